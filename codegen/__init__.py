@@ -1,0 +1,7 @@
+"""From a `casadi.Function` to compiled C, cached by content, and to loops over samples."""
+
+from codegen.cache import cache_folder
+from codegen.compiler import CompilationError, build_library, find_compiler
+from codegen.scan import Scan
+
+__all__ = ["CompilationError", "Scan", "build_library", "cache_folder", "find_compiler"]

@@ -1,0 +1,259 @@
+"""A step function folded over samples, in one compiled loop.
+
+Without a C compiler the CasADi virtual machine does the same, more slowly.
+"""
+
+import ctypes
+from collections.abc import Mapping
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.compiler import build_library
+
+Array = NDArray[np.float64]
+
+# k runs over samples. Carried ports alternate between two buffers; every other output is written
+# straight into the record on recorded samples and into scratch memory on the others.
+LOOP = """
+#include <string.h>
+
+int {name}_scan(long n, long every, const double** arg, const long* arg_step, double** res,
+                long n_carry, const long* carry_arg, const long* carry_res, const long* carry_size,
+                double** carry_now, double** carry_next, double** carry_record,
+                long n_out, const long* out_res, const long* out_size, double** out_record,
+                double** out_scratch, const double** call_arg, double** call_res,
+                casadi_int* iw, double* w) {{
+  long k, i, row;
+  double* swap;
+  (void)res;
+  for (k = 0; k < n; ++k) {{
+    const int keep = (k % every) == 0;
+    row = k / every;
+    for (i = 0; arg_step[i] >= 0; ++i) call_arg[i] = arg[i] + k * arg_step[i];
+    for (i = 0; i < n_carry; ++i) {{
+      call_arg[carry_arg[i]] = carry_now[i];
+      call_res[carry_res[i]] = carry_next[i];
+      if (keep)
+        memcpy(carry_record[i] + row * carry_size[i], carry_now[i],
+               (size_t)carry_size[i] * sizeof(double));
+    }}
+    for (i = 0; i < n_out; ++i)
+      call_res[out_res[i]] = keep ? out_record[i] + row * out_size[i] : out_scratch[i];
+    if ({name}(call_arg, call_res, iw, w, 0)) return 1;
+    for (i = 0; i < n_carry; ++i) {{
+      swap = carry_now[i];
+      carry_now[i] = carry_next[i];
+      carry_next[i] = swap;
+    }}
+  }}
+  return 0;
+}}
+"""
+
+
+class Scan:
+    """A step function run over samples, `carry, outputs = step(carry, sample, constants)`.
+
+    Parameters
+    ----------
+    step : a function with named, dense ports. An input `p` named in `carry` has an output `p_next`
+        of the same shape. Its name becomes part of a C identifier.
+    carry : inputs whose value is handed from one sample to the next.
+    over : inputs with one row a sample. Every other input is constant.
+
+    Raises
+    ------
+    ValueError
+        Where the ports do not fit together.
+    """
+
+    def __init__(self, step: ca.Function, *, carry: tuple[str, ...], over: tuple[str, ...]) -> None:
+        names_in, names_out = list(step.name_in()), list(step.name_out())
+        for port in (*carry, *over):
+            if port not in names_in:
+                raise ValueError(f"{step.name()} has no input {port!r}, only {names_in}")
+        for port in carry:
+            if f"{port}_next" not in names_out:
+                raise ValueError(
+                    f"{step.name()} has no output {port + '_next'!r}, only {names_out}"
+                )
+            if step.size_in(port) != step.size_out(f"{port}_next"):
+                raise ValueError(
+                    f"{step.name()}: {port} changes its shape from one step to the next"
+                )
+        for i in range(step.n_in()):
+            if not step.sparsity_in(i).is_dense():
+                raise ValueError(f"{step.name()}: input {names_in[i]!r} must be dense")
+        for i in range(step.n_out()):
+            if not step.sparsity_out(i).is_dense():
+                raise ValueError(f"{step.name()}: output {names_out[i]!r} must be dense")
+        self.step = step
+        self.carry = carry
+        self.over = over
+        self.constants = tuple(p for p in names_in if p not in carry and p not in over)
+        self.outputs = tuple(p for p in names_out if p.removesuffix("_next") not in carry)
+
+    @cached_property
+    def _loop(self) -> "ctypes._NamedFuncPointer | None":
+        """The compiled loop, or None where there is no compiler."""
+        name = self.step.name()
+        generator = ca.CodeGenerator(f"{name}.c")
+        generator.add(self.step)
+        library = build_library(generator.dump() + LOOP.format(name=name), name)
+        return None if library is None else ctypes.CDLL(str(library))[f"{name}_scan"]
+
+    def __call__(self, n: int, values: Mapping[str, Array], *, every: int = 1) -> dict[str, Array]:
+        """Run `n` samples.
+
+        Parameters
+        ----------
+        n : number of samples.
+        values : one array for every input of the step: carried ports their start, ports of `over`
+            one row a sample (n, size), constants their value. Matrices have the port's shape.
+        every : record each `every`-th sample.
+
+        Returns
+        -------
+        For each carried port `p` its value before each recorded step (n_recorded, *shape) and, as
+        `p_final`, after the last; for each other output its value (n_recorded, *shape). Column
+        vectors have the shape (n_recorded, size).
+
+        Raises
+        ------
+        ValueError
+            Where a value is missing, unknown, or has the wrong shape.
+        """
+        packed = self._pack(n, values)
+        if every < 1:
+            raise ValueError(f"every must be at least 1, it is {every}")
+        return (
+            self._run_virtual_machine(n, packed, every)
+            if self._loop is None
+            else self._run_compiled(self._loop, n, packed, every)
+        )
+
+    def _pack(self, n: int, values: Mapping[str, Array]) -> dict[str, Array]:
+        """Check shapes; flatten matrices by columns, as CasADi stores them."""
+        expected = set(self.step.name_in())
+        if set(values) != expected:
+            missing, unknown = sorted(expected - set(values)), sorted(set(values) - expected)
+            raise ValueError(
+                f"{self.step.name()}: missing inputs {missing}, unknown inputs {unknown}"
+            )
+        packed = {}
+        for port, value in values.items():
+            rows, columns = self.step.size_in(port)
+            array = np.asarray(value, dtype=np.float64)
+            wanted = (n, rows * columns) if port in self.over else (rows, columns)
+            if array.ndim < 2 and 1 in wanted and array.size == wanted[0] * wanted[1]:
+                array = array.reshape(wanted)  # a column given flat, a scalar given bare
+            if array.shape != wanted:
+                name = self.step.name()
+                raise ValueError(f"{name}: {port} must have shape {wanted}, not {array.shape}")
+            by_columns = array if port in self.over else array.ravel(order="F")
+            packed[port] = np.ascontiguousarray(by_columns)
+        return packed
+
+    def _shaped(self, flat: Array, size: tuple[int, int]) -> Array:
+        """Give rows of column-major numbers their matrix shape; column vectors stay flat."""
+        rows, columns = size
+        if columns == 1:
+            return flat
+        return flat.reshape(*flat.shape[:-1], columns, rows).swapaxes(-1, -2)
+
+    def _shape_all(self, record: dict[str, Array]) -> dict[str, Array]:
+        shaped = {}
+        for key, flat in record.items():
+            port = key.removesuffix("_final")
+            size = self.step.size_in(port) if port in self.carry else self.step.size_out(port)
+            shaped[key] = self._shaped(flat, size)
+        return shaped
+
+    def _run_compiled(
+        self, loop: "ctypes._NamedFuncPointer", n: int, packed: dict[str, Array], every: int
+    ) -> dict[str, Array]:
+        step, n_rows = self.step, -(-n // every)
+        names_in, names_out = list(step.name_in()), list(step.name_out())
+        size = {p: step.numel_in(p) for p in self.carry}
+        now = [packed[p].copy() for p in self.carry]
+        following = [np.empty_like(a) for a in now]
+        carried = [np.empty((n_rows, size[p])) for p in self.carry]
+        outputs = [np.empty((n_rows, step.numel_out(p))) for p in self.outputs]
+        scratch = [np.empty(step.numel_out(p)) for p in self.outputs]
+        arrays = [packed[p] for p in names_in]
+        stride = [step.numel_in(p) if p in self.over else 0 for p in names_in]
+        work = np.empty(max(step.sz_w(), 1))
+        integer_work = np.empty(max(step.sz_iw(), 1), dtype=np.int64)
+        now_pointers, next_pointers = _pointers(now), _pointers(following)
+        failed = loop(
+            ctypes.c_long(n),
+            ctypes.c_long(every),
+            _pointers(arrays),
+            _longs([*stride, -1]),
+            None,
+            ctypes.c_long(len(self.carry)),
+            _longs([names_in.index(p) for p in self.carry]),
+            _longs([names_out.index(f"{p}_next") for p in self.carry]),
+            _longs([size[p] for p in self.carry]),
+            now_pointers,
+            next_pointers,
+            _pointers(carried),
+            ctypes.c_long(len(self.outputs)),
+            _longs([names_out.index(p) for p in self.outputs]),
+            _longs([step.numel_out(p) for p in self.outputs]),
+            _pointers(outputs),
+            _pointers(scratch),
+            (ctypes.c_void_p * max(step.sz_arg(), len(names_in)))(),
+            (ctypes.c_void_p * max(step.sz_res(), len(names_out)))(),
+            integer_work.ctypes.data_as(ctypes.c_void_p),
+            work.ctypes.data_as(ctypes.c_void_p),
+        )
+        if failed:
+            raise RuntimeError(f"{step.name()} reported a failure")
+        final = following if n % 2 else now
+        record = dict(zip(self.carry, carried, strict=True))
+        record |= {f"{p}_final": a for p, a in zip(self.carry, final, strict=True)}
+        record |= dict(zip(self.outputs, outputs, strict=True))
+        return self._shape_all(record)
+
+    def _run_virtual_machine(
+        self, n: int, packed: dict[str, Array], every: int
+    ) -> dict[str, Array]:
+        step = self.step
+        folded = step.mapaccum(
+            f"{step.name()}_{n}",
+            n,
+            [step.index_in(p) for p in self.carry],
+            [step.index_out(f"{p}_next") for p in self.carry],
+        )
+        arguments = []
+        for port in step.name_in():
+            rows, columns = step.size_in(port)
+            value = packed[port]
+            if port in self.over:  # mapaccum lays samples side by side, (rows, n columns)
+                arguments.append(value.reshape(n * columns, rows).T)
+            else:
+                start = value.reshape(columns, rows).T
+                arguments.append(start if port in self.carry else np.tile(start, (1, n)))
+        results = dict(
+            zip(step.name_out(), folded.call([ca.DM(a) for a in arguments]), strict=True)
+        )
+        record = {}
+        for port in self.carry:
+            after = np.array(results[f"{port}_next"]).T.reshape(n, -1)
+            record[port] = np.vstack([packed[port][None], after[:-1]])[::every]
+            record[f"{port}_final"] = after[-1]
+        for port in self.outputs:
+            record[port] = np.array(results[port]).T.reshape(n, -1)[::every]
+        return self._shape_all(record)
+
+
+def _pointers(arrays: list[Array]) -> "ctypes.Array[ctypes.c_void_p]":
+    return (ctypes.c_void_p * max(len(arrays), 1))(*(a.ctypes.data for a in arrays))
+
+
+def _longs(numbers: list[int]) -> "ctypes.Array[ctypes.c_long]":
+    return (ctypes.c_long * max(len(numbers), 1))(*numbers)

@@ -1,0 +1,1 @@
+"""What is true: parameters, tires, bicycle, plant, maneuvers, sensors and recordings."""

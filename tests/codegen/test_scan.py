@@ -1,0 +1,83 @@
+"""The compiled loop, the virtual machine and a loop written by hand compute the same."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import codegen.scan
+from codegen import Scan
+
+
+def leaky_step() -> ca.Function:
+    """A matrix and a vector state, a sample input and a constant."""
+    M, s, u, c = ca.SX.sym("M", 2, 3), ca.SX.sym("s", 2), ca.SX.sym("u", 3), ca.SX.sym("c")
+    M_next = 0.9 * M + c * s @ u.T
+    s_next = 0.5 * s + M @ u
+    return ca.Function(
+        "leaky",
+        [M, s, u, c],
+        [M_next, s_next, M @ u, M[0, 1]],
+        ["M", "s", "u", "c"],
+        ["M_next", "s_next", "y", "corner"],
+    )
+
+
+def by_hand(M, s, u, c):
+    states, outputs = [], []
+    for row in u:
+        states.append((M, s))
+        outputs.append(M @ row)
+        M, s = 0.9 * M + c * np.outer(s, row), 0.5 * s + M @ row
+    return states, outputs, M, s
+
+
+@pytest.fixture(params=["compiled", "virtual machine"])
+def scan(request, monkeypatch, tmp_path):
+    monkeypatch.setenv("TIREID_CACHE", str(tmp_path))
+    if request.param == "virtual machine":
+        monkeypatch.setattr(codegen.scan, "build_library", lambda *_: None)
+    return Scan(leaky_step(), carry=("M", "s"), over=("u",))
+
+
+@pytest.mark.parametrize("n", [1, 7, 8])
+@pytest.mark.parametrize("every", [1, 3])
+def test_scan_repeats_the_loop_by_hand(scan, rng, n, every):
+    M, s, u = rng.normal(size=(2, 3)), rng.normal(size=2), rng.normal(size=(n, 3))
+    states, outputs, M_final, s_final = by_hand(M, s, u, 0.1)
+    record = scan(n, {"M": M, "s": s, "u": u, "c": np.array(0.1)}, every=every)
+    np.testing.assert_allclose(record["M"], [m for m, _ in states][::every], rtol=1e-13)
+    np.testing.assert_allclose(record["s"], [v for _, v in states][::every], rtol=1e-13)
+    np.testing.assert_allclose(record["y"], outputs[::every], rtol=1e-13)
+    np.testing.assert_allclose(record["corner"][:, 0], [m[0, 1] for m, _ in states][::every])
+    np.testing.assert_allclose(record["M_final"], M_final, rtol=1e-13)
+    np.testing.assert_allclose(record["s_final"], s_final, rtol=1e-13)
+
+
+def test_scan_does_not_change_what_it_is_given(scan, rng):
+    M, s, u = rng.normal(size=(2, 3)), rng.normal(size=2), rng.normal(size=(5, 3))
+    before = M.copy(), s.copy(), u.copy()
+    scan(5, {"M": M, "s": s, "u": u, "c": np.array(0.1)})
+    for now, then in zip((M, s, u), before, strict=True):
+        np.testing.assert_array_equal(now, then)
+
+
+def test_wrong_shapes_and_names_are_refused(scan):
+    good = {"M": np.zeros((2, 3)), "s": np.zeros(2), "u": np.zeros((4, 3)), "c": np.array(0.1)}
+    with pytest.raises(ValueError, match=r"u must have shape \(4, 3\)"):
+        scan(4, good | {"u": np.zeros((3, 4))})
+    with pytest.raises(ValueError, match=r"M must have shape \(2, 3\)"):
+        scan(4, good | {"M": np.zeros((3, 2))})
+    with pytest.raises(ValueError, match=r"missing inputs \['c'\]"):
+        scan(4, {k: v for k, v in good.items() if k != "c"})
+    with pytest.raises(ValueError, match="no output 'u_next'"):
+        Scan(leaky_step(), carry=("u",), over=())
+
+
+def test_a_library_is_built_once(monkeypatch, tmp_path, caplog):
+    monkeypatch.setenv("TIREID_CACHE", str(tmp_path))
+    inputs = {"M": np.zeros((2, 3)), "s": np.zeros(2), "u": np.zeros((4, 3)), "c": np.array(0.1)}
+    with caplog.at_level("INFO", logger="tireid"):
+        for _ in range(2):
+            Scan(leaky_step(), carry=("M", "s"), over=("u",))(4, inputs)
+    assert sum("compiling leaky" in message for message in caplog.messages) == 1
+    assert len(list(tmp_path.glob("leaky-*.so"))) == 1
