@@ -78,3 +78,17 @@ def slip_angles(l_f: Any, l_r: Any, v_x: Any, x: Any, u: Any) -> Any:
     u : [δ_f, δ_r], steering [rad].
     """
     return ca.vertcat(u[0] - (x[0] + l_f * x[1]) / v_x, u[1] - (x[0] - l_r * x[1]) / v_x)
+
+
+def linear_axle_force(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
+    """Return the axle forces of the linear tire (3), (2,) [N].
+
+    Parameters
+    ----------
+    parameters : of the bicycle.
+    v_x : longitudinal speed [m/s], not zero.
+    x : [v_y, r] (2,).
+    u : [δ_f, δ_r] (2,).
+    """
+    alpha = slip_angles(parameters.l_f, parameters.l_r, v_x, x, u)
+    return ca.vertcat(parameters.C_f * alpha[0], parameters.C_r * alpha[1])

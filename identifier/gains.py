@@ -1,0 +1,85 @@
+"""Gains of the identifier, with their units.
+
+With the force unit U (kN for a car) the axle impulse ξ is in U s, the filtered error z in U s².
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class NotHurwitzError(ValueError):
+    """A_d has an eigenvalue whose real part is not negative."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gains:
+    """Gains of the observer (8), the filter (10) and the laws (11)-(12).
+
+    Parameters
+    ----------
+    A_d : Hurwitz matrix of the prescribed error dynamics (2x2), by rows [1/s].
+    forgetting : λ of (9)-(10) [1/s].
+    eta_W : learning rate of W: η1 [1/s³] for the integral law, [1/s²] for the instantaneous law.
+    eta_V : learning rate of V: η2 [1/(U² s³)], or [1/(U² s²)] for the instantaneous law.
+    rho_W : leakage of W, ρ1 [1/(U s²)]; 0 where a projection bounds W.
+    rho_V : leakage of V, ρ2 [1/(U s²)]; 0 where a projection bounds V.
+    W_max : radius of the projection of W, Frobenius norm [U]; infinite: no projection.
+    V_max : radius of the projection of V, Frobenius norm [-]; infinite: no projection.
+
+    Raises
+    ------
+    NotHurwitzError
+        Where A_d is not Hurwitz.
+    ValueError
+        Where a gain is negative or not a number, λ or a radius not positive, or A_d not 2x2.
+    """
+
+    A_d: tuple[tuple[float, float], tuple[float, float]]
+    forgetting: float
+    eta_W: float
+    eta_V: float
+    rho_W: float
+    rho_V: float
+    W_max: float = np.inf
+    V_max: float = np.inf
+
+    def __post_init__(self) -> None:
+        A_d = np.array(self.A_d, dtype=np.float64)
+        if A_d.shape != (2, 2) or not np.isfinite(A_d).all():
+            raise ValueError(f"A_d must be a 2x2 matrix of finite numbers, it is {self.A_d}")
+        poles = np.linalg.eigvals(A_d)
+        if not poles.real.max() < 0.0:
+            raise NotHurwitzError(f"A_d must be Hurwitz, its eigenvalues are {poles}")
+        for name in ("eta_W", "eta_V", "rho_W", "rho_V"):
+            if not 0.0 <= getattr(self, name) < np.inf:
+                raise ValueError(f"{name} must not be negative, it is {getattr(self, name)}")
+        if not 0.0 < self.forgetting < np.inf:
+            raise ValueError(f"forgetting must be positive, it is {self.forgetting}")
+        for name in ("W_max", "V_max"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name} must be positive, it is {getattr(self, name)}")
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """A_d as an array (2, 2) [1/s]."""
+        return np.array(self.A_d, dtype=np.float64)
+
+    def scaled_by_forgetting(self) -> "Gains":
+        """Return these gains with η/λ in place of η.
+
+        Below the frequency λ the filtered error is z ≈ ξ̃/λ, so that the integral law at η acts as
+        the instantaneous law at η/λ: the control of every comparison of the two.
+        """
+        return replace(self, eta_W=self.eta_W / self.forgetting, eta_V=self.eta_V / self.forgetting)
+
+
+def diagonal(a: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return A_d = -a I by rows.
+
+    Parameters
+    ----------
+    a : rate of the error dynamics [1/s].
+    """
+    return ((-a, 0.0), (0.0, -a))

@@ -1,0 +1,96 @@
+"""The identifier's step: one casadi.Function that is simulation, test subject and C source.
+
+Carried: xi_hat (2,), z (2,), W (2, n_h), V (n_h, n_in).
+Sampled: x = [v_y, r] (2,), u = [δ_f, δ_r] (2,), v_x.
+Constant: vehicle (6,) = m, I_z, l_f, l_r, C_f, C_r; A_d (2, 2); gains (7,) = η1, η2, ρ1, ρ2, λ,
+W_max, V_max; sampling (3,) = T_s, force unit U, minimum speed.
+Outputs: the next carried values; f_hat (2,) [U], the network's force; axle_force (2,) [N], linear
+tire and network together; xi_tilde (2,) [U s].
+"""
+
+from typing import Any
+
+import casadi as ca
+
+from identifier.design import Design
+from identifier.integrators import INTEGRATORS
+from identifier.laws import DRIVING_ERRORS, ball, unbounded, weight_rates
+from identifier.network import hidden_layer, network_signals
+from identifier.observer import INPUT_SOURCES, filter_rate, observer_rate
+from models.bicycle import BicycleParameters, bicycle, linear_axle_force
+
+CARRY = ("xi_hat", "z", "W", "V")
+OVER = ("x", "u", "v_x")
+
+
+def build_step(design: Design) -> ca.Function:
+    """Return the step of a design; vehicle, gains and sampling stay inputs of it.
+
+    Parameters
+    ----------
+    design : structure, law and integrator are taken from it.
+    """
+    network = design.network
+    n_h, n_in = network.hidden, len(network.inputs)
+    xi_hat, z = ca.SX.sym("xi_hat", 2), ca.SX.sym("z", 2)
+    W, V = ca.SX.sym("W", 2, n_h), ca.SX.sym("V", n_h, n_in)
+    x, u, v_x = ca.SX.sym("x", 2), ca.SX.sym("u", 2), ca.SX.sym("v_x")
+    vehicle, A_d = ca.SX.sym("vehicle", 6), ca.SX.sym("A_d", 2, 2)
+    gains, sampling = ca.SX.sym("gains", 7), ca.SX.sym("sampling", 3)
+
+    parameters = BicycleParameters(*ca.vertsplit(vehicle))
+    eta_W, eta_V, rho_W, rho_V, forgetting, W_max, V_max = ca.vertsplit(gains)
+    dt, unit, min_speed = ca.vertsplit(sampling)
+    speed = ca.fmax(v_x, min_speed)
+    model = bicycle(parameters, speed)
+    xi = model.K_inv @ x / unit
+    drive, source = DRIVING_ERRORS[design.law], INPUT_SOURCES[design.input_source]
+    bounded = ball if design.projects else unbounded
+
+    def layers(xi_hat: Any, V: Any) -> tuple[Any, Any]:
+        x_read = unit * model.K @ source(xi, xi_hat)
+        x_bar = network.normalized_input(network_signals(parameters, speed, x_read, u))
+        return x_bar, hidden_layer(V, x_bar)
+
+    def derivative(state: list[Any]) -> list[Any]:
+        xi_hat, z, W, V = state
+        x_bar, sigma = layers(xi_hat, V)
+        xi_tilde = xi - xi_hat
+        rates = weight_rates(
+            drive=drive(z, xi_tilde),
+            xi_tilde=xi_tilde,
+            W=W,
+            V=V,
+            x_bar=x_bar,
+            sigma=sigma,
+            A_d=A_d,
+            eta_W=eta_W,
+            eta_V=eta_V,
+            rho_W=rho_W,
+            rho_V=rho_V,
+        )
+        xi_hat_dot = observer_rate(A_d, model.A_xi, model.B_xi / unit, xi, xi_hat, u, W @ sigma)
+        return [xi_hat_dot, filter_rate(forgetting, z, xi_tilde), *rates]
+
+    moving = v_x >= min_speed
+    f_hat = ca.if_else(moving, W @ layers(xi_hat, V)[1], 0)
+    linear = ca.if_else(moving, linear_axle_force(parameters, speed, x, u), 0)
+    xi_hat_next, z_next, W_next, V_next = INTEGRATORS[design.integrator](
+        derivative, [xi_hat, z, W, V], dt
+    )
+    return ca.Function(
+        f"identifier_{design.law}",
+        [xi_hat, z, W, V, x, u, v_x, vehicle, A_d, gains, sampling],
+        [
+            ca.if_else(moving, xi_hat_next, xi),  # at rest the observer follows the measurement
+            ca.if_else(moving, z_next, 0),
+            ca.if_else(moving, bounded(W_next, W_max), W),
+            ca.if_else(moving, bounded(V_next, V_max), V),
+            f_hat,
+            linear + unit * f_hat,
+            ca.if_else(moving, xi - xi_hat, 0),
+        ],
+        [*CARRY, *OVER, "vehicle", "A_d", "gains", "sampling"],
+        [*(f"{name}_next" for name in CARRY), "f_hat", "axle_force", "xi_tilde"],
+        {"cse": True},
+    )

@@ -1,0 +1,58 @@
+"""A small car and a drive whose axle forces are known exactly."""
+
+import numpy as np
+import pytest
+
+from models.recording import Recording
+from models.vehicle import Vehicle
+
+CAR = Vehicle(
+    mass=1500.0,
+    yaw_inertia=2500.0,
+    l_f=1.15,
+    l_r=1.55,
+    cornering_stiffness_front=1.4e5,
+    cornering_stiffness_rear=1.2e5,
+)
+
+
+def saturating(alpha, stiffness, peak):
+    return peak * np.tanh(stiffness * alpha / peak)
+
+
+def drive(n=1500, dt=0.01, speed=20.0, amplitude=0.06, scale=1.0):
+    """A slalom of a bicycle on saturating tires, integrated finely; forces are known exactly."""
+    p, fine = CAR.bicycle, 10
+    v_y = r = 0.0
+    rows = []
+    for k in range(n * fine):
+        t = k * dt / fine
+        delta = amplitude * np.sin(2 * np.pi * 0.5 * t)
+        alpha = delta - (v_y + p.l_f * r) / speed, -(v_y - p.l_r * r) / speed
+        F = saturating(alpha[0], p.C_f, 5000.0), saturating(alpha[1], p.C_r, 4500.0)
+        if k % fine == 0:
+            rows.append((t, v_y, r, delta, *F))
+        v_y += dt / fine * ((F[0] + F[1]) / p.m - speed * r)
+        r += dt / fine * (p.l_f * F[0] - p.l_r * F[1]) / p.I_z
+    t, v_y, r, delta, F_f, F_r = np.array(rows).T
+    return Recording(
+        name="drive",
+        t=t,
+        v_x=np.full(n, speed),
+        v_y=v_y,
+        r=r,
+        delta_f=delta,
+        delta_r=np.zeros(n),
+        axle_force=np.column_stack([F_f, F_r]) * scale,
+    )
+
+
+@pytest.fixture(name="car")
+def the_car():
+    return CAR
+
+
+@pytest.fixture(name="drive")
+def a_drive():
+    """The function `drive(n, dt, speed, amplitude, scale)`, which makes a recording."""
+    return drive

@@ -1,0 +1,114 @@
+"""Frozen models: the same force as online at the freeze, a file that comes back, honest errors."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.defaults import default_design
+from identifier.frozen_model import FrozenModel, FrozenModelError
+from identifier.frozen_test import AxleRmse, axle_rms, online_error, replay
+from identifier.identify import identify
+
+
+@pytest.fixture(name="history")
+def a_history(car, drive):
+    return identify(drive(n=600), car, default_design(car))
+
+
+def test_frozen_and_online_force_agree_at_the_instant_of_freezing(history):
+    for t in (1.0, 3.21):
+        k = round(t / 0.01)
+        frozen = history.freeze(t).axle_force(history.recording)
+        np.testing.assert_allclose(frozen[k], history.axle_force[k], rtol=1e-12)
+        assert np.abs(frozen[k - 50] - history.axle_force[k - 50]).max() > 1.0
+
+
+def test_frozen_force_is_the_network_by_hand(history, car):
+    model, recording, p = history.freeze(6.0), history.recording, car.bicycle
+    x_bar = np.column_stack([recording.x, recording.u]) / np.array(model.network.scale)
+    f_hat = np.tanh(x_bar @ model.weights.V.T) @ model.weights.W.T
+    v_y, r, v_x = recording.v_y, recording.r, recording.v_x
+    alpha = recording.u - np.column_stack([v_y + p.l_f * r, v_y - p.l_r * r]) / v_x[:, None]
+    expected = alpha * [p.C_f, p.C_r] + 1000.0 * f_hat
+    np.testing.assert_allclose(model.axle_force(recording), expected, rtol=1e-9, atol=1e-7)
+
+
+def test_freezing_at_the_end_takes_the_weights_after_the_last_sample(history):
+    np.testing.assert_array_equal(history.freeze(5.99).weights.W, history.W[-1])
+    np.testing.assert_array_equal(history.freeze(99.0).weights.W, history.W[-1])
+    with pytest.raises(ValueError, match="begins at 0 s"):
+        history.freeze(-1.0)
+
+
+def test_replay_compares_with_truth_and_with_what_was_said_online(history):
+    result = replay(history.freeze(6.0), history)
+    truth = history.recording.axle_force
+    by_hand = np.sqrt(np.mean((result.axle_force - truth) ** 2, axis=0))
+    assert (result.against_truth.front, result.against_truth.rear) == pytest.approx(by_hand)
+    online = np.sqrt(np.mean((result.axle_force - history.axle_force) ** 2, axis=0))
+    assert (result.against_online.front, result.against_online.rear) == pytest.approx(online)
+    assert result.against_truth.both == pytest.approx(np.sqrt(np.mean(by_hand**2)))
+
+
+def test_without_truth_there_is_no_error_against_it(history):
+    blind = replace(history, recording=replace(history.recording, axle_force=None))
+    assert online_error(blind) is None
+    assert replay(blind.freeze(6.0), blind).against_truth is None
+    assert replay(blind.freeze(6.0), blind).against_online.front > 0.0
+
+
+def test_samples_at_rest_do_not_count(history):
+    recording = history.recording
+    v_x = np.where(np.arange(recording.t.size) < 300, 20.0, 0.0)
+    halted = replace(history, recording=replace(recording, v_x=v_x))
+    kept = (halted.axle_force - recording.axle_force)[:300]
+    assert online_error(halted) == axle_rms(kept)
+
+
+def test_a_model_comes_back_from_its_file(history, tmp_path):
+    model = history.freeze(4.0)
+    model.save(tmp_path / "weights.json")
+    again = FrozenModel.load(tmp_path / "weights.json")
+    np.testing.assert_array_equal(
+        again.axle_force(history.recording), model.axle_force(history.recording)
+    )
+    assert (again.vehicle, again.network) == (model.vehicle, model.network)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda d: d.pop("W"), "key 'W' is missing"),
+        (lambda d: d.update(format="something"), "not a frozen model"),
+        (lambda d: d.update(V=[[1.0, 2.0]]), "V must have shape"),
+        (lambda d: d["W"][0].__setitem__(0, float("nan")), "not finite"),
+        (lambda d: d["vehicle"].update(mass=-1.0), "mass must be"),
+        (lambda d: d["network"].update(inputs=["v_y", "speed"]), "inputs must be chosen"),
+    ],
+)
+def test_a_wrong_file_is_refused_in_one_line(history, tmp_path, change, said):
+    data = history.freeze(4.0).to_dict()
+    change(data)
+    path = tmp_path / "weights.json"
+    path.write_text(json.dumps(data))
+    with pytest.raises(FrozenModelError, match=said) as error:
+        FrozenModel.load(path)
+    assert str(error.value).startswith(str(path))
+    assert "\n" not in str(error.value)
+
+
+def test_a_file_that_is_not_json_is_refused(tmp_path):
+    path = tmp_path / "weights.json"
+    path.write_bytes(b"\x80\x81")
+    with pytest.raises(FrozenModelError, match="cannot be read"):
+        FrozenModel.load(path)
+    with pytest.raises(FrozenModelError, match="cannot be read"):
+        FrozenModel.load(tmp_path / "absent.json")
+
+
+def test_both_axles_together_is_the_rms_of_all_samples():
+    force = np.array([[3.0, 0.0], [-3.0, 4.0]])
+    assert axle_rms(force).both == pytest.approx(np.sqrt(np.mean(force**2)))
+    assert AxleRmse(front=3.0, rear=4.0).both == pytest.approx(np.sqrt(12.5))

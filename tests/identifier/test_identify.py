@@ -1,0 +1,151 @@
+"""The compiled step against the equations written out in numpy, and what a run must guarantee."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.defaults import default_design
+from identifier.design import Design
+from identifier.gains import Gains, NotHurwitzError, diagonal
+from identifier.history import DivergedError
+from identifier.identify import identify
+from identifier.network import Network
+
+GAINS = Gains(
+    A_d=((-8.0, 1.0), (0.5, -6.0)),
+    forgetting=5.0,
+    eta_W=100.0,
+    eta_V=5.0,
+    rho_W=0.3,
+    rho_V=0.2,
+)
+
+
+def by_hand(recording, design, car):
+    """(8), (10)-(13) in explicit Euler, written with numpy alone; forces [N] and weights."""
+    p, g, dt, U = car.bicycle, design.gains, design.dt, design.force_unit
+    A_d, K = g.matrix, np.array([[1 / p.m, 1 / p.m], [p.l_f / p.I_z, -p.l_r / p.I_z]])
+    K_inv, scale = np.linalg.inv(K), np.array(design.network.scale)
+    W, V = design.network.initial_weights(np.random.default_rng(design.seed))
+    z, xi_hat, forces = np.zeros(2), K_inv @ recording.x[0] / U, []
+    for x, u, v_x in zip(recording.x, recording.u, recording.v_x, strict=True):
+        alpha = u - np.array([x[0] + p.l_f * x[1], x[0] - p.l_r * x[1]]) / v_x
+        linear = np.array([p.C_f, p.C_r]) * alpha
+        xi = K_inv @ x / U
+        x_read = x if design.input_source == "measured" else U * K @ xi_hat
+        x_bar = np.concatenate([x_read, u]) / scale
+        sigma = np.tanh(V @ x_bar)
+        f_hat, xi_t = W @ sigma, xi - xi_hat
+        error = z if design.law == "integral" else xi_t
+        direction = np.linalg.inv(A_d).T @ error
+        W_dot = -g.eta_W * np.outer(direction, sigma) - g.rho_W * np.linalg.norm(xi_t) * W
+        V_dot = -g.eta_V * np.outer((1 - sigma**2) * (W.T @ direction), x_bar)
+        V_dot -= g.rho_V * np.linalg.norm(xi_t) * V
+        coriolis = K_inv @ np.array([-v_x * x[1], 0.0]) / U
+        xi_hat_dot = A_d @ xi_hat + linear / U + coriolis - A_d @ xi + f_hat
+        forces.append(linear + U * f_hat)
+        z, xi_hat = z + dt * (-g.forgetting * z + xi_t), xi_hat + dt * xi_hat_dot
+        W, V = W + dt * W_dot, V + dt * V_dot
+        W *= min(1.0, g.W_max / max(np.linalg.norm(W), 1e-300))
+        V *= min(1.0, g.V_max / max(np.linalg.norm(V), 1e-300))
+    return np.array(forces), W, V
+
+
+@pytest.mark.parametrize("law", ["integral", "instantaneous"])
+@pytest.mark.parametrize("source", ["measured", "estimated"])
+@pytest.mark.parametrize("radius", [np.inf, 0.5])
+def test_step_repeats_the_equations_by_hand(law, source, radius, car, drive):
+    gains = replace(GAINS, W_max=radius, V_max=4 * radius)
+    design = Design(gains=gains, law=law, input_source=source, network=Network(hidden=6))
+    recording = drive(n=400)
+    history = identify(recording, car, design)
+    forces, W, V = by_hand(recording, design, car)
+    np.testing.assert_allclose(history.axle_force, forces, rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(history.W[-1], W, rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(history.V[-1], V, rtol=1e-9, atol=1e-10)
+
+
+def test_finer_steps_of_both_integrators_meet(car, drive):
+    """Euler and RK4 solve the same equation: their difference falls in proportion to the step."""
+    gaps = []
+    for fine in (1, 4):
+        recording = drive(n=300 * fine, dt=0.01 / fine)
+        forces = [
+            identify(
+                recording, car, Design(gains=GAINS, dt=0.01 / fine, integrator=name)
+            ).axle_force
+            for name in ("euler", "rk4")
+        ]
+        gaps.append(np.abs(forces[0] - forces[1]).max())
+    assert gaps[1] < 0.35 * gaps[0]
+
+
+def test_learnt_forces_approach_the_truth(car, drive):
+    recording = drive()
+    history = identify(recording, car, default_design(car))
+    p = car.bicycle
+    alpha_f = recording.delta_f - (recording.v_y + p.l_f * recording.r) / recording.v_x
+    linear = np.sqrt(np.mean((p.C_f * alpha_f - recording.axle_force[:, 0])[-500:] ** 2))
+    learnt = np.sqrt(np.mean((history.axle_force - recording.axle_force)[-500:, 0] ** 2))
+    assert learnt < 0.5 * linear
+
+
+def test_true_forces_are_not_looked_at(car, drive):
+    one = identify(drive(n=200), car, default_design(car))
+    other = identify(drive(n=200, scale=-3.0), car, default_design(car))
+    np.testing.assert_array_equal(one.axle_force, other.axle_force)
+
+
+def test_speed_may_vary_and_learning_rests_at_standstill(car, drive):
+    moving = drive(n=300)
+    v_x = np.where(np.arange(300) < 150, 20.0, 0.0)
+    stopped = replace(moving, v_x=v_x)
+    history = identify(stopped, car, default_design(car))
+    assert np.isfinite(history.axle_force).all()
+    np.testing.assert_array_equal(history.axle_force[150:], 0.0)
+    np.testing.assert_array_equal(history.W[150], history.W[-1])
+    assert np.abs(history.W[149] - history.W[100]).max() > 0.0
+
+
+def test_gains_that_diverge_are_reported_not_hidden(car, drive):
+    wild = replace(GAINS, eta_W=1e7, eta_V=1e7, rho_W=0.0, rho_V=0.0)
+    history = identify(drive(), car, Design(gains=wild))
+    assert history.diverged_at is not None
+    with pytest.raises(DivergedError, match="diverged at"):
+        history.freeze(14.0)
+
+
+def test_a_recording_of_another_rate_is_refused(car, drive):
+    with pytest.raises(ValueError, match=r"sampled at 0.02 s, the design at 0.01 s"):
+        identify(drive(n=50, dt=0.02), car, Design(gains=GAINS))
+
+
+def test_impossible_gains_are_refused():
+    with pytest.raises(NotHurwitzError, match="eigenvalues"):
+        replace(GAINS, A_d=((1.0, 0.0), (0.0, -1.0)))
+    with pytest.raises(ValueError, match="forgetting must be positive"):
+        replace(GAINS, forgetting=float("nan"))
+    with pytest.raises(ValueError, match="eta_W must not be negative"):
+        replace(GAINS, eta_W=-1.0)
+    with pytest.raises(ValueError, match="law must be one of"):
+        Design(gains=GAINS, law="magic")
+
+
+def test_default_design_is_similar_for_a_model_car(car):
+    """By Froude a 1:10 model sees the same scaled inputs: lengths over 10, times over sqrt(10)."""
+    model = replace(
+        car,
+        mass=1.5,
+        yaw_inertia=0.025,
+        l_f=0.115,
+        l_r=0.155,
+        cornering_stiffness_front=140.0,
+        cornering_stiffness_rear=120.0,
+    )
+    full, small = default_design(car), default_design(model)
+    ratio = np.array(full.network.scale) / np.array(small.network.scale)
+    np.testing.assert_allclose(ratio, [np.sqrt(10), 1 / np.sqrt(10), 1.0, 1.0])
+    assert full.force_unit == 1000.0
+    assert small.force_unit == 1.0
+    assert diagonal(10.0) == full.gains.A_d

@@ -1,0 +1,180 @@
+"""Equations (8)-(13) reached by other roads: derivatives, substitution and finite differences."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from identifier.laws import DRIVING_ERRORS, ball, instantaneous, integral, weight_rates
+from identifier.network import hidden_layer
+from identifier.observer import filter_rate, observer_rate
+
+RESIDUAL = 1e-12
+N_H, N_IN = 5, 4
+
+
+def numbers(expression):
+    return np.array(ca.DM(expression))
+
+
+@pytest.fixture
+def case(rng):
+    """Random values of everything in the laws; A_d is not symmetric, so that transposes matter."""
+    return {
+        "xi": rng.normal(size=2),
+        "xi_hat": rng.normal(size=2),
+        "z": rng.normal(size=2),
+        "W": rng.normal(size=(2, N_H)),
+        "V": rng.normal(size=(N_H, N_IN)),
+        "x_bar": rng.normal(size=N_IN),
+        "A_d": np.array([[-6.0, 4.0], [0.5, -3.0]]),
+    }
+
+
+def rates(case, *, drive, eta=(3.0, 2.0), rho=(0.0, 0.0)):
+    sigma = np.tanh(case["V"] @ case["x_bar"])
+    W_dot, V_dot = weight_rates(
+        drive=ca.DM(drive),
+        xi_tilde=ca.DM(case["xi"] - case["xi_hat"]),
+        W=ca.DM(case["W"]),
+        V=ca.DM(case["V"]),
+        x_bar=ca.DM(case["x_bar"]),
+        sigma=ca.DM(sigma),
+        A_d=ca.DM(case["A_d"]),
+        eta_W=eta[0],
+        eta_V=eta[1],
+        rho_W=rho[0],
+        rho_V=rho[1],
+    )
+    return numbers(W_dot), numbers(V_dot)
+
+
+def static_error(A_d, f, W, V, x_bar):
+    """The error at rest: 0 = A_d ξ̃ + f - f̂, so ξ̃ = -A_d⁻¹ (f - W tanh(V x̄))."""
+    return -ca.solve(A_d, f - W @ hidden_layer(V, x_bar))
+
+
+def descent(case, drive, eta):
+    """-η times the gradient, by automatic differentiation, of driveᵀ ξ̃(W, V) at rest."""
+    W, V = ca.SX.sym("W", 2, N_H), ca.SX.sym("V", N_H, N_IN)
+    f, x_bar = ca.DM([0.3, -0.7]), ca.DM(case["x_bar"])
+    loss = ca.dot(ca.DM(drive), static_error(ca.DM(case["A_d"]), f, W, V, x_bar))
+    evaluate = ca.Function("gradients", [W, V], [ca.jacobian(loss, s) for s in (W, V)])
+    return [
+        -rate * numbers(g).reshape(s.shape, order="F")
+        for rate, g, s in zip(eta, evaluate(case["W"], case["V"]), (W, V), strict=True)
+    ]
+
+
+def test_laws_descend_the_static_loss(case):
+    """(11)-(13) without leakage are the gradient of zᵀ ξ̃ through the error at rest, W and V."""
+    W_dot, V_dot = rates(case, drive=case["z"])
+    W_expected, V_expected = descent(case, case["z"], (3.0, 2.0))
+    np.testing.assert_allclose(W_dot, W_expected, rtol=RESIDUAL, atol=RESIDUAL)
+    np.testing.assert_allclose(V_dot, V_expected, rtol=RESIDUAL, atol=RESIDUAL)
+
+
+def test_laws_agree_with_finite_differences_of_the_loss(case):
+    f, h = np.array([0.3, -0.7]), 1e-6
+
+    def loss(W, V):
+        residual = f - W @ np.tanh(V @ case["x_bar"])
+        return case["z"] @ -np.linalg.solve(case["A_d"], residual)
+
+    W_dot, V_dot = rates(case, drive=case["z"])
+    for i, j in np.ndindex(2, N_H):
+        e = np.zeros((2, N_H))
+        e[i, j] = h
+        slope = (loss(case["W"] + e, case["V"]) - loss(case["W"] - e, case["V"])) / (2 * h)
+        assert W_dot[i, j] == pytest.approx(-3.0 * slope, rel=1e-6, abs=1e-8)
+    for i, j in np.ndindex(N_H, N_IN):
+        e = np.zeros((N_H, N_IN))
+        e[i, j] = h
+        slope = (loss(case["W"], case["V"] + e) - loss(case["W"], case["V"] - e)) / (2 * h)
+        assert V_dot[i, j] == pytest.approx(-2.0 * slope, rel=1e-6, abs=1e-8)
+
+
+def test_solve_without_the_transpose_is_caught(case):
+    """Planted: solve(A_d, z) for solve(A_d.T, z) is another direction: A_d is not symmetric."""
+    W_expected, _ = descent(case, case["z"], (3.0, 2.0))
+    sigma = np.tanh(case["V"] @ case["x_bar"])
+    planted = -3.0 * np.outer(np.linalg.solve(case["A_d"], case["z"]), sigma)
+    assert np.abs(planted - W_expected).max() > 0.1 * np.abs(W_expected).max()
+
+
+def test_opposite_sign_of_the_error_is_caught(case):
+    """Planted: ξ̂ - ξ in place of ξ - ξ̂ climbs the loss."""
+    xi_tilde = case["xi"] - case["xi_hat"]
+    W_expected, _ = descent(case, xi_tilde, (3.0, 2.0))
+    right, _ = rates(case, drive=xi_tilde)
+    planted, _ = rates(case, drive=-xi_tilde)
+    assert np.sum(right * W_expected) > 0.0
+    assert np.sum(planted * W_expected) < 0.0
+
+
+def test_leakage_pulls_weights_back_in_proportion_to_the_error(case):
+    still, _ = rates(case, drive=case["z"])
+    W_dot, V_dot = rates(case, drive=case["z"], rho=(0.7, 0.4))
+    _, V_still = rates(case, drive=case["z"])
+    size = np.linalg.norm(case["xi"] - case["xi_hat"])
+    np.testing.assert_allclose(W_dot - still, -0.7 * size * case["W"], rtol=1e-10)
+    np.testing.assert_allclose(V_dot - V_still, -0.4 * size * case["V"], rtol=1e-10)
+
+
+def test_observer_error_obeys_the_prescribed_dynamics(case, rng):
+    """(7) minus (8): dξ̃/dt = A_d ξ̃ + f - f̂, whatever A_ξ, B_ξ and the steering are."""
+    A_xi, B_xi = rng.normal(size=(2, 2)), np.diag(rng.normal(size=2))
+    u, f, f_hat = rng.normal(size=2), rng.normal(size=2), rng.normal(size=2)
+    xi, xi_hat, A_d = case["xi"], case["xi_hat"], case["A_d"]
+    xi_dot = A_xi @ xi + B_xi @ u + f  # (7)
+    xi_hat_dot = observer_rate(A_d, A_xi, B_xi, xi, xi_hat, u, f_hat)  # (8)
+    expected = A_d @ (xi - xi_hat) + f - f_hat
+    np.testing.assert_allclose(xi_dot - xi_hat_dot, expected, atol=RESIDUAL)
+
+
+def test_filter_is_the_exponentially_weighted_integral():
+    """(10) for ξ̃ = sin ωt against its integral in closed form: the filter's rate is its slope."""
+    lam, w = 3.0, 2.0
+
+    def z(t):  # ∫ exp(-λ (t - τ)) sin ωτ dτ from 0 to t
+        numerator = lam * np.sin(w * t) - w * np.cos(w * t) + w * np.exp(-lam * t)
+        return numerator / (lam**2 + w**2)
+
+    for t in (0.1, 0.7, 2.0):
+        slope = (lam * w * np.cos(w * t) + w**2 * np.sin(w * t) - lam * w * np.exp(-lam * t)) / (
+            lam**2 + w**2
+        )
+        assert filter_rate(lam, z(t), np.sin(w * t)) == pytest.approx(slope, abs=RESIDUAL)
+
+
+def test_filtered_error_is_the_gradient_for_a_constant_offset():
+    """∂J/∂ξ̃ = zᵀ of the paper: the derivative of (9) for an offset of the whole error history."""
+    lam, t, dt = 3.0, 2.0, 1e-3
+    tau = np.arange(0.0, t, dt) + dt / 2
+    weight = np.exp(-lam * (t - tau)) * dt
+    error = np.sin(2.0 * tau)[:, None] * np.array([1.0, -0.5])
+
+    def J(offset):
+        return 0.5 * np.sum(weight[:, None] * (error + offset) ** 2)
+
+    z = weight @ error
+    for i in range(2):
+        e = 1e-4 * np.eye(2)[i]
+        assert (J(e) - J(-e)) / 2e-4 == pytest.approx(z[i], rel=1e-9)
+
+
+def test_driving_errors_differ_in_their_argument_only(case):
+    assert DRIVING_ERRORS["integral"] is integral
+    assert DRIVING_ERRORS["instantaneous"] is instantaneous
+    np.testing.assert_array_equal(integral(case["z"], case["xi"]), case["z"])
+    np.testing.assert_array_equal(instantaneous(case["z"], case["xi"]), case["xi"])
+
+
+def test_projection_keeps_the_ball_and_leaves_its_inside_alone(rng):
+    W = rng.normal(size=(2, N_H))
+    norm = np.linalg.norm(W)
+    np.testing.assert_allclose(numbers(ball(ca.DM(W), 2 * norm)), W)
+    outside = numbers(ball(ca.DM(W), norm / 2))
+    assert np.linalg.norm(outside) == pytest.approx(norm / 2)
+    np.testing.assert_allclose(outside / np.linalg.norm(outside), W / norm, rtol=1e-12)
+    np.testing.assert_array_equal(numbers(ball(ca.DM.zeros(2, 3), 1.0)), np.zeros((2, 3)))
+    np.testing.assert_array_equal(numbers(ball(ca.DM(W), np.inf)), W)
