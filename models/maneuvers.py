@@ -1,0 +1,255 @@
+"""Steering maneuvers as data: what the road wheels are asked to do over time.
+
+Every maneuver is a frozen record with `.steering(t)`, commanded angles [δ_f, δ_r] [rad], δ > 0 to
+the left, and `.duration` [s]. Angles never jump: |dδ/dt| <= rate_limit, which the identifier needs
+(steering must be resolved at its sample time); a maneuver that cannot keep its limit is refused at
+birth. Steering starts at `onset`; a negative amplitude steers right first. `rear_ratio` is
+δ_r/δ_f, zero for a car that steers in front only.
+"""
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class ManeuverError(ValueError):
+    """A number of a maneuver breaks a rule; the message names it, the rule and the value."""
+
+
+class Maneuver(Protocol):
+    """What a plant asks of a maneuver."""
+
+    @property
+    def duration(self) -> float:
+        """Length [s]."""
+
+    def steering(self, t: Array) -> Array:
+        """Commanded [δ_f, δ_r] [rad], (n, 2), at times t [s], (n,)."""
+
+
+def _check(maneuver: Any, *, steepest: float) -> None:
+    """Refuse numbers that are not physical and a steering rate above the limit."""
+    name = type(maneuver).__name__
+    free = ("amplitude", "onset", "rear_ratio", "seed", "dwell", "pause")
+    for field in fields(maneuver):
+        value = getattr(maneuver, field.name)
+        if not math.isfinite(value):
+            raise ManeuverError(f"{name}: {field.name} must be finite, it is {value}")
+        if field.name not in free and not value > 0.0:
+            raise ManeuverError(f"{name}: {field.name} must be positive, it is {value}")
+        if field.name in ("onset", "seed", "dwell", "pause") and value < 0.0:
+            raise ManeuverError(f"{name}: {field.name} must not be negative, it is {value}")
+    rate = steepest * max(1.0, abs(maneuver.rear_ratio))
+    if rate > maneuver.rate_limit * (1.0 + 1e-12):
+        raise ManeuverError(
+            f"{name}: steers at up to {rate:.4g} rad/s, more than rate_limit {maneuver.rate_limit}"
+        )
+
+
+def _both(front: Any, rear_ratio: float) -> Array:
+    return np.column_stack((front, rear_ratio * front))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StepSteer:
+    """A ramp at `rate_limit` to a held angle, the step steer of ISO 7401.
+
+    Parameters
+    ----------
+    amplitude : final angle [rad].
+    onset : start of the ramp [s].
+    rate_limit : largest steering rate of either axle [rad/s].
+    duration : length [s].
+    rear_ratio : rear over front angle [-].
+    """
+
+    amplitude: float
+    onset: float
+    rate_limit: float
+    duration: float
+    rear_ratio: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self, steepest=0.0)
+
+    def steering(self, t: Array) -> Array:
+        """Commanded [δ_f, δ_r] [rad], (n, 2), at times t [s], (n,)."""
+        rate = self.rate_limit / max(1.0, abs(self.rear_ratio))
+        angle = np.clip(rate * (t - self.onset), 0.0, abs(self.amplitude))
+        return _both(np.copysign(angle, self.amplitude), self.rear_ratio)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Slalom:
+    """A sine from onset to the end.
+
+    Parameters
+    ----------
+    amplitude : of the sine [rad].
+    frequency : of the sine [Hz].
+    onset : start [s].
+    rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
+    duration : length [s].
+    rear_ratio : rear over front angle [-].
+    """
+
+    amplitude: float
+    frequency: float
+    onset: float
+    rate_limit: float
+    duration: float
+    rear_ratio: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self, steepest=2.0 * math.pi * self.frequency * abs(self.amplitude))
+
+    def steering(self, t: Array) -> Array:
+        """Commanded [δ_f, δ_r] [rad], (n, 2), at times t [s], (n,)."""
+        phase = 2.0 * math.pi * self.frequency * np.maximum(t - self.onset, 0.0)
+        return _both(self.amplitude * np.sin(phase), self.rear_ratio)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DoubleLaneChange:
+    """One sine to the next lane, a pause, and the opposite sine back: steered, not path-tracked.
+
+    Parameters
+    ----------
+    amplitude : of both sines [rad].
+    frequency : of both sines [Hz].
+    pause : time straight ahead between them [s].
+    onset : start of the first [s].
+    rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
+    duration : length [s].
+    rear_ratio : rear over front angle [-].
+    """
+
+    amplitude: float
+    frequency: float
+    pause: float
+    onset: float
+    rate_limit: float
+    duration: float
+    rear_ratio: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self, steepest=2.0 * math.pi * self.frequency * abs(self.amplitude))
+
+    def steering(self, t: Array) -> Array:
+        """Commanded [δ_f, δ_r] [rad], (n, 2), at times t [s], (n,)."""
+        there = np.clip((t - self.onset) * self.frequency, 0.0, 1.0) % 1.0
+        second = self.onset + 1.0 / self.frequency + self.pause
+        back = np.clip((t - second) * self.frequency, 0.0, 1.0) % 1.0
+        wave = np.sin(2.0 * math.pi * there) - np.sin(2.0 * math.pi * back)
+        return _both(self.amplitude * wave, self.rear_ratio)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SineWithDwell:
+    """One sine that holds its second peak for `dwell` seconds, the stability test of FMVSS 126.
+
+    Parameters
+    ----------
+    amplitude : of the sine [rad].
+    frequency : of the sine [Hz]; the test uses 0.7.
+    dwell : time at the second peak [s]; the test uses 0.5.
+    onset : start [s].
+    rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
+    duration : length [s].
+    rear_ratio : rear over front angle [-].
+    """
+
+    amplitude: float
+    frequency: float
+    dwell: float
+    onset: float
+    rate_limit: float
+    duration: float
+    rear_ratio: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self, steepest=2.0 * math.pi * self.frequency * abs(self.amplitude))
+
+    def steering(self, t: Array) -> Array:
+        """Commanded [δ_f, δ_r] [rad], (n, 2), at times t [s], (n,)."""
+        since = t - self.onset
+        peak = 0.75 / self.frequency
+        moving = np.minimum(since, peak) + np.maximum(since - peak - self.dwell, 0.0)
+        phase = np.clip(moving * self.frequency, 0.0, 1.0) % 1.0  # sin(2 pi) is not 0
+        return _both(self.amplitude * np.sin(2.0 * math.pi * phase), self.rear_ratio)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlowlyIncreasingSteer:
+    """A slow ramp up to an angle: steady-state cornering from straight ahead to the limit.
+
+    Parameters
+    ----------
+    amplitude : final angle [rad].
+    rate : slope of the ramp of the front axle [rad/s].
+    onset : start [s].
+    rate_limit : largest steering rate of either axle [rad/s]; `rate` must keep it.
+    duration : length [s].
+    rear_ratio : rear over front angle [-].
+    """
+
+    amplitude: float
+    rate: float
+    onset: float
+    rate_limit: float
+    duration: float
+    rear_ratio: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self, steepest=self.rate)
+
+    def steering(self, t: Array) -> Array:
+        """Commanded [δ_f, δ_r] [rad], (n, 2), at times t [s], (n,)."""
+        angle = np.clip(self.rate * (t - self.onset), 0.0, abs(self.amplitude))
+        return _both(np.copysign(angle, self.amplitude), self.rear_ratio)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RandomSteer:
+    """Random angles, joined by half cosines: excitation without a period.
+
+    The angles are drawn from `numpy.random.default_rng(seed)`, uniform in +-amplitude and one every
+    half period, so that the steepest path between two is that of a sine of `frequency`. The same
+    seed is the same maneuver, at any sampling.
+
+    Parameters
+    ----------
+    amplitude : largest angle [rad].
+    frequency : of the fastest swing [Hz].
+    seed : of the random numbers.
+    onset : start [s].
+    rate_limit : largest steering rate of either axle [rad/s], at least 2 pi frequency amplitude.
+    duration : length [s].
+    rear_ratio : rear over front angle [-].
+    """
+
+    amplitude: float
+    frequency: float
+    seed: int
+    onset: float
+    rate_limit: float
+    duration: float
+    rear_ratio: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self, steepest=2.0 * math.pi * self.frequency * abs(self.amplitude))
+
+    def steering(self, t: Array) -> Array:
+        """Commanded [δ_f, δ_r] [rad], (n, 2), at times t [s], (n,)."""
+        rng = np.random.default_rng(self.seed)
+        swings = 2 + math.ceil(2.0 * self.frequency * self.duration)
+        angles = np.append(0.0, self.amplitude * rng.uniform(-1.0, 1.0, swings))
+        swing = np.clip(2.0 * self.frequency * (t - self.onset), 0.0, swings)
+        first = np.minimum(swing.astype(int), swings - 1)
+        blend = 0.5 - 0.5 * np.cos(math.pi * (swing - first))
+        return _both(angles[first] + blend * np.diff(angles)[first], self.rear_ratio)

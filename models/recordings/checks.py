@@ -1,0 +1,255 @@
+"""Physical checks that need no vehicle: signs, axes and units of a recording.
+
+Every rule is a regression over at least 2 s of moving windows and stays silent without enough
+excitation, so straight, short, slow and drifting runs pass. The bounds come from physics, not
+from any log; a wrong unit changes a number by 57.3 (degrees), 3.6 (km/h), 9.81 (g) or 1000 (kN),
+and each bound lies inside that gap. One error nobody can see: a log whose lateral axis points to
+the right throughout (SAE, NED) obeys the same laws.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from models.recordings.evidence import (
+    STRIDE,
+    Steering,
+    Windows,
+    least_squares,
+    onset,
+    steering,
+    windows,
+)
+from models.recordings.record import Array, Recording, RecordingError
+
+LARGEST_STEERING = 1.2  # [rad], 69 degrees: beyond every road wheel and scale car (about 50)
+LARGEST_SPEED = 110.0  # [m/s], 396 km/h; a sedan's 110 km/h reads 110
+LARGEST_V_X_R = 60.0  # [m/s^2], 6 g: beyond downforce cars; 1 m/s^2 in degrees reads 57
+SLOPE = (0.5, 2.0)  # a_y on v_x r is 1, with roll up to 1.2; km/h 0.28, g 0.10, degrees 0.017
+LONGEST_CERTAIN = 45.0  # [m]: effective wheelbase; a 1.5 m car in degrees reads 86
+LONGEST_WHEELBASE = 4.0  # [m], in judging a mass: so 64 kg at least, a kart with driver has 150
+LIGHTEST = 1.0  # [kg/m^3]: mass over wheelbase cubed is 17 to 300 for all cars; in kN 0.3 at most
+
+
+def check_physics(recording: Recording) -> None:
+    """Refuse a recording whose signs, axes or units contradict the laws of motion.
+
+    Parameters
+    ----------
+    recording : the recording to judge.
+
+    Raises
+    ------
+    RecordingError
+        Naming the column, the rule, the value and the remedy.
+    """
+    _check_peaks(recording)
+    w = windows(recording)
+    if w.r.size * STRIDE < 2.0:
+        return
+    turn = steering(w)
+    _check_lateral_acceleration(recording, w, turn)
+    _check_v_x_r(recording, w)
+    if turn is not None:
+        _check_steering(recording, w, turn)
+        _check_lateral_velocity(recording, w, turn)
+    _check_forces(recording, w, turn)
+
+
+def _check_peaks(recording: Recording) -> None:
+    """Refuse steering beyond 1.2 rad, speeds beyond 110 m/s, and cars that drive backwards."""
+    for column in ("delta_f", "delta_r"):
+        peak = float(np.abs(getattr(recording, column)).max())
+        if peak > LARGEST_STEERING:
+            raise RecordingError(
+                f"{recording.name}: {column} must be the road-wheel angle in rad, below "
+                f"{LARGEST_STEERING}, its peak is {peak:.4g}; degrees or a hand-wheel angle? "
+                "convert it (degrees: multiply by pi/180)"
+            )
+    fastest = float(np.abs(recording.v_x).max())
+    if fastest > LARGEST_SPEED:
+        raise RecordingError(
+            f"{recording.name}: vx must be in m/s, below {LARGEST_SPEED:g}, its peak is "
+            f"{fastest:.4g}; km/h? divide by 3.6"
+        )
+    forward = float(np.percentile(recording.v_x, 95))
+    backward = float(np.percentile(recording.v_x, 5))
+    if backward < -1.0 and forward < -0.3 * backward:
+        raise RecordingError(
+            f"{recording.name}: vx must point forward (ISO axes), 95 % of it lies below "
+            f"{forward:.4g} m/s; change the sign of vx (and of vy, if the axes are turned about z)"
+        )
+
+
+def _check_lateral_acceleration(recording: Recording, w: Windows, turn: Steering | None) -> None:
+    """Refuse a_y that is not v̇_y + v_x r; the two slopes and the steering tell who is wrong.
+
+    Regressors: v_x r, v̇_y, ṙ (a sensor off the center of gravity) and, where v_x r varies by half
+    its mean, 1 (bias, bank). Needs std(v_x r) >= 0.3 m/s^2, or a steady turn of 1.5 m/s^2, three
+    times a usual bias. A slope is judged when it is four standard errors outside its bound; too
+    large a slope must also explain half of a_y, which vibration does not.
+    """
+    if w.a_y is None:
+        return
+    X = np.column_stack([w.v_x_r, w.v_y_dot, w.r_dot])
+    mean, spread = abs(float(np.mean(w.v_x_r))), float(np.std(w.v_x_r))
+    if spread >= max(0.3, 0.5 * mean):
+        X = np.column_stack([X, np.ones(w.r.size)])
+    elif mean < 1.5:
+        return
+    fit = least_squares(X, w.a_y)
+    slope, error = fit.theta[0], 4.0 * fit.error[0]
+    dot, dot_error = fit.theta[1], 4.0 * fit.error[1]
+    law = f"must be v̇_y + v_x r (ISO axes), its slope on v_x r is {slope:.3g} instead of 1"
+    if slope + error < 0.0:
+        r_is_wrong = turn is not None and turn.correlation < -0.5
+        if dot_error < 0.6 and abs(dot) > dot_error:
+            r_is_wrong = dot > 0.0
+        if r_is_wrong:
+            raise RecordingError(
+                f"{recording.name}: r contradicts ay: ay {law}; r must be positive to the left, "
+                "change its sign"
+            )
+        raise RecordingError(
+            f"{recording.name}: ay {law}; change the sign of ay (positive to the left)"
+        )
+    if slope + error < SLOPE[0] or (slope - error > SLOPE[1] and fit.r_squared > 0.5):
+        raise RecordingError(f"{recording.name}: {_blame(slope, law)}")
+    if _turned(dot, dot_error, w) and slope - error > 0.0:
+        raise RecordingError(
+            f"{recording.name}: vy contradicts ay: ay must be v̇_y + v_x r, its slope on v̇_y is "
+            f"{dot:.3g} instead of 1; vy must be positive to the left, change its sign"
+        )
+
+
+def _turned(dot: float, dot_error: float, w: Windows) -> bool:
+    """Whether a slope on v̇_y is the -1 of a wrong sign, and v̇_y moves enough to say so."""
+    return -2.5 < dot < -0.3 and dot + dot_error < 0.0 and float(np.std(w.v_y_dot)) >= 0.003
+
+
+def _blame(slope: float, law: str) -> str:
+    """Name the column and unit whose factor lies nearest to the slope."""
+    for factor, text in {
+        1 / 57.3: f"r must be in rad/s: ay {law}; degrees per second? multiply r by pi/180",
+        1 / 9.81: f"ay {law}; ay in g? multiply it by 9.81",
+        1 / 3.6: f"vx must be in m/s: ay {law}; km/h? divide vx by 3.6",
+    }.items():
+        if factor / 1.5 < slope < factor * 1.5:
+            return text
+    return f"ay {law}; check its axis, unit and time stamps, or leave the column ay out"
+
+
+def _check_v_x_r(recording: Recording, w: Windows) -> None:
+    """Refuse a centripetal acceleration |v_x r| above 60 m/s^2 in 5 % of the moving windows."""
+    peak = float(np.percentile(np.abs(w.v_x_r), 95))
+    if peak > LARGEST_V_X_R:
+        raise RecordingError(
+            f"{recording.name}: r must be in rad/s, |v_x r| below {LARGEST_V_X_R:g} m/s^2, it is "
+            f"{peak:.4g}; degrees per second? multiply r by pi/180"
+        )
+
+
+def _check_steering(recording: Recording, w: Windows, turn: Steering) -> None:
+    """Refuse steering that turns the wrong way or an effective wheelbase out of all cars.
+
+    Upper bound 7.5 m + 0.03 v_x^2 (a bus, with three times a sedan's understeer) where small
+    steering says the same as large, since a car that slides over its front wheels reads long;
+    lower bound 0.03 m (half a 1:43 car) rising to 0.12 m at 8 m/s (a sedan in degrees/s 0.05).
+    """
+    column = _larger_steering(recording)
+    L, correlation = turn
+    if correlation < -0.5:
+        raise RecordingError(
+            f"{recording.name}: {column} must turn the car to the left (r > 0) when positive, its "
+            f"correlation with r is {correlation:.2f}; change the sign of {column} (or of r)"
+        )
+    if correlation < 0.7:
+        return
+    v = float(np.sqrt(np.mean(w.v_x**2)))
+    small = onset(w)
+    same = small is not None and small.correlation > 0.7 and small.wheelbase > 0.7 * L
+    plows = small is not None and small.correlation > 0.7 and small.wheelbase < 0.5 * L
+    longest = 7.5 + 0.03 * v**2
+    too_long = longest < L and (same or (L > LONGEST_CERTAIN and not plows))
+    if too_long:
+        raise RecordingError(
+            f"{recording.name}: {column} must be in rad, the effective wheelbase v_x delta/r is "
+            f"{L:.4g} m, above {min(longest, L):.3g}; degrees? multiply {column} by pi/180"
+        )
+    shortest = min(max(0.015 * v, 0.03), 0.12)
+    if shortest > L:
+        raise RecordingError(
+            f"{recording.name}: r must be in rad/s, the effective wheelbase v_x delta/r is "
+            f"{L:.3g} m, below {shortest:.2g}; degrees per second? multiply r by pi/180"
+        )
+
+
+def _check_lateral_velocity(recording: Recording, w: Windows, turn: Steering) -> None:
+    """Refuse a center of rotation behind the rear axle: its tires would push outward.
+
+    v_y/r is the distance from the center of gravity back to where lateral velocity vanishes,
+    at most l_r, about half the wheelbase; alarm at 0.9 effective wheelbases.
+    """
+    behind = float(w.v_y @ w.r) / float(w.r @ w.r)
+    correlation = behind * float(np.sqrt(np.mean(w.r**2) / (np.mean(w.v_y**2) + 1e-300)))
+    rear_steers = np.abs(recording.delta_r).max() > 0.1 * np.abs(recording.delta_f).max()
+    clear = turn.correlation > 0.7 and correlation > 0.7 and not rear_steers
+    if clear and behind > 0.9 * turn.wheelbase:
+        raise RecordingError(
+            f"{recording.name}: vy must be positive to the left at the center of gravity, "
+            f"vy/r is {behind:.3g} m, behind the rear axle (effective wheelbase "
+            f"{turn.wheelbase:.3g} m); change the sign of vy or move it to the center of gravity"
+        )
+
+
+def _check_forces(recording: Recording, w: Windows, turn: Steering | None) -> None:
+    """Refuse axle forces that push against the acceleration, are swapped, or are in kN.
+
+    Needs rms(v̇_y + v_x r) >= 0.3 m/s^2. Signs: correlation below -0.5. Unit: the mass that the
+    summed force implies, over the cube of the effective wheelbase.
+    """
+    a = w.v_x_r + w.v_y_dot
+    if w.force is None or np.sqrt(np.mean(a**2)) < 0.3:
+        return
+    for column, force in zip(("Fyf", "Fyr"), w.force.T, strict=True):
+        correlation = _correlation(force, a)
+        if correlation < -0.5:
+            raise RecordingError(
+                f"{recording.name}: {column} must push to the left when positive (ISO axes), its "
+                f"correlation with v̇_y + v_x r is {correlation:.2f}; change the sign of {column}"
+            )
+    yaw = least_squares(w.force, w.r_dot)
+    if yaw.r_squared > 0.5 and yaw.theta[0] < -8 * yaw.error[0] and yaw.theta[1] > 8 * yaw.error[1]:
+        raise RecordingError(
+            f"{recording.name}: Fyf must turn the car to the left and Fyr to the right, ṙ says "
+            "the opposite; swap the columns Fyf and Fyr"
+        )
+    total = w.force.sum(axis=1)
+    if turn is None or turn.correlation < 0.7 or _correlation(total, a) < 0.7:
+        return
+    fit = least_squares(np.column_stack([w.v_x_r, w.v_y_dot, w.r_dot]), total)
+    dot, dot_error = fit.theta[1] / fit.theta[0], 4.0 * fit.error[1] / fit.theta[0]
+    if fit.theta[0] > 4.0 * fit.error[0] and _turned(dot, dot_error, w):
+        raise RecordingError(
+            f"{recording.name}: vy contradicts Fyf + Fyr, which must be mass times v̇_y + v_x r, "
+            f"the two slopes have the ratio {dot:.3g} instead of 1; change the sign of vy"
+        )
+    small = onset(w)
+    L = turn.wheelbase if small is None else min(turn.wheelbase, small.wheelbase)
+    mass = float(total @ a) / float(a @ a)
+    if mass < LIGHTEST * min(L, LONGEST_WHEELBASE) ** 3:
+        raise RecordingError(
+            f"{recording.name}: Fyf and Fyr must be in N, they imply a mass of {mass:.3g} kg on "
+            f"an effective wheelbase of {L:.3g} m; kN? multiply by 1000"
+        )
+
+
+def _larger_steering(recording: Recording) -> str:
+    """Name the axle that steers more."""
+    front, rear = np.mean(recording.delta_f**2), np.mean(recording.delta_r**2)
+    return "delta_f" if front >= rear else "delta_r"
+
+
+def _correlation(a: Array, b: Array) -> float:
+    """Correlation about zero."""
+    return float(a @ b) / (float(np.sqrt((a @ a) * (b @ b))) + 1e-300)

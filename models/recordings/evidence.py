@@ -1,0 +1,160 @@
+"""What a recording says about itself, in window means that noise and lag do not upset.
+
+Over a window of length T the lateral kinematics hold exactly without differentiating a signal:
+mean(a_y) = (v_y(t + T) - v_y(t))/T + mean(v_x r).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.recordings.record import Array, Recording
+
+WINDOW = 0.2  # [s]: keeps maneuvers up to 2 Hz, averages 20 samples of noise at 100 Hz
+STRIDE = 0.05  # [s]
+SLOWEST = 0.5  # [m/s]: below it slip and curvature are noise, for scale cars too
+TAIL_OUT = 0.15  # [rad]: sideslip against the turn beyond which a driver may countersteer
+
+
+class Windows(NamedTuple):
+    """Window means of the moving part of a recording, each of shape (k,).
+
+    v_x [m/s], v_y [m/s], r [rad/s], delta_f and delta_r [rad]; v_y_dot [m/s^2] and r_dot [rad/s^2]
+    are differences over the window; v_x_r = mean(v_x r) [m/s^2]; a_y [m/s^2] and force
+    (k, 2) [N] may be None.
+    """
+
+    v_x: Array
+    v_y: Array
+    r: Array
+    delta_f: Array
+    delta_r: Array
+    v_y_dot: Array
+    r_dot: Array
+    v_x_r: Array
+    a_y: Array | None
+    force: Array | None
+
+    @property
+    def delta(self) -> Array:
+        """Steering that turns the car, delta_f - delta_r [rad]."""
+        return self.delta_f - self.delta_r
+
+
+class Fit(NamedTuple):
+    """Least squares y = X theta: estimates, their standard errors, share of y explained."""
+
+    theta: Array
+    error: Array
+    r_squared: float
+
+
+class Steering(NamedTuple):
+    """Path curvature against steering: effective wheelbase L = v_x delta/r and correlation."""
+
+    wheelbase: float
+    correlation: float
+
+
+def windows(recording: Recording) -> Windows:
+    """Average a recording over windows of 0.2 s in which the car moves forward all the time.
+
+    Moving: v_x above 0.5 m/s and above 30 % of its 95th percentile.
+
+    Parameters
+    ----------
+    recording : the recording.
+    """
+    n, dt = len(recording), recording.dt
+    width = max(round(WINDOW / dt), 1)
+    start = np.arange(0, max(n - width, 0), max(round(STRIDE / dt), 1))
+    slow = recording.v_x < max(SLOWEST, 0.3 * float(np.percentile(recording.v_x, 95)))
+    start = start[_sums(slow.astype(np.float64), start, width) == 0.0]
+
+    def mean(signal: Array) -> Array:
+        means: Array = _sums(signal, start, width) / width
+        return means
+
+    def slope(signal: Array) -> Array:
+        slopes: Array = (signal[start + width] - signal[start]) / (width * dt)
+        return slopes
+
+    force = recording.axle_force
+    return Windows(
+        v_x=mean(recording.v_x),
+        v_y=mean(recording.v_y),
+        r=mean(recording.r),
+        delta_f=mean(recording.delta_f),
+        delta_r=mean(recording.delta_r),
+        v_y_dot=slope(recording.v_y),
+        r_dot=slope(recording.r),
+        v_x_r=mean(recording.v_x * recording.r),
+        a_y=None if recording.a_y is None else mean(recording.a_y),
+        force=None if force is None else np.column_stack([mean(force[:, 0]), mean(force[:, 1])]),
+    )
+
+
+def least_squares(X: Array, y: Array) -> Fit:
+    """Fit y = X theta; standard errors count overlapping windows once.
+
+    Parameters
+    ----------
+    X : regressors, shape (k, p).
+    y : response, shape (k,).
+    """
+    size = np.sqrt(np.mean(X**2, axis=0)) + 1e-300
+    theta, *_ = np.linalg.lstsq(X / size, y, rcond=None)
+    rest = y - (X / size) @ theta
+    independent = max(y.size * STRIDE / WINDOW - X.shape[1], 1.0)
+    covariance = np.linalg.pinv((X / size).T @ (X / size) / y.size) * np.mean(rest**2) / independent
+    total = float(np.sum((y - y.mean()) ** 2)) + 1e-300
+    return Fit(theta / size, np.sqrt(np.diag(covariance)) / size, 1 - float(rest @ rest) / total)
+
+
+def steering(w: Windows) -> Steering | None:
+    """Effective wheelbase sqrt(sum (v_x delta)^2 / sum r^2), or None when nothing turns.
+
+    It is the wheelbase L of a neutral car; understeer adds K v_x^2. Samples with the tail out,
+    where a driver may countersteer, do not count. Needs 2 s of turning with rms(r) >= 0.05 rad/s.
+
+    Parameters
+    ----------
+    w : window means.
+    """
+    return _wheelbase(w, np.ones(w.r.size, dtype=np.bool_))
+
+
+def onset(w: Windows) -> Steering | None:
+    """Return the same from the windows with less than half the usual peak steering, or None.
+
+    A car that slides over its front wheels reads long at large steering and normal here.
+
+    Parameters
+    ----------
+    w : window means.
+    """
+    size = np.abs(w.delta)
+    return _wheelbase(w, size < 0.5 * np.percentile(size, 95))
+
+
+def _wheelbase(w: Windows, keep: NDArray[np.bool_]) -> Steering | None:
+    """Return the effective wheelbase over some of the windows, None without excitation."""
+    tail_out = (w.v_y * w.r < 0.0) & (np.abs(w.v_y) > TAIL_OUT * w.v_x)
+    keep = keep & ~tail_out
+    r, kinematic = w.r[keep], (w.v_x * w.delta)[keep]
+    if r.size * STRIDE < 2.0 or not np.sqrt(np.mean(r**2)) >= 0.05:
+        return None
+    rr, dd, rd = float(r @ r), float(kinematic @ kinematic), float(r @ kinematic)
+    if dd == 0.0:
+        return None
+    return Steering(float(np.sqrt(dd / rr)), rd / float(np.sqrt(rr * dd)))
+
+
+def _sums(signal: Array, start: NDArray[np.intp], width: int) -> Array:
+    """Return the sums of `width` samples from each start."""
+    total = np.concatenate([[0.0], np.cumsum(signal)])
+    sums: Array = total[start + width] - total[start]
+    return sums

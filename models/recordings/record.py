@@ -1,0 +1,163 @@
+"""One recording of a car's lateral motion on a uniform time grid.
+
+x = [v_y, r]: lateral velocity [m/s], yaw rate [rad/s].   u = [delta_f, delta_r]: steering [rad].
+ISO axes: x forward, y left, z up; r and delta turn left when positive, forces push left.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+MINIMUM_SAMPLES = 10
+JITTER = 0.02  # largest departure of a sample from the uniform grid, as a share of one step
+
+
+class RecordingError(ValueError):
+    """A log or a recording breaks a rule; one line: file or name, column, rule, value, remedy."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recording:
+    """Signals of one run, all of the same length n, uniformly sampled and read-only.
+
+    Parameters
+    ----------
+    name : "FILE:RUN", or "FILE" when the file has no run column.
+    t : time [s], shape (n,), uniform to 2 % of one step.
+    v_x : forward speed at the center of gravity [m/s], shape (n,).
+    v_y : lateral velocity at the center of gravity [m/s], positive to the left, shape (n,).
+    r : yaw rate [rad/s], positive to the left, shape (n,).
+    delta_f : front road-wheel angle [rad], positive to the left, shape (n,).
+    delta_r : rear road-wheel angle [rad], positive to the left, shape (n,).
+    a_y : lateral acceleration v̇_y + v_x r [m/s^2], shape (n,), or None when it was not logged.
+    axle_force : front and rear lateral axle force [N], positive to the left, shape (n, 2), or
+        None when there is no truth.
+
+    Raises
+    ------
+    RecordingError
+        If lengths differ, a value is not finite, time is not uniform, or n < 10.
+    """
+
+    name: str
+    t: Array
+    v_x: Array
+    v_y: Array
+    r: Array
+    delta_f: Array
+    delta_r: Array
+    a_y: Array | None = None
+    axle_force: Array | None = None
+
+    def __post_init__(self) -> None:
+        n = np.size(self.t)
+        if n < MINIMUM_SAMPLES:
+            raise RecordingError(
+                f"{self.name}: a recording needs at least {MINIMUM_SAMPLES} samples, it has {n}"
+            )
+        for field in fields(self)[1:]:
+            value = getattr(self, field.name)
+            if value is None:
+                continue
+            array = _read_only(value)
+            shape = (n, 2) if field.name == "axle_force" else (n,)
+            if array.shape != shape:
+                raise RecordingError(
+                    f"{self.name}: {field.name} must have shape {shape}, it has {array.shape}"
+                )
+            bad = np.count_nonzero(~np.isfinite(array))
+            if bad:
+                raise RecordingError(
+                    f"{self.name}: {field.name} must be finite, {bad} of its values are not"
+                )
+            object.__setattr__(self, field.name, array)
+        step = (self.t[-1] - self.t[0]) / (n - 1)
+        off_grid = np.abs(self.t - self.t[0] - step * np.arange(n)).max()
+        if not (step > 0.0 and off_grid <= JITTER * step):
+            raise RecordingError(
+                f"{self.name}: t must rise in equal steps, mean step {step:.6g} s, "
+                f"largest departure {off_grid:.3g} s; read the log with read_recording"
+            )
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return int(self.t.size)
+
+    @property
+    def x(self) -> Array:
+        """State [v_y, r] [m/s, rad/s], shape (n, 2)."""
+        return _read_only(np.column_stack([self.v_y, self.r]))
+
+    @property
+    def u(self) -> Array:
+        """Steering [delta_f, delta_r] [rad], shape (n, 2)."""
+        return _read_only(np.column_stack([self.delta_f, self.delta_r]))
+
+    @property
+    def dt(self) -> float:
+        """Sample time T_s [s], rounded to a nanosecond so that 100 Hz gives exactly 0.01."""
+        return round(float(self.t[-1] - self.t[0]) / (self.t.size - 1), 9)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last sample [s]."""
+        return float(self.t[-1] - self.t[0])
+
+    def alpha(self, l_f: float, l_r: float) -> Array:
+        """Slip angles of the axles in the paper's sign, the negative of ISO 8855.
+
+        alpha = delta - atan2(v_y +- l r, v_x), so that F_y = +C alpha. Meaningless at standstill.
+
+        Parameters
+        ----------
+        l_f : distance from the center of gravity to the front axle [m].
+        l_r : distance from the center of gravity to the rear axle [m].
+
+        Returns
+        -------
+        Array
+            [alpha_f, alpha_r] [rad], shape (n, 2).
+        """
+        alpha_f = self.delta_f - np.arctan2(self.v_y + l_f * self.r, self.v_x)
+        alpha_r = self.delta_r - np.arctan2(self.v_y - l_r * self.r, self.v_x)
+        return _read_only(np.column_stack([alpha_f, alpha_r]))
+
+    def between(self, t0: float, t1: float) -> Recording:
+        """Return the part with t0 <= t <= t1.
+
+        Parameters
+        ----------
+        t0 : first time [s], on the recording's own clock.
+        t1 : last time [s], included (to a millionth of a step).
+
+        Raises
+        ------
+        RecordingError
+            If fewer than 10 samples are left.
+        """
+        slack = 1e-6 * self.dt
+        keep = (self.t >= t0 - slack) & (self.t <= t1 + slack)
+        if np.count_nonzero(keep) < MINIMUM_SAMPLES:
+            raise RecordingError(
+                f"{self.name}: between {t0:g} and {t1:g} s there are {np.count_nonzero(keep)} "
+                f"samples, at least {MINIMUM_SAMPLES} are needed; the recording runs from "
+                f"{self.t[0]:g} to {self.t[-1]:g} s"
+            )
+        cut = {
+            field.name: getattr(self, field.name)[keep]
+            for field in fields(self)[1:]
+            if getattr(self, field.name) is not None
+        }
+        return replace(self, **cut)
+
+
+def _read_only(value: object) -> Array:
+    """Copy to float64 and forbid writing."""
+    array = np.array(value, dtype=np.float64)
+    array.setflags(write=False)
+    return array

@@ -1,0 +1,173 @@
+"""The car as data: six numbers for the linear bicycle and, where a plant is wanted, its chassis.
+
+SI units, ISO axes. The cornering stiffness is per axle (both tires), in the paper's sign
+F_y = +C alpha with alpha = delta - atan2(v_y +- l r, v_x), the negative of the ISO 8855 slip angle.
+"""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from models import vehicle_file
+from models.bicycle import BicycleParameters
+from models.chassis import Chassis, VehicleError, require_positive
+
+GRAVITY = 9.81  # standard acceleration of free fall, rounded as usual [m/s^2]
+
+__all__ = ["GRAVITY", "BicycleParameters", "Chassis", "Vehicle", "VehicleError", "sedan"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Vehicle:
+    """A car; `chassis` may be None where only the linear bicycle is needed.
+
+    Parameters
+    ----------
+    name : what reports and figures call the car.
+    mass : total mass [kg].
+    yaw_inertia : moment of inertia about the vertical axis [kg m^2].
+    l_f, l_r : distance from the center of gravity to the front and rear axle [m].
+    cornering_stiffness_front, cornering_stiffness_rear : slope of the lateral force of the axle
+        (both tires) over its slip angle at zero [N/rad].
+    chassis : what the double-track plant needs, or None.
+
+    Raises
+    ------
+    VehicleError
+        For a value that is not positive and finite, or for springs too soft to carry the body.
+    """
+
+    name: str = "car"
+    mass: float
+    yaw_inertia: float
+    l_f: float
+    l_r: float
+    cornering_stiffness_front: float
+    cornering_stiffness_rear: float
+    chassis: Chassis | None = None
+
+    def __post_init__(self) -> None:
+        require_positive(
+            mass=self.mass,
+            yaw_inertia=self.yaw_inertia,
+            l_f=self.l_f,
+            l_r=self.l_r,
+            cornering_stiffness_front=self.cornering_stiffness_front,
+            cornering_stiffness_rear=self.cornering_stiffness_rear,
+        )
+        if self.chassis is not None:
+            tipping = self.weight * self.roll_arm
+            if not self.chassis.roll_stiffness > tipping:
+                raise VehicleError(
+                    f"roll_stiffness must exceed mass * g * roll arm = {tipping:.6g} N m/rad or "
+                    f"the body tips over at rest, it is {self.chassis.roll_stiffness}"
+                )
+
+    @property
+    def wheelbase(self) -> float:
+        """Distance between the axles, l_f + l_r [m]."""
+        return self.l_f + self.l_r
+
+    @property
+    def weight(self) -> float:
+        """Weight m g [N]."""
+        return self.mass * GRAVITY
+
+    @property
+    def axle_loads(self) -> tuple[float, float]:
+        """Static vertical load of the front and the rear axle [N]."""
+        return (
+            self.weight * self.l_r / self.wheelbase,
+            self.weight * self.l_f / self.wheelbase,
+        )
+
+    @property
+    def roll_arm(self) -> float:
+        """Height of the center of gravity above the roll axis [m].
+
+        Raises
+        ------
+        VehicleError
+            When the vehicle has no chassis.
+        """
+        chassis = self.require_chassis()
+        front, rear = chassis.roll_center_height_front, chassis.roll_center_height_rear
+        return chassis.cg_height - (self.l_r * front + self.l_f * rear) / self.wheelbase
+
+    @property
+    def bicycle(self) -> BicycleParameters:
+        """The six numbers of the linear bicycle in the paper's letters."""
+        return BicycleParameters(
+            m=self.mass,
+            I_z=self.yaw_inertia,
+            l_f=self.l_f,
+            l_r=self.l_r,
+            C_f=self.cornering_stiffness_front,
+            C_r=self.cornering_stiffness_rear,
+        )
+
+    def require_chassis(self) -> Chassis:
+        """Give the chassis to who cannot do without.
+
+        Raises
+        ------
+        VehicleError
+            When the vehicle has none.
+        """
+        if self.chassis is None:
+            raise VehicleError(f"vehicle '{self.name}' has no [chassis] table: a plant needs one")
+        return self.chassis
+
+    @classmethod
+    def from_toml(cls, path: str | os.PathLike[str]) -> "Vehicle":
+        """Read a vehicle from a TOML file: six flat keys, optional name and table [chassis].
+
+        Parameters
+        ----------
+        path : the TOML file; a relative `tire` in [chassis] starts from its folder.
+
+        Raises
+        ------
+        VehicleError
+            One line with file, key and rule: key unknown or missing, type or value wrong.
+        FileNotFoundError
+            When there is no such file.
+        """
+        file = Path(path)
+        try:
+            table = vehicle_file.read_table(file)
+            chassis = table.pop("chassis", None)
+            values = vehicle_file.checked(table, cls, where="", skip=("chassis",))
+            if chassis is None:
+                return cls(**values)
+            if not isinstance(chassis, dict):
+                raise VehicleError(f"chassis must be a table, it is {chassis!r}")
+            parts = vehicle_file.checked(chassis, Chassis, where="chassis.")
+            if "tire" in parts:
+                parts["tire"] = (file.parent / parts["tire"]).resolve()
+            return cls(**values, chassis=Chassis(**parts))
+        except VehicleError as error:
+            raise VehicleError(f"{file}: {error}") from None
+
+    def to_toml(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+        """Write the vehicle so that `from_toml` gives back an equal one, bit for bit.
+
+        Parameters
+        ----------
+        path : the file to write; a tire file is named relative to its folder.
+        overwrite : replace a file that is already there.
+
+        Raises
+        ------
+        FileExistsError
+            When the file is there and `overwrite` is False.
+        """
+        file = Path(path)
+        text = vehicle_file.text(self, folder=file.parent, table="chassis")
+        with file.open("w" if overwrite else "x", encoding="utf-8") as stream:
+            stream.write(text)
+
+
+def sedan() -> Vehicle:
+    """Give the documented mid-size sedan; its file says where each value comes from."""
+    return Vehicle.from_toml(Path(__file__).parent / "data" / "sedan.toml")

@@ -1,0 +1,131 @@
+"""Maneuvers: resolved at the sample time, with the shape their name promises."""
+
+import math
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from models.maneuvers import (
+    DoubleLaneChange,
+    ManeuverError,
+    RandomSteer,
+    SineWithDwell,
+    Slalom,
+    SlowlyIncreasingSteer,
+    StepSteer,
+)
+
+COMMON = {"amplitude": 0.1, "onset": 1.003, "rate_limit": 0.7, "duration": 12.0}
+ALL = [
+    StepSteer(**COMMON),
+    Slalom(**COMMON, frequency=0.6),
+    DoubleLaneChange(**COMMON, frequency=0.5, pause=1.2),
+    SineWithDwell(**COMMON, frequency=0.7, dwell=0.5),
+    SlowlyIncreasingSteer(**COMMON, rate=0.02),
+    RandomSteer(**COMMON, frequency=1.0, seed=3),
+]
+NAMES = [type(m).__name__ for m in ALL]
+every_maneuver = pytest.mark.parametrize("maneuver", ALL, ids=NAMES)
+
+
+@every_maneuver
+@pytest.mark.parametrize("dt", [0.001, 0.01, 0.05])
+def test_steering_never_jumps(maneuver, dt):
+    t = np.arange(0.0, maneuver.duration, dt)
+    change = np.abs(np.diff(maneuver.steering(t)[:, 0]))
+    assert change.max() <= maneuver.rate_limit * dt * (1.0 + 1e-9)
+    assert change.max() > 0.0
+
+
+@every_maneuver
+def test_nothing_happens_before_the_onset_and_the_amplitude_is_kept(maneuver):
+    t = np.arange(0.0, maneuver.duration, 0.001)
+    angle = maneuver.steering(t)
+    assert np.all(angle[t <= maneuver.onset] == 0.0)
+    assert np.abs(angle).max() <= maneuver.amplitude * (1.0 + 1e-12)
+    assert np.abs(angle).max() > 0.8 * maneuver.amplitude
+    assert np.all(angle[:, 1] == 0.0)
+
+
+@every_maneuver
+def test_a_negative_amplitude_is_the_mirror_image(maneuver):
+    t = np.linspace(0.0, maneuver.duration, 777)
+    mirrored = replace(maneuver, amplitude=-maneuver.amplitude)
+    np.testing.assert_array_equal(mirrored.steering(t), -maneuver.steering(t))
+
+
+@every_maneuver
+def test_angles_do_not_depend_on_the_sampling(maneuver):
+    fine = np.arange(0.0, maneuver.duration, 0.001)
+    np.testing.assert_array_equal(maneuver.steering(fine)[::10], maneuver.steering(fine[::10]))
+
+
+@every_maneuver
+def test_the_rear_axle_follows_its_ratio_and_the_limit_holds_for_it_too(maneuver):
+    t = np.linspace(0.0, maneuver.duration, 12001)
+    both = replace(maneuver, rear_ratio=-1.1).steering(t)
+    np.testing.assert_allclose(both[:, 1], -1.1 * both[:, 0], rtol=1e-15)
+    assert np.abs(np.diff(both[:, 1])).max() <= maneuver.rate_limit * 0.001 * (1.0 + 1e-9)
+
+
+@every_maneuver
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_numbers_that_are_not_finite_are_refused_by_name(maneuver, value):
+    for field in fields(maneuver):
+        if field.name != "seed":
+            with pytest.raises(ManeuverError, match=field.name):
+                replace(maneuver, **{field.name: value})
+
+
+@every_maneuver
+def test_numbers_that_must_be_positive_are(maneuver):
+    names = {field.name for field in fields(maneuver)}
+    for key in names & {"frequency", "rate", "rate_limit", "duration"}:
+        with pytest.raises(ManeuverError, match=key):
+            replace(maneuver, **{key: 0.0})
+    for key in names & {"onset", "dwell", "pause"}:
+        with pytest.raises(ManeuverError, match=key):
+            replace(maneuver, **{key: -0.1})
+
+
+def test_a_sine_steeper_than_the_limit_is_refused():
+    with pytest.raises(ManeuverError, match="rate_limit"):
+        Slalom(**COMMON, frequency=0.7 / (2.0 * math.pi * 0.1) * 1.01)
+    Slalom(**COMMON, frequency=0.7 / (2.0 * math.pi * 0.1) * 0.99)
+
+
+def test_a_step_ends_at_its_angle_after_amplitude_over_rate():
+    step = StepSteer(**COMMON)
+    arrival = 1.003 + 0.1 / 0.7
+    assert step.steering(np.array([arrival + 1e-9]))[0, 0] == 0.1
+    assert step.steering(np.array([arrival - 0.01]))[0, 0] == pytest.approx(0.1 - 0.007)
+
+
+def test_a_double_lane_change_brings_the_steering_integral_back_twice():
+    change = DoubleLaneChange(**COMMON, frequency=0.5, pause=1.2)
+    t = np.arange(0.0, 12.0, 0.001)
+    angle = change.steering(t)[:, 0]
+    heading = np.cumsum(angle) * 0.001
+    lane = np.cumsum(heading) * 0.001
+    assert abs(heading[-1]) < 1e-6
+    assert abs(lane[-1]) < 1e-3 * lane.max()  # back in the first lane
+    assert np.all(angle[(t > 3.01) & (t < 4.19)] == 0.0)
+
+
+def test_a_dwell_holds_the_second_peak():
+    sine = SineWithDwell(**COMMON, frequency=0.7, dwell=0.5)
+    t = np.arange(0.0, 12.0, 0.001)
+    held = t[np.abs(sine.steering(t)[:, 0] + 0.1) < 1e-12]
+    peak = 1.003 + 0.75 / 0.7
+    assert held[0] == pytest.approx(peak, abs=0.002)
+    assert held[-1] == pytest.approx(peak + 0.5, abs=0.002)
+    assert np.all(sine.steering(t)[t > 1.003 + 1.0 / 0.7 + 0.501] == 0.0)
+
+
+def test_random_steer_is_its_seed():
+    t = np.arange(0.0, 12.0, 0.01)
+    first = RandomSteer(**COMMON, frequency=1.0, seed=3)
+    np.testing.assert_array_equal(first.steering(t), replace(first).steering(t))
+    other = replace(first, seed=4).steering(t)
+    assert np.corrcoef(first.steering(t)[:, 0], other[:, 0])[0, 1] < 0.5

@@ -1,0 +1,130 @@
+"""The recording itself: shape rules, slices, slip angles, and what is written reads back."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from models.recordings import Recording, RecordingError, read_recording, write_recording
+
+N = 100
+
+
+def recording(**change: object) -> Recording:
+    t = 0.01 * np.arange(N)
+    signals: dict[str, object] = {
+        "name": "made",
+        "t": t,
+        "v_x": np.full(N, 20.0),
+        "v_y": 0.1 * np.sin(t),
+        "r": 0.2 * np.sin(t),
+        "delta_f": 0.03 * np.sin(t),
+        "delta_r": np.zeros(N),
+    }
+    return Recording(**(signals | change))  # type: ignore[arg-type]
+
+
+def test_signals_cannot_be_changed_and_do_not_follow_their_source() -> None:
+    source = np.full(N, 20.0)
+    made = recording(v_x=source)
+    source[:] = 0.0
+    assert np.all(made.v_x == 20.0)
+    for array in (made.v_x, made.x, made.u):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1.0
+
+
+def test_x_and_u_stack_the_papers_vectors() -> None:
+    made = recording(delta_r=np.full(N, 0.01))
+    assert np.array_equal(made.x, np.stack([made.v_y, made.r], axis=1))
+    assert np.array_equal(made.u, np.stack([made.delta_f, made.delta_r], axis=1))
+    assert made.dt == 0.01
+    assert made.duration == pytest.approx(0.99)
+    assert len(made) == N
+
+
+@pytest.mark.parametrize(
+    ("change", "rule"),
+    [
+        ({"r": np.zeros(N - 1)}, "r must have shape"),
+        ({"axle_force": np.zeros(N)}, "axle_force must have shape"),
+        ({"a_y": np.full(N, np.nan)}, "a_y must be finite, 100"),
+        ({"t": 0.01 * np.arange(N)[::-1]}, "t must rise"),
+        ({"t": 0.01 * np.arange(N) ** 1.01}, "t must rise in equal steps"),
+        ({"t": np.zeros(5)}, "at least 10 samples"),
+    ],
+)
+def test_a_broken_recording_cannot_be_born(change: dict[str, object], rule: str) -> None:
+    with pytest.raises(RecordingError, match=f"^made: .*{rule}"):
+        recording(**change)
+
+
+def test_a_slice_keeps_both_ends_and_its_clock() -> None:
+    part = recording(axle_force=np.ones((N, 2))).between(0.2, 0.5)
+    assert part.t[0] == pytest.approx(0.2)
+    assert part.t[-1] == pytest.approx(0.5)
+    assert len(part) == 31
+    assert part.axle_force is not None
+    assert part.axle_force.shape == (31, 2)
+    assert part.a_y is None
+    with pytest.raises(RecordingError, match=r"runs from 0 to 0\.99"):
+        recording().between(5.0, 6.0)
+
+
+def test_an_axle_that_rolls_without_slip_has_no_slip_angle() -> None:
+    """On a circle of radius R about a point in line with the rear axle both slips vanish."""
+    l_f, l_r, R, v = 1.2, 1.5, 30.0, 5.0
+    ones = np.ones(N)
+    made = recording(
+        v_x=v * ones,
+        v_y=l_r * v / R * ones,
+        r=v / R * ones,
+        delta_f=np.arctan((l_f + l_r) / R) * ones,
+    )
+    assert np.abs(made.alpha(l_f, l_r)).max() < 1e-15
+    more = recording(v_x=made.v_x, v_y=made.v_y, r=made.r, delta_f=made.delta_f + 0.01)
+    assert np.allclose(more.alpha(l_f, l_r), [0.01, 0.0])  # the paper's sign: rises with delta
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    dt=st.sampled_from([0.001, 0.005, 0.01, 0.02, 0.1]),
+    start=st.floats(-1e3, 1e6),
+    full=st.booleans(),
+    ending=st.sampled_from([".csv", ".csv.gz"]),
+)
+def test_what_is_written_reads_back_bit_for_bit(
+    tmp_path_factory: pytest.TempPathFactory,
+    seed: int,
+    dt: float,
+    start: float,
+    full: bool,
+    ending: str,
+) -> None:
+    rng = np.random.default_rng(seed)
+    made = Recording(
+        name="back",
+        t=start + dt * np.arange(N),
+        **{k: rng.normal(size=N) for k in ("v_x", "v_y", "r", "delta_f", "delta_r")},
+        a_y=rng.normal(size=N) if full else None,
+        axle_force=rng.normal(size=(N, 2)) if full else None,
+    )
+    path = write_recording(made, tmp_path_factory.mktemp("back") / f"back{ending}")
+    again = read_recording(path, dt=dt, check=False)
+    assert again.name == "back"
+    for name in ("t", "v_x", "v_y", "r", "delta_f", "delta_r", "a_y", "axle_force"):
+        assert np.array_equal(getattr(again, name), getattr(made, name))
+    assert (again.a_y is None) is (not full)
+
+
+def test_writing_leaves_one_file_and_refuses_other_endings(tmp_path: Path) -> None:
+    path = write_recording(recording(), tmp_path / "a.csv.gz")
+    first = path.read_bytes()
+    write_recording(recording(), path)
+    assert path.read_bytes() == first
+    assert [p.name for p in tmp_path.iterdir()] == ["a.csv.gz"]
+    with pytest.raises(RecordingError, match=r"must end in \.csv"):
+        write_recording(recording(), tmp_path / "a.mat")

@@ -1,0 +1,299 @@
+"""Physics: right recordings of many cars pass, and every planted error rings its own alarm."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from models.recordings import (
+    Recording,
+    RecordingError,
+    check_against_vehicle,
+    check_physics,
+    read_recording,
+    runs,
+)
+
+Array = np.ndarray
+DEGREES = 180.0 / np.pi
+
+# name -> m [kg], I_z [kg m^2], l_f, l_r [m], C_f, C_r [N/rad]
+CARS = {
+    "sedan": (1600.0, 2600.0, 1.25, 1.45, 90e3, 110e3),
+    "truck": (12000.0, 60e3, 2.4, 2.6, 300e3, 420e3),
+    "formula": (800.0, 1000.0, 1.9, 1.7, 180e3, 240e3),
+    "tenth": (1.6, 0.005, 0.08, 0.09, 20.0, 25.0),
+    "forty-third": (0.041, 28e-6, 0.029, 0.033, 1.2, 1.6),
+}
+SPEEDS = {"sedan": 20.0, "truck": 12.0, "formula": 45.0, "tenth": 2.2, "forty-third": 1.5}
+
+
+def drive(
+    car: str = "sedan",
+    peak: float = 3.0,
+    speed: float | None = None,
+    grip: float = 0.9,
+    steering: Callable[[Array], Array] | None = None,
+    duration: float = 12.0,
+) -> Recording:
+    """Single-track car, tires saturate as tanh; `peak` [m/s^2] scales its multi-sine steering."""
+    m, I_z, l_f, l_r, C_f, C_r = CARS[car]
+    L, v = l_f + l_r, SPEEDS[car] if speed is None else speed
+    dt, t = 1e-3, np.arange(0.0, duration, 1e-3)
+    if steering is None:
+        shape = 0.6 * np.sin(2 * np.pi * 0.35 * t) + 0.4 * np.sin(2 * np.pi * 0.8 * t + 1.0)
+        delta = (L / v**2 + 0.002 * (v > 5.0)) * peak * shape
+    else:
+        delta = steering(t)
+    F_f_max, F_r_max = (grip * m * 9.81 * share / L for share in (l_r, l_f))
+    v_y, r = np.zeros(t.size + 1), np.zeros(t.size + 1)
+    F, v_y_dot = np.zeros((t.size, 2)), np.zeros(t.size)
+    for k in range(t.size):
+        alpha_f = delta[k] - np.arctan2(v_y[k] + l_f * r[k], v)
+        alpha_r = -np.arctan2(v_y[k] - l_r * r[k], v)
+        F[k] = (
+            F_f_max * np.tanh(C_f * alpha_f / F_f_max),
+            F_r_max * np.tanh(C_r * alpha_r / F_r_max),
+        )
+        v_y_dot[k] = F[k].sum() / m - v * r[k]
+        v_y[k + 1] = v_y[k] + dt * v_y_dot[k]
+        r[k + 1] = r[k] + dt * (l_f * F[k, 0] - l_r * F[k, 1]) / I_z
+    keep = slice(None, None, 10)
+    return Recording(
+        name="made",
+        t=t[keep],
+        v_x=np.full(t.size, v)[keep],
+        v_y=v_y[:-1][keep],
+        r=r[:-1][keep],
+        delta_f=delta[keep],
+        delta_r=0.0 * t[keep],
+        a_y=(v_y_dot + v * r[:-1])[keep],
+        axle_force=F[keep],
+    )
+
+
+@pytest.fixture(scope="module")
+def driven() -> dict[str, Recording]:
+    return {car: drive(car) for car in CARS}
+
+
+def refusal(recording: Recording) -> str:
+    with pytest.raises(RecordingError) as caught:
+        check_physics(recording)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith(recording.name + ": ")
+    return message.removeprefix(recording.name + ": ")
+
+
+def scaled(**factors: float) -> Callable[[Recording], Recording]:
+    """Multiply signals; `bare=1` takes a_y and forces away, `silent=1` only a_y."""
+    bare, silent = factors.pop("bare", 0), factors.pop("silent", 0)
+
+    def plant(recording: Recording) -> Recording:
+        change = {k: getattr(recording, k) * f for k, f in factors.items()}
+        if bare or silent:
+            change["a_y"] = None
+        if bare:
+            change["axle_force"] = None
+        return replace(recording, **change)
+
+    return plant
+
+
+def forces(front: float, rear: float, order: int = 1) -> Callable[[Recording], Recording]:
+    def plant(recording: Recording) -> Recording:
+        assert recording.axle_force is not None
+        return replace(recording, axle_force=recording.axle_force[:, ::order] * [front, rear])
+
+    return plant
+
+
+# error -> how to plant it, how the message starts, what it asks for
+ON_MOTION = {
+    "r in degrees": (scaled(r=DEGREES), "r must be in rad/s", "pi/180"),
+    "r in degrees, bare": (scaled(r=DEGREES, bare=1), "r must be in rad/s", "pi/180"),
+    "delta in degrees": (scaled(delta_f=DEGREES), "delta_f must be", "pi/180"),
+    "delta in degrees, bare": (scaled(delta_f=DEGREES, bare=1), "delta_f must be", "pi/180"),
+    "both in degrees": (scaled(delta_f=DEGREES, r=DEGREES), ("delta_f", "r must"), "pi/180"),
+    "v_x in km/h": (scaled(v_x=3.6), "vx must be in m/s", "3.6"),
+    "all speeds in km/h": (scaled(v_x=3.6, v_y=3.6), "vx must be in m/s", "3.6"),
+    "v_x backward": (scaled(v_x=-1.0), "vx must point forward", "sign of vx"),
+    "delta to the right": (scaled(delta_f=-1.0), "delta_f must turn", "sign of delta_f"),
+    "r to the right, bare": (scaled(r=-1.0, bare=1), "delta_f must turn", "(or of r)"),
+    "a_y in g": (scaled(a_y=1 / 9.81), "ay must be", "9.81"),
+    "a_y to the right": (scaled(a_y=-1.0), "ay must be", "sign of ay"),
+    "a_y empty": (scaled(a_y=0.0), "ay must be", "leave the column ay out"),
+    "r to the right": (scaled(r=-1.0), "r contradicts ay", "change its sign"),
+}
+ON_V_Y = {"v_y to the right": (scaled(v_y=-1.0), "vy contradicts ay", "change its sign")}
+ON_FORCE = {
+    "forces to the right": (forces(-1, -1), "Fyf must push", "sign of Fyf"),
+    "front force to the right": (forces(-1, 1), "Fyf must push", "sign of Fyf"),
+    "rear force to the right": (forces(1, -1), "Fyr must push", "sign of Fyr"),
+    "forces swapped": (forces(1, 1, -1), "Fyf must turn", "swap"),
+    "forces in kN": (forces(1e-3, 1e-3), "Fyf and Fyr must be in N", "1000"),
+    "v_y to the right, no a_y": (
+        scaled(v_y=-1.0, silent=1),
+        "vy contradicts Fyf + Fyr",
+        "sign of vy",
+    ),
+}
+ALL = ON_MOTION | ON_V_Y | ON_FORCE
+
+
+@pytest.mark.parametrize("error", ALL)
+@pytest.mark.parametrize("car", CARS)
+def test_every_planted_error_rings_its_own_alarm(
+    driven: dict[str, Recording], car: str, error: str
+) -> None:
+    plant, start, remedy = ALL[error]
+    if car == "formula" and "km/h" in error:
+        start = ("vx must be in m/s",)  # 162 km/h: refused by its peak already
+    message = refusal(plant(driven[car]))
+    assert message.startswith(start)
+    assert remedy in message
+
+
+@pytest.mark.parametrize("car", CARS)
+@pytest.mark.parametrize("peak", [1.0, 3.0, 6.0])
+def test_a_right_recording_passes(car: str, peak: float) -> None:
+    made = drive(car, peak)
+    check_physics(made)
+    check_physics(replace(made, a_y=None, axle_force=None))
+    _, _, l_f, l_r, *_ = CARS[car]
+    check_against_vehicle(made, SimpleNamespace(l_f=l_f, l_r=l_r))
+    check_against_vehicle(replace(made, axle_force=None), SimpleNamespace(l_f=l_f, l_r=l_r))
+
+
+def test_one_degree_of_steering_in_degrees_is_found_without_acceleration() -> None:
+    made = drive("sedan", speed=25.0)
+    small = made.delta_f / np.abs(made.delta_f).max() / DEGREES
+    made = drive("sedan", speed=25.0, steering=lambda t: np.interp(t, made.t, small))
+    check_physics(made)
+    assert "effective wheelbase" in refusal(scaled(delta_f=DEGREES, bare=1)(made))
+
+
+@pytest.mark.parametrize("grip", [0.1, 0.3, 0.8])
+@pytest.mark.parametrize("speed", [8.0, 15.0, 25.0])
+def test_a_car_that_plows_over_its_front_wheels_passes(grip: float, speed: float) -> None:
+    """0.3 rad of steering on ice: the effective wheelbase is tens of meters, and true."""
+    check_physics(
+        drive(grip=grip, speed=speed, steering=lambda t: np.clip(0.1 * (t - 1.0), 0.0, 0.3))
+    )
+    check_physics(drive(grip=grip, speed=speed, steering=lambda t: 0.2 * np.sin(0.8 * t)))
+
+
+def test_a_drift_with_opposite_lock_passes() -> None:
+    """Steady: r > 0, sideslip -0.5 rad, wheels turned 0.2 rad to the right."""
+    t, v, r, beta = 0.01 * np.arange(1200), 12.0, 0.5, -0.5
+    wobble = 1.0 + 0.05 * np.sin(2.0 * t)
+    v_y = v * np.sin(beta) * wobble
+    made = Recording(
+        name="drift",
+        t=t,
+        v_x=np.full(t.size, v * np.cos(beta)),
+        v_y=v_y,
+        r=r * wobble,
+        delta_f=-0.2 * wobble,
+        delta_r=0 * t,
+        a_y=np.gradient(v_y, t) + v * np.cos(beta) * r * wobble,
+    )
+    check_physics(made)
+
+
+def test_noise_bias_bank_and_roll_do_not_ring(rng: np.random.Generator) -> None:
+    made = drive(peak=4.0)
+    n = len(made)
+    assert made.a_y is not None
+    for _ in range(5):
+        noisy = replace(
+            made,
+            v_x=made.v_x + 0.1 * rng.normal(size=n),
+            v_y=made.v_y + 0.05 * rng.normal(size=n) + rng.uniform(-0.1, 0.1),
+            r=made.r + 0.01 * rng.normal(size=n) + rng.uniform(-0.01, 0.01),
+            delta_f=made.delta_f + 0.002 * rng.normal(size=n) + rng.uniform(-0.01, 0.01),
+            a_y=1.1 * made.a_y + 0.5 * rng.normal(size=n) + rng.uniform(-0.5, 0.5),
+        )
+        check_physics(noisy)
+        check_physics(replace(noisy, a_y=None))
+
+
+def test_a_vibrating_sensor_on_a_steady_circle_does_not_ring(rng: np.random.Generator) -> None:
+    made = drive("tenth", steering=lambda t: 0.15 + 0.002 * np.sin(t))
+    part = made.between(4.0, 8.0)
+    assert part.a_y is not None
+    for _ in range(20):
+        slow = np.interp(part.t, np.arange(4.0, 9.0), rng.normal(size=5))
+        check_physics(replace(part, a_y=part.a_y + slow + rng.normal(size=len(part))))
+    assert "sign of ay" in refusal(replace(part, a_y=-part.a_y))
+
+
+def test_straight_short_and_standing_runs_pass_even_with_wrong_signs(
+    rng: np.random.Generator,
+) -> None:
+    straight = drive(peak=0.0)
+    noise = {k: 0.002 * rng.normal(size=len(straight)) for k in ("r", "delta_f", "v_y", "a_y")}
+    check_physics(replace(straight, **noise))
+    check_physics(scaled(delta_f=-1.0)(drive(duration=1.0)))
+    check_physics(replace(straight, v_x=0.01 * rng.normal(size=len(straight)), **noise))
+    with pytest.raises(RecordingError, match=r"delta_r must be .* below 1\.2, its peak is 3"):
+        check_physics(replace(straight, delta_r=np.full(len(straight), 3.0)))
+
+
+def test_a_mirrored_log_cannot_be_told_from_a_right_one() -> None:
+    """SAE or NED axes (y to the right, all signs turned) obey the same laws; documented."""
+    names = dict.fromkeys(("v_y", "r", "delta_f", "a_y", "axle_force"), -1.0)
+    check_physics(scaled(**names)(drive()))
+
+
+@pytest.mark.parametrize(
+    ("plant", "start"),
+    [
+        (scaled(r=DEGREES), ("vy and r must", "delta_f, r and vx")),
+        (scaled(delta_f=DEGREES), "delta_f, r and vx must fit the wheelbase"),
+        (scaled(delta_f=-1.0), "Fyf must rise with its slip angle"),
+        (forces(1, -1), "Fyr must rise"),
+        (forces(-1, 1), "Fyf must rise"),
+    ],
+)
+def test_the_vehicle_tells_slip_and_force_signs(
+    plant: Callable[[Recording], Recording], start: str | tuple[str, ...]
+) -> None:
+    with pytest.raises(RecordingError) as caught:
+        check_against_vehicle(plant(drive()), SimpleNamespace(l_f=1.25, l_r=1.45))
+    assert str(caught.value).removeprefix("made: ").startswith(start)
+
+
+def test_the_vehicle_tells_the_sign_of_v_y_at_speed_without_forces() -> None:
+    fast = drive(speed=40.0)
+    made = scaled(v_y=-1.0, bare=1)(fast)
+    check_against_vehicle(fast, SimpleNamespace(l_f=1.25, l_r=1.45))
+    with pytest.raises(RecordingError, match="lateral acceleration must rise with its slip"):
+        check_against_vehicle(made, SimpleNamespace(l_f=1.25, l_r=1.45))
+
+
+def test_the_vehicle_of_another_scale_is_refused() -> None:
+    with pytest.raises(RecordingError, match=r"wheelbase 0\.17 m"):
+        check_against_vehicle(drive(speed=6.0), SimpleNamespace(l_f=0.08, l_r=0.09))
+
+
+@pytest.mark.parametrize("file", ["carmaker.csv.gz", "dart.csv.gz"])
+def test_real_runs_pass_and_their_corruptions_ring(shared_data: Path, file: str) -> None:
+    path = shared_data / file
+    l_f, l_r = (0.924, 1.626) if file.startswith("car") else (0.0805, 0.093)
+    for run in runs(path):
+        real = read_recording(path, run)
+        assert real.name == f"{file.removesuffix('.csv.gz')}:{run}"
+        check_against_vehicle(real, SimpleNamespace(l_f=l_f, l_r=l_r))
+        errors = ALL if real.axle_force is not None else ON_MOTION | ON_V_Y
+        for part in (real, real.between(real.t[0] + 0.5 * real.duration, real.t[-1])):
+            check_physics(part)
+            for error, (plant, start, remedy) in errors.items():
+                if part is real or "v_y" not in error:
+                    message = refusal(plant(part))
+                    assert message.startswith(start), (run, error, message)
+                    assert remedy in message

@@ -1,0 +1,254 @@
+"""Files: what is read, how it is resampled, and what is refused with which line."""
+
+import gzip
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pyarrow
+import pyarrow.parquet
+import pytest
+
+from models.recordings import RecordingError, read_recording, runs, split_log_argument
+
+HEADER = "t,vx,vy,r,delta_f"
+
+
+def rows(n: int = 60, dt: float = 0.01, start: float = 0.0) -> list[str]:
+    return [f"{start + k * dt:.6f},20,0,0,0" for k in range(n)]
+
+
+def write(path: Path, header: str, lines: list[str]) -> Path:
+    text = "\n".join([header, *lines]) + "\n"
+    path.write_bytes(gzip.compress(text.encode()) if path.suffix == ".gz" else text.encode())
+    return path
+
+
+def refusal(path: Path, run: str | None = None, dt: float = 0.01) -> str:
+    with pytest.raises(RecordingError) as caught:
+        read_recording(path, run, dt)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith(str(path))
+    return message.removeprefix(str(path))
+
+
+def test_other_columns_order_spaces_quotes_and_byte_order_marks_do_not_matter(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "log.csv"
+    lines = [f'note;"x",{0.001 * k}, 1 ,"2",20,{k * 0.01:.2f}' for k in range(60)]
+    path.write_text("﻿junk,delta_f, r,vy,vx,t\n\n" + "\r\n".join(lines), encoding="utf-8")
+    got = read_recording(path, check=False)
+    assert got.name == "log"
+    assert got.delta_f[3] == 0.003
+    assert np.all(got.r == 1.0)
+    assert np.all(got.v_y == 2.0)
+    assert np.all(got.delta_r == 0.0)
+    assert got.a_y is None
+    assert got.axle_force is None
+
+
+def test_runs_are_listed_chosen_and_named(tmp_path: Path) -> None:
+    lines = [line + ",b" for line in rows()] + [line + ",a" for line in rows(start=7.0)]
+    path = write(tmp_path / "two.laps.csv.gz", HEADER + ",run", lines)
+    assert runs(path) == ["b", "a"]
+    assert read_recording(path, "a").name == "two.laps:a"
+    assert read_recording(path, "a").t[0] == 7.0
+    assert refusal(path).endswith("name one of its runs: b, a")
+    assert "no run 'c', the runs are: b, a" in refusal(path, "c")
+    single = write(tmp_path / "one.csv", HEADER + ",run", [line + ",only" for line in rows()])
+    assert read_recording(single).name == "one:only"
+    plain = write(tmp_path / "plain.csv", HEADER, rows())
+    assert runs(plain) == []
+    assert "no column run" in refusal(plain, "a")
+
+
+def test_parquet_gives_the_same_as_csv(tmp_path: Path) -> None:
+    t = 0.01 * np.arange(60)
+    columns = {"t": t, "vx": t + 20, "vy": 0 * t, "r": 0 * t, "delta_f": 0 * t, "run": ["a"] * 60}
+    path = tmp_path / "log.parquet"
+    pyarrow.parquet.write_table(pyarrow.table(columns | {"other": ["x"] * 60}), path)
+    got = read_recording(path)
+    assert got.name == "log:a"
+    assert np.array_equal(got.v_x, t + 20)
+    assert runs(path) == ["a"]
+    pyarrow.parquet.write_table(pyarrow.table(columns | {"vx": ["fast"] * 60}), path)
+    assert "vx must be numeric" in refusal(path)
+    pyarrow.parquet.write_table(pyarrow.table(columns | {"r": [None] + [0.0] * 59}), path)
+    assert "r must be finite, 1 of 60" in refusal(path)
+
+
+def test_parquet_without_pyarrow_names_the_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "log.parquet"
+    path.write_bytes(b"PAR1")
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert "pip install tireid[parquet]" in refusal(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "rule"),
+    [
+        ("a.csv", b"", "is empty"),
+        ("a.csv", b"\n \n", "is empty"),
+        ("a.csv", b"t,vx,vy,r,delta_f\n", "no row of data"),
+        ("a.csv", b"\x89PNG\r\n\x1a\n\xff\xfe", "not a text file"),
+        ("a.csv", b"t,vx\0", "binary"),
+        ("a.csv", gzip.compress(b"t"), "is gzip, rename"),
+        ("a.csv.gz", b"t,vx,vy,r,delta_f\n", "is not gzip"),
+        ("a.csv.gz", gzip.compress(b"t,vx\n" * 9)[:-9], "damaged or cut off"),
+        ("a.csv.gz", gzip.compress(b"t,vx\n" * 9)[:12] + b"junkjunk", "damaged or cut off"),
+        ("a.parquet", b"t,vx,vy,r,delta_f\n", "not a Parquet file"),
+        ("a.parquet", b"", "not a Parquet file"),
+        ("a.mat", b"MATLAB", "must end in one of .csv"),
+        ("a.csv", b"t;vx;vy;r;delta_f\n0;1;2;3;4\n", "separated by commas"),
+        ("a.csv", b"hello world\nhow are you\n", "column t, vx, vy, r, delta_f is missing"),
+    ],
+)
+def test_a_file_that_is_no_log_is_refused(
+    tmp_path: Path, name: str, content: bytes, rule: str
+) -> None:
+    (tmp_path / name).write_bytes(content)
+    assert rule in refusal(tmp_path / name)
+
+
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
+    assert "no such file" in refusal(tmp_path / "nowhere.csv")
+    assert "no such file" in refusal(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("header", "rule"),
+    [
+        ("t,Vx,vy,r,delta_f", "column vx is missing; did you mean 'Vx' for vx"),
+        ("time,vx,vy,r,delta_f", "'time' for t"),
+        ("t,vx,vy,yaw_rate,delta", "'yaw_rate' for r, 'delta' for delta_f"),
+        ("t,v_x,vy,r,delta_f", "'v_x' for vx"),
+        ("t,vx,vy,r [rad/s],delta_f", "'r [rad/s]' for r"),
+        ("t,vx,vy,vx,delta_f", "column vx appears more than once"),
+        ("t,vx,vy,r,steer_cmd", "column delta_f is missing"),
+    ],
+)
+def test_a_missing_or_doubled_column_is_named_with_what_was_meant(
+    tmp_path: Path, header: str, rule: str
+) -> None:
+    assert rule in refusal(write(tmp_path / "a.csv", header, rows()))
+
+
+def test_one_axle_force_alone_is_refused(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", HEADER + ",Fyf", [line + ",0" for line in rows()])
+    assert "Fyf needs its partner" in refusal(path)
+
+
+@pytest.mark.parametrize(
+    ("cell", "rule"),
+    [
+        ("fast", "vx must be numeric, line 12 has 'fast'"),
+        ("1;5", "vx must be numeric, line 12 has '1;5'"),
+        ("", "vx must be finite, 1 of 60 values are empty, NaN or infinite, the first in line 12"),
+        ("nan", "the first in line 12"),
+        ("inf", "the first in line 12"),
+        ("1,5", "line 12 has 6 cells, the header has 5"),
+    ],
+)
+def test_a_bad_cell_is_named_with_its_line(tmp_path: Path, cell: str, rule: str) -> None:
+    lines = rows()
+    lines[10] = f"0.10,{cell},0,0,0"
+    assert rule in refusal(write(tmp_path / "a.csv", HEADER, lines))
+
+
+def test_time_must_rise_in_seconds_without_gaps(tmp_path: Path) -> None:
+    path, lines = tmp_path / "a.csv", rows(400)
+    write(path, HEADER, [*lines[:50], lines[49], *lines[50:]])
+    assert "t must increase, line 52 has 0.49 after 0.49" in refusal(path)
+    write(path, HEADER, lines[:50] + lines[:50])
+    assert "several runs in one file need a column run" in refusal(path)
+    write(path, HEADER, lines[:50] + lines[61:])
+    assert "t has a gap of 0.12 s after 0.49 s (line 52)" in refusal(path)
+    write(path, HEADER, lines[:50] + lines[58:])
+    assert read_recording(path).t.size == 400  # eight lost samples are bridged
+    write(path, HEADER, rows(dt=10.0))
+    assert "milliseconds? divide by 1000" in refusal(path)
+    write(path, HEADER, rows(dt=0.2))
+    assert "at least 10 samples per second" in refusal(path)
+    write(path, HEADER, rows(8))
+    assert "there are 8 rows" in refusal(path)
+    write(path, HEADER, rows(60, dt=0.001))
+    assert "lasts 0.05 s" in refusal(path)
+
+
+@pytest.mark.parametrize("source", [0.001, 0.0025, 0.004, 0.02, 0.05])
+def test_resampling_keeps_a_maneuver_without_lag(tmp_path: Path, source: float) -> None:
+    t = source * np.arange(round(4.0 / source) + 1)
+    lines = [f"{a:.6f},20,{np.sin(2 * np.pi * a):.9f},0,0" for a in t]
+    got = read_recording(write(tmp_path / "a.csv", HEADER, lines), check=False)
+    assert got.dt == 0.01
+    assert got.t[-1] == pytest.approx(4.0)
+    error = got.v_y - np.sin(2 * np.pi * got.t)
+    assert np.abs(error).max() < (2 * np.pi * max(source, 0.01)) ** 2 / 8 * 1.01
+    assert abs(error @ np.cos(2 * np.pi * got.t)) / got.t.size < 1e-4  # in phase
+
+
+def test_resampling_does_not_fold_noise_above_the_new_rate_into_the_maneuver(
+    tmp_path: Path,
+) -> None:
+    """At 100 Hz a tone of 102 Hz would look like 2 Hz; the mean over a step removes it."""
+    t = 0.001 * np.arange(2001)
+    lines = [f"{a:.6f},20,{np.sin(2 * np.pi * 102 * a):.9f},0,0" for a in t]
+    got = read_recording(write(tmp_path / "a.csv", HEADER, lines), check=False)
+    assert np.abs(got.v_y[1:-1]).max() < 0.03
+
+
+def test_uneven_time_stamps_are_brought_to_the_grid(
+    tmp_path: Path, rng: np.random.Generator
+) -> None:
+    t = np.cumsum(rng.uniform(0.005, 0.015, 500))
+    lines = [f"{a:.9f},{20 + 3 * a:.9f},0,0,0" for a in t]
+    got = read_recording(write(tmp_path / "a.csv", HEADER, lines), check=False)
+    assert np.allclose(np.diff(got.t), 0.01)
+    assert np.allclose(got.v_x, 20 + 3 * got.t, atol=1e-7)  # a straight line stays one
+
+
+def test_a_log_argument_is_split_at_the_right_colon(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert split_log_argument("a/log.csv.gz:lap:2") == (Path("a/log.csv.gz"), "lap:2")
+    assert split_log_argument("log.csv") == (Path("log.csv"), None)
+    assert split_log_argument("C:\\logs\\log.csv") == (Path("C:\\logs\\log.csv"), None)
+    assert split_log_argument("C:/log.parquet:a") == (Path("C:/log.parquet"), "a")
+    assert split_log_argument("da:y/log.csv:a") == (Path("da:y/log.csv"), "a")
+    monkeypatch.chdir(tmp_path)
+    Path("log.csv:a").touch()
+    assert split_log_argument("log.csv:a") == (Path("log.csv:a"), None)
+
+
+def test_a_hundred_thousand_rows_read_in_seconds(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv.gz", HEADER, rows(100_000))
+    began = time.perf_counter()
+    read_recording(path)
+    assert time.perf_counter() - began < 5.0  # 0.5 s when the machine is idle
+
+
+def test_columns_of_another_name_are_read_when_named(tmp_path):
+    log = tmp_path / "log.csv"
+    rows = [f"{0.01 * k:.2f},10,0,0.01,0.002" for k in range(100)]
+    log.write_text("\n".join(["time,vx,vy,yaw_rate,delta_f", *rows]))
+    recording = read_recording(log, columns={"t": "time", "r": "yaw_rate"})
+    np.testing.assert_allclose(recording.r, 0.01)
+    with pytest.raises(RecordingError, match="no column 'yawrate' to read as r"):
+        read_recording(log, columns={"t": "time", "r": "yawrate"})
+    with pytest.raises(RecordingError, match="'rate' is no column of ours"):
+        read_recording(log, columns={"rate": "yaw_rate"})
+
+
+def test_inverse_forces_stand_in_where_none_were_measured(tmp_path):
+    log = tmp_path / "log.csv"
+    rows = [f"{0.01 * k:.2f},10,0,0.01,0.002,3,4" for k in range(100)]
+    log.write_text("\n".join(["t,vx,vy,r,delta_f,Fyf_inv,Fyr_inv", *rows]))
+    np.testing.assert_array_equal(read_recording(log).axle_force[0], [3.0, 4.0])
+    both = [row + ",5,6" for row in rows]
+    log.write_text("\n".join(["t,vx,vy,r,delta_f,Fyf_inv,Fyr_inv,Fyf,Fyr", *both]))
+    np.testing.assert_array_equal(read_recording(log).axle_force[0], [5.0, 6.0])

@@ -1,0 +1,94 @@
+"""Sensors do what their numbers say, and nothing else."""
+
+import math
+
+import numpy as np
+import pytest
+
+from models.recordings import Recording
+from models.sensors import Sensor, SensorError, Sensors
+
+N = 20001
+T = 0.01 * np.arange(N)
+
+
+def exact(rear: float = 0.0) -> Recording:
+    wave = np.sin(2.0 * math.pi * 0.3 * T)
+    return Recording(
+        name="exact",
+        t=T,
+        v_x=20.0 + wave,
+        v_y=0.5 * wave,
+        r=0.3 * wave,
+        delta_f=0.05 * wave,
+        delta_r=rear * wave,
+        a_y=6.0 * wave,
+        axle_force=np.column_stack((5000.0 * wave, 4000.0 * wave)),
+    )
+
+
+def test_perfect_sensors_change_nothing(rng):
+    recording, measured = exact(), Sensors().apply(exact(), rng)
+    for key in ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y", "axle_force"):
+        np.testing.assert_array_equal(getattr(measured, key), getattr(recording, key))
+
+
+def test_noise_and_bias_have_their_size_and_the_truth_stays_exact(rng):
+    sensors = Sensors(
+        v_y=Sensor(noise=0.05, bias=0.2), r=Sensor(noise=0.004), delta=Sensor(bias=-0.01)
+    )
+    recording, measured = exact(), sensors.apply(exact(), rng)
+    error = measured.v_y - recording.v_y
+    assert np.mean(error) == pytest.approx(0.2, abs=5 * 0.05 / math.sqrt(N))
+    assert np.std(error) == pytest.approx(0.05, rel=0.03)
+    assert np.std(measured.r - recording.r) == pytest.approx(0.004, rel=0.03)
+    assert np.corrcoef(error, measured.r - recording.r)[0, 1] == pytest.approx(0.0, abs=0.04)
+    np.testing.assert_allclose(measured.delta_f, recording.delta_f - 0.01, rtol=1e-14)
+    np.testing.assert_array_equal(measured.v_x, recording.v_x)
+    np.testing.assert_array_equal(measured.axle_force, recording.axle_force)
+
+
+def test_noise_is_white(rng):
+    error = Sensor(noise=1.0).measure(T, np.zeros(N), rng)
+    assert np.corrcoef(error[1:], error[:-1])[0, 1] == pytest.approx(0.0, abs=0.04)
+
+
+def test_a_delayed_signal_is_the_signal_some_time_ago(rng):
+    delay = 0.0137
+    measured = Sensor(delay=delay).measure(T, np.sin(T), rng)
+    np.testing.assert_allclose(measured[2:], np.sin(T - delay)[2:], atol=0.01**2 / 8.0)
+    assert measured[0] == 0.0
+
+
+def test_resolution_rounds_to_its_grid(rng):
+    recording = exact()
+    measured = Sensors(r=Sensor(resolution=0.01)).apply(recording, rng).r
+    np.testing.assert_allclose(measured / 0.01, np.round(measured / 0.01), atol=1e-9)
+    assert np.abs(measured - recording.r).max() == pytest.approx(0.005, rel=0.05)
+
+
+def test_the_same_generator_state_is_the_same_noise():
+    sensors = Sensors(v_x=Sensor(noise=0.1))
+    one = sensors.apply(exact(), np.random.default_rng(1))
+    two = sensors.apply(exact(), np.random.default_rng(1))
+    three = sensors.apply(exact(), np.random.default_rng(2))
+    np.testing.assert_array_equal(one.v_x, two.v_x)
+    assert np.abs(one.v_x - three.v_x).max() > 0.01
+
+
+def test_an_axle_that_does_not_steer_has_no_steering_sensor(rng):
+    sensors = Sensors(delta=Sensor(noise=0.01))
+    assert np.all(sensors.apply(exact(), rng).delta_r == 0.0)
+    assert np.any(sensors.apply(exact(rear=0.02), rng).delta_r != exact(rear=0.02).delta_r)
+
+
+@pytest.mark.parametrize("key", ["noise", "delay", "resolution"])
+def test_negative_numbers_are_refused_by_name(key):
+    with pytest.raises(SensorError, match=key):
+        Sensor(**{key: -1e-3})
+
+
+@pytest.mark.parametrize("key", ["noise", "bias", "delay", "resolution"])
+def test_nan_is_refused_by_name(key):
+    with pytest.raises(SensorError, match=key):
+        Sensor(**{key: math.nan})

@@ -1,0 +1,153 @@
+"""The car as data: what is refused, what comes back from a file, and the documented sedan."""
+
+import math
+from dataclasses import FrozenInstanceError, replace
+from pathlib import Path
+
+import pytest
+
+from models.bicycle import BicycleParameters
+from models.tires import MagicFormula
+from models.vehicle import GRAVITY, Chassis, Vehicle, VehicleError, sedan
+
+SIX = """mass = 1500
+yaw_inertia = 2500.0
+l_f = 1.1
+l_r = 1.6
+cornering_stiffness_front = 1.2e5
+cornering_stiffness_rear = 110000.0
+"""
+NUMBERS = ("mass", "yaw_inertia", "l_f", "l_r", "cornering_stiffness_front")
+
+
+def written(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "car.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
+@pytest.mark.parametrize("key", NUMBERS)
+def test_a_number_that_is_not_positive_and_finite_is_refused_by_name(key, value):
+    with pytest.raises(VehicleError, match=key):
+        replace(sedan(), **{key: value})
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("roll_stiffness_front_share", 1.01),
+        ("drive_front_share", -0.01),
+        ("drive_front_share", math.nan),
+        ("roll_center_height_front", 0.6),
+        ("roll_camber_rear", math.nan),
+        ("relaxation_length_rear", 0.0),
+        ("roll_damping", math.nan),
+    ],
+)
+def test_a_chassis_value_outside_its_range_is_refused_by_name(key, value):
+    with pytest.raises(VehicleError, match=key):
+        replace(sedan().require_chassis(), **{key: value})
+
+
+def test_springs_too_soft_for_the_body_are_refused():
+    car = sedan()
+    soft = replace(car.require_chassis(), roll_stiffness=0.99 * car.weight * car.roll_arm)
+    with pytest.raises(VehicleError, match="roll_stiffness"):
+        replace(car, chassis=soft)
+
+
+def test_a_vehicle_cannot_be_changed():
+    with pytest.raises(FrozenInstanceError):
+        sedan().mass = 1.0  # type: ignore[misc]
+
+
+def test_axle_loads_balance_weight_and_pitch_moment():
+    car = sedan()
+    front, rear = car.axle_loads
+    assert front + rear == pytest.approx(car.mass * GRAVITY, rel=1e-15)
+    assert front * car.l_f == pytest.approx(rear * car.l_r, rel=1e-15)
+
+
+def test_six_flat_keys_are_a_vehicle(tmp_path):
+    car = Vehicle.from_toml(written(tmp_path, SIX))
+    assert car.bicycle == BicycleParameters(1500.0, 2500.0, 1.1, 1.6, 1.2e5, 1.1e5)
+    assert isinstance(car.mass, float)
+    assert car.chassis is None
+    with pytest.raises(VehicleError, match="chassis"):
+        car.require_chassis()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (SIX + "masss = 1.0\n", "masss is unknown"),
+        (SIX.replace("mass = 1500\n", ""), "mass is missing"),
+        (SIX.replace("1500", '"1500"'), "mass must be a number"),
+        (SIX.replace("1500", "true"), "mass must be a number"),
+        (SIX.replace("1500", "-3"), "mass must be positive"),
+        (SIX.replace("1500", "nan"), "mass must be positive"),
+        (SIX + "name = 3\n", "name must be a text"),
+        (SIX + "chassis = 3\n", "chassis must be a table"),
+        (SIX + "[chassis]\ntrack = 1.5\n", "chassis.track is unknown"),
+        (SIX + "[chassis]\ntrack_front = 1.5\n", "chassis.track_rear is missing"),
+        ("mass = = 3", "must be TOML"),
+    ],
+)
+def test_a_wrong_file_is_one_line_with_file_key_and_rule(tmp_path, text, said):
+    path = written(tmp_path, text)
+    with pytest.raises(VehicleError) as caught:
+        Vehicle.from_toml(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert said in message
+    assert "\n" not in message
+
+
+def test_a_missing_file_says_so(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        Vehicle.from_toml(tmp_path / "none.toml")
+
+
+def test_a_vehicle_comes_back_from_its_file_bit_for_bit(tmp_path, rng):
+    for number in range(20):
+        scale = 1.0 + 0.3 * rng.random(3)
+        chassis = replace(sedan().require_chassis(), roll_damping=6000.0 * scale[1] ** 17)
+        name = 'a "quoted" \\ name with\ttab, ü and \x7f'
+        car = replace(
+            sedan(), name=name, mass=1000.0 * scale[0] / 3.0, l_f=scale[2], chassis=chassis
+        )
+        path = tmp_path / f"car{number}.toml"
+        car.to_toml(path)
+        assert Vehicle.from_toml(path) == car
+
+
+def test_a_file_is_not_overwritten_unless_asked(tmp_path):
+    path = written(tmp_path, "precious")
+    with pytest.raises(FileExistsError):
+        sedan().to_toml(path)
+    assert path.read_text() == "precious"
+    sedan().to_toml(path, overwrite=True)
+    assert Vehicle.from_toml(path) == sedan()
+
+
+def test_the_tire_is_found_from_the_folder_of_the_vehicle_file(tmp_path):
+    chassis = sedan().require_chassis()
+    (tmp_path / "sub").mkdir()
+    moved = replace(sedan(), chassis=replace(chassis, tire=tmp_path / "tires" / "t.tir"))
+    moved.to_toml(tmp_path / "sub" / "car.toml")
+    assert '"../tires/t.tir"' in (tmp_path / "sub" / "car.toml").read_text()
+
+
+def test_the_sedan_has_the_stiffness_of_its_tires_and_understeers():
+    car = sedan()
+    tire = MagicFormula.from_tir(car.require_chassis().tire)
+    _, _, l_f, l_r, C_f, C_r = car.bicycle
+    for stiffness, load in zip((C_f, C_r), car.axle_loads, strict=True):
+        assert stiffness == pytest.approx(2.0 * tire.cornering_stiffness(load / 2.0), rel=0.005)
+    assert l_r * C_r > l_f * C_f
+
+
+def test_no_physical_value_of_a_chassis_has_a_default():
+    with pytest.raises(TypeError):
+        Chassis(track_front=1.5)  # type: ignore[call-arg]

@@ -1,0 +1,166 @@
+"""Linear, Fiala and Dugoff tires: slopes, limits, and their integrals done another way."""
+
+from math import atan, hypot, isfinite, nan, pi, tan
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from models.tires import DugoffTire, FialaTire, LinearTire, Tire
+
+LINEAR = LinearTire(C_alpha=60e3, C_kappa=80e3)
+FIALA = FialaTire(C_alpha=60e3, C_kappa=80e3, friction=0.9)
+DUGOFF = DugoffTire(C_alpha=60e3, C_kappa=80e3, friction=0.9)
+TIRES = pytest.mark.parametrize("tire", [LINEAR, FIALA, DUGOFF], ids=["linear", "fiala", "dugoff"])
+LIMITED = pytest.mark.parametrize("tire", [FIALA, DUGOFF], ids=["fiala", "dugoff"])
+
+
+@TIRES
+@pytest.mark.parametrize("F_z", [-1.0, 0.0, 1.0, 4000.0])
+def test_stiffnesses_are_the_derivatives_at_zero_slip(tire: Tire, F_z: float) -> None:
+    slip = ca.SX.sym("slip", 2)
+    F = tire.forces(slip[0], slip[1], 0.0, F_z)
+    J = np.array(ca.Function("J", [slip], [ca.jacobian(ca.vertcat(*F), slip)])([0.0, 0.0]))
+    assert J[0, 1] == pytest.approx(tire.slip_stiffness(F_z), rel=1e-6)
+    assert J[1, 0] == pytest.approx(tire.cornering_stiffness(F_z), rel=1e-6)
+    assert J[0, 0] == J[1, 1] == 0.0
+    assert J[1, 0] == pytest.approx(60e3 if F_z > 0.0 else 0.0, rel=1e-6)
+
+
+@TIRES
+def test_forces_are_odd_in_the_slips_and_none_in_the_air(tire: Tire) -> None:
+    F = tire.forces(0.05, 0.0, 0.0, 4000.0)
+    assert tire.forces(-0.05, 0.0, 0.0, 4000.0) == (F.F_x, -F.F_y)
+    assert F.F_y > 1000.0
+    assert tire.forces(0.05, 0.1, 0.0, 0.0) == tire.forces(0.05, 0.1, 0.0, -50.0) == (0.0, 0.0)
+
+
+@LIMITED
+@settings(max_examples=200, deadline=None)
+@given(
+    alpha=st.floats(-7.0, 7.0),
+    kappa=st.floats(-3.0, 30.0),
+    F_z=st.floats(-1e3, 2e4),
+    mu=st.floats(0.0, 1.5),
+)
+def test_no_slip_leaves_the_friction_circle(
+    tire: Tire, alpha: float, kappa: float, F_z: float, mu: float
+) -> None:
+    F = tire.forces(alpha, kappa, 0.0, F_z, mu)
+    assert all(isinstance(f, float) and isfinite(f) for f in F)
+    assert hypot(*F) <= 0.9 * mu * max(F_z, 0.0) * (1.0 + 1e-9) + 1e-300  # subnormal digits
+
+
+@LIMITED
+@pytest.mark.parametrize("kappa", [-1.0, -1.5])
+def test_a_locked_wheel_slides_with_all_its_friction(tire: Tire, kappa: float) -> None:
+    F = tire.forces(0.1, kappa, 0.0, 4000.0)
+    assert hypot(*F) == pytest.approx(0.9 * 4000.0, rel=1e-3)
+    assert F.F_x < -3000.0
+    assert F.F_y > 0.0
+
+
+@LIMITED
+def test_a_wheel_that_rolls_backwards_slips_by_the_angle_to_its_axis(tire: Tire) -> None:
+    forward, backward = (tire.forces(alpha, 0.02, 0.0, 4000.0) for alpha in (0.05, pi - 0.05))
+    assert backward == pytest.approx(forward, rel=1e-9)
+    beyond = [tire.forces(alpha, 0.0, 0.0, 4000.0).F_y for alpha in (1.5, pi / 2, 1.6)]
+    assert beyond == pytest.approx([0.9 * 4000.0] * 3, rel=0.01)
+
+
+@LIMITED
+def test_derivatives_are_finite_everywhere(tire: Tire) -> None:
+    x = ca.SX.sym("x", 5)
+    J = ca.Function("J", [x], [ca.jacobian(ca.vertcat(*tire.forces(*ca.vertsplit(x))), x)])
+    for alpha in (0.0, 0.1, pi / 2, pi):
+        for kappa in (0.0, -1.0, 5.0):
+            for F_z in (-1.0, 0.0, 1e-9, 4000.0):
+                for mu in (0.0, 1.0):
+                    assert np.isfinite(np.array(J([alpha, kappa, 0.0, F_z, mu]))).all()
+
+
+@LIMITED
+@pytest.mark.parametrize("spoiled", range(5))
+def test_a_number_that_is_none_is_not_hidden(tire: Tire, spoiled: int) -> None:
+    point = [0.05, 0.02, 0.0, 4000.0, 1.0]
+    point[spoiled] = nan
+    finite = all(isfinite(f) for f in tire.forces(*point))
+    assert finite == (spoiled == 2)  # camber has no effect
+
+
+def test_fiala_is_the_integral_over_its_bristles() -> None:
+    """Bristle deflection limited by μ times the parabolic pressure, summed along the contact."""
+    F_z, C, mu = 4000.0, 60e3, 0.9
+    front_to_rear = (np.arange(200_000) + 0.5) / 200_000
+    pressure = 6.0 * F_z * front_to_rear * (1.0 - front_to_rear)
+    for alpha in (0.01, 0.05, 0.1, 0.17, 0.178, 0.179, 0.3):
+        adhesion = 2.0 * C * tan(alpha) * front_to_rear
+        integral = np.minimum(adhesion, mu * pressure).mean()
+        assert FIALA.forces(alpha, 0.0, 0.0, F_z).F_y == pytest.approx(integral, rel=1e-6)
+
+
+def test_fiala_slides_at_three_mu_F_z_and_smoothly() -> None:
+    alpha = ca.SX.sym("alpha")
+    F_y = FIALA.forces(alpha, 0.0, 0.0, 4000.0).F_y
+    slope = ca.Function("slope", [alpha], [F_y, ca.jacobian(F_y, alpha)])
+    sliding = atan(3.0 * 0.9 * 4000.0 / 60e3)
+    before, after = (slope(sliding + step) for step in (-1e-6, 1e-6))
+    assert float(after[0]) == pytest.approx(0.9 * 4000.0, rel=1e-12)
+    assert float(after[1]) == pytest.approx(0.0, abs=1e-6)
+    assert float(before[1]) == pytest.approx(0.0, abs=1e-3)  # N/rad, of 60 000
+    assert float(slope(0.9 * sliding)[1]) > 100.0
+
+
+def test_fiala_in_combined_slip_is_fiala_along_the_demand() -> None:
+    """With equal stiffnesses the force depends on |σ| alone and points along σ."""
+    tire = FialaTire(C_alpha=60e3, C_kappa=60e3, friction=0.9)
+    for alpha, kappa in ((0.05, 0.03), (0.02, -0.2), (0.3, 0.4)):
+        sigma = np.array([kappa, tan(alpha)]) / (1.0 + kappa)
+        size = float(np.hypot(*sigma))
+        alone = tire.forces(atan(size), 0.0, 0.0, 4000.0).F_y
+        F = tire.forces(alpha, kappa, 0.0, 4000.0)
+        assert np.array(F) == pytest.approx(alone * sigma / size, rel=1e-9)
+
+
+def test_dugoff_is_linear_while_less_than_half_the_friction_is_used() -> None:
+    F = DUGOFF.forces(0.02, 0.0, 0.0, 4000.0)
+    assert F.F_y == pytest.approx(60e3 * tan(0.02), rel=1e-12)
+    assert F.F_x == 0.0
+    both = DUGOFF.forces(0.01, 0.015, 0.0, 4000.0)
+    expected = (80e3 * 0.015 / 1.015, 60e3 * tan(0.01) / 1.015)
+    assert hypot(*both) < 0.5 * 0.9 * 4000.0
+    assert both == pytest.approx(expected, rel=1e-12)
+    beyond = DUGOFF.forces(0.04, 0.0, 0.0, 4000.0)
+    assert beyond.F_y < 0.99 * 60e3 * tan(0.04)
+
+
+@pytest.mark.parametrize("slip", [(0.1, 0.0), (0.1, 0.2), (-0.3, -0.4), (0.0, 0.5)])
+def test_dugoff_is_its_published_formula(slip: tuple[float, float]) -> None:
+    alpha, kappa = slip
+    demand = 2.0 * hypot(80e3 * kappa, 60e3 * tan(alpha))
+    lam = 0.9 * 4000.0 * (1.0 + kappa) / demand
+    f = (2.0 - lam) * lam if lam < 1.0 else 1.0
+    expected = (80e3 * kappa / (1 + kappa) * f, 60e3 * tan(alpha) / (1 + kappa) * f)
+    assert DUGOFF.forces(alpha, kappa, 0.0, 4000.0) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
+@TIRES
+@pytest.mark.parametrize("kind", [ca.SX, ca.MX])
+def test_symbols_and_floats_give_the_same_force(tire: Tire, kind: Any) -> None:
+    point = (0.06, -0.04, 0.03, 3500.0, 0.8)
+    x = [kind.sym(name) for name in ("alpha", "kappa", "gamma", "F_z", "mu")]
+    values = ca.Function("f", x, list(tire.forces(*x))).call(list(point))
+    assert [float(v) for v in values] == pytest.approx(tire.forces(*point), rel=1e-13)
+
+
+@pytest.mark.parametrize("bad", [0.0, -1.0, nan, float("inf")])
+def test_parameters_that_are_not_positive_are_refused(bad: float) -> None:
+    with pytest.raises(ValueError, match="C_alpha must be positive"):
+        LinearTire(C_alpha=bad, C_kappa=1.0)
+    with pytest.raises(ValueError, match="C_kappa must be positive"):
+        DugoffTire(C_alpha=1.0, C_kappa=bad, friction=1.0)
+    with pytest.raises(ValueError, match="friction must be positive"):
+        FialaTire(C_alpha=1.0, C_kappa=1.0, friction=bad)

@@ -1,0 +1,261 @@
+"""Tire property files as the world writes them, and the lines that say what is wrong with one."""
+
+import re
+from math import inf, radians
+from pathlib import Path
+
+import pytest
+
+from models.tires import MagicFormula, TirError, read_tir
+
+ESSENTIAL = {
+    "FNOMIN": "4000",
+    "PCX1": "1.6",
+    "PDX1": "1.1",
+    "PKX1": "22",
+    "PCY1": "1.3",
+    "PDY1": "1.0",
+    "PKY1": "-19",
+    "PKY2": "1.9",
+}
+PLAIN = "\n".join(f"{key} = {value}" for key, value in ESSENTIAL.items())
+
+
+def written(folder: Path, text: str | bytes) -> Path:
+    path = folder / "odd.tir"
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    return path
+
+
+def edited(**changes: str | None) -> str:
+    """A small complete file with values replaced, added, or (None) removed."""
+    lines = {**ESSENTIAL, **changes}
+    return "\n".join(f"{key} = {value}" for key, value in lines.items() if value is not None)
+
+
+def complaint(folder: Path, text: str | bytes) -> str:
+    """The one line about a file, without its path."""
+    path = written(folder, text)
+    with pytest.raises(TirError) as error:
+        MagicFormula.from_tir(path)
+    message = str(error.value)
+    assert isinstance(error.value, ValueError)
+    assert message.startswith(f"{path}: ")
+    assert "\n" not in message
+    return message.removeprefix(f"{path}: ")
+
+
+def test_eight_coefficients_are_a_tire(tmp_path: Path) -> None:
+    tire = MagicFormula.from_tir(written(tmp_path, PLAIN))
+    assert tire.name == "odd"
+    assert tire.side == "left"
+    assert tire.valid_range.F_z == (-inf, inf)
+    assert tire.coefficients.LMUY == 1.0
+    assert tire.coefficients.PDY2 == 0.0
+    assert tire.forces(0.3, 0.0, 0.0, 4000.0).F_y == pytest.approx(4000.0, rel=0.05)
+
+
+def test_a_file_of_odd_habits_means_the_same_tire(tmp_path: Path) -> None:
+    odd = """\ufeff$ file of an unknown program $ with = signs ! in comments
+[mdi_header]
+ FILE_TYPE='tir'
+(COMMENTS)
+{comment_string}
+'Reifen, Straße $ 5 ! gemessen'
+[Units]
+Length\t= 'MM'   $ lengths
+force = "kN"
+ANGLE = 'Degrees' ! not for coefficients
+TIME  = 'millisecond'
+[MODEL]
+property_file_format = 'pac2002' $Tire property type
+TYRESIDE = 'Right'
+[DIMENSION]
+unloaded_radius = 316
+[VERTICAL]
+fnomin\t=\t4.0   $ kN
+VERTICAL_STIFFNESS = .21
+[DEFLECTION_LOAD_CURVE]
+{pen fz}
+0 0.0
+10 2.0
+[SHAPE]
+{radial width}
+ 1.0    0.0
+ 0.9    1.0
+[INVENTED_SECTION]
+HELLO = world and more
+PI = 3.14159 is pi
+[VERTICAL_FORCE_RANGE]
+FZMIN = 0.2
+FZMAX = 9
+[SLIP_ANGLE_RANGE]
+ALPMIN = -10
+ALPMAX = 20
+[LONGITUDINAL_COEFFICIENTS]
+pcx1=+1.6D0$no space
+PDX1 = 1.1e+00 !
+pkx1 = 2.2d1
+[LATERAL_COEFFICIENTS]
+PCY1 = 130.E-2
+  PDY1 = '1.0'
+PKY1 = -19.
+PKY2 = 1.9
+$ the end, without a line break"""
+    plain = MagicFormula.from_tir(written(tmp_path, edited(TYRESIDE="RIGHT")))
+    forms = [
+        odd.encode("utf-8"),
+        odd.replace("\n", "\r\n").encode("utf-8"),
+        odd.replace("\n", "\r").encode("utf-8"),
+        odd.removeprefix("\ufeff").encode("latin-1"),
+        odd.removeprefix("\ufeff").encode("utf-16"),
+    ]
+    for form in forms:
+        tire = MagicFormula.from_tir(written(tmp_path, form))
+        assert tire.coefficients == plain.coefficients
+        assert tire.side == "right"
+        assert tire.valid_range.F_z == pytest.approx((200.0, 9000.0))
+        # the file's α is ISO's, ours the paper's: 20 degrees at one end become -20 at the other
+        assert tire.valid_range.alpha == pytest.approx((-radians(20.0), radians(10.0)))
+        assert tire.valid_range.gamma == (-inf, inf)
+    tir = read_tir(tmp_path / "odd.tir")
+    assert tir.number("UNLOADED_RADIUS") == pytest.approx(0.316)
+    assert tir.number("VERTICAL_STIFFNESS") == pytest.approx(210e3)
+    assert tir.text("HELLO", "") == "world and more"
+    assert tir.number("NO_SUCH_KEY") is None
+    assert "HELLO" in tir
+
+
+@pytest.mark.parametrize(
+    ("unit", "newton"),
+    [
+        ("newton", 1.0),
+        ("NEWTONS", 1.0),
+        ("N", 1.0),
+        ("kN", 1000.0),
+        ("kilonewton", 1000.0),
+        ("lbf", 4.4482216152605),
+        ("pound_force", 4.4482216152605),
+        ("pound_for", 4.4482216152605),
+        ("KGF", 9.80665),
+        ("kilogram_for", 9.80665),
+    ],
+)
+def test_loads_come_in_every_unit(tmp_path: Path, unit: str, newton: float) -> None:
+    tire = MagicFormula.from_tir(written(tmp_path, f"[UNITS]\nFORCE = '{unit}'\n{PLAIN}"))
+    nominal_load = tire.coefficients.FNOMIN
+    assert nominal_load == pytest.approx(4000.0 * newton, rel=1e-12)
+
+
+def test_only_units_that_are_needed_are_asked_for(tmp_path: Path) -> None:
+    stone = f"[UNITS]\nFORCE = 'stone'\n{PLAIN}"
+    assert "FORCE = 'stone'" in complaint(tmp_path, stone)
+    MagicFormula.from_tir(written(tmp_path, stone.replace("FORCE", "PRESSURE")))
+
+
+def test_a_key_named_like_a_unit_is_no_unit_outside_its_section(tmp_path: Path) -> None:
+    text = f"[UNITS] $ here\nFORCE = 'newton'\n[INERTIA]\nFORCE = 9.3\nMASS = 7\n{PLAIN}"
+    assert MagicFormula.from_tir(written(tmp_path, text)).coefficients.FNOMIN == 4000.0
+
+
+def test_files_of_the_same_formula_are_accepted(tmp_path: Path) -> None:
+    for head in (
+        "PROPERTY_FILE_FORMAT = 'PAC2002'",
+        "PROPERTY_FILE_FORMAT = 'USER'\nFITTYP = 6",
+        "PROPERTY_FILE_FORMAT = 'MF-TYRE'\nFITTYP = 52",
+        "PROPERTY_FILE_FORMAT = 'MF52'",
+        "FITTYP = 21",
+    ):
+        MagicFormula.from_tir(written(tmp_path, f"{head}\n{PLAIN}"))
+
+
+@pytest.mark.parametrize(
+    ("head", "says"),
+    [
+        ("FITTYP = 61", "Magic Formula 6.x"),
+        ("PROPERTY_FILE_FORMAT = 'MF-TYRE'\nFITTYP = 62", "Magic Formula 6.x"),
+        ("FITTYP = 3", "unknown model"),
+        ("PROPERTY_FILE_FORMAT = 'MF-SWIFT'\nFITTYP = 21", "MF-SWIFT"),
+        ("PROPERTY_FILE_FORMAT = 'PAC89'", "PAC89"),
+        ("PROPERTY_FILE_FORMAT = 'FTIRE'", "FTIRE"),
+        ("PKY4 = 2.0", "PKY4 belong to Magic Formula 6.x"),
+    ],
+)
+def test_other_models_are_refused_because_their_equations_differ(
+    tmp_path: Path, head: str, says: str
+) -> None:
+    assert says in complaint(tmp_path, f"{head}\n{PLAIN}")
+
+
+def test_all_missing_coefficients_are_named_at_once(tmp_path: Path) -> None:
+    message = complaint(tmp_path, edited(PCY1=None, PKX1=None, FNOMIN=None))
+    assert message.startswith("lacks FNOMIN, PKX1, PCY1")
+    assert message.count("P") >= 2
+    assert "lacks FNOMIN, PCX1, PDX1, PKX1, PCY1, PDY1, PKY1, PKY2" in complaint(tmp_path, "")
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"FNOMIN": "0"}, "FNOMIN must be positive, it is 0"),
+        ({"FNOMIN": "-4000"}, "FNOMIN must be positive"),
+        ({"PCY1": "-1.3"}, "PCY1 must be positive"),
+        ({"PCX1": "0"}, "PCX1 must be positive"),
+        ({"PKY1": "19"}, "PKY1 must be negative"),
+        ({"PKY2": "0"}, "PKY2 must be positive"),
+        ({"LMUY": "0"}, "LMUY must be positive"),
+        ({"LFZO": "-1"}, "LFZO must be positive"),
+        ({"FZMIN": "900", "FZMAX": "100"}, "FZMIN must be below FZMAX"),
+        ({"KPUMIN": "1", "KPUMAX": "1"}, "KPUMIN must be below KPUMAX"),
+        ({"TYRESIDE": "'RIGTH'"}, "TYRESIDE must be"),
+        ({"IP": "-1", "IP_NOM": "2"}, "IP and IP_NOM must be positive"),
+        ({"IP": "2", "IP_NOM": "1", "PPX3": "-1.5"}, "at its inflation pressure PDX1 must be"),
+    ],
+)
+def test_impossible_values_are_refused(tmp_path: Path, change: dict[str, str], says: str) -> None:
+    assert says in complaint(tmp_path, edited(**change))
+
+
+@pytest.mark.parametrize("word", ["abc", "1,3", "nan", "inf", "1e999", "1.3 1.4", "1_0", "", "'x'"])
+def test_a_value_that_is_no_number_is_shown_with_its_line(tmp_path: Path, word: str) -> None:
+    message = complaint(tmp_path, f"{PLAIN}\n\nPHY1 = {word}\n")
+    assert re.match(r"line 10: PHY1 must be a finite number, it is ", message)
+    MagicFormula.from_tir(written(tmp_path, f"{PLAIN}\nNOBODY_NEEDS_IT = {word}\n"))
+
+
+def test_a_forgotten_equals_sign_is_not_a_missing_coefficient(tmp_path: Path) -> None:
+    assert 'line 9: PHY1 has no "="' in complaint(tmp_path, f"{PLAIN}\nphy1 0.003\n")
+
+
+def test_two_lines_that_disagree_are_refused(tmp_path: Path) -> None:
+    assert "PCY1 has different values in lines 5, 9" in complaint(tmp_path, f"{PLAIN}\nPCY1 = 1.4")
+    MagicFormula.from_tir(written(tmp_path, f"{PLAIN}\nPCY1 = 1.30 $ said twice"))
+
+
+def test_a_symmetric_tire_loses_conicity_and_plysteer(tmp_path: Path) -> None:
+    lopsided = {"PHY1": "0.01", "PVY1": "0.02"}
+    plain = MagicFormula.from_tir(written(tmp_path, edited(**lopsided)))
+    tire = MagicFormula.from_tir(written(tmp_path, edited(**lopsided, TYRESIDE="SYMMETRIC")))
+    assert plain.forces(0.0, 0.0, 0.0, 4000.0).F_y != 0.0
+    assert tire.forces(0.0, 0.0, 0.0, 4000.0).F_y == 0.0
+
+
+def test_inflation_pressure_scales_stiffness_and_friction(tmp_path: Path) -> None:
+    """PAC2002: factors 1 + a dp + b dp², dp = (IP - IP_NOM)/IP_NOM = 0.1."""
+    pressure = {"IP": "220000", "IP_NOM": "200000"}
+    effects = {"PPX1": "0.5", "PPX2": "1", "PPX4": "2", "PPY1": "-0.4", "PPY2": "0.2", "PPY3": "-1"}
+    c = MagicFormula.from_tir(written(tmp_path, edited(**pressure, **effects))).coefficients
+    scaled = (c.PKX1, c.PDX1, c.PKY1, c.PKY2, c.PDY1)
+    assert scaled == pytest.approx((22.0 * 1.06, 1.1 * 1.02, -19.0 * 0.96, 1.9 * 1.02, 0.9))
+    plain = MagicFormula.from_tir(written(tmp_path, edited(**effects))).coefficients
+    assert plain.PKX1 == 22.0
+
+
+def test_a_file_that_is_not_there_is_an_os_error(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        MagicFormula.from_tir(tmp_path / "nowhere.tir")
+
+
+@pytest.mark.parametrize("raw", [b"\x00\x01\x02\xff" * 100, b"", b"\xff\xfe\x00", b"PK\x03\x04"])
+def test_a_file_that_is_no_text_is_a_tire_error(tmp_path: Path, raw: bytes) -> None:
+    assert complaint(tmp_path, raw).startswith("lacks FNOMIN")
