@@ -117,9 +117,9 @@ class Scan:
 
         Returns
         -------
-        For each carried port `p` its value before each recorded step (n_recorded, *shape) and, as
-        `p_final`, after the last; for each other output its value (n_recorded, *shape). Column
-        vectors have the shape (n_recorded, size).
+        For each carried port `p` its value before each recorded step (n_recorded, *shape), as
+        `p_final` after the last, and as `p_all` both (n_recorded + 1, *shape); for each other
+        output its value (n_recorded, *shape). Column vectors have the shape (n_recorded, size).
 
         Raises
         ------
@@ -166,10 +166,13 @@ class Scan:
 
     def _shape_all(self, record: dict[str, Array]) -> dict[str, Array]:
         shaped = {}
-        for key, flat in record.items():
-            port = key.removesuffix("_final")
-            size = self.step.size_in(port) if port in self.carry else self.step.size_out(port)
-            shaped[key] = self._shaped(flat, size)
+        for port, flat in record.items():
+            if port in self.carry:
+                everything = self._shaped(flat, self.step.size_in(port))
+                shaped[f"{port}_all"] = everything
+                shaped[port], shaped[f"{port}_final"] = everything[:-1], everything[-1]
+            else:
+                shaped[port] = self._shaped(flat, self.step.size_out(port))
         return shaped
 
     def _run_compiled(
@@ -180,7 +183,7 @@ class Scan:
         size = {p: step.numel_in(p) for p in self.carry}
         now = [packed[p].copy() for p in self.carry]
         following = [np.empty_like(a) for a in now]
-        carried = [np.empty((n_rows, size[p])) for p in self.carry]
+        carried = [np.empty((n_rows + 1, size[p])) for p in self.carry]
         outputs = [np.empty((n_rows, step.numel_out(p))) for p in self.outputs]
         scratch = [np.empty(step.numel_out(p)) for p in self.outputs]
         arrays = [packed[p] for p in names_in]
@@ -213,9 +216,9 @@ class Scan:
         )
         if failed:
             raise RuntimeError(f"{step.name()} reported a failure")
-        final = following if n % 2 else now
+        for rows, last in zip(carried, following if n % 2 else now, strict=True):
+            rows[-1] = last
         record = dict(zip(self.carry, carried, strict=True))
-        record |= {f"{p}_final": a for p, a in zip(self.carry, final, strict=True)}
         record |= dict(zip(self.outputs, outputs, strict=True))
         return self._shape_all(record)
 
@@ -244,8 +247,8 @@ class Scan:
         record = {}
         for port in self.carry:
             after = np.array(results[f"{port}_next"]).T.reshape(n, -1)
-            record[port] = np.vstack([packed[port][None], after[:-1]])[::every]
-            record[f"{port}_final"] = after[-1]
+            before = np.vstack([packed[port][None], after[:-1]])[::every]
+            record[port] = np.vstack([before, after[-1:]])
         for port in self.outputs:
             record[port] = np.array(results[port]).T.reshape(n, -1)[::every]
         return self._shape_all(record)

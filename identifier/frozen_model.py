@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from codegen import Scan
 from identifier.network import Network, Weights, hidden_layer, network_signals
 from models.bicycle import BicycleParameters, linear_axle_force
-from models.recording import Recording
+from models.recordings import Recording
 from models.vehicle import Vehicle
 
 FORMAT = "tireid frozen model 1"

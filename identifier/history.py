@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from identifier.design import Design
 from identifier.frozen_model import FrozenModel
 from identifier.network import Weights
-from models.recording import Recording
+from models.recordings import Recording
 from models.vehicle import Vehicle
 
 Array = NDArray[np.float64]
+IMPOSSIBLE_FORCE = 100.0  # times the car's weight: no tire reaches it, so the law has diverged
 
 
 class DivergedError(ArithmeticError):
@@ -47,9 +48,10 @@ class History:
 
     @property
     def diverged_at(self) -> float | None:
-        """Time [s] of the first sample that is not finite, or None."""
-        finite = np.isfinite(self.axle_force).all(axis=1) & np.isfinite(self.xi_tilde).all(axis=1)
-        return None if finite.all() else float(self.recording.t[np.argmin(finite)])
+        """Time [s] from which a force is not finite or a hundred times the weight, or None."""
+        possible = np.abs(self.axle_force) < IMPOSSIBLE_FORCE * self.vehicle.weight
+        sane = possible.all(axis=1) & np.isfinite(self.xi_tilde).all(axis=1)
+        return None if sane.all() else float(self.recording.t[np.argmin(sane)])
 
     def weights_at(self, t: float) -> Weights:
         """Return the weights in effect at a time; from the end on, those after the last sample.
@@ -86,8 +88,9 @@ class History:
             Where the recording begins after that time.
         """
         weights = self.weights_at(t)
-        if not (np.isfinite(weights.W).all() and np.isfinite(weights.V).all()):
-            raise DivergedError(f"the law diverged at {self.diverged_at} s, before {t:g} s")
+        diverged_at = self.diverged_at
+        if diverged_at is not None and diverged_at <= t:
+            raise DivergedError(f"the law diverged at {diverged_at:g} s, before {t:g} s")
         return FrozenModel(
             vehicle=self.vehicle,
             network=self.design.network,

@@ -11,7 +11,7 @@ from identifier.gains import Gains
 from identifier.history import History
 from identifier.network import Network, Weights
 from identifier.step import CARRY, OVER, build_step
-from models.recording import Recording
+from models.recordings import Recording
 from models.vehicle import Vehicle
 
 
@@ -95,8 +95,8 @@ def identify(
         f_hat=record["f_hat"],
         xi_tilde=record["xi_tilde"],
         z=record["z"],
-        W=np.concatenate([record["W"], record["W_final"][None]]),
-        V=np.concatenate([record["V"], record["V_final"][None]]),
+        W=record["W_all"],
+        V=record["V_all"],
     )
 
 

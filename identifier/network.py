@@ -86,7 +86,7 @@ class Network:
         """
         assert self.scale is not None
         pairs = zip(self.inputs, self.scale, strict=True)
-        return ca.vertcat(*(signals[name] / scale for name, scale in pairs))
+        return ca.vertcat(*(signals[name] * (1 / scale) for name, scale in pairs))
 
 
 def hidden_layer(V: Any, x_bar: Any) -> Any:

@@ -75,8 +75,9 @@ def build_step(design: Design) -> ca.Function:
     moving = v_x >= min_speed
     f_hat = ca.if_else(moving, W @ layers(xi_hat, V)[1], 0)
     linear = ca.if_else(moving, linear_axle_force(parameters, speed, x, u), 0)
+    ahead = ca.if_else(moving, dt, 0)  # at rest nothing moves on: weights keep their values
     xi_hat_next, z_next, W_next, V_next = INTEGRATORS[design.integrator](
-        derivative, [xi_hat, z, W, V], dt
+        derivative, [xi_hat, z, W, V], ahead
     )
     return ca.Function(
         f"identifier_{design.law}",
@@ -84,8 +85,8 @@ def build_step(design: Design) -> ca.Function:
         [
             ca.if_else(moving, xi_hat_next, xi),  # at rest the observer follows the measurement
             ca.if_else(moving, z_next, 0),
-            ca.if_else(moving, bounded(W_next, W_max), W),
-            ca.if_else(moving, bounded(V_next, V_max), V),
+            bounded(W_next, W_max),
+            bounded(V_next, V_max),
             f_hat,
             linear + unit * f_hat,
             ca.if_else(moving, xi - xi_hat, 0),

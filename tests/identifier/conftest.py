@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.recording import Recording
+from models.recordings import Recording
 from models.vehicle import Vehicle
 
 CAR = Vehicle(

@@ -8,8 +8,8 @@ import pytest
 
 from identifier.defaults import default_design
 from identifier.frozen_model import FrozenModel, FrozenModelError
-from identifier.frozen_test import AxleRmse, axle_rms, online_error, replay
 from identifier.identify import identify
+from identifier.reproducibility import AxleRmse, axle_rms, online_error, replay
 
 
 @pytest.fixture(name="history")

@@ -1,0 +1,117 @@
+"""Public docstrings document the parameters that there are, no more and no less."""
+
+import ast
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGES = ("codegen", "models", "identifier", "mpc", "tireid")
+Documented = ast.FunctionDef | ast.ClassDef
+
+
+def documented_parameters(docstring: str) -> list[str] | None:
+    """Names under "Parameters" of a numpy-style docstring, None where there is no such section."""
+    found = re.search(r"^Parameters\n-+\n(.*?)(?=^\w[^\n]*\n-+\n|\Z)", docstring, re.M | re.S)
+    if not found:
+        return None
+    names = []
+    for line in found.group(1).splitlines():
+        head = re.match(r"^([\w*]+(?:, [\w*]+)*) : ", line)
+        if head:
+            names += [name.lstrip("*") for name in head.group(1).split(", ")]
+    return names
+
+
+def fields(node: ast.ClassDef) -> list[ast.AnnAssign]:
+    return [
+        item
+        for item in node.body
+        if isinstance(item, ast.AnnAssign) and isinstance(item.target, ast.Name)
+    ]
+
+
+def is_method(node: ast.FunctionDef) -> bool:
+    arguments = [*node.args.posonlyargs, *node.args.args]
+    bound = {ast.unparse(d) for d in node.decorator_list} & {"classmethod"}
+    return bool(arguments) and (arguments[0].arg == "self" or bool(bound))
+
+
+def optional_fields(node: Documented) -> set[str]:
+    """Fields of a record that have a default: a long record may leave them undocumented."""
+    if not isinstance(node, ast.ClassDef):
+        return set()
+    return {item.target.id for item in fields(node) if item.value is not None}
+
+
+def actual_parameters(node: Documented) -> list[str]:
+    """Arguments of a function, or fields (else arguments of __init__) of a class."""
+    if isinstance(node, ast.ClassDef):
+        for item in node.body:
+            if isinstance(item, ast.FunctionDef) and item.name == "__init__":
+                return actual_parameters(item)
+        return [item.target.id for item in fields(node)]
+    arguments = node.args
+    listed = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
+    extra = [a for a in (arguments.vararg, arguments.kwarg) if a]
+    return [a.arg for a in (*listed, *extra)][is_method(node) :]
+
+
+def public_definitions(source: str) -> list[Documented]:
+    """Public functions, classes and methods."""
+    found: list[Documented] = []
+    for node in ast.parse(source).body:
+        if isinstance(node, Documented) and not node.name.startswith("_"):
+            found.append(node)
+            if isinstance(node, ast.ClassDef):
+                found += [
+                    item
+                    for item in node.body
+                    if isinstance(item, ast.FunctionDef) and not item.name.startswith("_")
+                ]
+    return found
+
+
+def complaints(source: str) -> list[str]:
+    wrong = []
+    for node in public_definitions(source):
+        docstring = ast.get_docstring(node)
+        if docstring is None:
+            wrong.append(f"{node.name} has no docstring")
+            continue
+        documented, actual = documented_parameters(docstring), actual_parameters(node)
+        if documented is not None and documented != actual:
+            optional = optional_fields(node)
+            if documented == [name for name in actual if name not in optional]:
+                continue
+            wrong.append(f"{node.name} documents {documented}, its parameters are {actual}")
+    return wrong
+
+
+def test_documented_parameters_are_those_of_the_signature():
+    wrong = [
+        f"{path.relative_to(ROOT)}: {line}"
+        for package in PACKAGES
+        for path in sorted((ROOT / package).rglob("*.py"))
+        for line in complaints(path.read_text())
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_a_drifted_docstring_is_caught():
+    source = '''
+def area(width, height):
+    """Return the area.
+
+    Parameters
+    ----------
+    width : of the thing [m].
+    depth : of the thing [m].
+    """
+
+def silent():
+    pass
+'''
+    assert complaints(source) == [
+        "area documents ['width', 'depth'], its parameters are ['width', 'height']",
+        "silent has no docstring",
+    ]

@@ -1,0 +1,48 @@
+"""Imports run one way, codegen <- models <- identifier <- mpc <- tireid; plots stay outside."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+ORDER = ("codegen", "models", "identifier", "mpc", "tireid")
+PLOTTING_ALLOWED = ("tireid", "examples", "benchmarks")
+
+
+def imported_packages(source: str) -> set[str]:
+    packages = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            packages |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            packages.add(node.module.split(".")[0])
+    return packages
+
+
+def wrong_imports(package: str, source: str) -> set[str]:
+    """What a file of `package` imports from the packages to its right, or to draw."""
+    later = set(ORDER[ORDER.index(package) + 1 :])
+    drawing = set() if package in PLOTTING_ALLOWED else {"matplotlib"}
+    return imported_packages(source) & (later | drawing)
+
+
+@pytest.mark.parametrize("package", ORDER)
+def test_imports_run_one_way(package):
+    for path in (ROOT / package).rglob("*.py"):
+        assert not wrong_imports(package, path.read_text()), path
+
+
+def test_the_rule_catches_a_planted_import():
+    assert wrong_imports("models", "from identifier.step import build_step") == {"identifier"}
+    assert wrong_imports("codegen", "import models.vehicle as v") == {"models"}
+    assert wrong_imports("identifier", "import matplotlib.pyplot") == {"matplotlib"}
+    assert wrong_imports("tireid", "import matplotlib, identifier, models") == set()
+
+
+def test_every_package_is_in_the_wheel():
+    import tomllib
+
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    packaged = project["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]
+    assert packaged == [name for name in ORDER if (ROOT / name).is_dir()]

@@ -1,0 +1,300 @@
+"""Figures: units on every axis, legends beside the data, nothing clipped, truth or no truth."""
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator
+from matplotlib.transforms import Bbox
+
+from identifier.design import Design
+from identifier.gains import Gains, diagonal
+from identifier.history import History
+from identifier.network import Network
+from identifier.reproducibility import AxleRmse, Replay
+from models.recordings import Recording
+from models.vehicle import Vehicle
+from tireid.figures import (
+    comparison_figure,
+    error_figure,
+    figure_png,
+    force_figure,
+    inputs_figure,
+    prediction_figure,
+    save_figure,
+    slip_figure,
+    weights_figure,
+)
+from tireid.figures.style import BLACK
+from tireid.figures.units import force_range, force_unit_of, impulse_unit
+
+N = 300
+CAR = Vehicle(
+    mass=1500.0,
+    yaw_inertia=2500.0,
+    l_f=1.2,
+    l_r=1.5,
+    cornering_stiffness_front=1e5,
+    cornering_stiffness_rear=1.2e5,
+)
+GAINS = Gains(A_d=diagonal(10.0), forgetting=10.0, eta_W=1.0, eta_V=1.0, rho_W=0.1, rho_V=0.1)
+
+
+def made_up(scale: float = 5000.0, *, truth: bool = True, rear: float = 0.0) -> History:
+    """A history with invented signals: figures do not ask where numbers come from."""
+    rng = np.random.default_rng(1)
+    t = np.linspace(20.0, 20.0 + 0.01 * (N - 1), N)
+    wave = np.sin(3.0 * t)
+    force = scale * np.column_stack([wave, 0.7 * wave])
+    recording = Recording(
+        name="log:run",
+        t=t,
+        v_x=np.full(N, 15.0),
+        v_y=0.1 * wave,
+        r=0.2 * wave,
+        delta_f=0.05 * wave,
+        delta_r=rear * wave,
+        a_y=4.0 * wave,
+        axle_force=force if truth else None,
+    )
+    unit = 1000.0 if scale > 100.0 else 1.0
+    return History(
+        vehicle=CAR,
+        design=Design(gains=GAINS, network=Network(hidden=3), force_unit=unit),
+        recording=recording,
+        axle_force=1.1 * force,
+        f_hat=0.1 * force / unit,
+        xi_tilde=0.01 * rng.standard_normal((N, 2)),
+        z=np.zeros((N, 2)),
+        W=np.cumsum(rng.standard_normal((N + 1, 2, 3)), axis=0),
+        V=np.cumsum(rng.standard_normal((N + 1, 3, 4)), axis=0),
+    )
+
+
+def replayed(history: History) -> Replay:
+    error = AxleRmse(front=430.0, rear=210.0)
+    return Replay(
+        recording=history.recording,
+        axle_force=0.9 * history.axle_force,
+        against_truth=error if history.recording.axle_force is not None else None,
+        against_online=AxleRmse(front=120.0, rear=110.0),
+    )
+
+
+def frozen_replays(history: History) -> dict[float, Replay]:
+    return {22.0: replayed(history), 21.0: replayed(history)}
+
+
+RESULTS = {
+    "instantaneous": {"online": (0.3, 0.2, 0.4), "32": (1.1, 0.9, 1.4)},
+    "integral": {"online": (0.3, 0.2, 0.4), "32": (0.4, 0.3, 0.5)},
+    "instantaneous_scaled": {"online": (0.3, 0.2, 0.4), "32": (0.4, 0.3, 0.5)},
+}
+PAPER = {"integral": {"online": 0.3386, "32": 0.4247}}
+
+FIGURES: dict[str, Callable[[], Figure]] = {
+    "forces": lambda: force_figure(made_up(), frozen_replays(made_up())),
+    "forces without truth": lambda: force_figure(
+        made_up(truth=False), frozen_replays(made_up(truth=False))
+    ),
+    "forces of a model car": lambda: force_figure(made_up(5.0), window=(20.5, 21.5)),
+    "slip": lambda: slip_figure(made_up().freeze(22.0), made_up().recording),
+    "slip without truth": lambda: slip_figure(
+        made_up(truth=False).freeze(22.0), made_up(truth=False).recording, made_up(truth=False)
+    ),
+    "error": lambda: error_figure(made_up(), freeze_times=[21.0]),
+    "error under bounds": lambda: error_figure(made_up(), {"X": 3.0, "trivial": 0.5}, [21.0]),
+    "weights": lambda: weights_figure(made_up(), [21.0, 22.0]),
+    "inputs": lambda: inputs_figure(made_up(rear=0.01).recording),
+    "comparison": lambda: comparison_figure(RESULTS, PAPER),
+    "prediction": lambda: prediction_figure(replayed(made_up())),
+    "prediction against online": lambda: prediction_figure(
+        replayed(made_up(truth=False)), made_up(truth=False)
+    ),
+    "prediction alone": lambda: prediction_figure(replayed(made_up(truth=False))),
+}
+every_figure = pytest.mark.parametrize("draw", FIGURES.values(), ids=FIGURES.keys())
+
+
+def clipped(figure: Figure) -> bool:
+    """Whether anything of a drawn figure lies outside of it."""
+    figure.canvas.draw()
+    drawn = figure.get_tightbbox()
+    width, height = figure.get_size_inches()
+    slack = 0.005  # inch
+    return bool(
+        drawn.x0 < -slack or drawn.y0 < -slack or drawn.x1 > width + slack
+        or drawn.y1 > height + slack
+    )  # fmt: skip
+
+
+def legend_boxes(figure: Figure) -> list[Bbox]:
+    legends = [axes.get_legend() for axes in figure.axes]
+    found = [*figure.legends, *(legend for legend in legends if legend is not None)]
+    return [legend.get_window_extent() for legend in found]
+
+
+@every_figure
+def test_outer_axes_have_labels_with_units(draw: Callable[[], Figure]) -> None:
+    for axes in draw().axes:
+        place = axes.get_subplotspec()
+        assert place is not None
+        if place.is_first_col():
+            assert re.search(r"\[.+\]$", axes.get_ylabel()), axes
+        named = isinstance(axes.xaxis.get_major_locator(), FixedLocator)
+        if place.is_last_row() and not named:
+            assert re.search(r"\[.+\]$", axes.get_xlabel()), axes
+
+
+@every_figure
+def test_nothing_is_clipped_and_no_legend_covers_data(draw: Callable[[], Figure]) -> None:
+    figure = draw()
+    assert not clipped(figure)
+    boxes = legend_boxes(figure)
+    assert boxes
+    for box in boxes:
+        for axes in figure.axes:
+            assert not box.overlaps(axes.get_window_extent())
+
+
+def test_a_label_that_is_clipped_would_be_seen() -> None:
+    figure = FIGURES["slip"]()
+    figure.axes[0].set_ylabel("a label that is far too long for its panel [kN] " * 3)
+    assert clipped(figure)
+
+
+def test_same_data_give_the_same_bytes_and_leave_matplotlib_alone(tmp_path: Path) -> None:
+    before = dict(matplotlib.rcParams)
+    first, second = figure_png(FIGURES["error"]()), figure_png(FIGURES["error"]())
+    assert first == second
+    save_figure(FIGURES["error"](), tmp_path / "error.png")
+    assert (tmp_path / "error.png").read_bytes() == first
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_the_users_own_settings_do_not_change_a_figure() -> None:
+    expected = figure_png(FIGURES["error"]())
+    with matplotlib.rc_context({"font.size": 20.0, "axes.grid": False, "savefig.bbox": "tight"}):
+        assert figure_png(FIGURES["error"]()) == expected
+
+
+def test_forces_show_truth_once_in_each_panel_and_one_row_for_each_freeze() -> None:
+    figure = FIGURES["forces"]()
+    assert len(figure.axes) == 6
+    assert [axes.get_title("left") for axes in figure.axes[::2]] == [
+        "Front axle, online",
+        "Front axle, frozen at 21 s",
+        "Front axle, frozen at 22 s",
+    ]
+    assert figure.axes[2].get_title("right") == "RMSE 0.43 kN"
+    for axes in figure.axes:
+        black = [line for line in axes.lines if to_hex(line.get_color()) == BLACK]
+        assert len(black) == 1
+        peak = 5.0 if axes in figure.axes[::2] else 3.5
+        assert np.max(black[0].get_ydata()) == pytest.approx(peak, rel=1e-3)
+
+
+def test_without_truth_errors_are_called_errors_to_the_online_force() -> None:
+    figure = FIGURES["forces without truth"]()
+    assert figure.axes[0].get_title("right") == ""
+    assert figure.axes[2].get_title("right") == "RMSE to online 0.12 kN"
+    assert all(to_hex(line.get_color()) != BLACK for axes in figure.axes for line in axes.lines)
+
+
+def test_forces_of_a_model_car_are_in_newtons() -> None:
+    assert FIGURES["forces of a model car"]().axes[0].get_ylabel() == "lateral force [N]"
+    assert force_unit_of(np.array([np.nan, -2000.0])).name == "kN"
+    assert (impulse_unit(1.0), impulse_unit(1000.0), impulse_unit(10.0)) == (
+        "N s",
+        "kN s",
+        "10 N s",
+    )
+
+
+def test_slip_angles_have_the_sign_of_the_paper() -> None:
+    figure = FIGURES["slip"]()
+    truth = figure.axes[0].lines[0]
+    recording = made_up().recording
+    front = recording.delta_f - np.arctan((recording.v_y + CAR.l_f * recording.r) / recording.v_x)
+    assert np.asarray(truth.get_xdata()) == pytest.approx(np.rad2deg(front))
+    linear = figure.axes[0].lines[2]
+    slope = np.diff(np.asarray(linear.get_ydata()))[0] / np.diff(np.asarray(linear.get_xdata()))[0]
+    assert slope == pytest.approx(1e5 / 1000.0 * np.pi / 180.0)
+
+
+def test_slow_samples_are_left_out_of_the_slip_figure() -> None:
+    history = made_up()
+    recording = replace(history.recording, v_x=np.where(np.arange(N) < 100, 0.1, 15.0))
+    truth = slip_figure(history.freeze(22.0), recording).axes[0].lines[0]
+    assert np.size(truth.get_xdata()) == N - 100
+    with pytest.raises(ValueError, match="never reaches 1 m/s"):
+        slip_figure(history.freeze(22.0), replace(recording, v_x=np.full(N, 0.1)))
+
+
+def test_the_error_norm_is_the_euclidean_norm_and_bounds_far_above_make_its_axis_logarithmic() -> (
+    None
+):
+    history = made_up()
+    axes = FIGURES["error"]().axes[0]
+    expected = np.sqrt(np.sum(history.xi_tilde**2, axis=1))
+    assert np.asarray(axes.lines[0].get_ydata()) == pytest.approx(expected)
+    assert axes.get_yscale() == "linear"
+    assert FIGURES["error under bounds"]().axes[0].get_yscale() == "log"
+
+
+def test_a_law_that_diverges_leaves_the_panel_instead_of_flattening_it() -> None:
+    history = made_up()
+    force, xi_tilde = history.axle_force.copy(), history.xi_tilde.copy()
+    growth = np.exp(np.minimum(10.0 * np.arange(100), 700.0))[:, None]
+    force[150:250] *= growth
+    xi_tilde[150:250] *= growth
+    force[250:], xi_tilde[250:] = np.nan, np.inf
+    W = history.W.copy()
+    W[150:], W[250:] = 1e200, np.nan
+    wild = replace(history, axle_force=force, xi_tilde=xi_tilde, W=W)
+    figure = force_figure(wild)
+    assert figure.axes[0].get_ylim()[1] < 20.0
+    assert figure.axes[0].get_title("right") == f"diverged at {wild.diverged_at:.4g} s"
+    assert weights_figure(wild).axes[0].get_ylim()[1] < 1e3
+    for drawn in (figure, error_figure(wild), weights_figure(wild)):
+        assert figure_png(drawn)
+
+
+def test_an_axis_shows_all_of_the_reference_and_at_most_thrice_of_the_rest() -> None:
+    assert force_range(np.array([-1.0, 2.0])) == pytest.approx((-1.18, 2.18))
+    low, high = force_range(np.array([-1.0, 2.0]), np.array([100.0, np.nan]))
+    assert (low, high) == pytest.approx((-1.0 - 0.42, 6.0 + 0.42))
+    assert force_range(np.zeros(3)) == (-1.0, 1.0)
+
+
+def test_a_comparison_leaves_out_what_diverged_and_shows_the_paper_hollow() -> None:
+    figure = comparison_figure({**RESULTS, "integral": {"online": (np.inf, 0.4, np.inf)}}, PAPER)
+    assert figure_png(figure)
+    hollow = [line for line in figure.axes[0].lines if line.get_markerfacecolor() == "white"]
+    assert [list(np.asarray(line.get_ydata())) for line in hollow] == [[0.3386]]
+    assert [text.get_text() for text in figure.axes[0].get_xticklabels()] == [
+        "online",
+        "frozen at 32 s",
+    ]
+    with pytest.raises(ValueError, match="at least one law"):
+        comparison_figure({})
+
+
+def test_replays_of_another_recording_are_refused() -> None:
+    history = made_up()
+    short = replace(replayed(history), axle_force=np.zeros((N - 1, 2)))
+    with pytest.raises(ValueError, match="replay frozen at 21 s is of log:run"):
+        force_figure(history, {21.0: short})
+    with pytest.raises(ValueError, match="replay is of log:run"):
+        prediction_figure(short, history)
+
+
+def test_a_window_without_samples_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"must lie within 20 s to 22\.99 s"):
+        force_figure(made_up(), window=(0.0, 10.0))

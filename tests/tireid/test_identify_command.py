@@ -1,0 +1,139 @@
+"""`tireid identify` as a user meets it: what it writes, and one clear line for what it refuses."""
+
+import json
+
+import numpy as np
+import pytest
+
+from identifier.frozen_model import FrozenModel
+from models.recordings import read_recording
+from tireid.cli import main
+
+
+@pytest.fixture(scope="module")
+def result(logs, tmp_path_factory):
+    out = tmp_path_factory.mktemp("result") / "out"
+    words = ["identify", str(logs / "slalom.csv"), "--vehicle", str(logs / "car.toml")]
+    words += ["--freeze", "4", "8", "--replay", str(logs / "quick.csv"), "--out", str(out)]
+    assert main(words) == 0
+    return out
+
+
+def refusal(capsys, words):
+    """The one line of an error, after checking the exit code."""
+    capsys.readouterr()
+    assert main([str(word) for word in words]) == 2
+    lines = [line for line in capsys.readouterr().err.splitlines() if "error:" in line]
+    assert len(lines) == 1
+    return lines[0]
+
+
+def test_summary_has_the_documented_keys_and_the_right_numbers(result, logs):
+    summary = json.loads((result / "summary.json").read_text())
+    assert set(summary["rms_force_N"]) == {"slalom", "quick"}
+    rmse = summary["rmse_N"]
+    assert set(rmse) == {"online", "frozen", "frozen_against_online"}
+    assert set(rmse["frozen"]) == {"4", "8"}
+    assert set(rmse["frozen"]["8"]["quick"]) == {"front", "rear"}
+    for key in ("gains", "vehicle", "seed", "version"):
+        assert key in summary
+    quick = read_recording(logs / "quick.csv")
+    force = FrozenModel.load(result / "weights.json").axle_force(quick)
+    front, rear = np.sqrt(np.mean((force - quick.axle_force) ** 2, axis=0))
+    assert rmse["frozen"]["8"]["quick"] == pytest.approx({"front": front, "rear": rear})
+    rms = np.sqrt(np.mean(quick.axle_force**2, axis=0))
+    assert summary["rms_force_N"]["quick"] == pytest.approx({"front": rms[0], "rear": rms[1]})
+
+
+def test_every_curve_is_also_data(result):
+    forces = np.genfromtxt(result / "forces.csv", delimiter=",", names=True)
+    truth, online = forces["Fyf_true_N"], forces["Fyf_online_N"]
+    summary = json.loads((result / "summary.json").read_text())
+    front = summary["rmse_N"]["online"]["slalom"]["front"]
+    assert np.sqrt(np.mean((truth - online) ** 2)) == pytest.approx(front, rel=1e-6)
+    assert "Fyr_frozen_4s_N" in forces.dtype.names
+    weights = np.genfromtxt(result / "weights.csv", delimiter=",", names=True)
+    assert len(weights.dtype.names) == 1 + 2 * 10 + 10 * 4
+    for name in ("errors.csv", "forces_quick.csv", "weights_4s.json"):
+        assert (result / name).is_file()
+
+
+def test_figures_are_written(result):
+    for name in ("forces", "slip", "error", "weights", "inputs", "replay_quick"):
+        assert (result / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_nothing_is_overwritten_unasked(result, logs, capsys):
+    words = ["identify", logs / "slalom.csv", "--vehicle", logs / "car.toml", "--out", result]
+    before = (result / "summary.json").read_bytes()
+    assert "is not empty" in refusal(capsys, words)
+    assert (result / "summary.json").read_bytes() == before
+
+
+def test_a_log_without_forces_has_no_error_against_them(logs, tmp_path):
+    lines = (logs / "slalom.csv").read_text().splitlines()
+    header = lines[0].split(",")
+    keep = [i for i, name in enumerate(header) if not name.startswith("Fy")]
+    blind = tmp_path / "blind.csv"
+    cells = [line.split(",") for line in lines]
+    blind.write_text("\n".join(",".join(row[i] for i in keep) for row in cells))
+    words = ["identify", str(blind), "--vehicle", str(logs / "car.toml")]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["rms_force_N"] == {"blind": None}
+    assert summary["rmse_N"]["online"] == {"blind": None}
+    assert summary["rmse_N"]["frozen"]["8"] == {"blind": None}
+    assert summary["rmse_N"]["frozen_against_online"]["8"]["blind"]["front"] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("extra", "said"),
+    [
+        (["--freeze", "99"], "--freeze 99 is outside the recording: slalom lasts from 0 to 8 s"),
+        (["--run", "lap"], "no column run"),
+        (["--replay", "nowhere.csv"], "nowhere.csv: there is no such file"),
+        (["--columns", "yaw_rate"], "--columns wants NAME=COLUMN"),
+        (["--vehicle", "nowhere.toml"], "nowhere.toml"),
+    ],
+)
+def test_wrong_words_are_one_clear_line_and_leave_nothing(logs, tmp_path, capsys, extra, said):
+    out = tmp_path / "out"
+    words = ["identify", logs / "slalom.csv", "--vehicle", logs / "car.toml", *extra, "--out", out]
+    assert said in refusal(capsys, words)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_log_in_degrees_is_refused_by_its_column(logs, tmp_path, capsys):
+    lines = [line.split(",") for line in (logs / "slalom.csv").read_text().splitlines()]
+    k = lines[0].index("r")
+    for row in lines[1:]:
+        row[k] = str(np.degrees(float(row[k])))
+    log = tmp_path / "degrees.csv"
+    log.write_text("\n".join(",".join(row) for row in lines))
+    words = ["identify", log, "--vehicle", logs / "car.toml", "--out", tmp_path / "out"]
+    line = refusal(capsys, words)
+    assert "degrees.csv: r " in line
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("law", ["integral", "instantaneous", "instantaneous_scaled"])
+def test_a_recorded_car_is_identified_by_every_law(shared_data, tmp_path, law):
+    """On the high-fidelity slalom each law beats the linear tire it started from."""
+    car = tmp_path / "car.toml"
+    car.write_text(
+        "mass = 2027.0\nyaw_inertia = 2877.0\nl_f = 0.924\nl_r = 1.626\n"
+        "cornering_stiffness_front = 110e3\ncornering_stiffness_rear = 130e3\n"
+    )
+    log = shared_data / "carmaker.csv.gz"
+    words = ["identify", str(log), "--run", "slalom1_14_5ms", "--vehicle", str(car), "--law", law]
+    words += ["--replay", f"{log}:experiment2_40kmh", "--out", str(tmp_path / "out")]
+    assert main(words) == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    online = summary["rmse_N"]["online"]["carmaker:slalom1_14_5ms"]
+    recording = read_recording(log, run="slalom1_14_5ms")
+    linear = recording.alpha(0.924, 1.626) * [110e3, 130e3]
+    missed = np.sqrt(np.mean((linear - recording.axle_force) ** 2, axis=0))
+    assert online["front"] < missed[0]
+    assert online["rear"] < missed[1]
+    (frozen,) = summary["rmse_N"]["frozen"].values()
+    assert set(frozen) == {"carmaker:slalom1_14_5ms", "carmaker:experiment2_40kmh"}

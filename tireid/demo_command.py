@@ -1,0 +1,64 @@
+"""`tireid demo`: the whole story on the built-in car, in a minute, with a report."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from tireid.demo_report import demo_sections
+from tireid.demo_story import run_story
+from tireid.identify_results import write_results
+from tireid.output import output_folder
+from tireid.paper_command import write_study
+from tireid.paper_study import run_study
+from tireid.paper_tables import table_text
+from tireid.progress import Stopwatch, say
+from tireid.report import write_report
+
+TITLE = "tireid: lateral tire forces, learnt while driving"
+SEEDS = 20
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : subparsers of `tireid`.
+    """
+    parser = commands.add_parser(
+        "demo",
+        help="the whole story on the built-in car, with a report",
+        description="Drive the built-in sedan, learn its tires, freeze them, test them on another "
+        "maneuver, and repeat the paper's tables; leaves one report.html to read.",
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("tireid-demo"), metavar="DIR", help="default: %(default)s"
+    )
+    parser.add_argument("--force", action="store_true", help="replace the folder if it exists")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run the command.
+
+    Parameters
+    ----------
+    options : parsed arguments.
+    """
+    watch = Stopwatch()
+    with output_folder(options.out, force=options.force) as folder:
+        say("1/3 driving the sedan, learning, freezing, predicting")
+        story = run_story()
+        learning, tables = folder / "identify", folder / "paper"
+        learning.mkdir()
+        tables.mkdir()
+        write_results(learning, "integral", story.learnt, story.others, story.frozen)
+        say("2/3 the frozen-weight test of the paper")
+        study = run_study(SEEDS, say)
+        write_study(tables, study)
+        say("3/3 writing the report")
+        write_report(folder / "report.html", TITLE, demo_sections(story, study, learning, tables))
+    for maneuver in study.errors:
+        print(table_text(maneuver, study))
+    print(story.text())
+    print(f"read {options.out / 'report.html'}  ({watch.seconds:.0f} s)")

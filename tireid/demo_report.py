@@ -1,0 +1,160 @@
+"""The demo's report: what was driven, learnt, frozen and predicted, in order."""
+
+from pathlib import Path
+
+from tireid.demo_story import FREEZE, SPEED, Story
+from tireid.paper_study import GAINS, NETWORK, Study
+from tireid.paper_tables import MEANING, header, rows, settings
+from tireid.report import Paragraph, Picture, Section, Table
+
+PAPER = 'Hong and Choi, "Integral Error-Based Adaptive Neural Identifier for Nonlinear Lateral Tire'
+PAPER_TITLE = f'{PAPER} Forces"'
+
+
+def demo_sections(story: Story, study: Study, learning: Path, tables: Path) -> list[Section]:
+    """Return the sections of the report.
+
+    Parameters
+    ----------
+    story : the noisy drives.
+    study : the paper's study.
+    learning : folder with the figures of the first drive.
+    tables : folder with the figures of the study.
+    """
+    return [
+        _drive(learning),
+        _learn(story, learning),
+        _predict(story, learning),
+        _slalom(study, tables),
+        _step(study, tables),
+    ]
+
+
+def _drive(learning: Path) -> Section:
+    return Section(
+        heading="A car is driven",
+        blocks=[
+            Paragraph(
+                text="The car is a double-track model of a mid-size sedan: roll, load transfer, "
+                "tire relaxation and combined slip on Magic Formula tires, integrated at 1 ms. It "
+                f"drives a slalom at {SPEED:g} m/s. The identifier sees what any log has, v_x, "
+                "v_y, r and steering at 100 Hz with sensor noise; it never sees a force."
+            ),
+            Picture(image=learning / "inputs.png", caption="What the identifier is given."),
+        ],
+    )
+
+
+def _learn(story: Story, learning: Path) -> Section:
+    design = story.learnt.design
+    gains = design.gains
+    return Section(
+        heading="Tire forces are learnt while it drives",
+        blocks=[
+            Paragraph(
+                text="At every sample an observer predicts the motion; its error drives the "
+                "weights of a network of "
+                f"{design.network.hidden} hidden units, which corrects the linear tire. The law is "
+                "the integral law of the paper, with gains from the phase margin of its loop: "
+                f"A_d = {gains.A_d[0][0]:g} I 1/s, lambda = {gains.forgetting:g} 1/s, eta1 = "
+                f"{gains.eta_W:.4g}, eta2 = {gains.eta_V:.4g}, rho1 = rho2 = {gains.rho_W:g}."
+            ),
+            Picture(
+                image=learning / "forces.png",
+                caption="Axle forces: online above, and below replayed with the weights frozen at "
+                f"{FREEZE:g} s.",
+            ),
+            Picture(
+                image=learning / "slip.png",
+                caption="The same forces over slip angle (sign of the paper: positive slip pushes "
+                "to the left). The true force forms loops since tires relax.",
+            ),
+            Picture(image=learning / "error.png", caption="Norm of the observer's error."),
+            Picture(image=learning / "weights.png", caption="Weights of the network."),
+        ],
+    )
+
+
+def _predict(story: Story, learning: Path) -> Section:
+    names = [history.recording.name for history in story.others]
+    return Section(
+        heading="The frozen model is asked about drives it has not seen",
+        blocks=[
+            Paragraph(
+                text="Reproducing the drive that was learnt is the easier half. The same frozen "
+                "weights predict two other maneuvers; the identifier that goes on learning there "
+                "(online) is beside it. Where the frozen error is far larger, the network learnt "
+                "the maneuver rather than the tire."
+            ),
+            Table(
+                caption="RMSE of the axle force, both axles together, and the frozen error as a "
+                "share of the rms force.",
+                header=["drive", "online [kN]", "frozen [kN]", "of rms force"],
+                rows=story.rows(),
+            ),
+            *(
+                Picture(
+                    image=learning / f"replay_{name}.png",
+                    caption=f"Frozen after the slalom, asked about the {name.replace('_', ' ')}.",
+                )
+                for name in names
+            ),
+        ],
+    )
+
+
+def _slalom(study: Study, tables: Path) -> Section:
+    return Section(
+        heading="The frozen-weight reproducibility test: slalom",
+        blocks=[
+            Paragraph(
+                text=f"{PAPER_TITLE} freezes the weights at an instant and replays the past with "
+                "them: a law that follows the instant forgets what it learnt before."
+            ),
+            Table(
+                caption=f"Table II of the paper beside ours, RMSE of the axle force [kN]: median "
+                f"and quartiles of {len(study.errors['slalom']['integral'])} seeds.",
+                header=header(),
+                rows=rows("slalom", study),
+            ),
+            Paragraph(text=MEANING),
+            Picture(
+                image=tables / "slalom_errors.png",
+                caption="The table as a picture; hollow marks are the paper's values.",
+            ),
+            Picture(
+                image=tables / "fig4_slalom_instantaneous.png",
+                caption="Instantaneous law, as Fig. 4 of the paper (seed of median error).",
+            ),
+            Picture(
+                image=tables / "fig5_slalom_integral.png",
+                caption="Integral law, as Fig. 5 of the paper (seed of median error).",
+            ),
+            Picture(
+                image=tables / "control_slalom_instantaneous_scaled.png",
+                caption="The control: instantaneous law at eta/lambda (seed of median error).",
+            ),
+            Paragraph(text=settings(GAINS, NETWORK).splitlines()[0]),
+        ],
+    )
+
+
+def _step(study: Study, tables: Path) -> Section:
+    return Section(
+        heading="The frozen-weight reproducibility test: step steer",
+        blocks=[
+            Table(
+                caption="Table I of the paper beside ours, RMSE of the axle force [kN].",
+                header=header(),
+                rows=rows("step_steer", study),
+            ),
+            Picture(
+                image=tables / "fig2_step_steer_instantaneous.png",
+                caption="Instantaneous law, as Fig. 2 of the paper.",
+            ),
+            Picture(
+                image=tables / "fig3_step_steer_integral.png",
+                caption="Integral law, as Fig. 3 of the paper.",
+            ),
+        ],
+    )
