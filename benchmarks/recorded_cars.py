@@ -1,0 +1,83 @@
+"""The paper's laws on recorded cars: a high-fidelity simulation and a real 1:10 car.
+
+Needs the recordings of ../shared/data beside the checkout, which are not part of the project. For
+each law: the online error, and the error of the weights frozen at the end, on the drive that was
+learnt and on another; in percent of the rms axle force, front / rear, median over seeds. Run it by
+`python -m benchmarks.recorded_cars`.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from identifier.defaults import LAWS, default_design
+from identifier.identify import identify
+from identifier.reproducibility import AxleRmse, axle_rms, online_error, replay
+from models.recordings import read_recording
+from models.vehicle import Vehicle
+
+DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+SEEDS = 10
+CARMAKER = Vehicle(
+    name="CarMaker sedan, effective",
+    mass=2027.0,
+    yaw_inertia=2877.0,
+    l_f=0.924,
+    l_r=1.626,
+    cornering_stiffness_front=110e3,
+    cornering_stiffness_rear=130e3,
+)
+DART = Vehicle(
+    name="DART 1:10",
+    mass=1.58,
+    yaw_inertia=0.00481,
+    l_f=0.0805,
+    l_r=0.0930,
+    cornering_stiffness_front=40.0,
+    cornering_stiffness_rear=40.0,
+)
+TASKS = (
+    (CARMAKER, "carmaker.csv.gz", "slalom1_14_5ms", "experiment2_40kmh"),
+    (CARMAKER, "carmaker.csv.gz", "experiment2_40kmh", "slalom1_14_5ms"),
+    (DART, "dart.csv.gz", "free_10_02_28", "free_10_12_05"),
+    (DART, "dart.csv.gz", "ramp_steer02", "free_10_12_05"),
+)
+
+
+def percent(error: AxleRmse | None, size: AxleRmse) -> tuple[float, float]:
+    """Return an error in percent of the rms force, front and rear."""
+    assert error is not None
+    return 100.0 * error.front / size.front, 100.0 * error.rear / size.rear
+
+
+def main() -> None:
+    """Print one table for each task."""
+    if not DATA.is_dir():
+        sys.exit(f"the recordings are not there: {DATA}")
+    for car, log, learn, other in TASKS:
+        learnt, unseen = (read_recording(DATA / log, run=run) for run in (learn, other))
+        assert learnt.axle_force is not None and unseen.axle_force is not None
+        sizes = axle_rms(learnt.axle_force), axle_rms(unseen.axle_force)
+        print(f"{car.name}: learnt on {learn}, frozen, replayed on {other} [% of rms force]")
+        for law in LAWS:
+            rows = []
+            for seed in range(SEEDS):
+                design = default_design(car, law=law, seed=seed)
+                history = identify(learnt, car, design)
+                model = history.freeze(float(learnt.t[-1]))
+                own, there = replay(model, history), replay(model, identify(unseen, car, design))
+                rows.append(
+                    percent(online_error(history), sizes[0])
+                    + percent(own.against_truth, sizes[0])
+                    + percent(there.against_truth, sizes[1])
+                )
+            cells = [f"{value:5.1f}" for value in np.median(rows, axis=0)]
+            print(
+                f"  {law:22} online {cells[0]} /{cells[1]}   frozen {cells[2]} /{cells[3]}   "
+                f"other drive {cells[4]} /{cells[5]}"
+            )
+
+
+if __name__ == "__main__":
+    main()
