@@ -20,7 +20,8 @@ class Design:
     ----------
     gains : gains of observer, filter and laws.
     network : structure of the network.
-    law : the driving error, "integral" (the paper's) or "instantaneous" (the conventional one).
+    law : the driving error, "integral" (the paper's), "instantaneous" (the conventional one) or
+        "pi_lead" (which needs the gain `lead`).
     input_source : where the network reads the state, "measured" or "estimated" (the paper's).
     integrator : "euler" or "rk4".
     dt : sampling interval T_s [s].

@@ -21,12 +21,13 @@ class Gains:
     ----------
     A_d : Hurwitz matrix of the prescribed error dynamics (2x2), by rows [1/s].
     forgetting : λ of (9)-(10) [1/s].
-    eta_W : learning rate of W: η1 [1/s³] for the integral law, [1/s²] for the instantaneous law.
-    eta_V : learning rate of V: η2 [1/(U² s³)], or [1/(U² s²)] for the instantaneous law.
+    eta_W : learning rate of W: η1 [1/s⁴], or [1/s³] for the instantaneous law.
+    eta_V : learning rate of V: η2 [1/(U² s⁴)], or [1/(U² s³)] for the instantaneous law.
     rho_W : leakage of W, ρ1 [1/(U s²)]; 0 where a projection bounds W.
     rho_V : leakage of V, ρ2 [1/(U s²)]; 0 where a projection bounds V.
     W_max : radius of the projection of W, Frobenius norm [U]; infinite: no projection.
     V_max : radius of the projection of V, Frobenius norm [-]; infinite: no projection.
+    lead : τ of the PI-lead law z + τ ξ̃ [s]; the other laws do not read it.
 
     Raises
     ------
@@ -44,6 +45,7 @@ class Gains:
     rho_V: float
     W_max: float = np.inf
     V_max: float = np.inf
+    lead: float = 0.0
 
     def __post_init__(self) -> None:
         A_d = np.array(self.A_d, dtype=np.float64)
@@ -52,7 +54,7 @@ class Gains:
         poles = np.linalg.eigvals(A_d)
         if not poles.real.max() < 0.0:
             raise NotHurwitzError(f"A_d must be Hurwitz, its eigenvalues are {poles}")
-        for name in ("eta_W", "eta_V", "rho_W", "rho_V"):
+        for name in ("eta_W", "eta_V", "rho_W", "rho_V", "lead"):
             if not 0.0 <= getattr(self, name) < np.inf:
                 raise ValueError(f"{name} must not be negative, it is {getattr(self, name)}")
         if not 0.0 < self.forgetting < np.inf:

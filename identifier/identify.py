@@ -82,6 +82,7 @@ def identify(
                     gains.forgetting,
                     gains.W_max,
                     gains.V_max,
+                    gains.lead,
                 ]
             ),
             "sampling": np.array([design.dt, design.force_unit, design.min_speed]),

@@ -9,36 +9,51 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-DrivingError = Callable[[Any, Any], Any]
+DrivingError = Callable[[Any, Any, Any], Any]
 
 
-def integral(z: Any, xi_tilde: Any) -> Any:
+def integral(z: Any, xi_tilde: Any, lead: Any) -> Any:
     """Drive the laws by the exponentially filtered error z, as (11)-(12) do; (2,).
 
     Parameters
     ----------
     z : filtered error (2,).
     xi_tilde : error (2,).
+    lead : not read.
     """
-    del xi_tilde
+    del xi_tilde, lead
     return z
 
 
-def instantaneous(z: Any, xi_tilde: Any) -> Any:
+def instantaneous(z: Any, xi_tilde: Any, lead: Any) -> Any:
     """Drive the laws by the error itself, the conventional scheme; (2,).
 
     Parameters
     ----------
     z : filtered error (2,).
     xi_tilde : error (2,).
+    lead : not read.
     """
-    del z
+    del z, lead
     return xi_tilde
+
+
+def pi_lead(z: Any, xi_tilde: Any, lead: Any) -> Any:
+    """Drive the laws by z + τ ξ̃: with τ >= 1/a the loop is positive real, no gain is too high.
+
+    Parameters
+    ----------
+    z : filtered error (2,).
+    xi_tilde : error (2,).
+    lead : lead time τ [s].
+    """
+    return z + lead * xi_tilde
 
 
 DRIVING_ERRORS: Mapping[str, DrivingError] = {
     "integral": integral,
     "instantaneous": instantaneous,
+    "pi_lead": pi_lead,
 }
 
 
@@ -67,7 +82,7 @@ def weight_rates(
 
     Parameters
     ----------
-    drive : the error that drives the laws, z or ξ̃ (2,).
+    drive : the error that drives the laws, z, ξ̃ or z + τ ξ̃ (2,).
     xi_tilde : error ξ - ξ̂ (2,), whose norm scales the leakage.
     W : weights (2, n_h).
     V : weights (n_h, n_in).

@@ -2,8 +2,8 @@
 
 Carried: xi_hat (2,), z (2,), W (2, n_h), V (n_h, n_in).
 Sampled: x = [v_y, r] (2,), u = [δ_f, δ_r] (2,), v_x.
-Constant: vehicle (6,) = m, I_z, l_f, l_r, C_f, C_r; A_d (2, 2); gains (7,) = η1, η2, ρ1, ρ2, λ,
-W_max, V_max; sampling (3,) = T_s, force unit U, minimum speed.
+Constant: vehicle (6,) = m, I_z, l_f, l_r, C_f, C_r; A_d (2, 2); gains (8,) = η1, η2, ρ1, ρ2, λ,
+W_max, V_max, τ; sampling (3,) = T_s, force unit U, minimum speed.
 Outputs: the next carried values; f_hat (2,) [U], the network's force; axle_force (2,) [N], linear
 tire and network together; xi_tilde (2,) [U s].
 """
@@ -36,10 +36,10 @@ def build_step(design: Design) -> ca.Function:
     W, V = ca.SX.sym("W", 2, n_h), ca.SX.sym("V", n_h, n_in)
     x, u, v_x = ca.SX.sym("x", 2), ca.SX.sym("u", 2), ca.SX.sym("v_x")
     vehicle, A_d = ca.SX.sym("vehicle", 6), ca.SX.sym("A_d", 2, 2)
-    gains, sampling = ca.SX.sym("gains", 7), ca.SX.sym("sampling", 3)
+    gains, sampling = ca.SX.sym("gains", 8), ca.SX.sym("sampling", 3)
 
     parameters = BicycleParameters(*ca.vertsplit(vehicle))
-    eta_W, eta_V, rho_W, rho_V, forgetting, W_max, V_max = ca.vertsplit(gains)
+    eta_W, eta_V, rho_W, rho_V, forgetting, W_max, V_max, lead = ca.vertsplit(gains)
     dt, unit, min_speed = ca.vertsplit(sampling)
     speed = ca.fmax(v_x, min_speed)
     model = bicycle(parameters, speed)
@@ -57,7 +57,7 @@ def build_step(design: Design) -> ca.Function:
         x_bar, sigma = layers(xi_hat, V)
         xi_tilde = xi - xi_hat
         rates = weight_rates(
-            drive=drive(z, xi_tilde),
+            drive=drive(z, xi_tilde, lead),
             xi_tilde=xi_tilde,
             W=W,
             V=V,

@@ -37,7 +37,7 @@ def by_hand(recording, design, car):
         x_bar = np.concatenate([x_read, u]) / scale
         sigma = np.tanh(V @ x_bar)
         f_hat, xi_t = W @ sigma, xi - xi_hat
-        error = z if design.law == "integral" else xi_t
+        error = {"integral": z, "instantaneous": xi_t, "pi_lead": z + g.lead * xi_t}[design.law]
         direction = np.linalg.inv(A_d).T @ error
         W_dot = -g.eta_W * np.outer(direction, sigma) - g.rho_W * np.linalg.norm(xi_t) * W
         V_dot = -g.eta_V * np.outer((1 - sigma**2) * (W.T @ direction), x_bar)
@@ -52,11 +52,11 @@ def by_hand(recording, design, car):
     return np.array(forces), W, V
 
 
-@pytest.mark.parametrize("law", ["integral", "instantaneous"])
+@pytest.mark.parametrize("law", ["integral", "instantaneous", "pi_lead"])
 @pytest.mark.parametrize("source", ["measured", "estimated"])
 @pytest.mark.parametrize("radius", [np.inf, 0.5])
 def test_step_repeats_the_equations_by_hand(law, source, radius, car, drive):
-    gains = replace(GAINS, W_max=radius, V_max=4 * radius)
+    gains = replace(GAINS, W_max=radius, V_max=4 * radius, lead=0.2)
     design = Design(gains=gains, law=law, input_source=source, network=Network(hidden=6))
     recording = drive(n=400)
     history = identify(recording, car, design)

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.laws import DRIVING_ERRORS, ball, instantaneous, integral, weight_rates
+from identifier.laws import DRIVING_ERRORS, ball, instantaneous, integral, pi_lead, weight_rates
 from identifier.network import hidden_layer
 from identifier.observer import filter_rate, observer_rate
 
@@ -165,8 +165,11 @@ def test_filtered_error_is_the_gradient_for_a_constant_offset():
 def test_driving_errors_differ_in_their_argument_only(case):
     assert DRIVING_ERRORS["integral"] is integral
     assert DRIVING_ERRORS["instantaneous"] is instantaneous
-    np.testing.assert_array_equal(integral(case["z"], case["xi"]), case["z"])
-    np.testing.assert_array_equal(instantaneous(case["z"], case["xi"]), case["xi"])
+    assert DRIVING_ERRORS["pi_lead"] is pi_lead
+    z, xi_tilde = case["z"], case["xi"]
+    np.testing.assert_array_equal(integral(z, xi_tilde, 0.3), z)
+    np.testing.assert_array_equal(instantaneous(z, xi_tilde, 0.3), xi_tilde)
+    np.testing.assert_array_equal(pi_lead(z, xi_tilde, 0.3), z + 0.3 * xi_tilde)
 
 
 def test_projection_keeps_the_ball_and_leaves_its_inside_alone(rng):

@@ -1,0 +1,48 @@
+"""design.toml comes back exactly, and is refused in one line that names the key."""
+
+from dataclasses import replace
+
+import pytest
+
+from identifier.defaults import default_design
+from identifier.design_file import DesignFileError, design_text, read_design
+
+
+def test_a_design_comes_back_from_its_file(car, tmp_path):
+    design = default_design(car)
+    odd = replace(
+        design,
+        law="pi_lead",
+        seed=7,
+        gains=replace(design.gains, A_d=((-3.0, 1.0), (0.25, -7.1)), W_max=12.5, lead=0.1 + 0.2),
+    )
+    for one in (design, odd):
+        path = tmp_path / "design.toml"
+        path.write_text(design_text(one))
+        assert read_design(path) == one
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("eta_W = ", "eta = ", "gains.eta is unknown"),
+        ("forgetting = 10.0", "", "gains.forgetting is missing"),
+        ("[gains]", "gains = 3\n[other]", "gains must be a table"),
+        ('law = "integral"', "law = 5", "law must be a text"),
+        ('law = "integral"', 'law = "magic"', "law must be one of"),
+        ("seed = 0", "seed = 0.5", "seed must be a whole number"),
+        ("forgetting = 10.0", "forgetting = -1.0", "forgetting must be positive"),
+        ("A_d = [[-10.0", "A_d = [[10.0", "must be Hurwitz"),
+        ("hidden = 10", "hidden = true", "network.hidden must be a whole number"),
+        ("dt = 0.01", "dt = [", "cannot be read as TOML"),
+    ],
+)
+def test_a_wrong_file_is_refused_by_its_key(car, tmp_path, old, new, said):
+    text = design_text(default_design(car))
+    assert old in text
+    path = tmp_path / "design.toml"
+    path.write_text(text.replace(old, new))
+    with pytest.raises(DesignFileError, match=said) as error:
+        read_design(path)
+    assert str(error.value).startswith(str(path))
+    assert "\n" not in str(error.value)
