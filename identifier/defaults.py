@@ -1,24 +1,74 @@
-"""A design from the vehicle alone: sizes by similarity, gains by the margin of the adaptive loop.
+"""A design from the vehicle alone: sizes by similarity, gains by the margin of the learning loop.
 
 Lengths scale with the wheelbase L and times with sqrt(L/g) (Froude), so that one rule serves a
-passenger car and a 1:10 model. The loop of the integral law with A_d = -a I and λ = a has a phase
-margin of 60° where max|σ|² η1 + ... = 0.287 a⁴.
+passenger car and a 1:10 model.
 """
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from identifier.design import Design, natural_force_unit
 from identifier.gains import Gains, diagonal
+from identifier.laws import DRIVING_ERRORS
 from identifier.network import SIGNALS, Network
+from identifier.stability.driving_limits import operation
+from identifier.stability.estimated_input import minimal_decay
+from identifier.stability.gain_design import decay_rate, design_gains
+from identifier.stability.loop import linear_law
+from identifier.stability.operation import Operation
 from models.vehicle import GRAVITY, Vehicle
 
 REFERENCE_WHEELBASE = 2.7  # m: the car for which the scales of SIGNALS are meant
-RATE = 10.0  # 1/s: a = λ, which is a T_s = 0.1 at 10 ms
-LOOP_GAIN = 0.287 * RATE**4  # 1/s⁴: 60 degrees of phase margin
-SHARE_OF_V = 0.2  # of the loop gain, for the V layer
-LARGE_W = 5.0  # U: a norm of W that is large; with it the V layer takes its share
-LEAKAGE = 0.1  # 1/(U s²)
-LAWS = ("integral", "instantaneous", "instantaneous_scaled")
+BANDWIDTH = 0.7  # Hz: a brisk slalom; the steering of a normal driver stays below 0.5 Hz
+PHASE_MARGIN = 60.0  # deg
+LAWS = ("integral", "instantaneous", "instantaneous_scaled", "pi_lead")
+
+
+class Driving(NamedTuple):
+    """How hard a car is driven: what a design is made for and judged at.
+
+    v_x [m/s], largest slip angle [rad], friction [-], bandwidth of the steering [Hz].
+    """
+
+    v_x: float
+    slip: float
+    friction: float
+    bandwidth: float
+
+
+def natural_driving(vehicle: Vehicle, *, bandwidth: float = BANDWIDTH) -> Driving:
+    """Return hard driving on a dry road: both axles slide, at 4 sqrt(g L) (20 m/s for a sedan).
+
+    Parameters
+    ----------
+    vehicle : the car; the slip is twice that at which its linear tire reaches the friction limit.
+    bandwidth : highest frequency of steering that matters [Hz].
+    """
+    stiffness = (vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear)
+    sliding = max(load / c for load, c in zip(vehicle.axle_loads, stiffness, strict=True))
+    return Driving(
+        v_x=4.0 * math.sqrt(GRAVITY * vehicle.wheelbase),
+        slip=2.0 * sliding,
+        friction=1.0,
+        bandwidth=bandwidth,
+    )
+
+
+def natural_operation(
+    design: Design, vehicle: Vehicle, driving: Driving | None = None
+) -> Operation:
+    """Return what a certificate of the design must know.
+
+    Parameters
+    ----------
+    design : the design.
+    vehicle : the car.
+    driving : how hard it is driven; None takes `natural_driving`.
+    """
+    return operation(design, vehicle, **(driving or natural_driving(vehicle))._asdict())
 
 
 def natural_network(
@@ -38,6 +88,68 @@ def natural_network(
     return Network(hidden=hidden, inputs=inputs, scale=scale)
 
 
+def design_for(
+    vehicle: Vehicle,
+    driving: Driving,
+    *,
+    law: str = "integral",
+    network: Network | None = None,
+    phase_margin: float = PHASE_MARGIN,
+    input_source: str = "measured",
+    integrator: str = "euler",
+    dt: float = 0.01,
+    seed: int = 0,
+) -> Design:
+    """Return a design whose learning loop has the wanted phase margin at the worst regressor.
+
+    Parameters
+    ----------
+    vehicle : the car.
+    driving : how hard it is driven.
+    law : "integral", "instantaneous" or "pi_lead", which gets the lead τ = 1/a.
+    network : structure; None takes `natural_network`.
+    phase_margin : of the sampled loop [deg].
+    input_source : "measured" or "estimated".
+    integrator : "euler" or "rk4".
+    dt : sampling interval [s].
+    seed : seed of the initial weights.
+
+    Raises
+    ------
+    DesignError
+        Where the bandwidth is too high for the sampling, or the margin cannot be had.
+    """
+    network = network or natural_network(vehicle)
+    frame = Design(
+        gains=_placeholder(),
+        network=network,
+        law=law,
+        input_source=input_source,
+        integrator=integrator,
+        dt=dt,
+        force_unit=natural_force_unit(vehicle.mass),
+        min_speed=0.2 * math.sqrt(GRAVITY * vehicle.wheelbase),
+        seed=seed,
+    )
+    known = natural_operation(frame, vehicle, driving)
+    feedback = known.input_feedback
+    slowest = 0.0 if feedback is None else minimal_decay(feedback)
+    lead = 1.0 / decay_rate(driving.bandwidth, slowest) if law == "pi_lead" else 0.0
+    designed = design_gains(
+        law=linear_law(DRIVING_ERRORS[law], lead),
+        bandwidth=driving.bandwidth,
+        dt=dt,
+        n_h=network.hidden,
+        x_bar_max=known.x_bar_max,
+        residual_bound=known.residual_bound,
+        V_max=2.0 * math.sqrt(network.hidden * len(network.inputs)),  # twice the initial norm
+        phase_margin=phase_margin,
+        integrator=integrator,
+        minimal_decay=slowest,
+    )
+    return replace(frame, gains=replace(designed.gains, lead=lead))
+
+
 def default_design(
     vehicle: Vehicle,
     *,
@@ -48,10 +160,13 @@ def default_design(
 ) -> Design:
     """Return a design for a vehicle.
 
+    The two instantaneous laws have the gains of the integral law, one as they are and one with
+    η/λ, since they are there to be compared with it.
+
     Parameters
     ----------
     vehicle : the car.
-    law : "integral", "instantaneous", or "instantaneous_scaled": the instantaneous law at η/λ.
+    law : "integral", "instantaneous", "instantaneous_scaled" (at η/λ) or "pi_lead".
     network : structure; None takes `natural_network`.
     seed : seed of the initial weights.
     dt : sampling interval [s].
@@ -63,21 +178,20 @@ def default_design(
     """
     if law not in LAWS:
         raise ValueError(f"law must be one of {list(LAWS)}, not {law!r}")
-    network = network or natural_network(vehicle)
-    gains = Gains(
-        A_d=diagonal(RATE),
-        forgetting=RATE,
-        eta_W=(1 - SHARE_OF_V) * LOOP_GAIN / network.hidden,
-        eta_V=SHARE_OF_V * LOOP_GAIN / (len(network.inputs) * LARGE_W**2),
-        rho_W=LEAKAGE,
-        rho_V=LEAKAGE,
-    )
-    return Design(
-        gains=gains.scaled_by_forgetting() if law == "instantaneous_scaled" else gains,
+    compared = law.startswith("instantaneous")
+    design = design_for(
+        vehicle,
+        natural_driving(vehicle),
+        law="integral" if compared else law,
         network=network,
-        law="integral" if law == "integral" else "instantaneous",
-        dt=dt,
-        force_unit=natural_force_unit(vehicle.mass),
-        min_speed=0.2 * float(np.sqrt(GRAVITY * vehicle.wheelbase)),
         seed=seed,
+        dt=dt,
     )
+    if law == "instantaneous_scaled":
+        design = replace(design, gains=design.gains.scaled_by_forgetting())
+    return replace(design, law="instantaneous") if compared else design
+
+
+def _placeholder() -> Gains:
+    """Gains that are replaced once the design around them is known."""
+    return Gains(A_d=diagonal(1.0), forgetting=1.0, eta_W=0.0, eta_V=0.0, rho_W=0.0, rho_V=0.0)

@@ -5,11 +5,11 @@ import sys
 import traceback
 from collections.abc import Sequence
 
-from tireid import demo_command, identify_command, paper_command
+from tireid import check_command, demo_command, identify_command, paper_command
 from tireid.progress import listen_to_library
 from tireid.summary import program_version
 
-COMMANDS = (demo_command, paper_command, identify_command)
+COMMANDS = (demo_command, paper_command, identify_command, check_command)
 BAD_INPUT = 2
 
 
@@ -28,7 +28,7 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; return 0, or 2 where its input was bad.
+    """Run a command; return 0, 1 where a check fails, or 2 where its input was bad.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = build_parser().parse_args(arguments)
     listen_to_library()
     try:
-        options.run(options)
+        status: int = options.run(options) or 0
     except (ValueError, ArithmeticError, OSError, ImportError) as error:
         if options.debug:
             traceback.print_exc()
@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("interrupted; nothing was written", file=sys.stderr)
         return 130
-    return 0
+    return status
 
 
 if __name__ == "__main__":

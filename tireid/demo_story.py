@@ -11,6 +11,7 @@ from identifier.identify import identify
 from identifier.reproducibility import Replay, axle_rms, online_error, replay
 from models.maneuvers import DoubleLaneChange, Maneuver, Slalom, StepSteer
 from models.plant import Plant
+from models.recordings import Recording
 from models.sensors import Sensor, Sensors
 from models.vehicle import sedan
 
@@ -72,15 +73,30 @@ class Story:
         return "\n".join(lines)
 
 
-def run_story() -> Story:
-    """Drive, learn, freeze and predict; sensors are noisy with a fixed seed."""
-    car = sedan()
-    plant, design = Plant(car), default_design(car)
-    sensors, rng = SENSORS, np.random.default_rng(1)
-    recordings = {
-        name: plant.simulate(maneuver, speed=SPEED, name=name).recording(sensors, rng)
-        for name, maneuver in {"slalom": LEARN, **PREDICT}.items()
+def drives(maneuvers: Mapping[str, Maneuver]) -> dict[str, Recording]:
+    """Drive the sedan; sensors are noisy with a fixed seed.
+
+    Parameters
+    ----------
+    maneuvers : by the name of the recording.
+    """
+    plant, rng = Plant(sedan()), np.random.default_rng(1)
+    return {
+        name: plant.simulate(maneuver, speed=SPEED, name=name).recording(SENSORS, rng)
+        for name, maneuver in maneuvers.items()
     }
+
+
+def drive_to_learn() -> Recording:
+    """Return the slalom of the demo."""
+    return drives({"slalom": LEARN})["slalom"]
+
+
+def run_story() -> Story:
+    """Drive, learn, freeze and predict."""
+    car = sedan()
+    design = default_design(car)
+    recordings = drives({"slalom": LEARN, **PREDICT})
     histories = {name: identify(rec, car, design) for name, rec in recordings.items()}
     model = histories["slalom"].freeze(FREEZE)
     return Story(

@@ -6,6 +6,7 @@ from tireid.figures.forces import force_figure
 from tireid.figures.inputs import inputs_figure
 from tireid.figures.prediction import prediction_figure
 from tireid.figures.slip import slip_figure
+from tireid.figures.stability import locus_figure
 from tireid.figures.style import figure_png, save_figure
 from tireid.figures.weights import weights_figure
 
@@ -15,6 +16,7 @@ __all__ = [
     "figure_png",
     "force_figure",
     "inputs_figure",
+    "locus_figure",
     "prediction_figure",
     "save_figure",
     "slip_figure",

@@ -1,0 +1,92 @@
+"""Steady cornering on saturated tires: every signal is constant, and so is the regressor."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.random_drives import FORCE_UNIT, random_vehicle
+from identifier.design import Design
+from identifier.network import Weights
+from identifier.stability.estimated_input import jacobian_feedback
+from identifier.stability.regressor_gain import regressor_gains
+from models.recordings import Recording
+from models.vehicle import GRAVITY, Vehicle
+
+Array = NDArray[np.float64]
+
+
+class Corner(NamedTuple):
+    """A car in a steady corner: its recording, and x_bar of a network (n_in,)."""
+
+    vehicle: Vehicle
+    recording: Recording
+
+
+def random_corner(rng: np.random.Generator, *, duration: float, dt: float = 0.01) -> Corner:
+    """Return a random car that corners at 80 to 98 % of its friction.
+
+    Parameters
+    ----------
+    rng : source of randomness.
+    duration : [s].
+    dt : sampling interval [s].
+    """
+    vehicle = random_vehicle(rng)
+    friction, share, speed = rng.uniform(0.4, 1.0), rng.uniform(0.8, 0.98), rng.uniform(15.0, 30.0)
+    load = vehicle.mass * GRAVITY / vehicle.wheelbase
+    peaks = friction * load * np.array([vehicle.l_r, vehicle.l_f])
+    stiffness = np.array([vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear])
+    alpha = 1.5 * peaks / stiffness * math.tan(math.asin(share) / 1.5)
+    r = share * friction * GRAVITY / speed
+    v_y = vehicle.l_r * r - speed * alpha[1]
+    delta_f = alpha[0] + (v_y + vehicle.l_f * r) / speed
+    n = round(duration / dt)
+    recording = Recording(
+        name="steady corner",
+        t=np.arange(n, dtype=np.float64) * dt,
+        v_x=np.full(n, speed),
+        v_y=np.full(n, v_y),
+        r=np.full(n, r),
+        delta_f=np.full(n, delta_f),
+        delta_r=np.zeros(n),
+    )
+    return Corner(vehicle, recording)
+
+
+def network_input(corner: Corner, design: Design) -> Array:
+    """Return x_bar of the network [v_y, r, delta_f, delta_r], (4,).
+
+    Parameters
+    ----------
+    corner : gives the signals.
+    design : gives the scales.
+    """
+    signals = np.concatenate([corner.recording.x[0], corner.recording.u[0]])
+    scaled: Array = signals / np.array(design.network.scale)
+    return scaled
+
+
+def loop_at(corner: Corner, design: Design, weights: Weights) -> tuple[Array, Array]:
+    """Return G (2, 2) of the design at these weights, and J_f K (2, 2) [1/s].
+
+    Parameters
+    ----------
+    corner : gives the regressor.
+    design : gives gains and scales.
+    weights : of the network.
+    """
+    x_bar = network_input(corner, design)
+    s = np.tanh(weights.V @ x_bar)
+    gains = design.gains
+    G = regressor_gains(eta_W=gains.eta_W, eta_V=gains.eta_V, s=s, x_bar=x_bar, W=weights.W)[0]
+    car = corner.vehicle
+    K = FORCE_UNIT * np.array(
+        [
+            [1.0 / car.mass, 1.0 / car.mass],
+            [car.l_f / car.yaw_inertia, -car.l_r / car.yaw_inertia],
+        ]
+    )
+    V_x = weights.V[:, :2] / np.array(design.network.scale)[:2]
+    return G, jacobian_feedback(W=weights.W, V_x=V_x, s=s, K=K)

@@ -1,0 +1,194 @@
+"""Design the other way round: from what the car does to gains with a wanted phase margin.
+
+1. a = λ = Ω / tan(22.5°): the filter chain 1/((s + a)(s + λ)) lags 45° at the bandwidth Ω, and the
+   drift frequency sqrt(a λ) is 2.4 Ω. a dt <= 0.2, so that a step of Euler resolves the poles.
+2. The loop gain g gives the sampled loop its phase margin (unlimited time: for a = λ and the
+   integral law g = a⁴ x (1 + x²), x = tan((90° - PM)/2); 0.287 a⁴ for 60°, 0.485 a⁴ for 45°).
+3. η_W = g/n_h: the margin holds at the worst regressor |s|² = n_h.
+4. ρ_W: the force that W can hold against its leakage is `capacity` times the expected residual at
+   |s|² = n_h (so that 4 leaves all of it at half-open units, s_i = 1/2).
+5. η_V = η_W/(x_bar_max W_max)², where V costs no margin, or less, where |V| would pass V_max;
+   ρ_V keeps |V| <= V_max. W_max is the proven bound on |W|.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from identifier.gains import Gains, diagonal
+from identifier.stability.gain_limit import require_positive
+from identifier.stability.loop import Law
+from identifier.stability.state_bound import StateBounds, small_gain, state_bounds
+
+LAG_RULE = 1.0 / math.tan(math.radians(22.5))  # a/Ω for 45 degrees of lag through two equal poles
+FASTEST = 0.2  # largest a dt
+
+
+class DesignError(ValueError):
+    """What is asked of the gains cannot be had at this sampling interval."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GainDesign:
+    """Gains and what is proved of them.
+
+    Parameters
+    ----------
+    gains : of (8) to (12).
+    loop_gain : g at the worst regressor.
+    bounds : proven bounds of |ξ̃| and |W_hat| from rest.
+    V_max : wanted bound on |V_hat|, kept by ρ_V.
+    """
+
+    gains: Gains
+    loop_gain: float
+    bounds: StateBounds
+    V_max: float
+
+
+def gain_for_phase_margin(
+    *, a: float, lam: float, law: Law, phase_margin: float, dt: float | None = None
+) -> float:
+    """Loop gain g that gives the scalar loop (A_d = -a I, no leakage) its phase margin, exactly.
+
+    The loop is (g/a) (c_ξ + c_z/(s + λ))/((s + a) s); the frequency where its phase is PM - 180° is
+    found by bisection, g is the inverse of its magnitude there.
+
+    Parameters
+    ----------
+    a : decay rate [1/s].
+    lam : forgetting factor λ [1/s].
+    law : coefficients of z and ξ̃ in the driving error.
+    phase_margin : wanted [deg], above 0 and below 90.
+    dt : step of explicit Euler [s]; None for continuous time (RK4 at a dt <= 0.2 comes to it).
+
+    Raises
+    ------
+    DesignError
+        If every gain has a larger phase margin.
+    """
+    require_positive(a=a, lam=lam)
+    if not 0.0 < phase_margin < 90.0:
+        raise DesignError(f"the phase margin must be in (0, 90) deg, it is {phase_margin}")
+    c_z, c_xi = law
+
+    def factors(frequency: float) -> tuple[complex, complex, complex, complex]:
+        s = 1j * frequency if dt is None else (np.exp(1j * frequency * dt) - 1.0) / dt
+        if c_z == 0.0:
+            return s, s + a, 1.0 + 0.0j, c_xi + 0.0j
+        return s, s + a, s + lam, c_z + c_xi * (s + lam)
+
+    def excess(frequency: float) -> float:
+        """Phase above PM - 180°, summed by factors so that it never wraps."""
+        first, second, third, zero = factors(frequency)
+        lag = sum(math.atan2(pole.imag, pole.real) for pole in (first, second, third))
+        return math.pi - math.radians(phase_margin) - lag + math.atan2(zero.imag, zero.real)
+
+    highest = 1e6 * (a + lam) if dt is None else math.pi / dt * (1.0 - 1e-9)
+    if not excess(highest) < 0.0:
+        raise DesignError(f"every gain has a phase margin above {phase_margin} deg")
+    crossing = float(brentq(excess, 1e-9 * a, highest, xtol=1e-14 * a, rtol=1e-14))
+    first, second, third, zero = factors(crossing)
+    return float(a * abs(first * second * third / zero))
+
+
+def decay_rate(bandwidth: float, minimal_decay: float = 0.0) -> float:
+    """Return a = λ of rule 1 [1/s].
+
+    Parameters
+    ----------
+    bandwidth : highest frequency of steering that matters [Hz].
+    minimal_decay : smallest a that the network's input allows [1/s]; a keeps 1.5 times it.
+    """
+    return max(LAG_RULE * 2.0 * math.pi * bandwidth, 1.5 * minimal_decay)
+
+
+def design_gains(
+    *,
+    law: Law,
+    bandwidth: float,
+    dt: float,
+    n_h: int,
+    x_bar_max: float,
+    residual_bound: float,
+    V_max: float,
+    phase_margin: float = 60.0,
+    capacity: float = 4.0,
+    integrator: str = "euler",
+    minimal_decay: float = 0.0,
+) -> GainDesign:
+    """Gains for a maneuver bandwidth and a wanted phase margin; the rules are those of the module.
+
+    Parameters
+    ----------
+    law : coefficients of z and ξ̃ in the driving error.
+    bandwidth : highest frequency of steering that matters [Hz].
+    dt : sampling interval T_s [s].
+    n_h : hidden units.
+    x_bar_max : bound on |x_bar|.
+    residual_bound : sup|f|, the force the linear tire misses [U].
+    V_max : wanted bound on |V_hat|, at least its initial norm.
+    phase_margin : wanted phase margin of the sampled loop at the worst regressor [deg].
+    capacity : force that W can hold at |s|² = n_h, in units of residual_bound.
+    integrator : "euler" or "rk4", as in the step.
+    minimal_decay : smallest a that the network's input allows [1/s]; a keeps 1.5 times it.
+
+    Raises
+    ------
+    DesignError
+        If a dt would pass 0.2, or the phase margin is too small for a proven bound (below about
+        22 deg for the integral law).
+    """
+    require_positive(
+        bandwidth=bandwidth,
+        dt=dt,
+        x_bar_max=x_bar_max,
+        residual_bound=residual_bound,
+        V_max=V_max,
+        capacity=capacity,
+    )
+    a = decay_rate(bandwidth, minimal_decay)
+    if not a * dt <= FASTEST:
+        raise DesignError(
+            f"a dt must not pass {FASTEST}, it is {a * dt:.3g}: sample every "
+            f"{1e3 * FASTEST / a:.3g} ms, or ask for a bandwidth of "
+            f"{FASTEST / (LAG_RULE * 2.0 * math.pi * dt):.3g} Hz"
+        )
+    lam, A_d = a, diagonal(a)
+    g = gain_for_phase_margin(
+        a=a, lam=lam, law=law, phase_margin=phase_margin, dt=dt if integrator == "euler" else None
+    )
+    eta_W = g / n_h
+    theta = small_gain(A_d, law=law, forgetting=lam, eta_W=eta_W, n_h=n_h)
+    if not theta < 1.0:
+        raise DesignError(f"ask for a larger phase margin: at {phase_margin} deg θ = {theta:.3g}")
+    c_z, c_xi = law
+    drive = c_z / lam + c_xi
+    rho_W = g * drive / (a * capacity * residual_bound)
+    bounds = state_bounds(
+        A_d,
+        law=law,
+        forgetting=lam,
+        eta_W=eta_W,
+        rho_W=rho_W,
+        n_h=n_h,
+        residual_bound=residual_bound,
+    )
+    per_eta = bounds.W * x_bar_max / a  # g2/η_V
+    memory = c_z * per_eta * bounds.xi_tilde / lam**2  # what z alone can move V by, per η_V
+    eta_V = eta_W / (x_bar_max * bounds.W) ** 2
+    if memory > 0.0:
+        eta_V = min(eta_V, 0.5 * V_max / memory)
+    rho_V = eta_V * per_eta * drive / (V_max - eta_V * memory)
+    gains = Gains(
+        A_d=A_d,
+        forgetting=lam,
+        eta_W=eta_W,
+        eta_V=eta_V,
+        rho_W=rho_W,
+        rho_V=rho_V,
+        lead=c_xi if c_z > 0.0 else 0.0,
+    )
+    return GainDesign(gains=gains, loop_gain=g, bounds=bounds, V_max=V_max)

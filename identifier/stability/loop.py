@@ -1,0 +1,229 @@
+"""The learning loop at a frozen regressor: one 6x6 matrix for every law that is linear in (z, ξ̃).
+
+With f_hat = p = W s and s = tanh(V x_bar) held, the identifier (8) and the laws (11), (12) are
+
+    ξ̃' = (A_d + J_f K) ξ̃ - p          J_f K: only where the network reads x_hat (else 0)
+    z'  = -λ z + ξ̃                     (10)
+    p'  = G D (c_z z + c_ξ ξ̃) - l p     D = -A_d⁻ᵀ in (11), (12)
+
+G = η_W |s|² I + η_V |x_bar|² W (I - Λ)² Wᵀ is the loop gain [1/s⁴, 1/s³ for the instantaneous
+law], l the leakage rate ρ |ξ̃| [1/s]. (c_z, c_ξ) is the law: (1, 0) the integral law, (0, 1) the
+instantaneous one, (1, τ) the PI-lead law. l = 0 is the worst case.
+A numerical integrator R acts on the eigenvalues μ of this matrix as R(μ dt), so that continuous
+time, Euler and Runge-Kutta 4 share one eigenvalue computation.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from identifier.laws import DrivingError
+from identifier.stability.lyapunov import Matrix, require_square
+
+ComplexArray = npt.NDArray[np.complex128]
+Integrator = Callable[[ComplexArray], ComplexArray]
+
+
+def exact(mu: ComplexArray) -> ComplexArray:
+    """Continuous time: exp(μ dt).
+
+    Parameters
+    ----------
+    mu : eigenvalues times the step [-].
+    """
+    return np.exp(mu)
+
+
+def euler(mu: ComplexArray) -> ComplexArray:
+    """Explicit Euler: 1 + μ dt.
+
+    Parameters
+    ----------
+    mu : eigenvalues times the step [-].
+    """
+    return 1.0 + mu
+
+
+def rk4(mu: ComplexArray) -> ComplexArray:
+    """Runge-Kutta of order 4: 1 + μ + μ²/2 + μ³/6 + μ⁴/24, with μ times dt.
+
+    Parameters
+    ----------
+    mu : eigenvalues times the step [-].
+    """
+    return 1.0 + mu * (1.0 + mu / 2.0 * (1.0 + mu / 3.0 * (1.0 + mu / 4.0)))
+
+
+INTEGRATORS: dict[str, Integrator] = {"exact": exact, "euler": euler, "rk4": rk4}
+
+
+class Law(NamedTuple):
+    """Coefficients of z and ξ̃ in the error that drives (11) and (12).
+
+    `z` has no unit and `xi_tilde` is a time [s]; for a law without z, `xi_tilde` has no unit.
+    """
+
+    z: float
+    xi_tilde: float
+
+    def drive(self, z: Any, xi_tilde: Any) -> Any:
+        """Return the driving error.
+
+        Parameters
+        ----------
+        z : filtered error.
+        xi_tilde : error.
+        """
+        return self.z * z + self.xi_tilde * xi_tilde
+
+
+INTEGRAL = Law(1.0, 0.0)
+INSTANTANEOUS = Law(0.0, 1.0)
+
+
+def linear_law(driving_error: DrivingError, lead: float = 0.0) -> Law:
+    """Read the coefficients of a law off with unit arguments.
+
+    Parameters
+    ----------
+    driving_error : of `identifier.laws`.
+    lead : τ of the PI-lead law [s].
+
+    Raises
+    ------
+    ValueError
+        If the law is not linear, or has no positive part.
+    """
+    c_z = float(driving_error(1.0, 0.0, lead))
+    c_xi = float(driving_error(0.0, 1.0, lead))
+    both = float(driving_error(2.0, -3.0, lead))
+    if not np.isclose(both, 2.0 * c_z - 3.0 * c_xi, rtol=1e-12, atol=1e-12):
+        raise ValueError("the law must be linear in z and xi_tilde")
+    if not (c_z >= 0.0 and c_xi >= 0.0 and c_z + c_xi > 0.0):
+        raise ValueError(f"the law must weigh z and xi_tilde positively, it is ({c_z}, {c_xi})")
+    return Law(c_z, c_xi)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Loop:
+    """The loop at one frozen regressor.
+
+    Parameters
+    ----------
+    A_d : (2, 2) error dynamics [1/s].
+    forgetting : λ of (9) and (10) [1/s].
+    law : coefficients of z and ξ̃ in the driving error.
+    G : (2, 2) loop gain, symmetric positive semidefinite.
+    leakage : l = ρ |ξ̃| [1/s].
+    input_feedback : (2, 2) J_f K [1/s], None where the network reads the measured x.
+    direction : (2, 2) matrix D that replaces -A_d⁻ᵀ [s], None for (11) and (12) as printed.
+    """
+
+    A_d: Matrix
+    forgetting: float
+    law: Law
+    G: Matrix
+    leakage: float = 0.0
+    input_feedback: Matrix | None = None
+    direction: Matrix | None = None
+
+    def __post_init__(self) -> None:
+        """Check shapes and signs once, here."""
+        object.__setattr__(self, "A_d", require_square(self.A_d))
+        object.__setattr__(self, "G", require_square(self.G))
+        if not self.forgetting > 0.0:
+            raise ValueError(f"forgetting must be positive, it is {self.forgetting}")
+        if not self.leakage >= 0.0:
+            raise ValueError(f"leakage must not be negative, it is {self.leakage}")
+
+    def matrix(self) -> Matrix:
+        """Return the (6, 6) matrix of the states (ξ̃, z, p)."""
+        eye, zero = np.eye(2), np.zeros((2, 2))
+        c_z, c_xi = self.law
+        printed = -np.linalg.inv(self.A_d).T  # (zᵀ A_d⁻¹)ᵀ = A_d⁻ᵀ z
+        drive = self.G @ (printed if self.direction is None else require_square(self.direction))
+        feedback = zero if self.input_feedback is None else require_square(self.input_feedback)
+        return np.block(
+            [
+                [self.A_d + feedback, zero, -eye],
+                [eye, -self.forgetting * eye, zero],
+                [c_xi * drive, c_z * drive, -self.leakage * eye],
+            ]
+        )
+
+    def scaled(self, factor: float) -> "Loop":
+        """Return the same loop with eta_W and eta_V multiplied by the factor.
+
+        Parameters
+        ----------
+        factor : multiplier of the loop gain [-].
+        """
+        return replace(self, G=factor * self.G)
+
+
+def scaled_matrices(loop: Loop, factors: npt.ArrayLike) -> ComplexArray:
+    """Stack the loop's matrices for many (complex) factors on the loop gain, (n, 6, 6).
+
+    Parameters
+    ----------
+    loop : the loop at factor 1.
+    factors : (n,) multipliers of G; complex ones turn the phase.
+    """
+    base = loop.matrix().astype(np.complex128)
+    stack = np.repeat(base[None], np.size(factors), axis=0)
+    stack[:, 4:, :4] *= np.ravel(factors)[:, None, None]
+    return stack
+
+
+def eigenvalues(matrices: npt.ArrayLike) -> ComplexArray:
+    """Eigenvalues as complex numbers, (..., n) [1/s].
+
+    Parameters
+    ----------
+    matrices : (..., n, n).
+    """
+    return np.asarray(np.linalg.eigvals(np.asarray(matrices)), dtype=np.complex128)
+
+
+def root_locus(loop: Loop, factors: npt.ArrayLike) -> ComplexArray:
+    """Eigenvalues of the loop for many factors on the gain, (n, 6) [1/s], unsorted.
+
+    Parameters
+    ----------
+    loop : the loop at factor 1.
+    factors : (n,) multipliers of G.
+    """
+    return eigenvalues(scaled_matrices(loop, factors))
+
+
+def growth_rate(
+    matrices: npt.ArrayLike, integrator: Integrator = exact, dt: float = 1.0
+) -> npt.NDArray[np.float64]:
+    """Log max|R(μ dt)| / dt [1/s]: negative is stable; the spectral abscissa for `exact`.
+
+    Parameters
+    ----------
+    matrices : (..., n, n) loop matrices.
+    integrator : R.
+    dt : step [s]; irrelevant for `exact`.
+    """
+    mu = eigenvalues(matrices)
+    growth = np.max(mu.real, axis=-1)
+    if integrator is not exact:
+        growth = np.log(np.max(np.abs(integrator(mu * dt)), axis=-1)) / dt
+    return np.asarray(growth, dtype=np.float64)
+
+
+def spectral_radius(matrices: npt.ArrayLike, integrator: Integrator, dt: float) -> Matrix:
+    """max|R(μ dt)|: below one the sampled loop is stable.
+
+    Parameters
+    ----------
+    matrices : (..., n, n) loop matrices.
+    integrator : R.
+    dt : step [s].
+    """
+    return np.exp(growth_rate(matrices, integrator, dt) * dt)

@@ -1,0 +1,229 @@
+"""Properties of the learning loop: poles, sampling, margins, damping, drift."""
+
+import math
+
+import numpy as np
+
+from identifier.gains import Gains
+from identifier.stability.drift import drift_frequency, sufficient_leakage
+from identifier.stability.loop import Law, Loop, eigenvalues, exact
+from identifier.stability.lyapunov import lyapunov
+from identifier.stability.margins import gain_margin, phase_margin
+from identifier.stability.operation import Operation, kept_weights
+from identifier.stability.property import Property, Status, at_least, at_most
+
+ENOUGH_GAIN, ENOUGH_PHASE, ENOUGH_DAMPING = 2.0, 30.0, 0.2
+LARGEST_STEP = 0.2  # fastest pole times dt that Euler resolves well
+
+
+def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
+    """A_d: Hurwitz, with a Lyapunov matrix, resolved by the step, faster than the x_hat loop.
+
+    Parameters
+    ----------
+    gains : of (8) to (12).
+    operation : where it runs.
+    """
+    A_d = gains.matrix
+    poles = np.linalg.eigvals(A_d)
+    slowest, step = -float(poles.real.max()), float(np.abs(poles).max()) * operation.dt
+    residual = lyapunov(A_d, np.eye(2)).residual
+    resolved = operation.resolves(A_d)
+    entries = [
+        _above_zero(
+            "error_dynamics",
+            "decay of the slowest pole of A_d (Hurwitz)",
+            slowest,
+            "give A_d poles with a negative real part",
+        ),
+        Property(
+            name="lyapunov_residual",
+            title="P of A_d' P + P A_d = -Q substituted back",
+            value=residual,
+            limit=1e-9,
+            margin=1e-9 / max(residual, 1e-18),
+            status=at_most(residual, good=1e-9, bad=1e-9),
+            unit="-",
+        ),
+        Property(
+            name="sampling",
+            title="fastest pole of A_d times the sampling interval",
+            value=step,
+            limit=LARGEST_STEP,
+            margin=LARGEST_STEP / step,
+            status=at_most(step, good=LARGEST_STEP, bad=None) if resolved else "fail",
+            unit="-",
+            advice=""
+            if step <= LARGEST_STEP and resolved
+            else f"slow A_d down or sample every {1e3 * operation.dt * LARGEST_STEP / step:.3g} ms",
+        ),
+    ]
+    if operation.input_feedback is not None:
+        need = float(np.linalg.eigvals(operation.input_feedback).real.max())
+        entries.append(
+            _above_zero(
+                "estimated_input",
+                "decay left where the network reads the estimate on a saturated tire",
+                -float(np.linalg.eigvals(A_d + operation.input_feedback).real.max()),
+                f"make A_d faster than {need:.3g} 1/s, or let the network read the measured state",
+            )
+        )
+    return entries
+
+
+def margin_checks(loop: Loop, operation: Operation) -> list[Property]:
+    """Gain margin in continuous time and sampled, phase margin, damping.
+
+    Parameters
+    ----------
+    loop : the loop at the worst regressor.
+    operation : where it runs.
+    """
+    phase = phase_margin(loop, operation.step, operation.dt)
+    damping = worst_damping(loop)
+    advice = ("lower eta_W", "raise A_d and forgetting, or lower eta_W")
+    return [
+        _gain_check(
+            "gain_continuous", "loop gain, continuous time", loop, operation, sampled=False
+        ),
+        _gain_check("gain_sampled", "loop gain, sampled", loop, operation, sampled=True),
+        Property(
+            name="phase_margin",
+            title="phase margin of the sampled loop",
+            value=phase,
+            limit=ENOUGH_PHASE,
+            margin=phase / ENOUGH_PHASE,
+            status=at_least(phase, good=ENOUGH_PHASE, bad=1e-9),
+            unit="deg",
+            advice="" if phase >= ENOUGH_PHASE else advice[0],
+        ),
+        Property(
+            name="damping",
+            title="damping ratio of the learning loop",
+            value=damping,
+            limit=ENOUGH_DAMPING,
+            margin=damping / ENOUGH_DAMPING,
+            status=at_least(damping, good=ENOUGH_DAMPING, bad=1e-9),
+            unit="-",
+            advice="" if damping >= ENOUGH_DAMPING else advice[1],
+        ),
+    ]
+
+
+def weight_check(gains: Gains, law: Law, operation: Operation) -> Property:
+    """Whether |W_hat| stays where the margins were judged; beside the point unless V learns.
+
+    Up to sqrt(η_V⁻¹ η_W)/x_bar_max the V layer adds nothing to the worst loop gain, however large
+    the weights at which the margins were judged.
+
+    Parameters
+    ----------
+    gains : of (8) to (12).
+    law : coefficients of z and ξ̃ in the driving error.
+    operation : where it runs.
+    """
+    kept = kept_weights(gains, law, operation)
+    limit = math.inf
+    if gains.eta_V > 0.0:
+        free = math.sqrt(gains.eta_W / gains.eta_V) / operation.x_bar_max
+        limit = max(operation.W_large, free)
+    holds = kept <= limit * (1.0 + 1e-9) and (math.isfinite(kept) or gains.eta_V == 0.0)
+    advice = "project W, or raise rho_W"
+    if math.isfinite(limit):
+        advice = f"the margins hold up to |W| = {limit:.3g}: set W_max to it, or raise rho_W"
+    return Property(
+        name="weight_range",
+        title="largest |W| that is proven, against the one that the margins are judged at",
+        value=kept,
+        limit=limit,
+        margin=limit / kept,
+        status="pass" if holds else "warn",
+        unit="U",
+        advice="" if holds else advice,
+    )
+
+
+def drift_check(gains: Gains, law: Law, operation: Operation) -> Property:
+    """Whether a regressor that moves at the maneuver's bandwidth makes the weights drift.
+
+    Parameters
+    ----------
+    gains : of (8) to (12).
+    law : coefficients of z and ξ̃ in the driving error.
+    operation : where it runs.
+    """
+    limit = drift_frequency(A_d=gains.matrix, forgetting=gains.forgetting, law=law) / (2 * math.pi)
+    advice = ""
+    if operation.bandwidth > limit:
+        leakage = sufficient_leakage(
+            A_d=gains.matrix,
+            forgetting=gains.forgetting,
+            law=law,
+            eta_W=gains.eta_W,
+            n_h=operation.n_h,
+        )
+        advice = f"raise A_d and forgetting; a leakage of {leakage:.3g} 1/s would stop the drift"
+    return Property(
+        name="drift",
+        title="steering bandwidth, against the frequency above which weights drift",
+        value=operation.bandwidth,
+        limit=limit,
+        margin=limit / operation.bandwidth,
+        status=at_most(operation.bandwidth, good=limit, bad=None),
+        unit="Hz",
+        advice=advice,
+    )
+
+
+def worst_damping(loop: Loop) -> float:
+    """Smallest -Re/|.| of the oscillating eigenvalues of the loop, 1 if none oscillates.
+
+    sqrt(a³/g)/2 for the instantaneous law with A_d = -a I; negative where the loop is unstable.
+
+    Parameters
+    ----------
+    loop : the loop.
+    """
+    mu = eigenvalues(loop.matrix())
+    turning = mu[np.abs(mu.imag) > 1e-9 * np.abs(mu).max()]
+    if turning.size == 0:
+        return 1.0 if float(mu.real.max()) <= 0.0 else -1.0
+    return float(np.min(-turning.real / np.abs(turning)))
+
+
+def _gain_check(
+    name: str, title: str, loop: Loop, operation: Operation, *, sampled: bool
+) -> Property:
+    found = gain_margin(loop, operation.step if sampled else exact, operation.dt)
+    value = float(np.linalg.eigvalsh(loop.G)[-1])
+    status: Status = at_least(found.factor, good=ENOUGH_GAIN, bad=1.0)
+    advice = ""
+    if status != "pass":
+        factor = found.factor / ENOUGH_GAIN
+        advice = f"multiply eta_W and eta_V by {factor:.2g}" if factor > 0.0 else "change A_d"
+        if math.isfinite(found.frequency):
+            advice += f"; at the limit it oscillates at {found.frequency / (2 * math.pi):.2g} Hz"
+    return Property(
+        name=name,
+        title=title,
+        value=value,
+        limit=value * found.factor,
+        margin=found.factor,
+        status=status,
+        unit="1/s^4" if loop.law.z > 0.0 else "1/s^3",
+        advice=advice,
+    )
+
+
+def _above_zero(name: str, title: str, value: float, advice: str) -> Property:
+    good = value > 0.0
+    return Property(
+        name=name,
+        title=title,
+        value=value,
+        limit=0.0,
+        margin=value,
+        status="pass" if good else "fail",
+        unit="1/s",
+        advice="" if good else advice,
+    )

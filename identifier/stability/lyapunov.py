@@ -1,0 +1,214 @@
+"""The error dynamics xi_tilde' = A_d xi_tilde + (f - f_hat): poles, Lyapunov matrix, peak gain.
+
+A_d: (2, 2) error dynamics [1/s].   P, Q: symmetric positive definite, A_dᵀ P + P A_d = -Q.
+γ = ∫₀^∞ |exp(A_d t)| dt: the largest |xi_tilde| that a unit force error can hold [s].
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from identifier.gains import NotHurwitzError
+
+Matrix = npt.NDArray[np.float64]
+
+
+class LyapunovError(ValueError):
+    """P does not solve the Lyapunov equation, or Q or P is not positive definite."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LyapunovPair:
+    """P and Q of A_dᵀ P + P A_d = -Q, with the residual found by substitution.
+
+    Parameters
+    ----------
+    A_d : (2, 2) error dynamics [1/s].
+    P : (2, 2) solution [s, for Q without unit].
+    Q : (2, 2) right-hand side [-].
+    residual : |A_dᵀ P + P A_d + Q| / |Q| [-].
+    """
+
+    A_d: Matrix
+    P: Matrix
+    Q: Matrix
+    residual: float
+
+
+def require_square(A_d: npt.ArrayLike) -> Matrix:
+    """Return A_d as a finite (2, 2) array.
+
+    Parameters
+    ----------
+    A_d : (2, 2) error dynamics [1/s].
+
+    Raises
+    ------
+    ValueError
+        If the shape is not (2, 2) or an entry is not finite.
+    """
+    matrix = np.array(A_d, dtype=np.float64)
+    if matrix.shape != (2, 2) or not np.all(np.isfinite(matrix)):
+        raise ValueError(f"A_d must be a finite 2x2 matrix, it is {matrix.tolist()}")
+    return matrix
+
+
+def require_hurwitz(A_d: npt.ArrayLike) -> Matrix:
+    """Return A_d as an array after checking that all its eigenvalues have Re < 0.
+
+    Parameters
+    ----------
+    A_d : (2, 2) error dynamics [1/s].
+
+    Raises
+    ------
+    NotHurwitzError
+        If an eigenvalue has a real part that is not negative.
+    """
+    matrix = require_square(A_d)
+    poles = np.linalg.eigvals(matrix)
+    if not np.max(poles.real) < 0.0:
+        shown = ", ".join(f"{pole:.4g}" for pole in poles)
+        raise NotHurwitzError(f"A_d must be Hurwitz, its eigenvalues are {shown} 1/s")
+    return matrix
+
+
+def lyapunov_residual(A_d: npt.ArrayLike, P: npt.ArrayLike, Q: npt.ArrayLike) -> float:
+    """Substitute P back: |A_dᵀ P + P A_d + Q| / |Q|.
+
+    Parameters
+    ----------
+    A_d : (2, 2) error dynamics [1/s].
+    P : (2, 2) candidate solution.
+    Q : (2, 2) right-hand side.
+    """
+    A_d, P, Q = np.asarray(A_d), np.asarray(P), np.asarray(Q)
+    return float(np.linalg.norm(A_d.T @ P + P @ A_d + Q, 2) / np.linalg.norm(Q, 2))
+
+
+def lyapunov(A_d: npt.ArrayLike, Q: npt.ArrayLike) -> LyapunovPair:
+    """Solve A_dᵀ P + P A_d = -Q (the P and Q of (14)) and check the answer by substitution.
+
+    Parameters
+    ----------
+    A_d : (2, 2) Hurwitz error dynamics [1/s].
+    Q : (2, 2) symmetric positive definite matrix.
+
+    Raises
+    ------
+    NotHurwitzError
+        If A_d is not Hurwitz.
+    LyapunovError
+        If Q is not symmetric positive definite, or P fails the substitution.
+    """
+    A_d, Q = require_hurwitz(A_d), require_square(Q)
+    if not np.allclose(Q, Q.T, rtol=1e-12) or not np.linalg.eigvalsh(Q)[0] > 0.0:
+        raise LyapunovError(f"Q must be symmetric positive definite, it is {Q.tolist()}")
+    import control  # takes a second to import, so only where it is needed
+
+    P = np.asarray(control.lyap(A_d.T, Q), dtype=np.float64)  # lyap(A, Q): A X + X Aᵀ + Q = 0
+    P = (P + P.T) / 2.0
+    residual = lyapunov_residual(A_d, P, Q)
+    if not residual < 1e-9 or not np.linalg.eigvalsh(P)[0] > 0.0:
+        raise LyapunovError(f"P = {P.tolist()} leaves a relative residual of {residual:.2e}")
+    return LyapunovPair(A_d=A_d, P=P, Q=Q, residual=residual)
+
+
+def peak_gain(A_d: npt.ArrayLike) -> float:
+    """γ = ∫₀^∞ |exp(A_d t)| dt [s], so that |xi_tilde| <= γ sup|f - f_hat| from rest.
+
+    1 / min|Re pole| where A_d is normal (symmetric, or a multiple of the identity plus a
+    rotation); otherwise Gauss-Legendre quadrature, refined until it agrees with itself to 1e-10.
+    With complex poles exp(A_d T) = -exp(m T) I after T = π/|Im|: one such period is enough.
+
+    Parameters
+    ----------
+    A_d : (2, 2) Hurwitz error dynamics [1/s].
+
+    Raises
+    ------
+    NotHurwitzError
+        If A_d is not Hurwitz.
+    """
+    A_d = require_hurwitz(A_d)
+    poles = np.linalg.eigvals(A_d)
+    slowest, size = -float(poles.real.max()), float(np.linalg.norm(A_d, 2))
+    if np.linalg.norm(A_d @ A_d.T - A_d.T @ A_d, 2) <= 1e-14 * size**2:
+        return 1.0 / slowest
+    end, repeats = 60.0 / slowest, 1.0
+    turning = float(np.abs(poles.imag).max())
+    if turning * end > np.pi:
+        end = np.pi / turning
+        repeats = 1.0 / -np.expm1(-slowest * end)
+    previous = np.inf
+    for panels in (64, 128, 256, 512, 1024, 2048):
+        early = np.geomspace(min(1e-2 / size, end / 2.0), end, panels)
+        edges = np.union1d(np.linspace(0.0, end, panels), early)
+        estimate = repeats * _quadrature(A_d, edges)
+        if abs(estimate - previous) <= 1e-10 * estimate:
+            return estimate
+        previous = estimate
+    raise ArithmeticError(f"the integral of |exp(A_d t)| did not converge for {A_d.tolist()}")
+
+
+def transition_norm(A_d: npt.ArrayLike, t: npt.ArrayLike) -> Matrix:
+    """|exp(A_d t)| of a 2x2 matrix in closed form, exp(m t + asinh(k S(t))), t > 0.
+
+    m = tr A_d/2, k = |the symmetric part of A_d - m I|, S = sinh(q t)/q, q² = m² - det A_d: the
+    singular values of C I + S (A_d - m I) are sqrt(1 + k² S²) ± k |S|.
+
+    Parameters
+    ----------
+    A_d : (2, 2) error dynamics [1/s].
+    t : times [s], positive; within half a turn where the poles are complex.
+    """
+    A_d, t = require_square(A_d), np.asarray(t, dtype=np.float64)
+    m = np.trace(A_d) / 2.0
+    k = np.hypot((A_d[0, 0] - A_d[1, 1]) / 2.0, (A_d[0, 1] + A_d[1, 0]) / 2.0)
+    squared = ((A_d[0, 0] - A_d[1, 1]) / 2.0) ** 2 + A_d[0, 1] * A_d[1, 0]
+    q = np.sqrt(abs(squared))
+    if squared > 0.0:  # by logarithms: sinh overflows
+        log_S = q * t + np.log(-np.expm1(-2.0 * q * t) / (2.0 * q))
+    else:
+        log_S = np.log(t * np.abs(np.sinc(q * t / np.pi)) + 1e-300)
+    log_x = log_S + np.log(k + 1e-300)
+    growth = np.logaddexp(log_x, np.logaddexp(0.0, 2.0 * log_x) / 2.0)  # asinh(k S)
+    return np.asarray(np.exp(m * t + growth), dtype=np.float64)
+
+
+def sampled_peak_gain(A_d: npt.ArrayLike, dt: float) -> float:
+    """γ of the Euler step: dt ∑ |(I + dt A_d)^k| [s]; equal to γ for A_d = -a I, a dt <= 1.
+
+    Parameters
+    ----------
+    A_d : (2, 2) error dynamics [1/s].
+    dt : step [s].
+
+    Raises
+    ------
+    NotHurwitzError
+        If I + dt A_d has an eigenvalue on or outside the unit circle.
+    """
+    step = np.eye(2) + dt * require_hurwitz(A_d)
+    radius = float(np.max(np.abs(np.linalg.eigvals(step))))
+    if not radius < 1.0:
+        raise NotHurwitzError(f"I + dt A_d must be inside the unit circle, its radius is {radius}")
+    if np.linalg.norm(step @ step.T - step.T @ step, 2) <= 1e-14:
+        return dt / (1.0 - radius)  # normal: |step^k| = radius^k
+    block, total, last = np.eye(2)[None], 0.0, np.inf
+    while block.shape[0] < 1024:
+        block = np.concatenate([block, block @ (block[-1] @ step)])
+    leap, base = block[-1] @ step, np.eye(2)
+    while last > 1e-16 * (1.0 - radius) * total:
+        norms = np.linalg.norm(block @ base, 2, axis=(1, 2))
+        total, last, base = total + float(norms.sum()), float(norms[-1]), base @ leap
+    return dt * total
+
+
+def _quadrature(A_d: Matrix, edges: Matrix) -> float:
+    """Integrate |exp(A_d t)| over the panels between the edges, 12 Gauss nodes each."""
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    half = np.diff(edges)[:, None] / 2.0
+    t = (edges[:-1, None] + edges[1:, None]) / 2.0 + half * nodes
+    return float(np.sum(half * weights * transition_norm(A_d, t)))

@@ -1,0 +1,179 @@
+"""Gain and phase margin of the learning loop: through eigenvalues, and with python-control.
+
+Gain margin: the factor on eta_W and eta_V at which the loop of `loop.py` turns unstable.
+Phase margin: the phase lag in the learning path that does the same, in degrees.
+For A_d = -a I both are those of the scalar loop (g/a) (c_ξ + c_z/(s + λ)) / ((s + a)(s + l)).
+"""
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import brentq
+
+from identifier.stability.gain_limit import require_positive
+from identifier.stability.loop import (
+    Integrator,
+    Law,
+    Loop,
+    eigenvalues,
+    exact,
+    growth_rate,
+    scaled_matrices,
+)
+from identifier.stability.lyapunov import Matrix
+
+if TYPE_CHECKING:
+    import control
+
+LARGEST_FACTOR = 1e6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GainMargin:
+    """Where the loop turns unstable.
+
+    Parameters
+    ----------
+    factor : multiplier of the loop gain [-]; inf if none up to 1e6, 0 if unstable without gain.
+    frequency : of the oscillation at the margin [rad/s]; nan if there is no margin to reach.
+    """
+
+    factor: float
+    frequency: float
+
+
+def gain_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) -> GainMargin:
+    """Find the smallest factor on the gain at which the loop is unstable, with its frequency.
+
+    Any A_d, any law, any input source: factors from 1e-6 to 1e6 are searched (150 a decade) for
+    the first unstable one, and the crossing is refined to round-off.
+
+    Parameters
+    ----------
+    loop : the loop at factor 1.
+    integrator : `exact` for continuous time, or the integrator of the step.
+    dt : step [s]; irrelevant for `exact`.
+    """
+
+    def growth_at(log_factors: Matrix) -> Matrix:
+        return growth_rate(scaled_matrices(loop, np.exp(log_factors)), integrator, dt)
+
+    span = np.log(LARGEST_FACTOR)
+    crossing = _first_crossing(growth_at, np.linspace(-span, span, 1801), 1e-11 * _rate(loop))
+    if crossing is None:
+        return GainMargin(factor=np.inf, frequency=np.nan)
+    if crossing == -span:
+        return GainMargin(factor=0.0, frequency=np.nan)
+    factor = float(np.exp(crossing))
+    return GainMargin(factor=factor, frequency=_frequency(loop.scaled(factor), integrator, dt))
+
+
+def phase_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) -> float:
+    """Return the smallest phase lag of the learning path that destabilizes the loop [deg].
+
+    0 if the loop is already unstable, 180 if no lag below half a turn does it. Defined for any
+    A_d: the gain G is turned to G exp(-jθ) on both channels at once.
+
+    Parameters
+    ----------
+    loop : the loop.
+    integrator : `exact` for continuous time, or the integrator of the step.
+    dt : step [s]; irrelevant for `exact`.
+    """
+
+    def growth_at(angles: Matrix) -> Matrix:
+        return growth_rate(scaled_matrices(loop, np.exp(-1j * angles)), integrator, dt)
+
+    grid = np.linspace(0.0, np.pi, 721)
+    crossing = _first_crossing(growth_at, grid, 1e-11 * _rate(loop))
+    return 180.0 if crossing is None else float(np.degrees(crossing))
+
+
+def scalar_loop(
+    *, a: float, lam: float, g: float, law: Law, leakage: float = 0.0, dt: float | None = None
+) -> "control.TransferFunction":
+    """Return the loop transfer function for A_d = -a I, in s, or in w = 1 + s dt (Euler).
+
+    (g/a) (c_ξ (s + λ) + c_z) / ((s + λ)(s + a)(s + l)); the pole-zero pair at λ of a law without
+    z is kept out.
+
+    Parameters
+    ----------
+    a : decay rate [1/s].
+    lam : forgetting factor λ [1/s].
+    g : loop gain λ_max(G).
+    law : coefficients of z and ξ̃ in the driving error.
+    leakage : l [1/s].
+    dt : step [s] of explicit Euler, None for continuous time.
+    """
+    require_positive(a=a, lam=lam, g=g)
+    c_z, c_xi = law
+    poles = [-a, -leakage] + ([-lam] if c_z > 0.0 else [])
+    zeros = [-lam - c_z / c_xi] if c_z > 0.0 and c_xi > 0.0 else []
+    gain = g / a * (c_xi if c_xi > 0.0 else c_z)
+    if dt is not None:
+        gain *= dt ** (len(poles) - len(zeros))
+        poles = [1.0 + dt * pole for pole in poles]
+        zeros = [1.0 + dt * zero for zero in zeros]
+    import control  # takes a second to import, so only where it is needed
+
+    time = 0 if dt is None else dt
+    return control.tf(gain * np.poly(zeros), np.poly(poles), time)
+
+
+def scalar_margins(loop: "control.TransferFunction") -> tuple[float, float, float, float]:
+    """Gain margin [-], phase margin [deg] and their frequencies [rad/s], by `control.margin`.
+
+    Parameters
+    ----------
+    loop : transfer function of `scalar_loop`.
+    """
+    import control
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # control warns where a margin is at infinity
+        gain, phase, at_phase_crossing, at_gain_crossing = control.margin(loop)
+    return float(gain), float(phase), float(at_phase_crossing), float(at_gain_crossing)
+
+
+def _first_crossing(
+    growth_at: Callable[[Matrix], Matrix], grid: Matrix, threshold: float
+) -> float | None:
+    """Where the growth rate first turns positive on the grid, refined; None if it never does.
+
+    Rates within the threshold count as zero: the bracket starts at the last point below it. If
+    the loop is marginal from the start (a direction that does not learn), the crossing of the
+    threshold is returned instead.
+    """
+    growth = growth_at(grid)
+    unstable = np.flatnonzero(growth > threshold)
+    if unstable.size == 0:
+        return None
+    first = int(unstable[0])
+    if first == 0:
+        return float(grid[0])
+    decaying = np.flatnonzero(growth[max(first - 2, 0) : first] < 0.0)
+    low = grid[max(first - 2, 0) + decaying[-1]] if decaying.size else grid[first - 1]
+    level = 0.0 if decaying.size else threshold
+
+    def excess(x: float) -> float:
+        return float(growth_at(np.array([x]))[0]) - level
+
+    return float(brentq(excess, low, grid[first], xtol=1e-14, rtol=1e-14))
+
+
+def _frequency(loop: Loop, integrator: Integrator, dt: float) -> float:
+    """|Im| of the eigenvalue on the boundary; for a sampled loop the angle of its image by dt."""
+    mu = eigenvalues(loop.matrix())
+    if integrator is exact:
+        return float(abs(mu[np.argmax(mu.real)].imag))
+    image = integrator(mu * dt)
+    return float(abs(np.angle(image[np.argmax(np.abs(image))])) / dt)
+
+
+def _rate(loop: Loop) -> float:
+    """Return the size of the loop's rates [1/s], against which a growth rate counts as zero."""
+    return float(np.linalg.norm(loop.A_d, 2)) + loop.forgetting

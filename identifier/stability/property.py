@@ -1,0 +1,108 @@
+"""One line of a certificate, and the verdict over all of them."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+Status = Literal["pass", "warn", "fail"]
+SEVERITY: tuple[Status, ...] = ("pass", "warn", "fail")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Property:
+    """A property of a design, its limit, and what to do.
+
+    Parameters
+    ----------
+    name : key, stable over versions.
+    title : what it means, in words.
+    value : measured value.
+    limit : what the value is held against; None where it is a statement only.
+    margin : distance from the limit: a ratio (1 is the limit), a difference where that is 0.
+    status : pass, warn or fail.
+    unit : unit of value and limit.
+    advice : one line; empty where there is nothing to say.
+    """
+
+    name: str
+    title: str
+    value: float
+    limit: float | None
+    margin: float | None
+    status: Status
+    unit: str
+    advice: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Certificate:
+    """All properties of a design.
+
+    Parameters
+    ----------
+    properties : in the order of the table.
+    """
+
+    properties: tuple[Property, ...]
+
+    @property
+    def verdict(self) -> Status:
+        """The worst status."""
+        return max((entry.status for entry in self.properties), key=SEVERITY.index)
+
+    def __getitem__(self, name: str) -> Property:
+        """Return the property of that name."""
+        for entry in self.properties:
+            if entry.name == name:
+                return entry
+        raise KeyError(f"no property {name!r}, there are {[p.name for p in self.properties]}")
+
+    def to_dict(self) -> dict[str, object]:
+        """Return plain data for JSON; a number that is not finite becomes None."""
+        return {
+            "verdict": self.verdict,
+            "properties": {
+                entry.name: {
+                    "value": _finite(entry.value),
+                    "limit": _finite(entry.limit),
+                    "margin": _finite(entry.margin),
+                    "status": entry.status,
+                    "unit": entry.unit,
+                    "title": entry.title,
+                    "advice": entry.advice,
+                }
+                for entry in self.properties
+            },
+        }
+
+
+def at_most(value: float, *, good: float, bad: float | None) -> Status:
+    """Pass up to `good`, warn up to `bad`, fail beyond (never, where `bad` is None).
+
+    Parameters
+    ----------
+    value : to be judged; nan fails.
+    good : largest value that passes.
+    bad : largest value that only warns.
+    """
+    if value <= good:
+        return "pass"
+    return "warn" if bad is None or value <= bad else "fail"
+
+
+def at_least(value: float, *, good: float, bad: float | None) -> Status:
+    """Pass down to `good`, warn down to `bad`, fail below (never, where `bad` is None).
+
+    Parameters
+    ----------
+    value : to be judged; nan fails.
+    good : smallest value that passes.
+    bad : smallest value that only warns.
+    """
+    if value >= good:
+        return "pass"
+    return "warn" if bad is None or value >= bad else "fail"
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None

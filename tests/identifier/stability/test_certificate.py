@@ -1,0 +1,176 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.gains import Gains, diagonal
+from identifier.laws import instantaneous, integral
+from identifier.laws import pi_lead as lead_law
+from identifier.stability import (
+    Certificate,
+    Operation,
+    along_run,
+    certify,
+    design_gains,
+    linear_law,
+)
+from identifier.stability.gain_limit import (
+    instantaneous_damping,
+    integral_euler_limit,
+    integral_limit,
+)
+from identifier.stability.operation import worst_loop
+from identifier.stability.property import Property, at_least, at_most
+
+CITY = Operation(
+    n_h=10,
+    dt=0.01,
+    integrator="euler",
+    bandwidth=0.7,
+    residual_bound=4.0,
+    x_bar_max=2.5,
+    input_feedback=None,
+    W_M=3.0,
+    w_bar=0.2,
+)
+
+
+def designed(law):
+    return design_gains(
+        law=linear_law(law),
+        bandwidth=0.7,
+        dt=0.01,
+        n_h=10,
+        x_bar_max=2.5,
+        residual_bound=4.0,
+        V_max=12.0,
+    ).gains
+
+
+def gains(a=8.0, lam=8.0, **changes):
+    settings = {"eta_W": 50.0, "eta_V": 0.0, "rho_W": 0.1, "rho_V": 0.1}
+    return Gains(A_d=diagonal(a), forgetting=lam, **{**settings, **changes})
+
+
+@pytest.mark.parametrize("law", [integral, instantaneous])
+def test_a_design_passes_its_own_certificate(law):
+    certificate = certify(designed(law), law, CITY)
+    assert certificate.verdict == "pass"
+    assert certificate["phase_margin"].value == pytest.approx(60.0, abs=1e-6)
+
+
+def test_the_margins_are_those_of_the_closed_forms():
+    certificate = certify(gains(), integral, CITY)
+    assert certificate["gain_continuous"].value == pytest.approx(500.0)
+    assert certificate["gain_continuous"].limit == pytest.approx(integral_limit(8.0, 8.0))
+    assert certificate["gain_sampled"].limit == pytest.approx(integral_euler_limit(8.0, 8.0, 0.01))
+    damping = certify(gains(), instantaneous, CITY)["damping"].value
+    assert damping == pytest.approx(instantaneous_damping(8.0, 500.0))
+
+
+def test_a_gain_beyond_the_limit_fails_with_a_factor_that_repairs_it():
+    wild = gains(eta_W=2.0 * integral_limit(8.0, 8.0) / 10)
+    certificate = certify(wild, integral, CITY)
+    assert certificate.verdict == "fail"
+    entry = certificate["gain_sampled"]
+    factor = float(entry.advice.split("by ")[1].split(";")[0])
+    repaired = replace(wild, eta_W=factor * wild.eta_W)
+    assert certify(repaired, integral, CITY)["gain_sampled"].margin == pytest.approx(2.0, rel=0.06)
+
+
+def test_a_gain_that_only_the_sampling_makes_unstable_fails_only_there():
+    between = (integral_limit(12.0, 12.0) + integral_euler_limit(12.0, 12.0, 0.01)) / 20
+    certificate = certify(gains(12.0, 12.0, eta_W=between), integral, CITY)
+    assert certificate["gain_continuous"].status == "warn"
+    assert certificate["gain_sampled"].status == "fail"
+    kutta = certify(gains(12.0, 12.0, eta_W=between), integral, replace(CITY, integrator="rk4"))
+    assert kutta["gain_sampled"].status == "warn"
+
+
+def test_slow_poles_warn_of_drift_and_the_lead_takes_it_away():
+    slow = gains(3.0, 3.0, eta_W=1.0)
+    entry = certify(slow, integral, CITY)["drift"]
+    assert entry.limit == pytest.approx(3.0 / (2 * np.pi))
+    assert entry.status == "warn"
+    assert "1/s would stop the drift" in entry.advice
+    assert certify(replace(slow, lead=1.0 / 3.0), lead_law, CITY)["drift"].status == "pass"
+
+
+def test_each_weakness_is_named():
+    def status(name, design, operation=CITY, law=integral):
+        return certify(design, law, operation)[name].status
+
+    assert status("sampling", gains(30.0)) == "warn"
+    assert status("sampling", gains(210.0)) == "fail"
+    assert status("small_gain", gains(eta_W=1000.0)) == "warn"
+    assert status("capacity", gains(rho_W=50.0)) == "warn"
+    assert status("leakage_step", gains(rho_W=300.0, eta_W=100.0)) == "warn"
+    reads_estimate = replace(CITY, input_feedback=10.0 * np.eye(2))
+    assert status("estimated_input", gains(), reads_estimate) == "fail"
+    assert status("estimated_input", gains(16.0), reads_estimate) == "pass"
+
+
+def test_bound_14_is_stated_with_its_shortcomings():
+    entry = certify(gains(), integral, CITY)["printed_bound"]
+    assert "does not cover" in entry.advice
+    assert "says nothing" in entry.advice
+    assert "does not cover" not in certify(gains(), instantaneous, CITY)["printed_bound"].advice
+
+
+def test_a_projection_gives_a_bound_where_the_leakage_gives_none():
+    certificate = certify(gains(eta_W=1000.0, rho_W=0.0, W_max=5.0), integral, CITY)
+    expected = (4.0 + np.sqrt(10) * 5.0) / 8.0
+    assert certificate["projection_bound"].value == pytest.approx(expected)
+    with pytest.raises(KeyError, match="error_bound"):
+        certificate["error_bound"]
+
+
+def test_the_certificate_is_plain_json_even_where_a_limit_is_infinite():
+    data = certify(designed(instantaneous), instantaneous, CITY).to_dict()
+    again = json.loads(json.dumps(data, allow_nan=False))
+    assert again["verdict"] == "pass"
+    assert again["properties"]["gain_continuous"]["limit"] is None
+    assert set(again["properties"]["damping"]) >= {"value", "limit", "margin", "status"}
+
+
+def test_the_worst_status_is_the_verdict_and_nan_never_passes():
+    def entry(status):
+        return Property(
+            name=status, title="", value=0.0, limit=None, margin=None, status=status, unit=""
+        )
+
+    assert Certificate(properties=(entry("pass"), entry("warn"))).verdict == "warn"
+    assert Certificate(properties=(entry("fail"), entry("warn"))).verdict == "fail"
+    assert at_most(np.nan, good=1.0, bad=2.0) == "fail"
+    assert at_least(np.nan, good=1.0, bad=0.5) == "fail"
+
+
+def test_along_a_run_the_loop_is_unstable_only_where_the_regressor_is_large():
+    design = gains(eta_W=1.0)
+    loop = worst_loop(design, linear_law(integral), CITY)
+    limit = integral_euler_limit(8.0, 8.0, 0.01)
+    G = np.array([0.5, 0.99, 1.01])[:, None, None] * limit * np.eye(2)
+    radius = along_run(loop, G, "euler", 0.01)
+    assert list(radius < 1.0) == [True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("dt", 0.0), ("bandwidth", np.nan), ("integrator", "heun"), ("w_bar", -1.0)]
+)
+def test_an_operation_that_makes_no_sense_is_refused(name, value):
+    with pytest.raises(ValueError, match=name):
+        replace(CITY, **{name: value})
+
+
+def test_where_V_learns_the_margins_hold_up_to_the_weights_that_are_kept():
+    design = designed(integral)
+    kept = certify(design, integral, CITY)["weight_range"].value
+    assert certify(design, integral, CITY)["weight_range"].status == "pass"
+    narrow = replace(CITY, W_large=kept / 2)
+    entry = certify(design, integral, narrow)["weight_range"]
+    assert entry.status == "warn"
+    projected = replace(design, W_max=kept / 2)
+    assert certify(projected, integral, narrow)["weight_range"].status == "pass"
+    free = replace(design, rho_W=0.0)  # nothing keeps W
+    assert certify(free, integral, CITY)["weight_range"].status == "warn"

@@ -1,0 +1,75 @@
+import casadi as ca
+import numpy as np
+import pytest
+
+from identifier.network import hidden_layer
+from identifier.stability.estimated_input import (
+    axle_coupling,
+    estimated_input_feedback,
+    jacobian_feedback,
+    minimal_decay,
+)
+from identifier.stability.loop import INTEGRAL, Loop
+from identifier.stability.margins import gain_margin
+from models.bicycle import BicycleParameters, bicycle, slip_angles
+
+CAR = {"m": 1500.0, "I_z": 2500.0, "l_f": 1.15, "l_r": 1.55}
+STIFFNESS = (127700.0, 106000.0)
+
+
+def saturated_car_feedback(v_x):
+    return estimated_input_feedback(**CAR, stiffness_lost=STIFFNESS, v_x=v_x)
+
+
+def test_the_feedback_is_the_jacobian_of_what_the_linear_tire_misses():
+    p = BicycleParameters(**CAR, C_f=STIFFNESS[0], C_r=STIFFNESS[1])
+    x, v_x = ca.SX.sym("x", 2), 20.0
+    alpha = slip_angles(p.l_f, p.l_r, v_x, x, ca.DM([0.02, 0.0]))
+    C = ca.vertcat(p.C_f, p.C_r)
+    peak = ca.DM([4000.0, 3500.0])
+    missed = peak * ca.tanh(C * alpha / peak) - C * alpha
+    at = np.array([-0.8, 0.3])
+    J_f = np.array(ca.Function("J", [x], [ca.jacobian(missed, x)])(at))
+    lost = C * ca.tanh(C * alpha / peak) ** 2  # C - F'
+    lost_at = np.array(ca.Function("lost", [x], [lost])(at)).ravel()
+    K = np.array(ca.DM(bicycle(p, v_x).K))
+    found = estimated_input_feedback(**CAR, stiffness_lost=lost_at, v_x=v_x)
+    np.testing.assert_allclose(found, J_f @ K, rtol=1e-10)
+    assert not np.allclose(found, J_f @ K.T, rtol=1e-2)  # (6) prints the transpose
+
+
+def test_the_coupling_is_symmetric_and_positive_so_that_the_minimal_decay_is_a_real_eigenvalue():
+    N = axle_coupling(**CAR)
+    np.testing.assert_allclose(N, N.T)
+    assert np.linalg.eigvalsh(N)[0] > 0.0
+    feedback = saturated_car_feedback(20.0)
+    assert np.abs(np.linalg.eigvals(feedback).imag).max() == 0.0
+    assert 5.0 < minimal_decay(feedback) < 12.0
+
+
+def test_below_the_minimal_decay_no_learning_rate_saves_the_loop_that_reads_the_estimate():
+    feedback = saturated_car_feedback(20.0)
+    least = minimal_decay(feedback)
+    for a, stable in ((0.95 * least, False), (1.3 * least, True)):
+        loop = Loop(
+            A_d=-a * np.eye(2), forgetting=a, law=INTEGRAL, G=np.eye(2), input_feedback=feedback
+        )
+        assert (gain_margin(loop).factor > 0.0) is stable
+
+
+def test_the_feedback_of_a_network_is_its_jacobian():
+    rng = np.random.default_rng(0)
+    W, V = rng.standard_normal((2, 6)), rng.standard_normal((6, 4))
+    scale, K = np.array([1.0, 0.5, 0.1, 0.1]), rng.standard_normal((2, 2))
+    x = ca.SX.sym("x", 2)
+    s = hidden_layer(V, ca.vertcat(x, ca.DM([0.1, 0.0])) / scale)
+    at = np.array([0.3, -0.2])
+    J, s_at = ca.Function("J", [x], [ca.jacobian(W @ s, x), s])(at)
+    V_x = V[:, :2] / scale[:2]
+    found = jacobian_feedback(W=W, V_x=V_x, s=np.array(s_at).ravel(), K=K)
+    np.testing.assert_allclose(found, np.array(J) @ K, rtol=1e-10)
+
+
+def test_a_speed_that_is_not_positive_is_refused():
+    with pytest.raises(ValueError, match="v_x must be positive"):
+        saturated_car_feedback(0.0)

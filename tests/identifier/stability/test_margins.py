@@ -1,0 +1,97 @@
+import numpy as np
+import pytest
+from scipy.linalg import eigvals
+
+from identifier.stability.gain_limit import integral_limit
+from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, euler, exact, growth_rate, rk4
+from identifier.stability.margins import gain_margin, phase_margin, scalar_loop, scalar_margins
+from identifier.stability.pi_lead import pi_lead
+
+
+def random_hurwitz(rng, skew):
+    while True:
+        A_d = np.array([[-1.0, 0.0], [0.0, -1.0]]) * rng.uniform(2.0, 8.0) + skew * (
+            rng.standard_normal((2, 2))
+        )
+        if np.linalg.eigvals(A_d).real.max() < -0.5:
+            return A_d
+
+
+def limits_by_the_kronecker_sum(loop):
+    """All factors with a pair of eigenvalues that sums to zero: M ⊕ M is singular there."""
+    M = loop.matrix()
+    free = M.copy()
+    free[4:, :4] = 0.0
+    eye = np.eye(6)
+    constant = np.kron(free, eye) + np.kron(eye, free)
+    slope = np.kron(M - free, eye) + np.kron(eye, M - free)
+    factors = eigvals(constant, -slope)
+    real = factors[np.isfinite(factors) & (np.abs(factors.imag) < 1e-7 * np.abs(factors))].real
+    return np.sort(real[real > 1e-9])
+
+
+def test_the_gain_margin_of_any_error_dynamics_is_a_root_of_the_kronecker_sum():
+    rng = np.random.default_rng(8)
+    for skew in (0.5, 2.0, 4.0):
+        for _ in range(4):
+            A_d = random_hurwitz(rng, skew)
+            G = np.diag(rng.uniform(1.0, 300.0, 2))
+            loop = Loop(A_d=A_d, forgetting=5.0, law=INTEGRAL, G=G, leakage=0.3)
+            found = gain_margin(loop).factor
+            roots = limits_by_the_kronecker_sum(loop)
+            assert np.min(np.abs(roots / found - 1.0)) < 1e-6
+            assert np.all(growth_rate([loop.scaled(0.999 * found).matrix()]) < 0.0)
+            assert np.all(growth_rate([loop.scaled(1.001 * found).matrix()]) > 0.0)
+
+
+def test_a_rule_with_the_slowest_pole_calls_an_unstable_loop_safe():
+    A_d = np.array([[-4.0, 14.0], [0.0, -4.0]])  # both poles at -4, far from normal
+    rule = 0.5 * integral_limit(4.0, 4.0)  # half of the limit for A_d = -4 I
+    loop = Loop(A_d=A_d, forgetting=4.0, law=INTEGRAL, G=rule * np.eye(2))
+    assert growth_rate(loop.matrix()) > 0.0
+    assert gain_margin(loop).factor < 1.0
+
+
+def test_the_instantaneous_law_too_has_a_gain_limit_where_error_dynamics_are_not_symmetric():
+    turning = np.array([[-4.0, -2.0], [2.0, -4.0]])  # normal, rotating
+    loop = Loop(A_d=turning, forgetting=4.0, law=INSTANTANEOUS, G=np.eye(2))
+    limit = gain_margin(loop)
+    assert np.isfinite(limit.factor)
+    a, w, g = 4.0, 2.0, limit.factor  # s² + (a - jw) s + g (a - jw)/(a² + w²), one of two copies
+    roots = np.roots([1.0, a - 1j * w, g * (a - 1j * w) / (a**2 + w**2)])
+    assert np.max(roots.real) == pytest.approx(0.0, abs=1e-9)
+    symmetric = Loop(
+        A_d=np.array([[-4.0, 2.0], [2.0, -4.0]]), forgetting=4.0, law=INSTANTANEOUS, G=np.eye(2)
+    )
+    assert gain_margin(symmetric).factor == np.inf
+
+
+@pytest.mark.parametrize("law", [INTEGRAL, INSTANTANEOUS, pi_lead(0.05)])
+@pytest.mark.parametrize(("integrator", "dt"), [(exact, None), (euler, 0.01)])
+def test_eigenvalues_and_python_control_find_the_same_margins(law, integrator, dt):
+    a, lam, g, leakage = 6.0, 9.0, 500.0, 0.2
+    loop = Loop(A_d=-a * np.eye(2), forgetting=lam, law=law, G=g * np.eye(2), leakage=leakage)
+    transfer = scalar_loop(a=a, lam=lam, g=g, law=law, leakage=leakage, dt=dt)
+    gain, phase, at_limit, _ = scalar_margins(transfer)
+    found = gain_margin(loop, integrator, 0.01)
+    assert found.factor == pytest.approx(gain, rel=1e-6)
+    if np.isfinite(gain):
+        assert found.frequency == pytest.approx(at_limit, rel=1e-6)
+    assert phase_margin(loop, integrator, 0.01) == pytest.approx(phase, rel=1e-6)
+
+
+def test_runge_kutta_keeps_the_phase_margin_and_euler_loses_some():
+    loop = Loop(A_d=-10 * np.eye(2), forgetting=10.0, law=INTEGRAL, G=0.287 * 1e4 * np.eye(2))
+    assert phase_margin(loop) == pytest.approx(60.0, abs=0.03)
+    assert phase_margin(loop, rk4, 0.01) == pytest.approx(phase_margin(loop), abs=1e-3)
+    assert 50.0 < phase_margin(loop, euler, 0.01) < 60.0
+
+
+def test_an_unstable_loop_has_no_margin():
+    loop = Loop(A_d=-np.eye(2), forgetting=1.0, law=INTEGRAL, G=2.1 * np.eye(2), leakage=0.0)
+    assert gain_margin(loop).factor == pytest.approx(2.0 / 2.1, rel=1e-9)
+    assert phase_margin(loop) == 0.0
+    read_back = Loop(
+        A_d=-np.eye(2), forgetting=1.0, law=INTEGRAL, G=np.eye(2), input_feedback=2.0 * np.eye(2)
+    )
+    assert gain_margin(read_back).factor == 0.0

@@ -1,0 +1,36 @@
+import numpy as np
+import pytest
+
+from identifier.stability.regressor_gain import regressor_gains, strongest, worst_gain
+
+
+def test_no_random_regressor_exceeds_the_worst_gain_and_the_corners_reach_it():
+    rng = np.random.default_rng(2)
+    n_h, n_in, W_max, x_max = 4, 3, 2.0, 1.5
+    for eta_V in (0.0, 0.05, 4.0):
+        worst = worst_gain(eta_W=1.3, eta_V=eta_V, n_h=n_h, x_bar_max=x_max, W_max=W_max)
+        s = np.tanh(rng.standard_normal((3000, n_h)) * rng.uniform(0, 5, (3000, 1)))
+        W = rng.standard_normal((3000, 2, n_h)) * rng.choice([0.05, 1.0], (3000, 1, n_h))
+        W *= W_max / np.linalg.norm(W, axis=(1, 2))[:, None, None]
+        x_bar = rng.standard_normal((3000, n_in))
+        x_bar *= x_max / np.linalg.norm(x_bar, axis=1)[:, None]
+        _, largest = strongest(regressor_gains(eta_W=1.3, eta_V=eta_V, s=s, x_bar=x_bar, W=W))
+        assert largest <= worst * (1 + 1e-12)
+        corner_W = np.zeros((2, n_h))
+        corner_W[0, 0] = W_max
+        first = 0.0 if eta_V * (x_max * W_max) ** 2 > 1.3 else 1.0
+        corner = np.array([first, 1.0, 1.0, 1.0])
+        G = regressor_gains(eta_W=1.3, eta_V=eta_V, s=corner, x_bar=x_bar[0], W=corner_W)
+        assert strongest(G)[1] == pytest.approx(worst, rel=1e-12)
+
+
+def test_the_strongest_sample_is_found():
+    G = np.array([np.eye(2), np.diag([1.0, 5.0]), 2.0 * np.eye(2)])
+    assert strongest(G) == (1, 5.0)
+
+
+def test_a_learning_V_without_bounds_is_refused():
+    with pytest.raises(ValueError, match="x_bar_max and W_max"):
+        worst_gain(eta_W=1.0, eta_V=1.0, n_h=5, x_bar_max=1.0, W_max=np.inf)
+    with pytest.raises(ValueError, match="shapes disagree"):
+        regressor_gains(eta_W=1.0, eta_V=1.0, s=np.ones(4), x_bar=np.ones(3), W=np.ones((2, 5)))

@@ -1,0 +1,205 @@
+import numpy as np
+import pytest
+
+from identifier.design import Design
+from identifier.gains import Gains, diagonal
+from identifier.identify import identify
+from identifier.network import Network
+from identifier.stability.gain_limit import integral_euler_limit
+from identifier.stability.loop import INSTANTANEOUS, INTEGRAL
+from identifier.stability.lyapunov import lyapunov
+from identifier.stability.pi_lead import pi_lead
+from identifier.stability.state_bound import (
+    NoBoundError,
+    Start,
+    V_bound,
+    projection_bound,
+    small_gain,
+    state_bounds,
+    steady_capacity,
+    transient_peak,
+)
+from identifier.stability.ultimate_bound import (
+    best_printed_bound,
+    bound_14,
+    canceling_pair,
+    tight_k_b,
+    trivial_bound,
+)
+
+SKEWED = np.array([[-4.0, 3.0], [-0.5, -6.0]])
+LAWS = {"integral": INTEGRAL, "instantaneous": INSTANTANEOUS, "pi_lead": pi_lead(0.3)}
+
+
+def simulated(A_d, law, lam, eta, rho, f, s, start=0.0, dt=2e-3, leak_scale=1.0):
+    """Largest |ξ̃| and |W| of the laws under given f (n, 2) and s (n, n_h), Euler."""
+    xi, z, W = np.array([start, 0.0]), np.zeros(2), np.zeros((2, s.shape[1]))
+    inverse, largest = np.linalg.inv(A_d).T, [0.0, 0.0]
+    for force, units in zip(f, s, strict=True):
+        size = np.linalg.norm(xi)
+        largest = [max(largest[0], size), max(largest[1], np.linalg.norm(W))]
+        drive = inverse @ law.drive(z, xi)
+        xi, z, W = (
+            xi + dt * (A_d @ xi + force - W @ units),
+            z + dt * (xi - lam * z),
+            W + dt * (-eta * np.outer(drive, units) - leak_scale * rho * size * W),
+        )
+    return largest
+
+
+def nasty_inputs(rng, n, n_h, f_max):
+    """A residual and hidden units that switch at random between their largest values."""
+    hold = int(rng.integers(50, 500))
+    turns = rng.uniform(0, 2 * np.pi, n // hold + 1)
+    f = f_max * np.column_stack([np.cos(turns), np.sin(turns)])
+    s = np.sign(rng.standard_normal((n // hold + 1, n_h)))
+    return np.repeat(f, hold, axis=0)[:n], np.repeat(s, hold, axis=0)[:n]
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS.keys())
+def test_error_and_weights_stay_within_their_bounds_for_the_worst_inputs_that_were_tried(law):
+    rng = np.random.default_rng(9)
+    closest = [np.inf, np.inf]
+    for k in range(8):
+        A_d = SKEWED if k % 2 else -rng.uniform(2, 8) * np.eye(2)
+        lam, n_h, f_max = rng.uniform(1, 8), 4, 2.0
+        unit = small_gain(A_d, law=law, forgetting=lam, eta_W=1.0, n_h=n_h)
+        eta = 0.6 / unit if unit > 0 else 20.0
+        capacity = f_max * rng.uniform(0.5, 3.0)
+        rho = steady_capacity(A_d, law=law, forgetting=lam, eta_W=eta, rho_W=capacity, n_h=n_h)
+        start = rng.choice([0.0, 1.0])
+        numbers = {"law": law, "forgetting": lam, "eta_W": eta, "rho_W": rho, "n_h": n_h}
+        bounds = state_bounds(
+            A_d, **numbers, residual_bound=f_max, start=Start(xi_tilde=start), dt=2e-3
+        )
+        f, s = nasty_inputs(rng, 5000, n_h, f_max)
+        error, W = simulated(A_d, law, lam, eta, rho, f, s, start)
+        assert error <= bounds.xi_tilde
+        assert W <= bounds.W
+        closest = [min(closest[0], bounds.xi_tilde / error), min(closest[1], bounds.W / W)]
+    assert closest[0] < 8.0  # the bounds are of the right order
+
+
+def test_weights_that_do_not_leak_pass_the_bound_that_leaking_ones_keep():
+    numbers = {"law": INSTANTANEOUS, "forgetting": 1.0, "eta_W": 20.0, "n_h": 4}
+    bounds = state_bounds(-4 * np.eye(2), **numbers, rho_W=5.0, residual_bound=20.0)
+    f, s = np.tile([20.0, 0.0], (10000, 1)), np.ones((10000, 4))
+    gains = (1.0, 20.0, 5.0)
+    _, leaking = simulated(-4 * np.eye(2), INSTANTANEOUS, *gains, f, s)
+    _, planted = simulated(-4 * np.eye(2), INSTANTANEOUS, *gains, f, s, leak_scale=0.0)
+    assert 0.9 * bounds.W < leaking <= bounds.W < planted
+
+
+def test_the_weights_settle_at_the_capacity_where_the_residual_is_larger():
+    for law in LAWS.values():
+        f, s = np.tile([30.0, 0.0], (10000, 1)), np.ones((10000, 4))
+        numbers = {"forgetting": 3.0, "eta_W": 2.0, "rho_W": 0.5, "n_h": 4}
+        capacity = steady_capacity(-4 * np.eye(2), law=law, **numbers)
+        _, W = simulated(-4 * np.eye(2), law, 3.0, 2.0, 0.5, f, s)
+        assert pytest.approx(capacity, rel=0.15) == 2.0 * W  # |f_hat| = √n_h |W|
+
+
+def test_the_bound_is_refused_where_the_circle_does_not_close():
+    numbers = {"law": INTEGRAL, "forgetting": 2.0, "rho_W": 1.0, "n_h": 4, "residual_bound": 1.0}
+    assert small_gain(
+        -3 * np.eye(2), law=INTEGRAL, forgetting=2.0, eta_W=9.0, n_h=4
+    ) == pytest.approx(1.0)  # η n_h = a² λ²
+    with pytest.raises(NoBoundError, match="below 1"):
+        state_bounds(-3 * np.eye(2), **numbers, eta_W=9.0)
+    assert state_bounds(-3 * np.eye(2), **{**numbers, "law": INSTANTANEOUS}, eta_W=1e6).W > 0
+
+
+def test_the_bound_solves_its_own_circle():
+    numbers = {"forgetting": 2.0, "eta_W": 1.0, "n_h": 4}
+    bounds = state_bounds(SKEWED, law=INTEGRAL, rho_W=0.7, residual_bound=1.5, **numbers)
+    assert bounds.xi_tilde == pytest.approx(
+        projection_bound(SKEWED, W_max=bounds.W, n_h=4, residual_bound=1.5), rel=1e-12
+    )
+
+
+def test_the_transient_of_skewed_error_dynamics_is_bounded():
+    A_d = np.array([[-1.0, 12.0], [0.0, -2.0]])
+    poles, vectors = np.linalg.eig(A_d)
+    t = np.linspace(0.0, 5.0, 2001)
+    E = (vectors * np.exp(np.multiply.outer(t, poles))[:, None, :]) @ np.linalg.inv(vectors)
+    peak = np.linalg.norm(E, 2, axis=(1, 2)).max()
+    assert 1.0 < peak <= transient_peak(A_d) < 5.0 * peak
+    assert transient_peak(-3.0 * np.eye(2)) == 1.0
+
+
+@pytest.fixture(name="run")
+def a_run(drive, car):
+    """Identify the drive of the fixtures and return the history with its sampled residual."""
+
+    def run(**gains):
+        settings = {"forgetting": 6.0, "eta_V": 5.0, "rho_W": 5.0, "rho_V": 5.0, **gains}
+        design = Design(gains=Gains(A_d=diagonal(6.0), **settings), network=Network(hidden=8))
+        history = identify(drive(n=1000), car, design)
+        p, K_inv = car.bicycle, np.array([[1500.0 * 1.55, 2500.0], [1500.0 * 1.15, -2500.0]]) / 2.7
+        record = history.recording
+        alpha = (
+            record.u
+            - np.column_stack([record.v_y + p.l_f * record.r, record.v_y - p.l_r * record.r])
+            / record.v_x[:, None]
+        )
+        linear = alpha * [p.C_f, p.C_r]
+        inertia = np.column_stack([record.v_x * record.r, 0 * record.r]) @ K_inv.T
+        xi = record.x @ K_inv.T
+        residual = (np.diff(xi, axis=0) / 0.01 - linear[:-1] + inertia[:-1]) / 1000.0
+        return history, residual
+
+    return run
+
+
+def test_the_identifier_itself_keeps_the_bounds_of_leakage_and_of_projection(run):
+    history, residual = run(eta_W=100.0)
+    f_max = np.linalg.norm(residual, axis=1).max()
+    assert 1.0 < f_max < 20.0
+    numbers = {"law": INTEGRAL, "forgetting": 6.0}
+    V_start = float(np.linalg.norm(history.V[0]))
+    bounds = state_bounds(
+        -6 * np.eye(2), **numbers, eta_W=100.0, rho_W=5.0, n_h=8, residual_bound=f_max, dt=0.01
+    )
+    error = np.linalg.norm(history.xi_tilde, axis=1).max()
+    assert 0.02 * bounds.xi_tilde < error <= bounds.xi_tilde
+    assert np.linalg.norm(history.W, axis=(1, 2)).max() <= bounds.W
+    signals = np.hstack([history.recording.x, history.recording.u])
+    x_bar_max = np.linalg.norm(signals / np.array(history.design.network.scale), axis=1).max()
+    limit = V_bound(
+        -6 * np.eye(2),
+        bounds,
+        **numbers,
+        eta_V=5.0,
+        rho_V=5.0,
+        x_bar_max=x_bar_max,
+        start=Start(V=V_start),
+    )
+    assert np.linalg.norm(history.V, axis=(1, 2)).max() <= limit
+    wild, residual = run(eta_W=1e5, rho_W=0.0, rho_V=0.0, W_max=3.0, V_max=9.0)
+    bound = projection_bound(-6 * np.eye(2), W_max=3.0, n_h=8, residual_bound=f_max, dt=0.01)
+    assert 0.1 * bound < np.linalg.norm(wild.xi_tilde, axis=1).max() <= bound
+
+
+def test_the_integral_law_passes_bound_14_many_times_over():
+    """No residual, ideal weights zero, w_bar = 0: (14) allows next to nothing."""
+    a, lam, rho, n_h, dt = 6.0, 6.0, 0.05, 4, 2e-3
+    eta = 1.2 * integral_euler_limit(a, lam, dt) / n_h
+    f, s = np.zeros((40000, 2)), np.ones((40000, n_h))
+    f[:50] = 1e-2  # a nudge
+    error, _ = simulated(-a * np.eye(2), INTEGRAL, lam, eta, rho, f, s, dt=dt)
+    pair = canceling_pair(-a * np.eye(2), eta_W=eta, rho_W=rho)
+    ideal = {"W_M": 1.0, "n_h": n_h, "eta_W": eta, "rho_W": rho}  # generous: W_M is 0
+    tight = bound_14(pair, w_bar=0.0, k_b=tight_k_b(pair, **ideal))
+    assert error > 100.0 * tight
+
+
+def test_the_integral_law_passes_even_the_printed_route_where_a_is_slow():
+    a, lam, rho, n_h, dt = 0.1, 0.1, 1.0, 1, 0.05
+    eta = 4.0 * integral_euler_limit(a, lam, dt)
+    f, s = np.zeros((60000, 2)), np.ones((60000, n_h))
+    f[:50] = 1e-3
+    error, _ = simulated(-a * np.eye(2), INTEGRAL, lam, eta, rho, f, s, dt=dt)
+    pair = lyapunov(-a * np.eye(2), np.eye(2))
+    printed = best_printed_bound(pair, w_bar=0.0, W_M=0.0, n_h=n_h, eta_W=eta, rho_W=rho)
+    assert error > 1.2 * printed
+    assert trivial_bound(-a * np.eye(2), 1e-3) < printed

@@ -1,0 +1,119 @@
+"""A certificate as a person reads it: a table with a line of advice for what does not pass."""
+
+import math
+from collections.abc import Sequence
+
+from identifier.defaults import Driving, natural_operation
+from identifier.design import Design
+from identifier.laws import DRIVING_ERRORS
+from identifier.stability import Certificate, Property, certify
+from models.vehicle import Vehicle
+from tireid.figures.units import force_unit_name
+
+HEADER = ("property", "value", "limit", "margin", "")
+
+
+def certificate_of(design: Design, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
+    """Return the certificate of a design.
+
+    Parameters
+    ----------
+    design : the design.
+    vehicle : the car.
+    driving : how hard it is driven; None takes `natural_driving`.
+    """
+    return certify(
+        design.gains, DRIVING_ERRORS[design.law], natural_operation(design, vehicle, driving)
+    )
+
+
+def certificate_rows(certificate: Certificate, force_unit: float) -> list[list[str]]:
+    """Return title with unit, value, limit, margin and status of every property.
+
+    Parameters
+    ----------
+    certificate : the properties.
+    force_unit : the unit U of the design [N].
+    """
+    return [
+        [
+            f"{entry.title} [{unit_text(entry.unit, force_unit)}]",
+            number(entry.value),
+            number(entry.limit),
+            number(entry.margin),
+            entry.status if entry.limit is not None else "stated",
+        ]
+        for entry in certificate.properties
+    ]
+
+
+def certificate_text(certificate: Certificate, force_unit: float) -> str:
+    """Return the certificate as lines of text, ending with advice and the verdict.
+
+    Parameters
+    ----------
+    certificate : the properties.
+    force_unit : the unit U of the design [N].
+    """
+    rows = [list(HEADER), *certificate_rows(certificate, force_unit)]
+    width = [max(len(row[i]) for row in rows) for i in range(len(HEADER))]
+    lines = [_line(row, width) for row in rows]
+    lines += [f"{e.status}: {e.title}: {e.advice}" for e in advised(certificate)]
+    return "\n".join([*lines, f"verdict: {certificate.verdict}"])
+
+
+def advised(certificate: Certificate) -> list[Property]:
+    """Return the properties that do not pass and say what to do.
+
+    Parameters
+    ----------
+    certificate : the properties.
+    """
+    return [e for e in certificate.properties if e.advice and e.status != "pass"]
+
+
+def verdict_line(certificate: Certificate) -> str:
+    """Return the verdict and the margins in one line.
+
+    Parameters
+    ----------
+    certificate : the properties.
+    """
+    gain, phase = certificate["gain_sampled"], certificate["phase_margin"]
+    worst = [e.title for e in certificate.properties if e.status == certificate.verdict]
+    reason = "" if certificate.verdict == "pass" else f" ({'; '.join(worst)})"
+    return (
+        f"certificate: {certificate.verdict}{reason}; sampled gain margin {number(gain.margin)}, "
+        f"phase margin {phase.value:.0f} deg, damping {certificate['damping'].value:.2f}"
+    )
+
+
+def unit_text(unit: str, force_unit: float) -> str:
+    """Return a unit with the force unit written out, kN or N where it is one.
+
+    Parameters
+    ----------
+    unit : with U for the force unit.
+    force_unit : U [N].
+    """
+    name = force_unit_name(force_unit)
+    return " ".join(name if word == "U" else word for word in unit.split())
+
+
+def number(value: float | None) -> str:
+    """Return four significant digits, a dash for none, "inf" for infinity.
+
+    Parameters
+    ----------
+    value : the number.
+    """
+    if value is None or math.isnan(value):
+        return "-"
+    return "inf" if math.isinf(value) else f"{value:.4g}"
+
+
+def _line(row: Sequence[str], width: Sequence[int]) -> str:
+    first, *others = row
+    cells = [first.ljust(width[0])]
+    cells += [cell.rjust(w) for cell, w in zip(others[:-1], width[1:-1], strict=True)]
+    return "  ".join([*cells, others[-1]]).rstrip()

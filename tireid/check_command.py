@@ -1,0 +1,217 @@
+"""`tireid check [design.toml]`: is a set of gains safe to drive with, and which would be better?"""
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from identifier.defaults import (
+    BANDWIDTH,
+    LAWS,
+    PHASE_MARGIN,
+    Driving,
+    default_design,
+    design_for,
+    natural_driving,
+    natural_operation,
+)
+from identifier.design import Design
+from identifier.design_file import design_text, read_design
+from identifier.identify import identify
+from identifier.stability import Certificate, DesignError
+from models.recordings import check_against_vehicle, read_recording, split_log_argument
+from models.vehicle import Vehicle, sedan
+from tireid.certificate_table import certificate_of, certificate_text, unit_text
+from tireid.output import OutputError
+from tireid.progress import say
+
+FAILS = 1
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : subparsers of `tireid`.
+    """
+    parser = commands.add_parser(
+        "check",
+        help="certificate of a design: margins, bounds, advice; or a design from a bandwidth",
+        description="Judge the gains of DESIGN at the worst regressor: poles, sampling, gain and "
+        "phase margin, damping, drift, proven bounds. Exit code 0: pass or warn, 1: fails, 2: bad "
+        "input. With --design, find gains instead and write them.",
+    )
+    parser.add_argument(
+        "file", nargs="?", type=Path, metavar="DESIGN", help="design.toml (the default design)"
+    )
+    parser.add_argument("--vehicle", type=Path, metavar="FILE", help="car as TOML (the sedan)")
+    parser.add_argument("--law", choices=LAWS, help="law of the default design or of --design")
+    parser.add_argument(
+        "--bandwidth", type=float, metavar="HZ", help=f"of the steering ({BANDWIDTH:g} Hz)"
+    )
+    parser.add_argument("--speed", type=float, metavar="M/S", help="(4 sqrt(g wheelbase))")
+    parser.add_argument("--slip", type=float, metavar="RAD", help="largest (twice sliding)")
+    parser.add_argument("--friction", type=float, metavar="MU", help="of the road (1)")
+    parser.add_argument("--log", metavar="LOG[:RUN]", help="judge the loop along a recording too")
+    parser.add_argument("--json", action="store_true", help="print the certificate as JSON")
+    parser.add_argument("--figures", type=Path, metavar="DIR", help="draw root locus and bounds")
+    parser.add_argument("--design", action="store_true", help="find gains and write them")
+    parser.add_argument(
+        "--phase-margin", type=float, metavar="DEG", help=f"for --design ({PHASE_MARGIN:g} deg)"
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE", help="for --design: file to write (design.toml)"
+    )
+    parser.add_argument("--force", action="store_true", help="replace the file if it exists")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command; return 0, or 1 where the design fails.
+
+    Parameters
+    ----------
+    options : parsed arguments.
+    """
+    _require_sense(options)
+    vehicle = sedan() if options.vehicle is None else Vehicle.from_toml(options.vehicle)
+    driving = _driving(options, vehicle)
+    design = _design(options, vehicle, driving)
+    certificate = certificate_of(design, vehicle, driving)
+    if options.json:
+        print(json.dumps(certificate.to_dict(), indent=2))
+    else:
+        print(_conditions(design, vehicle, driving))
+        print(certificate_text(certificate, design.force_unit))
+    if options.log:
+        _report_along(options.log, vehicle, design)
+    if options.figures:
+        _draw(options, vehicle, driving, design, certificate)
+    if options.design:
+        _write(options, design)
+    elif certificate.verdict != "pass" and not options.json:
+        print(_proposal(design, vehicle, driving))
+    return FAILS if certificate.verdict == "fail" else 0
+
+
+def _require_sense(options: argparse.Namespace) -> None:
+    if options.design and options.file is not None:
+        raise ValueError("--design finds gains: give no DESIGN file to judge with it")
+    if options.file is not None and options.law is not None:
+        raise ValueError("--law is for the default design: the law stands in the DESIGN file")
+    if not options.design and (options.phase_margin is not None or options.out is not None):
+        raise ValueError("--phase-margin and --out go with --design")
+    for name in ("bandwidth", "speed", "slip", "friction", "phase_margin"):
+        value = getattr(options, name)
+        if value is not None and not 0.0 < value < float("inf"):
+            raise ValueError(f"--{name.replace('_', '-')} must be positive, it is {value:g}")
+    if options.slip is not None and options.slip > 1.0:
+        raise ValueError(f"--slip must be in rad and below 1, it is {options.slip:g}")
+
+
+def _driving(options: argparse.Namespace, vehicle: Vehicle) -> Driving:
+    natural = natural_driving(vehicle)
+    return Driving(
+        v_x=options.speed or natural.v_x,
+        slip=options.slip or natural.slip,
+        friction=options.friction or natural.friction,
+        bandwidth=options.bandwidth or natural.bandwidth,
+    )
+
+
+def _design(options: argparse.Namespace, vehicle: Vehicle, driving: Driving) -> Design:
+    if options.file is not None:
+        return read_design(options.file)
+    law = options.law or "integral"
+    if options.design:
+        if law == "instantaneous_scaled":
+            raise ValueError("--law instantaneous_scaled is a control, design one of the others")
+        margin = options.phase_margin or PHASE_MARGIN
+        return design_for(vehicle, driving, law=law, phase_margin=margin)
+    return default_design(vehicle, law=law)
+
+
+def _conditions(design: Design, vehicle: Vehicle, driving: Driving) -> str:
+    gains = design.gains
+    unit = unit_text("U", design.force_unit)
+    return (
+        f"{vehicle.name} at {driving.v_x:.3g} m/s, slip up to {driving.slip:.3g} rad, friction "
+        f"{driving.friction:g}, steering up to {driving.bandwidth:g} Hz\n"
+        f"{design.law} law, {design.network.hidden} units, {design.integrator} at "
+        f"{1e3 * design.dt:g} ms, forces in {unit}: A_d {[list(row) for row in gains.A_d]}, lambda "
+        f"{gains.forgetting:.4g}, eta_W {gains.eta_W:.4g}, eta_V {gains.eta_V:.4g}, rho_W "
+        f"{gains.rho_W:.4g}, rho_V {gains.rho_V:.4g}\n"
+    )
+
+
+def _report_along(log: str, vehicle: Vehicle, design: Design) -> None:
+    from identifier.stability.recorded_run import loop_along
+
+    path, named = split_log_argument(log)
+    recording = read_recording(path, run=named, dt=design.dt)
+    check_against_vehicle(recording, vehicle)
+    history = identify(recording, vehicle, design)
+    if history.diverged_at is not None:
+        say(f"along {recording.name}: the law diverged at {history.diverged_at:g} s")
+        return
+    along = loop_along(history)
+    worst = along.worst
+    say(
+        f"along {recording.name}: largest loop gain {along.gain.max():.4g}, largest spectral "
+        f"radius {along.radius[worst]:.5f} at {along.t[worst]:g} s (limit 1)"
+    )
+
+
+def _proposal(design: Design, vehicle: Vehicle, driving: Driving) -> str:
+    try:
+        better = design_for(
+            vehicle,
+            driving,
+            law=design.law,
+            network=design.network,
+            input_source=design.input_source,
+            integrator=design.integrator,
+            dt=design.dt,
+        )
+    except DesignError as error:
+        return f"no better gains at this bandwidth: {error}"
+    gains, verdict = better.gains, certificate_of(better, vehicle, driving).verdict
+    return (
+        f"proposal ({verdict}): A_d = -{-gains.A_d[0][0]:.4g} I, lambda {gains.forgetting:.4g}, "
+        f"eta_W {gains.eta_W:.4g}, eta_V {gains.eta_V:.4g}, rho_W {gains.rho_W:.4g}, rho_V "
+        f"{gains.rho_V:.4g}{f', lead {gains.lead:.4g}' if gains.lead else ''}\n"
+        f"write it with: tireid check --design --law {design.law} --bandwidth "
+        f"{driving.bandwidth:g}"
+    )
+
+
+def _draw(
+    options: argparse.Namespace,
+    vehicle: Vehicle,
+    driving: Driving,
+    design: Design,
+    certificate: Certificate,
+) -> None:
+    from tireid.check_figures import draw_check
+
+    if options.log:
+        path, named = split_log_argument(options.log)
+        recording = read_recording(path, run=named, dt=design.dt)
+    else:
+        from tireid.demo_story import drive_to_learn
+
+        recording = drive_to_learn()
+    operation = natural_operation(design, vehicle, driving)
+    for path in draw_check(options.figures, recording, vehicle, design, operation, certificate):
+        say(f"wrote {path}")
+
+
+def _write(options: argparse.Namespace, design: Design) -> None:
+    target = options.out or Path("design.toml")
+    if target.exists() and not options.force:
+        raise OutputError(f"{target} exists: choose another file, or add --force to replace it")
+    scratch = target.with_name(f".{target.name}.part")
+    scratch.write_text(design_text(design))
+    scratch.replace(target)
+    say(f"wrote {target}")

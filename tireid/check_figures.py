@@ -1,0 +1,63 @@
+"""The figures of `tireid check`: root locus with its margin, bounds against an error that happened."""
+
+from pathlib import Path
+
+from identifier.design import Design
+from identifier.identify import identify
+from identifier.laws import DRIVING_ERRORS
+from identifier.stability import Certificate, Operation
+from identifier.stability.loop import linear_law
+from identifier.stability.operation import worst_loop
+from models.recordings import Recording
+from models.vehicle import Vehicle
+from tireid.figures import error_figure, locus_figure, save_figure
+
+BOUNDS = {
+    "error_bound": "proven bound, leakage",
+    "projection_bound": "proven bound, projection",
+    "trivial_bound": "no network",
+    "printed_bound": "(14) as printed",
+}
+
+
+def draw_check(
+    folder: Path,
+    recording: Recording,
+    vehicle: Vehicle,
+    design: Design,
+    operation: Operation,
+    certificate: Certificate,
+) -> list[Path]:
+    """Draw locus.png and bounds.png; return their paths.
+
+    Parameters
+    ----------
+    folder : where to, made if missing.
+    recording : a drive, for the error to compare the bounds with.
+    vehicle : the car.
+    design : the design.
+    operation : what its certificate knows.
+    certificate : its certificate.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    law = linear_law(DRIVING_ERRORS[design.law], design.gains.lead)
+    loop = worst_loop(design.gains, law, operation)
+    history = identify(recording, vehicle, design)
+    figures = {
+        "locus.png": locus_figure(loop, integrator=design.integrator, dt=design.dt),
+        "bounds.png": error_figure(history, error_bounds(certificate)),
+    }
+    for name, figure in figures.items():
+        save_figure(figure, folder / name)
+    return [folder / name for name in figures]
+
+
+def error_bounds(certificate: Certificate) -> dict[str, float]:
+    """Return the bounds of the error norm that a certificate holds, by the name in a legend [U s].
+
+    Parameters
+    ----------
+    certificate : the properties.
+    """
+    known = {entry.name: entry.value for entry in certificate.properties}
+    return {title: known[name] for name, title in BOUNDS.items() if name in known}
