@@ -1,7 +1,14 @@
 """From a `casadi.Function` to compiled C, cached by content, and to loops over samples."""
 
 from codegen.cache import cache_folder
-from codegen.compiler import CompilationError, build_library, find_compiler
+from codegen.compiler import CompilationError, build_library, find_compiler, load_library
 from codegen.scan import Scan
 
-__all__ = ["CompilationError", "Scan", "build_library", "cache_folder", "find_compiler"]
+__all__ = [
+    "CompilationError",
+    "Scan",
+    "build_library",
+    "cache_folder",
+    "find_compiler",
+    "load_library",
+]

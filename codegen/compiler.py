@@ -4,9 +4,11 @@ Messages go to the logger `tireid`: a build at level INFO, a missing compiler on
 (which Python prints even where no logging is set up).
 """
 
+import ctypes
 import hashlib
 import logging
 import os
+import shlex
 import shutil
 import subprocess
 import tempfile
@@ -37,20 +39,55 @@ class CompilationError(RuntimeError):
 
 
 @cache
-def find_compiler() -> str | None:
-    """Return the C compiler, `$CC` or gcc or cc, or None; where there is none, say so once."""
-    for name in (os.environ.get("CC"), "gcc", "cc"):
-        found = shutil.which(name) if name else None
+def find_compiler() -> tuple[str, ...] | None:
+    """Return the C compiler's command, `$CC` or gcc or cc; None, said once, where there is none.
+
+    `$CC` may hold several words, as in "ccache gcc".
+    """
+    for command in (os.environ.get("CC") or "", "gcc", "cc"):
+        words = shlex.split(command)
+        found = shutil.which(words[0]) if words else None
         if found:
-            return found
+            return (found, *words[1:])
     log.warning("no C compiler (gcc) found: running in the CasADi virtual machine, more slowly")
     return None
 
 
 @cache
-def _version(compiler: str) -> str:
-    answer = subprocess.run([compiler, "--version"], capture_output=True, text=True, check=False)
+def _version(compiler: tuple[str, ...]) -> str:
+    answer = subprocess.run([*compiler, "--version"], capture_output=True, text=True, check=False)
     return answer.stdout.splitlines()[0] if answer.stdout else "unknown"
+
+
+def load_library(source: str, name: str) -> ctypes.CDLL | None:
+    """Build C source as `build_library` does and load it; a damaged file is built anew, once.
+
+    Parameters
+    ----------
+    source : the whole text of one C99 file; it may include <math.h> and <string.h> only.
+    name : beginning of the file's name and of the messages.
+
+    Returns
+    -------
+    The library, or None where there is no compiler.
+
+    Raises
+    ------
+    CompilationError
+        Where the compiler refuses the source.
+    OSError
+        Where the library can be neither written nor loaded.
+    """
+    library = build_library(source, name)
+    if library is None:
+        return None
+    try:
+        return ctypes.CDLL(str(library))
+    except OSError as error:
+        log.info("%s is damaged (%s): building it anew", library, error)
+        library.unlink(missing_ok=True)
+        rebuilt = build_library(source, name)
+        return None if rebuilt is None else ctypes.CDLL(str(rebuilt))
 
 
 def build_library(source: str, name: str) -> Path | None:
@@ -58,7 +95,7 @@ def build_library(source: str, name: str) -> Path | None:
 
     Parameters
     ----------
-    source : the whole text of one C99 file; it may include <math.h> only.
+    source : the whole text of one C99 file; it may include <math.h> and <string.h> only.
     name : beginning of the file's name and of the messages.
 
     Returns
@@ -69,6 +106,8 @@ def build_library(source: str, name: str) -> Path | None:
     ------
     CompilationError
         Where the compiler refuses the source.
+    OSError
+        Where the compiler cannot be run or its result cannot be written.
     """
     compiler = find_compiler()
     if compiler is None:
@@ -84,12 +123,12 @@ def build_library(source: str, name: str) -> Path | None:
         c_file = Path(scratch) / f"{name}.c"
         built = Path(scratch) / library.name
         c_file.write_text(source)
-        command = [compiler, *FLAGS, str(c_file), "-o", str(built), "-lm"]
+        command = [*compiler, *FLAGS, str(c_file), "-o", str(built), "-lm"]
         answer = subprocess.run(command, capture_output=True, text=True, check=False)
         if answer.returncode != 0:
             first_lines = "\n".join(answer.stderr.splitlines()[:5])
             raise CompilationError(
-                f"{compiler} refused the generated code of {name}:\n{first_lines}"
+                f"{' '.join(compiler)} refused the generated code of {name}:\n{first_lines}"
             )
         built.replace(library)  # atomic: two processes may build the same library at once
     log.info("compiled %s in %.1f s", name, time.perf_counter() - start)

@@ -1,9 +1,10 @@
 """A step function folded over samples, in one compiled loop.
 
-Without a C compiler the CasADi virtual machine does the same, more slowly.
+Without a C compiler that works the CasADi virtual machine does the same, more slowly.
 """
 
 import ctypes
+import logging
 from collections.abc import Mapping
 from functools import cached_property
 
@@ -11,16 +12,18 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.compiler import build_library
+from codegen.compiler import CompilationError, load_library
 
 Array = NDArray[np.float64]
+
+log = logging.getLogger("tireid.codegen")
 
 # k runs over samples. Carried ports alternate between two buffers; every other output is written
 # straight into the record on recorded samples and into scratch memory on the others.
 LOOP = """
 #include <string.h>
 
-int {name}_scan(long n, long every, const double** arg, const long* arg_step, double** res,
+int {name}_scan(long n, long every, const double** arg, const long* arg_step,
                 long n_carry, const long* carry_arg, const long* carry_res, const long* carry_size,
                 double** carry_now, double** carry_next, double** carry_record,
                 long n_out, const long* out_res, const long* out_size, double** out_record,
@@ -28,7 +31,6 @@ int {name}_scan(long n, long every, const double** arg, const long* arg_step, do
                 casadi_int* iw, double* w) {{
   long k, i, row;
   double* swap;
-  (void)res;
   for (k = 0; k < n; ++k) {{
     const int keep = (k % every) == 0;
     row = k / every;
@@ -98,12 +100,17 @@ class Scan:
 
     @cached_property
     def _loop(self) -> "ctypes._NamedFuncPointer | None":
-        """The compiled loop, or None where there is no compiler."""
+        """The compiled loop, or None where it cannot be had; then the log says why."""
         name = self.step.name()
         generator = ca.CodeGenerator(f"{name}.c")
         generator.add(self.step)
-        library = build_library(generator.dump() + LOOP.format(name=name), name)
-        return None if library is None else ctypes.CDLL(str(library))[f"{name}_scan"]
+        try:
+            library = load_library(generator.dump() + LOOP.format(name=name), name)
+        except (CompilationError, OSError) as error:
+            reason = " ".join(str(error).split())
+            log.warning("running in the CasADi virtual machine, more slowly: %s", reason)
+            return None
+        return None if library is None else library[f"{name}_scan"]
 
     def __call__(self, n: int, values: Mapping[str, Array], *, every: int = 1) -> dict[str, Array]:
         """Run `n` samples.
@@ -158,7 +165,7 @@ class Scan:
         return packed
 
     def _shaped(self, flat: Array, size: tuple[int, int]) -> Array:
-        """Give rows of column-major numbers their matrix shape; column vectors stay flat."""
+        """Return rows of column-major numbers in their matrix shape; column vectors stay flat."""
         rows, columns = size
         if columns == 1:
             return flat
@@ -196,7 +203,6 @@ class Scan:
             ctypes.c_long(every),
             _pointers(arrays),
             _longs([*stride, -1]),
-            None,
             ctypes.c_long(len(self.carry)),
             _longs([names_in.index(p) for p in self.carry]),
             _longs([names_out.index(f"{p}_next") for p in self.carry]),

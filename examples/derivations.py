@@ -12,7 +12,7 @@ import numpy as np
 from identifier.observer import observer_rate
 from models.bicycle import BicycleParameters, bicycle
 
-EXPECTED_BELOW = 1e-10
+EXPECTED_BELOW = 1e-12
 
 
 def newton_euler(p: BicycleParameters, v_x: Any, x: Any, u: Any, f: Any) -> Any:

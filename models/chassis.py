@@ -4,30 +4,14 @@ SI units, ISO axes (x forward, y left, z up). Numbers are checked when a `Chassi
 plant never starts from a value that is not physical.
 """
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
+
+from models.rules import require_positive
 
 
 class VehicleError(ValueError):
     """A vehicle parameter breaks a rule; the message names the key, the rule and the value."""
-
-
-def require_positive(**values: float) -> None:
-    """Refuse every value that is not a finite number above zero.
-
-    Parameters
-    ----------
-    **values : what to check, by name.
-
-    Raises
-    ------
-    VehicleError
-        Naming the first key that breaks the rule and its value; NaN breaks it too.
-    """
-    for key, value in values.items():
-        if not (value > 0.0 and math.isfinite(value)):
-            raise VehicleError(f"{key} must be positive and finite, it is {value}")
 
 
 def require_within(low: float, high: float, **values: float) -> None:
@@ -97,6 +81,7 @@ class Chassis:
 
     def __post_init__(self) -> None:
         require_positive(
+            VehicleError,
             track_front=self.track_front,
             track_rear=self.track_rear,
             cg_height=self.cg_height,

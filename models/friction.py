@@ -14,6 +14,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from models.rules import require_positive
+
 Array = NDArray[np.float64]
 
 MAX_PLACES = 4  # changes over the place that a compiled plant has room for
@@ -46,8 +48,7 @@ class FrictionChange:
     width: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (self.scale > 0.0 and math.isfinite(self.scale)):
-            raise FrictionError(f"scale must be positive and finite, it is {self.scale}")
+        require_positive(FrictionError, scale=self.scale)
         if not (self.width >= 0.0 and math.isfinite(self.width)):
             raise FrictionError(f"width must be zero or positive, it is {self.width}")
         if (self.at_time is None) == (self.at_place is None):
@@ -80,8 +81,7 @@ class Friction:
     changes: tuple[FrictionChange, ...] = ()
 
     def __post_init__(self) -> None:
-        if not (self.scale > 0.0 and math.isfinite(self.scale)):
-            raise FrictionError(f"scale must be positive and finite, it is {self.scale}")
+        require_positive(FrictionError, scale=self.scale)
         if len({change.at_time is None for change in self.changes}) > 1:
             raise FrictionError("changes must be all over time or all over the place")
         for before, after in pairwise(self.changes):
@@ -98,7 +98,12 @@ class Friction:
         return bool(self.changes) and self.changes[0].at_time is None
 
     def over_time(self, t: Array) -> Array:
-        """Scale (n,) at times t [s], (n,), without the changes over the place."""
+        """Scale over time (n,) [-], without the changes over the place.
+
+        Parameters
+        ----------
+        t : times [s], (n,).
+        """
         scale = np.full(np.shape(t), self.scale)
         if not self.by_place:
             for change, step in zip(self.changes, self._steps(), strict=True):
@@ -121,7 +126,7 @@ class Friction:
 
 
 def place_change(table: Any, place: Any) -> Any:
-    """Give the sum of the changes over the place as a CasADi expression [-].
+    """Return the sum of the changes over the place as a CasADi expression [-].
 
     Parameters
     ----------

@@ -29,7 +29,12 @@ class Maneuver(Protocol):
         """Length [s]."""
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times t [s], (n,)."""
+        """Commanded [δ_f, δ_r] [rad], (n, 2).
+
+        Parameters
+        ----------
+        t : times [s], (n,).
+        """
 
 
 def _check(maneuver: Any, *, steepest: float) -> None:
@@ -49,6 +54,11 @@ def _check(maneuver: Any, *, steepest: float) -> None:
         raise ManeuverError(
             f"{name}: steers at up to {rate:.4g} rad/s, more than rate_limit {maneuver.rate_limit}"
         )
+
+
+def _check_sine(maneuver: Any) -> None:
+    """Check a maneuver that is as steep as a sine of its frequency and amplitude."""
+    _check(maneuver, steepest=2.0 * math.pi * maneuver.frequency * abs(maneuver.amplitude))
 
 
 def _both(front: Any, rear_ratio: float) -> Array:
@@ -78,7 +88,12 @@ class StepSteer:
         _check(self, steepest=0.0)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times t [s], (n,)."""
+        """Commanded [δ_f, δ_r] [rad], (n, 2).
+
+        Parameters
+        ----------
+        t : times [s], (n,).
+        """
         rate = self.rate_limit / max(1.0, abs(self.rear_ratio))
         angle = np.clip(rate * (t - self.onset), 0.0, abs(self.amplitude))
         return _both(np.copysign(angle, self.amplitude), self.rear_ratio)
@@ -106,10 +121,15 @@ class Slalom:
     rear_ratio: float = 0.0
 
     def __post_init__(self) -> None:
-        _check(self, steepest=2.0 * math.pi * self.frequency * abs(self.amplitude))
+        _check_sine(self)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times t [s], (n,)."""
+        """Commanded [δ_f, δ_r] [rad], (n, 2).
+
+        Parameters
+        ----------
+        t : times [s], (n,).
+        """
         phase = 2.0 * math.pi * self.frequency * np.maximum(t - self.onset, 0.0)
         return _both(self.amplitude * np.sin(phase), self.rear_ratio)
 
@@ -138,10 +158,15 @@ class DoubleLaneChange:
     rear_ratio: float = 0.0
 
     def __post_init__(self) -> None:
-        _check(self, steepest=2.0 * math.pi * self.frequency * abs(self.amplitude))
+        _check_sine(self)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times t [s], (n,)."""
+        """Commanded [δ_f, δ_r] [rad], (n, 2).
+
+        Parameters
+        ----------
+        t : times [s], (n,).
+        """
         there = np.clip((t - self.onset) * self.frequency, 0.0, 1.0) % 1.0
         second = self.onset + 1.0 / self.frequency + self.pause
         back = np.clip((t - second) * self.frequency, 0.0, 1.0) % 1.0
@@ -173,10 +198,15 @@ class SineWithDwell:
     rear_ratio: float = 0.0
 
     def __post_init__(self) -> None:
-        _check(self, steepest=2.0 * math.pi * self.frequency * abs(self.amplitude))
+        _check_sine(self)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times t [s], (n,)."""
+        """Commanded [δ_f, δ_r] [rad], (n, 2).
+
+        Parameters
+        ----------
+        t : times [s], (n,).
+        """
         since = t - self.onset
         peak = 0.75 / self.frequency
         moving = np.minimum(since, peak) + np.maximum(since - peak - self.dwell, 0.0)
@@ -209,7 +239,12 @@ class SlowlyIncreasingSteer:
         _check(self, steepest=self.rate)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times t [s], (n,)."""
+        """Commanded [δ_f, δ_r] [rad], (n, 2).
+
+        Parameters
+        ----------
+        t : times [s], (n,).
+        """
         angle = np.clip(self.rate * (t - self.onset), 0.0, abs(self.amplitude))
         return _both(np.copysign(angle, self.amplitude), self.rear_ratio)
 
@@ -242,10 +277,15 @@ class RandomSteer:
     rear_ratio: float = 0.0
 
     def __post_init__(self) -> None:
-        _check(self, steepest=2.0 * math.pi * self.frequency * abs(self.amplitude))
+        _check_sine(self)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2), at times t [s], (n,)."""
+        """Commanded [δ_f, δ_r] [rad], (n, 2).
+
+        Parameters
+        ----------
+        t : times [s], (n,).
+        """
         rng = np.random.default_rng(self.seed)
         swings = 2 + math.ceil(2.0 * self.frequency * self.duration)
         angles = np.append(0.0, self.amplitude * rng.uniform(-1.0, 1.0, swings))

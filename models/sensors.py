@@ -46,7 +46,7 @@ class Sensor:
                 raise SensorError(f"{field.name} must not be negative, it is {value}")
 
     def measure(self, t: Array, signal: Array, rng: np.random.Generator) -> Array:
-        """Give what the sensor makes of a signal (n,).
+        """Return what the sensor makes of a signal (n,).
 
         Parameters
         ----------
@@ -78,7 +78,7 @@ class Sensors:
     delta: Sensor = Sensor()
 
     def apply(self, recording: Recording, rng: np.random.Generator) -> Recording:
-        """Give the recording as these sensors would have taken it; its force truth stays exact.
+        """Return the recording as these sensors would have taken it; its force truth stays exact.
 
         Parameters
         ----------

@@ -10,7 +10,9 @@ from pathlib import Path
 
 from models import vehicle_file
 from models.bicycle import BicycleParameters
-from models.chassis import Chassis, VehicleError, require_positive
+from models.chassis import Chassis, VehicleError
+from models.files import write_atomically
+from models.rules import require_positive
 
 GRAVITY = 9.81  # standard acceleration of free fall, rounded as usual [m/s^2]
 
@@ -34,7 +36,8 @@ class Vehicle:
     Raises
     ------
     VehicleError
-        For a value that is not positive and finite, or for springs too soft to carry the body.
+        For a value that is not positive and finite, for an inertia or a stiffness that no car of
+        that mass has, or for springs too soft to carry the body.
     """
 
     name: str = "car"
@@ -48,6 +51,7 @@ class Vehicle:
 
     def __post_init__(self) -> None:
         require_positive(
+            VehicleError,
             mass=self.mass,
             yaw_inertia=self.yaw_inertia,
             l_f=self.l_f,
@@ -55,12 +59,29 @@ class Vehicle:
             cornering_stiffness_front=self.cornering_stiffness_front,
             cornering_stiffness_rear=self.cornering_stiffness_rear,
         )
+        self._require_plausible()
         if self.chassis is not None:
             tipping = self.weight * self.roll_arm
             if not self.chassis.roll_stiffness > tipping:
                 raise VehicleError(
                     f"roll_stiffness must exceed mass * g * roll arm = {tipping:.6g} N m/rad or "
                     f"the body tips over at rest, it is {self.chassis.roll_stiffness}"
+                )
+
+    def _require_plausible(self) -> None:
+        """Refuse values that no car of any size has: a wrong unit, or a digit too many."""
+        usual = self.mass * self.l_f * self.l_r  # about that; 0.4 times it in models
+        if not 0.05 < self.yaw_inertia / usual < 20.0:
+            raise VehicleError(
+                f"yaw_inertia in kg m^2 must be 0.05 to 20 times mass * l_f * l_r = {usual:.4g}, "
+                f"it is {self.yaw_inertia:g}: check the units"
+            )
+        for name, load in zip(("front", "rear"), self.axle_loads, strict=True):
+            stiffness = getattr(self, f"cornering_stiffness_{name}")
+            if not 0.5 < stiffness / load < 500.0:  # about 16 for a passenger car, 4 for models
+                raise VehicleError(
+                    f"cornering_stiffness_{name} in N/rad must be 0.5 to 500 times the static load "
+                    f"of the axle, {load:.4g} N, it is {stiffness:g}: check the units"
                 )
 
     @property
@@ -107,7 +128,7 @@ class Vehicle:
         )
 
     def require_chassis(self) -> Chassis:
-        """Give the chassis to who cannot do without.
+        """Return the chassis to who cannot do without.
 
         Raises
         ------
@@ -164,10 +185,11 @@ class Vehicle:
         """
         file = Path(path)
         text = vehicle_file.text(self, folder=file.parent, table="chassis")
-        with file.open("w" if overwrite else "x", encoding="utf-8") as stream:
-            stream.write(text)
+        if not overwrite and file.exists():
+            raise FileExistsError(f"{file} exists; overwrite=True replaces it")
+        write_atomically(file, text)
 
 
 def sedan() -> Vehicle:
-    """Give the documented mid-size sedan; its file says where each value comes from."""
+    """Return the documented mid-size sedan; its file says where each value comes from."""
     return Vehicle.from_toml(Path(__file__).parent / "data" / "sedan.toml")

@@ -31,7 +31,7 @@ def read_table(path: Path) -> dict[str, Any]:
 def checked(
     table: dict[str, Any], cls: type, *, where: str, skip: tuple[str, ...] = ()
 ) -> dict[str, Any]:
-    """Give the keyword arguments of `cls` in `table`, with numbers as float.
+    """Return the keyword arguments of `cls` in `table`, with numbers as float.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def checked(
 
 
 def text(record: Any, *, folder: Path, table: str) -> str:
-    """Give the TOML text of a dataclass and of the one dataclass inside it.
+    """Return the TOML text of a dataclass and of the one dataclass inside it.
 
     Parameters
     ----------

@@ -56,6 +56,13 @@ def actual_parameters(node: Documented) -> list[str]:
     return [a.arg for a in (*listed, *extra)][is_method(node) :]
 
 
+def needs_parameters(node: Documented) -> bool:
+    """Whether a section "Parameters" is due: a tuple with names may describe them in prose."""
+    if isinstance(node, ast.FunctionDef):
+        return True
+    return any("dataclass" in ast.unparse(decorator) for decorator in node.decorator_list)
+
+
 def public_definitions(source: str) -> list[Documented]:
     """Public functions, classes and methods."""
     found: list[Documented] = []
@@ -79,7 +86,10 @@ def complaints(source: str) -> list[str]:
             wrong.append(f"{node.name} has no docstring")
             continue
         documented, actual = documented_parameters(docstring), actual_parameters(node)
-        if documented is not None and documented != actual:
+        if documented is None:
+            if actual and needs_parameters(node):
+                wrong.append(f"{node.name} documents none of its parameters {actual}")
+        elif documented != actual:
             optional = optional_fields(node)
             if documented == [name for name in actual if name not in optional]:
                 continue
@@ -110,8 +120,29 @@ def area(width, height):
 
 def silent():
     pass
+
+def volume(width):
+    """Return the volume."""
+
+@dataclass(frozen=True)
+class Box:
+    """A box."""
+
+    width: float
+
+    def scaled(self, factor):
+        """Return a larger box."""
+
+class Corner(NamedTuple):
+    """A corner, x and y [m]."""
+
+    x: float
+    y: float
 '''
     assert complaints(source) == [
         "area documents ['width', 'depth'], its parameters are ['width', 'height']",
         "silent has no docstring",
+        "volume documents none of its parameters ['width']",
+        "Box documents none of its parameters ['width']",
+        "scaled documents none of its parameters ['factor']",
     ]

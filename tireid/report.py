@@ -4,13 +4,13 @@ Pictures are embedded, styles are inline, there are no scripts and no links to o
 the file can be mailed, archived and printed.
 """
 
-import os
-import tempfile
 from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
+
+from models.files import write_atomically
 
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 STYLE = """
@@ -192,16 +192,7 @@ def write_report(path: Path, title: str, sections: Sequence[Section], *, summary
     sections : its parts in order.
     summary : what a hurried reader should know, plain text.
     """
-    page = report_html(title, sections, summary=summary)
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
-    scratch = Path(name)
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            file.write(page)
-        scratch.chmod(0o644)
-        scratch.replace(path)
-    finally:
-        scratch.unlink(missing_ok=True)
+    write_atomically(path, report_html(title, sections, summary=summary))
 
 
 def _table(table: Table, number: int) -> str:

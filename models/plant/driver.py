@@ -6,6 +6,8 @@ from typing import Any
 
 import casadi as ca
 
+from models.rules import require_positive
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Driver:
@@ -28,15 +30,12 @@ class Driver:
     acceleration_limit: float = 3.0
 
     def __post_init__(self) -> None:
-        for key in ("gain", "acceleration_limit"):
-            value = getattr(self, key)
-            if not (value > 0.0 and math.isfinite(value)):
-                raise ValueError(f"{key} of the driver must be positive, it is {value}")
+        require_positive(ValueError, gain=self.gain, acceleration_limit=self.acceleration_limit)
         if not (self.integral_gain >= 0.0 and math.isfinite(self.integral_gain)):
             raise ValueError(f"integral_gain must not be negative, it is {self.integral_gain}")
 
     def demand(self, error: Any, integral: Any) -> tuple[Any, Any]:
-        """Give the demanded acceleration [m/s^2] and the derivative of the integral [m/s].
+        """Return the demanded acceleration [m/s^2] and the derivative of the integral [m/s].
 
         Parameters
         ----------

@@ -6,7 +6,8 @@ two axles [rad], the lagged side force of the two axles [N] and acceleration a_x
 wheel loads follow, and the driver's integral [m].
 The wheel loads follow the forces through a lag of 10 ms, the vertical motion of wheel and tire;
 it also breaks the algebraic loop between load and force.
-Assumed away: pitch, steer by the suspension, rolling and air resistance.
+Assumed away: pitch, steer by the suspension, aligning moments of the tires, spin of the wheels
+(longitudinal slip follows from the wanted force at once), rolling and air resistance.
 """
 
 from typing import Any
@@ -27,7 +28,7 @@ OUTPUTS = {"F_x": 4, "F_y": 4, "F_z": 4, "alpha": 4, "axle_force": 2, "accelerat
 
 
 def rotate(x: Any, y: Any, angle: Any) -> tuple[Any, Any]:
-    """Give the components of a wheel-frame vector in the body frame.
+    """Return the components of a wheel-frame vector in the body frame.
 
     Parameters
     ----------
@@ -39,7 +40,7 @@ def rotate(x: Any, y: Any, angle: Any) -> tuple[Any, Any]:
 
 
 def dynamics(vehicle: Vehicle, tire: Tire, driver: Driver) -> ca.Function:
-    """Give f(x, command, v_ref, mu, places) -> (x_dot, *OUTPUTS), an SX function.
+    """Return f(x, command, v_ref, mu, places) -> (x_dot, *OUTPUTS), an SX function.
 
     Parameters
     ----------
@@ -112,7 +113,7 @@ def dynamics(vehicle: Vehicle, tire: Tire, driver: Driver) -> ca.Function:
 
 
 def runge_kutta(car: ca.Function, dt: float) -> ca.Function:
-    """Give one classical fourth-order step as an MX function which calls `car` four times.
+    """Return one classical fourth-order step as an MX function which calls `car` four times.
 
     Its outputs are those of the state before the step.
 

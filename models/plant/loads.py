@@ -11,7 +11,7 @@ from models.vehicle import Vehicle
 
 
 def wheel_loads(vehicle: Vehicle, roll: Any, roll_rate: Any, axle_force: Any, a_x: Any) -> Any:
-    """Give the four wheel loads [N]; none is negative and their sum is m g exactly.
+    """Return the four wheel loads [N]; none is negative and their sum is m g exactly.
 
     An axle takes its share of the spring and damper moment and, through its roll center, the
     moment of its own side force. A wheel that would pull on the road is lifted: its load is zero

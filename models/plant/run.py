@@ -93,7 +93,7 @@ class PlantRun:
     def recording(
         self, sensors: Sensors | None = None, rng: np.random.Generator | None = None
     ) -> Recording:
-        """Give what a log of this run would hold, with the axle forces as truth.
+        """Return what a log of this run would hold, with the axle forces as truth.
 
         Parameters
         ----------

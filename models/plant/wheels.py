@@ -24,12 +24,18 @@ class Wheel(NamedTuple):
     axle: int
 
     def velocity(self, v_x: Any, v_y: Any, r: Any) -> tuple[Any, Any]:
-        """Velocity of the wheel center [m/s] in the body frame."""
+        """Velocity of the wheel center [m/s] in the body frame.
+
+        Parameters
+        ----------
+        v_x, v_y : velocity of the center of gravity, body frame [m/s].
+        r : yaw rate [rad/s].
+        """
         return v_x - self.y * r, v_y + self.x * r
 
 
 def wheels(vehicle: Vehicle) -> tuple[Wheel, Wheel, Wheel, Wheel]:
-    """Give the wheels: front left, front right, rear left, rear right.
+    """Return the wheels: front left, front right, rear left, rear right.
 
     Parameters
     ----------
@@ -46,7 +52,7 @@ def wheels(vehicle: Vehicle) -> tuple[Wheel, Wheel, Wheel, Wheel]:
 
 
 def mounted(tire: Tire, wheel: Wheel) -> Tire:
-    """Give the tire for the side of the wheel; only measured tires have sides.
+    """Return the tire for the side of the wheel; only measured tires have sides.
 
     Parameters
     ----------
@@ -59,7 +65,7 @@ def mounted(tire: Tire, wheel: Wheel) -> Tire:
 
 
 def relax(slip: Any, delta: Any, velocity: tuple[Any, Any], length: float) -> Any:
-    """Give the derivative [1/s] of the lagged lateral slip tan(α').
+    """Return the derivative [1/s] of the lagged lateral slip tan(α').
 
     σ d(tan α')/dt + |V_cx| tan α' = -V_cy with the velocity V_c of the contact point in the frame
     of the wheel (Pacejka, Tire and Vehicle Dynamics, 3rd ed., section 7.2; no division by speed,
@@ -79,7 +85,7 @@ def relax(slip: Any, delta: Any, velocity: tuple[Any, Any], length: float) -> An
 
 
 def tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: Any) -> Any:
-    """Give [F_x, F_y] [N] of one tire in the frame of the wheel.
+    """Return [F_x, F_y] [N] of one tire in the frame of the wheel.
 
     Parameters
     ----------

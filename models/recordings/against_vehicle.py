@@ -1,19 +1,17 @@
 """The checks that need the axle positions: slip angles against accelerations and forces."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 import numpy as np
 
-from models.recordings.evidence import STRIDE, onset, steering, windows
+from models.recordings.evidence import STRIDE, correlation, onset, steering, windows
 from models.recordings.record import Array, Recording, RecordingError
 
 LARGEST_SLIP = 0.7  # [rad], 40 degrees in the median window: nobody drives a whole run like that
 
 
 class Axles(Protocol):
-    """What the check must know of a vehicle: the distances of its axles [m]."""
+    """What the check must know of a vehicle: its mass and the distances of its axles."""
 
     @property
     def l_f(self) -> float:
@@ -23,6 +21,10 @@ class Axles(Protocol):
     def l_r(self) -> float:
         """Center of gravity to rear axle [m]."""
 
+    @property
+    def mass(self) -> float:
+        """Mass [kg]."""
+
 
 def check_against_vehicle(recording: Recording, vehicle: Axles) -> None:
     """Refuse a recording whose slip angles contradict this vehicle.
@@ -31,12 +33,13 @@ def check_against_vehicle(recording: Recording, vehicle: Axles) -> None:
     the median rear slip is below 0.7 rad; the effective wheelbase (the shorter of that of all and
     that of small steering) is above (l_f + l_r)/3 and below 3 (l_f + l_r) + 0.03 v_x^2;
     each axle's force, or failing that the lateral acceleration for the rear, rises with its slip
-    angle (correlation above -0.3).
+    angle (correlation above -0.3); the mass that the forces accelerate is a third to three times
+    the vehicle's.
 
     Parameters
     ----------
     recording : the recording to judge.
-    vehicle : anything with l_f and l_r [m].
+    vehicle : anything with l_f and l_r [m] and mass [kg].
 
     Raises
     ------
@@ -67,21 +70,30 @@ def check_against_vehicle(recording: Recording, vehicle: Axles) -> None:
                 f"v_x delta/r is {L:.3g} m, outside {lowest:.3g} to {highest:.3g}; check their "
                 "units, or name the right vehicle"
             )
-    front, rear = (None, a) if w.force is None else (w.force[:, 0], w.force[:, 1])
+    rear = a if w.force is None else w.force[:, 1]
     _check_rises(recording, alpha_r, rear, "vy" if w.force is None else "Fyr")
-    if front is not None:
-        _check_rises(recording, alpha_f, front, "Fyf")
+    if w.force is not None:
+        _check_rises(recording, alpha_f, w.force[:, 0], "Fyf")
+        _check_mass(recording, w.force.sum(axis=1), a, vehicle.mass)
+
+
+def _check_mass(recording: Recording, force: Array, a: Array, mass: float) -> None:
+    """Refuse a vehicle whose mass is far from the one that the forces accelerate."""
+    moved = float(force @ a / (a @ a))
+    if correlation(force, a) > 0.8 and not mass / 3.0 < moved < 3.0 * mass:
+        raise RecordingError(
+            f"{recording.name}: Fyf + Fyr must accelerate the vehicle of {mass:.4g} kg, they "
+            f"move {moved:.4g} kg; check the unit of mass, or name the right vehicle"
+        )
 
 
 def _check_rises(recording: Recording, alpha: Array, force: Array, column: str) -> None:
     """Refuse a force (or acceleration) that falls with the slip angle that makes it."""
-    correlation = float(alpha @ force) / (
-        float(np.sqrt((alpha @ alpha) * (force @ force))) + 1e-300
-    )
-    if correlation < -0.3 and np.sqrt(np.mean(alpha**2)) > 0.003:
+    together = correlation(alpha, force)
+    if together < -0.3 and np.sqrt(np.mean(alpha**2)) > 0.003:
         what = "lateral acceleration" if column == "vy" else column
         raise RecordingError(
             f"{recording.name}: {what} must rise with its slip angle (paper's sign, "
-            f"alpha = delta - atan2(v_y +- l r, v_x)), their correlation is {correlation:.2f}; "
+            f"alpha = delta - atan2(v_y +- l r, v_x)), their correlation is {together:.2f}; "
             f"change the sign of {column}" + ("" if column == "vy" else " or of vy")
         )

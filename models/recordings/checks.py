@@ -7,20 +7,19 @@ and each bound lies inside that gap. One error nobody can see: a log whose later
 the right throughout (SAE, NED) obeys the same laws.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from models.recordings.evidence import (
     STRIDE,
     Steering,
     Windows,
+    correlation,
     least_squares,
     onset,
     steering,
     windows,
 )
-from models.recordings.record import Array, Recording, RecordingError
+from models.recordings.record import Recording, RecordingError
 
 LARGEST_STEERING = 1.2  # [rad], 69 degrees: beyond every road wheel and scale car (about 50)
 LARGEST_SPEED = 110.0  # [m/s], 396 km/h; a sedan's 110 km/h reads 110
@@ -212,11 +211,11 @@ def _check_forces(recording: Recording, w: Windows, turn: Steering | None) -> No
     if w.force is None or np.sqrt(np.mean(a**2)) < 0.3:
         return
     for column, force in zip(("Fyf", "Fyr"), w.force.T, strict=True):
-        correlation = _correlation(force, a)
-        if correlation < -0.5:
+        together = correlation(force, a)
+        if together < -0.5:
             raise RecordingError(
                 f"{recording.name}: {column} must push to the left when positive (ISO axes), its "
-                f"correlation with v̇_y + v_x r is {correlation:.2f}; change the sign of {column}"
+                f"correlation with v̇_y + v_x r is {together:.2f}; change the sign of {column}"
             )
     yaw = least_squares(w.force, w.r_dot)
     if yaw.r_squared > 0.5 and yaw.theta[0] < -8 * yaw.error[0] and yaw.theta[1] > 8 * yaw.error[1]:
@@ -225,7 +224,7 @@ def _check_forces(recording: Recording, w: Windows, turn: Steering | None) -> No
             "the opposite; swap the columns Fyf and Fyr"
         )
     total = w.force.sum(axis=1)
-    if turn is None or turn.correlation < 0.7 or _correlation(total, a) < 0.7:
+    if turn is None or turn.correlation < 0.7 or correlation(total, a) < 0.7:
         return
     fit = least_squares(np.column_stack([w.v_x_r, w.v_y_dot, w.r_dot]), total)
     dot, dot_error = fit.theta[1] / fit.theta[0], 4.0 * fit.error[1] / fit.theta[0]
@@ -248,8 +247,3 @@ def _larger_steering(recording: Recording) -> str:
     """Name the axle that steers more."""
     front, rear = np.mean(recording.delta_f**2), np.mean(recording.delta_r**2)
     return "delta_f" if front >= rear else "delta_r"
-
-
-def _correlation(a: Array, b: Array) -> float:
-    """Correlation about zero."""
-    return float(a @ b) / (float(np.sqrt((a @ a) * (b @ b))) + 1e-300)

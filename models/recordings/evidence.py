@@ -4,8 +4,6 @@ Over a window of length T the lateral kinematics hold exactly without differenti
 mean(a_y) = (v_y(t + T) - v_y(t))/T + mean(v_x r).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -114,6 +112,16 @@ def least_squares(X: Array, y: Array) -> Fit:
     return Fit(theta / size, np.sqrt(np.diag(covariance)) / size, 1 - float(rest @ rest) / total)
 
 
+def correlation(a: Array, b: Array) -> float:
+    """Correlation about zero, from -1 to 1; 0 where one is zero throughout.
+
+    Parameters
+    ----------
+    a, b : samples of two signals, shape (k,).
+    """
+    return float(a @ b) / (float(np.sqrt((a @ a) * (b @ b))) + 1e-300)
+
+
 def steering(w: Windows) -> Steering | None:
     """Effective wheelbase sqrt(sum (v_x delta)^2 / sum r^2), or None when nothing turns.
 
@@ -147,10 +155,10 @@ def _wheelbase(w: Windows, keep: NDArray[np.bool_]) -> Steering | None:
     r, kinematic = w.r[keep], (w.v_x * w.delta)[keep]
     if r.size * STRIDE < 2.0 or not np.sqrt(np.mean(r**2)) >= 0.05:
         return None
-    rr, dd, rd = float(r @ r), float(kinematic @ kinematic), float(r @ kinematic)
+    rr, dd = float(r @ r), float(kinematic @ kinematic)
     if dd == 0.0:
         return None
-    return Steering(float(np.sqrt(dd / rr)), rd / float(np.sqrt(rr * dd)))
+    return Steering(float(np.sqrt(dd / rr)), correlation(r, kinematic))
 
 
 def _sums(signal: Array, start: NDArray[np.intp], width: int) -> Array:

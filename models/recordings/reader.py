@@ -1,7 +1,5 @@
 """From a log file to a Recording: one run, rising time, finite values, uniform grid, physics."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

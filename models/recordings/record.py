@@ -4,8 +4,6 @@ x = [v_y, r]: lateral velocity [m/s], yaw rate [rad/s].   u = [delta_f, delta_r]
 ISO axes: x forward, y left, z up; r and delta turn left when positive, forces push left.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -127,7 +125,7 @@ class Recording:
         alpha_r = self.delta_r - np.arctan2(self.v_y - l_r * self.r, self.v_x)
         return _read_only(np.column_stack([alpha_f, alpha_r]))
 
-    def between(self, t0: float, t1: float) -> Recording:
+    def between(self, t0: float, t1: float) -> "Recording":
         """Return the part with t0 <= t <= t1.
 
         Parameters

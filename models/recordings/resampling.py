@@ -5,17 +5,19 @@ mean over one step about its instant: no phase, 1.6 % loss at a tenth of the sam
 zeros at its multiples. The ends keep the logged values.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from models.recordings.record import Array
 
-ON_GRID = 0.01  # share of a step within which time stamps already are the grid
+ON_GRID = 0.01  # share of a step within which time stamps are those of the grid, with jitter
+SAME = 1e-6  # share of a step within which they already are the grid, but for rounding
 
 
 def resample(t: Array, columns: dict[str, Array], dt: float) -> tuple[Array, dict[str, Array]]:
-    """Return time and columns on the grid t[0], t[0] + dt, ...; bits stay when t is that grid.
+    """Return time and columns on the grid t[0], t[0] + dt, ...
+
+    Time stamps that are that grid keep their bits. Those that only jitter about it, or drift by
+    less than 1 % of a step, are replaced by it, and the values stay.
 
     Parameters
     ----------
@@ -23,8 +25,10 @@ def resample(t: Array, columns: dict[str, Array], dt: float) -> tuple[Array, dic
     columns : name -> values, shape (n,).
     dt : step of the grid [s].
     """
-    if np.abs(t - t[0] - dt * np.arange(t.size)).max() <= ON_GRID * dt:
-        return t, columns
+    grid = t[0] + dt * np.arange(t.size)
+    off = np.abs(t - grid).max()
+    if off <= ON_GRID * dt:
+        return t if off <= SAME * dt else grid, columns
     count = int(np.floor((t[-1] - t[0]) / dt + 1e-6)) + 1
     grid = np.minimum(t[0] + dt * np.arange(count), t[-1])
     if float(np.median(np.diff(t))) > dt / 1.5:

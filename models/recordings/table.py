@@ -1,7 +1,5 @@
 """Read the numeric columns of a log file: CSV, gzipped CSV or Parquet."""
 
-from __future__ import annotations
-
 import csv
 import difflib
 import gzip

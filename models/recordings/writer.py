@@ -1,15 +1,13 @@
 """Write a recording as a CSV that `read_recording` reads back bit for bit."""
 
-from __future__ import annotations
-
 import csv
 import gzip
 import io
-import os
 from pathlib import Path
 
 import numpy as np
 
+from models.files import write_atomically
 from models.recordings.record import Recording, RecordingError
 
 
@@ -56,10 +54,5 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
     data = text.getvalue().encode()
     if path.name.lower().endswith(".gz"):
         data = gzip.compress(data, mtime=0)  # without a time stamp: same recording, same bytes
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_bytes(data)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
+    write_atomically(path, data)
     return path

@@ -7,8 +7,10 @@ Source: Dugoff, Fancher and Segel, SAE 700377 (1970), constant friction coeffici
 
 from dataclasses import dataclass
 
+from models.rules import require_positive
+from models.tires import constant_stiffness
 from models.tires.forces import Expression, TireForces, positive, smaller
-from models.tires.slips import require_positive, slips
+from models.tires.slips import slips
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +34,9 @@ class DugoffTire:
     friction: float
 
     def __post_init__(self) -> None:
-        require_positive(C_alpha=self.C_alpha, C_kappa=self.C_kappa, friction=self.friction)
+        require_positive(
+            ValueError, C_alpha=self.C_alpha, C_kappa=self.C_kappa, friction=self.friction
+        )
 
     def forces(
         self,
@@ -58,20 +62,5 @@ class DugoffTire:
         per_demand = smaller(half, 1.0 / s.rolling) * (2.0 - lam)  # f(λ)/(1 + κ), no 0/0 at lock
         return TireForces(s.p_x * per_demand, s.p_y * per_demand)
 
-    def slip_stiffness(self, F_z: Expression) -> Expression:
-        """∂F_x/∂κ at zero slip [N]: C_κ, and 0 in the air.
-
-        Parameters
-        ----------
-        F_z : wheel load [N].
-        """
-        return self.C_kappa * (F_z > 0)
-
-    def cornering_stiffness(self, F_z: Expression) -> Expression:
-        """∂F_y/∂α at zero slip [N/rad]: C_α, and 0 in the air.
-
-        Parameters
-        ----------
-        F_z : wheel load [N].
-        """
-        return self.C_alpha * (F_z > 0)
+    slip_stiffness = constant_stiffness.slip_stiffness
+    cornering_stiffness = constant_stiffness.cornering_stiffness

@@ -9,8 +9,10 @@ Source: Pacejka, Tyre and Vehicle Dynamics, ch. 3.2-3.3; Fiala, VDI-Z 96 (1954).
 
 from dataclasses import dataclass
 
+from models.rules import require_positive
+from models.tires import constant_stiffness
 from models.tires.forces import Expression, TireForces, positive, smaller
-from models.tires.slips import NO_FORCE, require_positive, slips
+from models.tires.slips import NO_FORCE, slips
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +36,9 @@ class FialaTire:
     friction: float
 
     def __post_init__(self) -> None:
-        require_positive(C_alpha=self.C_alpha, C_kappa=self.C_kappa, friction=self.friction)
+        require_positive(
+            ValueError, C_alpha=self.C_alpha, C_kappa=self.C_kappa, friction=self.friction
+        )
 
     def forces(
         self,
@@ -61,20 +65,5 @@ class FialaTire:
         per_demand = (1.0 - x + x**2 / 3.0) * smaller(1.0 / s.rolling, sliding / s.size)
         return TireForces(s.p_x * per_demand, s.p_y * per_demand)
 
-    def slip_stiffness(self, F_z: Expression) -> Expression:
-        """∂F_x/∂κ at zero slip [N]: C_κ, and 0 in the air.
-
-        Parameters
-        ----------
-        F_z : wheel load [N].
-        """
-        return self.C_kappa * (F_z > 0)
-
-    def cornering_stiffness(self, F_z: Expression) -> Expression:
-        """∂F_y/∂α at zero slip [N/rad]: C_α, and 0 in the air.
-
-        Parameters
-        ----------
-        F_z : wheel load [N].
-        """
-        return self.C_alpha * (F_z > 0)
+    slip_stiffness = constant_stiffness.slip_stiffness
+    cornering_stiffness = constant_stiffness.cornering_stiffness

@@ -39,15 +39,34 @@ class Tire(Protocol):
         F_z: Expression,
         mu: Expression = 1.0,
     ) -> TireForces:
-        """Forces at slip angle α [rad], slip κ [-], camber γ [rad], load F_z [N], friction μ."""
+        """Longitudinal and lateral force in the wheel frame [N].
+
+        Parameters
+        ----------
+        alpha : slip angle, paper's sign [rad].
+        kappa : longitudinal slip [-].
+        gamma : camber [rad].
+        F_z : wheel load [N]; no force at F_z <= 0.
+        mu : friction of the road over that of the measurement [-].
+        """
         ...
 
     def slip_stiffness(self, F_z: Expression) -> Expression:
-        """∂F_x/∂κ at zero slip and camber [N]."""
+        """∂F_x/∂κ at zero slip and camber [N].
+
+        Parameters
+        ----------
+        F_z : wheel load [N].
+        """
         ...
 
     def cornering_stiffness(self, F_z: Expression) -> Expression:
-        """∂F_y/∂α at zero slip and camber [N/rad]."""
+        """∂F_y/∂α at zero slip and camber [N/rad].
+
+        Parameters
+        ----------
+        F_z : wheel load [N].
+        """
         ...
 
 

@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass
 
+from models.rules import require_positive
+from models.tires import constant_stiffness
 from models.tires.forces import Expression, TireForces
-from models.tires.slips import require_positive
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,7 +28,7 @@ class LinearTire:
     C_kappa: float
 
     def __post_init__(self) -> None:
-        require_positive(C_alpha=self.C_alpha, C_kappa=self.C_kappa)
+        require_positive(ValueError, C_alpha=self.C_alpha, C_kappa=self.C_kappa)
 
     def forces(
         self,
@@ -49,20 +50,5 @@ class LinearTire:
         """
         return TireForces(self.slip_stiffness(F_z) * kappa, self.cornering_stiffness(F_z) * alpha)
 
-    def slip_stiffness(self, F_z: Expression) -> Expression:
-        """∂F_x/∂κ [N]: C_κ, and 0 in the air.
-
-        Parameters
-        ----------
-        F_z : wheel load [N].
-        """
-        return self.C_kappa * (F_z > 0)
-
-    def cornering_stiffness(self, F_z: Expression) -> Expression:
-        """∂F_y/∂α [N/rad]: C_α, and 0 in the air.
-
-        Parameters
-        ----------
-        F_z : wheel load [N].
-        """
-        return self.C_alpha * (F_z > 0)
+    slip_stiffness = constant_stiffness.slip_stiffness
+    cornering_stiffness = constant_stiffness.cornering_stiffness

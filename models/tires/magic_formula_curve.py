@@ -1,13 +1,31 @@
-"""The two shapes of the Magic Formula, and the guard all its divisions share.
+"""The two curves of the Magic Formula, and the guard all its divisions share.
 
 Pacejka, Tyre and Vehicle Dynamics, 2nd ed., (4.49)-(4.52), (4.72).
 """
+
+from typing import NamedTuple
 
 import casadi as ca
 
 from models.tires.forces import Expression, positive
 
 EPSILON = 1e-9  # N; keeps B = K/(C D) finite in the air and on ice, changes no force by 1e-8 N
+
+
+class Shape(NamedTuple):
+    """Curve of a force over its slip at one load and camber, without E, which needs the slip.
+
+    Attributes
+    ----------
+    B, C, D : stiffness [1/rad for α, - for κ], shape [-] and peak [N].
+    S_H, S_V : shift of the slip [rad or -] and of the force [N].
+    """
+
+    B: Expression
+    C: Expression
+    D: Expression
+    S_H: Expression
+    S_V: Expression
 
 
 def magic_curve(

@@ -5,34 +5,14 @@ K_y < 0); F_z >= 0. Numbers: Pacejka, Tyre and Vehicle Dynamics, 2nd ed., ch. 4.
 takes α and γ where the book's later form takes tan α and sin γ, and knows no turn slip (ζ = 1).
 """
 
-from typing import NamedTuple
-
 import casadi as ca
 
 from models.tires.forces import Expression, positive
 from models.tires.magic_formula_coefficients import Coefficients
-from models.tires.magic_formula_curve import EPSILON, magic_curve, magic_slope, weight
+from models.tires.magic_formula_curve import EPSILON, Shape, magic_curve, magic_slope, weight
 
 
-class LateralShape(NamedTuple):
-    """Curve of F_y over α at one load and camber, without its curvature E, which needs α.
-
-    Attributes
-    ----------
-    B, C, D : stiffness [1/rad], shape [-] and peak [N].
-    S_H, S_V : shift of α [rad] and of F_y [N].
-    """
-
-    B: Expression
-    C: Expression
-    D: Expression
-    S_H: Expression
-    S_V: Expression
-
-
-def lateral_shape(
-    c: Coefficients, gamma: Expression, F_z: Expression, mu: Expression
-) -> LateralShape:
+def lateral_shape(c: Coefficients, gamma: Expression, F_z: Expression, mu: Expression) -> Shape:
     """All of the curve that does not depend on slip.
 
     Parameters
@@ -55,7 +35,7 @@ def lateral_shape(
     S_Hy = (c.PHY1 + c.PHY2 * df_z) * c.LHY + c.PHY3 * gamma_y * c.LKYG  # (4.E27)
     S_Vyg = (c.PVY3 + c.PVY4 * df_z) * gamma_y * c.LKYG  # (4.E28), over F_z
     S_Vy = F_z * ((c.PVY1 + c.PVY2 * df_z) * c.LVY + S_Vyg) * LMUY  # (4.E29)
-    return LateralShape(B_y, C_y, D_y, S_Hy, S_Vy)
+    return Shape(B_y, C_y, D_y, S_Hy, S_Vy)
 
 
 def lateral_curvature(

@@ -5,34 +5,16 @@ Numbers: Pacejka, Tyre and Vehicle Dynamics, 2nd ed., ch. 4.3.2. The 5.2 form ta
 the book's later form takes tan α and sin γ, and knows no turn slip (ζ = 1).
 """
 
-from typing import NamedTuple
-
 import casadi as ca
 
 from models.tires.forces import Expression, positive
 from models.tires.magic_formula_coefficients import Coefficients
-from models.tires.magic_formula_curve import EPSILON, magic_curve, magic_slope, weight
-
-
-class LongitudinalShape(NamedTuple):
-    """Curve of F_x over κ at one load and camber, without its curvature E, which needs κ.
-
-    Attributes
-    ----------
-    B, C, D : stiffness [-], shape [-] and peak [N].
-    S_H, S_V : shift of κ [-] and of F_x [N].
-    """
-
-    B: Expression
-    C: Expression
-    D: Expression
-    S_H: Expression
-    S_V: Expression
+from models.tires.magic_formula_curve import EPSILON, Shape, magic_curve, magic_slope, weight
 
 
 def longitudinal_shape(
     c: Coefficients, gamma: Expression, F_z: Expression, mu: Expression
-) -> LongitudinalShape:
+) -> Shape:
     """All of the curve that does not depend on slip.
 
     Parameters
@@ -52,7 +34,7 @@ def longitudinal_shape(
     B_x = K_x / (C_x * D_x + EPSILON)  # (4.E16)
     S_Hx = (c.PHX1 + c.PHX2 * df_z) * c.LHX  # (4.E17)
     S_Vx = F_z * (c.PVX1 + c.PVX2 * df_z) * c.LVX * LMUX  # (4.E18)
-    return LongitudinalShape(B_x, C_x, D_x, S_Hx, S_Vx)
+    return Shape(B_x, C_x, D_x, S_Hx, S_Vx)
 
 
 def longitudinal_curvature(c: Coefficients, kappa_x: Expression, F_z: Expression) -> Expression:

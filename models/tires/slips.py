@@ -45,15 +45,3 @@ def slips(alpha: Expression, kappa: Expression, C_alpha: float, C_kappa: float) 
     p_y = C_alpha * tan_alpha
     size = ca.sqrt(p_x**2 + p_y**2 + NO_FORCE**2)
     return Slips(p_x, p_y, size, ca.fmax(1.0 + kappa, ROLLING_FLOOR))
-
-
-def require_positive(**values: float) -> None:
-    """Raise ValueError unless every value is a finite number above zero.
-
-    Parameters
-    ----------
-    values : the numbers by name.
-    """
-    for name, value in values.items():
-        if not 0.0 < value < float("inf"):
-            raise ValueError(f"{name} must be positive and finite, it is {value!r}")

@@ -1,9 +1,20 @@
-"""What happens where the compiler is missing or refuses."""
+"""What happens where the compiler or its cache is missing, refuses, or is damaged."""
+
+import ctypes
+import math
+import platform
+import shutil
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
-from codegen import CompilationError, build_library, find_compiler
+from codegen import CompilationError, build_library, cache_folder, find_compiler, load_library
+from codegen import cache as cache_module
 from codegen import compiler as compiler_module
+
+ONE = "int one(void) { return 1; }"
 
 
 @pytest.fixture
@@ -12,24 +23,36 @@ def fresh_cache(monkeypatch, tmp_path):
     return tmp_path
 
 
+@pytest.fixture
+def ask_again():
+    """Forget the compiler and its version before and after."""
+    for function in (find_compiler, compiler_module._version):
+        function.cache_clear()
+    yield
+    for function in (find_compiler, compiler_module._version):
+        function.cache_clear()
+
+
 def test_refused_source_leaves_nothing_behind(fresh_cache):
     with pytest.raises(CompilationError, match="broken"):
         build_library("int broken(void) { return ; oops }", "broken")
     assert list(fresh_cache.iterdir()) == []
 
 
-def test_a_missing_compiler_is_said_in_one_line(monkeypatch, fresh_cache, caplog):
+def test_a_missing_compiler_is_said_in_one_line(monkeypatch, fresh_cache, caplog, ask_again):
     monkeypatch.setattr(compiler_module.shutil, "which", lambda _: None)
-    find_compiler.cache_clear()
-    try:
-        with caplog.at_level("WARNING", logger="tireid"):
-            assert build_library("int f(void) { return 0; }", "f") is None
-            assert build_library("int g(void) { return 0; }", "g") is None
-    finally:
-        find_compiler.cache_clear()
+    with caplog.at_level("WARNING", logger="tireid"):
+        assert build_library("int f(void) { return 0; }", "f") is None
+        assert load_library("int g(void) { return 0; }", "g") is None
     assert len(caplog.messages) == 1
     assert "no C compiler" in caplog.messages[0]
     assert list(fresh_cache.iterdir()) == []
+
+
+def test_a_compiler_of_several_words_is_run_with_all_of_them(monkeypatch, fresh_cache, ask_again):
+    monkeypatch.setenv("CC", "env TIREID_TEST=1 gcc")
+    assert find_compiler() == (shutil.which("env"), "TIREID_TEST=1", "gcc")
+    assert load_library(ONE, "one").one() == 1
 
 
 def test_the_name_of_a_library_follows_its_content(fresh_cache):
@@ -37,3 +60,150 @@ def test_the_name_of_a_library_follows_its_content(fresh_cache):
     two = build_library("int f(void) { return 2; }", "f")
     assert one != two
     assert build_library("int f(void) { return 1; }", "f") == one
+
+
+def test_the_name_of_a_library_follows_flags_and_compiler(monkeypatch, fresh_cache):
+    before = build_library(ONE, "one")
+    with monkeypatch.context() as other:
+        other.setattr(compiler_module, "FLAGS", (*compiler_module.FLAGS, "-O1"))
+        flags = build_library(ONE, "one")
+    with monkeypatch.context() as other:
+        other.setattr(compiler_module, "_version", lambda _: "another compiler 1.0")
+        version = build_library(ONE, "one")
+    assert len({before, flags, version}) == 3
+    assert build_library(ONE, "one") == before
+
+
+def require_no_library_before_it_is_whole(monkeypatch, folder, build):
+    """Look into the cache when the compiler has just ended: its file must have another name."""
+    seen = []
+    run = subprocess.run
+
+    def look(*arguments, **options):
+        answer = run(*arguments, **options)
+        seen.append(list(folder.glob("*.so")))
+        return answer
+
+    with monkeypatch.context() as patch:
+        patch.setattr(compiler_module.subprocess, "run", look)
+        library = build()
+    assert library.exists()
+    assert seen
+    assert seen[-1] == []
+
+
+def test_a_library_appears_whole_or_not_at_all(monkeypatch, fresh_cache):
+    def in_place():
+        library = fresh_cache / "one.so"
+        (fresh_cache / "one.c").write_text(ONE)
+        command = [*find_compiler(), *compiler_module.FLAGS, "one.c", "-o", library.name]
+        compiler_module.subprocess.run(command, cwd=fresh_cache, check=True)
+        return library
+
+    with pytest.raises(AssertionError):
+        require_no_library_before_it_is_whole(monkeypatch, fresh_cache, in_place)
+    (fresh_cache / "one.so").unlink()
+    (fresh_cache / "one.c").unlink()
+    require_no_library_before_it_is_whole(
+        monkeypatch, fresh_cache, lambda: build_library(ONE, "one")
+    )
+    assert len(list(fresh_cache.iterdir())) == 1
+
+
+@pytest.mark.parametrize("kept", [0, 100])
+def test_a_damaged_library_is_built_anew(fresh_cache, kept):
+    library = build_library(ONE, "one")
+    library.write_bytes(library.read_bytes()[:kept])
+    with pytest.raises(OSError, match="one"):
+        ctypes.CDLL(str(library))
+    assert load_library(ONE, "one").one() == 1
+
+
+@pytest.mark.parametrize("below", ["", "deeper"])
+def test_a_cache_that_is_a_file_is_replaced_for_this_run(monkeypatch, tmp_path, caplog, below):
+    (tmp_path / "file").write_text("not a folder")
+    monkeypatch.setenv("TIREID_CACHE", str(tmp_path / "file" / below))
+    cache_module._temporary_folder.cache_clear()
+    with caplog.at_level("WARNING", logger="tireid"):
+        assert load_library(ONE, "one").one() == 1
+        stand_in = cache_folder()
+    assert list(stand_in.glob("one-*.so"))
+    assert len(caplog.messages) == 1
+    assert "no cache of compiled code" in caplog.messages[0]
+
+
+def test_a_cache_that_cannot_be_written_is_replaced_for_this_run(monkeypatch, fresh_cache):
+    monkeypatch.setattr(cache_module.os, "access", lambda *_: False)
+    assert cache_folder() != fresh_cache
+    assert cache_folder().is_dir()
+
+
+def test_a_user_without_a_home_has_a_cache_all_the_same(monkeypatch):
+    def homeless():
+        raise RuntimeError("Could not determine home directory.")
+
+    for name in ("TIREID_CACHE", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(Path, "home", homeless)
+    assert cache_folder().is_dir()
+
+
+def test_the_stand_in_for_the_cache_is_gone_after_the_run(tmp_path):
+    (tmp_path / "file").write_text("not a folder")
+    program = "from codegen import cache_folder; print(cache_folder())"
+    answer = subprocess.run(
+        [sys.executable, "-W", "error", "-c", program],
+        env={"TIREID_CACHE": str(tmp_path / "file"), "TMPDIR": str(tmp_path)},
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    stand_in = Path(answer.stdout.strip())
+    assert stand_in.parent == tmp_path
+    assert not stand_in.exists()
+    assert answer.stderr.count("\n") == 1
+
+
+NAN_GUARD = "double guarded(double x) { return x != x ? -1.0 : x; }"
+
+
+def require_nan_guards_to_work():
+    guarded = load_library(NAN_GUARD, "guarded").guarded
+    guarded.argtypes, guarded.restype = [ctypes.c_double], ctypes.c_double
+    assert guarded(math.nan) == -1.0
+
+
+def test_flags_keep_guards_against_nan(monkeypatch, fresh_cache):
+    # not -ffast-math: loading what it links would flush denormals of the whole process
+    require_nan_guards_to_work()
+    monkeypatch.setattr(compiler_module, "FLAGS", (*compiler_module.FLAGS, "-ffinite-math-only"))
+    with pytest.raises(AssertionError):
+        require_nan_guards_to_work()
+
+
+MULTIPLY_ADD = "double f(double a, double b, double c) { return a * b + c; }"
+
+
+def require_two_roundings():
+    """a b + c rounded twice, as on a machine without a fused instruction."""
+    f = load_library(MULTIPLY_ADD, "f").f
+    f.argtypes, f.restype = [ctypes.c_double] * 3, ctypes.c_double
+    a = 1.0 + 2.0**-30
+    assert f(a, a, -(a * a)) == 0.0
+
+
+CPU = Path("/proc/cpuinfo")
+
+
+@pytest.mark.skipif(
+    platform.machine() != "x86_64" or not CPU.exists() or "fma" not in CPU.read_text().split(),
+    reason="needs an x86-64 processor that can fuse multiplication and addition",
+)
+def test_flags_give_the_same_bits_where_the_machine_could_fuse(monkeypatch, fresh_cache):
+    flags = compiler_module.FLAGS
+    monkeypatch.setattr(compiler_module, "FLAGS", (*flags, "-mfma"))
+    require_two_roundings()
+    monkeypatch.setattr(compiler_module, "FLAGS", (*flags, "-mfma", "-ffp-contract=fast"))
+    with pytest.raises(AssertionError):
+        require_two_roundings()

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import codegen.scan
-from codegen import Scan
+from codegen import CompilationError, Scan
 
 
 def leaky_step() -> ca.Function:
@@ -35,7 +35,7 @@ def by_hand(M, s, u, c):
 def scan(request, monkeypatch, tmp_path):
     monkeypatch.setenv("TIREID_CACHE", str(tmp_path))
     if request.param == "virtual machine":
-        monkeypatch.setattr(codegen.scan, "build_library", lambda *_: None)
+        monkeypatch.setattr(codegen.scan, "load_library", lambda *_: None)
     return Scan(leaky_step(), carry=("M", "s"), over=("u",))
 
 
@@ -81,3 +81,41 @@ def test_a_library_is_built_once(monkeypatch, tmp_path, caplog):
             Scan(leaky_step(), carry=("M", "s"), over=("u",))(4, inputs)
     assert sum("compiling leaky" in message for message in caplog.messages) == 1
     assert len(list(tmp_path.glob("leaky-*.so"))) == 1
+
+
+def no_compiler(*_):
+    raise CompilationError("gcc refused\nthe code")
+
+
+def no_space(*_):
+    raise OSError(28, "No space left on device")
+
+
+@pytest.mark.parametrize("failure", [no_compiler, no_space])
+def test_a_build_that_fails_is_one_warning_and_the_same_numbers(
+    monkeypatch, tmp_path, caplog, rng, failure
+):
+    monkeypatch.setenv("TIREID_CACHE", str(tmp_path))
+    M, s, u = rng.normal(size=(2, 3)), rng.normal(size=2), rng.normal(size=(5, 3))
+    monkeypatch.setattr(codegen.scan, "load_library", failure)
+    scan = Scan(leaky_step(), carry=("M", "s"), over=("u",))
+    with caplog.at_level("WARNING", logger="tireid"):
+        for _ in range(2):
+            record = scan(5, {"M": M, "s": s, "u": u, "c": np.array(0.1)})
+    np.testing.assert_allclose(record["M_final"], by_hand(M, s, u, 0.1)[2], rtol=1e-13)
+    assert len(caplog.messages) == 1
+    assert "virtual machine" in caplog.messages[0]
+    assert "\n" not in caplog.messages[0]
+
+
+def test_a_compiler_that_cannot_compile_is_no_error(monkeypatch, tmp_path, caplog):
+    monkeypatch.setenv("TIREID_CACHE", str(tmp_path))
+    monkeypatch.setenv("CC", "false")
+    codegen.find_compiler.cache_clear()
+    inputs = {"M": np.zeros((2, 3)), "s": np.zeros(2), "u": np.zeros((4, 3)), "c": np.array(0.1)}
+    try:
+        with caplog.at_level("WARNING", logger="tireid"):
+            Scan(leaky_step(), carry=("M", "s"), over=("u",))(4, inputs)
+    finally:
+        codegen.find_compiler.cache_clear()
+    assert "false refused the generated code of leaky" in caplog.messages[0]

@@ -15,6 +15,7 @@ from models.friction import Friction, FrictionChange, FrictionError
 from models.maneuvers import RandomSteer, Slalom, SlowlyIncreasingSteer, StepSteer
 from models.plant import Driver, Plant, PlantError
 from models.plant.loads import wheel_loads
+from models.plant.wheels import relax, tire_force
 from models.sensors import Sensor, Sensors
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
 from models.vehicle import GRAVITY, Vehicle, VehicleError, sedan
@@ -128,9 +129,34 @@ def test_slip_angles_have_the_papers_sign(hard_run):
     np.testing.assert_allclose(run.alpha[:, 3], rear_right, atol=1e-13)
 
 
+def require_steady_force_of_the_slip_angle(force_of):
+    """Once the lag is over, a tire pulls with C alpha at any angle, though the lag is in tan."""
+    stiffness, tire = 60e3, LinearTire(C_alpha=60e3, C_kappa=1e6)
+    for delta, velocity in ((0.6, (20.0, 1.0)), (-0.3, (15.0, 9.0)), (0.1, (25.0, 0.0))):
+        at_zero, at_one = (float(relax(s, delta, velocity, 0.5)) for s in (0.0, 1.0))
+        steady = at_zero / (at_zero - at_one)  # the lag is linear in the slip
+        F_y = float(force_of(tire, steady, 0.0, 0.0, 4000.0, 1.0)[1])
+        alpha = delta - math.atan2(velocity[1], velocity[0])
+        assert F_y == pytest.approx(stiffness * alpha, rel=1e-12)
+
+
+def test_the_steady_force_is_that_of_the_slip_angle():
+    require_steady_force_of_the_slip_angle(tire_force)
+
+
+def test_a_lagged_tangent_taken_for_an_angle_is_noticed():
+    def without_arc_tangent(tire, slip, *rest):
+        return tire_force(tire, math.tan(slip), *rest)
+
+    with pytest.raises(AssertionError):
+        require_steady_force_of_the_slip_angle(without_arc_tangent)
+
+
 def test_side_force_follows_slip_over_the_relaxation_length():
     sigma, speed, stiffness = 0.6, 20.0, 60e3
-    heavy = replace(CAR, mass=1e7, yaw_inertia=1e9, chassis=replace(CHASSIS, roll_stiffness=1e9))
+    stiff = {"cornering_stiffness_front": 1e8, "cornering_stiffness_rear": 1e8}  # not read here
+    chassis = replace(CHASSIS, roll_stiffness=1e9)
+    heavy = replace(CAR, mass=1e7, yaw_inertia=1e8, chassis=chassis, **stiff)
     tire = LinearTire(C_alpha=stiffness, C_kappa=1e9)
     step = StepSteer(amplitude=0.01, onset=0.2, rate_limit=10.0, duration=1.0)
     fast = replace(heavy, chassis=replace(heavy.chassis, steering_lag=0.002))

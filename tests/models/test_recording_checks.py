@@ -28,6 +28,7 @@ CARS = {
     "tenth": (1.6, 0.005, 0.08, 0.09, 20.0, 25.0),
     "forty-third": (0.041, 28e-6, 0.029, 0.033, 1.2, 1.6),
 }
+SEDAN_AXLES = SimpleNamespace(l_f=1.25, l_r=1.45, mass=1600.0)
 SPEEDS = {"sedan": 20.0, "truck": 12.0, "formula": 45.0, "tenth": 2.2, "forty-third": 1.5}
 
 
@@ -164,9 +165,10 @@ def test_a_right_recording_passes(car: str, peak: float) -> None:
     made = drive(car, peak)
     check_physics(made)
     check_physics(replace(made, a_y=None, axle_force=None))
-    _, _, l_f, l_r, *_ = CARS[car]
-    check_against_vehicle(made, SimpleNamespace(l_f=l_f, l_r=l_r))
-    check_against_vehicle(replace(made, axle_force=None), SimpleNamespace(l_f=l_f, l_r=l_r))
+    mass, _, l_f, l_r, *_ = CARS[car]
+    axles = SimpleNamespace(l_f=l_f, l_r=l_r, mass=mass)
+    check_against_vehicle(made, axles)
+    check_against_vehicle(replace(made, axle_force=None), axles)
 
 
 def test_one_degree_of_steering_in_degrees_is_found_without_acceleration() -> None:
@@ -264,31 +266,41 @@ def test_the_vehicle_tells_slip_and_force_signs(
     plant: Callable[[Recording], Recording], start: str | tuple[str, ...]
 ) -> None:
     with pytest.raises(RecordingError) as caught:
-        check_against_vehicle(plant(drive()), SimpleNamespace(l_f=1.25, l_r=1.45))
+        check_against_vehicle(plant(drive()), SEDAN_AXLES)
     assert str(caught.value).removeprefix("made: ").startswith(start)
 
 
 def test_the_vehicle_tells_the_sign_of_v_y_at_speed_without_forces() -> None:
     fast = drive(speed=40.0)
     made = scaled(v_y=-1.0, bare=1)(fast)
-    check_against_vehicle(fast, SimpleNamespace(l_f=1.25, l_r=1.45))
+    check_against_vehicle(fast, SEDAN_AXLES)
     with pytest.raises(RecordingError, match="lateral acceleration must rise with its slip"):
-        check_against_vehicle(made, SimpleNamespace(l_f=1.25, l_r=1.45))
+        check_against_vehicle(made, SEDAN_AXLES)
+
+
+def test_a_mass_in_another_unit_is_told_by_the_forces() -> None:
+    for factor in (1e-3, 1e3):
+        wrong = SimpleNamespace(l_f=1.25, l_r=1.45, mass=factor * SEDAN_AXLES.mass)
+        with pytest.raises(RecordingError, match="check the unit of mass"):
+            check_against_vehicle(drive(), wrong)
+    nearly = SimpleNamespace(l_f=1.25, l_r=1.45, mass=1.085 * SEDAN_AXLES.mass)
+    check_against_vehicle(drive(), nearly)
 
 
 def test_the_vehicle_of_another_scale_is_refused() -> None:
     with pytest.raises(RecordingError, match=r"wheelbase 0\.17 m"):
-        check_against_vehicle(drive(speed=6.0), SimpleNamespace(l_f=0.08, l_r=0.09))
+        check_against_vehicle(drive(speed=6.0), SimpleNamespace(l_f=0.08, l_r=0.09, mass=1.5))
 
 
 @pytest.mark.parametrize("file", ["carmaker.csv.gz", "dart.csv.gz"])
 def test_real_runs_pass_and_their_corruptions_ring(shared_data: Path, file: str) -> None:
     path = shared_data / file
-    l_f, l_r = (0.924, 1.626) if file.startswith("car") else (0.0805, 0.093)
+    l_f, l_r, mass = (0.924, 1.626, 2027.0) if file.startswith("car") else (0.0805, 0.093, 1.58)
+    axles = SimpleNamespace(l_f=l_f, l_r=l_r, mass=mass)
     for run in runs(path):
         real = read_recording(path, run)
         assert real.name == f"{file.removesuffix('.csv.gz')}:{run}"
-        check_against_vehicle(real, SimpleNamespace(l_f=l_f, l_r=l_r))
+        check_against_vehicle(real, axles)
         errors = ALL if real.axle_force is not None else ON_MOTION | ON_V_Y
         for part in (real, real.between(real.t[0] + 0.5 * real.duration, real.t[-1])):
             check_physics(part)

@@ -151,3 +151,26 @@ def test_the_sedan_has_the_stiffness_of_its_tires_and_understeers():
 def test_no_physical_value_of_a_chassis_has_a_default():
     with pytest.raises(TypeError):
         Chassis(track_front=1.5)  # type: ignore[call-arg]
+
+
+@pytest.mark.parametrize(
+    ("key", "factor"),
+    [
+        ("yaw_inertia", 1e-3),
+        ("mass", 1e-3),
+        ("cornering_stiffness_front", 1e-3),
+        ("cornering_stiffness_rear", 1 / 57.3),
+        ("cornering_stiffness_rear", 100.0),
+    ],
+)
+def test_a_value_in_another_unit_is_refused(key, factor):
+    car = sedan()
+    with pytest.raises(VehicleError, match="check the units"):
+        replace(car, **{key: factor * getattr(car, key)})
+
+
+def test_a_model_car_and_a_truck_are_plausible():
+    kwargs = {"mass": 1.58, "yaw_inertia": 0.00481, "l_f": 0.0805, "l_r": 0.093}
+    Vehicle(**kwargs, cornering_stiffness_front=20.0, cornering_stiffness_rear=300.0)
+    kwargs = {"mass": 18000.0, "yaw_inertia": 130000.0, "l_f": 3.5, "l_r": 2.0}
+    Vehicle(**kwargs, cornering_stiffness_front=4e5, cornering_stiffness_rear=8e5)

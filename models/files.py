@@ -1,0 +1,26 @@
+"""Files that appear whole or not at all."""
+
+import tempfile
+from os import PathLike
+from pathlib import Path
+
+
+def write_atomically(path: str | PathLike[str], content: str | bytes) -> None:
+    """Write a file; whoever reads it meanwhile, or after a failure, sees the old one whole.
+
+    Parameters
+    ----------
+    path : the file; where it is a link, what it points to.
+    content : text, written in UTF-8 with line ends as they are, or bytes.
+
+    Raises
+    ------
+    OSError
+        Where the file cannot be written; nothing is left behind.
+    """
+    target = Path(path).resolve()
+    data = content.encode("utf-8") if isinstance(content, str) else content
+    with tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as scratch:
+        part = Path(scratch) / target.name  # in the same folder, thus on the same disk
+        part.write_bytes(data)
+        part.replace(target)

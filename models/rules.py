@@ -1,0 +1,21 @@
+"""Rules that numbers must keep wherever they come from."""
+
+import math
+
+
+def require_positive(refusal: type[ValueError], /, **values: float) -> None:
+    """Refuse every value that is not a finite number above zero.
+
+    Parameters
+    ----------
+    refusal : class of the error to raise.
+    **values : what to check, by name.
+
+    Raises
+    ------
+    ValueError
+        Of that class, with the first name that breaks the rule and its value; NaN breaks it too.
+    """
+    for name, value in values.items():
+        if not (value > 0.0 and math.isfinite(value)):
+            raise refusal(f"{name} must be positive and finite, it is {value}")
