@@ -5,6 +5,7 @@ passenger car and a 1:10 model.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -24,7 +25,12 @@ from models.vehicle import GRAVITY, Vehicle
 REFERENCE_WHEELBASE = 2.7  # m: the car for which the scales of SIGNALS are meant
 BANDWIDTH = 0.7  # Hz: a brisk slalom; the steering of a normal driver stays below 0.5 Hz
 PHASE_MARGIN = 60.0  # deg
-LAWS = ("integral", "instantaneous", "instantaneous_scaled", "pi_lead")
+LAWS: Mapping[str, str] = {  # name, and what a reader is told
+    "integral": "integral",
+    "instantaneous": "instantaneous",
+    "instantaneous_scaled": "instantaneous at eta/lambda",
+    "pi_lead": "PI-lead",
+}
 
 
 class Driving(NamedTuple):
@@ -178,18 +184,28 @@ def default_design(
     """
     if law not in LAWS:
         raise ValueError(f"law must be one of {list(LAWS)}, not {law!r}")
-    compared = law.startswith("instantaneous")
     design = design_for(
         vehicle,
         natural_driving(vehicle),
-        law="integral" if compared else law,
+        law="integral" if law.startswith("instantaneous") else law,
         network=network,
         seed=seed,
         dt=dt,
     )
+    return with_law(design, law)
+
+
+def with_law(design: Design, law: str) -> Design:
+    """Return a design run by another law, to compare the two: its gains as they are, or with η/λ.
+
+    Parameters
+    ----------
+    design : the design.
+    law : one of `LAWS`; "instantaneous_scaled" is the instantaneous law with η/λ in place of η.
+    """
     if law == "instantaneous_scaled":
-        design = replace(design, gains=design.gains.scaled_by_forgetting())
-    return replace(design, law="instantaneous") if compared else design
+        return replace(design, law="instantaneous", gains=design.gains.scaled_by_forgetting())
+    return replace(design, law=law)
 
 
 def _placeholder() -> Gains:

@@ -1,15 +1,27 @@
-"""A design: everything that is chosen before the car drives."""
+"""A design of the paper's identifier: everything that is chosen before the car drives."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 
+import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
+from codegen import Scan
 from identifier.gains import Gains
 from identifier.integrators import INTEGRATORS
 from identifier.laws import DRIVING_ERRORS
-from identifier.network import Network
+from identifier.method import FrozenModel, Setup
+from identifier.network import Network, Weights
+from identifier.network_model import NetworkModel
 from identifier.observer import INPUT_SOURCES
-from models.vehicle import GRAVITY
+from identifier.step import CARRY, GAINS, OVER, Structure, build_step
+from models.bicycle import bicycle
+from models.recordings import Recording
+from models.vehicle import GRAVITY, Vehicle
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,9 +72,87 @@ class Design:
                 raise ValueError(f"{name} must be positive, it is {getattr(self, name)}")
 
     @property
-    def projects(self) -> bool:
-        """Whether a projection bounds the weights."""
-        return bool(np.isfinite(self.gains.W_max) or np.isfinite(self.gains.V_max))
+    def structure(self) -> Structure:
+        """What the compiled step is built from."""
+        return Structure(
+            network=self.network,
+            law=self.law,
+            input_source=self.input_source,
+            integrator=self.integrator,
+            projects=bool(np.isfinite(self.gains.W_max) or np.isfinite(self.gains.V_max)),
+        )
+
+    def setup(
+        self, vehicle: Vehicle, recording: Recording, start: FrozenModel | None = None
+    ) -> Setup:
+        """Return what a run needs; the observer starts at the first measurement.
+
+        Parameters
+        ----------
+        vehicle : the car as the identifier is told of it.
+        recording : what it will run over.
+        start : weights to begin with; None draws them from the seed.
+
+        Raises
+        ------
+        ValueError
+            Where stored weights are those of another structure.
+        """
+        return Setup(
+            scan=_scan(self.structure),
+            carry={
+                "xi_hat": axle_impulse(recording.x[0], vehicle) / self.force_unit,
+                "z": np.zeros(2),
+                **self._first_weights(start)._asdict(),
+            },
+            constants={
+                "vehicle": np.array(vehicle.bicycle),
+                "A_d": self.gains.matrix,
+                "gains": np.array([getattr(self.gains, name) for name in GAINS]),
+                "sampling": np.array([self.dt, self.force_unit, self.min_speed]),
+            },
+        )
+
+    def _first_weights(self, start: FrozenModel | None) -> Weights:
+        if start is None:
+            return self.network.initial_weights(np.random.default_rng(self.seed))
+        if not isinstance(start, NetworkModel) or start.network != self.network:
+            raise ValueError("the stored weights are of another structure than the design's")
+        return Weights(W=start.weights.W * (start.force_unit / self.force_unit), V=start.weights.V)
+
+    def frozen(self, vehicle: Vehicle, carried: Mapping[str, Array]) -> NetworkModel:
+        """Return the model with the carried weights.
+
+        Parameters
+        ----------
+        vehicle : the car.
+        carried : W (2, n_h) and V (n_h, n_in).
+        """
+        return NetworkModel(
+            vehicle=vehicle,
+            network=self.network,
+            weights=Weights(W=carried["W"].copy(), V=carried["V"].copy()),
+            force_unit=self.force_unit,
+            min_speed=self.min_speed,
+        )
+
+
+@cache
+def _scan(structure: Structure) -> Scan:
+    return Scan(build_step(structure), carry=CARRY, over=OVER)
+
+
+def axle_impulse(x: Array, vehicle: Vehicle) -> Array:
+    """Return ξ = K⁻¹ x of (7), (2,) [N s].
+
+    Parameters
+    ----------
+    x : [v_y, r] (2,).
+    vehicle : the car, which gives K.
+    """
+    K_inv = np.array(ca.DM(bicycle(vehicle.bicycle, 1.0).K_inv))  # K does not depend on v_x
+    impulse: Array = K_inv @ x
+    return impulse
 
 
 def natural_force_unit(mass: float) -> float:

@@ -1,13 +1,12 @@
-"""What an identifier did over a recording: weights, errors and forces at every sample."""
+"""What a method did over a recording: forces, and everything that its step carries and tells."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.design import Design
-from identifier.frozen_model import FrozenModel
-from identifier.network import Weights
+from identifier.method import FrozenModel, Method
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
@@ -21,40 +20,34 @@ class DivergedError(ArithmeticError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class History:
-    """An online run; n samples of the recording, U the force unit of the design.
+    """An online run over n samples.
 
     Parameters
     ----------
-    vehicle : the car the identifier was told of.
-    design : the design that ran.
+    vehicle : the car the method was told of.
+    design : the method that ran.
     recording : what it ran over.
     axle_force : forces that were identified online (n, 2) [N].
-    f_hat : output of the network (n, 2) [U].
-    xi_tilde : error ξ - ξ̂ (n, 2) [U s].
-    z : filtered error (n, 2) [U s²].
-    W : weights in effect at each sample, and after the last (n + 1, 2, n_h) [U].
-    V : weights in effect at each sample, and after the last (n + 1, n_h, n_in).
+    carried : by port, the carried values in effect at each sample and after the last (n + 1, ...).
+    told : by port, the other outputs of the step at each sample (n, ...).
     """
 
     vehicle: Vehicle
-    design: Design
+    design: Method
     recording: Recording
     axle_force: Array
-    f_hat: Array
-    xi_tilde: Array
-    z: Array
-    W: Array
-    V: Array
+    carried: Mapping[str, Array]
+    told: Mapping[str, Array]
 
     @property
     def diverged_at(self) -> float | None:
         """Time [s] from which a force is not finite or a hundred times the weight, or None."""
         possible = np.abs(self.axle_force) < IMPOSSIBLE_FORCE * self.vehicle.weight
-        sane = possible.all(axis=1) & np.isfinite(self.xi_tilde).all(axis=1)
+        sane = possible.all(axis=1)
         return None if sane.all() else float(self.recording.t[np.argmin(sane)])
 
-    def weights_at(self, t: float) -> Weights:
-        """Return the weights in effect at a time; from the end on, those after the last sample.
+    def carried_at(self, t: float) -> dict[str, Array]:
+        """Return the carried values in effect at a time; from the end on, those after the last.
 
         Parameters
         ----------
@@ -71,7 +64,7 @@ class History:
         tolerance = 1e-6 * self.design.dt
         index = int(np.searchsorted(times, t + tolerance, side="right")) - 1
         index = times.size if t > times[-1] - tolerance else index
-        return Weights(W=self.W[index], V=self.V[index])
+        return {name: values[index] for name, values in self.carried.items()}
 
     def freeze(self, t: float) -> FrozenModel:
         """Return the model with the weights in effect at a time.
@@ -84,17 +77,13 @@ class History:
         ------
         DivergedError
             Where the law had diverged by then.
+        CannotFreezeError
+            Where the method estimates a signal, not a model.
         ValueError
             Where the recording begins after that time.
         """
-        weights = self.weights_at(t)
+        carried = self.carried_at(t)
         diverged_at = self.diverged_at
         if diverged_at is not None and diverged_at <= t:
             raise DivergedError(f"the law diverged at {diverged_at:g} s, before {t:g} s")
-        return FrozenModel(
-            vehicle=self.vehicle,
-            network=self.design.network,
-            weights=weights,
-            force_unit=self.design.force_unit,
-            min_speed=self.design.min_speed,
-        )
+        return self.design.frozen(self.vehicle, carried)

@@ -54,6 +54,9 @@ class Network:
     scale: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "inputs", tuple(self.inputs))  # a list would not hash
+        if self.scale is not None:
+            object.__setattr__(self, "scale", tuple(self.scale))
         if self.hidden < 1:
             raise ValueError(f"hidden must be at least 1, it is {self.hidden}")
         unknown = [name for name in self.inputs if name not in SIGNALS]

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.frozen_model import FrozenModel
 from identifier.history import History
+from identifier.method import FrozenModel
 from models.recordings import Recording
 
 Array = NDArray[np.float64]
@@ -68,36 +68,105 @@ class Replay:
     against_online: AxleRmse
 
 
-def replay(model: FrozenModel, online: History) -> Replay:
+def freeze_key(t: float) -> str:
+    """Return a freeze time as results, files and figures name it: "32", "1700000004.25".
+
+    Parameters
+    ----------
+    t : time in the recording's own clock [s]; ten milliseconds of a Unix time are kept apart.
+    """
+    return f"{t:.12g}"
+
+
+def counted_samples(
+    recording: Recording, min_speed: float, since: float | None = None
+) -> NDArray[np.bool_]:
+    """Return which samples count wherever a force or its error is summed up, (n,).
+
+    Parameters
+    ----------
+    recording : the signals.
+    min_speed : samples below this speed [m/s] do not count.
+    since : nor do samples before this time [s]; None begins at the first.
+
+    Raises
+    ------
+    ValueError
+        Where no sample is left.
+    """
+    counted: NDArray[np.bool_] = recording.v_x >= min_speed
+    if since is not None:
+        counted = counted & (recording.t >= since)
+    if not counted.any():
+        later = "" if since is None else f" from {freeze_key(since)} s on"
+        raise ValueError(
+            f"{recording.name}: v_x never reaches {min_speed:.3g} m/s{later}, the speed from which "
+            f"samples count; its largest value is {recording.v_x.max():.3g} m/s"
+        )
+    return counted
+
+
+def replay(model: FrozenModel, online: History, *, since: float | None = None) -> Replay:
     """Replay a recording with frozen weights and compare.
 
     Parameters
     ----------
-    model : the frozen model.
+    model : the frozen model; samples below its minimum speed do not count.
     online : a run of the identifier over the recording, the run that the weights come from or
-        another; samples below the model's minimum speed do not count.
+        another.
+    since : samples before this time [s] do not count; None counts all.
+
+    Raises
+    ------
+    ValueError
+        Where no sample counts.
     """
     recording = online.recording
     force = model.axle_force(recording)
-    moving = recording.v_x >= model.min_speed
+    counted = counted_samples(recording, model.min_speed, since)
     truth = recording.axle_force
     return Replay(
         recording=recording,
         axle_force=force,
-        against_truth=None if truth is None else axle_rms(force - truth, moving),
-        against_online=axle_rms(force - online.axle_force, moving),
+        against_truth=None if truth is None else axle_rms(force - truth, counted),
+        against_online=axle_rms(force - online.axle_force, counted),
     )
 
 
-def online_error(history: History) -> AxleRmse | None:
+def online_error(history: History, *, since: float | None = None) -> AxleRmse | None:
     """Return the error of the forces identified online, None without truth.
 
     Parameters
     ----------
     history : an online run; samples below the design's minimum speed do not count.
+    since : samples before this time [s] do not count; None counts all.
+
+    Raises
+    ------
+    ValueError
+        Where no sample counts.
     """
     truth = history.recording.axle_force
     if truth is None:
         return None
-    moving = history.recording.v_x >= history.design.min_speed
-    return axle_rms(history.axle_force - truth, moving)
+    counted = counted_samples(history.recording, history.design.min_speed, since)
+    return axle_rms(history.axle_force - truth, counted)
+
+
+def force_rms(history: History, *, since: float | None = None) -> AxleRmse | None:
+    """Return the size of the true forces, over the samples that `online_error` counts.
+
+    Parameters
+    ----------
+    history : an online run.
+    since : samples before this time [s] do not count; None counts all.
+
+    Raises
+    ------
+    ValueError
+        Where no sample counts.
+    """
+    truth = history.recording.axle_force
+    if truth is None:
+        return None
+    return axle_rms(truth, counted_samples(history.recording, history.design.min_speed, since))

@@ -2,50 +2,71 @@
 
 Carried: xi_hat (2,), z (2,), W (2, n_h), V (n_h, n_in).
 Sampled: x = [v_y, r] (2,), u = [δ_f, δ_r] (2,), v_x.
-Constant: vehicle (6,) = m, I_z, l_f, l_r, C_f, C_r; A_d (2, 2); gains (8,) = η1, η2, ρ1, ρ2, λ,
-W_max, V_max, τ; sampling (3,) = T_s, force unit U, minimum speed.
+Constant: vehicle (6,) = m, I_z, l_f, l_r, C_f, C_r; A_d (2, 2); gains, in the order of `GAINS`;
+sampling (3,) = T_s, force unit U, minimum speed.
 Outputs: the next carried values; f_hat (2,) [U], the network's force; axle_force (2,) [N], linear
 tire and network together; xi_tilde (2,) [U s].
 """
 
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
-from identifier.design import Design
 from identifier.integrators import INTEGRATORS
 from identifier.laws import DRIVING_ERRORS, ball, unbounded, weight_rates
-from identifier.network import hidden_layer, network_signals
+from identifier.network import Network, hidden_layer, network_signals
 from identifier.observer import INPUT_SOURCES, filter_rate, observer_rate
 from models.bicycle import BicycleParameters, bicycle, linear_axle_force
 
 CARRY = ("xi_hat", "z", "W", "V")
 OVER = ("x", "u", "v_x")
+GAINS = ("eta_W", "eta_V", "rho_W", "rho_V", "forgetting", "W_max", "V_max", "lead")
 
 
-def build_step(design: Design) -> ca.Function:
-    """Return the step of a design; vehicle, gains and sampling stay inputs of it.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Structure:
+    """What the step is built from; all numbers stay inputs of it.
 
     Parameters
     ----------
-    design : structure, law and integrator are taken from it.
+    network : structure of the network.
+    law : name of the driving error.
+    input_source : where the network reads the state.
+    integrator : name of the integrator.
+    projects : whether a projection bounds the weights.
     """
-    network = design.network
+
+    network: Network
+    law: str
+    input_source: str
+    integrator: str
+    projects: bool
+
+
+def build_step(structure: Structure) -> ca.Function:
+    """Return the step; vehicle, gains and sampling stay inputs of it.
+
+    Parameters
+    ----------
+    structure : network, law, input source and integrator.
+    """
+    network = structure.network
     n_h, n_in = network.hidden, len(network.inputs)
     xi_hat, z = ca.SX.sym("xi_hat", 2), ca.SX.sym("z", 2)
     W, V = ca.SX.sym("W", 2, n_h), ca.SX.sym("V", n_h, n_in)
     x, u, v_x = ca.SX.sym("x", 2), ca.SX.sym("u", 2), ca.SX.sym("v_x")
     vehicle, A_d = ca.SX.sym("vehicle", 6), ca.SX.sym("A_d", 2, 2)
-    gains, sampling = ca.SX.sym("gains", 8), ca.SX.sym("sampling", 3)
+    gains, sampling = ca.SX.sym("gains", len(GAINS)), ca.SX.sym("sampling", 3)
 
     parameters = BicycleParameters(*ca.vertsplit(vehicle))
-    eta_W, eta_V, rho_W, rho_V, forgetting, W_max, V_max, lead = ca.vertsplit(gains)
+    eta_W, eta_V, rho_W, rho_V, lam, W_max, V_max, lead = ca.vertsplit(gains)
     dt, unit, min_speed = ca.vertsplit(sampling)
     speed = ca.fmax(v_x, min_speed)
     model = bicycle(parameters, speed)
     xi = model.K_inv @ x / unit
-    drive, source = DRIVING_ERRORS[design.law], INPUT_SOURCES[design.input_source]
-    bounded = ball if design.projects else unbounded
+    drive, source = DRIVING_ERRORS[structure.law], INPUT_SOURCES[structure.input_source]
+    bounded = ball if structure.projects else unbounded
 
     def layers(xi_hat: Any, V: Any) -> tuple[Any, Any]:
         x_read = unit * model.K @ source(xi, xi_hat)
@@ -70,17 +91,17 @@ def build_step(design: Design) -> ca.Function:
             rho_V=rho_V,
         )
         xi_hat_dot = observer_rate(A_d, model.A_xi, model.B_xi / unit, xi, xi_hat, u, W @ sigma)
-        return [xi_hat_dot, filter_rate(forgetting, z, xi_tilde), *rates]
+        return [xi_hat_dot, filter_rate(lam, z, xi_tilde), *rates]
 
     moving = v_x >= min_speed
     f_hat = ca.if_else(moving, W @ layers(xi_hat, V)[1], 0)
     linear = ca.if_else(moving, linear_axle_force(parameters, speed, x, u), 0)
     ahead = ca.if_else(moving, dt, 0)  # at rest nothing moves on: weights keep their values
-    xi_hat_next, z_next, W_next, V_next = INTEGRATORS[design.integrator](
+    xi_hat_next, z_next, W_next, V_next = INTEGRATORS[structure.integrator](
         derivative, [xi_hat, z, W, V], ahead
     )
     return ca.Function(
-        f"identifier_{design.law}",
+        f"identifier_{structure.law}",
         [xi_hat, z, W, V, x, u, v_x, vehicle, A_d, gains, sampling],
         [
             ca.if_else(moving, xi_hat_next, xi),  # at rest the observer follows the measurement

@@ -2,15 +2,13 @@
 
 import math
 
-import numpy as np
-
 from identifier.gains import Gains
 from identifier.stability.loop import Law
-from identifier.stability.lyapunov import lyapunov
 from identifier.stability.operation import Operation, proven_bounds
-from identifier.stability.property import Property, at_least, at_most
+from identifier.stability.printed_bounds import printed_bounds
+from identifier.stability.property import Property, at_least, at_most, statement
 from identifier.stability.state_bound import projection_bound, small_gain, steady_capacity
-from identifier.stability.ultimate_bound import best_printed_bound, trivial_bound
+from identifier.stability.ultimate_bound import trivial_bound
 
 
 def bound_checks(gains: Gains, law: Law, operation: Operation) -> list[Property]:
@@ -45,7 +43,7 @@ def bound_checks(gains: Gains, law: Law, operation: Operation) -> list[Property]
             unit="-",
             advice="" if theta < 1.0 else f"multiply eta_W by {0.9 / theta:.2g}, or project W",
         ),
-        _statement(
+        statement(
             "trivial_bound", "error bound of an identifier without a network", trivial, "U s"
         ),
     ]
@@ -53,10 +51,10 @@ def bound_checks(gains: Gains, law: Law, operation: Operation) -> list[Property]
     if bounds is not None:
         step = gains.rho_W * operation.dt * bounds.xi_tilde
         entries += [
-            _statement(
+            statement(
                 "error_bound", "proven bound of |xi - xi_hat| from rest", bounds.xi_tilde, "U s"
             ),
-            _statement("weight_bound", "proven bound of |W| from rest", bounds.W, "U"),
+            statement("weight_bound", "proven bound of |W| from rest", bounds.W, "U"),
             Property(
                 name="leakage_step",
                 title="largest leakage in one sample",
@@ -78,9 +76,12 @@ def bound_checks(gains: Gains, law: Law, operation: Operation) -> list[Property]
             residual_bound=operation.residual_bound,
             dt=operation.euler_step,
         )
-        entries.append(_statement("projection_bound", "bound by the projection", projected, "U s"))
+        entries.append(statement("projection_bound", "bound by the projection", projected, "U s"))
     if gains.rho_W > 0.0:
-        entries += [_capacity(gains, law, operation), _printed(gains, law, operation, trivial)]
+        entries += [
+            _capacity(gains, law, operation),
+            *printed_bounds(gains, law, operation, trivial),
+        ]
     return entries
 
 
@@ -105,35 +106,4 @@ def _capacity(gains: Gains, law: Law, operation: Operation) -> Property:
         status=at_least(capacity, good=need, bad=None),
         unit="U",
         advice="" if enough else f"rho_W below {gains.rho_W * capacity / need:.3g}",
-    )
-
-
-def _printed(gains: Gains, law: Law, operation: Operation, trivial: float) -> Property:
-    """State (14), and that it says nothing where it is above the trivial bound."""
-    b = best_printed_bound(
-        lyapunov(gains.matrix, np.eye(2)),
-        w_bar=operation.w_bar,
-        W_M=operation.W_M,
-        n_h=operation.n_h,
-        eta_W=gains.eta_W,
-        rho_W=gains.rho_W,
-    )
-    remarks = []
-    if law.z > 0.0:
-        remarks.append("its proof does not cover a law that reads z")
-    if b >= trivial:
-        remarks.append("above the trivial bound, it says nothing")
-    return _statement("printed_bound", "bound (14) of the paper", b, "U s", "; ".join(remarks))
-
-
-def _statement(name: str, title: str, value: float, unit: str, advice: str = "") -> Property:
-    return Property(
-        name=name,
-        title=title,
-        value=value,
-        limit=None,
-        margin=None,
-        status="pass",
-        unit=unit,
-        advice=advice,
     )

@@ -104,5 +104,28 @@ def at_least(value: float, *, good: float, bad: float | None) -> Status:
     return "warn" if bad is None or value >= bad else "fail"
 
 
+def statement(name: str, title: str, value: float, unit: str, advice: str = "") -> Property:
+    """Return a property that is only stated: it has no limit and passes.
+
+    Parameters
+    ----------
+    name : key.
+    title : what it means.
+    value : the value.
+    unit : of the value.
+    advice : remark.
+    """
+    return Property(
+        name=name,
+        title=title,
+        value=value,
+        limit=None,
+        margin=None,
+        status="pass",
+        unit=unit,
+        advice=advice,
+    )
+
+
 def _finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None

@@ -1,4 +1,4 @@
-"""The learning loop along a recorded run: how large its gain was, how close to the limit it came."""
+"""The learning loop along a recorded run: how large its gain was, how close to the limit."""
 
 from dataclasses import dataclass
 
@@ -6,12 +6,14 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from identifier.design import Design
 from identifier.history import History
 from identifier.laws import DRIVING_ERRORS
 from identifier.network import network_signals
 from identifier.stability.certificate import along_run
-from identifier.stability.loop import Loop, linear_law
-from identifier.stability.regressor_gain import regressor_gains
+from identifier.stability.loop import INTEGRATORS, Loop, linear_law
+from identifier.stability.margins import gain_margin
+from identifier.stability.regressor_gain import regressor_gains, strongest
 from models.bicycle import BicycleParameters
 
 Array = NDArray[np.float64]
@@ -25,20 +27,20 @@ class LoopAlongRun:
     ----------
     t : time (n,) [s].
     gain : largest eigenvalue of the loop gain (n,).
-    radius : spectral radius of the sampled loop without leakage (n,); below one it is stable.
+    radius : spectral radius of the sampled loop without leakage (n,); above one it is unstable,
+        one where nothing is learnt.
+    strongest : index of the sample with the largest gain.
+    margin : sampled gain margin there [-].
     """
 
     t: Array
     gain: Array
     radius: Array
-
-    @property
-    def worst(self) -> int:
-        """Index of the sample with the largest spectral radius."""
-        return int(np.argmax(self.radius))
+    strongest: int
+    margin: float
 
 
-def loop_along(history: History) -> LoopAlongRun:
+def loop_along(history: History, design: Design) -> LoopAlongRun:
     """Evaluate the loop at the regressors and weights of a run.
 
     The network's input is taken from the measured state, which the estimate follows closely.
@@ -46,40 +48,45 @@ def loop_along(history: History) -> LoopAlongRun:
     Parameters
     ----------
     history : a run that did not diverge.
+    design : the design that ran.
     """
-    design, recording = history.design, history.recording
+    recording = history.recording
     moving = recording.v_x >= design.min_speed
-    x_bar = network_inputs(history)[moving]
-    W, V = history.W[:-1][moving], history.V[:-1][moving]
+    x_bar = network_inputs(history, design)[moving]
+    W, V = history.carried["W"][:-1][moving], history.carried["V"][:-1][moving]
     s = np.tanh(np.einsum("nij,nj->ni", V, x_bar))
     gains = regressor_gains(
         eta_W=design.gains.eta_W, eta_V=design.gains.eta_V, s=s, x_bar=x_bar, W=W
     )
+    worst, _ = strongest(gains)
     loop = Loop(
         A_d=design.gains.matrix,
         forgetting=design.gains.forgetting,
         law=linear_law(DRIVING_ERRORS[design.law], design.gains.lead),
-        G=np.eye(2),
+        G=gains[worst],
     )
     return LoopAlongRun(
         t=recording.t[moving],
-        gain=np.linalg.eigvalsh(gains)[:, -1],
+        gain=np.asarray(np.linalg.eigvalsh(gains)[:, -1], dtype=np.float64),
         radius=along_run(loop, gains, design.integrator, design.dt),
+        strongest=worst,
+        margin=gain_margin(loop, INTEGRATORS[design.integrator], design.dt).factor,
     )
 
 
-def network_inputs(history: History) -> Array:
+def network_inputs(history: History, design: Design) -> Array:
     """Return x̄ at every sample, (n, n_in).
 
     Parameters
     ----------
     history : a run; samples below the minimum speed count as driven at it.
+    design : the design that ran.
     """
-    recording, network = history.recording, history.design.network
+    recording, network = history.recording, design.network
     x, u, v_x = ca.SX.sym("x", 2), ca.SX.sym("u", 2), ca.SX.sym("v_x")
     parameters = BicycleParameters(*history.vehicle.bicycle)
     signals = network_signals(parameters, v_x, x, u)
     evaluate = ca.Function("x_bar", [x, u, v_x], [network.normalized_input(signals)])
-    speed = np.maximum(recording.v_x, history.design.min_speed)
+    speed = np.maximum(recording.v_x, design.min_speed)
     columns = evaluate.map(recording.t.size)(recording.x.T, recording.u.T, speed[None, :])
     return np.array(columns).T

@@ -7,7 +7,7 @@ import pytest
 
 from identifier.defaults import default_design
 from identifier.design import Design
-from identifier.gains import Gains, NotHurwitzError, diagonal
+from identifier.gains import Gains, NotHurwitzError
 from identifier.history import DivergedError
 from identifier.identify import identify
 from identifier.network import Network
@@ -62,8 +62,8 @@ def test_step_repeats_the_equations_by_hand(law, source, radius, car, drive):
     history = identify(recording, car, design)
     forces, W, V = by_hand(recording, design, car)
     np.testing.assert_allclose(history.axle_force, forces, rtol=1e-9, atol=1e-6)
-    np.testing.assert_allclose(history.W[-1], W, rtol=1e-9, atol=1e-10)
-    np.testing.assert_allclose(history.V[-1], V, rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(history.carried["W"][-1], W, rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(history.carried["V"][-1], V, rtol=1e-9, atol=1e-10)
 
 
 def test_finer_steps_of_both_integrators_meet(car, drive):
@@ -104,8 +104,8 @@ def test_speed_may_vary_and_learning_rests_at_standstill(car, drive):
     history = identify(stopped, car, default_design(car))
     assert np.isfinite(history.axle_force).all()
     np.testing.assert_array_equal(history.axle_force[150:], 0.0)
-    np.testing.assert_array_equal(history.W[150], history.W[-1])
-    assert np.abs(history.W[149] - history.W[100]).max() > 0.0
+    np.testing.assert_array_equal(history.carried["W"][150], history.carried["W"][-1])
+    assert np.abs(history.carried["W"][149] - history.carried["W"][100]).max() > 0.0
 
 
 def test_gains_that_diverge_are_reported_not_hidden(car, drive):
@@ -148,4 +148,3 @@ def test_default_design_is_similar_for_a_model_car(car):
     np.testing.assert_allclose(ratio, [np.sqrt(10), 1 / np.sqrt(10), 1.0, 1.0])
     assert full.force_unit == 1000.0
     assert small.force_unit == 1.0
-    assert diagonal(10.0) == full.gains.A_d

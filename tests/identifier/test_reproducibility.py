@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from identifier.defaults import default_design
-from identifier.frozen_model import FrozenModel, FrozenModelError
 from identifier.identify import identify
+from identifier.model_file import load_model
+from identifier.model_format import FrozenModelError
 from identifier.reproducibility import AxleRmse, axle_rms, online_error, replay
 
 
@@ -36,8 +37,8 @@ def test_frozen_force_is_the_network_by_hand(history, car):
 
 
 def test_freezing_at_the_end_takes_the_weights_after_the_last_sample(history):
-    np.testing.assert_array_equal(history.freeze(5.99).weights.W, history.W[-1])
-    np.testing.assert_array_equal(history.freeze(99.0).weights.W, history.W[-1])
+    np.testing.assert_array_equal(history.freeze(5.99).weights.W, history.carried["W"][-1])
+    np.testing.assert_array_equal(history.freeze(99.0).weights.W, history.carried["W"][-1])
     with pytest.raises(ValueError, match="begins at 0 s"):
         history.freeze(-1.0)
 
@@ -70,7 +71,7 @@ def test_samples_at_rest_do_not_count(history):
 def test_a_model_comes_back_from_its_file(history, tmp_path):
     model = history.freeze(4.0)
     model.save(tmp_path / "weights.json")
-    again = FrozenModel.load(tmp_path / "weights.json")
+    again = load_model(tmp_path / "weights.json")
     np.testing.assert_array_equal(
         again.axle_force(history.recording), model.axle_force(history.recording)
     )
@@ -94,7 +95,7 @@ def test_a_wrong_file_is_refused_in_one_line(history, tmp_path, change, said):
     path = tmp_path / "weights.json"
     path.write_text(json.dumps(data))
     with pytest.raises(FrozenModelError, match=said) as error:
-        FrozenModel.load(path)
+        load_model(path)
     assert str(error.value).startswith(str(path))
     assert "\n" not in str(error.value)
 
@@ -103,9 +104,9 @@ def test_a_file_that_is_not_json_is_refused(tmp_path):
     path = tmp_path / "weights.json"
     path.write_bytes(b"\x80\x81")
     with pytest.raises(FrozenModelError, match="cannot be read"):
-        FrozenModel.load(path)
+        load_model(path)
     with pytest.raises(FrozenModelError, match="cannot be read"):
-        FrozenModel.load(tmp_path / "absent.json")
+        load_model(tmp_path / "absent.json")
 
 
 def test_both_axles_together_is_the_rms_of_all_samples():

@@ -168,9 +168,10 @@ def test_where_V_learns_the_margins_hold_up_to_the_weights_that_are_kept():
     kept = certify(design, integral, CITY)["weight_range"].value
     assert certify(design, integral, CITY)["weight_range"].status == "pass"
     narrow = replace(CITY, W_large=kept / 2)
-    entry = certify(design, integral, narrow)["weight_range"]
-    assert entry.status == "warn"
-    projected = replace(design, W_max=kept / 2)
+    assert certify(design, integral, narrow)["weight_range"].status == "pass"  # V costs nothing yet
+    eager = replace(design, eta_V=4.5 * design.eta_V)  # now it does from |W| = kept/2.1 on
+    assert certify(eager, integral, narrow)["weight_range"].status == "warn"
+    projected = replace(eager, W_max=kept / 2)
     assert certify(projected, integral, narrow)["weight_range"].status == "pass"
     free = replace(design, rho_W=0.0)  # nothing keeps W
     assert certify(free, integral, CITY)["weight_range"].status == "warn"

@@ -38,7 +38,7 @@ def test_the_operation_of_a_design_is_enough_for_its_certificate(car):
         task = operation(design, car, **HARD, bandwidth=0.5)
         certificate = certify(design.gains, DRIVING_ERRORS[design.law], task)
         assert certificate["gain_sampled"].margin > 1.0
-        assert certificate["error_dynamics"].value == pytest.approx(10.0)
+        assert certificate["error_dynamics"].value == pytest.approx(-design.gains.A_d[0][0])
 
 
 def test_a_network_that_reads_the_estimate_brings_its_feedback_along(car):

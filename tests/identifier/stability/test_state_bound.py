@@ -156,13 +156,13 @@ def test_the_identifier_itself_keeps_the_bounds_of_leakage_and_of_projection(run
     f_max = np.linalg.norm(residual, axis=1).max()
     assert 1.0 < f_max < 20.0
     numbers = {"law": INTEGRAL, "forgetting": 6.0}
-    V_start = float(np.linalg.norm(history.V[0]))
+    V_start = float(np.linalg.norm(history.carried["V"][0]))
     bounds = state_bounds(
         -6 * np.eye(2), **numbers, eta_W=100.0, rho_W=5.0, n_h=8, residual_bound=f_max, dt=0.01
     )
-    error = np.linalg.norm(history.xi_tilde, axis=1).max()
+    error = np.linalg.norm(history.told["xi_tilde"], axis=1).max()
     assert 0.02 * bounds.xi_tilde < error <= bounds.xi_tilde
-    assert np.linalg.norm(history.W, axis=(1, 2)).max() <= bounds.W
+    assert np.linalg.norm(history.carried["W"], axis=(1, 2)).max() <= bounds.W
     signals = np.hstack([history.recording.x, history.recording.u])
     x_bar_max = np.linalg.norm(signals / np.array(history.design.network.scale), axis=1).max()
     limit = V_bound(
@@ -174,10 +174,10 @@ def test_the_identifier_itself_keeps_the_bounds_of_leakage_and_of_projection(run
         x_bar_max=x_bar_max,
         start=Start(V=V_start),
     )
-    assert np.linalg.norm(history.V, axis=(1, 2)).max() <= limit
+    assert np.linalg.norm(history.carried["V"], axis=(1, 2)).max() <= limit
     wild, residual = run(eta_W=1e5, rho_W=0.0, rho_V=0.0, W_max=3.0, V_max=9.0)
     bound = projection_bound(-6 * np.eye(2), W_max=3.0, n_h=8, residual_bound=f_max, dt=0.01)
-    assert 0.1 * bound < np.linalg.norm(wild.xi_tilde, axis=1).max() <= bound
+    assert 0.1 * bound < np.linalg.norm(wild.told["xi_tilde"], axis=1).max() <= bound
 
 
 def test_the_integral_law_passes_bound_14_many_times_over():

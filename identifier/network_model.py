@@ -1,4 +1,4 @@
-"""A frozen model: weights at one instant and all that is needed to compute axle forces."""
+"""The paper's network, frozen: weights at one instant and all that axle forces need."""
 
 import json
 from dataclasses import asdict, dataclass
@@ -11,25 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Scan
+from identifier.model_format import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
 from identifier.network import Network, Weights, hidden_layer, network_signals
 from models.bicycle import BicycleParameters, linear_axle_force
+from models.files import write_atomically
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
-FORMAT = "tireid frozen model 1"
-VEHICLE_KEYS = (
-    "name",
-    "mass",
-    "yaw_inertia",
-    "l_f",
-    "l_r",
-    "cornering_stiffness_front",
-    "cornering_stiffness_rear",
-)
-
-
-class FrozenModelError(ValueError):
-    """A file does not hold a frozen model; the message names the file and what is wrong."""
+KIND = "network"
 
 
 def build_frozen(network: Network) -> ca.Function:
@@ -65,7 +54,7 @@ def _frozen_scan(network: Network) -> Scan:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FrozenModel:
+class NetworkModel:
     """Axle forces F_y = C α + U Ŵ tanh(V̂ x̄) with weights that no longer change.
 
     Parameters
@@ -89,6 +78,9 @@ class FrozenModel:
     min_speed: float
 
     def __post_init__(self) -> None:
+        for label in ("force_unit", "min_speed"):
+            if not 0.0 < getattr(self, label) < np.inf:
+                raise ValueError(f"{label} must be positive, it is {getattr(self, label)}")
         n_h, n_in = self.network.hidden, len(self.network.inputs)
         for name, value, shape in (
             ("W", self.weights.W, (2, n_h)),
@@ -126,8 +118,9 @@ class FrozenModel:
         """Return the model as plain numbers and words, ready for JSON."""
         return {
             "format": FORMAT,
+            "kind": KIND,
             "units": {"W": "force_unit_N newtons", "V": "-", "scale": "SI, by input"},
-            "vehicle": {key: getattr(self.vehicle, key) for key in VEHICLE_KEYS},
+            "vehicle": vehicle_numbers(self.vehicle),
             "network": asdict(self.network),
             "force_unit_N": self.force_unit,
             "min_speed_m_s": self.min_speed,
@@ -142,10 +135,10 @@ class FrozenModel:
         ----------
         path : the file.
         """
-        path.write_text(json.dumps(self.to_dict(), indent=2) + "\n")
+        write_atomically(path, json.dumps(self.to_dict(), indent=2) + "\n")
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any], source: str) -> "FrozenModel":
+    def from_dict(cls, data: dict[str, Any], source: str) -> "NetworkModel":
         """Return the model that `to_dict` describes.
 
         Parameters
@@ -158,8 +151,6 @@ class FrozenModel:
         FrozenModelError
             Where a key is missing or a value impossible.
         """
-        if not isinstance(data, dict) or data.get("format") != FORMAT:
-            raise FrozenModelError(f"{source}: not a frozen model, format must be {FORMAT!r}")
         try:
             structure = dict(data["network"])
             network = Network(
@@ -168,7 +159,7 @@ class FrozenModel:
                 scale=tuple(structure["scale"]),
             )
             return cls(
-                vehicle=Vehicle(**{key: data["vehicle"][key] for key in VEHICLE_KEYS}),
+                vehicle=vehicle_from(data["vehicle"]),
                 network=network,
                 weights=Weights(
                     W=np.array(data["W"], dtype=np.float64), V=np.array(data["V"], dtype=np.float64)
@@ -180,22 +171,3 @@ class FrozenModel:
             raise FrozenModelError(f"{source}: key {error} is missing") from error
         except (TypeError, ValueError) as error:
             raise FrozenModelError(f"{source}: {error}") from error
-
-    @classmethod
-    def load(cls, path: Path) -> "FrozenModel":
-        """Read a model that `save` wrote.
-
-        Parameters
-        ----------
-        path : the file.
-
-        Raises
-        ------
-        FrozenModelError
-            Where the file is not such a model.
-        """
-        try:
-            data = json.loads(path.read_text())
-        except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-            raise FrozenModelError(f"{path}: cannot be read as a frozen model: {error}") from error
-        return cls.from_dict(data, source=str(path))

@@ -1,0 +1,103 @@
+"""What every way to identify has in common: a compiled step, where it starts, what it freezes to.
+
+The laws of the paper, the better laws and the baselines run, are recorded, frozen and compared by
+the same code; they differ in the `Method` that is handed over.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen import Scan
+from models.recordings import Recording
+from models.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+
+class CannotFreezeError(ValueError):
+    """The method estimates a signal: there is no model of the tire to freeze."""
+
+
+class FrozenModel(Protocol):
+    """Axle forces from weights that no longer change; attributes vehicle and min_speed [m/s]."""
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """The car."""
+
+    @property
+    def min_speed(self) -> float:
+        """Below this speed [m/s] the forces read zero."""
+
+    def axle_force(self, recording: Recording) -> Array:
+        """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
+
+        Parameters
+        ----------
+        recording : its signals are the input; its forces are not looked at.
+        """
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the model as plain numbers and words, ready for JSON."""
+
+    def save(self, path: Path) -> None:
+        """Write the model as JSON.
+
+        Parameters
+        ----------
+        path : the file.
+        """
+
+
+class Setup(NamedTuple):
+    """A run, ready to go: the compiled step, the values it carries at the start, its constants.
+
+    The step reads x = [v_y, r] (2,), u = [δ_f, δ_r] (2,) and v_x sample by sample, SI, and has an
+    output axle_force (2,) [N].
+    """
+
+    scan: Scan
+    carry: Mapping[str, Array]
+    constants: Mapping[str, Array]
+
+
+class Method(Protocol):
+    """A way to identify axle forces: everything that is chosen before the car drives."""
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval [s]."""
+
+    @property
+    def min_speed(self) -> float:
+        """Below this speed [m/s] learning rests and forces read zero."""
+
+    def setup(
+        self, vehicle: Vehicle, recording: Recording, start: FrozenModel | None = None
+    ) -> Setup:
+        """Return what a run needs.
+
+        Parameters
+        ----------
+        vehicle : the car.
+        recording : what it drove; the run begins at its first sample.
+        start : model whose weights the run begins with; None begins with those of the method.
+        """
+
+    def frozen(self, vehicle: Vehicle, carried: Mapping[str, Array]) -> FrozenModel:
+        """Return the model that carried values make.
+
+        Parameters
+        ----------
+        vehicle : the car.
+        carried : values of the carried ports at one instant.
+
+        Raises
+        ------
+        CannotFreezeError
+            For a method that estimates a signal.
+        """

@@ -1,0 +1,36 @@
+"""The loop along a run: its gain by another road, and no regressor worse than the worst."""
+
+import numpy as np
+
+from identifier.defaults import default_design, natural_operation
+from identifier.identify import identify
+from identifier.laws import DRIVING_ERRORS
+from identifier.stability.loop import linear_law
+from identifier.stability.operation import worst_loop
+from identifier.stability.recorded_run import loop_along, network_inputs
+
+
+def test_gain_along_a_run_is_the_formula_at_one_sample(car, drive):
+    design = default_design(car)
+    history = identify(drive(n=600), car, design)
+    along, k = loop_along(history, design), 345
+    x_bar = np.concatenate([history.recording.x[k], history.recording.u[k]])
+    x_bar = x_bar / np.array(design.network.scale)
+    np.testing.assert_allclose(network_inputs(history, design)[k], x_bar)
+    W, V = history.carried["W"][k], history.carried["V"][k]
+    s = np.tanh(V @ x_bar)
+    through_V = (W * (1 - s**2)) @ (W * (1 - s**2)).T * (x_bar @ x_bar)
+    G = design.gains.eta_W * (s @ s) * np.eye(2) + design.gains.eta_V * through_V
+    assert np.isclose(along.gain[k], np.linalg.eigvalsh(G)[-1])
+    assert along.strongest == int(np.argmax(along.gain))
+
+
+def test_no_recorded_regressor_is_worse_than_the_worst(car, drive):
+    design = default_design(car)
+    history = identify(drive(n=600), car, design)
+    law = linear_law(DRIVING_ERRORS[design.law])
+    worst = worst_loop(design.gains, law, natural_operation(design, car))
+    along = loop_along(history, design)
+    assert along.gain.max() < np.linalg.eigvalsh(worst.G)[-1]
+    assert along.radius.max() < 1.0 + 1e-9
+    assert along.margin > 1.0
