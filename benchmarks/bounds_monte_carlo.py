@@ -90,10 +90,9 @@ def design_of(
     )
 
 
-def printed_bound(drive: Drive, history: History) -> float:
+def printed_bound(drive: Drive, history: History, design: Design) -> float:
     """Return (14) with the weights that fit this run best and the error that they leave."""
-    design = history.design
-    s = hidden_units(drive, history)[: len(drive.residual)]
+    s = hidden_units(drive, history, design)[: len(drive.residual)]
     fitted = np.linalg.solve(s.T @ s + 1e-6 * len(s) * np.eye(s.shape[1]), s.T @ drive.residual)
     return best_printed_bound(
         lyapunov(design.gains.matrix, np.eye(2)),
@@ -105,11 +104,11 @@ def printed_bound(drive: Drive, history: History) -> float:
     )
 
 
-def hidden_units(drive: Drive, history: History) -> Array:
+def hidden_units(drive: Drive, history: History, design: Design) -> Array:
     """Return tanh(V_hat x_bar) along a run with measured input, (n, n_h)."""
     signals = np.hstack([drive.recording.x, drive.recording.u])
-    x_bar = signals / np.array(history.design.network.scale)
-    units: Array = np.tanh(np.einsum("nhi,ni->nh", history.V[:-1], x_bar))
+    x_bar = signals / np.array(design.network.scale)
+    units: Array = np.tanh(np.einsum("nhi,ni->nh", history.carried["V"][:-1], x_bar))
     return units
 
 
@@ -151,8 +150,8 @@ def with_leakage(rng: np.random.Generator, drive: Drive) -> dict[str, float]:
     if rho * DT * bounds.xi_tilde > 1.0:
         return with_leakage(rng, drive)  # the certificate warns of it
     history = identify(drive.recording, drive.vehicle, design)
-    observed = float(np.linalg.norm(history.xi_tilde, axis=1).max())
-    W = float(np.linalg.norm(history.W, axis=(1, 2)).max())
+    observed = float(np.linalg.norm(history.told["xi_tilde"], axis=1).max())
+    W = float(np.linalg.norm(history.carried["W"], axis=(1, 2)).max())
     found = {
         "xi_tilde": bounds.xi_tilde / observed,
         "W": bounds.W / W,
@@ -172,8 +171,8 @@ def with_leakage(rng: np.random.Generator, drive: Drive) -> dict[str, float]:
             x_bar_max=x_bar_max,
             start=start,
         )
-        found["V"] = limit / float(np.linalg.norm(history.V, axis=(1, 2)).max())
-        found[f"(14), {law}"] = printed_bound(drive, history) / observed
+        found["V"] = limit / float(np.linalg.norm(history.carried["V"], axis=(1, 2)).max())
+        found[f"(14), {law}"] = printed_bound(drive, history, design) / observed
     return found
 
 
@@ -192,7 +191,7 @@ def with_projection(rng: np.random.Generator, drive: Drive) -> dict[str, float]:
         dt=DT,
         residual_bound=float(np.linalg.norm(drive.residual, axis=1).max()),
     )
-    observed = float(np.linalg.norm(history.xi_tilde, axis=1).max())
+    observed = float(np.linalg.norm(history.told["xi_tilde"], axis=1).max())
     return {"xi_tilde, projected": bound / observed}
 
 

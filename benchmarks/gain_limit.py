@@ -58,10 +58,10 @@ def scaled(design: Design, factor: float) -> Design:
 
 def grows(corner: Corner, design: Design, weights: Weights) -> bool:
     """Return whether a disturbance of a millionth grows, in the end or a hundredfold on the way."""
-    disturbed = Weights(W=weights.W * (1.0 + 1e-6), V=weights.V)
-    error = np.linalg.norm(
-        identify(corner.recording, corner.vehicle, design, disturbed).xi_tilde, axis=1
-    )
+    carried = {"W": weights.W * (1.0 + 1e-6), "V": weights.V}
+    start = design.frozen(corner.vehicle, carried)
+    history = identify(corner.recording, corner.vehicle, design, start)
+    error = np.linalg.norm(history.told["xi_tilde"], axis=1)
     n, first_second = error.size, round(1.0 / design.dt)
     middle, end = error[n // 2 : 3 * n // 4].max(), error[3 * n // 4 :].max()
     return not end < middle or bool(error.max() > 100.0 * error[:first_second].max())
@@ -120,7 +120,8 @@ def random_case(rng: np.random.Generator, source: str, integrator: str, coupled:
         force_unit=FORCE_UNIT,
         seed=int(rng.integers(1 << 30)),
     )
-    weights = identify(corner.recording, car, design).weights_at(SETTLE)
+    carried = identify(corner.recording, car, design).carried_at(SETTLE)
+    weights = Weights(W=carried["W"], V=carried["V"])
     G, feedback = loop_at(corner, design, weights)
     loop = Loop(
         A_d=gains.matrix,

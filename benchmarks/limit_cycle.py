@@ -85,7 +85,7 @@ def random_case(rng: np.random.Generator) -> Case:
     rho_W = share * g / (a * lam * residual)
     formula = sampled_limit_cycle(a=a, lam=lam, g=g, rho_W=rho_W, dt=DT)
     history = identify(corner.recording, corner.vehicle, design(g / float(s @ s), rho_W))
-    late = history.xi_tilde[-round(WATCH / DT) :]
+    late = history.told["xi_tilde"][-round(WATCH / DT) :]
     return Case(
         a,
         lam,

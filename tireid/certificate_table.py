@@ -59,6 +59,7 @@ def certificate_text(certificate: Certificate, force_unit: float) -> str:
     width = [max(len(row[i]) for row in rows) for i in range(len(HEADER))]
     lines = [_line(row, width) for row in rows]
     lines += [f"{e.status}: {e.title}: {e.advice}" for e in advised(certificate)]
+    lines += [f"note: {note}" for note in notes(certificate)]
     return "\n".join([*lines, f"verdict: {certificate.verdict}"])
 
 
@@ -70,6 +71,21 @@ def advised(certificate: Certificate) -> list[Property]:
     certificate : the properties.
     """
     return [e for e in certificate.properties if e.advice and e.status != "pass"]
+
+
+def notes(certificate: Certificate) -> list[str]:
+    """Return what is to be said of values that are only stated, each remark once.
+
+    Parameters
+    ----------
+    certificate : the properties.
+    """
+    titles: dict[str, list[str]] = {}
+    for entry in certificate.properties:
+        if entry.limit is None and entry.advice:
+            for remark in entry.advice.split("; "):
+                titles.setdefault(remark, []).append(entry.title)
+    return [f"{', '.join(about)}: {remark}" for remark, about in titles.items()]
 
 
 def verdict_line(certificate: Certificate) -> str:

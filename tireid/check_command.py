@@ -19,6 +19,7 @@ from identifier.design import Design
 from identifier.design_file import design_text, read_design
 from identifier.identify import identify
 from identifier.stability import Certificate, DesignError
+from models.files import write_atomically
 from models.recordings import check_against_vehicle, read_recording, split_log_argument
 from models.vehicle import Vehicle, sedan
 from tireid.certificate_table import certificate_of, certificate_text, unit_text
@@ -155,11 +156,11 @@ def _report_along(log: str, vehicle: Vehicle, design: Design) -> None:
     if history.diverged_at is not None:
         say(f"along {recording.name}: the law diverged at {history.diverged_at:g} s")
         return
-    along = loop_along(history)
-    worst = along.worst
+    along = loop_along(history, design)
+    at = along.strongest
     say(
-        f"along {recording.name}: largest loop gain {along.gain.max():.4g}, largest spectral "
-        f"radius {along.radius[worst]:.5f} at {along.t[worst]:g} s (limit 1)"
+        f"along {recording.name}: largest loop gain {along.gain[at]:.4g} at {along.t[at]:g} s, "
+        f"gain margin there {along.margin:.3g}"
     )
 
 
@@ -211,7 +212,5 @@ def _write(options: argparse.Namespace, design: Design) -> None:
     target = options.out or Path("design.toml")
     if target.exists() and not options.force:
         raise OutputError(f"{target} exists: choose another file, or add --force to replace it")
-    scratch = target.with_name(f".{target.name}.part")
-    scratch.write_text(design_text(design))
-    scratch.replace(target)
+    write_atomically(target, design_text(design))
     say(f"wrote {target}")

@@ -1,4 +1,4 @@
-"""The figures of `tireid check`: root locus with its margin, bounds against an error that happened."""
+"""The figures of `tireid check`: root locus with its margin, bounds against a real error."""
 
 from pathlib import Path
 

@@ -1,21 +1,38 @@
 """The command line: one subcommand each for what a person wants to do."""
 
 import argparse
+import os
+import signal
 import sys
 import traceback
 from collections.abc import Sequence
+from types import FrameType
+from typing import NoReturn
 
-from tireid import check_command, demo_command, identify_command, paper_command
-from tireid.progress import listen_to_library
-from tireid.summary import program_version
-
-COMMANDS = (demo_command, paper_command, identify_command, check_command)
 BAD_INPUT = 2
+INTERRUPTED = 130
 
 
-def build_parser() -> argparse.ArgumentParser:
+class Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line, like all errors of tireid."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print one line and exit with code 2.
+
+        Parameters
+        ----------
+        message : what is wrong with the words.
+        """
+        print(f"{self.prog}: error: {message} (see {self.prog} --help)", file=sys.stderr)
+        sys.exit(BAD_INPUT)
+
+
+def build_parser() -> Parser:
     """Return the parser of all commands."""
-    parser = argparse.ArgumentParser(
+    from tireid.commands import COMMANDS
+    from tireid.summary import program_version
+
+    parser = Parser(
         prog="tireid",
         description="Learns a car's lateral tire forces while it drives and freezes them.",
     )
@@ -34,21 +51,57 @@ def main(arguments: Sequence[str] | None = None) -> int:
     ----------
     arguments : words after `tireid`; None takes those of the process.
     """
+    try:
+        return _run(arguments)
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:  # who reads our output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     options = build_parser().parse_args(arguments)
+    from tireid.progress import listen_to_library
+
     listen_to_library()
     try:
         status: int = options.run(options) or 0
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise
     except (ValueError, ArithmeticError, OSError, ImportError) as error:
         if options.debug:
             traceback.print_exc()
-        line = " ".join(str(error).split()) or type(error).__name__
-        print(f"tireid {options.command}: error: {line}", file=sys.stderr)
+        print(f"tireid {options.command}: error: {one_line(error)}", file=sys.stderr)
         return BAD_INPUT
-    except KeyboardInterrupt:
-        print("interrupted; nothing was written", file=sys.stderr)
-        return 130
     return status
 
 
-if __name__ == "__main__":
+def one_line(error: Exception) -> str:
+    """Return what an error says, in one line; files are named first.
+
+    Parameters
+    ----------
+    error : any error.
+    """
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {(error.strerror or 'cannot be used').lower()}"
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def entry() -> NoReturn:
+    """Run as a program: a termination cleans up as Ctrl-C does."""
+
+    def stop(_number: int, _frame: FrameType | None) -> NoReturn:
+        raise KeyboardInterrupt
+
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), stop)
     sys.exit(main())
+
+
+if __name__ == "__main__":
+    entry()

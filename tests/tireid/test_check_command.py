@@ -1,0 +1,134 @@
+"""`tireid check`: a table with advice, JSON, exit codes, a design from a bandwidth."""
+
+import json
+import re
+from dataclasses import replace
+
+import pytest
+
+from identifier.defaults import default_design
+from identifier.design_file import design_text, read_design
+from models.vehicle import sedan
+from tireid.certificate_table import certificate_of, number, unit_text, verdict_line
+from tireid.cli import main
+from tireid.paper_study import paper_design
+
+
+def checked(capsys, *words):
+    """Exit code and what was printed."""
+    capsys.readouterr()
+    code = main(["check", *(str(word) for word in words)])
+    return code, capsys.readouterr()
+
+
+@pytest.fixture
+def unstable(tmp_path):
+    design = default_design(sedan())
+    gains = replace(design.gains, eta_W=30.0 * design.gains.eta_W)
+    path = tmp_path / "unstable.toml"
+    path.write_text(design_text(replace(design, gains=gains)))
+    return path
+
+
+def test_the_default_design_passes_for_any_size_of_car(capsys, tmp_path):
+    assert checked(capsys)[0] == 0
+    model = tmp_path / "model.toml"
+    model.write_text(
+        "mass = 1.58\nyaw_inertia = 0.00481\nl_f = 0.0805\nl_r = 0.093\n"
+        "cornering_stiffness_front = 40.0\ncornering_stiffness_rear = 40.0\n"
+    )
+    code, said = checked(capsys, "--vehicle", model)
+    assert code == 0
+    assert "verdict: pass" in said.out
+    assert "[N s]" in said.out
+
+
+def test_gains_beyond_the_limit_fail_with_advice_and_a_proposal_that_passes(capsys, unstable):
+    code, said = checked(capsys, unstable)
+    assert code == 1
+    assert "verdict: fail" in said.out
+    assert "fail: loop gain, sampled: multiply eta_W and eta_V by" in said.out
+    assert "proposal (pass)" in said.out
+
+
+def test_json_has_the_documented_keys_and_only_finite_numbers(capsys, unstable):
+    code, said = checked(capsys, unstable, "--json")
+    data = json.loads(said.out)
+    assert code == 1
+    assert data["verdict"] == "fail"
+    for entry in data["properties"].values():
+        assert {"value", "limit", "margin", "status"} <= set(entry)
+        assert entry["status"] in ("pass", "warn", "fail")
+    gain = data["properties"]["gain_sampled"]
+    assert gain["margin"] == pytest.approx(gain["limit"] / gain["value"])
+    assert gain["margin"] < 1.0
+
+
+def test_a_design_is_found_written_and_keeps_the_wanted_margin(capsys, tmp_path):
+    path = tmp_path / "design.toml"
+    words = ("--design", "--bandwidth", "0.5", "--phase-margin", "50", "--out", path)
+    code, said = checked(capsys, *words)
+    assert code == 0
+    assert f"wrote {path}" in said.err
+    design = read_design(path)
+    phase = certificate_of(design, sedan())["phase_margin"].value
+    assert phase == pytest.approx(50.0, abs=0.5)
+    assert checked(capsys, *words)[0] == 2  # nothing is overwritten unasked
+    assert checked(capsys, *words, "--force")[0] == 0
+    assert checked(capsys, path, "--bandwidth", "0.5")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["nowhere.toml"], "nowhere.toml"),
+        (["--design", "--bandwidth", "9"], "sample every"),
+        (["--bandwidth", "-1"], "--bandwidth must be positive"),
+        (["--slip", "12"], "--slip must be in rad"),
+        (["--phase-margin", "30"], "go with --design"),
+        (["--design", "--phase-margin", "120"], "phase margin must be in"),
+        (["--vehicle", "nowhere.toml"], "nowhere.toml"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(capsys, monkeypatch, tmp_path, words, said):
+    monkeypatch.chdir(tmp_path)
+    code, out = checked(capsys, *words)
+    errors = [line for line in out.err.splitlines() if "error:" in line]
+    assert code == 2
+    assert len(errors) == 1
+    assert said in errors[0]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_figures_and_a_recorded_run(capsys, logs, tmp_path):
+    folder = tmp_path / "figures"
+    code, said = checked(capsys, "--log", logs / "slalom.csv", "--figures", folder)
+    assert code == 0
+    margin = float(re.search(r"gain margin there ([\d.]+)", said.err).group(1))
+    worst = certificate_of(default_design(sedan()), sedan())["gain_sampled"].margin
+    assert margin > worst  # no recorded regressor is worse than the worst
+    for name in ("locus.png", "bounds.png"):
+        assert (folder / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_gains_of_the_paper_study_are_judged():
+    """The instantaneous law is stable but hardly damped; the integral law has its margins."""
+    judged = {
+        law: certificate_of(paper_design(law, 0), sedan()) for law in ("instantaneous", "integral")
+    }
+    assert judged["instantaneous"]["damping"].value < 0.2
+    assert judged["instantaneous"]["phase_margin"].value < 20.0
+    assert judged["integral"]["gain_sampled"].margin > 1.5
+    assert judged["integral"]["phase_margin"].value > judged["instantaneous"]["phase_margin"].value
+    assert "damping 0." in verdict_line(judged["instantaneous"])
+
+
+def test_numbers_and_units_read_well():
+    assert [number(v) for v in (None, float("inf"), 12.3456, 1e-9)] == [
+        "-",
+        "inf",
+        "12.35",
+        "1e-09",
+    ]
+    assert unit_text("U s", 1000.0) == "kN s"
+    assert unit_text("U s", 1.0) == "N s"
