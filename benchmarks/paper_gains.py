@@ -1,70 +1,131 @@
 """The search behind the gains of `tireid paper`: which designs show the pattern of Table II?
 
-Random designs (a, λ, η1, η2, ρ, n_h), each with the same seeds of the initial weights, are run over
-the slalom with both laws and the control. A design shows the pattern where the online errors of the
-two laws are within a quarter of each other and the instantaneous law, frozen, misses 1.8 times as
-much as the integral law at both freeze times. Run it with `python -m benchmarks.paper_gains`.
+Random designs (a, λ, η1, η2, ρ, n_h) run over the slalom with six seeds of the initial weights;
+those that show the pattern there run over both maneuvers with the control and 20 seeds. The
+pattern: in medians over the seeds of the slalom, the online errors of the two laws are within a
+quarter of each other and the instantaneous law, frozen, misses 1.8 times as much as the integral
+law at both freeze times; and no seed runs wild, with an online error of 1 kN or more. The gains of
+the study are the calmest of these designs: the one whose largest online error, over laws, maneuvers
+and seeds, is the smallest. Run it with `python -m benchmarks.paper_gains`; it takes some minutes.
 """
 
 import sys
+from collections.abc import Iterator
+from itertools import islice
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identifier.gains import Gains, diagonal
 from identifier.network import Network
-from tireid.paper_study import FREEZES, LAWS, drive_maneuvers, paper_design, run_trial
+from models.recordings import Recording
+from tireid.paper_study import (
+    FREEZES,
+    GAINS,
+    LAWS,
+    NETWORK,
+    drive_maneuvers,
+    paper_design,
+    run_trial,
+)
 
-SEEDS = 8
-ROWS = ("online", *(f"{t:g}" for t in FREEZES["slalom"]))
-
-
-def random_design(rng: np.random.Generator) -> tuple[Gains, Network]:
-    """Return gains below the stability limit η1 n_h < a² λ (a + λ) of the integral law."""
-    a, n_h = rng.uniform(2.0, 8.0), int(rng.choice([5, 10, 15, 20]))
-    lam = a * rng.uniform(1.0, 9.0)
-    eta_W = rng.uniform(0.1, 0.7) * a**2 * lam * (a + lam) / n_h
-    rho = 10.0 ** rng.uniform(-2.3, -0.3)
-    gains = Gains(
-        A_d=diagonal(a),
-        forgetting=lam,
-        eta_W=eta_W,
-        eta_V=10.0 ** rng.uniform(-2.0, 1.0),
-        rho_W=rho,
-        rho_V=rho,
-    )
-    return gains, Network(hidden=n_h)
+Array = NDArray[np.float64]
+DESIGNS = 1500
+SEED = 8
+FEW, ALL = 6, 20  # seeds of the initial weights
+SANE = 1.0  # kN, the largest online error of any seed
+RATIO, ONLINE = 1.8, 0.25
 
 
-def main(designs: int = 300) -> float:
-    """Print the designs that show the pattern; return their share of all stable ones."""
-    rng, shown, stable = np.random.default_rng(12), 0, 0
-    slalom = drive_maneuvers()["slalom"]
-    for _ in range(designs):
-        gains, network = random_design(rng)
-        medians = {}
+def random_designs() -> Iterator[tuple[Gains, Network]]:
+    """Yield designs, three digits each: slow observer, λ well above a, high learning rate."""
+    rng = np.random.default_rng(SEED)
+    while True:
+        n_h = int(rng.choice([10, 12, 15, 20]))
+        a, lam = rng.uniform(3.3, 5.2), rng.uniform(18.0, 32.0)
+        eta_W = rng.uniform(1500.0, 3800.0) / n_h
+        eta_V, rho = 10.0 ** rng.uniform(-2.0, 0.7), 10.0 ** rng.uniform(-1.5, -0.2)
+        a, lam, eta_W, eta_V, rho = (float(f"{value:.3g}") for value in (a, lam, eta_W, eta_V, rho))
+        gains = Gains(
+            A_d=diagonal(a), forgetting=lam, eta_W=eta_W, eta_V=eta_V, rho_W=rho, rho_V=rho
+        )
+        yield gains, Network(hidden=n_h)
+
+
+def errors(
+    recording: Recording, maneuver: str, law: str, design: tuple[Gains, Network], seeds: int
+) -> Array | None:
+    """Return online and frozen errors (seeds, 3) [kN], None where a seed ran wild."""
+    gains, network = design
+    rows = []
+    for seed in range(seeds):
+        trial = run_trial(
+            recording, maneuver, paper_design(law, seed, gains=gains, network=network)
+        )
+        if not trial.errors or trial.errors["online"] >= SANE:
+            return None
+        rows.append(list(trial.errors.values()))
+    return np.array(rows)
+
+
+def has_pattern(instantaneous: Array, integral: Array) -> bool:
+    """Tell whether errors (seeds, 3) on the slalom show the pattern in their medians."""
+    online, *frozen = np.median(instantaneous, axis=0) / np.median(integral, axis=0)
+    return bool(abs(online - 1.0) < ONLINE and min(frozen) >= RATIO)
+
+
+def promising(design: tuple[Gains, Network], slalom: Recording) -> bool:
+    """Tell whether a design shows the pattern with a few seeds."""
+    integral = errors(slalom, "slalom", "integral", design, FEW)
+    if integral is None:
+        return False
+    instantaneous = errors(slalom, "slalom", "instantaneous", design, FEW)
+    return instantaneous is not None and has_pattern(instantaneous, integral)
+
+
+def judge(
+    design: tuple[Gains, Network], recordings: dict[str, Recording]
+) -> dict[tuple[str, str], Array] | None:
+    """Return errors by maneuver and law where all seeds show the pattern, else None."""
+    found = {}
+    for maneuver, recording in recordings.items():
         for law in LAWS:
-            errors = [
-                run_trial(
-                    slalom, "slalom", paper_design(law, seed, gains=gains, network=network)
-                ).errors
-                for seed in range(SEEDS)
-            ]
-            if all(errors):
-                medians[law] = np.median([[e[row] for row in ROWS] for e in errors], axis=0)
-        if len(medians) < len(LAWS):
+            answer = errors(recording, maneuver, law, design, ALL)
+            if answer is None:
+                return None
+            found[maneuver, law] = answer
+    if not has_pattern(found["slalom", "instantaneous"], found["slalom", "integral"]):
+        return None
+    return found
+
+
+def main(designs: int = DESIGNS) -> int:
+    """Print the designs that show the pattern and the calmest; return 1 where it is another."""
+    recordings, tried, shown = drive_maneuvers(), 0, 0
+    calmest, best, same = np.inf, -1, False
+    columns = {m: ("online", *(f"{t:g} s" for t in times)) for m, times in FREEZES.items()}
+    for number, design in enumerate(islice(random_designs(), designs)):
+        if not promising(design, recordings["slalom"]):
             continue
-        stable += 1
-        online, *frozen = medians["instantaneous"] / medians["integral"]
-        if abs(online - 1.0) < 0.25 and min(frozen) >= 1.8:
-            shown += 1
-            table = "  ".join(f"{law} {np.round(m, 3)}" for law, m in medians.items())
-            print(
-                f"a {-gains.A_d[0][0]:.2f}  lambda {gains.forgetting:.1f}  eta1 {gains.eta_W:.0f}  "
-                f"eta2 {gains.eta_V:.2f}  rho {gains.rho_W:.3f}  n_h {network.hidden}:  {table}"
-            )
-    print(f"{shown} of {stable} designs that are stable on all seeds show the pattern")
-    return shown / max(stable, 1)
+        tried += 1
+        found = judge(design, recordings)
+        if found is None:
+            continue
+        shown += 1
+        largest = max(float(answer[:, 0].max()) for answer in found.values())
+        gains, network = design
+        print(f"design {number}: n_h {network.hidden}, {gains}; largest online {largest:.3f} kN")
+        for (maneuver, law), answer in found.items():
+            cells = zip(columns[maneuver], np.median(answer, axis=0), strict=True)
+            print(f"  {maneuver:10} {law:21}", *(f"{name} {kN:.3f}" for name, kN in cells))
+        if largest < calmest:
+            calmest, best, same = largest, number, design == (GAINS, NETWORK)
+    print(
+        f"{tried} of {designs} designs show the pattern with {FEW} seeds, {shown} with {ALL}; the"
+    )
+    print(f"calmest, design {best}, {'is' if same else 'IS NOT'} the one of tireid.paper_study")
+    return 0 if same else 1
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 300)
+    sys.exit(main(int(sys.argv[1]) if len(sys.argv) > 1 else DESIGNS))

@@ -12,7 +12,7 @@ def main() -> None:
     """Draw the slalom of the demo, learnt online and replayed frozen."""
     story = run_story()
     own = {FREEZE: story.frozen[FREEZE][story.learnt.recording.name]}
-    figure = force_figure(story.learnt, own, window=(0.0, 20.0))
+    figure = force_figure(story.learnt, own)
     TARGET.write_bytes(figure_png(figure, resolution=110))
     print(f"wrote {TARGET}")
 

@@ -11,6 +11,10 @@ BENCHMARKS = {
     "recorded_cars": [],
     "plant_against_commonroad": ["{out}"],
     "paper_gains": [],
+    "stability_formulas": [],
+    "gain_limit": [],
+    "limit_cycle": [],
+    "bounds_monte_carlo": [],
 }
 
 

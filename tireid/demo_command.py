@@ -4,17 +4,24 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from identifier.defaults import natural_operation
+from tireid.certificate_table import certificate_text
+from tireid.check_figures import draw_check
 from tireid.demo_report import demo_sections
 from tireid.demo_story import run_story
 from tireid.identify_results import write_results
 from tireid.output import output_folder
-from tireid.paper_command import write_study
+from tireid.paper_results import write_study
 from tireid.paper_study import run_study
 from tireid.paper_tables import table_text
 from tireid.progress import Stopwatch, say
 from tireid.report import write_report
 
 TITLE = "tireid: lateral tire forces, learnt while driving"
+SUMMARY = (
+    "A car drives, its tire forces are learnt from the signals that every log has, the weights are "
+    "frozen, and the frozen model is asked about drives that it has not seen."
+)
 SEEDS = 20
 
 
@@ -53,12 +60,19 @@ def run(options: argparse.Namespace) -> None:
         learning.mkdir()
         tables.mkdir()
         write_results(learning, "integral", story.learnt, story.others, story.frozen)
+        operation = natural_operation(story.design, story.car)
+        draw_check(
+            learning, story.learnt.recording, story.car, story.design, operation, story.certificate
+        )
         say("2/3 the frozen-weight test of the paper")
         study = run_study(SEEDS, say)
         write_study(tables, study)
         say("3/3 writing the report")
-        write_report(folder / "report.html", TITLE, demo_sections(story, study, learning, tables))
+        sections = demo_sections(story, study, learning, tables)
+        write_report(folder / "report.html", TITLE, sections, summary=SUMMARY)
     for maneuver in study.errors:
         print(table_text(maneuver, study))
+    print(certificate_text(story.certificate, story.design.force_unit))
+    print()
     print(story.text())
     print(f"read {options.out / 'report.html'}  ({watch.seconds:.0f} s)")

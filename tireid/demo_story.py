@@ -6,14 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from identifier.defaults import default_design
+from identifier.design import Design
 from identifier.history import History
 from identifier.identify import identify
-from identifier.reproducibility import Replay, axle_rms, online_error, replay
+from identifier.reproducibility import Replay, force_rms, online_error, replay
+from identifier.stability import Certificate
 from models.maneuvers import DoubleLaneChange, Maneuver, Slalom, StepSteer
 from models.plant import Plant
 from models.recordings import Recording
 from models.sensors import Sensor, Sensors
-from models.vehicle import sedan
+from models.vehicle import Vehicle, sedan
+from tireid.certificate_table import certificate_of
 
 SPEED = 20.0  # m/s
 FREEZE = 30.0  # s, the end of the first drive
@@ -43,24 +46,33 @@ class Story:
 
     Parameters
     ----------
+    car : what drives, and what the identifier is told of.
+    design : the design that learns.
     learnt : the online run that the weights come from.
     others : online runs over the drives that the frozen model predicts.
     frozen : freeze time [s] to recording name to replay.
     """
 
+    car: Vehicle
+    design: Design
     learnt: History
     others: Sequence[History]
     frozen: Mapping[float, Mapping[str, Replay]]
+
+    @property
+    def certificate(self) -> Certificate:
+        """What is known of the design before the car drives."""
+        return certificate_of(self.design, self.car)
 
     def rows(self) -> list[list[str]]:
         """Return name, online and frozen error of both axles together, and the share of force."""
         rows = []
         for history in (self.learnt, *self.others):
             name = history.recording.name
-            truth = history.recording.axle_force
             frozen, online = self.frozen[FREEZE][name].against_truth, online_error(history)
-            assert truth is not None and frozen is not None and online is not None
-            share = 100.0 * frozen.both / axle_rms(truth).both
+            size = force_rms(history)
+            assert size is not None and frozen is not None and online is not None
+            share = 100.0 * frozen.both / size.both
             rows.append(
                 [name, f"{online.both / 1e3:.3f}", f"{frozen.both / 1e3:.3f}", f"{share:.0f} %"]
             )
@@ -100,6 +112,8 @@ def run_story() -> Story:
     histories = {name: identify(rec, car, design) for name, rec in recordings.items()}
     model = histories["slalom"].freeze(FREEZE)
     return Story(
+        car=car,
+        design=design,
         learnt=histories["slalom"],
         others=[histories[name] for name in PREDICT],
         frozen={FREEZE: {name: replay(model, history) for name, history in histories.items()}},

@@ -1,15 +1,23 @@
 """`tireid identify LOG --vehicle FILE --out DIR`: learn the tires of a recording, freeze them."""
 
 import argparse
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from identifier.defaults import LAWS, default_design
+from identifier.design import Design
+from identifier.design_file import read_design
 from identifier.history import DivergedError, History
 from identifier.identify import identify
-from identifier.reproducibility import Replay, replay
+from identifier.reproducibility import (
+    AxleRmse,
+    Replay,
+    counted_samples,
+    force_rms,
+    freeze_key,
+    replay,
+)
 from models.recordings import (
     Recording,
     check_against_vehicle,
@@ -17,9 +25,10 @@ from models.recordings import (
     split_log_argument,
 )
 from models.vehicle import Vehicle
-from tireid.identify_results import write_results
+from tireid.certificate_table import certificate_of, verdict_line
+from tireid.identify_results import file_name, write_results
 from tireid.output import output_folder
-from tireid.progress import Stopwatch, say
+from tireid.progress import say
 
 
 def add_parser(commands: Any) -> None:
@@ -42,7 +51,10 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("log", metavar="LOG", help="recording; LOG:RUN names one of its runs")
     parser.add_argument("--vehicle", required=True, type=Path, metavar="FILE", help="car as TOML")
     parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
-    parser.add_argument("--law", choices=LAWS, default="integral", help="default: %(default)s")
+    parser.add_argument("--law", choices=LAWS, help="law of the default design (integral)")
+    parser.add_argument(
+        "--design", type=Path, metavar="FILE", help="design.toml, in place of the default design"
+    )
     parser.add_argument(
         "--freeze", nargs="+", type=float, metavar="T", help="freeze at these times [s] (the end)"
     )
@@ -59,7 +71,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--no-check", action="store_true", help="accept a log that contradicts physics"
     )
-    parser.add_argument("--seed", type=int, default=0, help="seed of the initial weights")
+    parser.add_argument("--seed", type=int, metavar="N", help="of the initial weights (0)")
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder to write")
     parser.add_argument("--force", action="store_true", help="replace the folder if it exists")
     parser.set_defaults(run=run)
@@ -73,38 +85,57 @@ def run(options: argparse.Namespace) -> None:
     options : parsed arguments.
     """
     vehicle = Vehicle.from_toml(options.vehicle)
-    design = default_design(vehicle, law=options.law, seed=options.seed)
-    recording = _read(options.log, options.run_name, vehicle, options)
-    others = [_read(log, None, vehicle, options) for log in options.replay]
+    law, design = _design(options, vehicle)
+    recording = _read(options.log, options.run_name, vehicle, design, options)
+    others = [_read(log, None, vehicle, design, options) for log in options.replay]
     _require_distinct([recording, *others])
     freeze_times = sorted(set(options.freeze or [float(recording.t[-1])]))
     _require_inside(freeze_times, recording)
     with output_folder(options.out, force=options.force) as folder:
-        watch = Stopwatch()
-        learnt = identify(recording, vehicle, design)
-        say(f"learnt {options.law} over {recording.name} in {1e3 * watch.seconds:.1f} ms")
-        if learnt.diverged_at is not None:
-            raise DivergedError(
-                f"{recording.name}: the {options.law} law diverged at {learnt.diverged_at:g} s"
-            )
-        histories = [learnt, *(identify(other, vehicle, design) for other in others)]
+        histories = [_learn(one, vehicle, law, design) for one in (recording, *others)]
+        learnt = histories[0]
         frozen = {t: _replays(t, learnt, histories) for t in freeze_times}
-        write_results(folder, options.law, learnt, histories[1:], frozen)
-    print_table(learnt, frozen)
+        write_results(folder, law, learnt, histories[1:], frozen)
+    print_table(histories, frozen)
+    print(verdict_line(certificate_of(design, vehicle)))
     say(f"wrote {options.out}/")
 
 
+def _design(options: argparse.Namespace, vehicle: Vehicle) -> tuple[str, Design]:
+    """Return the name of the law and the design."""
+    if options.design is None:
+        law = options.law or "integral"
+        return law, default_design(vehicle, law=law, seed=options.seed or 0)
+    for name in ("law", "seed"):
+        if getattr(options, name) is not None:
+            raise ValueError(f"--{name} is for the default design: it stands in {options.design}")
+    design = read_design(options.design)
+    return design.law, design
+
+
+def _learn(recording: Recording, vehicle: Vehicle, law: str, design: Design) -> History:
+    history = identify(recording, vehicle, design)
+    if history.diverged_at is not None:
+        at = freeze_key(history.diverged_at)
+        raise DivergedError(f"{recording.name}: the {law} law diverged at {at} s")
+    say(f"learnt {law} over {recording.name}")
+    return history
+
+
 def _read(
-    log: str, run_name: str | None, vehicle: Vehicle, options: argparse.Namespace
+    log: str, run_name: str | None, vehicle: Vehicle, design: Design, options: argparse.Namespace
 ) -> Recording:
     path, named = split_log_argument(log)
     if named is not None and run_name is not None and named != run_name:
         raise ValueError(f"{log} names the run {named}, --run names {run_name}: name one of them")
     check = not options.no_check
     columns = _columns(options.columns)
-    recording = read_recording(path, run=run_name or named, check=check, columns=columns)
+    recording = read_recording(
+        path, run=run_name or named, dt=design.dt, check=check, columns=columns
+    )
     if check:
         check_against_vehicle(recording, vehicle)
+    counted_samples(recording, design.min_speed)  # refuses a car that never drives
     say(f"read {recording.name}: {recording.t.size} samples, {recording.duration:.1f} s")
     return recording
 
@@ -120,18 +151,24 @@ def _columns(pairs: list[str]) -> dict[str, str]:
 
 
 def _require_distinct(recordings: list[Recording]) -> None:
-    names = [recording.name for recording in recordings]
-    for name in names:
-        if names.count(name) > 1:
-            raise ValueError(f"{name} is given twice: every recording needs a name of its own")
+    files = [file_name(recording) for recording in recordings]
+    for recording, name in zip(recordings, files, strict=True):
+        if files.count(name) > 1:
+            raise ValueError(
+                f"{recording.name} is given twice, or its files would be named as those of another "
+                f"recording, {name}: every recording needs a name of its own"
+            )
 
 
 def _require_inside(freeze_times: list[float], recording: Recording) -> None:
     first, last = float(recording.t[0]), float(recording.t[-1])
     for t in freeze_times:
         if not first <= t <= last:
-            lasts = f"{recording.name} lasts from {first:g} to {last:g} s"
-            raise ValueError(f"--freeze {t:g} is outside the recording: {lasts}")
+            lasts = f"{recording.name} lasts from {freeze_key(first)} to {freeze_key(last)} s"
+            raise ValueError(f"--freeze {freeze_key(t)} is outside the recording: {lasts}")
+    for earlier, later in pairwise(map(freeze_key, freeze_times)):
+        if earlier == later:
+            raise ValueError(f"--freeze {later} is given twice: the times differ too little")
 
 
 def _replays(t: float, learnt: History, histories: list[History]) -> dict[str, Replay]:
@@ -139,28 +176,29 @@ def _replays(t: float, learnt: History, histories: list[History]) -> dict[str, R
     return {history.recording.name: replay(model, history) for history in histories}
 
 
-def print_table(learnt: History, frozen: dict[float, dict[str, Replay]]) -> None:
+def print_table(histories: list[History], frozen: dict[float, dict[str, Replay]]) -> None:
     """Print the errors per axle, and as a share of the force where there is truth.
 
     Parameters
     ----------
-    learnt : the run that the weights come from.
+    histories : the online runs over all recordings.
     frozen : freeze time [s] to recording name to replay.
     """
+    sizes = {history.recording.name: force_rms(history) for history in histories}
     print(f"{'frozen at':>10}  {'replayed on':40} {'front':>16} {'rear':>16}")
     for t, replays in frozen.items():
         for name, result in replays.items():
             error = result.against_truth or result.against_online
-            truth = result.recording.axle_force
-            note = "" if truth is not None else "  (against online, no truth)"
-            cells = []
-            for i, newtons in enumerate((error.front, error.rear)):
-                share = "" if truth is None else _share(newtons, truth[:, i])
-                cells.append(f"{newtons:8.4g} N{share:>6}")
-            print(f"{t:8g} s  {name:40} {cells[0]:>16} {cells[1]:>16}{note}")
-    del learnt
+            note = "" if sizes[name] is not None else "  (against online, no truth)"
+            front, rear = _cells(error, sizes[name])
+            print(f"{freeze_key(t):>8} s  {name:40} {front:>16} {rear:>16}{note}")
 
 
-def _share(newtons: float, force: np.ndarray[Any, np.dtype[np.float64]]) -> str:
-    rms = float(np.sqrt(np.mean(force**2)))
-    return f" {100 * newtons / rms:.0f} %" if rms > 0.0 else ""
+def _cells(error: AxleRmse, size: AxleRmse | None) -> tuple[str, str]:
+    """Return front and rear error, with their share of the rms force where it is known."""
+    forces = (0.0, 0.0) if size is None else (size.front, size.rear)
+    front, rear = (
+        f"{newtons:8.4g} N{f' {100 * newtons / force:.0f} %' if force > 0.0 else '':>6}"
+        for newtons, force in zip((error.front, error.rear), forces, strict=True)
+    )
+    return front, rear

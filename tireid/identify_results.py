@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identifier.history import History
-from identifier.reproducibility import Replay
+from identifier.reproducibility import Replay, freeze_key
 from models.recordings import Recording
 from tireid.figures import (
     error_figure,
@@ -43,7 +43,7 @@ def write_results(
         folder / "summary.json", summarize(law=law, learnt=learnt, others=others, frozen=frozen)
     )
     for t in frozen:
-        name = "weights.json" if t == max(frozen) else f"weights_{t:g}s.json"
+        name = "weights.json" if t == max(frozen) else f"weights_{freeze_key(t)}s.json"
         learnt.freeze(t).save(folder / name)
     _write_curves(folder, learnt, others, frozen)
     say("drawing figures")
@@ -70,14 +70,14 @@ def _write_curves(folder: Path, learnt: History, others: Sequence[History], froz
         folder / "errors.csv",
         {
             "t_s": t,
-            "xi_tilde_f_Us": learnt.xi_tilde[:, 0],
-            "xi_tilde_r_Us": learnt.xi_tilde[:, 1],
-            "z_f_Us2": learnt.z[:, 0],
-            "z_r_Us2": learnt.z[:, 1],
+            "xi_tilde_f_Us": learnt.told["xi_tilde"][:, 0],
+            "xi_tilde_r_Us": learnt.told["xi_tilde"][:, 1],
+            "z_f_Us2": learnt.carried["z"][:-1, 0],
+            "z_r_Us2": learnt.carried["z"][:-1, 1],
         },
     )
     weights = {"t_s": t}
-    for matrix, values in (("W", learnt.W), ("V", learnt.V)):
+    for matrix, values in (("W", learnt.carried["W"]), ("V", learnt.carried["V"])):
         for i, j in np.ndindex(values.shape[1:]):
             weights[f"{matrix}_{i + 1}_{j + 1}"] = values[:n, i, j]
     write_csv(folder / "weights.csv", weights)
@@ -106,7 +106,7 @@ def force_columns(
         "alpha_r_rad": alpha[:, 1],
     }
     curves = {"online": history.axle_force}
-    curves |= {f"frozen_{t:g}s": replay.axle_force for t, replay in replays.items()}
+    curves |= {f"frozen_{freeze_key(t)}s": replay.axle_force for t, replay in replays.items()}
     if recording.axle_force is not None:
         curves = {"true": recording.axle_force} | curves
     for name, force in curves.items():

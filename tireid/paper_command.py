@@ -4,19 +4,10 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from tireid.figures import comparison_figure, force_figure, save_figure
-from tireid.output import output_folder, write_json
-from tireid.paper_study import GAINS, LAWS, NETWORK, ONSETS, Study, run_study
-from tireid.paper_tables import settings, table_text
-from tireid.paper_values import PAPER
+from tireid.output import output_folder
+from tireid.paper_results import study_text, write_study
+from tireid.paper_study import run_study
 from tireid.progress import say
-
-FIGURES = {  # number of the paper's figure, by maneuver and law
-    ("step_steer", "instantaneous"): "fig2",
-    ("step_steer", "integral"): "fig3",
-    ("slalom", "instantaneous"): "fig4",
-    ("slalom", "integral"): "fig5",
-}
 
 
 def add_parser(commands: Any) -> None:
@@ -50,34 +41,5 @@ def run(options: argparse.Namespace) -> None:
     with output_folder(options.out, force=options.force) as folder:
         study = run_study(options.seeds, say)
         write_study(folder, study)
-    for maneuver in study.errors:
-        print(table_text(maneuver, study))
-    print(settings(GAINS, NETWORK))
+    print(study_text(study))
     say(f"wrote {options.out}/")
-
-
-def write_study(folder: Path, study: Study) -> None:
-    """Write tables.json, tables.txt and the figures of a study.
-
-    Parameters
-    ----------
-    folder : where to.
-    study : its errors over all seeds.
-    """
-    tables = study.tables()
-    write_json(folder / "tables.json", tables)
-    text = [table_text(maneuver, study) for maneuver in tables]
-    (folder / "tables.txt").write_text("\n".join([*text, settings(GAINS, NETWORK)]) + "\n")
-    say("drawing figures")
-    for maneuver, by_law in tables.items():
-        results = {
-            law: {name: (q["median"], q["q25"], q["q75"]) for name, q in columns.items()}
-            for law, columns in by_law.items()
-        }
-        save_figure(comparison_figure(results, PAPER[maneuver]), folder / f"{maneuver}_errors.png")
-        window = (ONSETS[maneuver] - 1.0, float(study.recordings[maneuver].t[-1]))
-        for law in LAWS:
-            trial = study.typical(maneuver, law)
-            label = FIGURES.get((maneuver, law), "control")
-            figure = force_figure(trial.history, trial.replays, window=window)
-            save_figure(figure, folder / f"{label}_{maneuver}_{law}.png")

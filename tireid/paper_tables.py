@@ -2,19 +2,16 @@
 
 from collections.abc import Sequence
 
+from identifier.defaults import LAWS as LAW_TITLES
 from identifier.gains import Gains
 from identifier.network import Network
+from identifier.reproducibility import freeze_key
 from tireid.paper_study import FREEZES, LAWS, Study
 from tireid.paper_values import PAPER
 
 TITLES = {
     "step_steer": "Table I, step steer: RMSE of the axle force [kN]",
     "slalom": "Table II, slalom: RMSE of the axle force [kN]",
-}
-COLUMNS = {
-    "instantaneous": "instantaneous",
-    "integral": "integral",
-    "instantaneous_scaled": "instantaneous at eta/lambda",
 }
 MEANING = (
     "The third column is the conventional instantaneous law with its learning rates divided by "
@@ -32,7 +29,7 @@ def row_names(maneuver: str) -> list[str]:
     ----------
     maneuver : "step_steer" or "slalom".
     """
-    return ["online", *(f"{t:g}" for t in FREEZES[maneuver])]
+    return ["online", *(freeze_key(t) for t in FREEZES[maneuver])]
 
 
 def row_label(name: str) -> str:
@@ -47,6 +44,9 @@ def row_label(name: str) -> str:
 
 def rows(maneuver: str, study: Study) -> list[list[str]]:
     """Return the cells of a table: the label, and ours and the paper's value for each law.
+
+    Medians and quartiles are those of the seeds that did not diverge; the last row counts those
+    that did.
 
     Parameters
     ----------
@@ -66,19 +66,21 @@ def rows(maneuver: str, study: Study) -> list[list[str]]:
             printed = PAPER[maneuver].get(law, {}).get(name)
             row.append("" if printed is None else f"{printed:.4f}")
         cells.append(row)
-    return cells
+    lost = study.diverged()[maneuver]
+    counts = [(f"{lost[law]} of {len(study.errors[maneuver][law])}", "") for law in LAWS]
+    return [*cells, ["seeds that diverged", *(cell for pair in counts for cell in pair)]]
 
 
 def header() -> list[str]:
     """Return the head of the table's columns."""
     names = ["condition"]
     for law in LAWS:
-        names += [COLUMNS[law], "paper" if law != "instantaneous_scaled" else ""]
+        names += [LAW_TITLES[law], "paper" if law != "instantaneous_scaled" else ""]
     return names
 
 
 def table_text(maneuver: str, study: Study) -> str:
-    """Return a table as lines of text, with the number of seeds and of those that diverged.
+    """Return a table as lines of text, with the number of seeds.
 
     Parameters
     ----------
@@ -88,8 +90,7 @@ def table_text(maneuver: str, study: Study) -> str:
     lines = [header(), *rows(maneuver, study)]
     width = [max(len(row[i]) for row in lines) for i in range(len(lines[0]))]
     seeds = len(study.errors[maneuver]["integral"])
-    lost = sum(study.diverged()[maneuver].values())
-    title = f"{TITLES[maneuver]}, median (quartiles) of {seeds} seeds, {lost} runs diverged"
+    title = f"{TITLES[maneuver]}, median (quartiles) of {seeds} seeds"
     return "\n".join([title, *(_line(row, width) for row in lines), ""])
 
 

@@ -6,8 +6,9 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from identifier.history import History
-from identifier.reproducibility import AxleRmse, Replay, axle_rms, online_error
-from models.vehicle import Vehicle
+from identifier.model_format import vehicle_numbers
+from identifier.reproducibility import AxleRmse, Replay, force_rms, freeze_key, online_error
+from tireid.figures.units import paper_design
 
 
 def program_version() -> str:
@@ -22,16 +23,6 @@ def _axles(error: AxleRmse | None) -> dict[str, float] | None:
     return None if error is None else {"front": error.front, "rear": error.rear}
 
 
-def vehicle_numbers(vehicle: Vehicle) -> dict[str, Any]:
-    """Return the name and the six numbers of the bicycle, SI.
-
-    Parameters
-    ----------
-    vehicle : the car.
-    """
-    return {"name": vehicle.name, **vehicle.bicycle._asdict()}
-
-
 def summarize(
     *,
     law: str,
@@ -41,6 +32,8 @@ def summarize(
 ) -> dict[str, Any]:
     """Return what summary.json holds: errors by recording and freeze time, and all that went in.
 
+    All sums, of forces and of errors, are over the samples above the design's minimum speed.
+
     Parameters
     ----------
     law : the law as the user named it.
@@ -49,36 +42,32 @@ def summarize(
     frozen : freeze time [s] to recording name to replay.
     """
     runs = [learnt, *others]
-    truth = {h.recording.name: h.recording.axle_force for h in runs}
-    gains = learnt.design.gains
+    design = paper_design(learnt)
     return {
-        "rms_force_N": {
-            name: None if force is None else _axles(axle_rms(force))
-            for name, force in truth.items()
-        },
+        "rms_force_N": {h.recording.name: _axles(force_rms(h)) for h in runs},
         "rmse_N": {
             "online": {h.recording.name: _axles(online_error(h)) for h in runs},
             "frozen": {
-                f"{t:g}": {name: _axles(r.against_truth) for name, r in replays.items()}
+                freeze_key(t): {name: _axles(r.against_truth) for name, r in replays.items()}
                 for t, replays in frozen.items()
             },
             "frozen_against_online": {
-                f"{t:g}": {name: _axles(r.against_online) for name, r in replays.items()}
+                freeze_key(t): {name: _axles(r.against_online) for name, r in replays.items()}
                 for t, replays in frozen.items()
             },
         },
         "law": law,
-        "gains": asdict(gains),
-        "network": asdict(learnt.design.network),
+        "gains": asdict(design.gains),
+        "network": asdict(design.network),
         "design": {
-            "input_source": learnt.design.input_source,
-            "integrator": learnt.design.integrator,
-            "dt_s": learnt.design.dt,
-            "force_unit_N": learnt.design.force_unit,
-            "min_speed_m_s": learnt.design.min_speed,
+            "input_source": design.input_source,
+            "integrator": design.integrator,
+            "dt_s": design.dt,
+            "force_unit_N": design.force_unit,
+            "min_speed_m_s": design.min_speed,
         },
         "vehicle": vehicle_numbers(learnt.vehicle),
-        "seed": learnt.design.seed,
+        "seed": design.seed,
         "diverged_at_s": learnt.diverged_at,
         "version": program_version(),
     }

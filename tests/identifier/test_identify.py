@@ -104,8 +104,27 @@ def test_speed_may_vary_and_learning_rests_at_standstill(car, drive):
     history = identify(stopped, car, default_design(car))
     assert np.isfinite(history.axle_force).all()
     np.testing.assert_array_equal(history.axle_force[150:], 0.0)
+    np.testing.assert_array_equal(history.told["xi_tilde"][150:], 0.0)
     np.testing.assert_array_equal(history.carried["W"][150], history.carried["W"][-1])
     assert np.abs(history.carried["W"][149] - history.carried["W"][100]).max() > 0.0
+
+
+def test_at_rest_the_filter_empties_and_the_observer_follows_the_measurement(car, drive):
+    """Learning goes on from a clean start: no error of before the halt is left to learn from."""
+    moving = drive(n=300)
+    v_x = np.where((np.arange(300) < 150) | (np.arange(300) >= 200), 20.0, 0.0)
+    design = default_design(car)
+    history = identify(replace(moving, v_x=v_x), car, design)
+    z, xi_hat = history.carried["z"], history.carried["xi_hat"]
+    p, (v_y, r) = car.bicycle, moving.x.T
+    xi = np.column_stack([p.m * p.l_r * v_y + p.I_z * r, p.m * p.l_f * v_y - p.I_z * r])
+    xi /= (p.l_f + p.l_r) * design.force_unit
+    rest = slice(150, 200)  # what the carried values are after a sample at rest
+    assert np.abs(z[150]).min() > 1e-6
+    np.testing.assert_array_equal(z[1:][rest], 0.0)
+    assert np.abs(xi_hat[150] - xi[149]).max() > 1e-6
+    np.testing.assert_allclose(xi_hat[1:][rest], xi[rest], rtol=1e-9)
+    assert np.abs(z[202:]).max() > 1e-6
 
 
 def test_gains_that_diverge_are_reported_not_hidden(car, drive):

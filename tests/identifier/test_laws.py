@@ -30,9 +30,9 @@ def case(rng):
     }
 
 
-def rates(case, *, drive, eta=(3.0, 2.0), rho=(0.0, 0.0)):
+def rates(case, *, drive, eta=(3.0, 2.0), rho=(0.0, 0.0), laws=weight_rates):
     sigma = np.tanh(case["V"] @ case["x_bar"])
-    W_dot, V_dot = weight_rates(
+    W_dot, V_dot = laws(
         drive=ca.DM(drive),
         xi_tilde=ca.DM(case["xi"] - case["xi_hat"]),
         W=ca.DM(case["W"]),
@@ -65,22 +65,21 @@ def descent(case, drive, eta):
     ]
 
 
-def test_laws_descend_the_static_loss(case):
-    """(11)-(13) without leakage are the gradient of zᵀ ξ̃ through the error at rest, W and V."""
-    W_dot, V_dot = rates(case, drive=case["z"])
+def check_descent(case, laws=weight_rates):
+    W_dot, V_dot = rates(case, drive=case["z"], laws=laws)
     W_expected, V_expected = descent(case, case["z"], (3.0, 2.0))
     np.testing.assert_allclose(W_dot, W_expected, rtol=RESIDUAL, atol=RESIDUAL)
     np.testing.assert_allclose(V_dot, V_expected, rtol=RESIDUAL, atol=RESIDUAL)
 
 
-def test_laws_agree_with_finite_differences_of_the_loss(case):
+def check_finite_differences(case, laws=weight_rates):
     f, h = np.array([0.3, -0.7]), 1e-6
 
     def loss(W, V):
         residual = f - W @ np.tanh(V @ case["x_bar"])
         return case["z"] @ -np.linalg.solve(case["A_d"], residual)
 
-    W_dot, V_dot = rates(case, drive=case["z"])
+    W_dot, V_dot = rates(case, drive=case["z"], laws=laws)
     for i, j in np.ndindex(2, N_H):
         e = np.zeros((2, N_H))
         e[i, j] = h
@@ -93,22 +92,37 @@ def test_laws_agree_with_finite_differences_of_the_loss(case):
         assert V_dot[i, j] == pytest.approx(-2.0 * slope, rel=1e-6, abs=1e-8)
 
 
-def test_solve_without_the_transpose_is_caught(case):
+def test_laws_descend_the_static_loss(case):
+    """(11)-(13) without leakage are the gradient of zᵀ ξ̃ through the error at rest, W and V."""
+    check_descent(case)
+
+
+def test_laws_agree_with_finite_differences_of_the_loss(case):
+    check_finite_differences(case)
+
+
+def without_transpose(*, A_d, **others):
     """Planted: solve(A_d, z) for solve(A_d.T, z) is another direction: A_d is not symmetric."""
-    W_expected, _ = descent(case, case["z"], (3.0, 2.0))
-    sigma = np.tanh(case["V"] @ case["x_bar"])
-    planted = -3.0 * np.outer(np.linalg.solve(case["A_d"], case["z"]), sigma)
-    assert np.abs(planted - W_expected).max() > 0.1 * np.abs(W_expected).max()
+    return weight_rates(A_d=A_d.T, **others)
 
 
-def test_opposite_sign_of_the_error_is_caught(case):
+def opposite_error(*, drive, **others):
     """Planted: ξ̂ - ξ in place of ξ - ξ̂ climbs the loss."""
-    xi_tilde = case["xi"] - case["xi_hat"]
-    W_expected, _ = descent(case, xi_tilde, (3.0, 2.0))
-    right, _ = rates(case, drive=xi_tilde)
-    planted, _ = rates(case, drive=-xi_tilde)
-    assert np.sum(right * W_expected) > 0.0
-    assert np.sum(planted * W_expected) < 0.0
+    return weight_rates(drive=-drive, **others)
+
+
+def without_slope(*, sigma, V, x_bar, **others):
+    """Planted: (13) without its slope 1 - σ², as if the hidden layer were linear."""
+    W_dot, _ = weight_rates(sigma=sigma, V=V, x_bar=x_bar, **others)
+    _, V_dot = weight_rates(sigma=0 * sigma, V=V, x_bar=x_bar, **others)
+    return W_dot, V_dot
+
+
+@pytest.mark.parametrize("planted", [without_transpose, opposite_error, without_slope])
+@pytest.mark.parametrize("check", [check_descent, check_finite_differences])
+def test_a_planted_error_of_the_laws_is_caught(case, check, planted):
+    with pytest.raises(AssertionError):
+        check(case, laws=planted)
 
 
 def test_leakage_pulls_weights_back_in_proportion_to_the_error(case):
@@ -120,15 +134,36 @@ def test_leakage_pulls_weights_back_in_proportion_to_the_error(case):
     np.testing.assert_allclose(V_dot - V_still, -0.4 * size * case["V"], rtol=1e-10)
 
 
-def test_observer_error_obeys_the_prescribed_dynamics(case, rng):
-    """(7) minus (8): dξ̃/dt = A_d ξ̃ + f - f̂, whatever A_ξ, B_ξ and the steering are."""
+def check_observer(case, rng, rate=observer_rate):
     A_xi, B_xi = rng.normal(size=(2, 2)), np.diag(rng.normal(size=2))
     u, f, f_hat = rng.normal(size=2), rng.normal(size=2), rng.normal(size=2)
     xi, xi_hat, A_d = case["xi"], case["xi_hat"], case["A_d"]
     xi_dot = A_xi @ xi + B_xi @ u + f  # (7)
-    xi_hat_dot = observer_rate(A_d, A_xi, B_xi, xi, xi_hat, u, f_hat)  # (8)
+    xi_hat_dot = rate(A_d, A_xi, B_xi, xi, xi_hat, u, f_hat)  # (8)
     expected = A_d @ (xi - xi_hat) + f - f_hat
     np.testing.assert_allclose(xi_dot - xi_hat_dot, expected, atol=RESIDUAL)
+
+
+def test_observer_error_obeys_the_prescribed_dynamics(case, rng):
+    """(7) minus (8): dξ̃/dt = A_d ξ̃ + f - f̂, whatever A_ξ, B_ξ and the steering are."""
+    check_observer(case, rng)
+
+
+def test_planted_errors_of_the_observer_are_caught(case, rng):
+    """Planted: A_d transposed; the model evaluated at ξ̂; the network's force left out."""
+
+    def transposed(A_d, *others):
+        return observer_rate(A_d.T, *others)
+
+    def at_the_estimate(A_d, A_xi, B_xi, xi, xi_hat, u, f_hat):
+        return observer_rate(A_d, A_xi, B_xi, xi, xi_hat, u, f_hat) + A_xi @ (xi_hat - xi)
+
+    def without_network(A_d, A_xi, B_xi, xi, xi_hat, u, f_hat):
+        return observer_rate(A_d, A_xi, B_xi, xi, xi_hat, u, 0 * f_hat)
+
+    for planted in (transposed, at_the_estimate, without_network):
+        with pytest.raises(AssertionError):
+            check_observer(case, rng, rate=planted)
 
 
 def test_filter_is_the_exponentially_weighted_integral():

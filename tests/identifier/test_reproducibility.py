@@ -10,7 +10,15 @@ from identifier.defaults import default_design
 from identifier.identify import identify
 from identifier.model_file import load_model
 from identifier.model_format import FrozenModelError
-from identifier.reproducibility import AxleRmse, axle_rms, online_error, replay
+from identifier.reproducibility import (
+    AxleRmse,
+    axle_rms,
+    counted_samples,
+    force_rms,
+    freeze_key,
+    online_error,
+    replay,
+)
 
 
 @pytest.fixture(name="history")
@@ -66,6 +74,36 @@ def test_samples_at_rest_do_not_count(history):
     halted = replace(history, recording=replace(recording, v_x=v_x))
     kept = (halted.axle_force - recording.axle_force)[:300]
     assert online_error(halted) == axle_rms(kept)
+    assert force_rms(halted) == axle_rms(recording.axle_force[:300])
+    result = replay(history.freeze(6.0), halted)
+    assert result.against_truth == axle_rms((result.axle_force - recording.axle_force)[:300])
+    assert result.against_online == axle_rms((result.axle_force - halted.axle_force)[:300])
+
+
+def test_samples_before_the_asked_time_do_not_count(history):
+    truth, late = history.recording.axle_force, history.recording.t >= 4.0
+    assert online_error(history, since=4.0) == axle_rms((history.axle_force - truth)[late])
+    assert force_rms(history, since=4.0) == axle_rms(truth[late])
+    result = replay(history.freeze(6.0), history, since=4.0)
+    assert result.against_truth == axle_rms((result.axle_force - truth)[late])
+    assert result.against_truth != replay(history.freeze(6.0), history).against_truth
+
+
+def test_a_drive_without_a_sample_that_counts_is_refused(history):
+    slow = replace(history.recording, v_x=np.full(history.recording.t.size, 0.5))
+    with pytest.raises(ValueError, match=r"drive: v_x never reaches 1 m/s, .* is 0.5 m/s"):
+        counted_samples(slow, 1.0)
+    with pytest.raises(ValueError, match=r"never reaches 1 m/s from 99 s on"):
+        online_error(replace(history, design=replace(history.design, min_speed=1.0)), since=99.0)
+
+
+def test_freeze_times_of_any_clock_have_keys_of_their_own():
+    assert [freeze_key(t) for t in (32.0, 0.1, 1700000004.0, 1700000004.25)] == [
+        "32",
+        "0.1",
+        "1700000004",
+        "1700000004.25",
+    ]
 
 
 def test_a_model_comes_back_from_its_file(history, tmp_path):

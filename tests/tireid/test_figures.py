@@ -69,11 +69,12 @@ def made_up(scale: float = 5000.0, *, truth: bool = True, rear: float = 0.0) -> 
         design=Design(gains=GAINS, network=Network(hidden=3), force_unit=unit),
         recording=recording,
         axle_force=1.1 * force,
-        f_hat=0.1 * force / unit,
-        xi_tilde=0.01 * rng.standard_normal((N, 2)),
-        z=np.zeros((N, 2)),
-        W=np.cumsum(rng.standard_normal((N + 1, 2, 3)), axis=0),
-        V=np.cumsum(rng.standard_normal((N + 1, 3, 4)), axis=0),
+        told={"f_hat": 0.1 * force / unit, "xi_tilde": 0.01 * rng.standard_normal((N, 2))},
+        carried={
+            "z": np.zeros((N + 1, 2)),
+            "W": np.cumsum(rng.standard_normal((N + 1, 2, 3)), axis=0),
+            "V": np.cumsum(rng.standard_normal((N + 1, 3, 4)), axis=0),
+        },
     )
 
 
@@ -242,7 +243,7 @@ def test_the_error_norm_is_the_euclidean_norm_and_bounds_far_above_make_its_axis
 ):
     history = made_up()
     axes = FIGURES["error"]().axes[0]
-    expected = np.sqrt(np.sum(history.xi_tilde**2, axis=1))
+    expected = np.sqrt(np.sum(history.told["xi_tilde"] ** 2, axis=1))
     assert np.asarray(axes.lines[0].get_ydata()) == pytest.approx(expected)
     assert axes.get_yscale() == "linear"
     assert FIGURES["error under bounds"]().axes[0].get_yscale() == "log"
@@ -250,14 +251,19 @@ def test_the_error_norm_is_the_euclidean_norm_and_bounds_far_above_make_its_axis
 
 def test_a_law_that_diverges_leaves_the_panel_instead_of_flattening_it() -> None:
     history = made_up()
-    force, xi_tilde = history.axle_force.copy(), history.xi_tilde.copy()
+    force, xi_tilde = history.axle_force.copy(), history.told["xi_tilde"].copy()
     growth = np.exp(np.minimum(10.0 * np.arange(100), 700.0))[:, None]
     force[150:250] *= growth
     xi_tilde[150:250] *= growth
     force[250:], xi_tilde[250:] = np.nan, np.inf
-    W = history.W.copy()
+    W = history.carried["W"].copy()
     W[150:], W[250:] = 1e200, np.nan
-    wild = replace(history, axle_force=force, xi_tilde=xi_tilde, W=W)
+    wild = replace(
+        history,
+        axle_force=force,
+        told={**history.told, "xi_tilde": xi_tilde},
+        carried={**history.carried, "W": W},
+    )
     figure = force_figure(wild)
     assert figure.axes[0].get_ylim()[1] < 20.0
     assert figure.axes[0].get_title("right") == f"diverged at {wild.diverged_at:.4g} s"
@@ -284,6 +290,14 @@ def test_a_comparison_leaves_out_what_diverged_and_shows_the_paper_hollow() -> N
     ]
     with pytest.raises(ValueError, match="at least one law"):
         comparison_figure({})
+
+
+def test_a_law_without_any_stable_seed_has_no_mark_in_a_comparison() -> None:
+    def marked(figure: Figure) -> int:
+        return len(figure.axes[0].containers)
+
+    assert marked(comparison_figure(RESULTS)) == 3
+    assert marked(comparison_figure({**RESULTS, "instantaneous": {}}, PAPER)) == 2
 
 
 def test_replays_of_another_recording_are_refused() -> None:

@@ -1,12 +1,16 @@
 """`tireid identify` as a user meets it: what it writes, and one clear line for what it refuses."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from identifier.frozen_model import FrozenModel
+from identifier.defaults import default_design
+from identifier.design_file import design_text
+from identifier.model_file import load_model
 from models.recordings import read_recording
+from models.vehicle import sedan
 from tireid.cli import main
 
 
@@ -38,7 +42,7 @@ def test_summary_has_the_documented_keys_and_the_right_numbers(result, logs):
     for key in ("gains", "vehicle", "seed", "version"):
         assert key in summary
     quick = read_recording(logs / "quick.csv")
-    force = FrozenModel.load(result / "weights.json").axle_force(quick)
+    force = load_model(result / "weights.json").axle_force(quick)
     front, rear = np.sqrt(np.mean((force - quick.axle_force) ** 2, axis=0))
     assert rmse["frozen"]["8"]["quick"] == pytest.approx({"front": front, "rear": rear})
     rms = np.sqrt(np.mean(quick.axle_force**2, axis=0))
@@ -56,6 +60,13 @@ def test_every_curve_is_also_data(result):
     assert len(weights.dtype.names) == 1 + 2 * 10 + 10 * 4
     for name in ("errors.csv", "forces_quick.csv", "weights_4s.json"):
         assert (result / name).is_file()
+
+
+def test_the_vehicle_is_written_in_the_same_words_everywhere(result):
+    summary = json.loads((result / "summary.json").read_text())
+    weights = json.loads((result / "weights.json").read_text())
+    assert summary["vehicle"] == weights["vehicle"]
+    assert {"name", "mass", "yaw_inertia", "cornering_stiffness_rear"} <= summary["vehicle"].keys()
 
 
 def test_figures_are_written(result):
@@ -86,9 +97,118 @@ def test_a_log_without_forces_has_no_error_against_them(logs, tmp_path):
     assert summary["rmse_N"]["frozen_against_online"]["8"]["blind"]["front"] > 0.0
 
 
+def rewritten(log, target, change):
+    """A copy of a log, each row given to `change` as a dictionary of texts."""
+    header, *lines = [line.split(",") for line in log.read_text().splitlines()]
+    rows = [dict(zip(header, line, strict=True)) for line in lines]
+    for row in rows:
+        change(row)
+    target.write_text("\n".join([",".join(header), *(",".join(row.values()) for row in rows)]))
+    return target
+
+
+def test_a_log_on_a_unix_clock_keeps_its_freeze_times_apart(logs, tmp_path):
+    def to_unix(row):
+        row["t"] = f"{float(row['t']) + 1.7e9:.2f}"
+
+    log = rewritten(logs / "slalom.csv", tmp_path / "unix.csv", to_unix)
+    out = tmp_path / "out"
+    words = ["identify", str(log), "--vehicle", str(logs / "car.toml"), "--out", str(out)]
+    assert main([*words, "--freeze", "1700000004", "1700000008"]) == 0
+    frozen = json.loads((out / "summary.json").read_text())["rmse_N"]["frozen"]
+    assert set(frozen) == {"1700000004", "1700000008"}
+    assert (out / "weights_1700000004s.json").is_file()
+    forces = np.genfromtxt(out / "forces.csv", delimiter=",", names=True)
+    assert "Fyf_frozen_1700000004s_N" in forces.dtype.names
+    np.testing.assert_allclose(np.diff(forces["t_s"]), 0.01, atol=1e-5)
+
+
+def test_samples_at_rest_count_nowhere(logs, tmp_path, capsys):
+    """A halt of the second half, with forces that are not zero, changes neither size nor error."""
+
+    def halt(row):
+        if float(row["t"]) >= 4.0:
+            row["vx"] = "0.0"
+
+    log = rewritten(logs / "slalom.csv", tmp_path / "halt.csv", halt)
+    words = ["identify", str(log), "--vehicle", str(logs / "car.toml"), "--no-check"]
+    capsys.readouterr()
+    assert main([*words, "--out", str(tmp_path / "out")]) == 0
+    printed = capsys.readouterr().out
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    whole = read_recording(logs / "slalom.csv")
+    moving = whole.axle_force[whole.t < 4.0]
+    rms = np.sqrt(np.mean(moving**2, axis=0))
+    size = summary["rms_force_N"]["halt"]
+    assert size == pytest.approx({"front": rms[0], "rear": rms[1]}, rel=1e-6)
+    (frozen,) = summary["rmse_N"]["frozen"].values()
+    assert f"{100 * frozen['halt']['front'] / rms[0]:.0f} %" in printed
+
+
+def test_a_car_that_never_drives_is_refused(logs, tmp_path, capsys):
+    log = rewritten(logs / "slalom.csv", tmp_path / "still.csv", lambda row: row.update(vx="0.1"))
+    words = ["identify", log, "--vehicle", logs / "car.toml", "--no-check"]
+    line = refusal(capsys, [*words, "--out", tmp_path / "out"])
+    assert "still: v_x never reaches 1.0" in line
+    assert not (tmp_path / "out").exists()
+
+
+def written_design(path, **changes):
+    design = default_design(sedan())
+    names = changes.keys() & {"eta_W", "eta_V", "rho_W", "rho_V"}
+    gains = {name: changes.pop(name) for name in names}
+    path.write_text(design_text(replace(design, gains=replace(design.gains, **gains), **changes)))
+    return path
+
+
+def test_a_design_from_a_file_is_the_one_that_runs(logs, tmp_path, capsys):
+    design = written_design(tmp_path / "design.toml", law="instantaneous", seed=3, eta_W=12.5)
+    words = ["identify", str(logs / "slalom.csv"), "--vehicle", str(logs / "car.toml")]
+    words += ["--design", str(design), "--out", str(tmp_path / "out")]
+    capsys.readouterr()
+    assert main(words) == 0
+    assert "certificate: " in capsys.readouterr().out
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert (summary["law"], summary["seed"]) == ("instantaneous", 3)
+    assert summary["gains"]["eta_W"] == 12.5
+    for extra in (["--law", "integral"], ["--seed", "0"]):
+        assert f"{extra[0]} is for the default design" in refusal(
+            capsys, [*words[:-1], tmp_path / "other", *extra]
+        )
+
+
+def test_a_law_that_diverges_on_a_replayed_log_is_refused_by_its_name(logs, tmp_path, capsys):
+    """Nothing is learnt at rest and nothing diverges there; on the other drive it does."""
+    design = written_design(
+        tmp_path / "design.toml", law="instantaneous", eta_W=1e7, eta_V=1e7, rho_W=0.0, rho_V=0.0
+    )
+
+    def crawl(row):
+        if float(row["t"]) >= 0.5:  # before the steering begins
+            row["vx"] = "0.0"
+
+    calm = rewritten(logs / "slalom.csv", tmp_path / "calm.csv", crawl)
+    words = ["identify", calm, "--vehicle", logs / "car.toml", "--design", design, "--no-check"]
+    assert main([str(word) for word in [*words, "--out", tmp_path / "alone"]]) == 0
+    line = refusal(capsys, [*words, "--replay", logs / "quick.csv", "--out", tmp_path / "out"])
+    assert "quick: the instantaneous law diverged at" in line
+    assert not (tmp_path / "out").exists()
+
+
+def test_recordings_whose_files_would_be_the_same_are_refused(logs, tmp_path, capsys):
+    header, *lines = (logs / "slalom.csv").read_text().splitlines()
+    runs = [f"{line},{run}" for run in ("a b", "a/b") for line in lines]
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join([f"{header},run", *runs]))
+    words = ["identify", f"{log}:a b", "--vehicle", logs / "car.toml"]
+    line = refusal(capsys, [*words, "--replay", f"{log}:a/b", "--out", tmp_path / "out"])
+    assert "every recording needs a name of its own" in line
+
+
 @pytest.mark.parametrize(
     ("extra", "said"),
     [
+        (["--freeze", "4", "4.00000000000001"], "--freeze 4 is given twice"),
         (["--freeze", "99"], "--freeze 99 is outside the recording: slalom lasts from 0 to 8 s"),
         (["--run", "lap"], "no column run"),
         (["--replay", "nowhere.csv"], "nowhere.csv: there is no such file"),

@@ -5,14 +5,15 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
+from identifier.defaults import LAWS
 from tireid.figures.panels import legend_above
 from tireid.figures.style import AMBER, BLUE, GREEN, ORANGE, PAGE, PURPLE, new_figure, styled
 
 Quartiles = tuple[float, float, float]  # median, lower and upper quartile
-LAWS: Mapping[str, tuple[str, str, str]] = {  # label, color, marker
-    "instantaneous": ("instantaneous", ORANGE, "s"),
-    "integral": ("integral", BLUE, "o"),
-    "instantaneous_scaled": ("instantaneous at η/λ", GREEN, "D"),
+MARKS: Mapping[str, tuple[str, str]] = {  # color, marker
+    "instantaneous": (ORANGE, "s"),
+    "integral": (BLUE, "o"),
+    "instantaneous_scaled": (GREEN, "D"),
 }
 FURTHER = ((PURPLE, "^"), (AMBER, "v"))
 WIDE = 20.0  # from this ratio between what is drawn on, the axis is logarithmic
@@ -23,17 +24,15 @@ OFFSET = 0.2  # between neighboring laws, as a share of the distance of columns
 def comparison_figure(
     results: Mapping[str, Mapping[str, Quartiles]],
     paper: Mapping[str, Mapping[str, float]] | None = None,
-    *,
-    quantity: str = "force RMSE [kN]",
 ) -> Figure:
-    """Draw medians as dots with whiskers from quartile to quartile, the paper's values hollow.
+    """Draw medians of the force RMSE with whiskers from quartile to quartile, the paper's hollow.
 
     Parameters
     ----------
     results : by law, by column ("online" or a time of the freeze [s]): median, lower, upper
-        quartile; a law that diverged has values that are not finite, which are left out.
-    paper : by law, by column: the value that the paper prints.
-    quantity : name and unit of the axis.
+        quartile [kN]; a law that diverged has no column or values that are not finite, which are
+        left out.
+    paper : by law, by column: the value that the paper prints [kN].
 
     Raises
     ------
@@ -48,7 +47,10 @@ def comparison_figure(
     drawn: list[float] = []
     order: list[str] = []
     for number, (law, row) in enumerate(results.items()):
-        label, color, marker = LAWS.get(law, (law, *FURTHER[number % len(FURTHER)]))
+        if not row:
+            continue
+        label = LAWS.get(law, law).replace("eta/lambda", "η/λ")
+        color, marker = MARKS.get(law, FURTHER[number % len(FURTHER)])
         order += [label, f"{label} (paper)"]
         shift = OFFSET * (number - (len(results) - 1) / 2)
         middle, low, high = np.array(list(row.values()), dtype=np.float64).T
@@ -87,7 +89,7 @@ def comparison_figure(
     axes.set_xticks(range(len(columns)), [_column_label(name) for name in columns])
     axes.tick_params(axis="x", length=0.0)
     axes.grid(visible=False, axis="x")
-    axes.set(xlim=(-0.5, len(columns) - 0.5), ylabel=quantity)
+    axes.set(xlim=(-0.5, len(columns) - 0.5), ylabel="force RMSE [kN]")
     for boundary in range(1, len(columns)):
         axes.axvline(boundary - 0.5, color="#DDDDDD", linewidth=0.6)
     legend_above(figure, columns=len(results), order=order)

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from identifier.history import History
 from tireid.figures.panels import TIME, Window, legend_above, mark_freeze, shown, time_window
 from tireid.figures.style import AMBER, BLUE, GREEN, PAGE, PURPLE, new_figure, styled
-from tireid.figures.units import impulse_unit
+from tireid.figures.units import impulse_unit, paper_design
 
 WIDE = 20.0  # from this ratio between what is drawn on, the axis is logarithmic
 
@@ -41,7 +41,7 @@ def error_figure(
     ends = time_window(recording.t, window)
     part = shown(recording.t, ends)
     # A root of squares would overflow where a law diverges; hypot does not.
-    norm = np.hypot(history.xi_tilde[part, 0], history.xi_tilde[part, 1])
+    norm = np.hypot(history.told["xi_tilde"][part, 0], history.told["xi_tilde"][part, 1])
     known = {name: bound for name, bound in (bounds or {}).items() if np.isfinite(bound)}
     drawn = norm[np.isfinite(norm) & (norm > 0.0) & (norm < 1e12)]
     typical, peak = (float(np.median(drawn)), float(drawn.max())) if drawn.size else (1.0, 1.0)
@@ -70,7 +70,7 @@ def error_figure(
         mark_freeze(axes, t_freeze, prediction=False)
     axes.set(
         xlabel=TIME,
-        ylabel=rf"error norm $|\tilde{{\xi}}|$ [{impulse_unit(history.design.force_unit)}]",
+        ylabel=rf"error norm $|\tilde{{\xi}}|$ [{impulse_unit(paper_design(history).force_unit)}]",
     )
     legend_above(figure, columns=min(4, 1 + len(known) + bool(freeze_times)))
     return figure

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from matplotlib.figure import Figure
 
 from identifier.history import History
-from identifier.reproducibility import Replay, online_error
+from identifier.reproducibility import Replay, freeze_key, online_error
 from tireid.figures.panels import (
     AXLES,
     TIME,
@@ -22,18 +22,24 @@ from tireid.figures.units import drawable, force_range, force_unit_of
 
 @styled
 def force_figure(
-    history: History, replays: Mapping[float, Replay] | None = None, *, window: Window = None
+    history: History,
+    replays: Mapping[float, Replay] | None = None,
+    *,
+    window: Window = None,
+    since: float | None = None,
 ) -> Figure:
     """Draw forces of front and rear axle over time: identified online, and replayed frozen.
 
-    Above each panel stands the error over the whole recording: against the true force, or against
-    the online force where there is no truth.
+    Above each panel stands the error, whatever the window shows: against the true force, or
+    against the online force where there is no truth. That of a replay is the one it was made with.
 
     Parameters
     ----------
     history : the online run.
     replays : by time of the freeze [s], replays of the same recording; one row of panels each.
     window : first and last time to show [s]; None shows all.
+    since : time from which the error of the online run counts [s], as in the replays; None counts
+        all.
 
     Raises
     ------
@@ -45,7 +51,7 @@ def force_figure(
     for t_freeze, replay in replays.items():
         if replay.axle_force.shape != history.axle_force.shape:
             raise ValueError(
-                f"the replay frozen at {t_freeze:g} s is of {replay.recording.name}, "
+                f"the replay frozen at {freeze_key(t_freeze)} s is of {replay.recording.name}, "
                 f"the online run of {recording.name}"
             )
     ends = time_window(recording.t, window)
@@ -59,7 +65,7 @@ def force_figure(
     rows = 1 + len(replays)
     figure = new_figure(PAGE, 0.85 + 1.45 * rows)
     panels = figure.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)
-    error = online_error(history)
+    error = online_error(history, since=since)
     for axle, name in enumerate(AXLES):
         for axes in panels[:, axle]:
             axes.set(xlim=ends, ylim=limits)
@@ -73,7 +79,7 @@ def force_figure(
             note(panels[0, axle], f"RMSE {unit.format(error, axle)}")
         for axes, (at, replay) in zip(panels[1:, axle], replays.items(), strict=True):
             axes.plot(t, drawable(frozen[at][:, axle], limits), **FROZEN)
-            axes.set_title(f"{name}, frozen at {at:g} s")
+            axes.set_title(f"{name}, frozen at {freeze_key(at)} s")
             against = replay.against_truth
             if against is not None:
                 note(axes, f"RMSE {unit.format(against, axle)}")

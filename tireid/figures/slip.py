@@ -4,8 +4,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from identifier.frozen_model import FrozenModel
 from identifier.history import History
+from identifier.method import FrozenModel
 from models.recordings import Recording
 from tireid.figures.panels import AXLES, legend_above
 from tireid.figures.style import BLACK, BLUE, LINEAR, ORANGE, PAGE, new_figure, styled

@@ -112,13 +112,12 @@ def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
     return buffer.getvalue()
 
 
-def save_figure(figure: Figure, path: Path, *, resolution: int = RESOLUTION) -> None:
+def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure as PNG.
 
     Parameters
     ----------
     figure : as a function of this package returns it.
     path : the file.
-    resolution : dots per inch.
     """
-    path.write_bytes(figure_png(figure, resolution=resolution))
+    path.write_bytes(figure_png(figure))

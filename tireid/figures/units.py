@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from identifier.design import Design
+from identifier.history import History
 from identifier.reproducibility import AxleRmse
 
 Array = NDArray[np.float64]
@@ -51,6 +53,23 @@ def impulse_unit(force_unit: float) -> str:
     force_unit : U [N].
     """
     return f"{force_unit_name(force_unit)} s"
+
+
+def paper_design(history: History) -> Design:
+    """Return the design of a run of the paper's identifier, whose weights and error have units.
+
+    Parameters
+    ----------
+    history : an online run.
+
+    Raises
+    ------
+    TypeError
+        Where another method ran.
+    """
+    if not isinstance(history.design, Design):
+        raise TypeError(f"a run of the paper's identifier is needed, not of {history.design}")
+    return history.design
 
 
 def force_unit_name(force_unit: float) -> str:

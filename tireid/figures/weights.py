@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from identifier.history import History
 from tireid.figures.panels import TIME, Window, legend_beside, mark_freeze, shown, time_window
 from tireid.figures.style import GREEN, PAGE, PURPLE, SERIES, new_figure, styled
-from tireid.figures.units import drawable, force_range, force_unit_name
+from tireid.figures.units import drawable, force_range, force_unit_name, paper_design
 
 Array = NDArray[np.float64]
 SYMBOLS = {
@@ -41,10 +41,10 @@ def weights_figure(
     ValueError
         Where the window holds no sample.
     """
-    recording, design = history.recording, history.design
+    recording, design = history.recording, paper_design(history)
     ends = time_window(recording.t, window)
     part = shown(recording.t, ends)
-    t, W, V = recording.t[part], history.W[:-1][part], history.V[:-1][part]
+    t, W, V = recording.t[part], history.carried["W"][:-1][part], history.carried["V"][:-1][part]
 
     figure = new_figure(PAGE, 4.2)
     upper, lower = figure.subplots(2, 1, sharex=True)
