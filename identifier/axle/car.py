@@ -1,0 +1,64 @@
+"""The car in units of its static axle loads, where mass drops out of the equations.
+
+Rows are axles, front and rear.   F_z = m g l_o/L: static load [N], l_o distance to the other axle.
+φ = F_y/F_z [-].   ξ_i = v_y/g ± I_z r/(L F_z,i) [s], the axle impulse of (7) over F_z, obeys
+dξ_i/dt = φ_i cos δ_i - v_x r/g exactly: one axle, one equation, no stiffness in it.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.vehicle import GRAVITY, Vehicle
+
+Array = NDArray[np.float64]
+
+
+class Car(NamedTuple):
+    """Columns (2, 1), numbers or symbols: front and rear.
+
+    arm : l_f and -l_r [m].   share : of the weight on the axle [-].
+    inertia : ±I_z/(L F_z) [s²/rad].   load : F_z [N].
+    """
+
+    arm: Any
+    share: Any
+    inertia: Any
+    load: Any
+
+
+def car_numbers(vehicle: Vehicle) -> Array:
+    """Return the columns of `Car` (2, 4).
+
+    Parameters
+    ----------
+    vehicle : the car as the identifier is told of it.
+    """
+    load = np.array(vehicle.axle_loads)
+    yaw = np.array([1.0, -1.0]) * vehicle.yaw_inertia / (vehicle.wheelbase * load)
+    arm = np.array([vehicle.l_f, -vehicle.l_r])
+    return np.column_stack([arm, load / vehicle.weight, yaw, load])
+
+
+def froude_speed(vehicle: Vehicle) -> float:
+    """Return U = sqrt(g L) [m/s], the speed that scales with the size of the car.
+
+    Parameters
+    ----------
+    vehicle : the car; 5 m/s for a sedan, 1.3 m/s for a 1:10 model.
+    """
+    return math.sqrt(GRAVITY * vehicle.wheelbase)
+
+
+def axle_impulse(car: Car, v_y: Any, r: Any) -> Any:
+    """Return ξ [s], (2,).
+
+    Parameters
+    ----------
+    car : the car.
+    v_y : lateral velocity [m/s].
+    r : yaw rate [rad/s].
+    """
+    return v_y / GRAVITY + car.inertia * r

@@ -1,0 +1,191 @@
+"""The axle identifier as a method: everything that is chosen before the car drives."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen import Scan
+from identifier.axle.bounds import Bounds
+from identifier.axle.car import car_numbers, froude_speed
+from identifier.axle.excitation import EDGES
+from identifier.axle.forward import OVER
+from identifier.axle.friction_change import ChangeDetector
+from identifier.axle.gate import GateState, Plausibility
+from identifier.axle.model import AxleModel
+from identifier.axle.prior import Prior, friction_direction
+from identifier.axle.regression import Regression
+from identifier.axle.rls import packed, unpacked
+from identifier.axle.slip import SensitivityState
+from identifier.axle.step import CARRY, build_step
+from identifier.axle.sway import Sway, SwayState
+from identifier.axle.units import LADDER, doublings
+from identifier.method import FrozenModel, Setup
+from models.recordings import Recording
+from models.vehicle import GRAVITY, Vehicle
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AxleDesign:
+    """Axle units, lag, sway, and recursive least squares with directional forgetting.
+
+    Parameters
+    ----------
+    prior : what is believed before the first sample.
+    sway : roll of the body.
+    bounds : limits of what is learnt.
+    plausibility : which samples are believed, and the lowest speeds.
+    regression : filter, error model and memory.
+    change : detector of a change of friction.
+    ladder : slip scales of the units [rad], rising by powers of two.
+    rising_until : slip at which force curves shall not fall yet [rad]; None leaves them free.
+    dt : sampling interval T_s [s].
+
+    Raises
+    ------
+    ValueError
+        Where the ladder does not rise by powers of two, or dt or rising_until is not positive.
+    """
+
+    prior: Prior
+    sway: Sway
+    bounds: Bounds
+    plausibility: Plausibility
+    regression: Regression = field(default_factory=Regression)
+    change: ChangeDetector = field(default_factory=ChangeDetector)
+    ladder: tuple[float, ...] = LADDER
+    rising_until: float | None = None
+    dt: float = 0.01
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "ladder", tuple(self.ladder))  # a list would not hash
+        doublings(self.ladder)
+        if not 0.0 < self.dt < math.inf:
+            raise ValueError(f"dt must be positive, it is {self.dt}")
+        if self.rising_until is not None and not 0.0 < self.rising_until < math.inf:
+            raise ValueError(f"rising_until must be positive, it is {self.rising_until}")
+
+    @classmethod
+    def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> "AxleDesign":
+        """Return the design for a car: lengths scale with L, speeds with U = sqrt(g L) (Froude).
+
+        Parameters
+        ----------
+        vehicle : only its wheelbase is used here; its cornering stiffness enters the prior.
+        dt : sampling interval [s].
+        """
+        L, U = vehicle.wheelbase, froude_speed(vehicle)
+        return cls(
+            prior=Prior(compliance=0.01 * L, sd_compliance=0.01 * L, sd_v_y=0.005 * U),
+            sway=Sway.for_vehicle(vehicle),
+            bounds=Bounds(compliance=0.12 * L, v_y=0.04 * U),
+            plausibility=Plausibility(
+                min_speed=0.2 * U,
+                learning_speed=0.6 * U,
+                max_speed=60.0 * U,
+                slow=U,
+                max_yaw_rate=4.0 * U / L,
+                max_rate=3.0 * GRAVITY,
+                jump=0.1 * U,
+                max_yaw_acceleration=6.0 * GRAVITY / L,
+                yaw_jump=0.2 * U / L,
+            ),
+            dt=dt,
+        )
+
+    @property
+    def min_speed(self) -> float:
+        """Below this speed [m/s] forces read zero; learning rests below `learning_speed`."""
+        return self.plausibility.min_speed
+
+    def setup(
+        self, vehicle: Vehicle, recording: Recording, start: FrozenModel | None = None
+    ) -> Setup:
+        """Return what a run needs.
+
+        Parameters
+        ----------
+        vehicle : the car as the identifier is told of it.
+        recording : not read: the run starts with its first plausible sample.
+        start : stored weights to begin with, which know how sure they are; None takes the prior.
+
+        Raises
+        ------
+        ValueError
+            Where stored weights are those of another structure.
+        """
+        del recording
+        n = len(self.ladder)
+        W, own = self.prior.means(vehicle, self.ladder)
+        P = prior_P = self.prior.covariance(vehicle, self.ladder)
+        excitation = np.zeros((2, 1 + len(EDGES)))
+        if start is not None:
+            if not isinstance(start, AxleModel) or start.ladder != self.ladder:
+                raise ValueError("the stored weights are of another structure than the design's")
+            W, own, P, excitation = start.W, start.own, start.covariance, start.excitation
+        trace = np.trace(prior_P[:, :n, :n], axis1=1, axis2=2)
+        return Setup(
+            scan=_scan(doublings(self.ladder), self.rising_until is not None),
+            carry={
+                "W": W,
+                "own": own,
+                "P": packed(P),
+                "gate": np.zeros(len(GateState._fields)),
+                "sway": np.zeros(len(SwayState._fields)),
+                "slip": np.tile([0.0, 0.0, 1.0, 0.0], (2, 1)),  # slope 1: never divided by zero
+                "sensitivity": np.zeros((2, len(SensitivityState._fields))),
+                "filters": np.zeros((2, n + 4)),
+                "errors": np.tile([0.0, 1.0, 0.0], (2, 1)),
+                "excitation": excitation,
+            },
+            constants={
+                "dt": np.array(self.dt),
+                "car": car_numbers(vehicle),
+                "scales": 1.0 / np.array(self.ladder)[None],
+                "plausibility": self.plausibility.numbers(),
+                "roll": self.sway.numbers(),
+                "regression": self.regression.numbers(self.dt),
+                "change": self.change.numbers(self.dt),
+                "bounds": self.bounds.numbers(),
+                "friction_direction": friction_direction(self.ladder),
+                "widest": self.regression.widest * trace,
+                **self._rising(),
+            },
+        )
+
+    def _rising(self) -> dict[str, Array]:
+        """Return the derivatives of the units where curves shall not fall."""
+        if self.rising_until is None:
+            return {}
+        scales = np.array(self.ladder)
+        return {"rising": 1.0 / (scales * np.cosh(self.rising_until / scales) ** 2)}
+
+    def frozen(self, vehicle: Vehicle, carried: Mapping[str, Array]) -> AxleModel:
+        """Return the model with the carried weights.
+
+        Parameters
+        ----------
+        vehicle : the car.
+        carried : W (2, n), own (2, 3), P (2, q (q + 1)/2) and excitation (2, 9).
+        """
+        return AxleModel(
+            vehicle=vehicle,
+            ladder=self.ladder,
+            sway=self.sway,
+            plausibility=self.plausibility,
+            W=carried["W"].copy(),
+            own=carried["own"].copy(),
+            covariance=unpacked(carried["P"], len(self.ladder) + 3),
+            prior_covariance=self.prior.covariance(vehicle, self.ladder),
+            excitation=carried["excitation"].copy(),
+        )
+
+
+@cache
+def _scan(steps: tuple[int, ...], rises: bool) -> Scan:
+    return Scan(build_step(steps, rises=rises), carry=CARRY, over=OVER)

@@ -1,0 +1,167 @@
+"""Which samples are believed, and when learning may run.
+
+A sample that no car could have made is replaced by the last good one; after `hold` seconds of
+that the run restarts with the next good one. Learning waits `settle` seconds after a restart,
+after three bad samples in a row, and while v_y and r repeat to the last bit (a stuck sensor).
+"""
+
+from dataclasses import astuple, dataclass, fields
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from identifier.axle.checks import require_positive
+from identifier.axle.piecewise import larger
+
+Array = NDArray[np.float64]
+
+BAD_IN_A_ROW = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plausibility:
+    """Bounds of what a car can do; generous, since they are there for faults.
+
+    Parameters
+    ----------
+    min_speed : below this speed [m/s] forces read zero.
+    learning_speed : below this speed [m/s] learning rests.
+    max_speed : no car is faster [m/s].
+    max_sideslip : largest |v_y|/v_x [-].
+    slow : speed that stands for v_x in that ratio, where v_x is lower [m/s].
+    max_yaw_rate : [rad/s].
+    max_steering : [rad].
+    max_rate : largest acceleration [m/s²].
+    jump : what noise may add to v_x and v_y from one sample to the next [m/s].
+    max_yaw_acceleration : [rad/s²].
+    yaw_jump : what noise may add to r [rad/s].
+    max_steering_rate : [rad/s].
+    steering_jump : what noise may add to the steering [rad].
+    hold : longest time to go on with the last good sample [s].
+    settle : time to wait before learning [s].
+
+    Raises
+    ------
+    ValueError
+        Where a number is not positive.
+    """
+
+    min_speed: float
+    learning_speed: float
+    max_speed: float
+    max_sideslip: float = 0.6
+    slow: float
+    max_yaw_rate: float
+    max_steering: float = 1.2
+    max_rate: float
+    jump: float
+    max_yaw_acceleration: float
+    yaw_jump: float
+    max_steering_rate: float = 10.0
+    steering_jump: float = 0.1
+    hold: float = 0.25
+    settle: float = 0.5
+
+    def __post_init__(self) -> None:
+        require_positive(self)
+
+    def numbers(self) -> Array:
+        """Return the fields in their order, (15,)."""
+        return np.array(astuple(self))
+
+
+class GateState(NamedTuple):
+    """Last good sample (SI), whether the run is on (0 or 1), time of steady learning [s], and
+    samples in a row that were bad or stuck.
+    """
+
+    v_x: Any
+    v_y: Any
+    r: Any
+    delta_f: Any
+    delta_r: Any
+    on: Any
+    steady: Any
+    bad: Any
+    stuck: Any
+
+
+class Gate(NamedTuple):
+    """What the gate lets through.
+
+    v_x, v_y, r and delta (2,): the sample to go on with.   on : whether forces are told.
+    first : 1 at a (re)start, else 0.   learns : whether learning runs.   state : to carry.
+    """
+
+    v_x: Any
+    v_y: Any
+    r: Any
+    delta: Any
+    on: Any
+    first: Any
+    learns: Any
+    state: Any
+
+
+def _all(*conditions: Any) -> Any:
+    result = conditions[0]
+    for condition in conditions[1:]:
+        result = ca.logic_and(result, condition)
+    return result
+
+
+def gate(limits: Any, dt: Any, last: GateState, x: Any, u: Any, v_x: Any) -> Gate:
+    """Judge a sample.
+
+    Parameters
+    ----------
+    limits : the numbers of `Plausibility`, in their order, (15,).
+    dt : sampling interval [s].
+    last : state before the sample.
+    x : [v_y, r] (2,).
+    u : [δ_f, δ_r] (2,).
+    v_x : longitudinal speed [m/s].
+    """
+    names = [field.name for field in fields(Plausibility)]
+    at = dict(zip(names, ca.vertsplit(limits), strict=True))
+    v_y, r, delta_f, delta_r = x[0], x[1], u[0], u[1]
+    possible = _all(
+        v_x < at["max_speed"],
+        ca.fabs(v_y) < at["max_sideslip"] * larger(ca.fabs(v_x), at["slow"]),
+        ca.fabs(r) < at["max_yaw_rate"],
+        ca.fabs(delta_f) < at["max_steering"],
+        ca.fabs(delta_r) < at["max_steering"],
+    )
+    since = dt * (1 + last.bad)
+    reach = at["max_rate"] * since + at["jump"]
+    turn = at["max_steering_rate"] * since + at["steering_jump"]
+    near = _all(
+        ca.fabs(v_x - last.v_x) < reach,
+        ca.fabs(v_y - last.v_y) < reach,
+        ca.fabs(r - last.r) < at["max_yaw_acceleration"] * since + at["yaw_jump"],
+        ca.fabs(delta_f - last.delta_f) < turn,
+        ca.fabs(delta_r - last.delta_r) < turn,
+    )
+    good = ca.logic_and(possible, ca.logic_or(near, ca.logic_not(last.on)))
+    bad = ca.if_else(good, 0, last.bad + 1)
+    same = ca.logic_and(v_y == last.v_y, r == last.r)
+    stuck = ca.if_else(same, last.stuck + 1, 0)
+
+    sample = (v_x, v_y, r, delta_f, delta_r)
+    used = [ca.if_else(good, new, old) for new, old in zip(sample, last[:5], strict=True)]
+    held = ca.logic_and(last.on, bad * dt <= at["hold"])
+    on = ca.logic_and(used[0] >= at["min_speed"], ca.logic_or(good, held))
+    steady = _all(used[0] > at["learning_speed"], bad < BAD_IN_A_ROW, stuck < BAD_IN_A_ROW, on)
+    clock = ca.if_else(steady, last.on * last.steady + dt, 0)
+    return Gate(
+        v_x=larger(used[0], at["min_speed"]),
+        v_y=used[1],
+        r=used[2],
+        delta=ca.vertcat(used[3], used[4]),
+        on=on,
+        first=1 - last.on,
+        learns=ca.logic_and(good, clock >= at["settle"] * (1 - 1e-9)),
+        state=ca.vertcat(*used, on, clock, ca.if_else(on, bad, 0), stuck),
+    )

@@ -1,0 +1,271 @@
+"""The axle model, frozen: force curves of slip, their lag and sway, and where they are known."""
+
+import json
+from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen import Scan
+from identifier.axle.car import car_numbers
+from identifier.axle.excitation import EDGES
+from identifier.axle.forward import CARRY, OVER, build_frozen
+from identifier.axle.gate import GateState, Plausibility
+from identifier.axle.slip import SHORTEST
+from identifier.axle.sway import Sway, SwayState
+from identifier.axle.units import doublings, unit_matrix
+from identifier.method import Setup
+from identifier.model_format import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
+from models.recordings import Recording
+from models.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+KIND = "axle"
+ARRAYS = ("W", "own", "covariance", "prior_covariance", "excitation")
+DOUBT = 0.25  # standard deviation over the prior's, above which a slip is not known
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AxleModel:
+    """Axle forces φ(x) = Σ w_j tanh(x/α_j) of lagged slip x, in static axle loads.
+
+    Odd in slip up to the sensor offsets, saturating at Σ w_j. Rows are axles, front and rear.
+
+    Parameters
+    ----------
+    vehicle : the car.
+    ladder : slip scales α_j of the units [rad].
+    sway : roll of the body.
+    plausibility : which samples are believed.
+    W : weights [static axle loads], (2, n).
+    own : [compliance [m per load], sway share [-], offset ([rad] front, [m/s] rear)], (2, 3).
+    covariance : of [W, own], (2, n + 3, n + 3).
+    prior_covariance : the same before the first sample.
+    excitation : largest slip [rad], then time of learning above each of `EDGES` [s], (2, 9).
+
+    Raises
+    ------
+    ValueError
+        Where a number has the wrong shape or is not finite.
+    """
+
+    vehicle: Vehicle
+    ladder: tuple[float, ...]
+    sway: Sway
+    plausibility: Plausibility
+    W: Array
+    own: Array
+    covariance: Array
+    prior_covariance: Array
+    excitation: Array
+
+    def __post_init__(self) -> None:
+        doublings(self.ladder)
+        n = len(self.ladder)
+        for name, shape in (
+            ("W", (2, n)),
+            ("own", (2, 3)),
+            ("covariance", (2, n + 3, n + 3)),
+            ("prior_covariance", (2, n + 3, n + 3)),
+            ("excitation", (2, 1 + len(EDGES))),
+        ):
+            value = getattr(self, name)
+            if value.shape != shape:
+                raise ValueError(f"{name} must have shape {shape}, it has {value.shape}")
+            if not np.isfinite(value).all():
+                raise ValueError(f"{name} holds a number that is not finite")
+        if (self.own[:, 0] < 0.0).any():
+            raise ValueError(f"compliance must not be negative, it is {self.own[:, 0]}")
+
+    @property
+    def min_speed(self) -> float:
+        """Below this speed [m/s] the forces read zero."""
+        return self.plausibility.min_speed
+
+    @property
+    def cornering_stiffness(self) -> Array:
+        """Slope of the force curves at zero [N/rad], (2,): the linear part of the model."""
+        slope: Array = (self.W / np.array(self.ladder)).sum(axis=1)
+        return slope * self._loads
+
+    @property
+    def relaxation_length(self) -> Array:
+        """Lag of slip at small slip [m], (2,); it shortens with the slope of the curve."""
+        slope: Array = (self.W / np.array(self.ladder)).sum(axis=1)
+        return self.own[:, 0] * np.maximum(slope, 0.0) + SHORTEST * self.vehicle.wheelbase
+
+    @property
+    def _loads(self) -> Array:
+        return np.array(self.vehicle.axle_loads)
+
+    def force_at(self, alpha: Array) -> Array:
+        """Return the steady axle forces at slip angles, (k, 2) [N].
+
+        Parameters
+        ----------
+        alpha : slip angles in the paper's sign [rad], (k,).
+        """
+        force: Array = unit_matrix(alpha, self.ladder) @ self.W.T * self._loads
+        return force
+
+    def doubt(self, alpha: Array) -> Array:
+        """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning.
+
+        Standard deviation of the force over that of the prior.
+
+        Parameters
+        ----------
+        alpha : slip angles [rad], (k,), not zero.
+        """
+        T, n = unit_matrix(alpha, self.ladder), len(self.ladder)
+        ratio = [
+            np.einsum("ki,ij,kj->k", T, now[:n, :n], T)
+            / np.einsum("ki,ij,kj->k", T, before[:n, :n], T)
+            for now, before in zip(self.covariance, self.prior_covariance, strict=True)
+        ]
+        doubt: Array = np.sqrt(np.maximum(np.stack(ratio, axis=1), 0.0))
+        return doubt
+
+    @property
+    def known_slip_range(self) -> Array:
+        """Largest slip [rad] that was seen while learning and where the doubt is small, (2,)."""
+        grid = np.linspace(0.0, 1.0, 201)[1:]
+        known = np.zeros(2)
+        for i, largest in enumerate(self.excitation[:, 0]):
+            if largest > 0.0:
+                sure = self.doubt(largest * grid)[:, i] <= DOUBT
+                count = sure.size if sure.all() else int(np.argmin(sure))
+                known[i] = largest * count / grid.size
+        return known
+
+    @property
+    def learning_time(self) -> Array:
+        """Time of learning in each range of slip between `EDGES`, the last open [s], (2, 8)."""
+        above = self.excitation[:, 1:]
+        return above - np.column_stack([above[:, 1:], np.zeros(2)])
+
+    def outside(self, recording: Recording) -> NDArray[np.bool_]:
+        """Return where the slip leaves the known range, (n, 2).
+
+        Parameters
+        ----------
+        recording : its signals are the input.
+        """
+        outside: NDArray[np.bool_] = self._run(recording)["slip_size"] > self.known_slip_range
+        return outside
+
+    def lagged_slip(self, recording: Recording) -> Array:
+        """Return the slip that makes the force, in the paper's sign, (n, 2) [rad].
+
+        Parameters
+        ----------
+        recording : its signals are the input.
+        """
+        return self._run(recording)["lagged_slip"]
+
+    def axle_force(self, recording: Recording) -> Array:
+        """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
+
+        Parameters
+        ----------
+        recording : its signals are the input; its forces are not looked at.
+        """
+        return self._run(recording)["axle_force"]
+
+    def setup(self, recording: Recording) -> Setup:
+        """Return what a replay needs.
+
+        Parameters
+        ----------
+        recording : what is replayed; only its sampling interval is looked at.
+        """
+        return Setup(
+            scan=_frozen_scan(doublings(self.ladder)),
+            carry={
+                "gate": np.zeros(len(GateState._fields)),
+                "sway": np.zeros(len(SwayState._fields)),
+                "slip": np.tile([0.0, 0.0, 1.0, 0.0], (2, 1)),
+            },
+            constants={
+                "W": self.W,
+                "own": self.own,
+                "dt": np.array(recording.dt),
+                "car": car_numbers(self.vehicle),
+                "scales": 1.0 / np.array(self.ladder)[None],
+                "plausibility": self.plausibility.numbers(),
+                "roll": self.sway.numbers(),
+            },
+        )
+
+    def _run(self, recording: Recording) -> dict[str, Array]:
+        return self.setup(recording).run(recording)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the model as plain numbers and words, ready for JSON."""
+        return {
+            "format": FORMAT,
+            "kind": KIND,
+            "units": {
+                "ladder": "rad",
+                "W": "static axle loads",
+                "own": "m per static axle load, -, rad (front) or m/s (rear)",
+                "excitation": "rad, then s above the edges",
+                "edges": "rad",
+            },
+            "vehicle": vehicle_numbers(self.vehicle),
+            "sway": asdict(self.sway),
+            "plausibility": asdict(self.plausibility),
+            "ladder": list(self.ladder),
+            "edges": list(EDGES),
+            **{name: getattr(self, name).tolist() for name in ARRAYS},
+            "cornering_stiffness_N_rad": self.cornering_stiffness.tolist(),
+            "relaxation_length_m": self.relaxation_length.tolist(),
+            "known_slip_range_rad": self.known_slip_range.tolist(),
+        }
+
+    def save(self, path: Path) -> None:
+        """Write the model as JSON.
+
+        Parameters
+        ----------
+        path : the file.
+        """
+        path.write_text(json.dumps(self.to_dict(), indent=2) + "\n", encoding="utf-8")
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any], source: str) -> "AxleModel":
+        """Return the model that `to_dict` describes.
+
+        Parameters
+        ----------
+        data : as from `to_dict`.
+        source : name of the file, for errors.
+
+        Raises
+        ------
+        FrozenModelError
+            Where a key is missing or a value impossible.
+        """
+        try:
+            if list(data["edges"]) != list(EDGES):
+                raise ValueError(f"edges must be {list(EDGES)}, they are {data['edges']}")
+            return cls(
+                vehicle=vehicle_from(data["vehicle"]),
+                ladder=tuple(float(scale) for scale in data["ladder"]),
+                sway=Sway(**data["sway"]),
+                plausibility=Plausibility(**data["plausibility"]),
+                **{name: np.array(data[name], dtype=np.float64) for name in ARRAYS},
+            )
+        except KeyError as error:
+            raise FrozenModelError(f"{source}: key {error} is missing") from error
+        except (TypeError, ValueError) as error:
+            raise FrozenModelError(f"{source}: {error}") from error
+
+
+@cache
+def _frozen_scan(steps: tuple[int, ...]) -> Scan:
+    return Scan(build_frozen(steps), carry=CARRY, over=OVER)

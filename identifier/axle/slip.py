@@ -1,0 +1,141 @@
+"""The slip angle that makes the force: lagged by a carcass that is in series with the rubber.
+
+α = δ - atan2(v_y - b ± l r, v_x) + δ₀ + k (sway) in the paper's sign, with the zero δ₀ of the
+front steering and the bias b of v_y.   x' = (v_x/σ)(α - x), σ = s C(x): s is the deflection per
+load, C(x) the slope of the force curve, so that the lag shortens by itself where the tire slides.
+Solved exactly for α linear over the step (first-order hold): then the force still depends on s
+where σ is short against a step, and learning cannot get stuck at s = 0.
+"""
+
+from typing import Any, NamedTuple
+
+import casadi as ca
+
+from identifier.axle.car import Car
+from identifier.axle.gate import Gate
+from identifier.axle.units import Curve
+
+SHORTEST = 1e-3  # wheelbases: the lag never vanishes
+
+
+class SlipState(NamedTuple):
+    """Columns (2,): lagged slip x and slip α [rad]; slope C [1/rad] and force φ [-] at x."""
+
+    x: Any
+    alpha: Any
+    slope: Any
+    force: Any
+
+
+class SensitivityState(NamedTuple):
+    """Columns (2,): ∂x/∂s [rad per m/load], ∂x/∂k [rad], and dC/dx [1/rad²] at x."""
+
+    of_compliance: Any
+    of_share: Any
+    bend: Any
+
+
+class Hold(NamedTuple):
+    """One step of the lag, (2,): 1/σ [1/m], z = v_x dt/σ, e = exp(-z), φ = (1 - e)/z."""
+
+    per_sigma: Any
+    z: Any
+    e: Any
+    phi: Any
+
+
+def kinematic_slip(car: Car, seen: Gate, offset: Any) -> Any:
+    """Return α without sway [rad], (2,).
+
+    Parameters
+    ----------
+    car : the car.
+    seen : what the gate lets through.
+    offset : δ₀ [rad] and b [m/s], (2,).
+    """
+    sideways = seen.v_y - offset[1] + car.arm * seen.r
+    zero = ca.vertcat(offset[0], 0)
+    return seen.delta - ca.atan(sideways * (1 / seen.v_x)) + zero  # v_x > 0: atan2 is atan
+
+
+def hold(car: Car, v_x: Any, dt: Any, compliance: Any, slope: Any) -> Hold:
+    """Return the numbers of one step of the lag.
+
+    Parameters
+    ----------
+    car : the car.
+    v_x : longitudinal speed [m/s].
+    dt : sampling interval [s].
+    compliance : s [m], (2,).
+    slope : C(x) of the last sample [1/rad], (2,).
+    """
+    sigma = compliance * slope + SHORTEST * (car.arm[0] - car.arm[1])
+    z = v_x * dt * (1 / sigma)
+    e = ca.exp(-z)
+    return Hold(1 / sigma, z, e, (1 - e) * sigma * (1 / (v_x * dt)))
+
+
+def lagged_slip(h: Hold, last: SlipState, alpha: Any, first: Any) -> Any:
+    """Return x after the step [rad], (2,).
+
+    Parameters
+    ----------
+    h : numbers of the step.
+    last : state before the step.
+    alpha : slip angle now [rad], (2,).
+    first : 1 at a restart, which begins without lag, else 0.
+    """
+    change = alpha - last.alpha
+    x = h.e * last.x + (1 - h.e) * last.alpha + (1 - h.phi) * change
+    return first * alpha + (1 - first) * x
+
+
+def sensitivity(
+    h: Hold,
+    last: SlipState,
+    lasting: SensitivityState,
+    *,
+    compliance: Any,
+    alpha: Any,
+    first: Any,
+    sway_before: Any,
+    sway_now: Any,
+) -> tuple[Any, Any]:
+    """Return ∂x/∂s and ∂x/∂k after the step, (2,) each.
+
+    Parameters
+    ----------
+    h : numbers of the step.
+    last : slip before the step.
+    lasting : sensitivities before the step.
+    compliance : s [m], (2,).
+    alpha : slip angle now [rad], (2,).
+    first : 1 at a restart, else 0.
+    sway_before : ∂α/∂k at the last sample [rad].
+    sway_now : ∂α/∂k now [rad].
+    """
+    p_s, p_k = lasting.of_compliance, lasting.of_share
+    change = alpha - last.alpha
+    by_sigma = ((h.e - h.phi) * change - h.z * h.e * (last.alpha - last.x)) * h.per_sigma
+    p_s = h.e * p_s + by_sigma * (last.slope + compliance * lasting.bend * p_s)
+    p_k = h.e * p_k + (1 - h.e) * sway_before + (1 - h.phi) * (sway_now - sway_before)
+    return (1 - first) * p_s, first * sway_now + (1 - first) * p_k
+
+
+def force_gradient(c: Curve, of_compliance: Any, of_share: Any, cos_delta: Any, v_x: Any) -> Any:
+    """Return g = ∂(φ cos δ)/∂[w, s, k, offset], (2, n + 3).
+
+    The bias b of v_y is learnt at the rear axle: it acts on slip as b/v_x.
+
+    Parameters
+    ----------
+    c : force curve at x.
+    of_compliance : ∂x/∂s (2,).
+    of_share : ∂x/∂k (2,).
+    cos_delta : cos δ (2,).
+    v_x : longitudinal speed [m/s].
+    """
+    slope = c.slope * cos_delta
+    of_offset = ca.vertcat(1, 1 / v_x)
+    units = c.units * ca.repmat(cos_delta, 1, c.units.shape[1])
+    return ca.horzcat(units, slope * of_compliance, slope * of_share, slope * of_offset)

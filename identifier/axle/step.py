@@ -1,0 +1,160 @@
+"""The step of the axle identifier: one casadi.Function that is simulation, test and C source.
+
+Carried, rows front and rear: W (2, n) and own (2, 3), what is learnt; P (2, q (q + 1)/2) its
+covariance, upper triangles, q = n + 3; gate, sway, slip as in `forward`; sensitivity (2, 3);
+filters (2, q + 1); errors (2, 3); excitation (2, 9). Sampled: x, u, v_x. Everything else is a
+number that stays an input. Forces are told with the weights before the sample.
+"""
+
+from typing import Any, NamedTuple
+
+import casadi as ca
+
+from identifier.axle.bounds import BoundNumbers, bounded
+from identifier.axle.car import axle_impulse
+from identifier.axle.excitation import EDGES, excited
+from identifier.axle.forward import Forward, forward
+from identifier.axle.friction_change import (
+    ChangeNumbers,
+    ErrorState,
+    alarm,
+    error_means,
+    inflated,
+)
+from identifier.axle.piecewise import larger, within
+from identifier.axle.ports import axle_port, named_port
+from identifier.axle.regression import RegressionNumbers, filtered
+from identifier.axle.rls import Learnt, triangle, update
+from identifier.axle.slip import SensitivityState, force_gradient, sensitivity
+from models.vehicle import GRAVITY
+
+LEARNT = ("W", "own", "P")
+CARRY = (*LEARNT, "gate", "sway", "slip", "sensitivity", "filters", "errors", "excitation")
+
+
+class Lesson(NamedTuple):
+    """What a sample teaches, rows front and rear.
+
+    h : regressor (2, q).   error : y - h'w, clipped (2,).   R : its variance (2,).
+    inflation : variance to add along a change of friction.   learns : 1 or 0, (2,).
+    """
+
+    h: Any
+    error: Any
+    R: Any
+    inflation: Any
+    learns: Any
+
+
+def build_step(steps: tuple[int, ...], *, rises: bool = False) -> ca.Function:
+    """Return the step; every number stays an input of it.
+
+    Parameters
+    ----------
+    steps : doublings between the units, the structure.
+    rises : whether curves are kept from falling at a slip; adds the input `rising` (n,).
+    """
+    n = len(steps) + 1
+    f = forward(steps)
+    ports = dict(f.ports)
+    ports["P"] = ca.SX.sym("P", 2, len(triangle(n + 3)))
+    ports["friction_direction"] = ca.SX.sym("friction_direction", n, n)
+    ports["widest"] = ca.SX.sym("widest", 2)
+    h, y, carried = _regression(f, ports)
+    lesson, judged = _lesson(f, ports, h, y)
+    ports["bounds"], limits = named_port(BoundNumbers, "bounds")
+    if rises:
+        ports["rising"] = ca.SX.sym("rising", n)
+    axles = [_learn(ports, limits, lesson, i) for i in (0, 1)]
+    theta = ca.vertcat(*(ca.horzcat(*axle.theta) for axle in axles))
+    carried |= judged | f.carried
+    carried["W"], carried["own"] = theta[:, :n], theta[:, n:]
+    carried["P"] = ca.vertcat(*(ca.horzcat(*axle.P.values()) for axle in axles))
+    return ca.Function(
+        "_".join(["axle_step", *map(str, steps), *["rising"] * rises]),
+        list(ports.values()),
+        [*(carried[name] for name in CARRY), f.axle_force],
+        list(ports),
+        [*(f"{name}_next" for name in CARRY), "axle_force"],
+        {"cse": True},
+    )
+
+
+def _regression(f: Forward, ports: dict[str, Any]) -> tuple[Any, Any, dict[str, Any]]:
+    """Return h (2, q) and y (2,), and the states behind them; adds its ports."""
+    q = f.curve.units.shape[1] + 3
+    ports["sensitivity"], lasting = axle_port(SensitivityState, "sensitivity")
+    ports["filters"] = ca.SX.sym("filters", 2, q + 1)
+    ports["regression"], numbers = named_port(RegressionNumbers, "regression")
+    seen = f.seen
+    p_s, p_k = sensitivity(
+        f.hold,
+        f.last_slip,
+        lasting,
+        compliance=ports["own"][:, 0],
+        alpha=f.alpha,
+        first=seen.first,
+        sway_before=f.last_sway.slip,
+        sway_now=f.sway.slip,
+    )
+    g = force_gradient(f.curve, p_s, p_k, f.cos_delta, seen.v_x)
+    xi = numbers.bandwidth * axle_impulse(f.car, seen.v_y, seen.r)
+    inputs = ca.horzcat(g, xi - seen.v_x * seen.r / GRAVITY)
+    low, filters = filtered(numbers, ports["filters"], inputs, seen.first)
+    carried = {"sensitivity": ca.horzcat(p_s, p_k, f.curve.bend), "filters": filters}
+    return low[:, :q], xi - low[:, q], carried
+
+
+def _lesson(f: Forward, ports: dict[str, Any], h: Any, y: Any) -> tuple[Lesson, dict[str, Any]]:
+    """Return what the sample teaches, and the states behind it; adds its ports."""
+    ports["errors"], errors = axle_port(ErrorState, "errors")
+    ports["excitation"] = ca.SX.sym("excitation", 2, 1 + len(EDGES))
+    ports["change"], change = named_port(ChangeNumbers, "change")
+    numbers = RegressionNumbers(*ca.vertsplit(ports["regression"]))
+    learns, W = f.seen.learns, ports["W"]
+    y_hat = ca.sum2(W * h[:, : W.shape[1]])
+    error = y - y_hat
+    sigma = numbers.error + numbers.relative_error * ca.fabs(y_hat)
+    fast, slow = error_means(change, errors, (error / sigma) ** 2, learns)
+    peak = larger(ca.fabs(y_hat), errors.peak * numbers.decay)
+    peak = ca.if_else(learns, peak, errors.peak)
+    reach = numbers.clip * sigma * slow
+    lesson = Lesson(
+        h=h,
+        error=within(error, -reach, reach),
+        R=sigma**2 * slow * numbers.samples,
+        inflation=learns * change.inflation * alarm(change, fast, slow),
+        learns=ca.logic_and(learns, peak >= numbers.error),
+    )
+    times = excited(
+        ports["excitation"],
+        f.size,
+        dt=ports["dt"],
+        samples=numbers.samples,
+        learns=lesson.learns,
+    )
+    return lesson, {"errors": ca.horzcat(fast, slow, peak), "excitation": times}
+
+
+def _learn(ports: dict[str, Any], limits: BoundNumbers, lesson: Lesson, i: int) -> Learnt:
+    """Return parameters and covariance of axle i after the sample."""
+    w = ca.horzsplit(ports["W"][i, :])
+    theta = [*w, *ca.horzsplit(ports["own"][i, :])]
+    forgetting = RegressionNumbers(*ca.vertsplit(ports["regression"])).forgetting
+    P = dict(zip(triangle(len(theta)), ca.horzsplit(ports["P"][i, :]), strict=True))
+    direction = ca.vertsplit(ports["friction_direction"] @ ca.vertcat(*w))
+    P = inflated(P, direction, lesson.inflation)
+    learnt = update(
+        theta,
+        P,
+        ca.horzsplit(lesson.h[i, :]),
+        error=lesson.error[i],
+        R=lesson.R[i],
+        forgetting=forgetting,
+        grows=sum(P[j, j] for j in range(len(w))) <= ports["widest"][i],
+        learns=lesson.learns[i],
+    )
+    offset = (limits.steering, limits.v_y)[i]
+    slope = ca.vertsplit(ports["rising"]) if "rising" in ports else None
+    kept = bounded(limits, learnt.theta, learnt.P, offset=offset, slope=slope)
+    return Learnt(kept, learnt.P)

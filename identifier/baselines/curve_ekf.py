@@ -1,0 +1,198 @@
+"""The parameters of a tire curve by an extended Kalman filter; they freeze to that curve.
+
+Magic Formula: B, C, D per axle. Dugoff: stiffness per axle and the friction of the road.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Self
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen import Scan
+from identifier.baselines.curve_model import CurveModel
+from identifier.baselines.curves import CURVES
+from identifier.baselines.kalman import CARRY, NOISE, build_step
+from identifier.baselines.parametrizations import LIMITS, PARAMETRIZATIONS, SHAPE
+from identifier.baselines.ports import OVER, axle_loads
+from identifier.baselines.similarity import around, lowest_speed, require_positive, scales
+from identifier.method import FrozenModel, Setup
+from identifier.tuning import Range
+from models.bicycle import BicycleParameters
+from models.recordings import Recording
+from models.vehicle import GRAVITY, Vehicle
+
+Array = NDArray[np.float64]
+SPREADS = ("stiffness_spread", "shape_spread", "friction_spread")  # in the order of the kinds
+
+
+def build_curve_step(curve: str) -> ca.Function:
+    """Return the filter's step for a curve, see `kalman.build_step`; prior (1,) is a friction.
+
+    Parameters
+    ----------
+    curve : "magic_formula" or "dugoff".
+    """
+    shape, decode = CURVES[curve].force, PARAMETRIZATIONS[curve].decode
+
+    def force(p: BicycleParameters, known: Any, theta: Any, v_x: Any, x: Any, u: Any) -> Any:
+        loads = axle_loads(p, GRAVITY)
+        return shape(p, decode(p, known, loads, theta), loads, v_x, x, u)
+
+    n = len(PARAMETRIZATIONS[curve].kinds)
+    return build_step(f"{curve}_ekf", force, unknowns=n, prior=1, follows=False)
+
+
+@cache
+def _scan(curve: str) -> Scan:
+    return Scan(build_curve_step(curve), carry=CARRY, over=OVER)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CurveEkf:
+    """Tire parameters that walk at random, slowly, in the coordinates of `parametrizations`.
+
+    Parameters
+    ----------
+    curve : "magic_formula" or "dugoff".
+    walk : of every parameter [1/√s].
+    v_y_noise : standard deviation of measured v_y [m/s].
+    r_noise : standard deviation of the measured yaw rate [rad/s].
+    v_y_disturbance : what the curve misses, as random change of v_y [m/s/√s].
+    r_disturbance : what the curve misses, as random change of the yaw rate [rad/s/√s].
+    friction : what friction is held for at first [-].
+    stiffness_spread : standard deviation of the logarithm of stiffness at first [-].
+    shape_spread : standard deviation of the Magic Formula's shape at first, as its logit [-].
+    friction_spread : standard deviation of the logarithm of friction at first [-].
+    outlier : standard deviations from which an innovation teaches no more.
+    dt : sampling interval [s].
+    learning_speed : below this speed [m/s] learning rests.
+    min_speed : below this speed [m/s] forces read zero.
+
+    Raises
+    ------
+    ValueError
+        Where the curve is unknown or a number not positive.
+    """
+
+    curve: str
+    walk: float
+    v_y_noise: float
+    r_noise: float
+    v_y_disturbance: float
+    r_disturbance: float
+    friction: float = 0.9
+    stiffness_spread: float = 0.5
+    shape_spread: float = 0.7
+    friction_spread: float = 0.4
+    outlier: float = 5.0
+    dt: float = 0.01
+    learning_speed: float = 3.0
+    min_speed: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.curve not in PARAMETRIZATIONS:
+            raise ValueError(f"curve must be one of {list(PARAMETRIZATIONS)}, not {self.curve!r}")
+        names = ("walk", *NOISE, "friction", *SPREADS, "dt", "learning_speed", "min_speed")
+        require_positive(**{name: getattr(self, name) for name in names})
+
+    @classmethod
+    def for_vehicle(cls, vehicle: Vehicle, *, curve: str, dt: float = 0.01) -> Self:
+        """Return the filter for a car: for a sedan noise of 0.02 m/s and 0.002 rad/s.
+
+        Disturbances stand for what a static curve misses: 8 % of g, for a natural time at once.
+        The parameters may walk by one percent in a second.
+
+        Parameters
+        ----------
+        vehicle : the car.
+        curve : "magic_formula" or "dugoff".
+        dt : sampling interval [s].
+        """
+        time, speed = scales(vehicle).time, scales(vehicle).speed
+        return cls(
+            curve=curve,
+            walk=0.0075 / math.sqrt(time),
+            v_y_noise=0.004 * speed,
+            r_noise=0.001 / time,
+            v_y_disturbance=0.08 * speed / math.sqrt(time),
+            r_disturbance=0.12 / time**1.5,
+            dt=dt,
+            learning_speed=0.6 * speed,
+            min_speed=lowest_speed(vehicle),
+        )
+
+    @property
+    def tunables(self) -> Mapping[str, Range]:
+        """What a search may vary, around the numbers that it has."""
+        factors = {"walk": 10.0, "v_y_noise": 4.0, "r_noise": 4.0}
+        factors |= {"v_y_disturbance": 5.0, "r_disturbance": 5.0, "friction": 1.5}
+        factors |= {"stiffness_spread": 3.0, "friction_spread": 3.0}
+        if SHAPE in PARAMETRIZATIONS[self.curve].kinds:
+            factors |= {"shape_spread": 3.0}
+        return {name: around(getattr(self, name), factor) for name, factor in factors.items()}
+
+    def setup(
+        self, vehicle: Vehicle, recording: Recording, start: FrozenModel | None = None
+    ) -> Setup:
+        """Return what a run needs.
+
+        Parameters
+        ----------
+        vehicle : the car; its stiffness is the prior.
+        recording : what it will run over.
+        start : a frozen curve of the same kind to begin with; None begins with the prior.
+
+        Raises
+        ------
+        ValueError
+            Where the stored model is of another kind.
+        """
+        del recording
+        kinds, _, encode = PARAMETRIZATIONS[self.curve]
+        theta = np.zeros(len(kinds))
+        if start is not None:
+            if not isinstance(start, CurveModel) or start.curve != self.curve:
+                raise ValueError(f"the stored model is not a curve {self.curve!r}")
+            theta = encode(vehicle, self.friction, start.parameters)
+        spread = [getattr(self, SPREADS[kind]) for kind in kinds]
+        return Setup(
+            scan=_scan(self.curve),
+            carry={
+                "estimate": np.concatenate([np.zeros(2), theta]),
+                "P": np.diag([self.v_y_noise, self.r_noise, *spread]) ** 2,
+                "before": np.zeros(3),
+                "running": np.zeros(1),
+            },
+            constants={
+                "noise": np.array([getattr(self, name) for name in NOISE]),
+                "walk": np.full(len(kinds), self.walk),
+                "limit": np.array([LIMITS[kind] for kind in kinds]),
+                "prior": np.array([self.friction]),
+                "learning_speed": np.array(self.learning_speed),
+                "vehicle": np.array(vehicle.bicycle),
+                "sampling": np.array([self.dt, self.min_speed]),
+            },
+        )
+
+    def frozen(self, vehicle: Vehicle, carried: Mapping[str, Array]) -> CurveModel:
+        """Return the curve with the carried parameters.
+
+        Parameters
+        ----------
+        vehicle : the car.
+        carried : estimate (2 + n,).
+        """
+        decode = PARAMETRIZATIONS[self.curve].decode
+        loads = ca.DM(vehicle.axle_loads)
+        theta = ca.DM(carried["estimate"][2:])
+        return CurveModel(
+            vehicle=vehicle,
+            curve=self.curve,
+            parameters=np.array(ca.DM(decode(vehicle.bicycle, self.friction, loads, theta))),
+            min_speed=self.min_speed,
+        )

@@ -1,0 +1,111 @@
+"""One extended Kalman filter for every unknown that makes axle forces: [v_y, r, θ].
+
+ẋ = K F(θ, x, u) - [v_x r, 0] + w_x,   θ̇ = w_θ (random walk),   measured: x + noise.
+The sampled map is the linearly implicit midpoint rule, which no stiff tire at low speed makes
+unstable: x⁺ = x + T_s (I - T_s J/2)⁻¹ f, with f and J = ∂f/∂x at the mean of steering and speed.
+Its Jacobian is taken by automatic differentiation; the covariance is updated in Joseph's form. An
+innovation beyond `outlier` standard deviations moves θ no further than one at that distance, x
+follows it all the way. Source: Simon, Optimal State Estimation, 2006, sections 5.1 and 13.2.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import casadi as ca
+
+from identifier.baselines.ports import OVER, motion_rate, sample_ports
+from models.bicycle import BicycleParameters
+
+CARRY = ("estimate", "P", "before", "running")
+CONSTANTS = ("noise", "walk", "limit", "prior", "learning_speed")
+NOISE = ("v_y_noise", "r_noise", "v_y_disturbance", "r_disturbance", "outlier")
+
+# (bicycle parameters, prior, θ, v_x, x, u) -> axle forces (2,) [N]
+Force = Callable[[BicycleParameters, Any, Any, Any, Any, Any], Any]
+
+
+def build_step(name: str, force: Force, *, unknowns: int, prior: int, follows: bool) -> ca.Function:
+    """Return the filter's step; all numbers stay inputs of it.
+
+    Carried: estimate (2 + n,) = [v_y, r, θ], its covariance P, before (3,) = δ_f, δ_r and v_x of
+    the last sample, running (1 after a sample in motion). Constant: noise in the order of `NOISE`
+    (standard deviations [m/s], [rad/s]; disturbances per root of time [m/s/√s], [rad/s/√s]), walk
+    (n,) of θ [1/√s], limit (n,) of |θ|, learning_speed [m/s], prior: whatever the force needs.
+    Below that speed θ and its covariance are kept, and x begins anew from the measurement.
+
+    Parameters
+    ----------
+    name : of the function.
+    force : axle forces by θ.
+    unknowns : n, size of θ.
+    prior : size of the prior.
+    follows : whether the force told is that of the corrected θ (a signal), else that of the θ
+        carried into the sample (a model, which then freezes to the same force).
+    """
+    s = sample_ports()
+    p, dt, n = s.parameters, s.sampling[0], 2 + unknowns
+    estimate, P, before = ca.SX.sym("estimate", n), ca.SX.sym("P", n, n), ca.SX.sym("before", 3)
+    running, noise = ca.SX.sym("running"), ca.SX.sym("noise", len(NOISE))
+    walk, limit = ca.SX.sym("walk", unknowns), ca.SX.sym("limit", unknowns)
+    known, learning_speed = ca.SX.sym("prior", prior), ca.SX.sym("learning_speed")
+    x, theta = estimate[:2], estimate[2:]
+    learning = s.v_x >= learning_speed
+
+    u_mean = (before[:2] + s.u) / 2
+    v_mean = ca.fmax((before[2] + s.v_x) / 2, learning_speed)
+    rate = motion_rate(p, v_mean, x, force(p, known, theta, v_mean, x, u_mean))
+    implicit = ca.inv_minor(ca.SX.eye(2) - dt / 2 * ca.jacobian(rate, estimate)[:, :2])
+    ahead = ca.vertcat(x + dt * implicit @ rate, theta)
+    F = ca.jacobian(ahead, estimate)
+    Q = ca.diag(ca.vertcat(noise[2:4], walk) ** 2 * dt)
+    R = ca.diag(noise[:2] ** 2)
+    corrected, P_corrected = correct(ahead, F @ P @ F.T + Q, R, s.x, noise[4])
+
+    going = ca.logic_and(learning, running > 0.5)
+    afresh = ca.vertcat(s.x, theta)
+    P_afresh = ca.diagcat(R, P[2:, 2:])
+    following = ca.if_else(going, corrected, afresh)
+    theta_next = ca.fmin(ca.fmax(following[2:], -limit), limit)
+    told = theta_next if follows else theta
+    axle_force = force(p, known, told, s.speed, s.x, s.u)
+    return ca.Function(
+        name,
+        [
+            *(estimate, P, before, running),
+            *(s.x, s.u, s.v_x),
+            *(noise, walk, limit, known, learning_speed, s.vehicle, s.sampling),
+        ],
+        [
+            ca.vertcat(following[:2], theta_next),
+            ca.densify(ca.if_else(going, P_corrected, P_afresh)),
+            ca.vertcat(s.u, s.v_x),
+            ca.if_else(learning, 1, 0),
+            ca.if_else(s.moving, axle_force, 0),
+        ],
+        [*CARRY, *OVER, *CONSTANTS, "vehicle", "sampling"],
+        [*(f"{port}_next" for port in CARRY), "axle_force"],
+        {"cse": True},
+    )
+
+
+def correct(estimate: Any, P: Any, R: Any, x: Any, outlier: Any) -> tuple[Any, Any]:
+    """Return estimate and covariance after the measurement of the first two states.
+
+    Parameters
+    ----------
+    estimate : before, (n,).
+    P : its covariance (n, n).
+    R : covariance of the measurement (2, 2).
+    x : the measurement (2,).
+    outlier : standard deviations from which an innovation counts no more for the other states.
+    """
+    S = P[:2, :2] + R
+    gain = P[:, :2] @ ca.inv_minor(S)
+    innovation = x - estimate[:2]
+    deviation = ca.sqrt(ca.vertcat(S[0, 0], S[1, 1]))
+    trusted = ca.fmin(ca.fmax(innovation, -outlier * deviation), outlier * deviation)
+    move = ca.vertcat(gain[:2, :] @ innovation, gain[2:, :] @ trusted)
+    keep = ca.SX.eye(estimate.numel())
+    keep[:, :2] -= gain
+    after = keep @ P @ keep.T + gain @ R @ gain.T  # Joseph
+    return estimate + move, (after + after.T) / 2

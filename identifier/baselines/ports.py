@@ -1,0 +1,100 @@
+"""What the steps of all baselines read, and the equation of motion that they share.
+
+x = [v_y, r] [m/s, rad/s].   u = [δ_f, δ_r] [rad].   F: axle forces [N], frame of the body.
+ẋ = K F - [v_x r, 0]   and, with ξ = K⁻¹ x [N s],   ξ̇ = F - n,   n = m v_x r [l_r, l_f]/L:
+n is the force that holds a steady turn. Equation numbers: Hong and Choi.
+"""
+
+from typing import Any, NamedTuple
+
+import casadi as ca
+
+from models.bicycle import BicycleParameters, bicycle
+
+OVER = ("x", "u", "v_x")
+SAMPLING = ("dt", "min_speed")
+
+
+class Sample(NamedTuple):
+    """Ports of one sample and of the car: symbols.
+
+    x (2,), u (2,), v_x; vehicle (6,) = m, I_z, l_f, l_r, C_f, C_r; sampling (2,) = T_s [s] and the
+    lowest speed [m/s]; the six numbers by letter.
+    """
+
+    x: Any
+    u: Any
+    v_x: Any
+    vehicle: Any
+    sampling: Any
+    parameters: BicycleParameters
+
+    @property
+    def moving(self) -> Any:
+        """Whether the car moves."""
+        return self.v_x >= self.sampling[1]
+
+    @property
+    def speed(self) -> Any:
+        """v_x, held at the lowest speed, so that slip angles stay finite [m/s]."""
+        return ca.fmax(self.v_x, self.sampling[1])
+
+
+def sample_ports() -> Sample:
+    """Return fresh symbols."""
+    vehicle = ca.SX.sym("vehicle", 6)
+    return Sample(
+        x=ca.SX.sym("x", 2),
+        u=ca.SX.sym("u", 2),
+        v_x=ca.SX.sym("v_x"),
+        vehicle=vehicle,
+        sampling=ca.SX.sym("sampling", len(SAMPLING)),
+        parameters=BicycleParameters(*ca.vertsplit(vehicle)),
+    )
+
+
+def axle_loads(p: BicycleParameters, gravity: float) -> Any:
+    """Return the static axle loads F_z (2,) [N].
+
+    Parameters
+    ----------
+    p : of the bicycle.
+    gravity : g [m/s²].
+    """
+    return p.m * gravity / (p.l_f + p.l_r) * ca.vertcat(p.l_r, p.l_f)
+
+
+def impulse(p: BicycleParameters, x: Any) -> Any:
+    """Return ξ = K⁻¹ x of (7), (2,) [N s].
+
+    Parameters
+    ----------
+    p : of the bicycle.
+    x : [v_y, r] (2,).
+    """
+    return bicycle(p, 1.0).K_inv @ x  # K does not depend on v_x
+
+
+def turning_force(p: BicycleParameters, v_x: Any, x: Any) -> Any:
+    """Return n, the axle forces of a steady turn (2,) [N].
+
+    Parameters
+    ----------
+    p : of the bicycle.
+    v_x : longitudinal speed [m/s].
+    x : [v_y, r] (2,).
+    """
+    return p.m * v_x * x[1] / (p.l_f + p.l_r) * ca.vertcat(p.l_r, p.l_f)
+
+
+def motion_rate(p: BicycleParameters, v_x: Any, x: Any, F: Any) -> Any:
+    """Return dx/dt of (1)-(2), (2,).
+
+    Parameters
+    ----------
+    p : of the bicycle.
+    v_x : longitudinal speed [m/s].
+    x : [v_y, r] (2,).
+    F : axle forces (2,) [N].
+    """
+    return bicycle(p, 1.0).K @ F - ca.vertcat(v_x * x[1], 0)

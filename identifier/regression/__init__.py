@@ -1,0 +1,6 @@
+"""Laws for the last layer from a filtered regression: gradient, Newton, RLS and a memory."""
+
+from identifier.regression.design import RegressionDesign
+from identifier.regression.laws import LAWS
+
+__all__ = ["LAWS", "RegressionDesign"]

@@ -1,0 +1,188 @@
+"""The frozen axle model: what it says of the tire, of itself, and of files that are not one."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.axle import AxleDesign, AxleModel
+from identifier.identify import identify
+from identifier.model_file import load_model
+from identifier.model_format import FrozenModelError
+
+
+def learnt(recording, car, start=None):
+    return identify(recording, car, AxleDesign.for_vehicle(car), start=start)
+
+
+def error(force, recording):
+    return np.sqrt(np.mean((force - recording.axle_force) ** 2, axis=0)) / np.sqrt(
+        np.mean(recording.axle_force**2, axis=0)
+    )
+
+
+def test_told_another_stiffness_it_reads_off_the_true_one(car, drive):
+    told = replace(car, cornering_stiffness_front=0.7e5, cornering_stiffness_rear=1.8e5)
+    model = learnt(drive(amplitude=0.04), told).freeze(15.0)
+    true = np.array([car.cornering_stiffness_front, car.cornering_stiffness_rear])
+    np.testing.assert_allclose(model.cornering_stiffness, true, rtol=0.08)
+    alpha = np.array([-0.04, -0.01, 0.01, 0.04])
+    expected = np.column_stack(
+        [5000 * np.tanh(1.4e5 * alpha / 5000), 4500 * np.tanh(1.2e5 * alpha / 4500)]
+    )
+    curve = learnt(drive(amplitude=0.06), told).freeze(15.0).force_at(alpha)
+    np.testing.assert_allclose(curve, expected, atol=200.0)
+    assert (model.relaxation_length < 0.15).all()  # the drive's tires have no lag
+    early = learnt(drive(n=100, amplitude=0.0), told).freeze(0.0)
+    assert (np.abs(early.cornering_stiffness / true - 1) > 0.25).all()
+
+
+def test_frozen_weights_repeat_the_drive_and_another(car, drive):
+    model = learnt(drive(amplitude=0.08), car).freeze(15.0)
+    for recording in (drive(amplitude=0.08), drive(amplitude=0.04, speed=25.0)):
+        assert (error(model.axle_force(recording), recording) < 0.05).all()
+
+
+def test_frozen_and_online_forces_are_one_where_nothing_is_learnt(car, drive):
+    design = AxleDesign.for_vehicle(car)
+    never = replace(design, plausibility=replace(design.plausibility, learning_speed=100.0))
+    recording = drive(n=400)
+    history = identify(recording, car, never)
+    np.testing.assert_allclose(
+        history.freeze(0.0).axle_force(recording), history.axle_force, rtol=1e-12, atol=1e-9
+    )
+
+
+def test_it_knows_where_it_has_been(car, drive):
+    gentle, hard = drive(amplitude=0.02), drive(amplitude=0.1)
+    model, expert = learnt(gentle, car).freeze(15.0), learnt(hard, car).freeze(15.0)
+    assert model.outside(gentle).mean() < 0.05
+    assert model.outside(hard).mean() > 0.3
+    assert expert.outside(hard).mean() < 0.05
+    slip = np.abs(gentle.alpha(car.l_f, car.l_r)).max(axis=0)
+    np.testing.assert_allclose(model.known_slip_range, slip, rtol=0.2)
+    doubt = model.doubt(np.array([0.01, 0.1]))
+    assert (doubt[0] < 0.15).all()
+    assert (doubt[1] > 2 * doubt[0]).all()
+    new = AxleDesign.for_vehicle(car).frozen(car, learnt(gentle, car).carried_at(0.0))
+    np.testing.assert_allclose(new.doubt(np.array([0.01, 0.1])), 1.0)
+    np.testing.assert_array_equal(new.known_slip_range, 0.0)
+    assert new.outside(gentle)[100:].any(axis=1).mean() > 0.9
+    assert 10.0 < model.learning_time.sum(axis=1).min() <= 14.6
+
+
+def test_far_outside_it_saturates(car, drive):
+    model = learnt(drive(amplitude=0.02), car).freeze(15.0)
+    far = np.abs(model.force_at(np.linspace(-1.5, 1.5, 61)))
+    assert (far <= 1.5 * np.array(car.axle_loads) + 1e-6).all()
+    np.testing.assert_allclose(far[0], far[1], rtol=0.01)
+
+
+def test_learning_goes_on_from_stored_weights(car, drive, tmp_path):
+    whole = drive(n=1500, amplitude=0.08)
+    first, second = whole.between(0.0, 9.995), whole.between(10.0, 15.0)
+    model = learnt(first, car).freeze(10.0)
+    model.save(tmp_path / "weights.json")
+    stored = load_model(tmp_path / "weights.json")
+    assert isinstance(stored, AxleModel)
+    again, afresh = learnt(second, car, start=stored), learnt(second, car)
+    np.testing.assert_array_equal(again.carried["W"][0], model.W)
+    assert (error(again.axle_force, second) < 0.5 * error(afresh.axle_force, second)).all()
+    np.testing.assert_allclose(
+        again.freeze(15.0).force_at(np.array([0.05])),
+        learnt(whole, car).freeze(15.0).force_at(np.array([0.05])),
+        rtol=0.03,
+    )
+
+
+def test_weights_of_another_structure_are_refused(car, drive):
+    recording = drive(n=100)
+    model = learnt(recording, car).freeze(0.5)
+    other = replace(AxleDesign.for_vehicle(car), ladder=(0.016, 0.064, 0.256))
+    assert np.isfinite(identify(recording, car, other).axle_force).all()
+    with pytest.raises(ValueError, match="another structure"):
+        identify(recording, car, other, start=model)
+
+
+def test_a_model_survives_its_file_bit_for_bit(car, drive, tmp_path):
+    recording = drive(n=600)
+    model = learnt(recording, car).freeze(6.0)
+    model.save(tmp_path / "weights.json")
+    read = load_model(tmp_path / "weights.json")
+    assert read.to_dict() == model.to_dict()
+    np.testing.assert_array_equal(read.axle_force(recording), model.axle_force(recording))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "rule"),
+    [
+        ("W", None, "key 'W' is missing"),
+        ("W", [[1.0, 2.0]], r"W must have shape \(2, 4\)"),
+        ("own", [[float("nan"), 0, 0], [0, 0, 0]], "own holds a number that is not finite"),
+        ("own", [[-0.1, 0, 0], [0, 0, 0]], "compliance must not be negative"),
+        ("ladder", [0.01, 0.03, 0.1, 0.2], "ladder must rise by powers of two"),
+        ("sway", {"frequency": -1.0, "damping": 0.3}, "frequency must be positive"),
+        ("plausibility", {"color": 1}, "unexpected keyword"),
+        ("edges", [0.0, 1.0], "edges must be"),
+    ],
+)
+def test_a_file_that_is_no_model_is_refused(key, value, rule, car, drive, tmp_path):
+    data = learnt(drive(n=50), car).freeze(0.2).to_dict()
+    if value is None:
+        del data[key]
+    else:
+        data[key] = value
+    path = tmp_path / "bad.json"
+    path.write_text(json.dumps(data))
+    with pytest.raises(FrozenModelError, match=f"bad.json: .*{rule}"):
+        load_model(path)
+
+
+def test_impossible_numbers_are_refused(car):
+    design = AxleDesign.for_vehicle(car)
+    with pytest.raises(ValueError, match="dt must be positive"):
+        replace(design, dt=0.0)
+    with pytest.raises(ValueError, match="memory must be positive"):
+        replace(design.regression, memory=float("nan"))
+    with pytest.raises(ValueError, match="friction must be positive"):
+        replace(design.prior, friction=-1.0)
+
+
+def test_designs_are_similar_for_a_model_car(car):
+    """By Froude lengths over 10 and speeds over sqrt(10); times of drivers and sensors stay."""
+    small_car = replace(
+        car,
+        mass=1.5,
+        yaw_inertia=0.025,
+        l_f=0.115,
+        l_r=0.155,
+        cornering_stiffness_front=140.0,
+        cornering_stiffness_rear=120.0,
+    )
+    full, small = AxleDesign.for_vehicle(car), AxleDesign.for_vehicle(small_car)
+    assert full.prior.compliance / small.prior.compliance == pytest.approx(10.0)
+    assert full.min_speed / small.min_speed == pytest.approx(np.sqrt(10.0))
+    assert small.sway.frequency / full.sway.frequency == pytest.approx(np.sqrt(10.0))
+    assert full.regression == small.regression
+
+
+def test_curves_may_be_kept_from_falling_before_a_slip(car, drive):
+    """Left free, the learnt curve falls at some time; held, it never does from the start on."""
+    recording, until = drive(amplitude=0.08), 0.2
+    free = AxleDesign.for_vehicle(car)
+    held = replace(free, rising_until=until)
+    lowest = []
+    for design in (free, held):
+        history = identify(recording, car, design)
+        scales = np.array(design.ladder)
+        W = history.carried["W"][1:]
+        slope = (W / (scales * np.cosh(until / scales) ** 2)).sum(axis=2)
+        lowest.append(slope.min())
+        assert (error(history.freeze(15.0).axle_force(recording), recording) < 0.05).all()
+    assert lowest[0] < -0.01
+    assert lowest[1] > -1e-9
+    grid = np.linspace(0.0, until, 81)
+    assert (np.diff(history.freeze(15.0).force_at(grid), axis=0) > -1.0).all()
+    with pytest.raises(ValueError, match="rising_until must be positive"):
+        replace(free, rising_until=0.0)

@@ -1,0 +1,251 @@
+"""Each part of the axle identifier by another road."""
+
+from itertools import pairwise
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from identifier.axle import bounds, rls, slip, sway, units
+from identifier.axle.car import Car, axle_impulse, car_numbers
+from identifier.axle.prior import SLIPS, Prior, fiala_force, fiala_weights, friction_direction
+from identifier.axle.sway import Sway, SwayNumbers, SwayState
+from identifier.axle.units import LADDER
+
+STEPS = units.doublings(LADDER)
+SCALES = 1 / np.array(LADDER)[None]
+W = np.array([[0.1, 0.5, 0.3, 0.1], [0.05, 0.8, 0.2, -0.2]])
+
+
+def number(expression):
+    return np.array(ca.evalf(ca.SX(expression))).squeeze()
+
+
+def the_car(car):
+    return Car(*ca.horzsplit(ca.SX(car_numbers(car))))
+
+
+def test_units_by_doubling_are_hyperbolic_tangents():
+    for x in (-1.5, -0.05, 0.0, 1e-9, 0.02, 0.3, 3.1):
+        T = number(units.hidden_units(ca.SX([x, -x]), ca.SX(SCALES), STEPS))
+        np.testing.assert_allclose(T[0], np.tanh(x / np.array(LADDER)), atol=1e-15)
+        np.testing.assert_allclose(T[1], -T[0], atol=1e-15)
+
+
+def test_slope_and_bend_are_derivatives_of_the_force():
+    x, e = np.array([0.03, -0.07]), 1e-6
+    here, ahead, behind = (
+        units.curve(ca.SX(x + step), ca.SX(W), ca.SX(SCALES), STEPS) for step in (0, e, -e)
+    )
+    slope = (number(ahead.force) - number(behind.force)) / (2 * e)
+    bend = (number(ahead.slope) - number(behind.slope)) / (2 * e)
+    np.testing.assert_allclose(number(here.slope), slope, rtol=1e-7)
+    np.testing.assert_allclose(number(here.bend), bend, rtol=1e-6)
+
+
+@pytest.mark.parametrize("ladder", [(), (0.1, 0.05), (0.01, 0.03), (0.0, 0.1), (0.1, 0.1)])
+def test_a_ladder_that_cannot_be_climbed_is_refused(ladder):
+    with pytest.raises(ValueError, match="ladder"):
+        units.doublings(ladder)
+
+
+def test_axle_impulse_obeys_newton_and_euler(car):
+    """Its rate with forces F is F_i/F_z,i - v_x r/g for each axle alone."""
+    F, v_x, r = np.array([3000.0, -800.0]), 17.0, 0.2
+    v_y_dot = F.sum() / car.mass - v_x * r
+    r_dot = (car.l_f * F[0] - car.l_r * F[1]) / car.yaw_inertia
+    rate = number(axle_impulse(the_car(car), v_y_dot, r_dot))
+    np.testing.assert_allclose(rate, F / np.array(car.axle_loads) - v_x * r / 9.81, rtol=1e-12)
+
+
+def lag(alpha, s, dt, v_x, car):
+    """Lagged slip and its sensitivity to s over samples of alpha (n, 2), by the step."""
+    names = ("x", "a", "C", "phi", "p", "bend")
+    state = {name: np.zeros(2) for name in names}
+    xs, ps = [], []
+    for k, a in enumerate(alpha):
+        first = float(k == 0)
+        last = slip.SlipState(*(ca.SX(state[name]) for name in names[:4]))
+        if k == 0:
+            last = last._replace(slope=ca.SX.ones(2))
+        h = slip.hold(car, v_x, dt, ca.SX(s), last.slope)
+        x = slip.lagged_slip(h, last, ca.SX(a), first)
+        lasting = slip.SensitivityState(ca.SX(state["p"]), ca.SX.zeros(2), ca.SX(state["bend"]))
+        p, _ = slip.sensitivity(
+            h,
+            last,
+            lasting,
+            compliance=ca.SX(s),
+            alpha=ca.SX(a),
+            first=first,
+            sway_before=0,
+            sway_now=0,
+        )
+        c = units.curve(x, ca.SX(W), ca.SX(SCALES), STEPS)
+        state = {"x": number(x), "a": a, "C": number(c.carcass_slope), "phi": number(c.force)}
+        state |= {"p": number(p), "bend": number(c.bend)}
+        xs.append(state["x"])
+        ps.append(state["p"])
+    return np.array(xs), np.array(ps)
+
+
+def lag_by_euler(t, alpha_of, s, v_x, car, fine=400):
+    """The same differential equation in many small steps, with the slope of every instant."""
+    y, path = alpha_of(t[0]), [alpha_of(t[0])]
+    for start, end in pairwise(t):
+        h = (end - start) / fine
+        for j in range(fine):
+            T = np.tanh(y[:, None] * SCALES)
+            C = (W * (1 - T**2) * SCALES).sum(1)
+            sigma = s * C + 1e-3 * car.wheelbase
+            y = y + h * v_x / sigma * (alpha_of(start + h * (j + 0.5)) - y)
+        path.append(y)
+    return np.array(path)
+
+
+def test_lagged_slip_solves_its_differential_equation(car):
+    """Only the slope is held over a step: the error is of first order in it."""
+    v_x, s = 15.0, np.array([0.04, 0.05])
+
+    def alpha_of(t):
+        return 0.05 * np.sin(8 * t) * np.array([1.0, 0.7])
+
+    errors = []
+    for dt in (0.01, 0.0025):
+        t = dt * np.arange(round(0.4 / dt) + 1)
+        alpha = np.array([alpha_of(time) for time in t])
+        x, _ = lag(alpha, s, dt, v_x, the_car(car))
+        true = lag_by_euler(t, alpha_of, s, v_x, car, fine=round(dt / 5e-5))
+        errors.append(np.abs(x - true).max() / np.abs(alpha - true).max())
+    assert errors[0] < 0.05
+    assert errors[1] < 0.3 * errors[0]
+
+
+def test_sensitivity_is_the_derivative_of_the_lag_even_at_no_compliance(car):
+    dt, v_x, e = 0.01, 15.0, 1e-6
+    alpha = 0.05 * np.sin(0.08 * np.arange(40))[:, None] * np.array([1.0, 0.7])
+    for s in (np.array([0.04, 0.05]), np.array([2e-6, 0.01])):
+        _, p = lag(alpha, s, dt, v_x, the_car(car))
+        ahead, behind = (lag(alpha, s + d, dt, v_x, the_car(car))[0] for d in (e, -e))
+        np.testing.assert_allclose(p, (ahead - behind) / (2 * e), rtol=1e-3, atol=1e-5)
+        assert np.abs(p[-1]).min() > 1e-3
+
+
+def test_sway_settles_where_the_body_leans_and_a_step_swings(car):
+    """Under a constant force it ends at the acceleration, after the overshoot of the books."""
+    system = Sway(frequency=10.0, damping=0.3)
+    numbers = SwayNumbers(*system.numbers())
+    force, loads = np.array([0.4, 0.3]), np.array(car.axle_loads)
+    a = (force * loads).sum() / car.mass
+    state, path = SwayState(ca.SX(0), ca.SX(0), ca.SX(0)), []
+    for _ in range(3000):
+        state = sway.sway(
+            numbers,
+            the_car(car),
+            0.002,
+            state,
+            first=0,
+            v_x=20.0,
+            r=0.1,
+            force=ca.SX(force),
+            slope=ca.SX.ones(2),
+            share=ca.SX.zeros(2),
+        )
+        state = SwayState(*(ca.SX(float(value)) for value in state))
+        path.append(float(state.rho))
+    assert path[-1] == pytest.approx(a, rel=1e-6)
+    overshoot = np.exp(-0.3 * np.pi / np.sqrt(1 - 0.09))
+    assert max(path) == pytest.approx(a * (1 + overshoot), rel=0.02)
+
+
+def learnt(h, y, R, forgetting, P0, learns=1.0):
+    q = P0.shape[0]
+    theta, P = ca.SX.sym("theta", q), ca.SX.sym("P", len(rls.triangle(q)))
+    regressor, e = ca.SX.sym("h", q), ca.SX.sym("e")
+    upper = dict(zip(rls.triangle(q), ca.vertsplit(P), strict=True))
+    result = rls.update(
+        ca.vertsplit(theta),
+        upper,
+        ca.vertsplit(regressor),
+        error=e,
+        R=R,
+        forgetting=forgetting,
+        grows=True,
+        learns=learns,
+    )
+    step = ca.Function(
+        "f", [theta, P, regressor, e], [ca.vertcat(*result.theta), ca.vertcat(*result.P.values())]
+    )
+    t, p = np.zeros(q), rls.packed(np.stack([P0, P0]))[0]
+    for row, value in zip(h, y, strict=True):
+        t, p = (np.array(v).ravel() for v in step(t, p, row, value - row @ t))
+    return t, rls.unpacked(np.stack([p, p]), q)[0]
+
+
+def test_without_forgetting_the_recursion_is_the_batch_solution(rng):
+    h, true, R = rng.standard_normal((60, 3)), np.array([1.0, -2.0, 0.5]), 0.1
+    y = h @ true + np.sqrt(R) * rng.standard_normal(60)
+    P0 = np.diag([1.0, 4.0, 0.3])
+    t, P = learnt(h, y, R, 0.0, P0)
+    information = np.linalg.inv(P0) + h.T @ h / R
+    np.testing.assert_allclose(P, np.linalg.inv(information), rtol=1e-8)
+    np.testing.assert_allclose(t, np.linalg.solve(information, h.T @ y / R), rtol=1e-8)
+
+
+def test_only_the_excited_direction_is_forgotten(rng):
+    """A direction that is never excited keeps its variance; the excited one stays awake."""
+    h = np.outer(rng.standard_normal(4000), [1.0, 1.0, 0.0])
+    _, P = learnt(h, h @ np.array([1.0, 2.0, 3.0]), 0.1, 0.02, np.eye(3))
+    across = np.array([1.0, -1.0, 0.0]) / np.sqrt(2)
+    assert across @ P @ across == pytest.approx(1.0, rel=1e-9)
+    assert P[2, 2] == 1.0
+    assert np.linalg.eigvalsh(P).min() > 1e-4
+    _, asleep = learnt(h, h @ np.array([1.0, 2.0, 3.0]), 0.1, 0.0, np.eye(3))
+    assert P[0, 0] + P[0, 1] > 5 * (asleep[0, 0] + asleep[0, 1])
+
+
+def test_nothing_is_learnt_where_learning_rests(rng):
+    h = rng.standard_normal((5, 3))
+    t, P = learnt(h, np.ones(5), 0.1, 0.01, np.eye(3), learns=0.0)
+    np.testing.assert_array_equal(t, 0.0)
+    np.testing.assert_array_equal(P, np.eye(3))
+
+
+def test_grip_is_bounded_by_the_least_move_in_the_metric_of_the_covariance(rng):
+    A = rng.standard_normal((7, 7))
+    P = A @ A.T
+    theta = np.array([0.9, 0.9, 0.5, 0.2, 0.05, 0.3, 0.001])
+    limits = bounds.BoundNumbers(*bounds.Bounds(compliance=0.1, v_y=0.2, weight=50.0).numbers())
+    upper = dict(zip(rls.triangle(7), rls.packed(P[None].repeat(2, 0))[0], strict=True))
+    kept = np.array(
+        [float(v) for v in bounds.bounded(limits, list(map(ca.SX, theta)), upper, offset=0.01)]
+    )
+    assert kept[:4].sum() == pytest.approx(1.5)
+    multiplier = np.linalg.solve(P[:4, :4], kept[:4] - theta[:4])  # the same for every weight
+    np.testing.assert_allclose(multiplier, multiplier[0], rtol=1e-6)
+    inside = bounds.bounded(limits, list(map(ca.SX, theta / 3)), upper, offset=0.01)
+    np.testing.assert_allclose([float(v) for v in inside], theta / 3)
+
+
+def test_prior_is_the_told_tire_and_unsure_of_what_cars_differ_in(car):
+    prior = Prior(compliance=0.027, sd_compliance=0.027, sd_v_y=0.03)
+    W0, own = prior.means(car, LADDER)
+    T = np.tanh(SLIPS[:, None] / np.array(LADDER))
+    for i, (c, load) in enumerate(
+        zip((car.bicycle.C_f, car.bicycle.C_r), car.axle_loads, strict=True)
+    ):
+        force = fiala_force(SLIPS, c / load, 0.8)
+        assert np.abs(T @ W0[i] - force).max() < 0.06
+        P = prior.covariance(car, LADDER)[i]
+        assert np.linalg.eigvalsh(P).min() > 0.0
+        sd = np.sqrt(np.einsum("ki,ij,kj->k", T, P[:4, :4], T))
+        assert 0.2 < sd[-1] / force[-1] < 0.6
+    np.testing.assert_array_equal(own[:, 2], 0.0)
+
+
+def test_friction_direction_stretches_the_curve():
+    """One step along M w of a brush tire is the brush tire on another road."""
+    w, w_icy = fiala_weights(15.0, 0.8, LADDER), fiala_weights(15.0, 0.76, LADDER)
+    moved = friction_direction(LADDER) @ w * np.log(0.76 / 0.8)
+    T = np.tanh(SLIPS[:, None] / np.array(LADDER))
+    assert np.abs(T @ (moved - (w_icy - w))).max() < 0.25 * np.abs(T @ (w_icy - w)).max()

@@ -1,0 +1,207 @@
+"""The compiled step against its equations, written out with numpy alone, sample by sample."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.axle import AxleDesign
+from identifier.identify import identify
+
+G = 9.81
+
+
+class ByHand:
+    """One axle identifier with plain matrices: no ports, no triangles, tanh and cos as they are."""
+
+    def __init__(self, design, car):
+        self.d, self.car = design, car
+        self.alpha_j = np.array(design.ladder)
+        n = self.n = self.alpha_j.size
+        self.L, self.U = car.wheelbase, np.sqrt(G * car.wheelbase)
+        self.load = car.weight * np.array([car.l_r, car.l_f]) / self.L
+        W, own = design.prior.means(car, design.ladder)
+        self.theta = np.hstack([W, own])
+        self.P = design.prior.covariance(car, design.ladder)
+        self.P0_trace = [np.trace(P[:n, :n]) for P in self.P]
+        # dw/d ln mu by differences of a projected, stretched curve instead of a derivative
+        slip = np.linspace(0.002, 0.6, 300)
+        T = np.tanh(slip[:, None] / self.alpha_j)
+        stretched = [mu * np.tanh(slip[:, None] / mu / self.alpha_j) for mu in (1 + 1e-5, 1 - 1e-5)]
+        slopes = (stretched[0] - stretched[1]) / 2e-5
+        self.M = np.linalg.solve(T.T @ T + 0.09 * np.eye(n), T.T @ slopes)
+        self.on = False
+        self.last = np.zeros(5)
+        self.bad = self.stuck = 0
+        self.steady = 0.0
+        self.fast, self.slow, self.peak = np.zeros(2), np.ones(2), np.zeros(2)
+        self.longest = np.zeros(2)
+
+    def believe(self, sample):
+        """The sample to go on with, or None where forces read zero; and whether to learn."""
+        p, dt = self.d.plausibility, self.d.dt
+        v_x, v_y, r, *delta = sample
+        good = v_x < p.max_speed and abs(v_y) < p.max_sideslip * max(abs(v_x), p.slow)
+        good = good and abs(r) < p.max_yaw_rate and max(map(abs, delta)) < p.max_steering
+        if self.on:
+            since = dt * (1 + self.bad)
+            far = np.abs(sample - self.last)
+            good = good and max(far[:2]) < p.max_rate * since + p.jump
+            good = good and far[2] < p.max_yaw_acceleration * since + p.yaw_jump
+            good = good and max(far[3:]) < p.max_steering_rate * since + p.steering_jump
+        same = v_y == self.last[1] and r == self.last[2]
+        self.stuck = self.stuck + 1 if same else 0
+        self.bad = 0 if good else self.bad + 1
+        if good:
+            self.last = sample
+        held = self.on and self.bad * dt <= p.hold
+        restart, self.on = not self.on, bool((good or held) and self.last[0] >= p.min_speed)
+        if not self.on:
+            self.bad, self.steady = 0, 0.0
+            return restart, False
+        if restart:
+            self.steady = 0.0
+        calm = self.bad < 3 and self.stuck < 3 and self.last[0] > p.learning_speed
+        self.steady = self.steady + dt if calm else 0.0
+        return restart, good and self.steady >= p.settle - 1e-9
+
+    def step(self, sample):
+        first, learns = self.believe(np.asarray(sample, dtype=float))
+        if not self.on:
+            return np.zeros(2)
+        v_x, v_y, r, *delta = self.last
+        delta, dt, n = np.array(delta), self.d.dt, self.n
+        w, (s, k, o) = self.theta[:, :n], self.theta[:, n:].T
+        omega, zeta = self.d.sway.frequency, self.d.sway.damping
+        if first:
+            self.rho, self.rate, self.b0 = v_x * r, 0.0, 0.0
+        else:
+            a = (self.phi * self.load).sum() / self.car.mass
+            grip = (self.C * k * self.load).sum() / (self.car.mass * v_x)
+            self.rate += dt * (omega**2 * (a - self.rho) + grip * self.rate)
+            self.rate /= 1 + dt * (2 * zeta * omega + grip)
+            self.rho += dt * self.rate
+        b = -self.rate / (omega**2 * v_x)
+        arm = np.array([self.car.l_f, -self.car.l_r])
+        seen = delta - np.arctan2(v_y - o[1] + arm * r, v_x) + np.array([o[0], 0.0])
+        alpha = seen + k * b
+        if first:
+            x, p_s, p_k = alpha, np.zeros(2), np.full(2, b)
+        else:
+            sigma = s * self.C + 1e-3 * self.L
+            z = v_x * dt / sigma
+            e, da = np.exp(-z), alpha - self.alpha0
+            f = (1 - e) / z
+            x = e * self.x + (1 - e) * self.alpha0 + (1 - f) * da
+            dx_dsigma = ((e - f) * da - z * e * (self.alpha0 - self.x)) / sigma
+            p_s = e * self.p_s + dx_dsigma * (self.C + s * self.bend * self.p_s)
+            p_k = e * self.p_k + (1 - e) * self.b0 + (1 - f) * (b - self.b0)
+        T = np.tanh(x[:, None] / self.alpha_j)
+        S = (1 - T**2) / self.alpha_j
+        phi, C = (w * T).sum(1), (w * S).sum(1)
+        bend = -2 * (w * T * S / self.alpha_j).sum(1)
+        least = 0.02 * np.maximum((w / self.alpha_j).sum(1), 0.1)
+        slope = C
+        bend, C = np.where(least > C, 0.0, bend), np.maximum(C, least)
+        cos = np.cos(delta)
+        offset = np.array([1.0, 1 / v_x])
+        g = cos[:, None] * np.column_stack([T, slope * p_s, slope * p_k, slope * offset])
+        yaw = self.car.yaw_inertia * np.array([1, -1]) * r / (self.L * self.load)
+        kappa = self.d.regression.bandwidth
+        xi = kappa * (v_y / G + yaw)
+        now = np.column_stack([g, xi - v_x * r / G])
+        if first:
+            self.low = now
+        else:
+            e = np.exp(-kappa * dt)
+            self.low = e * self.low + (1 - e) * (now + self.before) / 2
+        self.before, self.x, self.alpha0, self.p_s, self.p_k = now, x, alpha, p_s, p_k
+        self.C, self.phi, self.bend, self.b0 = C, phi, bend, b
+        if learns:
+            self.learn(xi - self.low[:, -1], np.maximum(np.abs(seen), np.abs(x)))
+        return phi * cos * self.load
+
+    def learn(self, y, size):
+        q, n, dt, c, m = self.n + 3, self.n, self.d.dt, self.d.change, self.d.regression
+        h = self.low[:, :q]
+        y_hat = (self.theta[:, :n] * h[:, :n]).sum(1)
+        error, sd = y - y_hat, m.error + m.relative_error * np.abs(y_hat)
+        squared = np.minimum((error / sd) ** 2, 25)
+        self.fast += dt / c.fast * (squared - self.fast)
+        self.slow += dt / c.slow * (np.minimum(squared, 4 * self.slow) - self.slow)
+        self.slow = np.maximum(self.slow, 1)
+        alarm = np.clip((self.fast / self.slow).min() / c.threshold - 1, 0, 1)
+        self.peak = np.maximum(np.abs(y_hat), self.peak * np.exp(-dt / m.excitation_time))
+        for i in (0, 1):
+            P, theta = self.P[i], self.theta[i]
+            d = self.M @ theta[:n]
+            P[:n, :n] += alarm * dt * c.step**2 / c.step_time * np.outer(d, d)
+            if self.peak[i] < m.error:
+                continue
+            R = sd[i] ** 2 * self.slow[i] * m.correlation_time / dt
+            reach = m.clip * sd[i] * self.slow[i]
+            Ph = P @ h[i]
+            excited = h[i] @ Ph
+            lam = np.exp(-dt / m.memory)
+            shrink = (1 - (1 - lam) / lam * R / excited) / (R + excited)
+            if shrink < 0 and np.trace(P[:n, :n]) > m.widest * self.P0_trace[i]:
+                shrink = 0.0
+            theta += Ph * np.clip(error[i], -reach, reach) / (R + excited)
+            P -= shrink * np.outer(Ph, Ph)
+            bounds = self.d.bounds
+            grip = theta[:n].sum()
+            P1 = P[:n, :n].sum(1)
+            theta[:n] += P1 / P1.sum() * (np.clip(grip, bounds.least_grip, bounds.most_grip) - grip)
+            theta[:n] = np.clip(theta[:n], -bounds.weight, bounds.weight)
+            last = (bounds.steering, bounds.v_y)[i]
+            theta[n:] = np.clip(theta[n:], [0, 0, -last], [bounds.compliance, 1, last])
+            gain = min(1.0, dt / m.correlation_time)
+            self.longest[i] += gain * max(0.0, size[i] - self.longest[i])
+
+
+def disturbed(recording):
+    """A recording with noise, a spike, a dropout, a stuck sensor, a standstill: every branch."""
+    rng = np.random.default_rng(3)
+    n = recording.t.size
+    v_x, v_y = recording.v_x.copy(), recording.v_y + 0.02 * rng.standard_normal(n)
+    r = recording.r + 0.002 * rng.standard_normal(n)
+    v_y[300] += 4.0
+    r[400:440] = 30.0
+    v_y[500:512], r[500:512] = v_y[500], r[500]
+    v_x[700:720] = 0.0
+    v_x[730:800] = 2.0
+    return replace(recording, v_x=v_x, v_y=v_y, r=r)
+
+
+@pytest.mark.parametrize("damage", [False, True])
+def test_step_repeats_the_equations_by_hand(damage, car, drive):
+    recording = drive(n=1200, amplitude=0.08)
+    recording = disturbed(recording) if damage else recording
+    design = AxleDesign.for_vehicle(car)
+    history = identify(recording, car, design)
+    hand = ByHand(design, car)
+    samples = np.column_stack([recording.v_x, recording.x, recording.u])
+    forces = np.array([hand.step(sample) for sample in samples])
+    largest = np.abs(forces).max()
+    np.testing.assert_allclose(history.axle_force, forces, rtol=0, atol=1e-6 * largest)
+    model = history.freeze(1e9)
+    np.testing.assert_allclose(np.hstack([model.W, model.own]), hand.theta, rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(model.covariance, hand.P, rtol=1e-4, atol=1e-7)
+    np.testing.assert_allclose(model.excitation[:, 0], hand.longest, rtol=1e-5)
+    moved = np.abs(hand.theta - np.hstack(design.prior.means(car, design.ladder)))
+    assert moved[:, :4].max() > 0.05
+
+
+def test_true_forces_are_not_looked_at(car, drive):
+    design = AxleDesign.for_vehicle(car)
+    one = identify(drive(n=200), car, design)
+    other = identify(drive(n=200, scale=-3.0), car, design)
+    np.testing.assert_array_equal(one.axle_force, other.axle_force)
+
+
+def test_a_mirrored_drive_gives_mirrored_forces(car, drive):
+    design = AxleDesign.for_vehicle(car)
+    left = drive(n=800)
+    right = replace(left, v_y=-left.v_y, r=-left.r, delta_f=-left.delta_f)
+    forces = [identify(recording, car, design).axle_force for recording in (left, right)]
+    np.testing.assert_allclose(forces[0], -forces[1], atol=1e-6)

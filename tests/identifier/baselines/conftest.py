@@ -1,0 +1,66 @@
+"""Drives on a tire curve that is known exactly, so that its parameters can be asked for."""
+
+from dataclasses import replace
+from math import atan2, cos, sin
+
+import numpy as np
+import pytest
+
+from models.recordings import Recording
+
+
+def steering(t, amplitude):
+    """A sweep of frequency and amplitude: the tire is asked everywhere."""
+    return amplitude * (0.55 + 0.45 * sin(0.23 * t)) * sin(2.0 * t + 0.8 * sin(0.31 * t))
+
+
+def rates(car, curve, speed, v_y, r, delta):
+    """dv_y/dt, dr/dt and both axle forces in the frame of the body."""
+    F_f = cos(delta) * curve(0, delta - atan2(v_y + car.l_f * r, speed))
+    F_r = curve(1, -atan2(v_y - car.l_r * r, speed))
+    rate = (F_f + F_r) / car.mass - speed * r, (car.l_f * F_f - car.l_r * F_r) / car.yaw_inertia
+    return *rate, F_f, F_r
+
+
+def simulate(car, curve, n=2000, dt=0.01, speed=20.0, amplitude=0.1, rng=None):
+    """A bicycle on curve(axle, alpha) [N], by midpoint steps; rng makes v_y and r noisy."""
+    v_y = r = 0.0
+    rows, fine = [], 5
+    h = dt / fine
+    for k in range(n * fine):
+        t = k * h
+        here = rates(car, curve, speed, v_y, r, steering(t, amplitude))
+        if k % fine == 0:
+            rows.append((t, v_y, r, steering(t, amplitude), *here[2:]))
+        half = v_y + h / 2 * here[0], r + h / 2 * here[1]
+        middle = rates(car, curve, speed, *half, steering(t + h / 2, amplitude))
+        v_y, r = v_y + h * middle[0], r + h * middle[1]
+    t, v_y, r, delta, F_f, F_r = np.array(rows).T
+    if rng is not None:
+        v_y = v_y + 0.02 * rng.standard_normal(n)
+        r = r + 0.002 * rng.standard_normal(n)
+    return Recording(
+        name="curve",
+        t=t,
+        v_x=np.full(n, speed),
+        v_y=v_y,
+        r=r,
+        delta_f=delta,
+        delta_r=np.zeros(n),
+        axle_force=np.column_stack([F_f, F_r]),
+    )
+
+
+@pytest.fixture(name="curve_drive")
+def a_curve_drive():
+    """The function `simulate(car, curve, n, dt, speed, amplitude, rng)`."""
+    return simulate
+
+
+@pytest.fixture(name="halted_drive")
+def a_halted_drive(car, drive):
+    """A slalom that stands still between its fourth and sixth second, and where it does."""
+    recording = drive(n=1000)
+    rest = (recording.t >= 4.0) & (recording.t < 6.0)
+    v_x = np.where(rest, 0.0, recording.v_x)
+    return replace(recording, v_x=v_x), rest

@@ -1,0 +1,80 @@
+"""Recursive least squares against the batch solution of the same filtered regression."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from identifier.baselines import CurveModel, StiffnessRls
+from identifier.identify import identify
+
+METHOD = StiffnessRls(cutoff=4.0, memory=3.0, prior_slip=0.002)
+
+
+def batch(recording, car, method):
+    """Σ w h y / Σ w h², exponentially weighted, the prior included; filters by scipy."""
+    L, dt, kappa = car.wheelbase, method.dt, method.cutoff
+    other = np.array([car.l_r, car.l_f])
+    v_y, r, v_x = recording.v_y[:, None], recording.r[:, None], recording.v_x[:, None]
+    xi = (car.mass * other * v_y + car.yaw_inertia * np.array([1, -1]) * r) / L
+    alpha = recording.u - (v_y + np.array([car.l_f, -car.l_r]) * r) / v_x
+    keep = np.exp(-kappa * dt)
+
+    def low_pass(signal):
+        b, a = [(1 - keep) / 2, (1 - keep) / 2], [1.0, -keep]
+        settled = (1 - b[0]) * signal[:1]  # the first output is the first input
+        return lfilter(b, a, signal, axis=0, zi=settled)[0]
+
+    h = low_pass(alpha)
+    y = kappa * xi - low_pass(kappa * xi - car.mass * v_x * r * other / L)
+    learning = np.arange(len(recording)) * dt * kappa > 2
+    h, y = h[learning], y[learning]
+    weight = np.exp(-np.arange(len(h))[::-1, None] * dt / method.memory)
+    prior = method.prior_slip**2 * method.memory * np.exp(-len(h) * dt / method.memory)
+    told = np.array([car.cornering_stiffness_front, car.cornering_stiffness_rear])
+    top = prior * told + np.sum(weight * h * y * dt, axis=0)
+    return top / (prior + np.sum(weight * h**2 * dt, axis=0))
+
+
+def test_recursion_gives_the_weighted_batch_solution(car, curve_drive):
+    recording = curve_drive(car, lambda i, a: (8e4, 1.5e5)[i] * np.tanh(20 * a) / 20, n=800)
+    history = identify(recording, car, METHOD)
+    online = history.carried["stiffness"][-1]
+    floor = METHOD.prior_slip**2 * METHOD.memory
+    learning = history.carried["information"][52:]  # the filters warm up for half a second
+    assert (learning > floor).all(), "else it is not plain weighting"
+    np.testing.assert_allclose(online, batch(recording, car, METHOD), rtol=1e-9)
+    other = StiffnessRls(cutoff=4.0, memory=1.0, prior_slip=0.002)
+    assert np.abs(online / batch(recording, car, other) - 1).max() > 0.01
+
+
+def test_the_stiffness_of_a_linear_car_is_found_and_frozen(car, curve_drive, rng):
+    true = np.array([8.5e4, 1.45e5])
+    recording = curve_drive(car, lambda i, a: true[i] * a, amplitude=0.03, rng=rng)
+    model = identify(recording, car, METHOD).freeze(99.0)
+    assert isinstance(model, CurveModel)
+    np.testing.assert_allclose(model.parameters[:, 0], true, rtol=0.03)
+    again = identify(recording, car, METHOD, start=model)
+    np.testing.assert_array_equal(again.carried["stiffness"][0], model.parameters[:, 0])
+
+
+def test_straight_driving_forgets_nothing(car, curve_drive):
+    recording = curve_drive(car, lambda i, a: 8e4 * a, n=800, amplitude=0.0)
+    history = identify(recording, car, METHOD)
+    np.testing.assert_array_equal(history.carried["stiffness"][-1], np.array(car.bicycle)[4:])
+    assert history.carried["information"].min() >= METHOD.prior_slip**2 * METHOD.memory
+
+
+def test_learning_rests_at_low_speed_and_force_at_rest(car, halted_drive):
+    recording, rest = halted_drive
+    history = identify(recording, car, METHOD)
+    assert (history.axle_force[rest] == 0.0).all()
+    stiffness = history.carried["stiffness"]
+    assert (np.diff(stiffness, axis=0)[rest] == 0.0).all()
+    assert np.ptp(stiffness[:, 0]) > 0.0
+
+
+def test_a_model_of_another_kind_is_refused(car, drive):
+    parameters = np.array([[9e4, 0.8], [9e4, 0.8]])
+    start = CurveModel(vehicle=car, curve="dugoff", parameters=parameters, min_speed=1.0)
+    with pytest.raises(ValueError, match="not a linear tire"):
+        identify(drive(n=20), car, METHOD, start=start)
