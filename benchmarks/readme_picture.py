@@ -2,18 +2,16 @@
 
 from pathlib import Path
 
-from tireid.demo_story import FREEZE, run_story
-from tireid.figures import figure_png, force_figure
+from tireid.demo_story import run_story
+from tireid.figures import figure_png, side_by_side_figure
 
 TARGET = Path(__file__).resolve().parents[1] / "docs" / "forces.png"
 
 
 def main() -> None:
-    """Draw the slalom of the demo, learnt online and replayed frozen."""
-    story = run_story()
-    own = {FREEZE: story.frozen[FREEZE][story.learnt.recording.name]}
-    figure = force_figure(story.learnt, own)
-    TARGET.write_bytes(figure_png(figure, resolution=110))
+    """Draw both methods, learnt on the demo's slalom, on the step steer that neither has seen."""
+    figure = side_by_side_figure(run_story().side_by_side("step_steer"))
+    TARGET.write_bytes(figure_png(figure, resolution=130))
     print(f"wrote {TARGET}")
 
 

@@ -9,6 +9,7 @@ ROOT = Path(__file__).resolve().parents[1]
 BENCHMARKS = {
     "speed": [],
     "recorded_cars": [],
+    "learn_and_extrapolate": [],
     "plant_against_commonroad": ["{out}"],
     "paper_gains": [],
     "stability_formulas": [],

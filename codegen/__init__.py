@@ -1,10 +1,12 @@
 """From a `casadi.Function` to compiled C, cached by content, and to loops over samples."""
 
+from codegen.batch import BatchScan
 from codegen.cache import cache_folder
 from codegen.compiler import CompilationError, build_library, find_compiler, load_library
 from codegen.scan import Scan
 
 __all__ = [
+    "BatchScan",
     "CompilationError",
     "Scan",
     "build_library",

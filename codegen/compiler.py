@@ -59,13 +59,16 @@ def _version(compiler: tuple[str, ...]) -> str:
     return answer.stdout.splitlines()[0] if answer.stdout else "unknown"
 
 
-def load_library(source: str, name: str) -> ctypes.CDLL | None:
+def load_library(
+    source: str, name: str, flags: tuple[str, ...] | None = None
+) -> ctypes.CDLL | None:
     """Build C source as `build_library` does and load it; a damaged file is built anew, once.
 
     Parameters
     ----------
     source : the whole text of one C99 file; it may include <math.h> and <string.h> only.
     name : beginning of the file's name and of the messages.
+    flags : of the compiler; None takes `FLAGS`.
 
     Returns
     -------
@@ -78,7 +81,7 @@ def load_library(source: str, name: str) -> ctypes.CDLL | None:
     OSError
         Where the library can be neither written nor loaded.
     """
-    library = build_library(source, name)
+    library = build_library(source, name, flags)
     if library is None:
         return None
     try:
@@ -86,17 +89,18 @@ def load_library(source: str, name: str) -> ctypes.CDLL | None:
     except OSError as error:
         log.info("%s is damaged (%s): building it anew", library, error)
         library.unlink(missing_ok=True)
-        rebuilt = build_library(source, name)
+        rebuilt = build_library(source, name, flags)
         return None if rebuilt is None else ctypes.CDLL(str(rebuilt))
 
 
-def build_library(source: str, name: str) -> Path | None:
+def build_library(source: str, name: str, flags: tuple[str, ...] | None = None) -> Path | None:
     """Compile C source to a shared library in the cache folder, or find it there.
 
     Parameters
     ----------
     source : the whole text of one C99 file; it may include <math.h> and <string.h> only.
     name : beginning of the file's name and of the messages.
+    flags : of the compiler; None takes `FLAGS`.
 
     Returns
     -------
@@ -112,7 +116,8 @@ def build_library(source: str, name: str) -> Path | None:
     compiler = find_compiler()
     if compiler is None:
         return None
-    content = "\0".join((source, _version(compiler), *FLAGS))
+    flags = FLAGS if flags is None else flags
+    content = "\0".join((source, _version(compiler), *flags))
     digest = hashlib.sha256(content.encode()).hexdigest()[:20]
     library = cache_folder() / f"{name}-{digest}.so"
     if library.exists():
@@ -123,7 +128,7 @@ def build_library(source: str, name: str) -> Path | None:
         c_file = Path(scratch) / f"{name}.c"
         built = Path(scratch) / library.name
         c_file.write_text(source)
-        command = [*compiler, *FLAGS, str(c_file), "-o", str(built), "-lm"]
+        command = [*compiler, *flags, str(c_file), "-o", str(built), "-lm"]
         answer = subprocess.run(command, capture_output=True, text=True, check=False)
         if answer.returncode != 0:
             first_lines = "\n".join(answer.stderr.splitlines()[:5])

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 
 import casadi as ca
 import numpy as np
@@ -17,7 +17,7 @@ from identifier.network import Network, Weights
 from identifier.network_model import NetworkModel
 from identifier.observer import INPUT_SOURCES
 from identifier.step import CARRY, GAINS, OVER, Structure, build_step
-from models.bicycle import bicycle
+from models.bicycle import BicycleParameters, bicycle
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 
@@ -150,9 +150,13 @@ def axle_impulse(x: Array, vehicle: Vehicle) -> Array:
     x : [v_y, r] (2,).
     vehicle : the car, which gives K.
     """
-    K_inv = np.array(ca.DM(bicycle(vehicle.bicycle, 1.0).K_inv))  # K does not depend on v_x
-    impulse: Array = K_inv @ x
+    impulse: Array = _K_inv(vehicle.bicycle) @ x
     return impulse
+
+
+@lru_cache(maxsize=1024)
+def _K_inv(parameters: BicycleParameters) -> Array:
+    return np.array(ca.DM(bicycle(parameters, 1.0).K_inv))  # K does not depend on v_x
 
 
 def natural_force_unit(mass: float) -> float:

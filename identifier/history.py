@@ -18,6 +18,27 @@ class DivergedError(ArithmeticError):
     """The law diverged before the instant that was asked for."""
 
 
+def carried_index(recording: Recording, t: float) -> int:
+    """Return which carried values are in effect at a time: those before that sample; n at the end.
+
+    Parameters
+    ----------
+    recording : n samples.
+    t : time in the recording's own clock [s].
+
+    Raises
+    ------
+    ValueError
+        Where the recording begins after that time.
+    """
+    times, tolerance = recording.t, 1e-6 * recording.dt
+    if not t >= times[0]:
+        raise ValueError(f"cannot freeze at {t:g} s, the recording begins at {times[0]:g} s")
+    if t > times[-1] - tolerance:
+        return int(times.size)
+    return int(np.searchsorted(times, t + tolerance, side="right")) - 1
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class History:
     """An online run over n samples.
@@ -58,12 +79,7 @@ class History:
         ValueError
             Where the recording begins after that time.
         """
-        times = self.recording.t
-        if not t >= times[0]:
-            raise ValueError(f"cannot freeze at {t:g} s, the recording begins at {times[0]:g} s")
-        tolerance = 1e-6 * self.design.dt
-        index = int(np.searchsorted(times, t + tolerance, side="right")) - 1
-        index = times.size if t > times[-1] - tolerance else index
+        index = carried_index(self.recording, t)
         return {name: values[index] for name, values in self.carried.items()}
 
     def freeze(self, t: float) -> FrozenModel:

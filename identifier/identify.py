@@ -6,6 +6,25 @@ from models.recordings import Recording
 from models.vehicle import Vehicle
 
 
+def check_sampling(recording: Recording, design: Method) -> None:
+    """Refuse a recording that is not sampled at the design's interval.
+
+    Parameters
+    ----------
+    recording : what the design is to run over.
+    design : the method.
+
+    Raises
+    ------
+    ValueError
+        Where the two differ.
+    """
+    if abs(recording.dt - design.dt) > 1e-6 * design.dt:
+        raise ValueError(
+            f"{recording.name} is sampled at {recording.dt:g} s, the design at {design.dt:g} s"
+        )
+
+
 def identify(
     recording: Recording, vehicle: Vehicle, design: Method, start: FrozenModel | None = None
 ) -> History:
@@ -23,14 +42,9 @@ def identify(
     ValueError
         Where recording and design differ in their sampling interval.
     """
-    if abs(recording.dt - design.dt) > 1e-6 * design.dt:
-        raise ValueError(
-            f"{recording.name} is sampled at {recording.dt:g} s, the design at {design.dt:g} s"
-        )
+    check_sampling(recording, design)
     setup = design.setup(vehicle, recording, start)
-    signals = {"x": recording.x, "u": recording.u, "v_x": recording.v_x}
-    sampled = {name: signals[name] for name in setup.scan.over}
-    record = setup.scan(recording.t.size, {**setup.carry, **sampled, **setup.constants})
+    record = setup.run(recording)
     return History(
         vehicle=vehicle,
         design=design,

@@ -64,6 +64,17 @@ class Setup(NamedTuple):
     carry: Mapping[str, Array]
     constants: Mapping[str, Array]
 
+    def run(self, recording: Recording) -> dict[str, Array]:
+        """Return what the compiled step records over a recording, by port.
+
+        Parameters
+        ----------
+        recording : its signals are the input; its forces are not looked at.
+        """
+        signals = {"x": recording.x, "u": recording.u, "v_x": recording.v_x}
+        sampled = {name: signals[name] for name in self.scan.over}
+        return self.scan(len(recording), {**self.carry, **sampled, **self.constants})
+
 
 class Method(Protocol):
     """A way to identify axle forces: everything that is chosen before the car drives."""

@@ -5,6 +5,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from identifier.axle.model import KIND as AXLE
+from identifier.axle.model import AxleModel
+from identifier.baselines.curve_model import KIND as CURVE
+from identifier.baselines.curve_model import CurveModel
 from identifier.method import FrozenModel
 from identifier.model_format import FORMAT, FrozenModelError
 from identifier.network_model import KIND as NETWORK
@@ -12,6 +16,8 @@ from identifier.network_model import NetworkModel
 
 READERS: Mapping[str, Callable[[dict[str, Any], str], FrozenModel]] = {
     NETWORK: NetworkModel.from_dict,
+    AXLE: AxleModel.from_dict,
+    CURVE: CurveModel.from_dict,
 }
 
 

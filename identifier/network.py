@@ -12,6 +12,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from codegen.tanh import tanh
 from models.bicycle import BicycleParameters, slip_angles
 
 # Signals that may enter the network, each with the value that counts as large for a passenger car.
@@ -93,14 +94,14 @@ class Network:
 
 
 def hidden_layer(V: Any, x_bar: Any) -> Any:
-    """Return σ = tanh(V x̄), (n_h,).
+    """Return σ = tanh(V x̄), (n_h,), by the rational tanh that every machine computes alike.
 
     Parameters
     ----------
     V : weights (n_h, n_in).
     x_bar : scaled input (n_in,).
     """
-    return ca.tanh(V @ x_bar)
+    return tanh(V @ x_bar)
 
 
 def network_signals(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Scan
+from identifier.method import Setup
 from identifier.model_format import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
 from identifier.network import Network, Weights, hidden_layer, network_signals
 from models.bicycle import BicycleParameters, linear_axle_force
@@ -48,9 +49,30 @@ def build_frozen(network: Network) -> ca.Function:
     )
 
 
+def build_replay(network: Network) -> ca.Function:
+    """Return the frozen model as it is replayed: no force below min_speed [m/s], a further port.
+
+    Parameters
+    ----------
+    network : structure of the network.
+    """
+    frozen = build_frozen(network)
+    ports = {name: ca.SX.sym(name, *frozen.size_in(name)) for name in frozen.name_in()}
+    min_speed, v_x = ca.SX.sym("min_speed"), ports["v_x"]
+    read = {**ports, "v_x": ca.fmax(v_x, min_speed)}
+    force = frozen(*read.values())[1]
+    return ca.Function(
+        "replayed_network",
+        [*ports.values(), min_speed],
+        [ca.if_else(v_x >= min_speed, force, 0)],
+        [*ports, "min_speed"],
+        ["axle_force"],
+    )
+
+
 @cache
-def _frozen_scan(network: Network) -> Scan:
-    return Scan(build_frozen(network), carry=(), over=("x", "u", "v_x"))
+def _replay_scan(network: Network) -> Scan:
+    return Scan(build_replay(network), carry=(), over=("x", "u", "v_x"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,6 +113,26 @@ class NetworkModel:
             if not np.isfinite(value).all():
                 raise ValueError(f"{name} holds a number that is not finite: the law has diverged")
 
+    def setup(self, recording: Recording) -> Setup:
+        """Return what a replay needs.
+
+        Parameters
+        ----------
+        recording : what is replayed; it is not looked at.
+        """
+        del recording
+        return Setup(
+            scan=_replay_scan(self.network),
+            carry={},
+            constants={
+                "W": self.weights.W,
+                "V": self.weights.V,
+                "vehicle": np.array(self.vehicle.bicycle),
+                "force_unit": np.array(self.force_unit),
+                "min_speed": np.array(self.min_speed),
+            },
+        )
+
     def axle_force(self, recording: Recording) -> NDArray[np.float64]:
         """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
 
@@ -98,21 +140,7 @@ class NetworkModel:
         ----------
         recording : its signals are the input; its forces are not looked at.
         """
-        moving = recording.v_x >= self.min_speed
-        record = _frozen_scan(self.network)(
-            recording.t.size,
-            {
-                "W": self.weights.W,
-                "V": self.weights.V,
-                "x": recording.x,
-                "u": recording.u,
-                "v_x": np.where(moving, recording.v_x, self.min_speed),
-                "vehicle": np.array(self.vehicle.bicycle),
-                "force_unit": np.array(self.force_unit),
-            },
-        )
-        force: NDArray[np.float64] = np.where(moving[:, None], record["axle_force"], 0.0)
-        return force
+        return self.setup(recording).run(recording)["axle_force"]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the model as plain numbers and words, ready for JSON."""

@@ -56,19 +56,20 @@ def run(options: argparse.Namespace) -> None:
     with output_folder(options.out, force=options.force) as folder:
         say("1/3 driving the sedan, learning, freezing, predicting")
         story = run_story()
-        learning, tables = folder / "identify", folder / "paper"
-        learning.mkdir()
-        tables.mkdir()
-        write_results(learning, "integral", story.learnt, story.others, story.frozen)
-        operation = natural_operation(story.design, story.car)
+        folders = {name: folder / name for name in ("identify", "paper_network", "paper")}
+        for one in folders.values():
+            one.mkdir()
+        for name, part in (("identify", story.default), ("paper_network", story.paper)):
+            write_results(folders[name], part.law, part.learnt, part.others, part.frozen)
+        operation, drive = natural_operation(story.design, story.car), story.paper.learnt.recording
         draw_check(
-            learning, story.learnt.recording, story.car, story.design, operation, story.certificate
+            folders["paper_network"], drive, story.car, story.design, operation, story.certificate
         )
         say("2/3 the frozen-weight test of the paper")
         study = run_study(SEEDS, say)
-        write_study(tables, study)
+        write_study(folders["paper"], study)
         say("3/3 writing the report")
-        sections = demo_sections(story, study, learning, tables)
+        sections = demo_sections(story, study, folder)
         write_report(folder / "report.html", TITLE, sections, summary=SUMMARY)
     for maneuver in study.errors:
         print(table_text(maneuver, study))

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from tireid.certificate_table import HEADER, advised, certificate_rows, notes, verdict_line
 from tireid.demo_story import FREEZE, SPEED, Story
+from tireid.figures import figure_png, side_by_side_figure
 from tireid.paper_study import GAINS, NETWORK, Study
 from tireid.paper_tables import MEANING, header, rows, settings
 from tireid.report import Paragraph, Picture, Section, Table
@@ -14,21 +15,22 @@ REFERENCE = (
 )
 
 
-def demo_sections(story: Story, study: Study, learning: Path, tables: Path) -> list[Section]:
+def demo_sections(story: Story, study: Study, folder: Path) -> list[Section]:
     """Return the sections of the report.
 
     Parameters
     ----------
-    story : the noisy drives.
+    story : the noisy drives, learnt by both methods.
     study : the paper's study.
-    learning : folder with the figures of the first drive.
-    tables : folder with the figures of the study.
+    folder : with the figures in identify/, paper_network/ and paper/.
     """
+    default, network, tables = (folder / n for n in ("identify", "paper_network", "paper"))
     return [
-        _drive(learning),
-        _certify(story, learning),
-        _learn(story, learning),
-        _predict(story, learning),
+        _drive(default),
+        _learn(default),
+        _predict(story),
+        _certify(story, network),
+        _network(story, network),
         _slalom(study, tables),
         _step(study, tables),
     ]
@@ -52,7 +54,7 @@ def _drive(learning: Path) -> Section:
 def _certify(story: Story, learning: Path) -> Section:
     certificate, unit = story.certificate, story.design.force_unit
     return Section(
-        heading="The gains are judged before anything is learnt",
+        heading="The gains of the paper's law are judged before it learns",
         blocks=[
             Paragraph(
                 text="The certificate follows from the gains, the network and how hard the car is "
@@ -78,60 +80,88 @@ def _certify(story: Story, learning: Path) -> Section:
     )
 
 
-def _learn(story: Story, learning: Path) -> Section:
-    design = story.design
-    gains = design.gains
+def _learn(default: Path) -> Section:
     return Section(
         heading="Tire forces are learnt while it drives",
+        blocks=[
+            Paragraph(
+                text="Each axle has a force curve of slip, a sum of tanh units that is odd and "
+                "saturates. Slip is lagged by the relaxation of the tire, which is learnt too, and "
+                "moved by the sway of the body. The curves are learnt by recursive least squares "
+                "from motion alone; what was never excited keeps what is believed of any tire."
+            ),
+            Picture(
+                image=default / "forces.png",
+                caption="Axle forces: online above, and below replayed with the weights frozen at "
+                f"{FREEZE:g} s.",
+            ),
+            Picture(
+                image=default / "slip.png",
+                caption="The same forces over slip angle (sign of the paper: positive slip pushes "
+                "to the left), and the curve behind them. Forces form loops since tires relax and "
+                "the body sways. Slip that the model does not know is shaded.",
+            ),
+            Picture(
+                image=default / "learnt.png",
+                caption="What is learnt, in the numbers of a tire: each settles when excited.",
+            ),
+        ],
+    )
+
+
+def _predict(story: Story) -> Section:
+    blocks: list[Paragraph | Table | Picture] = [
+        Paragraph(
+            text="Reproducing the drive that was learnt is the easier half. The same frozen "
+            "weights predict two other maneuvers, beside them the paper's network and law, learnt "
+            "on the same slalom with gains from the phase margin of their loop."
+        ),
+        Table(
+            caption="RMSE of the axle force, both axles together [kN], and the frozen error as a "
+            "share of the rms force.",
+            header=[
+                "drive",
+                "default, online",
+                "frozen",
+                "of rms",
+                "paper, online",
+                "frozen",
+                "of rms",
+            ],
+            rows=story.rows(),
+        ),
+    ]
+    for history in story.default.others:
+        name = history.recording.name
+        said = name.replace("_", " ")
+        figure = side_by_side_figure(story.side_by_side(name))
+        caption = f"Both methods, frozen after the slalom, asked about the {said}."
+        blocks.append(Picture(image=figure_png(figure), caption=caption))
+    return Section(heading="The frozen model is asked about drives it has not seen", blocks=blocks)
+
+
+def _network(story: Story, network: Path) -> Section:
+    design, gains = story.design, story.design.gains
+    return Section(
+        heading="The paper's network on the same slalom",
         blocks=[
             Paragraph(
                 text="At every sample an observer predicts the motion; its error drives the "
                 "weights of a network of "
                 f"{design.network.hidden} hidden units, which corrects the linear tire. The law is "
-                "the integral law of the paper, with gains from the phase margin of its loop: "
-                f"A_d = {gains.A_d[0][0]:g} I 1/s, lambda = {gains.forgetting:g} 1/s, eta1 = "
-                f"{gains.eta_W:.4g}, eta2 = {gains.eta_V:.4g}, rho1 = rho2 = {gains.rho_W:g}."
+                "the integral law of the paper: "
+                f"A_d = {gains.A_d[0][0]:.4g} I 1/s, lambda = {gains.forgetting:.4g} 1/s, eta1 = "
+                f"{gains.eta_W:.4g} 1/s^4, eta2 = {gains.eta_V:.4g} 1/(kN^2 s^4), rho1 = "
+                f"{gains.rho_W:.4g} and rho2 = {gains.rho_V:.4g} 1/(kN s^2)."
             ),
             Picture(
-                image=learning / "forces.png",
+                image=network / "forces.png",
                 caption="Axle forces: online above, and below replayed with the weights frozen at "
                 f"{FREEZE:g} s.",
             ),
-            Picture(
-                image=learning / "slip.png",
-                caption="The same forces over slip angle (sign of the paper: positive slip pushes "
-                "to the left). The true force forms loops since tires relax.",
-            ),
-            Picture(image=learning / "error.png", caption="Norm of the observer's error."),
-            Picture(image=learning / "weights.png", caption="Weights of the network."),
-        ],
-    )
-
-
-def _predict(story: Story, learning: Path) -> Section:
-    names = [history.recording.name for history in story.others]
-    return Section(
-        heading="The frozen model is asked about drives it has not seen",
-        blocks=[
-            Paragraph(
-                text="Reproducing the drive that was learnt is the easier half. The same frozen "
-                "weights predict two other maneuvers; the identifier that goes on learning there "
-                "(online) is beside it. Where the frozen error is far larger, the network learnt "
-                "the maneuver rather than the tire."
-            ),
-            Table(
-                caption="RMSE of the axle force, both axles together, and the frozen error as a "
-                "share of the rms force.",
-                header=["drive", "online [kN]", "frozen [kN]", "of rms force"],
-                rows=story.rows(),
-            ),
-            *(
-                Picture(
-                    image=learning / f"replay_{name}.png",
-                    caption=f"Frozen after the slalom, asked about the {name.replace('_', ' ')}.",
-                )
-                for name in names
-            ),
+            Picture(image=network / "slip.png", caption="The same forces over slip angle."),
+            Picture(image=network / "error.png", caption="Norm of the observer's error."),
+            Picture(image=network / "weights.png", caption="Weights of the network."),
         ],
     )
 

@@ -9,6 +9,8 @@ from identifier.defaults import default_design
 from identifier.design import Design
 from identifier.history import History
 from identifier.identify import identify
+from identifier.method import Method
+from identifier.methods import DEFAULT, REFERENCE, make_method
 from identifier.reproducibility import Replay, force_rms, online_error, replay
 from identifier.stability import Certificate
 from models.maneuvers import DoubleLaneChange, Maneuver, Slalom, StepSteer
@@ -41,47 +43,93 @@ PREDICT: Mapping[str, Maneuver] = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Story:
-    """The demo's drives and what was learnt on the first.
+class Learning:
+    """What one method learnt on the first drive, and what it says of the others.
 
     Parameters
     ----------
-    car : what drives, and what the identifier is told of.
-    design : the design that learns.
+    law : name of the method.
     learnt : the online run that the weights come from.
     others : online runs over the drives that the frozen model predicts.
     frozen : freeze time [s] to recording name to replay.
     """
 
-    car: Vehicle
-    design: Design
+    law: str
     learnt: History
     others: Sequence[History]
     frozen: Mapping[float, Mapping[str, Replay]]
 
+    def errors(self, drive: History) -> tuple[float, float, float]:
+        """Return online and frozen error of both axles [kN], and the frozen share of the rms [-].
+
+        Parameters
+        ----------
+        drive : `learnt`, or one of `others`.
+        """
+        frozen = self.frozen[FREEZE][drive.recording.name].against_truth
+        online, size = online_error(drive), force_rms(drive)
+        assert size is not None and frozen is not None and online is not None
+        return online.both / 1e3, frozen.both / 1e3, frozen.both / size.both
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Story:
+    """The demo's drives, learnt by the default method and by the paper's beside it.
+
+    Parameters
+    ----------
+    car : what drives, and what the identifier is told of.
+    design : the design of the paper's identifier.
+    default : what the default method learnt.
+    paper : what the paper's network and law learnt.
+    """
+
+    car: Vehicle
+    design: Design
+    default: Learning
+    paper: Learning
+
     @property
     def certificate(self) -> Certificate:
-        """What is known of the design before the car drives."""
+        """What is known of the paper's design before the car drives."""
         return certificate_of(self.design, self.car)
 
     def rows(self) -> list[list[str]]:
-        """Return name, online and frozen error of both axles together, and the share of force."""
+        """Return by drive, for default and paper: online and frozen error, share of the force."""
         rows = []
-        for history in (self.learnt, *self.others):
-            name = history.recording.name
-            frozen, online = self.frozen[FREEZE][name].against_truth, online_error(history)
-            size = force_rms(history)
-            assert size is not None and frozen is not None and online is not None
-            share = 100.0 * frozen.both / size.both
-            rows.append(
-                [name, f"{online.both / 1e3:.3f}", f"{frozen.both / 1e3:.3f}", f"{share:.0f} %"]
-            )
+        methods = self.default, self.paper
+        for drives in zip(*([m.learnt, *m.others] for m in methods), strict=True):
+            row = [drives[0].recording.name]
+            for method, drive in zip(methods, drives, strict=True):
+                online, frozen, share = method.errors(drive)
+                row += [f"{online:.3f}", f"{frozen:.3f}", f"{100.0 * share:.0f} %"]
+            rows.append(row)
         return rows
+
+    def side_by_side(self, drive: str) -> dict[str, Replay]:
+        """Return the replays of both methods over a drive, by the name in a legend.
+
+        Parameters
+        ----------
+        drive : name of the recording.
+        """
+        return {
+            "default (axle curves)": self.default.frozen[FREEZE][drive],
+            "paper (network, integral law)": self.paper.frozen[FREEZE][drive],
+        }
 
     def text(self) -> str:
         """Return the rows as lines of text."""
-        lines = ["Frozen after the slalom: RMSE of the axle force [kN], online / frozen / of rms"]
-        lines += [f"  {a:20} {b:>8} {c:>8} {d:>6}" for a, b, c, d in self.rows()]
+        lines = [
+            "Frozen after the slalom, asked about drives that were not learnt: RMSE [kN]",
+            f"  {'':20} {'default (axle)':>26}   {'paper (network, integral)':>26}",
+            f"  {'drive':20} {'online':>8} {'frozen':>8} {'of rms':>8}"
+            f"   {'online':>8} {'frozen':>8} {'of rms':>8}",
+        ]
+        for name, *cells in self.rows():
+            first, second = cells[:3], cells[3:]
+            numbers = "   ".join(" ".join(f"{c:>8}" for c in part) for part in (first, second))
+            lines.append(f"  {name:20} {numbers}")
         return "\n".join(lines)
 
 
@@ -105,15 +153,25 @@ def drive_to_learn() -> Recording:
 
 
 def run_story() -> Story:
-    """Drive, learn, freeze and predict."""
+    """Drive, learn, freeze and predict, with both methods."""
     car = sedan()
-    design = default_design(car)
     recordings = drives({"slalom": LEARN, **PREDICT})
-    histories = {name: identify(rec, car, design) for name, rec in recordings.items()}
-    model = histories["slalom"].freeze(FREEZE)
+    design = default_design(car)
     return Story(
         car=car,
         design=design,
+        default=_learning(DEFAULT, make_method(DEFAULT, car), car, recordings),
+        paper=_learning(REFERENCE, design, car, recordings),
+    )
+
+
+def _learning(
+    law: str, method: Method, car: Vehicle, recordings: Mapping[str, Recording]
+) -> Learning:
+    histories = {name: identify(rec, car, method) for name, rec in recordings.items()}
+    model = histories["slalom"].freeze(FREEZE)
+    return Learning(
+        law=law,
         learnt=histories["slalom"],
         others=[histories[name] for name in PREDICT],
         frozen={FREEZE: {name: replay(model, history) for name, history in histories.items()}},

@@ -5,11 +5,16 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from identifier.defaults import LAWS, default_design
+import numpy as np
+
+from identifier.axle import AxleModel
 from identifier.design import Design
 from identifier.design_file import read_design
 from identifier.history import DivergedError, History
 from identifier.identify import identify
+from identifier.method import FrozenModel, Method
+from identifier.methods import DEFAULT, METHODS, REFERENCE, make_method
+from identifier.model_file import load_model
 from identifier.reproducibility import (
     AxleRmse,
     Replay,
@@ -18,15 +23,11 @@ from identifier.reproducibility import (
     freeze_key,
     replay,
 )
-from models.recordings import (
-    Recording,
-    check_against_vehicle,
-    read_recording,
-    split_log_argument,
-)
+from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid.certificate_table import certificate_of, verdict_line
 from tireid.identify_results import file_name, write_results
+from tireid.inputs import read_log
 from tireid.output import output_folder
 from tireid.progress import say
 
@@ -51,25 +52,44 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("log", metavar="LOG", help="recording; LOG:RUN names one of its runs")
     parser.add_argument("--vehicle", required=True, type=Path, metavar="FILE", help="car as TOML")
     parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
-    parser.add_argument("--law", choices=LAWS, help="law of the default design (integral)")
+    parser.add_argument(
+        "--law", choices=METHODS, metavar="NAME", help=f"{', '.join(METHODS)} (default: {DEFAULT})"
+    )
+    parser.add_argument(
+        "--paper", action="store_true", help=f"the paper's network and law: --law {REFERENCE}"
+    )
     parser.add_argument(
         "--design", type=Path, metavar="FILE", help="design.toml, in place of the default design"
     )
     parser.add_argument(
-        "--freeze", nargs="+", type=float, metavar="T", help="freeze at these times [s] (the end)"
+        "--freeze",
+        nargs="+",
+        action="extend",
+        type=float,
+        metavar="T",
+        help="freeze at these times [s] (the end)",
     )
     parser.add_argument(
-        "--replay", nargs="+", default=[], metavar="LOG[:RUN]", help="recordings to predict"
+        "--replay",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="LOG[:RUN]",
+        help="recordings to predict",
     )
     parser.add_argument(
         "--columns",
         nargs="+",
+        action="extend",
         default=[],
         metavar="NAME=COLUMN",
         help="read column COLUMN of the logs as NAME, for example r=yaw_rate",
     )
     parser.add_argument(
         "--no-check", action="store_true", help="accept a log that contradicts physics"
+    )
+    parser.add_argument(
+        "--weights", type=Path, metavar="FILE", help="weights.json to begin learning with"
     )
     parser.add_argument("--seed", type=int, metavar="N", help="of the initial weights (0)")
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder to write")
@@ -86,26 +106,46 @@ def run(options: argparse.Namespace) -> None:
     """
     vehicle = Vehicle.from_toml(options.vehicle)
     law, design = _design(options, vehicle)
+    start = None if options.weights is None else load_model(options.weights)
     recording = _read(options.log, options.run_name, vehicle, design, options)
     others = [_read(log, None, vehicle, design, options) for log in options.replay]
     _require_distinct([recording, *others])
     freeze_times = sorted(set(options.freeze or [float(recording.t[-1])]))
     _require_inside(freeze_times, recording)
     with output_folder(options.out, force=options.force) as folder:
-        histories = [_learn(one, vehicle, law, design) for one in (recording, *others)]
+        histories = [_learn(one, vehicle, law, design, start) for one in (recording, *others)]
         learnt = histories[0]
         frozen = {t: _replays(t, learnt, histories) for t in freeze_times}
         write_results(folder, law, learnt, histories[1:], frozen)
     print_table(histories, frozen)
-    print(verdict_line(certificate_of(design, vehicle)))
+    print(_closing_line(learnt.freeze(freeze_times[-1]), design, vehicle))
     say(f"wrote {options.out}/")
 
 
-def _design(options: argparse.Namespace, vehicle: Vehicle) -> tuple[str, Design]:
-    """Return the name of the law and the design."""
+def _closing_line(model: FrozenModel, design: Method, vehicle: Vehicle) -> str:
+    """Return the certificate of the paper's identifier, or what the axle identifier knows."""
+    if isinstance(design, Design):
+        return verdict_line(certificate_of(design, vehicle))
+    if not isinstance(model, AxleModel):
+        return f"frozen: {type(model).__name__}"
+    stiffness, length = model.cornering_stiffness, model.relaxation_length
+    known = np.degrees(model.known_slip_range)
+    return (
+        f"learnt: cornering stiffness {stiffness[0]:.4g} / {stiffness[1]:.4g} N/rad, relaxation "
+        f"length {length[0]:.2g} / {length[1]:.2g} m, known to {known[0]:.1f} / {known[1]:.1f} deg "
+        "of slip (front / rear)"
+    )
+
+
+def _design(options: argparse.Namespace, vehicle: Vehicle) -> tuple[str, Method]:
+    """Return the name of the law and the method."""
+    if options.seed is not None and options.seed < 0:
+        raise ValueError(f"--seed must not be negative, it is {options.seed}")
+    if options.paper and (options.law or options.design):
+        raise ValueError("--paper names the law already: give no --law or --design with it")
     if options.design is None:
-        law = options.law or "integral"
-        return law, default_design(vehicle, law=law, seed=options.seed or 0)
+        law = options.law or (REFERENCE if options.paper else DEFAULT)
+        return law, make_method(law, vehicle, options.seed or 0)
     for name in ("law", "seed"):
         if getattr(options, name) is not None:
             raise ValueError(f"--{name} is for the default design: it stands in {options.design}")
@@ -113,8 +153,14 @@ def _design(options: argparse.Namespace, vehicle: Vehicle) -> tuple[str, Design]
     return design.law, design
 
 
-def _learn(recording: Recording, vehicle: Vehicle, law: str, design: Design) -> History:
-    history = identify(recording, vehicle, design)
+def _learn(
+    recording: Recording,
+    vehicle: Vehicle,
+    law: str,
+    design: Method,
+    start: FrozenModel | None,
+) -> History:
+    history = identify(recording, vehicle, design, start)
     if history.diverged_at is not None:
         at = freeze_key(history.diverged_at)
         raise DivergedError(f"{recording.name}: the {law} law diverged at {at} s")
@@ -123,31 +169,18 @@ def _learn(recording: Recording, vehicle: Vehicle, law: str, design: Design) -> 
 
 
 def _read(
-    log: str, run_name: str | None, vehicle: Vehicle, design: Design, options: argparse.Namespace
+    log: str, run_name: str | None, vehicle: Vehicle, design: Method, options: argparse.Namespace
 ) -> Recording:
-    path, named = split_log_argument(log)
-    if named is not None and run_name is not None and named != run_name:
-        raise ValueError(f"{log} names the run {named}, --run names {run_name}: name one of them")
-    check = not options.no_check
-    columns = _columns(options.columns)
-    recording = read_recording(
-        path, run=run_name or named, dt=design.dt, check=check, columns=columns
+    recording = read_log(
+        log,
+        vehicle,
+        run_name=run_name,
+        columns=options.columns,
+        check=not options.no_check,
+        dt=design.dt,
     )
-    if check:
-        check_against_vehicle(recording, vehicle)
     counted_samples(recording, design.min_speed)  # refuses a car that never drives
-    say(f"read {recording.name}: {recording.t.size} samples, {recording.duration:.1f} s")
     return recording
-
-
-def _columns(pairs: list[str]) -> dict[str, str]:
-    columns = {}
-    for pair in pairs:
-        name, equals, column = pair.partition("=")
-        if not (name and equals and column):
-            raise ValueError(f"--columns wants NAME=COLUMN, not {pair!r}")
-        columns[name] = column
-    return columns
 
 
 def _require_distinct(recordings: list[Recording]) -> None:

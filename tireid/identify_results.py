@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from identifier.axle import AxleDesign
+from identifier.design import Design
 from identifier.history import History
 from identifier.reproducibility import Replay, freeze_key
 from models.recordings import Recording
@@ -14,6 +16,7 @@ from tireid.figures import (
     error_figure,
     force_figure,
     inputs_figure,
+    learnt_axles_figure,
     prediction_figure,
     save_figure,
     slip_figure,
@@ -24,6 +27,7 @@ from tireid.progress import say
 from tireid.summary import summarize
 
 Frozen = Mapping[float, Mapping[str, Replay]]
+WEIGHTS = ("W", "V", "own")  # carried matrices that are the learnt model, by whatever method
 
 
 def write_results(
@@ -66,18 +70,20 @@ def _write_curves(folder: Path, learnt: History, others: Sequence[History], froz
         name = "forces.csv" if history is learnt else f"forces_{file_name(history.recording)}.csv"
         write_csv(folder / name, force_columns(history, replays))
     t, n = learnt.recording.t, learnt.recording.t.size
-    write_csv(
-        folder / "errors.csv",
-        {
-            "t_s": t,
-            "xi_tilde_f_Us": learnt.told["xi_tilde"][:, 0],
-            "xi_tilde_r_Us": learnt.told["xi_tilde"][:, 1],
-            "z_f_Us2": learnt.carried["z"][:-1, 0],
-            "z_r_Us2": learnt.carried["z"][:-1, 1],
-        },
-    )
+    if isinstance(learnt.design, Design):
+        write_csv(
+            folder / "errors.csv",
+            {
+                "t_s": t,
+                "xi_tilde_f_Us": learnt.told["xi_tilde"][:, 0],
+                "xi_tilde_r_Us": learnt.told["xi_tilde"][:, 1],
+                "z_f_Us2": learnt.carried["z"][:-1, 0],
+                "z_r_Us2": learnt.carried["z"][:-1, 1],
+            },
+        )
     weights = {"t_s": t}
-    for matrix, values in (("W", learnt.carried["W"]), ("V", learnt.carried["V"])):
+    for matrix in [name for name in WEIGHTS if name in learnt.carried]:
+        values = learnt.carried[matrix]
         for i, j in np.ndindex(values.shape[1:]):
             weights[f"{matrix}_{i + 1}_{j + 1}"] = values[:n, i, j]
     write_csv(folder / "weights.csv", weights)
@@ -120,10 +126,13 @@ def _draw(folder: Path, learnt: History, others: Sequence[History], frozen: Froz
     figures = {
         "forces": force_figure(learnt, own),
         "slip": slip_figure(learnt.freeze(last), learnt.recording, learnt),
-        "error": error_figure(learnt, freeze_times=list(frozen)),
-        "weights": weights_figure(learnt, list(frozen)),
         "inputs": inputs_figure(learnt.recording),
     }
+    if isinstance(learnt.design, Design):
+        figures["error"] = error_figure(learnt, freeze_times=list(frozen))
+        figures["weights"] = weights_figure(learnt, list(frozen))
+    elif isinstance(learnt.design, AxleDesign):
+        figures["learnt"] = learnt_axles_figure(learnt, list(frozen))
     for other in others:
         replay = frozen[last][other.recording.name]
         figures[f"replay_{file_name(other.recording)}"] = prediction_figure(replay, other)

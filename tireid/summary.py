@@ -1,14 +1,15 @@
 """The machine-readable result of `tireid identify`: summary.json, whose keys are stable."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, is_dataclass
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from typing import Any, cast
 
+from identifier.design import Design
 from identifier.history import History
+from identifier.method import Method
 from identifier.model_format import vehicle_numbers
 from identifier.reproducibility import AxleRmse, Replay, force_rms, freeze_key, online_error
-from tireid.figures.units import paper_design
 
 
 def program_version() -> str:
@@ -21,6 +22,37 @@ def program_version() -> str:
 
 def _axles(error: AxleRmse | None) -> dict[str, float] | None:
     return None if error is None else {"front": error.front, "rear": error.rear}
+
+
+def method_numbers(design: Method) -> dict[str, Any]:
+    """Return gains, network, the rest of the design, and the seed (None without random weights).
+
+    A method that is not the paper's has all its numbers under "gains" and no network.
+
+    Parameters
+    ----------
+    design : any method.
+    """
+    if isinstance(design, Design):
+        return {
+            "gains": asdict(design.gains),
+            "network": asdict(design.network),
+            "design": {
+                "input_source": design.input_source,
+                "integrator": design.integrator,
+                "dt_s": design.dt,
+                "force_unit_N": design.force_unit,
+                "min_speed_m_s": design.min_speed,
+            },
+            "seed": design.seed,
+        }
+    numbers: dict[str, Any] = asdict(cast(Any, design)) if is_dataclass(design) else {}
+    return {
+        "gains": numbers,
+        "network": numbers.get("network"),
+        "design": {"dt_s": design.dt, "min_speed_m_s": design.min_speed},
+        "seed": numbers.get("seed"),
+    }
 
 
 def summarize(
@@ -42,7 +74,6 @@ def summarize(
     frozen : freeze time [s] to recording name to replay.
     """
     runs = [learnt, *others]
-    design = paper_design(learnt)
     return {
         "rms_force_N": {h.recording.name: _axles(force_rms(h)) for h in runs},
         "rmse_N": {
@@ -57,17 +88,8 @@ def summarize(
             },
         },
         "law": law,
-        "gains": asdict(design.gains),
-        "network": asdict(design.network),
-        "design": {
-            "input_source": design.input_source,
-            "integrator": design.integrator,
-            "dt_s": design.dt,
-            "force_unit_N": design.force_unit,
-            "min_speed_m_s": design.min_speed,
-        },
+        **method_numbers(learnt.design),
         "vehicle": vehicle_numbers(learnt.vehicle),
-        "seed": design.seed,
         "diverged_at_s": learnt.diverged_at,
         "version": program_version(),
     }

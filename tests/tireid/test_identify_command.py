@@ -13,12 +13,23 @@ from models.recordings import read_recording
 from models.vehicle import sedan
 from tireid.cli import main
 
+METHOD_FILES = {  # figures and tables that belong to a method, and the columns of weights.csv
+    "axle": (("learnt.png",), 2 * 4 + 2 * 3),
+    "integral": (("error.png", "weights.png", "errors.csv"), 2 * 10 + 10 * 4),
+}
+
+
+@pytest.fixture(scope="module", params=METHOD_FILES)
+def law(request):
+    return request.param
+
 
 @pytest.fixture(scope="module")
-def result(logs, tmp_path_factory):
+def result(law, logs, tmp_path_factory):
     out = tmp_path_factory.mktemp("result") / "out"
     words = ["identify", str(logs / "slalom.csv"), "--vehicle", str(logs / "car.toml")]
     words += ["--freeze", "4", "8", "--replay", str(logs / "quick.csv"), "--out", str(out)]
+    words += ["--paper"] if law == "integral" else []
     assert main(words) == 0
     return out
 
@@ -49,7 +60,7 @@ def test_summary_has_the_documented_keys_and_the_right_numbers(result, logs):
     assert summary["rms_force_N"]["quick"] == pytest.approx({"front": rms[0], "rear": rms[1]})
 
 
-def test_every_curve_is_also_data(result):
+def test_every_curve_is_also_data(result, law):
     forces = np.genfromtxt(result / "forces.csv", delimiter=",", names=True)
     truth, online = forces["Fyf_true_N"], forces["Fyf_online_N"]
     summary = json.loads((result / "summary.json").read_text())
@@ -57,8 +68,9 @@ def test_every_curve_is_also_data(result):
     assert np.sqrt(np.mean((truth - online) ** 2)) == pytest.approx(front, rel=1e-6)
     assert "Fyr_frozen_4s_N" in forces.dtype.names
     weights = np.genfromtxt(result / "weights.csv", delimiter=",", names=True)
-    assert len(weights.dtype.names) == 1 + 2 * 10 + 10 * 4
-    for name in ("errors.csv", "forces_quick.csv", "weights_4s.json"):
+    files, columns = METHOD_FILES[law]
+    assert len(weights.dtype.names) == 1 + columns
+    for name in (*files, "forces_quick.csv", "weights_4s.json"):
         assert (result / name).is_file()
 
 
@@ -70,7 +82,7 @@ def test_the_vehicle_is_written_in_the_same_words_everywhere(result):
 
 
 def test_figures_are_written(result):
-    for name in ("forces", "slip", "error", "weights", "inputs", "replay_quick"):
+    for name in ("forces", "slip", "inputs", "replay_quick"):
         assert (result / f"{name}.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -236,8 +248,35 @@ def test_a_log_in_degrees_is_refused_by_its_column(logs, tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("law", ["integral", "instantaneous", "instantaneous_scaled"])
-def test_a_recorded_car_is_identified_by_every_law(shared_data, tmp_path, law):
+def test_learning_goes_on_from_stored_weights(result, law, logs, tmp_path):
+    """What was learnt on the slalom serves from the first sample of the next drive."""
+    words = ["identify", str(logs / "quick.csv"), "--vehicle", str(logs / "car.toml")]
+    words += ["--law", law]
+    errors = {}
+    for name, more in (("afresh", []), ("stored", ["--weights", str(result / "weights.json")])):
+        assert main([*words, *more, "--out", str(tmp_path / name)]) == 0
+        summary = json.loads((tmp_path / name / "summary.json").read_text())
+        errors[name] = summary["rmse_N"]["online"]["quick"]["front"]
+    assert errors["stored"] < 0.9 * errors["afresh"]
+
+
+def test_weights_of_another_structure_are_refused(logs, tmp_path, capsys, result, law):
+    words = ["identify", logs / "quick.csv", "--vehicle", logs / "car.toml"]
+    words += ["--out", tmp_path / "out"]
+    other = "integral" if law == "axle" else "axle"
+    said = refusal(capsys, [*words, "--law", other, "--weights", result / "weights.json"])
+    assert "the stored weights are of another structure" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_filter_of_forces_has_nothing_to_freeze(logs, tmp_path, capsys):
+    words = ["identify", logs / "quick.csv", "--vehicle", logs / "car.toml", "--law", "ekf_force"]
+    assert "not a tire" in refusal(capsys, [*words, "--out", tmp_path / "out"])
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["integral", "instantaneous", "instantaneous_scaled", "axle"])
+def test_a_recorded_car_is_identified_by_every_law(shared_data, tmp_path, name):
     """On the high-fidelity slalom each law beats the linear tire it started from."""
     car = tmp_path / "car.toml"
     car.write_text(
@@ -245,7 +284,7 @@ def test_a_recorded_car_is_identified_by_every_law(shared_data, tmp_path, law):
         "cornering_stiffness_front = 110e3\ncornering_stiffness_rear = 130e3\n"
     )
     log = shared_data / "carmaker.csv.gz"
-    words = ["identify", str(log), "--run", "slalom1_14_5ms", "--vehicle", str(car), "--law", law]
+    words = ["identify", str(log), "--run", "slalom1_14_5ms", "--vehicle", str(car), "--law", name]
     words += ["--replay", f"{log}:experiment2_40kmh", "--out", str(tmp_path / "out")]
     assert main(words) == 0
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())

@@ -1,6 +1,7 @@
 """Tables I and II: the pattern is there in the medians, the committed numbers are those we get."""
 
 import json
+import re
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -157,7 +158,10 @@ def test_demo_leaves_one_self_contained_report(tmp_path, monkeypatch, capsys):
     assert "http" not in page.replace("http-equiv", "")
     assert (tmp_path / "demo" / "identify" / "weights.json").is_file()
     for name in ("locus", "bounds"):
-        assert (tmp_path / "demo" / "identify" / f"{name}.png").is_file()
+        assert (tmp_path / "demo" / "paper_network" / f"{name}.png").is_file()
     printed = capsys.readouterr().out
     assert "report.html" in printed
     assert "verdict: pass" in printed
+    frozen = re.search(r"step_steer +[\d.]+ +([\d.]+) +\d+ % +[\d.]+ +([\d.]+)", printed)
+    default, paper = (float(number) for number in frozen.groups())
+    assert default < paper / 3.0  # on a maneuver that neither has learnt

@@ -1,10 +1,15 @@
 """Figures worth putting in a paper: functions of results that return a matplotlib Figure."""
 
+from tireid.figures.compare_matrix import matrix_figure
+from tireid.figures.compare_methods import methods_figure
+from tireid.figures.compare_pareto import pareto_figure
 from tireid.figures.comparison import comparison_figure
 from tireid.figures.errors import error_figure
 from tireid.figures.forces import force_figure
 from tireid.figures.inputs import inputs_figure
+from tireid.figures.learnt_axles import learnt_axles_figure
 from tireid.figures.prediction import prediction_figure
+from tireid.figures.side_by_side import side_by_side_figure
 from tireid.figures.slip import slip_figure
 from tireid.figures.stability import locus_figure
 from tireid.figures.style import figure_png, save_figure
@@ -16,9 +21,14 @@ __all__ = [
     "figure_png",
     "force_figure",
     "inputs_figure",
+    "learnt_axles_figure",
     "locus_figure",
+    "matrix_figure",
+    "methods_figure",
+    "pareto_figure",
     "prediction_figure",
     "save_figure",
+    "side_by_side_figure",
     "slip_figure",
     "weights_figure",
 ]

@@ -1,15 +1,20 @@
 """Axle force against slip angle: the shape of the tire, as measured and as learnt."""
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
+from identifier.axle import AxleModel
 from identifier.history import History
 from identifier.method import FrozenModel
 from models.recordings import Recording
 from tireid.figures.panels import AXLES, legend_above
 from tireid.figures.style import BLACK, BLUE, LINEAR, ORANGE, PAGE, new_figure, styled
 from tireid.figures.units import drawable, force_range, force_unit_of
+
+UNKNOWN = "slip not known"
 
 
 @styled
@@ -79,10 +84,30 @@ def slip_figure(model: FrozenModel, recording: Recording, online: History | None
         margin = 0.04 * (high - low) or 1.0
         ends = np.array([low - margin, high + margin])
         axes.plot(ends, stiffness[axle] / unit.newtons * np.deg2rad(ends), **LINEAR)
+        if isinstance(model, AxleModel):
+            _draw_curve(axes, model, axle, ends, unit.newtons)
         axes.set(
             xlim=ends, ylim=limits, title=name, xlabel=rf"slip angle $\alpha_{'fr'[axle]}$ [deg]"
         )
         axes.xaxis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 5, 10]))
     panels[0].set_ylabel(f"lateral force [{unit.name}]")
-    legend_above(figure)
+    legend_above(figure, order=(UNKNOWN,))
     return figure
+
+
+def _draw_curve(
+    axes: Axes, model: AxleModel, axle: int, ends: NDArray[np.float64], newtons: float
+) -> None:
+    """Draw the steady curve of an axle, and shade the slip that the model does not know."""
+    slip = np.linspace(np.deg2rad(ends[0]), np.deg2rad(ends[1]), 200)
+    axes.plot(
+        np.rad2deg(slip),
+        model.force_at(slip)[:, axle] / newtons,
+        color=BLUE,
+        linewidth=1.2,
+        label="frozen curve, steady",
+    )
+    known = float(np.rad2deg(model.known_slip_range[axle]))
+    for low, high in ((ends[0], -known), (known, ends[1])):
+        if low < high:
+            axes.axvspan(low, high, color="#EFE9DD", linewidth=0.0, zorder=0, label=UNKNOWN)

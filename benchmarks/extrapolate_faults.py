@@ -1,0 +1,89 @@
+"""Every method on a slalom whose signals fail now and then: estimates must stay finite."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.targets import Targets, show
+from identifier.cross_replay import Course
+from identifier.identify import identify
+from identifier.method import CannotFreezeError
+from identifier.methods import DEFAULT, METHODS, make_method
+from models.recordings import Recording
+from models.vehicle import sedan
+from tireid.plant_drives import plant_recordings
+
+Array = NDArray[np.float64]
+SIGNALS = ("v_x", "v_y", "r", "delta_f")
+EVERY, LASTS = 500, 40  # samples: a fault every 5 s, of 0.4 s
+
+
+def faults(targets: Targets) -> None:
+    """Count estimates that are not finite; show what the default still learns.
+
+    Parameters
+    ----------
+    targets : collects what is missed.
+    """
+    car = sedan()
+    clean = plant_recordings(car, np.random.default_rng(0))[0]
+    course = Course(vehicle=car, recordings=(clean,), min_speed=make_method(DEFAULT, car).min_speed)
+    print("Slalom with faults, every method")
+    for fault, recording in faulty(clean, np.random.default_rng(0)).items():
+        lost = []
+        for name in METHODS:
+            history = identify(recording, car, make_method(name, car))
+            finite = np.isfinite(history.axle_force).all()
+            try:
+                force = history.design.frozen(car, history.carried_at(clean.t[-1]))
+                finite = finite and np.isfinite(force.axle_force(recording)).all()
+            except CannotFreezeError:
+                pass
+            except ValueError:
+                finite = np.bool_(False)
+            lost += [] if finite else [name]
+            if name == DEFAULT and finite:
+                error = course.share(clean.name, course.error(clean, force.axle_force(clean)))
+                show(f"{fault}: {DEFAULT} frozen, on the clean slalom", f"{error:.1f} %")
+        text = f" ({', '.join(lost)})" if lost else ""
+        targets.at_most(f"{fault}: methods that are not finite{text}", len(lost), 0, "")
+
+
+def faulty(clean: Recording, rng: np.random.Generator) -> Mapping[str, Recording]:
+    """Return the recording with one kind of fault each.
+
+    Parameters
+    ----------
+    clean : the recording.
+    rng : of the size of spikes.
+    """
+    n = len(clean)
+    starts = np.arange(EVERY, n - LASTS, EVERY)
+    gap = (np.arange(n)[:, None] - starts >= 0) & (np.arange(n)[:, None] - starts < LASTS)
+    lost = gap.any(axis=1)
+    held = np.arange(n)
+    for start in starts:
+        held[start : start + LASTS] = start
+    spikes = np.zeros(n)
+    spikes[starts] = rng.standard_normal(starts.size)
+    middle = (np.arange(n) > n // 2) & (np.arange(n) < n // 2 + 300)
+    signals = {name: getattr(clean, name) for name in SIGNALS}
+    return {
+        "zeros for 0.4 s": _with(clean, {k: np.where(lost, 0.0, s) for k, s in signals.items()}),
+        "stuck for 0.4 s": _with(clean, {k: s[held] for k, s in signals.items()}),
+        "spikes of 10": _with(clean, {k: s + 10.0 * spikes for k, s in signals.items()}),
+        "spikes of 1000": _with(clean, {k: s + 1e3 * spikes for k, s in signals.items()}),
+        "standstill": _with(clean, {k: np.where(middle, 0.0, s) for k, s in signals.items()}),
+    }
+
+
+def _with(clean: Recording, signals: Mapping[str, Array]) -> Recording:
+    return replace(
+        clean,
+        v_x=signals["v_x"],
+        v_y=signals["v_y"],
+        r=signals["r"],
+        delta_f=signals["delta_f"],
+    )

@@ -1,0 +1,155 @@
+"""Learn on a noisy slalom of our plant, freeze, predict other maneuvers; and a drop of friction."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.targets import Targets, show
+from identifier.baselines import fit_floor, structure_of
+from identifier.cross_replay import Course
+from identifier.floors import STRUCTURES
+from identifier.identify import identify
+from identifier.methods import DEFAULT, METHODS, REFERENCE, make_method
+from identifier.reproducibility import AxleRmse
+from models.friction import Friction, FrictionChange
+from models.maneuvers import Slalom
+from models.plant import Plant
+from models.recordings import Recording
+from models.vehicle import sedan
+from tireid.plant_drives import DRIVES, RATE_LIMIT, SENSORS, SLALOM, plant_recordings
+
+Array = NDArray[np.float64]
+SEEDS = 5
+CHANGE, BACK, END = 20.0, 40.0, 60.0  # s
+SETTLED = 2.0  # s of excitation
+DROPS = (0.5, 0.7)
+
+
+def maneuvers(targets: Targets) -> None:
+    """Judge the default on maneuvers that it did not learn on, with several seeds of the noise.
+
+    Parameters
+    ----------
+    targets : collects what is missed.
+    """
+    car = sedan()
+    slowest = max(make_method(name, car).min_speed for name in METHODS)
+    rows: list[dict[str, dict[str, AxleRmse]]] = []
+    for seed in range(SEEDS):
+        recordings = _drives(np.random.default_rng(seed))
+        course = Course(vehicle=car, recordings=recordings, min_speed=slowest)
+        row = {name: _learnt_on_first(name, course, seed) for name in (DEFAULT, REFERENCE)}
+        structure = structure_of(make_method(STRUCTURES["axle units"], car), car)
+        for label, fitted in (("floor", recordings[:1]), ("best of all", recordings)):
+            model = fit_floor(structure, fitted, rng=np.random.default_rng(seed), starts=2)
+            row[label] = course.replays(model)
+        rows.append(row)
+    names = list(rows[0][DEFAULT])
+    print(f"Plant with noise, learnt on {names[0]}, median (smallest-largest) of {SEEDS} seeds")
+    worst = max(max(e.front, e.rear) for row in rows for e in [row[DEFAULT][names[0]]]) / 1e3
+    targets.at_most("in-sample, larger axle, worst seed", worst, 0.15, "kN")
+    for name in names:
+        for label in rows[0]:
+            fronts, rears = ([getattr(r[label][name], a) / 1e3 for r in rows] for a in AXLES)
+            show(f"{name}, {label}: front / rear [kN]", f"{_spread(fronts)} / {_spread(rears)}")
+        ratios = {
+            other: [row[DEFAULT][name].both / row[other][name].both for row in rows]
+            for other in rows[0]
+        }
+        if name != names[0]:
+            targets.at_most(f"{name}: over the floor, median", _median(ratios["floor"]), 1.3, "-")
+            show(f"{name}: over the best of all", _spread(ratios["best of all"]))
+            targets.at_most(
+                f"{name}: over the integral law, median", _median(ratios[REFERENCE]), 1 / 3, "-"
+            )
+    exact = Course(vehicle=car, recordings=_drives(None)[:1], min_speed=slowest)
+    (clean,) = _learnt_on_first(DEFAULT, exact, 0).values()
+    targets.at_most(
+        "in-sample without noise, larger axle", max(clean.front, clean.rear) / 1e3, 0.1, "kN"
+    )
+
+
+def friction_drop(targets: Targets) -> None:
+    """Judge how fast a drop of friction in the middle of a slalom is followed, and the return.
+
+    Parameters
+    ----------
+    targets : collects what is missed.
+    """
+    car = sedan()
+    plant = Plant(car)
+    slalom = Slalom(
+        amplitude=SLALOM.amplitude,
+        frequency=SLALOM.frequency,
+        onset=SLALOM.onset,
+        rate_limit=RATE_LIMIT,
+        duration=END,
+    )
+    for drop in DROPS:
+        changes = (
+            FrictionChange(scale=drop, at_time=CHANGE),
+            FrictionChange(scale=1.0, at_time=BACK),
+        )
+        run = plant.simulate(slalom, speed=20.0, friction=Friction(changes=changes), name="drop")
+        print(
+            f"Friction 1 to {drop} at {CHANGE:g} s and back at {BACK:g} s, worst of {SEEDS} seeds"
+        )
+        for name in (DEFAULT, REFERENCE):
+            recordings = [run.recording(SENSORS, np.random.default_rng(s)) for s in range(SEEDS)]
+            errors = [_phases(recording, name, seed) for seed, recording in enumerate(recordings)]
+            for (label, *_), values in zip(PHASES, np.max(errors, axis=0).tolist(), strict=True):
+                if name == DEFAULT and drop == DROPS[0] and "from 2 s on" in label:
+                    targets.at_most(f"{name}, {label}", values, 15.0)
+                else:
+                    show(f"{name}, {label}", f"{values:8.2f} %")
+
+
+AXLES = ("front", "rear")
+PHASES = (
+    ("before", CHANGE - 5.0, CHANGE),
+    ("dropped, first 2 s", CHANGE, CHANGE + SETTLED),
+    ("dropped, from 2 s on", CHANGE + SETTLED, BACK),
+    ("returned, first 2 s", BACK, BACK + SETTLED),
+    ("returned, from 2 s on", BACK + SETTLED, END),
+)
+
+
+def _phases(recording: Recording, name: str, seed: int) -> list[float]:
+    """Online error of both axles in each phase, over the rms force of the phase [%].
+
+    From 2 s on it is that of the worst second, over the rms force of all that phase.
+    """
+    history = identify(recording, sedan(), make_method(name, sedan(), seed))
+    assert recording.axle_force is not None
+    squares = np.mean((history.axle_force - recording.axle_force) ** 2, axis=1)
+    forces = np.mean(recording.axle_force**2, axis=1)
+    found = []
+    for label, first, last in PHASES:
+        now = (recording.t >= first) & (recording.t < last)
+        error = np.mean(squares[now])
+        if "from 2 s on" in label:
+            second = round(1.0 / recording.dt)
+            error = np.convolve(squares[now], np.ones(second) / second, "valid").max()
+        found.append(100.0 * float(np.sqrt(error / np.mean(forces[now]))))
+    return found
+
+
+def _drives(rng: np.random.Generator | None) -> tuple[Recording, ...]:
+    """The drives of `tireid compare`, and the slalom at 15 m/s."""
+    slow = Plant(sedan()).simulate(SLALOM, speed=15.0, name="slalom_15")
+    sensors = None if rng is None else SENSORS
+    assert next(iter(DRIVES)).startswith("slalom")  # the first is learnt on
+    return (*plant_recordings(sedan(), rng), slow.recording(sensors, rng))
+
+
+def _learnt_on_first(name: str, course: Course, seed: int) -> dict[str, AxleRmse]:
+    first = course.recordings[0]
+    history = identify(first, course.vehicle, make_method(name, course.vehicle, seed))
+    return course.replays(history.freeze(float(first.t[-1])))
+
+
+def _median(values: list[float]) -> float:
+    return float(np.median(values))
+
+
+def _spread(values: list[float]) -> str:
+    return f"{np.median(values):.3f} ({min(values):.3f}-{max(values):.3f})"

@@ -1,0 +1,159 @@
+"""The scalars of an SX function as a graph in which equal expressions are one node."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import casadi as ca
+
+OPERATIONS: Mapping[int, str] = {
+    getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")
+}
+BUILDERS: Mapping[str, Callable[..., Any]] = {
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "div": lambda a, b: a / b,
+    "neg": lambda a: -a,
+    "inv": lambda a: 1 / a,
+    "sq": lambda a: a**2,
+    "twice": lambda a: 2 * a,
+    "sqrt": ca.sqrt,
+    "fabs": ca.fabs,
+    "fmin": ca.fmin,
+    "fmax": ca.fmax,
+    "lt": lambda a, b: a < b,
+    "le": lambda a, b: a <= b,
+    "eq": lambda a, b: a == b,
+    "ne": lambda a, b: a != b,
+    "not": ca.logic_not,
+    "and": ca.logic_and,
+    "or": ca.logic_or,
+    "if_else_zero": lambda c, a: ca.if_else(c, a, 0),
+    "select": ca.if_else,
+    "sin": ca.sin,
+    "cos": ca.cos,
+    "log": ca.log,
+}
+
+
+class UnknownOperationError(ValueError):
+    """A function holds an operation that has no plain C of its own."""
+
+
+class Node(NamedTuple):
+    """An operation on earlier nodes; or a constant; or an entry, by columns, of an input."""
+
+    op: str
+    args: tuple[int, ...] = ()
+    value: float = 0.0
+    port: int = -1
+    entry: int = -1
+
+
+class Graph:
+    """Nodes, each after those that it reads, and which node every entry of every output is."""
+
+    def __init__(self) -> None:
+        self.nodes: list[Node] = []
+        self.outputs: list[list[int]] = []
+        self._known: dict[Node, int] = {}
+
+    def add(self, node: Node) -> int:
+        """Return the place of a node, which is added unless it is there.
+
+        Parameters
+        ----------
+        node : its `args` are places in this graph.
+        """
+        place = self._known.setdefault(node, len(self.nodes))
+        if place == len(self.nodes):
+            self.nodes.append(node)
+        return place
+
+    def constant(self, value: float) -> int:
+        """Return the place of a number.
+
+        Parameters
+        ----------
+        value : the number.
+        """
+        return self.add(Node("const", value=value + 0.0))  # -0 becomes 0
+
+    def reached(self) -> list[int]:
+        """Return the places that outputs depend on, rising."""
+        needed = {place for entries in self.outputs for place in entries}
+        for place in range(len(self.nodes) - 1, -1, -1):
+            if place in needed:
+                needed.update(self.nodes[place].args)
+        return sorted(needed)
+
+    def uses(self) -> dict[int, int]:
+        """Return how often each place that outputs depend on is read."""
+        reached = self.reached()
+        count = dict.fromkeys(reached, 0)
+        for place in reached:
+            for argument in self.nodes[place].args:
+                count[argument] += 1
+        for entries in self.outputs:
+            for place in entries:
+                count[place] += 1
+        return count
+
+
+def graph_of(function: ca.Function) -> Graph:
+    """Return the graph of an SX function with dense outputs.
+
+    Parameters
+    ----------
+    function : its instructions are read one by one.
+    """
+    graph, work = Graph(), dict[int, int]()
+    graph.outputs = [[-1] * function.numel_out(i) for i in range(function.n_out())]
+    for k in range(function.n_instructions()):
+        op = OPERATIONS[function.instruction_id(k)]
+        read, written = function.instruction_input(k), function.instruction_output(k)
+        if op == "output":
+            graph.outputs[written[0]][written[1]] = work[read[0]]
+        elif op == "const":
+            work[written[0]] = graph.constant(function.instruction_constant(k))
+        elif op == "input":
+            work[written[0]] = graph.add(Node("input", port=read[0], entry=read[1]))
+        else:
+            work[written[0]] = graph.add(Node(op, tuple(work[i] for i in read)))
+    return graph
+
+
+def function_of(
+    graph: Graph, like: ca.Function, builders: Mapping[str, Callable[..., Any]] = BUILDERS
+) -> ca.Function:
+    """Return an SX function of a graph.
+
+    Parameters
+    ----------
+    graph : the graph.
+    like : function with the wanted name and ports.
+    builders : expression of each operation.
+
+    Raises
+    ------
+    UnknownOperationError
+        Where an operation has no builder.
+    """
+    ports = [ca.SX.sym(name, *like.size_in(name)) for name in like.name_in()]
+    entries = [ca.vertsplit(ca.vec(port)) if port.numel() else [] for port in ports]
+    made: dict[int, Any] = {}
+    for place in graph.reached():
+        node = graph.nodes[place]
+        if node.op == "const":
+            made[place] = ca.SX(node.value)
+        elif node.op == "input":
+            made[place] = entries[node.port][node.entry]
+        elif node.op in builders:
+            made[place] = builders[node.op](*(made[a] for a in node.args))
+        else:
+            raise UnknownOperationError(f"{like.name()}: {node.op} has no plain C of its own")
+    results = [
+        ca.reshape(ca.vertcat(*(made[p] for p in places)), *like.size_out(i))
+        for i, places in enumerate(graph.outputs)
+    ]
+    return ca.Function(like.name(), ports, results, like.name_in(), like.name_out())

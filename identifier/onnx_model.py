@@ -1,0 +1,205 @@
+"""A user's own static tire network, an ONNX file, as a frozen model."""
+
+import base64
+import binascii
+import json
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen import Scan
+from identifier.model_format import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
+from identifier.network import network_signals
+from identifier.tire_network import UnusableNetworkError, read_network
+from models.bicycle import BicycleParameters
+from models.files import write_atomically
+from models.recordings import Recording
+from models.vehicle import Vehicle
+
+KIND = "onnx"
+OVER = ("x", "u", "v_x")
+PROBE = 0.02  # rad, a slip at which every tire pushes back
+PROBE_SPEED = 10.0  # m/s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OnnxModel:
+    """Axle forces of a static network in the frame of the body, left positive.
+
+    A network that reads slip angles is given them in the paper's sign, α = δ - atan(v/v_x),
+    where F_y = +C α; ISO 8855 has the opposite sign: for a network of that, set `slip_sign` to -1.
+
+    Parameters
+    ----------
+    vehicle : the car, whose l_f and l_r make slip angles.
+    content : the ONNX file.
+    min_speed : below this speed [m/s] the forces read zero.
+    inputs : what the network's columns are, see `read_network`; None goes by names and number.
+    slip_sign : 1 where the network's slip angles have the paper's sign, -1 for ISO 8855.
+
+    Raises
+    ------
+    ValueError
+        Where a number is impossible, the network cannot be read, or its forces do not push back.
+    """
+
+    vehicle: Vehicle
+    content: bytes
+    min_speed: float = 1.0
+    inputs: tuple[str, ...] | None = None
+    slip_sign: int = 1
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.min_speed < np.inf:
+            raise ValueError(f"min_speed must be positive, it is {self.min_speed}")
+        if self.slip_sign not in (1, -1):
+            raise ValueError(f"slip_sign must be 1 or -1, it is {self.slip_sign}")
+        if self.inputs is not None:
+            object.__setattr__(self, "inputs", tuple(self.inputs))
+        speed = max(PROBE_SPEED, self.min_speed)
+        drift = np.array([-np.tan(PROBE) * speed, 0.0])  # both axles slip by PROBE
+        force = [
+            np.array(self.step(x, np.zeros(2), speed, self.vehicle.bicycle)).ravel()
+            for x in (drift, -drift)
+        ]
+        if not (force[0] > force[1]).all():
+            raise UnusableNetworkError(
+                f"axle forces must rise with slip, at {-PROBE} and {PROBE} rad they are "
+                f"{force[1].tolist()} and {force[0].tolist()} N: check units, the order of inputs, "
+                "and the sign of slip (slip_sign)"
+            )
+
+    @classmethod
+    def from_onnx(
+        cls,
+        path: Path,
+        vehicle: Vehicle,
+        *,
+        min_speed: float = 1.0,
+        inputs: tuple[str, ...] | None = None,
+        slip_sign: int = 1,
+    ) -> "OnnxModel":
+        """Read a network file.
+
+        Parameters
+        ----------
+        path : the ONNX file.
+        vehicle : the car.
+        min_speed : below this speed [m/s] the forces read zero.
+        inputs : what the network's columns are; None goes by names and number.
+        slip_sign : 1 where the network's slip angles have the paper's sign, -1 for ISO 8855.
+
+        Raises
+        ------
+        UnusableNetworkError
+            Where the file cannot be read or used; one line that names it.
+        """
+        try:
+            return cls(
+                vehicle=vehicle,
+                content=path.read_bytes(),
+                min_speed=min_speed,
+                inputs=inputs,
+                slip_sign=slip_sign,
+            )
+        except (OSError, ValueError) as error:
+            raise UnusableNetworkError(f"{path}: {error}") from error
+
+    @property
+    def step(self) -> ca.Function:
+        """Function of x = [v_y, r] (2,), u = [δ_f, δ_r] (2,), v_x and vehicle (6,), SI.
+
+        Its result is axle_force (2,) [N]. It has derivatives and generates code.
+        """
+        return _scan(self.content, self.inputs, self.slip_sign).step
+
+    def axle_force(self, recording: Recording) -> NDArray[np.float64]:
+        """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
+
+        Parameters
+        ----------
+        recording : its signals are the input; its forces are not looked at.
+        """
+        moving = recording.v_x >= self.min_speed
+        record = _scan(self.content, self.inputs, self.slip_sign)(
+            recording.t.size,
+            {
+                "x": recording.x,
+                "u": recording.u,
+                "v_x": np.where(moving, recording.v_x, self.min_speed),
+                "vehicle": np.array(self.vehicle.bicycle),
+            },
+        )
+        force: NDArray[np.float64] = np.where(moving[:, None], record["axle_force"], 0.0)
+        return force
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the model as plain numbers and words, ready for JSON; the network in base64."""
+        return {
+            "format": FORMAT,
+            "kind": KIND,
+            "units": {"inputs": "SI", "outputs": "N"},
+            "vehicle": vehicle_numbers(self.vehicle),
+            "min_speed_m_s": self.min_speed,
+            "inputs": None if self.inputs is None else list(self.inputs),
+            "slip_sign": self.slip_sign,
+            "onnx_base64": base64.b64encode(self.content).decode("ascii"),
+        }
+
+    def save(self, path: Path) -> None:
+        """Write the model as JSON.
+
+        Parameters
+        ----------
+        path : the file.
+        """
+        write_atomically(path, json.dumps(self.to_dict(), indent=2) + "\n")
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any], source: str) -> "OnnxModel":
+        """Return the model that `to_dict` describes.
+
+        Parameters
+        ----------
+        data : as from `to_dict`.
+        source : name of the file, for errors.
+
+        Raises
+        ------
+        FrozenModelError
+            Where a key is missing or a value impossible.
+        """
+        try:
+            inputs = data["inputs"]
+            return cls(
+                vehicle=vehicle_from(data["vehicle"]),
+                content=base64.b64decode(data["onnx_base64"], validate=True),
+                min_speed=float(data["min_speed_m_s"]),
+                inputs=None if inputs is None else tuple(inputs),
+                slip_sign=data["slip_sign"],
+            )
+        except KeyError as error:
+            raise FrozenModelError(f"{source}: key {error} is missing") from error
+        except (TypeError, ValueError, binascii.Error) as error:
+            raise FrozenModelError(f"{source}: {error}") from error
+
+
+@cache
+def _scan(content: bytes, inputs: tuple[str, ...] | None, slip_sign: int) -> Scan:
+    """Return the compiled loop; cached by content, for reading a graph takes a while."""
+    network = read_network(content, inputs)
+    x, u, v_x = ca.MX.sym("x", 2), ca.MX.sym("u", 2), ca.MX.sym("v_x")
+    vehicle = ca.MX.sym("vehicle", 6)
+    signals = network_signals(BicycleParameters(*ca.vertsplit(vehicle)), v_x, x, u)
+    for name in ("alpha_f", "alpha_r"):
+        signals[name] = slip_sign * signals[name]
+    force = network(*(signals[name] for name in network.name_in()))
+    step = ca.Function(
+        "frozen_onnx", [x, u, v_x, vehicle], [force], [*OVER, "vehicle"], ["axle_force"]
+    )
+    return Scan(step, carry=(), over=OVER)

@@ -1,0 +1,200 @@
+"""`tireid compare` as a user meets it: its numbers by another road, its files, its refusals."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from identifier.methods import METHODS
+from models.recordings import read_recording
+from models.vehicle import sedan
+from tireid.cli import main
+from tireid.compare_results import ERROR_COLUMNS, SWEEP_COLUMNS
+from tireid.figures.compare_labels import short_names
+
+METHODS_TRIED = ("integral", "linear", "eso")
+
+
+@pytest.fixture(scope="module")
+def words(logs):
+    return ["compare", f"{logs / 'slalom.csv'}", f"{logs / 'quick.csv'}", "--vehicle",
+            f"{logs / 'car.toml'}", "--workers", "1"]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def result(words, tmp_path_factory):
+    out = tmp_path_factory.mktemp("compare") / "out"
+    words = [*words, "--methods", *METHODS_TRIED, "--sweep", "5", "--floor", "0"]
+    assert main([*words, "--out", str(out)]) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def numbers(result):
+    return json.loads((result / "compare.json").read_text())
+
+
+def linear_error(path, stiffness=None):
+    """RMSE per axle of C α with the small-angle slip of (3), the best C where none is given [N]."""
+    recording, car = read_recording(path), sedan()
+    v_y, r, force = recording.v_y, recording.r, recording.axle_force
+    alpha = (
+        recording.u
+        - np.column_stack([v_y + car.l_f * r, v_y - car.l_r * r]) / (recording.v_x[:, None])
+    )
+    if stiffness is None:
+        stiffness = (alpha * force).sum(axis=0) / (alpha**2).sum(axis=0)
+    error = np.sqrt(np.mean((alpha * stiffness - force) ** 2, axis=0))
+    return dict(zip(("front", "rear"), error, strict=True)), np.sqrt(np.mean(force**2, axis=0))
+
+
+def test_the_linear_tire_has_the_error_of_stiffness_times_slip(numbers, logs):
+    car = sedan()
+    told = [car.cornering_stiffness_front, car.cornering_stiffness_rear]
+    linear = numbers["methods"]["linear"]
+    shares = []
+    for name in ("slalom", "quick"):
+        error, size = linear_error(logs / f"{name}.csv", told)
+        assert linear["online_N"][name] == pytest.approx(error, rel=1e-6)
+        for learnt in ("slalom", "quick"):
+            assert linear["frozen_N"][learnt][name] == pytest.approx(error, rel=1e-6)
+        shares.append(100 * np.linalg.norm(list(error.values())) / np.linalg.norm(size))
+        rms = numbers["recordings"][name]["rms_force_N"]
+        assert [rms["front"], rms["rear"]] == pytest.approx(size)
+    assert linear["percent"] == pytest.approx(
+        dict.fromkeys(("online", "in_sample", "other"), np.mean(shares))
+    )
+
+
+def test_the_floor_of_the_linear_tire_is_least_squares(words, logs, tmp_path):
+    out = tmp_path / "out"
+    words = [*words, "--methods", "linear", "--floor", "2", "--out", str(out)]
+    assert main(words) == 0
+    data = json.loads((out / "compare.json").read_text())
+    found = data["floors"]["linear tire"]["frozen_N"]
+    for name in ("slalom", "quick"):
+        best, _ = linear_error(logs / f"{name}.csv")
+        assert found[name][name] == pytest.approx(best, rel=1e-3)
+    assert data["sweep"] == {}
+    assert not (out / "pareto.png").exists()
+
+
+def test_a_signal_estimator_has_no_frozen_error(numbers, result):
+    eso = numbers["methods"]["eso"]
+    assert eso["frozen_N"] is None
+    assert eso["percent"]["other"] is None
+    assert eso["percent"]["online"] > 0.0
+    assert "a signal, no model" in (result / "tables.txt").read_text()
+
+
+def test_times_are_over_that_of_the_integral_law(numbers):
+    methods = numbers["methods"]
+    assert methods["integral"]["step_ratio"] == 1.0
+    ratio = methods["linear"]["step_s"] / methods["integral"]["step_s"]
+    assert methods["linear"]["step_ratio"] == pytest.approx(ratio)
+    assert 0.0 < ratio < 1.0
+
+
+def test_the_tables_as_csv_hold_the_numbers_of_the_json(numbers, result):
+    with (result / "compare.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert tuple(rows[0]) == ERROR_COLUMNS
+    assert len(rows) == 3 * 2 + 2 * 4  # online, and frozen where there is a model
+    for row in (row for row in rows if row["kind"] == "frozen"):
+        method = numbers["methods"][row["method"]]
+        error = method["frozen_N"][row["learnt_on"]][row["replayed_on"]]
+        assert float(row["front_N"]) == pytest.approx(error["front"])
+        assert float(row["rear_N"]) == pytest.approx(error["rear"])
+
+
+def test_every_design_of_the_sweep_is_told_of(numbers, result):
+    sweeps = numbers["sweep"]
+    assert {name: found["designs"] for name, found in sweeps.items()} == {
+        "integral": 5,
+        "linear": 1,  # nothing to tune
+        "eso": 5,
+    }
+    for found in sweeps.values():
+        lost = [trial for trial in found["trials"] if trial["diverged_on"]]
+        assert len(lost) == found["diverged"]
+        assert len(found["trials"]) == found["designs"]
+    errors = [trial["percent"]["other"] for trial in sweeps["integral"]["trials"]]
+    best = min(error for error in errors if error is not None)
+    assert sweeps["integral"]["best"]["percent"]["other"] == best
+    with (result / "sweep.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert tuple(rows[0]) == SWEEP_COLUMNS
+    assert len(rows) == 11
+
+
+def test_figures_are_written(result):
+    for name in ("methods", "matrix", "pareto"):
+        assert (result / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_same_seed_finds_the_same(words, numbers, tmp_path):
+    out = tmp_path / "out"
+    words = [*words, "--methods", *METHODS_TRIED, "--sweep", "5", "--floor", "0"]
+    assert main([*words, "--out", str(out)]) == 0
+    again = json.loads((out / "compare.json").read_text())
+    assert again["sweep"] == numbers["sweep"]
+    for name in METHODS_TRIED:
+        assert again["methods"][name]["frozen_N"] == numbers["methods"][name]["frozen_N"]
+
+
+@pytest.mark.parametrize(
+    ("extra", "said"),
+    [
+        (["--methods", "magic"], "--methods magic is none of axle, "),
+        (["--sweep", "-1"], "--sweep must be at least 0, it is -1"),
+        (["--workers", "0"], "--workers must be at least 1"),
+        (["--vehicle", "nowhere.toml"], "nowhere.toml"),
+        (["slalom"], "slalom is given twice"),
+        (["blind"], "blind: a comparison needs the true forces Fyf, Fyr"),
+    ],
+)
+def test_wrong_words_are_one_clear_line_and_leave_nothing(
+    words, logs, tmp_path, capsys, extra, said
+):
+    if extra == ["blind"]:
+        cells = [line.split(",") for line in (logs / "slalom.csv").read_text().splitlines()]
+        keep = [i for i, name in enumerate(cells[0]) if not name.startswith("Fy")]
+        text = "\n".join(",".join(row[i] for i in keep) for row in cells)
+        (tmp_path / "blind.csv").write_text(text)
+        extra = [str(tmp_path / "blind.csv")]
+    elif extra == ["slalom"]:
+        extra = [str(logs / "slalom.csv")]
+    out = tmp_path / "out"
+    first, *rest = words
+    named = [first, *extra, *rest] if extra[0].endswith(".csv") else [*words, *extra]
+    assert main([*named, "--out", str(out)]) == 2
+    lines = [line for line in capsys.readouterr().err.splitlines() if "error:" in line]
+    assert len(lines) == 1
+    assert said in lines[0]
+    assert not out.exists()
+
+
+def test_a_log_needs_its_vehicle(logs, tmp_path, capsys):
+    assert main(["compare", str(logs / "slalom.csv"), "--out", str(tmp_path / "out")]) == 2
+    assert "--vehicle FILE is needed with a LOG" in capsys.readouterr().err
+
+
+def test_without_a_log_the_plant_drives(tmp_path):
+    out = tmp_path / "out"
+    words = ["compare", "--methods", "linear", "--floor", "0", "--workers", "1"]
+    assert main([*words, "--out", str(out)]) == 0
+    data = json.loads((out / "compare.json").read_text())
+    assert set(data["recordings"]) == {"slalom_20", "step_steer", "lane_change", "slalom_25"}
+
+
+def test_the_registry_has_every_name_that_is_promised():
+    promised = "linear eso ekf_force stiffness_rls magic_formula_ekf dugoff_ekf instantaneous "
+    promised += "integral instantaneous_scaled pi_lead kreisselmeier kreisselmeier_newton rls "
+    promised += "concurrent axle"
+    assert set(METHODS) == set(promised.split())
+
+
+def test_runs_of_one_file_are_named_by_the_run_alone():
+    assert short_names(["log:a", "log:b"]) == {"log:a": "a", "log:b": "b"}
+    assert short_names(["log:a", "other:a"]) == {"log:a": "log:a", "other:a": "other:a"}
