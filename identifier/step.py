@@ -21,6 +21,7 @@ from models.bicycle import BicycleParameters, bicycle, linear_axle_force
 
 CARRY = ("xi_hat", "z", "W", "V")
 OVER = ("x", "u", "v_x")
+LARGEST_SPEED, LARGEST_ANGLE = 300.0, 1.5  # m/s and rad: no car is faster, no wheel turns more
 GAINS = ("eta_W", "eta_V", "rho_W", "rho_V", "forgetting", "W_max", "V_max", "lead")
 
 
@@ -42,6 +43,26 @@ class Structure:
     input_source: str
     integrator: str
     projects: bool
+
+
+def plausible(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
+    """Return whether a car can be in this state: v_x below 300 m/s, axles sliding less than 63°.
+
+    A sample that is not (a spike, a dropout of a sensor) is not learnt from, and no force is told:
+    one of 1000 m/s would carry the weights beyond any number.
+
+    Parameters
+    ----------
+    parameters : of the bicycle.
+    v_x : longitudinal speed [m/s].
+    x : [v_y, r] (2,).
+    u : [δ_f, δ_r] (2,).
+    """
+    reach = 2 * v_x  # tan 63°
+    front, rear = x[0] + parameters.l_f * x[1], x[0] - parameters.l_r * x[1]
+    inside = ca.logic_and(ca.fabs(front) <= reach, ca.fabs(rear) <= reach)
+    steering = ca.logic_and(ca.fabs(u[0]) <= LARGEST_ANGLE, ca.fabs(u[1]) <= LARGEST_ANGLE)
+    return ca.logic_and(ca.logic_and(inside, steering), v_x <= LARGEST_SPEED)
 
 
 def build_step(structure: Structure) -> ca.Function:
@@ -94,9 +115,10 @@ def build_step(structure: Structure) -> ca.Function:
         return [xi_hat_dot, filter_rate(lam, z, xi_tilde), *rates]
 
     moving = v_x >= min_speed
-    f_hat = ca.if_else(moving, W @ layers(xi_hat, V)[1], 0)
-    linear = ca.if_else(moving, linear_axle_force(parameters, speed, x, u), 0)
-    ahead = ca.if_else(moving, dt, 0)  # at rest nothing moves on: weights keep their values
+    used = ca.logic_and(moving, plausible(parameters, v_x, x, u))
+    f_hat = ca.if_else(used, W @ layers(xi_hat, V)[1], 0)
+    linear = ca.if_else(used, linear_axle_force(parameters, speed, x, u), 0)
+    ahead = ca.if_else(used, dt, 0)  # else nothing moves on: weights keep their values
     xi_hat_next, z_next, W_next, V_next = INTEGRATORS[structure.integrator](
         derivative, [xi_hat, z, W, V], ahead
     )
@@ -110,7 +132,7 @@ def build_step(structure: Structure) -> ca.Function:
             bounded(V_next, V_max),
             f_hat,
             linear + unit * f_hat,
-            ca.if_else(moving, xi - xi_hat, 0),
+            ca.if_else(used, xi - xi_hat, 0),
         ],
         [*CARRY, *OVER, "vehicle", "A_d", "gains", "sampling"],
         [*(f"{name}_next" for name in CARRY), "f_hat", "axle_force", "xi_tilde"],

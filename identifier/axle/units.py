@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from codegen.tanh import tanh
 from identifier.axle.piecewise import larger
 
 Array = NDArray[np.float64]
@@ -67,7 +68,8 @@ def hidden_units(x: Any, scales: Any, steps: tuple[int, ...]) -> Any:
     scales : 1/α_j [1/rad], (1, n).
     steps : from `doublings`.
     """
-    E = ca.exp(2 * scales[0, len(steps)] * x)  # finite for every angle
+    T = tanh(scales[0, len(steps)] * x)
+    E = (1 + T) / (1 - T)  # exp(2 x/α) of the widest unit, the same bits on every machine
     columns = [E]
     for count in reversed(steps):
         for _ in range(count):

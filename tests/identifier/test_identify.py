@@ -167,3 +167,20 @@ def test_default_design_is_similar_for_a_model_car(car):
     np.testing.assert_allclose(ratio, [np.sqrt(10), 1 / np.sqrt(10), 1.0, 1.0])
     assert full.force_unit == 1000.0
     assert small.force_unit == 1.0
+
+
+@pytest.mark.parametrize("law", ["integral", "instantaneous", "instantaneous_scaled", "pi_lead"])
+@pytest.mark.parametrize("signal", ["v_x", "v_y", "r", "delta_f"])
+@pytest.mark.parametrize("size", [-1e3, 1e3, 1e30])
+def test_a_spike_is_not_learnt_from(car, drive, law, signal, size):
+    """One impossible sample changes neither weights nor what is said one second later."""
+    recording = drive(n=400)
+    spoilt = getattr(recording, signal).copy()
+    spoilt[200] += size
+    design = default_design(car, law=law)
+    clean = identify(recording, car, design)
+    history = identify(replace(recording, **{signal: spoilt}), car, design)
+    assert np.isfinite(history.axle_force).all()
+    assert history.diverged_at is None
+    np.testing.assert_array_equal(history.axle_force[200], 0.0)
+    np.testing.assert_allclose(history.axle_force[300:], clean.axle_force[300:], atol=150.0)

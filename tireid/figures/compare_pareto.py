@@ -53,7 +53,7 @@ def pareto_figure(comparison: Comparison) -> Figure:
         _draw_method(axes, comparison, name, clouds[name], fronts[name])
         axes.set_title(method_label(name))
         lost = sum(bool(candidate.diverged_on) for candidate in comparison.sweeps[name])
-        note(axes, f"{lost} of {len(comparison.sweeps[name])} diverged" if lost else "")
+        note(axes, f"{lost} diverged" if lost else "")
     for number, axes in enumerate(grid.flat):
         axes.set_visible(number < len(names))
         axes.tick_params(labelbottom=number + columns >= len(names))
