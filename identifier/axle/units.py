@@ -1,8 +1,8 @@
 """The hidden units of an axle: a ladder of odd functions tanh(x/α_j) of one slip angle.
 
 φ(x) = Σ_j w_j tanh(x/α_j), in static axle loads.   α_j: slip scales [rad], each a power of two of
-the next: tanh(y) = 1 - 2/(1 + E) with E = exp(2y), and doubling y squares E, so that one exp
-gives all units.   φ saturates at Σ w_j.
+the next: tanh(y) = 1 - 2/(1 + E) with E = exp(2y), and doubling y squares E, so that one tanh
+gives all units, with the same bits on every machine.   φ saturates at Σ w_j.
 """
 
 import math
