@@ -13,11 +13,14 @@ from identifier.method import FrozenModel
 from identifier.model_format import FORMAT, FrozenModelError
 from identifier.network_model import KIND as NETWORK
 from identifier.network_model import NetworkModel
+from identifier.onnx_model import KIND as ONNX
+from identifier.onnx_model import OnnxModel
 
 READERS: Mapping[str, Callable[[dict[str, Any], str], FrozenModel]] = {
     NETWORK: NetworkModel.from_dict,
     AXLE: AxleModel.from_dict,
     CURVE: CurveModel.from_dict,
+    ONNX: OnnxModel.from_dict,
 }
 
 

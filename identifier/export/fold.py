@@ -1,0 +1,176 @@
+"""The step of a method with every number of it folded in: what is exported.
+
+Gains, T_s, vehicle and K⁻¹ become literals, so that only signals and carried values are left:
+(carried, x = [v_y, r], u = [δ_f, δ_r], v_x) -> (carried next, axle_force [N], other outputs), SI.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from identifier.axle import AxleDesign
+from identifier.baselines import StiffnessRls
+from identifier.design import Design
+from identifier.method import FrozenModel, Method, Setup
+from identifier.regression import RegressionDesign
+from models.recordings import Recording
+from models.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+SAMPLED = ("x", "u", "v_x")
+
+
+class Signal(NamedTuple):
+    """An input or output: name in C, FMU and JSON; unit; what it is. A vector has `size` > 1."""
+
+    name: str
+    unit: str
+    description: str
+    size: int = 1
+
+
+INPUTS = (
+    Signal("v_x", "m/s", "longitudinal speed at the center of mass, forward positive"),
+    Signal("v_y", "m/s", "lateral velocity at the center of mass, left positive"),
+    Signal("r", "rad/s", "yaw rate, left positive"),
+    Signal("delta_f", "rad", "road-wheel steering angle in front, left positive"),
+    Signal("delta_r", "rad", "road-wheel steering angle at the rear, left positive"),
+)
+OUTPUTS: Mapping[str, tuple[str, str]] = {
+    "axle_force": ("N", "lateral axle forces, front and rear, left positive, frame of the body"),
+    "f_hat": ("force_unit", "force of the network alone, front and rear"),
+    "xi_tilde": ("force_unit s", "error of the observed axle impulse, front and rear"),
+    "residual": ("force_unit", "error of the filtered regression, front and rear"),
+}
+
+
+class FoldedStep(NamedTuple):
+    """A step without constants, where it starts, and what its ports mean.
+
+    name : C identifier, prefix of everything that is exported.
+    function : SX function of the carried ports, then x (2,), u (2,), v_x; returns `p_next` of each
+        carried port `p`, then the outputs, axle_force (2,) [N] first.
+    carry : value of each carried port at the start, in the port's matrix shape.
+    learnt : carried ports that hold their values while adaptation is off; empty: it cannot be.
+    inputs : the five scalars v_x, v_y, r, delta_f, delta_r.
+    outputs : axle_force and what else the step tells.
+    dt : sampling interval [s].   min_speed : [m/s], below it forces read zero.
+    rests_first : whether a run begins with one step at v_x = 0 of its first sample, in which the
+        observer takes the measurement.
+    """
+
+    name: str
+    function: ca.Function
+    carry: Mapping[str, Array]
+    learnt: tuple[str, ...]
+    inputs: tuple[Signal, ...]
+    outputs: tuple[Signal, ...]
+    dt: float
+    min_speed: float
+    rests_first: bool
+
+
+def learnt_ports(method: Method, carry: Mapping[str, Array]) -> tuple[str, ...]:
+    """Return the carried ports that adaptation moves; filters and observers are not among them.
+
+    Parameters
+    ----------
+    method : the method.
+    carry : its carried ports.
+    """
+    match method:
+        case Design():
+            moving = {"W", "V"}
+        case AxleDesign():
+            moving = {"W", "own", "P", "errors", "excitation"}
+        case RegressionDesign():
+            moving = set(carry) - {"target_lag", "regressor_lag", "fresh"}
+        case StiffnessRls():
+            moving = {"stiffness", "information"}
+        case _:
+            moving = set()
+    return tuple(port for port in carry if port in moving)
+
+
+def fold(
+    method: Method, vehicle: Vehicle, start: FrozenModel | None = None, name: str = "tireid"
+) -> FoldedStep:
+    """Return the step of a method for a car, ready to be exported.
+
+    Parameters
+    ----------
+    method : the method, with its numbers.
+    vehicle : the car.
+    start : weights to begin with; None begins with those of the method.
+    name : C identifier.
+
+    Raises
+    ------
+    ValueError
+        Where stored weights are those of another structure.
+    """
+    setup = method.setup(vehicle, _standing(method.dt), start)
+    moved = method.setup(vehicle, _standing(method.dt, x=1.0), start)
+    step = setup.scan.step
+    function = _folded(setup, name)
+    outputs = tuple(
+        Signal(port, *OUTPUTS.get(port, ("-", port)), step.numel_out(port))
+        for port in sorted(setup.scan.outputs, key=lambda port: port != "axle_force")
+    )
+    return FoldedStep(
+        name=name,
+        function=function,
+        carry={port: _matrix(value, step.size_in(port)) for port, value in setup.carry.items()},
+        learnt=learnt_ports(method, setup.carry),
+        inputs=INPUTS,
+        outputs=outputs,
+        dt=method.dt,
+        min_speed=method.min_speed,
+        rests_first=any(
+            not np.array_equal(setup.carry[port], moved.carry[port]) for port in setup.carry
+        ),
+    )
+
+
+def _folded(setup: Setup, name: str) -> ca.Function:
+    step, carry = setup.scan.step, list(setup.carry)
+    ports = {port: ca.SX.sym(port, *step.size_in(port)) for port in carry}
+    ports |= {"x": ca.SX.sym("x", 2), "u": ca.SX.sym("u", 2), "v_x": ca.SX.sym("v_x")}
+    sampled = {port: ports[port] for port in (*carry, *setup.scan.over)}
+    constants = {
+        port: ca.DM(_matrix(value, step.size_in(port))) for port, value in setup.constants.items()
+    }
+    results = step(**sampled, **constants)
+    told = sorted(setup.scan.outputs, key=lambda port: port != "axle_force")
+    wanted = [*(f"{port}_next" for port in carry), *told]
+    return ca.Function(
+        name,
+        list(ports.values()),
+        [ca.densify(results[port]) for port in wanted],
+        list(ports),
+        wanted,
+        {"cse": True},
+    )
+
+
+def _matrix(value: Array, size: tuple[int, int]) -> Array:
+    array = np.asarray(value, dtype=np.float64)
+    return array if array.shape == tuple(size) else array.reshape(size)
+
+
+def _standing(dt: float, x: float = 0.0) -> Recording:
+    """Return ten samples of a car that stands, or is said to slide sideways by x."""
+    zero = np.zeros(10)
+    return Recording(
+        name="standing",
+        t=dt * np.arange(10.0),
+        v_x=zero,
+        v_y=zero + x,
+        r=zero + x,
+        delta_f=zero,
+        delta_r=zero,
+    )

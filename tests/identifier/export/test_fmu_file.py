@@ -1,0 +1,97 @@
+"""An FMU as a file: valid, reproducible, and told apart from others by its content."""
+
+import logging
+import re
+import zipfile
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.defaults import default_design
+from identifier.export.fmu import binaries, export_fmu, package
+from identifier.export.fmu.package import fmu_text
+from identifier.export.fold import fold
+from models.vehicle import sedan
+
+fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")
+validation = pytest.importorskip("fmpy.validation")
+CAR = sedan()
+DESIGN = default_design(CAR)
+needs_compiler = pytest.mark.skipif(
+    not binaries.targets(), reason="needs a C compiler on Linux x86-64"
+)
+
+
+@pytest.fixture(name="exported")
+def sources_only(tmp_path, monkeypatch):
+    """Paths of both FMUs by version, without binaries."""
+    monkeypatch.setattr(package, "targets", lambda: ())
+    paths = {version: tmp_path / f"{version}.fmu" for version in (2, 3)}
+    for version, path in paths.items():
+        export_fmu(fold(DESIGN, CAR), path, version)
+    return paths
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_fmpy_finds_nothing_to_complain_about(exported, version):
+    assert validation.validate_fmu(str(exported[version])) == []
+
+
+@needs_compiler
+def test_the_same_step_gives_the_same_bytes_on_every_platform(tmp_path):
+    paths = [tmp_path / name for name in ("a.fmu", "b.fmu")]
+    for path in paths:
+        export_fmu(fold(DESIGN, CAR), path)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    with zipfile.ZipFile(paths[0]) as archive:
+        libraries = {
+            target.folder_2: archive.read(f"binaries/{target.folder_2}/tireid{target.ending}")
+            for target in binaries.targets()
+        }
+    assert all(b"fmi2DoStep" in content for content in libraries.values())
+    assert libraries["linux64"].startswith(b"\x7fELF")
+    assert libraries.get("win64", b"MZ").startswith(b"MZ")
+
+
+def test_every_number_changes_the_token():
+    def token(step):
+        return re.search(r'guid="([^"]+)"', fmu_text(step, 2)["modelDescription.xml"])[1]
+
+    same, again = fold(DESIGN, CAR), fold(DESIGN, CAR)
+    assert token(same) == token(again)
+    others = [
+        fold(replace(DESIGN, seed=1), CAR),
+        fold(replace(DESIGN, dt=0.02), CAR),
+        fold(DESIGN, replace(CAR, mass=CAR.mass + 1)),
+    ]
+    assert len({token(step) for step in (same, *others)}) == 4
+
+
+def test_another_version_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="version must be 2 or 3, it is 1"):
+        export_fmu(fold(DESIGN, CAR), tmp_path / "one.fmu", 1)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_units_are_told(exported, version):
+    about = fmpy.read_model_description(str(exported[version]))
+    units = {variable.name: variable.unit for variable in about.modelVariables}
+    assert [units[name] for name in ("v_x", "r", "delta_f", "F_yr")] == ["m/s", "rad/s", "rad", "N"]
+
+
+def test_without_a_compiler_it_holds_sources_only_and_says_so(exported, caplog, tmp_path):
+    with caplog.at_level(logging.WARNING, "tireid.export"):
+        export_fmu(fold(DESIGN, CAR), tmp_path / "again.fmu")
+    assert "no C compiler found" in caplog.text
+    with zipfile.ZipFile(exported[2]) as archive:
+        names = archive.namelist()
+    assert not [name for name in names if name.startswith("binaries")]
+    assert {"modelDescription.xml", "sources/model.c", "sources/fmi2.c"} <= set(names)
+
+
+def test_a_start_that_is_not_finite_is_refused(tmp_path):
+    folded = fold(DESIGN, CAR)
+    carry = {port: np.full_like(value, np.nan) for port, value in folded.carry.items()}
+    with pytest.raises(ValueError, match="must be finite to be exported, it is nan"):
+        export_fmu(folded._replace(carry=carry), tmp_path / "nan.fmu")
