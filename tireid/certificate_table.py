@@ -85,7 +85,7 @@ def notes(certificate: Certificate) -> list[str]:
         if entry.limit is None and entry.advice:
             for remark in entry.advice.split("; "):
                 titles.setdefault(remark, []).append(entry.title)
-    return [f"{', '.join(about)}: {remark}" for remark, about in titles.items()]
+    return [f"{remark} ({' | '.join(about)})" for remark, about in titles.items()]
 
 
 def verdict_line(certificate: Certificate) -> str:

@@ -20,9 +20,10 @@ from identifier.design_file import design_text, read_design
 from identifier.identify import identify
 from identifier.stability import Certificate, DesignError
 from models.files import write_atomically
-from models.recordings import check_against_vehicle, read_recording, split_log_argument
+from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
 from tireid.certificate_table import certificate_of, certificate_text, unit_text
+from tireid.inputs import read_log
 from tireid.output import OutputError
 from tireid.progress import say
 
@@ -80,19 +81,34 @@ def run(options: argparse.Namespace) -> int:
     driving = _driving(options, vehicle)
     design = _design(options, vehicle, driving)
     certificate = certificate_of(design, vehicle, driving)
+    drive = _read(options.log, vehicle, design)  # everything is read before anything is said
+    if options.design:
+        _require_free(options)
     if options.json:
         print(json.dumps(certificate.to_dict(), indent=2))
-    else:
-        print(_conditions(design, vehicle, driving))
-        print(certificate_text(certificate, design.force_unit))
-    if options.log:
-        _report_along(options.log, vehicle, design)
+        return _finish(options, vehicle, driving, design, certificate, drive)
+    print(_conditions(design, vehicle, driving))
+    print(certificate_text(certificate, design.force_unit))
+    if drive is not None:
+        print(_along(drive, vehicle, design))
+    if certificate.verdict != "pass" and not options.design:
+        print(_proposal(options, design, vehicle, driving))
+    return _finish(options, vehicle, driving, design, certificate, drive)
+
+
+def _finish(
+    options: argparse.Namespace,
+    vehicle: Vehicle,
+    driving: Driving,
+    design: Design,
+    certificate: Certificate,
+    drive: Recording | None,
+) -> int:
+    """Write what was asked for; return the exit code."""
     if options.figures:
-        _draw(options, vehicle, driving, design, certificate)
+        _draw(options, vehicle, driving, design, certificate, drive)
     if options.design:
         _write(options, design)
-    elif certificate.verdict != "pass" and not options.json:
-        print(_proposal(design, vehicle, driving))
     return FAILS if certificate.verdict == "fail" else 0
 
 
@@ -136,35 +152,38 @@ def _design(options: argparse.Namespace, vehicle: Vehicle, driving: Driving) -> 
 def _conditions(design: Design, vehicle: Vehicle, driving: Driving) -> str:
     gains = design.gains
     unit = unit_text("U", design.force_unit)
+    rows = "; ".join(" ".join(f"{value:.4g}" for value in row) for row in gains.A_d)
     return (
         f"{vehicle.name} at {driving.v_x:.3g} m/s, slip up to {driving.slip:.3g} rad, friction "
         f"{driving.friction:g}, steering up to {driving.bandwidth:g} Hz\n"
         f"{design.law} law, {design.network.hidden} units, {design.integrator} at "
-        f"{1e3 * design.dt:g} ms, forces in {unit}: A_d {[list(row) for row in gains.A_d]}, lambda "
+        f"{1e3 * design.dt:g} ms, forces in {unit}: A_d {rows}, lambda "
         f"{gains.forgetting:.4g}, eta_W {gains.eta_W:.4g}, eta_V {gains.eta_V:.4g}, rho_W "
         f"{gains.rho_W:.4g}, rho_V {gains.rho_V:.4g}\n"
     )
 
 
-def _report_along(log: str, vehicle: Vehicle, design: Design) -> None:
+def _read(log: str | None, vehicle: Vehicle, design: Design) -> Recording | None:
+    return None if log is None else read_log(log, vehicle, dt=design.dt)
+
+
+def _along(recording: Recording, vehicle: Vehicle, design: Design) -> str:
     from identifier.stability.recorded_run import loop_along
 
-    path, named = split_log_argument(log)
-    recording = read_recording(path, run=named, dt=design.dt)
-    check_against_vehicle(recording, vehicle)
     history = identify(recording, vehicle, design)
     if history.diverged_at is not None:
-        say(f"along {recording.name}: the law diverged at {history.diverged_at:g} s")
-        return
+        return f"along {recording.name}: the law diverged at {history.diverged_at:g} s"
     along = loop_along(history, design)
     at = along.strongest
-    say(
+    return (
         f"along {recording.name}: largest loop gain {along.gain[at]:.4g} at {along.t[at]:g} s, "
         f"gain margin there {along.margin:.3g}"
     )
 
 
-def _proposal(design: Design, vehicle: Vehicle, driving: Driving) -> str:
+def _proposal(
+    options: argparse.Namespace, design: Design, vehicle: Vehicle, driving: Driving
+) -> str:
     try:
         better = design_for(
             vehicle,
@@ -182,9 +201,15 @@ def _proposal(design: Design, vehicle: Vehicle, driving: Driving) -> str:
         f"proposal ({verdict}): A_d = -{-gains.A_d[0][0]:.4g} I, lambda {gains.forgetting:.4g}, "
         f"eta_W {gains.eta_W:.4g}, eta_V {gains.eta_V:.4g}, rho_W {gains.rho_W:.4g}, rho_V "
         f"{gains.rho_V:.4g}{f', lead {gains.lead:.4g}' if gains.lead else ''}\n"
-        f"write it with: tireid check --design --law {design.law} --bandwidth "
-        f"{driving.bandwidth:g}"
+        f"write it with: tireid check --design --law {design.law}{_given(options)}"
     )
+
+
+def _given(options: argparse.Namespace) -> str:
+    """Return the options that say which car drives how hard, as they were given."""
+    names = ("vehicle", "bandwidth", "speed", "slip", "friction")
+    given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    return "".join(f" --{name} {value}" for name, value in given.items())
 
 
 def _draw(
@@ -193,24 +218,28 @@ def _draw(
     driving: Driving,
     design: Design,
     certificate: Certificate,
+    drive: Recording | None,
 ) -> None:
     from tireid.check_figures import draw_check
+    from tireid.demo_story import drive_to_learn
 
-    if options.log:
-        path, named = split_log_argument(options.log)
-        recording = read_recording(path, run=named, dt=design.dt)
-    else:
-        from tireid.demo_story import drive_to_learn
-
-        recording = drive_to_learn()
+    recording = drive_to_learn() if drive is None else drive
     operation = natural_operation(design, vehicle, driving)
     for path in draw_check(options.figures, recording, vehicle, design, operation, certificate):
         say(f"wrote {path}")
 
 
-def _write(options: argparse.Namespace, design: Design) -> None:
-    target = options.out or Path("design.toml")
+def _require_free(options: argparse.Namespace) -> None:
+    target = _target(options)
     if target.exists() and not options.force:
         raise OutputError(f"{target} exists: choose another file, or add --force to replace it")
+
+
+def _target(options: argparse.Namespace) -> Path:
+    return options.out or Path("design.toml")
+
+
+def _write(options: argparse.Namespace, design: Design) -> None:
+    target = _target(options)
     write_atomically(target, design_text(design))
     say(f"wrote {target}")

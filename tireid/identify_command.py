@@ -12,7 +12,7 @@ from identifier.design import Design
 from identifier.design_file import read_design
 from identifier.history import DivergedError, History
 from identifier.identify import identify
-from identifier.method import FrozenModel, Method
+from identifier.method import CannotFreezeError, FrozenModel, Method
 from identifier.methods import DEFAULT, METHODS, REFERENCE, make_method
 from identifier.model_file import load_model
 from identifier.reproducibility import (
@@ -112,6 +112,9 @@ def run(options: argparse.Namespace) -> None:
     _require_distinct([recording, *others])
     freeze_times = sorted(set(options.freeze or [float(recording.t[-1])]))
     _require_inside(freeze_times, recording)
+    _require_model(law, design, recording, vehicle)
+    if isinstance(start, AxleModel) and start.vehicle != vehicle:
+        say(f"{options.weights} is of the car {start.vehicle.name!r}: scaled by the axle loads")
     with output_folder(options.out, force=options.force) as folder:
         histories = [_learn(one, vehicle, law, design, start) for one in (recording, *others)]
         learnt = histories[0]
@@ -122,12 +125,20 @@ def run(options: argparse.Namespace) -> None:
     say(f"wrote {options.out}/")
 
 
+def _require_model(law: str, design: Method, recording: Recording, vehicle: Vehicle) -> None:
+    """Refuse a filter of forces before it runs: there would be nothing to freeze."""
+    try:
+        design.frozen(vehicle, design.setup(vehicle, recording).carry)
+    except CannotFreezeError as error:
+        raise CannotFreezeError(f"--law {law}: {error}; tireid compare shows it") from None
+
+
 def _closing_line(model: FrozenModel, design: Method, vehicle: Vehicle) -> str:
     """Return the certificate of the paper's identifier, or what the axle identifier knows."""
     if isinstance(design, Design):
         return verdict_line(certificate_of(design, vehicle))
     if not isinstance(model, AxleModel):
-        return f"frozen: {type(model).__name__}"
+        return "frozen; `tireid compare` sets it beside the other methods"
     stiffness, length = model.cornering_stiffness, model.relaxation_length
     known = np.degrees(model.known_slip_range)
     return (

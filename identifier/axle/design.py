@@ -43,13 +43,15 @@ class AxleDesign:
     regression : filter, error model and memory.
     change : detector of a change of friction.
     ladder : slip scales of the units [rad], rising by powers of two.
-    rising_until : slip at which force curves shall not fall yet [rad]; None leaves them free.
+    rising_until : slip at which force curves shall not fall yet [rad]; None leaves them free. At
+        0 the cornering stiffness cannot turn negative, where steering has play or data mislead.
     dt : sampling interval T_s [s].
 
     Raises
     ------
     ValueError
-        Where the ladder does not rise by powers of two, or dt or rising_until is not positive.
+        Where the ladder does not rise by powers of two, dt is not positive, or rising_until is
+        negative.
     """
 
     prior: Prior
@@ -59,7 +61,7 @@ class AxleDesign:
     regression: Regression = field(default_factory=Regression)
     change: ChangeDetector = field(default_factory=ChangeDetector)
     ladder: tuple[float, ...] = LADDER
-    rising_until: float | None = None
+    rising_until: float | None = 0.0
     dt: float = 0.01
 
     def __post_init__(self) -> None:
@@ -67,8 +69,8 @@ class AxleDesign:
         doublings(self.ladder)
         if not 0.0 < self.dt < math.inf:
             raise ValueError(f"dt must be positive, it is {self.dt}")
-        if self.rising_until is not None and not 0.0 < self.rising_until < math.inf:
-            raise ValueError(f"rising_until must be positive, it is {self.rising_until}")
+        if self.rising_until is not None and not 0.0 <= self.rising_until < math.inf:
+            raise ValueError(f"rising_until must not be negative, it is {self.rising_until}")
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> "AxleDesign":

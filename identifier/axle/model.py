@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 
 KIND = "axle"
 ARRAYS = ("W", "own", "covariance", "prior_covariance", "excitation")
+LARGEST_WEIGHT = 100.0  # static axle loads: no unit of a tire carries more
 DOUBT = 0.25  # standard deviation over the prior's, above which a slip is not known
 
 
@@ -78,6 +79,15 @@ class AxleModel:
                 raise ValueError(f"{name} must have shape {shape}, it has {value.shape}")
             if not np.isfinite(value).all():
                 raise ValueError(f"{name} holds a number that is not finite")
+        for name in ("covariance", "prior_covariance"):
+            for P in getattr(self, name):
+                if not np.allclose(P, P.T) or np.linalg.eigvalsh(P)[0] <= 0.0:
+                    raise ValueError(f"{name} must be symmetric and positive definite")
+        if np.abs(self.W).max() > LARGEST_WEIGHT:
+            raise ValueError(
+                f"W must be static axle loads below {LARGEST_WEIGHT:g}, it reaches "
+                f"{np.abs(self.W).max():g}"
+            )
         if (self.own[:, 0] < 0.0).any():
             raise ValueError(f"compliance must not be negative, it is {self.own[:, 0]}")
 

@@ -104,7 +104,7 @@ def test_figures_and_a_recorded_run(capsys, logs, tmp_path):
     folder = tmp_path / "figures"
     code, said = checked(capsys, "--log", logs / "slalom.csv", "--figures", folder)
     assert code == 0
-    margin = float(re.search(r"gain margin there ([\d.]+)", said.err).group(1))
+    margin = float(re.search(r"gain margin there ([\d.]+)", said.out).group(1))
     worst = certificate_of(default_design(sedan()), sedan())["gain_sampled"].margin
     assert margin > worst  # no recorded regressor is worse than the worst
     for name in ("locus.png", "bounds.png"):

@@ -170,7 +170,7 @@ def test_designs_are_similar_for_a_model_car(car):
 def test_curves_may_be_kept_from_falling_before_a_slip(car, drive):
     """Left free, the learnt curve falls at some time; held, it never does from the start on."""
     recording, until = drive(amplitude=0.08), 0.2
-    free = AxleDesign.for_vehicle(car)
+    free = replace(AxleDesign.for_vehicle(car), rising_until=None)
     held = replace(free, rising_until=until)
     lowest = []
     for design in (free, held):
@@ -184,5 +184,5 @@ def test_curves_may_be_kept_from_falling_before_a_slip(car, drive):
     assert lowest[1] > -1e-9
     grid = np.linspace(0.0, until, 81)
     assert (np.diff(history.freeze(15.0).force_at(grid), axis=0) > -1.0).all()
-    with pytest.raises(ValueError, match="rising_until must be positive"):
-        replace(free, rising_until=0.0)
+    with pytest.raises(ValueError, match="rising_until must not be negative"):
+        replace(free, rising_until=-0.1)
