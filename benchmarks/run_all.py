@@ -16,6 +16,7 @@ BENCHMARKS = {
     "gain_limit": [],
     "limit_cycle": [],
     "bounds_monte_carlo": [],
+    "batch_speed": [],
 }
 
 

@@ -111,7 +111,7 @@ class BatchScan:
         if kept.size and not (kept[0] >= 0 and kept[-1] < n and (np.diff(kept) > 0).all()):
             raise ValueError(f"keep must rise within 0 ... {n - 1}, it is {list(keep)}")
         runs, packed = self._pack(n, values)
-        workers = workers or _processors()
+        workers = workers or processors()
         if self._loop is None:
             return self._run_one_by_one(n, packed, kept, runs, workers)
         step = self.scan.step
@@ -191,8 +191,8 @@ def _shaped(flat: Array, size: tuple[int, int]) -> Array:
     return flat.reshape(*flat.shape[:-1], columns, rows).swapaxes(-1, -2)
 
 
-def _processors() -> int:
-    """Processors that this process may use."""
+def processors() -> int:
+    """Return how many processors this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

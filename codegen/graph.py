@@ -1,6 +1,7 @@
 """The scalars of an SX function as a graph in which equal expressions are one node."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -15,7 +16,7 @@ BUILDERS: Mapping[str, Callable[..., Any]] = {
     "div": lambda a, b: a / b,
     "neg": lambda a: -a,
     "inv": lambda a: 1 / a,
-    "sq": lambda a: a**2,
+    "sq": lambda a: a * a,
     "twice": lambda a: 2 * a,
     "sqrt": ca.sqrt,
     "fabs": ca.fabs,
@@ -119,10 +120,31 @@ def graph_of(function: ca.Function) -> Graph:
         elif op == "input":
             work[written[0]] = graph.add(Node("input", port=read[0], entry=read[1]))
         else:
-            work[written[0]] = graph.add(Node(op, tuple(work[i] for i in read)))
+            work[written[0]] = graph.add(_usual(graph, op, tuple(work[i] for i in read)))
     return graph
 
 
+def _usual(graph: Graph, op: str, args: tuple[int, ...]) -> Node:
+    """Return the one form of operations that CasADi writes in two."""
+    if op == "mul" and args[0] == args[1]:
+        return Node("sq", args[:1])
+    if op == "div" and graph.nodes[args[0]] == Node("const", value=1.0):
+        return Node("inv", args[1:])
+    return Node(op, args)
+
+
+@contextmanager
+def as_written() -> Iterator[None]:
+    """Build SX expressions without CasADi's own simplifications, such as c/x for c (1/x)."""
+    before = ca.GlobalOptions.getSimplificationOnTheFly()
+    ca.GlobalOptions.setSimplificationOnTheFly(False)
+    try:
+        yield
+    finally:
+        ca.GlobalOptions.setSimplificationOnTheFly(before)
+
+
+@as_written()
 def function_of(
     graph: Graph, like: ca.Function, builders: Mapping[str, Callable[..., Any]] = BUILDERS
 ) -> ca.Function:

@@ -46,7 +46,7 @@ class Structure:
 
 
 def plausible(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
-    """Return whether a car can be in this state: v_x below 300 m/s, axles sliding less than 63°.
+    """Return whether a car can be in this state: its axles slide less than 63°, its wheels turn.
 
     A sample that is not (a spike, a dropout of a sensor) is not learnt from, and no force is told:
     one of 1000 m/s would carry the weights beyond any number.
@@ -54,7 +54,7 @@ def plausible(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     Parameters
     ----------
     parameters : of the bicycle.
-    v_x : longitudinal speed [m/s].
+    v_x : longitudinal speed, at least the minimum speed [m/s].
     x : [v_y, r] (2,).
     u : [δ_f, δ_r] (2,).
     """
@@ -62,7 +62,7 @@ def plausible(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     front, rear = x[0] + parameters.l_f * x[1], x[0] - parameters.l_r * x[1]
     inside = ca.logic_and(ca.fabs(front) <= reach, ca.fabs(rear) <= reach)
     steering = ca.logic_and(ca.fabs(u[0]) <= LARGEST_ANGLE, ca.fabs(u[1]) <= LARGEST_ANGLE)
-    return ca.logic_and(ca.logic_and(inside, steering), v_x <= LARGEST_SPEED)
+    return ca.logic_and(inside, steering)
 
 
 def build_step(structure: Structure) -> ca.Function:
@@ -115,7 +115,8 @@ def build_step(structure: Structure) -> ca.Function:
         return [xi_hat_dot, filter_rate(lam, z, xi_tilde), *rates]
 
     moving = v_x >= min_speed
-    used = ca.logic_and(moving, plausible(parameters, v_x, x, u))
+    believed = ca.logic_and(plausible(parameters, speed, x, u), v_x <= LARGEST_SPEED)
+    used = ca.logic_and(moving, believed)
     f_hat = ca.if_else(used, W @ layers(xi_hat, V)[1], 0)
     linear = ca.if_else(used, linear_axle_force(parameters, speed, x, u), 0)
     ahead = ca.if_else(used, dt, 0)  # else nothing moves on: weights keep their values
@@ -126,7 +127,8 @@ def build_step(structure: Structure) -> ca.Function:
         f"identifier_{structure.law}",
         [xi_hat, z, W, V, x, u, v_x, vehicle, A_d, gains, sampling],
         [
-            ca.if_else(moving, xi_hat_next, xi),  # at rest the observer follows the measurement
+            # at rest the observer follows the measurement, as far as it can be believed
+            ca.if_else(ca.logic_or(moving, ca.logic_not(believed)), xi_hat_next, xi),
             ca.if_else(moving, z_next, 0),
             bounded(W_next, W_max),
             bounded(V_next, V_max),

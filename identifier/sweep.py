@@ -4,18 +4,24 @@ A method whose numbers were chosen well beats one whose were not, whatever their
 try the same number of designs from the ranges that it names itself.
 """
 
+import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import nullcontext
+from dataclasses import asdict, dataclass
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
-from identifier.cross_replay import Course, Shares, cross_replay, shares
+from identifier.batch_trials import cross_replay_batch
+from identifier.cross_replay import Course, Shares, shares
+from identifier.resume import Store, content_digest, run_resumably
 from identifier.tuned import tunables, tuned_method
 from identifier.tuning import Range
-from identifier.workers import spread
+from identifier.workers import Map, spread
 
-CHUNK = 10  # designs that a process takes at once
+CHUNK = 64  # designs that a process takes at once: their runs fill the lanes of a few registers
+QUIET = 5.0  # s between words about a method
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,19 +60,22 @@ def random_values(
     ]
 
 
-def judge(course: Course, seed: int, task: tuple[str, Mapping[str, float]]) -> Candidate:
-    """Run one design over the course.
+def judge(
+    course: Course, seed: int, task: tuple[str, Sequence[Mapping[str, float]]]
+) -> tuple[Candidate, ...]:
+    """Run designs of one method over the course, side by side.
 
     Parameters
     ----------
     course : car and recordings.
     seed : seed of the initial weights.
-    task : name of the method, and values of its tunables.
+    task : name of the method, and for each design the values of its tunables.
     """
-    name, values = task
-    trial = cross_replay(tuned_method(name, course.vehicle, values, seed), course)
-    return Candidate(
-        values=values, shares=shares(trial, course), diverged_on=tuple(trial.diverged_at)
+    name, draws = task
+    methods = [tuned_method(name, course.vehicle, values, seed) for values in draws]
+    return tuple(
+        Candidate(values=values, shares=shares(trial, course), diverged_on=tuple(trial.diverged_at))
+        for values, trial in zip(draws, cross_replay_batch(methods, course, workers=1), strict=True)
     )
 
 
@@ -78,6 +87,8 @@ def sweep(
     seed: int,
     workers: int = 2,
     progress: Callable[[str], None] | None = None,
+    elsewhere: Map | None = None,
+    folder: Path | None = None,
 ) -> dict[str, tuple[Candidate, ...]]:
     """Try the same number of random designs of each method.
 
@@ -89,16 +100,68 @@ def sweep(
     seed : of the initial weights, and of the draws, which are the same numbers for each method.
     workers : processes; 1 stays in this one.
     progress : told what is being done.
+    elsewhere : does the work in place of processes of this machine, as a cluster's map does; its
+        results may come in any order.
+    folder : where results are kept, so that a sweep that was stopped goes on; None keeps none.
     """
     found: dict[str, tuple[Candidate, ...]] = {}
-    with spread(workers, chunk=CHUNK) as spread_map:
+    with nullcontext(elsewhere) if elsewhere else spread(workers) as spread_map:
         for name in names:
             ranges = tunables(name, course.vehicle)
             rng = np.random.default_rng(seed)
             draws = random_values(ranges, designs if ranges else 1, rng)
-            tasks = [(name, values) for values in draws]
-            found[name] = tuple(spread_map(partial(judge, course, seed), tasks))
+            chunks = run_resumably(
+                partial(judge, course, seed),
+                [(name, draws[i : i + CHUNK]) for i in range(0, len(draws), CHUNK)],
+                spread_map,
+                store=None if folder is None else _store(folder, course, seed),
+                done=progress and _counter(name, len(draws), progress),
+            )
+            found[name] = tuple(candidate for chunk in chunks for candidate in chunk)
             lost = sum(bool(candidate.diverged_on) for candidate in found[name])
             if progress:
-                progress(f"{name}: {len(tasks)} designs, {lost} diverged")
+                progress(f"{name}: {len(draws)} designs, {lost} diverged")
     return found
+
+
+def _counter(
+    name: str, designs: int, progress: Callable[[str], None]
+) -> Callable[[int, int], None]:
+    """Return who is told of chunks and says so now and then."""
+    last, told_of_earlier = time.monotonic(), False
+
+    def count(earlier: int, ready: int) -> None:
+        nonlocal last, told_of_earlier
+        if earlier and not told_of_earlier:
+            told_of_earlier = True
+            found = min(earlier * CHUNK, designs)
+            progress(f"{name}: {found} of {designs} designs were judged by an earlier run")
+        elif time.monotonic() - last > QUIET and ready * CHUNK < designs:
+            last = time.monotonic()
+            progress(f"{name}: {ready * CHUNK} of {designs} designs")
+
+    return count
+
+
+def _store(folder: Path, course: Course, seed: int) -> Store:
+    """Return the store of `judge`, whose results follow from the course, the seed and the task."""
+    arrays = [
+        array
+        for rec in course.recordings
+        for array in (rec.t, rec.x, rec.u, rec.v_x, rec.axle_force)
+    ]
+    names = [rec.name for rec in course.recordings]
+    setting = content_digest(course.vehicle, course.min_speed, seed, names, *arrays)
+    return Store(
+        folder=folder,
+        name=lambda task: content_digest(setting, task),
+        to_json=lambda candidates: [asdict(candidate) for candidate in candidates],
+        from_json=lambda rows: tuple(
+            Candidate(
+                values=row["values"],
+                shares=Shares(*row["shares"]),
+                diverged_on=tuple(row["diverged_on"]),
+            )
+            for row in rows
+        ),
+    )

@@ -2,6 +2,7 @@
 
 import argparse
 import os
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from identifier.methods import METHODS
 from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
+from tireid.cluster import cluster
 from tireid.compare_results import comparison_text, write_comparison
 from tireid.compare_study import run_comparison
 from tireid.compare_table import pair_tables
@@ -62,6 +64,11 @@ def add_parser(commands: Any) -> None:
         help="processes (%(default)s)",
     )
     parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="do the sweep on the Dask cluster of this scheduler, as in tcp://host:8786",
+    )
+    parser.add_argument(
         "--columns",
         nargs="+",
         action="extend",
@@ -93,10 +100,13 @@ def run(options: argparse.Namespace) -> None:
     unknown = [name for name in names if name not in METHODS]
     if unknown:
         raise ValueError(f"--methods {unknown[0]} is none of {', '.join(METHODS)}")
+    if options.scheduler and not options.sweep:
+        raise ValueError("--scheduler does sweeps only: say how many designs with --sweep N")
     if options.logs and options.vehicle is None:
         raise ValueError("--vehicle FILE is needed with a LOG: the car that drove it")
     watch = Stopwatch()
-    with output_folder(options.out, force=options.force) as folder:
+    there = cluster(options.scheduler) if options.scheduler else nullcontext()
+    with there as elsewhere, output_folder(options.out, force=options.force) as folder:
         vehicle = sedan() if options.vehicle is None else Vehicle.from_toml(options.vehicle)
         comparison = run_comparison(
             names,
@@ -107,6 +117,7 @@ def run(options: argparse.Namespace) -> None:
             starts=options.floor,
             workers=options.workers,
             progress=say,
+            elsewhere=elsewhere,
         )
         write_comparison(folder, comparison)
     print(comparison_text(comparison))

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from codegen import cache_folder
 from identifier.cross_replay import Course, Shares, Trial, cross_replay, shares
 from identifier.floors import fit_floors
 from identifier.method import Method
@@ -10,6 +11,7 @@ from identifier.methods import REFERENCE, make_method
 from identifier.reproducibility import AxleRmse
 from identifier.step_time import step_times
 from identifier.sweep import Candidate, sweep
+from identifier.workers import Map
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
@@ -72,6 +74,7 @@ def run_comparison(
     starts: int,
     workers: int,
     progress: Callable[[str], None],
+    elsewhere: Map | None = None,
 ) -> Comparison:
     """Run every method over every recording.
 
@@ -85,6 +88,7 @@ def run_comparison(
     starts : of each offline fit to the true forces; 0 leaves the floors out.
     workers : processes of fits and sweep.
     progress : told what is being done.
+    elsewhere : does the sweep in place of processes of this machine, as a cluster's map does.
 
     Raises
     ------
@@ -111,7 +115,14 @@ def run_comparison(
     if designs:
         progress(f"sweep: {designs} random designs of each method")
         sweeps = sweep(
-            names, course, designs=designs, seed=seed, workers=workers, progress=progress
+            names,
+            course,
+            designs=designs,
+            seed=seed,
+            workers=workers,
+            progress=progress,
+            elsewhere=elsewhere,
+            folder=cache_folder() / "sweeps",
         )
     return Comparison(
         course=course, seed=seed, trials=trials, floors=floors, step_times=times, sweeps=sweeps

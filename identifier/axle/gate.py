@@ -39,7 +39,7 @@ class Plausibility:
     yaw_jump : what noise may add to r [rad/s].
     max_steering_rate : [rad/s].
     steering_jump : what noise may add to the steering [rad].
-    hold : longest time to go on with the last good sample [s].
+    hold : longest time to go on with the last good sample, or with values that do not change [s].
     settle : time to wait before learning [s].
 
     Raises
@@ -153,7 +153,9 @@ def gate(limits: Any, dt: Any, last: GateState, x: Any, u: Any, v_x: Any) -> Gat
     used = [ca.if_else(good, new, old) for new, old in zip(sample, last[:5], strict=True)]
     held = ca.logic_and(last.on, bad * dt <= at["hold"])
     on = ca.logic_and(used[0] >= at["min_speed"], ca.logic_or(good, held))
-    steady = _all(used[0] > at["learning_speed"], bad < BAD_IN_A_ROW, stuck < BAD_IN_A_ROW, on)
+    # A slow sensor in a fast log holds its value for some samples; one that is stuck, for longer.
+    alive = stuck * dt <= at["hold"]
+    steady = _all(used[0] > at["learning_speed"], bad < BAD_IN_A_ROW, alive, on)
     clock = ca.if_else(steady, last.on * last.steady + dt, 0)
     return Gate(
         v_x=larger(used[0], at["min_speed"]),
@@ -162,6 +164,6 @@ def gate(limits: Any, dt: Any, last: GateState, x: Any, u: Any, v_x: Any) -> Gat
         delta=ca.vertcat(used[3], used[4]),
         on=on,
         first=1 - last.on,
-        learns=ca.logic_and(good, clock >= at["settle"] * (1 - 1e-9)),
+        learns=_all(good, stuck < BAD_IN_A_ROW, clock >= at["settle"] - dt / 2),
         state=ca.vertcat(*used, on, clock, ca.if_else(on, bad, 0), stuck),
     )

@@ -19,6 +19,7 @@ from identifier.axle.sway import Sway, SwayState
 from identifier.axle.units import doublings, unit_matrix
 from identifier.method import Setup
 from identifier.model_format import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
+from models.files import write_atomically
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
@@ -244,7 +245,7 @@ class AxleModel:
         ----------
         path : the file.
         """
-        path.write_text(json.dumps(self.to_dict(), indent=2) + "\n", encoding="utf-8")
+        write_atomically(path, json.dumps(self.to_dict(), indent=2) + "\n")
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str) -> "AxleModel":

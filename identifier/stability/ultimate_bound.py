@@ -5,7 +5,7 @@ L' <= |ξ̃| (-λ_min(Q) |ξ̃|/2 + |P| w_bar + 2 k_b y - y²), hence L' < 0 whe
 w_bar bounds f - W tanh(V_hat x_bar): it includes W [tanh(V x_bar) - tanh(V_hat x_bar)].
 |.| spectral, Frobenius for weights. Forces in U (kN), ξ̃ in U s. `residual_bound` is sup|f| [U].
 
-(14) is proved for the instantaneous law. The integral law can exceed it; see `integral_bound.py`.
+(14) is proved for the instantaneous law. The integral law can exceed it; see `state_bound.py`.
 """
 
 import math

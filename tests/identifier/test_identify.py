@@ -184,3 +184,17 @@ def test_a_spike_is_not_learnt_from(car, drive, law, signal, size):
     assert history.diverged_at is None
     np.testing.assert_array_equal(history.axle_force[200], 0.0)
     np.testing.assert_allclose(history.axle_force[300:], clean.axle_force[300:], atol=150.0)
+
+
+@pytest.mark.parametrize("law", ["integral", "instantaneous"])
+def test_spikes_of_all_signals_at_once_are_not_believed(car, drive, law, rng):
+    recording = drive(n=600)
+    spoilt = {}
+    for signal in ("v_x", "v_y", "r", "delta_f"):
+        values = getattr(recording, signal).copy()
+        values[100:500:40] += 1000.0 * rng.choice([-1.0, 1.0], size=10)
+        spoilt[signal] = values
+    history = identify(replace(recording, **spoilt), car, default_design(car, law=law))
+    assert np.isfinite(history.axle_force).all()
+    assert history.diverged_at is None
+    assert np.abs(history.axle_force).max() < 3.0 * np.abs(recording.axle_force).max()

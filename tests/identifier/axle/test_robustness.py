@@ -126,3 +126,19 @@ def test_forces_read_zero_below_the_least_speed_only(car, drive):
     force = identify(replace(recording, v_x=v_x), car, design).axle_force
     np.testing.assert_array_equal(force[326:], 0.0)
     assert np.abs(force[20:300]).min(axis=1).max() > 0.0
+
+
+@pytest.mark.parametrize("hold", [2, 4, 5])
+def test_a_slow_sensor_in_a_fast_log_is_learnt_from(hold, car, drive):
+    """Signals held for some samples are not stuck: what is learnt stays near that of the rest."""
+    recording = drive()
+    held = np.arange(recording.t.size) // hold * hold
+    slow = replace(recording, v_y=recording.v_y[held], r=recording.r[held])
+    design = AxleDesign.for_vehicle(car)
+    errors = []
+    for one in (recording, slow):
+        history = identify(one, car, design)
+        assert history.carried["excitation"][-1, :, 1].min() > 2.0  # seconds of learning
+        force = history.freeze(15.0).axle_force(recording)
+        errors.append(np.sqrt(np.mean((force - recording.axle_force) ** 2)))
+    assert errors[1] < errors[0] + 0.06 * np.sqrt(np.mean(recording.axle_force**2))

@@ -61,9 +61,9 @@ class ByHand:
             return restart, False
         if restart:
             self.steady = 0.0
-        calm = self.bad < 3 and self.stuck < 3 and self.last[0] > p.learning_speed
+        calm = self.bad < 3 and self.stuck * dt <= p.hold and self.last[0] > p.learning_speed
         self.steady = self.steady + dt if calm else 0.0
-        return restart, good and self.steady >= p.settle - 1e-9
+        return restart, good and self.stuck < 3 and self.steady >= p.settle - 1e-9
 
     def step(self, sample):
         first, learns = self.believe(np.asarray(sample, dtype=float))

@@ -1,0 +1,134 @@
+"""Many gain sets at once in SIMD lanes against the same compiled C one at a time.
+
+    python -m benchmarks.batch_speed [GAIN_SETS]
+
+45 s of driving (4500 steps), the paper's law, 10 hidden units. Both loops are compiled from the
+same CasADi function and record nothing but where they end; they take turns, the shortest of
+several processor times counts. Then `identify_batch` as a user calls it, with set-up, packing and
+errors, on every processor, against `identify` one at a time. Fails where a run differs in a bit.
+"""
+
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from codegen import BatchScan
+from codegen.batch import processors
+from codegen.lanes import find_target
+from identifier.batch import BatchRun, identify_batch
+from identifier.defaults import default_design
+from identifier.design import Design
+from identifier.history import History
+from identifier.identify import identify
+from identifier.methods import make_method
+from models.maneuvers import Slalom
+from models.plant import Plant
+from models.recordings import Recording
+from models.vehicle import Vehicle, sedan
+
+SLALOM = Slalom(amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=44.99)
+TURNS = 15
+METHODS = ("integral", "instantaneous", "pi_lead", "rls", "axle", "magic_formula_ekf")
+
+
+def shortest(
+    actions: dict[str, Callable[[], object]],
+    turns: int = TURNS,
+    clock: Callable[[], float] = time.perf_counter,
+) -> dict[str, float]:
+    """Return the shortest time of each action [s]; they take turns."""
+    best = dict.fromkeys(actions, float("inf"))
+    for _ in range(turns):
+        for name, action in actions.items():
+            start = clock()
+            action()
+            best[name] = min(best[name], clock() - start)
+    return best
+
+
+def per_step(name: str, car: Vehicle, recording: Recording) -> tuple[float, float]:
+    """Return the time of a step of one run [s]: alone, and in lanes on one core."""
+    setup, n = make_method(name, car).setup(car, recording), len(recording)
+    signals = {"x": recording.x, "u": recording.u, "v_x": recording.v_x}
+    sampled = {port: signals[port] for port in setup.scan.over}
+    numbers = {**setup.carry, **setup.constants}
+    scan = setup.scan
+    batch = BatchScan(scan.step, carry=scan.carry, over=scan.over, lanes_over=tuple(numbers))
+    target = find_target()
+    runs = 8 * (target.lanes if target else 1)
+    many = {port: np.repeat(np.asarray(v)[None], runs, axis=0) for port, v in numbers.items()}
+    alone = scan(n, {**numbers, **sampled}, every=n)
+    lanes = batch(n, {**many, **sampled}, workers=1)
+    for port in scan.carry:
+        for value in lanes[f"{port}_final"]:
+            np.testing.assert_array_equal(value, alone[f"{port}_final"])
+    times = shortest(
+        {
+            "alone": lambda: scan(n, {**numbers, **sampled}, every=n),
+            "lanes": lambda: batch(n, {**many, **sampled}, workers=1),
+        },
+        clock=time.process_time,  # of this one thread: a busy machine does not count
+    )
+    return times["alone"] / n, times["lanes"] / n / runs
+
+
+def gain_sets(car: Vehicle, count: int) -> list[Design]:
+    """Return designs whose gains are drawn around those of the vehicle, each with its own seed."""
+    rng, base = np.random.default_rng(0), default_design(car)
+    drawn = []
+    for seed, (rate, leak, forgetting) in enumerate(np.exp(rng.uniform(-1, 1, (count, 3)))):
+        gains = replace(
+            base.gains,
+            eta_W=base.gains.eta_W * rate,
+            rho_W=base.gains.rho_W * leak,
+            forgetting=base.gains.forgetting * forgetting,
+        )
+        drawn.append(replace(base, gains=gains, seed=seed))
+    return drawn
+
+
+def check(run: BatchRun, history: History) -> None:
+    """Fail where a run in a lane is not that of the same design alone, in every bit."""
+    for port, value in run.carried[np.inf].items():
+        np.testing.assert_array_equal(value, history.carried[port][-1])
+
+
+def main(count: int = 1000) -> dict[str, float]:
+    """Print the table; return the time of the batch [s] and the ratios by method."""
+    car = sedan()
+    recording = Plant(car).simulate(SLALOM, speed=20.0).recording()
+    target = find_target()
+    print(f"{target.lanes if target else 1} lanes, {processors()} processors")
+    print("one step of one run, one core       alone [ns]   in lanes [ns]   ratio")
+    found = {}
+    for name in METHODS:
+        alone, lanes = per_step(name, car, recording)
+        found[name] = alone / lanes
+        print(f"{name:34}{1e9 * alone:12.1f}{1e9 * lanes:16.1f}{found[name]:8.1f}")
+    designs = gain_sets(car, count)
+    runs = identify_batch(recording, car, designs)
+    for k in range(0, count, max(count // 20, 1)):
+        check(runs[k], identify(recording, car, designs[k]))
+    few = designs[: min(count, 20)]
+    times = shortest(
+        {
+            "one core": lambda: identify_batch(recording, car, designs, workers=1),
+            "all cores": lambda: identify_batch(recording, car, designs),
+            "alone": lambda: [identify(recording, car, design) for design in few],
+        },
+        turns=5,
+    )
+    alone = times["alone"] / len(few) * count
+    print(f"{count} gain sets over {recording.duration:.0f} s, n_h = {designs[0].network.hidden}:")
+    print(f"  identify_batch, one core   {times['one core']:8.3f} s")
+    print(f"  identify_batch, all cores  {times['all cores']:8.3f} s")
+    print(f"  identify, one at a time    {alone:8.3f} s (from {len(few)})")
+    print(f"  ratio on all cores         {alone / times['all cores']:8.1f}")
+    return {"batch": times["all cores"], **found}
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))

@@ -1,0 +1,165 @@
+"""A sweep on a Dask cluster of two workers is the sweep of this machine, and can be resumed."""
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import time
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+import tireid.cluster
+from identifier.cross_replay import Course
+from identifier.sweep import CHUNK, sweep
+from models.recordings import read_recording
+from models.vehicle import sedan
+from tireid.cli import main
+from tireid.cluster import ClusterError, cluster
+
+pytest.importorskip("distributed", reason="needs Dask: pip install 'tireid[cluster]'")
+pytestmark = pytest.mark.filterwarnings("default")  # Dask's own
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def start(kind, options, folder):
+    return subprocess.Popen(
+        [sys.executable, "-m", f"distributed.cli.dask_{kind}", "--no-dashboard", *options],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    """The address of a scheduler with two workers, processes as a user starts them."""
+    folder, port = tmp_path_factory.mktemp("cluster"), free_port()
+    address = f"tcp://127.0.0.1:{port}"
+    running = [
+        start("scheduler", ["--host", "127.0.0.1", "--port", str(port)], folder),
+        start("worker", [address, "--nthreads", "1", "--nworkers", "2"], folder),
+    ]
+    yield address
+    for process in reversed(running):
+        process.terminate()
+        process.wait(timeout=20)
+
+
+@pytest.fixture(scope="module")
+def course(logs):
+    recordings = tuple(read_recording(logs / f"{name}.csv") for name in ("slalom", "quick"))
+    return Course(vehicle=sedan(), recordings=recordings, min_speed=1.0)
+
+
+NAMES = ("integral", "linear")
+
+
+def test_two_workers_find_what_this_machine_finds(address, course):
+    designs, said = CHUNK + 5, []
+    with cluster(address) as elsewhere:
+        spread = sweep(
+            NAMES, course, designs=designs, seed=3, elsewhere=elsewhere, progress=said.append
+        )
+    assert spread == sweep(NAMES, course, designs=designs, seed=3, workers=1)
+    assert said[0].startswith(f"integral: {designs} designs")
+
+
+def where(pause, item):
+    time.sleep(pause)
+    return os.getpid(), item
+
+
+def test_both_workers_work_and_no_result_is_lost(address):
+    with cluster(address) as elsewhere:
+        found = list(elsewhere(partial(where, 0.05), range(20)))
+    assert sorted(item for _, item in found) == list(range(20))
+    processes = {process for process, _ in found}
+    assert len(processes) == 2
+    assert os.getpid() not in processes
+
+
+def fail(item):
+    raise ValueError(f"item {item} cannot be done")
+
+
+def test_an_error_of_a_worker_arrives_here(address):
+    with cluster(address) as elsewhere, pytest.raises(ValueError, match="item 1 cannot be done"):
+        list(elsewhere(fail, [1]))
+
+
+def test_a_worker_of_another_version_is_refused(address, monkeypatch):
+    monkeypatch.setattr(tireid.cluster, "source_digest", another_version)
+    with pytest.raises(ClusterError, match="has another version of tireid"), cluster(address):
+        pass
+
+
+def another_version():
+    return f"that of process {os.getpid()}"
+
+
+def test_a_scheduler_without_workers_is_told_of(monkeypatch, tmp_path):
+    monkeypatch.setattr(tireid.cluster, "PATIENCE", 2.0)
+    port = free_port()
+    lonely = f"tcp://127.0.0.1:{port}"
+    process = start("scheduler", ["--host", "127.0.0.1", "--port", str(port)], tmp_path)
+    try:
+        wait_until_open(port)
+        with pytest.raises(ClusterError, match="the scheduler has no workers"), cluster(lonely):
+            pass
+    finally:
+        process.terminate()
+        process.wait(timeout=20)
+
+
+def wait_until_open(port, patience=20.0):
+    until = time.monotonic() + patience
+    while time.monotonic() < until:
+        with socket.socket() as probe:
+            if probe.connect_ex(("127.0.0.1", port)) == 0:
+                return
+        time.sleep(0.1)
+    raise TimeoutError(port)
+
+
+@pytest.fixture
+def words(logs):
+    return ["compare", str(logs / "slalom.csv"), str(logs / "quick.csv"), "--vehicle",
+            str(logs / "car.toml"), "--methods", *NAMES, "--floor", "0"]  # fmt: skip
+
+
+def test_the_command_writes_the_same_sweep_from_a_cluster(words, address, tmp_path, monkeypatch):
+    sweeps = {}
+    for name, extra in (("here", ["--workers", "1"]), ("there", ["--scheduler", address])):
+        monkeypatch.setenv("TIREID_CACHE", str(tmp_path / f"cache {name}"))
+        out = tmp_path / name
+        assert main([*words, "--sweep", "4", "--out", str(out), *extra]) == 0
+        sweeps[name] = json.loads((out / "compare.json").read_text())["sweep"]
+        kept = list((tmp_path / f"cache {name}" / "sweeps").glob("*.json"))
+        assert len(kept) == len(NAMES)
+    assert set(sweeps["here"]) == set(NAMES)
+    assert sweeps["there"] == sweeps["here"]
+
+
+def test_the_command_names_what_is_wrong_with_the_cluster(words, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(tireid.cluster, "PATIENCE", 1.0)
+    nobody = f"tcp://127.0.0.1:{free_port()}"
+    out = ["--out", str(tmp_path / "out")]
+    assert main([*words, *out, "--sweep", "4", "--scheduler", nobody]) == 2
+    assert f"{nobody}: no Dask scheduler answers there" in capsys.readouterr().err
+    assert main([*words, *out, "--scheduler", nobody]) == 2
+    assert "--scheduler does sweeps only" in capsys.readouterr().err
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert main([*words, *out, "--sweep", "4", "--scheduler", nobody]) == 2
+    assert "pip install 'tireid[cluster]'" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
