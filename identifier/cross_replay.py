@@ -177,12 +177,28 @@ def frozen_shares(
     frozen : by recording learnt on and recording replayed [N].
     course : car and recordings.
     """
-    own: list[float] = []
-    other: list[float] = []
+    own, other = where_learnt_and_elsewhere(frozen)
+    return (
+        _mean([course.share(name, error) for name, error in own]),
+        _mean([course.share(name, error) for name, error in other]),
+    )
+
+
+def where_learnt_and_elsewhere(
+    frozen: Mapping[str, Mapping[str, AxleRmse]],
+) -> tuple[list[tuple[str, AxleRmse]], list[tuple[str, AxleRmse]]]:
+    """Return name and error of replays of the drive that was learnt, and of every other drive.
+
+    Parameters
+    ----------
+    frozen : by recording learnt on and recording replayed [N].
+    """
+    own: list[tuple[str, AxleRmse]] = []
+    other: list[tuple[str, AxleRmse]] = []
     for learnt, replays in frozen.items():
         for name, error in replays.items():
-            (own if name == learnt else other).append(course.share(name, error))
-    return _mean(own), _mean(other)
+            (own if name == learnt else other).append((name, error))
+    return own, other
 
 
 def _mean(values: Sequence[float]) -> float | None:

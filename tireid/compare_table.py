@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from identifier.cross_replay import Trial
+from identifier.cross_replay import Trial, where_learnt_and_elsewhere
 from identifier.pareto import best_candidate, frozen_share, pareto_front
 from identifier.reproducibility import AxleRmse
-from tireid.compare_study import Comparison, Frozen
+from tireid.compare_study import Comparison
 
 HINDSIGHT = (
     "The best design of a sweep is chosen with the recordings that it is judged on, for every "
@@ -29,7 +29,7 @@ def summary_table(comparison: Comparison) -> str:
         cells = ["diverged" if trial.diverged_at else _mean(comparison, online)]
         lines.append([name, *cells, *_frozen_cells(comparison, trial), time])
     for name, frozen in comparison.floors.items():
-        cells = [_mean(comparison, pairs) for pairs in _split(frozen)]
+        cells = [_mean(comparison, pairs) for pairs in where_learnt_and_elsewhere(frozen)]
         lines.append([f"floor, {name}", "", *cells, ""])
     title = f"Axle force RMSE, front / rear, % of rms (N), mean over {n} recordings"
     return _text(title, lines)
@@ -138,17 +138,7 @@ def _frozen_cells(comparison: Comparison, trial: Trial) -> list[str]:
         return ["a signal, no model", ""]
     if trial.diverged_at:
         return ["diverged", "diverged"]
-    return [_mean(comparison, pairs) for pairs in _split(trial.frozen)]
-
-
-def _split(frozen: Frozen) -> tuple[list[tuple[str, AxleRmse]], list[tuple[str, AxleRmse]]]:
-    """Errors by the recording replayed: where learnt, and elsewhere."""
-    own: list[tuple[str, AxleRmse]] = []
-    other: list[tuple[str, AxleRmse]] = []
-    for learnt, replays in frozen.items():
-        for name, error in replays.items():
-            (own if name == learnt else other).append((name, error))
-    return own, other
+    return [_mean(comparison, pairs) for pairs in where_learnt_and_elsewhere(trial.frozen)]
 
 
 def _mean(comparison: Comparison, pairs: list[tuple[str, AxleRmse]]) -> str:

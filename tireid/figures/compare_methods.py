@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from identifier.cross_replay import where_learnt_and_elsewhere
 from tireid.compare_study import Comparison, Frozen
 from tireid.compare_table import ranking
 from tireid.figures.compare_labels import FARTHEST, method_label, percent_axis
@@ -82,11 +83,11 @@ def floor_errors(comparison: Comparison, name: str) -> dict[str, list[float]]:
 
 
 def _frozen_errors(comparison: Comparison, frozen: Frozen) -> dict[str, list[float]]:
-    found: dict[str, list[float]] = {OWN: [], OTHER: []}
-    for learnt, replays in frozen.items():
-        for name, error in replays.items():
-            found[OWN if name == learnt else OTHER].append(comparison.course.share(name, error))
-    return found
+    course = comparison.course
+    return {
+        kind: [course.share(name, error) for name, error in pairs]
+        for kind, pairs in zip((OWN, OTHER), where_learnt_and_elsewhere(frozen), strict=True)
+    }
 
 
 def _draw_row(axes: Axes, position: int, errors: Mapping[str, list[float]]) -> None:
