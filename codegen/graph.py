@@ -173,7 +173,7 @@ def function_of(
         elif node.op in builders:
             made[place] = builders[node.op](*(made[a] for a in node.args))
         else:
-            raise UnknownOperationError(f"{like.name()}: {node.op} has no plain C of its own")
+            raise UnknownOperationError(f"{like.name()}: there is no plain C for {node.op}")
     results = [
         ca.reshape(ca.vertcat(*(made[p] for p in places)), *like.size_out(i))
         for i, places in enumerate(graph.outputs)

@@ -4,8 +4,16 @@ from tireid import (
     check_command,
     compare_command,
     demo_command,
+    export_command,
     identify_command,
     paper_command,
 )
 
-COMMANDS = (demo_command, paper_command, identify_command, compare_command, check_command)
+COMMANDS = (
+    demo_command,
+    paper_command,
+    identify_command,
+    compare_command,
+    check_command,
+    export_command,
+)

@@ -4,6 +4,7 @@ Gains, T_s, vehicle and K⁻¹ become literals, so that only signals and carried
 (carried, x = [v_y, r], u = [δ_f, δ_r], v_x) -> (carried next, axle_force [N], other outputs), SI.
 """
 
+import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -11,41 +12,32 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from codegen.tuned import Tuned, tuned
 from identifier.axle import AxleDesign
 from identifier.baselines import StiffnessRls
 from identifier.design import Design
+from identifier.export.signals import INPUTS, Signal, describe
 from identifier.method import FrozenModel, Method, Setup
 from identifier.regression import RegressionDesign
 from models.recordings import Recording
-from models.vehicle import Vehicle
+from models.vehicle import GRAVITY, Vehicle
 
 Array = NDArray[np.float64]
 
 SAMPLED = ("x", "u", "v_x")
+FROUDE = 60.0  # largest speed, in sqrt(g wheelbase): 300 m/s for a sedan
+TURN = 4.0  # largest yaw rate, in sqrt(g/wheelbase): 8 rad/s for a sedan
+STEERING = 1.5  # rad
+WEIGHTS = 5.0  # largest force of an axle, in weights of the car
 
 
-class Signal(NamedTuple):
-    """An input or output: name in C, FMU and JSON; unit; what it is. A vector has `size` > 1."""
+class Limits(NamedTuple):
+    """What no car reaches: speed [m/s], yaw rate [rad/s], steering [rad], axle force [N]."""
 
-    name: str
-    unit: str
-    description: str
-    size: int = 1
-
-
-INPUTS = (
-    Signal("v_x", "m/s", "longitudinal speed at the center of mass, forward positive"),
-    Signal("v_y", "m/s", "lateral velocity at the center of mass, left positive"),
-    Signal("r", "rad/s", "yaw rate, left positive"),
-    Signal("delta_f", "rad", "road-wheel steering angle in front, left positive"),
-    Signal("delta_r", "rad", "road-wheel steering angle at the rear, left positive"),
-)
-OUTPUTS: Mapping[str, tuple[str, str]] = {
-    "axle_force": ("N", "lateral axle forces, front and rear, left positive, frame of the body"),
-    "f_hat": ("force_unit", "force of the network alone, front and rear"),
-    "xi_tilde": ("force_unit s", "error of the observed axle impulse, front and rear"),
-    "residual": ("force_unit", "error of the filtered regression, front and rear"),
-}
+    speed: float
+    yaw_rate: float
+    steering: float
+    force: float
 
 
 class FoldedStep(NamedTuple):
@@ -54,24 +46,30 @@ class FoldedStep(NamedTuple):
     name : C identifier, prefix of everything that is exported.
     function : SX function of the carried ports, then x (2,), u (2,), v_x; returns `p_next` of each
         carried port `p`, then the outputs, axle_force (2,) [N] first.
+    parts : the same function in the parts that C is written from.
     carry : value of each carried port at the start, in the port's matrix shape.
     learnt : carried ports that hold their values while adaptation is off; empty: it cannot be.
     inputs : the five scalars v_x, v_y, r, delta_f, delta_r.
     outputs : axle_force and what else the step tells.
+    carried : units of the carried ports.
     dt : sampling interval [s].   min_speed : [m/s], below it forces read zero.
     rests_first : whether a run begins with one step at v_x = 0 of its first sample, in which the
         observer takes the measurement.
+    limits : of inputs and forces.
     """
 
     name: str
     function: ca.Function
+    parts: Tuned
     carry: Mapping[str, Array]
     learnt: tuple[str, ...]
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
+    carried: tuple[Signal, ...]
     dt: float
     min_speed: float
     rests_first: bool
+    limits: Limits
 
 
 def learnt_ports(method: Method, carry: Mapping[str, Array]) -> tuple[str, ...]:
@@ -116,27 +114,32 @@ def fold(
     setup = method.setup(vehicle, _standing(method.dt), start)
     moved = method.setup(vehicle, _standing(method.dt, x=1.0), start)
     step = setup.scan.step
-    function = _folded(setup, name)
-    outputs = tuple(
-        Signal(port, *OUTPUTS.get(port, ("-", port)), step.numel_out(port))
-        for port in sorted(setup.scan.outputs, key=lambda port: port != "axle_force")
-    )
+    parts = _folded(setup, name)
+    told = sorted(setup.scan.outputs, key=lambda port: port != "axle_force")
     return FoldedStep(
         name=name,
-        function=function,
+        function=parts.function,
+        parts=parts,
         carry={port: _matrix(value, step.size_in(port)) for port, value in setup.carry.items()},
         learnt=learnt_ports(method, setup.carry),
         inputs=INPUTS,
-        outputs=outputs,
+        outputs=tuple(describe(method, port, step.numel_out(port)) for port in told),
+        carried=tuple(describe(method, port, value.size) for port, value in setup.carry.items()),
         dt=method.dt,
         min_speed=method.min_speed,
         rests_first=any(
             not np.array_equal(setup.carry[port], moved.carry[port]) for port in setup.carry
         ),
+        limits=Limits(
+            speed=FROUDE * math.sqrt(GRAVITY * vehicle.wheelbase),
+            yaw_rate=TURN * math.sqrt(GRAVITY / vehicle.wheelbase),
+            steering=STEERING,
+            force=WEIGHTS * vehicle.weight,
+        ),
     )
 
 
-def _folded(setup: Setup, name: str) -> ca.Function:
+def _folded(setup: Setup, name: str) -> Tuned:
     step, carry = setup.scan.step, list(setup.carry)
     ports = {port: ca.SX.sym(port, *step.size_in(port)) for port in carry}
     ports |= {"x": ca.SX.sym("x", 2), "u": ca.SX.sym("u", 2), "v_x": ca.SX.sym("v_x")}
@@ -147,7 +150,7 @@ def _folded(setup: Setup, name: str) -> ca.Function:
     results = step(**sampled, **constants)
     told = sorted(setup.scan.outputs, key=lambda port: port != "axle_force")
     wanted = [*(f"{port}_next" for port in carry), *told]
-    return ca.Function(
+    literal = ca.Function(
         name,
         list(ports.values()),
         [ca.densify(results[port]) for port in wanted],
@@ -155,6 +158,7 @@ def _folded(setup: Setup, name: str) -> ca.Function:
         wanted,
         {"cse": True},
     )
+    return tuned(literal, sampled=SAMPLED)
 
 
 def _matrix(value: Array, size: tuple[int, int]) -> Array:

@@ -6,9 +6,9 @@ What the whole model adds, the lag of slip and the sway of the body, has a state
 import numpy as np
 
 from identifier.axle.model import AxleModel
-from identifier.export.fold import Signal
 from identifier.export.onnx_graph import Graph
 from identifier.export.onnx_network import OUTPUTS, SLIP_SIGN
+from identifier.export.signals import Signal
 
 INPUTS = (
     Signal("alpha_f", "rad", "slip angle of the front axle, paper's sign"),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from identifier.export.fold import Signal
+from identifier.export.signals import Signal
 
 OPSET = 13
 IR_VERSION = 7  # of the file format that came with opset 13

@@ -5,8 +5,8 @@ Rows are samples, as ONNX has it, so that every product is transposed: x̄ᵀ V�
 
 import numpy as np
 
-from identifier.export.fold import INPUTS, Signal
 from identifier.export.onnx_graph import Graph
+from identifier.export.signals import INPUTS, Signal
 from identifier.network_model import NetworkModel
 
 SLIP_SIGN = "slip angle δ - atan(v/v_x), the negative of ISO 8855; force to the left is positive"

@@ -1,0 +1,228 @@
+"""Scalars as plain C99 statements: real float or double, no library calls but sqrt and fabs.
+
+Literals and functions go through macros of the prefix, `PREFIX_C(1.0)` and `PREFIX_SQRT(x)`, so
+that one text serves both precisions. Every compound operand is in parentheses.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+from codegen.branches import CONDITIONS
+from codegen.graph import Graph, Node, UnknownOperationError
+
+Place = Callable[[int, int], str]  # (port, entry by columns) -> C expression
+
+FLOAT_MIN, FLOAT_MAX = 1.2e-38, 3.4e38  # normal numbers of float
+LONGEST = 72  # characters of an expression that is not given a name
+TWICE = ("sq", "fmin", "fmax")  # they write an argument twice
+
+BINARY: Mapping[str, str] = {
+    "add": "+",
+    "sub": "-",
+    "mul": "*",
+    "div": "/",
+    "lt": "<",
+    "le": "<=",
+    "eq": "==",
+    "ne": "!=",
+    "and": "&&",
+    "or": "||",
+}
+CALLS: Mapping[str, str] = {"tanh": "tanh", "exp": "exp", "atan": "atan"}  # functions of our own
+MACROS: Mapping[str, str] = {"sqrt": "SQRT", "fabs": "FABS"}
+
+
+def literal(value: float, prefix: str) -> str:
+    """Return a number in C, which reads back as the same double; in float the nearest there is.
+
+    Parameters
+    ----------
+    value : finite.
+    prefix : of the macro.
+    """
+    size = abs(value)
+    in_float = math.copysign(min(max(size, FLOAT_MIN), FLOAT_MAX), value) if size else 0.0
+    if in_float != value:
+        return f"{prefix.upper()}_PICK({_digits(in_float)}, {_digits(value)})"
+    return f"{prefix.upper()}_C({_digits(value)})"
+
+
+def _digits(value: float) -> str:
+    text = repr(float(value))
+    if "." in text:
+        return text
+    mantissa, _, exponent = text.partition("e")
+    return f"{mantissa}.0e{exponent}" if exponent else f"{mantissa}.0"
+
+
+class Statements:
+    """Statements that compute the outputs of a graph.
+
+    Parameters
+    ----------
+    graph : the scalars; choices and our own functions are nodes.
+    prefix : of every function and macro.
+    read : C expression of an entry of an input.
+    write : C lvalue of an entry of an output.
+    returns : whether the one output is a truth value that is returned.
+
+    Raises
+    ------
+    UnknownOperationError
+        Where an operation has no plain C.
+    """
+
+    def __init__(
+        self, graph: Graph, *, prefix: str, read: Place, write: Place, returns: bool = False
+    ) -> None:
+        self.graph, self.prefix, self.read = graph, prefix, read
+        self.uses = graph.uses()
+        for place in graph.reached():
+            if graph.nodes[place].op in TWICE:
+                for argument in graph.nodes[place].args:
+                    self.uses[argument] += 1
+        self.text: dict[int, str] = {}
+        self.lines: list[str] = []
+        self.groups = _groups(graph)
+        self.members = {place: group for group in self.groups for place in group}
+        self.called: set[str] = set()
+        self.names = 0
+        for port, entries in enumerate(graph.outputs):
+            for entry, place in enumerate(entries):
+                if returns:
+                    self.lines.append(f"return {_bare(self._condition(place))};")
+                else:
+                    self.lines.append(f"{write(port, entry)} = {_bare(self._real(place))};")
+
+    def block(self, indent: int = 4) -> str:
+        """Return the statements, one a line.
+
+        Parameters
+        ----------
+        indent : spaces before each.
+        """
+        return "".join(f"{' ' * indent}{line}\n" for line in self.lines)
+
+    def _real(self, place: int) -> str:
+        """Return a node as a number."""
+        text = self._expression(place)
+        if self.graph.nodes[place].op in CONDITIONS:
+            return f"({text} ? {literal(1.0, self.prefix)} : {literal(0.0, self.prefix)})"
+        return text
+
+    def _condition(self, place: int) -> str:
+        """Return a node as a truth value."""
+        text = self._expression(place)
+        if self.graph.nodes[place].op in CONDITIONS:
+            return text
+        return f"({text} != {literal(0.0, self.prefix)})"
+
+    def _expression(self, place: int) -> str:
+        if place in self.text:
+            return self.text[place]
+        waiting = [place]  # not by recursion: graphs are deep
+        while waiting:
+            now = waiting[-1]
+            if now in self.text:
+                waiting.pop()
+                continue
+            missing = [a for a in self._needs(now) if a not in self.text]
+            if missing:
+                waiting += reversed(missing)
+                continue
+            self._name_or_inline(waiting.pop())
+        return self.text[place]
+
+    def _needs(self, place: int) -> Sequence[int]:
+        if place in self.members:
+            return [self.graph.nodes[p].args[0] for p in self.members[place]]
+        return self.graph.nodes[place].args
+
+    def _name_or_inline(self, place: int) -> None:
+        node = self.graph.nodes[place]
+        if place in self.members:
+            self._call_group(self.members[place], node.op)
+            return
+        text = self._plain(node)
+        atomic = node.op in ("const", "input")
+        if not atomic and (self.uses[place] > 1 or len(text) > LONGEST):
+            kind = "bool" if node.op in CONDITIONS else f"{self.prefix}_real"
+            name = self._new("c" if node.op in CONDITIONS else "t")
+            self.lines.append(f"const {kind} {name} = {_bare(text)};")
+            text = name
+        self.text[place] = text
+
+    def _new(self, letter: str) -> str:
+        self.names += 1
+        return f"{letter}{self.names}"
+
+    def _call_group(self, group: Sequence[int], op: str) -> None:
+        """Call one of our own functions on several numbers in one loop."""
+        name, size = self._new("h"), len(group)
+        self.called.add(op)
+        self.lines.append(f"{self.prefix}_real {name}[{size}];")
+        for i, place in enumerate(group):
+            argument = self._real(self.graph.nodes[place].args[0])
+            self.lines.append(f"{name}[{i}] = {_bare(argument)};")
+        self.lines.append(f"{self.prefix}_{op}({name}, {size}U);")
+        self.text.update({place: f"{name}[{i}]" for i, place in enumerate(group)})
+
+    def _plain(self, node: Node) -> str:
+        op, args = node.op, node.args
+        if op == "const":
+            return literal(node.value, self.prefix)
+        if op == "input":
+            return self.read(node.port, node.entry)
+        if op in ("and", "or"):
+            return f"({self._condition(args[0])} {BINARY[op]} {self._condition(args[1])})"
+        if op in BINARY:
+            return f"({self._real(args[0])} {BINARY[op]} {self._real(args[1])})"
+        if op in MACROS:
+            return f"{self.prefix.upper()}_{MACROS[op]}({_bare(self._real(args[0]))})"
+        rules: Mapping[str, Callable[[], str]] = {
+            "not": lambda: f"(!{self._condition(args[0])})",
+            "neg": lambda: f"(-{self._real(args[0])})",
+            "inv": lambda: f"({literal(1.0, self.prefix)} / {self._real(args[0])})",
+            "sq": lambda: f"({self._real(args[0])} * {self._real(args[0])})",
+            "twice": lambda: f"({literal(2.0, self.prefix)} * {self._real(args[0])})",
+            "fmin": lambda: self._smaller("<", *args),
+            "fmax": lambda: self._smaller(">", *args),
+            "select": lambda: self._choice(args[0], args[1], self._real(args[2])),
+            "if_else_zero": lambda: self._choice(args[0], args[1], literal(0.0, self.prefix)),
+        }
+        if op not in rules:
+            raise UnknownOperationError(f"{self.prefix}: there is no plain C for {op}")
+        return rules[op]()
+
+    def _choice(self, condition: int, chosen: int, other: str) -> str:
+        return f"({self._condition(condition)} ? {self._real(chosen)} : {other})"
+
+    def _smaller(self, sign: str, a: int, b: int) -> str:
+        """Return fmin or fmax; NaN in a gives b, as in C, NaN in b gives b."""
+        one, other = self._real(a), self._real(b)
+        return f"(({one} {sign} {other}) ? {one} : {other})"
+
+
+def _bare(text: str) -> str:
+    """Return an expression without its outer parentheses, if they belong together."""
+    if not (text.startswith("(") and text.endswith(")")):
+        return text
+    depth = 0
+    for character in text[:-1]:
+        depth += (character == "(") - (character == ")")
+        if depth == 0:
+            return text
+    return text[1:-1]
+
+
+def _groups(graph: Graph) -> list[list[int]]:
+    """Return calls of our own functions that do not need one another, those of a layer together."""
+    level: dict[int, int] = {}
+    found: dict[tuple[str, int], list[int]] = {}
+    for place in graph.reached():
+        node = graph.nodes[place]
+        level[place] = max((level[a] for a in node.args), default=0)
+        if node.op in CALLS:
+            level[place] += 1
+            found.setdefault((node.op, level[place]), []).append(place)
+    return list(found.values())

@@ -1,0 +1,91 @@
+"""Finding again, in the scalars of a function, what a person would have written there.
+
+a·[c] + b·[not c] is a choice; the scalars of our own tanh, exp and atan are one call each. Those of
+C libraries become calls of our own: they would differ from machine to machine.
+"""
+
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import Any
+
+import casadi as ca
+
+from codegen.elementary import atan, exp
+from codegen.graph import BUILDERS, Graph, Node, graph_of
+from codegen.tanh import tanh
+
+OWN: Mapping[str, Callable[[Any], Any]] = {"tanh": tanh, "exp": exp, "atan": atan}
+EXPANDED = {**BUILDERS, **OWN}
+
+
+def recognized(graph: Graph, *, whole: bool = True) -> Graph:
+    """Return a graph with choices and our own functions as nodes.
+
+    Parameters
+    ----------
+    graph : of single operations.
+    whole : False leaves our own functions as the scalars that they are made of.
+    """
+    if not whole:
+        return _with_choices(graph)
+    result, found = _with_choices(graph), Graph()
+    place_of: dict[int, int] = {}
+    for place, node in enumerate(result.nodes):
+        place_of[place] = found.add(_mapped(node, place_of))
+        for name in OWN:
+            argument = _argument(result, place, *_template(name))
+            if argument is not None:
+                place_of[place] = found.add(Node(name, (place_of[argument],)))
+    found.outputs = [[place_of[p] for p in entries] for entries in result.outputs]
+    return found
+
+
+def _mapped(node: Node, place_of: Mapping[int, int]) -> Node:
+    return node._replace(args=tuple(place_of[a] for a in node.args))
+
+
+def _with_choices(graph: Graph) -> Graph:
+    result, place_of = Graph(), dict[int, int]()
+    for place, node in enumerate(graph.nodes):
+        moved = _mapped(node, place_of)
+        place_of[place] = result.add(_choice(result, moved) or moved)
+    result.outputs = [[place_of[p] for p in entries] for entries in graph.outputs]
+    return result
+
+
+def _choice(graph: Graph, node: Node) -> Node | None:
+    """Return [c] a + [not c] b as one choice."""
+    if node.op != "add":
+        return None
+    one, other = (graph.nodes[a] for a in node.args)
+    if one.op == other.op == "if_else_zero":
+        for first, second in ((one, other), (other, one)):
+            negated = graph.nodes[second.args[0]]
+            if negated.op == "not" and negated.args[0] == first.args[0]:
+                return Node("select", (first.args[0], first.args[1], second.args[1]))
+    return None
+
+
+@cache
+def _template(name: str) -> tuple[Graph, int]:
+    """Return the scalars of one of our own functions and the place of its argument."""
+    x = ca.SX.sym("x")
+    graph = _with_choices(graph_of(ca.Function(name, [x], [OWN[name](x)])))
+    leaf = next(i for i, node in enumerate(graph.nodes) if node.op == "input")
+    return graph, leaf
+
+
+def _argument(graph: Graph, place: int, template: Graph, leaf: int) -> int | None:
+    """Return what the function is called with where this place is its result, else None."""
+    bound: dict[int, int] = {}
+
+    def fits(there: int, here: int) -> bool:
+        if here in bound or here == leaf:
+            return bound.setdefault(here, there) == there
+        wanted, node = template.nodes[here], graph.nodes[there]
+        if (wanted.op, wanted.value, len(wanted.args)) != (node.op, node.value, len(node.args)):
+            return False
+        bound[here] = there
+        return all(map(fits, node.args, wanted.args))
+
+    return bound[leaf] if fits(place, template.outputs[0][0]) else None

@@ -1,0 +1,287 @@
+"""The shipped C from Python: sample by sample, or a whole recording in one call."""
+
+import ctypes
+import json
+import re
+from collections.abc import Mapping
+from enum import IntEnum
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen import load_library
+from identifier.export.c_source import filled
+from identifier.export.manifest import FORMAT
+from identifier.export.package import Package
+from models.recordings import Recording
+
+Array = NDArray[np.float64]
+
+
+class Status(IntEnum):
+    """What a step did with its sample; see the README of the package."""
+
+    OK = 0
+    REST = 1
+    IMPLAUSIBLE = 2
+    BAD_INPUT = 3
+    BAD_RESULT = 4
+    BAD_CALL = 5
+
+
+class NoCompilerError(RuntimeError):
+    """There is no C compiler to build the package with."""
+
+
+class PackageFileError(ValueError):
+    """A folder does not hold a package."""
+
+
+class ShippedRun(NamedTuple):
+    """A recording through the package: axle_force (n, 2) [N], every output by name, status (n,)."""
+
+    axle_force: Array
+    outputs: Mapping[str, Array]
+    status: NDArray[np.int32]
+
+
+class CompiledPackage:
+    """One instance of the shipped C.
+
+    Parameters
+    ----------
+    manifest : content of <name>.json.
+    files : headers and sources by path.
+    single : whether to compute in float; None takes the package's default.
+
+    Raises
+    ------
+    NoCompilerError
+        Where there is no C compiler.
+    CompilationError
+        Where the compiler refuses the package.
+    """
+
+    def __init__(
+        self,
+        manifest: Mapping[str, Any],
+        files: Mapping[str, str],
+        *,
+        single: bool | None = None,
+    ) -> None:
+        self.name = str(manifest["name"])
+        self.single = manifest["precision"] == "float" if single is None else single
+        self.dt = float(manifest["sample_time_s"])
+        self._outputs = {one["name"]: int(one["size"]) for one in manifest["outputs"]}
+        learnt = [one for one in manifest["carried"] if one["learnt"]]
+        self._weights = {one["name"]: tuple(one["shape"]) for one in learnt}
+        library = load_library(self._source(files), f"{self.name}_package")
+        if library is None:
+            raise NoCompilerError("no C compiler found: the package cannot be built")
+        self._library = library
+        self._call("instance_size").restype = ctypes.c_size_t
+        self._call("version").restype = ctypes.c_char_p
+        self._call("instance_faults").restype = ctypes.c_uint
+        self._instance = ctypes.create_string_buffer(self._call("instance_size")())
+        self.init()
+
+    @classmethod
+    def of(cls, package: Package, *, single: bool | None = None) -> "CompiledPackage":
+        """Return an instance of a package that was just built.
+
+        Parameters
+        ----------
+        package : the package.
+        single : whether to compute in float; None takes the package's default.
+        """
+        manifest = json.loads(package.files[f"{package.folded.name}.json"])
+        return cls(manifest, package.files, single=single)
+
+    @classmethod
+    def from_folder(cls, folder: Path, *, single: bool | None = None) -> "CompiledPackage":
+        """Return an instance of a package that was exported.
+
+        Parameters
+        ----------
+        folder : what `tireid export` wrote.
+        single : whether to compute in float; None takes the package's default.
+
+        Raises
+        ------
+        PackageFileError
+            Where the folder holds no package.
+        """
+        for path in sorted(folder.glob("*.json")):
+            manifest = json.loads(path.read_text(encoding="utf-8"))
+            if isinstance(manifest, dict) and manifest.get("format") == FORMAT:
+                parts = [*(folder / "include").glob("*.h"), *(folder / "src").glob("*.[ch]")]
+                files = {
+                    part.relative_to(folder).as_posix(): part.read_text(encoding="utf-8")
+                    for part in parts
+                }
+                return cls(manifest, files, single=single)
+        raise PackageFileError(f"{folder}: no package, a JSON file of format {FORMAT!r} is missing")
+
+    def _source(self, files: Mapping[str, str]) -> str:
+        """Return the package as one file."""
+        name = self.name
+        order = ("src/{}_equations.h", "src/{}_equations.c", "src/{}.c")
+        paths = [f"include/{name}.h", *(path.format(name) for path in order)]
+        text = "".join(files[path] for path in paths)
+        glue = filled("glue.c", {"name": name})
+        if self._weights:
+            glue += filled("glue_weights.c", {"name": name})
+        return (
+            f"#define {name.upper()}_SINGLE {int(self.single)}\n"
+            + re.sub(r'^#include "[^"]*"$', "", text, flags=re.M)
+            + glue
+        )
+
+    def _call(self, function: str) -> Any:
+        return getattr(self._library, f"{self.name}_{function}")  # which keeps it
+
+    def init(self) -> None:
+        """Begin as exported: weights, mode, faults."""
+        self._call("instance_init")(self._instance)
+
+    def reset(self) -> None:
+        """Begin anew with the weights, the mode and the number of faults kept."""
+        self._call("instance_reset")(self._instance)
+
+    @property
+    def version(self) -> str:
+        """Name, hash and version of tireid."""
+        text: bytes = self._call("version")()
+        return text.decode()
+
+    @property
+    def faults(self) -> int:
+        """Steps that were refused or implausible since `init`."""
+        return int(self._call("instance_faults")(self._instance))
+
+    @property
+    def state(self) -> bytes:
+        """The state as it lies in memory, with the parameters after it."""
+        return self._instance.raw
+
+    def step(
+        self, v_x: float, v_y: float, r: float, delta_f: float, delta_r: float = 0.0
+    ) -> tuple[Status, Array]:
+        """Take one sample; return its status and the axle forces (2,) [N].
+
+        Parameters
+        ----------
+        v_x : longitudinal speed [m/s].
+        v_y : lateral velocity [m/s].
+        r : yaw rate [rad/s].
+        delta_f : steering in front [rad].
+        delta_r : steering at the rear [rad].
+        """
+        run = self.run_samples(np.array([[v_x, v_y, r, delta_f, delta_r]]))
+        return Status(int(run.status[0])), run.axle_force[0]
+
+    def run(self, recording: Recording) -> ShippedRun:
+        """Run a whole recording, from the state that the instance is in.
+
+        Parameters
+        ----------
+        recording : sampled at the package's interval.
+
+        Raises
+        ------
+        ValueError
+            Where the sampling intervals differ.
+        """
+        if abs(recording.dt - self.dt) > 1e-6 * self.dt:
+            raise ValueError(
+                f"{recording.name} is sampled at {recording.dt:g} s, the package at {self.dt:g} s"
+            )
+        return self.run_samples(samples_of(recording))
+
+    def run_samples(self, samples: Array) -> ShippedRun:
+        """Run samples, from the state that the instance is in.
+
+        Parameters
+        ----------
+        samples : (n, 5): v_x, v_y, r, delta_f, delta_r, SI.
+
+        Raises
+        ------
+        ValueError
+            Where the shape is another.
+        """
+        rows = np.ascontiguousarray(samples, dtype=np.float64)
+        if rows.ndim != 2 or rows.shape[1] != 5:
+            raise ValueError(f"samples must have shape (n, 5), not {rows.shape}")
+        told = np.empty((len(rows), sum(self._outputs.values())))
+        status = np.empty(len(rows), dtype=np.int32)
+        pointers = (ctypes.c_void_p(array.ctypes.data) for array in (rows, told, status))
+        self._call("instance_run")(self._instance, ctypes.c_long(len(rows)), *pointers)
+        ends = np.cumsum(list(self._outputs.values()))[:-1]
+        outputs = dict(zip(self._outputs, np.split(told, ends, axis=1), strict=True))
+        return ShippedRun(outputs["axle_force"], outputs, status)
+
+    @property
+    def weights(self) -> dict[str, Array]:
+        """What is learnt, by name; empty for a method that estimates a signal."""
+        if not self._weights:
+            return {}
+        flat = np.empty(self._weights_size)
+        self._call("instance_weights")(self._instance, ctypes.c_void_p(flat.ctypes.data))
+        ends = np.cumsum([int(np.prod(shape)) for shape in self._weights.values()])[:-1]
+        parts = zip(self._weights.items(), np.split(flat, ends), strict=True)
+        return {name: part.reshape(shape) for (name, shape), part in parts}
+
+    @property
+    def _weights_size(self) -> int:
+        return sum(int(np.prod(shape)) for shape in self._weights.values())
+
+    def set_weights(self, weights: Mapping[str, Array]) -> None:
+        """Go on with other weights.
+
+        Parameters
+        ----------
+        weights : by name, in the shapes of `weights`.
+
+        Raises
+        ------
+        ValueError
+            Where a name or shape is another, or a number not finite.
+        """
+        shapes = {name: np.shape(value) for name, value in weights.items()}
+        if shapes != self._weights:
+            raise ValueError(f"weights must have the shapes {self._weights}, not {shapes}")
+        flat = np.concatenate([np.asarray(weights[name]).ravel() for name in self._weights])
+        flat = np.ascontiguousarray(flat, dtype=np.float64)
+        answer = self._call("instance_take")(self._instance, ctypes.c_void_p(flat.ctypes.data))
+        if answer != Status.OK:
+            raise ValueError("weights must be finite")
+
+    def set_adaptation(self, adapts: bool) -> None:
+        """Learn, or hold what is learnt.
+
+        Parameters
+        ----------
+        adapts : False freezes.
+
+        Raises
+        ------
+        ValueError
+            For a method that has no weights.
+        """
+        if not self._weights:
+            raise ValueError(f"{self.name} estimates a signal: there is nothing to freeze")
+        self._call("instance_adapt")(self._instance, int(adapts))
+
+
+def samples_of(recording: Recording) -> Array:
+    """Return a recording as samples (n, 5) in the order of the inputs.
+
+    Parameters
+    ----------
+    recording : the recording.
+    """
+    columns = (recording.v_x, recording.v_y, recording.r, recording.delta_f, recording.delta_r)
+    return np.column_stack(columns)

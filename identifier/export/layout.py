@@ -1,0 +1,151 @@
+"""How the ports of a step lie in the structures of the exported C."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.clean_c import literal
+from identifier.export.fold import SAMPLED, FoldedStep
+from identifier.export.signals import Signal
+
+Array = NDArray[np.float64]
+FEW = 8  # entries that are summed one by one
+READS = {"x": ("v_y", "r"), "u": ("delta_f", "delta_r"), "v_x": ("v_x",)}
+
+
+class Member(NamedTuple):
+    """A member of a structure: what it is, its matrix shape, whether it is among the weights."""
+
+    signal: Signal
+    shape: tuple[int, int]
+    learnt: bool
+
+    @property
+    def dimensions(self) -> tuple[int, ...]:
+        """Sizes of the C array: none for a scalar, one for a row or column."""
+        return tuple(size for size in self.shape if size > 1)
+
+    @property
+    def path(self) -> str:
+        """Place in the structure of carried values."""
+        return f"weights.{self.signal.name}" if self.learnt else self.signal.name
+
+    def declaration(self, real: str) -> str:
+        """Return the line that declares it.
+
+        Parameters
+        ----------
+        real : type of a number.
+        """
+        sizes = "".join(f"[{size}]" for size in self.dimensions)
+        _, unit, description, _ = self.signal
+        return f"    {real} {self.signal.name}{sizes}; /* {description} [{unit}] */\n"
+
+    def element(self, entry: int) -> str:
+        """Return the C index of an entry.
+
+        Parameters
+        ----------
+        entry : counted by columns, as CasADi does.
+        """
+        row, column = entry % self.shape[0], entry // self.shape[0]
+        pair = zip((row, column), self.shape, strict=True)
+        return "".join(f"[{index}]" for index, size in pair if size > 1)
+
+    @property
+    def first(self) -> str:
+        """C index of the first number, in memory."""
+        return "[0]" * len(self.dimensions)
+
+
+def carried_members(folded: FoldedStep) -> list[Member]:
+    """Return the carried ports in their order.
+
+    Parameters
+    ----------
+    folded : the step.
+    """
+    return [
+        Member(signal, folded.function.size_in(signal.name), signal.name in folded.learnt)
+        for signal in folded.carried
+    ]
+
+
+def output_members(folded: FoldedStep) -> list[Member]:
+    """Return the outputs in their order.
+
+    Parameters
+    ----------
+    folded : the step.
+    """
+    return [
+        Member(signal, folded.function.size_out(signal.name), False) for signal in folded.outputs
+    ]
+
+
+def read_expression(folded: FoldedStep, port: int, entry: int) -> str:
+    """Return the C expression of an entry of an input of the step.
+
+    Parameters
+    ----------
+    folded : the step.
+    port : number of the input.
+    entry : counted by columns.
+    """
+    name = folded.function.name_in(port)
+    if name in SAMPLED:
+        return f"in->{READS[name][entry]}"
+    member = carried_members(folded)[port]
+    return f"now->{member.path}{member.element(entry)}"
+
+
+def write_expression(folded: FoldedStep, port: int, entry: int) -> str:
+    """Return the C lvalue of an entry of an output of the step.
+
+    Parameters
+    ----------
+    folded : the step.
+    port : number of the output.
+    entry : counted by columns.
+    """
+    carried = carried_members(folded)
+    if port < len(carried):
+        return f"next->{carried[port].path}{carried[port].element(entry)}"
+    told = output_members(folded)[port - len(carried)]
+    return f"out->{told.signal.name}{told.element(entry)}"
+
+
+def initializer(value: Array, dimensions: tuple[int, ...], prefix: str) -> str:
+    """Return a nested initializer by rows.
+
+    Parameters
+    ----------
+    value : the numbers.
+    dimensions : of the C array.
+    prefix : of the macro of literals.
+    """
+    if not dimensions:
+        return literal(float(value.ravel()[0]), prefix)
+    rows: Iterator[Array] = iter(value.reshape(dimensions[0], -1))
+    return "{ " + ", ".join(initializer(row, dimensions[1:], prefix) for row in rows) + " }"
+
+
+def sum_expression(members: list[Member], prefix: str, base: str) -> str:
+    """Return the sum of all numbers of members, which is finite where they are.
+
+    Parameters
+    ----------
+    members : of one structure.
+    prefix : of the functions.
+    base : expression of the structure with its dot or arrow.
+    """
+    terms = []
+    for member in members:
+        place, size = f"{base}{member.path}", member.shape[0] * member.shape[1]
+        if size > FEW:
+            terms.append(f"{prefix}_sum(&{place}{member.first}, {size}U)")
+        else:
+            terms += [f"{place}{member.element(entry)}" for entry in range(size)]
+    return "\n        + ".join(terms)

@@ -1,0 +1,126 @@
+"""<name>.json: everything that went into a package, what is in it, and their hashes."""
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, is_dataclass
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+
+from identifier.export.fold import FoldedStep
+from identifier.export.signals import Signal
+from identifier.method import Method
+from identifier.model_format import vehicle_numbers
+from models.vehicle import Vehicle
+
+FORMAT = "tireid package 1"
+
+
+def ingredients(
+    folded: FoldedStep, method: Method, vehicle: Vehicle, *, single: bool
+) -> dict[str, Any]:
+    """Return everything that a package is made of, ready for JSON.
+
+    Parameters
+    ----------
+    folded : the step.
+    method : the method with its numbers.
+    vehicle : the car.
+    single : whether float is the default precision.
+    """
+    numbers: dict[str, Any] = (
+        asdict(method) if is_dataclass(method) and not isinstance(method, type) else {}
+    )
+    return {
+        "format": FORMAT,
+        "name": folded.name,
+        "tireid": tireid_version(),
+        "precision": "float" if single else "double",
+        "method": {"kind": type(method).__name__, **plain(numbers)},
+        "vehicle": plain(vehicle_numbers(vehicle)),
+        "sample_time_s": folded.dt,
+        "min_speed_m_s": folded.min_speed,
+        "limits": {
+            "speed_m_s": folded.limits.speed,
+            "yaw_rate_rad_s": folded.limits.yaw_rate,
+            "steering_rad": folded.limits.steering,
+            "force_N": folded.limits.force,
+        },
+        "inputs": [_described(signal) for signal in folded.inputs],
+        "outputs": [_described(signal) for signal in folded.outputs],
+        "carried": [
+            {
+                **_described(signal),
+                "learnt": signal.name in folded.learnt,
+                "shape": list(folded.carry[signal.name].shape),
+                "start": plain(folded.carry[signal.name].tolist()),
+            }
+            for signal in folded.carried
+        ],
+    }
+
+
+def digest(content: Any) -> str:
+    """Return the SHA-256 of data as JSON, 64 hexadecimal digits.
+
+    Parameters
+    ----------
+    content : ready for JSON.
+    """
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def manifest_text(content: Mapping[str, Any], files: Mapping[str, str]) -> str:
+    """Return <name>.json.
+
+    Parameters
+    ----------
+    content : what `ingredients` returned.
+    files : text of the other files by path.
+    """
+    hashes = {path: hashlib.sha256(text.encode()).hexdigest() for path, text in files.items()}
+    data = {**content, "hash": digest(content), "files_sha256": dict(sorted(hashes.items()))}
+    return json.dumps(data, indent=2) + "\n"
+
+
+def plain(value: Any) -> Any:
+    """Return data with plain numbers, lists and texts; infinity becomes a text.
+
+    Parameters
+    ----------
+    value : any of what dataclasses of methods hold.
+    """
+    match value:
+        case Mapping():
+            return {str(key): plain(item) for key, item in value.items()}
+        case np.ndarray():
+            return plain(value.tolist())
+        case list() | tuple():
+            return [plain(item) for item in value]
+        case float() | np.floating():
+            return float(value) if math.isfinite(value) else str(float(value))
+        case None | bool() | int() | str():
+            return value
+        case _:
+            return str(value)
+
+
+def tireid_version() -> str:
+    """Return the version of tireid."""
+    try:
+        return version("tireid")
+    except PackageNotFoundError:  # run from a checkout that is not installed
+        return "unknown"
+
+
+def _described(signal: Signal) -> dict[str, Any]:
+    return {
+        "name": signal.name,
+        "size": signal.size,
+        "unit": signal.unit,
+        "description": signal.description,
+    }

@@ -1,0 +1,150 @@
+"""The package: C sources, example, self-test, build file, README and manifest, as texts by path."""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from identifier.export.c_source import c_sources, filled
+from identifier.export.fold import FoldedStep, fold
+from identifier.export.layout import Member, carried_members, output_members
+from identifier.export.manifest import digest, ingredients, manifest_text, tireid_version
+from identifier.export.vectors import vectors, vectors_header
+from identifier.method import FrozenModel, Method
+from models.vehicle import Vehicle
+
+NAME = re.compile(r"[a-z][a-z0-9_]{0,30}")
+# Largest differences of a force that the self-test allows, in parts of the limit of forces.
+TOLERANCE_DOUBLE, TOLERANCE_SINGLE = 1e-8, 2e-5
+
+
+class PackageNameError(ValueError):
+    """A name that cannot begin the symbols of a C library."""
+
+
+class Package(NamedTuple):
+    """A package before it is written: its step, its files by path, title, version and hash."""
+
+    folded: FoldedStep
+    files: Mapping[str, str]
+    about: Mapping[str, str]
+
+
+def build_package(
+    method: Method,
+    vehicle: Vehicle,
+    start: FrozenModel | None = None,
+    *,
+    name: str = "tireid",
+    single: bool = False,
+) -> Package:
+    """Return the package of a method for a car; the same input gives the same bytes.
+
+    Parameters
+    ----------
+    method : the method with its numbers.
+    vehicle : the car.
+    start : weights to begin with; None begins with those of the method.
+    name : beginning of every symbol and file name.
+    single : whether float is the default precision.
+
+    Raises
+    ------
+    PackageNameError
+        Where the name is not one of C in lower case.
+    UnknownOperationError
+        Where the method needs an operation that has no plain C.
+    ValueError
+        Where stored weights are those of another structure.
+    """
+    if not NAME.fullmatch(name):
+        raise PackageNameError(
+            f"name must be lower-case letters, digits and _, at most 31, not {name!r}"
+        )
+    folded = fold(method, vehicle, start, name)
+    if not folded.carry:
+        raise ValueError(f"{type(method).__name__} is a formula without state: nothing to export")
+    content = ingredients(folded, method, vehicle, single=single)
+    short = digest(content)[:12]
+    version = tireid_version()
+    about = {
+        "title": f"Tire forces of {vehicle.name}",
+        "method": type(method).__name__,
+        "version": version,
+        "hash": short,
+        "version_text": f"{name} {short}, tireid {version}",
+        "single": str(int(single)),
+        "dt": f"{folded.dt:g}",
+        "min_speed": f"{folded.min_speed:.3g}",
+        "name": name,
+        "NAME": name.upper(),
+    }
+    files = c_sources(folded, single=single, about=about)
+    files |= _other_files(folded, about, single=single)
+    return Package(folded, files | {f"{name}.json": manifest_text(content, files)}, about)
+
+
+def _other_files(folded: FoldedStep, about: Mapping[str, str], *, single: bool) -> dict[str, str]:
+    name, learnt = folded.name, bool(folded.learnt)
+    members = carried_members(folded)
+    first = next((m.signal.name + m.first for m in members if m.learnt), "")
+    values = {
+        "weights_test": filled("weights_test.c", {"first_weight": first, **about})
+        if learnt
+        else "",
+        "weights_call": "    test_modes(&state, &params);\n" if learnt else "",
+        "tolerance_double": f"{TOLERANCE_DOUBLE * folded.limits.force:.2g}",
+        "tolerance_single": f"{TOLERANCE_SINGLE * folded.limits.force:.2g}",
+        "single_option": "ON" if single else "OFF",
+        **about,
+    }
+    return {
+        "CMakeLists.txt": filled("CMakeLists.txt", values),
+        "examples/main.c": filled("main.c", values),
+        f"tests/test_{name}.c": filled("test.c", values),
+        "tests/vectors.h": vectors_header(vectors(folded)),
+    }
+
+
+def readme(package: Package, about_figures: str) -> str:
+    """Return the README of a package.
+
+    Parameters
+    ----------
+    package : what it describes.
+    about_figures : flash, RAM, stack and instructions, as Markdown.
+    """
+    folded = package.folded
+    carried = carried_members(folded)
+    carry_table = "".join(
+        f"| `{m.path}` | {_shape(m)} | {m.signal.unit} | {m.signal.description} |\n"
+        for m in carried
+    )
+    modes = (
+        f"`{folded.name}_set_adaptation(&state, 0)` freezes what is learnt "
+        f"({', '.join(folded.learnt)}); observers and filters go on, so that adaptation may be "
+        "switched on again at any time. `_get_weights` and `_set_weights` store it and bring it "
+        "back, `_reset` begins anew with it, `_init` forgets it."
+        if folded.learnt
+        else "This method estimates a signal: there are no weights to read, set or freeze."
+    )
+    return filled(
+        "README.md",
+        {
+            "input_table": _table([Member(s, (1, 1), False) for s in folded.inputs]),
+            "output_table": _table(output_members(folded)),
+            "carry_table": carry_table,
+            "modes": modes,
+            "figures": about_figures,
+            **package.about,
+        },
+    )
+
+
+def _table(members: Sequence[Member]) -> str:
+    return "".join(
+        f"| `{m.signal.name}` | {m.signal.unit} | {m.signal.description} |\n" for m in members
+    )
+
+
+def _shape(member: Member) -> str:
+    return " x ".join(str(size) for size in member.dimensions) or "1"

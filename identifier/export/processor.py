@@ -1,0 +1,277 @@
+"""Processor in the loop without hardware: a package on the Arm boards of QEMU, and on this machine.
+
+A recording runs through the package; what comes back is a hash of every state and status on the way
+and, from QEMU, what a step costs. QEMU lets one instruction take 1 ns, and SysTick counts.
+"""
+
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen import CompilationError
+from identifier.export.c_source import KEY
+
+Array = NDArray[np.float64]
+
+TARGET = Path(__file__).parent / "target"
+CROSS_COMPILER, SIZE, EMULATOR = "arm-none-eabi-gcc", "arm-none-eabi-size", "qemu-system-arm"
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno")
+WRAPPED = tuple(f"-Wl,--wrap=__aeabi_{name}" for name in ("dadd", "dsub", "drsub"))
+TIMEOUT = 120.0  # s
+
+
+class Processor(NamedTuple):
+    """A processor: name, machine of QEMU, flags of the compiler, whether it computes in double."""
+
+    name: str
+    machine: str
+    flags: tuple[str, ...]
+    has_double: bool
+
+
+PROCESSORS = (
+    Processor(
+        "Cortex-M4F",
+        "mps2-an386",
+        ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"),
+        False,
+    ),
+    Processor(
+        "Cortex-M7",
+        "mps2-an500",
+        ("-mcpu=cortex-m7", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv5-d16"),
+        True,
+    ),
+)
+
+
+class Replay(NamedTuple):
+    """What a machine made of a recording.
+
+    hash : of every state and status.   steps : samples.   faults : steps that were refused.
+    state, params : sizes [bytes].   stack : of one step [bytes].
+    instructions, most_instructions : of a step, mean while driving and largest; 0 where the machine
+    does not count.
+    """
+
+    hash: str
+    steps: int
+    faults: int
+    state: int
+    params: int
+    stack: int
+    instructions: int
+    most_instructions: int
+
+
+class ReplayError(RuntimeError):
+    """A machine did not come to the end of a recording."""
+
+
+def missing_tools() -> tuple[str, ...]:
+    """Return which of the tools for Arm are not there."""
+    return tuple(t for t in (CROSS_COMPILER, SIZE, EMULATOR) if shutil.which(t) is None)
+
+
+def replay_on(
+    processor: Processor,
+    name: str,
+    files: Mapping[str, str],
+    samples: Array,
+    *,
+    single: bool,
+    corrected: bool = False,
+) -> Replay:
+    """Run a recording through a package on a processor in QEMU.
+
+    Parameters
+    ----------
+    processor : one of `PROCESSORS`.
+    name : of the package.
+    files : its texts by path.
+    samples : (n, 5) in the order of the inputs, SI.
+    single : whether to compute in float.
+    corrected : whether sums of doubles that are computed in software are those of `soft_add.c`, for
+        comparisons, and not those of libgcc, for costs.
+
+    Raises
+    ------
+    CompilationError
+        Where the compiler refuses a file.
+    ReplayError
+        Where the program does not come to its end.
+    """
+    with tempfile.TemporaryDirectory(prefix="tireid-") as scratch:
+        folder = Path(scratch)
+        extra = ["soft_add.c", *WRAPPED] if corrected and not processor.has_double else []
+        board = ["-ffreestanding", "-Wno-unused", "-nostartfiles", "-T", "mps2.ld", *extra]
+        libraries = ["board.c", "--specs=nosys.specs", "-Wl,--no-warnings", "-lm"]
+        command = [CROSS_COMPILER, *processor.flags, "-std=gnu99", *board, *libraries]
+        _build(folder, name, files, samples, [*command[:1], *FLAGS, *command[1:]], single=single)
+        return _result(
+            [
+                EMULATOR,
+                "-M",
+                processor.machine,
+                "-nographic",
+                "-monitor",
+                "none",
+                "-semihosting-config",
+                "enable=on,target=native",
+                "-icount",
+                "shift=0",
+                "-kernel",
+                "replay",
+            ],
+            folder,
+        )
+
+
+def replay_here(
+    compiler: str,
+    name: str,
+    files: Mapping[str, str],
+    samples: Array,
+    *,
+    single: bool,
+    flags: Sequence[str] = FLAGS,
+) -> Replay:
+    """Run a recording through a package on this machine.
+
+    Parameters
+    ----------
+    compiler : its command.
+    name : of the package.
+    files : its texts by path.
+    samples : (n, 5) in the order of the inputs, SI.
+    single : whether to compute in float.
+    flags : of the compiler.
+
+    Raises
+    ------
+    CompilationError
+        Where the compiler refuses a file.
+    ReplayError
+        Where the program does not come to its end.
+    """
+    with tempfile.TemporaryDirectory(prefix="tireid-") as scratch:
+        folder = Path(scratch)
+        _build(folder, name, files, samples, [compiler, *flags, "host.c", "-lm"], single=single)
+        return _result([str(folder / "replay")], folder)
+
+
+def flash_size(
+    processor: Processor, name: str, files: Mapping[str, str], *, single: bool, level: str = "-O2"
+) -> int:
+    """Return the code and constants of a package on a processor [bytes].
+
+    Parameters
+    ----------
+    processor : one of `PROCESSORS`.
+    name : of the package.
+    files : its texts by path.
+    single : whether to compute in float.
+    level : of optimization.
+
+    Raises
+    ------
+    CompilationError
+        Where the compiler refuses a file.
+    """
+    with tempfile.TemporaryDirectory(prefix="tireid-") as scratch:
+        folder = Path(scratch)
+        sources = _write(folder, files)
+        define = f"-D{name.upper()}_SINGLE={int(single)}"
+        for source in sources:
+            words = [*processor.flags, *FLAGS, level, define, "-Iinclude", "-Isrc", "-c", source]
+            _compile([CROSS_COMPILER, *words], folder)
+        objects = [Path(source).with_suffix(".o").name for source in sources]
+        answer = subprocess.run(
+            [SIZE, *objects], cwd=folder, capture_output=True, text=True, check=True
+        )
+        rows = [line.split() for line in answer.stdout.splitlines()[1:]]
+        return sum(int(row[0]) + int(row[1]) for row in rows)
+
+
+@cache
+def compiler_version(command: str) -> str:
+    """Return the first line of what a compiler says about itself.
+
+    Parameters
+    ----------
+    command : of the compiler.
+    """
+    answer = subprocess.run([command, "--version"], capture_output=True, text=True, check=True)
+    return answer.stdout.splitlines()[0]
+
+
+def _write(folder: Path, files: Mapping[str, str]) -> list[str]:
+    """Write headers and sources of a package; return the paths of its C files."""
+    wanted = {
+        path: text for path, text in files.items() if path.split("/")[0] in ("include", "src")
+    }
+    for path, text in wanted.items():
+        (folder / path).parent.mkdir(exist_ok=True)
+        (folder / path).write_text(text)
+    return sorted(path for path in wanted if path.endswith(".c"))
+
+
+def _build(
+    folder: Path,
+    name: str,
+    files: Mapping[str, str],
+    samples: Array,
+    command: Sequence[str],
+    *,
+    single: bool,
+) -> None:
+    sources = _write(folder, files)
+    for path in TARGET.iterdir():
+        text = path.read_text(encoding="utf-8")
+        (folder / path.name).write_text(_named(text, name))
+    (folder / "samples.bin").write_bytes(np.ascontiguousarray(samples, dtype="<f8").tobytes())
+    own = [f"-D{name.upper()}_SINGLE={int(single)}", "-Iinclude", "-Isrc", "-I."]
+    compiler, *words = command
+    _compile([compiler, *own, *sources, "replay.c", "samples.S", *words, "-o", "replay"], folder)
+
+
+def _named(text: str, name: str) -> str:
+    return KEY.sub(lambda found: name if found[1].islower() else name.upper(), text)
+
+
+def _compile(command: Sequence[str], folder: Path) -> None:
+    answer = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if answer.returncode != 0:
+        first_lines = "\n".join(answer.stderr.splitlines()[:5])
+        raise CompilationError(f"{command[0]} refused the package:\n{first_lines}")
+
+
+def _result(command: Sequence[str], folder: Path) -> Replay:
+    try:
+        answer = subprocess.run(
+            command,
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=TIMEOUT,
+            stdin=subprocess.DEVNULL,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise ReplayError(f"{command[0]} did not end within {TIMEOUT:g} s") from error
+    found = dict(
+        line.split()
+        for line in (answer.stdout + answer.stderr).splitlines()
+        if line.count(" ") == 1
+    )
+    if answer.returncode != 0 or "hash" not in found:
+        raise ReplayError(f"{command[0]} ended with {answer.returncode}: {answer.stderr[:200]}")
+    numbers = {key: int(found[key], 16) for key in Replay._fields if key != "hash"}
+    return Replay(hash=found["hash"], **numbers)

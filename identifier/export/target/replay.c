@@ -1,0 +1,93 @@
+/* Runs a recording through @name@ and prints a hash of all that came out, and what it cost. */
+#include "@name@.h"
+#include "machine.h"
+
+#define SPOT 16U /* the stack is looked at each so many steps */
+
+typedef struct {
+    double value[5];
+} sample;
+
+extern const sample recorded_samples[];
+extern const sample recorded_end[];
+
+static @name@_state state; /* in .bss: bytes between its members are zero everywhere */
+
+static uint64_t hash_bytes(uint64_t hash, const void *start, uint32_t size)
+{
+    const uint8_t *byte = (const uint8_t *)start;
+    uint32_t i;
+    for (i = 0U; i < size; i++) {
+        hash = (hash ^ byte[i]) * 1099511628211U; /* FNV-1a */
+    }
+    return hash;
+}
+
+static void print(const char *key, uint64_t number)
+{
+    char text[20];
+    int i;
+    for (i = 15; i >= 0; i--) {
+        text[i] = "0123456789abcdef"[number & 15U];
+        number >>= 4;
+    }
+    text[16] = '\n';
+    text[17] = '\0';
+    machine_print(key);
+    machine_print(" ");
+    machine_print(text);
+}
+
+int main(void)
+{
+    @name@_params params;
+    uint64_t hash = 14695981039346656037U;
+    uint64_t total = 0U;
+    uint32_t most = 0U;
+    uint32_t steps = 0U;
+    uint32_t driven = 0U;
+    uint32_t stack = 0U;
+    const sample *at;
+    (void)@name@_default_params(&params);
+    (void)@name@_init(&state);
+    machine_start_clock();
+    for (at = recorded_samples; at < recorded_end; at++) {
+        @name@_input input;
+        uint32_t code; /* an enum has not the same size everywhere */
+        uint32_t before;
+        uint32_t spent;
+        input.v_x = (@name@_real)at->value[0];
+        input.v_y = (@name@_real)at->value[1];
+        input.r = (@name@_real)at->value[2];
+        input.delta_f = (@name@_real)at->value[3];
+        input.delta_r = (@name@_real)at->value[4];
+        if ((steps % SPOT) == 0U) {
+            machine_paint_stack();
+        }
+        before = machine_instructions();
+        code = (uint32_t)@name@_step(&state, &params, &input);
+        spent = machine_instructions() - before;
+        spent = (spent > 0x80000000U) ? 0U : spent; /* the counter wrapped */
+        if ((steps % SPOT) == 0U) {
+            const uint32_t used = machine_painted_stack_used();
+            stack = (used > stack) ? used : stack;
+        }
+        if (code == (uint32_t)@NAME@_OK) {
+            total += spent;
+            driven++;
+        }
+        most = (spent > most) ? spent : most;
+        steps++;
+        hash = hash_bytes(hash, &state, (uint32_t)sizeof state);
+        hash = hash_bytes(hash, &code, (uint32_t)sizeof code);
+    }
+    print("hash", hash);
+    print("stack", stack);
+    print("steps", steps);
+    print("instructions", (driven > 0U) ? (total / driven) : 0U);
+    print("most_instructions", most);
+    print("state", (uint64_t)sizeof state);
+    print("params", (uint64_t)sizeof params);
+    print("faults", state.faults);
+    return 0;
+}
