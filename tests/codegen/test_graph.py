@@ -1,0 +1,149 @@
+"""Functions as graphs: read and rebuilt, our own functions found again, decided, simplified."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from codegen.branches import assumed, decision
+from codegen.elementary import atan, exp
+from codegen.graph import Graph, Node, UnknownOperationError, function_of, graph_of
+from codegen.recognize import EXPANDED, recognized
+from codegen.simplify import simplified
+from codegen.tanh import tanh
+from codegen.tuned import tuned
+
+
+def operations(graph):
+    return [graph.nodes[place].op for place in graph.reached()]
+
+
+def learning_step():
+    """A step like the identifier's: gains are constants, and a standing car does not learn."""
+    W, s, z, v = ca.SX.sym("W", 2, 5), ca.SX.sym("s", 5), ca.SX.sym("z", 2), ca.SX.sym("v")
+    moves = ca.logic_and(v >= 1.0, v <= 90.0)
+    rate = -3.0 * z @ tanh(s).T - 0.7 * ca.norm_2(z) * W
+    ahead = ca.if_else(moves, 0.01, 0)
+    force = ca.if_else(moves, W @ tanh(s) / ca.fmax(v, 1.0), 0)
+    ports = ["W", "s", "z", "v"]
+    return ca.Function(
+        "step", [W, s, z, v], [W + ahead * rate, force], ports, ["W_next", "force"], {"cse": True}
+    )
+
+
+def arguments(rng, v):
+    return rng.normal(size=(2, 5)), rng.normal(size=5), rng.normal(size=2), v
+
+
+def compare(one, other, rng, exact):
+    for v in (0.5, 20.0, 100.0):
+        given = arguments(rng, v)
+        for a, b in zip(one(*given), other(*given), strict=True):
+            if exact:
+                np.testing.assert_array_equal(np.array(a), np.array(b))
+            else:
+                np.testing.assert_allclose(np.array(a), np.array(b), rtol=1e-13, atol=1e-15)
+
+
+def test_a_graph_is_the_function_it_was_read_from(rng):
+    step = learning_step()
+    compare(step, function_of(graph_of(step), step), rng, exact=True)
+
+
+def test_equal_expressions_are_one_node():
+    x = ca.SX.sym("x")
+    function = ca.Function("f", [x], [ca.sin(x) * 2, ca.sin(x) * 3])
+    assert operations(graph_of(function)).count("sin") == 1
+
+
+def test_our_own_functions_are_found_again_and_those_of_libraries_replaced(rng):
+    x = ca.SX.sym("x", 3)
+    own = ca.Function("f", [x], [tanh(x[0]) + exp(x[1]) * atan(x[2])])
+    library = ca.Function("f", [x], [ca.tanh(x[0]) + ca.exp(x[1]) * ca.atan(x[2])])
+    for function in (own, library):
+        found = operations(recognized(graph_of(function)))
+        assert {op: found.count(op) for op in ("tanh", "exp", "atan", "div")} == {
+            "tanh": 1,
+            "exp": 1,
+            "atan": 1,
+            "div": 0,
+        }
+    given = rng.normal(size=3)
+    rebuilt = function_of(recognized(graph_of(library)), library, EXPANDED)
+    assert float(rebuilt(given)) == float(own(given))
+
+
+def test_what_only_looks_like_tanh_is_left_alone():
+    x = ca.SX.sym("x")
+    near = ca.Function("f", [x], [1.5 * x / (1 + x * x)])
+    assert "tanh" not in operations(recognized(graph_of(near)))
+
+
+def test_simplifying_keeps_the_values_and_saves_operations(rng):
+    step = learning_step()
+    graph = recognized(graph_of(step))
+    fewer = simplified(graph)
+    compare(step, function_of(fewer, step, EXPANDED), rng, exact=False)
+    assert len(operations(fewer)) < len(operations(graph))
+
+
+def test_gains_meet_in_one_factor_for_all_weights():
+    """W + h (-3 z σ - 0.7 |z| W): per weight two products and one sum."""
+    step = learning_step()
+    graph = recognized(graph_of(step))
+    driving = simplified(assumed(graph, decision(graph, {3}), True))
+    driving.outputs = driving.outputs[:1]
+    found = operations(driving)
+    per_weight = 3 * 10
+    others = found.count("tanh") + found.count("sq") + found.count("sqrt")
+    arithmetic = sum(found.count(op) for op in ("add", "sub", "mul", "neg", "div"))
+    assert arithmetic <= per_weight + 6
+    assert others == 5 + 2 + 1
+
+
+def test_a_matrix_times_its_inverse_leaves_no_rounding():
+    x = ca.SX.sym("x", 2)
+    K = ca.DM([[0.62, 0.61], [0.46, -0.6]])
+    there_and_back = ca.Function("f", [x], [K @ (ca.inv(K) @ x)])
+    graph = simplified(graph_of(there_and_back))
+    assert operations(graph) == ["input", "input"]
+
+
+def test_known_conditions_decide():
+    step = learning_step()
+    graph = recognized(graph_of(step))
+    place = decision(graph, {3})
+    driving, resting = (simplified(assumed(graph, place, holds)) for holds in (True, False))
+    for part in (driving, resting):
+        assert not {"select", "if_else_zero", "and", "le", "fmax"} & set(operations(part))
+    assert set(operations(resting)) <= {"input", "const"}  # W as it is, no force
+
+
+def test_tuned_parts_are_the_whole(rng):
+    step = learning_step()
+    parts = tuned(step, sampled=("v",))
+    compare(step, parts.function, rng, exact=False)
+    for v, part in ((0.5, parts.where_false), (20.0, parts.where_true)):
+        given = arguments(rng, v)
+        assert float(parts.condition(*given)) == (v > 1.0)
+        for a, b in zip(part(*given), parts.function(*given), strict=True):
+            np.testing.assert_array_equal(np.array(a), np.array(b))
+
+
+def test_a_function_that_decides_nothing_stays_whole():
+    x = ca.SX.sym("x")
+    parts = tuned(ca.Function("f", [x], [tanh(3 * x)], ["x"], ["y"]), sampled=("x",))
+    assert parts.where_false is None
+    assert float(parts.condition(0.3)) == 1.0
+
+
+def test_casadi_simplifies_again_afterwards():
+    tuned(learning_step(), sampled=("v",))
+    assert ca.GlobalOptions.getSimplificationOnTheFly()
+
+
+def test_an_operation_without_plain_c_is_refused():
+    graph = Graph()
+    graph.outputs = [[graph.add(Node("erf", (graph.constant(1.0),)))]]
+    x = ca.SX.sym("x")
+    with pytest.raises(UnknownOperationError, match="f: there is no plain C for erf"):
+        function_of(graph, ca.Function("f", [x], [x]))
