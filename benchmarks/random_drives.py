@@ -4,14 +4,18 @@ The residual f that the identifier sees is known exactly: (ξ_{k+1} - ξ_k)/dt -
 """
 
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Scan
-from models.bicycle import BicycleParameters, bicycle, slip_angles
+from identifier.stability.random_drives import (
+    Drives,
+    residuals,
+    saturating_bicycle,
+    smooth_steering,
+)
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 
@@ -46,24 +50,6 @@ def random_vehicle(rng: np.random.Generator) -> Vehicle:
         cornering_stiffness_front=stiffness * l_r,
         cornering_stiffness_rear=stiffness * l_f * rng.uniform(1.05, 1.3),
     )
-
-
-def smooth_steering(rng: np.random.Generator, t: Array, *, highest: float, peak: float) -> Array:
-    """Return a sum of sines up to a frequency, faded in, (n, 2) [rad]; both axles may steer.
-
-    Parameters
-    ----------
-    rng : source of randomness.
-    t : times [s].
-    highest : largest frequency [Hz].
-    peak : largest angle of the front axle [rad].
-    """
-    frequencies = rng.uniform(0.05, highest, 6)
-    sines = np.sin(2 * np.pi * np.outer(t, frequencies) + rng.uniform(0, 2 * np.pi, 6))
-    wave = sines @ rng.standard_normal(6) * np.clip(t, 0.0, 1.0) ** 2
-    rear = rng.choice([0.0, rng.uniform(-0.15, 0.15)])
-    angles: Array = peak * np.column_stack([wave, rear * wave]) / np.abs(wave).max()
-    return angles
 
 
 LARGEST_SLIP = 0.4  # v_y/v_x beyond which a car has spun and the drive is thrown away
@@ -126,45 +112,11 @@ def sampled_residual(vehicle: Vehicle, recording: Recording) -> Array:
     vehicle : the car.
     recording : its drive.
     """
-    v_x, x, u = ca.SX.sym("v_x"), ca.SX.sym("x", 2), ca.SX.sym("u", 2)
-    model = bicycle(vehicle.bicycle, v_x)
-    rate = ca.Function("rate", [x, u, v_x], [model.A_xi @ (model.K_inv @ x) + model.B_xi @ u])
-    known = np.array(rate.map(recording.t.size)(recording.x.T, recording.u.T, recording.v_x)).T
-    K_inv = np.array(ca.DM(bicycle(vehicle.bicycle, 1.0).K_inv))
-    xi = recording.x @ K_inv.T
-    residual: Array = (np.diff(xi, axis=0) / recording.dt - known[:-1]) / FORCE_UNIT
+    drive = Drives(recording.v_x[None], recording.x[None], recording.u[None])
+    residual: Array = residuals(vehicle, drive, recording.dt)[0] / FORCE_UNIT
     return residual
 
 
 @cache
 def _plant() -> Scan:
-    """Compile the bicycle with F = mu F_z sin(1.5 atan(C α/(1.5 mu F_z))), 10 steps a sample."""
-    x, u, u_ahead, v_x = (
-        ca.SX.sym(n, k) for n, k in (("x", 2), ("u", 2), ("u_ahead", 2), ("v_x", 1))
-    )
-    parameters, road = ca.SX.sym("vehicle", 6), ca.SX.sym("road", 2)
-    p = BicycleParameters(*ca.vertsplit(parameters))
-    friction, dt = ca.vertsplit(road)
-    load = p.m * GRAVITY / (p.l_f + p.l_r)
-
-    def rate(x: Any, u: Any) -> Any:
-        alpha = slip_angles(p.l_f, p.l_r, v_x, x, u)
-        peak = ca.vertcat(friction * load * p.l_r, friction * load * p.l_f)
-        C = ca.vertcat(p.C_f, p.C_r)
-        F = peak * ca.sin(1.5 * ca.atan(C * alpha / (1.5 * peak)))
-        return ca.vertcat((F[0] + F[1]) / p.m - v_x * x[1], (p.l_f * F[0] - p.l_r * F[1]) / p.I_z)
-
-    now, substeps = x, 10
-    for k in range(substeps):
-        h = dt / substeps
-        here = u + (k + 0.5) / substeps * (u_ahead - u)
-        middle = now + h / 2 * rate(now, here)
-        now = now + h * rate(middle, here)
-    step = ca.Function(
-        "saturating_bicycle",
-        [x, u, u_ahead, v_x, parameters, road],
-        [now],
-        ["x", "u", "u_ahead", "v_x", "vehicle", "road"],
-        ["x_next"],
-    )
-    return Scan(step, carry=("x",), over=("u", "u_ahead", "v_x"))
+    return Scan(saturating_bicycle(), carry=("x",), over=("u", "u_ahead", "v_x"))

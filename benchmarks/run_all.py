@@ -17,6 +17,7 @@ BENCHMARKS = {
     "limit_cycle": [],
     "bounds_monte_carlo": [],
     "batch_speed": [],
+    "export_cost": [],
 }
 
 

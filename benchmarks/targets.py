@@ -24,11 +24,25 @@ class Targets:
         limit : largest that is good.
         unit : of both.
         """
-        good = value <= limit
+        self._print(label, value, f"<= {limit:g} {unit}", unit, value <= limit)
+
+    def at_least(self, label: str, value: float, limit: float, unit: str = "%") -> None:
+        """Print a value beside the smallest that is good.
+
+        Parameters
+        ----------
+        label : what it is.
+        value : measured.
+        limit : smallest that is good.
+        unit : of both.
+        """
+        self._print(label, value, f">= {limit:g} {unit}", unit, value >= limit)
+
+    def _print(self, label: str, value: float, target: str, unit: str, good: bool) -> None:
         if not good:
             self.missed.append(label)
         verdict = "ok" if good else "MISSED"
-        print(f"  {label:66} {value:8.2f} {unit:3} target <= {limit:g} {unit}  {verdict}")
+        print(f"  {label:66} {value:8.2f} {unit:3} target {target}  {verdict}")
 
 
 def show(label: str, text: str) -> None:

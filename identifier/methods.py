@@ -55,6 +55,16 @@ METHODS: Mapping[str, Factory] = {
 }
 
 
+def draws_weights(name: str) -> bool:
+    """Return whether a method begins with random weights, so that a seed changes its results.
+
+    Parameters
+    ----------
+    name : one of `METHODS`.
+    """
+    return name in (*REGRESSIONS, *LAWS)
+
+
 def make_method(name: str, vehicle: Vehicle, seed: int = 0) -> Method:
     """Return a method with the numbers that follow from the vehicle.
 

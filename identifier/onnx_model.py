@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Scan
+from identifier.method import Setup
 from identifier.model_format import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
 from identifier.network import network_signals
 from identifier.tire_network import UnusableNetworkError, read_network
@@ -116,7 +117,29 @@ class OnnxModel:
 
         Its result is axle_force (2,) [N]. It has derivatives and generates code.
         """
-        return _scan(self.content, self.inputs, self.slip_sign).step
+        return _step(self.content, self.inputs, self.slip_sign)
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """The signals that the network reads, column by column."""
+        return tuple(read_network(self.content, self.inputs).name_in())
+
+    def setup(self, recording: Recording) -> Setup:
+        """Return what a replay needs.
+
+        Parameters
+        ----------
+        recording : what is replayed; it is not looked at.
+        """
+        del recording
+        return Setup(
+            scan=_scan(self.content, self.inputs, self.slip_sign),
+            carry={},
+            constants={
+                "vehicle": np.array(self.vehicle.bicycle),
+                "min_speed": np.array(self.min_speed),
+            },
+        )
 
     def axle_force(self, recording: Recording) -> NDArray[np.float64]:
         """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
@@ -125,18 +148,7 @@ class OnnxModel:
         ----------
         recording : its signals are the input; its forces are not looked at.
         """
-        moving = recording.v_x >= self.min_speed
-        record = _scan(self.content, self.inputs, self.slip_sign)(
-            recording.t.size,
-            {
-                "x": recording.x,
-                "u": recording.u,
-                "v_x": np.where(moving, recording.v_x, self.min_speed),
-                "vehicle": np.array(self.vehicle.bicycle),
-            },
-        )
-        force: NDArray[np.float64] = np.where(moving[:, None], record["axle_force"], 0.0)
-        return force
+        return self.setup(recording).run(recording)["axle_force"]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the model as plain numbers and words, ready for JSON; the network in base64."""
@@ -190,8 +202,8 @@ class OnnxModel:
 
 
 @cache
-def _scan(content: bytes, inputs: tuple[str, ...] | None, slip_sign: int) -> Scan:
-    """Return the compiled loop; cached by content, for reading a graph takes a while."""
+def _step(content: bytes, inputs: tuple[str, ...] | None, slip_sign: int) -> ca.Function:
+    """Return the network as a step; cached by content, for reading a graph takes a while."""
     network = read_network(content, inputs)
     x, u, v_x = ca.MX.sym("x", 2), ca.MX.sym("u", 2), ca.MX.sym("v_x")
     vehicle = ca.MX.sym("vehicle", 6)
@@ -199,7 +211,23 @@ def _scan(content: bytes, inputs: tuple[str, ...] | None, slip_sign: int) -> Sca
     for name in ("alpha_f", "alpha_r"):
         signals[name] = slip_sign * signals[name]
     force = network(*(signals[name] for name in network.name_in()))
-    step = ca.Function(
+    return ca.Function(
         "frozen_onnx", [x, u, v_x, vehicle], [force], [*OVER, "vehicle"], ["axle_force"]
     )
-    return Scan(step, carry=(), over=OVER)
+
+
+@cache
+def _scan(content: bytes, inputs: tuple[str, ...] | None, slip_sign: int) -> Scan:
+    """Return the compiled loop: no force below min_speed [m/s], a further port."""
+    step = _step(content, inputs, slip_sign)
+    ports = {name: ca.MX.sym(name, *step.size_in(name)) for name in step.name_in()}
+    min_speed, v_x = ca.MX.sym("min_speed"), ports["v_x"]
+    force = step(*{**ports, "v_x": ca.fmax(v_x, min_speed)}.values())
+    replay = ca.Function(
+        "replayed_onnx",
+        [*ports.values(), min_speed],
+        [ca.if_else(v_x >= min_speed, force, ca.MX.zeros(2))],
+        [*ports, "min_speed"],
+        ["axle_force"],
+    )
+    return Scan(replay, carry=(), over=OVER)

@@ -5,6 +5,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from identifier.defaults import (
     BANDWIDTH,
     LAWS,
@@ -19,13 +21,15 @@ from identifier.design import Design
 from identifier.design_file import design_text, read_design
 from identifier.identify import identify
 from identifier.stability import Certificate, DesignError
+from identifier.stability.monte_carlo import Observed, monte_carlo
 from models.files import write_atomically
 from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
 from tireid.certificate_table import certificate_of, certificate_text, unit_text
 from tireid.inputs import read_log
+from tireid.monte_carlo_table import bound_rows, monte_carlo_numbers, monte_carlo_text
 from tireid.output import OutputError
-from tireid.progress import say
+from tireid.progress import Stopwatch, say
 
 FAILS = 1
 
@@ -56,6 +60,13 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("--slip", type=float, metavar="RAD", help="largest (twice sliding)")
     parser.add_argument("--friction", type=float, metavar="MU", help="of the road (1)")
     parser.add_argument("--log", metavar="LOG[:RUN]", help="judge the loop along a recording too")
+    parser.add_argument(
+        "--monte-carlo",
+        type=int,
+        metavar="N",
+        help="run N random drives within what is judged: is a proven bound ever passed?",
+    )
+    parser.add_argument("--seed", type=int, metavar="N", help="of --monte-carlo (0)")
     parser.add_argument("--json", action="store_true", help="print the certificate as JSON")
     parser.add_argument("--figures", type=Path, metavar="DIR", help="draw root locus and bounds")
     parser.add_argument("--design", action="store_true", help="find gains and write them")
@@ -84,16 +95,25 @@ def run(options: argparse.Namespace) -> int:
     drive = _read(options.log, vehicle, design)  # everything is read before anything is said
     if options.design:
         _require_free(options)
+    observed = _drive(options, vehicle, driving, design)
+    rows = [] if observed is None else bound_rows(certificate, observed)
+    passed = any(row.passed for row in rows)
+    seed = options.seed or 0
     if options.json:
-        print(json.dumps(certificate.to_dict(), indent=2))
-        return _finish(options, vehicle, driving, design, certificate, drive)
+        numbers = certificate.to_dict()
+        if observed is not None:
+            numbers["monte_carlo"] = monte_carlo_numbers(rows, observed, seed)
+        print(json.dumps(numbers, indent=2))
+        return _finish(options, vehicle, driving, design, certificate, drive) or FAILS * passed
     print(_conditions(design, vehicle, driving))
     print(certificate_text(certificate, design.force_unit))
     if drive is not None:
         print(_along(drive, vehicle, design))
+    if observed is not None:
+        print(monte_carlo_text(rows, observed, seed, design.force_unit))
     if certificate.verdict != "pass" and not options.design:
         print(_proposal(options, design, vehicle, driving))
-    return _finish(options, vehicle, driving, design, certificate, drive)
+    return _finish(options, vehicle, driving, design, certificate, drive) or FAILS * passed
 
 
 def _finish(
@@ -123,6 +143,10 @@ def _require_sense(options: argparse.Namespace) -> None:
         value = getattr(options, name)
         if value is not None and not 0.0 < value < float("inf"):
             raise ValueError(f"--{name.replace('_', '-')} must be positive, it is {value:g}")
+    if options.seed is not None and (options.monte_carlo is None or options.seed < 0):
+        raise ValueError("--seed, not negative, goes with --monte-carlo")
+    if options.monte_carlo is not None and options.monte_carlo < 1:
+        raise ValueError(f"--monte-carlo must be at least 1, it is {options.monte_carlo}")
     if options.slip is not None and options.slip > 1.0:
         raise ValueError(f"--slip must be in rad and below 1, it is {options.slip:g}")
 
@@ -147,6 +171,24 @@ def _design(options: argparse.Namespace, vehicle: Vehicle, driving: Driving) -> 
         margin = options.phase_margin or PHASE_MARGIN
         return design_for(vehicle, driving, law=law, phase_margin=margin)
     return default_design(vehicle, law=law)
+
+
+def _drive(
+    options: argparse.Namespace, vehicle: Vehicle, driving: Driving, design: Design
+) -> Observed | None:
+    """Run the random drives of --monte-carlo; None where there are none."""
+    if options.monte_carlo is None:
+        return None
+    watch, count = Stopwatch(), options.monte_carlo
+    return monte_carlo(
+        design,
+        vehicle,
+        natural_operation(design, vehicle, driving),
+        count,
+        **driving._asdict(),
+        rng=np.random.default_rng(options.seed or 0),
+        progress=lambda done: say(f"{done} of {count} random drives, {watch.seconds:.1f} s"),
+    )
 
 
 def _conditions(design: Design, vehicle: Vehicle, driving: Driving) -> str:

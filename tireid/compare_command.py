@@ -8,6 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from identifier.defaults import default_design
+from identifier.frozen_method import FrozenMethod
+from identifier.method import Method
 from identifier.methods import METHODS
 from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
@@ -16,6 +19,7 @@ from tireid.compare_results import comparison_text, write_comparison
 from tireid.compare_study import run_comparison
 from tireid.compare_table import pair_tables
 from tireid.inputs import read_log
+from tireid.network_option import add_network_arguments, network_model
 from tireid.output import output_folder
 from tireid.plant_drives import plant_recordings
 from tireid.progress import Stopwatch, say
@@ -55,7 +59,13 @@ def add_parser(commands: Any) -> None:
         metavar="N",
         help="starts of each fit to the true forces (%(default)s; 0: none)",
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all randomness (0)")
+    parser.add_argument(
+        "--seed",
+        type=int,
+        default=0,
+        metavar="N",
+        help="of sensor noise, sweep, floors, and the weights of networks; %(default)s",
+    )
     parser.add_argument(
         "--workers",
         type=int,
@@ -79,6 +89,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--no-check", action="store_true", help="accept a log that contradicts physics"
     )
+    add_network_arguments(parser, "compare with this network, which learns nothing")
     parser.add_argument(
         "--out", type=Path, default=Path("tireid-compare"), metavar="DIR", help="%(default)s"
     )
@@ -106,8 +117,9 @@ def run(options: argparse.Namespace) -> None:
         raise ValueError("--vehicle FILE is needed with a LOG: the car that drove it")
     watch = Stopwatch()
     there = cluster(options.scheduler) if options.scheduler else nullcontext()
+    vehicle = sedan() if options.vehicle is None else Vehicle.from_toml(options.vehicle)
+    others = _network(options, vehicle)
     with there as elsewhere, output_folder(options.out, force=options.force) as folder:
-        vehicle = sedan() if options.vehicle is None else Vehicle.from_toml(options.vehicle)
         comparison = run_comparison(
             names,
             vehicle,
@@ -118,12 +130,19 @@ def run(options: argparse.Namespace) -> None:
             workers=options.workers,
             progress=say,
             elsewhere=elsewhere,
+            others=others,
         )
         write_comparison(folder, comparison)
     print(comparison_text(comparison))
     if len(comparison.names) ** 2 <= FEW_PAIRS:
         print(pair_tables(comparison))
     say(f"wrote {options.out}/ in {watch.seconds:.0f} s")
+
+
+def _network(options: argparse.Namespace, vehicle: Vehicle) -> dict[str, Method]:
+    """Return the network of --network as a method by the name of its file."""
+    model = network_model(options, vehicle, default_design(vehicle).min_speed)
+    return {} if model is None else {options.network.name: FrozenMethod(model=model)}
 
 
 def _recordings(options: argparse.Namespace, vehicle: Vehicle) -> list[Recording]:

@@ -75,6 +75,7 @@ def run_comparison(
     workers: int,
     progress: Callable[[str], None],
     elsewhere: Map | None = None,
+    others: Mapping[str, Method] | None = None,
 ) -> Comparison:
     """Run every method over every recording.
 
@@ -89,6 +90,7 @@ def run_comparison(
     workers : processes of fits and sweep.
     progress : told what is being done.
     elsewhere : does the sweep in place of processes of this machine, as a cluster's map does.
+    others : further methods by name, which have neither sweep nor floor.
 
     Raises
     ------
@@ -96,6 +98,7 @@ def run_comparison(
         Where a method is unknown or the recordings cannot be compared on.
     """
     methods: dict[str, Method] = {name: make_method(name, vehicle, seed) for name in names}
+    methods |= others or {}
     slowest = max(method.min_speed for method in methods.values())
     course = Course(vehicle=vehicle, recordings=tuple(recordings), min_speed=slowest)
     trials = {}

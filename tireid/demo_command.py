@@ -7,6 +7,7 @@ from typing import Any
 from identifier.defaults import natural_operation
 from tireid.certificate_table import certificate_text
 from tireid.check_figures import draw_check
+from tireid.demo_package import FOLDER, ship, shipped_text
 from tireid.demo_report import demo_sections
 from tireid.demo_story import run_story
 from tireid.identify_results import write_results
@@ -36,7 +37,8 @@ def add_parser(commands: Any) -> None:
         "demo",
         help="the whole story on the built-in car, with a report",
         description="Drive the built-in sedan, learn its tires, freeze them, test them on another "
-        "maneuver, and repeat the paper's tables; leaves one report.html to read.",
+        "maneuver, export them as a C package that is compiled and tested, and repeat the paper's "
+        "tables; leaves one report.html to read.",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("tireid-demo"), metavar="DIR", help="default: %(default)s"
@@ -54,7 +56,7 @@ def run(options: argparse.Namespace) -> None:
     """
     watch = Stopwatch()
     with output_folder(options.out, force=options.force) as folder:
-        say("1/3 driving the sedan, learning, freezing, predicting")
+        say("1/4 driving the sedan, learning, freezing, predicting")
         story = run_story()
         folders = {name: folder / name for name in ("identify", "paper_network", "paper")}
         for one in folders.values():
@@ -65,15 +67,19 @@ def run(options: argparse.Namespace) -> None:
         draw_check(
             folders["paper_network"], drive, story.car, story.design, operation, story.certificate
         )
-        say("2/3 the frozen-weight test of the paper")
+        say("2/4 exporting what was learnt as C, compiling and testing it")
+        shipped = ship(story, folder / FOLDER)
+        say("3/4 the frozen-weight test of the paper")
         study = run_study(SEEDS, say)
         write_study(folders["paper"], study)
-        say("3/3 writing the report")
-        sections = demo_sections(story, study, folder)
+        say("4/4 writing the report")
+        sections = demo_sections(story, shipped, study, folder)
         write_report(folder / "report.html", TITLE, sections, summary=SUMMARY)
     for maneuver in study.errors:
         print(table_text(maneuver, study))
     print(certificate_text(story.certificate, story.design.force_unit))
     print()
     print(story.text())
+    print()
+    print(shipped_text(shipped))
     print(f"read {options.out / 'report.html'}  ({watch.seconds:.0f} s)")

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from tireid.certificate_table import HEADER, advised, certificate_rows, notes, verdict_line
+from tireid.demo_package import Shipped, package_section
 from tireid.demo_story import FREEZE, SPEED, Story
 from tireid.figures import figure_png, side_by_side_figure
 from tireid.paper_study import GAINS, NETWORK, Study
@@ -15,12 +16,13 @@ REFERENCE = (
 )
 
 
-def demo_sections(story: Story, study: Study, folder: Path) -> list[Section]:
+def demo_sections(story: Story, shipped: Shipped, study: Study, folder: Path) -> list[Section]:
     """Return the sections of the report.
 
     Parameters
     ----------
     story : the noisy drives, learnt by both methods.
+    shipped : what was learnt, as a C package.
     study : the paper's study.
     folder : with the figures in identify/, paper_network/ and paper/.
     """
@@ -29,6 +31,7 @@ def demo_sections(story: Story, study: Study, folder: Path) -> list[Section]:
         _drive(default),
         _learn(default),
         _predict(story),
+        package_section(shipped),
         _certify(story, network),
         _network(story, network),
         _slalom(study, tables),

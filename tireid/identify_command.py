@@ -13,10 +13,9 @@ from identifier.design_file import read_design
 from identifier.history import DivergedError, History
 from identifier.identify import identify
 from identifier.method import CannotFreezeError, FrozenModel, Method
-from identifier.methods import DEFAULT, METHODS, REFERENCE, make_method
+from identifier.methods import DEFAULT, METHODS, REFERENCE, draws_weights, make_method
 from identifier.model_file import load_model
 from identifier.reproducibility import (
-    AxleRmse,
     Replay,
     counted_samples,
     force_rms,
@@ -26,8 +25,10 @@ from identifier.reproducibility import (
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid.certificate_table import certificate_of, verdict_line
-from tireid.identify_results import file_name, write_results
+from tireid.identify_results import error_cells, file_name, write_results
 from tireid.inputs import read_log
+from tireid.network_option import add_network_arguments, network_model
+from tireid.network_results import network_table, write_network_results
 from tireid.output import output_folder
 from tireid.progress import say
 
@@ -91,7 +92,10 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--weights", type=Path, metavar="FILE", help="weights.json to begin learning with"
     )
-    parser.add_argument("--seed", type=int, metavar="N", help="of the initial weights (0)")
+    parser.add_argument(
+        "--seed", type=int, metavar="N", help="of the initial weights of the paper's network (0)"
+    )
+    add_network_arguments(parser, "freeze nothing, judge this network instead")
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder to write")
     parser.add_argument("--force", action="store_true", help="replace the folder if it exists")
     parser.set_defaults(run=run)
@@ -106,17 +110,26 @@ def run(options: argparse.Namespace) -> None:
     """
     vehicle = Vehicle.from_toml(options.vehicle)
     law, design = _design(options, vehicle)
+    if options.network is not None and options.freeze is not None:
+        raise ValueError("--freeze is for what is learnt: the network of --network is frozen")
     start = None if options.weights is None else load_model(options.weights)
     recording = _read(options.log, options.run_name, vehicle, design, options)
     others = [_read(log, None, vehicle, design, options) for log in options.replay]
     _require_distinct([recording, *others])
+    network = network_model(options, vehicle, design.min_speed)
     freeze_times = sorted(set(options.freeze or [float(recording.t[-1])]))
     _require_inside(freeze_times, recording)
-    _require_model(law, design, recording, vehicle)
+    if network is None:
+        _require_model(law, design, recording, vehicle)
     if isinstance(start, AxleModel) and start.vehicle != vehicle:
         say(f"{options.weights} is of the car {start.vehicle.name!r}: scaled by the axle loads")
     with output_folder(options.out, force=options.force) as folder:
         histories = [_learn(one, vehicle, law, design, start) for one in (recording, *others)]
+        if network is not None:
+            replays = write_network_results(folder, options.network, law, network, histories)
+            print(network_table(law, histories, replays))
+            say(f"wrote {options.out}/")
+            return
         learnt = histories[0]
         frozen = {t: _replays(t, learnt, histories) for t in freeze_times}
         write_results(folder, law, learnt, histories[1:], frozen)
@@ -156,6 +169,8 @@ def _design(options: argparse.Namespace, vehicle: Vehicle) -> tuple[str, Method]
         raise ValueError("--paper names the law already: give no --law or --design with it")
     if options.design is None:
         law = options.law or (REFERENCE if options.paper else DEFAULT)
+        if options.seed is not None and not draws_weights(law):
+            raise ValueError(f"--seed is of random initial weights, and {law} begins with none")
         return law, make_method(law, vehicle, options.seed or 0)
     for name in ("law", "seed"):
         if getattr(options, name) is not None:
@@ -234,15 +249,5 @@ def print_table(histories: list[History], frozen: dict[float, dict[str, Replay]]
         for name, result in replays.items():
             error = result.against_truth or result.against_online
             note = "" if sizes[name] is not None else "  (against online, no truth)"
-            front, rear = _cells(error, sizes[name])
+            front, rear = error_cells(error, sizes[name])
             print(f"{freeze_key(t):>8} s  {name:40} {front:>16} {rear:>16}{note}")
-
-
-def _cells(error: AxleRmse, size: AxleRmse | None) -> tuple[str, str]:
-    """Return front and rear error, with their share of the rms force where it is known."""
-    forces = (0.0, 0.0) if size is None else (size.front, size.rear)
-    front, rear = (
-        f"{newtons:8.4g} N{f' {100 * newtons / force:.0f} %' if force > 0.0 else '':>6}"
-        for newtons, force in zip((error.front, error.rear), forces, strict=True)
-    )
-    return front, rear

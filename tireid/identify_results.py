@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from identifier.axle import AxleDesign
 from identifier.design import Design
 from identifier.history import History
-from identifier.reproducibility import Replay, freeze_key
+from identifier.reproducibility import AxleRmse, Replay, freeze_key
 from models.recordings import Recording
 from tireid.figures import (
     error_figure,
@@ -64,9 +64,28 @@ def file_name(recording: Recording) -> str:
     return re.sub(r"[^\w.-]+", "_", recording.name)
 
 
+def error_cells(error: AxleRmse, size: AxleRmse | None) -> tuple[str, str]:
+    """Return front and rear error as text, with their share of the rms force where it is known.
+
+    Parameters
+    ----------
+    error : [N].
+    size : rms of the true forces [N], None without truth.
+    """
+    forces = (0.0, 0.0) if size is None else (size.front, size.rear)
+    front, rear = (
+        f"{newtons:8.4g} N{f' {100 * newtons / force:.0f} %' if force > 0.0 else '':>6}"
+        for newtons, force in zip((error.front, error.rear), forces, strict=True)
+    )
+    return front, rear
+
+
 def _write_curves(folder: Path, learnt: History, others: Sequence[History], frozen: Frozen) -> None:
     for history in (learnt, *others):
-        replays = {t: by_name[history.recording.name] for t, by_name in frozen.items()}
+        replays = {
+            f"frozen_{freeze_key(t)}s": by_name[history.recording.name]
+            for t, by_name in frozen.items()
+        }
         name = "forces.csv" if history is learnt else f"forces_{file_name(history.recording)}.csv"
         write_csv(folder / name, force_columns(history, replays))
     t, n = learnt.recording.t, learnt.recording.t.size
@@ -90,14 +109,14 @@ def _write_curves(folder: Path, learnt: History, others: Sequence[History], froz
 
 
 def force_columns(
-    history: History, replays: Mapping[float, Replay]
+    history: History, replays: Mapping[str, Replay]
 ) -> dict[str, NDArray[np.float64]]:
     """Return the curves of forces.csv: slip angles, true, online and frozen forces.
 
     Parameters
     ----------
     history : an online run.
-    replays : freeze time [s] to replay of the same recording.
+    replays : replays of the same recording by the name of their columns.
     """
     recording, car = history.recording, history.vehicle
     alpha = recording.alpha(car.l_f, car.l_r)
@@ -112,7 +131,7 @@ def force_columns(
         "alpha_r_rad": alpha[:, 1],
     }
     curves = {"online": history.axle_force}
-    curves |= {f"frozen_{freeze_key(t)}s": replay.axle_force for t, replay in replays.items()}
+    curves |= {label: replay.axle_force for label, replay in replays.items()}
     if recording.axle_force is not None:
         curves = {"true": recording.axle_force} | curves
     for name, force in curves.items():

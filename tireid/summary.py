@@ -73,18 +73,33 @@ def summarize(
     others : online runs of the same design over the other recordings.
     frozen : freeze time [s] to recording name to replay.
     """
-    runs = [learnt, *others]
+    by_key = {freeze_key(t): replays for t, replays in frozen.items()}
+    return summarize_replays(law, [learnt, *others], by_key)
+
+
+def summarize_replays(
+    law: str, runs: Sequence[History], frozen: Mapping[str, Mapping[str, Replay]]
+) -> dict[str, Any]:
+    """Return the same of any replays.
+
+    Parameters
+    ----------
+    law : the law as the user named it.
+    runs : online runs of one design, the first the one that was learnt.
+    frozen : key in the summary to recording name to replay.
+    """
+    learnt = runs[0]
     return {
         "rms_force_N": {h.recording.name: _axles(force_rms(h)) for h in runs},
         "rmse_N": {
             "online": {h.recording.name: _axles(online_error(h)) for h in runs},
             "frozen": {
-                freeze_key(t): {name: _axles(r.against_truth) for name, r in replays.items()}
-                for t, replays in frozen.items()
+                key: {name: _axles(r.against_truth) for name, r in replays.items()}
+                for key, replays in frozen.items()
             },
             "frozen_against_online": {
-                freeze_key(t): {name: _axles(r.against_online) for name, r in replays.items()}
-                for t, replays in frozen.items()
+                key: {name: _axles(r.against_online) for name, r in replays.items()}
+                for key, replays in frozen.items()
             },
         },
         "law": law,

@@ -8,6 +8,7 @@ import pytest
 
 from identifier.defaults import default_design
 from identifier.design_file import design_text
+from identifier.methods import METHODS, draws_weights
 from identifier.model_file import load_model
 from models.recordings import read_recording
 from models.vehicle import sedan
@@ -187,6 +188,16 @@ def test_a_design_from_a_file_is_the_one_that_runs(logs, tmp_path, capsys):
         assert f"{extra[0]} is for the default design" in refusal(
             capsys, [*words[:-1], tmp_path / "other", *extra]
         )
+
+
+def test_a_seed_that_would_change_nothing_is_refused(logs, tmp_path, capsys):
+    words = ["identify", logs / "slalom.csv", "--vehicle", logs / "car.toml", "--seed", "3"]
+    words += ["--out", tmp_path / "out"]
+    assert "axle begins with none" in refusal(capsys, words)
+    assert "linear begins with none" in refusal(capsys, [*words, "--law", "linear"])
+    for name, factory in METHODS.items():  # what is told is what is so
+        drawn = factory(sedan(), 0) != factory(sedan(), 1)
+        assert draws_weights(name) == drawn, name
 
 
 def test_a_law_that_diverges_on_a_replayed_log_is_refused_by_its_name(logs, tmp_path, capsys):

@@ -151,12 +151,15 @@ def test_paper_command_writes_tables_and_figures(tmp_path, capsys):
 
 def test_demo_leaves_one_self_contained_report(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(tireid.demo_command, "SEEDS", 2)
+    monkeypatch.setattr("tireid.demo_package.measure", lambda _: [])  # has tests of its own
     assert main(["demo", "--out", str(tmp_path / "demo")]) == 0
     page = (tmp_path / "demo" / "report.html").read_text()
     assert page.count("data:image/png;base64,") >= 12
     assert "phase margin of the sampled loop [deg]" in page
     assert "http" not in page.replace("http-equiv", "")
     assert (tmp_path / "demo" / "identify" / "weights.json").is_file()
+    assert (tmp_path / "demo" / "package" / "src" / "tireid.c").is_file()
+    assert "self-test" in page
     for name in ("locus", "bounds"):
         assert (tmp_path / "demo" / "paper_network" / f"{name}.png").is_file()
     printed = capsys.readouterr().out

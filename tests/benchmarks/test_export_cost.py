@@ -1,0 +1,57 @@
+"""What the cost of exported C is measured against computes the same as it does."""
+
+import numpy as np
+import pytest
+
+from benchmarks import c_loops
+from benchmarks.export_cost import LOOP, NUMPY, PACKAGE, check, steps
+from benchmarks.targets import Targets
+from codegen import find_compiler
+from identifier.defaults import default_design
+from identifier.export.package import build_package
+from models.vehicle import sedan
+
+CAR = sedan()
+
+
+@pytest.fixture(scope="module")
+def package():
+    if find_compiler() is None:
+        pytest.skip("needs a C compiler")
+    return build_package(default_design(CAR), CAR)
+
+
+@pytest.fixture
+def samples():
+    """A slalom of 6 s that begins straight ahead, by formulas: forces need not be real."""
+    t = 0.01 * np.arange(600)
+    wave = np.sin(3.0 * t)
+    return np.column_stack([20.0 + t, -0.3 * wave, 0.2 * wave, 0.05 * wave, 0.01 * wave])
+
+
+def test_every_way_to_write_the_step_gives_the_same_forces(package, samples):
+    check(steps(package), samples)
+
+
+def test_a_hand_written_step_that_computes_something_else_is_seen(
+    package, samples, monkeypatch, tmp_path
+):
+    text = c_loops.HAND_WRITTEN.read_text()
+    wrong = tmp_path / "wrong.c"
+    wrong.write_text(text.replace("keep_V * s->V[j][i] - rate", "keep_V * s->V[j][i] + rate"))
+    monkeypatch.setattr(c_loops, "HAND_WRITTEN", wrong)
+    with pytest.raises(AssertionError, match=LOOP):
+        check(steps(package), samples)
+
+
+def test_the_flags_are_those_of_the_package(package):
+    flags = c_loops.release_flags(package)
+    assert "-ffp-contract=off" in flags and "-std=c99" in flags and "-O3" in flags
+
+
+def test_missed_targets_are_kept(capsys):
+    targets = Targets()
+    targets.at_least(f"{NUMPY} over {PACKAGE}", 150.0, 200.0, "")
+    targets.at_most("ratio", 0.5, 0.7, "")
+    assert targets.missed == [f"{NUMPY} over {PACKAGE}"]
+    assert "MISSED" in capsys.readouterr().out

@@ -1,0 +1,170 @@
+"""Random drives against proven bounds: what is kept of a run, and when the alarm rings."""
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from identifier.defaults import default_design, natural_driving, natural_operation
+from identifier.design import Design
+from identifier.history import History
+from identifier.identify import identify
+from identifier.network import Weights
+from identifier.network_model import NetworkModel
+from identifier.stability import monte_carlo as module
+from identifier.stability.monte_carlo import monte_carlo
+from identifier.stability.random_drives import (
+    Drives,
+    random_drives,
+    residuals,
+    saturating_bicycle,
+    slips,
+)
+from models.bicycle import bicycle
+from models.recordings import Recording
+from models.vehicle import sedan
+
+CAR = sedan()
+DRIVING = natural_driving(CAR)
+COUNT = 12
+
+
+def draw(seed=3, dt=0.01):
+    return random_drives(
+        CAR,
+        np.random.default_rng(seed),
+        COUNT,
+        v_x=DRIVING.v_x,
+        friction=DRIVING.friction,
+        bandwidth=DRIVING.bandwidth,
+        duration=8.0,
+        dt=dt,
+    )
+
+
+@pytest.fixture(scope="module")
+def drives():
+    return draw()
+
+
+def recording_of(drives, i):
+    x, u = drives.x[i], drives.u[i]
+    return Recording(
+        name="drive",
+        t=0.01 * np.arange(len(x)),
+        v_x=drives.v_x[i],
+        v_y=x[:, 0],
+        r=x[:, 1],
+        delta_f=u[:, 0],
+        delta_r=u[:, 1],
+    )
+
+
+def learnt_alone(design: Design, drives: Drives, weights: Weights, i: int) -> History:
+    """The same drive by the ordinary road, one run by itself."""
+    start = NetworkModel(
+        vehicle=CAR, network=design.network, weights=weights, force_unit=1000.0, min_speed=1.0
+    )
+    return identify(recording_of(drives, i), CAR, design, start)
+
+
+@pytest.mark.parametrize("law", ["integral", "instantaneous", "pi_lead"])
+def test_the_largest_norms_are_those_of_the_same_run_alone(drives, law):
+    design = default_design(CAR, law=law)
+    found = module._largest(design, CAR, drives, np.random.default_rng(8))
+    rng = np.random.default_rng(8)
+    for i in range(COUNT):
+        weights = design.network.initial_weights(rng)
+        history = learnt_alone(design, drives, weights, i)
+        expected = (
+            np.linalg.norm(history.told["xi_tilde"], axis=1).max(),
+            np.linalg.norm(history.carried["W"], axis=(1, 2)).max(),
+            np.linalg.norm(history.carried["V"][1:], axis=(1, 2)).max(),
+        )
+        np.testing.assert_allclose([values[i] for values in found], expected, rtol=1e-12)
+
+
+def test_what_is_not_a_number_shows_in_the_end():
+    design = default_design(CAR)
+    wild = replace(design, gains=replace(design.gains, eta_W=1e9, rho_W=0.0, rho_V=0.0))
+    operation = natural_operation(design, CAR)
+    found = monte_carlo(wild, CAR, operation, 20, **DRIVING._asdict(), rng=np.random.default_rng(0))
+    assert found.diverged > 0
+
+
+def test_residuals_are_those_of_the_sampled_model(drives):
+    found, K_inv = residuals(CAR, drives, 0.01), np.array(ca.DM(bicycle(CAR.bicycle, 1.0).K_inv))
+    for i, k in ((0, 100), (3, 500), (7, 711)):
+        model = bicycle(CAR.bicycle, float(drives.v_x[i, k]))
+        now, ahead = (K_inv @ drives.x[i, j] for j in (k, k + 1))
+        known = ca.DM(model.A_xi) @ now + ca.DM(model.B_xi) @ drives.u[i, k]
+        expected = (ahead - now) / 0.01 - np.array(known).ravel()
+        np.testing.assert_allclose(found[i, k], expected, rtol=1e-9, atol=1e-6)
+
+
+def test_the_plant_is_a_magic_formula_that_saturates_at_the_friction():
+    """In steady state at a large slip both axles push with μ F_z, and in the linear range C α."""
+    step = saturating_bicycle()
+    vehicle, road = np.array(CAR.bicycle), np.array([0.5, 0.01])
+    for slip, expected in ((1e-4, "linear"), (1.0, "curve")):
+        x = np.array([-20.0 * slip, 0.0])
+        x_next = np.array(step(x, np.zeros(2), np.zeros(2), 20.0, vehicle, road)).ravel()
+        load = np.array(CAR.axle_loads)
+        C = np.array([CAR.cornering_stiffness_front, CAR.cornering_stiffness_rear])
+        curve = 0.5 * load * np.sin(1.5 * np.arctan(C * slip / (0.75 * load)))
+        force = C * slip if expected == "linear" else curve
+        lateral = (x_next[0] - x[0]) / 0.01
+        assert lateral == pytest.approx(force.sum() / CAR.mass, rel=0.05)
+
+
+def test_drives_stay_within_what_is_judged():
+    design = default_design(CAR)
+    operation = natural_operation(design, CAR)
+    found = monte_carlo(
+        design, CAR, operation, 300, **DRIVING._asdict(), rng=np.random.default_rng(1)
+    )
+    assert found.xi_tilde.shape == found.W.shape == found.residual.shape == (300,)
+    assert found.residual.max() <= operation.residual_bound
+    assert found.outside > 0
+    assert found.diverged == 0
+
+
+def test_the_same_seed_gives_the_same_drives_and_progress_reaches_the_end():
+    design = default_design(CAR)
+    operation, told = natural_operation(design, CAR), []
+    first, again = (
+        monte_carlo(
+            design,
+            CAR,
+            operation,
+            40,
+            **DRIVING._asdict(),
+            rng=np.random.default_rng(2),
+            progress=told.append,
+        )
+        for _ in range(2)
+    )
+    np.testing.assert_array_equal(first.xi_tilde, again.xi_tilde)
+    assert told[-1] == 40
+
+
+def test_driving_that_hardly_a_drive_keeps_to_is_refused(monkeypatch):
+    monkeypatch.setattr(module, "TRIES", 1)
+    design = default_design(CAR)
+    with pytest.raises(ValueError, match="judge harder driving"):
+        monte_carlo(
+            design,
+            CAR,
+            natural_operation(design, CAR),
+            5,
+            **DRIVING._replace(slip=1e-6)._asdict(),
+            rng=np.random.default_rng(0),
+        )
+
+
+def test_slips_are_those_of_the_paper(drives):
+    recording = recording_of(drives, 2)
+    small = np.abs(slips(CAR, drives)[2]) < 0.05
+    alpha = recording.alpha(CAR.l_f, CAR.l_r)
+    np.testing.assert_allclose(slips(CAR, drives)[2][small], alpha[small], atol=2e-4)

@@ -1,0 +1,63 @@
+"""What the demo makes of what it learnt: a package that compiles, passes and agrees with Python."""
+
+import pytest
+
+from codegen import find_compiler
+from tireid import demo_package, self_test
+from tireid.demo_package import NO_COMPILER, package_section, ship, shipped_text
+from tireid.demo_story import run_story
+from tireid.self_test import SelfTestError
+
+
+@pytest.fixture(scope="module")
+def story():
+    return run_story()
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    """Costs on Arm have tests of their own."""
+    monkeypatch.setattr(demo_package, "measure", lambda _: [])
+
+
+def test_it_compiles_passes_and_computes_what_python_computes(story, tmp_path):
+    if find_compiler() is None:
+        pytest.skip("needs a C compiler")
+    folder = tmp_path / "package"
+    shipped = ship(story, folder)
+    double, single = shipped.checks
+    assert (double.precision, single.precision) == ("double", "float")
+    assert double.verdict.verdict == single.verdict.verdict == "passed"
+    assert double.difference < 1e-5 < single.difference < 1.0
+    assert double.refused == single.refused == 0
+    assert shipped.package.about["hash"] in double.verdict.version
+    assert (folder / "README.md").is_file()
+    assert "self-test passed" in shipped_text(shipped)
+    assert "passed" in str(package_section(shipped))
+
+
+def test_without_a_compiler_the_report_says_so(story, tmp_path, monkeypatch):
+    monkeypatch.setattr(demo_package, "find_compiler", lambda: None)
+    shipped = ship(story, tmp_path / "package")
+    assert (tmp_path / "package" / "src" / "tireid.c").is_file()
+    assert NO_COMPILER in shipped_text(shipped)
+    assert NO_COMPILER in str(package_section(shipped))
+    monkeypatch.setattr(self_test, "find_compiler", lambda: None)
+    assert self_test.self_test(tmp_path / "package", "tireid", single=False) is None
+
+
+def test_a_spoiled_package_fails_its_self_test(story, tmp_path):
+    if find_compiler() is None:
+        pytest.skip("needs a C compiler")
+    folder = tmp_path / "package"
+    ship(story, folder)
+    vectors = folder / "tests" / "vectors.h"
+    text = vectors.read_text()
+    head, rows = text.split("vector_force", 1)
+    first = rows.index("{", rows.index("{") + 1)
+    vectors.write_text(f"{head}vector_force{rows[: first + 1]} 1e3 + {rows[first + 1 :]}")
+    with pytest.raises(SelfTestError, match="forces are those of the vectors"):
+        self_test.self_test(folder, "tireid", single=False)
+    (folder / "src" / "tireid.c").write_text("int")
+    with pytest.raises(SelfTestError, match="error"):
+        self_test.self_test(folder, "tireid", single=False)
