@@ -1,0 +1,101 @@
+"""Axle curves in closed form: Dugoff, Fiala, and the Magic Formula without E; F = curve(α) cos δ.
+
+Sources: Dugoff, Fancher and Segel, SAE 700377 (1970); Pacejka, Tyre and Vehicle Dynamics, ch. 3.2
+(Fiala's brush) and 2nd ed., (4.49). No longitudinal slip.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from mpc.tires.structure import Pair, Point, no_lag, wheel_slip
+
+
+@dataclass(frozen=True, slots=True)
+class DugoffAxles:
+    """C tan α f(λ), f = λ (2 - λ), λ = N/(2 C |tan α|) <= 1; w = [C_f, N_f, C_r, N_r].
+
+    C [N/rad] and N = μ F_z [N] are of an axle.
+    """
+
+    n_weights = 4
+    lagged = False
+
+    slip = wheel_slip
+    lag_length = no_lag
+
+    def force(self, slip: Pair, at: Point) -> Pair:
+        """Return the axle forces [N], frame of the body.
+
+        Parameters
+        ----------
+        slip : what makes the force [rad].
+        at : motion, car and weights.
+        """
+        delta, w = at.delta, at.w
+        return _dugoff(slip[0], w[0], w[1]) * ca.cos(delta), _dugoff(slip[1], w[2], w[3])
+
+
+@dataclass(frozen=True, slots=True)
+class FialaAxles:
+    """Brush tire, full sliding from C |tan α| = 3 N on; w = [C_f, N_f, C_r, N_r] as Dugoff's."""
+
+    n_weights = 4
+    lagged = False
+
+    slip = wheel_slip
+    lag_length = no_lag
+
+    def force(self, slip: Pair, at: Point) -> Pair:
+        """Return the axle forces [N], frame of the body.
+
+        Parameters
+        ----------
+        slip : what makes the force [rad].
+        at : motion, car and weights.
+        """
+        delta, w = at.delta, at.w
+        return _fiala(slip[0], w[0], w[1]) * ca.cos(delta), _fiala(slip[1], w[2], w[3])
+
+
+@dataclass(frozen=True, slots=True)
+class MagicAxles:
+    """D sin(C atan(B α)); w = [B, C, D] of the front, then of the rear axle, [1/rad, -, N]."""
+
+    n_weights = 6
+    lagged = False
+
+    slip = wheel_slip
+    lag_length = no_lag
+
+    def force(self, slip: Pair, at: Point) -> Pair:
+        """Return the axle forces [N], frame of the body.
+
+        Parameters
+        ----------
+        slip : what makes the force [rad].
+        at : motion, car and weights.
+        """
+        delta, w = at.delta, at.w
+        front, rear = (
+            D * ca.sin(C * ca.atan(B * alpha))
+            for alpha, (B, C, D) in zip(
+                slip, (ca.vertsplit(w[:3]), ca.vertsplit(w[3:])), strict=True
+            )
+        )
+        return front * ca.cos(delta), rear
+
+
+def _dugoff(alpha: Any, C: Any, N: Any) -> Any:
+    demand = C * ca.tan(alpha)
+    half = 0.5 * N
+    lam = half / ca.fmax(ca.fabs(demand), half)
+    return demand * lam * (2 - lam)
+
+
+def _fiala(alpha: Any, C: Any, N: Any) -> Any:
+    demand = C * ca.tan(alpha)
+    x = ca.fmin(ca.fabs(demand) / (3 * N), 1)
+    gentle = demand * (1 - x + x * x / 3)
+    return ca.if_else(x < 1, gentle, N * ca.sign(demand))

@@ -1,0 +1,92 @@
+"""One door for every tire: whatever a tire comes as, a structure and its weights come out."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from identifier.axle.model import AxleModel
+from identifier.baselines.curve_model import CurveModel
+from identifier.network_model import NetworkModel
+from identifier.onnx_model import OnnxModel
+from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
+from models.vehicle import Vehicle
+from mpc.tires.curves import DugoffAxles, FialaAxles, MagicAxles
+from mpc.tires.ladder import axle_tire
+from mpc.tires.linear import linear_tire
+from mpc.tires.network import network_tire
+from mpc.tires.onnx import onnx_tire
+from mpc.tires.oracle import mounted_tire
+from mpc.tires.structure import TireModel
+
+
+def tire_model(source: Any, vehicle: Vehicle | None = None) -> TireModel:
+    """Return the prediction tire of a frozen model, of a tire of `models.tires`, or of a vehicle.
+
+    Parameters
+    ----------
+    source : a frozen model; or a tire, two of which are mounted on each axle of `vehicle` at its
+        static load; or a vehicle, for the linear tire that it states. A prediction tire is
+        returned as it is.
+    vehicle : the car of the prediction; None takes that of the model.
+
+    Raises
+    ------
+    ValueError
+        Where a tire comes without a vehicle, or is one that cannot be fitted.
+    TypeError
+        Where the source is none of these.
+    """
+    if isinstance(source, TireModel):
+        return source if vehicle is None else source._replace(vehicle=vehicle)
+    if isinstance(source, Vehicle):
+        return linear_tire(source if vehicle is None else vehicle, np.array(source.bicycle[4:]))
+    for kind, of_model in MODELS.items():
+        if isinstance(source, kind):
+            return tire_model(of_model(source), vehicle)
+    for kind, of_tire in TIRES.items():
+        if isinstance(source, kind):
+            if vehicle is None:
+                raise ValueError(f"{kind.__name__} needs the vehicle that it is mounted on")
+            return of_tire(vehicle, source)
+    raise TypeError(f"no prediction tire can be made of {type(source).__name__}")
+
+
+def curve_tire(model: CurveModel) -> TireModel:
+    """Return the prediction tire of a frozen curve.
+
+    Parameters
+    ----------
+    model : its parameters.
+    """
+    q = model.parameters
+    if model.curve == "linear":
+        return linear_tire(model.vehicle, q[:, 0])
+    if model.curve == "magic_formula":
+        return TireModel(MagicAxles(), q.ravel(), model.vehicle)
+    limit = q[:, 1] * np.array(model.vehicle.axle_loads)
+    return TireModel(DugoffAxles(), np.column_stack([q[:, 0], limit]).ravel(), model.vehicle)
+
+
+def _linear(vehicle: Vehicle, tire: LinearTire) -> TireModel:
+    return linear_tire(vehicle, np.full(2, 2.0 * tire.C_alpha))
+
+
+def _limited(vehicle: Vehicle, tire: DugoffTire | FialaTire) -> TireModel:
+    structure = DugoffAxles() if isinstance(tire, DugoffTire) else FialaAxles()
+    pairs = [[2.0 * tire.C_alpha, tire.friction * load] for load in vehicle.axle_loads]
+    return TireModel(structure, np.array(pairs).ravel(), vehicle)
+
+
+MODELS: Mapping[type, Callable[[Any], TireModel]] = {
+    NetworkModel: network_tire,
+    AxleModel: axle_tire,
+    CurveModel: curve_tire,
+    OnnxModel: onnx_tire,
+}
+TIRES: Mapping[type, Callable[[Vehicle, Any], TireModel]] = {
+    LinearTire: _linear,
+    DugoffTire: _limited,
+    FialaTire: _limited,
+    MagicFormula: mounted_tire,
+}

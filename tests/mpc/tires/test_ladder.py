@@ -1,0 +1,128 @@
+"""The frozen axle model in the prediction: its curves, its lag, its offsets."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from identifier.axle import AxleDesign, AxleModel
+from models.recordings import Recording
+from mpc.motion import N_CAR
+from mpc.prediction import build_dynamics
+from mpc.tires import tire_model
+from mpc.tires.structure import Car, Point
+
+W = np.array([[0.05, 0.5, 0.5, -0.15], [0.02, 0.6, 0.6, -0.2]])
+
+
+def axle_model(car, *, compliance=(0.05, 0.06), offset=(0.0, 0.0), weights=W):
+    design, n = AxleDesign.for_vehicle(car), weights.shape[1]
+    return AxleModel(
+        vehicle=car,
+        ladder=design.ladder,
+        sway=design.sway,
+        plausibility=design.plausibility,
+        W=weights,
+        own=np.column_stack([compliance, np.zeros(2), offset]),
+        covariance=np.tile(np.eye(n + 3), (2, 1, 1)),
+        prior_covariance=np.tile(np.eye(n + 3), (2, 1, 1)),
+        excitation=np.zeros((2, 9)),
+    )
+
+
+def slalom(n=600, speed=20.0):
+    t = 0.01 * np.arange(n)
+    wave = np.sin(2.0 * np.pi * 0.7 * t)
+    return Recording(
+        name="slalom",
+        t=t,
+        v_x=np.full(n, speed),
+        v_y=0.5 * np.sin(2.0 * np.pi * 0.7 * t + 0.5),
+        r=0.3 * wave,
+        delta_f=0.05 * wave,
+        delta_r=np.zeros(n),
+    )
+
+
+def standing(v_y, r, delta, speed=20.0, n=400):
+    return Recording(
+        name="steady",
+        t=0.01 * np.arange(n),
+        v_x=np.full(n, speed),
+        v_y=np.full(n, v_y),
+        r=np.full(n, r),
+        delta_f=np.full(n, delta),
+        delta_r=np.zeros(n),
+    )
+
+
+@pytest.mark.parametrize("motion", [(0.4, 0.3, 0.05), (-1.0, -0.2, -0.1), (1.5, 0.5, 0.2)])
+def test_steady_forces_are_those_of_the_frozen_model(car, forces, motion):
+    model = axle_model(car, offset=(0.01, 0.15))
+    predicted, _ = forces(tire_model(model), 20.0, *(np.array([value]) for value in motion))
+    expected = model.axle_force(standing(*motion))[-1]
+    np.testing.assert_allclose(predicted[0], expected, rtol=1e-9)
+
+
+def test_curves_are_those_of_the_frozen_model(car, forces):
+    alpha = np.linspace(-0.4, 0.4, 41)
+    model, none = axle_model(car), np.zeros(41)
+    predicted, _ = forces(
+        tire_model(model), 20.0, none, none, none, lagged=np.column_stack([alpha, alpha])
+    )
+    np.testing.assert_allclose(predicted, model.force_at(alpha), rtol=1e-9, atol=1e-6)
+
+
+def lengths(model, alpha):
+    tire = tire_model(model)
+    w = ca.SX.sym("w", tire.structure.n_weights)
+    x = ca.SX.sym("x", 2)
+    at = Point(0.0, 0.0, 0.0, 20.0, Car(*tire.car), w)
+    pair = tire.structure.lag_length((x[0], x[1]), at)
+    return np.array(ca.Function("lag", [x, w], [ca.vertcat(*pair)])(alpha, tire.weights)).ravel()
+
+
+def test_the_lag_is_that_of_the_frozen_model_and_shortens_where_the_tire_slides(car):
+    model = axle_model(car)
+    np.testing.assert_allclose(lengths(model, [0.0, 0.0]), model.relaxation_length, rtol=1e-12)
+    sliding = lengths(model, [0.2, 0.2])
+    assert (sliding < 0.25 * model.relaxation_length).all()
+    assert (sliding > 0.0).all()
+    falling = axle_model(car, weights=np.array([[0.0, 0.8, 0.8, -0.7]] * 2))
+    np.testing.assert_allclose(  # the curve falls there: the slope is held at 2 %
+        lengths(falling, [0.3, 0.3]),
+        0.02 * falling.relaxation_length + 0.98e-3 * car.wheelbase,
+        rtol=1e-9,
+    )
+
+
+def test_lagged_slip_follows_as_in_the_frozen_model(car):
+    model, drive = axle_model(car), slalom()
+    tire = tire_model(model)
+    rates = build_dynamics(tire.structure)
+    behind, fine = np.zeros(2), 5
+    slips = []
+    for k in range(drive.t.size):
+        slips.append(behind)
+        for j in range(fine):  # Euler at 2 ms, signals linear between samples
+            share = j / fine
+            i = min(k + 1, drive.t.size - 1)
+            v_y, r, delta = (
+                (1 - share) * signal[k] + share * signal[i]
+                for signal in (drive.v_y, drive.r, drive.delta_f)
+            )
+            x = np.concatenate([[0.0, 0.0, v_y, r, delta], behind])
+            x_dot = rates(x, 0.0, 0.0, drive.v_x[k], 1e-9, tire.car, tire.weights)
+            behind = behind + 0.01 / fine * np.array(x_dot).ravel()[5:]
+    expected = model.lagged_slip(drive)[100:]
+    size = np.abs(expected).max(axis=0)
+    assert (np.abs(np.array(slips)[100:] - expected).max(axis=0) < 0.03 * size).all()
+    kinematic = drive.alpha(car.l_f, car.l_r)[100:]  # without the lag it would show
+    assert (np.abs(kinematic - expected).max(axis=0) > 0.1 * size).all()
+
+
+def test_a_model_learnt_anew_is_other_weights_only(car):
+    one, other = tire_model(axle_model(car)), tire_model(axle_model(car, weights=0.5 * W))
+    assert one.structure == other.structure
+    assert one.weights.size == one.structure.n_weights
+    assert one.structure.lagged
+    assert one.car.size == N_CAR

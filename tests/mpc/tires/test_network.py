@@ -1,0 +1,60 @@
+"""The paper's network in the prediction: the frozen model's own forces, weights as data."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.network import Network, Weights
+from identifier.network_model import NetworkModel
+from mpc.tires import tire_model
+
+
+def model_of(car, network, rng):
+    n_in = len(network.inputs)
+    return NetworkModel(
+        vehicle=car,
+        network=network,
+        weights=Weights(
+            W=rng.normal(0.0, 1.0, (2, network.hidden)), V=rng.normal(0, 1, (network.hidden, n_in))
+        ),
+        force_unit=1500.0,
+        min_speed=1.0,
+    )
+
+
+@pytest.mark.parametrize(
+    "network",
+    [
+        Network(),
+        Network(hidden=3, inputs=("v_y", "r", "delta_f", "delta_r", "v_x"), scale=(1, 2, 3, 4, 5)),
+        Network(hidden=7, inputs=("alpha_r", "alpha_f")),
+    ],
+)
+def test_forces_are_those_of_the_frozen_model(network, car, motions, forces, at, rng):
+    model = model_of(car, network, rng)
+    predicted, _ = forces(tire_model(model), *at(motions))
+    expected = model.axle_force(motions)
+    np.testing.assert_allclose(predicted, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+
+
+def test_another_network_of_that_size_is_other_weights_only(car, motions, forces, at, rng):
+    one, other = (tire_model(model_of(car, Network(), rng)) for _ in range(2))
+    assert one.structure == other.structure
+    assert hash(one.structure) == hash(other.structure)
+    assert not np.allclose(forces(one, *at(motions))[0], forces(other, *at(motions))[0], rtol=0.1)
+    larger = tire_model(model_of(car, Network(hidden=11), rng))
+    assert larger.structure != one.structure
+    assert larger.weights.size == larger.structure.n_weights == one.weights.size + 6
+
+
+def test_scale_unit_and_stiffness_are_weights(car, rng):
+    model = model_of(car, Network(), rng)
+    others = (
+        replace(model, force_unit=1.0),
+        replace(model, network=replace(model.network, scale=(2.0, 1.0, 1.0, 1.0))),
+        replace(model, vehicle=replace(car, cornering_stiffness_front=1.0e5)),
+    )
+    for other in others:
+        assert tire_model(other).structure == tire_model(model).structure
+        assert not np.array_equal(tire_model(other).weights, tire_model(model).weights)
