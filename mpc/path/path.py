@@ -1,0 +1,287 @@
+"""The path that a car is to follow: X, Y, heading and curvature over arc length.
+
+s: arc length [m], e_y > 0 left of the path, κ > 0 turns left. Between the samples X and Y are
+quintics with the slopes cos ψ and sin ψ, ψ a cubic with the slope κ, and κ is linear: |dP/ds| = 1
+to 1e-6 and κ continuous.
+An open path goes on straight beyond both ends; a closed one counts laps, s may be any number.
+"""
+
+import math
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path as FilePath
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mpc.path.checks import check_line
+from mpc.path.csv_file import read_waypoints
+from mpc.path.line import Array, Line, PathError
+from mpc.path.projection import Projection, walk_to_foot
+from mpc.path.steps import Ends
+from mpc.path.waypoints import line_through
+
+NO_CONES = np.empty((0, 2))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Path:
+    """A smooth path, sampled at equal steps of arc length; arrays are read-only.
+
+    Parameters
+    ----------
+    name : for tables and pictures.
+    s : arc length [m], (n,), from 0.
+    X : [m], (n,).
+    Y : [m], (n,).
+    psi : heading [rad], (n,), unwrapped.
+    kappa : curvature dψ/ds [1/m], (n,).
+    closed : whether the last sample is the first one again.
+    cones : X, Y [m], (k, 2), for pictures; k may be 0.
+
+    Raises
+    ------
+    PathError
+        Where shapes differ, a value is not finite, s is not uniform from 0, samples are too coarse
+        or disagree with one another, or a closed path does not close.
+
+    Examples
+    --------
+    >>> path = Path.from_waypoints([0.0, 40.0, 80.0], [0.0, 3.0, 0.0], name="bump")
+    >>> here = path.project(41.0, 2.5)
+    >>> round(here.s, 2), round(here.e_y, 2)
+    (41.14, -0.5)
+    >>> ahead = path.curvature(here.s + np.arange(40))  # (40,) [1/m]
+    """
+
+    name: str
+    s: Array
+    X: Array
+    Y: Array
+    psi: Array
+    kappa: Array
+    closed: bool = False
+    cones: Array = field(default_factory=lambda: NO_CONES)
+
+    def __post_init__(self) -> None:
+        for part in fields(self):
+            if part.name in ("name", "closed"):
+                continue
+            values = np.array(getattr(self, part.name), dtype=np.float64)
+            values.setflags(write=False)
+            object.__setattr__(self, part.name, values)
+            shape = (values.shape[0], 2) if part.name == "cones" else (np.size(self.s),)
+            if values.shape != shape:
+                raise PathError(
+                    f"{self.name}: {part.name} must have shape {shape}, it has {values.shape}"
+                )
+            if not np.isfinite(values).all():
+                raise PathError(f"{self.name}: {part.name} must be finite")
+        line = Line(self.s, self.X, self.Y, self.psi, self.kappa)
+        check_line(line, self.name, self.closed)
+
+    @classmethod
+    def from_line(
+        cls, line: Line, *, name: str, closed: bool = False, cones: Array = NO_CONES
+    ) -> Self:
+        """Wrap samples of a curve.
+
+        Parameters
+        ----------
+        line : samples at equal steps of arc length.
+        name : for tables and pictures.
+        closed : whether the last sample is the first one again.
+        cones : X, Y [m], (k, 2).
+        """
+        return cls(name=name, closed=closed, cones=cones, **line._asdict())
+
+    @classmethod
+    def from_waypoints(
+        cls,
+        X: ArrayLike,
+        Y: ArrayLike,
+        *,
+        closed: bool = False,
+        name: str = "way-points",
+        spacing: float = 0.25,
+        smoothing: float = 0.0,
+        minimum_radius: float = 3.0,
+    ) -> Self:
+        """Draw a spline with continuous curvature through way-points, or close by them.
+
+        Parameters
+        ----------
+        X : of the way-points in driving order [m], (k,).
+        Y : of the way-points [m], (k,).
+        closed : whether the last way-point leads back to the first; that may be repeated.
+        name : for messages, tables and pictures.
+        spacing : longest step of the samples [m].
+        smoothing : root mean square distance that the path may keep from the way-points [m]; 0
+            passes through them all. Points that were measured need about their noise.
+        minimum_radius : tightest turn allowed [m].
+
+        Raises
+        ------
+        PathError
+            Where there are too few way-points, one is not finite or equals its neighbor, or the
+            path turns tighter than minimum_radius.
+        """
+        line = line_through(
+            X,
+            Y,
+            closed=closed,
+            name=name,
+            spacing=spacing,
+            smoothing=smoothing,
+            minimum_radius=minimum_radius,
+        )
+        return cls.from_line(line, name=name, closed=closed)
+
+    @classmethod
+    def from_csv(
+        cls,
+        file: FilePath | str,
+        *,
+        closed: bool | None = None,
+        spacing: float = 0.25,
+        smoothing: float = 0.0,
+        minimum_radius: float = 3.0,
+    ) -> Self:
+        """Read way-points from a CSV with columns X_m, Y_m or x, y [m]; others are ignored.
+
+        The name of the path is that of the file without folder and ending.
+
+        Parameters
+        ----------
+        file : CSV with a header, which may start with "#".
+        closed : as for way-points; None: closed where the last point is no farther from the first
+            than 1.5 median gaps between neighbors.
+        spacing : longest step of the samples [m].
+        smoothing : root mean square distance that the path may keep from the way-points [m].
+        minimum_radius : tightest turn allowed [m].
+
+        Raises
+        ------
+        PathError
+            Naming the file and the column, line or rule that is broken.
+        """
+        waypoints = read_waypoints(FilePath(file))
+        path = cls.from_waypoints(
+            waypoints.X,
+            waypoints.Y,
+            closed=waypoints.seems_closed() if closed is None else closed,
+            name=str(file),
+            spacing=spacing,
+            smoothing=smoothing,
+            minimum_radius=minimum_radius,
+        )
+        return replace(path, name=FilePath(file).stem)
+
+    @property
+    def length(self) -> float:
+        """Arc length of the path, of one lap where it is closed [m]."""
+        return float(self.s[-1])
+
+    @property
+    def step(self) -> float:
+        """Arc length between two samples [m]."""
+        return float(self.s[-1]) / (self.s.size - 1)
+
+    @property
+    def lap_turn(self) -> float:
+        """Heading gained from the first to the last sample [rad]: +-2 pi for a plain circuit."""
+        return float(self.psi[-1] - self.psi[0])
+
+    @property
+    def peak_curvature(self) -> float:
+        """Largest |κ| [1/m]."""
+        return float(np.abs(self.kappa).max())
+
+    def pose(self, s: ArrayLike) -> tuple[Array, Array, Array]:
+        """Return X, Y [m] and ψ [rad], each of the shape of s.
+
+        Parameters
+        ----------
+        s : arc length [m]; beyond the ends an open path goes on straight, a closed one counts laps.
+        """
+        s = np.asarray(s, dtype=np.float64)
+        laps = np.floor(s / self.length) if self.closed else np.zeros_like(s)
+        inside = s - laps * self.length
+        within = np.clip(inside, 0.0, self.length)
+        i = np.minimum((within / self.step).astype(int), self.s.size - 2)
+        parts = self.X, self.Y, self.psi, self.kappa
+        ends = Ends(*((part[i], part[i + 1]) for part in parts))
+        X, Y, psi, _ = ends.between(within / self.step - i, self.step, np.cos, np.sin)
+        beyond = inside - within
+        X, Y = X + beyond * np.cos(psi), Y + beyond * np.sin(psi)
+        return X, Y, psi + laps * self.lap_turn
+
+    def curvature(self, s: ArrayLike) -> Array:
+        """Return κ [1/m] in the shape of s; zero beyond the ends of an open path.
+
+        Parameters
+        ----------
+        s : arc length [m].
+        """
+        s = np.asarray(s, dtype=np.float64)
+        if self.closed:
+            return np.asarray(np.interp(s % self.length, self.s, self.kappa))
+        return np.asarray(np.interp(s, self.s, self.kappa, left=0.0, right=0.0))
+
+    def along(self, values: ArrayLike, s: ArrayLike) -> Array:
+        """Interpolate values given at the samples, such as a speed, in the shape of s.
+
+        Parameters
+        ----------
+        values : at `self.s`, (n,).
+        s : arc length [m]; laps count alike, and an open path holds its end values.
+        """
+        s = np.asarray(s, dtype=np.float64)
+        at = s % self.length if self.closed else s
+        return np.asarray(np.interp(at, self.s, np.asarray(values, dtype=np.float64)))
+
+    def project(
+        self, X: float, Y: float, near: float | None = None, *, reach: float = 10.0
+    ) -> Projection:
+        """Return the point of the path that a car is at.
+
+        Parameters
+        ----------
+        X : of the car [m].
+        Y : of the car [m].
+        near : s of the last projection [m], laps included: the search follows the path from there
+            and does not jump to another leg. None: the nearest point of the whole path.
+        reach : how far from `near` to look [m].
+
+        Raises
+        ------
+        PathError
+            Where X, Y or near is not finite.
+        """
+        if not (math.isfinite(X) and math.isfinite(Y) and math.isfinite(near or 0.0)):
+            raise PathError(f"{self.name}: cannot project X = {X}, Y = {Y}, near = {near}")
+        if near is not None:
+            return walk_to_foot(self._point, X, Y, near, reach)
+        nearest = int(np.argmin((self.X - X) ** 2 + (self.Y - Y) ** 2))
+        start = float(self.s[nearest])
+        if nearest in (0, self.s.size - 1) and not self.closed:  # perhaps far beyond an end
+            psi = float(self.psi[nearest])
+            start += (X - self.X[nearest]) * math.cos(psi) + (Y - self.Y[nearest]) * math.sin(psi)
+        found = walk_to_foot(self._point, X, Y, start, 2.0 * self.step)
+        if self.closed and not 0.0 <= found.s < self.length:
+            return walk_to_foot(self._point, X, Y, found.s % self.length, 2.0 * self.step)
+        return found
+
+    def _point(self, s: float) -> tuple[float, float, float, float]:
+        """Return X, Y [m], ψ [rad], κ [1/m] at one s; plain numbers are quicker than arrays."""
+        laps = math.floor(s / self.length) if self.closed else 0
+        inside = s - laps * self.length
+        within = min(max(inside, 0.0), self.length)
+        i = min(int(within / self.step), self.s.size - 2)
+        parts = self.X, self.Y, self.psi, self.kappa
+        ends = Ends(*((part.item(i), part.item(i + 1)) for part in parts))
+        X, Y, psi, kappa = ends.between(within / self.step - i, self.step, math.cos, math.sin)
+        if beyond := inside - within:
+            X, Y = X + beyond * math.cos(psi), Y + beyond * math.sin(psi)
+            kappa = 0.0
+        return X, Y, psi + laps * self.lap_turn, kappa

@@ -1,0 +1,178 @@
+"""A smooth line through way-points: a C2 spline X(s), Y(s), sampled at equal steps of arc length.
+
+The spline runs over its own arc length, found by fitting again over the length of the last fit, so
+that way-points need no equal gaps. Open ends are natural: κ = 0, as on the straight beyond them.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
+
+from mpc.path.line import Array, Line, PathError, uniform_grid
+from mpc.path.smoothing import smooth
+
+FITS = 4
+SAME = 1e-6  # of the median gap: way-points as near as this are one
+PIECES = 8  # of every interval between knots, for its length
+LOBES, SHARES = np.polynomial.legendre.leggauss(8)  # nodes on -1 to 1, and weights
+
+
+class Waypoints(NamedTuple):
+    """Points in driving order, X and Y [m], (k,)."""
+
+    X: Array
+    Y: Array
+
+    def seems_closed(self) -> bool:
+        """Whether the last point is as near to the first as neighbors are, 1.5 median gaps."""
+        if self.X.size < 4:
+            return False
+        gaps = np.hypot(np.diff(self.X), np.diff(self.Y))
+        last = np.hypot(self.X[-1] - self.X[0], self.Y[-1] - self.Y[0])
+        return bool(last <= 1.5 * np.median(gaps))
+
+
+def line_through(
+    X: ArrayLike,
+    Y: ArrayLike,
+    *,
+    closed: bool,
+    name: str,
+    spacing: float,
+    smoothing: float,
+    minimum_radius: float,
+) -> Line:
+    """Draw the line; the arguments and errors are those of `Path.from_waypoints`.
+
+    Parameters
+    ----------
+    X : of the way-points [m], (k,).
+    Y : of the way-points [m], (k,).
+    closed : whether the last leads back to the first.
+    name : for messages.
+    spacing : longest step of the samples [m].
+    smoothing : root mean square distance that the line may keep from the way-points [m].
+    minimum_radius : tightest turn allowed [m].
+
+    Raises
+    ------
+    PathError
+        Where a rule is broken.
+    """
+    if not minimum_radius > 0.0:
+        raise PathError(f"{name}: minimum_radius must be positive, it is {minimum_radius}")
+    points = _checked(X, Y, closed, name)
+    if not (smoothing >= 0.0 and np.isfinite(smoothing)):
+        raise PathError(f"{name}: smoothing must be finite and not negative, it is {smoothing}")
+    if smoothing > 0.0:
+        points = smooth(points, closed=closed, distance=smoothing)
+    spline = _fit(points, closed)
+    line = sample(spline, spline.x, spacing, name)
+    # A spike between two samples shows in the heading alone.
+    step = line.s[-1] / (line.s.size - 1)
+    bend = np.maximum(np.abs(line.kappa[:-1]), np.abs(np.diff(line.psi)) / step)
+    tightest = int(bend.argmax())
+    if bend[tightest] * minimum_radius > 1.0:
+        raise PathError(
+            f"{name}: no turn may be tighter than {minimum_radius} m, at s = "
+            f"{line.s[tightest]:.4g} m, X = {line.X[tightest]:.4g}, Y = {line.Y[tightest]:.4g} "
+            f"the radius is {1.0 / bend[tightest]:.3g} m; smooth or move the way-points"
+        )
+    return line
+
+
+def sample(spline: Any, knots: Array, spacing: float, name: str) -> Line:
+    """Sample a plane curve at equal steps of its arc length.
+
+    Parameters
+    ----------
+    spline : t -> (X, Y) with `.derivative(order)`, C2, polynomial between its knots.
+    knots : rising t, (k,).
+    spacing : longest step [m].
+    name : for messages.
+
+    Raises
+    ------
+    PathError
+        Where spacing does not suit the length.
+    """
+    velocity, acceleration = spline.derivative(1), spline.derivative(2)
+    # Quadrature needs pieces over which the speed changes little, even between far way-points.
+    t = np.interp(np.arange(PIECES * (knots.size - 1) + 1) / PIECES, np.arange(knots.size), knots)
+    half = 0.5 * np.diff(t)
+    nodes = t[:-1, None] + half[:, None] * (1.0 + LOBES)
+    length_at_t = np.append(0.0, np.cumsum(half * (_norm(velocity(nodes)) @ SHARES)))
+    try:
+        s = uniform_grid(float(length_at_t[-1]), spacing)
+    except PathError as error:
+        raise PathError(f"{name}: {error}") from None
+    at = _times(velocity, t, length_at_t, s)
+    (X, Y), (dX, dY), (ddX, ddY) = (f(at).T for f in (spline, velocity, acceleration))
+    kappa = (dX * ddY - dY * ddX) / (dX**2 + dY**2) ** 1.5
+    return Line(s, X, Y, np.unwrap(np.arctan2(dY, dX)), kappa)
+
+
+def _times(velocity: Any, t: Array, length_at_t: Array, s: Array) -> Array:
+    """Return where the arc length is s, by Newton's method from the last knot before it."""
+    i = np.clip(np.searchsorted(length_at_t, s, side="right") - 1, 0, t.size - 2)
+    rest = s - length_at_t[i]
+    at = t[i] + np.diff(t)[i] * rest / np.diff(length_at_t)[i]
+    for _ in range(20):
+        half = 0.5 * (at - t[i])
+        nodes = t[i][:, None] + half[:, None] * (1.0 + LOBES)
+        error = half * (_norm(velocity(nodes)) @ SHARES) - rest
+        at = np.clip(at - error / _norm(velocity(at)), t[i], t[i + 1])
+        if np.abs(error).max() < 1e-12 * s[-1]:
+            break
+    return np.asarray(at)
+
+
+def _norm(vectors: Array) -> Array:
+    return np.asarray(np.hypot(vectors[..., 0], vectors[..., 1]))
+
+
+def _checked(X: ArrayLike, Y: ArrayLike, closed: bool, name: str) -> Array:
+    """Return the way-points (k, 2), the first repeated at the end where the path is closed."""
+    X, Y = np.asarray(X, dtype=np.float64), np.asarray(Y, dtype=np.float64)
+    if X.ndim != 1 or X.shape != Y.shape:
+        raise PathError(f"{name}: X and Y must be (k,) alike, they are {X.shape} and {Y.shape}")
+    points = np.column_stack((X, Y))
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if bad.size:
+        raise PathError(
+            f"{name}: way-points must be finite, number {bad[0] + 1} is {points[bad[0]].tolist()}"
+        )
+    gaps = _norm(np.diff(points, axis=0))
+    if closed and gaps.size and _norm(points[0] - points[-1]) <= SAME * np.median(gaps):
+        points = points[:-1]
+    fewest = 4 if closed else 2
+    if len(points) < fewest:
+        kind = "a closed" if closed else "an open"
+        raise PathError(
+            f"{name}: {kind} path needs at least {fewest} different way-points, it has "
+            f"{len(points)}"
+        )
+    if closed:
+        points = np.vstack((points, points[:1]))
+    gaps = _norm(np.diff(points, axis=0))
+    same = np.flatnonzero(gaps <= SAME * np.median(gaps))
+    if same.size:
+        raise PathError(
+            f"{name}: neighboring way-points must differ, numbers {same[0] + 1} and "
+            f"{same[0] + 2} are both {points[same[0]].tolist()}"
+        )
+    return points
+
+
+def _fit(points: Array, closed: bool) -> Any:
+    """Interpolate by a C2 spline over its own arc length."""
+    t = np.append(0.0, np.cumsum(_norm(np.diff(points, axis=0))))
+    for _ in range(FITS):
+        spline = CubicSpline(t, points, bc_type="periodic" if closed else "natural")
+        half = 0.5 * np.diff(t)
+        nodes = t[:-1, None] + half[:, None] * (1.0 + LOBES)
+        lengths = half * (_norm(spline.derivative()(nodes)) @ SHARES)
+        t = np.append(0.0, np.cumsum(lengths))
+    return spline

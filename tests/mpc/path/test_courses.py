@@ -1,0 +1,83 @@
+import numpy as np
+import pytest
+
+from mpc.path import BUILT_IN, PathError, constant_radius, handling_course
+from mpc.path.courses import pairs_beside
+
+
+@pytest.fixture(scope="module")
+def course():
+    return handling_course()
+
+
+def crossings(X, Y):
+    """Pairs of steps of a polygon that cross, by the signs of the areas to both ends."""
+    a = np.column_stack((X[:-1], Y[:-1]))
+    b = np.column_stack((X[1:], Y[1:]))
+
+    def side(p, q, r):
+        along, to = (q - p)[:, None], r[None] - p[:, None]
+        return np.sign(along[..., 0] * to[..., 1] - along[..., 1] * to[..., 0])
+
+    apart = side(a, b, a) * side(a, b, b) < 0
+    i, j = np.nonzero(apart & apart.T)
+    return [(m, n) for m, n in zip(i, j, strict=True) if n > m + 1]
+
+
+def test_the_course_never_crosses_itself(course):
+    assert not crossings(course.X[::4], course.Y[::4])
+    planted = crossings(np.array([0.0, 10.0, 10.0, 5.0]), np.array([0.0, 0.0, 5.0, -5.0]))
+    assert planted == [(0, 2)]
+
+
+def test_other_legs_of_the_course_keep_a_width_of_the_road(course):
+    X, Y, s = course.X[:-1:4], course.Y[:-1:4], course.s[:-1:4]
+    along = np.abs(s[:, None] - s)
+    along = np.minimum(along, course.length - along)
+    apart = np.hypot(X[:, None] - X, Y[:, None] - Y)
+    assert apart[along > 60.0].min() > 8.0
+
+
+def test_the_course_has_turns_of_many_radii_to_both_sides(course):
+    held = np.abs(np.diff(course.kappa)) < 1e-9
+    radii = np.unique((1 / course.kappa[:-1][held & (np.abs(course.kappa[:-1]) > 1e-3)]).round(3))
+    assert sorted(radii) == pytest.approx([-35, -22, -12, 15, 18, 25, 30, 40, 45, 60], abs=1e-3)
+    assert 700.0 < course.length < 1000.0
+    assert course.lap_turn == pytest.approx(2 * np.pi)
+    assert abs(course.kappa[0]) < 1e-9 and abs(course.curvature(30.0)) < 1e-9
+
+
+def test_a_circle_is_entered_and_left_gently_on_either_side():
+    for left, side in ((True, 1.0), (False, -1.0)):
+        path = constant_radius(25.0, turns=1.25, left=left, run_in=20.0)
+        assert path.lap_turn == pytest.approx(side * 2.5 * np.pi)
+        assert np.abs(path.kappa).max() == pytest.approx(1 / 25.0)
+        assert np.all(side * path.kappa >= 0.0)
+        middle = (path.s > 40.0) & (path.s < path.length - 40.0)
+        radius = side * 25.0
+        X = path.X - radius * np.sin(path.psi)
+        Y = path.Y + radius * np.cos(path.psi)
+        center = X[middle][0], Y[middle][0]
+        np.testing.assert_allclose(X[middle], center[0], atol=1e-6)
+        np.testing.assert_allclose(Y[middle], center[1], atol=1e-6)
+        assert np.hypot(*(path.cones - center).T).max() < 25.0
+
+
+def test_cones_stand_beside_the_path(course):
+    cones = pairs_beside(course, gap=10.0, half_width=2.0)
+    near = [course.project(x, y).e_y for x, y in cones]
+    half = len(cones) // 2
+    assert near == pytest.approx([2.0] * half + [-2.0] * half, abs=1e-6)
+    assert len(cones) == 2 * round(course.length / 10.0)
+
+
+def test_the_names_of_the_command_line_build_paths():
+    assert set(BUILT_IN) == {"iso-3888-1", "iso-3888-2", "slalom", "circle", "course"}
+    with pytest.raises(TypeError):
+        BUILT_IN["mine"] = handling_course
+
+
+@pytest.mark.parametrize("numbers", [{"radius": -1.0}, {"turns": 0.0}, {"radius": np.nan}])
+def test_circles_that_are_none_are_refused(numbers):
+    with pytest.raises(PathError, match="radius must be positive"):
+        constant_radius(**{"radius": 30.0, **numbers})

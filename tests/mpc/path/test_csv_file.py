@@ -1,0 +1,72 @@
+import numpy as np
+import pytest
+
+from mpc.path import Path, PathError
+
+RING = [(30.0 * np.cos(a), 30.0 * np.sin(a)) for a in np.linspace(0, 2 * np.pi, 25)[:-1]]
+
+
+def write(folder, text):
+    file = folder / "track.csv"
+    file.write_text(text)
+    return file
+
+
+def rows(points, sep=","):
+    return "".join(f"{x:.6f}{sep}{y:.6f}\n" for x, y in points)
+
+
+@pytest.mark.parametrize("header", ["X_m,Y_m", "x,y", "# x_m,y_m", "\ufeffx, y", "X [m],Y [m]"])
+def test_the_usual_headers_are_understood(tmp_path, header):
+    path = Path.from_csv(write(tmp_path, f"{header}\n{rows(RING)}"))
+    assert path.closed
+    assert path.name == "track"
+    assert path.kappa == pytest.approx(1 / 30.0, rel=0.02)
+
+
+def test_other_columns_comments_and_empty_lines_do_not_matter(tmp_path):
+    lines = "".join(f"{k},{y},,{x}\n" for k, (x, y) in enumerate(RING))
+    path = Path.from_csv(write(tmp_path, f"n,y,note,x\n# a comment\n\n{lines}\n"))
+    np.testing.assert_allclose((path.X[0], path.Y[0]), RING[0], atol=1e-9)
+
+
+def test_an_open_path_stays_open_and_the_caller_decides(tmp_path):
+    half = write(tmp_path, "x,y\n" + rows(RING[:13]))
+    assert not Path.from_csv(half).closed
+    assert Path.from_csv(half, closed=True).closed
+    whole = write(tmp_path, "x,y\n" + rows(RING))
+    assert not Path.from_csv(whole, closed=False).closed
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "is empty"),
+        ("x,y\n", "no way-point"),
+        ("x,z\n1,2\n", r"column Y_m \(or y\) is missing, found 'x, z'"),
+        ("x;y\n1;2\n", "separated by commas"),
+        ("x_mm,y_mm\n1,2\n", "x_mm is not in meters"),
+        ("lat,lon\n48.1,11.5\n", "latitude and longitude"),
+        ("0.0,1.0\n1,2\n", "first line must name the columns"),
+        ("x,y,X_m\n1,2,3\n", "column X must be there once"),
+        ("x,y\n1,2\n3,abc\n", "y must be a finite number, line 3 has 'abc'"),
+        ("x,y\n1,2\n3,\n", "line 3 has ''"),
+        ("x,y\n1,2\n3\n", "line 3 has ''"),
+        ("x,y\n1,2\nnan,3\n", "x must be a finite number, line 3 has 'nan'"),
+        ("x,y\n1,2\n1,2\n3,4\n", "numbers 1 and 2 are both"),
+    ],
+)
+def test_bad_files_are_named_with_the_place(tmp_path, text, message):
+    file = write(tmp_path, text)
+    with pytest.raises(PathError, match=message) as caught:
+        Path.from_csv(file)
+    assert str(file) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_files_that_are_none_are_named(tmp_path):
+    with pytest.raises(PathError, match="no such file"):
+        Path.from_csv(tmp_path / "absent.csv")
+    (tmp_path / "binary.csv").write_bytes(b"x,y\n\xff\xfe\n")
+    with pytest.raises(PathError, match="UTF-8"):
+        Path.from_csv(tmp_path / "binary.csv")

@@ -1,0 +1,94 @@
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from mpc.path import Path, PathError
+from mpc.path.line import line_from_heading
+from mpc.path.sections import Straight, Turn, close, line_along
+
+RIGHT = Turn(radius=20.0, angle=-1.2, easing=8.0)
+
+
+def test_a_turn_turns_by_its_angle_and_reaches_its_radius():
+    s = np.linspace(0.0, RIGHT.length, 5001)
+    psi, kappa = RIGHT.heading(s)
+    assert psi[[0, -1]] == pytest.approx([0.0, -1.2])
+    assert kappa.min() == pytest.approx(-1 / 20.0)
+    assert kappa[[0, -1]] == pytest.approx(0.0)
+    assert np.gradient(psi, s)[1:-1] == pytest.approx(kappa[1:-1], abs=1e-6)
+
+
+def test_sections_end_where_quadrature_says():
+    line = line_along([Straight(length=10.0), RIGHT, Straight(length=5.0)], spacing=0.25)
+
+    def heading(s):
+        return (
+            float(RIGHT.heading(np.array([s - 10.0]))[0][0])
+            if 10.0 < s < 10.0 + RIGHT.length
+            else 0.0
+        )
+
+    X = 10.0 + quad(lambda s: np.cos(heading(s)), 10.0, 10.0 + RIGHT.length)[0] + 5.0 * np.cos(-1.2)
+    Y = quad(lambda s: np.sin(heading(s)), 10.0, 10.0 + RIGHT.length)[0] + 5.0 * np.sin(-1.2)
+    assert (line.X[-1], line.Y[-1]) == pytest.approx((X, Y), abs=1e-7)
+    assert line.s[-1] == pytest.approx(10.0 + RIGHT.length + 5.0)
+
+
+def corners(last):
+    turn = Turn(radius=15.0, angle=np.pi / 2, easing=6.0)
+    return [
+        Straight(length=40.0),
+        turn,
+        Straight(length=25.0),
+        turn,
+        Straight(length=10.0),
+        turn,
+        Straight(length=10.0),
+        last,
+    ]
+
+
+def test_two_straights_close_a_course():
+    course = close(corners(Turn(radius=15.0, angle=np.pi / 2, easing=6.0)), (4, 6))
+    assert [course[4].length, course[6].length] == pytest.approx([40.0, 25.0], abs=1e-6)
+    Path.from_line(line_along(course), name="rectangle", closed=True)
+
+
+def test_courses_that_cannot_close_are_refused():
+    right = Turn(radius=15.0, angle=np.pi / 2, easing=6.0)
+    with pytest.raises(PathError, match="must turn by 2 pi"):
+        close(corners(Turn(radius=15.0, angle=1.5, easing=6.0)), (4, 6))
+    with pytest.raises(PathError, match="must not be parallel"):
+        close(corners(right), (0, 4))
+    with pytest.raises(PathError, match="section 6 cannot close"):
+        close(
+            [
+                Straight(length=4.0),
+                *corners(right)[1:2],
+                Straight(length=2.0),
+                *corners(right)[3:4],
+                Straight(length=99.0),
+                right,
+                Straight(length=9.0),
+                Turn(radius=50.0, angle=np.pi / 2, easing=6.0),
+            ],
+            (4, 6),
+        )
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: Straight(length=0.0), "length of a straight"),
+        (lambda: Straight(length=np.nan), "length of a straight"),
+        (lambda: Turn(radius=-3.0, angle=1.0, easing=1.0), "radius and easing"),
+        (lambda: Turn(radius=3.0, angle=np.nan, easing=1.0), "radius and easing"),
+        (lambda: Turn(radius=10.0, angle=0.5, easing=6.0), "easing of at most 5 m"),
+        (lambda: line_along([]), "0 sections"),
+        (lambda: line_along([Straight(length=5.0)], spacing=0.0), "every 0.0 m"),
+        (lambda: line_from_heading(np.zeros(7), np.zeros(7), 1.0), r"4 n \+ 1 samples"),
+    ],
+)
+def test_sections_that_are_none_are_refused(build, message):
+    with pytest.raises(PathError, match=message):
+        build()
