@@ -1,8 +1,9 @@
 """The lane changes of ISO 3888: a double lane change (part 1) and obstacle avoidance (part 2).
 
-Lengths and widths of the lanes: ISO 3888-1:2018 and ISO 3888-2:2011, tables 1; b is the width of
-the car. x = 0 at the first cones, y = 0 in the middle of the first lane, the middle lane is to the
-left, and the right cones of the last lane are in line with those of the first.
+Lengths and widths of the lanes are those of ISO 3888-1:2018 and ISO 3888-2:2011 as public programs
+and papers give them, not checked against the text of the standards; b is the width of the car.
+x = 0 at the first cones, y = 0 in the middle of the first lane, the middle lane is to the left, and
+the right cones of the last lane are in line with those of the first.
     part 1: lanes 15, 25, 30 m (two of 15) with 30 and 25 m between them, 1.1 b + 0.25,
         1.2 b + 0.25, 1.3 b + 0.25 wide; the middle lane is offset by 3.5 m.
     part 2: lanes 12, 11, 12 m with 13.5 and 12.5 m between them, 1.1 b + 0.25, b + 1 and
