@@ -1,4 +1,4 @@
-"""Scalars as plain C99 statements: real float or double, no library calls but sqrt and fabs.
+"""Scalars as plain C99 statements: real float or double, no library calls but exact ones.
 
 Literals and functions go through macros of the prefix, `PREFIX_C(1.0)` and `PREFIX_SQRT(x)`, so
 that one text serves both precisions. Every compound operand is in parentheses.
@@ -9,12 +9,13 @@ from collections.abc import Callable, Mapping, Sequence
 
 from codegen.branches import CONDITIONS
 from codegen.graph import Graph, Node, UnknownOperationError
+from codegen.recognize import OWN
 
 Place = Callable[[int, int], str]  # (port, entry by columns) -> C expression
 
 FLOAT_MIN, FLOAT_MAX = 1.2e-38, 3.4e38  # normal numbers of float
 LONGEST = 72  # characters of an expression that is not given a name
-TWICE = ("sq", "fmin", "fmax")  # they write an argument twice
+TWICE = ("sq", "fmin", "fmax", "sign")  # they write an argument twice
 
 BINARY: Mapping[str, str] = {
     "add": "+",
@@ -28,8 +29,7 @@ BINARY: Mapping[str, str] = {
     "and": "&&",
     "or": "||",
 }
-CALLS: Mapping[str, str] = {"tanh": "tanh", "exp": "exp", "atan": "atan"}  # functions of our own
-MACROS: Mapping[str, str] = {"sqrt": "SQRT", "fabs": "FABS"}
+MACROS: Mapping[str, str] = {"sqrt": "SQRT", "fabs": "FABS", "floor": "FLOOR"}
 
 
 def literal(value: float, prefix: str) -> str:
@@ -81,6 +81,8 @@ class Statements:
             if graph.nodes[place].op in TWICE:
                 for argument in graph.nodes[place].args:
                     self.uses[argument] += 1
+        results = [place for entries in graph.outputs for place in entries]
+        self.results = {place for place in results if self.uses[place] == 1}  # named by their place
         self.text: dict[int, str] = {}
         self.lines: list[str] = []
         self.groups = _groups(graph)
@@ -145,7 +147,8 @@ class Statements:
             return
         text = self._plain(node)
         atomic = node.op in ("const", "input")
-        if not atomic and (self.uses[place] > 1 or len(text) > LONGEST):
+        long = len(text) > LONGEST and place not in self.results
+        if not atomic and (self.uses[place] > 1 or long):
             kind = "bool" if node.op in CONDITIONS else f"{self.prefix}_real"
             name = self._new("c" if node.op in CONDITIONS else "t")
             self.lines.append(f"const {kind} {name} = {_bare(text)};")
@@ -185,9 +188,10 @@ class Statements:
             "inv": lambda: f"({literal(1.0, self.prefix)} / {self._real(args[0])})",
             "sq": lambda: f"({self._real(args[0])} * {self._real(args[0])})",
             "twice": lambda: f"({literal(2.0, self.prefix)} * {self._real(args[0])})",
+            "sign": lambda: self._sign(args[0]),
             "fmin": lambda: self._smaller("<", *args),
             "fmax": lambda: self._smaller(">", *args),
-            "select": lambda: self._choice(args[0], args[1], self._real(args[2])),
+            "select": lambda: self._choice(args[0], args[1], self._short(args[2])),
             "if_else_zero": lambda: self._choice(args[0], args[1], literal(0.0, self.prefix)),
         }
         if op not in rules:
@@ -195,12 +199,29 @@ class Statements:
         return rules[op]()
 
     def _choice(self, condition: int, chosen: int, other: str) -> str:
-        return f"({self._condition(condition)} ? {self._real(chosen)} : {other})"
+        return f"({self._condition(condition)} ? {self._short(chosen)} : {other})"
+
+    def _short(self, place: int) -> str:
+        """Return a node as a number of one word: in a choice no operator stands beside another."""
+        text = self._real(place)
+        if " " not in text:
+            return text
+        name = self._new("t")
+        self.lines.append(f"const {self.prefix}_real {name} = {_bare(text)};")
+        if self.graph.nodes[place].op not in CONDITIONS:
+            self.text[place] = name
+        return name
 
     def _smaller(self, sign: str, a: int, b: int) -> str:
         """Return fmin or fmax; NaN in a gives b, as in C, NaN in b gives b."""
         one, other = self._real(a), self._real(b)
         return f"(({one} {sign} {other}) ? {one} : {other})"
+
+    def _sign(self, a: int) -> str:
+        """Return -1 or 1, and 0 and NaN as they are."""
+        text, zero, one = self._short(a), *(literal(x, self.prefix) for x in (0.0, 1.0))
+        positive = f"(({zero} < {text}) ? {one} : {text})"
+        return f"(({text} < {zero}) ? (-{one}) : {positive})"
 
 
 def _bare(text: str) -> str:
@@ -222,7 +243,7 @@ def _groups(graph: Graph) -> list[list[int]]:
     for place in graph.reached():
         node = graph.nodes[place]
         level[place] = max((level[a] for a in node.args), default=0)
-        if node.op in CALLS:
+        if node.op in OWN:
             level[place] += 1
             found.setdefault((node.op, level[place]), []).append(place)
     return list(found.values())

@@ -31,8 +31,11 @@ BUILDERS: Mapping[str, Callable[..., Any]] = {
     "or": ca.logic_or,
     "if_else_zero": lambda c, a: ca.if_else(c, a, 0),
     "select": ca.if_else,
+    "sign": ca.sign,
+    "floor": ca.floor,
     "sin": ca.sin,
     "cos": ca.cos,
+    "tan": ca.tan,
     "log": ca.log,
 }
 
@@ -134,17 +137,22 @@ def _usual(graph: Graph, op: str, args: tuple[int, ...]) -> Node:
 
 
 @contextmanager
-def as_written() -> Iterator[None]:
-    """Build SX expressions without CasADi's own simplifications, such as c/x for c (1/x)."""
+def simplifying(on: bool) -> Iterator[None]:
+    """Build SX expressions with or without CasADi's own simplifications, such as c/x for c (1/x).
+
+    Parameters
+    ----------
+    on : whether CasADi simplifies.
+    """
     before = ca.GlobalOptions.getSimplificationOnTheFly()
-    ca.GlobalOptions.setSimplificationOnTheFly(False)
+    ca.GlobalOptions.setSimplificationOnTheFly(on)
     try:
         yield
     finally:
         ca.GlobalOptions.setSimplificationOnTheFly(before)
 
 
-@as_written()
+@simplifying(False)
 def function_of(
     graph: Graph, like: ca.Function, builders: Mapping[str, Callable[..., Any]] = BUILDERS
 ) -> ca.Function:

@@ -1,20 +1,21 @@
 """Finding again, in the scalars of a function, what a person would have written there.
 
-a·[c] + b·[not c] is a choice; the scalars of our own tanh, exp and atan are one call each. Those of
-C libraries become calls of our own: they would differ from machine to machine.
+a·[c] + b·[not c] is a choice; the scalars of our own tanh, exp, atan and sin are one call each.
+Those of C libraries become calls of our own: they would differ from machine to machine.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
 import casadi as ca
 
-from codegen.elementary import atan, exp
-from codegen.graph import BUILDERS, Graph, Node, graph_of
+from codegen.elementary import atan, exp, sin
+from codegen.graph import BUILDERS, Graph, Node, graph_of, simplifying
 from codegen.tanh import tanh
 
-OWN: Mapping[str, Callable[[Any], Any]] = {"tanh": tanh, "exp": exp, "atan": atan}
+OWN: Mapping[str, Callable[[Any], Any]] = {"tanh": tanh, "exp": exp, "atan": atan, "sin": sin}
 EXPANDED = {**BUILDERS, **OWN}
 
 
@@ -31,9 +32,9 @@ def recognized(graph: Graph, *, whole: bool = True) -> Graph:
     result, found = _with_choices(graph), Graph()
     place_of: dict[int, int] = {}
     for place, node in enumerate(result.nodes):
-        place_of[place] = found.add(_mapped(node, place_of))
-        for name in OWN:
-            argument = _argument(result, place, *_template(name))
+        place_of[place] = _by_sines(found, _mapped(node, place_of))
+        for name, template, leaf in _templates():
+            argument = _argument(result, place, template, leaf)
             if argument is not None:
                 place_of[place] = found.add(Node(name, (place_of[argument],)))
     found.outputs = [[place_of[p] for p in entries] for entries in result.outputs]
@@ -66,13 +67,32 @@ def _choice(graph: Graph, node: Node) -> Node | None:
     return None
 
 
+def _by_sines(graph: Graph, node: Node) -> int:
+    """Add a node, cos x as sin(x + π/2) and tan x as their quotient; return its place."""
+    if node.op not in ("cos", "tan"):
+        return graph.add(node)
+    ahead = graph.add(Node("add", (*node.args, graph.constant(0.5 * math.pi))))
+    cosine = graph.add(Node("sin", (ahead,)))
+    if node.op == "cos":
+        return cosine
+    return graph.add(Node("div", (graph.add(Node("sin", node.args)), cosine)))
+
+
 @cache
-def _template(name: str) -> tuple[Graph, int]:
-    """Return the scalars of one of our own functions and the place of its argument."""
-    x = ca.SX.sym("x")
-    graph = _with_choices(graph_of(ca.Function(name, [x], [OWN[name](x)])))
-    leaf = next(i for i, node in enumerate(graph.nodes) if node.op == "input")
-    return graph, leaf
+def _templates() -> list[tuple[str, Graph, int]]:
+    """Return our own functions: name, scalars, place of the argument.
+
+    Each twice: simplified by CasADi, as where a person calls it, and as written, as in `tuned`.
+    """
+    found = []
+    for on in (True, False):
+        with simplifying(on):
+            for name, own in OWN.items():
+                x = ca.SX.sym("x")
+                graph = _with_choices(graph_of(ca.Function(name, [x], [own(x)])))
+                leaf = next(i for i, node in enumerate(graph.nodes) if node.op == "input")
+                found.append((name, graph, leaf))
+    return found
 
 
 def _argument(graph: Graph, place: int, template: Graph, leaf: int) -> int | None:

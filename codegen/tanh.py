@@ -71,3 +71,13 @@ def where(condition: Any, a: Any, b: Any) -> Any:
     """
     symbolic = isinstance(condition, ca.SX | ca.MX | ca.DM)
     return ca.if_else(condition, a, b) if symbolic else np.where(condition, a, b)
+
+
+def floor(x: Any) -> Any:
+    """Return the largest whole number that is not above x, entry by entry; exact everywhere.
+
+    Parameters
+    ----------
+    x : expression, array or number.
+    """
+    return ca.floor(x) if isinstance(x, ca.SX | ca.MX | ca.DM) else np.floor(x)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import casadi as ca
 
 from codegen.branches import assumed, decision
-from codegen.graph import Graph, as_written, function_of, graph_of
+from codegen.graph import Graph, function_of, graph_of, simplifying
 from codegen.recognize import EXPANDED, recognized
 from codegen.simplify import simplified
 
@@ -27,7 +27,7 @@ class Tuned(NamedTuple):
     where_false: ca.Function | None
 
 
-@as_written()
+@simplifying(False)
 def tuned(function: ca.Function, *, sampled: tuple[str, ...]) -> Tuned:
     """Return a function with our own tanh, exp and atan and without needless operations.
 

@@ -1,7 +1,9 @@
 """The C files of a folded step: header, equations, state and guards."""
 
+import math
 import re
-from collections.abc import Mapping
+import textwrap
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import casadi as ca
@@ -17,11 +19,17 @@ from identifier.export.layout import (
     initializer,
     output_members,
     read_expression,
-    sum_expression,
+    sum_terms,
     write_expression,
 )
 
 TEMPLATES = Path(__file__).parent / "c"
+MACROS: Mapping[str, tuple[str, str]] = {  # in float and in double
+    "PICK": ("PICK(x, y) x##F", "PICK(x, y) y"),
+    "SQRT": ("SQRT(x) sqrtf(x)", "SQRT(x) sqrt(x)"),
+    "FABS": ("FABS(x) fabsf(x)", "FABS(x) fabs(x)"),
+    "FLOOR": ("FLOOR(x) floorf(x)", "FLOOR(x) floor(x)"),
+}
 KEY = re.compile(r"@(\w+)@")
 
 
@@ -47,14 +55,29 @@ def c_sources(folded: FoldedStep, *, single: bool, about: Mapping[str, str]) -> 
     folded : the step.
     single : whether float is the default precision.
     about : title, method, version and hash, as text.
+
+    Raises
+    ------
+    UnknownOperationError
+        Where the method needs an operation that has no plain C.
+    ValueError
+        Where nothing is carried from step to step, or a carried value is not finite.
     """
+    if not folded.carry:
+        kind = type(folded.method).__name__
+        raise ValueError(f"{kind} is a formula without state: nothing to export")
+    for number in (number for value in folded.carry.values() for number in value.ravel()):
+        if not math.isfinite(number):
+            raise ValueError(f"a carried value must be finite to be exported, it is {number}")
     name = folded.name
     values = {**about, **_pieces(folded, single=single)}
+    equations, shell = filled("equations.c", values), filled("name.c", values)
+    values |= _macros(name, equations + shell)
     return {
         f"include/{name}.h": filled("name.h", values),
         f"src/{name}_equations.h": filled("equations.h", values),
-        f"src/{name}_equations.c": filled("equations.c", values),
-        f"src/{name}.c": filled("name.c", values),
+        f"src/{name}_equations.c": equations,
+        f"src/{name}.c": shell,
     }
 
 
@@ -66,8 +89,8 @@ def _pieces(folded: FoldedStep, *, single: bool) -> dict[str, str]:
     driving, called = _body(folded, folded.parts.where_true)
     decided, called_elsewhere = _decided(folded)
     limits = folded.limits
-    parts = (sum_expression(carried, name, "values->"), sum_expression(told, name, "out->"))
-    total = "\n        + ".join(parts)
+    terms = (*sum_terms(carried, name, "values->"), *sum_terms(told, name, "out->"))
+    total = _sum(terms, " " * 8)
     return {
         "single": str(int(single)),
         "dt": _number(folded.dt),
@@ -98,8 +121,9 @@ def _pieces(folded: FoldedStep, *, single: bool) -> dict[str, str]:
         "zeros": _zeros(told, name),
         "sum": total,
         "sum_function": _template("sum.c") if f"{name}_sum(" in total else "",
-        "weights_sum": sum_expression(
-            [member._replace(learnt=False) for member in learnt], name, "weights->"
+        "weights_sum": _sum(
+            sum_terms([member._replace(learnt=False) for member in learnt], name, "weights->"),
+            " " * 12,
         ),
         "keep": _keep(name, bool(learnt)),
         "hold": (
@@ -109,6 +133,9 @@ def _pieces(folded: FoldedStep, *, single: bool) -> dict[str, str]:
             if learnt
             else ""
         ),
+        "believed": folded.believed or "",
+        "believed_function": _template("believed.c") if folded.believed else "",
+        "judge": _template("judge.c") if folded.believed else "",
         "begin": _template("begin.c") if folded.rests_first else "",
         "first": (
             "        if (state->started == 0U) {\n"
@@ -118,6 +145,31 @@ def _pieces(folded: FoldedStep, *, single: bool) -> dict[str, str]:
             else ""
         ),
     }
+
+
+def _macros(name: str, text: str) -> dict[str, str]:
+    """Return the definitions of the macros that a text uses, in float and in double."""
+    used = [key for key in MACROS if f"{name.upper()}_{key}(" in text]
+    return {
+        f"macros_{kind}": "".join(f"#define {name.upper()}_{MACROS[key][i]}\n" for key in used)
+        for i, kind in enumerate(("single", "double"))
+    }
+
+
+def _wrapped(text: str, indent: str, width: int = 100) -> str:
+    return textwrap.fill(
+        text,
+        width,
+        initial_indent=indent,
+        subsequent_indent=indent + "  " * text.startswith("{"),
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def _sum(terms: Sequence[str], indent: str) -> str:
+    solid = " + ".join(term.replace(" ", "\xa0") for term in terms)
+    return _wrapped(solid, indent).replace("\xa0", " ")
 
 
 def _template(name: str) -> str:
@@ -166,7 +218,7 @@ def _decided(folded: FoldedStep) -> tuple[dict[str, str], set[str]]:
 
 
 def _functions(name: str, called: set[str]) -> str:
-    """Return our own tanh, exp and atan, each over an array, written from their one expression."""
+    """Return those of our own that are called, each over an array, written from one expression."""
     texts = []
     for own in sorted(called):
         x = ca.SX.sym("x")
@@ -180,15 +232,22 @@ def _functions(name: str, called: set[str]) -> str:
 
 
 def _start(folded: FoldedStep, learnt: list[Member], others: list[Member]) -> str:
-    def lines(members: list[Member]) -> list[str]:
-        return [
+    def lines(members: list[Member], indent: str) -> str:
+        texts = (
             initializer(folded.carry[m.signal.name], m.dimensions, folded.name) for m in members
-        ]
+        )
+        return ",\n".join(_by_rows(text, indent) for text in texts)
 
-    parts = lines(others)
-    if learnt:
-        parts = ["{ " + ",\n      ".join(lines(learnt)) + " }", *parts]
-    return "    " + ",\n    ".join(parts)
+    weights = f"    {{\n{lines(learnt, '        ')} }}" if learnt else ""
+    return ",\n".join(part for part in (weights, lines(others, "    ")) if part)
+
+
+def _by_rows(text: str, indent: str) -> str:
+    """Return the initializer of a matrix with its rows below one another."""
+    if not text.startswith("{ {"):
+        return _wrapped(text, indent)
+    rows = [f"{{ {row} }}" for row in text[4:-4].split(" }, { ")]
+    return f"{indent}{{\n" + ",\n".join(_wrapped(row, f"{indent}    ") for row in rows) + " }"
 
 
 def _zeros(members: list[Member], name: str) -> str:
@@ -199,7 +258,8 @@ def _keep(name: str, learns: bool) -> str:
     if not learns:
         return f"        state->values = {name}_start;\n"
     return (
-        f"        const {name}_weights weights = state->values.weights;\n"
+        f"        {name}_weights weights;\n"
+        "        weights = state->values.weights;\n"
         f"        state->values = {name}_start;\n"
         "        state->values.weights = weights;\n"
     )

@@ -44,6 +44,7 @@ class FoldedStep(NamedTuple):
     """A step without constants, where it starts, and what its ports mean.
 
     name : C identifier, prefix of everything that is exported.
+    method, vehicle : what it was folded from.
     function : SX function of the carried ports, then x (2,), u (2,), v_x; returns `p_next` of each
         carried port `p`, then the outputs, axle_force (2,) [N] first.
     parts : the same function in the parts that C is written from.
@@ -55,10 +56,14 @@ class FoldedStep(NamedTuple):
     dt : sampling interval [s].   min_speed : [m/s], below it forces read zero.
     rests_first : whether a run begins with one step at v_x = 0 of its first sample, in which the
         observer takes the measurement.
+    believed : carried port whose first five entries are the inputs that the step went on with,
+        older ones where a sample was not believed; None where the method has no such port.
     limits : of inputs and forces.
     """
 
     name: str
+    method: Method
+    vehicle: Vehicle
     function: ca.Function
     parts: Tuned
     carry: Mapping[str, Array]
@@ -69,6 +74,7 @@ class FoldedStep(NamedTuple):
     dt: float
     min_speed: float
     rests_first: bool
+    believed: str | None
     limits: Limits
 
 
@@ -118,6 +124,8 @@ def fold(
     told = sorted(setup.scan.outputs, key=lambda port: port != "axle_force")
     return FoldedStep(
         name=name,
+        method=method,
+        vehicle=vehicle,
         function=parts.function,
         parts=parts,
         carry={port: _matrix(value, step.size_in(port)) for port, value in setup.carry.items()},
@@ -130,6 +138,7 @@ def fold(
         rests_first=any(
             not np.array_equal(setup.carry[port], moved.carry[port]) for port in setup.carry
         ),
+        believed="gate" if isinstance(method, AxleDesign) else None,
         limits=Limits(
             speed=FROUDE * math.sqrt(GRAVITY * vehicle.wheelbase),
             yaw_rate=TURN * math.sqrt(GRAVITY / vehicle.wheelbase),

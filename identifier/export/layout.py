@@ -33,7 +33,7 @@ class Member(NamedTuple):
         return f"weights.{self.signal.name}" if self.learnt else self.signal.name
 
     def declaration(self, real: str) -> str:
-        """Return the line that declares it.
+        """Return what declares it, with a comment.
 
         Parameters
         ----------
@@ -41,7 +41,9 @@ class Member(NamedTuple):
         """
         sizes = "".join(f"[{size}]" for size in self.dimensions)
         _, unit, description, _ = self.signal
-        return f"    {real} {self.signal.name}{sizes}; /* {description} [{unit}] */\n"
+        code, words = f"    {real} {self.signal.name}{sizes};", f"/* {description} [{unit}] */"
+        line = f"{code} {words}\n"
+        return line if len(line) <= 100 else f"    {words}\n{code}\n"
 
     def element(self, entry: int) -> str:
         """Return the C index of an entry.
@@ -132,8 +134,8 @@ def initializer(value: Array, dimensions: tuple[int, ...], prefix: str) -> str:
     return "{ " + ", ".join(initializer(row, dimensions[1:], prefix) for row in rows) + " }"
 
 
-def sum_expression(members: list[Member], prefix: str, base: str) -> str:
-    """Return the sum of all numbers of members, which is finite where they are.
+def sum_terms(members: list[Member], prefix: str, base: str) -> list[str]:
+    """Return terms whose sum is that of all numbers of members, and finite where they are.
 
     Parameters
     ----------
@@ -148,4 +150,4 @@ def sum_expression(members: list[Member], prefix: str, base: str) -> str:
             terms.append(f"{prefix}_sum(&{place}{member.first}, {size}U)")
         else:
             terms += [f"{place}{member.element(entry)}" for entry in range(size)]
-    return "\n        + ".join(terms)
+    return terms

@@ -12,25 +12,20 @@ import numpy as np
 
 from identifier.export.fold import FoldedStep
 from identifier.export.signals import Signal
-from identifier.method import Method
 from identifier.model_format import vehicle_numbers
-from models.vehicle import Vehicle
 
 FORMAT = "tireid package 1"
 
 
-def ingredients(
-    folded: FoldedStep, method: Method, vehicle: Vehicle, *, single: bool
-) -> dict[str, Any]:
+def ingredients(folded: FoldedStep, *, single: bool) -> dict[str, Any]:
     """Return everything that a package is made of, ready for JSON.
 
     Parameters
     ----------
     folded : the step.
-    method : the method with its numbers.
-    vehicle : the car.
     single : whether float is the default precision.
     """
+    method = folded.method
     numbers: dict[str, Any] = (
         asdict(method) if is_dataclass(method) and not isinstance(method, type) else {}
     )
@@ -40,7 +35,7 @@ def ingredients(
         "tireid": tireid_version(),
         "precision": "float" if single else "double",
         "method": {"kind": type(method).__name__, **plain(numbers)},
-        "vehicle": plain(vehicle_numbers(vehicle)),
+        "vehicle": plain(vehicle_numbers(folded.vehicle)),
         "sample_time_s": folded.dt,
         "min_speed_m_s": folded.min_speed,
         "limits": {
@@ -60,6 +55,29 @@ def ingredients(
             }
             for signal in folded.carried
         ],
+    }
+
+
+def summary(folded: FoldedStep, content: Mapping[str, Any]) -> dict[str, str]:
+    """Return what texts say about a package: title, method, versions, hash, names and numbers.
+
+    Parameters
+    ----------
+    folded : the step.
+    content : what `ingredients` returned.
+    """
+    short, version = digest(content)[:12], tireid_version()
+    return {
+        "title": f"Tire forces of the car {folded.vehicle.name}",
+        "method": type(folded.method).__name__,
+        "version": version,
+        "hash": short,
+        "version_text": f"{folded.name} {short}, tireid {version}",
+        "single": str(int(content["precision"] == "float")),
+        "dt": f"{folded.dt:g}",
+        "min_speed": f"{folded.min_speed:.3g}",
+        "name": folded.name,
+        "NAME": folded.name.upper(),
     }
 
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 from identifier.export.c_source import c_sources, filled
 from identifier.export.fold import FoldedStep, fold
 from identifier.export.layout import Member, carried_members, output_members
-from identifier.export.manifest import digest, ingredients, manifest_text, tireid_version
-from identifier.export.vectors import vectors, vectors_header
+from identifier.export.manifest import ingredients, manifest_text, summary
+from identifier.export.vectors import SAMPLES, vectors, vectors_header
 from identifier.method import FrozenModel, Method
 from models.vehicle import Vehicle
 
@@ -61,23 +61,8 @@ def build_package(
             f"name must be lower-case letters, digits and _, at most 31, not {name!r}"
         )
     folded = fold(method, vehicle, start, name)
-    if not folded.carry:
-        raise ValueError(f"{type(method).__name__} is a formula without state: nothing to export")
-    content = ingredients(folded, method, vehicle, single=single)
-    short = digest(content)[:12]
-    version = tireid_version()
-    about = {
-        "title": f"Tire forces of {vehicle.name}",
-        "method": type(method).__name__,
-        "version": version,
-        "hash": short,
-        "version_text": f"{name} {short}, tireid {version}",
-        "single": str(int(single)),
-        "dt": f"{folded.dt:g}",
-        "min_speed": f"{folded.min_speed:.3g}",
-        "name": name,
-        "NAME": name.upper(),
-    }
+    content = ingredients(folded, single=single)
+    about = summary(folded, content)
     files = c_sources(folded, single=single, about=about)
     files |= _other_files(folded, about, single=single)
     return Package(folded, files | {f"{name}.json": manifest_text(content, files)}, about)
@@ -119,14 +104,10 @@ def readme(package: Package, about_figures: str) -> str:
         f"| `{m.path}` | {_shape(m)} | {m.signal.unit} | {m.signal.description} |\n"
         for m in carried
     )
-    modes = (
-        f"`{folded.name}_set_adaptation(&state, 0)` freezes what is learnt "
-        f"({', '.join(folded.learnt)}); observers and filters go on, so that adaptation may be "
-        "switched on again at any time. `_get_weights` and `_set_weights` store it and bring it "
-        "back, `_reset` begins anew with it, `_init` forgets it."
-        if folded.learnt
-        else "This method estimates a signal: there are no weights to read, set or freeze."
-    )
+    modes = _modes(folded)
+    tolerance = TOLERANCE_DOUBLE * folded.limits.force, TOLERANCE_SINGLE * folded.limits.force
+    equations = package.files[f"src/{folded.name}_equations.h"]
+    called = [f"`{word}`" for word in ("sqrt", "fabs", "floor") if f" {word}(x)" in equations]
     return filled(
         "README.md",
         {
@@ -134,10 +115,40 @@ def readme(package: Package, about_figures: str) -> str:
             "output_table": _table(output_members(folded)),
             "carry_table": carry_table,
             "modes": modes,
+            "implausible_row": _implausible_row(folded),
+            "libraries": f"{', '.join(called) or 'nothing'} of `<math.h>`, copies of structures",
+            "samples": str(SAMPLES),
+            "tolerance_double": f"{tolerance[0]:.2g}",
+            "tolerance_single": f"{tolerance[1]:.2g}",
             "figures": about_figures,
             **package.about,
         },
     )
+
+
+def _modes(folded: FoldedStep) -> str:
+    if not folded.learnt:
+        return "This method estimates a signal: there are no weights to read, set or freeze."
+    name = folded.name
+    learnt = ", ".join(folded.learnt)
+    return (
+        f"`{name}_set_adaptation(&state, false)` freezes what is learnt ({learnt});\n"
+        "observers and filters go on, so that it may be switched on again at any time. "
+        f"`{name}_get_weights` and\n`{name}_set_weights` store it and bring it back, "
+        f"`{name}_reset` begins anew with it, `{name}_init`\nforgets it."
+    )
+
+
+def _implausible_row(folded: FoldedStep) -> str:
+    """Return what is done with a sample that no car can be in, where the method judges that."""
+    if folded.believed is not None:
+        return (
+            "| 2 `IMPLAUSIBLE` | no car can be there, or get there within a sample | of the last "
+            "sample that was believed, zero where that lasts | hold | yes |\n"
+        )
+    if folded.parts.where_false is not None:
+        return "| 2 `IMPLAUSIBLE` | no car can be there | zero | hold | yes |\n"
+    return ""
 
 
 def _table(members: Sequence[Member]) -> str:

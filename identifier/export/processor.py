@@ -77,7 +77,20 @@ class ReplayError(RuntimeError):
 
 def missing_tools() -> tuple[str, ...]:
     """Return which of the tools for Arm are not there."""
-    return tuple(t for t in (CROSS_COMPILER, SIZE, EMULATOR) if shutil.which(t) is None)
+    missing = [t for t in (CROSS_COMPILER, SIZE, EMULATOR) if shutil.which(t) is None]
+    if CROSS_COMPILER not in missing and not _has_newlib():
+        missing.append(f"newlib of {CROSS_COMPILER}")
+    return tuple(missing)
+
+
+@cache
+def _has_newlib() -> bool:
+    command = [
+        CROSS_COMPILER,
+        "-print-file-name=nosys.specs",
+    ]  # answers with a path where there is one
+    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    return "/" in answer.stdout
 
 
 def replay_on(
@@ -167,10 +180,17 @@ def replay_here(
         return _result([str(folder / "replay")], folder)
 
 
-def flash_size(
+class Size(NamedTuple):
+    """Memory of a package itself [bytes]: code and constants, and data that may change."""
+
+    flash: int
+    static_ram: int
+
+
+def size_on(
     processor: Processor, name: str, files: Mapping[str, str], *, single: bool, level: str = "-O2"
-) -> int:
-    """Return the code and constants of a package on a processor [bytes].
+) -> Size:
+    """Return the memory that a package takes on a processor, instances not included.
 
     Parameters
     ----------
@@ -197,7 +217,8 @@ def flash_size(
             [SIZE, *objects], cwd=folder, capture_output=True, text=True, check=True
         )
         rows = [line.split() for line in answer.stdout.splitlines()[1:]]
-        return sum(int(row[0]) + int(row[1]) for row in rows)
+        text, data, bss = (sum(int(row[i]) for row in rows) for i in range(3))
+        return Size(flash=text + data, static_ram=data + bss)
 
 
 @cache

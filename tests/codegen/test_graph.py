@@ -4,9 +4,10 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from codegen import recognize
 from codegen.branches import assumed, decision
-from codegen.elementary import atan, exp
-from codegen.graph import Graph, Node, UnknownOperationError, function_of, graph_of
+from codegen.elementary import atan, exp, sin
+from codegen.graph import Graph, Node, UnknownOperationError, function_of, graph_of, simplifying
 from codegen.recognize import EXPANDED, recognized
 from codegen.simplify import simplified
 from codegen.tanh import tanh
@@ -56,20 +57,41 @@ def test_equal_expressions_are_one_node():
 
 
 def test_our_own_functions_are_found_again_and_those_of_libraries_replaced(rng):
-    x = ca.SX.sym("x", 3)
-    own = ca.Function("f", [x], [tanh(x[0]) + exp(x[1]) * atan(x[2])])
-    library = ca.Function("f", [x], [ca.tanh(x[0]) + ca.exp(x[1]) * ca.atan(x[2])])
-    for function in (own, library):
+    x = ca.SX.sym("x", 4)
+    own = ca.Function("f", [x], [tanh(x[0]) + exp(x[1]) * atan(x[2]) - sin(x[3])])
+    library = ca.Function("f", [x], [ca.tanh(x[0]) + ca.exp(x[1]) * ca.atan(x[2]) - ca.sin(x[3])])
+    with simplifying(False):
+        as_written = ca.Function("f", [x], [tanh(x[0]) + exp(x[1]) * atan(x[2]) - sin(x[3])])
+    for function in (own, library, as_written):
         found = operations(recognized(graph_of(function)))
-        assert {op: found.count(op) for op in ("tanh", "exp", "atan", "div")} == {
-            "tanh": 1,
-            "exp": 1,
-            "atan": 1,
-            "div": 0,
-        }
-    given = rng.normal(size=3)
+        names = ("tanh", "exp", "atan", "sin", "div", "floor")
+        assert [found.count(op) for op in names] == [1, 1, 1, 1, 0, 0]
+    given = rng.normal(size=4)
     rebuilt = function_of(recognized(graph_of(library)), library, EXPANDED)
     assert float(rebuilt(given)) == float(own(given))
+
+
+@pytest.mark.parametrize("simplify", [False, True])
+def test_who_asks_first_does_not_decide_what_is_found(simplify):
+    """The forms to look for are made once, under whichever option then holds."""
+    recognize._templates.cache_clear()
+    x = ca.SX.sym("x")
+    own = ca.Function("f", [x], [exp(x) * atan(x)])
+    with simplifying(simplify):
+        assert {"exp", "atan"} <= set(operations(recognized(graph_of(own))))
+    assert {"exp", "atan"} <= set(operations(recognized(graph_of(own))))
+
+
+def test_cosine_and_tangent_are_made_of_sines(rng):
+    x = ca.SX.sym("x", 2)
+    function = ca.Function("f", [x], [ca.vertcat(ca.cos(x[0]), ca.tan(x[1]))])
+    graph = recognized(graph_of(function))
+    assert not {"cos", "tan"} & set(operations(graph))
+    rebuilt = function_of(graph, function, EXPANDED)
+    given = rng.normal(size=2)
+    np.testing.assert_allclose(
+        np.array(rebuilt(given)).ravel(), [np.cos(given[0]), np.tan(given[1])], rtol=1e-11
+    )
 
 
 def test_what_only_looks_like_tanh_is_left_alone():

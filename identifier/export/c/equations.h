@@ -8,15 +8,9 @@
 
 #if @NAME@_SINGLE
 #define @NAME@_C(x) x##F
-#define @NAME@_PICK(x, y) x##F
-#define @NAME@_SQRT(x) sqrtf(x)
-#define @NAME@_FABS(x) fabsf(x)
-#else
+@macros_single@#else
 #define @NAME@_C(x) x
-#define @NAME@_PICK(x, y) y
-#define @NAME@_SQRT(x) sqrt(x)
-#define @NAME@_FABS(x) fabs(x)
-#endif
+@macros_double@#endif
 
 #ifdef __cplusplus
 extern "C" {

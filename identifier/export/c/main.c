@@ -57,9 +57,18 @@ static int find_columns(char *header, int column[SIGNALS])
     return 1;
 }
 
+/* Read a number; a column that the log has not is zero, a cell without a number is NaN. */
 static double number(char *piece[COLUMNS], int count, int column)
 {
-    return ((column >= 0) && (column < count)) ? strtod(piece[column], NULL) : 0.0;
+    double value = 0.0;
+    if (column >= 0) {
+        char *end = NULL;
+        value = strtod((column < count) ? piece[column] : "", &end);
+        if ((column >= count) || (end == piece[column])) {
+            value = strtod("nan", NULL);
+        }
+    }
+    return value;
 }
 
 int main(int argc, char *argv[])

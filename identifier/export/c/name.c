@@ -6,7 +6,8 @@
 #include "@name@_equations.h"
 
 static const @name@_values @name@_start = {
-@start@};
+@start@
+};
 
 @sum_function@/* Whether |x| <= limit, which NaN is not. */
 static bool @name@_within(@name@_real x, @name@_real limit)
@@ -32,7 +33,8 @@ static bool @name@_accepts(const @name@_params *params, const @name@_input *in)
 static bool @name@_believes(const @name@_params *params, const @name@_values *values,
     const @name@_output *out)
 {
-    const @name@_real sum = @sum@;
+    const @name@_real sum =
+@sum@;
     return @name@_finite(sum) && @name@_within(out->axle_force[0], params->max_force)
         && @name@_within(out->axle_force[1], params->max_force);
 }
@@ -77,7 +79,7 @@ static bool @name@_believes(const @name@_params *params, const @name@_values *va
     return status;
 }
 
-@begin@@name@_status @name@_step(@name@_state *state, const @name@_params *params, const @name@_input *input)
+@believed_function@@begin@@name@_status @name@_step(@name@_state *state, const @name@_params *params, const @name@_input *input)
 {
     @name@_values next;
     @name@_output out;

@@ -12,7 +12,8 @@
 {
     @name@_status status = @NAME@_BAD_CALL;
     if ((state != NULL) && (weights != NULL)) {
-        const @name@_real sum = @weights_sum@;
+        const @name@_real sum =
+@weights_sum@;
         if (@name@_finite(sum)) {
             state->values.weights = *weights;
             status = @NAME@_OK;
@@ -27,7 +28,10 @@
 {
     @name@_status status = @NAME@_BAD_CALL;
     if (state != NULL) {
-        state->adapts = adapts ? 1U : 0U;
+        state->adapts = 0U;
+        if (adapts) {
+            state->adapts = 1U;
+        }
         status = @NAME@_OK;
     }
     return status;

@@ -1,86 +1,44 @@
-"""C source of a folded step for the FMU: model.h, what is fixed, and model.c, what it does.
+"""C source of a folded step for the FMU: the files of the C package, and model.h, which names them.
 
-The step itself is text that CasADi generates. Carried values lie one after the other in one array,
-matrices by columns.
+What is simulated is what is shipped: the same equations, guards and status codes, in double.
 """
 
-import math
-from collections.abc import Iterable
+from pathlib import PurePosixPath
 
-import casadi as ca
-import numpy as np
-
+from identifier.export.c_source import c_sources
 from identifier.export.fold import FoldedStep
+from identifier.export.manifest import ingredients, summary
 
-HEADER = """/* Generated: one identifier, every number folded in. */
+HEADER = """/* Generated: which component the FMU holds. */
 #ifndef MODEL_H
 #define MODEL_H
 
-/* All names begin with that of the model, for programs that hold several. */
-#define MODEL(function) {name}_##function
+#include "{name}.h"
+
+/* All names begin with that of the component, for programs that hold several. */
+#define MODEL(name) {name}_##name
 
 #define MODEL_TOKEN "{token}"
-#define MODEL_DT {dt}        /* s, sampling interval */
-#define MODEL_MIN_SPEED {min_speed} /* m/s, below it forces are zero and learning rests */
-#define MODEL_CARRY {carry}      /* numbers carried from sample to sample, at least one */
-#define MODEL_RESTS_FIRST {rests_first} /* before the first sample the observer takes its values */
-
-extern const double MODEL(carry_start)[MODEL_CARRY];
-
-/* One sample: input is v_x, x = (v_y, r), u = (delta_f, delta_r); next and force are written. */
-void MODEL(kernel)(const double *carry, const double *input, double *next, double *force);
-
-/* With adaptation off, what has been learnt stays: next takes it from carry. */
-void MODEL(keep_learnt)(const double *carry, double *next);
+#define MODEL_DT {NAME}_SAMPLE_TIME
+#define MODEL_MIN_SPEED {NAME}_MIN_SPEED
 
 #endif
 """
 
-SOURCE = """/* Generated: see model.h. */
-#include "model.h"
 
-#include <stddef.h>
-#include <string.h>
-
-{generated}
-const double MODEL(carry_start)[MODEL_CARRY] = {{
-{start}
-}};
-
-void MODEL(kernel)(const double *carry, const double *input, double *next, double *force) {{
-  const double *arg[{sz_arg}] = {{{arguments}}};
-  double *res[{sz_res}] = {{{results}}};
-  double w[{sz_w}];
-  casadi_int iw[{sz_iw}];
-{clear}  {name}(arg, res, iw, w, 0);
-}}
-
-void MODEL(keep_learnt)(const double *carry, double *next) {{
-{kept}
-}}
-"""
-
-
-def model_header(folded: FoldedStep, token: str) -> str:
+def model_header(name: str, token: str) -> str:
     """Return model.h.
 
     Parameters
     ----------
-    folded : the step.
+    name : of the step.
     token : GUID of FMI 2.0, instantiation token of FMI 3.0.
     """
-    return HEADER.format(
-        name=folded.name,
-        token=token,
-        dt=literal(folded.dt),
-        min_speed=literal(folded.min_speed),
-        carry=max(sum(value.size for value in folded.carry.values()), 1),
-        rests_first=int(folded.rests_first),
-    )
+    return HEADER.format(name=name, NAME=name.upper(), token=token)
 
 
-def model_source(folded: FoldedStep) -> str:
-    """Return model.c.
+def model_files(folded: FoldedStep) -> dict[str, str]:
+    """Return header and sources of the C package by file name.
 
     Parameters
     ----------
@@ -88,57 +46,11 @@ def model_source(folded: FoldedStep) -> str:
 
     Raises
     ------
+    UnknownOperationError
+        Where the method needs an operation that has no plain C.
     ValueError
-        Where a carried value is not finite.
+        Where nothing is carried from step to step, or a carried value is not finite.
     """
-    step = folded.function
-    generator = ca.CodeGenerator("model.c", {"with_header": False})
-    generator.add(step)
-    sizes = [value.size for value in folded.carry.values()]
-    offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
-    ports = dict(zip(folded.carry, zip(offsets, sizes, strict=False), strict=False))
-    start = [float(number) for value in folded.carry.values() for number in value.ravel(order="F")]
-    kept = [
-        f"  memcpy(next + {first}, carry + {first}, {size} * sizeof(double)); /* {port} */"
-        for port, (first, size) in ports.items()
-        if port in folded.learnt
-    ]
-    return SOURCE.format(
-        generated=generator.dump(),
-        name=folded.name,
-        start=_rows(literal(number) for number in start or [0.0]),
-        clear="" if ports else "  next[0] = carry[0]; /* nothing is carried */\n",
-        sz_arg=step.sz_arg(),
-        sz_res=step.sz_res(),
-        sz_w=max(step.sz_w(), 1),
-        sz_iw=max(step.sz_iw(), 1),
-        arguments=", ".join(
-            [f"carry + {first}" for first, _ in ports.values()]
-            + ["&input[1]", "&input[3]", "input"]
-        ),
-        results=", ".join([f"next + {first}" for first, _ in ports.values()] + ["force"]),
-        kept="\n".join(kept) or "  (void)carry; /* nothing is learnt */\n  (void)next;",
-    )
-
-
-def literal(number: float) -> str:
-    """Return a C literal that reads back as the same double.
-
-    Parameters
-    ----------
-    number : finite.
-
-    Raises
-    ------
-    ValueError
-        Where it is not.
-    """
-    if not math.isfinite(number):
-        raise ValueError(f"a carried value must be finite to be exported, it is {number}")
-    return repr(float(number))
-
-
-def _rows(literals: Iterable[str], width: int = 4) -> str:
-    words = list(literals)
-    lines = [", ".join(words[i : i + width]) for i in range(0, len(words), width)]
-    return ",\n".join(f"  {line}" for line in lines)
+    about = summary(folded, ingredients(folded, single=False))
+    sources = c_sources(folded, single=False, about=about)
+    return {PurePosixPath(path).name: text for path, text in sources.items()}

@@ -11,7 +11,7 @@ from typing import Literal
 
 from identifier.export.fmu.binaries import build_binary, targets
 from identifier.export.fmu.description import build_description, description_2, description_3
-from identifier.export.fmu.model_source import model_header, model_source
+from identifier.export.fmu.model_source import model_files, model_header
 from identifier.export.fold import FoldedStep
 from models.files import write_atomically
 
@@ -41,7 +41,7 @@ def export_fmu(folded: FoldedStep, path: Path, version: Version = 2) -> None:
     Raises
     ------
     ValueError
-        Where the version is another, or a carried value not finite.
+        Where the version is another, nothing is carried, or a carried value is not finite.
     CompilationError
         Where a compiler refuses the sources.
     OSError
@@ -73,19 +73,21 @@ def fmu_text(folded: FoldedStep, version: Version) -> dict[str, str]:
     folded : the step.
     version : of FMI, 2 or 3.
     """
-    blank = _text_with(folded, version, "")
+    shared = model_files(folded)
+    blank = _text_with(folded, shared, version, "")
     content = "\0".join(f"{name}\0{text}" for name, text in sorted(blank.items()))
-    return _text_with(folded, version, _token(content))
+    return _text_with(folded, shared, version, _token(content))
 
 
-def _text_with(folded: FoldedStep, version: Version, token: str) -> dict[str, str]:
+def _text_with(
+    folded: FoldedStep, shared: Mapping[str, str], version: Version, token: str
+) -> dict[str, str]:
     templates = files(__package__) / "sources"
     text = {
         name: (templates / name).read_text(encoding="utf-8")
         for name in (*SHARED, *OF_VERSION[version])
     }
-    text["model.h"] = model_header(folded, token)
-    text["model.c"] = model_source(folded)
+    text |= {**shared, "model.h": model_header(folded.name, token)}
     c_files = sorted(name for name in text if name.endswith(".c"))
     members = {f"sources/{name}": content for name, content in text.items()}
     if version == 2:

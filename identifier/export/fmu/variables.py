@@ -60,8 +60,9 @@ def variables(folded: FoldedStep) -> tuple[Variable, ...]:
             "status",
             "integer",
             "",
-            "of the last sample: 0 running, 1 below the minimum speed, forces are zero, "
-            "2 an input is not finite, 3 a result is not finite; 2 and 3: sample ignored",
+            "of the last sample: 0 taken; 1 below the minimum speed, forces are zero; 2 it is one "
+            "that no car can be in, not learnt from; 3 an input or 4 a result is not finite or "
+            "beyond what any car reaches, state and forces as before",
         ),
         _output(9, "samples", "integer", "", "number of samples taken, those ignored included"),
         Variable(

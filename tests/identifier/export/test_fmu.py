@@ -271,11 +271,19 @@ def test_a_bad_sample_is_told_and_changes_nothing(master, bad, column):
     spoiled = inputs[30].copy()
     spoiled[column] = bad
     held = one.run(spoiled[None], 0.01, first=30)[0]
-    assert one.count(STATUS) == 2
+    assert one.count(STATUS) == 3
     assert (held == before).all()
     after = one.run(inputs[30:], 0.01, first=31)
     assert one.count(STATUS) == 0
     assert (after == in_python(swaying(60))["axle_force"][30:]).all()
+
+
+def test_a_sample_that_no_car_can_be_in_is_told(master):
+    inputs, one = rows(swaying(60)), master()
+    one.run(inputs[:30], 0.01)
+    inputs[30, 1] = 100.0  # m/s to the left
+    assert (one.run(inputs[30:31], 0.01, first=30) == 0.0).all()
+    assert one.count(STATUS) == 2
 
 
 def test_below_the_minimum_speed_forces_are_zero(master):

@@ -12,11 +12,13 @@ from identifier.defaults import default_design
 from identifier.export.fmu import binaries, export_fmu, package
 from identifier.export.fmu.package import fmu_text
 from identifier.export.fold import fold
+from identifier.export.package import build_package
 from models.vehicle import sedan
 
 fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")
 validation = pytest.importorskip("fmpy.validation")
 CAR = sedan()
+PARTS = ("include", "src")
 DESIGN = default_design(CAR)
 needs_compiler = pytest.mark.skipif(
     not binaries.targets(), reason="needs a C compiler on Linux x86-64"
@@ -68,6 +70,15 @@ def test_every_number_changes_the_token():
     assert len({token(step) for step in (same, *others)}) == 4
 
 
+def test_its_component_is_the_c_package():
+    shipped = build_package(DESIGN, CAR).files
+    shared = {path: text for path, text in shipped.items() if path.split("/")[0] in PARTS}
+    inside = fmu_text(fold(DESIGN, CAR), 3)
+    assert len(shared) == 4
+    for path, text in shared.items():
+        assert inside[f"sources/{path.split('/')[1]}"] == text
+
+
 def test_another_version_is_refused(tmp_path):
     with pytest.raises(ValueError, match="version must be 2 or 3, it is 1"):
         export_fmu(fold(DESIGN, CAR), tmp_path / "one.fmu", 1)
@@ -87,7 +98,7 @@ def test_without_a_compiler_it_holds_sources_only_and_says_so(exported, caplog, 
     with zipfile.ZipFile(exported[2]) as archive:
         names = archive.namelist()
     assert not [name for name in names if name.startswith("binaries")]
-    assert {"modelDescription.xml", "sources/model.c", "sources/fmi2.c"} <= set(names)
+    assert {"modelDescription.xml", "sources/tireid_equations.c", "sources/fmi2.c"} <= set(names)
 
 
 def test_a_start_that_is_not_finite_is_refused(tmp_path):

@@ -1,4 +1,4 @@
-/* The interface of FMI 2.0 for Co-Simulation. What it computes is in memory.c and model.c. */
+/* The interface of FMI 2.0 for Co-Simulation. What it computes is in memory.c and the component. */
 #include "fmi2Functions.h"
 
 #include <stdlib.h>
@@ -71,7 +71,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
   }
   memcpy(instance->name, instanceName, length);
   if (functions) instance->callbacks = *functions;
-  MODEL(start)(&instance->now);
+  MODEL(fmu_start)(&instance->now);
   return instance;
 }
 
@@ -118,7 +118,7 @@ fmi2Status fmi2Reset(fmi2Component c) {
   Instance *instance = c;
   if (!instance) return fmi2Error;
   instance->running = 0;
-  MODEL(start)(&instance->now);
+  MODEL(fmu_start)(&instance->now);
   return fmi2OK;
 }
 
@@ -134,27 +134,27 @@ fmi2Status fmi2Reset(fmi2Component c) {
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                        fmi2Real value[]) {
-  EACH(get_real, &value[i]);
+  EACH(fmu_get_real, &value[i]);
 }
 
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                           fmi2Integer value[]) {
-  EACH(get_integer, &value[i]);
+  EACH(fmu_get_integer, &value[i]);
 }
 
 fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                           fmi2Boolean value[]) {
-  EACH(get_boolean, &value[i]);
+  EACH(fmu_get_boolean, &value[i]);
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                        const fmi2Real value[]) {
-  EACH(set_real, value[i]);
+  EACH(fmu_set_real, value[i]);
 }
 
 fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                           const fmi2Boolean value[]) {
-  EACH(set_boolean, value[i]);
+  EACH(fmu_set_boolean, value[i]);
 }
 
 /* Of these there are none: right only where none is asked for. */
@@ -225,7 +225,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
   (void)noSetFMUStatePriorToCurrentPoint;
   if (!instance || !instance->running) return refuse(c, "a step before initialization");
   if (!(communicationStepSize >= 0.0)) return refuse(c, "the step size must not be negative");
-  if (MODEL(advance)(&instance->now, currentCommunicationPoint + communicationStepSize))
+  if (MODEL(fmu_advance)(&instance->now, currentCommunicationPoint + communicationStepSize))
     return refuse(c, "the communication point is no time");
   return fmi2OK;
 }

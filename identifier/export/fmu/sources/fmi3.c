@@ -1,4 +1,4 @@
-/* The interface of FMI 3.0 for Co-Simulation. What it computes is in memory.c and model.c. */
+/* The interface of FMI 3.0 for Co-Simulation. What it computes is in memory.c and the component. */
 #include "fmi3Functions.h"
 
 #include <stdlib.h>
@@ -61,7 +61,7 @@ fmi3Instance fmi3InstantiateCoSimulation(
   }
   instance->environment = instanceEnvironment;
   instance->log = logMessage;
-  MODEL(start)(&instance->now);
+  MODEL(fmu_start)(&instance->now);
   return instance;
 }
 
@@ -99,7 +99,7 @@ fmi3Status fmi3Reset(fmi3Instance c) {
   Instance *instance = c;
   if (!instance) return fmi3Error;
   instance->running = 0;
-  MODEL(start)(&instance->now);
+  MODEL(fmu_start)(&instance->now);
   return fmi3OK;
 }
 
@@ -116,18 +116,18 @@ fmi3Status fmi3Reset(fmi3Instance c) {
 
 fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference valueReferences[],
                           size_t nValueReferences, fmi3Float64 values[], size_t nValues) {
-  EACH(MODEL(get_real), &values[i]);
+  EACH(MODEL(fmu_get_real), &values[i]);
 }
 
 fmi3Status fmi3GetInt32(fmi3Instance c, const fmi3ValueReference valueReferences[],
                         size_t nValueReferences, fmi3Int32 values[], size_t nValues) {
-  EACH(MODEL(get_integer), &values[i]);
+  EACH(MODEL(fmu_get_integer), &values[i]);
 }
 
 /* A boolean is a bool here and an int in memory.h. */
 static int get_bool(const Memory *memory, fmi3ValueReference reference, fmi3Boolean *value) {
   int number = 0;
-  const int unknown = MODEL(get_boolean)(memory, reference, &number);
+  const int unknown = MODEL(fmu_get_boolean)(memory, reference, &number);
   *value = number != 0;
   return unknown;
 }
@@ -139,12 +139,12 @@ fmi3Status fmi3GetBoolean(fmi3Instance c, const fmi3ValueReference valueReferenc
 
 fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference valueReferences[],
                           size_t nValueReferences, const fmi3Float64 values[], size_t nValues) {
-  EACH(MODEL(set_real), values[i]);
+  EACH(MODEL(fmu_set_real), values[i]);
 }
 
 fmi3Status fmi3SetBoolean(fmi3Instance c, const fmi3ValueReference valueReferences[],
                           size_t nValueReferences, const fmi3Boolean values[], size_t nValues) {
-  EACH(MODEL(set_boolean), values[i]);
+  EACH(MODEL(fmu_set_boolean), values[i]);
 }
 
 fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *FMUState) {
@@ -206,7 +206,7 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 currentCommunicationPoint,
   (void)noSetFMUStatePriorToCurrentPoint;
   if (!instance || !instance->running) return refuse(c, "a step before initialization");
   if (!(communicationStepSize >= 0.0)) return refuse(c, "the step size must not be negative");
-  if (MODEL(advance)(&instance->now, currentCommunicationPoint + communicationStepSize))
+  if (MODEL(fmu_advance)(&instance->now, currentCommunicationPoint + communicationStepSize))
     return refuse(c, "the communication point is no time");
   *eventHandlingNeeded = fmi3False;
   *terminateSimulation = fmi3False;

@@ -4,54 +4,28 @@
 #include <math.h>
 #include <string.h>
 
-#ifdef __FAST_MATH__
-#error "fast math removes the guards against numbers that are not finite"
-#endif
-
 /* A sample is due this fraction of a sampling interval early, so that the rounding of a master's
    clock neither takes it twice nor leaves it out: a million additions err by less. */
 static const double EARLY = 1e-3;
 static const double FARTHEST = 9e15; /* samples that a double counts one by one */
 
-void MODEL(start)(Memory *memory) {
+void MODEL(fmu_start)(Memory *memory) {
   memset(memory, 0, sizeof *memory);
-  memory->adaptation = 1;
-  memcpy(memory->carry, MODEL(carry_start), sizeof memory->carry);
+  MODEL(default_params)(&memory->params);
+  MODEL(init)(&memory->state);
 }
 
-static int finite_all(const double *values, int count) {
-  int i;
-  for (i = 0; i < count; ++i)
-    if (!isfinite(values[i])) return 0;
-  return 1;
-}
-
-/* One sample: on success the carried values move on, else they stay. */
 static void take_sample(Memory *memory) {
-  double next[MODEL_CARRY], force[FORCES], first[INPUTS];
-  const double *input = memory->input;
-  if (!finite_all(input, INPUTS)) {
-    memory->status = STATUS_BAD_INPUT;
-    return;
-  }
-  if (MODEL_RESTS_FIRST && memory->samples == 0) {
-    memcpy(first, input, sizeof first);
-    first[0] = 0.0; /* standing, the observer takes the measurement */
-    MODEL(kernel)(memory->carry, first, next, force);
-    if (finite_all(next, MODEL_CARRY)) memcpy(memory->carry, next, sizeof next);
-  }
-  MODEL(kernel)(memory->carry, input, next, force);
-  if (!finite_all(next, MODEL_CARRY) || !finite_all(force, FORCES)) {
-    memory->status = STATUS_NOT_FINITE;
-    return;
-  }
-  if (!memory->adaptation) MODEL(keep_learnt)(memory->carry, next);
-  memcpy(memory->carry, next, sizeof next);
-  memcpy(memory->force, force, sizeof force);
-  memory->status = input[0] < MODEL_MIN_SPEED ? STATUS_BELOW_MIN_SPEED : STATUS_RUNNING;
+  MODEL(input) input;
+  input.v_x = memory->input[0];
+  input.v_y = memory->input[1];
+  input.r = memory->input[2];
+  input.delta_f = memory->input[3];
+  input.delta_r = memory->input[4];
+  memory->status = (int32_t)MODEL(step)(&memory->state, &memory->params, &input);
 }
 
-int MODEL(advance)(Memory *memory, double end_time) {
+int MODEL(fmu_advance)(Memory *memory, double end_time) {
   const double elapsed = (end_time - memory->start_time) / MODEL_DT;
   int64_t due;
   if (!(fabs(elapsed) < FARTHEST)) return 1;
@@ -61,13 +35,13 @@ int MODEL(advance)(Memory *memory, double end_time) {
   return 0;
 }
 
-int MODEL(get_real)(const Memory *memory, unsigned int reference, double *value) {
+int MODEL(fmu_get_real)(const Memory *memory, unsigned int reference, double *value) {
   if (reference == VR_TIME)
     *value = memory->time;
   else if (reference >= VR_INPUT && reference < VR_INPUT + INPUTS)
     *value = memory->input[reference - VR_INPUT];
   else if (reference >= VR_FORCE && reference < VR_FORCE + FORCES)
-    *value = memory->force[reference - VR_FORCE];
+    *value = memory->state.output.axle_force[reference - VR_FORCE];
   else if (reference == VR_SAMPLE_TIME)
     *value = MODEL_DT;
   else if (reference == VR_MIN_SPEED)
@@ -77,13 +51,13 @@ int MODEL(get_real)(const Memory *memory, unsigned int reference, double *value)
   return 0;
 }
 
-int MODEL(set_real)(Memory *memory, unsigned int reference, double value) {
+int MODEL(fmu_set_real)(Memory *memory, unsigned int reference, double value) {
   if (reference < VR_INPUT || reference >= VR_INPUT + INPUTS) return 1;
   memory->input[reference - VR_INPUT] = value;
   return 0;
 }
 
-int MODEL(get_integer)(const Memory *memory, unsigned int reference, int32_t *value) {
+int MODEL(fmu_get_integer)(const Memory *memory, unsigned int reference, int32_t *value) {
   if (reference == VR_STATUS)
     *value = memory->status;
   else if (reference == VR_SAMPLES) /* an Int32 for masters; the count itself goes on */
@@ -93,14 +67,14 @@ int MODEL(get_integer)(const Memory *memory, unsigned int reference, int32_t *va
   return 0;
 }
 
-int MODEL(get_boolean)(const Memory *memory, unsigned int reference, int *value) {
+int MODEL(fmu_get_boolean)(const Memory *memory, unsigned int reference, int *value) {
   if (reference != VR_ADAPTATION) return 1;
-  *value = memory->adaptation;
+  *value = memory->state.adapts != 0;
   return 0;
 }
 
-int MODEL(set_boolean)(Memory *memory, unsigned int reference, int value) {
+int MODEL(fmu_set_boolean)(Memory *memory, unsigned int reference, int value) {
   if (reference != VR_ADAPTATION) return 1;
-  memory->adaptation = value != 0;
+  memory->state.adapts = value != 0;
   return 0;
 }

@@ -24,36 +24,28 @@ enum {
   VR_MIN_SPEED = 12
 };
 
-enum {
-  STATUS_RUNNING = 0,
-  STATUS_BELOW_MIN_SPEED = 1, /* forces are zero, learning rests */
-  STATUS_BAD_INPUT = 2,       /* an input is not finite: sample ignored, forces held */
-  STATUS_NOT_FINITE = 3       /* the result is not finite: sample ignored, forces held */
-};
-
 /* Plain numbers: a copy of this is a saved state. */
 typedef struct {
   double time;
   double start_time;
   double input[INPUTS]; /* v_x, v_y, r, delta_f, delta_r */
-  double force[FORCES];
   int64_t samples;
-  int32_t status;
-  int32_t adaptation;
-  double carry[MODEL_CARRY];
+  int32_t status; /* of the component's last step */
+  MODEL(params) params;
+  MODEL(state) state;
 } Memory;
 
 /* All values as before the first sample. */
-void MODEL(start)(Memory *memory);
+void MODEL(fmu_start)(Memory *memory);
 
 /* Takes all samples before a time. Returns 0, or 1 where the time is no number or too far away. */
-int MODEL(advance)(Memory *memory, double end_time);
+int MODEL(fmu_advance)(Memory *memory, double end_time);
 
 /* Each returns 0, or 1 where there is no such variable. */
-int MODEL(get_real)(const Memory *memory, unsigned int reference, double *value);
-int MODEL(set_real)(Memory *memory, unsigned int reference, double value);
-int MODEL(get_integer)(const Memory *memory, unsigned int reference, int32_t *value);
-int MODEL(get_boolean)(const Memory *memory, unsigned int reference, int *value);
-int MODEL(set_boolean)(Memory *memory, unsigned int reference, int value);
+int MODEL(fmu_get_real)(const Memory *memory, unsigned int reference, double *value);
+int MODEL(fmu_set_real)(Memory *memory, unsigned int reference, double value);
+int MODEL(fmu_get_integer)(const Memory *memory, unsigned int reference, int32_t *value);
+int MODEL(fmu_get_boolean)(const Memory *memory, unsigned int reference, int *value);
+int MODEL(fmu_set_boolean)(Memory *memory, unsigned int reference, int value);
 
 #endif

@@ -1,0 +1,200 @@
+/* A million samples that no sensor should deliver; and ten instances side by side. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "@name@.h"
+
+static uint64_t seed;
+
+static uint64_t draw(void)
+{
+    seed ^= seed << 13;
+    seed ^= seed >> 7;
+    seed ^= seed << 17;
+    return seed;
+}
+
+static double uniform(void)
+{
+    return (double)(draw() >> 11) / 9007199254740992.0;
+}
+
+static @name@_real odd_number(void)
+{
+    const double zero = 0.0;
+    switch (draw() % 8U) {
+    case 0:
+        return (@name@_real)(zero / zero);
+    case 1:
+        return (@name@_real)(1.0 / zero);
+    case 2:
+        return (@name@_real)(-1.0 / zero);
+    case 3:
+        return (@name@_real)1e-42;
+    case 4:
+        return (@name@_real)(-1e-42);
+    case 5:
+        return (@name@_real)3e38;
+    case 6:
+        return (@name@_real)(1e3 * (uniform() - 0.5));
+    default:
+        return (@name@_real)0;
+    }
+}
+
+#define SPELL 200 /* samples of calm driving, then as many without sense */
+
+static @name@_input calm(long k)
+{
+    const double t = 0.01 * (double)k;
+    @name@_input in;
+    in.v_x = (@name@_real)(20.0 + 15.0 * sin(0.2 * t));
+    in.v_y = (@name@_real)(0.3 * sin(2.0 * t));
+    in.r = (@name@_real)(0.2 * sin(2.1 * t));
+    in.delta_f = (@name@_real)(0.03 * sin(2.2 * t));
+    in.delta_r = (@name@_real)(0.003 * sin(1.1 * t));
+    return in;
+}
+
+/* Plausible, stuck, reversed, at the limits, and anything at all. */
+static @name@_input next_input(@name@_input last, long k)
+{
+    @name@_input in = last;
+    const uint64_t kind = draw() % 16U;
+    if ((((k / SPELL) % 2) == 0) && ((draw() % 50U) != 0U)) {
+        return calm(k);
+    }
+    if (kind == 0U) {
+        return in; /* stuck */
+    }
+    if (kind == 1U) {
+        in.v_x = -in.v_x;
+        in.v_y = -in.v_y;
+        in.r = -in.r;
+        return in;
+    }
+    in.v_x = (@name@_real)(40.0 * uniform());
+    in.v_y = (@name@_real)(4.0 * (uniform() - 0.5));
+    in.r = (@name@_real)(2.0 * (uniform() - 0.5));
+    in.delta_f = (@name@_real)(0.6 * (uniform() - 0.5));
+    in.delta_r = (@name@_real)(0.2 * (uniform() - 0.5));
+    if (kind == 2U) {
+        in.v_x = (@name@_real)(290.0 * uniform());
+        in.v_y = (@name@_real)(580.0 * (uniform() - 0.5));
+        in.r = (@name@_real)(15.0 * (uniform() - 0.5));
+    } else if (kind < 8U) {
+        @name@_real *const field[5] = { &in.v_x, &in.v_y, &in.r, &in.delta_f, &in.delta_r };
+        *field[draw() % 5U] = odd_number();
+    }
+    return in;
+}
+
+static int all_finite(const @name@_values *values)
+{
+    @name@_real number[sizeof *values / sizeof(@name@_real)];
+    size_t i;
+    memcpy(number, values, sizeof number);
+    for (i = 0; i < sizeof number / sizeof number[0]; i++) {
+        if (!isfinite(number[i])) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+static int torture(@name@_params *params)
+{
+    static @name@_state state;
+    @name@_input in = { 0 };
+    uint32_t faults = 0;
+    uint32_t kinds[8] = { 0 };
+    long k;
+    seed = 88172645463325252U;
+    @name@_init(&state);
+    for (k = 0; k < 1000000; k++) {
+        const @name@_state before = state;
+        @name@_status status;
+        in = next_input(in, k);
+        status = @name@_step(&state, params, &in);
+        kinds[status]++;
+        faults += (status >= @NAME@_IMPLAUSIBLE) ? 1U : 0U;
+        if (state.faults != faults) {
+            printf("fault %ld was not counted\n", k);
+            return 1;
+        }
+        if (!all_finite(&state.values)) {
+            printf("the state is not finite after %ld\n", k);
+            return 1;
+        }
+        if (!(fabs((double)state.output.axle_force[0]) <= (double)params->max_force)
+            || !(fabs((double)state.output.axle_force[1]) <= (double)params->max_force)) {
+            printf("a force is beyond the limit after %ld\n", k);
+            return 1;
+        }
+        if ((status >= @NAME@_BAD_INPUT)
+            && ((memcmp(&before.values, &state.values, sizeof state.values) != 0)
+                || (memcmp(&before.output, &state.output, sizeof state.output) != 0))) {
+            printf("sample %ld was refused and changed the state\n", k);
+            return 1;
+        }
+    }
+    printf("ok %u rest %u implausible %u bad_input %u bad_result %u\n", kinds[0], kinds[1],
+        kinds[2], kinds[3], kinds[4]);
+    return 0;
+}
+
+#define INSTANCES 10
+#define STEPS 2000
+
+static void drive(@name@_state *state, const @name@_params *params, int which, int k)
+{
+    const double t = 0.01 * k;
+    @name@_input in;
+    in.v_x = (@name@_real)(10.0 + which);
+    in.v_y = (@name@_real)(0.3 * sin(2.0 * t + which));
+    in.r = (@name@_real)(0.2 * sin(2.1 * t + which));
+    in.delta_f = (@name@_real)(0.03 * sin(2.2 * t + which));
+    in.delta_r = (@name@_real)0;
+    (void)@name@_step(state, params, &in);
+}
+
+static int side_by_side(const @name@_params *params)
+{
+    static @name@_state together[INSTANCES];
+    static @name@_state alone;
+    static @name@_state moved;
+    int i;
+    int k;
+    for (i = 0; i < INSTANCES; i++) {
+        @name@_init(&together[i]);
+    }
+    for (k = 0; k < STEPS; k++) {
+        for (i = 0; i < INSTANCES; i++) {
+            if (k == STEPS / 2) { /* a state may be moved */
+                memcpy(&moved, &together[i], sizeof moved);
+                memset(&together[i], 0x5A, sizeof moved);
+                memcpy(&together[i], &moved, sizeof moved);
+            }
+            drive(&together[i], params, i, k);
+        }
+    }
+    for (i = 0; i < INSTANCES; i++) {
+        @name@_init(&alone);
+        for (k = 0; k < STEPS; k++) {
+            drive(&alone, params, i, k);
+        }
+        if (memcmp(&alone, &together[i], sizeof alone) != 0) {
+            printf("instance %d was disturbed\n", i);
+            return 1;
+        }
+    }
+    return memcmp(&together[0], &together[1], sizeof alone) == 0;
+}
+
+int main(void)
+{
+    static @name@_params params;
+    @name@_default_params(&params);
+    return torture(&params) || side_by_side(&params);
+}

@@ -1,0 +1,102 @@
+"""The same bits everywhere: two compilers here, two processors in QEMU, CasADi itself."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from identifier.export.compiled import CompiledPackage, samples_of
+from identifier.export.processor import PROCESSORS, missing_tools, replay_here, replay_on
+from identifier.export.vectors import run_in_virtual_machine
+
+needs_arm = pytest.mark.skipif(bool(missing_tools()), reason=f"needs {', '.join(missing_tools())}")
+LAWS = ("integral", "axle")
+
+
+@pytest.fixture(scope="module")
+def here(packages, samples):
+    """By law and precision, what gcc makes of the slalom on this machine."""
+    if shutil.which("gcc") is None:
+        pytest.skip("needs gcc")
+    return {
+        (law, single): replay_here("gcc", "tireid", packages[law].files, samples, single=single)
+        for law in LAWS
+        for single in (False, True)
+    }
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("single", [False, True])
+def test_clang_computes_the_bits_of_gcc(law, single, here, packages, samples):
+    if shutil.which("clang") is None:
+        pytest.skip("needs clang")
+    found = replay_here("clang", "tireid", packages[law].files, samples, single=single)
+    assert found.hash == here[law, single].hash
+    assert found.faults == here[law, single].faults
+
+
+@pytest.mark.parametrize("flags", ["-O0", "-O3", "-O3 -march=native", "-O2 -fno-trapping-math"])
+def test_optimization_does_not_change_a_bit(flags, here, packages, samples):
+    words = ["-std=c99", "-ffp-contract=off", *flags.split()]
+    found = replay_here(
+        "gcc", "tireid", packages["integral"].files, samples, single=True, flags=words
+    )
+    assert found.hash == here["integral", True].hash
+
+
+@needs_arm
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("single", [False, True])
+@pytest.mark.parametrize("processor", PROCESSORS, ids=[p.name for p in PROCESSORS])
+def test_the_processor_computes_the_bits_of_this_machine(
+    processor, law, single, here, packages, samples
+):
+    found = replay_on(
+        processor, "tireid", packages[law].files, samples, single=single, corrected=True
+    )
+    assert found.hash == here[law, single].hash
+    assert found.steps == len(samples)
+    assert found.faults == here[law, single].faults
+
+
+@needs_arm
+def test_one_bit_of_one_weight_would_be_noticed(here, packages, samples):
+    files = dict(packages["integral"].files)
+    place = "src/tireid_equations.c"
+    first = "next->weights.V[9][3] = "
+    assert files[place].count(first) >= 1
+    files[place] = files[place].replace(first, f"{first}(TIREID_C(1.0) + TIREID_C(1.2e-7)) * ", 1)
+    found = replay_on(PROCESSORS[0], "tireid", files, samples, single=True)
+    assert found.hash != here["integral", True].hash
+
+
+def test_faults_are_those_that_were_planted(here):
+    """The paper's law refuses NaN alone; the default does not believe a halt within a sample."""
+    for single in (False, True):
+        assert here["integral", single].faults == 1
+        assert here["axle", single].faults == 1 + 20
+
+
+def test_precisions_differ(here):
+    assert here["integral", False].hash != here["integral", True].hash
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_c_computes_the_bits_of_casadi_in_double(law, packages, slalom):
+    rows = samples_of(slalom)
+    run = CompiledPackage.of(packages[law], single=False)
+    told, carried = run_in_virtual_machine(packages[law].folded, rows)
+    shipped = run.run(slalom)
+    np.testing.assert_array_equal(shipped.axle_force, told[:, :2])
+    np.testing.assert_array_equal(np.column_stack(list(shipped.outputs.values())), told)
+    for name, value in run.weights.items():
+        np.testing.assert_array_equal(value, carried[name].reshape(value.shape))
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_float_is_within_a_tenth_of_a_newton_over_45_s(law, packages, slalom):
+    double, single = (
+        CompiledPackage.of(packages[law], single=choice).run(slalom).axle_force
+        for choice in (False, True)
+    )
+    assert 0.0 < np.abs(double - single).max() <= 0.1

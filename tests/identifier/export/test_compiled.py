@@ -1,0 +1,142 @@
+"""The shipped C from Python."""
+
+import numpy as np
+import pytest
+
+from codegen import find_compiler
+from identifier.export.compiled import (
+    CompiledPackage,
+    PackageFileError,
+    Status,
+    samples_of,
+)
+from identifier.export.package import build_package
+from identifier.identify import identify
+from identifier.methods import make_method
+from models.vehicle import sedan
+
+CAR = sedan()
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
+
+
+@pytest.mark.parametrize("law", ["integral", "axle"])
+def test_a_log_through_the_shipped_c_is_the_method_in_python(law, packages, slalom):
+    expected = identify(slalom, CAR, make_method(law, CAR)).axle_force
+    run = CompiledPackage.of(packages[law]).run(slalom)
+    assert np.abs(run.axle_force - expected).max() < 1e-6
+    assert (run.status == Status.OK).all()
+
+
+def test_sample_by_sample_is_the_whole_recording(packages, slalom):
+    one, all_at_once = (CompiledPackage.of(packages["integral"]) for _ in range(2))
+    rows = samples_of(slalom)[:200]
+    forces = np.array([one.step(*row)[1] for row in rows])
+    np.testing.assert_array_equal(forces, all_at_once.run_samples(rows).axle_force)
+    assert one.state == all_at_once.state
+
+
+@pytest.mark.parametrize("law", ["integral", "axle", "rls"])
+def test_frozen_c_is_the_frozen_model(law, slalom):
+    method = make_method(law, CAR)
+    run = CompiledPackage.of(build_package(method, CAR))
+    run.run(slalom)
+    learnt = run.weights
+    model = identify(slalom, CAR, method).freeze(float(slalom.t[-1]))
+    run.set_adaptation(False)
+    run.reset()
+    frozen = run.run(slalom).axle_force
+    assert np.abs(frozen - model.axle_force(slalom)).max() < 1e-6
+    for name, value in run.weights.items():
+        np.testing.assert_array_equal(value, learnt[name])
+
+
+def test_weights_go_from_one_instance_to_another(packages, slalom):
+    one, two = (CompiledPackage.of(packages["integral"]) for _ in range(2))
+    one.run(slalom)
+    assert np.abs(two.weights["W"]).max() == 0.0
+    two.set_weights(one.weights)
+    one.reset()
+    np.testing.assert_array_equal(one.run(slalom).axle_force, two.run(slalom).axle_force)
+
+
+def test_init_forgets_and_reset_keeps_what_was_learnt(packages, slalom):
+    run = CompiledPackage.of(packages["integral"])
+    first = run.run(slalom).axle_force
+    learnt = run.weights["W"]
+    run.reset()
+    np.testing.assert_array_equal(run.weights["W"], learnt)
+    run.init()
+    np.testing.assert_array_equal(run.run(slalom).axle_force, first)
+
+
+def test_every_status_is_told(packages):
+    run = CompiledPackage.of(packages["integral"])
+    assert run.step(20.0, 0.1, 0.1, 0.01)[0] == Status.OK
+    force = run.step(20.0, 0.1, 0.1, 0.01)[1]
+    assert run.step(0.0, 0.0, 0.0, 0.0)[0] == Status.REST
+    assert run.step(20.0, 100.0, 0.1, 0.01)[0] == Status.IMPLAUSIBLE
+    run.step(20.0, 0.1, 0.1, 0.01)
+    status, held = run.step(20.0, float("nan"), 0.1, 0.01)
+    assert status == Status.BAD_INPUT
+    np.testing.assert_allclose(held, force, rtol=0.05)
+    assert run.faults == 2
+
+
+def test_the_default_goes_on_with_the_last_sample_that_it_believes(packages):
+    run = CompiledPackage.of(packages["axle"])
+    for _ in range(100):
+        assert run.step(20.0, 0.1, 0.1, 0.01)[0] == Status.OK
+    before = run.step(20.0, 0.1, 0.1, 0.01)[1]
+    status, force = run.step(20.0, 8.0, 0.1, 0.01)
+    assert status == Status.IMPLAUSIBLE
+    np.testing.assert_allclose(force, before, rtol=0.05)
+    assert run.faults == 1
+    assert run.step(20.0, 0.1, 0.1, 0.01)[0] == Status.OK
+    for _ in range(26):
+        status, force = run.step(20.0, 100.0, 0.1, 0.01)
+    assert (status, *force) == (Status.IMPLAUSIBLE, 0.0, 0.0)
+    assert run.faults == 27
+
+
+def test_weights_that_do_not_fit_are_refused(packages):
+    run = CompiledPackage.of(packages["integral"])
+    weights = run.weights
+    with pytest.raises(ValueError, match="shapes"):
+        run.set_weights({"W": weights["W"]})
+    with pytest.raises(ValueError, match="finite"):
+        run.set_weights({**weights, "W": np.full((2, 10), np.nan)})
+
+
+def test_a_signal_has_no_weights(slalom):
+    run = CompiledPackage.of(build_package(make_method("eso", CAR), CAR))
+    assert run.weights == {}
+    with pytest.raises(ValueError, match="nothing to freeze"):
+        run.set_adaptation(False)
+    assert np.abs(run.run(slalom).axle_force - slalom.axle_force)[500:].max() < 3000.0
+
+
+def test_a_folder_is_loaded_with_its_own_precision(write, slalom):
+    package = build_package(make_method("integral", CAR), CAR, single=True, name="mine")
+    folder = write(package)
+    from_folder = CompiledPackage.from_folder(folder)
+    assert from_folder.single
+    assert from_folder.version.startswith(f"mine {package.about['hash']}")
+    np.testing.assert_array_equal(
+        from_folder.run(slalom).axle_force, CompiledPackage.of(package).run(slalom).axle_force
+    )
+
+
+def test_a_folder_without_a_package_is_refused(tmp_path):
+    (tmp_path / "other.json").write_text("{}")
+    with pytest.raises(PackageFileError, match="no package"):
+        CompiledPackage.from_folder(tmp_path)
+
+
+def test_a_recording_of_another_interval_is_refused(packages, drive):
+    with pytest.raises(ValueError, match="sampled at"):
+        CompiledPackage.of(packages["integral"]).run(drive(n=100, dt=0.02))
+
+
+def test_samples_of_another_shape_are_refused(packages):
+    with pytest.raises(ValueError, match=r"\(n, 5\)"):
+        CompiledPackage.of(packages["integral"]).run_samples(np.zeros((3, 4)))

@@ -1,0 +1,63 @@
+"""What the paper's network (n_h = 10) costs in float on a Cortex-M4F: the targets are kept."""
+
+import json
+
+import pytest
+
+from identifier.export.figures import figures_text, measure, with_figures
+from identifier.export.processor import PROCESSORS, missing_tools, replay_on, size_on
+
+pytestmark = pytest.mark.skipif(bool(missing_tools()), reason=f"needs {', '.join(missing_tools())}")
+
+
+def test_the_paper_s_network_keeps_the_targets(packages, samples):
+    package = packages["integral"]
+    found = replay_on(PROCESSORS[0], "tireid", package.files, samples, single=True)
+    assert 1000 < found.instructions <= 2000
+    assert found.most_instructions <= 2600  # the first sample counts twice
+    assert 256 < found.stack <= 800
+    size = size_on(PROCESSORS[0], "tireid", package.files, single=True)
+    assert size.static_ram == 0
+    assert found.state + found.params <= 400
+    assert 4000 < size.flash <= 7000
+
+
+def test_the_counter_counts(packages, samples):
+    """A thousand additions more are a thousand additions and their loop."""
+    package = packages["integral"]
+    files = dict(package.files)
+    place = "src/tireid.c"
+    files[place] = files[place].replace(
+        "    tireid_status status;\n    if ((state == NULL) || (params",
+        "    tireid_status status;\n    volatile int i = 0;\n    while (i < 1000) {\n        i++;\n"
+        "    }\n    if ((state == NULL) || (params",
+    )
+    assert files[place] != package.files[place]
+    before, after = (
+        replay_on(PROCESSORS[0], "tireid", one, samples[:500], single=True).instructions
+        for one in (package.files, files)
+    )
+    assert 5000 <= after - before <= 8500
+
+
+def test_data_that_may_change_would_be_counted(packages):
+    files = dict(packages["integral"].files)
+    files["src/tireid.c"] += "int tireid_calls;\nint tireid_most = 7;\n"
+    assert size_on(PROCESSORS[0], "tireid", files, single=True).static_ram == 8
+
+
+def test_the_table_has_a_row_for_each_processor_and_precision(packages):
+    costs = measure(packages["integral"])
+    text = figures_text(costs)
+    assert [(cost.processor, cost.single) for cost in costs] == [
+        ("Cortex-M4F", True),
+        ("Cortex-M4F", False),
+        ("Cortex-M7", True),
+        ("Cortex-M7", False),
+    ]
+    assert text.count("\n| Cortex") == 4
+    assert text.count(" | 0 + ") == 4  # no static RAM
+    manifest = json.loads(with_figures(packages["integral"].files["tireid.json"], costs))
+    assert [one["ram_B"] for one in manifest["figures"]] == [cost.ram for cost in costs]
+    assert manifest["hash"].startswith(packages["integral"].about["hash"])
+    assert str(costs[0].replay.instructions) in text

@@ -1,0 +1,94 @@
+"""A folded step against the method that it came from."""
+
+import numpy as np
+import pytest
+
+from codegen import Scan
+from identifier.export.compiled import samples_of
+from identifier.export.fold import FoldedStep, fold
+from identifier.export.vectors import run_in_virtual_machine, synthetic_samples
+from identifier.identify import identify
+from identifier.methods import METHODS, make_method
+from models.vehicle import sedan
+
+CAR = sedan()
+
+
+def run_folded(folded: FoldedStep, recording):
+    scan = Scan(folded.function, carry=tuple(folded.carry), over=("x", "u", "v_x"))
+    carry = dict(folded.carry)
+    if folded.rests_first:
+        names = list(carry)
+        rested = folded.function(*carry.values(), recording.x[0], recording.u[0], 0.0)
+        carry = dict(zip(names, map(np.array, rested[: len(names)]), strict=True))
+    signals = {"x": recording.x, "u": recording.u, "v_x": recording.v_x}
+    return scan(recording.t.size, {**carry, **signals})["axle_force"]
+
+
+@pytest.mark.parametrize("law", [law for law in METHODS if law != "concurrent"])
+def test_the_folded_step_is_the_method_up_to_rounding(law, slalom):
+    method = make_method(law, CAR)
+    folded = fold(method, CAR)
+    expected = identify(slalom, CAR, method).axle_force
+    error = np.abs(run_folded(folded, slalom) - expected).max()
+    assert error <= 1e-6  # N, of 5000; the tires' own sin, cos and exp are far from exact
+
+
+def test_a_forgotten_constant_would_be_noticed(slalom):
+    other = make_method("integral", CAR, seed=1)
+    expected = identify(slalom, CAR, make_method("integral", CAR)).axle_force
+    assert np.abs(run_folded(fold(other, CAR), slalom) - expected).max() > 1.0
+
+
+def test_a_run_starts_with_weights_that_were_learnt(slalom):
+    method = make_method("integral", CAR)
+    model = identify(slalom, CAR, method).freeze(40.0)
+    np.testing.assert_array_equal(fold(method, CAR, model).carry["W"], model.weights.W)
+
+
+def test_the_paper_s_step_takes_fewer_operations_than_it_was_written_in():
+    folded = fold(make_method("integral", CAR), CAR)
+    assert folded.parts.where_true.n_instructions() < 1300
+    assert folded.parts.where_false.n_instructions() < 200
+
+
+def test_observers_begin_with_the_first_measurement_filters_do_not():
+    assert fold(make_method("integral", CAR), CAR).rests_first
+    assert not fold(make_method("axle", CAR), CAR).rests_first
+    assert not fold(make_method("rls", CAR), CAR).rests_first
+
+
+def test_what_is_learnt_is_told_apart_from_filters():
+    assert fold(make_method("integral", CAR), CAR).learnt == ("W", "V")
+    assert "filters" not in fold(make_method("axle", CAR), CAR).learnt
+    assert {"W", "P"} <= set(fold(make_method("rls", CAR), CAR).learnt)
+    assert fold(make_method("eso", CAR), CAR).learnt == ()
+
+
+@pytest.mark.parametrize("law", ["integral", "axle", "rls", "eso", "ekf_force"])
+def test_every_port_has_a_unit_and_words(law):
+    folded = fold(make_method(law, CAR), CAR)
+    assert [signal.name for signal in folded.carried] == list(folded.carry)
+    for signal in (*folded.inputs, *folded.outputs, *folded.carried):
+        assert signal.unit
+        assert signal.description
+    assert folded.outputs[0].name == "axle_force"
+
+
+def test_synthetic_samples_rest_drive_and_rest_again():
+    folded = fold(make_method("integral", CAR), CAR)
+    samples = synthetic_samples(folded)
+    resting = samples[:, 0] < folded.min_speed
+    assert resting[0]
+    assert resting[len(samples) // 2]
+    assert (~resting).sum() > 150
+    outputs, _ = run_in_virtual_machine(folded, samples)
+    assert (outputs[resting, :2] == 0.0).all()
+    assert np.abs(outputs[~resting, :2]).max() > 500.0
+
+
+def test_samples_are_in_the_order_of_the_inputs(slalom):
+    rows = samples_of(slalom)
+    folded = fold(make_method("integral", CAR), CAR)
+    for column, signal in zip(rows.T, folded.inputs, strict=True):
+        np.testing.assert_array_equal(column, getattr(slalom, signal.name))

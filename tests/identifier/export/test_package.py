@@ -1,0 +1,224 @@
+"""A package: no warnings, no foreign symbols, the same bytes, built and tested by its own files."""
+
+import hashlib
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.export.package import PackageNameError, build_package, readme
+from identifier.methods import METHODS, make_method
+from identifier.network import Network
+from models.recordings import write_recording
+from models.vehicle import sedan
+from tests.identifier.export.conftest import STRICT
+
+CAR = sedan()
+MISRA_FINDINGS = 2  # may only become fewer: one operator ##, one macro for users alone
+ALLOWED = {"sqrt", "sqrtf", "floor", "floorf", "memcpy", "memset"}
+
+
+@pytest.mark.parametrize("law", ["integral", "axle"])
+@pytest.mark.parametrize("single", [0, 1])
+def test_no_compiler_has_anything_to_say(law, single, compiler, packages, write, run):
+    folder = write(packages[law])
+    define = f"-DTIREID_SINGLE={single}"
+    sources = ["src/tireid.c", "src/tireid_equations.c", "examples/main.c", "tests/test_tireid.c"]
+    for source in sources:
+        answer = run(
+            compiler, *STRICT, "-O2", define, "-Iinclude", "-Isrc", "-c", source, cwd=folder
+        )
+        assert (answer.returncode, answer.stderr) == (0, ""), source
+
+
+def test_the_warnings_are_on(compiler, packages, write, run):
+    folder = write(packages["integral"])
+    source = folder / "src" / "tireid.c"
+    source.write_text(source.read_text() + "static float half(double x) { return x / 2; }\n")
+    answer = run(compiler, *STRICT, "-Iinclude", "-Isrc", "-c", "src/tireid.c", cwd=folder)
+    assert answer.returncode != 0
+
+
+@pytest.mark.parametrize("law", ["integral", "axle", "rls", "magic_formula_ekf"])
+def test_symbols_begin_with_the_name_and_nothing_is_called_but_roots_and_copies(
+    law, compiler, write, run
+):
+    folder = write(build_package(make_method(law, CAR), CAR, name="left"))
+    flags = ["-std=c99", "-O2", "-fno-stack-protector", "-Iinclude", "-Isrc", "-c"]
+    for source in ("left", "left_equations"):
+        run(compiler, *flags, f"src/{source}.c", "-o", f"{source}.o", cwd=folder)
+        symbols = [
+            line.split()[-2:] for line in run("nm", f"{source}.o", cwd=folder).stdout.splitlines()
+        ]
+        own = {name for kind, name in symbols if kind in "TDBRC"}
+        foreign = {name for kind, name in symbols if kind == "U" and not name.startswith("left_")}
+        assert own
+        assert all(name.startswith("left_") for name in own)
+        assert foreign <= ALLOWED
+
+
+def test_fast_math_is_refused(compiler, packages, write, run):
+    folder = write(packages["integral"])
+    for flag in ("-Ofast", "-ffast-math", "-ffinite-math-only"):
+        answer = run(compiler, flag, "-Iinclude", "-Isrc", "-c", "src/tireid.c", cwd=folder)
+        assert answer.returncode != 0
+        assert "guards against NaN" in answer.stderr
+
+
+def test_misra_findings_do_not_grow(packages, write, run):
+    folder = write(packages["integral"])
+    answer = run(
+        *["cppcheck", "--addon=misra", "--std=c99", "-DTIREID_SINGLE=1", "-Iinclude", "-Isrc"],
+        "src/tireid.c",
+        "src/tireid_equations.c",
+        cwd=folder,
+    )
+    if "misra" not in answer.stderr:
+        pytest.skip("needs the MISRA addon of cppcheck")
+    findings = set(re.findall(r"^(\S+:\d+):.*\[(misra-\S+)\]$", answer.stderr, re.M))
+    assert len(findings) == MISRA_FINDINGS, sorted(findings)
+
+
+@pytest.mark.parametrize("law", ["integral", "axle", "concurrent"])
+def test_the_same_input_gives_the_same_bytes(law):
+    one, two = (build_package(make_method(law, CAR), CAR) for _ in range(2))
+    assert one.files == two.files
+    assert readme(one, "") == readme(two, "")
+
+
+def test_everything_that_goes_in_changes_the_hash():
+    design = make_method("integral", CAR)
+    packages = [
+        build_package(design, CAR),
+        build_package(design, CAR, single=True),
+        build_package(design, CAR, name="other"),
+        build_package(replace(design, seed=1), CAR),
+        build_package(replace(design, gains=replace(design.gains, rho_W=0.0)), CAR),
+        build_package(design, replace(CAR, mass=CAR.mass + 1.0)),
+        build_package(replace(design, network=Network(hidden=11)), CAR),
+    ]
+    assert len({package.about["hash"] for package in packages}) == len(packages)
+
+
+def test_the_manifest_tells_all_that_went_in(packages):
+    files = packages["integral"].files
+    manifest = json.loads(files["tireid.json"])
+    design = make_method("integral", CAR)
+    assert manifest["method"]["gains"]["eta_W"] == design.gains.eta_W
+    assert manifest["method"]["gains"]["W_max"] == "inf"
+    assert manifest["vehicle"]["mass"] == CAR.mass
+    for one in (*manifest["inputs"], *manifest["outputs"], *manifest["carried"]):
+        assert one["unit"]
+        assert one["description"]
+    for path, hashed in manifest["files_sha256"].items():
+        assert hashlib.sha256(files[path].encode()).hexdigest() == hashed
+    assert manifest["hash"].startswith(packages["integral"].about["hash"])
+    start = {one["name"]: np.array(one["start"]) for one in manifest["carried"]}
+    np.testing.assert_array_equal(
+        start["V"], design.network.initial_weights(np.random.default_rng(0)).V
+    )
+
+
+@pytest.mark.parametrize("name", ["Upper", "1st", "with-dash", "", "a" * 32])
+def test_names_that_are_not_of_c_are_refused(name):
+    with pytest.raises(PackageNameError, match="name must be"):
+        build_package(make_method("integral", CAR), CAR, name=name)
+
+
+def test_a_formula_is_not_exported():
+    with pytest.raises(ValueError, match="formula without state"):
+        build_package(make_method("linear", CAR), CAR)
+
+
+def test_nothing_is_left_to_fill_in(packages):
+    for package in packages.values():
+        for path, text in {**package.files, "README.md": readme(package, "none")}.items():
+            assert "@" not in text, path
+
+
+@pytest.mark.parametrize("law", ["integral", "axle"])
+@pytest.mark.parametrize("single", ["OFF", "ON"])
+def test_cmake_builds_and_the_self_test_passes(law, single, packages, write, run, slalom, tmp_path):
+    folder = write(packages[law])
+    answer = run("cmake", "-B", "build", f"-DTIREID_SINGLE={single}", cwd=folder)
+    assert answer.returncode == 0, answer.stderr
+    assert run("cmake", "--build", "build", cwd=folder).returncode == 0
+    assert run("ctest", "--test-dir", "build", cwd=folder).returncode == 0
+    log = tmp_path / "log.csv"
+    write_recording(slalom, log)
+    answer = run(str(folder / "build" / "tireid_example"), str(log))
+    forces = np.loadtxt(answer.stdout.splitlines()[1:], delimiter=",")
+    assert forces.shape == (slalom.t.size, 4)
+    error = forces[2000:, 1:3] - slalom.axle_force[2000:]
+    assert np.sqrt((error**2).mean()) < 0.2 * np.sqrt((slalom.axle_force[2000:] ** 2).mean())
+
+
+def test_the_self_test_sees_a_wrong_sign(packages, write, run, compiler):
+    folder = write(packages["integral"])
+    equations = folder / "src" / "tireid_equations.c"
+    text = equations.read_text()
+    assert "next->z[0] = (" in text
+    equations.write_text(text.replace("next->z[0] = (", "next->z[0] = -("))
+    sources = ["src/tireid.c", "src/tireid_equations.c", "tests/test_tireid.c"]
+    run(compiler, "-std=c99", "-Iinclude", *sources, "-lm", "-o", "self_test", cwd=folder)
+    answer = run(str(folder / "self_test"))
+    assert answer.returncode == 1
+    assert "FAILED: forces are those of the vectors" in answer.stdout
+
+
+def test_the_self_test_sees_a_wrong_vector(packages, write, run, compiler):
+    folder = write(packages["integral"])
+    vectors = folder / "tests" / "vectors.h"
+    *head, last = re.split(r"(?<=\{ )(?=-?[1-9]\d{2,}\.)", vectors.read_text())
+    vectors.write_text("".join(head) + "1" + last)  # one digit more in one force
+    sources = ["src/tireid.c", "src/tireid_equations.c", "tests/test_tireid.c"]
+    run(compiler, "-std=c99", "-Iinclude", *sources, "-lm", "-o", "self_test", cwd=folder)
+    answer = run(str(folder / "self_test"))
+    assert answer.returncode == 1
+    assert "FAILED: forces are those of the vectors" in answer.stdout
+
+
+@pytest.mark.parametrize("law", [law for law in METHODS if law != "linear"])
+def test_every_method_passes_its_own_test_without_a_warning(law, write, run):
+    folder = write(build_package(make_method(law, CAR), CAR))
+    sources = ["src/tireid.c", "src/tireid_equations.c", "tests/test_tireid.c"]
+    told = []
+    for single in (0, 1):
+        flags = [*STRICT, f"-DTIREID_SINGLE={single}", "-Iinclude", "-o", "self_test"]
+        answer = run("gcc", *flags, *sources, "-lm", cwd=folder)
+        assert (answer.returncode, answer.stderr) == (0, "")
+        answer = run(str(folder / "self_test"))
+        assert answer.returncode == 0, answer.stdout
+        told.append(answer.stdout)
+    assert "largest difference of a force: 0 N" in told[0]  # the bits of CasADi
+    assert "largest difference of a force: 0 N" not in told[1]
+
+
+def test_a_cell_without_a_number_is_a_fault_in_the_example(packages, write, run):
+    folder = write(packages["integral"])
+    log = folder / "log.csv"
+    log.write_text("t,r,vx,delta_f,vy\n0,0.1,20,0.02,0.1\n0.01,,20,0.02,0.1\n0.02,0.1,20\n")
+    sources = ["src/tireid.c", "src/tireid_equations.c", "examples/main.c"]
+    run("gcc", "-std=c99", "-Iinclude", *sources, "-lm", "-o", "example", cwd=folder)
+    answer = run(str(folder / "example"), str(log))
+    assert [line.split(",")[-1] for line in answer.stdout.splitlines()[1:]] == ["0", "3", "3"]
+    assert "faults: 2" in answer.stderr
+
+
+def test_a_project_of_its_own_can_use_the_package(packages, write, run):
+    folder = write(packages["integral"])
+    project = folder / "project"
+    project.mkdir()
+    (project / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.13)\nproject(app CXX C)\n"
+        f"add_subdirectory({folder} tires)\nadd_executable(app main.cpp)\n"
+        "target_link_libraries(app PRIVATE tireid::tireid)\n"
+    )
+    (project / "main.cpp").write_text(
+        '#include "tireid.h"\nint main() { tireid_state s; return tireid_init(&s); }\n'
+    )
+    assert run("cmake", "-B", "build", cwd=project).returncode == 0
+    assert run("cmake", "--build", "build", cwd=project).returncode == 0
+    assert run(str(project / "build" / "app")).returncode == 0
