@@ -99,7 +99,7 @@ class Scan:
         self.outputs = tuple(p for p in names_out if p.removesuffix("_next") not in carry)
 
     @cached_property
-    def _loop(self) -> "ctypes._NamedFuncPointer | None":
+    def loop(self) -> "ctypes._NamedFuncPointer | None":
         """The compiled loop, or None where it cannot be had; then the log says why."""
         name = self.step.name()
         generator = ca.CodeGenerator(f"{name}.c")
@@ -133,17 +133,28 @@ class Scan:
         ValueError
             Where a value is missing, unknown, or has the wrong shape.
         """
-        packed = self._pack(n, values)
+        packed = self.packed(n, values)
         if every < 1:
             raise ValueError(f"every must be at least 1, it is {every}")
         return (
             self._run_virtual_machine(n, packed, every)
-            if self._loop is None
-            else self._run_compiled(self._loop, n, packed, every)
+            if self.loop is None
+            else self._run_compiled(self.loop, n, packed, every)
         )
 
-    def _pack(self, n: int, values: Mapping[str, Array]) -> dict[str, Array]:
-        """Check shapes; flatten matrices by columns, as CasADi stores them."""
+    def packed(self, n: int, values: Mapping[str, Array]) -> dict[str, Array]:
+        """Check shapes; flatten matrices by columns, as CasADi stores them.
+
+        Parameters
+        ----------
+        n : number of samples.
+        values : one array for every input of the step.
+
+        Raises
+        ------
+        ValueError
+            Where a value is missing, unknown, or has the wrong shape.
+        """
         expected = set(self.step.name_in())
         if set(values) != expected:
             missing, unknown = sorted(expected - set(values)), sorted(set(values) - expected)
@@ -164,8 +175,14 @@ class Scan:
             packed[port] = np.ascontiguousarray(by_columns)
         return packed
 
-    def _shaped(self, flat: Array, size: tuple[int, int]) -> Array:
-        """Return rows of column-major numbers in their matrix shape; column vectors stay flat."""
+    def shaped(self, flat: Array, size: tuple[int, int]) -> Array:
+        """Return rows of column-major numbers in their matrix shape; column vectors stay flat.
+
+        Parameters
+        ----------
+        flat : numbers (..., rows columns).
+        size : rows and columns of the port.
+        """
         rows, columns = size
         if columns == 1:
             return flat
@@ -175,11 +192,11 @@ class Scan:
         shaped = {}
         for port, flat in record.items():
             if port in self.carry:
-                everything = self._shaped(flat, self.step.size_in(port))
+                everything = self.shaped(flat, self.step.size_in(port))
                 shaped[f"{port}_all"] = everything
                 shaped[port], shaped[f"{port}_final"] = everything[:-1], everything[-1]
             else:
-                shaped[port] = self._shaped(flat, self.step.size_out(port))
+                shaped[port] = self.shaped(flat, self.step.size_out(port))
         return shaped
 
     def _run_compiled(
@@ -197,24 +214,24 @@ class Scan:
         stride = [step.numel_in(p) if p in self.over else 0 for p in names_in]
         work = np.empty(max(step.sz_w(), 1))
         integer_work = np.empty(max(step.sz_iw(), 1), dtype=np.int64)
-        now_pointers, next_pointers = _pointers(now), _pointers(following)
+        now_pointers, next_pointers = pointers(now), pointers(following)
         failed = loop(
             ctypes.c_long(n),
             ctypes.c_long(every),
-            _pointers(arrays),
-            _longs([*stride, -1]),
+            pointers(arrays),
+            longs([*stride, -1]),
             ctypes.c_long(len(self.carry)),
-            _longs([names_in.index(p) for p in self.carry]),
-            _longs([names_out.index(f"{p}_next") for p in self.carry]),
-            _longs([size[p] for p in self.carry]),
+            longs([names_in.index(p) for p in self.carry]),
+            longs([names_out.index(f"{p}_next") for p in self.carry]),
+            longs([size[p] for p in self.carry]),
             now_pointers,
             next_pointers,
-            _pointers(carried),
+            pointers(carried),
             ctypes.c_long(len(self.outputs)),
-            _longs([names_out.index(p) for p in self.outputs]),
-            _longs([step.numel_out(p) for p in self.outputs]),
-            _pointers(outputs),
-            _pointers(scratch),
+            longs([names_out.index(p) for p in self.outputs]),
+            longs([step.numel_out(p) for p in self.outputs]),
+            pointers(outputs),
+            pointers(scratch),
             (ctypes.c_void_p * max(step.sz_arg(), len(names_in)))(),
             (ctypes.c_void_p * max(step.sz_res(), len(names_out)))(),
             integer_work.ctypes.data_as(ctypes.c_void_p),
@@ -260,9 +277,21 @@ class Scan:
         return self._shape_all(record)
 
 
-def _pointers(arrays: list[Array]) -> "ctypes.Array[ctypes.c_void_p]":
+def pointers(arrays: list[Array]) -> "ctypes.Array[ctypes.c_void_p]":
+    """Return where arrays begin, as C wants it.
+
+    Parameters
+    ----------
+    arrays : contiguous; the caller keeps them alive.
+    """
     return (ctypes.c_void_p * max(len(arrays), 1))(*(a.ctypes.data for a in arrays))
 
 
-def _longs(numbers: list[int]) -> "ctypes.Array[ctypes.c_long]":
+def longs(numbers: list[int]) -> "ctypes.Array[ctypes.c_long]":
+    """Return integers as C wants them.
+
+    Parameters
+    ----------
+    numbers : the integers.
+    """
     return (ctypes.c_long * max(len(numbers), 1))(*numbers)

@@ -26,7 +26,16 @@ class PlantError(ArithmeticError):
 
 
 @cache
-def _scan(vehicle: Vehicle, tire: Tire, driver: Driver, dt: float) -> Scan:
+def compiled_loop(vehicle: Vehicle, tire: Tire, driver: Driver, dt: float) -> Scan:
+    """Return the compiled loop of a plant over time, built once.
+
+    Parameters
+    ----------
+    vehicle : the car, with chassis.
+    tire : of all four wheels, hashable.
+    driver : who holds the speed.
+    dt : step of the integration [s].
+    """
     step = runge_kutta(dynamics(vehicle, tire, driver), dt)
     return Scan(step, carry=("x",), over=("command", "v_ref", "mu"))
 
@@ -108,7 +117,7 @@ class Plant:
         start[0] = v_ref[0]
         values = {"x": start, "command": command, "v_ref": v_ref}
         values |= {"mu": road.over_time(middle), "places": road.over_place()}
-        record = _scan(self.vehicle, cast(Hashable, self.tire), self.driver, dt)(
+        record = compiled_loop(self.vehicle, cast(Hashable, self.tire), self.driver, dt)(
             n, values, every=every
         )
         finite = np.isfinite(record["x"]).all(axis=1)

@@ -1,0 +1,155 @@
+"""A method beside a car that drives: sample in, axle forces out, and the model learnt so far.
+
+The compiled step is that of `identify`, so that a drive and its recording teach the same bits.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen import Stepper
+from identifier.history import IMPOSSIBLE_FORCE, DivergedError
+from identifier.method import FrozenModel, Method, Setup
+from models.recordings import Recording
+from models.recordings.record import MINIMUM_SAMPLES
+from models.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+
+@dataclass(slots=True)
+class Counts:
+    """What became of the samples.
+
+    Parameters
+    ----------
+    samples : that the method took.
+    refused : that held a number which is not finite; nothing moved on.
+    """
+
+    samples: int = 0
+    refused: int = 0
+
+
+class OnlineIdentifier:
+    """A method that is told sample by sample; attributes vehicle, method, counts.
+
+    Parameters
+    ----------
+    method : the method.
+    vehicle : the car as the method is told of it.
+    dt : interval at which `update` is called [s].
+    start : stored weights to begin with; None begins afresh.
+
+    Raises
+    ------
+    ValueError
+        Where the interval is not that of the method.
+    """
+
+    def __init__(
+        self, method: Method, vehicle: Vehicle, dt: float, start: FrozenModel | None = None
+    ) -> None:
+        if not abs(dt - method.dt) <= 1e-6 * method.dt:
+            raise ValueError(f"samples come every {dt:g} s, the method wants {method.dt:g} s")
+        self.vehicle, self.method, self.counts = vehicle, method, Counts()
+        self._start = start
+        self._force = np.zeros(2)
+        self._stepper: Stepper | None = None
+        self._diverged = False
+
+    def update(self, x: Array, u: Array, v_x: float) -> Array:
+        """Take a sample; return the axle forces (2,) [N], told with the weights before it.
+
+        Forces stay as they were where a number is not finite: such a sample is refused.
+
+        Parameters
+        ----------
+        x : [v_y, r] (2,) [m/s, rad/s].
+        u : [δ_f, δ_r] (2,), angles of the road wheels [rad].
+        v_x : longitudinal speed [m/s].
+
+        Raises
+        ------
+        ValueError
+            Where x or u are not pairs.
+        """
+        (v_y, r), (delta_f, delta_r) = x, u
+        if not all(map(math.isfinite, (v_y, r, delta_f, delta_r, v_x))):
+            self.counts.refused += 1
+            return self._force.copy()
+        stepper = self._stepper or self._begun(x, u, v_x)
+        values = {"x": (v_y, r), "u": (delta_f, delta_r), "v_x": (v_x,)}
+        for port, array in stepper.inputs.items():
+            array[:] = values[port]
+        stepper.advance()
+        self.counts.samples += 1
+        self._force = stepper.outputs["axle_force"].copy()
+        if not np.abs(self._force).max() < IMPOSSIBLE_FORCE * self.vehicle.weight:
+            self._diverged = True
+        return self._force.copy()
+
+    def _begun(self, x: Array, u: Array, v_x: float) -> Stepper:
+        """Return the step, set up where `identify` would: at the first sample."""
+        setup = self._setup(x, u, v_x)
+        self._stepper = Stepper(setup.scan, {**setup.carry, **setup.constants})
+        return self._stepper
+
+    def _setup(self, x: Array, u: Array, v_x: float) -> Setup:
+        n = MINIMUM_SAMPLES  # all alike: a setup looks at the first one
+        first = Recording(
+            name="first sample",
+            t=self.method.dt * np.arange(n, dtype=np.float64),
+            v_x=np.full(n, v_x),
+            v_y=np.full(n, x[0]),
+            r=np.full(n, x[1]),
+            delta_f=np.full(n, u[0]),
+            delta_r=np.full(n, u[1]),
+        )
+        return self.method.setup(self.vehicle, first, self._start)
+
+    def prepare(self) -> None:
+        """Compile the step before the first sample comes, where that takes a while."""
+        if self._stepper is None:
+            self._begun(np.zeros(2), np.zeros(2), self.method.min_speed)
+            self._stepper = None
+
+    @property
+    def diverged(self) -> bool:
+        """Whether a force was not finite or a hundred times the weight."""
+        return self._diverged
+
+    @property
+    def told(self) -> dict[str, Array]:
+        """What the step told about the last sample, by port, matrices by columns; copies."""
+        if self._stepper is None:
+            return {}
+        return {name: array.copy() for name, array in self._stepper.outputs.items()}
+
+    def carried(self) -> dict[str, Array]:
+        """Return the values that the next sample will meet, by port; copies.
+
+        Before the first sample those of a car that rolls straight ahead.
+        """
+        if self._stepper is None:
+            carry = self._setup(np.zeros(2), np.zeros(2), self.method.min_speed).carry
+            return {name: np.array(value) for name, value in carry.items()}
+        return self._stepper.carried()
+
+    def model(self) -> FrozenModel:
+        """Return the model with the weights in effect now.
+
+        Raises
+        ------
+        DivergedError
+            Where the law has diverged.
+        CannotFreezeError
+            Where the method estimates a signal, not a model.
+        ValueError
+            Where a weight is not what the model allows.
+        """
+        if self._diverged:
+            raise DivergedError(f"the law diverged within {self.counts.samples} samples")
+        return self.method.frozen(self.vehicle, self.carried())

@@ -1,0 +1,100 @@
+"""Sample by sample a method does what it does over the recording, to the last bit."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.axle import AxleDesign
+from identifier.history import DivergedError
+from identifier.identify import identify
+from identifier.method import CannotFreezeError
+from identifier.methods import METHODS, make_method
+from identifier.online import OnlineIdentifier
+
+
+def driven(identifier, recording):
+    samples = zip(recording.x, recording.u, recording.v_x, strict=True)
+    return np.array([identifier.update(*sample) for sample in samples])
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_every_method_learns_the_same_bits_as_over_the_recording(name, car, drive):
+    recording, method = drive(n=300), make_method(name, car)
+    history = identify(recording, car, method)
+    online = OnlineIdentifier(method, car, recording.dt)
+    np.testing.assert_array_equal(driven(online, recording), history.axle_force)
+    for port, value in online.carried().items():
+        np.testing.assert_array_equal(value, history.carried[port][-1])
+    for port, value in history.told.items():
+        np.testing.assert_array_equal(online.told[port], value[-1].ravel(order="F"))
+    try:
+        frozen = history.freeze(recording.t[-1])
+    except CannotFreezeError:
+        with pytest.raises(CannotFreezeError):
+            online.model()
+    else:
+        assert online.model().to_dict() == frozen.to_dict()
+
+
+@pytest.mark.parametrize("name", ["axle", "integral"])
+def test_a_run_goes_on_from_stored_weights(name, car, drive):
+    recording, method = drive(n=300), make_method(name, car)
+    start = identify(recording, car, method).freeze(2.0)
+    history = identify(recording, car, method, start)
+    online = OnlineIdentifier(method, car, recording.dt, start)
+    assert online.model().to_dict() == start.to_dict()  # before the first sample
+    np.testing.assert_array_equal(driven(online, recording), history.axle_force)
+
+
+def test_a_sample_that_is_no_number_is_refused_and_changes_nothing(car, drive):
+    recording, method = drive(n=200), AxleDesign.for_vehicle(car)
+    online, clean = (OnlineIdentifier(method, car, 0.01) for _ in range(2))
+    for k, (x, u, v_x) in enumerate(zip(recording.x, recording.u, recording.v_x, strict=True)):
+        force = clean.update(x, u, v_x)
+        np.testing.assert_array_equal(online.update(x, u, v_x), force)
+        if k % 10 == 0:
+            for bad in ((np.array([np.nan, 0.0]), u, v_x), (x, u, np.inf)):
+                np.testing.assert_array_equal(online.update(*bad), force)
+    assert (online.counts.samples, online.counts.refused) == (200, 40)
+    assert clean.counts.refused == 0
+
+
+def test_preparing_leaves_no_trace(car, drive):
+    recording, method = drive(n=100), make_method("integral", car)
+    fresh, prepared = (OnlineIdentifier(method, car, 0.01) for _ in range(2))
+    prepared.prepare()
+    np.testing.assert_array_equal(driven(prepared, recording), driven(fresh, recording))
+    assert prepared.counts == fresh.counts
+
+
+def test_a_law_that_diverges_is_noticed_and_freezes_to_nothing(car, drive):
+    design = make_method("integral", car)
+    gains = replace(design.gains, eta_W=1e9, rho_W=0.0, W_max=np.inf)
+    online = OnlineIdentifier(replace(design, gains=gains), car, 0.01)
+    assert not online.diverged
+    driven(online, drive(n=300))
+    assert online.diverged
+    with pytest.raises(DivergedError, match="300 samples"):
+        online.model()
+
+
+def test_another_interval_and_samples_of_another_shape_are_refused(car):
+    method = AxleDesign.for_vehicle(car)
+    with pytest.raises(ValueError, match=r"every 0\.02 s, the method wants 0\.01 s"):
+        OnlineIdentifier(method, car, 0.02)
+    with pytest.raises(ValueError, match="unpack"):
+        OnlineIdentifier(method, car, 0.01).update(np.zeros(3), np.zeros(2), 20.0)
+
+
+def test_an_update_takes_far_less_than_a_sample(car, drive):
+    recording = drive(n=500)
+    online = OnlineIdentifier(AxleDesign.for_vehicle(car), car, recording.dt)
+    online.prepare()
+    times = []
+    for sample in zip(recording.x, recording.u, recording.v_x, strict=True):
+        start = time.perf_counter()
+        online.update(*sample)
+        times.append(time.perf_counter() - start)
+    assert np.median(times) < 3e-4  # 6 microseconds where nothing else runs

@@ -1,0 +1,105 @@
+"""The plant one period at a time."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from models.friction import Friction, FrictionChange
+from models.plant import Plant, PlantError, StepwisePlant
+from models.vehicle import sedan
+
+PERIOD = 0.01
+PERIODS = 150
+
+
+@dataclass(frozen=True)
+class Staircase:
+    """Steering that is held over each period, as a controller's is."""
+
+    angles: tuple[float, ...]
+
+    @property
+    def duration(self) -> float:
+        return PERIOD * len(self.angles)
+
+    def steering(self, t):
+        row = np.minimum((t / PERIOD + 1e-9).astype(int), len(self.angles) - 1)
+        return np.column_stack([np.array(self.angles)[row], np.zeros(len(t))])
+
+
+def wanted(k):
+    return 20.0 + 0.5 * (k // 40)
+
+
+@pytest.fixture(scope="module")
+def angles() -> tuple[float, ...]:
+    generator = np.random.default_rng(1)
+    return tuple(np.cumsum(generator.normal(0.0, 0.004, PERIODS)))
+
+
+@pytest.mark.parametrize(
+    "friction",
+    [
+        Friction(),
+        Friction(scale=0.9, changes=(FrictionChange(scale=0.4, at_time=0.7, width=0.2),)),
+        Friction(changes=(FrictionChange(scale=0.5, at_place=12.0, width=3.0),)),
+    ],
+)
+def test_the_same_commands_give_the_same_run_bit_for_bit(angles, friction):
+    plant = Plant(sedan())
+    run = plant.simulate(
+        Staircase(angles),
+        speed=lambda t: np.array([wanted(k) for k in (t / PERIOD + 1e-9).astype(int)]),
+        friction=friction,
+    )
+    stepwise = StepwisePlant(plant, friction=friction, period=PERIOD)
+    state = stepwise.start(20.0)
+    for k, angle in enumerate(angles):
+        columns = (run.v_x, run.v_y, run.r, run.roll, run.roll_rate, run.X, run.Y, run.psi)
+        assert np.array_equal(state.x[:8], [column[k] for column in columns])
+        assert np.array_equal(state.alpha, run.alpha[k])
+        assert np.array_equal(state.F_z, run.F_z[k])
+        if k == 0 or wanted(k) == wanted(k - 1):  # else the drive force has jumped since
+            assert np.array_equal(state.axle_force, run.axle_force[k])
+            assert np.array_equal(state.acceleration, [run.a_x[k], run.a_y[k]])
+        state = stepwise.step(state, np.array([angle, 0.0]), wanted(k))
+    assert state.x[5] == run.X[PERIODS]
+
+
+def test_a_step_changes_nothing_but_gives_the_next_state():
+    stepwise = StepwisePlant(Plant(sedan()))
+    state = stepwise.start(15.0)
+    before = state.x.copy()
+    first = stepwise.step(state, np.array([0.03, 0.0]), 15.0)
+    second = stepwise.step(state, np.array([0.03, 0.0]), 15.0)
+    assert np.array_equal(state.x, before)
+    assert np.array_equal(first.x, second.x)
+    assert first.steps == 10
+
+
+def test_a_car_that_starts_turned_drives_the_same_curve_turned():
+    stepwise = StepwisePlant(Plant(sedan()))
+    straight, turned = stepwise.start(15.0), stepwise.start(15.0, X=3.0, Y=-2.0, psi=0.7)
+    for _ in range(100):
+        straight = stepwise.step(straight, np.array([0.04, 0.0]), 15.0)
+        turned = stepwise.step(turned, np.array([0.04, 0.0]), 15.0)
+    c, s = np.cos(0.7), np.sin(0.7)
+    expected = np.array([3.0, -2.0]) + np.array([[c, -s], [s, c]]) @ straight.x[5:7]
+    assert turned.x[5:7] == pytest.approx(expected, abs=1e-9)
+    assert turned.x[7] == pytest.approx(straight.x[7] + 0.7, abs=1e-12)
+
+
+def test_what_cannot_be_stepped_is_refused():
+    plant = Plant(sedan())
+    with pytest.raises(ValueError, match="multiple of dt"):
+        StepwisePlant(plant, period=0.0105)
+    stepwise = StepwisePlant(plant)
+    with pytest.raises(ValueError, match="v_x must be positive"):
+        stepwise.start(0.0)
+    state = stepwise.start(10.0)
+    with pytest.raises(ValueError, match="must be finite"):
+        stepwise.step(state, np.array([np.nan, 0.0]), 10.0)
+    broken = state._replace(x=np.full(18, np.nan))
+    with pytest.raises(PlantError, match=r"not finite from t = 0.010 s"):
+        stepwise.step(broken, np.zeros(2), 10.0)
