@@ -10,6 +10,7 @@ UNITS = 6
 NARROWEST = 0.25  # α_1 over the slip F_max/C at which the linear tire would reach the peak force
 WORST = 0.02  # largest error of a fit over the largest force
 SAMPLES = 400
+SMALL = 1e-3  # rad; the slope at zero is read here, well above rounding
 
 
 class CurveFitError(ValueError):
@@ -47,7 +48,8 @@ def fitted_ladder(alpha: Array, force: Array) -> tuple[Array, Array]:
     CurveFitError
         Where the largest error is above 2 % of the largest force.
     """
-    stiffness, peak = force[:, 0] / alpha[0], np.abs(force).max(axis=1)
+    first = min(int(np.searchsorted(alpha, SMALL)), alpha.size - 1)
+    stiffness, peak = force[:, first] / alpha[first], np.abs(force).max(axis=1)
     if not (stiffness > 0.0).all():
         raise CurveFitError(f"force must rise with slip at zero, its slope is {stiffness} N/rad")
     narrowest = NARROWEST * float((peak / stiffness).min())

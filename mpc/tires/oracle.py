@@ -46,7 +46,9 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
         raise VehicleError(f"vehicle '{vehicle.name}' names no tire file and none was given")
     tire = MagicFormula.from_tir(chassis.tire or "") if tire is None else tire
     alpha = slip_grid(LARGEST_SLIP * min(mu, 1.0))
-    force = np.stack([cornering_force(vehicle, tire, axle, alpha, mu) for axle in (0, 1)])
+    grid = np.concatenate([[0.0], alpha])
+    force = np.stack([cornering_force(vehicle, tire, axle, grid, mu) for axle in (0, 1)])
+    force = force[:, 1:] - force[:, :1]  # wheels that are not mirrored push at zero slip, too
     lengths = np.array([chassis.relaxation_length_front, chassis.relaxation_length_rear])
     return _fitted_tire(vehicle, alpha, force, lengths)
 
@@ -81,7 +83,7 @@ def cornering_force(vehicle: Vehicle, tire: Tire, axle: int, alpha: Array, mu: f
     vehicle : the car, with chassis.
     tire : of both wheels.
     axle : 0 in front, 1 at the rear.
-    alpha : slip angles [rad], positive, (k,).
+    alpha : slip angles [rad], not negative, (k,).
     mu : friction of the road over that of the measurement [-].
     """
     c, h = vehicle.require_chassis(), vehicle.roll_arm

@@ -25,10 +25,20 @@ def useful_slip(tire: TireModel) -> Array:
     ----------
     tire : structure and weights.
     """
-    slopes = np.array(_slopes(tire.structure)(SLIPS[None], tire.car, tire.weights))
+    slopes = curve_slopes(tire)
     flat = slopes < FLAT * slopes[:, :1]
     found = np.where(flat.any(axis=1), SLIPS[flat.argmax(axis=1)], np.inf)
     return np.where(slopes[:, 0] > 0.0, found, np.inf)
+
+
+def curve_slopes(tire: TireModel) -> Array:
+    """Return dF/dα of the axles at `SLIPS` (2, k) [N/rad], straight ahead.
+
+    Parameters
+    ----------
+    tire : structure and weights.
+    """
+    return np.array(_slopes(tire.structure)(SLIPS[None], tire.car, tire.weights))
 
 
 @cache
