@@ -104,8 +104,13 @@ class Stepper:
 
     def carried(self) -> dict[str, Array]:
         """Return the carried values in effect, by port, in their shapes; copies."""
-        scan = self._scan
-        return {
-            port: scan.shaped(flat, scan.step.size_in(port)).copy()
-            for port, flat in self._now.items()
-        }
+        return {port: self.value(port) for port in self._now}
+
+    def value(self, port: str) -> Array:
+        """Return the value of one carried port in effect, in its shape; a copy.
+
+        Parameters
+        ----------
+        port : one of those that are carried.
+        """
+        return self._scan.shaped(self._now[port], self._scan.step.size_in(port)).copy()

@@ -81,7 +81,7 @@ def test_misra_findings_do_not_grow(packages, write, run):
     assert len(findings) == MISRA_FINDINGS, sorted(findings)
 
 
-@pytest.mark.parametrize("law", ["integral", "axle", "concurrent"])
+@pytest.mark.parametrize("law", ["integral", "axle", "rls"])
 def test_the_same_input_gives_the_same_bytes(law):
     one, two = (build_package(make_method(law, CAR), CAR) for _ in range(2))
     assert one.files == two.files
