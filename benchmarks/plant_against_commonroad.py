@@ -6,7 +6,7 @@ drives step steers and a slalom with both at 20 m/s on dry and on slippery road,
 and writes the figure OUT/plant_against_commonroad.png. The multi-body car has 29 states and its own
 authors; both get the same parameters (its BMW 320i), tires, steering and speed controller.
 The first table is against the program as published, the second with its two contradictions removed
-(see `commonroad_car`, `commonroad_multibody`): what remains is the difference of the models.
+(see `mpc.cars.commonroad.multi_body`): what remains is the difference of the models.
 The lateral velocity passes through zero near this speed, so that its error in percent of its own
 rms says little; the table gives it as an angle of side slip too. It does not decide about passing.
 """
@@ -20,11 +20,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.commonroad_car import CommonRoadTire, bmw, bmw_parameters
 from benchmarks.commonroad_multibody import drive
 from models.friction import Friction
 from models.maneuvers import Maneuver, Slalom, StepSteer
 from models.plant import Driver, Plant
+from mpc.cars.commonroad import CommonRoadTire, bmw
+from mpc.cars.commonroad.multi_body import MultiBody
+from mpc.cars.commonroad.package import bmw_parameters
 
 Array = NDArray[np.float64]
 
@@ -84,7 +86,8 @@ def compare(name: str, maneuver: Maneuver, scale: float, *, repaired: bool) -> C
         maneuver, speed=SPEED, friction=Friction(scale=scale)
     )
     plant = {"a_y": run.a_y, "r": run.r, "v_y": run.v_y}
-    reference = drive(parameters, maneuver, speed=SPEED, driver=DRIVER, repaired=repaired)
+    equations = MultiBody(bmw(), repaired=repaired)
+    reference = drive(equations, parameters, maneuver, speed=SPEED, driver=DRIVER)
     steady = {}
     if isinstance(maneuver, StepSteer):
         end = run.t > maneuver.duration - STEADY_LENGTH

@@ -1,18 +1,24 @@
-"""The picture on the first screen of the README: `python -m benchmarks.readme_picture`."""
+"""The pictures of the README: `python -m benchmarks.readme_picture`."""
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+from tireid.demo_drive import LANE_CHANGE, drive_story
 from tireid.demo_story import run_story
 from tireid.figures import figure_png, side_by_side_figure
 
-TARGET = Path(__file__).resolve().parents[1] / "docs" / "forces.png"
+DOCS = Path(__file__).resolve().parents[1] / "docs"
 
 
 def main() -> None:
-    """Draw both methods, learnt on the demo's slalom, on the step steer that neither has seen."""
-    figure = side_by_side_figure(run_story().side_by_side("step_steer"))
-    TARGET.write_bytes(figure_png(figure, resolution=130))
-    print(f"wrote {TARGET}")
+    """Draw the demo's models on a step steer that they have not seen, and the film of its drive."""
+    story = run_story()
+    figure = side_by_side_figure(story.side_by_side("step_steer"))
+    (DOCS / "forces.png").write_bytes(figure_png(figure, resolution=130))
+    with TemporaryDirectory() as folder:
+        drive_story(story, Path(folder))
+        (DOCS / "drive.gif").write_bytes((Path(folder) / LANE_CHANGE / "drive.gif").read_bytes())
+    print(f"wrote {DOCS}/forces.png and drive.gif")
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from tireid import (
     check_command,
     compare_command,
     demo_command,
+    drive_command,
     export_command,
     identify_command,
     paper_command,
@@ -16,4 +17,5 @@ COMMANDS = (
     compare_command,
     check_command,
     export_command,
+    drive_command,
 )

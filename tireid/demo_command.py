@@ -7,6 +7,7 @@ from typing import Any
 from identifier.defaults import natural_operation
 from tireid.certificate_table import certificate_text
 from tireid.check_figures import draw_check
+from tireid.demo_drive import drive_section, drive_story, drive_text
 from tireid.demo_package import FOLDER, ship, shipped_text
 from tireid.demo_report import demo_sections
 from tireid.demo_story import run_story
@@ -21,7 +22,7 @@ from tireid.report import write_report
 TITLE = "tireid: lateral tire forces, learnt while driving"
 SUMMARY = (
     "A car drives, its tire forces are learnt from the signals that every log has, the weights are "
-    "frozen, and the frozen model is asked about drives that it has not seen."
+    "frozen, and the frozen model is asked about drives that it has not seen; at the end it steers."
 )
 SEEDS = 20
 
@@ -37,8 +38,8 @@ def add_parser(commands: Any) -> None:
         "demo",
         help="the whole story on the built-in car, with a report",
         description="Drive the built-in sedan, learn its tires, freeze them, test them on another "
-        "maneuver, export them as a C package that is compiled and tested, and repeat the paper's "
-        "tables; leaves one report.html to read.",
+        "maneuver, export them as a C package that is compiled and tested, repeat the paper's "
+        "tables, and steer the car along a path on what it learnt; leaves one report.html to read.",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("tireid-demo"), metavar="DIR", help="default: %(default)s"
@@ -56,7 +57,7 @@ def run(options: argparse.Namespace) -> None:
     """
     watch = Stopwatch()
     with output_folder(options.out, force=options.force) as folder:
-        say("1/4 driving the sedan, learning, freezing, predicting")
+        say("1/5 driving the sedan, learning, freezing, predicting")
         story = run_story()
         folders = {name: folder / name for name in ("identify", "paper_network", "paper")}
         for one in folders.values():
@@ -67,13 +68,16 @@ def run(options: argparse.Namespace) -> None:
         draw_check(
             folders["paper_network"], drive, story.car, story.design, operation, story.certificate
         )
-        say("2/4 exporting what was learnt as C, compiling and testing it")
+        say("2/5 exporting what was learnt as C, compiling and testing it")
         shipped = ship(story, folder / FOLDER)
-        say("3/4 the frozen-weight test of the paper")
+        say("3/5 the frozen-weight test of the paper")
         study = run_study(SEEDS, say)
         write_study(folders["paper"], study)
-        say("4/4 writing the report")
+        say("4/5 driving on what was learnt")
+        driven = drive_story(story, folder)
+        say("5/5 writing the report")
         sections = demo_sections(story, shipped, study, folder)
+        sections.append(drive_section(driven, folder))
         write_report(folder / "report.html", TITLE, sections, summary=SUMMARY)
     for maneuver in study.errors:
         print(table_text(maneuver, study))
@@ -82,4 +86,6 @@ def run(options: argparse.Namespace) -> None:
     print(story.text())
     print()
     print(shipped_text(shipped))
+    print()
+    print(drive_text(driven))
     print(f"read {options.out / 'report.html'}  ({watch.seconds:.0f} s)")

@@ -62,7 +62,7 @@ def ship(story: Story, folder: Path) -> Shipped:
     model = learnt.freeze(FREEZE)
     package = build_package(learnt.design, story.car, model)
     costs = measure(package)
-    write_files(folder, package, figures_text(costs))
+    write_files(folder, package, figures_text(costs), costs)
     checks: list[Check] = []
     if find_compiler() is not None:
         expected = identify(learnt.recording, story.car, learnt.design, model).axle_force

@@ -1,6 +1,7 @@
 """`tireid export DIR`: the identifier as clean C, and as FMU and ONNX."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ from identifier.axle import AxleDesign
 from identifier.axle.model import AxleModel
 from identifier.defaults import default_design
 from identifier.design_file import read_design
-from identifier.export.figures import figures_text, measure
+from identifier.export.figures import Cost, figures_text, measure, with_figures
 from identifier.export.package import Package, build_package, readme
 from identifier.method import CannotFreezeError, FrozenModel, Method
 from identifier.methods import DEFAULT, METHODS, REFERENCE, make_method
@@ -17,6 +18,8 @@ from identifier.network_model import NetworkModel
 from models.vehicle import Vehicle, sedan
 from tireid.output import output_folder
 from tireid.progress import say
+
+IDENTIFIER = "identifier"  # folder of the package where a tracker lies beside it
 
 
 def add_parser(commands: Any) -> None:
@@ -51,6 +54,9 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("--single", action="store_true", help="float unless the build says double")
     parser.add_argument("--fmu", action="store_true", help="also FMUs 2.0 and 3.0, Co-Simulation")
     parser.add_argument("--onnx", action="store_true", help="also the model, frozen, as ONNX")
+    parser.add_argument(
+        "--mpc", action="store_true", help="also a tracker that steers by what is learnt"
+    )
     parser.add_argument("--force", action="store_true", help="replace the folder if it exists")
     parser.set_defaults(run=run)
 
@@ -68,7 +74,9 @@ def run(options: argparse.Namespace) -> None:
     package = build_package(method, vehicle, start, name=options.name, single=options.single)
     with output_folder(options.folder, force=options.force) as folder:
         costs = measure(package)
-        write_files(folder, package, figures_text(costs))
+        place = folder / IDENTIFIER if options.mpc else folder
+        write_files(place, package, figures_text(costs), costs)
+        told = _write_tracker(folder, package, options.single) if options.mpc else []
         if options.fmu:
             _write_fmus(folder, package)
         if options.onnx:
@@ -77,12 +85,14 @@ def run(options: argparse.Namespace) -> None:
         kind = "float" if cost.single else "double"
         say(
             f"{cost.processor}, {kind}: {cost.replay.instructions} instructions a step, "
-            f"{cost.flash} B flash, {cost.replay.stack} B stack"
+            f"{cost.flash} B flash, {cost.ram} B RAM, {cost.replay.stack} B stack"
         )
+    for line in told:
+        say(line)
     say(f"wrote {options.folder}/, hash {package.about['hash']}")
 
 
-def write_files(folder: Path, package: Package, figures: str) -> None:
+def write_files(folder: Path, package: Package, figures: str, costs: Sequence[Cost] = ()) -> None:
     """Write a package.
 
     Parameters
@@ -90,8 +100,11 @@ def write_files(folder: Path, package: Package, figures: str) -> None:
     folder : an empty folder.
     package : the package.
     figures : what it costs, as Markdown.
+    costs : what it costs, for the JSON file.
     """
-    for path, text in {**package.files, "README.md": readme(package, figures)}.items():
+    manifest = f"{package.folded.name}.json"
+    texts = {**package.files, "README.md": readme(package, figures)}
+    for path, text in {**texts, manifest: with_figures(texts[manifest], costs)}.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, encoding="utf-8")
 
@@ -124,6 +137,12 @@ def _method(options: argparse.Namespace, vehicle: Vehicle, start: FrozenModel | 
                 f"{options.weights} holds a {type(start).__name__}, from which no method can go "
                 "on learning"
             )
+
+
+def _write_tracker(folder: Path, package: Package, single: bool) -> list[str]:
+    from tireid.export_mpc import write_tracker
+
+    return write_tracker(folder, package, single=single)
 
 
 def _write_fmus(folder: Path, package: Package) -> None:

@@ -40,3 +40,29 @@ class Stopwatch:
     def seconds(self) -> float:
         """Elapsed time [s]."""
         return time.perf_counter() - self._start
+
+
+class Ticker:
+    """Tells every few seconds how far something has come, so that short work says nothing.
+
+    Parameters
+    ----------
+    what : that goes on.
+    every : time between two lines [s].
+    """
+
+    def __init__(self, what: str, every: float = 3.0) -> None:
+        self._what, self._every = what, every
+        self._last = time.perf_counter()
+
+    def __call__(self, share: float) -> None:
+        """Say it where it is time.
+
+        Parameters
+        ----------
+        share : done, 0 to 1.
+        """
+        now = time.perf_counter()
+        if now - self._last >= self._every:
+            self._last = now
+            say(f"{self._what}: {100.0 * share:.0f} %")

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from models.files import write_atomically
 
-PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+SIGNATURES = {b"\x89PNG\r\n\x1a\n": "png", b"GIF89a": "gif"}  # of files, by their kind
 STYLE = """
 :root { color-scheme: light; }
 * { box-sizing: border-box; }
@@ -101,13 +101,13 @@ class Picture:
 
     Parameters
     ----------
-    image : the PNG itself, or the path of its file.
+    image : the PNG or GIF itself, or the path of its file.
     caption : what the picture shows, plain text.
 
     Raises
     ------
     ValueError
-        Where the image is not a PNG.
+        Where the image is neither.
     OSError
         Where its file cannot be read.
     """
@@ -117,8 +117,8 @@ class Picture:
 
     def __post_init__(self) -> None:
         data = self.image.read_bytes() if isinstance(self.image, Path) else self.image
-        if not data.startswith(PNG_SIGNATURE):
-            raise ValueError(f"the picture {self.caption!r} must be a PNG")
+        if not data.startswith(tuple(SIGNATURES)):
+            raise ValueError(f"the picture {self.caption!r} must be a PNG or a GIF")
         object.__setattr__(self, "image", data)
 
 
@@ -217,10 +217,12 @@ def _table(table: Table, number: int) -> str:
 def _picture(picture: Picture, number: int) -> str:
     assert isinstance(picture.image, bytes)
     caption, data = escape(picture.caption), b64encode(picture.image).decode("ascii")
+    (kind,) = (name for start, name in SIGNATURES.items() if picture.image.startswith(start))
     return "\n".join(
         [
             "<figure>",
-            f'<div class="scroll"><img src="data:image/png;base64,{data}" alt="{caption}"></div>',
+            '<div class="scroll">',
+            f'<img src="data:image/{kind};base64,{data}" alt="{caption}"></div>',
             f"<figcaption><b>Figure {number}.</b> {caption}</figcaption>",
             "</figure>",
         ]

@@ -23,7 +23,7 @@ def test_help_lists_the_commands(capsys):
         main(["--help"])
     assert stop.value.code == 0
     said = capsys.readouterr().out
-    for command in ("demo", "paper", "identify", "check"):
+    for command in ("demo", "paper", "identify", "check", "drive"):
         assert command in said
 
 

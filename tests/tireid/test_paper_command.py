@@ -152,6 +152,7 @@ def test_paper_command_writes_tables_and_figures(tmp_path, capsys):
 def test_demo_leaves_one_self_contained_report(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(tireid.demo_command, "SEEDS", 2)
     monkeypatch.setattr("tireid.demo_package.measure", lambda _: [])  # has tests of its own
+    monkeypatch.setattr("tireid.demo_command.drive_story", lambda *_: {})  # so has this
     assert main(["demo", "--out", str(tmp_path / "demo")]) == 0
     page = (tmp_path / "demo" / "report.html").read_text()
     assert page.count("data:image/png;base64,") >= 12

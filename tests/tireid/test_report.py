@@ -122,6 +122,14 @@ def test_rows_that_do_not_fit_and_pictures_that_are_none_are_refused(tmp_path: P
         Picture(image=tmp_path / "missing.png", caption="c")
 
 
+def test_a_film_is_embedded_as_what_it_is() -> None:
+    film = Picture(image=b"GIF89a and more", caption="c")
+    page = report_html("t", [Section(heading="h", blocks=[film])])
+    (image,) = (attributes["src"] for tag, attributes in outline(page).tags if tag == "img")
+    assert str(image).startswith("data:image/gif;base64,")
+    assert b64decode(str(image).split(",")[1]) == film.image
+
+
 def test_report_replaces_the_old_one_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "report.html"
     write_report(path, "First", SECTIONS)

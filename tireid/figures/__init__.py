@@ -4,6 +4,11 @@ from tireid.figures.compare_matrix import matrix_figure
 from tireid.figures.compare_methods import methods_figure
 from tireid.figures.compare_pareto import pareto_figure
 from tireid.figures.comparison import comparison_figure
+from tireid.figures.drive_errors import drive_errors_figure
+from tireid.figures.drive_path import drive_path_figure
+from tireid.figures.drive_solve import drive_solve_figure
+from tireid.figures.drive_steering import drive_steering_figure
+from tireid.figures.drive_tires import drive_tires_figure
 from tireid.figures.errors import error_figure
 from tireid.figures.forces import force_figure
 from tireid.figures.inputs import inputs_figure
@@ -13,10 +18,18 @@ from tireid.figures.side_by_side import side_by_side_figure
 from tireid.figures.slip import slip_figure
 from tireid.figures.stability import locus_figure
 from tireid.figures.style import figure_png, save_figure
+from tireid.figures.tire_curve import TireCurve, axle_slip
 from tireid.figures.weights import weights_figure
 
 __all__ = [
+    "TireCurve",
+    "axle_slip",
     "comparison_figure",
+    "drive_errors_figure",
+    "drive_path_figure",
+    "drive_solve_figure",
+    "drive_steering_figure",
+    "drive_tires_figure",
     "error_figure",
     "figure_png",
     "force_figure",

@@ -1,0 +1,195 @@
+"""Other ways to solve the problem of `mpc_double_lane_change`, each as well kept as we know.
+
+HPIPM: CasADi's sqpmethod with one iteration, Gauss-Newton, stage by stage, jit -O3. IPOPT: to
+convergence, warm started, jit -O3. DAQP: our own linearization, condensed; see mpc_daqp.c.
+"""
+
+import ctypes
+import time
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.mpc_double_lane_change import PROBLEM, SPEED
+from codegen import load_library
+from mpc.converged import build_errors
+from mpc.prediction import build_rk4
+from mpc.realtime import Status, Tracker
+from mpc.realtime.instance import FLAGS
+from mpc.realtime.source_cache import tracker_source
+from mpc.tires.structure import TireModel
+
+Array = NDArray[np.float64]
+N, N_X, WIDTH = PROBLEM.horizon, 5, 7  # a stage: x, u and the slack of the deviation behind it
+JIT = {"jit": True, "compiler": "shell", "jit_options": {"flags": ["-O3"], "verbose": False}}
+QUIET = {"print_time": False, "error_on_fail": False}
+WHEEL = Path(ca.__file__).parent
+
+
+class Answer(NamedTuple):
+    """Plan x (N + 1, 5) and u (N,), thread time of the solver [s], and whether it failed."""
+
+    x: Array
+    u: Array
+    time: float
+    failed: bool
+
+
+class Peer(Protocol):
+    """Solves one step after the other, each from the answer before, moved ahead by a stage."""
+
+    def step(self, x0: Array, kappa: Array) -> Answer:
+        """Return the plan from a state, on the curvature of the stages."""
+
+
+class Stagewise(NamedTuple):
+    """The nonlinear program stage by stage, residuals r of its cost ½ r'r, and bounds."""
+
+    nlp: dict[str, Any]
+    r: Any
+    bounds: dict[str, Array]
+
+
+def stagewise(tire: TireModel) -> Stagewise:
+    """Return the problem in the order that structure-aware solvers read; p = x0, kappa, car, w."""
+    limits, cost, k_last = PROBLEM.limits, PROBLEM.cost, N - 1
+    rk4, errors = build_rk4(tire.structure), build_errors(tire.structure)
+    x0, road = ca.MX.sym("x0", N_X), ca.MX.sym("road", N)
+    car, w = ca.MX.sym("car", 4), ca.MX.sym("w", tire.weights.size)
+    X = [ca.MX.sym(f"x{k}", N_X) for k in range(N + 1)]
+    U = [ca.MX.sym(f"u{k}", 2) for k in range(N)]
+    q, q_end = np.sqrt(cost.numbers()), np.sqrt(cost.terminal_numbers())
+    r, g, low, high = [], [], [], []
+    for k in range(N):
+        x_next = rk4(X[k], U[k][0], road[k], SPEED, PROBLEM.dt, car, w)
+        g += [X[k + 1] - x_next, *([X[0] - x0] if k == 0 else [])]
+        g += [x_next[0] - U[k][1], -x_next[0] - U[k][1]]  # |e_y| <= limit + slack
+        zeros = [0.0] * (N_X if k else 2 * N_X)
+        low += [*zeros, -np.inf, -np.inf]
+        high += [*zeros, limits.e_y, limits.e_y]
+        r += [q * errors(X[k], road[k], SPEED, car, w)[0]]
+        r += [np.sqrt(cost.R) * U[k][0], np.sqrt(limits.soft_e_y) * U[k][1]]
+    r.append(q_end * errors(X[N], road[k_last], SPEED, car, w)[0])
+    v = ca.vertcat(*(ca.vertcat(*pair) for pair in zip(X[:-1], U, strict=True)), X[N])
+    most = np.tile([np.inf] * 4 + [limits.steering, limits.steering_rate, np.inf], N + 1)
+    least = -most
+    least[N_X + 1 :: WIDTH] = 0.0
+    most[:N_X], least[:N_X] = np.inf, -np.inf
+    size = WIDTH * N + N_X
+    residual = ca.vertcat(*r)
+    p = ca.vertcat(x0, road, car, w)
+    return Stagewise(
+        {"x": v, "p": p, "f": 0.5 * ca.sumsqr(residual), "g": ca.vertcat(*g)},
+        residual,
+        {"lbx": least[:size], "ubx": most[:size], "lbg": np.array(low), "ubg": np.array(high)},
+    )
+
+
+class Nlp:
+    """A solver of CasADi, called without copies."""
+
+    def __init__(self, tire: TireModel, problem: Stagewise, solver: Any, *, warm: bool) -> None:
+        self.numbers = np.concatenate([tire.car, tire.weights])
+        self.solver, self.warm = solver, warm
+        self.values: dict[str, Array] = {
+            name: np.zeros(solver.numel_in(name)) for name in solver.name_in()
+        }
+        self.results: dict[str, Array] = {
+            name: np.zeros(solver.numel_out(name)) for name in solver.name_out()
+        }
+        for name, value in problem.bounds.items():
+            self.values[name][:] = value
+        self.buffer, self.call = solver.buffer()
+        for i, name in enumerate(solver.name_in()):
+            self.buffer.set_arg(i, self.values[name].data)
+        for i, name in enumerate(solver.name_out()):
+            self.buffer.set_res(i, self.results[name].data)
+
+    def step(self, x0: Array, kappa: Array) -> Answer:
+        """Return the plan from a state, on the curvature of the stages."""
+        guess, values = self.values["x0"], self.values
+        guess[: WIDTH * (N - 1)] = self.results["x"][WIDTH : WIDTH * N]
+        guess[WIDTH * (N - 1) :] = self.results["x"][WIDTH * (N - 1) :]
+        guess[WIDTH * (N - 1) : WIDTH * (N - 1) + N_X] = self.results["x"][WIDTH * N :]
+        guess[:N_X] = x0
+        values["p"][:] = np.concatenate([x0, kappa, self.numbers])
+        if self.warm:
+            values["lam_x0"][:], values["lam_g0"][:] = self.results["lam_x"], self.results["lam_g"]
+        start = time.thread_time()
+        self.call()
+        elapsed = time.thread_time() - start
+        stages = self.results["x"][: WIDTH * N].reshape(N, WIDTH)
+        x = np.vstack([stages[:, :N_X], self.results["x"][WIDTH * N :]])
+        return Answer(x, stages[:, N_X].copy(), elapsed, not np.isfinite(x).all())
+
+
+def hpipm(tire: TireModel) -> Nlp:
+    """Return CasADi's real-time iteration with HPIPM."""
+    problem = stagewise(tire)
+    nlp = problem.nlp
+    J = ca.jacobian(problem.r, nlp["x"])
+    scale, multipliers = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", nlp["g"].numel())
+    ports = [nlp["x"], nlp["p"], scale, multipliers]
+    names = ["x", "p", "lam_f", "lam_g"]
+    gauss_newton = ca.Function("nlp_hess_l", ports, [scale * (J.T @ J)], names, ["hess_gamma_x_x"])
+    silent = {f"print_{what}": False for what in ("header", "iteration", "status", "time")}
+    once = {"max_iter": 1, "max_iter_ls": 0, "hess_lag": gauss_newton, "error_on_fail": False}
+    options: dict[str, Any] = {"qpsol": "hpipm", "qpsol_options": QUIET, **once, **silent, **JIT}
+    return Nlp(tire, problem, ca.nlpsol("rti", "sqpmethod", nlp, options), warm=False)
+
+
+def ipopt(tire: TireModel) -> Nlp:
+    """Return IPOPT, to convergence."""
+    problem = stagewise(tire)
+    warm = {"warm_start_init_point": "yes", "mu_init": 1e-3, "tol": 1e-6}
+    options: dict[str, Any] = {"ipopt": {"print_level": 0, "sb": "yes", **warm}, **QUIET, **JIT}
+    return Nlp(tire, problem, ca.nlpsol("ipopt", "ipopt", problem.nlp, options), warm=True)
+
+
+class Ours:
+    """The tracker, one iteration a step."""
+
+    def __init__(self, tire: TireModel, *, converged: bool = False) -> None:
+        self.tracker = Tracker(tire, PROBLEM, period=PROBLEM.dt, clock=time.thread_time)
+        self.converged = converged
+
+    def step(self, x0: Array, kappa: Array) -> Answer:
+        """Return the plan from a state, on the curvature of the stages."""
+        self.tracker.shift()
+        if self.converged:
+            told = self.tracker.solve_converged(x0, kappa, SPEED)
+        else:
+            told = self.tracker.solve(x0, kappa, SPEED)
+        return Answer(told.plan_x, told.plan_u, told.solve_time_s, told.status != Status.OK)
+
+
+class CondensedDaqp(Ours):
+    """Our linearization, condensed, and DAQP."""
+
+    def __init__(self, tire: TireModel) -> None:
+        super().__init__(tire)
+        source = tracker_source(tire.structure, N, single=False)
+        source = f"#include <string.h>\n{source}\n" + Path(__file__).with_name(
+            "mpc_daqp.c"
+        ).read_text(encoding="utf-8")
+        include = [f"-I{WHEEL / 'include'}", f"-I{WHEEL / 'include' / 'daqp'}"]
+        linked = ["-Wl,--no-as-needed", f"-Wl,-rpath,{WHEEL}", str(WHEEL / "libdaqp.so")]
+        flags = (*FLAGS, *include, *linked)
+        library = load_library(source, "tracker_daqp", flags)
+        assert library is not None, "this benchmark needs a C compiler"
+        self.iterate = library.daqp_iterate
+
+    def step(self, x0: Array, kappa: Array) -> Answer:
+        """Return the plan from a state, on the curvature of the stages."""
+        instance = self.tracker.instance
+        instance.shift()
+        instance.state["x"][0] = x0
+        instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, SPEED
+        start = time.thread_time()
+        flag = self.iterate(*instance.solve_arguments)
+        elapsed = time.thread_time() - start
+        x, u = instance.state["x"].copy(), instance.state["u"].copy()
+        return Answer(x, u, elapsed, ctypes.c_int(flag).value < 1)

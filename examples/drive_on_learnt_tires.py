@@ -1,0 +1,68 @@
+"""Learn the tires of a sedan on a slalom, freeze them, and steer along a lane change with them.
+
+The tracker is told of the learnt tires, then of the linear ones of the vehicle file; the car, the
+noise of its sensors and the delay are the same. Draws drive_on_learnt_tires.png.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from identifier.axle import AxleDesign
+from identifier.identify import identify
+from models.maneuvers import Slalom
+from models.plant import Plant
+from models.vehicle import sedan
+from mpc.cars import DoubleTrackCar
+from mpc.loop import Drive, cornering_limit, drive, inertial_unit
+from mpc.path import iso_3888_2, steady_speed
+from mpc.realtime import Tracker
+from mpc.tires import TireModel, tire_model
+from tireid.figures import drive_errors_figure, save_figure
+
+EXPECTED_BELOW = 0.5
+SHARE = 0.9  # of the lateral acceleration that the tires can give
+DELAY = 2  # periods of 10 ms
+
+
+def steer(tires: TireModel) -> Drive:
+    """Return the drive of a tracker that is told of some tires.
+
+    Parameters
+    ----------
+    tires : what it believes.
+    """
+    car, path = DoubleTrackCar(sedan()), iso_3888_2()
+    limit = cornering_limit(car.vehicle, car.tire)
+    lag = DELAY * car.period + car.vehicle.require_chassis().steering_lag
+    return drive(
+        path,
+        car,
+        Tracker(tires, period=car.period, delay=lag),
+        speed=steady_speed(path, a_y_max=limit, share=SHARE),
+        sensors=inertial_unit(),
+        delay=DELAY,
+        rng=np.random.default_rng(0),
+    )
+
+
+def main() -> float:
+    """Return the rms deviation on learnt tires over that on linear ones [-]."""
+    car = sedan()
+    slalom = Slalom(amplitude=0.07, frequency=0.5, onset=1.0, rate_limit=0.5, duration=20.0)
+    recording = Plant(car).simulate(slalom, speed=20.0).recording()
+    history = identify(recording, car, AxleDesign.for_vehicle(car))
+    learnt = tire_model(history.freeze(t=20.0))
+
+    drives = {"frozen": steer(learnt), "linear": steer(tire_model(car))}
+    rms = {}
+    for name, driven in drives.items():
+        rms[name] = float(np.sqrt(np.mean(driven.e_y**2)))
+        print(f"{name}: rms deviation {100 * rms[name]:.1f} cm, {driven.ending}")
+    figure = drive_errors_figure(drives, off_path=2.0)
+    save_figure(figure, Path("drive_on_learnt_tires.png"))
+    return rms["frozen"] / rms["linear"]
+
+
+if __name__ == "__main__":
+    main()

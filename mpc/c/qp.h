@@ -1,0 +1,23 @@
+/* Inside of @name@: not for users. One quadratic program of the tracker and its solution. */
+#ifndef @NAME@_QP_H
+#define @NAME@_QP_H
+
+#include "@name@.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Minimize sum 1/2 x'H x + h'x + 1/2 R u^2 + g u over the stages and the end, where
+ * x[k+1] = A x[k] + B u[k] + c, x[0] = 0, and rows of bounds |value + row x| <= 1 hold: u and the
+ * steering angle hard; deviation and slip angles soft, at the cost 1/2 s^2 / regular of breaking
+ * one by s. Everything is the difference from the plan that was linearized at.
+ *
+ * Return what became of it, with du, dx and the count of iterations in `work`. */
+@name@_status @name@_qp(@name@_work *work, const @name@_params *params);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

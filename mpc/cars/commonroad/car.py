@@ -1,0 +1,226 @@
+"""A car of commonroad-vehicle-models to drive: their equations under our speed and steering."""
+
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.friction import Friction
+from models.plant import Driver
+from mpc.cars.car import CarState
+from mpc.cars.commonroad.bmw import bmw
+from mpc.cars.commonroad.drift import Drift
+from mpc.cars.commonroad.motion import friction_at, runge_kutta_step
+from mpc.cars.commonroad.multi_body import MultiBody
+from mpc.cars.commonroad.package import bmw_parameters, bmw_tire, scale_friction
+from mpc.cars.commonroad.tire import CommonRoadTire
+from mpc.cars.double_track import HOLDING
+
+Array = NDArray[np.float64]
+
+STEERING = 2  # of both state vectors
+FASTEST_STEERING = 0.4  # what their parameters allow [rad/s]
+
+
+class CommonRoadError(ArithmeticError):
+    """Their car left the range of its equations; the message says when."""
+
+
+class Equations(Protocol):
+    """Their equations of motion."""
+
+    def start(self, core: list[float], parameters: Any) -> Array:
+        """Return their state.
+
+        Parameters
+        ----------
+        core : X, Y, steering, speed, heading, yaw rate, side slip.
+        parameters : theirs.
+        """
+
+    def derivative(self, x: Array, rate: float, demand: float, parameters: Any) -> Array:
+        """Return the derivative of their state.
+
+        Parameters
+        ----------
+        x : their state.
+        rate : of the steering [rad/s].
+        demand : acceleration asked for [m/s^2].
+        parameters : theirs.
+        """
+
+    def seen(self, t: float, x: Array, x_dot: Array, inner: Any, parameters: Any) -> CarState:
+        """Return the state in our words.
+
+        Parameters
+        ----------
+        t : time [s].
+        x, x_dot : their state and its derivative.
+        inner : what the car reads when it goes on.
+        parameters : theirs.
+        """
+
+
+class Inner(NamedTuple):
+    """Periods since the start, and their state."""
+
+    periods: int
+    x: Array
+
+
+class CommonRoadCar:
+    """The BMW 320i by their equations; `multi_body_car` and `drift_car` make it.
+
+    The road wheels turn to the command within one period, as far as 0.4 rad/s reach.
+
+    Parameters
+    ----------
+    equations : theirs.
+    parameters : theirs, at friction 1; not shared with another car.
+    friction : of the road; a change over the place acts on all wheels at once.
+    driver : who holds the speed, by proportional gain alone.
+    period : for which the inputs are held [s], a multiple of `dt`.
+    dt : step of the integration [s].
+
+    Raises
+    ------
+    ValueError
+        When the period is not a multiple of the step, or the driver has an integral.
+    """
+
+    def __init__(
+        self,
+        equations: Equations,
+        parameters: Any,
+        *,
+        friction: Friction | None = None,
+        driver: Driver = HOLDING,
+        period: float = 0.01,
+        dt: float = 1e-3,
+    ) -> None:
+        self._steps = round(period / dt)
+        if not (dt > 0.0 and self._steps >= 1 and abs(self._steps * dt - period) < 1e-9 * period):
+            raise ValueError(f"period {period} must be a multiple of dt {dt}")
+        if driver.integral_gain != 0.0:
+            raise ValueError(f"integral_gain must be zero here, it is {driver.integral_gain}")
+        self._equations, self._parameters, self._dt = equations, parameters, dt
+        self._tire_at_scale_1 = bmw_tire()
+        self._driver = driver
+        self.vehicle = bmw()
+        self.tire = CommonRoadTire.read()
+        self.friction = friction if friction is not None else Friction()
+        self.period = period
+        self.speed_gain = driver.gain
+
+    def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> CarState:
+        """Return the car rolling straight ahead.
+
+        Parameters
+        ----------
+        v_x : speed [m/s].
+        X, Y : position of the center of gravity [m].
+        psi : heading [rad].
+
+        Raises
+        ------
+        ValueError
+            When the speed is not positive.
+        """
+        if not v_x > 0.0:
+            raise ValueError(f"v_x must be positive at the start, it is {v_x}")
+        x = self._equations.start([X, Y, 0.0, v_x, psi, 0.0, 0.0], self._parameters)
+        return self._seen(Inner(0, x), 0.0, 0.0)
+
+    def step(self, state: CarState, command: float, v_ref: float) -> CarState:
+        """Return the car one period later.
+
+        Parameters
+        ----------
+        state : now.
+        command : angle asked of the front road wheels [rad].
+        v_ref : wanted speed [m/s].
+
+        Raises
+        ------
+        ValueError
+            When the inputs are not finite.
+        CommonRoadError
+            When a state stops being a finite number.
+        """
+        if not np.isfinite([command, v_ref]).all():
+            raise ValueError(f"command and v_ref must be finite, they are {command} and {v_ref}")
+        inner: Inner = state.inner
+        rate = (command - state.delta) / self.period
+        rate = min(max(rate, -FASTEST_STEERING), FASTEST_STEERING)
+        limit = self._driver.acceleration_limit
+        demand = min(max(self._driver.gain * (v_ref - state.v_x), -limit), limit)
+        scale = friction_at(self.friction, state.t + 0.5 * self.period, state.X)
+        scale_friction(self._parameters, self._tire_at_scale_1, scale)
+        x = inner.x
+        now = inner.periods + 1
+        try:
+            for _ in range(self._steps):
+                x = runge_kutta_step(
+                    lambda x: self._equations.derivative(x, rate, demand, self._parameters),
+                    x,
+                    self._dt,
+                )
+            if not np.isfinite(x).all():
+                raise ArithmeticError("a state is not finite")
+            return self._seen(Inner(now, x), rate, demand)
+        except (ArithmeticError, ValueError) as error:  # math.sin(inf) is a ValueError
+            message = f"their car left its equations before t = {now * self.period:.3f} s: {error}"
+            raise CommonRoadError(message) from None
+
+    def _seen(self, inner: Inner, rate: float, demand: float) -> CarState:
+        x_dot = self._equations.derivative(inner.x, rate, demand, self._parameters)
+        t = inner.periods * self.period
+        return self._equations.seen(t, inner.x, x_dot, inner, self._parameters)
+
+
+def multi_body_car(
+    *,
+    friction: Friction | None = None,
+    driver: Driver = HOLDING,
+    period: float = 0.01,
+    repaired: bool = False,
+) -> CommonRoadCar:
+    """Return their multi-body car, 29 states.
+
+    Parameters
+    ----------
+    friction : of the road.
+    driver : who holds the speed.
+    period : for which the inputs are held [s].
+    repaired : remove the two contradictions in their program, see `multi_body`.
+
+    Raises
+    ------
+    MissingCommonRoadError
+        Where the package is not installed.
+    """
+    equations = MultiBody(bmw(), repaired=repaired)
+    parameters = bmw_parameters(repaired=repaired)
+    return CommonRoadCar(equations, parameters, friction=friction, driver=driver, period=period)
+
+
+def drift_car(
+    *, friction: Friction | None = None, driver: Driver = HOLDING, period: float = 0.01
+) -> CommonRoadCar:
+    """Return their single-track drift car, 9 states.
+
+    Parameters
+    ----------
+    friction : of the road.
+    driver : who holds the speed.
+    period : for which the inputs are held [s].
+
+    Raises
+    ------
+    MissingCommonRoadError
+        Where the package is not installed.
+    """
+    equations = Drift(bmw())
+    return CommonRoadCar(
+        equations, bmw_parameters(), friction=friction, driver=driver, period=period
+    )

@@ -1,0 +1,1 @@
+"""The tracker as a C package, alone and together with the identifier."""

@@ -1,0 +1,73 @@
+#define UNITS @units@U
+#define AXLE (UNITS + 2U)                      /* weights of an axle */
+#define SHORTEST ((real)@shortest@) /* lag that is always there [m] */
+#define LEAST_SLOPE ((real)0.1)                /* of a force curve at zero [static loads a rad] */
+#define MAX_SLIP ((real)0.5)                   /* up to which a flat curve is looked for [rad] */
+#define STEPS 250U
+#define FLAT ((real)0.05) /* of the slope at zero: there the peak is reached */
+
+static const real load[2] = { @load@ };    /* static, of the axles [N] */
+static const real ladder[UNITS] = { @ladder@ }; /* scales of the units [rad] */
+static const real max_slip[2] = { @max_slip@ }; /* of the tracker, at most [rad] */
+
+/* Weights of the prediction: offsets and lag, scales, then compliance, least lag and units. */
+static bool convert(const @name@_weights *learnt, real w[WEIGHTS])
+{
+    bool is_tire = true;
+    uint32_t i;
+    uint32_t j;
+    w[0] = (real)learnt->own[0][2];
+    w[1] = (real)learnt->own[1][2];
+    w[2] = SHORTEST;
+    is_tire = ((w[0] - w[0]) <= (real)0.0) && ((w[1] - w[1]) <= (real)0.0);
+    for (j = 0U; j < UNITS; j++) {
+        w[3U + j] = (real)1.0 / ladder[j];
+    }
+    for (i = 0U; i < 2U; i++) {
+        real *axle = &w[3U + UNITS + (i * AXLE)];
+        const real compliance = (real)learnt->own[i][0] / load[i];
+        real slope = (real)0.0;
+        real most = (real)0.0;
+        for (j = 0U; j < UNITS; j++) {
+            const real weight = (real)learnt->W[i][j];
+            const real force = weight * load[i];
+            slope += weight / ladder[j];
+            most += (force < (real)0.0) ? -force : force;
+            axle[2U + j] = force;
+        }
+        is_tire = is_tire && (most <= MAX_FORCE) && (slope >= LEAST_SLOPE)
+            && (compliance >= (real)0.0) && ((compliance - compliance) <= (real)0.0);
+        axle[0] = compliance;
+        axle[1] = (compliance * (real)0.02 * (slope * load[i])) + SHORTEST;
+    }
+    return is_tire;
+}
+
+/* Slope of an axle's force at a slip [N/rad]. */
+static real slope_at(const real w[WEIGHTS], uint32_t i, real slip)
+{
+    const real *force = &w[3U + UNITS + (i * AXLE) + 2U];
+    real slope = (real)0.0;
+    uint32_t j;
+    for (j = 0U; j < UNITS; j++) {
+        const real t = (real)tanh((double)(w[3U + j] * slip));
+        slope += (force[j] * w[3U + j]) * ((real)1.0 - (t * t));
+    }
+    return slope;
+}
+
+/* Slip that is of use: up to where the force of the axle hardly grows any more. */
+static real useful_slip(const real w[WEIGHTS], uint32_t i)
+{
+    const real least = FLAT * slope_at(w, i, (real)0.0);
+    real slip = max_slip[i];
+    uint32_t k;
+    for (k = STEPS; k > 0U; k--) {
+        const real at = MAX_SLIP * ((real)k / (real)STEPS);
+        if ((at < slip) && (slope_at(w, i, at) < least)) {
+            slip = at;
+        }
+    }
+    return slip;
+}
+

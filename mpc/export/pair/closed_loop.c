@@ -1,0 +1,191 @@
+/* @name@ and @name@_mpc on a car: learn the tires while driving, and steer by what was learnt.
+ *
+ *     @name@_closed_loop [log.csv]
+ *
+ * Drives the same double lane changes twice: by the tires of the export, and learning. Returns 0
+ * where the learning car stays on the road and, once it has learnt, within LEARNT_PEAK.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+#include "@name@.h"
+#include "@name@_handover.h"
+#include "@name@_mpc.h"
+#include "@name@_mpc_params.h"
+#include "simulated_car.h"
+#include "lane_changes.h"
+
+#define SPEED 21.0         /* m/s: the lane changes ask for 0.83 of the friction */
+#define PASSES 6           /* double lane changes */
+#define TRANSPORT 2        /* periods from a measurement until its command leaves */
+#define ACTUATOR 0.02      /* lag of the steering [s] */
+#define LEARN_FIRST 6.0    /* s before anything is handed over */
+#define SHARE 0.02         /* of the way to what was learnt, each period */
+#define WIDEST 1.75        /* m: the car leaves the road */
+#define LEARNT_PEAK @learnt_peak@    /* m, in the last pass */
+
+typedef struct {
+    double sum;   /* of squares of e_y [m^2] */
+    double peak;  /* of |e_y| [m] */
+    long samples;
+} score;
+
+typedef struct {
+    score pass[PASSES];
+    double solve_time; /* of all steps [s] */
+    unsigned long steps;
+    unsigned long taken;  /* times that learnt weights were taken */
+    unsigned long faults; /* steps without a new plan */
+    bool completed;
+} result;
+
+static unsigned long seed;
+
+/* Noise, uniform between -size and size, the same on every machine. */
+static double noise(double size)
+{
+    seed = ((seed * 1664525UL) + 1013904223UL) & 0xFFFFFFFFUL;
+    return size * (((double)seed / 2147483648.0) - 1.0);
+}
+
+/* The car against the road, and the road ahead. */
+static @name@_mpc_input look(const simulated_car *car, const @name@_mpc_params *params)
+{
+    const double period = (double)params->period;
+    const double ahead = fmax((double)params->delay - (0.5 * period), 0.0);
+    @name@_mpc_input in;
+    unsigned k;
+    in.e_y = (@name@_mpc_real)(car->e_y + noise(0.005));
+    in.e_psi = (@name@_mpc_real)(car->e_psi + noise(0.001));
+    in.v_y = (@name@_mpc_real)(car->v_y + noise(0.02));
+    in.r = (@name@_mpc_real)(car->r + noise(0.002));
+    for (k = 0; k <= @NAME@_MPC_HORIZON; k++) {
+        const double stage = ((double)k - 0.5) * (double)params->stage_time;
+        const double t = (k == 0) ? 0.0 : (ahead + stage);
+        in.kappa[k] = (@name@_mpc_real)lane_changes_curvature(car->s + (car->v_x * t));
+        in.v_x[k] = (@name@_mpc_real)car->v_x;
+    }
+    return in;
+}
+
+/* Tell the identifier what the sensors say, and hand over what it has learnt. */
+static bool learn(@name@_state *identifier, const @name@_params *limits, const simulated_car *car,
+    const @name@_mpc_input *seen, @name@_mpc_params *params, bool hands_over)
+{
+    @name@_input in;
+    @name@_weights learnt;
+    in.v_x = (@name@_real)car->v_x;
+    in.v_y = (@name@_real)seen->v_y;
+    in.r = (@name@_real)seen->r;
+    in.delta_f = (@name@_real)car->delta;
+    in.delta_r = 0;
+    (void)@name@_step(identifier, limits, &in);
+    (void)@name@_get_weights(identifier, &learnt);
+    return hands_over && @name@_handover(&learnt, params, (@name@_mpc_real)SHARE);
+}
+
+static void add(score *pass, double e_y)
+{
+    pass->sum += e_y * e_y;
+    pass->peak = fmax(pass->peak, fabs(e_y));
+    pass->samples++;
+}
+
+static result drive(bool learns, FILE *log)
+{
+    static @name@_state identifier;
+    static @name@_mpc_state tracker;
+    static @name@_mpc_work work;
+    static @name@_params limits;
+    static @name@_mpc_params params;
+    double on_the_way[TRANSPORT] = { 0.0 }; /* commands, the oldest last */
+    simulated_car_numbers numbers = { 0.0, 0.0, { 0.0, 0.0 }, 0.95, 15.0, 0.4, ACTUATOR };
+    simulated_car car;
+    result found;
+    unsigned i;
+    (void)memset(&car, 0, sizeof car);
+    (void)memset(&found, 0, sizeof found);
+    (void)@name@_default_params(&limits);
+    (void)@name@_init(&identifier);
+    (void)@name@_mpc_default_params(&params);
+    (void)@name@_mpc_init(&tracker);
+    numbers.mass = (double)params.car[0];
+    numbers.inertia = (double)params.car[1];
+    numbers.l[0] = (double)params.car[2];
+    numbers.l[1] = (double)params.car[3];
+    params.delay = ((@name@_mpc_real)TRANSPORT * params.period) + (@name@_mpc_real)ACTUATOR;
+    car.v_x = SPEED;
+    seed = 1UL;
+    while ((car.s < (PASSES * LANE_CHANGES_PASS)) && (fabs(car.e_y) < WIDEST)) {
+        const double t = (double)found.steps * (double)params.period;
+        const @name@_mpc_input seen = look(&car, &params);
+        @name@_mpc_real steering = 0;
+        @name@_mpc_status status;
+        clock_t start;
+        found.taken += learn(&identifier, &limits, &car, &seen, &params, learns && (t > LEARN_FIRST))
+            ? 1UL
+            : 0UL;
+        start = clock();
+        status = @name@_mpc_step(&tracker, &params, &work, &seen, &steering);
+        found.solve_time += (double)(clock() - start) / (double)CLOCKS_PER_SEC;
+        found.faults += (status >= @NAME@_MPC_QP_FAILED) ? 1UL : 0UL;
+        found.steps++;
+        add(&found.pass[(int)(car.s / LANE_CHANGES_PASS)], car.e_y);
+        if (log != NULL) {
+            fprintf(log, "%d,%.3f,%.4f,%.5f,%.5f,%.5f,%.5f,%.6f,%.1f,%.1f,%d\n", learns ? 1 : 0, t,
+                car.s, car.e_y, car.e_psi, car.v_y, car.r, car.delta, car.force[0], car.force[1],
+                (int)status);
+        }
+        simulated_car_advance(&car, &numbers, on_the_way[TRANSPORT - 1], (double)params.period);
+        for (i = TRANSPORT - 1; i > 0; i--) {
+            on_the_way[i] = on_the_way[i - 1];
+        }
+        on_the_way[0] = (double)steering;
+    }
+    found.completed = fabs(car.e_y) < WIDEST;
+    return found;
+}
+
+static void print(const char *title, const result *found)
+{
+    int i;
+    printf("%s: %s, %lu steps, %lu without a new plan, %.0f us a step\n", title,
+        found->completed ? "completed" : "LEFT THE ROAD", found->steps, found->faults,
+        1e6 * found->solve_time / (double)found->steps);
+    for (i = 0; i < PASSES; i++) {
+        const score *pass = &found->pass[i];
+        if (pass->samples > 0) {
+            printf("  pass %d: e_y rms %.3f m, peak %.3f m\n", i + 1,
+                sqrt(pass->sum / (double)pass->samples), pass->peak);
+        }
+    }
+}
+
+int main(int argc, char *argv[])
+{
+    FILE *log = (argc > 1) ? fopen(argv[1], "w") : NULL;
+    result exported;
+    result learnt;
+    bool good;
+    if ((argc > 1) && (log == NULL)) {
+        fprintf(stderr, "%s: cannot be written\n", argv[1]);
+        return 2;
+    }
+    if (log != NULL) {
+        fprintf(log, "learns,t,s,e_y,e_psi,v_y,r,delta,Fyf,Fyr,status\n");
+    }
+    exported = drive(false, log);
+    learnt = drive(true, log);
+    if (log != NULL) {
+        (void)fclose(log);
+    }
+    print("tires of the export", &exported);
+    print("tires that are learnt", &learnt);
+    good = learnt.completed && (learnt.faults == 0UL) && (learnt.taken > 0UL)
+        && (learnt.pass[PASSES - 1].peak <= LEARNT_PEAK);
+    printf("%s; the last pass stays within %.2f m of %.2f m allowed: %s\n", @name@_mpc_version(),
+        learnt.pass[PASSES - 1].peak, LEARNT_PEAK, good ? "yes" : "NO");
+    return good ? 0 : 1;
+}

@@ -1,0 +1,10 @@
+/* The road of the example: a double lane change after the other. */
+#ifndef @NAME@_LANE_CHANGES_H
+#define @NAME@_LANE_CHANGES_H
+
+#define LANE_CHANGES_PASS 180.0 /* m from one double lane change to the next */
+
+/* Curvature [1/m], positive to the left, after a way s [m]. */
+double lane_changes_curvature(double s);
+
+#endif

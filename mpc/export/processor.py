@@ -1,0 +1,149 @@
+"""A package on a Cortex-M7 in QEMU, and on this machine: the same bits, and what a step costs."""
+
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from codegen import CompilationError
+from identifier.export.processor import (
+    CROSS_COMPILER,
+    EMULATOR,
+    PROCESSORS,
+    TIMEOUT,
+    ReplayError,
+)
+from identifier.export.processor import TARGET as BOARD
+from mpc.export.package import MpcPackage, filled
+
+TARGET = Path(__file__).parent / "target"
+PROCESSOR = PROCESSORS[-1]  # the one that computes in double
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno")
+STEPS = 40  # of the self-test that are replayed
+
+
+class Replay(NamedTuple):
+    """What a machine made of the vectors.
+
+    hash : of every state and status.   steps : of the tracker.
+    state, params, work : sizes [bytes].   stack : of one step [bytes].
+    instructions, most_instructions : of a step, mean of those that plan, and largest; 0 where the
+    machine does not count.
+    """
+
+    hash: str
+    steps: int
+    state: int
+    params: int
+    work: int
+    stack: int
+    instructions: int
+    most_instructions: int
+
+
+def replay_on_processor(package: MpcPackage, *, single: bool, steps: int = STEPS) -> Replay:
+    """Run vectors through a package on a Cortex-M7 in QEMU.
+
+    Parameters
+    ----------
+    package : of the tracker.
+    single : whether to compute in float.
+    steps : how many vectors.
+
+    Raises
+    ------
+    CompilationError
+        Where the compiler refuses a file.
+    ReplayError
+        Where the program does not come to its end.
+    """
+    board = ["-std=gnu99", "-ffreestanding", "-nostartfiles", "-T", "mps2.ld", "board.c"]
+    libraries = ["--specs=nosys.specs", "-Wl,--no-warnings", "-lm"]
+    compiler = [CROSS_COMPILER, *FLAGS, *PROCESSOR.flags, *board, *libraries]
+    machine = ["-M", PROCESSOR.machine, "-nographic", "-monitor", "none", "-icount", "shift=0"]
+    semihosting = ["-semihosting-config", "enable=on,target=native"]
+    command = [EMULATOR, *machine, *semihosting, "-kernel", "replay"]
+    return _replayed(package, compiler, command, single=single, steps=steps)
+
+
+def replay_here(
+    package: MpcPackage,
+    compiler: str,
+    *,
+    single: bool,
+    steps: int = STEPS,
+    flags: Sequence[str] = FLAGS,
+) -> Replay:
+    """Run vectors through a package on this machine.
+
+    Parameters
+    ----------
+    package : of the tracker.
+    compiler : its command.
+    single : whether to compute in float.
+    steps : how many vectors.
+    flags : of the compiler.
+
+    Raises
+    ------
+    CompilationError
+        Where the compiler refuses a file.
+    ReplayError
+        Where the program does not come to its end.
+    """
+    words = [compiler, *flags, "host.c", "-lm"]
+    return _replayed(package, words, ["./replay"], single=single, steps=steps)
+
+
+def _replayed(
+    package: MpcPackage,
+    compiler: Sequence[str],
+    command: Sequence[str],
+    *,
+    single: bool,
+    steps: int,
+) -> Replay:
+    name = package.name
+    with tempfile.TemporaryDirectory(prefix="tireid-") as scratch:
+        folder = Path(scratch)
+        for path, text in package.files.items():
+            (folder / path).parent.mkdir(exist_ok=True)
+            (folder / path).write_text(text, encoding="utf-8")
+        for board in ("board.c", "host.c", "machine.h", "mps2.ld"):
+            (folder / board).write_text((BOARD / board).read_text(encoding="utf-8"))
+        values = {"name": name, "NAME": name.upper(), "steps": str(steps)}
+        (folder / "replay.c").write_text(filled("replay.c", values, TARGET))
+        sources = sorted(path for path in package.files if path.startswith("src/"))
+        own = [f"-D{name.upper()}_SINGLE={int(single)}", "-Iinclude", "-Isrc", "-Itests", "-I."]
+        files = [path for path in sources if path.endswith(".c")]
+        first, *words = compiler
+        answer = _run([first, *own, *files, "replay.c", *words, "-o", "replay"], folder)
+        if answer.returncode != 0:
+            lines = "\n".join(answer.stderr.splitlines()[:5])
+            raise CompilationError(f"{first} refused the package:\n{lines}")
+        return _result(_run(command, folder), command[0])
+
+
+def _run(command: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    try:
+        return subprocess.run(
+            command,
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=TIMEOUT,
+            stdin=subprocess.DEVNULL,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise ReplayError(f"{command[0]} did not end within {TIMEOUT:g} s") from error
+
+
+def _result(answer: subprocess.CompletedProcess[str], program: str) -> Replay:
+    lines = (answer.stdout + answer.stderr).splitlines()
+    found = dict(line.split() for line in lines if line.count(" ") == 1)
+    if answer.returncode != 0 or "hash" not in found:
+        raise ReplayError(f"{program} ended with {answer.returncode}: {answer.stderr[:200]}")
+    numbers = {key: int(found[key], 16) for key in Replay._fields if key != "hash"}
+    return Replay(hash=found["hash"], **numbers)

@@ -1,0 +1,107 @@
+"""What must hold before learnt numbers may steer: the law was proven, and the tire is a tire."""
+
+from collections.abc import Hashable
+from functools import cache
+from typing import Any, cast
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from identifier.axle.car import car_numbers
+from identifier.defaults import natural_operation
+from identifier.design import Design
+from identifier.laws import DRIVING_ERRORS
+from identifier.method import Method
+from identifier.stability import certify
+from models.vehicle import GRAVITY, Vehicle
+from mpc.tires import TireModel
+from mpc.tires.structure import Car, Point
+
+Array = NDArray[np.float64]
+
+LARGEST_SLIP = 0.25  # rad: an axle slides long before
+SHARES = (0.02, 0.04, 0.08, 0.16, 0.28, 0.44, 0.64, 1.0)  # of the largest slip that is judged
+MOST_GRIP = 1.8  # static axle loads: no road tire has more
+LEAST_GRIP = 0.03  # static axle loads at a slip of 0.1 rad and more: less is no road
+WRONG_WAY = 0.03  # static axle loads that a force may push the wrong way, for offsets of sensors
+
+
+def law_complaint(method: Method, vehicle: Vehicle) -> str | None:
+    """Return why a method must not teach while driving, or None.
+
+    The paper's laws need the certificate of their gains. Least squares with bounded parameters
+    has no gain that could be too high; what it teaches is judged by `tire_complaint`.
+
+    Parameters
+    ----------
+    method : the method.
+    vehicle : the car.
+    """
+    if not isinstance(method, Design):
+        return None
+    driving_error = DRIVING_ERRORS[method.law]
+    certificate = certify(method.gains, driving_error, natural_operation(method, vehicle))
+    failed = [entry.title for entry in certificate.properties if entry.status == "fail"]
+    return f"the certificate fails: {'; '.join(failed)}" if failed else None
+
+
+def tire_complaint(tire: TireModel, v_x: float, largest: float = LARGEST_SLIP) -> str | None:
+    """Return why a tire must not be steered with at a speed, or None.
+
+    Its forces are finite, push against the slip of their axle, rise from zero slip, and lie between
+    those of ice and a grip that no road tire has; straight ahead and in bends of g/3.
+
+    Parameters
+    ----------
+    tire : weights to be handed over.
+    v_x : speed [m/s].
+    largest : slip up to which it is judged [rad].
+    """
+    if not np.isfinite(tire.weights).all():
+        return "a weight is not finite"
+    slip, forces = _forces(tire, v_x, largest)
+    pushes = forces * np.sign(slip)  # (turns, axles, signs, slips) [static axle loads]
+    if not np.isfinite(forces).all():
+        return "a force is not finite"
+    for i, axle in enumerate(("front", "rear")):
+        push = pushes[:, i]
+        if push.max() > MOST_GRIP:
+            return f"the {axle} axle would carry {push.max():.2f} times its load"
+        if push.min() < -WRONG_WAY:
+            return f"the {axle} axle would push the wrong way by {-push.min():.2f} of its load"
+        if largest >= 0.1 and push[..., -1].min() < LEAST_GRIP:
+            return f"the {axle} axle would slide at {push[..., -1].min():.2f} of its load"
+        if not (push[0].sum(axis=0)[0] > 0.0):
+            return f"the force of the {axle} axle does not rise with slip"
+    return None
+
+
+def _forces(tire: TireModel, v_x: float, largest: float) -> tuple[Array, Array]:
+    """Return slips and forces (turns, axles, signs, slips) [rad, static axle loads]."""
+    arm, load = car_numbers(tire.vehicle)[:, [0, 3]].T
+    signs = np.array([1.0, -1.0])[:, None]
+    alpha = signs * largest * np.array(SHARES)
+    r = np.array([0.0, 1.0, -1.0])[:, None, None] * GRAVITY / (3.0 * v_x)
+    alpha, r = np.broadcast_arrays(alpha[None], r)
+    v_y = arm[1] * -r - v_x * np.tan(alpha)  # both axles at the same slip
+    delta = alpha + np.arctan((v_y + arm[0] * r) / v_x)
+    points = np.stack([part.ravel() for part in (v_y, r, delta)])
+    structure = cast(Hashable, tire.structure)
+    force = np.array(_statics(structure, points.shape[1])(points, v_x, tire.car, tire.weights))
+    shaped = force.reshape(2, *alpha.shape).swapaxes(0, 1) / load[None, :, None, None]
+    return np.broadcast_to(alpha[:, None], shaped.shape), shaped
+
+
+@cache
+def _statics(structure: Any, n: int) -> ca.Function:
+    """Return steady axle forces (2, n) at states (3, n) = v_y, r, δ."""
+    states, v_x = ca.MX.sym("states", 3, n), ca.MX.sym("v_x")
+    car, w = ca.MX.sym("car", 4), ca.MX.sym("w", structure.n_weights)
+    one, speed = ca.SX.sym("one", 3), ca.SX.sym("v_x")
+    numbers, weights = ca.SX.sym("car", 4), ca.SX.sym("w", structure.n_weights)
+    v_y, r, delta = ca.vertsplit(one)
+    at = Point(v_y, r, delta, speed, Car(*ca.vertsplit(numbers)), weights)
+    force = structure.force(structure.slip(at), at)
+    at_one = ca.Function("one", [one, speed, numbers, weights], [ca.vertcat(*force)])
+    return ca.Function("statics", [states, v_x, car, w], [at_one.map(n)(states, v_x, car, w)])

@@ -1,0 +1,104 @@
+"""The whole of learning while driving, beside a tracker: observe, decide, move the weights."""
+
+from functools import partial
+from typing import NamedTuple, Protocol
+
+from mpc.handover.blend import blended
+from mpc.handover.preview import previewed_rate
+from mpc.handover.rules import Decision, Verdict
+from mpc.handover.supervisor import Supervisor
+from mpc.realtime import Tracker
+
+
+class Sample(Protocol):
+    """What a learner reads of a measurement, SI: `mpc.loop.sensing.Measured` is one."""
+
+    @property
+    def v_x(self) -> float:
+        """Longitudinal speed [m/s]."""
+
+    @property
+    def v_y(self) -> float:
+        """Lateral velocity [m/s]."""
+
+    @property
+    def r(self) -> float:
+        """Yaw rate [rad/s]."""
+
+    @property
+    def delta(self) -> float:
+        """Angle of the front road wheels [rad]."""
+
+
+class Moved(NamedTuple):
+    """A move of weights at a time [s]: share of the way, jump of the planned rate [rad/s]."""
+
+    t: float
+    share: float
+    jump: float
+
+
+class Learner:
+    """Keeps a tracker on the tire that its supervisor names.
+
+    Weights go to a new target within the blending time of the rules, in steps that change the
+    planned steering rate by no more than `largest_jump`, or `quick_jump` for another friction.
+
+    Attributes: supervisor; moves, one for each period in which weights moved or could not.
+
+    Parameters
+    ----------
+    supervisor : decides.
+    largest_jump : of the planned steering rate [rad/s].
+    quick_jump : the same where the friction has changed [rad/s].
+
+    Raises
+    ------
+    ValueError
+        Where a bound is not positive.
+    """
+
+    def __init__(
+        self, supervisor: Supervisor, *, largest_jump: float = 0.05, quick_jump: float = 0.2
+    ) -> None:
+        if not (largest_jump > 0.0 and quick_jump > 0.0):
+            raise ValueError(f"jumps must be positive, they are {largest_jump} and {quick_jump}")
+        self.supervisor = supervisor
+        self.moves: list[Moved] = []
+        self._jump, self._quick_jump = largest_jump, quick_jump
+        self._left = 0.0  # time in which to arrive [s]
+        self._quick = False
+
+    def observe(self, measured: Sample, tracker: Tracker) -> str | None:
+        """Take a sample before the tracker steps; return what was decided, where that matters.
+
+        Parameters
+        ----------
+        measured : by the sensors.
+        tracker : which steers; its tire is moved.
+        """
+        decision = self.supervisor.observe(measured.v_x, measured.v_y, measured.r, measured.delta)
+        changed = decision is not None and decision.verdict is not Verdict.KEEP
+        if decision is not None and changed:
+            self._begin(decision)
+        self._move(tracker)
+        return f"{decision.verdict.value}: {decision.reason}" if decision and changed else None
+
+    def _begin(self, decision: Decision) -> None:
+        rules = self.supervisor.rules
+        self._quick = decision.verdict is not Verdict.LEARNT
+        self._left = rules.quick_blend if self._quick else rules.blend
+
+    def _move(self, tracker: Tracker) -> None:
+        target = self.supervisor.target
+        if tracker.tire is target:
+            return
+        most = self._quick_jump if self._quick else self._jump
+        share = min(1.0, tracker.period / max(self._left, tracker.period))
+        step = blended(
+            tracker.tire, target, share, planned=partial(previewed_rate, tracker), most=most
+        )
+        if step.share > 0.0:
+            tracker.set_tire(step.tire)
+        self._left = max(self._left - tracker.period, tracker.period)
+        self.moves.append(Moved(self.supervisor.t, step.share, step.jump))

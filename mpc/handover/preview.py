@@ -1,0 +1,30 @@
+"""What a tracker would plan with other weights, in the situation that it is in."""
+
+from mpc.realtime import Tracker
+from mpc.tires import TireModel
+
+
+def previewed_rate(tracker: Tracker, tire: TireModel) -> float:
+    """Return the first steering rate of the plan after one more iteration with a tire [rad/s].
+
+    From the plan and the road of the last step; the tracker is left as it was.
+
+    Parameters
+    ----------
+    tracker : after a step.
+    tire : of the same structure.
+
+    Raises
+    ------
+    ValueError
+        Where the structure is another.
+    """
+    if tire.structure != tracker.tire.structure:
+        raise ValueError(f"the tracker is built for {tracker.tire.structure}, not {tire.structure}")
+    instance = tracker.instance
+    state, params = instance.state.copy(), instance.params.copy()
+    instance.params["weights"], instance.params["car"] = tire.weights, tire.car
+    instance.solve()
+    rate = float(instance.state["u"][0])
+    instance.state[...], instance.params[...] = state, params
+    return rate

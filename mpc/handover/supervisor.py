@@ -1,0 +1,183 @@
+"""Which tire should be steered with: the one in use, the one learnt, or one of another friction."""
+
+import math
+
+import numpy as np
+
+from identifier.history import DivergedError
+from identifier.method import CannotFreezeError
+from identifier.online import OnlineIdentifier
+from mpc.handover.certificate import law_complaint, tire_complaint
+from mpc.handover.excitation import Excitation
+from mpc.handover.misfit import Array, Judge, Misfit
+from mpc.handover.road import Road, look_at_road
+from mpc.handover.rules import Decision, Rules, Verdict
+from mpc.handover.window import Window
+from mpc.tires import TireModel, tire_model
+
+LOST = 5  # samples in a row after which a window is none
+
+
+class Supervisor:
+    """Watches an identifier learn and names the tire to be steered with, `target`.
+
+    Two ways lead to another tire. The learnt one, where its law is certified, its forces are those
+    of a tire, it was excited where the car is driven, and it explains the last seconds better than
+    the one in use. And, for what cannot wait for seconds, the tire in use at another friction,
+    where that explains the last moments far better; it is corrected as more is seen.
+
+    Attributes: target; decisions, those that changed it, and the last one.
+
+    Parameters
+    ----------
+    identifier : which is told every sample here.
+    in_use : the tire that is steered with at the start.
+    rules : times and evidence.
+    judge : of misfits; None expects the usual errors.
+    proven : whether that tire is one of this car, so that what it does not explain is the road;
+        else a friction is looked for only after a learnt tire took over.
+
+    Raises
+    ------
+    ValueError
+        Where a law does not have its certificate.
+    """
+
+    def __init__(
+        self,
+        identifier: OnlineIdentifier,
+        in_use: TireModel,
+        rules: Rules | None = None,
+        judge: Judge | None = None,
+        *,
+        proven: bool = True,
+    ) -> None:
+        dt = identifier.method.dt
+        self.identifier, self.target = identifier, in_use
+        self.rules, self.judge = rules or Rules(), judge or Judge(dt)
+        self._require_fit_for_use(in_use)
+        longest = max(self.rules.seconds, self.rules.follow)
+        self._window = Window(self.judge.reach(longest), dt)
+        self._excitation = Excitation(dt, identifier.vehicle, self.rules.learning_time)
+        self._every = max(1, round(self.rules.every / dt))
+        self._learnt_every = max(1, round(self.rules.learnt_every / dt))
+        self._samples, self._dt = 0, dt
+        self._sample, self._lost = (0.0, 0.0, 0.0, 0.0), 0
+        self._usual = 1.0  # mean misfit of the tire in use
+        self._proven = proven
+        self._road = Road(in_use)
+        self.decisions: list[Decision] = []
+        self.last = Decision(0.0, Verdict.KEEP, "nothing was driven yet", 0.0, 0.0)
+
+    def _require_fit_for_use(self, in_use: TireModel) -> None:
+        complaint = law_complaint(self.identifier.method, self.identifier.vehicle)
+        if complaint is not None:
+            raise ValueError(complaint)
+        learnt = tire_model(self.identifier.model()).structure
+        if learnt != in_use.structure:
+            raise ValueError(
+                f"what is learnt ({learnt}) cannot replace what is steered with "
+                f"({in_use.structure}): begin with a tire of the identifier"
+            )
+
+    @property
+    def t(self) -> float:
+        """Time since the first sample [s]."""
+        return self._samples * self._dt
+
+    def observe(self, v_x: float, v_y: float, r: float, delta: float) -> Decision | None:
+        """Take a sample; return a decision where one was due.
+
+        Parameters
+        ----------
+        v_x : longitudinal speed [m/s].
+        v_y : lateral velocity [m/s].
+        r : yaw rate [rad/s].
+        delta : angle of the front road wheels [rad].
+        """
+        self.identifier.update(np.array([v_y, r]), np.array([delta, 0.0]), v_x)
+        self._samples += 1
+        if all(map(math.isfinite, (v_x, v_y, r, delta))):
+            self._lost = 0
+            sample = (v_x, v_y, r, delta)
+        else:
+            self._lost += 1
+            sample = self._sample  # for a moment the last one stands for it
+        self._sample = sample
+        if self._lost > LOST or not sample[0] >= self.identifier.method.min_speed:
+            self._window.clear()
+            return None
+        self._window.add((*sample, *self.identifier.sway_slip()))
+        self._excitation.add(*sample)
+        if self._samples % self._every and self._samples % self._learnt_every:
+            return None
+        self.last = self._decide(sample[0])
+        if self.last.verdict is not Verdict.KEEP:
+            self.decisions.append(self.last)
+        return self.last
+
+    def _keep(self, reason: str, in_use: float = 0.0, candidate: float = 0.0) -> Decision:
+        return Decision(self.t, Verdict.KEEP, reason, in_use, candidate)
+
+    def _decide(self, v_x: float) -> Decision:
+        rules, judge = self.rules, self.judge
+        if self._window.duration < judge.reach(rules.last_moments):
+            return self._keep("too few samples")
+        moments = self._window.last(judge.reach(rules.last_moments))
+        now = judge.misfit(self.target, moments)
+        if self._proven:
+            change = look_at_road(
+                self._road,
+                self.target,
+                self._window,
+                t=self.t,
+                usual=self._usual,
+                trusted=self._excitation.trusted_slip(self.target),
+                judge=judge,
+                rules=rules,
+            )
+            if change is not None:
+                self._road, self.target = change.road, change.tire
+                return Decision(
+                    self.t,
+                    change.verdict,
+                    change.reason,
+                    change.before,
+                    change.after,
+                    change.road.ratio,
+                )
+        share = rules.every / rules.usual_time
+        rise = min(now.mean, 4.0 * self._usual) - self._usual  # shall not follow a change
+        self._usual = max(1.0, self._usual + share * rise)
+        if self._samples % self._learnt_every:
+            return self._keep(self.last.reason, now.total)
+        return self._learnt(moments, now, v_x)
+
+    def _learnt(self, moments: Array, now: Misfit, v_x: float) -> Decision:
+        """Return a decision on what the identifier has learnt."""
+        rules, judge = self.rules, self.judge
+        seconds = min(rules.seconds, self.t - self._road.changed_at)
+        samples = self._window.last(judge.reach(seconds))
+        if seconds < rules.least_seconds or len(samples) * self._dt < rules.least_seconds:
+            return self._keep("too few seconds to judge what was learnt", now.total)
+        try:
+            model = self.identifier.model()
+        except (DivergedError, CannotFreezeError, ValueError) as error:
+            return self._keep(str(error), now.total)
+        complaint = self._excitation.complaint(model, samples)
+        candidate = tire_model(model)
+        trusted = self._excitation.trusted_slip(candidate)
+        complaint = complaint or tire_complaint(candidate, v_x, trusted)
+        if complaint is not None:
+            return self._keep(complaint, now.total)
+        weights = np.stack([self.target.weights, candidate.weights])
+        before, after = judge.misfits(candidate, weights, samples)
+        reason = f"misfit of {seconds:.1f} s {before.total:.0f} -> {after.total:.0f}"
+        if before.total - after.total < rules.evidence * self._usual:
+            return self._keep(f"not better: {reason}", before.total, after.total)
+        latest = judge.misfit(candidate, moments)
+        if latest.total > now.total + rules.correction * self._usual:
+            return self._keep("worse in the last moments", before.total, after.total)
+        self.target, self._proven = candidate, True
+        self._road = self._road.on(candidate)
+        return Decision(self.t, Verdict.LEARNT, reason, before.total, after.total)

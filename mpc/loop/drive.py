@@ -1,0 +1,156 @@
+"""The closed loop: a car that is not the prediction, noisy sensors, delay, and a tracker.
+
+At t_k the car is measured and the tracker decides; what it decides acts from t_{k+d} to t_{k+d+1},
+d periods later.
+"""
+
+import math
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+
+from mpc.cars import Car, CarState
+from mpc.loop.profile import SpeedProfile
+from mpc.loop.record import Drive
+from mpc.loop.recorder import Recorder
+from mpc.loop.sensing import CarSensors, Measured
+from mpc.loop.tracking import PathTracker
+from mpc.path.path import Path
+from mpc.path.projection import Projection
+from mpc.realtime.messages import Measurement
+
+COMPLETED = "reached the end"
+SPUN = math.radians(45.0)  # side slip of the center of gravity [rad]
+SLOWEST = 1.0  # m/s
+
+
+class Learner(Protocol):
+    """What runs beside the tracker and may hand it another tire."""
+
+    def observe(self, measured: Measured, tracker: Any) -> str | None:
+        """Look at a sample; return what was decided where that is worth a note.
+
+        Parameters
+        ----------
+        measured : by the sensors, before the tracker steps.
+        tracker : which steers.
+        """
+
+
+def drive(
+    path: Path,
+    car: Car,
+    tracker: PathTracker,
+    *,
+    speed: SpeedProfile | float,
+    sensors: CarSensors | None = None,
+    delay: int = 1,
+    rng: np.random.Generator,
+    learner: Learner | None = None,
+    laps: float = 1.0,
+    time_limit: float = 300.0,
+    widest: float = 2.0,
+    plan_every: int = 10,
+    name: str | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Drive:
+    """Drive a car along a path.
+
+    Parameters
+    ----------
+    path : to follow, from s = 0.
+    car : to drive.
+    tracker : which steers; it is reset.
+    speed : wanted along the path, [m/s] where it is a number.
+    sensors : of the car; None measures exactly.
+    delay : periods from a measurement until what follows from it acts.
+    rng : source of the noise.
+    learner : what may change the tracker's tire on the way.
+    laps : how often to drive a closed path; an open one is driven once.
+    time_limit : after which the drive is given up [s].
+    widest : deviation at which the car has left the path [m].
+    plan_every : periods between two plans that are kept; 0 keeps none.
+    name : of the drive; None takes that of the path.
+    progress : called with the share of the way at every period.
+
+    Raises
+    ------
+    ValueError
+        Where the tracker's period is not the car's, or a delay is negative.
+    """
+    if abs(car.period - tracker.period) > 1e-9:
+        raise ValueError(f"the car steps {car.period} s, the tracker {tracker.period} s")
+    if delay < 0:
+        raise ValueError(f"delay must not be negative, it is {delay}")
+    profile = speed if isinstance(speed, SpeedProfile) else SpeedProfile(path, speed)
+    sensors = sensors if sensors is not None else CarSensors()
+    goal = path.length * (laps if path.closed else 1.0)
+    tracker.reset()
+    state = _at_the_start(path, car, profile)
+    waiting = deque([0.0] * delay)
+    record = Recorder(plan_every)
+    here, believed = path.project(state.X, state.Y, 0.0), 0.0
+    ending = ""
+    while not ending:
+        measured = sensors.measure(state, rng)
+        seen = path.project(measured.X, measured.Y, believed)
+        believed = seen.s
+        if learner is not None:
+            record.note(state.t, learner.observe(measured, tracker))
+        ahead = profile.ahead(seen.s, measured.v_x, tracker.times, car.speed_gain)
+        command = tracker.step(
+            Measurement(
+                e_y=seen.e_y,
+                e_psi=seen.heading_error(measured.psi),
+                v_y=measured.v_y,
+                r=measured.r,
+                kappa=ahead.kappa,
+                v_x=ahead.v_x,
+            )
+        )
+        v_ref = profile.reference(here.s, car.speed_gain)
+        if record.plan_is_due:
+            there = profile.ahead(seen.s, measured.v_x, tracker.plan_times, car.speed_gain)
+            record.plan(command, there.s)
+        record.add(state, here, measured, v_ref, command)
+        waiting.append(command.steering)
+        try:
+            state = car.step(state, waiting.popleft(), v_ref)
+        except ArithmeticError as error:
+            ending = str(error)
+            break
+        here = path.project(state.X, state.Y, here.s)
+        if progress is not None:
+            progress(min(here.s / goal, 1.0))
+        ending = _ending(state, here, goal, widest, time_limit)
+    return record.drive(
+        name=name or path.name,
+        vehicle=car.vehicle,
+        path=path,
+        period=car.period,
+        completed=ending == COMPLETED,
+        ending=ending,
+    )
+
+
+def _at_the_start(path: Path, car: Car, profile: SpeedProfile) -> CarState:
+    """Return the car on the path, along it, at the wanted speed."""
+    X, Y, psi = (float(value) for value in path.pose(0.0))
+    return car.start(float(profile.at(0.0)), X=X, Y=Y, psi=psi)
+
+
+def _ending(
+    state: CarState, here: Projection, goal: float, widest: float, time_limit: float
+) -> str:
+    """Return why the drive is over, or nothing while it goes on."""
+    if abs(here.e_y) > widest:
+        return f"left the path by more than {widest:g} m"
+    if abs(math.atan2(state.v_y, state.v_x)) > SPUN:
+        return "spun"
+    if state.v_x < SLOWEST:
+        return f"slower than {SLOWEST:g} m/s"
+    if here.s >= goal:
+        return COMPLETED
+    return f"not there after {time_limit:g} s" if state.t >= time_limit else ""

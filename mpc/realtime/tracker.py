@@ -1,0 +1,229 @@
+"""The tracker in C, from Python: compiled once for a structure, every number set at run time."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mpc.problem import Problem
+from mpc.realtime.guards import Guards
+from mpc.realtime.instance import Instance
+from mpc.realtime.layout import N_COMMANDS, set_params
+from mpc.realtime.messages import Command, Measurement, Status
+from mpc.tires.structure import TireModel
+
+Array = NDArray[np.float64]
+
+TOLERANCE = {False: 1e-8, True: 1e-5}  # of the solver, by `single`
+STAYS = 1e-9  # change of the steering rate [rad/s] below which a plan has converged
+
+
+class Tracker:
+    """Steers a car along a path by one iteration of the solver each period.
+
+    The command of a step acts `delay` after its measurement, and is held for a period. What is
+    steered is a ramp to the solver, so that it plans from half a period before.
+
+    Parameters
+    ----------
+    tire : of the prediction, with its car.
+    problem : what to minimize; None takes the default.
+    period : between two steps [s], at most the stage's length.
+    delay : from a measurement until its command acts on the wheels [s], lags included.
+    guards : what is possible, and the fall-back; None takes the default.
+    budget : time of a step [s] beyond which it is late: then the plan before it steers.
+    tolerance : of the solver, in parts: mean product of gap and multiplier against the largest
+        multiplier, where gaps count limits as 1; None takes 1e-8, in float 1e-5.
+    max_iterations : of the solver.
+    linearizations : a step; 1 in real time, some 10 to convergence.
+    single : whether to compute in float.
+    clock : of the solve times [s].
+
+    Raises
+    ------
+    ValueError
+        Where a number is out of its range.
+    NoCompilerError
+        Where there is no C compiler.
+    CompilationError
+        Where the compiler refuses the code.
+    """
+
+    def __init__(
+        self,
+        tire: TireModel,
+        problem: Problem | None = None,
+        *,
+        period: float = 0.01,
+        delay: float = 0.0,
+        guards: Guards | None = None,
+        budget: float | None = None,
+        tolerance: float | None = None,
+        max_iterations: int = 40,
+        linearizations: int = 1,
+        single: bool = False,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        problem = Problem() if problem is None else problem
+        longest = (N_COMMANDS - 1) * period
+        if not 0.0 < period <= problem.dt:
+            raise ValueError(f"period must be positive and at most {problem.dt}, it is {period}")
+        if not 0.0 <= delay <= longest:
+            raise ValueError(f"delay must be between 0 and {longest:g} s, it is {delay}")
+        solver = {
+            "tolerance": TOLERANCE[single] if tolerance is None else tolerance,
+            "max_iterations": max_iterations,
+            "linearizations": linearizations,
+        }
+        for name, value in solver.items():
+            if not value > 0:
+                raise ValueError(f"{name} must be positive, it is {value}")
+        self.tire, self.problem, self.period, self.delay = tire, problem, period, delay
+        self._budget, self._clock = budget, clock
+        self.instance = Instance(tire.structure, problem.horizon, single=single)
+        params = self.instance.params
+        set_params(params, problem, guards or Guards())
+        for name, value in {"period": period, "delay": delay, **solver}.items():
+            params[name] = value
+        self.set_tire(tire)
+
+    @property
+    def times(self) -> Array:
+        """Times after a measurement at which to tell curvature and speed [s], (N + 1,)."""
+        middles = np.arange(self.problem.horizon, dtype=np.float64) + 0.5
+        return np.concatenate([[0.0], self._ahead + self.problem.dt * middles])
+
+    @property
+    def plan_times(self) -> Array:
+        """Times after a measurement of the states of the plan [s], (N + 1,)."""
+        return self._ahead + self.problem.dt * np.arange(self.problem.horizon + 1.0)
+
+    @property
+    def _ahead(self) -> float:
+        return max(self.delay - 0.5 * self.period, 0.0)
+
+    @property
+    def faults(self) -> dict[Status, int]:
+        """Steps of each status since the tracker was made."""
+        return {status: int(self.instance.state["faults"][status]) for status in Status}
+
+    @property
+    def params(self) -> NDArray[np.void]:
+        """A copy of the numbers that the C reads, of `mpc.realtime.layout.params_type`."""
+        return self.instance.params.copy()
+
+    def set_tire(self, tire: TireModel) -> None:
+        """Go on with other weights, the car that they are of and the slip that is of use to it.
+
+        Parameters
+        ----------
+        tire : of the same structure.
+
+        Raises
+        ------
+        ValueError
+            Where the structure is another, or a number not finite.
+        """
+        if tire.structure != self.tire.structure:
+            raise ValueError(
+                f"the tracker is built for {self.tire.structure}, not {tire.structure}"
+            )
+        weights, car, params = np.asarray(tire.weights), tire.car, self.instance.params
+        if weights.shape != params["weights"].shape:
+            raise ValueError(f"weights must be {params['weights'].size}, not {weights.shape}")
+        if not (np.isfinite(weights).all() and np.isfinite(car).all()):
+            raise ValueError("weights and car must be finite")
+        params["weights"], params["car"] = weights, car
+        params["max_slip"] = self.problem.limits.on(tire).slip
+        self.tire = tire
+
+    def reset(self, steering: float = 0.0) -> None:
+        """Forget what was planned and steered; faults are kept.
+
+        Parameters
+        ----------
+        steering : angle of the wheels now [rad].
+
+        Raises
+        ------
+        ValueError
+            Where the angle is not finite.
+        """
+        if self.instance.reset(steering) != Status.OK:
+            raise ValueError(f"steering must be finite, it is {steering}")
+
+    def step(self, measurement: Measurement) -> Command:
+        """Return what to steer from `delay` after the measurement on.
+
+        Parameters
+        ----------
+        measurement : the car against the path, and the road ahead.
+        """
+        instance, told = self.instance, self.instance.input
+        told["e_y"], told["e_psi"], told["v_y"], told["r"] = measurement[:4]
+        told["kappa"], told["v_x"] = measurement[4:6]
+        instead = self._planned_steering() if self._budget is not None else 0.0
+        start = self._clock()
+        status = instance.step()
+        elapsed = self._clock() - start
+        steering = float(instance.steering)
+        if self._budget is not None and elapsed > self._budget:
+            instance.late(instead)
+            status, steering = int(Status.LATE), instead
+        return self._command(steering, status, elapsed)
+
+    def solve(self, x0: ArrayLike, kappa: ArrayLike, v_x: ArrayLike) -> Command:
+        """Take one iteration from the plan as it is; the steering is that behind the first stage.
+
+        Parameters
+        ----------
+        x0 : state at the beginning of the first stage (n_x,).
+        kappa : curvature of the stages [1/m], (N,) or a number.
+        v_x : speed of the stages [m/s], (N,) or a number.
+        """
+        instance = self.instance
+        instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, v_x
+        instance.start[:] = x0
+        start = self._clock()
+        status = instance.solve()
+        elapsed = self._clock() - start
+        return self._command(float(instance.state["x"][1, 4]), status, elapsed)
+
+    def solve_converged(
+        self, x0: ArrayLike, kappa: ArrayLike, v_x: ArrayLike, *, most: int = 100
+    ) -> Command:
+        """Iterate from a guess until the plan stays; its status is that of the last iteration.
+
+        Parameters
+        ----------
+        x0 : state at the beginning of the first stage (n_x,).
+        kappa : curvature of the stages [1/m], (N,) or a number.
+        v_x : speed of the stages [m/s], (N,) or a number.
+        most : iterations, after which the status is ITERATION_LIMIT.
+        """
+        instance = self.instance
+        instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, v_x
+        instance.guess(x0)
+        for _ in range(most):
+            before = instance.state["u"].copy()
+            command = self.solve(x0, kappa, v_x)
+            if np.abs(instance.state["u"] - before).max() <= STAYS:
+                return command
+        return command._replace(status=int(Status.ITERATION_LIMIT))
+
+    def shift(self) -> None:
+        """Move the plan ahead by a period, as `step` does."""
+        self.instance.shift()
+
+    def _planned_steering(self) -> float:
+        """Return the steering that the plan says for the next step [rad]."""
+        state, limit = self.instance.state, self.problem.limits.steering
+        share, (u, u_next) = self.period / self.problem.dt, state["u"][:2]
+        planned = float(state["commands"][0] + self.period * (u + share * (u_next - u)))
+        return min(max(planned, -limit), limit)
+
+    def _command(self, steering: float, status: int, elapsed: float) -> Command:
+        state = self.instance.state
+        x, u = state["x"].astype(np.float64), state["u"].astype(np.float64)
+        return Command(steering, status, x, u, elapsed, int(state["iterations"]))

@@ -1,0 +1,174 @@
+"""Identifier and tracker together: they build, hand tires over, and drive a car neither knows."""
+
+import ctypes
+import re
+import subprocess
+
+import numpy as np
+import pytest
+
+from identifier.export.compiled import CompiledPackage
+from identifier.export.package import build_package
+from identifier.methods import make_method
+from models.maneuvers import Slalom
+from models.plant import Plant
+from models.vehicle import sedan
+from mpc.export.handover import NoHandoverError
+from mpc.export.pair import build_pair
+from mpc.realtime import Tracker
+from mpc.tires import tire_model
+from tests.mpc.export.conftest import LAWS, STRICT, c_files, put
+
+CAR = sedan()
+INCLUDES = ["-Iinclude", "-Iidentifier/include", "-Impc/include"]
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("precision", [(0, 0), (1, 0), (0, 1)])
+def test_example_and_handover_have_no_warning_in_any_mix_of_precisions(
+    law, precision, compiler, pairs, write_pair, run
+):
+    folder = write_pair(pairs[law])
+    defines = [f"-DTIREID_SINGLE={precision[0]}", f"-DTIREID_MPC_SINGLE={precision[1]}"]
+    for source in [*c_files(folder), *c_files(folder, "examples")]:
+        answer = run(compiler, *STRICT, *defines, *INCLUDES, "-O2", "-c", source, cwd=folder)
+        assert (answer.returncode, answer.stderr) == (0, ""), source
+
+
+@pytest.mark.parametrize(("law", "single"), [("integral", "OFF"), ("axle", "ON")])
+def test_cmake_builds_both_and_the_learning_car_keeps_its_lane(law, single, pairs, write_pair, run):
+    folder = write_pair(pairs[law])
+    defines = [f"-DTIREID_SINGLE={single}", f"-DTIREID_MPC_SINGLE={single}"]
+    answer = run("cmake", "-B", "build", *defines, cwd=folder)
+    assert answer.returncode == 0, answer.stderr
+    answer = run("cmake", "--build", "build", cwd=folder)
+    assert answer.returncode == 0, answer.stderr
+    assert "warning" not in answer.stderr
+    answer = run("ctest", "--test-dir", "build", cwd=folder)
+    assert answer.returncode == 0, answer.stdout
+    assert "3 tests" in answer.stdout or "out of 3" in answer.stdout
+    log = folder / "log.csv"
+    answer = run(str(folder / "build" / "tireid_closed_loop"), str(log))
+    assert answer.returncode == 0, answer.stdout
+    rms = [float(text) for text in re.findall(r"rms ([\d.]+) m", answer.stdout)]
+    exported, learnt = np.array(rms).reshape(2, -1)
+    assert learnt[-1] < 0.6 * exported[-1]  # what was learnt is worth something
+    rows = np.loadtxt(log, delimiter=",", skiprows=1)
+    assert np.abs(rows[:, 3]).max() < 0.3
+    assert (rows[:, -1] <= 1).all()
+
+
+def test_the_example_fails_where_nothing_is_learnt_or_the_sign_is_wrong(pairs, write_pair, run):
+    folder = write_pair(pairs["integral"])
+    loop = folder / "examples" / "closed_loop.c"
+    text = loop.read_text()
+    planted = {
+        "(tireid_mpc_real)SHARE)": "(tireid_mpc_real)2.0)",
+        "on_the_way[0] = (double)steering": "on_the_way[0] = -(double)steering",
+    }
+    for good, bad in planted.items():
+        assert good in text
+        loop.write_text(text.replace(good, bad))
+        sources = [
+            path for part in ("", "identifier/", "mpc/") for path in c_files(folder, f"{part}src")
+        ]
+        examples = c_files(folder, "examples")
+        words = ["-std=c99", "-O2", *INCLUDES, *sources, *examples, "-lm", "-o", "loop"]
+        assert run("gcc", *words, cwd=folder).returncode == 0
+        answer = run(str(folder / "loop"))
+        assert answer.returncode == 1, answer.stdout
+
+
+@pytest.fixture(scope="module")
+def taught(pairs):
+    """By law, the identifier after 10 s of a slalom, as C has learnt it."""
+    slalom = Slalom(
+        amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=9.99
+    )
+    recording = Plant(sedan()).simulate(slalom, speed=20.0).recording()
+    found = {}
+    for law in LAWS:
+        found[law] = CompiledPackage.of(pairs[law].identifier, single=False)
+        found[law].run(recording)
+    return found
+
+
+@pytest.fixture(scope="module")
+def libraries(pairs, tmp_path_factory):
+    """By law, the handover and the tracker in double."""
+    found = {}
+    for law, pair in pairs.items():
+        folder = tmp_path_factory.mktemp(law)
+        for part, files in (
+            ("identifier", pair.identifier.files),
+            ("mpc", pair.tracker.files),
+            ("", pair.files),
+        ):
+            put(folder / part, files)
+        sources = ["src/tireid_handover.c", "mpc/src/tireid_mpc_params.c"]
+        flags = ["-std=c99", "-O1", "-ffp-contract=off", "-fPIC", "-shared", *INCLUDES]
+        words = ["gcc", *flags, *sources, "-lm", "-o", "joined.so"]
+        subprocess.run(words, cwd=folder, check=True)
+        found[law] = ctypes.CDLL(str(folder / "joined.so"))
+        found[law].tireid_handover.restype = ctypes.c_bool
+    return found
+
+
+def handed_over(library, pair, weights, share):
+    """Hand weights over in C; return whether they were taken, and the parameters then."""
+    params = np.zeros((), pair.tracker.params.dtype)
+    place = ctypes.c_void_p(params.ctypes.data)
+    library.tireid_mpc_default_params(place)
+    flat = np.concatenate([np.ravel(value) for value in weights.values()])
+    taken = library.tireid_handover(
+        ctypes.c_void_p(flat.ctypes.data), place, ctypes.c_double(share)
+    )
+    return taken, params
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_c_hands_over_what_python_makes_of_the_same_weights(law, taught, pairs, libraries):
+    pair, weights = pairs[law], taught[law].weights
+    folded = pair.identifier.folded
+    carried = {**folded.carry, **weights}
+    wanted = tire_model(folded.method.frozen(folded.vehicle, carried))
+    assert not np.allclose(wanted.weights, pair.tracker.tire.weights, rtol=0.01)
+    taken, params = handed_over(libraries[law], pair, weights, 1.0)
+    assert taken
+    np.testing.assert_allclose(params["weights"], wanted.weights, rtol=1e-14)
+    tracker = Tracker(pair.tracker.tire, period=0.01, delay=0.03)
+    tracker.set_tire(wanted)  # which may do more than copy weights
+    for name in params.dtype.names:
+        np.testing.assert_allclose(params[name], tracker.params[name], rtol=1e-14, err_msg=name)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_share_moves_weights_that_far(law, taught, pairs, libraries):
+    pair, weights = pairs[law], taught[law].weights
+    _, whole = handed_over(libraries[law], pair, weights, 1.0)
+    _, part = handed_over(libraries[law], pair, weights, 0.25)
+    start = pair.tracker.tire.weights
+    np.testing.assert_allclose(part["weights"], 0.75 * start + 0.25 * whole["weights"], rtol=1e-12)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e6])
+def test_numbers_that_are_no_tire_change_nothing(law, value, taught, pairs, libraries):
+    pair = pairs[law]
+    weights = {name: array.copy() for name, array in taught[law].weights.items()}
+    weights["W"][1, 2] = value
+    taken, params = handed_over(libraries[law], pair, weights, 1.0)
+    assert not taken
+    np.testing.assert_array_equal(params["weights"], pair.tracker.tire.weights)
+
+
+def test_a_curve_that_falls_is_no_tire(taught, pairs, libraries):
+    weights = {**taught["axle"].weights, "W": -taught["axle"].weights["W"]}
+    taken, _ = handed_over(libraries["axle"], pairs["axle"], weights, 1.0)
+    assert not taken
+
+
+@pytest.mark.parametrize(("law", "complaint"), [("eso", "no tire"), ("dugoff_ekf", "CurveModel")])
+def test_what_cannot_be_handed_over_is_said(law, complaint):
+    with pytest.raises(NoHandoverError, match=complaint):
+        build_pair(build_package(make_method(law, CAR), CAR))

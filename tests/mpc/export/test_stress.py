@@ -1,0 +1,83 @@
+"""Hostile measurements and weights that change while driving, under AddressSanitizer and UBSan."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from models.vehicle import sedan
+from mpc.export.package import build_mpc_package
+from mpc.problem import Problem
+from mpc.tires import tire_model
+from tests.mpc.export.conftest import LAWS, c_files
+
+HOSTILE = (Path(__file__).parent / "hostile.c").read_text()
+SANITIZED = (  # -O1: a solve takes a millisecond
+    "-std=c99 -O1 -g -ffp-contract=off -fsanitize=address,undefined -fno-sanitize-recover=all"
+)
+
+
+def build(folder, run, single, steps=3000):
+    text = HOSTILE.replace("@name@", "tireid_mpc").replace("@NAME@", "TIREID_MPC")
+    (folder / "hostile.c").write_text(text)
+    flags = [*SANITIZED.split(), f"-DTIREID_MPC_SINGLE={single}", f"-DSTEPS={steps}L"]
+    words = [*flags, "-Iinclude", "-Isrc", *c_files(folder), "hostile.c", "-lm", "-o", "hostile"]
+    answer = run("gcc", *words, cwd=folder)
+    if "cannot find" in answer.stderr and "san" in answer.stderr:
+        pytest.skip("needs the sanitizers of gcc")
+    assert answer.returncode == 0, answer.stderr
+    return str(folder / "hostile")
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_three_thousand_hostile_measurements_find_nothing(law, packages, write, run):
+    answer = run(build(write(packages[law]), run, 0))
+    assert (answer.returncode, answer.stderr) == (0, ""), answer.stdout + answer.stderr
+    counts = {name: int(n) for name, n in re.findall(r"(\w+) (\d+)", answer.stdout)}
+    assert counts.pop("unsolved") == 0
+    assert sum(counts.values()) == 3000
+    assert counts["limit"] <= 30
+    assert counts["failed"] <= 60  # infinite in all but name: 1e300 is finite
+    assert all(counts[name] > 10 for name in ("not_finite", "off_path", "off_map", "slow"))
+
+
+def test_float_keeps_the_same_limits(packages, write, run):
+    answer = run(build(write(packages["axle"]), run, 1, steps=800))
+    assert (answer.returncode, answer.stderr) == (0, ""), answer.stdout + answer.stderr
+    counts = {name: int(n) for name, n in re.findall(r"(\w+) (\d+)", answer.stdout)}
+    assert counts["unsolved"] <= 2
+    assert counts["ok"] > 650
+
+
+@pytest.mark.parametrize(
+    ("file", "pattern", "replacement", "complaint"),
+    [
+        ("src/tireid_mpc.c", r"!tireid_mpc_finite\(sum\)", "false", "of measurement"),
+        (
+            "src/tireid_mpc_iteration.c",
+            r"= tireid_mpc_finite\(sum\)",
+            "= true",
+            "is -?nan|by -?nan",
+        ),
+        ("src/tireid_mpc.c", r"count\(state, status\);", ";", "was not counted"),
+        (
+            "src/tireid_mpc.c",
+            r"tireid_mpc_clipped\(wanted - last, most\)",
+            "((real)9 * (wanted - last)) + ((real)0 * most)",
+            "changes by",
+        ),
+        ("include/tireid_mpc.h", r"dx\[TIREID_MPC_HORIZON \+ 1U\]", "dx[TIREID_MPC_HORIZON]", ""),
+    ],
+)
+def test_without_a_guard_the_alarm_rings(file, pattern, replacement, complaint, write, run):
+    folder = write(build_mpc_package(tire_model(sedan()), Problem(horizon=8)))
+    text = (folder / file).read_text()
+    changed = re.sub(pattern, replacement, text, count=1)
+    assert changed != text
+    (folder / file).write_text(changed)
+    answer = run(build(folder, run, 0, steps=500))
+    assert answer.returncode != 0
+    if complaint:
+        assert re.search(complaint, answer.stdout), answer.stdout + answer.stderr
+    else:
+        assert "runtime error" in answer.stderr

@@ -1,0 +1,90 @@
+"""What is no tire, and what was taught by an unproven law or by too little, never steers."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.methods import make_method
+from mpc.handover.certificate import law_complaint, tire_complaint
+from mpc.handover.excitation import Excitation, slips
+from mpc.handover.friction import at_friction
+from mpc.tires import oracle_tire, tire_model
+
+
+def edited(tire, axle, change):
+    """The tire with other w_j of one axle."""
+    weights, n = tire.weights.copy(), tire.structure.units
+    force = weights[3 + n :].reshape(2, -1)[axle, 2:]
+    force[:] = change(force)
+    return tire._replace(weights=weights)
+
+
+def test_true_and_learnt_tires_pass_on_every_road(car, tire):
+    for mu in (0.3, 0.5, 1.0):
+        assert tire_complaint(oracle_tire(car, mu=mu), 20.0) is None
+        for v_x in (5.0, 20.0, 40.0):
+            assert tire_complaint(at_friction(tire, mu), v_x) is None
+
+
+@pytest.mark.parametrize(
+    ("axle", "change", "complaint"),
+    [
+        (0, lambda w: 3.0 * w, r"the front axle would carry 2\.\d+ times its load"),
+        (1, lambda w: -w, r"the rear axle would push the wrong way by 1.03 of its load"),
+        (1, lambda w: 0.01 * w, r"the rear axle would slide at 0\.01 of its load"),
+        (0, lambda w: np.nan * w, "a weight is not finite"),
+        (0, lambda w: np.array([-0.097, 0.0, 0.0, 1.0]) * w.sum(), "front axle does not rise"),
+    ],
+)
+def test_what_is_no_tire_is_refused(tire, axle, change, complaint):
+    with np.errstate(invalid="ignore"):
+        found = tire_complaint(edited(tire, axle, change), 20.0)
+    assert found is not None
+    assert re.search(complaint, found)
+
+
+def test_a_tire_without_limit_passes_only_as_far_as_it_was_driven(car):
+    linear = tire_model(car)
+    assert tire_complaint(linear, 20.0, 0.05) is None
+    assert "times its load" in tire_complaint(linear, 20.0)
+
+
+def test_a_law_without_its_certificate_is_refused(car):
+    design = make_method("integral", car)
+    assert law_complaint(design, car) is None
+    wild = replace(design, gains=replace(design.gains, eta_W=100.0 * design.gains.eta_W))
+    assert "certificate fails" in law_complaint(wild, car)
+    assert law_complaint(make_method("axle", car), car) is None
+
+
+def test_slips_are_those_of_the_paper(car, rng):
+    samples = np.column_stack(
+        [rng.uniform(10, 30, 20), rng.normal(size=20), rng.normal(size=20), rng.normal(size=20)]
+    )
+    for (v_x, v_y, r, delta), alpha in zip(samples, slips(samples, car), strict=True):
+        front = delta - np.angle(v_x + 1j * (v_y + car.l_f * r))
+        np.testing.assert_allclose(alpha, [front, -np.angle(v_x + 1j * (v_y - car.l_r * r))])
+
+
+def test_a_tire_must_be_known_where_the_car_is_driven(car, learnt, dry):
+    excitation, samples = Excitation(0.01, car, 1.0), np.tile([20.0, 0.0, 0.0, 0.0], (100, 1))
+    assert "the front axle learnt for 0.0 s, not 1 s" in excitation.complaint(learnt, samples)
+    recording = dry[1]
+    for row in zip(recording.v_x, recording.v_y, recording.r, recording.delta_f, strict=True):
+        excitation.add(*row)
+    assert excitation.complaint(learnt, samples) is None
+    known = learnt.known_slip_range
+    v_y = -20.0 * np.tan(1.5 * known.max())
+    beyond = np.tile([20.0, v_y, 0.0, 0.0], (100, 1))
+    assert "it is known to" in excitation.complaint(learnt, beyond)
+
+
+def test_ladders_are_judged_far_others_as_far_as_the_car_slipped(car, tire):
+    excitation = Excitation(0.01, car, 1.0)
+    assert excitation.trusted_slip(tire) == 0.25
+    assert excitation.trusted_slip(tire_model(car)) == 0.01
+    for _ in range(100):
+        excitation.add(20.0, -20.0 * np.tan(0.05), 0.0, 0.0)
+    assert excitation.trusted_slip(tire_model(car)) == pytest.approx(0.06, rel=1e-3)

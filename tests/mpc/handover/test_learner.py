@@ -1,0 +1,86 @@
+"""In the closed loop: the friction halves, and the car that learns stays on the path."""
+
+import numpy as np
+import pytest
+
+from identifier.axle import AxleDesign
+from identifier.online import OnlineIdentifier
+from models.friction import Friction, FrictionChange
+from mpc.cars import DoubleTrackCar
+from mpc.handover import Learner, Supervisor
+from mpc.handover.friction import at_friction
+from mpc.handover.preview import previewed_rate
+from mpc.loop import drive, inertial_unit
+from mpc.path import iso_3888_1
+from mpc.realtime import Measurement, Tracker
+from mpc.tires import tire_model
+
+PLACE = 50.0  # m
+SPEED = 27.5  # m/s, 96 % of the limit at friction 0.5
+
+
+@pytest.fixture(scope="module")
+def drives(car, learnt):
+    """The lane change on the linear tire of the data sheet, and learning."""
+    friction = Friction(changes=(FrictionChange(scale=0.5, at_place=PLACE),))
+    identifier = OnlineIdentifier(AxleDesign.for_vehicle(car), car, 0.01, learnt)
+    learner = Learner(Supervisor(identifier, tire_model(learnt)))
+    found = []
+    for tire, beside in ((tire_model(car), None), (tire_model(learnt), learner)):
+        tracker = Tracker(tire, period=0.01, delay=0.06)
+        driven = drive(
+            iso_3888_1(),
+            DoubleTrackCar(car, friction=friction),
+            tracker,
+            speed=SPEED,
+            sensors=inertial_unit(),
+            delay=2,
+            rng=np.random.default_rng(1),
+            learner=beside,
+        )
+        found.append(driven)
+    return (*found, learner)
+
+
+def test_the_learning_car_stays_where_the_linear_one_leaves(drives):
+    linear, learning, _ = drives
+    assert np.abs(linear.e_y).max() > 0.5
+    assert learning.completed
+    assert np.abs(learning.e_y).max() < 0.3
+
+
+def test_the_drop_is_noted_in_time(drives):
+    _, learning, _ = drives
+    dropped_at = learning.t[np.argmax(learning.X > PLACE)]
+    lost = [t for t, note in learning.notes if note.startswith("friction lost")]
+    assert 0.0 < lost[0] - dropped_at < 0.7
+
+
+def test_no_handover_makes_the_plan_jump_more_than_noise_does(drives):
+    _, learning, learner = drives
+    assert len(learner.moves) >= 5
+    rates = np.diff(learning.command) / learning.period
+    usual = np.percentile(np.abs(np.diff(rates)), 99)
+    assert max(move.jump for move in learner.moves) <= min(0.2, usual)
+
+
+def test_a_preview_changes_nothing(car, learnt):
+    """Two trackers, one of them asked what it would do with another tire at every step."""
+    tire = tire_model(learnt)
+    asked, left_alone = (Tracker(tire, period=0.01, delay=0.02) for _ in range(2))
+    n = asked.times.size
+    for k in range(20):
+        kappa, v_x = np.full(n, 0.01), np.full(n, 20.0)
+        measurement = Measurement(0.3 - 0.01 * k, 0.0, 0.1, 0.05, kappa, v_x)
+        same, other = (previewed_rate(asked, one) for one in (tire, at_friction(tire, 0.4)))
+        assert asked.step(measurement).steering == left_alone.step(measurement).steering
+    assert same != other
+    assert asked.tire is tire
+    with pytest.raises(ValueError, match="the tracker is built for"):
+        previewed_rate(asked, tire_model(car))
+
+
+def test_jumps_must_be_positive(car, learnt):
+    identifier = OnlineIdentifier(AxleDesign.for_vehicle(car), car, 0.01, learnt)
+    with pytest.raises(ValueError, match="jumps must be positive"):
+        Learner(Supervisor(identifier, tire_model(learnt)), quick_jump=0.0)

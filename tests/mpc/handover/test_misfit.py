@@ -1,0 +1,126 @@
+"""The error of a tire's forces, told from impulses, is the error of its forces."""
+
+import numpy as np
+import pytest
+
+from mpc.handover.axle_force import axle_forces
+from mpc.handover.misfit import ErrorModel, Judge
+from mpc.handover.window import Window
+from mpc.tires import tire_model
+from tests.mpc.handover.conftest import samples_of, steady
+
+
+def forces_by_hand(tire, samples, dt):
+    """Ladders with lag, in plain numpy."""
+    car, n = tire.vehicle, tire.structure.units
+    (delta_0, bias, sigma_0), per_scale = tire.weights[:3], tire.weights[3 : 3 + n]
+    axles = tire.weights[3 + n :].reshape(2, -1)
+    lagged, told = None, []
+    for v_x, v_y, r, delta, *sway in samples:
+        alpha = np.array(
+            [
+                delta + delta_0 - np.arctan((v_y - bias + car.l_f * r) / v_x),
+                -np.arctan((v_y - bias - car.l_r * r) / v_x),
+            ]
+        )
+        alpha += sway
+        if lagged is None:
+            lagged = alpha
+        else:
+            slope = [
+                np.sum(axle[2:] * per_scale / np.cosh(per_scale * x) ** 2)
+                for axle, x in zip(axles, lagged, strict=True)
+            ]
+            sigma = np.maximum(axles[:, 0] * slope + sigma_0, axles[:, 1])
+            lagged = alpha + np.exp(-v_x * dt / sigma) * (lagged - alpha)
+        force = [
+            np.sum(axle[2:] * np.tanh(per_scale * x)) for axle, x in zip(axles, lagged, strict=True)
+        ]
+        told.append([force[0] * np.cos(delta), force[1]])
+    return np.array(told)
+
+
+def test_forces_along_a_drive_are_those_by_hand(tire, dry, rng):
+    samples = steady(samples_of(dry[1])[:200])
+    samples[:, 4:] = 0.01 * rng.normal(size=(200, 2))
+    weights = np.stack([tire.weights, 0.9 * tire.weights])
+    told = axle_forces(tire, weights, samples, 0.01)
+    np.testing.assert_allclose(told[0], forces_by_hand(tire, samples, 0.01), atol=1.0)
+    other = tire._replace(weights=weights[1])
+    np.testing.assert_allclose(told[1], forces_by_hand(other, samples, 0.01), atol=1.0)
+
+
+def bicycle_drive(car, n=300, fine=10, dt=0.01, v_x=20.0):
+    """Samples of a bicycle whose axle forces (n, 2) [N] are known exactly."""
+    v_y = r = 0.0
+    load, h = np.array(car.axle_loads), dt / fine
+    rows, forces = [], []
+    for k in range(n * fine):
+        delta = 0.05 * np.sin(3.0 * k * h)
+        alpha = np.array([delta - (v_y + car.l_f * r) / v_x, -(v_y - car.l_r * r) / v_x])
+        F = 0.8 * load * np.tanh(20.0 * alpha)
+        if k % fine == 0:
+            rows.append((v_x, v_y, r, delta))
+            forces.append(F)
+        v_y += h * (F.sum() / car.mass - v_x * r)
+        r += h * (car.l_f * F[0] - car.l_r * F[1]) / car.yaw_inertia
+    return np.array(rows), np.array(forces)
+
+
+def test_errors_are_those_of_the_forces(car, tire):
+    """The slope over 13 samples is the mean over 12 steps, weighted by a parabola."""
+    samples, forces = bicycle_drive(car)
+    samples = steady(samples)
+    weights = tire.weights.copy()
+    weights[3 + 4 :].reshape(2, -1)[1, 2:] *= 0.8  # a fifth of the rear force is missing
+    e, _ = Judge(0.01).errors(tire._replace(weights=weights), samples)
+    told = axle_forces(tire, weights[None], samples, 0.01)[0]
+    missing = (forces - told) / np.array(car.axle_loads)
+    j = np.arange(1, 13)
+    parabola = j * (13 - j) / np.sum(j * (13 - j))
+    steps = 0.5 * (missing[1:] + missing[:-1])
+    mean = np.array([parabola @ steps[i : i + 12] for i in range(10, 10 + len(e))])
+    np.testing.assert_allclose(e, mean, atol=1e-3)
+    assert np.abs(mean[:, 1]).max() > 0.05
+
+
+def test_a_learnt_tire_fits_and_another_does_not(car, tire, dry):
+    judge, samples = Judge(0.01), steady(samples_of(dry[1]))
+    good = judge.misfit(tire, samples)
+    assert good.mean < 1.0
+    assert judge.misfit(tire_model(car), samples).mean > 2.0 * good.mean  # the linear tire
+    both = judge.misfits(tire, np.stack([tire.weights, tire.weights]), samples)
+    assert both[0].total == both[1].total == pytest.approx(good.total)
+    assert good.independent == pytest.approx(2 * (1 + (len(samples) - 22 - 1) / 12), rel=1e-12)
+
+
+def test_one_fault_counts_as_one(tire, dry):
+    samples = steady(samples_of(dry[1])[:200])
+    judge = Judge(0.01)
+    before = judge.misfit(tire, samples)
+    samples[100, 1] += 50.0  # v_y of a broken sensor, for one sample
+    after = judge.misfit(tire, samples)
+    assert before.total < after.total < before.total + 2.5 * 2 * 25.0
+
+
+def test_a_judge_wants_samples_and_a_stretch(tire):
+    with pytest.raises(ValueError, match="takes more than 22 samples, there are 22"):
+        Judge(0.01).misfit(tire, np.ones((22, 6)))
+    with pytest.raises(ValueError, match="three samples"):
+        Judge(0.1)
+    with pytest.raises(ValueError, match="error must be positive"):
+        ErrorModel(error=0.0)
+
+
+@pytest.mark.parametrize("count", [3, 10, 11, 37, 60])
+def test_a_window_holds_the_last_samples_in_order(count):
+    window = Window(0.1, 0.01)
+    for k in range(count):
+        window.add(k + 0.1 * np.arange(6))
+    n = min(count, 10)
+    expected = np.arange(count - n, count)[:, None] + 0.1 * np.arange(6)
+    np.testing.assert_array_equal(window.last(1.0), expected)
+    np.testing.assert_array_equal(window.last(0.03), expected[-3:])
+    assert (len(window), window.duration) == (n, n * 0.01)
+    window.clear()
+    assert len(window.last(1.0)) == 0

@@ -1,0 +1,157 @@
+"""The supervisor names another tire where, and only where, that explains the car better."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.axle import AxleDesign
+from identifier.methods import make_method
+from identifier.network import Network
+from identifier.online import OnlineIdentifier
+from models.friction import Friction, FrictionChange
+from models.maneuvers import RandomSteer, Slalom
+from mpc.handover import Rules, Supervisor, Verdict
+from mpc.handover.friction import at_friction
+from mpc.handover.misfit import Judge
+from mpc.tires import tire_model
+from tests.mpc.handover.conftest import DROP, drive, samples_of, steady
+
+
+def supervisor_of(car, start=None, *, in_use=None, rules=None):
+    identifier = OnlineIdentifier(AxleDesign.for_vehicle(car), car, 0.01, start)
+    in_use = tire_model(identifier.model()) if in_use is None else in_use
+    return Supervisor(identifier, in_use, rules, proven=start is not None)
+
+
+def watched(supervisor, recording):
+    for row in samples_of(recording):
+        supervisor.observe(*row)
+    return supervisor
+
+
+def test_a_friction_drop_is_believed_within_the_first_bend(car, learnt, dropped):
+    supervisor = watched(supervisor_of(car, learnt), dropped[1])
+    first = next(d for d in supervisor.decisions if d.verdict is Verdict.FRICTION)
+    assert DROP < first.t < DROP + 0.6
+    assert 0.4 < first.friction < 0.7
+    assert first.candidate < 0.5 * first.in_use
+    before = [d for d in supervisor.decisions if d.t < DROP]
+    assert all(d.verdict is Verdict.LEARNT for d in before)
+
+
+def test_after_a_drop_the_named_tire_explains_it_and_the_dry_one_does_not(car, learnt, dropped):
+    supervisor = watched(supervisor_of(car, learnt), dropped[1])
+    late = steady(samples_of(dropped[1]))[-200:]
+    judge = Judge(0.01)
+    named, dry = (judge.misfit(tire, late).mean for tire in (supervisor.target, tire_model(learnt)))
+    assert named < 1.5
+    assert dry > 4.0 * named
+
+
+def test_without_a_drop_no_friction_is_lost(car, learnt, dry):
+    supervisor = watched(supervisor_of(car, learnt), dry[1])
+    assert all(d.verdict is Verdict.LEARNT for d in supervisor.decisions)
+
+
+def test_from_nothing_the_learnt_tire_takes_over_and_is_better(car, dry):
+    supervisor = supervisor_of(car)
+    begun = supervisor.target
+    watched(supervisor, dry[1])
+    first = supervisor.decisions[0]
+    assert first.verdict is Verdict.LEARNT
+    assert 0.5 < first.t < 6.0
+    judge, late = Judge(0.01), steady(samples_of(dry[1]))[-300:]
+    assert judge.misfit(supervisor.target, late).total < judge.misfit(begun, late).total
+
+
+def test_a_friction_that_comes_back_is_regained_up_to_what_was_learnt(car, learnt, tire):
+    """Begun on the low friction that was found, on a road that is dry again."""
+    steer = RandomSteer(
+        amplitude=0.05, frequency=0.5, seed=5, onset=0.2, rate_limit=1.0, duration=8.0
+    )
+    changes = (FrictionChange(scale=0.5, at_time=0.5), FrictionChange(scale=1.0, at_time=4.0))
+    _, recording = drive(steer, friction=Friction(changes=changes))
+    rules = Rules(learning_time=1e3)  # nothing that is learnt is handed over
+    supervisor = watched(supervisor_of(car, learnt, rules=rules), recording)
+    lost = [d for d in supervisor.decisions if d.verdict is Verdict.FRICTION]
+    back = [d for d in supervisor.decisions if d.verdict is Verdict.RECOVERY]
+    assert lost
+    assert back
+    assert 4.0 < back[0].t < 6.0
+    assert supervisor.decisions[-1].friction > 0.7
+    assert max(d.friction for d in supervisor.decisions) <= 1.0
+
+
+def test_the_dry_tire_comes_back_after_another_was_learnt_in_between(car, learnt):
+    steer = Slalom(amplitude=0.05, frequency=0.4, onset=0.2, rate_limit=1.0, duration=10.0)
+    changes = (FrictionChange(scale=0.5, at_time=2.0), FrictionChange(scale=1.0, at_time=8.0))
+    _, recording = drive(steer, friction=Friction(changes=changes))
+    supervisor = watched(supervisor_of(car, learnt), recording)
+    made = [(d.verdict, d.t) for d in supervisor.decisions]
+    assert any(verdict is Verdict.LEARNT and 2.5 < t < 8.0 for verdict, t in made)
+    back = [t for verdict, t in made if verdict is Verdict.RECOVERY]
+    assert 8.0 < back[0] < 9.5
+    n = supervisor.target.structure.units
+    grip = [
+        tire.weights[3 + n :].reshape(2, -1)[:, 2:].sum()
+        for tire in (supervisor.target, tire_model(learnt))
+    ]
+    assert grip[0] > 0.8 * grip[1]
+
+
+def test_what_is_not_better_is_not_handed_over(car, learnt, dry):
+    """An identifier that begins with the tire in use, on the road that it was learnt on."""
+    supervisor = watched(supervisor_of(car, learnt, rules=Rules(evidence=1e3)), dry[1])
+    assert supervisor.decisions == []
+    assert "not better" in supervisor.last.reason
+
+
+def test_what_was_not_excited_is_not_handed_over(car, learnt):
+    straight = np.tile([20.0, 0.0, 0.0, 0.0], (400, 1))
+    straight[:, 1] += np.random.default_rng(0).normal(0.0, 0.03, 400)
+    supervisor = supervisor_of(car, learnt, in_use=tire_model(learnt))
+    for row in straight:
+        supervisor.observe(*row)
+    assert supervisor.decisions == []
+    assert "axle learnt for" in supervisor.last.reason
+
+
+def test_a_lost_sample_now_and_then_hides_no_drop(car, learnt, dropped):
+    supervisor = supervisor_of(car, learnt)
+    for k, row in enumerate(samples_of(dropped[1])):
+        supervisor.observe(*(np.full(4, np.nan) if k % 20 < 3 else row))
+    lost = [d.t for d in supervisor.decisions if d.verdict is Verdict.FRICTION]
+    assert DROP < lost[0] < DROP + 0.7
+    assert supervisor.identifier.counts.refused == 3 * 45 + 1
+
+
+@pytest.mark.parametrize("broken", [np.full(4, np.nan), np.zeros(4)])
+def test_many_lost_samples_and_standing_still_decide_nothing(car, learnt, dropped, broken):
+    supervisor = supervisor_of(car, learnt)
+    for k, row in enumerate(samples_of(dropped[1])):
+        supervisor.observe(*(broken if k % 30 < 10 else row))
+    assert supervisor.decisions == []
+    assert supervisor.last.reason == "too few samples"
+
+
+def test_another_structure_and_an_unproven_law_are_refused_at_the_start(car, learnt):
+    with pytest.raises(ValueError, match="begin with a tire of the identifier"):
+        supervisor_of(car, in_use=tire_model(car))
+    design = make_method("integral", car)
+    wild = replace(design, gains=replace(design.gains, eta_W=100.0 * design.gains.eta_W))
+    identifier = OnlineIdentifier(wild, car, 0.01)
+    with pytest.raises(ValueError, match="certificate fails"):
+        Supervisor(identifier, tire_model(identifier.model()))
+
+
+def test_a_tire_that_cannot_be_told_for_a_friction_still_learns(car, dry):
+    """A network that reads the speed: no friction is looked for, nothing breaks."""
+    design = make_method("integral", car)
+    inputs = ("v_y", "r", "delta_f", "v_x")
+    design = replace(design, network=Network(hidden=6, inputs=inputs, scale=(1.0, 0.5, 0.1, 20.0)))
+    identifier = OnlineIdentifier(design, car, 0.01)
+    supervisor = watched(Supervisor(identifier, tire_model(identifier.model())), dry[1])
+    assert all(d.verdict is Verdict.LEARNT for d in supervisor.decisions)
+    with pytest.raises(ValueError, match="another friction"):
+        at_friction(supervisor.target, 0.5)

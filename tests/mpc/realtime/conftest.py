@@ -1,0 +1,43 @@
+"""Trackers, built once: a short horizon, for speed of the tests."""
+
+import numpy as np
+import pytest
+
+from models.vehicle import sedan
+from mpc.problem import Limits, Problem
+from mpc.realtime import Measurement
+from mpc.tires import tire_model
+from mpc.tires.oracle import oracle_tire
+
+PROBLEM = Problem(horizon=20, limits=Limits(steering=0.2, steering_rate=0.5, slip=(0.1, 0.1)))
+
+
+@pytest.fixture(scope="session")
+def linear():
+    return tire_model(sedan())
+
+
+@pytest.fixture(scope="session")
+def lagging():
+    return oracle_tire(sedan())
+
+
+@pytest.fixture(params=["linear", "lagging"])
+def tire(request):
+    return request.getfixturevalue(request.param)
+
+
+@pytest.fixture
+def problem():
+    return PROBLEM
+
+
+def measured(e_y=0.0, e_psi=0.0, v_y=0.0, r=0.0, kappa=0.0, v_x=20.0, horizon=PROBLEM.horizon):
+    """A measurement on a road of one curvature and speed."""
+    one = np.ones(horizon + 1)
+    return Measurement(e_y, e_psi, v_y, r, kappa * one, v_x * one)
+
+
+@pytest.fixture
+def measure():
+    return measured

@@ -1,0 +1,216 @@
+import numpy as np
+import pytest
+
+from mpc.prediction import build_rk4
+from mpc.problem import Problem
+from mpc.realtime import Guards, Status, Tracker
+
+PERIOD = 0.02
+
+
+@pytest.fixture
+def tracker(tire, problem):
+    return Tracker(tire, problem, period=PERIOD, delay=2 * PERIOD)
+
+
+def drive(tracker, tire, measure, x, steps, delay_periods, kappa=0.004, v_x=20.0):
+    """Drive the prediction itself; return states at the measurements, commands and plans.
+
+    A command is held from `delay_periods` after its measurement on.
+    """
+    step, n_x = build_rk4(tire.structure), 7 if tire.structure.lagged else 5
+    waiting = [0.0] * delay_periods
+    x = np.concatenate([x, np.zeros(n_x - len(x))])
+    states, commands = [], []
+    for _ in range(steps):
+        states.append(x.copy())
+        commands.append(tracker.step(measure(*x[:4], kappa=kappa, v_x=v_x)))
+        waiting.append(commands[-1].steering)
+        x[4] = waiting.pop(0)
+        for _ in range(4):
+            told = step(x, 0.0, kappa, v_x, PERIOD / 4, tire.car, tire.weights)
+            x = np.asarray(told).ravel()
+    return np.array(states), commands
+
+
+def test_it_brings_the_prediction_to_the_path(tracker, tire, measure):
+    states, commands = drive(tracker, tire, measure, [0.5, 0.0, 0.0, 0.0], 150, 2)
+    assert all(command.status == Status.OK for command in commands)
+    assert abs(states[-1, 0]) < 0.02
+    assert commands[-1].steering == pytest.approx(states[-1, 4], abs=1e-3)  # steady
+
+
+def test_the_delay_is_predicted_away(tracker, tire, measure):
+    states, commands = drive(tracker, tire, measure, [0.3, 0.0, 0.1, 0.05], 40, 2)
+    # The plan begins half a period before its command acts, where the held steering has the mean of
+    # a ramp: between the states of the first and second measurement after.
+    for k in range(10, 35):
+        middle = 0.5 * (states[k + 1] + states[k + 2])
+        np.testing.assert_allclose(commands[k].plan_x[0, :4], middle[:4], atol=4e-3)
+
+
+def test_a_wrong_delay_is_seen(tire, problem, measure):
+    plain = Tracker(tire, problem, period=PERIOD, delay=0.0)
+    states, commands = drive(plain, tire, measure, [0.3, 0.0, 0.1, 0.05], 40, 2)
+    middles = 0.5 * (states[1:-1] + states[2:])
+    misses = [
+        np.abs(c.plan_x[0, :4] - x[:4]).max() for c, x in zip(commands, middles, strict=False)
+    ]
+    assert max(misses[10:35]) > 1e-2
+
+
+def test_hard_limits_hold_for_every_command_and_plan(tracker, measure, problem):
+    rng, last, limits = np.random.default_rng(1), 0.0, problem.limits
+    for _ in range(60):
+        state = [0.8, 0.1, 0.5, 0.2] * rng.standard_normal(4)
+        command = tracker.step(measure(*state, kappa=0.02 * rng.standard_normal()))
+        assert abs(command.steering) <= limits.steering
+        assert abs(command.steering - last) <= limits.steering_rate * PERIOD + 1e-12
+        assert np.abs(command.plan_u).max() <= limits.steering_rate
+        assert np.abs(command.plan_x[:, 4]).max() <= limits.steering
+        last = command.steering
+
+
+WRONG = {
+    Status.NOT_FINITE: {"e_y": np.nan},
+    Status.OFF_PATH: {"e_y": 6.0},
+    Status.OFF_MAP: {"v_y": -11.0},
+    Status.TOO_SLOW: {"v_x": 1.0},
+}
+
+
+@pytest.mark.parametrize("status", WRONG)
+def test_what_cannot_be_planned_has_a_status_and_a_counter(tracker, measure, status):
+    tracker.step(measure(e_y=0.3))
+    command = tracker.step(measure(**WRONG[status]))
+    assert command.status == status
+    assert tracker.faults[status] == 1
+    assert tracker.faults[Status.OK] == 1
+    assert np.isfinite(command.steering)
+
+
+@pytest.mark.parametrize("status", WRONG)
+def test_then_the_old_plan_steers_and_later_damped_tracking(tracker, measure, problem, status):
+    good = tracker.step(measure(e_y=0.3, kappa=0.002))
+    rate, share, last = good.plan_u.copy(), PERIOD / problem.dt, good.steering
+    for _ in range(round(Guards().hold_time / PERIOD)):
+        rate[:-1] += share * np.diff(rate)
+        command = tracker.step(measure(**WRONG[status]))
+        assert command.steering == pytest.approx(last + PERIOD * rate[0], abs=1e-12)
+        last = command.steering
+    for _ in range(60):
+        command = tracker.step(measure(**{"kappa": 0.002, **WRONG[status]}))
+    length = tracker.tire.vehicle.wheelbase
+    e_y, v_y_is_off = WRONG[status].get("e_y", 0.0), status == Status.OFF_MAP
+    v_x = WRONG[status].get("v_x", 20.0)
+    wanted = 0.002 * length + Guards().gain_yaw_rate * 0.002 * v_x - Guards().gain_e_y * e_y
+    if status == Status.NOT_FINITE:
+        wanted = 0.002 * length  # all that is known
+    assert v_y_is_off or command.steering == pytest.approx(
+        np.clip(wanted, -problem.limits.steering, problem.limits.steering), abs=1e-9
+    )
+
+
+def test_after_a_fault_it_plans_again(tracker, measure):
+    tracker.step(measure(e_y=0.3))
+    for _ in range(30):
+        tracker.step(measure(e_y=np.nan))
+    assert tracker.step(measure(e_y=0.3)).status == Status.OK
+
+
+def test_damped_tracking_alone_brings_the_car_back(tire, problem, measure):
+    guards = Guards(min_speed=50.0, hold_time=0.0)  # it never plans
+    tracker = Tracker(tire, problem, period=PERIOD, guards=guards)
+    for speed in (10.0, 20.0, 30.0):
+        tracker.reset()
+        states, _ = drive(tracker, tire, measure, [0.5, 0.02, 0.0, 0.0], 400, 1, 0.0, speed)
+        assert np.abs(states[-50:, 0]).max() < 0.05, speed
+
+
+def test_weights_swap_without_a_build_and_act_at_once(tracker, tire, measure):
+    library = tracker.instance._library
+    other = tire._replace(weights=0.7 * tire.weights)
+    tracker.set_tire(other)
+    assert tracker.instance._library is library
+    fresh = Tracker(other, tracker.problem, period=PERIOD, delay=tracker.delay)
+    told = measure(e_y=0.4, kappa=0.004)
+    assert tracker.step(told).steering == fresh.step(told).steering
+    old = Tracker(tire, tracker.problem, period=PERIOD, delay=tracker.delay)
+    assert old.step(told).steering != fresh.step(told).steering
+
+
+def test_another_structure_and_broken_weights_are_refused(linear, lagging, problem):
+    tracker = Tracker(linear, problem)
+    with pytest.raises(ValueError, match="is built for LinearAxles"):
+        tracker.set_tire(lagging)
+    with pytest.raises(ValueError, match="must be finite"):
+        tracker.set_tire(linear._replace(weights=np.array([1e5, np.nan])))
+    with pytest.raises(ValueError, match="weights must be 2"):
+        tracker.set_tire(linear._replace(weights=np.ones(3)))
+    assert tracker.tire is linear
+
+
+def test_a_reset_forgets_all_but_the_faults(tracker, measure):
+    first = tracker.step(measure(e_y=0.3)).steering
+    tracker.step(measure(e_y=np.nan))
+    tracker.reset()
+    assert tracker.step(measure(e_y=0.3)).steering == first
+    assert tracker.faults[Status.NOT_FINITE] == 1
+    with pytest.raises(ValueError, match="must be finite"):
+        tracker.reset(np.nan)
+
+
+def test_a_late_step_is_steered_by_the_plan_before(tire, problem, measure):
+    clock = iter([0.0, 0.001, 0.0, 0.5, 0.0, 0.001]).__next__
+    tracker = Tracker(tire, problem, period=PERIOD, budget=0.01, clock=clock)
+    good = tracker.step(measure(e_y=0.3))
+    late = tracker.step(measure(e_y=0.3))
+    share = PERIOD / problem.dt
+    rate = good.plan_u[0] + share * (good.plan_u[1] - good.plan_u[0])
+    assert late.status == Status.LATE
+    assert late.steering == pytest.approx(good.steering + PERIOD * rate, abs=1e-12)
+    assert tracker.faults[Status.LATE] == 1
+    after = tracker.step(measure(e_y=0.3))
+    assert abs(after.steering - late.steering) <= PERIOD * problem.limits.steering_rate + 1e-12
+
+
+def test_more_linearizations_come_nearer_to_convergence(lagging, problem, measure):
+    told = measure(e_y=0.8, e_psi=0.1, kappa=0.01)
+    plans = [
+        Tracker(lagging, problem, period=PERIOD, linearizations=n).step(told).plan_u
+        for n in (1, 4, 40)
+    ]
+    misses = [np.abs(plan - plans[2]).max() for plan in plans[:2]]
+    assert misses[1] < 0.2 * misses[0]
+
+
+def test_the_road_is_asked_for_where_the_plan_will_be(tracker, problem):
+    ahead = tracker.delay - 0.5 * PERIOD
+    assert tracker.times[0] == 0.0
+    assert tracker.times[1] == pytest.approx(ahead + 0.5 * problem.dt)
+    assert tracker.plan_times[[0, -1]] == pytest.approx([ahead, ahead + 20 * problem.dt])
+    assert len(tracker.times) == len(tracker.plan_times) == problem.horizon + 1
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"period": 0.0},
+        {"period": 0.06},
+        {"delay": -0.01},
+        {"delay": 0.5},
+        {"tolerance": 0.0},
+        {"max_iterations": 0},
+        {"linearizations": 0},
+    ],
+)
+def test_numbers_out_of_range_are_refused_by_name(linear, wrong):
+    (name,) = wrong
+    with pytest.raises(ValueError, match=f"{name} must be"):
+        Tracker(linear, Problem(dt=0.05), **wrong)
+
+
+@pytest.mark.parametrize("wrong", [{"e_y": 0.0}, {"min_speed": np.nan}, {"gain_e_y": -0.1}])
+def test_guards_are_checked(wrong):
+    with pytest.raises(ValueError, match=f"{next(iter(wrong))} must be"):
+        Guards(**wrong)

@@ -1,0 +1,216 @@
+"""`tireid drive` as a user meets it: a short bend, what is written of it, and what is refused."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.model_file import load_model
+from models.friction import Friction
+from models.vehicle import sedan
+from mpc.cars import DoubleTrackCar
+from mpc.loop import CarSensors
+from mpc.loop.limit import cornering_limit
+from mpc.realtime import NoCompilerError
+from mpc.tires import oracle_tire, tire_model
+from tireid import drive_learn, drive_results, drive_runs
+from tireid.cli import main
+from tireid.drive_case import digest
+from tireid.drive_tires import steady_curve
+
+SIDE = 3.0 * (1.0 - np.cos(np.linspace(0.0, 2.0 * np.pi, 9)))
+BEND = np.column_stack([np.linspace(0.0, 70.0, 9), SIDE])
+
+
+@pytest.fixture(scope="module")
+def bend(tmp_path_factory):
+    """A file of way-points 70 m ahead, with a bulge of 6 m."""
+    file = tmp_path_factory.mktemp("paths") / "bend.csv"
+    lines = ["X_m,Y_m", *(f"{x:.3f},{y:.3f}" for x, y in BEND)]
+    file.write_text("\n".join(lines))
+    return file
+
+
+@pytest.fixture(scope="module")
+def result(bend, tmp_path_factory):
+    """Frozen tires that learnt for 15 s, and linear ones, both at 90 % of the grip."""
+    out = tmp_path_factory.mktemp("result") / "out"
+    words = ["drive", "--path", str(bend), "--tires", "frozen", "linear", "--out", str(out)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(drive_learn, "DURATION", 15.0)
+        patch.setattr(drive_learn, "GROWS", 10.0)
+        assert main(words) == 0
+    return out
+
+
+@pytest.fixture
+def no_figures(monkeypatch):
+    """Pictures are looked at once, in `result`."""
+    monkeypatch.setattr(drive_results, "save_figure", lambda *_: None)
+
+
+def summary_of(folder):
+    return json.loads((folder / "summary.json").read_text())
+
+
+def refusal(capsys, words):
+    """The one line of an error, after checking the exit code."""
+    capsys.readouterr()
+    assert main(["drive", *(str(word) for word in words)]) == 2
+    lines = [line for line in capsys.readouterr().err.splitlines() if "error:" in line]
+    assert len(lines) == 1
+    return lines[0]
+
+
+def test_summary_has_the_documented_keys_and_the_numbers_of_the_csv(result):
+    summary = summary_of(result)
+    assert summary["completed"] is True and summary["tires"] == "frozen"
+    assert set(summary["solve_ms"]) == {"median", "p99", "max"}
+    assert summary["failures"] == {}
+    for label, name in (("frozen", "drive.csv"), ("linear", "drive_linear.csv")):
+        drive = np.genfromtxt(result / name, delimiter=",", names=True)
+        numbers = summary["drives"][label]
+        assert numbers["rms_e_y_m"] == pytest.approx(np.sqrt(np.mean(drive["e_y_m"] ** 2)))
+        assert numbers["peak_e_y_m"] == pytest.approx(np.abs(drive["e_y_m"]).max())
+        solve = 1e3 * np.median(drive["solve_time_s"])
+        assert numbers["solve_ms"]["median"] == pytest.approx(solve)
+    assert summary["rms_e_y_m"] == summary["drives"]["frozen"]["rms_e_y_m"]
+
+
+def test_the_frozen_car_stays_on_its_path_where_the_linear_one_leaves_it_more(result):
+    drives = summary_of(result)["drives"]
+    assert drives["frozen"]["peak_e_y_m"] < 0.2
+    assert drives["frozen"]["rms_e_y_m"] < 0.5 * drives["linear"]["rms_e_y_m"]
+
+
+def test_deviation_and_forces_of_the_csv_follow_from_its_motion(result):
+    """By Newton and by the way-points, which know nothing of the loop."""
+    drive = np.genfromtxt(result / "drive.csv", delimiter=",", names=True)
+    total = drive["Fyf_N"] + drive["Fyr_N"]
+    np.testing.assert_allclose(total, sedan().mass * drive["a_y_m_s2"], atol=250.0)
+    assert 60.0 < drive["X_m"][-1] < 72.0
+    k = int(np.argmin(np.abs(drive["X_m"] - BEND[4, 0])))
+    assert drive["Y_m"][k] == pytest.approx(BEND[4, 1], abs=0.3)
+    np.testing.assert_allclose(np.diff(drive["t_s"]), 0.01, atol=1e-9)
+
+
+def test_everything_is_written(result):
+    for name in ("path", "errors", "steering", "tires", "solve_times"):
+        assert (result / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    assert (result / "drive.gif").read_bytes().startswith(b"GIF89a")
+    assert (result / "drive.gif").stat().st_size < 3e6
+    assert load_model(result / "weights.json").vehicle.name == "sedan"
+
+
+def test_stored_weights_steer_alike_and_the_hash_tells_what_went_in(
+    result, bend, tmp_path, no_figures
+):
+    words = ["drive", "--path", str(bend), "--film", "none"]
+    words += ["--weights", str(result / "weights.json")]
+    for name, more in (("same", []), ("other", ["--seed", "1"])):
+        assert main([*words, *more, "--out", str(tmp_path / name)]) == 0
+    before, same, other = map(summary_of, (result, tmp_path / "same", tmp_path / "other"))
+    assert same["rms_e_y_m"] == before["rms_e_y_m"] != other["rms_e_y_m"]
+    assert same["inputs"]["weights_hash"] == before["inputs"]["weights_hash"]
+    assert same["hash"] == digest(same["inputs"]) != other["hash"]
+    assert not (tmp_path / "same" / "drive.gif").exists()
+
+
+def test_learning_and_oracle_are_told_of_a_friction_that_drops(
+    result, bend, tmp_path, capsys, no_figures
+):
+    words = ["drive", "--path", str(bend), "--tires", "learning", "oracle", "--film", "none"]
+    words += ["--weights", str(result / "weights.json"), "--speed", "60%"]
+    capsys.readouterr()
+    assert main([*words, "--mu-drop", "30:0.5", "--out", str(tmp_path / "out")]) == 0
+    printed = capsys.readouterr().out
+    assert "friction 1, 0.5 from 30 m on" in printed
+    assert "oracle at " in printed and "told of friction 0.5" in printed
+    drives = summary_of(tmp_path / "out")["drives"]
+    assert drives["oracle"]["peak_e_y_m"] < drives["learning"]["peak_e_y_m"]
+    reasons = " ".join(entry["note"] for entry in drives["learning"]["notes"])
+    assert "friction" in reasons
+
+
+def test_a_car_that_leaves_its_path_is_told_with_exit_code_1(bend, tmp_path, capsys, no_figures):
+    words = ["drive", "--path", str(bend), "--tires", "linear", "--film", "none"]
+    capsys.readouterr()
+    assert main([*words, "--speed", "140%", "--out", str(tmp_path / "out")]) == 1
+    assert "no: left the path by more than 2 m" in capsys.readouterr().out
+    assert summary_of(tmp_path / "out")["completed"] is False
+
+
+def test_the_drive_to_learn_on_slides_but_neither_spins_nor_tips():
+    car = DoubleTrackCar(sedan(), friction=Friction())
+    grip = cornering_limit(car.vehicle, car.tire)
+    recording = drive_learn.learning_drive(
+        car, CarSensors(), np.random.default_rng(0), grip=grip, seed=3
+    )
+    assert recording.duration == pytest.approx(drive_learn.DURATION, abs=0.02)
+    slip = np.abs(recording.alpha(car.vehicle.l_f, car.vehicle.l_r)).max(axis=0)
+    assert (slip > np.radians(3.5)).all()
+    assert np.abs(recording.a_y).max() > 0.9 * grip
+    learnt = steady_curve("", tire_model(drive_learn.learn("axle", recording, sedan())), 20.0)
+    true = steady_curve("", oracle_tire(car.vehicle, car.tire), 20.0)
+    within = np.abs(true.alpha) < np.radians(4.0)
+    np.testing.assert_allclose(learnt.force[within], true.force[within], atol=300.0)
+
+
+def test_a_car_that_would_spin_ends_the_drive_to_learn_on_before():
+    """Its center of gravity is moved back until it oversteers."""
+    car = sedan()
+    loose = replace(car, l_f=1.6, l_r=1.1, cornering_stiffness_rear=150e3)
+    plant = DoubleTrackCar(loose, friction=Friction())
+    recording = drive_learn.learning_drive(
+        plant, CarSensors(), np.random.default_rng(0), grip=8.0, seed=0
+    )
+    assert recording.duration < drive_learn.DURATION - 1.0
+    assert np.abs(np.arctan2(recording.v_y, recording.v_x)).max() < np.radians(15.0)
+
+
+@pytest.mark.parametrize(
+    ("extra", "said"),
+    [
+        (["--path", "nowhere"], "--path: there is no path 'nowhere'; iso-3888-1, iso-3888-2"),
+        (["--path", "nowhere.csv"], "nowhere.csv"),
+        (["--speed", "17"], "--speed 17 has no unit"),
+        (["--mu", "0"], "--mu: friction must be 0.05 to 1.5, it is 0"),
+        (["--mu-drop", "500:0.5"], "--mu-drop 500 is beyond the path"),
+        (["--delay", "15"], "--delay must be 0 to 100 ms in steps of 10 ms, it is 15"),
+        (["--laps", "2"], "--laps is for a closed path"),
+        (["--laps", "nan"], "--laps must be positive"),
+        (["--seed", "-1"], "--seed must not be negative"),
+        (["--weights", "nowhere.json"], "nowhere.json"),
+        (["--weights", "a.json", "--paper"], "give only one of --weights, --paper"),
+        (["--network-iso"], "go with --network"),
+        (["--plant", "drift", "--vehicle", "car.toml"], "--plant drift brings a car of its own"),
+        (["--vehicle", "nowhere.toml"], "nowhere.toml"),
+    ],
+)
+def test_wrong_words_are_one_clear_line_and_leave_nothing(bend, tmp_path, capsys, extra, said):
+    words = ["--path", bend, *extra, "--out", tmp_path / "out"]
+    assert said in refusal(capsys, words)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_car_without_a_chassis_is_refused(bend, tmp_path, capsys):
+    replace(sedan(), chassis=None).to_toml(tmp_path / "flat.toml")
+    words = ["--path", bend, "--vehicle", tmp_path / "flat.toml", "--out", tmp_path / "out"]
+    assert "chassis" in refusal(capsys, words)
+
+
+def test_a_plant_whose_package_is_missing_names_the_extra(bend, tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "vehiclemodels.parameters_vehicle2", None)
+    words = ["--path", bend, "--plant", "multi-body", "--out", tmp_path / "out"]
+    assert "tireid[commonroad]" in refusal(capsys, words)
+
+
+def test_without_a_compiler_it_says_what_is_missing(bend, tmp_path, capsys, monkeypatch):
+    def none(*_, **__):
+        raise NoCompilerError("no C compiler found: the tracker cannot be built")
+
+    monkeypatch.setattr(drive_runs, "Tracker", none)
+    words = ["--path", bend, "--tires", "linear", "--out", tmp_path / "out"]
+    assert "no C compiler found" in refusal(capsys, words)
+    assert list(tmp_path.iterdir()) == []

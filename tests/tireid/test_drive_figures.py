@@ -1,0 +1,203 @@
+"""Pictures of a drive: units on every axis, nothing cut off, one scale for maps, a moving film."""
+
+import re
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from PIL import Image, ImageSequence
+
+from models.vehicle import sedan
+from mpc.loop import Drive, Plan
+from mpc.path import Path
+from tireid.animation import frames, write_film
+from tireid.animation.camera import Camera
+from tireid.figures import (
+    TireCurve,
+    axle_slip,
+    drive_errors_figure,
+    drive_path_figure,
+    drive_solve_figure,
+    drive_steering_figure,
+    drive_tires_figure,
+)
+from tireid.figures.car_shape import car_shape
+
+CAR = sedan()
+SPEED, PERIOD = 16.0, 0.02
+LANE_X = np.linspace(0.0, 120.0, 81)
+LANE = Path.from_waypoints(
+    LANE_X, 1.75 * (np.tanh((LANE_X - 40) / 6) - np.tanh((LANE_X - 90) / 6)), name="lane"
+)
+LANE = replace(LANE, cones=np.array([[20.0, 1.2], [20.0, -1.2], [65.0, 4.8], [65.0, 2.2]]))
+AROUND = np.linspace(0.0, 2.0 * np.pi, 101)[:-1]
+COURSE = Path.from_waypoints(
+    120.0 * np.cos(AROUND), 70.0 * np.sin(AROUND), closed=True, name="course"
+)
+
+
+def made_up(path: Path, off: float) -> Drive:
+    """A drive with invented signals that is `off` [m] to the left of its path on the average."""
+    t = np.arange(0.0, path.length / SPEED, PERIOD)
+    s, wave, none = SPEED * t, np.sin(2.0 * t), np.zeros_like(t)
+    X, Y, psi = path.pose(s)
+    e_y = off * (1.0 + 0.2 * wave)
+    kappa = path.curvature(s)
+    force = CAR.mass * SPEED**2 * kappa
+    share = np.array(CAR.axle_loads) / CAR.weight
+    plans = tuple(
+        Plan(k, s[k] + 0.8 * np.arange(41), np.full((41, 5), e_y[k]), np.zeros(40))
+        for k in range(0, t.size, 4)
+    )
+    status = np.zeros(t.size, dtype=np.int64)
+    status[7] = 2
+    return Drive(
+        name=path.name,
+        vehicle=CAR,
+        path=path,
+        period=PERIOD,
+        t=t,
+        X=X - e_y * np.sin(psi),
+        Y=Y + e_y * np.cos(psi),
+        psi=psi,
+        v_x=np.full(t.size, SPEED),
+        v_y=none,
+        r=SPEED * kappa,
+        a_x=none,
+        a_y=SPEED**2 * kappa,
+        delta=CAR.wheelbase * kappa,
+        axle_force=force[:, None] * share,
+        s=s,
+        e_y=e_y,
+        e_psi=none,
+        kappa=kappa,
+        v_ref=np.full(t.size, SPEED),
+        command=CAR.wheelbase * kappa,
+        measured={},
+        status=status,
+        solve_time=1e-4 * (1.0 + 0.1 * wave),
+        plans=plans,
+        notes=(),
+        completed=True,
+        ending="reached the end",
+    )
+
+
+ON_LANE = {"frozen": made_up(LANE, 0.1), "linear": made_up(LANE, 1.9)}
+ON_COURSE = {"frozen": made_up(COURSE, 0.1), "linear": made_up(COURSE, -0.8)}
+ALPHA = np.linspace(-0.3, 0.3, 31)
+CURVES = [
+    TireCurve(label=label, alpha=ALPHA, force=np.column_stack([1e5 * ALPHA, 8e4 * ALPHA]))
+    for label in ("frozen", "linear", "oracle")
+]
+FIGURES = {
+    "lane": lambda: drive_path_figure(ON_LANE),
+    "course": lambda: drive_path_figure(ON_COURSE),
+    "errors": lambda: drive_errors_figure(ON_LANE, off_path=2.0, drops=[(60.0, 0.5)]),
+    "steering": lambda: drive_steering_figure(ON_LANE, angle_limit=0.5, rate_limit=0.01),
+    "tires": lambda: drive_tires_figure(ON_LANE["frozen"], CURVES),
+    "solve times": lambda: drive_solve_figure(ON_LANE["frozen"]),
+}
+every_figure = pytest.mark.parametrize("draw", FIGURES.values(), ids=FIGURES.keys())
+
+
+@every_figure
+def test_outer_axes_have_labels_with_units(draw):
+    for axes in draw().axes:
+        place = axes.get_subplotspec()
+        if place.is_first_col():
+            assert re.search(r"\[.+\]$", axes.get_ylabel())
+        if place.is_last_row():
+            assert re.search(r"\[.+\]$", axes.get_xlabel())
+
+
+@every_figure
+def test_nothing_is_cut_off_and_legends_cover_no_panel(draw):
+    figure = draw()
+    figure.canvas.draw()
+    drawn, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
+    assert drawn.x0 > -0.01 and drawn.y0 > -0.01
+    assert drawn.x1 < width + 0.01 and drawn.y1 < height + 0.01
+    for legend in figure.legends:
+        box = legend.get_window_extent()
+        assert not any(box.overlaps(axes.get_window_extent()) for axes in figure.axes)
+
+
+@pytest.mark.parametrize("drives", [ON_LANE, ON_COURSE], ids=["lane", "course"])
+def test_maps_have_one_scale_and_show_the_whole_path(drives):
+    figure = drive_path_figure(drives)
+    figure.canvas.draw()
+    assert all(axes.get_aspect() == 1.0 for axes in figure.axes)
+    rows = [axes for axes in figure.axes if "scale" not in axes.get_title()]
+    path = drives["frozen"].path
+    shown = path.cones[:, 0] if len(path.cones) else path.X
+    assert min(axes.get_xlim()[0] for axes in rows) < shown.min()
+    assert max(axes.get_xlim()[1] for axes in rows) > shown.max()
+
+
+def test_the_limit_and_the_end_of_the_path_are_drawn_where_they_matter():
+    labels = [text.get_text() for text in FIGURES["errors"]().legends[0].get_texts()]
+    assert labels == ["off the path", "frozen", "linear", "friction 0.5"]
+    gentle = {"frozen": ON_LANE["frozen"]}
+    texts = drive_errors_figure(gentle, off_path=2.0).legends[0].get_texts()
+    assert [text.get_text() for text in texts] == ["frozen"]
+
+
+def test_slip_has_the_sign_of_the_force():
+    drive = ON_LANE["frozen"]
+    slip = axle_slip(drive)
+    front = drive.delta - np.arctan2(CAR.l_f * drive.r, drive.v_x)
+    np.testing.assert_allclose(slip[:, 0], front)
+    turning = np.abs(drive.r) > 0.05
+    assert (slip[turning, 1] * drive.axle_force[turning, 1] > 0.0).all()
+
+
+def test_a_car_turned_left_has_its_nose_up_and_its_wheels_turned_further():
+    shape = car_shape(CAR, 10.0, 5.0, np.radians(90.0), np.radians(20.0))
+    assert shape.body[:, 1].max() - 5.0 > CAR.l_f > 5.0 - 5.0
+    assert np.ptp(shape.body[:, 0]) == pytest.approx(1.82, abs=0.02)
+    front, rear = shape.wheels[0], shape.wheels[2]
+    along = (front[0] - front[1], rear[0] - rear[1])
+    angles = [np.degrees(np.arctan2(y, x)) for x, y in along]
+    assert angles == pytest.approx([110.0, 90.0])
+    assert shape.wheels[0][:, 0].mean() < 10.0 < shape.wheels[1][:, 0].mean()  # left, right
+
+
+def test_the_camera_sees_what_is_ahead_to_the_right_and_left_above():
+    for path, s in ((LANE, 30.0), (COURSE, 200.0)):
+        X, Y, psi = (float(value) for value in path.pose(s))
+        view = Camera(path).at(s)
+        here = view.see(np.array([X, Y]))
+        ahead = view.see(np.array([X + np.cos(psi), Y + np.sin(psi)])) - here
+        left = view.see(np.array([X - np.sin(psi), Y + np.cos(psi)])) - here
+        assert ahead[0] > 0.9 and left[1] > 0.9
+        assert abs(here[0]) < 1e-6
+
+
+def test_a_long_drive_is_shown_faster_and_a_short_one_slower():
+    assert frames.reel(5.0).pace == 0.5
+    assert frames.reel(10.0).pace == 1.0
+    long = frames.reel(100.0)
+    assert long.pace == 12.0 and long.t.size <= frames.MOST
+    assert long.t[0] == 0.0 and long.t[-1] == 100.0
+
+
+@pytest.mark.parametrize("drives", [ON_LANE, ON_COURSE], ids=["lane", "course"])
+def test_the_film_is_small_and_moves(drives, tmp_path, monkeypatch):
+    monkeypatch.setattr(frames, "MOST", 12)
+    file = tmp_path / "drive.gif"
+    write_film(file, drives, CURVES, title="made up")
+    assert file.stat().st_size < 1e6
+    with Image.open(file) as film:
+        pictures = [np.array(frame.convert("RGB")) for frame in ImageSequence.Iterator(film)]
+        assert film.info["loop"] == 0
+    assert len(pictures) == 12
+    for before, after in pairwise(pictures):
+        assert (before != after).any()
+
+
+def test_an_mp4_without_ffmpeg_is_refused_with_what_to_do(tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(ValueError, match=r"needs ffmpeg.*or ask for a GIF"):
+        frames.require_ffmpeg()

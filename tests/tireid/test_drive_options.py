@@ -1,0 +1,69 @@
+"""How fast and on what road: words with units, and one clear line for what is no speed."""
+
+import pytest
+
+from tireid.drive_options import SpeedWish, parse_drop, parse_speed, require_friction
+
+
+@pytest.mark.parametrize(
+    ("text", "share", "speed"),
+    [
+        ("90%", 0.9, None),
+        ("0.97", 0.97, None),
+        ("1", 1.0, None),
+        ("17 m/s", None, 17.0),
+        ("72km/h", None, 20.0),
+    ],
+)
+def test_a_speed_is_a_share_of_the_grip_or_has_a_unit(text, share, speed):
+    wish = parse_speed(text)
+    assert wish == SpeedWish(
+        None if share is None else pytest.approx(share),
+        None if speed is None else pytest.approx(speed),
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("17", "has no unit: write 17%, 17m/s or 17km/h"),
+        ("fast", "not 'fast'"),
+        ("-5m/s", "not '-5m/s'"),
+        ("nan%", "not 'nan%'"),
+        ("1e", "not '1e'"),
+        ("300%", "5 to 150 % of the grip, it is 300 %"),
+        ("1km/h", "3 to 100 m/s, it is 0.278 m/s"),
+    ],
+)
+def test_what_is_no_speed_is_refused_with_its_rule(text, said):
+    with pytest.raises(ValueError, match="--speed") as refusal:
+        parse_speed(text)
+    assert said in str(refusal.value)
+
+
+def test_a_drop_is_a_place_and_a_friction():
+    assert parse_drop("60:0.5") == (60.0, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("60", "wants S:MU"),
+        ("60:", "wants S:MU"),
+        ("a:0.5", "wants S:MU"),
+        ("nan:0.5", "wants S:MU"),
+        ("-1:0.5", "the place must not be negative, it is -1 m"),
+        ("inf:0.5", "the place"),
+        ("60:0", "friction must be 0.05 to 1.5, it is 0"),
+    ],
+)
+def test_what_is_no_drop_is_refused_with_its_rule(text, said):
+    with pytest.raises(ValueError, match="--mu-drop") as refusal:
+        parse_drop(text)
+    assert said in str(refusal.value)
+
+
+def test_a_friction_names_the_word_that_gave_it():
+    assert require_friction("--mu", 0.5) == 0.5
+    with pytest.raises(ValueError, match="--mu: friction must be"):
+        require_friction("--mu", 2.0)

@@ -1,0 +1,96 @@
+"""`tireid export --mpc`: what it writes and what it refuses."""
+
+import json
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from codegen import find_compiler
+from identifier.export.compiled import CompiledPackage
+from identifier.identify import identify
+from identifier.methods import make_method
+from models.recordings import read_recording
+from models.vehicle import sedan
+from mpc.export import figures
+from mpc.tires import tire_model
+from tireid import export_command
+from tireid.cli import main
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
+CAR = sedan()
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    """Costs on Arm have tests of their own."""
+    monkeypatch.setattr(export_command, "measure", lambda _: [])
+    monkeypatch.setattr(figures, "missing_tools", lambda: ("arm-none-eabi-gcc",))
+
+
+def test_both_packages_and_what_joins_them_are_complete(tmp_path, capsys):
+    out = tmp_path / "package"
+    assert main(["export", str(out), "--mpc", "--name", "car"]) == 0
+    for path in (
+        "README.md",
+        "CMakeLists.txt",
+        "include/car_handover.h",
+        "src/car_handover.c",
+        "examples/closed_loop.c",
+        "examples/simulated_car.c",
+        "examples/lane_changes.c",
+        "identifier/include/car.h",
+        "identifier/car.json",
+        "mpc/include/car_mpc.h",
+        "mpc/src/car_mpc_qp.c",
+        "mpc/tests/test_car_mpc.c",
+        "mpc/README.md",
+        "mpc/car_mpc.json",
+    ):
+        assert (out / path).stat().st_size > 300, path
+    assert "car_mpc takes" in capsys.readouterr().err
+    assert "Arm was not measured" in (out / "mpc" / "README.md").read_text()
+    assert CompiledPackage.from_folder(out / "identifier").name == "car"
+
+
+def test_a_car_named_as_the_example_builds_and_drives(tmp_path):
+    if shutil.which("cmake") is None:
+        pytest.skip("needs cmake")
+    out = tmp_path / "package"
+    assert main(["export", str(out), "--mpc", "--paper", "--name", "car", "--single"]) == 0
+    for command in ("cmake -B build", "cmake --build build", "ctest --test-dir build"):
+        answer = subprocess.run(
+            command.split(), cwd=out, capture_output=True, text=True, check=False
+        )
+        assert answer.returncode == 0, answer.stdout + answer.stderr
+    assert "#define CAR_MPC_SINGLE 1" in (out / "mpc" / "include" / "car_mpc.h").read_text()
+    assert json.loads((out / "mpc" / "car_mpc.json").read_text())["precision"] == "float"
+
+
+def test_the_tracker_begins_with_learnt_weights_and_another_car(tmp_path, logs):
+    model = identify(read_recording(logs / "slalom.csv"), CAR, make_method("axle", CAR)).freeze(7.0)
+    model.save(tmp_path / "weights.json")
+    out = tmp_path / "package"
+    assert main(["export", str(out), "--mpc", "--weights", str(tmp_path / "weights.json")]) == 0
+    manifest = json.loads((out / "mpc" / "tireid_mpc.json").read_text())
+    np.testing.assert_array_equal(manifest["params"]["weights"], tire_model(model).weights)
+    assert manifest["params"]["car"] == list(CAR.bicycle[:4])
+
+
+@pytest.mark.parametrize("law", ["eso", "dugoff_ekf", "stiffness_rls"])
+def test_a_method_without_a_tire_for_c_is_refused_in_one_line(law, tmp_path, capsys):
+    out = tmp_path / "package"
+    assert main(["export", str(out), "--mpc", "--law", law]) == 2
+    error = [line for line in capsys.readouterr().err.splitlines() if "error" in line]
+    assert len(error) == 1
+    assert "hand" in error[0]
+    assert not out.exists()
+
+
+def test_without_a_compiler_nothing_is_left_behind(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("mpc.realtime.instance.load_library", lambda *_, **__: None)
+    out = tmp_path / "package"
+    assert main(["export", str(out), "--mpc"]) == 2
+    assert "--mpc: no C compiler" in capsys.readouterr().err
+    assert not out.exists()

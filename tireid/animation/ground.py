@@ -1,0 +1,184 @@
+"""The ground as the camera sees it: grid, path, cones, cars, their plan and their forces."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from numpy.typing import NDArray
+
+from mpc.loop import Drive
+from mpc.path import Path
+from tireid.animation.camera import Instant, View
+from tireid.animation.panels import sample_at
+from tireid.figures.car_shape import car_shape
+from tireid.figures.drive_errors import friction_label
+from tireid.figures.drive_look import CONES, PATH, tire_look
+from tireid.figures.style import PURPLE
+
+Array = NDArray[np.float64]
+Moved = list[tuple[Axes, Artist]]
+
+PLAN = "#333333"
+DROP: Mapping[str, Any] = {"color": "#AA4499", "linewidth": 1.6, "linestyle": (0, (3, 1.5))}
+HALF_ROAD = 4.0  # [m]
+GRID = 5.0  # [m]
+SHOWN = 60.0  # of the path, to both sides of the car [m]
+FORCE_LENGTH = 4.0  # of the arrow that is as long as the static load of the axle [m]
+ARROW = np.array([(0.0, 0.1), (0.0, -0.1), (1.0, -0.1), (1.0, -0.42), (1.7, 0.0), (1.0, 0.42),
+                  (1.0, 0.1)])  # fmt: skip
+SMALLEST = 0.15  # an arrow that would be shorter is left out [m]
+
+
+class Ground:
+    """The upper part of the picture.
+
+    Parameters
+    ----------
+    axes : in meters of the picture.
+    drives : by the name in the legend, along one path; the first is in the middle.
+    drops : arc length [m] and friction from there on.
+    """
+
+    def __init__(
+        self, axes: Axes, drives: Mapping[str, Drive], drops: Sequence[tuple[float, float]]
+    ) -> None:
+        self._axes, self._drives = axes, list(drives.values())
+        path = self._path = self._drives[0].path
+        plans = self._drives[0].plans
+        self._plan_at = np.array([plan.period for plan in plans])
+        self._plan_lines = [np.column_stack(plan.line(path)) for plan in plans]
+        self._room = 1.1 * np.hypot(*(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())))
+        self._grid = LineCollection([], colors="#E2E2DA", linewidths=0.8, animated=True)
+        axes.add_collection(self._grid)
+        (self._line,) = axes.plot([], [], animated=True, **PATH)
+        (self._cones,) = axes.plot([], [], animated=True, **{**CONES, "markersize": 4.5})
+        self._drops = [
+            (
+                _across(path, s),
+                axes.plot([], [], label=friction_label(mu), animated=True, **DROP)[0],
+            )
+            for s, mu in drops
+        ]
+        self._tracks, self._bodies, self._wheels = [], [], []
+        for number, label in enumerate(drives):
+            color = tire_look(label)["color"]
+            (track,) = axes.plot([], [], color=color, linewidth=1.4, alpha=0.8, animated=True)
+            body = PolyCollection(
+                [],
+                facecolors=[(color, 0.5), (color, 0.95)] if number == 0 else [(color, 0.12)],
+                edgecolors=color,
+                linewidths=1.2,
+                animated=True,
+            )
+            wheels = PolyCollection([], facecolors="#222222", edgecolors="none", animated=True)
+            for collection in (body, wheels):
+                axes.add_collection(collection)
+            self._tracks.append(track)
+            self._bodies.append(body)
+            self._wheels.append(wheels)
+        (self._plan,) = axes.plot(
+            [], [], color=PLAN, linewidth=1.3, marker="o", markersize=2.2, animated=True
+        )
+        self._forces = PolyCollection([], facecolors=PURPLE, edgecolors="none", animated=True)
+        axes.add_collection(self._forces)
+        self._names = ["path", "plan", *drives]
+
+    def legend(self) -> tuple[list[Artist], list[str]]:
+        """Return what a legend shows, and what it says of it."""
+        marks: list[Artist] = [self._line, self._plan, *self._tracks]
+        names = list(self._names)
+        if len(self._path.cones):
+            marks.append(self._cones)
+            names.append("cones")
+        for _, line in self._drops:
+            marks.append(line)
+            names.append(str(line.get_label()))
+        return [*marks, self._forces], [*names, "forces"]
+
+    def show(self, now: Instant) -> Moved:
+        """Return what moved, in the order of drawing.
+
+        Parameters
+        ----------
+        now : the instant.
+        """
+        drive, (k, t, view) = self._drives[0], now
+        self._grid.set_segments(self._grid_lines(view))
+        around = drive.s[k] + np.linspace(-SHOWN, SHOWN, 121)
+        if not self._path.closed:
+            around = np.clip(around, 0.0, self._path.length)
+        X, Y, _ = self._path.pose(around)
+        self._line.set_data(*view.see(np.column_stack([X, Y])).T)
+        artists: list[Artist] = [self._grid, self._line]
+        if len(self._path.cones):
+            self._cones.set_data(*view.see(self._path.cones).T)
+            artists.append(self._cones)
+        for ends, line in self._drops:
+            line.set_data(*view.see(ends).T)
+            artists.append(line)
+        for number in reversed(range(len(self._drives))):
+            artists += self._car(number, t, view)
+        if self._plan_at.size:
+            kept = max(int(np.searchsorted(self._plan_at, k, side="right")) - 1, 0)
+            self._plan.set_data(*view.see(self._plan_lines[kept]).T)
+            artists.append(self._plan)
+        self._forces.set_verts(self._arrows(drive, k, view))
+        artists.append(self._forces)
+        return [(self._axes, artist) for artist in artists]
+
+    def _car(self, number: int, t: float, view: View) -> list[Artist]:
+        drive = self._drives[number]
+        k = sample_at(drive, t)
+        places = np.column_stack([drive.X[: k + 1], drive.Y[: k + 1]])[-1200::4]
+        self._tracks[number].set_data(*view.see(places).T)
+        pose = (float(values[k]) for values in (drive.X, drive.Y, drive.psi, drive.delta))
+        shape = car_shape(drive.vehicle, *pose)
+        body = [view.see(shape.body), view.see(shape.glass)] if number == 0 else [
+            view.see(shape.body)
+        ]  # fmt: skip
+        self._bodies[number].set_verts(body)
+        self._wheels[number].set_verts(list(view.see(shape.wheels)))
+        if number == 0:
+            return [self._tracks[0], self._wheels[0], self._bodies[0]]
+        return [self._tracks[number], self._bodies[number], self._wheels[number]]
+
+    def _arrows(self, drive: Drive, k: int, view: View) -> list[Array]:
+        """Lateral axle forces as arrows from the axles, to the side to which they push."""
+        car, psi = drive.vehicle, float(drive.psi[k])
+        ahead, left = np.array([np.cos(psi), np.sin(psi)]), np.array([-np.sin(psi), np.cos(psi)])
+        place = np.array([drive.X[k], drive.Y[k]])
+        arrows = []
+        for axle, x in enumerate((car.l_f, -car.l_r)):
+            length = FORCE_LENGTH * drive.axle_force[k, axle] / car.axle_loads[axle]
+            if abs(length) < SMALLEST:
+                continue
+            head = ARROW.copy()
+            shaft = max(abs(length) - 0.7, 0.01)
+            head[:, 0] = np.where(ARROW[:, 0] < 0.5, 0.0, shaft + ARROW[:, 0] - 1.0)
+            head[:, 0] *= np.sign(length)
+            arrows.append(view.see(place + x * ahead + head[:, :1] * left + head[:, 1:] * ahead))
+        return arrows
+
+    def _grid_lines(self, view: View) -> list[Array]:
+        """Lines on the ground every few meters, so that one sees it pass."""
+        reach = 0.5 * self._room + 10.0
+        lines = []
+        for axis in (0, 1):
+            low, high = view.center[axis] - reach, view.center[axis] + reach
+            for at in np.arange(np.ceil(low / GRID), np.floor(high / GRID) + 1.0) * GRID:
+                ends = np.empty((2, 2))
+                ends[:, axis] = at
+                ends[:, 1 - axis] = view.center[1 - axis] + np.array([-1.5, 1.5]) * reach
+                lines.append(view.see(ends))
+        return lines
+
+
+def _across(path: Path, s: float) -> Array:
+    """Ends of a line across the path at a place, (2, 2) [m]."""
+    X, Y, psi = (float(value) for value in path.pose(s))
+    sides = HALF_ROAD * np.array([[1.0], [-1.0]])
+    ends: Array = np.array([X, Y]) + sides * np.array([-np.sin(psi), np.cos(psi)])
+    return ends

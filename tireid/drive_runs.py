@@ -1,0 +1,136 @@
+"""One drive for each tire that a tracker is told: linear, frozen, true, or learnt on the way."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identifier.method import FrozenModel
+from mpc.loop import CarSensors, Drive, Learner, Scores, drive, inertial_unit, scores
+from mpc.problem import Problem
+from mpc.realtime import NoCompilerError, Tracker
+from mpc.tires import TireModel, tire_model
+from tireid.drive_learners import Informer, make_learner
+from tireid.drive_setup import PERIOD, Setup
+from tireid.progress import Ticker
+
+LINEAR, FROZEN, ORACLE, LEARNING = TIRES = ("linear", "frozen", "oracle", "learning")
+WIDEST = 2.0  # deviation at which a car is off the path [m]
+PLAN_EVERY = 4  # periods between two plans that are kept: half a frame of the film
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Conditions:
+    """What is alike for every tire.
+
+    Parameters
+    ----------
+    setup : path, car and road.
+    delay : periods from a measurement until what follows from it acts.
+    noise : whether sensors are noisy.
+    seed : of the noise.
+    laps : of a closed path.
+    """
+
+    setup: Setup
+    delay: int
+    noise: bool
+    seed: int
+    laps: float
+
+    @property
+    def sensors(self) -> CarSensors:
+        """The sensors of the car."""
+        return inertial_unit() if self.noise else CarSensors()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """A drive and what is known of it.
+
+    Parameters
+    ----------
+    label : the tire that the tracker was told.
+    model, final : that tire, at the start and at the end.
+    problem : of the tracker.
+    drive : what happened.
+    scores : what it is worth.
+    """
+
+    label: str
+    model: TireModel
+    final: TireModel
+    problem: Problem
+    drive: Drive
+    scores: Scores
+
+
+def told_tire(label: str, setup: Setup, learnt: FrozenModel | None) -> TireModel:
+    """Return the tire that a tracker is told at the start.
+
+    Parameters
+    ----------
+    label : of `TIRES`.
+    setup : path, car and road.
+    learnt : what was learnt before the drive, for `frozen` and, where there is any, `learning`.
+    """
+    if label == LINEAR:
+        return tire_model(setup.vehicle)
+    if label == ORACLE:
+        return setup.oracle()
+    assert learnt is not None
+    return tire_model(learnt, setup.vehicle)
+
+
+def run_drive(label: str, conditions: Conditions, learnt: FrozenModel | None) -> Run:
+    """Drive the path once with the tracker told of a tire.
+
+    Parameters
+    ----------
+    label : of `TIRES`.
+    conditions : what is alike for every tire.
+    learnt : what was learnt before the drive.
+
+    Raises
+    ------
+    ValueError
+        Where there is no C compiler for the tracker.
+    """
+    setup, problem = conditions.setup, Problem()
+    model = told_tire(label, setup, learnt)
+    lag = setup.vehicle.require_chassis().steering_lag
+    try:
+        tracker = Tracker(model, problem, period=PERIOD, delay=conditions.delay * PERIOD + lag)
+    except NoCompilerError as error:
+        raise ValueError(str(error)) from None
+    driven = drive(
+        setup.path,
+        setup.car(),
+        tracker,
+        speed=setup.profile(),
+        sensors=conditions.sensors,
+        delay=conditions.delay,
+        rng=np.random.default_rng([conditions.seed, 2]),
+        learner=_learner(label, setup, learnt),
+        laps=conditions.laps,
+        widest=WIDEST,
+        plan_every=PLAN_EVERY,
+        name=f"{setup.path.name}, {label}",
+        progress=Ticker(f"driving on {label} tires"),
+    )
+    return Run(
+        label=label,
+        model=model,
+        final=tracker.tire,
+        problem=problem,
+        drive=driven,
+        scores=scores(driven),
+    )
+
+
+def _learner(label: str, setup: Setup, learnt: FrozenModel | None) -> Learner | None:
+    if label == ORACLE and setup.drops:
+        return Informer(setup)
+    if label == LEARNING:
+        assert learnt is not None
+        return make_learner(learnt, setup.vehicle)
+    return None
