@@ -5,14 +5,16 @@ frozen model is learnt on one drive of the same car on the same friction before:
 steering at 15 m/s, up to and beyond the limit of both axles, through the same noise.
 """
 
+from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
+from identifier.axle import AxleDesign
 from identifier.defaults import default_design
 from identifier.identify import identify
-from identifier.methods import DEFAULT, make_method
+from identifier.method import Method
 from models.friction import Friction
 from models.maneuvers import RandomSteer
 from models.plant import Plant
@@ -25,8 +27,9 @@ from mpc.loop.limit import cornering_limit
 from mpc.path import BUILT_IN, Path, grip_speed, steady_speed
 from mpc.realtime import Tracker
 from mpc.tires import TireModel, oracle_tire, tire_model
+from mpc.tires.held import held
 
-TIRES = ("linear", "paper", "axle", "oracle")
+TIRES = ("linear", "paper", "axle", "fine", "oracle")
 FASTEST = 30.0  # m/s
 ACCELERATION, BRAKING = 2.0, 3.0  # m/s^2, at friction 1
 LEARNING_TIME = 60.0  # s
@@ -90,10 +93,18 @@ def tires(kind: str, mu: float, seed: int) -> TireModel:
     if kind == "linear":
         return tire_model(car)
     if kind == "oracle":
-        return oracle_tire(car, plant().tire, mu)
-    method = make_method(DEFAULT, car) if kind == DEFAULT else default_design(car, seed=seed)
-    recording = learning_drive(mu, seed)
-    return tire_model(identify(recording, car, method).freeze(LEARNING_TIME))
+        return held(oracle_tire(car, plant().tire, mu))
+    history = identify(learning_drive(mu, seed), car, _method(kind, seed))
+    return held(tire_model(history.freeze(LEARNING_TIME)))
+
+
+def _method(kind: str, seed: int) -> Method:
+    if kind == "paper":
+        return default_design(sedan(), seed=seed)
+    axle = AxleDesign.for_vehicle(sedan())
+    if kind == "fine":
+        return replace(axle, ladder=tuple(0.5 * scale for scale in axle.ladder))
+    return axle
 
 
 @cache

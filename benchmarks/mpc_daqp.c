@@ -92,15 +92,15 @@ static void condense(const mpc_work *work, const mpc_params *params)
 }
 
 /* As mpc_solve. */
-int daqp_iterate(mpc_state *state, const mpc_params *params, mpc_work *work, const double *kappa,
-    const double *v_x)
+int daqp_iterate(mpc_state *state, const mpc_params *params, mpc_work *work, const double *x0,
+    const double *kappa, const double *v_x)
 {
     static DAQPProblem problem;
     DAQPResult result;
     uint32_t k, i, j;
     double nothing;
-    linearize(state, params, work, kappa, v_x);
-    measure_rows(state, params, work);
+    linearize(state, params, work, x0, kappa, v_x);
+    measure_rows(params, work);
     condense(work, params);
     result.x = c.x;
     result.lam = c.lambda;
@@ -126,5 +126,6 @@ int daqp_iterate(mpc_state *state, const mpc_params *params, mpc_work *work, con
         }
     }
     (void)take(state, params, work);
+    state->guessed = 1U; /* there is no feedback */
     return result.exitflag;
 }

@@ -2,9 +2,9 @@
 
 Each built-in path at 90 % of the limit of grip is driven by trackers that differ in one number,
 the linearizations a step: 1, 3, and 20, which is converged. Once with exact sensors, where the plan
-of one step leads into the next, and over seeds of sensor noise, which moves the state that the plan
-begins at by more than an iteration corrects. The tracker knows the true tire, which lags and
-saturates: the hardest prediction there is. The cost is that of the problem, from what the car did.
+of one step leads into the next, and over seeds of sensor noise, which throws the car off it at
+every step. The tracker knows the true tire, which lags and saturates: the hardest prediction there
+is. The cost is that of the problem, from what the car did.
 """
 
 from typing import NamedTuple

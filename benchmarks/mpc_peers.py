@@ -186,7 +186,7 @@ class CondensedDaqp(Ours):
         """Return the plan from a state, on the curvature of the stages."""
         instance = self.tracker.instance
         instance.shift()
-        instance.state["x"][0] = x0
+        instance.start[:] = x0
         instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, SPEED
         start = time.thread_time()
         flag = self.iterate(*instance.solve_arguments)

@@ -8,6 +8,7 @@ UndefinedBehaviorSanitizer, and must steer the same.
 
 import subprocess
 import tempfile
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -37,7 +38,7 @@ SANITIZED = ("-std=c99", "-O1", "-g", "-ffp-contract=off", "-fsanitize=address,u
 
 
 class Stress(NamedTuple):
-    """What came of it; solve times in ms, limits in parts of themselves."""
+    """What came of it; CPU times in ms, limits in parts of themselves."""
 
     statuses: Mapping[str, int]
     iterations: NDArray[np.int64]
@@ -70,7 +71,7 @@ def random_road(times: Array, rng: np.random.Generator) -> tuple[Array, Array]:
 
 def stress(choice: list[TireModel], steps: int, rng: np.random.Generator) -> Stress:
     """Drive random episodes."""
-    tracker = Tracker(choice[0], PROBLEM, period=PERIOD, delay=DELAY)
+    tracker = Tracker(choice[0], PROBLEM, period=PERIOD, delay=DELAY, clock=time.thread_time)
     limits, share = PROBLEM.limits, PERIOD / PROBLEM.dt
     records, iterations, times = [], [], []
     angle = rate = last = 0.0

@@ -18,6 +18,11 @@ BENCHMARKS = {
     "bounds_monte_carlo": [],
     "batch_speed": [],
     "export_cost": [],
+    "mpc_speed": [],
+    "mpc_optimality": [],
+    "mpc_stress": [],
+    "mpc_worth": ["{out}"],
+    "mpc_friction_drop": ["{out}"],
 }
 
 

@@ -31,7 +31,8 @@ class Cost:
     """Weights of the errors, without unit: 1 costs ½ a stage where the error is as large as said.
 
     Defaults were chosen on lane changes at 90 to 115 % of the grip, friction 1 and 0.5: with none
-    on the yaw rate and a quarter on the input, plans became jerky and runs beyond the grip failed.
+    on the yaw rate and a quarter on the input, plans became jerky and runs beyond the grip failed;
+    with 8 on e_y some did at the grip. With 1 the car stays 1.3 times as far from the path.
 
     Parameters
     ----------
@@ -51,7 +52,7 @@ class Cost:
         Where a weight is negative or not finite, or steering_rate zero.
     """
 
-    e_y: float = 1.0
+    e_y: float = 3.0
     e_psi: float = 0.0
     course: float = 0.05
     v_y: float = 0.0

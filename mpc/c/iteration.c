@@ -12,8 +12,6 @@
 #define STEERING 4U /* place of the angle among the states */
 
 #define real @name@_real
-#define IN(x, l) (((x) <= (l)) && ((x) >= -(l)))
-#define ON_MAP(x) (IN((x)[0], params->widest_e_y) && IN((x)[1], params->widest_e_psi) && IN((x)[2], params->max_v_y) && IN((x)[3], params->max_yaw_rate))
 
 bool @name@_finite(real x)
 {
@@ -27,6 +25,17 @@ real @name@_clipped(real x, real limit)
     return (low < -limit) ? -limit : low;
 }
 
+bool @name@_within(real x, real limit)
+{
+    return (x <= limit) && (x >= -limit);
+}
+
+bool @name@_on_map(const @name@_params *params, const real *x)
+{
+    return @name@_within(x[0], params->widest_e_y) && @name@_within(x[1], params->widest_e_psi)
+        && @name@_within(x[2], params->max_v_y) && @name@_within(x[3], params->max_yaw_rate);
+}
+
 void @name@_shift(@name@_state *state, const @name@_params *params)
 {
     const real share = params->period / params->stage_time;
@@ -37,8 +46,9 @@ void @name@_shift(@name@_state *state, const @name@_params *params)
             state->x[k][i] += share * (state->x[k + 1U][i] - state->x[k][i]);
         }
         if (k < (N - 1U)) {
+            const real *ahead = state->feedback[k + 1U];
             for (i = 0U; i < NX; i++) {
-                state->feedback[k][i] += share * (state->feedback[k + 1U][i] - state->feedback[k][i]);
+                state->feedback[k][i] += share * (ahead[i] - state->feedback[k][i]);
             }
             state->u[k] += share * (state->u[k + 1U] - state->u[k]);
         }
@@ -70,7 +80,7 @@ void @name@_guess(@name@_state *state, const @name@_params *params, const real *
             state->feedback[k][i] = @NAME@_C(0.0);
         }
     }
-    state->follows = 0U;
+    state->guessed = 1U;
 }
 
 /* Input of the plan, fed back what the car is off it, within the hard limits. */
@@ -89,32 +99,29 @@ static real fed_back(const @name@_state *state, const @name@_params *params, uin
     return @name@_clipped(u, params->max_rate);
 }
 
-/* Linearize along the way that the prediction takes from x0 under the plan and its feedback; where
- * that leaves the map, go on along the plan itself. */
+/* Linearize along the way that the prediction takes from x0 under the plan and its feedback, which
+ * answers most of what the car is off the plan before anything is solved. A guess, and what leaves
+ * the map, is gone on with along the plan itself. */
 static void linearize(const @name@_state *state, const @name@_params *params, @name@_work *work,
     const real *x0, const real *kappa, const real *v_x)
 {
+    bool rolls;
     uint32_t k;
     uint32_t i;
     for (i = 0U; i < NX; i++) {
         work->x[0][i] = x0[i];
     }
+    work->x[0][STEERING] = @name@_clipped(x0[STEERING], params->max_steering);
     for (k = 0U; k < N; k++) {
         real *x = work->x[k];
         real *next = work->x[k + 1U];
         @name@_stage *stage = &work->stage[k];
         work->u[k] = fed_back(state, params, k, x);
         @name@_linearize(params, params->cost, x, work->u[k], kappa[k], v_x[k], stage);
-        if ((state->follows != 0U) && ON_MAP(stage->c)) {
-            for (i = 0U; i < NX; i++) {
-                next[i] = stage->c[i];
-                stage->c[i] = @NAME@_C(0.0);
-            }
-        } else {
-            for (i = 0U; i < NX; i++) {
-                next[i] = (k == (N - 1U)) ? stage->c[i] : state->x[k + 1U][i];
-                stage->c[i] -= next[i];
-            }
+        rolls = (state->guessed == 0U) && @name@_on_map(params, stage->c);
+        for (i = 0U; i < NX; i++) {
+            next[i] = (rolls || (k == (N - 1U))) ? stage->c[i] : state->x[k + 1U][i];
+            stage->c[i] -= next[i];
         }
     }
     @name@_linearize_end(params, params->cost_end, work->x[N], kappa[N - 1U], v_x[N - 1U],
@@ -164,6 +171,7 @@ static bool take(@name@_state *state, const @name@_params *params, const @name@_
     }
     finite = @name@_finite(sum);
     if (finite) {
+        state->guessed = 0U;
         for (i = 0U; i < NX; i++) {
             state->x[0][i] = work->x[0][i];
         }
@@ -180,7 +188,6 @@ static bool take(@name@_state *state, const @name@_params *params, const @name@_
             state->u[k] = @name@_clipped((after - before) / params->stage_time, params->max_rate);
         }
     }
-    state->follows = finite ? 1U : state->follows;
     return finite;
 }
 

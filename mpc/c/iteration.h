@@ -11,8 +11,14 @@ extern "C" {
 /* Whether x is a number: the difference of infinities, and of NaN, is not zero. */
 bool @name@_finite(@name@_real x);
 
+/* Whether |x| <= limit, which NaN is not. */
+bool @name@_within(@name@_real x, @name@_real limit);
+
 /* x, not beyond +-limit. */
 @name@_real @name@_clipped(@name@_real x, @name@_real limit);
+
+/* Whether a state is where the prediction holds. */
+bool @name@_on_map(const @name@_params *params, const @name@_real *x);
 
 /* The plan, a time later: between its states, and its last input goes on. */
 void @name@_shift(@name@_state *state, const @name@_params *params);

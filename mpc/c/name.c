@@ -13,11 +13,6 @@
 
 #define real @name@_real
 
-static bool within(real x, real limit)
-{
-    return (x <= limit) && (x >= -limit);
-}
-
 /* What can be said of a measurement before anything is computed. */
 static @name@_status judge(const @name@_params *params, const @name@_input *in)
 {
@@ -31,9 +26,11 @@ static @name@_status judge(const @name@_params *params, const @name@_input *in)
     }
     if (!@name@_finite(sum)) {
         status = @NAME@_NOT_FINITE;
-    } else if (!within(in->e_y, params->widest_e_y) || !within(in->e_psi, params->widest_e_psi)) {
+    } else if (!@name@_within(in->e_y, params->widest_e_y)
+        || !@name@_within(in->e_psi, params->widest_e_psi)) {
         status = @NAME@_OFF_PATH;
-    } else if (!within(in->v_y, params->max_v_y) || !within(in->r, params->max_yaw_rate)) {
+    } else if (!@name@_within(in->v_y, params->max_v_y)
+        || !@name@_within(in->r, params->max_yaw_rate)) {
         status = @NAME@_OFF_MAP;
     } else if (slow) {
         status = @NAME@_TOO_SLOW;
@@ -157,7 +154,7 @@ static void count(@name@_state *state, @name@_status status)
                 state->feedback[k][i] = @NAME@_C(0.0);
             }
         }
-        state->follows = 0U;
+        state->guessed = 1U;
         for (i = 0U; i < @NAME@_COMMANDS; i++) {
             state->commands[i] = steering;
         }
@@ -178,9 +175,7 @@ static bool is_sound(const @name@_state *state, const @name@_params *params)
     bool sound = true;
     uint32_t k;
     for (k = 1U; k <= N; k++) {
-        const real *x = state->x[k];
-        sound = sound && within(x[0], params->widest_e_y) && within(x[1], params->widest_e_psi)
-            && within(x[2], params->max_v_y) && within(x[3], params->max_yaw_rate);
+        sound = sound && @name@_on_map(params, state->x[k]);
     }
     return sound;
 }

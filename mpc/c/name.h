@@ -106,8 +106,8 @@ typedef struct {
     uint32_t iterations;                                    /* of the last solution */
     uint32_t age;                                           /* steps since the plan was new */
     uint32_t planned;                                       /* 0 until there is a plan */
+    uint32_t guessed;                                       /* 1: x and u without a solution */
     uint32_t started;                                       /* 0 until the first step */
-    uint32_t follows;
 } @name@_state;
 
 /* A stage, linearized: x_next = A x + B u + c, all as differences from the plan; by columns. */
@@ -125,8 +125,8 @@ typedef @name@_real @name@_sides[2][@NAME@_HORIZON * @NAME@_ROWS]; /* v <= 1 and
 
 typedef struct {
     @name@_stage stage[@NAME@_HORIZON + 1U];
-    @name@_real u[@NAME@_HORIZON]; /* inputs that were linearized at */
-    @name@_real x[@NAME@_HORIZON + 1U][@NAME@_STATES];
+    @name@_real x[@NAME@_HORIZON + 1U][@NAME@_STATES]; /* that were linearized at */
+    @name@_real u[@NAME@_HORIZON];
     @name@_real du[@NAME@_HORIZON];
     @name@_real dx[@NAME@_HORIZON + 1U][@NAME@_STATES];
     @name@_real feedback[@NAME@_HORIZON][@NAME@_STATES];
@@ -157,10 +157,11 @@ typedef struct {
 @name@_status @name@_step(@name@_state *state, const @name@_params *params, @name@_work *work,
     const @name@_input *input, @name@_real *steering);
 
-/* One iteration from the plan in the state, which is not shifted: state->x[0] is the car at the
- * beginning of the first stage; kappa and v_x are those of the stages. */
+/* One iteration from the plan in the state, which is not shifted. x0 is the car at the beginning of
+ * the first stage; kappa and v_x are those of the stages. */
 @name@_status @name@_solve(@name@_state *state, const @name@_params *params, @name@_work *work,
-    const @name@_real x0[@NAME@_STATES], const @name@_real kappa[@NAME@_HORIZON], const @name@_real v_x[@NAME@_HORIZON]);
+    const @name@_real x0[@NAME@_STATES], const @name@_real kappa[@NAME@_HORIZON],
+    const @name@_real v_x[@NAME@_HORIZON]);
 
 /* Say that the command of the last step came too late, and what was steered instead [rad]. */
 @name@_status @name@_late(@name@_state *state, @name@_real steering);

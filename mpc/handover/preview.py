@@ -23,6 +23,7 @@ def previewed_rate(tracker: Tracker, tire: TireModel) -> float:
         raise ValueError(f"the tracker is built for {tracker.tire.structure}, not {tire.structure}")
     instance = tracker.instance
     state, params = instance.state.copy(), instance.params.copy()
+    instance.start[:] = state["x"][0]
     instance.params["weights"], instance.params["car"] = tire.weights, tire.car
     instance.solve()
     rate = float(instance.state["u"][0])

@@ -48,7 +48,7 @@ def state_type(horizon: int, n_x: int, *, single: bool) -> np.dtype[np.void]:
     n_x : states of the car.
     single : whether numbers are float.
     """
-    real, counts = _real(single), ("iterations", "age", "planned", "started", "follows")
+    real, counts = _real(single), ("iterations", "age", "planned", "guessed", "started")
     return np.dtype(
         [
             ("x", real, (horizon + 1, n_x)),

@@ -2,7 +2,7 @@
 
 Behind its peak an axle gives less for more slip. A tracker that linearizes there and wants less
 force steers on, farther from where it has to go, and stays there. So beyond the useful slip
-F = F(held slip) + 0.02 dF/dα(0) (α - held slip): more slip never gives less.
+F = F(held slip) + 0.04 dF/dα(0) (α - held slip): more slip never gives less.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ import numpy as np
 from mpc.tires.reach import curve_slopes, useful_slip
 from mpc.tires.structure import Pair, Point, PredictionTire, TireModel
 
-RISE = 0.02  # of the slope at zero
+RISE = 0.04  # of the slope at zero; a little less than where slip ends to be of use
 N_HELD = 4
 
 
@@ -55,7 +55,8 @@ class HeldAxles:
         slip : what makes the force [rad].
         at : motion, car and weights.
         """
-        held = [ca.fmin(ca.fmax(x, -most), most) for x, most in zip(slip, (at.w[0], at.w[1]))]
+        most = ca.vertsplit(at.w[:2])
+        held = [ca.fmin(ca.fmax(x, -m), m) for x, m in zip(slip, most, strict=True)]
         front, rear = self.inner.force((held[0], held[1]), _inside(at))
         return front + at.w[2] * (slip[0] - held[0]), rear + at.w[3] * (slip[1] - held[1])
 

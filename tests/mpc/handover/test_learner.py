@@ -64,17 +64,19 @@ def test_no_handover_makes_the_plan_jump_more_than_noise_does(drives):
     assert max(move.jump for move in learner.moves) <= min(0.2, usual)
 
 
-def test_a_preview_changes_nothing(car, learnt):
-    """Two trackers, one of them asked what it would do with another tire at every step."""
+def test_a_preview_changes_nothing_and_tells_the_plan(car, learnt):
+    """Two trackers that drift off a bend, one of them asked at every step what it would do."""
     tire = tire_model(learnt)
     asked, left_alone = (Tracker(tire, period=0.01, delay=0.02) for _ in range(2))
-    n = asked.times.size
-    for k in range(20):
-        kappa, v_x = np.full(n, 0.01), np.full(n, 20.0)
-        measurement = Measurement(0.3 - 0.01 * k, 0.0, 0.1, 0.05, kappa, v_x)
+    kappa, v_x = (np.full(asked.times.size, value) for value in (0.01, 20.0))
+    for k in range(30):
+        measurement = Measurement(0.01 * k, 0.0, -0.1, 0.2, kappa, v_x)
+        command = asked.step(measurement)
+        assert command.steering == left_alone.step(measurement).steering
         same, other = (previewed_rate(asked, one) for one in (tire, at_friction(tire, 0.4)))
-        assert asked.step(measurement).steering == left_alone.step(measurement).steering
-    assert same != other
+    assert abs(command.plan_u[0]) > 0.05
+    assert same == pytest.approx(command.plan_u[0], rel=0.1)  # it is one iteration further
+    assert abs(other - same) > 0.02
     assert asked.tire is tire
     with pytest.raises(ValueError, match="the tracker is built for"):
         previewed_rate(asked, tire_model(car))
