@@ -5,11 +5,11 @@
 A slalom through 12 cones 36 m apart at the constant speed (24 m/s) that takes 95 % of the cornering
 limit of the road after the drop, and ISO 3888-1 at 97 % of it (28 m/s): before the drop the car
 uses half of its grip, after it nearly all, so that the course stays drivable. (The faster, the
-less feedback alone makes up for a wrong tire: 30 m apart, at 20 m/s, the linear tire is on the path
-in 2 of 10 drives.) The drop from 1.0 to 0.5 is a line across the road, which each wheel meets on its
-own; in the slalom it lies 190 to 244 m from the start, at another phase of the slalom for each seed,
-in the lane change 45 to 63 m, before the first change. Seeds also change the noise, the delay (10,
-20, 30 ms) and the drive on the dry road that the frozen tires were learnt on.
+less feedback alone makes up for a wrong tire: 30 m apart, at 20 m/s, the linear tire stays on the
+path in 2 of 10 drives.) The drop from 1.0 to 0.5 is a line across the road, which each wheel meets
+on its own; in the slalom it lies 190 to 244 m from the start, at another phase for each seed, in
+the lane change 45 to 63 m, before the first change. Seeds also change the noise, the delay (10, 20,
+30 ms) and the drive on the dry road that the frozen tires were learnt on.
 
 linear: the tire of the data sheet.   frozen: learnt on the dry road.   learning: begins with the
 frozen one, learns on and hands over.   oracle: the true tire, told of the drop as the car passes.
@@ -40,7 +40,7 @@ from mpc.loop import Drive, Measured, drive, inertial_unit
 from mpc.loop.limit import cornering_limit
 from mpc.path import Path, iso_3888_1, slalom, steady_speed
 from mpc.realtime import Tracker
-from mpc.tires import TireModel, oracle_tire, tire_model
+from mpc.tires import oracle_tire, tire_model
 
 TIRES = ("linear", "frozen", "learning", "oracle")
 COURSES = ("slalom", "lane change")
@@ -138,12 +138,10 @@ def run(case: Case) -> tuple[Drive, Learner | None]:
     vehicle, (path, speed) = sedan(), course(case.course)
     change = FrictionChange(scale=WET, at_place=case.place)
     car = DoubleTrackCar(vehicle, friction=Friction(scale=DRY, changes=(change,)))
-    model = learnt(case.seed)
-    tire: TireModel = {
-        "linear": lambda: tire_model(vehicle),
-        "oracle": lambda: oracle_tire(vehicle, plant().tire, DRY),
-    }.get(case.tires, lambda: tire_model(model))()
-    learner = None
+    model, learner = learnt(case.seed), None
+    tire = tire_model(vehicle if case.tires == "linear" else model)
+    if case.tires == "oracle":
+        tire = oracle_tire(vehicle, plant().tire, DRY)
     if case.tires == "learning":
         design = AxleDesign.for_vehicle(vehicle, dt=car.period)
         learner = Learner(Supervisor(OnlineIdentifier(design, vehicle, car.period, model), tire))
@@ -174,17 +172,14 @@ def score(case: Case) -> Result:
     driven, learner = run(case)
     after = driven.X - case.place >= 0.0
     e_y, dropped_at = driven.e_y[after], float(driven.t[after][0])
-    found = None
-    if learner is not None:
-        changes = [one for one in learner.supervisor.decisions if one.friction != 1.0]
-        if changes:
-            found = (changes[0].t - dropped_at, changes[0].friction)
+    decisions = learner.supervisor.decisions if learner else []
+    changes = [(one.t - dropped_at, one.friction) for one in decisions if one.friction != 1.0]
     rates = np.diff(driven.command[driven.t < dropped_at]) / driven.period
     return Result(
         peak=float(np.abs(e_y).max()),
         rms=float(np.sqrt(np.mean(e_y**2))),
         completed=driven.completed,
-        found=found,
+        found=changes[0] if changes else None,
         jump=max((move.jump for move in learner.moves), default=0.0) if learner else 0.0,
         usual=float(np.percentile(np.abs(np.diff(rates)), 99.0)),
         notes=[f"{t - dropped_at:+.2f} s: {text}" for t, text in driven.notes],
@@ -255,7 +250,7 @@ def _times(results: list[Result]) -> str:
 
 
 def draw(seeds: int, path: File) -> None:
-    """Draw deviation along the slalom for the first seeds.
+    """Draw the deviation along both courses for the first seeds.
 
     Parameters
     ----------
@@ -281,16 +276,12 @@ def draw(seeds: int, path: File) -> None:
 
 
 def main(out: File, seeds: int = SEEDS) -> list[str]:
-    """Drive, print, draw.
+    """Drive, print, draw; return the labels of the targets that were missed.
 
     Parameters
     ----------
     out : folder of the JSON and the figure.
     seeds : of each course and tires.
-
-    Returns
-    -------
-    Labels of the targets that were missed.
     """
     out.mkdir(parents=True, exist_ok=True)
     found, targets = drive_all(seeds), Targets()
