@@ -1,6 +1,18 @@
-"""Numbers beside their targets, one line each."""
+"""What a benchmark measured: numbers by key beside their targets, printed, and recorded.
 
+A number that README or docs quote is recorded here first: `Targets("mpc_worth")` collects under the
+name of the script, `finish` writes benchmarks/results/mpc_worth.json where it is asked to, and the
+documents name script and key. A missed target is printed, recorded, and an exit code of 1.
+"""
+
+import json
+import platform
+import sys
 from dataclasses import dataclass, field
+from pathlib import Path
+
+RESULTS = Path(__file__).resolve().parent / "results"
+MISSED = 1
 
 
 @dataclass(slots=True)
@@ -9,12 +21,40 @@ class Targets:
 
     Parameters
     ----------
+    script : name of the benchmark, without its ending.
+    values : by key; what documents may quote, at full precision.
+    units : by key.
     missed : labels of the targets that were not reached so far.
+    met : how many were reached.
     """
 
+    script: str = ""
+    values: dict[str, float | int | str] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
     missed: list[str] = field(default_factory=list)
+    met: int = 0
 
-    def at_most(self, label: str, value: float, limit: float, unit: str = "%") -> None:
+    def record(self, key: str, value: float | int | str, unit: str = "") -> None:
+        """Keep a number that has no target of its own.
+
+        Parameters
+        ----------
+        key : words joined by slashes, `course/97/0.5/axle/rms`.
+        value : at full precision.
+        unit : of it.
+
+        Raises
+        ------
+        ValueError
+            Where the key is taken: two numbers of one name are one number too many.
+        """
+        if key in self.values:
+            raise ValueError(f"{self.script}: the key {key!r} is recorded twice")
+        self.values[key], self.units[key] = value, unit
+
+    def at_most(
+        self, label: str, value: float, limit: float, unit: str = "%", key: str = ""
+    ) -> None:
         """Print a value beside the largest that is good.
 
         Parameters
@@ -23,10 +63,13 @@ class Targets:
         value : measured.
         limit : largest that is good.
         unit : of both.
+        key : under which it is recorded too; none where empty.
         """
-        self._print(label, value, f"<= {limit:g} {unit}", unit, value <= limit)
+        self._judge(label, value, f"<= {limit:g} {unit}", unit, key, value <= limit)
 
-    def at_least(self, label: str, value: float, limit: float, unit: str = "%") -> None:
+    def at_least(
+        self, label: str, value: float, limit: float, unit: str = "%", key: str = ""
+    ) -> None:
         """Print a value beside the smallest that is good.
 
         Parameters
@@ -35,14 +78,59 @@ class Targets:
         value : measured.
         limit : smallest that is good.
         unit : of both.
+        key : under which it is recorded too; none where empty.
         """
-        self._print(label, value, f">= {limit:g} {unit}", unit, value >= limit)
+        self._judge(label, value, f">= {limit:g} {unit}", unit, key, value >= limit)
 
-    def _print(self, label: str, value: float, target: str, unit: str, good: bool) -> None:
-        if not good:
+    def _judge(
+        self, label: str, value: float, target: str, unit: str, key: str, good: bool
+    ) -> None:
+        if good:
+            self.met += 1
+        else:
             self.missed.append(label)
+        if key:
+            self.record(key, value, unit)
         verdict = "ok" if good else "MISSED"
         print(f"  {label:66} {value:8.2f} {unit:3} target {target}  {verdict}")
+
+    def finish(self, *, keep: bool) -> int:
+        """Say how many targets were met; return the exit code, 1 where one was missed.
+
+        Parameters
+        ----------
+        keep : write the numbers to benchmarks/results, for the documents to quote: only a run
+            with the defaults of the script may.
+        """
+        if keep:
+            RESULTS.mkdir(exist_ok=True)
+            path = RESULTS / f"{self.script}.json"
+            text = {
+                "script": f"benchmarks/{self.script}.py",
+                "machine": f"{platform.machine()}, Python {platform.python_version()}",
+                "missed": self.missed,
+                "met": self.met,
+                "units": self.units,
+                "values": self.values,
+            }
+            path.write_text(json.dumps(text, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+            print(f"wrote {path}")
+        if self.missed:
+            print(f"{self.script}: MISSED {len(self.missed)} targets: {'; '.join(self.missed)}")
+        return MISSED if self.missed else 0
+
+
+def keeps(argv: list[str] = sys.argv) -> bool:
+    """Return whether the words of the command ask to record, taking `--record` out of them.
+
+    Parameters
+    ----------
+    argv : words of the command.
+    """
+    if "--record" in argv:
+        argv.remove("--record")
+        return True
+    return False
 
 
 def show(label: str, text: str) -> None:
