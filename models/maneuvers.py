@@ -8,7 +8,7 @@ birth. Steering starts at `onset`; a negative amplitude steers right first. `rea
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -40,7 +40,7 @@ class Maneuver(Protocol):
 def _check(maneuver: Any, *, steepest: float) -> None:
     """Refuse numbers that are not physical and a steering rate above the limit."""
     name = type(maneuver).__name__
-    free = ("amplitude", "onset", "rear_ratio", "seed", "dwell", "pause")
+    free = ("amplitude", "second_share", "onset", "rear_ratio", "seed", "dwell", "pause")
     for field in fields(maneuver):
         value = getattr(maneuver, field.name)
         if not math.isfinite(value):
@@ -94,9 +94,71 @@ class StepSteer:
         ----------
         t : times [s], (n,).
         """
-        rate = self.rate_limit / max(1.0, abs(self.rear_ratio))
-        angle = np.clip(rate * (t - self.onset), 0.0, abs(self.amplitude))
+        angle = np.clip(self._rate * (t - self.onset), 0.0, abs(self.amplitude))
         return _both(np.copysign(angle, self.amplitude), self.rear_ratio)
+
+    @property
+    def arrival(self) -> float:
+        """Time at which the angle is reached [s]."""
+        return self.onset + abs(self.amplitude) / self._rate
+
+    @property
+    def _rate(self) -> float:
+        return self.rate_limit / max(1.0, abs(self.rear_ratio))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TwoStepSteer:
+    """A step steer whose angle changes again: two ramps at `rate_limit`, each to a held angle.
+
+    Parameters
+    ----------
+    amplitude : angle held from the first ramp to the second [rad].
+    second_share : angle held after the second ramp, over `amplitude` [-].
+    onset : start of the first ramp [s].
+    second_onset : start of the second ramp [s], not before the first has arrived.
+    rate_limit : largest steering rate of either axle [rad/s].
+    duration : length [s].
+    rear_ratio : rear over front angle [-].
+    """
+
+    amplitude: float
+    second_share: float
+    onset: float
+    second_onset: float
+    rate_limit: float
+    duration: float
+    rear_ratio: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check(self, steepest=0.0)
+        arrival = self._first.arrival
+        if self.second_onset < arrival:
+            raise ManeuverError(
+                f"TwoStepSteer: second_onset must not be before the first ramp arrives at "
+                f"{arrival:.4g} s, it is {self.second_onset}"
+            )
+
+    @property
+    def _first(self) -> StepSteer:
+        return StepSteer(
+            amplitude=self.amplitude,
+            onset=self.onset,
+            rate_limit=self.rate_limit,
+            duration=self.duration,
+            rear_ratio=self.rear_ratio,
+        )
+
+    def steering(self, t: Array) -> Array:
+        """Commanded [δ_f, δ_r] [rad], (n, 2).
+
+        Parameters
+        ----------
+        t : times [s], (n,).
+        """
+        change = (self.second_share - 1.0) * self.amplitude
+        second = replace(self._first, amplitude=change, onset=self.second_onset)
+        return self._first.steering(t) + second.steering(t)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

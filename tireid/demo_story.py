@@ -11,7 +11,7 @@ from identifier.history import History
 from identifier.identify import identify
 from identifier.method import Method
 from identifier.methods import DEFAULT, REFERENCE, make_method
-from identifier.reproducibility import Replay, force_rms, online_error, replay
+from identifier.reproducibility import Replay, force_rms, online_error, replay, reproduce
 from identifier.stability import Certificate
 from models.maneuvers import DoubleLaneChange, Maneuver, Slalom, StepSteer
 from models.plant import Plant
@@ -174,5 +174,8 @@ def _learning(
         law=law,
         learnt=histories["slalom"],
         others=[histories[name] for name in PREDICT],
-        frozen={FREEZE: {name: replay(model, history) for name, history in histories.items()}},
+        frozen={
+            FREEZE: {name: replay(model, history) for name, history in histories.items()}
+            | {"slalom": reproduce(histories["slalom"], FREEZE)}
+        },
     )

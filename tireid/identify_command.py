@@ -21,6 +21,7 @@ from identifier.reproducibility import (
     force_rms,
     freeze_key,
     replay,
+    reproduce,
 )
 from models.recordings import Recording
 from models.vehicle import Vehicle
@@ -31,6 +32,8 @@ from tireid.network_option import add_network_arguments, network_model
 from tireid.network_results import network_table, write_network_results
 from tireid.output import output_folder
 from tireid.progress import say
+
+OWN_PAST = "  its past, against online"
 
 
 def add_parser(commands: Any) -> None:
@@ -231,12 +234,17 @@ def _require_inside(freeze_times: list[float], recording: Recording) -> None:
 
 
 def _replays(t: float, learnt: History, histories: list[History]) -> dict[str, Replay]:
-    model = learnt.freeze(t)
-    return {history.recording.name: replay(model, history) for history in histories}
+    model, others = learnt.freeze(t), histories[1:]
+    return {learnt.recording.name: reproduce(learnt, t)} | {
+        history.recording.name: replay(model, history) for history in others
+    }
 
 
 def print_table(histories: list[History], frozen: dict[float, dict[str, Replay]]) -> None:
     """Print the errors per axle, and as a share of the force where there is truth.
+
+    Under the recording that was learnt stands the paper's measure: its past, t < T_freeze, against
+    what was identified online.
 
     Parameters
     ----------
@@ -251,3 +259,7 @@ def print_table(histories: list[History], frozen: dict[float, dict[str, Replay]]
             note = "" if sizes[name] is not None else "  (against online, no truth)"
             front, rear = error_cells(error, sizes[name])
             print(f"{freeze_key(t):>8} s  {name:40} {front:>16} {rear:>16}{note}")
+            sides = result.reproduction
+            if sides is not None and sides.past_against_online is not None:
+                front, rear = error_cells(sides.past_against_online, sizes[name])
+                print(f"{'':10}  {OWN_PAST:40} {front:>16} {rear:>16}")

@@ -9,7 +9,14 @@ from identifier.design import Design
 from identifier.history import History
 from identifier.method import Method
 from identifier.model_format import vehicle_numbers
-from identifier.reproducibility import AxleRmse, Replay, force_rms, freeze_key, online_error
+from identifier.reproducibility import (
+    AxleRmse,
+    Replay,
+    Reproduction,
+    force_rms,
+    freeze_key,
+    online_error,
+)
 
 
 def program_version() -> str:
@@ -22,6 +29,14 @@ def program_version() -> str:
 
 def _axles(error: AxleRmse | None) -> dict[str, float] | None:
     return None if error is None else {"front": error.front, "rear": error.rear}
+
+
+def _sides(sides: Reproduction) -> dict[str, dict[str, float] | None]:
+    return {
+        "past_against_online": _axles(sides.past_against_online),
+        "past_against_truth": _axles(sides.past_against_truth),
+        "after_against_truth": _axles(sides.after_against_truth),
+    }
 
 
 def method_numbers(design: Method) -> dict[str, Any]:
@@ -64,7 +79,10 @@ def summarize(
 ) -> dict[str, Any]:
     """Return what summary.json holds: errors by recording and freeze time, and all that went in.
 
-    All sums, of forces and of errors, are over the samples above the design's minimum speed.
+    All sums, of forces and of errors, are over the samples above the design's minimum speed. Those
+    of `frozen` and `frozen_against_online` are over the whole recording; `reproducibility` splits
+    the recording that was learnt at the freeze, and its `past_against_online` is the measure of the
+    paper's section IV-A.
 
     Parameters
     ----------
@@ -99,6 +117,10 @@ def summarize_replays(
             },
             "frozen_against_online": {
                 key: {name: _axles(r.against_online) for name, r in replays.items()}
+                for key, replays in frozen.items()
+            },
+            "reproducibility": {
+                key: {name: _sides(r.reproduction) for name, r in replays.items() if r.reproduction}
                 for key, replays in frozen.items()
             },
         },

@@ -18,6 +18,7 @@ from identifier.reproducibility import (
     freeze_key,
     online_error,
     replay,
+    reproduce,
 )
 
 
@@ -87,6 +88,69 @@ def test_samples_before_the_asked_time_do_not_count(history):
     result = replay(history.freeze(6.0), history, since=4.0)
     assert result.against_truth == axle_rms((result.axle_force - truth)[late])
     assert result.against_truth != replay(history.freeze(6.0), history).against_truth
+
+
+def by_hand(force, reference, start, stop):
+    missed = (force - reference)[start:stop]
+    return pytest.approx([np.sqrt(np.mean(missed[:, axle] ** 2)) for axle in (0, 1)])
+
+
+def axles(error):
+    return [error.front, error.rear]
+
+
+def test_a_freeze_parts_the_past_from_what_comes_after(history):
+    """The paper's measure counts t < T_freeze and compares with what was said online."""
+    result, truth = reproduce(history, 4.0), history.recording.axle_force
+    frozen = history.freeze(4.0).axle_force(history.recording)
+    sides = result.reproduction
+    assert axles(sides.past_against_online) == by_hand(frozen, history.axle_force, 0, 400)
+    assert axles(sides.past_against_truth) == by_hand(frozen, truth, 0, 400)
+    assert axles(sides.after_against_truth) == by_hand(frozen, truth, 401, 600)
+    assert replace(result, reproduction=None, axle_force=frozen) == replace(
+        replay(history.freeze(4.0), history), axle_force=frozen
+    )
+
+
+def test_the_paper_s_measure_does_not_see_the_future_nor_the_truth(history):
+    recording, n = history.recording, history.recording.t.size
+    late = (np.arange(n) > 400)[:, None] * 500.0
+    spoiled = replace(
+        history,
+        axle_force=history.axle_force + late,
+        recording=replace(recording, axle_force=recording.axle_force + 300.0),
+    )
+    sides, as_was = (reproduce(h, 4.0).reproduction for h in (spoiled, history))
+    assert sides.past_against_online == as_was.past_against_online
+    assert sides.past_against_truth != as_was.past_against_truth
+    early = replace(history, axle_force=history.axle_force + 500.0 - late)
+    assert reproduce(early, 4.0).reproduction.past_against_online != as_was.past_against_online
+
+
+def test_a_law_that_does_not_learn_reproduces_its_past_exactly(history, car):
+    gains = replace(history.design.gains, eta_W=1e-300, eta_V=1e-300, rho_W=1e-300, rho_V=1e-300)
+    still = identify(history.recording, car, replace(history.design, gains=gains))
+    sides = reproduce(still, 4.0).reproduction
+    assert sides.past_against_online.both < 1e-9
+    assert sides.past_against_truth.both > 1.0  # and yet it knows nothing
+
+
+def test_sides_count_from_the_asked_time_on(history):
+    sides = reproduce(history, 4.0, since=2.0).reproduction
+    frozen = history.freeze(4.0).axle_force(history.recording)
+    assert axles(sides.past_against_online) == by_hand(frozen, history.axle_force, 200, 400)
+    nothing_before = reproduce(history, 4.0, since=4.5).reproduction
+    assert nothing_before.past_against_online is None
+    assert nothing_before.past_against_truth is None
+
+
+def test_a_side_without_samples_or_truth_has_no_error(history):
+    assert reproduce(history, 5.99).reproduction.after_against_truth is None
+    assert reproduce(history, 0.0).reproduction.past_against_online is None
+    blind = replace(history, recording=replace(history.recording, axle_force=None))
+    sides = reproduce(blind, 4.0).reproduction
+    assert sides.past_against_online.front > 0.0
+    assert (sides.past_against_truth, sides.after_against_truth) == (None, None)
 
 
 def test_a_drive_without_a_sample_that_counts_is_refused(history):

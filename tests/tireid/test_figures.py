@@ -1,8 +1,10 @@
 """Figures: units on every axis, legends beside the data, nothing clipped, truth or no truth."""
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import matplotlib
@@ -10,6 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.patches import FancyBboxPatch
 from matplotlib.ticker import FixedLocator
 from matplotlib.transforms import Bbox
 
@@ -17,7 +20,7 @@ from identifier.design import Design
 from identifier.gains import Gains, diagonal
 from identifier.history import History
 from identifier.network import Network
-from identifier.reproducibility import AxleRmse, Replay
+from identifier.reproducibility import AxleRmse, Replay, Reproduction
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid.figures import (
@@ -28,9 +31,11 @@ from tireid.figures import (
     inputs_figure,
     prediction_figure,
     save_figure,
+    scheme_figure,
     slip_figure,
     weights_figure,
 )
+from tireid.figures.scheme import BLOCKS, DIFFERENCE, SIGNALS, SUM
 from tireid.figures.style import BLACK
 from tireid.figures.units import force_range, force_unit_of, impulse_unit
 
@@ -201,6 +206,75 @@ def test_forces_show_truth_once_in_each_panel_and_one_row_for_each_freeze() -> N
         assert np.max(black[0].get_ydata()) == pytest.approx(peak, rel=1e-3)
 
 
+def test_the_paper_s_measure_stands_below_the_error_to_the_truth() -> None:
+    past = AxleRmse(front=260.0, rear=140.0)
+    sides = Reproduction(
+        past_against_online=past, past_against_truth=None, after_against_truth=None
+    )
+    result = replace(replayed(made_up()), reproduction=sides)
+    figure = force_figure(made_up(), {22.0: result})
+    assert figure.axes[2].get_title("right") == "RMSE 0.43 kN\npast to online 0.26 kN"
+    assert figure.axes[3].get_title("right") == "RMSE 0.21 kN\npast to online 0.14 kN"
+    assert not clipped(figure)
+
+
+def test_the_scheme_holds_every_equation_inside_its_frames() -> None:
+    figure = scheme_figure()
+    assert not clipped(figure)
+    (axes,) = figure.axes
+    frames = [
+        patch.get_window_extent() for patch in axes.patches if isinstance(patch, FancyBboxPatch)
+    ]
+    inside = [text for text in axes.texts if text.get_text() in {b.text for b in BLOCKS.values()}]
+    assert len(frames) == len(inside) == len(BLOCKS)
+    for frame, text in zip(frames, inside, strict=True):
+        written = text.get_window_extent()
+        assert frame.x0 < written.x0 < written.x1 < frame.x1, text.get_text()
+        assert frame.y0 < written.y0 < written.y1 < frame.y1, text.get_text()
+    said = " ".join(text.get_text() for text in inside)
+    for equation in ("(6)", "(7)", "(8)", "(10)", "(11)-(13)"):
+        assert equation in said
+    labels = [text for text in axes.texts if text not in inside and text.get_text()]
+    for label in labels:
+        for frame in frames:
+            assert not label.get_window_extent().overlaps(frame), label.get_text()
+
+
+def test_signals_of_the_scheme_end_at_a_block_and_begin_at_one_or_on_a_signal() -> None:
+    def edges(point: tuple[float, float]) -> set[str]:
+        found = set()
+        for name, block in BLOCKS.items():
+            x, y = (abs(p - c) for p, c in zip(point, block.center, strict=True))
+            w, h = block.size[0] / 2, block.size[1] / 2
+            if (x == pytest.approx(w) and y <= h) or (y == pytest.approx(h) and x <= w):
+                found.add(name)
+        if math.dist(point, DIFFERENCE) == pytest.approx(SUM):
+            found.add("difference")
+        return found
+
+    told = {
+        (b, e) for s in SIGNALS.values() for b in edges(s.points[0]) for e in edges(s.points[-1])
+    }
+    assert told == {
+        ("vehicle", "transform"),
+        ("transform", "difference"),
+        ("observer", "difference"),
+        ("difference", "filter"),
+        ("filter", "laws"),
+        ("laws", "network"),
+        ("network", "observer"),
+    }
+    assert all(edges(signal.points[-1]) for signal in SIGNALS.values())
+    for signal in SIGNALS.values():
+        if signal.joint:
+            (x, y), ways = signal.points[0], [s.points for s in SIGNALS.values() if s != signal]
+            assert any(
+                min(a[0], b[0]) <= x <= max(a[0], b[0]) and min(a[1], b[1]) <= y <= max(a[1], b[1])
+                for way in ways
+                for a, b in pairwise(way)
+            )
+
+
 def test_without_truth_errors_are_called_errors_to_the_online_force() -> None:
     figure = FIGURES["forces without truth"]()
     assert figure.axes[0].get_title("right") == ""
@@ -284,10 +358,7 @@ def test_a_comparison_leaves_out_what_diverged_and_shows_the_paper_hollow() -> N
     assert figure_png(figure)
     hollow = [line for line in figure.axes[0].lines if line.get_markerfacecolor() == "white"]
     assert [list(np.asarray(line.get_ydata())) for line in hollow] == [[0.3386]]
-    assert [text.get_text() for text in figure.axes[0].get_xticklabels()] == [
-        "online",
-        "frozen at 32 s",
-    ]
+    assert [text.get_text() for text in figure.axes[0].get_xticklabels()] == ["online", "32"]
     with pytest.raises(ValueError, match="at least one law"):
         comparison_figure({})
 

@@ -48,7 +48,7 @@ def test_summary_has_the_documented_keys_and_the_right_numbers(result, logs):
     summary = json.loads((result / "summary.json").read_text())
     assert set(summary["rms_force_N"]) == {"slalom", "quick"}
     rmse = summary["rmse_N"]
-    assert set(rmse) == {"online", "frozen", "frozen_against_online"}
+    assert set(rmse) == {"online", "frozen", "frozen_against_online", "reproducibility"}
     assert set(rmse["frozen"]) == {"4", "8"}
     assert set(rmse["frozen"]["8"]["quick"]) == {"front", "rear"}
     for key in ("gains", "vehicle", "seed", "version"):
@@ -59,6 +59,25 @@ def test_summary_has_the_documented_keys_and_the_right_numbers(result, logs):
     assert rmse["frozen"]["8"]["quick"] == pytest.approx({"front": front, "rear": rear})
     rms = np.sqrt(np.mean(quick.axle_force**2, axis=0))
     assert summary["rms_force_N"]["quick"] == pytest.approx({"front": rms[0], "rear": rms[1]})
+
+
+def test_the_summary_has_the_paper_s_measure_of_the_drive_that_was_learnt(result):
+    """The past, t < T_freeze, against the online output: from the curves that lie beside it."""
+    sides = json.loads((result / "summary.json").read_text())["rmse_N"]["reproducibility"]
+    assert {t: set(by_name) for t, by_name in sides.items()} == {"4": {"slalom"}, "8": {"slalom"}}
+    forces = np.genfromtxt(result / "forces.csv", delimiter=",", names=True)
+    past, after = forces["t_s"] < 4.0 - 1e-9, forces["t_s"] > 4.0 + 1e-9
+    for axle, letter in (("front", "f"), ("rear", "r")):
+        frozen, online, truth = (
+            forces[f"Fy{letter}_{name}_N"] for name in ("frozen_4s", "online", "true")
+        )
+        for key, missed in (
+            ("past_against_online", (frozen - online)[past]),
+            ("past_against_truth", (frozen - truth)[past]),
+            ("after_against_truth", (frozen - truth)[after]),
+        ):
+            rms = np.sqrt(np.mean(missed**2))
+            assert sides["4"]["slalom"][key][axle] == pytest.approx(rms, rel=1e-6), key
 
 
 def test_every_curve_is_also_data(result, law):

@@ -14,6 +14,7 @@ from tireid.figures.forces import force_figure
 from tireid.figures.inputs import inputs_figure
 from tireid.figures.learnt_axles import learnt_axles_figure
 from tireid.figures.prediction import prediction_figure
+from tireid.figures.scheme import scheme_figure
 from tireid.figures.side_by_side import side_by_side_figure
 from tireid.figures.slip import slip_figure
 from tireid.figures.stability import locus_figure
@@ -41,6 +42,7 @@ __all__ = [
     "pareto_figure",
     "prediction_figure",
     "save_figure",
+    "scheme_figure",
     "side_by_side_figure",
     "slip_figure",
     "weights_figure",

@@ -29,9 +29,8 @@ def comparison_figure(
 
     Parameters
     ----------
-    results : by law, by column ("online" or a time of the freeze [s]): median, lower, upper
-        quartile [kN]; a law that diverged has no column or values that are not finite, which are
-        left out.
+    results : by law, by column as it is to be labeled: median, lower, upper quartile [kN]; a law
+        that diverged has no column or values that are not finite, which are left out.
     paper : by law, by column: the value that the paper prints [kN].
 
     Raises
@@ -86,7 +85,7 @@ def comparison_figure(
         axes.set(yscale="log", ylim=(min(positive) / 1.5, max(positive) * 1.5))
     else:
         axes.set_ylim(0.0, 1.08 * max(positive, default=1.0))
-    axes.set_xticks(range(len(columns)), [_column_label(name) for name in columns])
+    axes.set_xticks(range(len(columns)), columns)
     axes.tick_params(axis="x", length=0.0)
     axes.grid(visible=False, axis="x")
     axes.set(xlim=(-0.5, len(columns) - 0.5), ylabel="force RMSE [kN]")
@@ -94,11 +93,3 @@ def comparison_figure(
         axes.axvline(boundary - 0.5, color="#DDDDDD", linewidth=0.6)
     legend_above(figure, columns=len(results), order=order)
     return figure
-
-
-def _column_label(name: str) -> str:
-    """Return "frozen at 32 s" for "32", and other names as they are."""
-    try:
-        return f"frozen at {float(name):g} s"
-    except ValueError:
-        return name

@@ -17,7 +17,7 @@ from tireid.figures.panels import (
     time_window,
 )
 from tireid.figures.style import FROZEN, ONLINE, PAGE, TRUTH, new_figure, styled
-from tireid.figures.units import drawable, force_range, force_unit_of
+from tireid.figures.units import ForceUnit, drawable, force_range, force_unit_of
 
 
 @styled
@@ -31,7 +31,8 @@ def force_figure(
     """Draw forces of front and rear axle over time: identified online, and replayed frozen.
 
     Above each panel stands the error, whatever the window shows: against the true force, or
-    against the online force where there is no truth. That of a replay is the one it was made with.
+    against the online force where there is no truth. That of a replay is the one it was made with;
+    below it stands the paper's measure, the past against online, where both sides are known.
 
     Parameters
     ----------
@@ -80,11 +81,7 @@ def force_figure(
         for axes, (at, replay) in zip(panels[1:, axle], replays.items(), strict=True):
             axes.plot(t, drawable(frozen[at][:, axle], limits), **FROZEN)
             axes.set_title(f"{name}, frozen at {freeze_key(at)} s")
-            against = replay.against_truth
-            if against is not None:
-                note(axes, f"RMSE {unit.format(against, axle)}")
-            else:
-                note(axes, f"RMSE to online {unit.format(replay.against_online, axle)}")
+            note(axes, _errors(replay, unit, axle))
             mark_freeze(panels[0, axle], at, prediction=False)
             mark_freeze(axes, at, prediction=True)
         panels[-1, axle].set_xlabel(TIME)
@@ -92,3 +89,15 @@ def force_figure(
         axes.set_ylabel(f"lateral force [{unit.name}]")
     legend_above(figure)
     return figure
+
+
+def _errors(replay: Replay, unit: ForceUnit, axle: int) -> str:
+    against = replay.against_truth
+    if against is not None:
+        said = f"RMSE {unit.format(against, axle)}"
+    else:
+        said = f"RMSE to online {unit.format(replay.against_online, axle)}"
+    sides = replay.reproduction
+    if sides is None or sides.past_against_online is None:
+        return said
+    return f"{said}\npast to online {unit.format(sides.past_against_online, axle)}"
