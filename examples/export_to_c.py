@@ -52,7 +52,7 @@ def main() -> float:
     learnt = identify(slalom, car, design).freeze(t=20.0)
 
     folder = Path("identifier_c")
-    folder.mkdir()
+    folder.mkdir(exist_ok=True)
     package = build_package(design, car, learnt, name="tires")
     write_files(folder, package, figures="")
     print(f"{folder}/: {', '.join(sorted(package.files))}")

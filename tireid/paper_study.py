@@ -57,7 +57,7 @@ MANEUVERS: Mapping[str, Maneuver] = {
 # learning rate.
 NETWORK = Network(hidden=20)
 GAINS = Gains(
-    A_d=diagonal(4.36), forgetting=22.1, eta_W=162.0, eta_V=0.0215, rho_W=0.281, rho_V=0.281
+    A_d=diagonal(4.31), forgetting=30.3, eta_W=161.0, eta_V=0.322, rho_W=0.069, rho_V=0.069
 )
 
 

@@ -67,7 +67,7 @@ def medians(study, maneuver, measure):
 
 def test_by_the_paper_s_measure_the_slalom_keeps_its_pattern_and_the_step_steer_reverses(study):
     slalom = medians(study, "slalom", "past_against_online")
-    assert np.all(slalom["instantaneous"] > 1.6 * slalom["integral"])
+    assert np.all(slalom["instantaneous"] > 1.4 * slalom["integral"])
     assert np.all(slalom["instantaneous_scaled"] < slalom["integral"])
     step = medians(study, "step_steer", "past_against_online")
     assert np.all(step["integral"] > 1.2 * step["instantaneous"])
@@ -131,8 +131,8 @@ def test_no_seed_runs_wild_on_either_maneuver(study):
 
 
 def test_the_gains_are_those_that_the_search_prints():
-    """Design 716 of benchmarks/paper_gains.py, which prints it as its best."""
-    assert next(islice(random_designs(), 716, None)) == (GAINS, NETWORK)
+    """Design 1420 of benchmarks/paper_gains.py, which prints it as its best."""
+    assert next(islice(random_designs(), 1420, None)) == (GAINS, NETWORK)
 
 
 def test_the_pattern_is_that_of_an_instantaneous_law_beyond_its_stability_limit():
