@@ -80,6 +80,18 @@ def test_the_summary_has_the_paper_s_measure_of_the_drive_that_was_learnt(result
             assert sides["4"]["slalom"][key][axle] == pytest.approx(rms, rel=1e-6), key
 
 
+def test_the_table_says_the_paper_s_measure_below_the_drive_that_was_learnt(logs, tmp_path, capsys):
+    words = ["identify", str(logs / "slalom.csv"), "--vehicle", str(logs / "car.toml")]
+    words += ["--replay", str(logs / "quick.csv"), "--freeze", "4", "--out", str(tmp_path / "out")]
+    assert main(words) == 0
+    lines = capsys.readouterr().out.splitlines()
+    (own,) = (k for k, line in enumerate(lines) if "its past, against online" in line)
+    assert "slalom" in lines[own - 1]  # and none below the drive that was not learnt
+    sides = json.loads((tmp_path / "out" / "summary.json").read_text())["rmse_N"]["reproducibility"]
+    front = sides["4"]["slalom"]["past_against_online"]["front"]
+    assert f"{front:.4g} N" in lines[own]
+
+
 def test_every_curve_is_also_data(result, law):
     forces = np.genfromtxt(result / "forces.csv", delimiter=",", names=True)
     truth, online = forces["Fyf_true_N"], forces["Fyf_online_N"]
