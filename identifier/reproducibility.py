@@ -64,7 +64,7 @@ class Reproduction:
     Parameters
     ----------
     past_against_online : error for t < T_freeze against what was identified online, the measure of
-        the paper's section IV-A.
+        the paper's section IV-A; the linear part of both forces is the same and cancels.
     past_against_truth : the same samples against the true force.
     after_against_truth : error for t > T_freeze against the true force.
     """
