@@ -108,6 +108,61 @@ def test_simplifying_keeps_the_values_and_saves_operations(rng):
     assert len(operations(fewer)) < len(operations(graph))
 
 
+def test_a_constant_in_a_divisor_goes_to_the_other_side_as_its_inverse():
+    """Divisors that are read once, read twice, and inputs; with constants above and below."""
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    wave = ca.sin(y) + 2
+    quotients = [
+        x / (3 * ca.cos(y)),
+        5 * x / (4 * ca.sin(2 * y)),
+        x / (-7 * y),
+        1 / (6 * ca.tan(y)),
+        8 / (9 * wave),
+        (11 * x) / (13 * wave),
+        (x / 3) / 5,
+    ]
+    with simplifying(False):
+        function = ca.Function("f", [x, y], [ca.vertcat(*quotients)])
+    told = np.array(function_of(simplified(graph_of(function)), function)(1.7, 0.6)).ravel()
+    s = np.sin(0.6) + 2
+    expected = [1.7 / (3 * np.cos(0.6)), 8.5 / (4 * np.sin(1.2)), -1.7 / 4.2]
+    expected += [1 / (6 * np.tan(0.6)), 8 / (9 * s), 18.7 / (13 * s), 1.7 / 15]
+    np.testing.assert_allclose(told, expected, rtol=1e-14)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_a_random_formula_keeps_its_value(seed):
+    """Every operation that has a rule, on nodes that are read once and often."""
+    rng = np.random.default_rng(seed)
+    symbols = [ca.SX.sym(name) for name in "abcd"]
+    given = rng.uniform(0.5, 2.0, 4) * rng.choice([-1.0, 1.0], 4)
+    with simplifying(False):
+        nodes, values = list(symbols), list(given)
+        while len(nodes) < 40:
+            i, j = rng.integers(len(nodes), size=2)
+            c = float(rng.choice([-3.0, -1.0, 0.5, 1.0, 2.0, 7.0]))
+            kind = rng.integers(10)
+            (x, u), (y, v) = (nodes[i], values[i]), (nodes[j], values[j])
+            made, value = (
+                (x + y, u + v),
+                (x - y, u - v),
+                (x * y, u * v),
+                (x / (c * y), u / (c * v)),
+                (c / y, c / v),
+                (c * x, c * u),
+                (-x, -u),
+                (ca.sin(x), np.sin(u)),
+                (x * x, u * u),
+                (2 * x + c, 2 * u + c),
+            )[kind]
+            if 1e-2 < abs(value) < 1e2:
+                nodes.append(made)
+                values.append(value)
+        function = ca.Function("f", symbols, [ca.vertcat(*nodes[-8:])])
+    told = function_of(simplified(graph_of(function)), function)(*given)
+    np.testing.assert_allclose(np.array(told).ravel(), values[-8:], rtol=1e-7)
+
+
 def test_gains_meet_in_one_factor_for_all_weights():
     """W + h (-3 z σ - 0.7 |z| W): per weight two products and one sum."""
     step = learning_step()

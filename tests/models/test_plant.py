@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from models.friction import Friction, FrictionChange, FrictionError
+from models.friction import Friction, FrictionChange, FrictionError, place_change
 from models.maneuvers import RandomSteer, Slalom, SlowlyIncreasingSteer, StepSteer
 from models.plant import Driver, Plant, PlantError
 from models.plant.loads import wheel_loads
@@ -322,6 +322,45 @@ def test_a_wide_change_is_smooth_and_meets_its_ends():
     change = Friction(changes=(FrictionChange(scale=0.5, at_time=1.0, width=2.0),))
     scale = change.over_time(np.array([0.0, 1.0, 1.5, 2.0, 3.0, 9.0]))
     np.testing.assert_allclose(scale, [1.0, 1.0, 1.0 - 0.5 * 0.15625, 0.75, 0.5, 0.5])
+
+
+def test_a_wide_change_over_the_place_is_the_one_cubic_that_starts_and_ends_flat():
+    """Four conditions fix it: both ends, and no slope at either. Two ramps add up."""
+    first = FrictionChange(scale=0.5, at_place=10.0, width=4.0)
+    road = Friction(scale=0.9, changes=(first, replace(first, scale=0.8, at_place=30.0)))
+    X = ca.SX.sym("X")
+    change = place_change(road.over_place(), X)
+    scale, slope = (
+        ca.Function("f", [X], [f]).map(400) for f in (0.9 + change, ca.gradient(change, X))
+    )
+    places = np.linspace(5.0, 40.0, 400)
+    expected = np.empty(400)
+    for k, place in enumerate(places):
+        expected[k] = 0.9 if place < 10.0 else 0.5 if place < 30.0 else 0.8
+        for start, before, after in ((10.0, 0.9, 0.5), (30.0, 0.5, 0.8)):
+            if start <= place < start + 4.0:
+                ends = np.vander([start, start + 4.0], 4)
+                flat = [[3 * at**2, 2 * at, 1.0, 0.0] for at in (start, start + 4.0)]
+                cubic = np.linalg.solve(np.vstack([ends, flat]), [before, after, 0.0, 0.0])
+                expected[k] = np.polyval(cubic, place)
+    np.testing.assert_allclose(np.array(scale(places)).ravel(), expected, atol=1e-8)
+    steepest = np.abs(np.array(slope(places))).max()
+    assert steepest == pytest.approx(1.5 * 0.4 / 4.0, rel=1e-3)  # of a straight ramp: 0.4/4
+
+
+def test_a_wheel_on_a_wide_change_has_the_grip_of_its_place():
+    """A car that slides sideways without steering: side force over that of a dry road."""
+    ramp = Friction(changes=(FrictionChange(scale=0.5, at_place=20.0, width=40.0),))
+    spun = StepSteer(amplitude=0.5, onset=0.1, rate_limit=5.0, duration=3.0)
+    wet = PLANT.simulate(spun, speed=20.0, friction=ramp, sample_time=0.01)
+    inside = (wet.X - 3.0 > 20.0) & (wet.X + 3.0 < 60.0)
+    share = (wet.X + CAR.l_f * np.cos(wet.psi) - 20.0) / 40.0
+    grip = 1.0 - 0.5 * share**2 * (3.0 - 2.0 * share)
+    load = wet.F_z[:, :2].sum(axis=1)
+    used = np.abs(wet.F_y[:, :2].sum(axis=1)) / load
+    ratio = (used / grip)[inside]
+    assert inside.sum() > 50
+    assert ratio.std() < 0.05 * ratio.mean()
 
 
 def test_a_wrong_friction_is_refused():

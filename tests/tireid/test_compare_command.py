@@ -76,6 +76,12 @@ def test_the_floor_of_the_linear_tire_is_least_squares(words, logs, tmp_path):
     for name in ("slalom", "quick"):
         best, _ = linear_error(logs / f"{name}.csv")
         assert found[name][name] == pytest.approx(best, rel=1e-3)
+    with (out / "compare.csv").open(newline="") as file:
+        floors = [row for row in csv.DictReader(file) if row["kind"] == "floor"]
+    assert len(floors) == 4
+    for row in floors:
+        error = found[row["learnt_on"]][row["replayed_on"]]
+        assert_shares(row, error, data["recordings"][row["replayed_on"]]["rms_force_N"])
     assert data["sweep"] == {}
     assert not (out / "pareto.png").exists()
 
@@ -101,11 +107,25 @@ def test_the_tables_as_csv_hold_the_numbers_of_the_json(numbers, result):
         rows = list(csv.DictReader(file))
     assert tuple(rows[0]) == ERROR_COLUMNS
     assert len(rows) == 3 * 2 + 2 * 4  # online, and frozen where there is a model
-    for row in (row for row in rows if row["kind"] == "frozen"):
+    for row in rows:
         method = numbers["methods"][row["method"]]
-        error = method["frozen_N"][row["learnt_on"]][row["replayed_on"]]
-        assert float(row["front_N"]) == pytest.approx(error["front"])
-        assert float(row["rear_N"]) == pytest.approx(error["rear"])
+        if row["kind"] == "frozen":
+            error = method["frozen_N"][row["learnt_on"]][row["replayed_on"]]
+        else:
+            assert row["learnt_on"] == row["replayed_on"]
+            error = method["online_N"][row["replayed_on"]]
+        assert_shares(row, error, numbers["recordings"][row["replayed_on"]]["rms_force_N"])
+
+
+def assert_shares(row, error, size):
+    """Errors of a row in N, and in percent of the rms of what was replayed on."""
+    assert float(row["front_N"]) == pytest.approx(error["front"])
+    assert float(row["rear_N"]) == pytest.approx(error["rear"])
+    for axle in ("front", "rear"):
+        assert float(row[f"{axle}_percent"]) == pytest.approx(100.0 * error[axle] / size[axle])
+    both = np.hypot(error["front"], error["rear"]) / np.hypot(size["front"], size["rear"])
+    assert float(row["both_percent"]) == pytest.approx(100.0 * both)
+    assert size["front"] != pytest.approx(size["rear"], rel=0.02)
 
 
 def test_every_design_of_the_sweep_is_told_of(numbers, result):

@@ -16,6 +16,7 @@ from matplotlib.patches import FancyBboxPatch
 from matplotlib.ticker import FixedLocator
 from matplotlib.transforms import Bbox
 
+from identifier.axle import AxleDesign, AxleModel
 from identifier.design import Design
 from identifier.gains import Gains, diagonal
 from identifier.history import History
@@ -301,6 +302,56 @@ def test_slip_angles_have_the_sign_of_the_paper() -> None:
     linear = figure.axes[0].lines[2]
     slope = np.diff(np.asarray(linear.get_ydata()))[0] / np.diff(np.asarray(linear.get_xdata()))[0]
     assert slope == pytest.approx(1e5 / 1000.0 * np.pi / 180.0)
+
+
+def unlike_axles() -> AxleModel:
+    """A ladder whose axles differ in stiffness, grip and in how far they are known."""
+    design = AxleDesign.for_vehicle(CAR)
+    carried = dict(design.setup(CAR, made_up().recording).carry)
+    n = len(design.ladder)
+    carried["W"] = np.array([0.2, 0.3, 0.2, 0.1])[:n] * np.array([[1.0], [0.4]])
+    carried["P"] = 1e-4 * carried["P"]  # sure of everything that was seen
+    carried["excitation"] = carried["excitation"].copy()
+    carried["excitation"][:, 0] = 0.02, 0.01
+    return design.frozen(CAR, carried)
+
+
+def test_every_axle_has_its_own_curves_in_the_slip_figure() -> None:
+    model, recording = unlike_axles(), made_up().recording
+    figure = slip_figure(model, recording)
+    loads = 1500.0 * 9.81 / 2.7 * np.array([1.5, 1.2])
+    alpha = np.column_stack(
+        [
+            recording.delta_f - np.arctan((recording.v_y + 1.2 * recording.r) / recording.v_x),
+            -np.arctan((recording.v_y - 1.5 * recording.r) / recording.v_x),
+        ]
+    )
+    frozen = model.axle_force(recording)
+    assert recording.axle_force is not None
+    for axle, axes in enumerate(figure.axes):
+        drawn = {
+            str(line.get_label()): np.radians(1.0) * np.asarray(line.get_xdata())
+            for line in axes.lines
+        }
+        force = {str(line.get_label()): 1e3 * np.asarray(line.get_ydata()) for line in axes.lines}
+        slip = drawn["frozen curve, steady"]
+        units = np.tanh(slip[:, None] / np.array(model.ladder))
+        np.testing.assert_allclose(
+            force["frozen curve, steady"], loads[axle] * units @ model.W[axle], rtol=1e-6, atol=1e-6
+        )
+        for label, expected in (("truth", recording.axle_force), ("frozen weights", frozen)):
+            np.testing.assert_allclose(drawn[label], alpha[:, axle], atol=1e-9)
+            np.testing.assert_allclose(force[label], expected[:, axle], rtol=1e-9, atol=1e-6)
+        linear = next(line for line in axes.lines if "linear" in str(line.get_label()))
+        stiffness = np.ptp(np.asarray(linear.get_ydata())) / np.ptp(np.asarray(linear.get_xdata()))
+        assert stiffness * 1e3 == pytest.approx((1e5, 1.2e5)[axle] * np.radians(1.0))
+        shaded = [
+            patch.get_extents().transformed(axes.transData.inverted()) for patch in axes.patches
+        ]
+        edges = sorted(min(abs(box.x0), abs(box.x1)) for box in shaded)
+        assert edges == pytest.approx([np.degrees((0.02, 0.01)[axle])] * 2)
+    slopes = [np.ptp(np.asarray(axes.lines[-1].get_ydata())) for axes in figure.axes]
+    assert slopes[0] > 1.5 * slopes[1]
 
 
 def test_slow_samples_are_left_out_of_the_slip_figure() -> None:

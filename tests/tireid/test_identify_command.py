@@ -106,6 +106,57 @@ def test_every_curve_is_also_data(result, law):
         assert (result / name).is_file()
 
 
+def test_slip_angles_and_forces_of_every_axle_are_in_its_own_column(result, logs):
+    """The columns alone say it: slips by the other columns, truth by the log."""
+    car = sedan()
+    for name, log in (("forces.csv", "slalom"), ("forces_quick.csv", "quick")):
+        told = np.genfromtxt(result / name, delimiter=",", names=True)
+        v_x, v_y, r = (told[column] for column in ("v_x_m_s", "v_y_m_s", "r_rad_s"))
+        front = told["delta_f_rad"] - np.arctan((v_y + car.l_f * r) / v_x)
+        rear = told["delta_r_rad"] - np.arctan((v_y - car.l_r * r) / v_x)
+        np.testing.assert_allclose(told["alpha_f_rad"], front, atol=1e-8)
+        np.testing.assert_allclose(told["alpha_r_rad"], rear, atol=1e-8)
+        assert np.abs(front - rear).max() > 0.01
+        truth = np.genfromtxt(logs / f"{log}.csv", delimiter=",", names=True)
+        written = np.column_stack([told["Fyf_true_N"], told["Fyr_true_N"]])
+        np.testing.assert_allclose(
+            written, np.column_stack([truth["Fyf"], truth["Fyr"]]), rtol=1e-6, atol=1e-3
+        )
+        frozen = load_model(result / "weights_4s.json").axle_force(
+            read_recording(logs / f"{log}.csv")
+        )
+        written = np.column_stack([told["Fyf_frozen_4s_N"], told["Fyr_frozen_4s_N"]])
+        np.testing.assert_allclose(written, frozen, rtol=1e-6, atol=1e-3)
+
+
+def test_the_filtered_error_is_the_one_that_the_law_saw_at_that_sample(result, law):
+    """z = 0 at the first sample; from one row to the next Euler's step of dz/dt = ξ̃ - λ z."""
+    if law != "integral":
+        assert not (result / "errors.csv").exists()  # there is no filtered error
+        return
+    told = np.genfromtxt(result / "errors.csv", delimiter=",", names=True)
+    gains = json.loads((result / "summary.json").read_text())["gains"]
+    lam, dt = gains["forgetting"], np.diff(told["t_s"])
+    for axle in "fr":
+        xi_tilde, z = told[f"xi_tilde_{axle}_Us"], told[f"z_{axle}_Us2"]
+        assert z[0] == 0.0
+        steps = z[:-1] + dt * (xi_tilde[:-1] - lam * z[:-1])
+        np.testing.assert_allclose(z[1:], steps, rtol=1e-6, atol=1e-7 * np.abs(z).max())
+        assert np.abs(z).max() > 0.0
+
+
+def test_weights_of_a_row_are_those_in_effect_at_that_sample(result):
+    """At the freeze time they are those of the frozen model."""
+    told = np.genfromtxt(result / "weights.csv", delimiter=",", names=True)
+    row = told[np.argmin(np.abs(told["t_s"] - 4.0))]
+    weights = json.loads((result / "weights_4s.json").read_text())
+    W = np.array(weights["W"] if "W" in weights else weights["weights"]["W"])
+    written = np.array([[row[f"W_{i + 1}_{j + 1}"] for j in range(W.shape[1])] for i in (0, 1)])
+    np.testing.assert_allclose(written, W, rtol=1e-7, atol=1e-9)
+    ahead = told[np.argmin(np.abs(told["t_s"] - 4.0)) + 1]
+    assert any(abs(row[name] - ahead[name]) > 1e-6 for name in told.dtype.names if name != "t_s")
+
+
 def test_the_vehicle_is_written_in_the_same_words_everywhere(result):
     summary = json.loads((result / "summary.json").read_text())
     weights = json.loads((result / "weights.json").read_text())

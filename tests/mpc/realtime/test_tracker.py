@@ -71,6 +71,20 @@ def test_hard_limits_hold_for_every_command_and_plan(tracker, measure, problem):
         last = command.steering
 
 
+def test_a_shifted_plan_is_the_plan_of_a_period_later(tracker, problem, rng):
+    """States, inputs and feedback, each read off between its own nodes; the last ones stay."""
+    state, share = tracker.instance.state, PERIOD / problem.dt
+    before = {name: rng.normal(size=state[name].shape) for name in ("x", "u", "feedback")}
+    for name, values in before.items():
+        state[name] = values
+    tracker.shift()
+    for name, values in before.items():
+        nodes = np.arange(len(values))
+        columns = values.reshape(len(values), -1).T
+        read = np.column_stack([np.interp(nodes + share, nodes, column) for column in columns])
+        np.testing.assert_allclose(state[name].reshape(read.shape), read, atol=1e-14)
+
+
 WRONG = {
     Status.NOT_FINITE: {"e_y": np.nan},
     Status.OFF_PATH: {"e_y": 6.0},
