@@ -5,9 +5,12 @@ import json
 import numpy as np
 import pytest
 
+from identifier.stability import Certificate
 from identifier.stability.monte_carlo import Observed
+from identifier.stability.property import statement
 from tireid import check_command
 from tireid.cli import main
+from tireid.monte_carlo_table import bound_rows
 
 
 def observed(xi_tilde):
@@ -43,6 +46,27 @@ def test_a_bound_that_is_passed_fails_the_check(monkeypatch, capsys, json_too):
     else:
         row = next(line for line in told.splitlines() if line.startswith("|xi - xi_hat|"))
         assert row.split()[-4] == "1"
+
+
+BOUNDED = {"error_bound": "xi_tilde", "projection_bound": "xi_tilde", "weight_bound": "W"}
+
+
+@pytest.mark.parametrize("name", BOUNDED)
+@pytest.mark.parametrize(("over", "passed"), [(0.999, 0), (1.001, 2), (1.9, 2), (np.inf, 2)])
+def test_the_alarm_rings_right_at_the_bound(name, over, passed):
+    """Two of three drives come to a share of the bound, each bound by its own signal."""
+    values = dict.fromkeys(BOUNDED, 7.0)
+    certificate = Certificate(
+        properties=tuple(statement(key, "", value, "U s") for key, value in values.items())
+    )
+    drives = observed([0.5, 0.5, 0.5])
+    seen = np.array([0.5, 7.0 * over, 7.0 * over])
+    rows = bound_rows(certificate, drives._replace(**{BOUNDED[name]: seen}))
+    (row,) = (row for row in rows if row.name == name)
+    assert (row.bound, row.passed) == (7.0, passed)
+    assert row.largest == 7.0 * over
+    others = [row for row in rows if BOUNDED[row.name] != BOUNDED[name]]
+    assert all(row.passed == 0 for row in others)
 
 
 def test_a_run_that_diverged_counts_as_passed(monkeypatch, capsys):

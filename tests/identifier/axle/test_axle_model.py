@@ -72,6 +72,37 @@ def test_it_knows_where_it_has_been(car, drive):
     assert 10.0 < model.learning_time.sum(axis=1).min() <= 14.6
 
 
+def test_slip_is_known_up_to_where_a_quarter_of_the_doubt_is_left(car):
+    """Weights of one unit: doubt is that of the unit at every slip. Of two: where they balance."""
+    design = AxleDesign.for_vehicle(car)
+    n = len(design.ladder)
+    carried = dict(design.setup(car, None).carry)
+    new = design.frozen(car, carried)
+    seen = np.array([[0.2], [0.1]]) * np.eye(1, 9)
+    for share, known in ((0.24, [0.2, 0.1]), (0.26, [0.0, 0.0]), (0.35, [0.0, 0.0])):
+        model = replace(new, excitation=seen, covariance=share**2 * new.prior_covariance)
+        np.testing.assert_allclose(model.doubt(np.array([0.05])), share, rtol=1e-9)
+        np.testing.assert_allclose(model.known_slip_range, known)
+
+    # Units of the first scale and of the last alone, the first well known, the last not at all:
+    # (0.01 t_1² + t_4²)/(t_1² + t_4²) = 1/16 where (t_4/t_1)² = (1/16 - 0.01)/(1 - 1/16).
+    alone = np.full(n + 3, 1e-18)
+    alone[[0, n - 1]] = 1.0
+    told = alone.copy()
+    told[0] = 0.01
+    axles = np.stack([np.diag(told)] * 2), np.stack([np.diag(alone)] * 2)
+    model = replace(new, excitation=seen, covariance=axles[0], prior_covariance=axles[1])
+    wanted = np.sqrt((1 / 16 - 0.01) / (1 - 1 / 16))
+    slip = np.linspace(1e-4, 0.3, 300001)
+    ratio = np.tanh(slip / design.ladder[-1]) / np.tanh(slip / design.ladder[0])
+    edge = slip[np.argmax(ratio > wanted)]
+    assert 0.03 < edge < 0.1
+    np.testing.assert_allclose(model.known_slip_range, edge, atol=0.2 / 200)
+    recordings = np.array([-1.05, -0.9, 0.9, 1.05]) * edge
+    inside = np.abs(recordings) < model.known_slip_range[0]
+    assert inside.tolist() == [False, True, True, False]
+
+
 def test_far_outside_it_saturates(car, drive):
     model = learnt(drive(amplitude=0.02), car).freeze(15.0)
     far = np.abs(model.force_at(np.linspace(-1.5, 1.5, 61)))

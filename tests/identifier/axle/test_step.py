@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from identifier.axle import AxleDesign
+from identifier.axle.rls import unpacked
 from identifier.identify import identify
 
 G = 9.81
@@ -178,6 +179,13 @@ def test_step_repeats_the_equations_by_hand(damage, car, drive):
     recording = drive(n=1200, amplitude=0.08)
     recording = disturbed(recording) if damage else recording
     design = AxleDesign.for_vehicle(car)
+    hand = assert_by_hand(design, car, recording)
+    moved = np.abs(hand.theta - np.hstack(design.prior.means(car, design.ladder)))
+    assert moved[:, :4].max() > 0.05
+
+
+def assert_by_hand(design, car, recording):
+    """Run both, compare all that is told and learnt, and return what was done by hand."""
     history = identify(recording, car, design)
     hand = ByHand(design, car)
     samples = np.column_stack([recording.v_x, recording.x, recording.u])
@@ -188,8 +196,70 @@ def test_step_repeats_the_equations_by_hand(damage, car, drive):
     np.testing.assert_allclose(np.hstack([model.W, model.own]), hand.theta, rtol=1e-4, atol=1e-6)
     np.testing.assert_allclose(model.covariance, hand.P, rtol=1e-4, atol=1e-7)
     np.testing.assert_allclose(model.excitation[:, 0], hand.longest, rtol=1e-5)
+    return hand
+
+
+@pytest.mark.parametrize("dt", [0.002, 0.02, 0.05, 0.09])
+def test_step_repeats_the_equations_at_every_rate_above_ten_hertz(dt, car, drive):
+    design = AxleDesign.for_vehicle(car, dt=dt)
+    recording = drive(n=min(1200, round(12.0 / dt)), dt=dt, amplitude=0.08)
+    hand = assert_by_hand(design, car, recording)
     moved = np.abs(hand.theta - np.hstack(design.prior.means(car, design.ladder)))
-    assert moved[:, :4].max() > 0.05
+    assert moved[:, :4].max() > 0.02
+
+
+def test_what_is_learnt_does_not_depend_on_the_rate(car, drive):
+    """Errors are correlated in time: five times the samples are no more evidence."""
+    slow = drive(n=750, dt=0.02, amplitude=0.08)
+    fast = drive(n=3750, dt=0.004, amplitude=0.08)
+    designs = {
+        0.02: AxleDesign.for_vehicle(car, dt=0.02),
+        0.004: AxleDesign.for_vehicle(car, dt=0.004),
+    }
+    models = [identify(one, car, designs[one.dt]).freeze(15.0) for one in (slow, fast)]
+    slips = np.array([0.01, 0.03, 0.05])
+    doubts = [model.doubt(slips) for model in models]
+    np.testing.assert_allclose(doubts[0], doubts[1], rtol=0.15)
+    curves = [model.force_at(slips) for model in models]
+    np.testing.assert_allclose(curves[0], curves[1], rtol=0.03)
+    np.testing.assert_allclose(models[0].excitation, models[1].excitation, rtol=0.1, atol=0.1)
+
+
+RARE = {  # settings that bring what rarely happens into every drive
+    "errors are clipped": {"clip": 0.3},
+    "covariance would grow too wide": {"memory": 0.3, "widest": 0.2},
+}
+
+
+@pytest.mark.parametrize("rare", RARE)
+def test_step_repeats_the_equations_where_limits_act(rare, car, drive):
+    design = AxleDesign.for_vehicle(car)
+    design = replace(design, regression=replace(design.regression, **RARE[rare]))
+    limited = assert_by_hand(design, car, disturbed(drive(n=1200, amplitude=0.08)))
+    free = {"clip": 1e6, "widest": 1e6}
+    for_ever = replace(design, regression=replace(design.regression, **free))
+    other = assert_by_hand(for_ever, car, disturbed(drive(n=1200, amplitude=0.08)))
+    assert np.abs(limited.P / other.P - 1.0).max() > 0.1 or (
+        np.abs(limited.theta - other.theta).max() > 0.01
+    )
+
+
+@pytest.mark.parametrize(("widest", "grows"), [(0.3, False), (0.58, True), (1e6, True)])
+def test_covariance_grows_again_only_while_it_is_no_wider_than_told(widest, grows, car, drive):
+    """A memory of a moment, and no alarm: forgetting alone can widen it."""
+    design = AxleDesign.for_vehicle(car)
+    design = replace(
+        design,
+        regression=replace(design.regression, memory=0.1, widest=widest),
+        change=replace(design.change, threshold=1e6),
+    )
+    n = len(design.ladder)
+    upper = identify(drive(n=1500, amplitude=0.02), car, design).carried["P"]
+    P = np.stack([unpacked(triangles, n + 3) for triangles in upper])
+    trace = np.trace(P[:, :, :n, :n], axis1=2, axis2=3)
+    grew = np.diff(trace, axis=0) > 1e-9 * trace[0]
+    assert grew.any() == grows
+    assert (trace[:-1] <= widest * trace[0])[grew].all()
 
 
 def test_true_forces_are_not_looked_at(car, drive):

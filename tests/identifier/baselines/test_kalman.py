@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
 
 from identifier.baselines import ForceEkf, dugoff_ekf, magic_formula_ekf
+from identifier.baselines.kalman import correct
 from identifier.identify import identify
 from models.vehicle import GRAVITY
 
@@ -114,10 +116,11 @@ def test_covariance_stays_symmetric_and_positive(make, car, drive):
 
 
 @pytest.mark.parametrize("make", [magic_formula_ekf, dugoff_ekf])
-def test_a_spike_teaches_little_and_all_forces_stay_finite(make, car, drive):
+@pytest.mark.parametrize("size", [1000.0, -1000.0])
+def test_a_spike_teaches_little_and_all_forces_stay_finite(size, make, car, drive):
     clean, method = drive(n=800), make(car)
     v_y = clean.v_y.copy()
-    v_y[500] += 1000.0
+    v_y[500] += size
     spiked = replace(clean, v_y=v_y)
 
     def moved(method):
@@ -129,6 +132,23 @@ def test_a_spike_teaches_little_and_all_forces_stay_finite(make, car, drive):
 
     assert moved(method) < 1.0
     assert moved(replace(method, outlier=1e6)) > 3.0, "without the guard the spike is believed"
+
+
+@pytest.mark.parametrize("away", [(0.5, -2.0), (3.0, 80.0), (-80.0, 3.0), (-9.0, -7.0)])
+def test_an_outlier_is_followed_but_teaches_as_one_at_the_limit(away, rng):
+    """Measured `away` deviations: θ moves as for the same, cut to 5; x all the way; P as ever."""
+    root = rng.standard_normal((5, 5))
+    P, R, estimate = root @ root.T, np.diag([0.3, 0.7]), rng.standard_normal(5)
+    S = P[:2, :2] + R
+    deviation = np.sqrt(np.diag(S))
+    gain = P[:, :2] @ np.linalg.inv(S)
+    x = estimate[:2] + np.array(away) * deviation
+    after, P_after = (np.array(ca.DM(v)) for v in correct(*map(ca.DM, (estimate, P, R, x)), 5.0))
+    moved = after.ravel() - estimate
+    np.testing.assert_allclose(moved[:2], gain[:2] @ (np.array(away) * deviation), rtol=1e-9)
+    cut = np.clip(away, -5.0, 5.0) * deviation
+    np.testing.assert_allclose(moved[2:], gain[2:] @ cut, rtol=1e-9)
+    np.testing.assert_allclose(P_after, P - gain @ S @ gain.T, rtol=1e-8, atol=1e-10)
 
 
 @pytest.mark.parametrize("make", [magic_formula_ekf, dugoff_ekf])

@@ -111,6 +111,39 @@ def test_each_weakness_is_named():
     assert status("estimated_input", gains(16.0), reads_estimate) == "pass"
 
 
+def test_leakage_is_judged_by_what_it_takes_in_one_sample():
+    """ρ T |ξ̃|: a sixteenth of the sampling interval lets a sixteenth of it leak."""
+    shares = []
+    for dt in (0.016, 0.001):
+        certificate = certify(gains(rho_W=2.0), integral, replace(CITY, dt=dt))
+        entry = certificate["leakage_step"]
+        assert entry.value == pytest.approx(2.0 * dt * certificate["error_bound"].value, rel=1e-9)
+        shares.append(entry.value)
+    assert shares[0] == pytest.approx(16.0 * shares[1], rel=1e-6)
+
+
+def test_bounds_of_the_certificate_are_those_of_the_sampled_identifier():
+    """Error dynamics that swing, sampled coarsely by Euler: every bound has its own γ."""
+    A_d, dt = np.array([[-4.0, 30.0], [-6.0, -9.0]]), 0.04
+    power, gamma = np.eye(2), 0.0
+    for _ in range(1500):
+        gamma, power = gamma + dt * np.linalg.norm(power, 2), power @ (np.eye(2) + dt * A_d)
+    size = np.linalg.norm(np.linalg.inv(A_d), 2)
+    wild = replace(
+        gains(lam=3.0, eta_W=0.05, rho_W=0.5, W_max=5.0), A_d=tuple(map(tuple, A_d.tolist()))
+    )
+    coarse = replace(CITY, dt=dt)
+    certificate = certify(wild, instantaneous, coarse)
+    root = np.sqrt(10.0)
+    capacity = 0.05 * size * root / 0.5
+    assert certificate["error_bound"].value == pytest.approx(gamma * (4.0 + root * capacity))
+    assert certificate["projection_bound"].value == pytest.approx(gamma * (4.0 + root * 5.0))
+    theta = certify(wild, integral, coarse)["small_gain"].value
+    assert theta == pytest.approx(gamma * 0.05 * size * 10 / 9.0)
+    finely = certify(wild, integral, replace(CITY, dt=1e-4))["small_gain"].value
+    assert theta > 1.3 * finely
+
+
 def test_bound_14_is_stated_with_its_shortcomings():
     entry = certify(gains(), integral, CITY)["printed_bound"]
     assert "does not cover" in entry.advice

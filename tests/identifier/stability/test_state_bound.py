@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -31,9 +33,14 @@ SKEWED = np.array([[-4.0, 3.0], [-0.5, -6.0]])
 LAWS = {"integral": INTEGRAL, "instantaneous": INSTANTANEOUS, "pi_lead": pi_lead(0.3)}
 
 
-def simulated(A_d, law, lam, eta, rho, f, s, start=0.0, dt=2e-3, leak_scale=1.0):
-    """Largest |ξ̃| and |W| of the laws under given f (n, 2) and s (n, n_h), Euler."""
-    xi, z, W = np.array([start, 0.0]), np.zeros(2), np.zeros((2, s.shape[1]))
+def simulated(A_d, law, lam, eta, rho, f, s, start=0.0, dt=2e-3, leak_scale=1.0, z=0.0, W=0.0):
+    """Largest |ξ̃| and |W| of the laws under given f (n, 2) and s (n, n_h), Euler.
+
+    ξ̃ and z start along the first axle, W with the norm that is given, the way that z drives it.
+    """
+    n_h = s.shape[1]
+    xi, z = np.array([start, 0.0]), np.array([z, 0.0])
+    W = W / np.sqrt(n_h) * np.outer([1.0, 0.0], s[0])
     inverse, largest = np.linalg.inv(A_d).T, [0.0, 0.0]
     for force, units in zip(f, s, strict=True):
         size = np.linalg.norm(xi)
@@ -109,12 +116,94 @@ def test_the_bound_is_refused_where_the_circle_does_not_close():
     assert state_bounds(-3 * np.eye(2), **{**numbers, "law": INSTANTANEOUS}, eta_W=1e6).W > 0
 
 
-def test_the_bound_solves_its_own_circle():
+STARTS = [
+    Start(),
+    Start(xi_tilde=0.4),
+    Start(z=0.3),
+    Start(z=40.0),
+    Start(W=50.0),
+    Start(xi_tilde=0.4, z=8.0, W=50.0),
+]
+
+
+@pytest.mark.parametrize("start", STARTS)
+@pytest.mark.parametrize("dt", [None, 0.02])
+def test_the_bound_solves_its_own_circle(start, dt):
     numbers = {"forgetting": 2.0, "eta_W": 1.0, "n_h": 4}
-    bounds = state_bounds(SKEWED, law=INTEGRAL, rho_W=0.7, residual_bound=1.5, **numbers)
-    assert bounds.xi_tilde == pytest.approx(
-        projection_bound(SKEWED, W_max=bounds.W, n_h=4, residual_bound=1.5), rel=1e-12
+    bounds = state_bounds(
+        SKEWED, law=INTEGRAL, rho_W=0.7, residual_bound=1.5, start=start, dt=dt, **numbers
     )
+    by_weights = projection_bound(
+        SKEWED, W_max=bounds.W, n_h=4, residual_bound=1.5, start=start, dt=dt
+    )
+    assert bounds.xi_tilde == pytest.approx(by_weights, rel=1e-12)
+
+
+@pytest.mark.parametrize("start", STARTS)
+def test_weights_keep_their_bound_whatever_the_error_does_within_its_own(start):
+    """φ = |W| + (g/λ) m and its sister for V, integrated with |ξ̃| = X all the time or none of it.
+
+    With φ' and m' as in the text above the bounds: what a proof says of them, in small steps.
+    """
+    lam, eta, rho, n_h, x_bar = 2.0, 1.0, 30.0, 4, 2.5
+    size = np.linalg.norm(np.linalg.inv(SKEWED), 2)
+    start = replace(start, V=60.0)
+    numbers = {"law": INTEGRAL, "forgetting": lam}
+    bounds = state_bounds(
+        SKEWED, eta_W=eta, rho_W=rho, n_h=n_h, residual_bound=1.5, start=start, **numbers
+    )
+    V_limit = V_bound(SKEWED, bounds, eta_V=0.7, rho_V=rho, x_bar_max=x_bar, start=start, **numbers)
+    for gain, first, limit in (
+        (eta * size * np.sqrt(n_h), start.W, bounds.W),
+        (0.7 * size * bounds.W * x_bar, start.V, V_limit),
+    ):
+        for X in (bounds.xi_tilde, 1e-3):
+            m, dt = start.z, 0.02 / (rho * bounds.xi_tilde + lam)
+            phi, largest = first + gain / lam * m, 0.0
+            for _ in range(20000):
+                largest = max(largest, phi)
+                rate = X * (gain / lam + rho * gain / lam * m - rho * phi)
+                phi, m = phi + dt * rate, m + dt * (X - lam * m)
+            assert largest <= limit * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("start", [Start(z=6.0, W=4.0), Start(z=6.0), Start(z=3.0, W=9.0)])
+def test_what_the_filter_remembers_at_the_start_is_counted(start):
+    """z(0) alone drives the weights; without it in the bound they would pass."""
+    lam, n_h, rho = 2.0, 4, 2.0
+    A_d = -4.0 * np.eye(2)
+    numbers = {"law": INTEGRAL, "forgetting": lam, "eta_W": 5.0, "n_h": n_h}
+    numbers |= {"rho_W": rho, "residual_bound": 1e-3}
+    bounds = state_bounds(A_d, start=start, **numbers)
+    s = np.ones((5000, n_h))
+    error, W = simulated(
+        A_d, INTEGRAL, lam, 5.0, rho, 0.0 * s[:, :2], s, dt=1e-3, z=start.z, W=start.W
+    )
+    assert error <= bounds.xi_tilde
+    assert W <= bounds.W
+    forgotten = state_bounds(A_d, start=replace(start, z=0.0), **numbers)
+    assert error > forgotten.xi_tilde or W > forgotten.W
+
+
+def sum_of_powers(A_d, dt):
+    """γ of Euler's step, term by term."""
+    power, total = np.eye(2), 0.0
+    for _ in range(1500):
+        total, power = total + dt * np.linalg.norm(power, 2), power @ (np.eye(2) + dt * A_d)
+    return total
+
+
+def test_sampled_bounds_hold_the_gain_of_the_sampled_error_dynamics():
+    A_d, dt = np.array([[-4.0, 30.0], [-6.0, -9.0]]), 0.04  # it swings: sampled it swings further
+    gamma, size = sum_of_powers(A_d, dt), np.linalg.norm(np.linalg.inv(A_d), 2)
+    assert gamma > 1.3 * sum_of_powers(A_d, 4e-3)
+    theta = small_gain(A_d, law=INTEGRAL, forgetting=3.0, eta_W=0.4, n_h=4, dt=dt)
+    assert theta == pytest.approx(gamma * 0.4 * size * 4 / 9.0, rel=1e-9)
+    projected = projection_bound(A_d, W_max=3.0, n_h=4, residual_bound=2.0, dt=dt)
+    assert projected == pytest.approx(gamma * (2.0 + 2.0 * 3.0), rel=1e-9)
+    numbers = {"forgetting": 3.0, "eta_W": 0.4, "rho_W": 0.5, "n_h": 4, "residual_bound": 2.0}
+    bounds = state_bounds(A_d, law=INSTANTANEOUS, dt=dt, **numbers)
+    assert bounds.xi_tilde == pytest.approx(gamma * (2.0 + 2.0 * 0.4 * size * 2.0 / 0.5), rel=1e-9)
 
 
 def test_the_transient_of_skewed_error_dynamics_is_bounded():
