@@ -12,8 +12,9 @@ from identifier.online import OnlineIdentifier
 from models.friction import Friction, FrictionChange
 from models.maneuvers import RandomSteer, Slalom
 from mpc.handover import Rules, Supervisor, Verdict
+from mpc.handover import supervisor as supervisor_module
 from mpc.handover.friction import at_friction
-from mpc.handover.misfit import Judge
+from mpc.handover.misfit import Judge, Misfit
 from mpc.tires import tire_model
 from tests.mpc.handover.conftest import DROP, drive, samples_of, steady
 
@@ -133,6 +134,81 @@ def test_many_lost_samples_and_standing_still_decide_nothing(car, learnt, droppe
         supervisor.observe(*(broken if k % 30 < 10 else row))
     assert supervisor.decisions == []
     assert supervisor.last.reason == "too few samples"
+
+
+class Told:
+    """A judge whose mean misfits are given: of the tire in use, and of any other."""
+
+    def __init__(self, in_use, mean, *, better=0.0, worse_lately=0.0):
+        self.in_use, self._mean = in_use, mean
+        self._better, self._worse_lately = better, worse_lately
+
+    def reach(self, seconds):
+        return seconds
+
+    def misfit(self, tire, samples):
+        return self.misfits(tire, tire.weights[None], samples)[0]
+
+    def misfits(self, tire, weights, samples):
+        total = 20.0 * self._mean
+        other = total - self._better if len(samples) > 50 else total + self._worse_lately
+        totals = [total if np.array_equal(w, self.in_use.weights) else other for w in weights]
+        return [Misfit(total, 20.0, np.zeros(2)) for total in totals]
+
+
+@pytest.mark.parametrize("mean", [0.3, 1.0, 3.0, 100.0])
+def test_the_usual_misfit_follows_what_is_seen_slowly_and_not_a_change(
+    car, learnt, dry, monkeypatch, mean
+):
+    """A low-pass over `usual_time` from 1 on, of no more than four times itself, never below 1."""
+    usual = []
+    monkeypatch.setattr(
+        supervisor_module, "look_at_road", lambda *_, **given: usual.append(given["usual"])
+    )
+    supervisor = supervisor_of(car, learnt, rules=Rules(learning_time=1e3))
+    supervisor.judge = Told(supervisor.target, mean)
+    watched(supervisor, dry[1].between(0.0, 4.0))
+    n, share = np.arange(len(usual)), 0.05 / 10.0
+    assert n.size > 70
+    wanted = {
+        0.3: np.ones(n.size),
+        1.0: np.ones(n.size),
+        3.0: 3.0 - 2.0 * (1.0 - share) ** n,
+        100.0: (1.0 + 3.0 * share) ** n,
+    }
+    np.testing.assert_allclose(usual, wanted[mean], rtol=1e-9)
+
+
+@pytest.mark.parametrize("usual", [1.0, 3.0])
+@pytest.mark.parametrize(
+    ("better", "worse_lately", "taken"),
+    [(4.4, 0.0, True), (3.6, 0.0, False), (40.0, 1.8, True), (40.0, 2.2, False)],
+)
+def test_a_learnt_tire_is_taken_by_evidence_in_parts_of_what_is_usual(
+    car, learnt, dry, usual, better, worse_lately, taken
+):
+    """4 better over seconds, no more than 2 worse in the last moments; on a bad road thrice it."""
+    supervisor = supervisor_of(car, learnt, rules=Rules(usual_time=0.05))
+    supervisor._proven = False  # friction is not looked for
+    supervisor.judge = Told(
+        supervisor.target, usual, better=usual * better, worse_lately=usual * worse_lately
+    )
+    watched(supervisor, dry[1].between(0.0, 6.0))
+    assert [d.verdict for d in supervisor.decisions[:1]] == [Verdict.LEARNT] * taken
+    reason = "not better" if better < 4.0 else "worse in the last moments"
+    assert taken or reason in supervisor.last.reason
+
+
+def test_friction_is_looked_for_only_on_a_tire_that_is_one_of_this_car(
+    car, learnt, dry, monkeypatch
+):
+    asked = []
+    monkeypatch.setattr(supervisor_module, "look_at_road", lambda *_, **given: asked.append(given))
+    early = dry[1].between(0.0, 2.0)
+    watched(supervisor_of(car, rules=Rules(learning_time=1e3)), early)
+    assert not asked
+    watched(supervisor_of(car, learnt, rules=Rules(learning_time=1e3)), early)
+    assert asked
 
 
 def test_another_structure_and_an_unproven_law_are_refused_at_the_start(car, learnt):

@@ -1,0 +1,156 @@
+"""What is believed of the road, on misfits that are told by a formula of the friction."""
+
+import math
+from itertools import product
+
+import numpy as np
+import pytest
+
+from mpc.handover.friction import at_friction
+from mpc.handover.misfit import Misfit
+from mpc.handover.road import Road, look_at_road
+from mpc.handover.rules import Rules, Verdict
+from mpc.handover.window import Window
+
+COUNT = 10.0  # independent errors, whatever the samples
+
+
+class Formula:
+    """A judge: mean misfit = size (least + slope (ln μ - ln μ_true)²) of a tire of friction μ."""
+
+    def __init__(self, tire, *, true, least, slope, size=1.0):
+        self._grip = grip(tire.weights, tire)
+        self._true, self._least, self._slope, self._size = true, least, slope, size
+
+    def reach(self, seconds):
+        return seconds
+
+    def misfit(self, tire, samples):
+        return self.misfits(tire, tire.weights[None], samples)[0]
+
+    def misfits(self, tire, weights, samples):
+        del samples
+        away = [np.log(grip(w, tire) / self._grip / self._true) for w in weights]
+        means = [self._size * (self._least + self._slope * a**2) for a in away]
+        return [Misfit(COUNT * mean, COUNT, np.zeros(2)) for mean in means]
+
+
+def grip(weights, tire):
+    """Saturated force of both axles of a ladder [static axle loads]."""
+    n = tire.structure.units
+    return weights[3 + n :].reshape(2, -1)[:, 2:].sum()
+
+
+def seen(seconds=4.0):
+    window = Window(seconds, 0.01)
+    for _ in range(round(seconds / 0.01)):
+        window.add((20.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    return window
+
+
+def look(road, in_use, judge, *, usual, t=10.0, window=None):
+    return look_at_road(
+        road,
+        in_use,
+        window or seen(),
+        t=t,
+        usual=usual,
+        trusted=0.2,
+        judge=judge,
+        rules=Rules(),
+    )
+
+
+def believed(change):
+    """The verdict, or none, and the friction."""
+    return (None, 0.0) if change is None else (change.verdict, change.road.ratio)
+
+
+CASES = [
+    {"known": known, "since": since, "true": true, "least": least, "slope": slope}
+    for known, since, true, least, slope in product(
+        (1.0, 0.5), (1.0, math.inf), (0.3, 0.6, 0.95), (0.5, 1.2, 2.0), (0.5, 2.0, 5.0, 20.0)
+    )
+]
+
+
+def test_a_road_on_which_all_tires_misfit_more_is_judged_as_any_other(tire):
+    """Misfits and their usual size thrice as large: the same beliefs, to the last digit."""
+    found = {}
+    for case in CASES:
+        told = {name: case[name] for name in ("true", "least", "slope")}
+        road = Road(tire, case["known"], 10.0 - case["since"])
+        in_use = at_friction(tire, case["known"])
+        one, three = (
+            believed(look(road, in_use, Formula(tire, **told, size=size), usual=size))
+            for size in (1.0, 3.0)
+        )
+        assert one[0] is three[0], case
+        assert one[1] == pytest.approx(three[1], rel=1e-9), case
+        found.setdefault(one[0], []).append(case)
+    assert set(found) == {None, Verdict.FRICTION, Verdict.CORRECTION, Verdict.RECOVERY}
+    assert min(map(len, found.values())) >= 3
+
+
+def test_misfits_that_are_usual_are_no_drop_and_the_same_without_that_are(tire):
+    judge = Formula(tire, true=0.4, least=1.0, slope=6.0)
+    assert look(Road(tire), tire, judge, usual=1.0).verdict is Verdict.FRICTION
+    assert look(Road(tire), tire, judge, usual=8.0) is None
+
+
+def test_a_lower_friction_must_explain_well_and_not_only_better(tire):
+    """As badly as before at every friction, or well at one: the usual size says what well is."""
+    change = look(Road(tire), tire, Formula(tire, true=0.4, least=1.4, slope=9.0), usual=1.0)
+    assert change.verdict is Verdict.FRICTION
+    # ln μ that is least: total/usual + (ln μ/0.7)², its minimum by hand
+    steep = COUNT * 9.0
+    assert math.log(change.road.ratio) == pytest.approx(
+        steep * math.log(0.4) / (steep + 1 / 0.49), abs=0.03
+    )
+    assert change.tire.weights == pytest.approx(at_friction(tire, change.road.ratio).weights)
+    badly = Formula(tire, true=0.4, least=1.6, slope=9.0)
+    assert look(Road(tire), tire, badly, usual=1.0) is None
+    assert look(Road(tire), tire, badly, usual=1.2).verdict is Verdict.FRICTION
+
+
+def test_the_first_base_is_remembered_and_only_where_friction_was_lost(tire):
+    first, second, third = (tire._replace(weights=share * tire.weights) for share in (1, 0.9, 0.8))
+    assert Road(first).on(second) == Road(second)  # nothing was lost
+    lost = Road(first, ratio=0.5, changed_at=3.0).on(second)
+    assert lost.before is first
+    assert (lost.base, lost.ratio, lost.changed_at) == (second, 1.0, 3.0)
+    assert lost.on(third).before is first
+    assert lost._replace(ratio=0.7).on(third).before is first  # lost twice: the first road
+
+
+@pytest.mark.parametrize("size", [1.0, 3.0])
+def test_the_road_before_comes_back_where_it_explains_enough_more(tire, size):
+    """16 more than the tire in use, in parts of what is usual; else it stays forgotten."""
+    wet = at_friction(tire, 0.5)
+    for evidence, comes_back in ((15.0, False), (17.0, True)):
+        slope = evidence / COUNT / math.log(0.5) ** 2
+        judge = Formula(tire, true=1.0, least=1.0, slope=slope, size=size)
+        change = look(Road(wet, before=tire), wet, judge, usual=size)
+        assert (change is not None) == comes_back
+        assert look(Road(wet), wet, judge, usual=size) is None  # there was no road before
+    assert change.verdict is Verdict.RECOVERY
+    assert change.tire is tire
+    assert change.road == Road(tire, changed_at=10.0)
+    assert change.before - change.after == pytest.approx(17.0 * size)
+
+
+def test_the_road_before_does_not_come_back_where_the_misfit_is_usual(tire):
+    wet = at_friction(tire, 0.5)
+    judge = Formula(tire, true=1.0, least=0.1, slope=10.0)  # mean in use 4.9
+    assert look(Road(wet, before=tire), wet, judge, usual=2.0).verdict is Verdict.RECOVERY
+    assert look(Road(wet, before=tire), wet, judge, usual=5.0) is None
+
+
+def test_a_change_waits_until_enough_was_seen_for_it(tire):
+    wet = at_friction(tire, 0.5)
+    judge = Formula(tire, true=1.0, least=0.5, slope=20.0)
+    half = Road(tire, 0.5)
+    assert look(half, wet, judge, usual=1.0, window=seen(0.4)) is None
+    assert look(half, wet, judge, usual=1.0, window=seen(0.7)).verdict is Verdict.RECOVERY
+    fresh = half._replace(changed_at=9.5)
+    assert look(fresh, wet, judge, usual=1.0, window=seen(0.4)).verdict is Verdict.CORRECTION
