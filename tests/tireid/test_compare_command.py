@@ -146,6 +146,18 @@ def test_every_design_of_the_sweep_is_told_of(numbers, result):
         rows = list(csv.DictReader(file))
     assert tuple(rows[0]) == SWEEP_COLUMNS
     assert len(rows) == 11
+    for row in rows:
+        trial = sweeps[row["method"]]["trials"][int(row["number"])]
+        assert row["diverged"].split() == trial["diverged_on"]
+        for name, percent in trial["percent"].items():
+            told = row[f"{name}_percent"]
+            assert (
+                (told in ("", "inf")) if percent is None else float(told) == pytest.approx(percent)
+            )
+        values = dict(pair.split("=") for pair in row["values"].split())
+        assert set(values) == set(trial["values"])
+        for name, value in trial["values"].items():
+            assert float(values[name]) == pytest.approx(value, rel=1e-5)
 
 
 def test_figures_are_written(result):

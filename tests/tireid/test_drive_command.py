@@ -93,6 +93,18 @@ def test_deviation_and_forces_of_the_csv_follow_from_its_motion(result):
     k = int(np.argmin(np.abs(drive["X_m"] - BEND[4, 0])))
     assert drive["Y_m"][k] == pytest.approx(BEND[4, 1], abs=0.3)
     np.testing.assert_allclose(np.diff(drive["t_s"]), 0.01, atol=1e-9)
+    car = sedan()
+    moment = car.l_f * drive["Fyf_N"] - car.l_r * drive["Fyr_N"]
+    turning = car.yaw_inertia * np.gradient(drive["r_rad_s"], drive["t_s"])
+    np.testing.assert_allclose(moment, turning, atol=500.0)
+    swapped = car.l_f * drive["Fyr_N"] - car.l_r * drive["Fyf_N"]
+    assert np.abs(swapped - turning).max() > 2000.0
+    v_x, v_y, r = (drive[name] for name in ("v_x_m_s", "v_y_m_s", "r_rad_s"))
+    front = drive["delta_rad"] - np.arctan((v_y + car.l_f * r) / v_x)
+    np.testing.assert_allclose(drive["alpha_f_rad"], front, atol=1e-8)
+    np.testing.assert_allclose(
+        drive["alpha_r_rad"], -np.arctan((v_y - car.l_r * r) / v_x), atol=1e-8
+    )
 
 
 def test_everything_is_written(result):

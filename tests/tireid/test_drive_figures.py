@@ -102,6 +102,22 @@ FIGURES = {
 every_figure = pytest.mark.parametrize("draw", FIGURES.values(), ids=FIGURES.keys())
 
 
+def test_every_axle_has_its_own_curves_and_cloud():
+    drive, figure = ON_LANE["frozen"], FIGURES["tires"]()
+    slip = [
+        drive.delta - np.arctan((drive.v_y + CAR.l_f * drive.r) / drive.v_x),
+        -np.arctan((drive.v_y - CAR.l_r * drive.r) / drive.v_x),
+    ]
+    for axle, axes in enumerate(figure.axes):
+        cloud, *curves = axes.lines
+        np.testing.assert_allclose(np.radians(cloud.get_xdata()), slip[axle], atol=1e-12)
+        np.testing.assert_allclose(1e3 * cloud.get_ydata(), drive.axle_force[:, axle], atol=1e-6)
+        assert [line.get_label() for line in curves] == ["frozen", "linear", "oracle"]
+        for line in curves:
+            stiffness = 1e3 * np.diff(line.get_ydata()) / np.diff(np.radians(line.get_xdata()))
+            np.testing.assert_allclose(stiffness, (1e5, 8e4)[axle])
+
+
 @every_figure
 def test_outer_axes_have_labels_with_units(draw):
     for axes in draw().axes:

@@ -30,6 +30,7 @@ from tireid.figures import (
     figure_png,
     force_figure,
     inputs_figure,
+    learnt_axles_figure,
     prediction_figure,
     save_figure,
     scheme_figure,
@@ -352,6 +353,24 @@ def test_every_axle_has_its_own_curves_in_the_slip_figure() -> None:
         assert edges == pytest.approx([np.degrees((0.02, 0.01)[axle])] * 2)
     slopes = [np.ptp(np.asarray(axes.lines[-1].get_ydata())) for axes in figure.axes]
     assert slopes[0] > 1.5 * slopes[1]
+
+
+def test_the_learnt_axles_are_drawn_each_in_its_own_numbers() -> None:
+    """Stiffness, relaxation length and saturation by hand, with the weights before each sample."""
+    design, n = AxleDesign.for_vehicle(CAR), N + 1
+    growth = np.linspace(0.5, 1.0, n)[:, None, None]
+    W = growth * np.array([[0.2, 0.3, 0.2, 0.1], [0.1, 0.4, 0.1, 0.3]])
+    own = growth * np.array([[0.03, 0.5, 0.0], [0.05, 0.2, 0.0]])
+    history = replace(made_up(), design=design, carried={"W": W, "own": own})
+    stiffness, lag, grip = learnt_axles_figure(history).axes
+    for axle, load in enumerate(1500.0 * 9.81 / 2.7 * np.array([1.5, 1.2])):
+        slope = (W[:-1, axle] / np.array(design.ladder)).sum(axis=1)
+        for axes, values in (
+            (stiffness, slope * load / 1e3),
+            (lag, own[:-1, axle, 0] * slope + 1e-3 * 2.7),
+            (grip, W[:-1, axle].sum(axis=1)),
+        ):
+            np.testing.assert_allclose(np.asarray(axes.lines[axle].get_ydata()), values, rtol=1e-6)
 
 
 def test_slow_samples_are_left_out_of_the_slip_figure() -> None:

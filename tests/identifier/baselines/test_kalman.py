@@ -69,11 +69,12 @@ def magic(car, method):
     return force
 
 
-def test_magic_formula_filter_is_the_textbook(car, drive, rng):
-    clean = drive(n=120)
+@pytest.mark.parametrize("dt", [0.01, 0.03])
+def test_magic_formula_filter_is_the_textbook(dt, car, drive, rng):
+    clean = drive(n=120, dt=dt)
     v_y = clean.v_y + 0.02 * rng.standard_normal(120)
     recording = replace(clean, v_y=v_y, r=clean.r + 0.002 * rng.standard_normal(120))
-    method = replace(magic_formula_ekf(car), outlier=1e6)
+    method = replace(magic_formula_ekf(car), outlier=1e6, dt=dt)
     history = identify(recording, car, method)
     spread = [0.5, 0.5, 0.7, 0.7, 0.4, 0.4]
     rows, P = textbook(

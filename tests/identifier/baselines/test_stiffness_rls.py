@@ -1,5 +1,7 @@
 """Recursive least squares against the batch solution of the same filtered regression."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -35,15 +37,19 @@ def batch(recording, car, method):
     return top / (prior + np.sum(weight * h**2 * dt, axis=0))
 
 
-def test_recursion_gives_the_weighted_batch_solution(car, curve_drive):
-    recording = curve_drive(car, lambda i, a: (8e4, 1.5e5)[i] * np.tanh(20 * a) / 20, n=800)
-    history = identify(recording, car, METHOD)
+@pytest.mark.parametrize("dt", [0.01, 0.025])
+def test_recursion_gives_the_weighted_batch_solution(dt, car, curve_drive):
+    recording = curve_drive(
+        car, lambda i, a: (8e4, 1.5e5)[i] * np.tanh(20 * a) / 20, n=round(8.0 / dt), dt=dt
+    )
+    method = replace(METHOD, dt=dt)
+    history = identify(recording, car, method)
     online = history.carried["stiffness"][-1]
     floor = METHOD.prior_slip**2 * METHOD.memory
-    learning = history.carried["information"][52:]  # the filters warm up for half a second
+    learning = history.carried["information"][round(0.52 / dt) + 1 :]  # after half a second
     assert (learning > floor).all(), "else it is not plain weighting"
-    np.testing.assert_allclose(online, batch(recording, car, METHOD), rtol=1e-9)
-    other = StiffnessRls(cutoff=4.0, memory=1.0, prior_slip=0.002)
+    np.testing.assert_allclose(online, batch(recording, car, method), rtol=1e-9)
+    other = replace(method, memory=1.0)
     assert np.abs(online / batch(recording, car, other) - 1).max() > 0.01
 
 

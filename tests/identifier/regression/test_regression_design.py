@@ -80,8 +80,9 @@ def learn_by_hand(s, y, d):
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_the_compiled_step_repeats_the_equations_by_hand(law, car, drive, design, pairs):
-    chosen, recording = design(law, quiet=0.1, W_max=2.5), drive(n=300)
+@pytest.mark.parametrize("dt", [0.01, 0.04])
+def test_the_compiled_step_repeats_the_equations_by_hand(law, dt, car, drive, design, pairs):
+    chosen, recording = design(law, quiet=0.1, W_max=2.5, dt=dt), drive(n=300, dt=dt)
     history = identify(recording, car, chosen)
     expected = learn_by_hand(*pairs(recording, chosen, car), chosen)
     np.testing.assert_allclose(history.carried["W"], expected, rtol=1e-6, atol=1e-7)

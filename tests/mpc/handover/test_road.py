@@ -18,8 +18,8 @@ COUNT = 10.0  # independent errors, whatever the samples
 class Formula:
     """A judge: mean misfit = size (least + slope (ln μ - ln μ_true)²) of a tire of friction μ."""
 
-    def __init__(self, tire, *, true, least, slope, size=1.0):
-        self._grip = grip(tire.weights, tire)
+    def __init__(self, tire, *, true, least, slope, size=1.0, count=COUNT):
+        self._grip, self._count = grip(tire.weights, tire), count
         self._true, self._least, self._slope, self._size = true, least, slope, size
 
     def reach(self, seconds):
@@ -32,7 +32,7 @@ class Formula:
         del samples
         away = [np.log(grip(w, tire) / self._grip / self._true) for w in weights]
         means = [self._size * (self._least + self._slope * a**2) for a in away]
-        return [Misfit(COUNT * mean, COUNT, np.zeros(2)) for mean in means]
+        return [Misfit(self._count * mean, self._count, np.zeros(2)) for mean in means]
 
 
 def grip(weights, tire):
@@ -141,7 +141,7 @@ def test_the_road_before_comes_back_where_it_explains_enough_more(tire, size):
 
 def test_the_road_before_does_not_come_back_where_the_misfit_is_usual(tire):
     wet = at_friction(tire, 0.5)
-    judge = Formula(tire, true=1.0, least=0.1, slope=10.0)  # mean in use 4.9
+    judge = Formula(tire, true=1.0, least=0.1, slope=10.0, count=40.0)  # mean in use 4.9
     assert look(Road(wet, before=tire), wet, judge, usual=2.0).verdict is Verdict.RECOVERY
     assert look(Road(wet, before=tire), wet, judge, usual=5.0) is None
 
