@@ -83,6 +83,9 @@ def test_slip_is_known_up_to_where_a_quarter_of_the_doubt_is_left(car):
         model = replace(new, excitation=seen, covariance=share**2 * new.prior_covariance)
         np.testing.assert_allclose(model.doubt(np.array([0.05])), share, rtol=1e-9)
         np.testing.assert_allclose(model.known_slip_range, known)
+    shares = np.array([0.3, 0.2])[:, None, None]
+    uneven = replace(new, excitation=seen, covariance=shares**2 * new.prior_covariance)
+    np.testing.assert_allclose(uneven.known_slip_range, [0.0, 0.1])
 
     # Units of the first scale and of the last alone, the first well known, the last not at all:
     # (0.01 t_1² + t_4²)/(t_1² + t_4²) = 1/16 where (t_4/t_1)² = (1/16 - 0.01)/(1 - 1/16).

@@ -66,11 +66,13 @@ def believed(change):
     return (None, 0.0) if change is None else (change.verdict, change.road.ratio)
 
 
+GRID = product(
+    (1.0, 0.5), (1.0, math.inf), (0.3, 0.6, 0.95), (0.5, 1.2, 2.0), (0.5, 2.0, 5.0, 20.0)
+)
+EDGE = [(1.0, math.inf, 0.4, 0.3, slope) for slope in (1.3, 1.4, 1.5)]  # mean about 1.5
 CASES = [
-    {"known": known, "since": since, "true": true, "least": least, "slope": slope}
-    for known, since, true, least, slope in product(
-        (1.0, 0.5), (1.0, math.inf), (0.3, 0.6, 0.95), (0.5, 1.2, 2.0), (0.5, 2.0, 5.0, 20.0)
-    )
+    dict(zip(("known", "since", "true", "least", "slope"), case, strict=True))
+    for case in (*GRID, *EDGE)
 ]
 
 
@@ -111,6 +113,22 @@ def test_a_lower_friction_must_explain_well_and_not_only_better(tire):
     badly = Formula(tire, true=0.4, least=1.6, slope=9.0)
     assert look(Road(tire), tire, badly, usual=1.0) is None
     assert look(Road(tire), tire, badly, usual=1.2).verdict is Verdict.FRICTION
+
+
+def test_a_new_friction_is_corrected_by_little_evidence_and_only_for_a_while(tire):
+    """5 is enough while it is followed, the time of the change stays; later 16 are asked for."""
+    wet, road = at_friction(tire, 0.5), Road(tire, 0.5, changed_at=9.0)
+    slope = 5.0 / COUNT / math.log(0.7 / 0.5) ** 2
+    judge = Formula(tire, true=0.7, least=1.1, slope=slope)
+    change = look(road, wet, judge, usual=1.0)
+    assert change.verdict is Verdict.CORRECTION
+    assert (change.road.base, change.road.changed_at) == (tire, 9.0)
+    assert 0.6 < change.road.ratio < 0.75
+    assert look(road, wet, judge, usual=1.0, t=9.0 + 2.1) is None
+    assert look(road, wet, Formula(tire, true=0.7, least=1.1, slope=0.3 * slope), usual=1.0) is None
+    clear = Formula(tire, true=0.7, least=1.1, slope=4.0 * slope)
+    back = look(road, wet, clear, usual=1.0, t=9.0 + 2.1)
+    assert (back.verdict, back.road.changed_at) == (Verdict.RECOVERY, 9.0 + 2.1)
 
 
 def test_the_first_base_is_remembered_and_only_where_friction_was_lost(tire):
