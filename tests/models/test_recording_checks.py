@@ -16,6 +16,7 @@ from models.recordings import (
     read_recording,
     runs,
 )
+from models.recordings.evidence import windows
 
 Array = np.ndarray
 DEGREES = 180.0 / np.pi
@@ -39,8 +40,12 @@ def drive(
     grip: float = 0.9,
     steering: Callable[[Array], Array] | None = None,
     duration: float = 12.0,
+    every: int = 10,
 ) -> Recording:
-    """Single-track car, tires saturate as tanh; `peak` [m/s^2] scales its multi-sine steering."""
+    """Single-track car, tires saturate as tanh; `peak` [m/s^2] scales its multi-sine steering.
+
+    Sampled `every` so many milliseconds.
+    """
     m, I_z, l_f, l_r, C_f, C_r = CARS[car]
     L, v = l_f + l_r, SPEEDS[car] if speed is None else speed
     dt, t = 1e-3, np.arange(0.0, duration, 1e-3)
@@ -62,7 +67,7 @@ def drive(
         v_y_dot[k] = F[k].sum() / m - v * r[k]
         v_y[k + 1] = v_y[k] + dt * v_y_dot[k]
         r[k + 1] = r[k] + dt * (l_f * F[k, 0] - l_r * F[k, 1]) / I_z
-    keep = slice(None, None, 10)
+    keep = slice(None, None, every)
     return Recording(
         name="made",
         t=t[keep],
@@ -169,6 +174,31 @@ def test_a_right_recording_passes(car: str, peak: float) -> None:
     axles = SimpleNamespace(l_f=l_f, l_r=l_r, mass=mass)
     check_against_vehicle(made, axles)
     check_against_vehicle(replace(made, axle_force=None), axles)
+
+
+@pytest.mark.parametrize("every", [2, 20, 50, 90])
+def test_at_every_rate_above_ten_hertz_a_right_recording_passes_and_errors_ring(every: int) -> None:
+    made = drive(every=every)
+    check_physics(made)
+    check_against_vehicle(made, SEDAN_AXLES)
+    for error, (plant, start, remedy) in ALL.items():
+        message = refusal(plant(made))
+        assert message.startswith(start), error
+        assert remedy in message, error
+
+
+@pytest.mark.parametrize("every", [2, 10, 40])
+def test_windows_are_as_long_and_as_far_apart_at_every_rate(every: int) -> None:
+    """Means over 0.2 s every 0.05 s of a parabola, whose differences are known."""
+    made = drive(every=every)
+    t = made.t
+    found = windows(replace(made, v_y=1.0 + 0.3 * t + 0.05 * t**2, r=0.1 * t))
+    starts = 0.05 * np.arange(found.r.size) if every != 40 else 0.04 * np.arange(found.r.size)
+    assert found.r.size == pytest.approx((made.duration - 0.2) / (starts[1] - starts[0]), abs=2)
+    middle = starts + 0.1
+    np.testing.assert_allclose(found.v_y_dot, 0.3 + 0.1 * middle, atol=1e-9)
+    np.testing.assert_allclose(found.r, 0.1 * (middle - 0.5e-3 * every), atol=1e-9)
+    np.testing.assert_allclose(found.r_dot, 0.1, atol=1e-9)
 
 
 def test_one_degree_of_steering_in_degrees_is_found_without_acceleration() -> None:
