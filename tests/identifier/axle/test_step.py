@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from identifier.axle import AxleDesign
-from identifier.axle.rls import unpacked
 from identifier.identify import identify
 
 G = 9.81
@@ -275,8 +274,9 @@ def test_covariance_grows_again_only_while_it_is_no_wider_than_told(widest, grow
         change=replace(design.change, threshold=1e6),
     )
     n = len(design.ladder)
-    upper = identify(drive(n=1500, amplitude=0.02), car, design).carried["P"]
-    P = np.stack([unpacked(triangles, n + 3) for triangles in upper])
+    history = identify(drive(n=1500, amplitude=0.02), car, design)
+    times = np.append(history.recording.t, np.inf)  # before each sample and after the last
+    P = np.stack([design.frozen(car, history.carried_at(t)).covariance for t in times])
     trace = np.trace(P[:, :, :n, :n], axis1=2, axis2=3)
     grew = np.diff(trace, axis=0) > 1e-9 * trace[0]
     assert grew.any() == grows
