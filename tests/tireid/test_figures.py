@@ -308,13 +308,13 @@ def test_slip_angles_have_the_sign_of_the_paper() -> None:
 def unlike_axles() -> AxleModel:
     """A ladder whose axles differ in stiffness, grip and in how far they are known."""
     design = AxleDesign.for_vehicle(CAR)
-    carried = dict(design.setup(CAR, made_up().recording).carry)
-    n = len(design.ladder)
-    carried["W"] = np.array([0.2, 0.3, 0.2, 0.1])[:n] * np.array([[1.0], [0.4]])
-    carried["P"] = 1e-4 * carried["P"]  # sure of everything that was seen
-    carried["excitation"] = carried["excitation"].copy()
-    carried["excitation"][:, 0] = 0.02, 0.01
-    return design.frozen(CAR, carried)
+    new = design.frozen(CAR, design.setup(CAR, made_up().recording).carry)
+    return replace(
+        new,
+        W=np.array([0.2, 0.3, 0.2, 0.1]) * np.array([[1.0], [0.4]]),
+        covariance=1e-4 * new.prior_covariance,  # sure of everything that was seen
+        excitation=np.array([[0.02], [0.01]]) * np.eye(1, new.excitation.shape[1]),
+    )
 
 
 def test_every_axle_has_its_own_curves_in_the_slip_figure() -> None:
