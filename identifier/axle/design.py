@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from codegen import Scan
 from identifier.axle.bounds import Bounds
 from identifier.axle.car import car_numbers, froude_speed
+from identifier.axle.covariance import narrowed, packed, per_variance, unpacked
 from identifier.axle.excitation import EDGES
 from identifier.axle.forward import OVER
 from identifier.axle.friction_change import ChangeDetector
@@ -18,7 +19,6 @@ from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.model import AxleModel
 from identifier.axle.prior import Prior, friction_direction
 from identifier.axle.regression import Regression
-from identifier.axle.rls import packed, unpacked
 from identifier.axle.slip import SensitivityState
 from identifier.axle.step import CARRY, build_step
 from identifier.axle.sway import Sway, SwayState
@@ -130,13 +130,13 @@ class AxleDesign:
             if not isinstance(start, AxleModel) or start.ladder != self.ladder:
                 raise ValueError("the stored weights are of another structure than the design's")
             W, own, P, excitation = start.W, start.own, start.covariance, start.excitation
-        trace = np.trace(prior_P[:, :n, :n], axis1=1, axis2=2)
+        widest = per_variance(prior_P, n, self.regression.widest)
         return Setup(
             scan=_scan(doublings(self.ladder), self.rising_until is not None),
             carry={
                 "W": W,
                 "own": own,
-                "P": packed(P),
+                "UD": packed(narrowed(P, widest)),
                 "gate": np.zeros(len(GateState._fields)),
                 "sway": np.zeros(len(SwayState._fields)),
                 "slip": np.tile([0.0, 0.0, 1.0, 0.0], (2, 1)),  # slope 1: never divided by zero
@@ -153,19 +153,20 @@ class AxleDesign:
                 "roll": self.sway.numbers(),
                 "regression": self.regression.numbers(self.dt),
                 "change": self.change.numbers(self.dt),
-                "bounds": self.bounds.numbers(),
+                "bounds": self.bounds.numbers(n),
                 "friction_direction": friction_direction(self.ladder),
-                "widest": self.regression.widest * trace,
+                "per_variance": widest,
                 **self._rising(),
             },
         )
 
     def _rising(self) -> dict[str, Array]:
-        """Return the derivatives of the units where curves shall not fall."""
+        """Return the derivatives of the units where curves shall not fall, over their sum."""
         if self.rising_until is None:
             return {}
         scales = np.array(self.ladder)
-        return {"rising": 1.0 / (scales * np.cosh(self.rising_until / scales) ** 2)}
+        slopes = 1.0 / (scales * np.cosh(self.rising_until / scales) ** 2)
+        return {"rising": slopes / slopes.sum()}
 
     def frozen(self, vehicle: Vehicle, carried: Mapping[str, Array]) -> AxleModel:
         """Return the model with the carried weights.
@@ -173,7 +174,7 @@ class AxleDesign:
         Parameters
         ----------
         vehicle : the car.
-        carried : W (2, n), own (2, 3), P (2, q (q + 1)/2) and excitation (2, 9).
+        carried : W (2, n), own (2, 3), UD (2, q (q + 1)/2) and excitation (2, 9).
         """
         return AxleModel(
             vehicle=vehicle,
@@ -182,7 +183,7 @@ class AxleDesign:
             plausibility=self.plausibility,
             W=carried["W"].copy(),
             own=carried["own"].copy(),
-            covariance=unpacked(carried["P"], len(self.ladder) + 3),
+            covariance=unpacked(carried["UD"], len(self.ladder) + 3),
             prior_covariance=self.prior.covariance(vehicle, self.ladder),
             excitation=carried["excitation"].copy(),
         )
