@@ -9,7 +9,6 @@ parameter stay below `widest` times the prior's: what would pass that is not add
 from itertools import combinations_with_replacement
 from typing import Any, NamedTuple
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -259,7 +258,7 @@ def updated(factors: Factors, seen: Excited, c: Any) -> Factors:
             v[i] = v[i] + old * g
         v.append(g)
         beta = 1 + c * excitation
-        per_beta = reciprocal(beta)
-        D[j] = D[j] * (before * per_beta)
-        before, per_before = beta, per_beta
+        ratio = before / beta  # 1, not almost, where nothing is excited
+        D[j] = D[j] * ratio
+        before, per_before = beta, per_before * ratio
     return Factors(U, D)

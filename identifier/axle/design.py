@@ -4,14 +4,16 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
+from typing import Any
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Scan
-from identifier.axle.bounds import Bounds
+from identifier.axle.bounds import BoundNumbers, Bounds, bounded
 from identifier.axle.car import car_numbers, froude_speed
-from identifier.axle.covariance import narrowed, packed, per_variance, unpacked
+from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
 from identifier.axle.excitation import EDGES
 from identifier.axle.forward import OVER
 from identifier.axle.friction_change import ChangeDetector
@@ -28,6 +30,8 @@ from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 
 Array = NDArray[np.float64]
+
+NOT_CERTIFIED = "not certified"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,6 +109,25 @@ class AxleDesign:
         """Below this speed [m/s] forces read zero; learning rests below `learning_speed`."""
         return self.plausibility.min_speed
 
+    @property
+    def certificate(self) -> dict[str, Any]:
+        """What is proven of it: no margins or error bounds; the boxes hold after every sample."""
+        b, last = self.bounds, self.regression.widest
+        rising = self.rising_until
+        return {
+            "verdict": NOT_CERTIFIED,
+            "held_by_construction": {
+                "grip_static_axle_loads": [b.least_grip, b.most_grip],
+                "weight_static_axle_loads": [-b.weight, b.weight],
+                **({} if rising is None else {"force_curves_rise_at_slip_rad": rising}),
+                "compliance_m": [0.0, b.compliance],
+                "sway_share": [0.0, 1.0],
+                "steering_offset_rad": [-b.steering, b.steering],
+                "v_y_offset_m_s": [-b.v_y, b.v_y],
+                "covariance_over_prior": [0.0, last],
+            },
+        }
+
     def setup(
         self, vehicle: Vehicle, recording: Recording, start: FrozenModel | None = None
     ) -> Setup:
@@ -131,6 +154,7 @@ class AxleDesign:
                 raise ValueError("the stored weights are of another structure than the design's")
             W, own, P, excitation = start.W, start.own, start.covariance, start.excitation
         widest = per_variance(prior_P, n, self.regression.widest)
+        W, own = self._within_bounds(W, own, P)
         return Setup(
             scan=_scan(doublings(self.ladder), self.rising_until is not None),
             carry={
@@ -159,6 +183,24 @@ class AxleDesign:
                 **self._rising(),
             },
         )
+
+    def _within_bounds(self, W: Array, own: Array, P: Array) -> tuple[Array, Array]:
+        """Return what is begun with, within bounds: a file or a prior may lie outside."""
+        n, b = len(self.ladder), self.bounds
+        slope = self._rising().get("rising")
+        numbers = BoundNumbers(*b.numbers(n))
+        theta = [
+            bounded(
+                numbers,
+                [ca.SX(float(one)) for one in (*W[i], *own[i])],
+                {(j, k): float(P[i, j, k]) for j, k in triangle(n)},
+                offset=(numbers.steering, numbers.v_y)[i],
+                slope=None if slope is None else list(slope),
+            )
+            for i in (0, 1)
+        ]
+        kept = np.array([[float(one) for one in row] for row in theta])
+        return kept[:, :n], kept[:, n:]
 
     def _rising(self) -> dict[str, Array]:
         """Return the derivatives of the units where curves shall not fall, over their sum."""

@@ -1,9 +1,9 @@
 """The step of the axle identifier: one casadi.Function that is simulation, test and C source.
 
 Carried, rows front and rear: W (2, n) and own (2, 3), what is learnt; UD (2, q (q + 1)/2) the
-factors of its covariance P = U D U', D on the diagonal, q = n + 3; gate, sway, slip as in `forward`; sensitivity (2, 3);
-filters (2, q + 1); errors (2, 3); excitation (2, 9). Sampled: x, u, v_x. Everything else is a
-number that stays an input. Forces are told with the weights before the sample.
+factors of its covariance P = U D U', D on the diagonal, q = n + 3; gate, sway, slip as in
+`forward`; sensitivity (2, 3); filters (2, q + 1); errors (2, 3); excitation (2, 9). Sampled: x, u,
+v_x. Everything else is a number that stays an input. Forces are told with the weights before the sample.
 """
 
 from typing import Any, NamedTuple
