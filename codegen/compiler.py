@@ -29,6 +29,7 @@ FLAGS = (
     "-fno-trapping-math",
     "-fno-signed-zeros",
     "-ffp-contract=off",
+    "-fno-semantic-interposition",
     "-fPIC",
     "-shared",
 )

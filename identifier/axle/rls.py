@@ -54,8 +54,8 @@ def update(
     share = reciprocal((R + a) * a)
     growth = -kappa * share  # of P along v v'
     n = len(v) - len(spread.others)
-    trace = spread.trace + growth * sum(one * one for one in v[:n])
-    others = [p + growth * (one * one) for p, one in zip(spread.others, v[n:], strict=True)]
+    trace = spread.trace + sum(growth * one * one for one in v[:n])
+    others = [p + growth * one * one for p, one in zip(spread.others, v[n:], strict=True)]
     wide = width(trace, others, limits)
     moves = ca.logic_and(learns, ca.logic_or(kappa >= 0, wide <= 1))
     # β_q = 1 + c a = (R + a)/(R + R (1 - λ)/λ), so that c/β_q = κ/((R + a) a)

@@ -3,7 +3,8 @@
 Carried, rows front and rear: W (2, n) and own (2, 3), what is learnt; UD (2, q (q + 1)/2) the
 factors of its covariance P = U D U', D on the diagonal, q = n + 3; gate, sway, slip as in
 `forward`; sensitivity (2, 3); filters (2, q + 1); errors (2, 3); excitation (2, 9). Sampled: x, u,
-v_x. Everything else is a number that stays an input. Forces are told with the weights before the sample.
+v_x. Everything else is a number that stays an input. Forces are told with the weights before the
+sample.
 """
 
 from typing import Any, NamedTuple
@@ -146,7 +147,7 @@ def _learn(ports: dict[str, Any], limits: BoundNumbers, lesson: Lesson, i: int) 
     P = factors_of(ca.horzsplit(ports["UD"][i, :]), q)
     seen = spread(P, n)
     direction = ca.vertsplit(ports["friction_direction"] @ ca.vertcat(*w))
-    trace = seen.trace + lesson.inflation * sum(d * d for d in direction)
+    trace = seen.trace + sum(lesson.inflation * d * d for d in direction)
     fits = trace * widest[0] <= 1
     learnt = update(
         theta,

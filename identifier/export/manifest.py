@@ -104,17 +104,15 @@ def _certificate_text(method: Method) -> str:
     proven = certificate(method)
     if isinstance(method, Design):
         return (
-            "The stability and error bounds of this law depend on its gains: `tireid check` on its\n"
+            "Stability and error bounds of this law depend on its gains: `tireid check` on its\n"
             "design file gives the certificate. None is part of this package."
         )
-    lines = [
-        f"This method is **{proven['verdict']}**: no stability margin or error bound is proven."
-    ]
-    if proven["held_by_construction"]:
+    verdict, held = proven["verdict"], proven["held_by_construction"]
+    lines = [f"This method is **{verdict}**: no stability margin and no error bound is proven."]
+    if held:
         lines.append("What holds by construction after every sample, whatever is measured, in both")
-        lines.append("precisions, of the weights that it learns:\n")
-        lines.append("| bound | |\n|---|---|")
-        lines += [f"| {key} | {value} |" for key, value in proven["held_by_construction"].items()]
+        lines.append("precisions, of what it learns:\n")
+        lines += ["| bound | |", "|---|---|", *(f"| {key} | {held[key]} |" for key in held)]
     return "\n".join(lines)
 
 

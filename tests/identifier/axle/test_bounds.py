@@ -95,7 +95,7 @@ def spoilt(recording, fault, seed=0):
 
 
 def broken(design, car, carried):
-    """What is declared and does not hold of some sample, in exact arithmetic for sums of weights."""
+    """What is declared and does not hold of some sample; sums of weights are exact."""
     b, found, n = design.bounds, set(), len(design.ladder)
     prior = design.prior.covariance(car, design.ladder)
     for W, own, UD in zip(carried["W"], carried["own"], carried["UD"], strict=True):
@@ -214,7 +214,7 @@ def test_the_set_is_reached_from_anywhere_by_any_metric(scale, rng):
 def test_bounds_that_no_weights_can_keep_are_refused():
     with pytest.raises(ValueError, match="least_grip must be below most_grip"):
         bounds.Bounds(compliance=0.1, v_y=0.1, least_grip=2.0)
-    with pytest.raises(ValueError, match="4 weights up to 0.1 cannot carry"):
+    with pytest.raises(ValueError, match=r"4 weights up to 0\.1 cannot carry"):
         bounds.Bounds(compliance=0.1, v_y=0.1, weight=0.1).numbers(4)
 
 
@@ -242,7 +242,7 @@ def test_a_stored_covariance_that_is_too_wide_is_narrowed(car, drive):
     wide = replace(
         model,
         W=10.0 * model.W,
-        own=model.own + [0.5, 2.0, 1.0],
+        own=model.own + np.array([0.5, 2.0, 1.0]),
         covariance=300.0 * model.prior_covariance,
     )
     carried = identify(recording, car, design, start=wide).carried

@@ -219,7 +219,7 @@ def test_variance_grows_to_its_limit_and_no_further(rng):
     h = np.array([[1e-2, 0.0, 1e-2]]).repeat(3000, axis=0)
     _, free = learnt(h, np.zeros(3000), 0.1, 0.01, np.eye(3))
     _, held = learnt(h, np.zeros(3000), 0.1, 0.01, np.eye(3), widest=2.0)
-    assert np.diag(free)[[0, 2]].min() > 3.0
+    assert np.diag(free)[[0, 2]].min() > 2.5
     assert 1.98 < np.diag(held).max() <= 2.0
     assert held[1, 1] == 1.0
 
