@@ -21,7 +21,8 @@ from codegen.cache import cache_folder
 log = logging.getLogger("tireid.codegen")
 
 # -ffp-contract=off and no -march: the same bits on every machine. The three -fno options keep NaN
-# guards, which -Ofast would delete.
+# guards, which -Ofast would delete. Without interposition the small functions of generated code are
+# inlined although the library could be preloaded against.
 FLAGS = (
     "-std=c99",
     "-O2",
@@ -29,6 +30,7 @@ FLAGS = (
     "-fno-trapping-math",
     "-fno-signed-zeros",
     "-ffp-contract=off",
+    "-fno-semantic-interposition",
     "-fPIC",
     "-shared",
 )

@@ -20,6 +20,7 @@ from identifier.defaults import (
 from identifier.design import Design
 from identifier.design_file import design_text, read_design
 from identifier.identify import identify
+from identifier.methods import DEFAULT
 from identifier.stability import Certificate, DesignError
 from identifier.stability.monte_carlo import Observed, monte_carlo
 from models.files import write_atomically
@@ -105,6 +106,10 @@ def run(options: argparse.Namespace) -> int:
             numbers["monte_carlo"] = monte_carlo_numbers(rows, observed, seed)
         print(json.dumps(numbers, indent=2))
         return _finish(options, vehicle, driving, design, certificate, drive) or FAILS * passed
+    if options.file is None:
+        print(
+            f"judged is the paper's law; {DEFAULT}, the default of tireid identify: not certified"
+        )
     print(_conditions(design, vehicle, driving))
     print(certificate_text(certificate, design.force_unit))
     if drive is not None:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from identifier.axle import AxleModel
+from identifier.axle.design import NOT_CERTIFIED
 from identifier.design import Design
 from identifier.design_file import read_design
 from identifier.history import DivergedError, History
@@ -160,7 +161,9 @@ def _closing_line(model: FrozenModel, design: Method, vehicle: Vehicle) -> str:
     return (
         f"learnt: cornering stiffness {stiffness[0]:.4g} / {stiffness[1]:.4g} N/rad, relaxation "
         f"length {length[0]:.2g} / {length[1]:.2g} m, known to {known[0]:.1f} / {known[1]:.1f} deg "
-        "of slip (front / rear)"
+        "of slip (front / rear)\n"
+        f"certificate: {NOT_CERTIFIED}; grip, cornering stiffness, weights, offsets and covariance "
+        "stay in their boxes by construction (summary.json lists them)"
     )
 
 

@@ -5,6 +5,8 @@ from dataclasses import asdict, is_dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, cast
 
+from identifier.axle import AxleDesign
+from identifier.axle.design import NOT_CERTIFIED
 from identifier.design import Design
 from identifier.history import History
 from identifier.method import Method
@@ -17,6 +19,8 @@ from identifier.reproducibility import (
     freeze_key,
     online_error,
 )
+from models.vehicle import Vehicle
+from tireid.certificate_table import certificate_of
 
 
 def program_version() -> str:
@@ -68,6 +72,24 @@ def method_numbers(design: Method) -> dict[str, Any]:
         "design": {"dt_s": design.dt, "min_speed_m_s": design.min_speed},
         "seed": numbers.get("seed"),
     }
+
+
+def certificate_numbers(design: Method, vehicle: Vehicle) -> dict[str, Any]:
+    """Return the verdict on a method, and which bounds hold of it whatever is measured.
+
+    Only the paper's laws have a certificate.
+
+    Parameters
+    ----------
+    design : any method.
+    vehicle : the car.
+    """
+    if isinstance(design, Design):
+        verdict = certificate_of(design, vehicle).verdict
+        return {"verdict": verdict, "held_by_construction": {}}
+    if isinstance(design, AxleDesign):
+        return design.certificate
+    return {"verdict": NOT_CERTIFIED, "held_by_construction": {}}
 
 
 def summarize(
@@ -126,6 +148,7 @@ def summarize_replays(
         },
         "law": law,
         **method_numbers(learnt.design),
+        "certificate": certificate_numbers(learnt.design, learnt.vehicle),
         "vehicle": vehicle_numbers(learnt.vehicle),
         "diverged_at_s": learnt.diverged_at,
         "version": program_version(),

@@ -4,13 +4,16 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
+from typing import Any
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Scan
-from identifier.axle.bounds import Bounds
+from identifier.axle.bounds import BoundNumbers, Bounds, bounded
 from identifier.axle.car import car_numbers, froude_speed
+from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
 from identifier.axle.excitation import EDGES
 from identifier.axle.forward import OVER
 from identifier.axle.friction_change import ChangeDetector
@@ -18,7 +21,6 @@ from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.model import AxleModel
 from identifier.axle.prior import Prior, friction_direction
 from identifier.axle.regression import Regression
-from identifier.axle.rls import packed, unpacked
 from identifier.axle.slip import SensitivityState
 from identifier.axle.step import CARRY, build_step
 from identifier.axle.sway import Sway, SwayState
@@ -28,6 +30,8 @@ from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 
 Array = NDArray[np.float64]
+
+NOT_CERTIFIED = "not certified"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,6 +109,25 @@ class AxleDesign:
         """Below this speed [m/s] forces read zero; learning rests below `learning_speed`."""
         return self.plausibility.min_speed
 
+    @property
+    def certificate(self) -> dict[str, Any]:
+        """What is proven of it: no margins or error bounds; the boxes hold after every sample."""
+        b, last = self.bounds, self.regression.widest
+        rising = self.rising_until
+        return {
+            "verdict": NOT_CERTIFIED,
+            "held_by_construction": {
+                "grip_static_axle_loads": [b.least_grip, b.most_grip],
+                "weight_static_axle_loads": [-b.weight, b.weight],
+                **({} if rising is None else {"force_curves_rise_at_slip_rad": rising}),
+                "compliance_m": [0.0, b.compliance],
+                "sway_share": [0.0, 1.0],
+                "steering_offset_rad": [-b.steering, b.steering],
+                "v_y_offset_m_s": [-b.v_y, b.v_y],
+                "covariance_over_prior": [0.0, last],
+            },
+        }
+
     def setup(
         self, vehicle: Vehicle, recording: Recording, start: FrozenModel | None = None
     ) -> Setup:
@@ -130,13 +153,14 @@ class AxleDesign:
             if not isinstance(start, AxleModel) or start.ladder != self.ladder:
                 raise ValueError("the stored weights are of another structure than the design's")
             W, own, P, excitation = start.W, start.own, start.covariance, start.excitation
-        trace = np.trace(prior_P[:, :n, :n], axis1=1, axis2=2)
+        widest = per_variance(prior_P, n, self.regression.widest)
+        W, own = self._within_bounds(W, own, P)
         return Setup(
             scan=_scan(doublings(self.ladder), self.rising_until is not None),
             carry={
                 "W": W,
                 "own": own,
-                "P": packed(P),
+                "UD": packed(narrowed(P, widest)),
                 "gate": np.zeros(len(GateState._fields)),
                 "sway": np.zeros(len(SwayState._fields)),
                 "slip": np.tile([0.0, 0.0, 1.0, 0.0], (2, 1)),  # slope 1: never divided by zero
@@ -153,19 +177,38 @@ class AxleDesign:
                 "roll": self.sway.numbers(),
                 "regression": self.regression.numbers(self.dt),
                 "change": self.change.numbers(self.dt),
-                "bounds": self.bounds.numbers(),
+                "bounds": self.bounds.numbers(n),
                 "friction_direction": friction_direction(self.ladder),
-                "widest": self.regression.widest * trace,
+                "per_variance": widest,
                 **self._rising(),
             },
         )
 
+    def _within_bounds(self, W: Array, own: Array, P: Array) -> tuple[Array, Array]:
+        """Return what is begun with, within bounds: a file or a prior may lie outside."""
+        n, b = len(self.ladder), self.bounds
+        slope = self._rising().get("rising")
+        numbers = BoundNumbers(*b.numbers(n))
+        theta = [
+            bounded(
+                numbers,
+                [ca.SX(float(one)) for one in (*W[i], *own[i])],
+                {(j, k): float(P[i, j, k]) for j, k in triangle(n)},
+                offset=(numbers.steering, numbers.v_y)[i],
+                slope=None if slope is None else list(slope),
+            )
+            for i in (0, 1)
+        ]
+        kept = np.array([[float(one) for one in row] for row in theta])
+        return kept[:, :n], kept[:, n:]
+
     def _rising(self) -> dict[str, Array]:
-        """Return the derivatives of the units where curves shall not fall."""
+        """Return the derivatives of the units where curves shall not fall, over their sum."""
         if self.rising_until is None:
             return {}
         scales = np.array(self.ladder)
-        return {"rising": 1.0 / (scales * np.cosh(self.rising_until / scales) ** 2)}
+        slopes = 1.0 / (scales * np.cosh(self.rising_until / scales) ** 2)
+        return {"rising": slopes / slopes.sum()}
 
     def frozen(self, vehicle: Vehicle, carried: Mapping[str, Array]) -> AxleModel:
         """Return the model with the carried weights.
@@ -173,7 +216,7 @@ class AxleDesign:
         Parameters
         ----------
         vehicle : the car.
-        carried : W (2, n), own (2, 3), P (2, q (q + 1)/2) and excitation (2, 9).
+        carried : W (2, n), own (2, 3), UD (2, q (q + 1)/2) and excitation (2, 9).
         """
         return AxleModel(
             vehicle=vehicle,
@@ -182,7 +225,7 @@ class AxleDesign:
             plausibility=self.plausibility,
             W=carried["W"].copy(),
             own=carried["own"].copy(),
-            covariance=unpacked(carried["P"], len(self.ladder) + 3),
+            covariance=unpacked(carried["UD"], len(self.ladder) + 3),
             prior_covariance=self.prior.covariance(vehicle, self.ladder),
             excitation=carried["excitation"].copy(),
         )

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from identifier.axle.checks import require_positive
 from identifier.axle.piecewise import larger, smaller
-from identifier.axle.rls import Symmetric
 
 Array = NDArray[np.float64]
 
@@ -104,19 +103,3 @@ def alarm(numbers: ChangeNumbers, fast: Any, slow: Any) -> Any:
     ratio = fast / slow
     excess = smaller(ratio[0], ratio[1]) * numbers.per_threshold - 1
     return smaller(larger(excess, 0), 1)
-
-
-def inflated(P: Symmetric, direction: list[Any], amount: Any) -> Symmetric:
-    """Return P + amount d d' in the block of the weights.
-
-    Parameters
-    ----------
-    P : covariance, upper triangle.
-    direction : d, n entries.
-    amount : variance to add.
-    """
-    n = len(direction)
-    return {
-        (i, j): value + amount * direction[i] * direction[j] if j < n else value
-        for (i, j), value in P.items()
-    }

@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 KIND = "axle"
 ARRAYS = ("W", "own", "covariance", "prior_covariance", "excitation")
 LARGEST_WEIGHT = 100.0  # static axle loads: no unit of a tire carries more
+ROUNDING = 1e-6  # of correlations, as learning in float leaves them
 DOUBT = 0.25  # standard deviation over the prior's, above which a slip is not known
 
 
@@ -82,7 +83,7 @@ class AxleModel:
                 raise ValueError(f"{name} holds a number that is not finite")
         for name in ("covariance", "prior_covariance"):
             for P in getattr(self, name):
-                if not np.allclose(P, P.T) or np.linalg.eigvalsh(P)[0] <= 0.0:
+                if not np.allclose(P, P.T) or not _is_covariance(P):
                     raise ValueError(f"{name} must be symmetric and positive definite")
         if np.abs(self.W).max() > LARGEST_WEIGHT:
             raise ValueError(
@@ -275,6 +276,15 @@ class AxleModel:
             raise FrozenModelError(f"{source}: key {error} is missing") from error
         except (TypeError, ValueError) as error:
             raise FrozenModelError(f"{source}: {error}") from error
+
+
+def _is_covariance(P: Array) -> bool:
+    """Return whether variances are positive and correlations those of some errors, to rounding."""
+    variances = np.diag(P)
+    if not (variances > 0.0).all():
+        return False
+    sd = np.sqrt(variances)
+    return bool(np.linalg.eigvalsh(P / np.outer(sd, sd))[0] > -ROUNDING)
 
 
 @cache

@@ -1,4 +1,7 @@
-"""Larger, smaller, within: as comparisons, since fmin and fmax of C are calls that cost more."""
+"""Larger, smaller, within: as comparisons, since fmin and fmax of C are calls that cost more.
+
+And one division for many quotients: CasADi writes x (1/y) as x/y, once for each x.
+"""
 
 from typing import Any
 
@@ -37,3 +40,13 @@ def within(a: Any, least: Any, most: Any) -> Any:
     most : upper end.
     """
     return smaller(larger(a, least), most)
+
+
+def reciprocal(x: Any) -> Any:
+    """Return 1/x, rounded once, as a number that products share; 1 where x is 1.
+
+    Parameters
+    ----------
+    x : expression.
+    """
+    return 2 / (x + x)

@@ -1,110 +1,65 @@
 """Recursive least squares with directional forgetting (R. Kulhavy, Automatica 23, 1987).
 
 Only the direction that the regressor excites is forgotten: no wind-up while the rest is not
-excited. P (q, q) is symmetric and kept as its upper triangle, by rows.
+excited, and none that would make the covariance wider than its limit.
 """
 
-from itertools import combinations_with_replacement
 from typing import Any, NamedTuple
 
 import casadi as ca
-import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Symmetric = dict[tuple[int, int], Any]
+from identifier.axle.covariance import Factors, Spread, excited, scaled, updated, width
+from identifier.axle.piecewise import reciprocal
 
 
 class Learnt(NamedTuple):
-    """Parameters (q entries) and covariance after an update."""
+    """Parameters (q entries) and factors of the covariance after an update."""
 
     theta: list[Any]
-    P: Symmetric
-
-
-def triangle(q: int) -> list[tuple[int, int]]:
-    """Return the places of the upper triangle, by rows.
-
-    Parameters
-    ----------
-    q : size of the matrix.
-    """
-    return list(combinations_with_replacement(range(q), 2))
-
-
-def packed(P: Array) -> Array:
-    """Return upper triangles (2, q (q + 1)/2) of symmetric matrices (2, q, q).
-
-    Parameters
-    ----------
-    P : symmetric matrices.
-    """
-    rows, columns = np.array(triangle(P.shape[1])).T
-    upper: Array = P[:, rows, columns]
-    return upper
-
-
-def unpacked(upper: Array, q: int) -> Array:
-    """Return symmetric matrices (2, q, q) of upper triangles (2, q (q + 1)/2).
-
-    Parameters
-    ----------
-    upper : upper triangles, by rows.
-    q : size of the matrices.
-    """
-    P = np.zeros((2, q, q))
-    rows, columns = np.array(triangle(q)).T
-    P[:, rows, columns] = upper
-    P[:, columns, rows] = upper
-    return P
-
-
-def at(P: Symmetric, i: int, j: int) -> Any:
-    """Return P_ij from the upper triangle.
-
-    Parameters
-    ----------
-    P : upper triangle by place.
-    i : row.
-    j : column.
-    """
-    return P[min(i, j), max(i, j)]
+    P: Factors
 
 
 def update(
     theta: list[Any],
-    P: Symmetric,
+    P: Factors,
     h: list[Any],
     *,
     error: Any,
     R: Any,
     forgetting: Any,
-    grows: Any,
+    spread: Spread,
+    limits: list[Any],
     learns: Any,
 ) -> Learnt:
     """Return parameters and covariance after one sample.
 
-    θ⁺ = θ + P h e/(R + h'Ph);  P⁺ = P - c P h h'P, c = (1 - (1 - λ) R/(λ h'Ph))/(R + h'Ph), which
-    keeps P positive definite for every c, also c < 0, where P grows: 1/h'P⁻¹h stays positive.
+    θ⁺ = θ + P h e/(R + a), a = h'Ph;  P⁺ = P - κ P h h'P/((R + a) a), κ = a - R (1 - λ)/λ, which
+    keeps P positive definite for every a, also where κ < 0 and P grows: 1/h'P⁻¹h stays positive.
 
     Parameters
     ----------
     theta : parameters, q entries.
-    P : covariance.
+    P : factors of their covariance.
     h : regressor, q entries.
     error : e = y - h'θ, clipped.
     R : variance of the error.
     forgetting : (1 - λ)/λ.
-    grows : whether P may grow.
+    spread : of P, and of what is added to it otherwise in this step.
+    limits : as in `width`; where P would grow beyond them it stays as it is.
     learns : whether to update at all.
     """
-    q = len(theta)
-    Ph = [sum(at(P, i, j) * h[j] for j in range(q)) for i in range(q)]
-    excited = sum(a * b for a, b in zip(Ph, h, strict=True)) + 1e-12 * R
-    scale = learns / ((R + excited) * excited)
-    gain = error * excited * scale
-    c = excited - forgetting * R
-    c = ca.if_else(ca.logic_and(c < 0, ca.logic_not(grows)), 0, c) * scale
-    theta = [a + b * gain for a, b in zip(theta, Ph, strict=True)]
-    P = {(i, j): value - c * Ph[i] * Ph[j] for (i, j), value in P.items()}
-    return Learnt(theta, P)
+    seen = excited(P, h, 1e-12 * R)
+    v, a = seen.v, seen.a
+    kappa = a - forgetting * R
+    share = reciprocal((R + a) * a)
+    growth = -kappa * share  # of P along v v'
+    n = len(v) - len(spread.others)
+    trace = spread.trace + sum(growth * one * one for one in v[:n])
+    others = [p + growth * one * one for p, one in zip(spread.others, v[n:], strict=True)]
+    wide = width(trace, others, limits)
+    moves = ca.logic_and(learns, ca.logic_or(kappa >= 0, wide <= 1))
+    # β_q = 1 + c a = (R + a)/(R + R (1 - λ)/λ), so that c/β_q = κ/((R + a) a)
+    c = ca.if_else(moves, kappa / (a * R * (1 + forgetting)), 0)
+    gain = learns * error * a * share
+    theta = [one + along * gain for one, along in zip(theta, v, strict=True)]
+    return Learnt(theta, scaled(updated(P, seen, c), moves * wide))

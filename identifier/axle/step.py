@@ -1,9 +1,10 @@
 """The step of the axle identifier: one casadi.Function that is simulation, test and C source.
 
-Carried, rows front and rear: W (2, n) and own (2, 3), what is learnt; P (2, q (q + 1)/2) its
-covariance, upper triangles, q = n + 3; gate, sway, slip as in `forward`; sensitivity (2, 3);
-filters (2, q + 1); errors (2, 3); excitation (2, 9). Sampled: x, u, v_x. Everything else is a
-number that stays an input. Forces are told with the weights before the sample.
+Carried, rows front and rear: W (2, n) and own (2, 3), what is learnt; UD (2, q (q + 1)/2) the
+factors of its covariance P = U D U', D on the diagonal, q = n + 3; gate, sway, slip as in
+`forward`; sensitivity (2, 3); filters (2, q + 1); errors (2, 3); excitation (2, 9). Sampled: x, u,
+v_x. Everything else is a number that stays an input. Forces are told with the weights before the
+sample.
 """
 
 from typing import Any, NamedTuple
@@ -12,6 +13,7 @@ import casadi as ca
 
 from identifier.axle.bounds import BoundNumbers, bounded
 from identifier.axle.car import axle_impulse
+from identifier.axle.covariance import factors_of, inflated, row_of, spread, triangle
 from identifier.axle.excitation import EDGES, excited
 from identifier.axle.forward import Forward, forward
 from identifier.axle.friction_change import (
@@ -19,16 +21,15 @@ from identifier.axle.friction_change import (
     ErrorState,
     alarm,
     error_means,
-    inflated,
 )
 from identifier.axle.piecewise import larger, within
 from identifier.axle.ports import axle_port, named_port
 from identifier.axle.regression import RegressionNumbers, filtered
-from identifier.axle.rls import Learnt, triangle, update
+from identifier.axle.rls import Learnt, update
 from identifier.axle.slip import SensitivityState, force_gradient, sensitivity
 from models.vehicle import GRAVITY
 
-LEARNT = ("W", "own", "P")
+LEARNT = ("W", "own", "UD")
 CARRY = (*LEARNT, "gate", "sway", "slip", "sensitivity", "filters", "errors", "excitation")
 
 
@@ -57,9 +58,9 @@ def build_step(steps: tuple[int, ...], *, rises: bool = False) -> ca.Function:
     n = len(steps) + 1
     f = forward(steps)
     ports = dict(f.ports)
-    ports["P"] = ca.SX.sym("P", 2, len(triangle(n + 3)))
+    ports["UD"] = ca.SX.sym("UD", 2, len(triangle(n + 3)))
     ports["friction_direction"] = ca.SX.sym("friction_direction", n, n)
-    ports["widest"] = ca.SX.sym("widest", 2)
+    ports["per_variance"] = ca.SX.sym("per_variance", 2, 4)
     h, y, carried = _regression(f, ports)
     lesson, judged = _lesson(f, ports, h, y)
     ports["bounds"], limits = named_port(BoundNumbers, "bounds")
@@ -69,7 +70,7 @@ def build_step(steps: tuple[int, ...], *, rises: bool = False) -> ca.Function:
     theta = ca.vertcat(*(ca.horzcat(*axle.theta) for axle in axles))
     carried |= judged | f.carried
     carried["W"], carried["own"] = theta[:, :n], theta[:, n:]
-    carried["P"] = ca.vertcat(*(ca.horzcat(*axle.P.values()) for axle in axles))
+    carried["UD"] = ca.vertcat(*(ca.horzcat(*row_of(axle.P)) for axle in axles))
     return ca.Function(
         "_".join(["axle_step", *map(str, steps), *["rising"] * rises]),
         list(ports.values()),
@@ -140,10 +141,14 @@ def _learn(ports: dict[str, Any], limits: BoundNumbers, lesson: Lesson, i: int) 
     """Return parameters and covariance of axle i after the sample."""
     w = ca.horzsplit(ports["W"][i, :])
     theta = [*w, *ca.horzsplit(ports["own"][i, :])]
+    n, q = len(w), len(theta)
     forgetting = RegressionNumbers(*ca.vertsplit(ports["regression"])).forgetting
-    P = dict(zip(triangle(len(theta)), ca.horzsplit(ports["P"][i, :]), strict=True))
+    widest = ca.horzsplit(ports["per_variance"][i, :])
+    P = factors_of(ca.horzsplit(ports["UD"][i, :]), q)
+    seen = spread(P, n)
     direction = ca.vertsplit(ports["friction_direction"] @ ca.vertcat(*w))
-    P = inflated(P, direction, lesson.inflation)
+    trace = seen.trace + sum(lesson.inflation * d * d for d in direction)
+    fits = trace * widest[0] <= 1
     learnt = update(
         theta,
         P,
@@ -151,10 +156,12 @@ def _learn(ports: dict[str, Any], limits: BoundNumbers, lesson: Lesson, i: int) 
         error=lesson.error[i],
         R=lesson.R[i],
         forgetting=forgetting,
-        grows=sum(P[j, j] for j in range(len(w))) <= ports["widest"][i],
+        spread=seen._replace(trace=ca.if_else(fits, trace, seen.trace)),
+        limits=widest,
         learns=lesson.learns[i],
     )
+    after = inflated(learnt.P, direction, ca.if_else(fits, lesson.inflation, 0))
     offset = (limits.steering, limits.v_y)[i]
     slope = ca.vertsplit(ports["rising"]) if "rising" in ports else None
-    kept = bounded(limits, learnt.theta, learnt.P, offset=offset, slope=slope)
-    return Learnt(kept, learnt.P)
+    kept = bounded(limits, learnt.theta, seen.weights, offset=offset, slope=slope)
+    return Learnt(kept, after)

@@ -90,7 +90,7 @@ def learnt_ports(method: Method, carry: Mapping[str, Array]) -> tuple[str, ...]:
         case Design():
             moving = {"W", "V"}
         case AxleDesign():
-            moving = {"W", "own", "P", "errors", "excitation"}
+            moving = {"W", "own", "UD", "errors", "excitation"}
         case RegressionDesign():
             moving = set(carry) - {"target_lag", "regressor_lag", "fresh"}
         case StiffnessRls():

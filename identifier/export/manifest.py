@@ -10,8 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from identifier.axle import AxleDesign
+from identifier.axle.design import NOT_CERTIFIED
+from identifier.design import Design
 from identifier.export.fold import FoldedStep
 from identifier.export.signals import Signal
+from identifier.method import Method
 from identifier.model_format import vehicle_numbers
 
 FORMAT = "tireid package 1"
@@ -35,6 +39,7 @@ def ingredients(folded: FoldedStep, *, single: bool) -> dict[str, Any]:
         "tireid": tireid_version(),
         "precision": "float" if single else "double",
         "method": {"kind": type(method).__name__, **plain(numbers)},
+        "certificate": certificate(method),
         "vehicle": plain(vehicle_numbers(folded.vehicle)),
         "sample_time_s": folded.dt,
         "min_speed_m_s": folded.min_speed,
@@ -58,6 +63,19 @@ def ingredients(folded: FoldedStep, *, single: bool) -> dict[str, Any]:
     }
 
 
+def certificate(method: Method) -> dict[str, Any]:
+    """Return what is proven of a method, as the manifest says it.
+
+    Parameters
+    ----------
+    method : what was exported.
+    """
+    if isinstance(method, AxleDesign):
+        return method.certificate
+    verdict = "judged by tireid check" if isinstance(method, Design) else NOT_CERTIFIED
+    return {"verdict": verdict, "held_by_construction": {}}
+
+
 def summary(folded: FoldedStep, content: Mapping[str, Any]) -> dict[str, str]:
     """Return what texts say about a package: title, method, versions, hash, names and numbers.
 
@@ -72,6 +90,7 @@ def summary(folded: FoldedStep, content: Mapping[str, Any]) -> dict[str, str]:
         "method": type(folded.method).__name__,
         "version": version,
         "hash": short,
+        "certificate": _certificate_text(folded.method),
         "version_text": f"{folded.name} {short}, tireid {version}",
         "single": str(int(content["precision"] == "float")),
         "dt": f"{folded.dt:g}",
@@ -79,6 +98,22 @@ def summary(folded: FoldedStep, content: Mapping[str, Any]) -> dict[str, str]:
         "name": folded.name,
         "NAME": folded.name.upper(),
     }
+
+
+def _certificate_text(method: Method) -> str:
+    proven = certificate(method)
+    if isinstance(method, Design):
+        return (
+            "Stability and error bounds of this law depend on its gains: `tireid check` on its\n"
+            "design file gives the certificate. None is part of this package."
+        )
+    verdict, held = proven["verdict"], proven["held_by_construction"]
+    lines = [f"This method is **{verdict}**: no stability margin and no error bound is proven."]
+    if held:
+        lines.append("What holds by construction after every sample, whatever is measured, in both")
+        lines.append("precisions, of what it learns:\n")
+        lines += ["| bound | |", "|---|---|", *(f"| {key} | {held[key]} |" for key in held)]
+    return "\n".join(lines)
 
 
 def digest(content: Any) -> str:

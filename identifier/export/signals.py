@@ -50,7 +50,10 @@ AXLE_PORTS: Mapping[str, tuple[str, str]] = {
         "m per load; -; rad and m/s",
         "compliance, sway share, offset of steering (front) and of v_y (rear)",
     ),
-    "P": ("of W and own", "covariance of W and own: upper triangle by rows; front and rear"),
+    "UD": (
+        "of W and own",
+        "covariance U D U' of W and own: D, and U above it, by rows; front and rear",
+    ),
     "gate": (
         "SI",
         "last good v_x, v_y, r, delta_f, delta_r; on; time of steady learning; bad and stuck "

@@ -31,7 +31,8 @@ def law_complaint(method: Method, vehicle: Vehicle) -> str | None:
     """Return why a method must not teach while driving, or None.
 
     The paper's laws need the certificate of their gains. Least squares with bounded parameters
-    has no gain that could be too high; what it teaches is judged by `tire_complaint`.
+    is not certified: its boxes hold by construction, and what it teaches is judged by
+    `tire_complaint`.
 
     Parameters
     ----------

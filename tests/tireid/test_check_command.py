@@ -132,3 +132,9 @@ def test_numbers_and_units_read_well():
     ]
     assert unit_text("U s", 1000.0) == "kN s"
     assert unit_text("U s", 1.0) == "N s"
+
+
+def test_without_a_file_it_says_which_law_it_judges(capsys, unstable):
+    said = checked(capsys)[1].out
+    assert "judged is the paper's law; axle, the default of tireid identify: not certified" in said
+    assert "not certified" not in checked(capsys, unstable)[1].out

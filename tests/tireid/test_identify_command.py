@@ -53,6 +53,12 @@ def test_summary_has_the_documented_keys_and_the_right_numbers(result, logs):
     assert set(rmse["frozen"]["8"]["quick"]) == {"front", "rear"}
     for key in ("gains", "vehicle", "seed", "version"):
         assert key in summary
+    certificate = summary["certificate"]
+    if summary["law"] == "axle":
+        assert certificate["verdict"] == "not certified"
+        assert certificate["held_by_construction"]["grip_static_axle_loads"] == [0.1, 1.5]
+    else:
+        assert certificate["verdict"] in ("pass", "warn", "fail")
     quick = read_recording(logs / "quick.csv")
     force = load_model(result / "weights.json").axle_force(quick)
     front, rear = np.sqrt(np.mean((force - quick.axle_force) ** 2, axis=0))

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.axle import bounds, rls, slip, sway, units
+from identifier.axle import covariance, rls, slip, sway, units
 from identifier.axle.car import Car, axle_impulse, car_numbers
 from identifier.axle.prior import SLIPS, Prior, fiala_force, fiala_weights, friction_direction
 from identifier.axle.sway import Sway, SwayNumbers, SwayState
@@ -158,28 +158,31 @@ def test_sway_settles_where_the_body_leans_and_a_step_swings(car):
     assert max(path) == pytest.approx(a * (1 + overshoot), rel=0.02)
 
 
-def learnt(h, y, R, forgetting, P0, learns=1.0):
+def learnt(h, y, R, forgetting, P0, learns=1.0, widest=1e9):
     q = P0.shape[0]
-    theta, P = ca.SX.sym("theta", q), ca.SX.sym("P", len(rls.triangle(q)))
+    theta, P = ca.SX.sym("theta", q), ca.SX.sym("P", len(covariance.triangle(q)))
     regressor, e = ca.SX.sym("h", q), ca.SX.sym("e")
-    upper = dict(zip(rls.triangle(q), ca.vertsplit(P), strict=True))
+    factors = covariance.factors_of(ca.vertsplit(P), q)
     result = rls.update(
         ca.vertsplit(theta),
-        upper,
+        factors,
         ca.vertsplit(regressor),
         error=e,
         R=R,
         forgetting=forgetting,
-        grows=True,
+        spread=covariance.spread(factors, 1),
+        limits=[1 / widest] * q,
         learns=learns,
     )
     step = ca.Function(
-        "f", [theta, P, regressor, e], [ca.vertcat(*result.theta), ca.vertcat(*result.P.values())]
+        "f",
+        [theta, P, regressor, e],
+        [ca.vertcat(*result.theta), ca.vertcat(*covariance.row_of(result.P))],
     )
-    t, p = np.zeros(q), rls.packed(np.stack([P0, P0]))[0]
+    t, p = np.zeros(q), covariance.packed(np.stack([P0, P0]))[0]
     for row, value in zip(h, y, strict=True):
         t, p = (np.array(v).ravel() for v in step(t, p, row, value - row @ t))
-    return t, rls.unpacked(np.stack([p, p]), q)[0]
+    return t, covariance.unpacked(np.stack([p, p]), q)[0]
 
 
 def test_without_forgetting_the_recursion_is_the_batch_solution(rng):
@@ -211,20 +214,14 @@ def test_nothing_is_learnt_where_learning_rests(rng):
     np.testing.assert_array_equal(P, np.eye(3))
 
 
-def test_grip_is_bounded_by_the_least_move_in_the_metric_of_the_covariance(rng):
-    A = rng.standard_normal((7, 7))
-    P = A @ A.T
-    theta = np.array([0.9, 0.9, 0.5, 0.2, 0.05, 0.3, 0.001])
-    limits = bounds.BoundNumbers(*bounds.Bounds(compliance=0.1, v_y=0.2, weight=50.0).numbers())
-    upper = dict(zip(rls.triangle(7), rls.packed(P[None].repeat(2, 0))[0], strict=True))
-    kept = np.array(
-        [float(v) for v in bounds.bounded(limits, list(map(ca.SX, theta)), upper, offset=0.01)]
-    )
-    assert kept[:4].sum() == pytest.approx(1.5)
-    multiplier = np.linalg.solve(P[:4, :4], kept[:4] - theta[:4])  # the same for every weight
-    np.testing.assert_allclose(multiplier, multiplier[0], rtol=1e-6)
-    inside = bounds.bounded(limits, list(map(ca.SX, theta / 3)), upper, offset=0.01)
-    np.testing.assert_allclose([float(v) for v in inside], theta / 3)
+def test_variance_grows_to_its_limit_and_no_further(rng):
+    """A regressor so weak that it forgets more than it teaches: variances stop at their limits."""
+    h = np.array([[1e-2, 0.0, 1e-2]]).repeat(3000, axis=0)
+    _, free = learnt(h, np.zeros(3000), 0.1, 0.01, np.eye(3))
+    _, held = learnt(h, np.zeros(3000), 0.1, 0.01, np.eye(3), widest=2.0)
+    assert np.diag(free)[[0, 2]].min() > 2.5
+    assert 1.98 < np.diag(held).max() <= 2.0
+    assert held[1, 1] == 1.0
 
 
 def test_prior_is_the_told_tire_and_unsure_of_what_cars_differ_in(car):

@@ -23,7 +23,9 @@ class ByHand:
         W, own = design.prior.means(car, design.ladder)
         self.theta = np.hstack([W, own])
         self.P = design.prior.covariance(car, design.ladder)
-        self.P0_trace = [np.trace(P[:n, :n]) for P in self.P]
+        self.most = np.array([design.regression.widest * self.sizes(P) for P in self.P])
+        for P, most in zip(self.P, self.most, strict=True):
+            P /= max(1.0, (self.sizes(P) / most).max())
         # dw/d ln mu by differences of a projected, stretched curve instead of a derivative
         slip = np.linspace(0.002, 0.6, 300)
         T = np.tanh(slip[:, None] / self.alpha_j)
@@ -36,6 +38,10 @@ class ByHand:
         self.steady = 0.0
         self.fast, self.slow, self.peak = np.zeros(2), np.ones(2), np.zeros(2)
         self.longest, self.time = np.zeros(2), np.zeros(2)
+
+    def sizes(self, P):
+        """Trace of the weights' block and the other variances, which are bounded."""
+        return np.array([np.trace(P[: self.n, : self.n]), *np.diag(P)[self.n :]])
 
     def believe(self, sample):
         """The sample to go on with, or None where forces read zero; and whether to learn."""
@@ -134,24 +140,32 @@ class ByHand:
         self.peak = np.maximum(np.abs(y_hat), self.peak * np.exp(-dt / m.excitation_time))
         for i in (0, 1):
             P, theta = self.P[i], self.theta[i]
-            d = self.M @ theta[:n]
-            P[:n, :n] += alarm * dt * c.step**2 / c.step_time * np.outer(d, d)
-            if self.peak[i] < m.error:
+            d, before = self.M @ theta[:n], P.copy()
+            amount = alarm * dt * c.step**2 / c.step_time
+            wider = self.sizes(P) + amount * (d @ d) * np.eye(1, 4)[0]
+            if wider[0] > self.most[i, 0]:
+                amount, wider = 0.0, self.sizes(P)
+            learns = self.peak[i] >= m.error
+            if learns:
+                self.time[i] += dt
+                R = sd[i] ** 2 * self.slow[i] * m.correlation_time / dt
+                reach = m.clip * sd[i] * self.slow[i]
+                Ph = P @ h[i]
+                excited = h[i] @ Ph
+                lam = np.exp(-dt / m.memory)
+                shrink = (1 - (1 - lam) / lam * R / excited) / (R + excited)
+                moved = np.array([Ph[:n] @ Ph[:n], *Ph[n:] ** 2])
+                wide = ((wider - shrink * moved) / self.most[i]).max()
+                theta += Ph * np.clip(error[i], -reach, reach) / (R + excited)
+                if shrink >= 0 or wide <= 1:
+                    P -= shrink * np.outer(Ph, Ph)
+                    P /= max(wide, 1.0)
+            P[:n, :n] += amount * np.outer(d, d)
+            if not learns:
                 continue
-            self.time[i] += dt
-            R = sd[i] ** 2 * self.slow[i] * m.correlation_time / dt
-            reach = m.clip * sd[i] * self.slow[i]
-            Ph = P @ h[i]
-            excited = h[i] @ Ph
-            lam = np.exp(-dt / m.memory)
-            shrink = (1 - (1 - lam) / lam * R / excited) / (R + excited)
-            if shrink < 0 and np.trace(P[:n, :n]) > m.widest * self.P0_trace[i]:
-                shrink = 0.0
-            theta += Ph * np.clip(error[i], -reach, reach) / (R + excited)
-            P -= shrink * np.outer(Ph, Ph)
             bounds = self.d.bounds
             grip = theta[:n].sum()
-            P1 = P[:n, :n].sum(1)
+            P1 = before[:n, :n].sum(1)
             theta[:n] += P1 / P1.sum() * (np.clip(grip, bounds.least_grip, bounds.most_grip) - grip)
             theta[:n] = np.clip(theta[:n], -bounds.weight, bounds.weight)
             last = (bounds.steering, bounds.v_y)[i]

@@ -103,6 +103,71 @@ static int all_finite(const @name@_values *values)
     return 1;
 }
 
+#ifdef BOUNDED /* the axle identifier: limits come as macros, -DLEAST_GRIP=... */
+#define UNITS 4
+#define ALL (UNITS + 3)
+
+/* Whether the weights are in their boxes, P = U D U' definite and its variances within limits. */
+static int within_bounds(const @name@_weights *weights)
+{
+    static const long double scale[UNITS] = { LADDER };
+    static const long double offset[2] = { STEERING, V_Y };
+    static const long double widest[2][4] = { WIDEST };
+    int axle, i, j;
+    for (axle = 0; axle < 2; axle++) {
+        const @name@_real *const w = weights->W[axle];
+        const @name@_real *const own = weights->own[axle];
+        long double U[ALL][ALL] = { { 0 } };
+        long double D[ALL];
+        long double size[4] = { 0 };
+        long double grip = 0;
+        long double slope = 0;
+        int k = 0;
+        for (i = 0; i < UNITS; i++) {
+            grip += (long double)w[i];
+            slope += (long double)w[i] / scale[i];
+            if (!(fabsl((long double)w[i]) <= WEIGHT)) {
+                printf("weight %g: ", (double)w[i]);
+                return 0;
+            }
+        }
+        if (!(grip >= LEAST_GRIP && grip <= MOST_GRIP && slope >= 0)) {
+            printf("grip %.9g, slope %.9g: ", (double)grip, (double)slope);
+            return 0;
+        }
+        if (!((long double)own[0] >= 0 && (long double)own[0] <= COMPLIANCE
+                && (long double)own[1] >= 0 && (long double)own[1] <= 1
+                && fabsl((long double)own[2]) <= offset[axle])) {
+            printf("own %g %g %g: ", (double)own[0], (double)own[1], (double)own[2]);
+            return 0;
+        }
+        for (i = 0; i < ALL; i++) {
+            D[i] = (long double)weights->UD[axle][k++];
+            if (!(D[i] >= 0)) {
+                printf("covariance that is not definite: ");
+                return 0;
+            }
+            U[i][i] = 1;
+            for (j = i + 1; j < ALL; j++) {
+                U[i][j] = (long double)weights->UD[axle][k++];
+            }
+        }
+        for (i = 0; i < ALL; i++) {
+            for (j = i; j < ALL; j++) {
+                size[(i < UNITS) ? 0 : i - UNITS + 1] += U[i][j] * U[i][j] * D[j];
+            }
+        }
+        for (i = 0; i < 4; i++) {
+            if (!(size[i] <= widest[axle][i])) {
+                printf("variance %d is %.9g of its limit: ", i, (double)(size[i] / widest[axle][i]));
+                return 0;
+            }
+        }
+    }
+    return 1;
+}
+#endif
+
 static int torture(@name@_params *params)
 {
     static @name@_state state;
@@ -127,6 +192,12 @@ static int torture(@name@_params *params)
             printf("the state is not finite after %ld\n", k);
             return 1;
         }
+#ifdef BOUNDED
+        if (!within_bounds(&state.values.weights)) {
+            printf("a bound is broken after %ld\n", k);
+            return 1;
+        }
+#endif
         if (!(fabs((double)state.output.axle_force[0]) <= (double)params->max_force)
             || !(fabs((double)state.output.axle_force[1]) <= (double)params->max_force)) {
             printf("a force is beyond the limit after %ld\n", k);

@@ -1,9 +1,13 @@
 """Hostile input under AddressSanitizer and UBSan."""
 
 import re
+from dataclasses import asdict, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from identifier.axle import AxleDesign
 
 HOSTILE = (Path(__file__).parent / "hostile.c").read_text()
 SANITIZED = (
@@ -12,11 +16,29 @@ SANITIZED = (
 SOURCES = ["src/tireid.c", "src/tireid_equations.c", "hostile.c"]
 
 
-def build(folder, run, compiler, single):
+def declared(package, **changed):
+    """The bounds of the axle identifier as macros, none for another method."""
+    method, n = package.folded.method, 4
+    if not isinstance(method, AxleDesign):
+        return []
+    bounds = replace(method.bounds, **changed)
+    prior = method.prior.covariance(package.folded.vehicle, method.ladder)
+    trace = np.trace(prior[:, :n, :n], axis1=1, axis2=2)
+    widest = method.regression.widest * np.column_stack([trace, prior[:, [4, 5, 6], [4, 5, 6]]])
+    rows = ",".join("{" + ",".join(f"{one!r}L" for one in row) + "}" for row in widest.tolist())
+    numbers = {
+        **{key.upper(): f"{value!r}L" for key, value in asdict(bounds).items()},
+        "LADDER": ",".join(f"{one!r}L" for one in method.ladder),
+        "WIDEST": rows,
+    }
+    return ["-DBOUNDED=1", *(f"-D{key}={value}" for key, value in numbers.items())]
+
+
+def build(folder, run, compiler, single, macros=()):
     (folder / "hostile.c").write_text(
         HOSTILE.replace("@name@", "tireid").replace("@NAME@", "TIREID")
     )
-    flags = [*SANITIZED.split(), f"-DTIREID_SINGLE={single}", "-Iinclude", "-Isrc"]
+    flags = [*SANITIZED.split(), f"-DTIREID_SINGLE={single}", *macros, "-Iinclude", "-Isrc"]
     answer = run(compiler, *flags, *SOURCES, "-lm", "-o", "hostile", cwd=folder)
     if "cannot find" in answer.stderr and "san" in answer.stderr:
         pytest.skip(f"needs the sanitizers of {compiler}")
@@ -27,13 +49,24 @@ def build(folder, run, compiler, single):
 @pytest.mark.parametrize("law", ["integral", "axle"])
 @pytest.mark.parametrize("single", [0, 1])
 def test_a_million_hostile_samples_find_nothing(law, single, packages, write, run):
-    program = build(write(packages[law]), run, "gcc", single)
+    program = build(write(packages[law]), run, "gcc", single, declared(packages[law]))
     answer = run(str(program))
     assert (answer.returncode, answer.stderr) == (0, ""), answer.stdout + answer.stderr
     counts = {name: int(n) for name, n in re.findall(r"(\w+) (\d+)", answer.stdout)}
     assert sum(counts.values()) == 1_000_000
     assert counts["ok"] > 100_000
     assert counts["bad_input"] > 50_000
+
+
+@pytest.mark.parametrize(
+    ("changed", "complaint"),
+    [({"most_grip": 0.9}, "grip"), ({"weight": 0.4}, "weight"), ({"v_y": 1e-3}, "own")],
+)
+def test_bounds_narrower_than_the_declared_are_broken(changed, complaint, packages, write, run):
+    macros = declared(packages["axle"], **changed)
+    answer = run(str(build(write(packages["axle"]), run, "gcc", 1, macros)))
+    assert answer.returncode != 0
+    assert re.search(f"{complaint}.*a bound is broken after", answer.stdout), answer.stdout
 
 
 @pytest.mark.parametrize(

@@ -102,6 +102,19 @@ def test_everything_that_goes_in_changes_the_hash():
     assert len({package.about["hash"] for package in packages}) == len(packages)
 
 
+def test_a_package_says_what_is_proven_of_it(packages):
+    """The default method is not certified; its boxes are those of its design."""
+    axle, integral = packages["axle"], packages["integral"]
+    held = json.loads(axle.files["tireid.json"])["certificate"]["held_by_construction"]
+    bounds = axle.folded.method.bounds
+    assert held["grip_static_axle_loads"] == [bounds.least_grip, bounds.most_grip]
+    text = readme(axle, "")
+    assert "This method is **not certified**" in text
+    assert f"| compliance_m | [0.0, {bounds.compliance}] |" in text
+    assert "not certified" not in readme(integral, "")
+    assert "`tireid check`" in readme(integral, "")
+
+
 def test_the_manifest_tells_all_that_went_in(packages):
     files = packages["integral"].files
     manifest = json.loads(files["tireid.json"])

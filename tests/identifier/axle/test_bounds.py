@@ -1,0 +1,251 @@
+"""What is declared of the learnt numbers holds of the stored ones, whatever was measured."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from identifier.axle import AxleDesign, bounds
+from identifier.axle.covariance import LEAST_VARIANCE, narrowed, packed, per_variance, unpacked
+from identifier.axle.units import LADDER
+from identifier.identify import identify
+
+ROW = 1 / np.array(LADDER) / np.sum(1 / np.array(LADDER))
+
+
+def dead_yaw_rate(s, rng):
+    s["r"][:] = 0.0
+
+
+def stuck_yaw_rate(s, rng):
+    s["r"][300:] = s["r"][300] + 1e-9 * rng.standard_normal(s["r"].size - 300)
+
+
+def noise_of_a_dead_yaw_rate(s, rng):
+    s["r"][:] = 1e-4 * rng.standard_normal(s["r"].size)
+
+
+def flipped_yaw_rate(s, rng):
+    s["r"] *= -1.0
+
+
+def flipped_v_y(s, rng):
+    s["v_y"] *= -1.0
+
+
+def flipped_steering(s, rng):
+    s["delta_f"] *= -1.0
+
+
+def constant_v_y(s, rng):
+    s["v_y"][:] = 1.0
+
+
+def dead_steering(s, rng):
+    s["delta_f"][:] = 0.0
+
+
+def late_yaw_rate(s, rng):
+    s["r"][:] = np.roll(s["r"], 60)
+
+
+def threefold_yaw_rate(s, rng):
+    s["r"] *= 3.0
+
+
+def noise_of_a_million(s, rng):
+    s["v_y"] += 1e6 * rng.standard_normal(s["v_y"].size)
+    s["r"] += 1e6 * rng.standard_normal(s["r"].size)
+
+
+def noise_within_the_gate(s, rng):
+    s["v_y"][:] = rng.standard_normal(s["v_y"].size)
+    s["r"][:] = 0.3 * rng.standard_normal(s["r"].size)
+
+
+def wandering_gains(s, rng):
+    for name in ("v_y", "r", "delta_f"):
+        s[name] *= np.cumsum(0.1 * rng.standard_normal(s[name].size))
+
+
+HOSTILE = [
+    dead_yaw_rate,
+    stuck_yaw_rate,
+    noise_of_a_dead_yaw_rate,
+    flipped_yaw_rate,
+    flipped_v_y,
+    flipped_steering,
+    constant_v_y,
+    dead_steering,
+    late_yaw_rate,
+    threefold_yaw_rate,
+    noise_of_a_million,
+    noise_within_the_gate,
+    wandering_gains,
+]
+
+
+def spoilt(recording, fault, seed=0):
+    names = ("v_x", "v_y", "r", "delta_f")
+    signals = {name: getattr(recording, name).copy() for name in names}
+    fault(signals, np.random.default_rng(seed))
+    return replace(recording, **signals)
+
+
+def broken(design, car, carried):
+    """What is declared and does not hold of some sample; sums of weights are exact."""
+    b, found, n = design.bounds, set(), len(design.ladder)
+    prior = design.prior.covariance(car, design.ladder)
+    for W, own, UD in zip(carried["W"], carried["own"], carried["UD"], strict=True):
+        for i, w in enumerate(W):
+            grip = sum(map(Fraction, w))
+            slope = sum(Fraction(x) / Fraction(a) for x, a in zip(w, design.ladder, strict=True))
+            s, k, o = own[i]
+            held = Fraction(b.least_grip) <= grip <= Fraction(b.most_grip)
+            found |= set() if held else {"grip"}
+            found |= {"stiffness"} if not slope >= 0 else set()
+            found |= {"weight"} if not np.abs(w).max() <= b.weight else set()
+            found |= {"compliance"} if not 0.0 <= s <= b.compliance else set()
+            found |= {"share"} if not 0.0 <= k <= 1.0 else set()
+            found |= {"offset"} if not abs(o) <= (b.steering, b.v_y)[i] else set()
+        P = unpacked(UD, n + 3)
+        sizes, most = (
+            np.column_stack([np.trace(A[:, :n, :n], axis1=1, axis2=2), A[:, [4, 5, 6], [4, 5, 6]]])
+            for A in (P, design.regression.widest * prior)
+        )
+        found |= {"variance"} if not (sizes <= most).all() else set()
+        F = np.zeros((2, n + 3, n + 3))
+        F[:, *np.triu_indices(n + 3)] = UD
+        found |= {"definite"} if not (np.einsum("aii->ai", F) >= 0.0).all() else set()
+    return found
+
+
+@pytest.mark.parametrize("speed", [8.0, 20.0, 35.0])
+@pytest.mark.parametrize("fault", HOSTILE, ids=lambda fault: fault.__name__)
+def test_what_is_declared_holds_after_every_sample(fault, speed, car, drive):
+    design = AxleDesign.for_vehicle(car)
+    history = identify(spoilt(drive(speed=speed, amplitude=0.07), fault), car, design)
+    assert history.diverged_at is None
+    assert broken(design, car, history.carried) == set()
+    assert history.freeze(1e9).cornering_stiffness.min() >= 0.0
+
+
+def test_a_dead_yaw_rate_sensor_leads_to_the_bounds_and_not_beyond(car, drive):
+    """The bounds are at work: the drive ends at them, and a check of narrower ones rings."""
+    design = AxleDesign.for_vehicle(car)
+    history = identify(spoilt(drive(n=4000, amplitude=0.07), dead_yaw_rate), car, design)
+    grip = history.carried["W"].sum(axis=2)
+    assert broken(design, car, history.carried) == set()
+    assert min(grip.min() - 0.1, 1.5 - grip.max()) < 1e-4
+    narrower = replace(
+        design,
+        bounds=replace(design.bounds, least_grip=0.3, most_grip=0.7, weight=0.5),
+        regression=replace(design.regression, widest=0.5),
+    )
+    assert {"grip", "weight", "variance"} <= broken(narrower, car, history.carried)
+
+
+def test_left_free_the_same_drive_leaves_the_box(car, drive):
+    design = AxleDesign.for_vehicle(car)
+    wide = replace(design.bounds, least_grip=1e-3, most_grip=30.0, weight=60.0)
+    free = replace(
+        design, bounds=wide, rising_until=None, regression=replace(design.regression, widest=1e6)
+    )
+    found = set()
+    for fault in (dead_yaw_rate, flipped_yaw_rate, flipped_v_y):
+        recording = spoilt(drive(n=4000, amplitude=0.07), fault)
+        found |= broken(design, car, identify(recording, car, free).carried)
+    assert {"grip", "stiffness", "weight", "variance"} <= found
+
+
+def kept(theta, P, **limits):
+    """[w, s, k, offset] within bounds, in double."""
+    n = len(theta) - 3
+    declared = bounds.Bounds(compliance=0.3, v_y=0.2, **limits)
+    numbers = bounds.BoundNumbers(*declared.numbers(n))
+    upper = {(i, j): P[i, j] for i in range(n) for j in range(i, n)}
+    found = bounds.bounded(
+        numbers, [ca.SX(float(t)) for t in theta], upper, offset=0.01, slope=list(ROW)
+    )
+    return np.array([float(ca.evalf(one)) for one in found])
+
+
+def test_the_move_is_the_least_in_the_metric_of_the_covariance(rng):
+    """No point of the set, among many near it, is nearer in that metric."""
+    at_both = 0
+    for _ in range(60):
+        A = rng.standard_normal((4, 4))
+        P = A @ A.T + 0.05 * np.eye(4)
+        theta = np.concatenate([rng.standard_normal(4) * 1.5, [0.1, 0.2, 0.001]])
+        found = kept(theta, P, weight=50.0)[:4]
+        assert 0.1 <= found.sum() <= 1.5
+        assert ROW @ found >= 0.0
+        metric = np.linalg.inv(P)
+        size = (found - theta[:4]) @ metric @ (found - theta[:4])
+        near = found + 10.0 ** rng.uniform(-3, 0, (4000, 1)) * rng.standard_normal((4000, 4))
+        inside = (near.sum(1) >= 0.101) & (near.sum(1) <= 1.499) & (near @ ROW >= 1e-3)
+        away = near[inside] - theta[:4]
+        assert (np.einsum("ki,ij,kj->k", away, metric, away) > size - 1e-2 * (1 + size)).all()
+        at_both += ROW @ found < 1e-3 and min(found.sum() - 0.1, 1.5 - found.sum()) < 1e-2
+    assert at_both >= 3
+
+
+def test_what_is_inside_is_not_moved_by_a_bit(rng):
+    for _ in range(50):
+        theta = np.concatenate([rng.uniform(0.03, 0.35, 4), [0.1, 0.2, 0.001]])
+        np.testing.assert_array_equal(kept(theta, np.eye(4)), theta)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e3, 1e15])
+def test_the_set_is_reached_from_anywhere_by_any_metric(scale, rng):
+    """Also by one that is singular, or that rounding has made indefinite."""
+    for k in range(60):
+        v = rng.standard_normal((4, 1 + k % 4))
+        P = v @ v.T - 1e-9 * np.eye(4) * (k % 2)
+        theta = scale * rng.standard_normal(7)
+        w = kept(theta, P)[:4]
+        assert Fraction(0.1) <= sum(map(Fraction, w)) <= Fraction(1.5)
+        assert sum(Fraction(a) / Fraction(b) for a, b in zip(w, LADDER, strict=True)) >= 0
+        assert np.abs(w).max() <= 3.0
+
+
+def test_bounds_that_no_weights_can_keep_are_refused():
+    with pytest.raises(ValueError, match="least_grip must be below most_grip"):
+        bounds.Bounds(compliance=0.1, v_y=0.1, least_grip=2.0)
+    with pytest.raises(ValueError, match=r"4 weights up to 0\.1 cannot carry"):
+        bounds.Bounds(compliance=0.1, v_y=0.1, weight=0.1).numbers(4)
+
+
+def test_limits_are_floats_that_are_not_above_the_declared():
+    for limit in (0.1, 0.3, 0.324, 1 / 3, 0.01):
+        numbers = bounds.Bounds(compliance=limit, v_y=limit).numbers(4)
+        assert (np.float32(numbers[-3:]).astype(float) == numbers[-3:]).all()
+        assert limit * (1 - 2e-7) < numbers[-1] <= limit
+
+
+def test_factors_are_those_of_the_covariance(rng):
+    A = rng.standard_normal((2, 7, 9))
+    P = A @ A.transpose(0, 2, 1)
+    np.testing.assert_allclose(unpacked(packed(P), 7), P, rtol=1e-10, atol=1e-12)
+    first = packed(P)[0]
+    assert (first[[0, 7, 13, 18, 22, 25, 27]] > 0.0).all()  # D, by rows
+    assert first[27] == pytest.approx(P[0, 6, 6])
+    assert (packed(np.zeros((2, 7, 7)))[:, [0, 27]] == LEAST_VARIANCE).all()
+
+
+def test_a_stored_covariance_that_is_too_wide_is_narrowed(car, drive):
+    """Weights may come from a file of another design: its boxes hold from the first sample on."""
+    design, recording = AxleDesign.for_vehicle(car), drive(n=300)
+    model = identify(recording, car, design).freeze(1e9)
+    wide = replace(
+        model,
+        W=10.0 * model.W,
+        own=model.own + np.array([0.5, 2.0, 1.0]),
+        covariance=300.0 * model.prior_covariance,
+    )
+    carried = identify(recording, car, design, start=wide).carried
+    assert broken(design, car, carried) == set()
+    limits = per_variance(model.prior_covariance, 4, 2.0)
+    np.testing.assert_array_equal(narrowed(model.covariance, limits), model.covariance)
