@@ -7,11 +7,11 @@ passenger car and a 1:10 model.
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from identifier.design import Design, natural_force_unit
+from identifier.driving import Driving
 from identifier.gains import Gains, diagonal
 from identifier.laws import DRIVING_ERRORS
 from identifier.network import SIGNALS, Network
@@ -25,24 +25,14 @@ from models.vehicle import GRAVITY, Vehicle
 REFERENCE_WHEELBASE = 2.7  # m: the car for which the scales of SIGNALS are meant
 BANDWIDTH = 0.7  # Hz: a brisk slalom; the steering of a normal driver stays below 0.5 Hz
 PHASE_MARGIN = 60.0  # deg
+# Four standard deviations of a good inertial sensor and a steering encoder, m/s, rad/s, rad.
+PEAK_NOISE = {"v_x": 0.12, "v_y": 0.12, "r": 0.012, "delta": 0.002}
 LAWS: Mapping[str, str] = {  # name, and what a reader is told
     "integral": "integral",
     "instantaneous": "instantaneous",
     "instantaneous_scaled": "instantaneous at eta/lambda",
     "pi_lead": "PI-lead",
 }
-
-
-class Driving(NamedTuple):
-    """How hard a car is driven: what a design is made for and judged at.
-
-    v_x [m/s], largest slip angle [rad], friction [-], bandwidth of the steering [Hz].
-    """
-
-    v_x: float
-    slip: float
-    friction: float
-    bandwidth: float
 
 
 def natural_driving(vehicle: Vehicle, *, bandwidth: float = BANDWIDTH) -> Driving:
@@ -55,11 +45,16 @@ def natural_driving(vehicle: Vehicle, *, bandwidth: float = BANDWIDTH) -> Drivin
     """
     stiffness = (vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear)
     sliding = max(load / c for load, c in zip(vehicle.axle_loads, stiffness, strict=True))
+    ratio = math.sqrt(vehicle.wheelbase / REFERENCE_WHEELBASE)
     return Driving(
         v_x=4.0 * math.sqrt(GRAVITY * vehicle.wheelbase),
         slip=2.0 * sliding,
         friction=1.0,
         bandwidth=bandwidth,
+        noise_v_x=PEAK_NOISE["v_x"] * ratio,
+        noise_v_y=PEAK_NOISE["v_y"] * ratio,
+        noise_r=PEAK_NOISE["r"] / ratio,
+        noise_delta=PEAK_NOISE["delta"],
     )
 
 
@@ -72,9 +67,10 @@ def natural_operation(
     ----------
     design : the design.
     vehicle : the car.
-    driving : how hard it is driven; None takes `natural_driving`.
+    driving : how hard it is driven; None takes what is stored in the design, else
+        `natural_driving`.
     """
-    return operation(design, vehicle, **(driving or natural_driving(vehicle))._asdict())
+    return operation(design, vehicle, driving or design.driving or natural_driving(vehicle))
 
 
 def natural_network(
@@ -111,7 +107,7 @@ def design_for(
     Parameters
     ----------
     vehicle : the car.
-    driving : how hard it is driven.
+    driving : how hard it is driven; it is stored with the design.
     law : "integral", "instantaneous" or "pi_lead", which gets the lead τ = 1/a.
     network : structure; None takes `natural_network`.
     phase_margin : of the sampled loop [deg].
@@ -136,6 +132,7 @@ def design_for(
         force_unit=natural_force_unit(vehicle.mass),
         min_speed=0.2 * math.sqrt(GRAVITY * vehicle.wheelbase),
         seed=seed,
+        driving=driving,
     )
     known = natural_operation(frame, vehicle, driving)
     feedback = known.input_feedback
@@ -147,8 +144,9 @@ def design_for(
         dt=dt,
         n_h=network.hidden,
         x_bar_max=known.x_bar_max,
-        residual_bound=known.residual_bound,
-        V_max=2.0 * math.sqrt(network.hidden * len(network.inputs)),  # twice the initial norm
+        disturbance=known.disturbance,
+        needed_force=known.needed_force,
+        V_max=known.V_start,
         phase_margin=phase_margin,
         integrator=integrator,
         minimal_decay=slowest,

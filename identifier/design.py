@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Scan
+from identifier.driving import Driving
 from identifier.gains import Gains
 from identifier.integrators import INTEGRATORS
 from identifier.laws import DRIVING_ERRORS
@@ -40,6 +41,8 @@ class Design:
     force_unit : the unit U of forces inside the identifier [N]; gains are meant in it.
     min_speed : below this speed [m/s] learning rests and forces read zero.
     seed : seed of the initial weights.
+    driving : the conditions that it was designed for and is judged at; None takes those of the
+        car, `identifier.defaults.natural_driving`.
 
     Raises
     ------
@@ -56,6 +59,7 @@ class Design:
     force_unit: float = 1000.0
     min_speed: float = 1.0
     seed: int = 0
+    driving: Driving | None = None
 
     def __post_init__(self) -> None:
         for name, known in (

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from identifier.design import Design
+from identifier.driving import Driving
 from identifier.gains import Gains
 from identifier.network import Network
 
@@ -32,6 +33,14 @@ COMMENTS = {
     "hidden": "units",
     "inputs": "what the network reads",
     "scale": "divisors of the inputs, SI",
+    "v_x": "m/s, give or take 5 %",
+    "slip": "rad, largest slip angle of an axle",
+    "friction": "largest of the road",
+    "bandwidth": "Hz, highest frequency of the steering",
+    "noise_v_x": "m/s, largest error of the sensor",
+    "noise_v_y": "m/s, largest error of the sensor",
+    "noise_r": "rad/s, largest error of the sensor",
+    "noise_delta": "rad, largest error of the sensor",
 }
 
 
@@ -44,7 +53,8 @@ def read_design(path: Path) -> Design:
 
     Parameters
     ----------
-    path : TOML with the keys of `Design`, and tables [gains] and [network].
+    path : TOML with the keys of `Design`, and tables [gains], [network] and, where the conditions
+        of driving are declared, [driving].
 
     Raises
     ------
@@ -58,8 +68,10 @@ def read_design(path: Path) -> Design:
     try:
         gains = _record(data.pop("gains", {}), Gains, "gains.")
         network = _record(data.pop("network", {}), Network, "network.")
-        values = _record(data, Design, "", skip=("gains", "network"))
-        return Design(gains=Gains(**gains), network=Network(**network), **values)
+        stored = data.pop("driving", None)
+        driving = None if stored is None else Driving(**_record(stored, Driving, "driving."))
+        values = _record(data, Design, "", skip=TABLES)
+        return Design(gains=Gains(**gains), network=Network(**network), driving=driving, **values)
     except ValueError as error:
         raise DesignFileError(f"{path}: {error}") from None
 
@@ -99,11 +111,13 @@ def design_text(design: Design) -> str:
     lines = [_line(design, field.name) for field in fields(Design) if field.name not in TABLES]
     for name in TABLES:
         record = getattr(design, name)
+        if record is None:
+            continue
         lines += ["", f"[{name}]", *(_line(record, field.name) for field in fields(record))]
     return "\n".join(lines) + "\n"
 
 
-TABLES = ("gains", "network")
+TABLES = ("gains", "network", "driving")
 
 
 def _line(record: Any, name: str) -> str:

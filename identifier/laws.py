@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 
 DrivingError = Callable[[Any, Any, Any], Any]
+Direction = Callable[[Any, Any], Any]
 
 
 def integral(z: Any, xi_tilde: Any, lead: Any) -> Any:
@@ -39,7 +40,10 @@ def instantaneous(z: Any, xi_tilde: Any, lead: Any) -> Any:
 
 
 def pi_lead(z: Any, xi_tilde: Any, lead: Any) -> Any:
-    """Drive the laws by z + τ ξ̃: with τ >= 1/a the loop is positive real, no gain is too high.
+    """Drive the laws by z + τ ξ̃: with τ long enough the loop is positive real.
+
+    Together with `lyapunov_direction` no gain is then too high, whatever the Hurwitz A_d; for
+    A_d = -a I long enough is 1/a, else `identifier.stability.pi_lead.lead_time`.
 
     Parameters
     ----------
@@ -54,6 +58,41 @@ DRIVING_ERRORS: Mapping[str, DrivingError] = {
     "integral": integral,
     "instantaneous": instantaneous,
     "pi_lead": pi_lead,
+}
+
+
+def static_direction(A_d: Any, drive: Any) -> Any:
+    """Return (driveᵀ A_d⁻¹)ᵀ, along which (11)-(12) descend, (2,).
+
+    Parameters
+    ----------
+    A_d : Hurwitz matrix (2, 2) [1/s].
+    drive : the error that drives the laws (2,).
+    """
+    return ca.solve(A_d.T, drive)  # with A_dᵀ: it differs where A_d is not symmetric
+
+
+def lyapunov_direction(A_d: Any, drive: Any) -> Any:
+    """Return -P drive with A_dᵀ P + P A_d = -2 I, (2,): -A_d⁻¹ where A_d is symmetric.
+
+    P = [det(A_d) I + Sᵀ S]/(-tr(A_d) det(A_d)), S = A_d - tr(A_d) I, solves the equation of a
+    2x2 matrix in closed form.
+
+    Parameters
+    ----------
+    A_d : Hurwitz matrix (2, 2) [1/s].
+    drive : the error that drives the laws (2,).
+    """
+    trace = A_d[0, 0] + A_d[1, 1]
+    determinant = A_d[0, 0] * A_d[1, 1] - A_d[0, 1] * A_d[1, 0]
+    S = A_d - trace * ca.DM.eye(2)
+    return (determinant * drive + S.T @ (S @ drive)) / (trace * determinant)
+
+
+DIRECTIONS: Mapping[DrivingError, Direction] = {
+    integral: static_direction,
+    instantaneous: static_direction,
+    pi_lead: lyapunov_direction,  # only with P is the lead passive where A_d is not symmetric
 }
 
 
@@ -77,6 +116,7 @@ def weight_rates(
     eta_V: Any,
     rho_W: Any,
     rho_V: Any,
+    direction: Direction = static_direction,
 ) -> WeightRates:
     """Return (11)-(12), each a descent along the static gradient with a leakage.
 
@@ -93,8 +133,9 @@ def weight_rates(
     eta_V : learning rate η2.
     rho_W : leakage ρ1.
     rho_V : leakage ρ2.
+    direction : of the descent, from A_d and the driving error; one of `DIRECTIONS`.
     """
-    g = ca.solve(A_d.T, drive)  # (zᵀ A_d⁻¹)ᵀ: with A_dᵀ, it differs where A_d is not symmetric
+    g = direction(A_d, drive)  # (zᵀ A_d⁻¹)ᵀ as printed
     leak = ca.norm_2(xi_tilde)
     slope = 1 - sigma**2  # diagonal of I - Λ, (13)
     W_dot = -eta_W * g @ sigma.T - rho_W * leak * W  # (11)

@@ -14,7 +14,7 @@ from typing import Any
 import casadi as ca
 
 from identifier.integrators import INTEGRATORS
-from identifier.laws import DRIVING_ERRORS, ball, unbounded, weight_rates
+from identifier.laws import DIRECTIONS, DRIVING_ERRORS, ball, unbounded, weight_rates
 from identifier.network import Network, hidden_layer, network_signals
 from identifier.observer import INPUT_SOURCES, filter_rate, observer_rate
 from models.bicycle import BicycleParameters, bicycle, linear_axle_force
@@ -110,9 +110,14 @@ def build_step(structure: Structure) -> ca.Function:
             eta_V=eta_V,
             rho_W=rho_W,
             rho_V=rho_V,
+            direction=DIRECTIONS[drive],
         )
         xi_hat_dot = observer_rate(A_d, model.A_xi, model.B_xi / unit, xi, xi_hat, u, W @ sigma)
         return [xi_hat_dot, filter_rate(lam, z, xi_tilde), *rates]
+
+    def kept(state: list[Any]) -> list[Any]:
+        """Return a state within its projections, which inner stages must see too."""
+        return [state[0], state[1], bounded(state[2], W_max), bounded(state[3], V_max)]
 
     moving = v_x >= min_speed
     believed = ca.logic_and(plausible(parameters, speed, x, u), v_x <= LARGEST_SPEED)
@@ -121,7 +126,7 @@ def build_step(structure: Structure) -> ca.Function:
     linear = ca.if_else(used, linear_axle_force(parameters, speed, x, u), 0)
     ahead = ca.if_else(used, dt, 0)  # else nothing moves on: weights keep their values
     xi_hat_next, z_next, W_next, V_next = INTEGRATORS[structure.integrator](
-        derivative, [xi_hat, z, W, V], ahead
+        derivative, [xi_hat, z, W, V], ahead, kept
     )
     return ca.Function(
         f"identifier_{structure.law}",

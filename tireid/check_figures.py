@@ -6,8 +6,9 @@ from identifier.design import Design
 from identifier.identify import identify
 from identifier.laws import DRIVING_ERRORS
 from identifier.stability import Certificate, Operation
-from identifier.stability.loop import linear_law
-from identifier.stability.operation import worst_loop
+from identifier.stability.certificate import judged_loop
+from identifier.stability.loop import direction_matrix, linear_law
+from identifier.stability.operation import proven_bounds
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid.figures import error_figure, locus_figure, save_figure
@@ -40,8 +41,11 @@ def draw_check(
     certificate : its certificate.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    law = linear_law(DRIVING_ERRORS[design.law], design.gains.lead)
-    loop = worst_loop(design.gains, law, operation)
+    driving_error = DRIVING_ERRORS[design.law]
+    law = linear_law(driving_error, design.gains.lead)
+    D = direction_matrix(driving_error, design.gains.matrix)
+    kept = proven_bounds(design.gains, law, operation, D).W
+    _, loop, _ = judged_loop(design.gains, law, operation, D, kept)
     history = identify(recording, vehicle, design)
     figures = {
         "locus.png": locus_figure(loop, integrator=design.integrator, dt=design.dt),

@@ -129,7 +129,13 @@ def shortage_formula(a: float, lam: float) -> float:
 
 
 def sufficient_leakage(
-    *, A_d: npt.ArrayLike, forgetting: float, law: Law, eta_W: float, n_h: int
+    *,
+    A_d: npt.ArrayLike,
+    forgetting: float,
+    law: Law,
+    eta_W: float,
+    n_h: int,
+    direction: Matrix | None = None,
 ) -> float:
     """Constant leakage rate s0 [1/s] above which no regressor can drift, η |s|²_max shortage.
 
@@ -142,5 +148,7 @@ def sufficient_leakage(
     law : coefficients of z and ξ̃ in the driving error.
     eta_W : learning rate of (11).
     n_h : hidden units; |s|² <= n_h.
+    direction : (2, 2) D, None for -A_d⁻ᵀ.
     """
-    return eta_W * n_h * passivity_shortage(A_d=A_d, forgetting=forgetting, law=law)
+    shortage = passivity_shortage(A_d=A_d, forgetting=forgetting, law=law, direction=direction)
+    return eta_W * n_h * shortage

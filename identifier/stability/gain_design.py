@@ -12,15 +12,23 @@
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
 
 from identifier.gains import Gains, diagonal
+from identifier.stability.disturbance import Disturbance
 from identifier.stability.gain_limit import require_positive
 from identifier.stability.loop import Law
-from identifier.stability.state_bound import StateBounds, small_gain, state_bounds
+from identifier.stability.sampled_bound import (
+    Learning,
+    SampledBounds,
+    by_leakage,
+    error_gains,
+    output_layer,
+)
+from identifier.stability.state_bound import small_gain
 
 LAG_RULE = 1.0 / math.tan(math.radians(22.5))  # a/Ω for 45 degrees of lag through two equal poles
 FASTEST = 0.2  # largest a dt
@@ -38,13 +46,13 @@ class GainDesign:
     ----------
     gains : of (8) to (12).
     loop_gain : g at the worst regressor.
-    bounds : proven bounds of |ξ̃| and |W_hat| from rest.
-    V_max : wanted bound on |V_hat|, kept by ρ_V.
+    bounds : proven bounds of |ξ̃| and |W_hat|.
+    V_max : bound on |V_hat|, kept by ρ_V.
     """
 
     gains: Gains
     loop_gain: float
-    bounds: StateBounds
+    bounds: SampledBounds
     V_max: float
 
 
@@ -112,7 +120,8 @@ def design_gains(
     dt: float,
     n_h: int,
     x_bar_max: float,
-    residual_bound: float,
+    disturbance: Disturbance,
+    needed_force: float,
     V_max: float,
     phase_margin: float = 60.0,
     capacity: float = 4.0,
@@ -128,10 +137,11 @@ def design_gains(
     dt : sampling interval T_s [s].
     n_h : hidden units.
     x_bar_max : bound on |x_bar|.
-    residual_bound : sup|f|, the force the linear tire misses [U].
+    disturbance : what acts on the error, for the proven bounds.
+    needed_force : that the network is expected to hold [U].
     V_max : wanted bound on |V_hat|, at least its initial norm.
     phase_margin : wanted phase margin of the sampled loop at the worst regressor [deg].
-    capacity : force that W can hold at |s|² = n_h, in units of residual_bound.
+    capacity : force that W can hold at |s|² = n_h, in units of needed_force.
     integrator : "euler" or "rk4", as in the step.
     minimal_decay : smallest a that the network's input allows [1/s]; a keeps 1.5 times it.
 
@@ -145,7 +155,7 @@ def design_gains(
         bandwidth=bandwidth,
         dt=dt,
         x_bar_max=x_bar_max,
-        residual_bound=residual_bound,
+        needed_force=needed_force,
         V_max=V_max,
         capacity=capacity,
     )
@@ -166,22 +176,24 @@ def design_gains(
         raise DesignError(f"ask for a larger phase margin: at {phase_margin} deg θ = {theta:.3g}")
     c_z, c_xi = law
     drive = c_z / lam + c_xi
-    rho_W = g * drive / (a * capacity * residual_bound)
-    bounds = state_bounds(
-        A_d,
-        law=law,
-        forgetting=lam,
-        eta_W=eta_W,
-        rho_W=rho_W,
-        n_h=n_h,
-        residual_bound=residual_bound,
-    )
-    per_eta = bounds.W * x_bar_max / a  # g2/η_V
-    memory = c_z * per_eta * bounds.xi_tilde / lam**2  # what z alone can move V by, per η_V
+    rho_W = g * drive / (a * capacity * needed_force)
+    free = Gains(A_d=A_d, forgetting=lam, eta_W=eta_W, eta_V=0.0, rho_W=rho_W, rho_V=0.0)
+    D = np.eye(2) / a  # of every law for A_d = -a I
+    learning = output_layer(free, law, D, n_h=n_h, integrator=integrator, dt=dt)
+    error = error_gains(free.matrix, integrator, dt)
+    bounds = by_leakage(error, learning, free.matrix, disturbance, n_h)
+    if bounds is None:
+        raise DesignError(
+            f"nothing is proven of these gains: at {phase_margin} deg θ = {theta:.3g}, and "
+            f"rho_W = {rho_W:.3g} leaks too much in {1e3 * dt:g} ms"
+        )
+    widest = bounds.W + max(learning.beyond(bounds.stage))  # at the inner stages of RK4
+    layer = replace(learning, drive=widest * x_bar_max / a)  # g2/η_V
+    memory = c_z * layer.drive * bounds.stage / lam**2  # what z alone can move V by, per η_V
     eta_V = eta_W / (x_bar_max * bounds.W) ** 2
     if memory > 0.0:
         eta_V = min(eta_V, 0.5 * V_max / memory)
-    rho_V = eta_V * per_eta * drive / (V_max - eta_V * memory)
+    rho_V = _leakage_of_V(replace(layer, drive=eta_V * layer.drive), V_max, bounds.stage)
     gains = Gains(
         A_d=A_d,
         forgetting=lam,
@@ -192,3 +204,21 @@ def design_gains(
         lead=c_xi if c_z > 0.0 else 0.0,
     )
     return GainDesign(gains=gains, loop_gain=g, bounds=bounds, V_max=V_max)
+
+
+def _leakage_of_V(layer: Learning, V_max: float, X: float) -> float:
+    """ρ_V that keeps |V| <= V_max."""
+    if not layer.staged:
+        unit = replace(layer, leakage=1.0, dt=0.0)
+        memory = unit.kept(X) - unit.kept(0.0)
+        return unit.kept(0.0) / (V_max - memory)
+    most = 1.0 / (layer.dt * X)
+
+    def excess(rho_V: float) -> float:
+        return replace(layer, leakage=rho_V).kept(X) - V_max
+
+    weakest = _leakage_of_V(replace(layer, staged=False), V_max, X)
+    strongest = min(2.0 * weakest, 0.5 * (weakest + most))
+    if excess(strongest) > 0.0:
+        raise DesignError(f"no leakage keeps |V| below {V_max:.3g} at this sampling interval")
+    return float(brentq(excess, weakest, strongest, xtol=1e-14 * weakest, rtol=1e-14))

@@ -17,10 +17,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
+import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from identifier.laws import DrivingError
+from identifier.laws import DIRECTIONS, DrivingError, static_direction
 from identifier.stability.lyapunov import Matrix, require_square
 
 ComplexArray = npt.NDArray[np.complex128]
@@ -105,6 +106,19 @@ def linear_law(driving_error: DrivingError, lead: float = 0.0) -> Law:
     if not (c_z >= 0.0 and c_xi >= 0.0 and c_z + c_xi > 0.0):
         raise ValueError(f"the law must weigh z and xi_tilde positively, it is ({c_z}, {c_xi})")
     return Law(c_z, c_xi)
+
+
+def direction_matrix(driving_error: DrivingError, A_d: npt.ArrayLike) -> Matrix:
+    """Return D of the law, (2, 2) [s]: -A_d⁻ᵀ as printed, P for the PI-lead law.
+
+    Parameters
+    ----------
+    driving_error : of `identifier.laws`.
+    A_d : (2, 2) Hurwitz error dynamics [1/s].
+    """
+    direction = DIRECTIONS.get(driving_error, static_direction)
+    found: Matrix = -np.array(ca.DM(direction(ca.DM(require_square(A_d)), ca.DM.eye(2))))
+    return found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

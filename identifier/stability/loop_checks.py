@@ -6,10 +6,10 @@ import numpy as np
 
 from identifier.gains import Gains
 from identifier.stability.drift import drift_frequency, sufficient_leakage
-from identifier.stability.loop import Law, Loop, eigenvalues, exact
-from identifier.stability.lyapunov import lyapunov
+from identifier.stability.loop import ComplexArray, Law, Loop, eigenvalues, exact
+from identifier.stability.lyapunov import Matrix, lyapunov
 from identifier.stability.margins import gain_margin, phase_margin
-from identifier.stability.operation import Operation, kept_weights
+from identifier.stability.operation import Operation
 from identifier.stability.property import Property, Status, at_least, at_most
 
 ENOUGH_GAIN, ENOUGH_PHASE, ENOUGH_DAMPING = 2.0, 30.0, 0.2
@@ -17,7 +17,7 @@ LARGEST_STEP = 0.2  # fastest pole times dt that Euler resolves well
 
 
 def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
-    """A_d: Hurwitz, with a Lyapunov matrix, resolved by the step, faster than the x_hat loop.
+    """A_d and λ: stable as they are sampled, resolved by the step, faster than the x_hat loop.
 
     Parameters
     ----------
@@ -25,25 +25,31 @@ def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
     operation : where it runs.
     """
     A_d = gains.matrix
-    poles = np.linalg.eigvals(A_d)
-    slowest, step = -float(poles.real.max()), float(np.abs(poles).max()) * operation.dt
-    residual = lyapunov(A_d, np.eye(2)).residual
+    poles = state_space_poles(A_d)
+    step = float(np.abs(poles).max()) * operation.dt
+    sampled = np.abs(operation.step(poles * operation.dt))
+    slowest = -math.log(float(sampled.max())) / operation.dt
+    filtered = gains.forgetting * operation.dt
     resolved = operation.resolves(A_d)
+    lyapunov(A_d, np.eye(2))  # raises where P does not solve its equation
     entries = [
         _above_zero(
             "error_dynamics",
-            "decay of the slowest pole of A_d (Hurwitz)",
+            "decay of the slowest pole of A_d, as sampled",
             slowest,
-            "give A_d poles with a negative real part",
+            "give A_d poles with a negative real part that the step resolves",
         ),
         Property(
-            name="lyapunov_residual",
-            title="P of A_d' P + P A_d = -Q substituted back",
-            value=residual,
-            limit=1e-9,
-            margin=1e-9 / max(residual, 1e-18),
-            status=at_most(residual, good=1e-9, bad=1e-9),
+            name="filter_step",
+            title="lambda times the sampling interval",
+            value=filtered,
+            limit=1.0,
+            margin=1.0 / filtered,
+            status=at_most(filtered, good=1.0, bad=1.0),
             unit="-",
+            advice=""
+            if filtered <= 1.0
+            else f"lambda below {1.0 / operation.dt:.3g} 1/s, or sample faster",
         ),
         Property(
             name="sampling",
@@ -110,7 +116,7 @@ def margin_checks(loop: Loop, operation: Operation) -> list[Property]:
     ]
 
 
-def weight_check(gains: Gains, law: Law, operation: Operation) -> Property:
+def weight_check(gains: Gains, operation: Operation, kept: float, judged: float) -> Property:
     """Whether |W_hat| stays where the margins were judged; beside the point unless V learns.
 
     Up to sqrt(η_V⁻¹ η_W)/x_bar_max the V layer adds nothing to the worst loop gain, however large
@@ -119,16 +125,16 @@ def weight_check(gains: Gains, law: Law, operation: Operation) -> Property:
     Parameters
     ----------
     gains : of (8) to (12).
-    law : coefficients of z and ξ̃ in the driving error.
     operation : where it runs.
+    kept : |W_hat| that is proven [U].
+    judged : |W_hat| at which the margins were judged [U].
     """
-    kept = kept_weights(gains, law, operation)
     limit = math.inf
     if gains.eta_V > 0.0:
         free = math.sqrt(gains.eta_W / gains.eta_V) / operation.x_bar_max
-        limit = max(operation.W_large, free)
-    holds = kept <= limit * (1.0 + 1e-9) and (math.isfinite(kept) or gains.eta_V == 0.0)
-    advice = "project W, or raise rho_W"
+        limit = max(judged, free)
+    holds = math.isfinite(kept) and kept <= limit * (1.0 + 1e-9)
+    advice = "project W, or raise rho_W and keep theta below 1"
     if math.isfinite(limit):
         advice = f"the margins hold up to |W| = {limit:.3g}: set W_max to it, or raise rho_W"
     return Property(
@@ -136,14 +142,28 @@ def weight_check(gains: Gains, law: Law, operation: Operation) -> Property:
         title="largest |W| that is proven, against the one that the margins are judged at",
         value=kept,
         limit=limit,
-        margin=limit / kept,
+        margin=limit / kept if math.isfinite(kept) else 0.0,
         status="pass" if holds else "warn",
         unit="U",
         advice="" if holds else advice,
     )
 
 
-def drift_check(gains: Gains, law: Law, operation: Operation) -> Property:
+def state_space_poles(A_d: Matrix) -> ComplexArray:
+    """Poles of ξ̃' = A_d ξ̃ + (f - f_hat), by python-control (2,) [1/s].
+
+    Parameters
+    ----------
+    A_d : (2, 2) error dynamics [1/s].
+    """
+    import control  # takes a second to import, so only where it is needed
+
+    eye = np.eye(2)
+    error_dynamics = control.ss(A_d, eye, eye, np.zeros((2, 2)))
+    return np.asarray(control.poles(error_dynamics), dtype=np.complex128)
+
+
+def drift_check(gains: Gains, law: Law, operation: Operation, direction: Matrix) -> Property:
     """Whether a regressor that moves at the maneuver's bandwidth makes the weights drift.
 
     Parameters
@@ -151,8 +171,12 @@ def drift_check(gains: Gains, law: Law, operation: Operation) -> Property:
     gains : of (8) to (12).
     law : coefficients of z and ξ̃ in the driving error.
     operation : where it runs.
+    direction : (2, 2) D [s].
     """
-    limit = drift_frequency(A_d=gains.matrix, forgetting=gains.forgetting, law=law) / (2 * math.pi)
+    found = drift_frequency(
+        A_d=gains.matrix, forgetting=gains.forgetting, law=law, direction=direction
+    )
+    limit = found / (2 * math.pi)
     advice = ""
     if operation.bandwidth > limit:
         leakage = sufficient_leakage(
@@ -161,6 +185,7 @@ def drift_check(gains: Gains, law: Law, operation: Operation) -> Property:
             law=law,
             eta_W=gains.eta_W,
             n_h=operation.n_h,
+            direction=direction,
         )
         advice = f"raise A_d and forgetting; a leakage of {leakage:.3g} 1/s would stop the drift"
     return Property(

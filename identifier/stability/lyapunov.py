@@ -194,16 +194,31 @@ def sampled_peak_gain(A_d: npt.ArrayLike, dt: float) -> float:
     radius = float(np.max(np.abs(np.linalg.eigvals(step))))
     if not radius < 1.0:
         raise NotHurwitzError(f"I + dt A_d must be inside the unit circle, its radius is {radius}")
-    if np.linalg.norm(step @ step.T - step.T @ step, 2) <= 1e-14:
-        return dt / (1.0 - radius)  # normal: |step^k| = radius^k
-    block, total, last = np.eye(2)[None], 0.0, np.inf
+    return dt * power_norms(step, np.eye(2))[1]
+
+
+def power_norms(step: Matrix, entry: Matrix) -> tuple[float, float]:
+    """Largest and sum of |step^k entry| over k = 0, 1, ...
+
+    Parameters
+    ----------
+    step : (2, 2) with every eigenvalue inside the unit circle.
+    entry : (2, 2).
+    """
+    radius, size = float(np.max(np.abs(np.linalg.eigvals(step)))), np.linalg.norm(entry, 2)
+    scalar = np.linalg.norm(step - step[0, 0] * np.eye(2), 2) <= 1e-14
+    normal = np.linalg.norm(step @ step.T - step.T @ step, 2) <= 1e-14
+    if scalar or (normal and np.array_equal(entry, np.eye(2))):
+        return float(size), float(size / (1.0 - radius))  # |step^k| = radius^k
+    block, total, last, largest = np.eye(2)[None], 0.0, np.inf, 0.0
     while block.shape[0] < 1024:
         block = np.concatenate([block, block @ (block[-1] @ step)])
-    leap, base = block[-1] @ step, np.eye(2)
+    leap, base = block[-1] @ step, entry
     while last > 1e-16 * (1.0 - radius) * total:
         norms = np.linalg.norm(block @ base, 2, axis=(1, 2))
         total, last, base = total + float(norms.sum()), float(norms[-1]), base @ leap
-    return dt * total
+        largest = max(largest, float(norms.max()))
+    return largest, total
 
 
 def _quadrature(A_d: Matrix, edges: Matrix) -> float:

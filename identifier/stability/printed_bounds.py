@@ -1,6 +1,8 @@
 """Statements about (14): as printed, by the tight route, with the V layer; the true bound.
 
 They say how little (14) says: every one stands beside the bound of an identifier with no network.
+(14) needs ideal weights and a bound w_bar on what they leave. Nothing but W = 0, w_bar = sup|f| is
+known for sure before a drive, and that is what it is given: a smaller w_bar would be a claim.
 P is scaled as suits (14) best: b depends on the scale, the loop does not.
 """
 

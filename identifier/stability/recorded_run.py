@@ -11,7 +11,7 @@ from identifier.history import History
 from identifier.laws import DRIVING_ERRORS
 from identifier.network import network_signals
 from identifier.stability.certificate import along_run
-from identifier.stability.loop import INTEGRATORS, Loop, linear_law
+from identifier.stability.loop import INTEGRATORS, Loop, direction_matrix, linear_law
 from identifier.stability.margins import gain_margin
 from identifier.stability.regressor_gain import regressor_gains, strongest
 from models.bicycle import BicycleParameters
@@ -64,6 +64,7 @@ def loop_along(history: History, design: Design) -> LoopAlongRun:
         forgetting=design.gains.forgetting,
         law=linear_law(DRIVING_ERRORS[design.law], design.gains.lead),
         G=gains[worst],
+        direction=direction_matrix(DRIVING_ERRORS[design.law], design.gains.matrix),
     )
     return LoopAlongRun(
         t=recording.t[moving],

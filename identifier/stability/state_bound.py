@@ -22,7 +22,13 @@ import numpy.typing as npt
 
 from identifier.stability.gain_limit import require_positive
 from identifier.stability.loop import Law
-from identifier.stability.lyapunov import lyapunov, peak_gain, require_hurwitz, sampled_peak_gain
+from identifier.stability.lyapunov import (
+    Matrix,
+    lyapunov,
+    peak_gain,
+    require_hurwitz,
+    sampled_peak_gain,
+)
 
 
 class NoBoundError(ValueError):
@@ -72,6 +78,7 @@ def small_gain(
     eta_W: float,
     n_h: int,
     dt: float | None = None,
+    direction: Matrix | None = None,
 ) -> float:
     """θ = c_z γ η_W |A_d⁻¹| n_h/λ² [-]; below 1 the law is bounded.
 
@@ -83,14 +90,22 @@ def small_gain(
     eta_W : learning rate of (11).
     n_h : hidden units; |s|² <= n_h.
     dt : step of explicit Euler [s]; None for continuous time.
+    direction : (2, 2) D [s], None for -A_d⁻ᵀ.
     """
     require_positive(forgetting=forgetting)
     c_z, _ = law
-    return c_z * _peak(A_d, dt) * eta_W * _inverse_norm(A_d) * n_h / forgetting**2
+    return c_z * _peak(A_d, dt) * eta_W * _size(A_d, direction) * n_h / forgetting**2
 
 
 def steady_capacity(
-    A_d: npt.ArrayLike, *, law: Law, forgetting: float, eta_W: float, rho_W: float, n_h: int
+    A_d: npt.ArrayLike,
+    *,
+    law: Law,
+    forgetting: float,
+    eta_W: float,
+    rho_W: float,
+    n_h: int,
+    direction: Matrix | None = None,
 ) -> float:
     """n_h η_W |A_d⁻¹| (c_z/λ + c_ξ)/ρ_W [U]: the largest force that leakage lets W hold.
 
@@ -105,10 +120,11 @@ def steady_capacity(
     eta_W : learning rate of (11).
     rho_W : leakage gain of (11) [1/(U s²)].
     n_h : hidden units.
+    direction : (2, 2) D [s], None for -A_d⁻ᵀ.
     """
     require_positive(forgetting=forgetting, rho_W=rho_W)
     c_z, c_xi = law
-    return n_h * eta_W * _inverse_norm(A_d) * (c_z / forgetting + c_xi) / rho_W
+    return n_h * eta_W * _size(A_d, direction) * (c_z / forgetting + c_xi) / rho_W
 
 
 def state_bounds(
@@ -122,6 +138,7 @@ def state_bounds(
     residual_bound: float,
     start: Start = AT_REST,
     dt: float | None = None,
+    direction: Matrix | None = None,
 ) -> StateBounds:
     """Return X and the bound on |W_hat|.
 
@@ -140,6 +157,7 @@ def state_bounds(
     residual_bound : sup|f| [U].
     start : norms of the initial state.
     dt : step of explicit Euler [s]; None for continuous time.
+    direction : (2, 2) D [s], None for -A_d⁻ᵀ.
 
     Raises
     ------
@@ -147,12 +165,20 @@ def state_bounds(
         If θ >= 1.
     """
     require_positive(rho_W=rho_W)
-    theta = small_gain(A_d, law=law, forgetting=forgetting, eta_W=eta_W, n_h=n_h, dt=dt)
+    theta = small_gain(
+        A_d,
+        law=law,
+        forgetting=forgetting,
+        eta_W=eta_W,
+        n_h=n_h,
+        dt=dt,
+        direction=direction,
+    )
     if not theta < 1.0:
         raise NoBoundError(f"θ must be below 1 for a bound of this law, it is {theta:.4g}")
     c_z, c_xi = law
     gamma, s_max = _peak(A_d, dt), math.sqrt(n_h)
-    g = eta_W * _inverse_norm(A_d) * s_max  # g'
+    g = eta_W * _size(A_d, direction) * s_max  # g'
     balance, memory = g * (c_z / forgetting + c_xi) / rho_W, c_z * g / forgetting
     W_start = start.W + memory * start.z
     unlearned = transient_peak(A_d) * start.xi_tilde + gamma * residual_bound
@@ -175,6 +201,7 @@ def V_bound(
     rho_V: float,
     x_bar_max: float,
     start: Start = AT_REST,
+    direction: Matrix | None = None,
 ) -> float:
     """Bound on |V_hat| [-]: the same argument, with g2 = η_V |A_d⁻¹| |W_hat|_max x_bar_max.
 
@@ -188,10 +215,11 @@ def V_bound(
     rho_V : leakage gain of (12) [1/(U s²)].
     x_bar_max : bound on |x_bar|.
     start : norms of the initial state.
+    direction : (2, 2) D [s], None for -A_d⁻ᵀ.
     """
     require_positive(forgetting=forgetting, rho_V=rho_V)
     c_z, c_xi = law
-    g2 = eta_V * _inverse_norm(A_d) * bounds.W * x_bar_max
+    g2 = eta_V * _size(A_d, direction) * bounds.W * x_bar_max
     memory = c_z * g2 / forgetting
     m = max(start.z, bounds.xi_tilde / forgetting)
     balance = g2 * (c_z / forgetting + c_xi) / rho_V
@@ -242,6 +270,7 @@ def _peak(A_d: npt.ArrayLike, dt: float | None) -> float:
     return peak_gain(A_d) if dt is None else sampled_peak_gain(A_d, dt)
 
 
-def _inverse_norm(A_d: npt.ArrayLike) -> float:
-    """|A_d⁻¹| [s]."""
-    return float(np.linalg.norm(np.linalg.inv(require_hurwitz(A_d)), 2))
+def _size(A_d: npt.ArrayLike, direction: Matrix | None) -> float:
+    """|D| [s]."""
+    dynamics = require_hurwitz(A_d)
+    return float(np.linalg.norm(np.linalg.inv(dynamics) if direction is None else direction, 2))

@@ -1,0 +1,55 @@
+"""How hard a car is driven: the conditions that a design is made for, judged at, and stored with.
+
+A bound that is proven holds on every drive that keeps all of them; a drive that breaks one proves
+nothing. They stand in design.toml, so that the same file is judged alike wherever it is judged.
+"""
+
+import math
+from dataclasses import dataclass, fields
+
+SPEED_SPREAD = 0.05  # of the speed, give or take
+YAW_OVERSHOOT = 1.5  # largest yaw rate, of the steady one at the friction limit
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Driving:
+    """Conditions of driving, SI.
+
+    The sensors may err by as much as the noise at every sample, in any direction: it is a largest
+    error, not a standard deviation.
+
+    Parameters
+    ----------
+    v_x : speed [m/s], give or take `SPEED_SPREAD`.
+    slip : largest slip angle of an axle [rad].
+    friction : largest μ of the road [-]; an axle pushes with at most μ times its load.
+    bandwidth : highest frequency of the steering [Hz].
+    noise_v_x : largest error of the speed [m/s].
+    noise_v_y : largest error of the lateral velocity [m/s].
+    noise_r : largest error of the yaw rate [rad/s].
+    noise_delta : largest error of a steering angle [rad].
+
+    Raises
+    ------
+    ValueError
+        Where a condition is not positive, or a noise negative, not a number or beyond the speed.
+    """
+
+    v_x: float
+    slip: float
+    friction: float
+    bandwidth: float
+    noise_v_x: float = 0.0
+    noise_v_y: float = 0.0
+    noise_r: float = 0.0
+    noise_delta: float = 0.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            lowest = 0.0 <= value if field.name.startswith("noise") else 0.0 < value
+            if not (lowest and math.isfinite(value)):
+                rule = "not be negative" if field.name.startswith("noise") else "be positive"
+                raise ValueError(f"{field.name} must {rule} and finite, it is {value}")
+        if not self.noise_v_x < 0.5 * self.v_x:
+            raise ValueError(f"noise_v_x must be below half the speed, it is {self.noise_v_x}")

@@ -1,0 +1,266 @@
+"""Bounds of the identifier as it runs, sample by sample, with Euler or RK4 and noisy sensors.
+
+e = ξ - ξ_hat with the true ξ, n the sensors' error of it: the identifier sees ξ̃ = e + n.
+Euler: e⁺ = (I + Z) e + dt (f - f_hat + A_d n), Z = dt A_d.
+RK4, inputs held: e⁺ = R e + dt φ (f + A_d n) + dt (I - φ) ξ' - dt ∑ M_i f_hat_i over its stages,
+R = I + Z φ, φ = I + Z/2 + Z²/6 + Z³/24 = ∑ M_i.
+So |e| <= τ |n| + γ_f (sup|f| + |A_d| |n|) + γ_ξ sup|ξ'| + ∑ γ_i √n_h |W_i|, γ = dt ∑ |R^k .|.
+
+Weights: with q = ρ dt |ξ̃| <= 1 and μ = λ dt <= 1 the leakage of a step is a weighted mean, and
+the argument of `state_bound.py` goes through: |W_hat| stays below
+g' [c_z (1 + κ)/λ + c_ξ]/(ρ (1 - ε)) + c_z g' X/λ², κ = ε = 0 for Euler. RK4 has κ = μ² (z of an
+inner stage), ε = q (the leakage of one stage acts on the slope of another), and inner stages
+see |W| up to e_i = dt g' (c_z (1 + μ²) X/λ + c_ξ X) (0, 1/2, (1 + q/2)/2, 1 + q/2 + q²/4) beyond
+it, unless a projection keeps them. X bounds |ξ̃| at every stage. The same holds for V_hat.
+
+The start: ξ_hat at the first measurement, z = 0, |W_hat(0)| within the bound on W_hat: so weights
+that were learnt within the declared conditions may be resumed.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from identifier.gains import Gains
+from identifier.stability.disturbance import Disturbance
+from identifier.stability.loop import Law
+from identifier.stability.lyapunov import Matrix, peak_gain, power_norms
+from identifier.stability.state_bound import transient_peak
+
+NEWTON_STEPS = 100
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampledBounds:
+    """What the state of the running identifier never exceeds.
+
+    Parameters
+    ----------
+    xi_tilde : bound on |ξ̃| at every sample [U s].
+    stage : bound on |ξ̃| at the inner stages too [U s]; leakage acts with it.
+    W : bound on |W_hat| [U].
+    """
+
+    xi_tilde: float
+    stage: float
+    W: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ErrorGains:
+    """How large an error what acts on it can hold.
+
+    Parameters
+    ----------
+    start : τ, largest growth of an error that is left alone [-].
+    force : γ_f of the residual [s].
+    rate : γ_ξ of ξ' [s].
+    weights : γ_i of the force of the network at each stage [s].
+    inner : for stages 2 to 4, the factors on |ξ̃|, and on |A_ξ ξ + B_ξ u| and each f_hat before.
+    """
+
+    start: float
+    force: float
+    rate: float
+    weights: tuple[float, ...]
+    inner: tuple[tuple[float, float, tuple[float, ...]], ...] = ()
+
+
+def error_gains(A_d: Matrix, integrator: str, dt: float) -> ErrorGains:
+    """Return the gains of the error dynamics.
+
+    Parameters
+    ----------
+    A_d : (2, 2) error dynamics [1/s], which the step keeps stable.
+    integrator : "euler", "rk4" or "exact" (continuous time).
+    dt : sampling interval [s].
+    """
+    if integrator == "exact":
+        gamma = peak_gain(A_d)
+        return ErrorGains(start=transient_peak(A_d), force=gamma, rate=0.0, weights=(gamma,))
+    eye, Z = np.eye(2), dt * A_d
+    if integrator == "euler":
+        start, gamma = power_norms(eye + Z, eye)
+        return ErrorGains(start=start, force=dt * gamma, rate=0.0, weights=(dt * gamma,))
+    Z2, Z3 = Z @ Z, Z @ Z @ Z
+    phi = eye + Z / 2.0 + Z2 / 6.0 + Z3 / 24.0
+    R = eye + Z @ phi
+    stages = (  # what f_hat of each stage adds to the step, over -dt
+        (eye + Z + Z2 / 2.0 + Z3 / 4.0) / 6.0,
+        (2.0 * eye + Z + Z2 / 2.0) / 6.0,
+        (2.0 * eye + Z) / 6.0,
+        eye / 6.0,
+    )
+    inner = (  # ξ̃ of each stage = first ξ̃ - second dt known - third dt f_hat
+        (eye + Z / 2.0, eye / 2.0, (eye / 2.0,)),
+        (eye + Z / 2.0 + Z2 / 4.0, eye / 2.0 + Z / 4.0, (Z / 4.0, eye / 2.0)),
+        (
+            eye + Z + Z2 / 2.0 + Z3 / 4.0,
+            eye + Z / 2.0 + Z2 / 4.0,
+            (Z2 / 4.0, Z / 2.0, eye),
+        ),
+    )
+    return ErrorGains(
+        start=power_norms(R, eye)[0],
+        force=dt * power_norms(R, phi)[1],
+        rate=dt * power_norms(R, eye - phi)[1],
+        weights=tuple(dt * power_norms(R, M)[1] for M in stages),
+        inner=tuple(
+            (_norm(a), dt * _norm(b), tuple(dt * _norm(c) for c in cs)) for a, b, cs in inner
+        ),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Learning:
+    """How the weights of one layer are driven and leak.
+
+    Parameters
+    ----------
+    law : coefficients of z and ξ̃ in the driving error.
+    forgetting : λ [1/s].
+    leakage : ρ [1/(U s²)].
+    drive : g', what |driving error| moves the weights by.
+    dt : sampling interval [s]; 0 in continuous time.
+    staged : whether the step has inner stages (RK4).
+    """
+
+    law: Law
+    forgetting: float
+    leakage: float
+    drive: float
+    dt: float
+    staged: bool
+
+    def kept(self, X: float) -> float:
+        """Bound on the weights while |ξ̃| <= X; inf where the leakage of a step is too large.
+
+        Parameters
+        ----------
+        X : bound on |ξ̃| at every stage [U s].
+        """
+        (c_z, c_xi), lam = self.law, self.forgetting
+        if self.drive == 0.0:
+            return 0.0 if self.leakage * self.dt * X <= 1.0 else math.inf
+        q, mu = self.leakage * self.dt * X, lam * self.dt
+        if self.leakage == 0.0 or q > 1.0 or mu > 1.0 or (self.staged and q == 1.0):
+            return math.inf
+        late, weak = (mu**2, q) if self.staged else (0.0, 0.0)
+        balance = self.drive * (c_z * (1.0 + late) / lam + c_xi) / (self.leakage * (1.0 - weak))
+        return balance + c_z * self.drive * X / lam**2
+
+    def beyond(self, X: float) -> tuple[float, ...]:
+        """What inner stages may lie beyond the weights of the sample, one for each stage.
+
+        Parameters
+        ----------
+        X : bound on |ξ̃| at every stage [U s].
+        """
+        if not self.staged:
+            return (0.0,)
+        (c_z, c_xi), mu = self.law, self.forgetting * self.dt
+        q = self.leakage * self.dt * X
+        slope = self.dt * self.drive * X * (c_z * (1.0 + mu**2) / self.forgetting + c_xi)
+        return (0.0, slope / 2.0, slope * (1.0 + q / 2.0) / 2.0, slope * (1.0 + q / 2.0 + q**2 / 4))
+
+
+def output_layer(
+    gains: Gains, law: Law, direction: Matrix, *, n_h: int, integrator: str, dt: float
+) -> Learning:
+    """Return how W is driven: g' = η_W |D| √n_h.
+
+    Parameters
+    ----------
+    gains : of (8) to (12).
+    law : coefficients of z and ξ̃ in the driving error.
+    direction : (2, 2) D [s].
+    n_h : hidden units.
+    integrator : "euler", "rk4" or "exact".
+    dt : sampling interval [s].
+    """
+    return Learning(
+        law=law,
+        forgetting=gains.forgetting,
+        leakage=gains.rho_W,
+        drive=gains.eta_W * _norm(direction) * math.sqrt(n_h),
+        dt=0.0 if integrator == "exact" else dt,
+        staged=integrator == "rk4",
+    )
+
+
+def by_leakage(
+    error: ErrorGains, learning: Learning, A_d: Matrix, acting: Disturbance, n_h: int
+) -> SampledBounds | None:
+    """Return the bounds that leakage gives, or None where the circle does not close.
+
+    The smallest X >= F(X), F increasing and convex, by Newton from below.
+
+    Parameters
+    ----------
+    error : of `error_gains`.
+    learning : of `output_layer`.
+    A_d : (2, 2) error dynamics [1/s].
+    acting : what acts from outside.
+    n_h : hidden units.
+    """
+
+    def around(X: float) -> tuple[float, float, float]:
+        """Return what follows from |ξ̃| <= X: at samples, at stages, and of W."""
+        W = learning.kept(X)
+        forces = tuple(math.sqrt(n_h) * (W + more) for more in learning.beyond(X))
+        return *_error(error, A_d, acting, forces), W
+
+    X = around(0.0)[1]
+    for _ in range(NEWTON_STEPS):
+        if not math.isfinite(X):
+            return None
+        here, ahead = around(X)[1], around(X * (1.0 + 1e-7))[1]
+        slope = (ahead - here) / (1e-7 * X)
+        if not slope < 1.0:
+            return None
+        if here <= X * (1.0 + 1e-12):
+            break
+        X += (here - X) / (1.0 - slope)
+    X *= 1.0 + 1e-9
+    at_samples, at_stages, W = around(X)
+    if not at_stages <= X:
+        return None
+    return SampledBounds(xi_tilde=min(at_samples, X), stage=X, W=W)
+
+
+def by_projection(
+    error: ErrorGains, A_d: Matrix, acting: Disturbance, *, n_h: int, W_max: float
+) -> SampledBounds:
+    """Return the bounds while |W_hat| <= W_max at every stage: for any law and any gain.
+
+    Parameters
+    ----------
+    error : of `error_gains`.
+    A_d : (2, 2) error dynamics [1/s].
+    acting : what acts from outside.
+    n_h : hidden units.
+    W_max : radius of the projection (Frobenius) [U].
+    """
+    forces = (math.sqrt(n_h) * W_max,) * len(error.weights)
+    at_samples, at_stages = _error(error, A_d, acting, forces)
+    return SampledBounds(xi_tilde=at_samples, stage=at_stages, W=W_max)
+
+
+def _error(
+    error: ErrorGains, A_d: Matrix, acting: Disturbance, forces: tuple[float, ...]
+) -> tuple[float, float]:
+    """Bound |ξ̃| at the samples and at every stage, from |f_hat| of each stage."""
+    e = error.start * acting.noise + error.force * (acting.residual + _norm(A_d) * acting.noise)
+    e += error.rate * acting.rate
+    e += sum(gamma * force for gamma, force in zip(error.weights, forces, strict=True))
+    seen = e + acting.noise
+    stages = [
+        grown * seen + held * acting.known + sum(c * f for c, f in zip(cs, forces, strict=False))
+        for grown, held, cs in error.inner
+    ]
+    return seen, max([seen, *stages])
+
+
+def _norm(matrix: Matrix) -> float:
+    return float(np.linalg.norm(matrix, 2))
