@@ -2,6 +2,8 @@
 
 import argparse
 import json
+import math
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,6 @@ from identifier.defaults import (
     BANDWIDTH,
     LAWS,
     PHASE_MARGIN,
-    Driving,
     default_design,
     design_for,
     natural_driving,
@@ -19,10 +20,11 @@ from identifier.defaults import (
 )
 from identifier.design import Design
 from identifier.design_file import design_text, read_design
+from identifier.driving import Driving
 from identifier.identify import identify
 from identifier.methods import DEFAULT
 from identifier.stability import Certificate, DesignError
-from identifier.stability.monte_carlo import Observed, monte_carlo
+from identifier.stability.monte_carlo import Beginning, Observed, monte_carlo
 from models.files import write_atomically
 from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
@@ -33,6 +35,16 @@ from tireid.output import OutputError
 from tireid.progress import Stopwatch, say
 
 FAILS = 1
+CONDITIONS = {  # field of the declared driving, and the option that says otherwise
+    "v_x": "speed",
+    "slip": "slip",
+    "friction": "friction",
+    "bandwidth": "bandwidth",
+    "noise_v_x": "noise_v_x",
+    "noise_v_y": "noise_v_y",
+    "noise_r": "noise_r",
+    "noise_delta": "noise_delta",
+}
 
 
 def add_parser(commands: Any) -> None:
@@ -60,6 +72,10 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("--speed", type=float, metavar="M/S", help="(4 sqrt(g wheelbase))")
     parser.add_argument("--slip", type=float, metavar="RAD", help="largest (twice sliding)")
     parser.add_argument("--friction", type=float, metavar="MU", help="of the road (1)")
+    for signal, unit in (("v-x", "M/S"), ("v-y", "M/S"), ("r", "RAD/S"), ("delta", "RAD")):
+        parser.add_argument(
+            f"--noise-{signal}", type=float, metavar=unit, help=f"largest error of {signal}"
+        )
     parser.add_argument("--log", metavar="LOG[:RUN]", help="judge the loop along a recording too")
     parser.add_argument(
         "--monte-carlo",
@@ -90,18 +106,19 @@ def run(options: argparse.Namespace) -> int:
     """
     _require_sense(options)
     vehicle = sedan() if options.vehicle is None else Vehicle.from_toml(options.vehicle)
-    driving = _driving(options, vehicle)
-    design = _design(options, vehicle, driving)
+    stored = None if options.file is None else read_design(options.file)
+    driving = _driving(options, stored, vehicle)
+    design = _design(options, vehicle, driving) if stored is None else stored
     certificate = certificate_of(design, vehicle, driving)
     drive = _read(options.log, vehicle, design)  # everything is read before anything is said
     if options.design:
         _require_free(options)
-    observed = _drive(options, vehicle, driving, design)
+    observed = _drive(options, vehicle, driving, design, certificate)
     rows = [] if observed is None else bound_rows(certificate, observed)
-    passed = any(row.passed for row in rows)
+    passed = any(row.passed for row in rows) or (observed is not None and observed.diverged > 0)
     seed = options.seed or 0
     if options.json:
-        numbers = certificate.to_dict()
+        numbers = {"conditions": asdict(driving), **certificate.to_dict()}
         if observed is not None:
             numbers["monte_carlo"] = monte_carlo_numbers(rows, observed, seed)
         print(json.dumps(numbers, indent=2))
@@ -110,7 +127,7 @@ def run(options: argparse.Namespace) -> int:
         print(
             f"judged is the paper's law; {DEFAULT}, the default of tireid identify: not certified"
         )
-    print(_conditions(design, vehicle, driving))
+    print(_conditions(design, vehicle, driving, _said(options, design, driving)))
     print(certificate_text(certificate, design.force_unit))
     if drive is not None:
         print(_along(drive, vehicle, design))
@@ -148,6 +165,10 @@ def _require_sense(options: argparse.Namespace) -> None:
         value = getattr(options, name)
         if value is not None and not 0.0 < value < float("inf"):
             raise ValueError(f"--{name.replace('_', '-')} must be positive, it is {value:g}")
+    for name in ("noise_v_x", "noise_v_y", "noise_r", "noise_delta"):
+        value = getattr(options, name)
+        if value is not None and not 0.0 <= value < float("inf"):
+            raise ValueError(f"--{name.replace('_', '-')} must not be negative, it is {value:g}")
     if options.seed is not None and (options.monte_carlo is None or options.seed < 0):
         raise ValueError("--seed, not negative, goes with --monte-carlo")
     if options.monte_carlo is not None and options.monte_carlo < 1:
@@ -156,53 +177,76 @@ def _require_sense(options: argparse.Namespace) -> None:
         raise ValueError(f"--slip must be in rad and below 1, it is {options.slip:g}")
 
 
-def _driving(options: argparse.Namespace, vehicle: Vehicle) -> Driving:
-    natural = natural_driving(vehicle)
-    return Driving(
-        v_x=options.speed or natural.v_x,
-        slip=options.slip or natural.slip,
-        friction=options.friction or natural.friction,
-        bandwidth=options.bandwidth or natural.bandwidth,
-    )
+def _driving(options: argparse.Namespace, design: Design | None, vehicle: Vehicle) -> Driving:
+    """Return what the design declares, or what is natural for the car, with the options over it."""
+    declared = None if design is None else design.driving
+    return replace(declared or natural_driving(vehicle), **_overrides(options))
+
+
+def _overrides(options: argparse.Namespace) -> dict[str, float]:
+    given = {field: getattr(options, option) for field, option in CONDITIONS.items()}
+    return {field: value for field, value in given.items() if value is not None}
+
+
+def _said(options: argparse.Namespace, design: Design, driving: Driving) -> str:
+    """Return where the conditions come from."""
+    changed = ", ".join(f"--{CONDITIONS[field].replace('_', '-')}" for field in _overrides(options))
+    if options.file is None:
+        return "conditions: of the car" + (f", but for {changed}" if changed else "")
+    if design.driving is None:
+        told = "conditions: none stored in the design, those of the car"
+        return told + (f", but for {changed}" if changed else "")
+    if driving == design.driving:
+        return "conditions: as stored in the design"
+    return f"conditions: as stored in the design, but for {changed}: another verdict than the file's own"
 
 
 def _design(options: argparse.Namespace, vehicle: Vehicle, driving: Driving) -> Design:
-    if options.file is not None:
-        return read_design(options.file)
     law = options.law or "integral"
     if options.design:
         if law == "instantaneous_scaled":
             raise ValueError("--law instantaneous_scaled is a control, design one of the others")
         margin = options.phase_margin or PHASE_MARGIN
         return design_for(vehicle, driving, law=law, phase_margin=margin)
-    return default_design(vehicle, law=law)
+    return replace(default_design(vehicle, law=law), driving=driving)
 
 
 def _drive(
-    options: argparse.Namespace, vehicle: Vehicle, driving: Driving, design: Design
+    options: argparse.Namespace,
+    vehicle: Vehicle,
+    driving: Driving,
+    design: Design,
+    certificate: Certificate,
 ) -> Observed | None:
     """Run the random drives of --monte-carlo; None where there are none."""
     if options.monte_carlo is None:
         return None
     watch, count = Stopwatch(), options.monte_carlo
+    known = {entry.name: entry.value for entry in certificate.properties}
+    kept = min(known.get("weight_bound", math.inf), design.gains.W_max)
     return monte_carlo(
         design,
         vehicle,
-        natural_operation(design, vehicle, driving),
+        driving,
         count,
-        **driving._asdict(),
+        beginning=Beginning(
+            W=kept if math.isfinite(kept) else 0.0,
+            V=min(natural_operation(design, vehicle, driving).V_start, design.gains.V_max),
+        ),
         rng=np.random.default_rng(options.seed or 0),
         progress=lambda done: say(f"{done} of {count} random drives, {watch.seconds:.1f} s"),
     )
 
 
-def _conditions(design: Design, vehicle: Vehicle, driving: Driving) -> str:
+def _conditions(design: Design, vehicle: Vehicle, driving: Driving, said: str) -> str:
     gains = design.gains
     unit = unit_text("U", design.force_unit)
     rows = "; ".join(" ".join(f"{value:.4g}" for value in row) for row in gains.A_d)
     return (
         f"{vehicle.name} at {driving.v_x:.3g} m/s, slip up to {driving.slip:.3g} rad, friction "
-        f"{driving.friction:g}, steering up to {driving.bandwidth:g} Hz\n"
+        f"{driving.friction:g}, steering up to {driving.bandwidth:g} Hz; sensors err by up to "
+        f"{driving.noise_v_x:.3g} and {driving.noise_v_y:.3g} m/s, {driving.noise_r:.3g} rad/s, "
+        f"{driving.noise_delta:.3g} rad\n{said}\n"
         f"{design.law} law, {design.network.hidden} units, {design.integrator} at "
         f"{1e3 * design.dt:g} ms, forces in {unit}: A_d {rows}, lambda "
         f"{gains.forgetting:.4g}, eta_W {gains.eta_W:.4g}, eta_V {gains.eta_V:.4g}, rho_W "
@@ -254,9 +298,9 @@ def _proposal(
 
 def _given(options: argparse.Namespace) -> str:
     """Return the options that say which car drives how hard, as they were given."""
-    names = ("vehicle", "bandwidth", "speed", "slip", "friction")
+    names = ("vehicle", *CONDITIONS.values())
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
-    return "".join(f" --{name} {value}" for name, value in given.items())
+    return "".join(f" --{name.replace('_', '-')} {value}" for name, value in given.items())
 
 
 def _draw(

@@ -15,6 +15,7 @@ BOUNDS = (  # name in the certificate, what it bounds, and how a table calls it
     ("error_bound", "xi_tilde", "|xi - xi_hat|, by the leakage"),
     ("projection_bound", "xi_tilde", "|xi - xi_hat|, by the projection"),
     ("weight_bound", "W", "|W|, by the leakage"),
+    ("V_bound", "V", "|V|"),
 )
 
 
@@ -45,7 +46,7 @@ def bound_rows(certificate: Certificate, observed: Observed) -> list[Row]:
     known = {entry.name: entry for entry in certificate.properties}
     rows = []
     for name, what, title in BOUNDS:
-        if name in known:
+        if name in known and np.isfinite(known[name].value):
             seen: NDArray[np.float64] = getattr(observed, what)
             bound = known[name].value
             passed = int(np.count_nonzero(~(seen <= bound * (1.0 + TOLERANCE))))

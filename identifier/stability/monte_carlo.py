@@ -1,8 +1,9 @@
 """The proven bounds of a design against drives: how far does the identifier really go?
 
 Each drive has its own road, steering and initial weights; the identifier runs over all of them at
-once, one in each lane, and keeps nothing but the largest norms. Drives beyond what the certificate
-was given (slip, residual) are drawn anew, so that a bound that is passed is wrong.
+once, one in each lane, and keeps nothing but the largest norms. Sensors err as much as was declared.
+Only drives that break a declared condition (slip, speed, steering, yaw rate) are left out, so that a
+bound that is passed is wrong.
 """
 
 from collections.abc import Callable
@@ -15,9 +16,17 @@ from numpy.typing import NDArray
 
 from codegen import BatchScan
 from identifier.design import Design
-from identifier.stability.operation import Operation
-from identifier.stability.random_drives import Drives, random_drives, residuals, slips
+from identifier.driving import Driving
+from identifier.network import Weights
+from identifier.stability.random_drives import (
+    Drives,
+    measured,
+    random_drives,
+    residuals,
+    within,
+)
 from identifier.step import CARRY, GAINS, OVER, Structure, build_step
+from models.bicycle import bicycle
 from models.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -31,7 +40,8 @@ class Observed(NamedTuple):
     """What happened on N drives.
 
     xi_tilde, W, V : largest norm on each drive (N,) [U s], [U], [-]; not finite: diverged.
-    residual : sup|f| of each drive (N,) [U].   outside : drives that were left out.
+    residual : sup|f| of each drive, without noise (N,) [U].
+    outside : drives that were left out.
     """
 
     xi_tilde: Array
@@ -46,86 +56,108 @@ class Observed(NamedTuple):
         return int(np.count_nonzero(~np.isfinite(self.xi_tilde + self.W + self.V)))
 
 
+class Beginning(NamedTuple):
+    """Largest weights that a drive may begin with: |W_hat(0)| [U] and |V_hat(0)| [-]."""
+
+    W: float
+    V: float
+
+
 def monte_carlo(
     design: Design,
     vehicle: Vehicle,
-    operation: Operation,
+    driving: Driving,
     count: int,
     *,
-    v_x: float,
-    slip: float,
-    friction: float,
-    bandwidth: float,
+    beginning: Beginning,
     rng: np.random.Generator,
     progress: Callable[[int], None] = lambda _: None,
 ) -> Observed:
-    """Run the identifier over random drives that are no harder than its certificate was given.
+    """Run the identifier over random drives that keep what was declared.
 
     Parameters
     ----------
     design : the design.
     vehicle : the car as the identifier is told of it, and as it drives.
-    operation : what the certificate knows, among it the largest residual.
+    driving : the declared conditions.
     count : number of drives N.
-    v_x : speed [m/s].
-    slip : largest slip angle [rad].
-    friction : largest of the road.
-    bandwidth : highest frequency of steering [Hz].
-    rng : source of roads, steering and initial weights.
+    beginning : largest first weights; every second drive resumes with some W.
+    rng : source of roads, steering, noise and initial weights.
     progress : told after each part how many drives are done.
 
     Raises
     ------
     ValueError
-        Where hardly a drive keeps to what was judged.
+        Where hardly a drive keeps to what was declared.
     """
     size = max(FEWEST, count // 10)
     found: list[tuple[Array, ...]] = []
     done = outside = 0
     while done < count:
-        drawn = random_drives(
-            vehicle,
-            rng,
-            size,
-            v_x=v_x,
-            friction=friction,
-            bandwidth=bandwidth,
-            duration=DURATION,
-            dt=design.dt,
-        )
-        residual = np.linalg.norm(residuals(vehicle, drawn, design.dt), axis=2).max(axis=1)
-        residual = residual / design.force_unit
-        within = residual <= operation.residual_bound
-        within &= (np.abs(slips(vehicle, drawn)) <= slip).all(axis=(1, 2))
-        chosen = np.flatnonzero(within)[: count - done]
-        outside += int(np.count_nonzero(~within[: chosen[-1] + 1 if chosen.size else None]))
+        drawn = random_drives(vehicle, rng, size, driving=driving, duration=DURATION, dt=design.dt)
+        chosen = np.flatnonzero(within(vehicle, drawn, driving, design.dt))[: count - done]
+        last = chosen[-1] + 1 if chosen.size else size
+        outside += int(last - chosen.size)
         done += chosen.size
         if outside > TRIES * max(count, size):
             raise ValueError(
-                f"of {done + outside} drives only {done} kept to a slip of {slip:.3g} rad and "
-                f"{operation.residual_bound:.3g} U beyond the linear tire: judge harder driving"
+                f"of {done + outside} drives only {done} kept to a slip of {driving.slip:.3g} rad "
+                f"at {driving.v_x:.3g} m/s and {driving.bandwidth:.3g} Hz: judge harder driving"
             )
         if chosen.size:
             kept = Drives(*(values[chosen] for values in drawn))
-            found.append((*_largest(design, vehicle, kept, rng), residual[chosen]))
+            residual = np.linalg.norm(residuals(vehicle, kept, design.dt), axis=2).max(axis=1)
+            seen = measured(kept, driving, rng)
+            peaks = largest_norms(
+                design, vehicle, seen, first_weights(design, chosen.size, beginning, rng)
+            )
+            found.append((*peaks, residual / design.force_unit))
             progress(done)
     xi_tilde, W, V, residual = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return Observed(xi_tilde, W, V, residual, outside)
 
 
-def _largest(
-    design: Design, vehicle: Vehicle, drives: Drives, rng: np.random.Generator
-) -> tuple[Array, ...]:
-    """Return the largest norms of ξ̃, W and V on each drive; every drive begins with its own V."""
+def first_weights(
+    design: Design, count: int, beginning: Beginning, rng: np.random.Generator
+) -> Weights:
+    """Return first weights of N drives: W (N, 2, n_h), zero on every second, and V (N, n_h, n_in).
+
+    Parameters
+    ----------
+    design : the design.
+    count : number of drives N.
+    beginning : largest weights.
+    rng : source of randomness.
+    """
+    V = np.stack([design.network.initial_weights(rng).V for _ in range(count)])
+    W = rng.standard_normal((count, 2, design.network.hidden))
+    share = rng.random(count) * (np.arange(count) % 2)
+    W *= (share * beginning.W / np.linalg.norm(W, axis=(1, 2)))[:, None, None]
+    V *= np.minimum(1.0, beginning.V / np.linalg.norm(V, axis=(1, 2)))[:, None, None]
+    return Weights(W=W, V=V)
+
+
+def largest_norms(
+    design: Design, vehicle: Vehicle, drives: Drives, weights: Weights
+) -> tuple[Array, Array, Array]:
+    """Return the largest norms of ξ̃, W and V on each drive, (N,) each.
+
+    Parameters
+    ----------
+    design : the design.
+    vehicle : the car.
+    drives : as measured; the observer begins at the first sample.
+    weights : of each drive to begin with.
+    """
     count, n = drives.v_x.shape
-    start = [design.network.initial_weights(rng) for _ in range(count)]
+    K_inv = np.array(ca.DM(bicycle(vehicle.bicycle, 1.0).K_inv)) / design.force_unit
     record = _batch(design.structure)(
         n,
         {
-            "xi_hat": np.zeros(2),
+            "xi_hat": drives.x[:, 0] @ K_inv.T,
             "z": np.zeros(2),
-            "W": start[0].W,
-            "V": np.stack([weights.V for weights in start]),
+            "W": weights.W,
+            "V": weights.V,
             "x": drives.x,
             "u": drives.u,
             "v_x": drives.v_x[:, :, None],
@@ -136,13 +168,16 @@ def _largest(
             **dict.fromkeys(PEAKS, np.zeros(())),
         },
     )
-    return tuple(record[f"{name}_final"].reshape(count) for name in PEAKS)
+    xi_tilde, W, V = (record[f"{name}_final"].reshape(count) for name in PEAKS)
+    return xi_tilde, W, V
 
 
 @cache
 def _batch(structure: Structure) -> BatchScan:
     step = with_peaks(build_step(structure))
-    return BatchScan(step, carry=(*CARRY, *PEAKS), over=OVER, lanes_over=("V", *OVER))
+    return BatchScan(
+        step, carry=(*CARRY, *PEAKS), over=OVER, lanes_over=("xi_hat", "W", "V", *OVER)
+    )
 
 
 def with_peaks(step: ca.Function) -> ca.Function:

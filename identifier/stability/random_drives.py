@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import BatchScan
+from identifier.driving import SPEED_SPREAD, Driving
+from identifier.stability.driving_limits import declared_signals, largest_steering_rate
 from models.bicycle import BicycleParameters, bicycle, slip_angles
 from models.vehicle import GRAVITY, Vehicle
 
@@ -20,7 +22,6 @@ Array = NDArray[np.float64]
 SUBSTEPS = 10  # of the plant in a sample
 HARD = (0.6, 1.3)  # lateral acceleration that is asked of the linear car, over friction x g
 UNDERSTEER = 0.05  # rad/g, up to which steering makes up for it
-SPEED_SHARE = 0.05  # of the speed, by which it swings
 
 
 class Drives(NamedTuple):
@@ -54,37 +55,50 @@ def random_drives(
     rng: np.random.Generator,
     count: int,
     *,
-    v_x: float,
-    friction: float,
-    bandwidth: float,
+    driving: Driving,
     duration: float,
     dt: float,
 ) -> Drives:
-    """Return drives straight from rest in the car's frame (v_y = r = 0), some beyond its limits.
+    """Return drives straight from rest in the car's frame (v_y = r = 0), some beyond what is declared.
 
     Parameters
     ----------
     vehicle : the car.
     rng : source of randomness.
     count : number of drives N.
-    v_x : speed [m/s], about which it swings.
-    friction : largest friction of the road; each drive has one from 0.3 times that on.
-    bandwidth : highest frequency of steering [Hz].
+    driving : how hard; each drive has a friction from 0.3 times the declared one on.
     duration : of a drive [s].
     dt : sampling interval [s].
     """
     n = round(duration / dt)
     t: Array = np.arange(n, dtype=np.float64) * dt
-    road = friction * rng.uniform(0.3, 1.0, count)
-    lateral = road * GRAVITY * rng.uniform(*HARD, count)
-    peak = vehicle.wheelbase * lateral / v_x**2
+    road = driving.friction * rng.uniform(0.3, 1.0, count)
+    stiffness = np.array([vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear])
+    slips_at = driving.slip * float((stiffness / np.array(vehicle.axle_loads)).min())  # in g
+    lateral = np.minimum(road, slips_at) * GRAVITY * rng.uniform(*HARD, count)
+    peak = vehicle.wheelbase * lateral / driving.v_x**2
     peak = peak + lateral / GRAVITY * rng.uniform(0.0, UNDERSTEER, count)
-    highest = bandwidth * rng.uniform(0.3, 1.0, count)
+    highest = driving.bandwidth * rng.uniform(0.3, 1.0, count)
     u = np.array(
         [smooth_steering(rng, t, highest=h, peak=p) for h, p in zip(highest, peak, strict=True)]
     )
     swing = np.sin(2 * np.pi * np.outer(rng.uniform(0.05, 0.1, count), t))
-    speed = v_x * (1.0 + SPEED_SHARE * swing)
+    speed = driving.v_x * (1.0 + SPEED_SPREAD * swing)
+    return driven(vehicle, u, speed, road, dt)
+
+
+def driven(vehicle: Vehicle, u: Array, speed: Array, road: Array, dt: float) -> Drives:
+    """Drive the bicycle on saturating tires from v_y = r = 0.
+
+    Parameters
+    ----------
+    vehicle : the car.
+    u : steering (N, n, 2) [rad].
+    speed : v_x (N, n) [m/s].
+    road : friction (N,).
+    dt : sampling interval [s].
+    """
+    count, n = speed.shape
     record = _plant()(
         n,
         {
@@ -98,6 +112,56 @@ def random_drives(
         keep=range(n),
     )
     return Drives(speed, record["x"], u)
+
+
+def within(vehicle: Vehicle, drives: Drives, driving: Driving, dt: float) -> NDArray[np.bool_]:
+    """Return which drives keep every declared condition but the friction, which is the road's, (N,).
+
+    Parameters
+    ----------
+    vehicle : the car.
+    drives : what it drove.
+    driving : what was declared.
+    dt : sampling interval [s].
+    """
+    most, rates = declared_signals(vehicle, driving), largest_steering_rate(vehicle, driving)
+    speed = driving.v_x * (1.0 + SPEED_SPREAD * (1.0 + 1e-9))
+    slowest = driving.v_x * (1.0 - SPEED_SPREAD * (1.0 + 1e-9))
+    kept = (np.abs(slips(vehicle, drives)) <= driving.slip).all(axis=(1, 2))
+    kept &= ((drives.v_x <= speed) & (drives.v_x >= slowest)).all(axis=1)
+    kept &= (np.abs(np.diff(drives.v_x)) <= driving.friction * GRAVITY * dt).all(axis=1)
+    for values, names in ((drives.x, ("v_y", "r")), (drives.u, ("delta_f", "delta_r"))):
+        kept &= (np.abs(values) <= [most[name] for name in names]).all(axis=(1, 2))
+    moved = np.abs(np.diff(drives.u, axis=1)) / dt
+    kept &= (moved <= rates).all(axis=(1, 2))
+    return np.asarray(kept)
+
+
+def measured(drives: Drives, driving: Driving, rng: np.random.Generator) -> Drives:
+    """Return what sensors within the declared errors tell of the drives.
+
+    On each drive their errors are white, or as large as declared with a sign that stays, that
+    turns at every sample, or that turns at random.
+
+    Parameters
+    ----------
+    drives : the true signals.
+    driving : what was declared.
+    rng : source of randomness.
+    """
+    count, n = drives.v_x.shape
+    kind = rng.integers(0, 4, count)[:, None, None]
+    sign = np.where(rng.random((count, 1, 5)) < 0.5, -1.0, 1.0)
+    turning = np.where(np.arange(n) % 2 == 0, 1.0, -1.0)[None, :, None]
+    white = rng.uniform(-1.0, 1.0, (count, n, 5))
+    pattern = np.choose(
+        kind, [white, sign + 0.0 * white, sign * turning + 0.0 * white, np.sign(white)]
+    )
+    size = (driving.noise_v_x, driving.noise_v_y, driving.noise_r, *(driving.noise_delta,) * 2)
+    errors = pattern * np.array(size)
+    return Drives(
+        drives.v_x + errors[..., 0], drives.x + errors[..., 1:3], drives.u + errors[..., 3:]
+    )
 
 
 def residuals(vehicle: Vehicle, drives: Drives, dt: float) -> Array:
