@@ -47,7 +47,7 @@ class Driving:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            lowest = 0.0 <= value if field.name.startswith("noise") else 0.0 < value
+            lowest = value >= 0.0 if field.name.startswith("noise") else value > 0.0
             if not (lowest and math.isfinite(value)):
                 rule = "not be negative" if field.name.startswith("noise") else "be positive"
                 raise ValueError(f"{field.name} must {rule} and finite, it is {value}")

@@ -3,8 +3,9 @@
 import math
 from collections.abc import Sequence
 
-from identifier.defaults import Driving, natural_operation
+from identifier.defaults import natural_operation
 from identifier.design import Design
+from identifier.driving import Driving
 from identifier.laws import DRIVING_ERRORS
 from identifier.stability import Certificate, Property, certify
 from models.vehicle import Vehicle

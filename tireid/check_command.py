@@ -198,7 +198,7 @@ def _said(options: argparse.Namespace, design: Design, driving: Driving) -> str:
         return told + (f", but for {changed}" if changed else "")
     if driving == design.driving:
         return "conditions: as stored in the design"
-    return f"conditions: as stored in the design, but for {changed}: another verdict than the file's own"
+    return f"conditions: as stored in the design, but for {changed}: not the file's own verdict"
 
 
 def _design(options: argparse.Namespace, vehicle: Vehicle, driving: Driving) -> Design:

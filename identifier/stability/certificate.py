@@ -43,7 +43,7 @@ def certify(gains: Gains, driving_error: DrivingError, operation: Operation) -> 
     """
     law, D = linear_law(driving_error, gains.lead), direction_matrix(driving_error, gains.matrix)
     proven = proven_bounds(gains, law, operation, D)
-    W, loop, margins = judged_loop(gains, law, operation, D, proven.W)
+    W, _, margins = judged_loop(gains, law, operation, D, proven.W)
     return Certificate(
         properties=(
             *dynamics_checks(gains, operation),

@@ -1,9 +1,9 @@
 """The proven bounds of a design against drives: how far does the identifier really go?
 
 Each drive has its own road, steering and initial weights; the identifier runs over all of them at
-once, one in each lane, and keeps nothing but the largest norms. Sensors err as much as was declared.
-Only drives that break a declared condition (slip, speed, steering, yaw rate) are left out, so that a
-bound that is passed is wrong.
+once, one in each lane, and keeps nothing but the largest norms. Sensors err as much as is declared.
+Only drives that break a declared condition (slip, speed, steering, yaw rate) are left out: a bound
+that is passed is wrong.
 """
 
 from collections.abc import Callable

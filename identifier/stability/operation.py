@@ -170,7 +170,7 @@ def proven_bounds(gains: Gains, law: Law, operation: Operation, direction: Matri
 
 def _unleaked(error: ErrorGains, learning: Learning, operation: Operation, A_d: Matrix) -> float:
     """Estimate |ξ̃| where nothing is proven: leakage of small steps, in continuous time."""
-    smooth = replace(learning, dt=0.0, staged=False)
+    smooth = replace(learning, dt=0.0)
     found = by_leakage(error, smooth, A_d, operation.disturbance, operation.n_h)
     return error.force * operation.disturbance.residual if found is None else found.stage
 

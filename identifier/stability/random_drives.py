@@ -42,7 +42,7 @@ def smooth_steering(rng: np.random.Generator, t: Array, *, highest: float, peak:
     highest : largest frequency [Hz].
     peak : largest angle of the front axle [rad].
     """
-    frequencies = rng.uniform(0.05, highest, 6)
+    frequencies = rng.uniform(min(0.05, highest / 2), highest, 6)
     sines = np.sin(2 * np.pi * np.outer(t, frequencies) + rng.uniform(0, 2 * np.pi, 6))
     wave = sines @ rng.standard_normal(6) * np.clip(t, 0.0, 1.0) ** 2
     rear = rng.choice([0.0, rng.uniform(-0.15, 0.15)])
@@ -59,7 +59,7 @@ def random_drives(
     duration: float,
     dt: float,
 ) -> Drives:
-    """Return drives straight from rest in the car's frame (v_y = r = 0), some beyond what is declared.
+    """Return drives straight from rest in the car's frame (v_y = r = 0), some of them too hard.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def driven(vehicle: Vehicle, u: Array, speed: Array, road: Array, dt: float) -> 
 
 
 def within(vehicle: Vehicle, drives: Drives, driving: Driving, dt: float) -> NDArray[np.bool_]:
-    """Return which drives keep every declared condition but the friction, which is the road's, (N,).
+    """Return which drives keep every condition but friction, the road's own, (N,).
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def measured(drives: Drives, driving: Driving, rng: np.random.Generator) -> Driv
     rng : source of randomness.
     """
     count, n = drives.v_x.shape
-    kind = rng.integers(0, 4, count)[:, None, None]
+    kind = np.asarray(rng.integers(0, 4, count))[:, None, None]
     sign = np.where(rng.random((count, 1, 5)) < 0.5, -1.0, 1.0)
     turning = np.where(np.arange(n) % 2 == 0, 1.0, -1.0)[None, :, None]
     white = rng.uniform(-1.0, 1.0, (count, n, 5))

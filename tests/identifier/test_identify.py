@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import solve_continuous_lyapunov
 
 from identifier.defaults import default_design
 from identifier.design import Design
@@ -39,6 +40,8 @@ def by_hand(recording, design, car):
         f_hat, xi_t = W @ sigma, xi - xi_hat
         error = {"integral": z, "instantaneous": xi_t, "pi_lead": z + g.lead * xi_t}[design.law]
         direction = np.linalg.inv(A_d).T @ error
+        if design.law == "pi_lead":  # along P of the Lyapunov equation, P = -A_d⁻ᵀ if symmetric
+            direction = -solve_continuous_lyapunov(A_d.T, -2.0 * np.eye(2)) @ error
         W_dot = -g.eta_W * np.outer(direction, sigma) - g.rho_W * np.linalg.norm(xi_t) * W
         V_dot = -g.eta_V * np.outer((1 - sigma**2) * (W.T @ direction), x_bar)
         V_dot -= g.rho_V * np.linalg.norm(xi_t) * V

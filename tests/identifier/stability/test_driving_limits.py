@@ -4,45 +4,103 @@ import numpy as np
 import pytest
 
 from identifier.defaults import default_design
+from identifier.driving import Driving
 from identifier.laws import DRIVING_ERRORS
 from identifier.stability import certify
-from identifier.stability.driving_limits import largest_signals, operation, residual_bound
+from identifier.stability.driving_limits import (
+    disturbance,
+    expected_residual,
+    largest_signals,
+    operation,
+    residual_bound,
+)
 from identifier.stability.estimated_input import minimal_decay
+from identifier.stability.random_drives import Drives, measured, random_drives, within
 
 HARD = {"v_x": 20.0, "slip": 0.12, "friction": 0.9}
+DRIVING = Driving(**HARD, bandwidth=0.5)
 
 
 def test_a_random_state_within_slip_and_grip_stays_within_the_signals(car):
     limits = largest_signals(car, **HARD)
     rng = np.random.default_rng(0)
     alpha = rng.uniform(-0.12, 0.12, (1000, 2))
-    r = rng.uniform(-1, 1, 1000) * 0.9 * 9.81 / 20.0
+    r = 1.5 * rng.uniform(-1, 1, 1000) * 0.9 * 9.81 / 20.0
     v_y = car.l_r * r - 20.0 * alpha[:, 1]  # the rear axle does not steer
     delta_f = alpha[:, 0] + (v_y + car.l_f * r) / 20.0
     for name, signal in (("v_y", v_y), ("r", r), ("delta_f", delta_f)):
         assert 0.8 * limits[name] < np.abs(signal).max() <= limits[name]
 
 
-def test_the_residual_is_what_is_left_of_the_linear_force_when_both_axles_slide(car):
-    sliding = 0.9 * car.mass * 9.81 / car.wheelbase * np.array([car.l_r, car.l_f])
-    linear = 0.12 * np.array([car.cornering_stiffness_front, car.cornering_stiffness_rear])
-    assert residual_bound(car, slip=0.12, friction=0.9) == pytest.approx(
-        np.linalg.norm(linear - sliding)
+def test_no_tire_between_none_and_twice_the_stated_stiffness_misses_more_than_the_bound(car):
+    """Magic curves of any friction and shape; those that slide late are the ones that counted."""
+    rng, C = np.random.default_rng(1), (car.cornering_stiffness_front, car.cornering_stiffness_rear)
+    bound, worst = residual_bound(car, slip=0.12), 0.0
+    for _ in range(300):
+        alpha, friction = rng.uniform(-0.12, 0.12, 2), rng.uniform(0.05, 1.2, 2)
+        shape, stiffer = rng.uniform(1.0, 1.9), rng.uniform(0.1, 2.0)
+        peak = friction * car.axle_loads
+        force = peak * np.sin(shape * np.arctan(stiffer * np.multiply(C, alpha) / (shape * peak)))
+        worst = max(worst, np.linalg.norm(force - np.multiply(C, alpha)))
+    assert 0.8 * bound < worst <= bound
+
+
+def test_a_smooth_tire_misses_force_long_before_it_slides(car):
+    """At half the slip of sliding nothing slides, and yet the linear tire is wrong."""
+    sliding = min(car.axle_loads) / max(car.cornering_stiffness_front, car.cornering_stiffness_rear)
+    missed = expected_residual(car, slip=0.5 * sliding, friction=1.0)
+    assert 0.0 < 100.0 < missed < residual_bound(car, slip=0.5 * sliding)
+    late = expected_residual(car, slip=0.12, friction=0.9)
+    slid = 0.12 * np.array([car.cornering_stiffness_front, car.cornering_stiffness_rear])
+    assert late == pytest.approx(np.linalg.norm(slid - 0.9 * np.array(car.axle_loads)), rel=0.05)
+
+
+def test_the_samples_of_drives_show_no_more_than_the_disturbance(car):
+    """Residual, ξ' and what the observer is told, of drives within the conditions, with noise."""
+    noisy = replace(
+        DRIVING, noise_v_x=0.1, noise_v_y=0.1, noise_r=0.01, noise_delta=0.002, bandwidth=1.2
     )
-    assert residual_bound(car, slip=0.01, friction=0.9) == 0.0
+    acting = disturbance(car, noisy, dt=0.02, unit=1000.0)
+    rng = np.random.default_rng(2)
+    drives = random_drives(car, rng, 64, driving=noisy, duration=8.0, dt=0.02)
+    kept = within(car, drives, noisy, 0.02)
+    assert kept.sum() > 10
+    drives = Drives(*(values[kept] for values in drives))
+    seen = measured(drives, noisy, rng)
+    K_inv = np.array([[1500.0 * 1.55, 2500.0], [1500.0 * 1.15, -2500.0]]) / 2.7 / 1000.0
+    xi = drives.x @ K_inv.T
+    rate = np.diff(xi, axis=1) / 0.02
+    lever = np.array([car.l_f, -car.l_r])
+    C = np.array([car.cornering_stiffness_front, car.cornering_stiffness_rear]) / 1000.0
+
+    def known(of):
+        alpha = of.u - (of.x[..., :1] + lever * of.x[..., 1:]) / of.v_x[..., None]
+        return alpha * C - np.stack([of.v_x * of.x[..., 1], 0 * of.v_x], axis=-1) @ K_inv.T
+
+    def largest(values):
+        return float(np.linalg.norm(values, axis=2).max())
+
+    # rate and known take both worst cases at once, which a drive does not: 0.15 of them is much
+    assert 0.3 * acting.residual < largest(rate - known(seen)[:, :-1]) <= acting.residual
+    assert 0.15 * acting.rate < largest(rate) <= acting.rate
+    assert 0.15 * acting.known < largest(known(seen)) <= acting.known
+    noise = largest((seen.x - drives.x) @ K_inv.T)
+    assert 0.9 * acting.noise < noise <= acting.noise * (1 + 1e-12)
 
 
 def test_the_operation_of_a_design_is_enough_for_its_certificate(car):
     for law in ("integral", "instantaneous_scaled"):
         design = default_design(car, law=law)
-        task = operation(design, car, **HARD, bandwidth=0.5)
+        task = operation(design, car, DRIVING)
         certificate = certify(design.gains, DRIVING_ERRORS[design.law], task)
         assert certificate["gain_sampled"].margin > 1.0
-        assert certificate["error_dynamics"].value == pytest.approx(-design.gains.A_d[0][0])
+        a = -design.gains.A_d[0][0]
+        decay = -np.log(1.0 - 0.01 * a) / 0.01  # of Euler at 10 ms
+        assert certificate["error_dynamics"].value == pytest.approx(decay)
 
 
 def test_a_network_that_reads_the_estimate_brings_its_feedback_along(car):
     design = replace(default_design(car), input_source="estimated")
-    task = operation(design, car, **HARD, bandwidth=0.5)
+    task = operation(design, car, DRIVING)
     assert task.input_feedback is not None
     assert 5.0 < minimal_decay(task.input_feedback) < 12.0

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from identifier.stability.disturbance import Disturbance
 from identifier.stability.gain_design import DesignError, design_gains, gain_for_phase_margin
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, euler, exact
 from identifier.stability.margins import phase_margin
@@ -13,7 +14,8 @@ TASK = {
     "dt": 0.01,
     "n_h": 10,
     "x_bar_max": 2.5,
-    "residual_bound": 4.0,
+    "disturbance": Disturbance(residual=4.0),
+    "needed_force": 4.0,
     "V_max": 12.0,
 }
 
@@ -24,7 +26,8 @@ def operation(**changes):
         "dt": 0.01,
         "integrator": "euler",
         "bandwidth": 0.7,
-        "residual_bound": 4.0,
+        "disturbance": Disturbance(residual=4.0),
+        "needed_force": 4.0,
         "x_bar_max": 2.5,
         "input_feedback": None,
         "W_M": 3.0,
@@ -58,7 +61,8 @@ def test_a_phase_margin_below_that_of_every_gain_is_refused():
 def test_a_design_keeps_its_phase_margin_at_the_worst_regressor_with_both_layers_learning(law):
     design = design_gains(law=law, **TASK, phase_margin=55.0)
     assert design.gains.eta_V > 0.0
-    loop = worst_loop(design.gains, law, operation())
+    direction = -np.linalg.inv(design.gains.matrix)
+    loop = worst_loop(design.gains, law, operation(), direction, design.bounds.W)
     assert phase_margin(loop, euler, 0.01) == pytest.approx(55.0, abs=1e-6)
     assert loop.G[0, 0] == pytest.approx(design.loop_gain)
 

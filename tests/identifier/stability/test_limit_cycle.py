@@ -6,12 +6,19 @@ from identifier.stability.gain_limit import (
     integral_euler_limit,
     integral_limit,
 )
-from identifier.stability.limit_cycle import NoLimitCycleError, limit_cycle, sampled_limit_cycle
+from identifier.stability.limit_cycle import (
+    NoLimitCycleError,
+    _line_leak,
+    _sampled,
+    limit_cycle,
+    sampled_limit_cycle,
+)
 
 
 def simulated(a, lam, g, rho, dt, duration=150.0):
     """Mean |ξ̃| and frequency [rad/s] of the loop with its leakage, stepped with Euler."""
-    xi, z, p = np.zeros(2), np.zeros(2), np.array([0.1, 0.03])
+    # not all along one line: from such a start no orbit but the line can ever be reached
+    xi, z, p = np.zeros(2), np.array([0.0, 0.02]), np.array([0.1, 0.03])
     errors = np.empty((round(duration / dt), 2))
     for k in range(len(errors)):
         errors[k] = xi
@@ -28,7 +35,15 @@ def simulated(a, lam, g, rho, dt, duration=150.0):
 
 
 @pytest.mark.parametrize(
-    ("a", "lam", "beyond"), [(7.0, 5.0, 1.3), (3.0, 8.5, 2.8), (9.0, 3.0, 2.0)]
+    ("a", "lam", "beyond"),
+    [
+        (7.0, 5.0, 1.3),
+        (3.0, 8.5, 2.8),
+        (9.0, 5.0, 2.0),
+        (6.0, 0.6, 3.0),
+        (6.0, 1.2, 1.5),
+        (9.0, 2.5, 2.0),
+    ],
 )
 def test_the_limit_cycle_of_the_sampled_loop_is_that_of_the_harmonic_balance(a, lam, beyond):
     dt, rho = 0.01, 0.7
@@ -37,6 +52,16 @@ def test_the_limit_cycle_of_the_sampled_loop_is_that_of_the_harmonic_balance(a, 
     cycle = sampled_limit_cycle(a=a, lam=lam, g=g, rho_W=rho, dt=dt)
     assert amplitude == pytest.approx(cycle.amplitude, rel=0.02)
     assert frequency == pytest.approx(cycle.frequency, rel=0.01)
+
+
+def test_where_the_filter_forgets_slowly_the_error_goes_round_a_circle_and_not_along_a_line():
+    a, lam, rho, dt = 6.0, 0.6, 0.7, 0.01
+    g = 3.0 * integral_euler_limit(a, lam, dt)
+    amplitude, _ = simulated(a, lam, g, rho, dt)
+    line = _sampled(_line_leak, a, lam, g, rho, dt)
+    assert amplitude > 1.12 * line.amplitude
+    m = sampled_limit_cycle(a=a, lam=lam, g=g, rho_W=rho, dt=1e-5).leakage
+    assert a * (m + a) * (m + lam) * (a + lam) == pytest.approx(g, rel=1e-3)
 
 
 def test_a_circular_error_would_have_a_smaller_amplitude_than_the_one_that_is_seen():

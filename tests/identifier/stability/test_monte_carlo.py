@@ -13,7 +13,12 @@ from identifier.identify import identify
 from identifier.network import Weights
 from identifier.network_model import NetworkModel
 from identifier.stability import monte_carlo as module
-from identifier.stability.monte_carlo import monte_carlo
+from identifier.stability.monte_carlo import (
+    Beginning,
+    first_weights,
+    largest_norms,
+    monte_carlo,
+)
 from identifier.stability.random_drives import (
     Drives,
     random_drives,
@@ -27,7 +32,7 @@ from models.vehicle import sedan
 
 CAR = sedan()
 DRIVING = natural_driving(CAR)
-COUNT = 12
+COUNT, FRESH = 12, Beginning(W=0.0, V=13.0)
 
 
 def draw(seed=3, dt=0.01):
@@ -35,9 +40,7 @@ def draw(seed=3, dt=0.01):
         CAR,
         np.random.default_rng(seed),
         COUNT,
-        v_x=DRIVING.v_x,
-        friction=DRIVING.friction,
-        bandwidth=DRIVING.bandwidth,
+        driving=DRIVING,
         duration=8.0,
         dt=dt,
     )
@@ -72,10 +75,10 @@ def learnt_alone(design: Design, drives: Drives, weights: Weights, i: int) -> Hi
 @pytest.mark.parametrize("law", ["integral", "instantaneous", "pi_lead"])
 def test_the_largest_norms_are_those_of_the_same_run_alone(drives, law):
     design = default_design(CAR, law=law)
-    found = module._largest(design, CAR, drives, np.random.default_rng(8))
-    rng = np.random.default_rng(8)
+    begun = first_weights(design, COUNT, Beginning(W=3.0, V=12.0), np.random.default_rng(8))
+    found = largest_norms(design, CAR, drives, begun)
     for i in range(COUNT):
-        weights = design.network.initial_weights(rng)
+        weights = Weights(W=begun.W[i], V=begun.V[i])
         history = learnt_alone(design, drives, weights, i)
         expected = (
             np.linalg.norm(history.told["xi_tilde"], axis=1).max(),
@@ -88,8 +91,7 @@ def test_the_largest_norms_are_those_of_the_same_run_alone(drives, law):
 def test_what_is_not_a_number_shows_in_the_end():
     design = default_design(CAR)
     wild = replace(design, gains=replace(design.gains, eta_W=1e9, rho_W=0.0, rho_V=0.0))
-    operation = natural_operation(design, CAR)
-    found = monte_carlo(wild, CAR, operation, 20, **DRIVING._asdict(), rng=np.random.default_rng(0))
+    found = monte_carlo(wild, CAR, DRIVING, 20, beginning=FRESH, rng=np.random.default_rng(0))
     assert found.diverged > 0
 
 
@@ -121,25 +123,23 @@ def test_the_plant_is_a_magic_formula_that_saturates_at_the_friction():
 def test_drives_stay_within_what_is_judged():
     design = default_design(CAR)
     operation = natural_operation(design, CAR)
-    found = monte_carlo(
-        design, CAR, operation, 300, **DRIVING._asdict(), rng=np.random.default_rng(1)
-    )
+    found = monte_carlo(design, CAR, DRIVING, 300, beginning=FRESH, rng=np.random.default_rng(1))
     assert found.xi_tilde.shape == found.W.shape == found.residual.shape == (300,)
-    assert found.residual.max() <= operation.residual_bound
+    assert found.residual.max() <= operation.disturbance.residual
     assert found.outside > 0
     assert found.diverged == 0
 
 
 def test_the_same_seed_gives_the_same_drives_and_progress_reaches_the_end():
     design = default_design(CAR)
-    operation, told = natural_operation(design, CAR), []
+    told = []
     first, again = (
         monte_carlo(
             design,
             CAR,
-            operation,
+            DRIVING,
             40,
-            **DRIVING._asdict(),
+            beginning=FRESH,
             rng=np.random.default_rng(2),
             progress=told.append,
         )
@@ -156,9 +156,9 @@ def test_driving_that_hardly_a_drive_keeps_to_is_refused(monkeypatch):
         monte_carlo(
             design,
             CAR,
-            natural_operation(design, CAR),
+            replace(DRIVING, bandwidth=1e-3),
             5,
-            **DRIVING._replace(slip=1e-6)._asdict(),
+            beginning=FRESH,
             rng=np.random.default_rng(0),
         )
 

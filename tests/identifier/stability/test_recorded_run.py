@@ -5,8 +5,8 @@ import numpy as np
 from identifier.defaults import default_design, natural_operation
 from identifier.identify import identify
 from identifier.laws import DRIVING_ERRORS
-from identifier.stability.loop import linear_law
-from identifier.stability.operation import worst_loop
+from identifier.stability.loop import direction_matrix, linear_law
+from identifier.stability.operation import proven_bounds, worst_loop
 from identifier.stability.recorded_run import loop_along, network_inputs
 
 
@@ -28,8 +28,10 @@ def test_gain_along_a_run_is_the_formula_at_one_sample(car, drive):
 def test_no_recorded_regressor_is_worse_than_the_worst(car, drive):
     design = default_design(car)
     history = identify(drive(n=600), car, design)
-    law = linear_law(DRIVING_ERRORS[design.law])
-    worst = worst_loop(design.gains, law, natural_operation(design, car))
+    integral, task = DRIVING_ERRORS[design.law], natural_operation(design, car)
+    law, D = linear_law(integral), direction_matrix(integral, design.gains.matrix)
+    kept = proven_bounds(design.gains, law, task, D).W
+    worst = worst_loop(design.gains, law, task, D, kept)
     along = loop_along(history, design)
     assert along.gain.max() < np.linalg.eigvalsh(worst.G)[-1]
     assert along.radius.max() < 1.0 + 1e-9
