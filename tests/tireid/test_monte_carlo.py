@@ -1,6 +1,7 @@
 """`tireid check --monte-carlo` as a user meets it."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,13 @@ import pytest
 from identifier.stability import Certificate
 from identifier.stability.monte_carlo import Observed
 from identifier.stability.property import statement
+from identifier.defaults import default_design, natural_driving
+from identifier.design_file import design_text, read_design
+from identifier.driving import Driving
+from identifier.stability.monte_carlo import Beginning, Observed, monte_carlo
+from models.vehicle import sedan
 from tireid import check_command
+from tireid.certificate_table import certificate_of
 from tireid.cli import main
 from tireid.monte_carlo_table import bound_rows
 
@@ -92,15 +99,66 @@ def test_bad_words_are_one_line(words, complaint, capsys):
 
 
 def test_gains_of_which_nothing_is_proven_say_so(tmp_path, capsys):
-    from dataclasses import replace
-
-    from identifier.defaults import default_design
-    from identifier.design_file import design_text
-    from models.vehicle import sedan
-
     design = default_design(sedan())
     unproven = replace(design, gains=replace(design.gains, eta_W=6.0 * design.gains.eta_W))
     path = tmp_path / "design.toml"
     path.write_text(design_text(unproven))
     main(["check", str(path), "--monte-carlo", "20"])
     assert "nothing is proven of these gains" in capsys.readouterr().out
+
+
+def test_a_drive_that_diverges_fails_the_check_where_nothing_is_proven(tmp_path, capsys):
+    design = default_design(sedan())
+    gains = replace(design.gains, eta_W=1e9, rho_W=0.0, rho_V=0.0)
+    path = tmp_path / "design.toml"
+    path.write_text(design_text(replace(design, gains=gains)))
+    assert main(["check", str(path), "--monte-carlo", "20"]) == 1
+    told = capsys.readouterr().out
+    assert "nothing is proven" in told
+    assert "diverged on 0" not in told
+
+
+def test_divergence_alone_is_an_exit_code_of_one(monkeypatch, capsys):
+    """No row is there to be passed: the projection's certificate, and drives that blew up."""
+    monkeypatch.setattr(check_command, "bound_rows", lambda *_: [])
+    monkeypatch.setattr(check_command, "monte_carlo", lambda *_, **__: observed([0.5, np.inf]))
+    assert main(["check", "--monte-carlo", "2"]) == 1
+    monkeypatch.setattr(check_command, "monte_carlo", lambda *_, **__: observed([0.5, 0.5]))
+    assert main(["check", "--monte-carlo", "2"]) == 0
+    capsys.readouterr()
+
+
+def test_every_row_is_passed_by_a_law_that_breaks_what_it_bounds():
+    """The certificate of a sound design, beside drives of one whose layers do not leak."""
+    vehicle, design = sedan(), default_design(sedan())
+    driving = natural_driving(vehicle)
+    passed = {}
+    for name, changed in {
+        "error_bound": {"eta_W": 3e5, "rho_W": 0.0},
+        "weight_bound": {"eta_W": 3e5, "rho_W": 0.0},
+        "V_bound": {"eta_V": 3e3, "rho_V": 0.0},
+        "projection_bound": {"eta_W": 3e5, "rho_W": 0.0},
+    }.items():
+        kept = replace(design, gains=replace(design.gains, W_max=5.0, V_max=13.0))
+        told = kept if name == "projection_bound" else design
+        planted = replace(design, gains=replace(design.gains, **changed))
+        beginning = Beginning(W=0.0, V=12.0)
+        rng = np.random.default_rng(1)
+        seen = monte_carlo(planted, vehicle, driving, 30, beginning=beginning, rng=rng)
+        found = bound_rows(certificate_of(told, vehicle), seen)
+        passed[name] = {row.name: row.passed for row in found}[name]
+    assert min(passed.values()) > 0, passed
+
+
+def test_the_same_file_gives_the_same_verdict_and_options_are_said(tmp_path, capsys):
+    path = tmp_path / "design.toml"
+    words = ["--bandwidth", "0.5", "--slip", "0.09", "--noise-r", "0.02"]
+    assert main(["check", "--design", *words, "--out", str(path), "--json"]) == 0
+    there = json.loads(capsys.readouterr().out)
+    assert read_design(path).driving == Driving(**there["conditions"])
+    main(["check", str(path), "--json"])
+    assert json.loads(capsys.readouterr().out) == there
+    main(["check", str(path)])
+    assert "conditions: as stored in the design\n" in capsys.readouterr().out
+    main(["check", str(path), "--slip", "0.2"])
+    assert "as stored in the design, but for --slip" in capsys.readouterr().out

@@ -1,9 +1,15 @@
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
 
+from identifier import laws
+from identifier.gains import Gains
+from identifier.stability import Operation, certify
+from identifier.stability.disturbance import Disturbance
 from identifier.stability.drift import drift_frequency
-from identifier.stability.loop import INTEGRAL, Loop
+from identifier.stability.loop import INTEGRAL, Loop, direction_matrix
 from identifier.stability.lyapunov import lyapunov
 from identifier.stability.margins import gain_margin
 from identifier.stability.pi_lead import (
@@ -94,3 +100,45 @@ def test_with_skewed_error_dynamics_the_printed_direction_has_a_limit_even_with_
     passive = Loop(A_d=SKEWED, forgetting=3.0, law=law, G=np.eye(2), direction=pair.P)
     assert np.isfinite(gain_margin(printed).factor)
     assert gain_margin(passive).factor == np.inf
+
+
+def test_the_law_that_runs_goes_along_p_of_the_lyapunov_equation():
+    rng = np.random.default_rng(7)
+    for _ in range(50):
+        A_d = -rng.uniform(1.0, 8.0) * np.eye(2) + 2.0 * rng.standard_normal((2, 2))
+        if np.linalg.eigvals(A_d).real.max() > -0.1:
+            continue
+        P = direction_matrix(laws.pi_lead, A_d)
+        np.testing.assert_allclose(A_d.T @ P + P @ A_d, -2.0 * np.eye(2), atol=1e-10)
+        printed = direction_matrix(laws.integral, A_d)
+        np.testing.assert_allclose(A_d.T @ printed, -np.eye(2), atol=1e-10)
+
+
+def test_the_certificate_finds_no_gain_limit_of_the_lead_even_for_skewed_error_dynamics():
+    tau = 1.01 * lead_time(lyapunov(SKEWED, 2.0 * np.eye(2)), forgetting=3.0)
+    task = Operation(
+        n_h=4,
+        dt=0.001,
+        integrator="rk4",
+        bandwidth=0.5,
+        disturbance=Disturbance(residual=2.0),
+        needed_force=2.0,
+        x_bar_max=1.0,
+        input_feedback=None,
+        W_M=0.0,
+        w_bar=2.0,
+    )
+    gains = Gains(
+        A_d=tuple(map(tuple, SKEWED)),
+        forgetting=3.0,
+        eta_W=1.0,
+        eta_V=0.0,
+        rho_W=0.1,
+        rho_V=0.1,
+        lead=tau,
+    )
+    certificate = certify(gains, laws.pi_lead, task)
+    assert certificate["gain_continuous"].margin == np.inf
+    assert certificate["drift"].limit == np.inf
+    short = certify(replace(gains, lead=0.2 * tau), laws.pi_lead, task)
+    assert short["drift"].limit < np.inf

@@ -1,0 +1,196 @@
+"""The bounds of the identifier as it runs: what they cover, and what passes when it is left out."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.defaults import default_design, design_for, natural_driving, natural_operation
+from identifier.design import Design
+from identifier.gains import Gains, diagonal
+from identifier.integrators import rk4
+from identifier.laws import DRIVING_ERRORS
+from identifier.network import Network
+from identifier.stability import certify
+from identifier.stability.disturbance import Disturbance
+from identifier.stability.loop import INTEGRAL, Law, direction_matrix, linear_law
+from identifier.stability.monte_carlo import Beginning, largest_norms, monte_carlo
+from identifier.stability.operation import proven_bounds
+from identifier.stability.random_drives import measured, random_drives, within
+from identifier.stability.sampled_bound import by_leakage, by_projection, error_gains, output_layer
+from identifier.stability.state_bound import state_bounds
+from identifier.step import GAINS, build_step
+from models.vehicle import sedan
+
+CAR = sedan()
+DRIVING = natural_driving(CAR)
+SKEWED = np.array([[-6.0, 4.0], [-1.0, -9.0]])
+
+
+def judged(design):
+    return certify(design.gains, DRIVING_ERRORS[design.law], natural_operation(design, CAR))
+
+
+def bounds_of(design, driving=None):
+    law = DRIVING_ERRORS[design.law]
+    D = direction_matrix(law, design.gains.matrix)
+    task = natural_operation(design, CAR, driving)
+    return proven_bounds(design.gains, linear_law(law, design.gains.lead), task, D)
+
+
+@pytest.mark.parametrize("A_d", [-6.0 * np.eye(2), SKEWED])
+@pytest.mark.parametrize("law", [INTEGRAL, Law(0.0, 1.0), Law(1.0, 0.2)])
+def test_without_noise_euler_has_the_bounds_of_the_closed_form(A_d, law):
+    gains = Gains(
+        A_d=tuple(map(tuple, A_d)), forgetting=5.0, eta_W=40.0, eta_V=0.0, rho_W=2.0, rho_V=0.0
+    )
+    D, acting = -np.linalg.inv(A_d).T, Disturbance(residual=6.0)
+    learning = output_layer(gains, law, D, n_h=4, integrator="euler", dt=0.01)
+    found = by_leakage(error_gains(A_d, "euler", 0.01), learning, A_d, acting, 4)
+    numbers = {"law": law, "forgetting": 5.0, "eta_W": 40.0, "rho_W": 2.0, "n_h": 4}
+    expected = state_bounds(A_d, **numbers, residual_bound=6.0, dt=0.01)
+    assert found.xi_tilde == pytest.approx(expected.xi_tilde, rel=1e-6)
+    assert pytest.approx(expected.W, rel=1e-6) == found.W
+
+
+def test_the_gains_of_rk4_are_those_of_its_own_step():
+    """Each stage's force, alone and of one sign for ever, holds the error that its gain says."""
+    A_d, dt = np.array([[-7.0, 0.0], [0.0, -7.0]]), 0.02
+    gains = error_gains(A_d, "rk4", dt)
+    for stage, gamma in enumerate(gains.weights):
+        e = np.zeros(2)
+        for _ in range(2000):
+            calls = iter(range(4))
+
+            def rate(state, calls=calls, stage=stage):
+                return [A_d @ state[0] + (next(calls) == stage) * np.array([1.0, 0.0])]
+
+            (e,) = rk4(rate, [e], dt)
+        assert e[0] == pytest.approx(gamma, rel=1e-9)
+    assert sum(gains.weights) == pytest.approx(gains.force, rel=1e-9)
+
+
+def test_rk4_with_held_inputs_errs_by_what_the_car_moves_on():
+    """No residual at all: A_ξ ξ + B_ξ u is ξ' exactly, and yet the estimate is late."""
+    a, dt, slope = 20.0, 0.01, 3.0  # kN
+    gains = Gains(A_d=diagonal(a), forgetting=5.0, eta_W=0.0, eta_V=0.0, rho_W=0.0, rho_V=0.0)
+    design = Design(gains=gains, network=Network(hidden=2), integrator="rk4", dt=dt)
+    step = build_step(design.structure)
+    numbers = np.array([getattr(gains, name) for name in GAINS])
+    K = np.array([[1 / CAR.mass] * 2, [CAR.l_f / CAR.yaw_inertia, -CAR.l_r / CAR.yaw_inertia]])
+    C = np.array([CAR.cornering_stiffness_front, CAR.cornering_stiffness_rear])
+    xi_hat, errors, v_x = np.zeros(2), [], 20.0
+    lever = np.array([CAR.l_f, -CAR.l_r])
+    for k in range(150):
+        x = K @ np.array([slope, slope]) * 1e3 * k * dt  # ξ' = (3, 3) kN
+        alpha_force = np.array([slope, slope]) * 1e3 + np.linalg.inv(K) @ [v_x * x[1], 0.0]
+        u = alpha_force / C + (x[0] + lever * x[1]) / v_x
+        out = step(
+            xi_hat, [0, 0], np.zeros((2, 2)), np.zeros((2, 4)), x, u, v_x,
+            np.array(CAR.bicycle), gains.matrix, numbers, [dt, 1e3, 1.0],
+        )  # fmt: skip
+        xi_hat = np.array(out[0]).ravel()
+        errors.append(float(np.linalg.norm(np.array(out[6]))))
+    reach = error_gains(gains.matrix, "rk4", dt).rate * np.hypot(slope, slope)
+    assert errors[-1] == pytest.approx(reach, rel=1e-6)
+    assert reach > 0.09 * np.hypot(slope, slope) * dt * 1.0  # a dt/2 = 0.1 of a sample
+
+
+def test_inner_stages_of_rk4_are_projected():
+    seen = []
+
+    def rate(state):
+        seen.append(abs(state[0]))
+        return [100.0]
+
+    def ball(state):
+        return [min(state[0], 1.0)]
+
+    rk4(rate, [0.5], 0.1, ball)
+    assert max(seen) == 1.0
+    rk4(rate, [0.5], 0.1)
+    assert max(seen) > 5.0
+
+
+@pytest.mark.parametrize("integrator", ["euler", "rk4"])
+@pytest.mark.parametrize("law", ["integral", "instantaneous", "pi_lead"])
+def test_no_drive_passes_a_bound_with_noise_resumed_weights_and_a_high_gain(law, integrator):
+    design = design_for(CAR, DRIVING, law=law, integrator=integrator)
+    gains = replace(design.gains, eta_W=1.5 * design.gains.eta_W, rho_W=1.5 * design.gains.rho_W)
+    coupled = ((gains.A_d[0][0], 3.0), (-1.0, gains.A_d[1][1]))
+    projected = replace(gains, W_max=4.0, V_max=9.0, eta_W=1e3 * gains.eta_W, A_d=coupled)
+    for numbers in (gains, projected):
+        wild = replace(design, gains=numbers)
+        found = bounds_of(wild)
+        assert np.isfinite([found.xi_tilde, found.W, found.V]).all()
+        seen = monte_carlo(
+            wild, CAR, DRIVING, 64, beginning=Beginning(W=found.W, V=9.0),
+            rng=np.random.default_rng(5),
+        )  # fmt: skip
+        for values, bound in (
+            (seen.xi_tilde, found.xi_tilde),
+            (seen.W, found.W),
+            (seen.V, found.V),
+        ):
+            assert 0.02 * bound < values.max() <= bound * (1.0 + 1e-9)
+
+
+def test_a_V_layer_that_leaks_more_than_itself_in_a_sample_fails_and_diverges():
+    design = default_design(CAR)
+    planted = replace(design, gains=replace(design.gains, rho_V=3000.0))
+    certificate = judged(planted)
+    assert certificate["leakage_step_V"].status == "fail"
+    assert judged(design).verdict == "pass"
+    seen = monte_carlo(
+        planted, CAR, DRIVING, 40, beginning=Beginning(0.0, 12.0), rng=np.random.default_rng(1)
+    )
+    assert not (seen.V < 1e6).all()
+    factor = float(certificate["leakage_step_V"].advice.split()[2].rstrip(","))
+    mended = replace(design, gains=replace(design.gains, rho_V=0.99 * factor))
+    assert judged(mended)["leakage_step_V"].status == "pass"
+
+
+def test_a_filter_that_forgets_more_than_itself_in_a_sample_fails():
+    design = default_design(CAR)
+    certificate = judged(replace(design, gains=replace(design.gains, forgetting=199.0)))
+    assert certificate["filter_step"].status == "fail"
+
+
+def test_nothing_that_is_unbounded_passes():
+    gains = default_design(CAR).gains
+    for changed in ({"rho_W": 0.0, "eta_V": 0.0}, {"rho_V": 0.0}, {"rho_W": 0.0, "rho_V": 0.0}):
+        design = replace(default_design(CAR), gains=replace(gains, **changed))
+        assert judged(design).verdict != "pass"
+
+
+def test_sensors_that_err_more_than_declared_pass_the_bound_and_those_as_declared_do_not():
+    exact = replace(DRIVING, slip=0.01, noise_v_x=0.0, noise_v_y=0.0, noise_r=0.0, noise_delta=0.0)
+    poor = replace(exact, noise_v_y=1.0, noise_r=0.1)
+    design = default_design(CAR)
+    gains = replace(design.gains, eta_W=0.0, eta_V=0.0, rho_W=0.0, rho_V=0.0, W_max=1e-3)
+    quiet = replace(design, gains=gains)
+    rng = np.random.default_rng(3)
+    drives = random_drives(CAR, rng, 64, driving=exact, duration=5.0, dt=0.01)
+    drives = type(drives)(*(values[within(CAR, drives, exact, 0.01)] for values in drives))
+    weights = quiet.network.initial_weights(rng)
+    count = len(drives.v_x)
+    begun = weights._replace(W=np.zeros((count, 2, 10)), V=np.repeat(weights.V[None], count, 0))
+    error = largest_norms(quiet, CAR, measured(drives, poor, rng), begun)[0].max()
+    assert bounds_of(quiet, exact).xi_tilde < error <= bounds_of(quiet, poor).xi_tilde
+
+
+def test_the_projection_of_rk4_needs_no_gain_to_be_small():
+    acting = Disturbance(residual=5.0, rate=8.0, known=9.0)
+    error = error_gains(SKEWED, "rk4", 0.01)
+    found = by_projection(error, SKEWED, acting, n_h=4, W_max=2.0)
+    assert found.xi_tilde == pytest.approx(
+        error.force * 5.0 + error.rate * 8.0 + sum(error.weights) * 4
+    )
+    assert found.stage > found.xi_tilde
+
+
+def test_the_tight_route_claims_no_less_than_an_identifier_without_a_network():
+    for law in ("integral", "instantaneous"):
+        certificate = judged(default_design(CAR, law=law))
+        for name in ("printed_bound", "tight_bound", "ultimate_bound"):
+            assert certificate[name].value >= certificate["trivial_bound"].value * (1 - 1e-9)
