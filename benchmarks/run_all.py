@@ -16,6 +16,7 @@ BENCHMARKS = {
     "gain_limit": [],
     "limit_cycle": [],
     "bounds_monte_carlo": [],
+    "hostile_certificates": ["300", "20"],
     "batch_speed": [],
     "export_cost": [],
     "mpc_speed": [],

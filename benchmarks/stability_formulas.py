@@ -12,6 +12,7 @@ import sys
 import numpy as np
 from scipy.linalg import eigvals
 
+from benchmarks.targets import Targets, keeps
 from identifier.stability.gain_limit import (
     critical_frequency,
     instantaneous_euler_limit,
@@ -21,7 +22,7 @@ from identifier.stability.gain_limit import (
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Law, Loop, euler, growth_rate
 from identifier.stability.margins import gain_margin
 
-DT = 0.01
+DT, CASES = 0.01, 200
 TOLERANCES = {
     "continuous limit": 1e-8,
     "critical frequency": 1e-8,
@@ -108,13 +109,19 @@ def rule_of_slowest_pole(cases: int, seed: int) -> float:
 
 def main() -> int:
     """Print the differences; 1 if one is too large."""
-    worst = differences(cases=200, seed=1)
-    print(f"{'200 random designs':34s}{'largest difference':>20s}{'allowed':>10s}")
+    worst, targets = differences(cases=CASES, seed=1), Targets("stability_formulas")
+    targets.record("cases", CASES)
+    print(f"{CASES} random designs{'largest difference':>40s}{'allowed':>10s}")
     for name, difference in worst.items():
         print(f"{name:34s}{difference:20.1e}{TOLERANCES[name]:10.0e}")
+        key = name.replace(",", "").replace(" ", "_")
+        title = f"{name}, of what is allowed"
+        targets.at_most(title, difference / TOLERANCES[name], 1.0, "")
+        targets.record(key, difference)
     unsafe = rule_of_slowest_pole(cases=1000, seed=2)
     print(f"half the limit of the slowest pole is unstable for {unsafe:.1%} of 1000 random A_d")
-    return int(any(worst[name] > TOLERANCES[name] for name in worst))
+    targets.record("slowest_pole_unsafe", 100.0 * unsafe, "%")
+    return targets.finish(keep=keeps())
 
 
 if __name__ == "__main__":

@@ -129,14 +129,14 @@ def test_divergence_alone_is_an_exit_code_of_one(monkeypatch, capsys):
 
 
 def test_every_row_is_passed_by_a_law_that_breaks_what_it_bounds():
-    """The certificate of a sound design, beside drives of one whose layers do not leak."""
+    """The certificate of a sound design, beside drives of one whose layers leak wrongly."""
     vehicle, design = sedan(), default_design(sedan())
     driving = natural_driving(vehicle)
     passed = {}
     for name, changed in {
         "error_bound": {"eta_W": 3e5, "rho_W": 0.0},
         "weight_bound": {"eta_W": 3e5, "rho_W": 0.0},
-        "V_bound": {"eta_V": 3e3, "rho_V": 0.0},
+        "V_bound": {"rho_V": 3e3},
         "projection_bound": {"eta_W": 3e5, "rho_W": 0.0},
     }.items():
         kept = replace(design, gains=replace(design.gains, W_max=5.0, V_max=13.0))
