@@ -3,7 +3,7 @@
     python -m benchmarks.limit_cycle
 
 A car corners steadily on saturated tires and the integral law runs at 1.2 to 3 times its sampled
-limit. What the leakage leaves is a limit cycle: a line where lambda is near a or above, a circle where
+limit. What the leakage leaves is a limit cycle: a line where lambda is near a, a circle where
 lambda is 0.1 to 0.4 of it. Fails where a case is off by more than 5 % in amplitude or frequency.
 """
 
