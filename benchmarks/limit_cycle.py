@@ -91,7 +91,12 @@ def random_case(rng: np.random.Generator, shares: tuple[float, float] | None = N
     residual = float(np.linalg.norm(sampled_residual(corner.vehicle, corner.recording)[0]))
     rho_W = share * g / (a * lam * residual)
     formula = sampled_limit_cycle(a=a, lam=lam, g=g, rho_W=rho_W, dt=DT)
-    history = identify(corner.recording, corner.vehicle, design(g / float(s @ s), rho_W))
+    # The residual of a corner has one direction, and an error that begins along it never leaves it,
+    # stable or not: weights to begin with that point elsewhere take the symmetry away.
+    W = rho_W * formula.amplitude * rng.standard_normal((2, network.hidden))
+    judged = design(g / float(s @ s), rho_W)
+    start = judged.frozen(corner.vehicle, {"W": W, "V": V})
+    history = identify(corner.recording, corner.vehicle, judged, start)
     late = history.told["xi_tilde"][-round(WATCH / DT) :]
     return Case(
         a,

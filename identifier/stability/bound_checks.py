@@ -11,7 +11,10 @@ from identifier.stability.property import Property, at_least, at_most, statement
 from identifier.stability.state_bound import small_gain, steady_capacity
 from identifier.stability.ultimate_bound import trivial_bound
 
-CONDITION = "it holds while slip, friction, speed, steering, yaw rate and noise are as declared"
+CONDITION = (
+    "it holds while slip, friction, speed, steering, yaw rate and noise are as declared, no sample "
+    "is left out as impossible, and the first weights keep it (resumed ones too)"
+)
 
 
 def bound_checks(

@@ -35,10 +35,10 @@ class Operation:
     disturbance : sup|f|, noise and rates that act on the error.
     needed_force : that the network should be able to hold against its leakage [U].
     x_bar_max : bound on |x_bar| [-], without what the error adds where the network reads x_hat.
-    V_start : largest |V_hat| to begin with (Frobenius) [-].
     input_feedback : (2, 2) J_f K [1/s] where the network reads x_hat; None where it reads x.
     W_M : bound on the ideal weights (Frobenius) [U], for (14).
     w_bar : bound on the approximation error [U], for (14).
+    V_start : largest |V_hat| to begin with (Frobenius) [-].
     W_large : where the margins do not hold up to the proven |W_hat|, they are judged up to this
         one (Frobenius) [U]; the V layer's share of the loop gain grows with it.
     input_per_error : what an error adds to |x_bar| where the network reads x_hat [1/(U s)].

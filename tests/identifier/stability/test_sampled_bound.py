@@ -150,6 +150,26 @@ def test_a_V_layer_that_leaks_more_than_itself_in_a_sample_fails_and_diverges():
     assert judged(mended)["leakage_step_V"].status == "pass"
 
 
+def test_a_smooth_tire_short_of_sliding_keeps_the_bound_and_passes_that_of_a_sliding_one():
+    """At 0.06 rad the sedan hardly slides: what slides is no bound on what the tire misses."""
+    gentle = replace(DRIVING, v_x=20.0, slip=0.07, bandwidth=0.5)
+    design = design_for(CAR, gentle)
+    C = np.array([CAR.cornering_stiffness_front, CAR.cornering_stiffness_rear])
+    sliding = np.linalg.norm(np.maximum(C * 0.07 - CAR.axle_loads, 0.0)) / 1000.0
+    D, gains = np.eye(2) / -design.gains.A_d[0][0], design.gains
+    learning = output_layer(gains, INTEGRAL, D, n_h=10, integrator="euler", dt=0.01)
+    error = error_gains(gains.matrix, "euler", 0.01)
+    found = bounds_of(design)
+    small = replace(natural_operation(design, CAR).disturbance, residual=max(sliding, 1e-3))
+    claimed = by_projection(error, gains.matrix, small, n_h=10, W_max=1e-9)
+    seen = monte_carlo(
+        design, CAR, gentle, 64, beginning=Beginning(0.0, 12.0), rng=np.random.default_rng(2)
+    )
+    assert by_leakage(error, learning, gains.matrix, small, 10).W < found.W
+    assert seen.residual.max() > 3.0 * sliding
+    assert claimed.xi_tilde < seen.xi_tilde.max() <= found.xi_tilde
+
+
 def test_a_filter_that_forgets_more_than_itself_in_a_sample_fails():
     design = default_design(CAR)
     certificate = judged(replace(design, gains=replace(design.gains, forgetting=199.0)))
