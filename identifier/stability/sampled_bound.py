@@ -9,9 +9,10 @@ So |e| <= τ |n| + γ_f (sup|f| + |A_d| |n|) + γ_ξ sup|ξ'| + ∑ γ_i √n_h 
 Weights: with q = ρ dt |ξ̃| <= 1 and μ = λ dt <= 1 the leakage of a step is a weighted mean, and
 the argument of `state_bound.py` goes through: |W_hat| stays below
 g' [c_z (1 + κ)/λ + c_ξ]/(ρ (1 - ε)) + c_z g' X/λ², κ = ε = 0 for Euler. RK4 has κ = μ² (z of an
-inner stage), ε = q (the leakage of one stage acts on the slope of another), and inner stages
-see |W| up to e_i = dt g' (c_z (1 + μ²) X/λ + c_ξ X) (0, 1/2, (1 + q/2)/2, 1 + q/2 + q²/4) beyond
-it, unless a projection keeps them. X bounds |ξ̃| at every stage. The same holds for V_hat.
+inner stage), ε = q (the leakage of one stage acts on the slope of another). Its second stage is a
+step of Euler and keeps the bound; with p = dt g' X c_z μ/λ and w = dt g' X (c_z (1 + μ²)/λ + c_ξ)
+the third sees up to p/2 + w q/4 more and the fourth p (1 + μ/2) + w (q/2 + q²/4), unless a
+projection keeps them. X bounds |ξ̃| at every stage. The same holds for V_hat.
 
 The start: ξ_hat at the first measurement, z = 0, |W_hat(0)| within the bound on W_hat: so weights
 that were learnt within the declared conditions may be resumed.
@@ -160,9 +161,11 @@ class Learning:
         if not self.staged:
             return (0.0,)
         (c_z, c_xi), mu = self.law, self.forgetting * self.dt
-        q = self.leakage * self.dt * X
-        slope = self.dt * self.drive * X * (c_z * (1.0 + mu**2) / self.forgetting + c_xi)
-        return (0.0, slope / 2.0, slope * (1.0 + q / 2.0) / 2.0, slope * (1.0 + q / 2.0 + q**2 / 4))
+        q, moved = self.leakage * self.dt * X, self.dt * self.drive * X
+        late = moved * c_z * mu / self.forgetting  # z of an inner stage
+        weak = moved * (c_z * (1.0 + mu**2) / self.forgetting + c_xi)  # leakage acting on slopes
+        third = late / 2.0 + weak * q / 4.0
+        return (0.0, 0.0, third, late * (1.0 + mu / 2.0) + weak * (q / 2.0 + q**2 / 4.0))
 
 
 def output_layer(

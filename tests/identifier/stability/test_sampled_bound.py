@@ -160,7 +160,7 @@ def test_a_smooth_tire_short_of_sliding_keeps_the_bound_and_passes_that_of_a_sli
     learning = output_layer(gains, INTEGRAL, D, n_h=10, integrator="euler", dt=0.01)
     error = error_gains(gains.matrix, "euler", 0.01)
     found = bounds_of(design)
-    small = replace(natural_operation(design, CAR).disturbance, residual=max(sliding, 1e-3))
+    small = Disturbance(residual=max(sliding, 1e-3))
     claimed = by_projection(error, gains.matrix, small, n_h=10, W_max=1e-9)
     seen = monte_carlo(
         design, CAR, gentle, 64, beginning=Beginning(0.0, 12.0), rng=np.random.default_rng(2)
