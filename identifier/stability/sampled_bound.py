@@ -219,6 +219,8 @@ def by_leakage(
         if not math.isfinite(X):
             return None
         here, ahead = around(X)[1], around(X * (1.0 + 1e-7))[1]
+        if not math.isfinite(ahead):
+            return None
         slope = (ahead - here) / (1e-7 * X)
         if not slope < 1.0:
             return None
