@@ -6,13 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.stability import Certificate
-from identifier.stability.monte_carlo import Observed
-from identifier.stability.property import statement
 from identifier.defaults import default_design, natural_driving
 from identifier.design_file import design_text, read_design
 from identifier.driving import Driving
+from identifier.stability import Certificate
 from identifier.stability.monte_carlo import Beginning, Observed, monte_carlo
+from identifier.stability.property import statement
 from models.vehicle import sedan
 from tireid import check_command
 from tireid.certificate_table import certificate_of
