@@ -10,6 +10,7 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from mpc.tires.held import held
 
 from identifier.axle import AxleDesign
 from identifier.defaults import default_design
@@ -27,7 +28,6 @@ from mpc.loop.limit import cornering_limit
 from mpc.path import BUILT_IN, Path, grip_speed, steady_speed
 from mpc.realtime import Tracker
 from mpc.tires import TireModel, oracle_tire, tire_model
-from mpc.tires.held import held
 
 TIRES = ("linear", "paper", "axle", "fine", "oracle")
 FASTEST = 30.0  # m/s

@@ -3,10 +3,10 @@
 import casadi as ca
 import numpy as np
 import pytest
+from mpc.tires.held import RISE, HeldAxles, held
 
 from models.vehicle import sedan
 from mpc.tires import oracle_tire, tire_model
-from mpc.tires.held import RISE, HeldAxles, held
 from mpc.tires.reach import useful_slip
 from mpc.tires.structure import Car, Point
 

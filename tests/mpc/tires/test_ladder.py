@@ -9,6 +9,7 @@ from models.recordings import Recording
 from mpc.motion import N_CAR
 from mpc.prediction import build_dynamics
 from mpc.tires import tire_model
+from mpc.tires.reach import ALL
 from mpc.tires.structure import Car, Point
 
 W = np.array([[0.05, 0.5, 0.5, -0.15], [0.02, 0.6, 0.6, -0.2]])
@@ -111,7 +112,7 @@ def test_lagged_slip_follows_as_in_the_frozen_model(car):
                 for signal in (drive.v_y, drive.r, drive.delta_f)
             )
             x = np.concatenate([[0.0, 0.0, v_y, r, delta], behind])
-            x_dot = rates(x, 0.0, 0.0, drive.v_x[k], 1e-9, tire.car, tire.weights)
+            x_dot = rates(x, 0.0, 0.0, drive.v_x[k], 1e-9, tire.car, tire.weights, *ALL)
             behind = behind + 0.01 / fine * np.array(x_dot).ravel()[5:]
     expected = model.lagged_slip(drive)[100:]
     size = np.abs(expected).max(axis=0)
