@@ -5,9 +5,9 @@
 drives ISO 3888-2 and the handling course at 90 % and 97 % of the limit, on friction 1.0 and 0.5, as
 the command does with these words and `--tires`: the linear tire of the data sheet; learnt and
 frozen the paper's network (`--paper`) and the axle model, the default; the true tire. Seeds are
-those of `--seed`. A drive that leaves the path by 2 m or spins ends there and counts as it was until
-then. What the tracker minimizes and how far it believes a tire was chosen on ISO 3888-1, the slalom
-and a course of other turns, with other seeds.
+those of `--seed`. A drive that leaves the path by 2 m or spins ends there and counts as it was
+until then. How far the tracker believes a tire was chosen on ISO 3888-1, the slalom and a course of
+other turns, with other seeds.
 Prints a table, writes OUT/mpc_worth.json and the figure OUT/mpc_worth.png.
 """
 

@@ -38,7 +38,7 @@ class Limits:
     e_y: float = 1.0
     slip: tuple[float, float] = (0.2, 0.2)
     soft_e_y: float = 1e3
-    soft_slip: float = 1e2
+    soft_slip: float = 1e3
 
     def __post_init__(self) -> None:
         _require_positive(self, ("steering", "steering_rate", "e_y", "soft_e_y", "soft_slip"))
