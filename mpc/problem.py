@@ -25,7 +25,9 @@ class Limits:
     slip : kinematic slip angle in front and at the rear [rad], soft. A tire whose curves are flat
         before that has its own, see `mpc.tires.reach`.
     soft_e_y : Z of ½ Z s² where the deviation is s beyond its bound [1/m²].
-    soft_slip : Z of slip angles [1/rad²].
+    soft_slip : Z of slip angles [1/rad²]. Chosen on ISO 3888-1, the slalom and a course of other
+        turns, at 97 % of the grip on friction 0.5: with 3000 and more plans alternate between the
+        limits of the steering rate, with 100 courses are driven up to 1.4 times as far off.
 
     Raises
     ------

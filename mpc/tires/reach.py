@@ -32,8 +32,7 @@ ALL = Reach(np.full(2, np.inf), np.zeros(2))  # the curves as they are
 def reach_of(tire: TireModel, most: tuple[float, float]) -> Reach:
     """Return how far the curves of a tire are believed, and how they go on.
 
-    They go on straight, but never with less than 4 % of their slope at zero. Forces that do not
-    read the slip angles, as those of a network of other signals, have a slope of zero.
+    They go on straight, but never with less than 4 % of their slope at zero.
 
     Parameters
     ----------
@@ -83,9 +82,9 @@ def believed_force(
     """
     x = ca.SX.sym("x", 2)
     curves = ca.vertcat(*structure.force((x[0], x[1]), at))
-    if not ca.depends_on(curves, x):
-        return curves
     alpha = ca.vertcat(*slip)
+    if ca.is_linear(curves, x):  # goes on as it is
+        return ca.substitute(curves, x, alpha)
     held = ca.fmin(ca.fmax(alpha, -max_slip), max_slip)
     return ca.substitute(curves, x, held) + rise * (alpha - held)
 
