@@ -277,9 +277,10 @@ def main(out: File, seeds: int = SEEDS, *, keep: bool = False) -> int:
     report(found, seeds, targets)
     rows = [{**case._asdict(), "place": case.place, **r._asdict()} for case, r in found.items()]
     (out / "mpc_friction_drop.json").write_text(json.dumps(rows, indent=1))
-    draw(seeds, out / "mpc_friction_drop.png")
     print(f"wrote {out / 'mpc_friction_drop.json'}")
-    return targets.finish(keep=keep)
+    status = targets.finish(keep=keep)
+    draw(seeds, out / "mpc_friction_drop.png")
+    return status
 
 
 if __name__ == "__main__":
