@@ -195,12 +195,13 @@ def judge(name: str, results: dict[str, list[Result]], targets: Targets) -> None
     results : by tires, one for each seed.
     targets : collects what is missed.
     """
+    place = name.replace(" ", "_")
     for kind, row in results.items():
         peaks = [r.peak for r in row]
-        targets.record(f"{name}/{kind}/least", min(peaks), "m")
-        targets.record(f"{name}/{kind}/most", max(peaks), "m")
-        targets.record(f"{name}/{kind}/left", sum(not _kept(r) for r in row))
-    targets.record(f"{name}/speed", course(name)[1], "m/s")
+        targets.record(f"{place}/{kind}/least", min(peaks), "m")
+        targets.record(f"{place}/{kind}/most", max(peaks), "m")
+        targets.record(f"{place}/{kind}/left", sum(not _kept(r) for r in row))
+    targets.record(f"{place}/speed", course(name)[1], "m/s")
     learning = results["learning"]
     kept = [_kept(r) for r in learning]
     least = 0.9 * len(kept)
@@ -210,14 +211,14 @@ def judge(name: str, results: dict[str, list[Result]], targets: Targets) -> None
             one and not _kept(other) for one, other in zip(kept, results["linear"], strict=True)
         )
         label = f"{name}: learning within {WITHIN} m where linear leaves it"
-        targets.at_least(label, saved, least, "", key=f"{name}/saved")
+        targets.at_least(label, saved, least, "", key=f"{place}/saved")
     share = max(r.jump for r in learning) / min(r.usual for r in learning)
     label = f"{name}: jump of the plan at a handover over its usual"
-    targets.at_most(label, share, 1.0, "-", key=f"{name}/jump")
+    targets.at_most(label, share, 1.0, "-", key=f"{place}/jump")
     found = [r.found[0] for r in learning if r.found is not None]
     if found:
-        targets.record(f"{name}/noticed", float(np.median(found)), "s")
-        targets.record(f"{name}/noticed_latest", max(found), "s")
+        targets.record(f"{place}/noticed", float(np.median(found)), "s")
+        targets.record(f"{place}/noticed_latest", max(found), "s")
     show("time from the drop to a lower friction, median and longest", _times(learning))
 
 
