@@ -17,6 +17,7 @@ from mpc.cost import Cost
 from mpc.prediction import build_rk4
 from mpc.problem import Limits, Problem
 from mpc.tires.network import NetworkAxles
+from mpc.tires.reach import ALL
 from mpc.tires.structure import TireModel
 
 Array = NDArray[np.float64]
@@ -105,5 +106,5 @@ class Plant:
         """Return the state a step later."""
         dt = PROBLEM.dt / self.substeps
         for _ in range(self.substeps):
-            x = np.asarray(self.rk4(x, u, kappa, SPEED, dt, self.car, self.weights)).ravel()
+            x = np.asarray(self.rk4(x, u, kappa, SPEED, dt, self.car, self.weights, *ALL)).ravel()
         return x

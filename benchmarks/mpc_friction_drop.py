@@ -1,15 +1,15 @@
 """Friction halves in mid course: does learning while driving save the car?
 
-    python -m benchmarks.mpc_friction_drop OUT [SEEDS]
+    python -m benchmarks.mpc_friction_drop OUT [SEEDS] [--record]
 
-A slalom through 12 cones 36 m apart at the constant speed (24 m/s) that takes 95 % of the cornering
-limit of the road after the drop, and ISO 3888-1 at 97 % of it (28 m/s): before the drop the car
-uses half of its grip, after it nearly all, so that the course stays drivable. (The faster, the
-less feedback alone makes up for a wrong tire: 30 m apart, at 20 m/s, the linear tire stays on the
-path in 2 of 10 drives.) The drop from 1.0 to 0.5 is a line across the road, which each wheel meets
-on its own; in the slalom it lies 190 to 244 m from the start, at another phase for each seed, in
-the lane change 45 to 63 m, before the first change. Seeds also change the noise, the delay (10, 20,
-30 ms) and the drive on the dry road that the frozen tires were learnt on.
+What `tireid drive --mu-drop` does, in slaloms through 12 cones 24, 30 and 36 m apart at the
+constant speed that takes 95 % of the cornering limit of the road after the drop, and on ISO 3888-1
+at 97 % of it: before the drop the car uses half of its grip, after it nearly all, so that the
+course stays drivable. The faster, the less feedback alone makes up for a wrong tire: the three gaps
+show from where on it matters. The drop from 1.0 to 0.5 is a line across the road, which each wheel
+meets on its own; in a slalom it lies between the fifth and the seventh cone, at another phase for
+each seed, in the lane change 45 to 63 m from the start, before the first change. Seeds also change
+the noise and the drive on the dry road that the frozen tires were learnt on.
 
 linear: the tire of the data sheet.   frozen: learnt on the dry road.   learning: begins with the
 frozen one, learns on and hands over.   oracle: the true tire, told of the drop as the car passes.
@@ -18,32 +18,31 @@ Prints a table, writes OUT/mpc_friction_drop.json and the figure OUT/mpc_frictio
 
 import json
 import sys
+from dataclasses import replace
 from functools import cache
 from itertools import product
 from pathlib import Path as File
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
 
-from benchmarks.mpc_cases import LEARNING_TIME, learning_drive, plant
-from benchmarks.targets import Targets, show
-from identifier.axle import AxleDesign, AxleModel
-from identifier.identify import identify
-from identifier.online import OnlineIdentifier
+from benchmarks.mpc_cases import drive_with, options_of
+from benchmarks.targets import Targets, keeps, show
 from identifier.workers import spread
-from models.friction import Friction, FrictionChange
 from models.vehicle import sedan
-from mpc.cars import DoubleTrackCar
-from mpc.handover import Learner, Supervisor
-from mpc.loop import Drive, Measured, drive, inertial_unit
+from mpc.handover import Learner
 from mpc.loop.limit import cornering_limit
 from mpc.path import Path, iso_3888_1, slalom, steady_speed
-from mpc.realtime import Tracker
-from mpc.tires import oracle_tire, tire_model
+from tireid.drive_case import conditions_of
+from tireid.drive_options import SpeedWish
+from tireid.drive_runs import Conditions, Run
+from tireid.drive_setup import make_setup
 
 TIRES = ("linear", "frozen", "learning", "oracle")
-COURSES = ("slalom", "lane change")
+GAPS = {"slalom 24 m": 24.0, "slalom 30 m": 30.0, "slalom 36 m": 36.0}  # of the cones [m]
+COURSES = (*GAPS, "lane change")
+SAVED = ("slalom 36 m", "lane change")  # where the linear tire leaves the path
 DRY, WET = 1.0, 0.5
 WITHIN = 0.5  # m
 SEEDS = 10
@@ -51,7 +50,7 @@ WORKERS = 2
 
 
 class Case(NamedTuple):
-    """One drive: course, tires, seed of noise, place, delay and learning drive."""
+    """One drive: course, tires, seed of noise, place and learning drive."""
 
     course: str
     tires: str
@@ -59,13 +58,10 @@ class Case(NamedTuple):
 
     @property
     def place(self) -> float:
-        """Where the friction drops [m]."""
-        return 190.0 + 6.0 * self.seed if self.course == "slalom" else 45.0 + 2.0 * self.seed
-
-    @property
-    def delay(self) -> int:
-        """Periods of 10 ms until a command acts."""
-        return 1 + self.seed % 3
+        """Arc length where the friction drops [m]."""
+        if self.course in GAPS:
+            return 40.0 + GAPS[self.course] * (25.0 + self.seed) / 6.0
+        return 45.0 + 2.0 * self.seed
 
 
 class Result(NamedTuple):
@@ -86,20 +82,6 @@ class Result(NamedTuple):
     notes: list[str]
 
 
-class Told:
-    """What an oracle has in place of a learner: the true tire from where the friction drops on."""
-
-    def __init__(self, place: float) -> None:
-        self._place, self._tire = place, oracle_tire(sedan(), plant().tire, WET)
-
-    def observe(self, measured: Measured, tracker: Tracker) -> str | None:
-        """Tell the tracker as the car passes the place."""
-        if self._place > measured.X or tracker.tire is self._tire:
-            return None
-        tracker.set_tire(self._tire)
-        return "told of the drop"
-
-
 @cache
 def course(name: str) -> tuple[Path, float]:
     """Return the path and the speed [m/s].
@@ -108,58 +90,42 @@ def course(name: str) -> tuple[Path, float]:
     ----------
     name : one of `COURSES`.
     """
-    limit = cornering_limit(sedan(), plant().tire, WET)
-    path, share = (slalom(gap=36.0, cones=12), 0.95) if name == "slalom" else (iso_3888_1(), 0.97)
+    limit = cornering_limit(sedan(), None, WET)
+    if name in GAPS:
+        path, share = slalom(gap=GAPS[name], cones=12), 0.95
+    else:
+        path, share = iso_3888_1(), 0.97
     return path, steady_speed(path, a_y_max=limit, share=share)
 
 
-@cache
-def learnt(seed: int) -> AxleModel:
-    """Return the model that was learnt on the dry road.
+def conditions(case: Case) -> Conditions:
+    """Return what `tireid drive` would drive, on a path of our own.
 
     Parameters
     ----------
-    seed : of the learning drive.
+    case : what to drive.
     """
-    car = sedan()
-    history = identify(learning_drive(DRY, seed), car, AxleDesign.for_vehicle(car))
-    model = history.freeze(LEARNING_TIME)
-    assert isinstance(model, AxleModel)
-    return model
+    path, speed = course(case.course)
+    setup = make_setup(
+        path,
+        vehicle=None,
+        plant="double-track",
+        mu=DRY,
+        drops=[(case.place, WET)],
+        wish=SpeedWish(None, speed),
+    )
+    defaults = conditions_of(options_of(["--seed", str(case.seed)]))
+    return replace(defaults, setup=setup)
 
 
-def run(case: Case) -> tuple[Drive, Learner | None]:
+def run(case: Case) -> Run:
     """Drive a case.
 
     Parameters
     ----------
     case : what to drive.
     """
-    vehicle, (path, speed) = sedan(), course(case.course)
-    change = FrictionChange(scale=WET, at_place=case.place)
-    car = DoubleTrackCar(vehicle, friction=Friction(scale=DRY, changes=(change,)))
-    model, learner = learnt(case.seed), None
-    tire = tire_model(vehicle if case.tires == "linear" else model)
-    if case.tires == "oracle":
-        tire = oracle_tire(vehicle, plant().tire, DRY)
-    if case.tires == "learning":
-        design = AxleDesign.for_vehicle(vehicle, dt=car.period)
-        learner = Learner(Supervisor(OnlineIdentifier(design, vehicle, car.period, model), tire))
-    lag = vehicle.require_chassis().steering_lag
-    beside: Any = Told(case.place) if case.tires == "oracle" else learner
-    driven = drive(
-        path,
-        car,
-        Tracker(tire, period=car.period, delay=case.delay * car.period + lag),
-        speed=speed,
-        sensors=inertial_unit(),
-        delay=case.delay,
-        rng=np.random.default_rng([case.seed, 3]),
-        learner=beside,
-        plan_every=0,
-        name=f"{case.course}, {case.tires}",
-    )
-    return driven, learner
+    return drive_with(conditions(case), case.tires)
 
 
 def score(case: Case) -> Result:
@@ -169,8 +135,9 @@ def score(case: Case) -> Result:
     ----------
     case : to drive.
     """
-    driven, learner = run(case)
-    after = driven.X - case.place >= 0.0
+    run_, place = run(case), float(course(case.course)[0].pose(case.place)[0])
+    driven, learner = run_.drive, run_.learner if isinstance(run_.learner, Learner) else None
+    after = place <= driven.X
     e_y, dropped_at = driven.e_y[after], float(driven.t[after][0])
     decisions = learner.supervisor.decisions if learner else []
     changes = [(one.t - dropped_at, one.friction) for one in decisions if one.friction != 1.0]
@@ -228,17 +195,36 @@ def judge(name: str, results: dict[str, list[Result]], targets: Targets) -> None
     results : by tires, one for each seed.
     targets : collects what is missed.
     """
-    kept = [r.completed and r.peak <= WITHIN for r in results["learning"]]
-    left = [r.peak > WITHIN for r in results["linear"]]
-    saved = sum(a and b for a, b in zip(left, kept, strict=True))
-    label = f"{name}: learning within {WITHIN} m where linear leaves it"
-    targets.at_least(label, 10.0 * saved / len(kept), 9.0, "/10")
-    jump = max(r.jump for r in results["learning"])
-    usual = min(r.usual for r in results["learning"])
-    targets.at_most(
-        f"{name}: jump of the plan at a handover over its usual", jump / usual, 1.0, "-"
-    )
-    show("time from the drop to a lower friction, median and longest", _times(results["learning"]))
+    place = name.replace(" ", "_")
+    for kind, row in results.items():
+        peaks = [r.peak for r in row]
+        targets.record(f"{place}/{kind}/least", min(peaks), "m")
+        targets.record(f"{place}/{kind}/most", max(peaks), "m")
+        targets.record(f"{place}/{kind}/left", sum(not _kept(r) for r in row))
+    targets.record(f"{place}/speed", course(name)[1], "m/s")
+    learning = results["learning"]
+    kept = [_kept(r) for r in learning]
+    least = 0.9 * len(kept)
+    targets.at_least(f"{name}: learning stays within {WITHIN} m", sum(kept), least, "")
+    if name in SAVED:
+        saved = sum(
+            one and not _kept(other) for one, other in zip(kept, results["linear"], strict=True)
+        )
+        label = f"{name}: learning within {WITHIN} m where linear leaves it"
+        targets.at_least(label, saved, least, "", key=f"{place}/saved")
+    share = max(r.jump for r in learning) / min(r.usual for r in learning)
+    label = f"{name}: jump of the plan at a handover over its usual"
+    targets.at_most(label, share, 1.0, "-", key=f"{place}/jump")
+    found = [r.found[0] for r in learning if r.found is not None]
+    if found:
+        targets.record(f"{place}/noticed", float(np.median(found)), "s")
+        targets.record(f"{place}/noticed_latest", max(found), "s")
+    show("time from the drop to a lower friction, median and longest", _times(learning))
+
+
+def _kept(result: Result) -> bool:
+    """Return whether the car stayed on the path after the drop."""
+    return result.completed and result.peak <= WITHIN
 
 
 def _times(results: list[Result]) -> str:
@@ -257,12 +243,15 @@ def draw(seeds: int, path: File) -> None:
     seeds : of each course and tires.
     path : the PNG file.
     """
-    figure, axes = plt.subplots(2, 1, figsize=(10.0, 6.0), sharey=True, layout="constrained")
+    rows = len(COURSES)
+    figure, axes = plt.subplots(
+        rows, 1, figsize=(10.0, 3.0 * rows), sharey=True, layout="constrained"
+    )
     for ax, name in zip(axes, COURSES, strict=True):
         for k, tires in enumerate(TIRES):
             for seed in range(min(seeds, 3)):
                 case = Case(name, tires, seed)
-                driven, _ = run(case)
+                driven = run(case).drive
                 label = tires if seed == 0 else None
                 ax.plot(driven.s - case.place, driven.e_y, color=f"C{k}", lw=1.0, label=label)
         ax.axvline(0.0, color="0.3", lw=0.8)
@@ -275,25 +264,28 @@ def draw(seeds: int, path: File) -> None:
     plt.close(figure)
 
 
-def main(out: File, seeds: int = SEEDS) -> list[str]:
-    """Drive, print, draw; return the labels of the targets that were missed.
+def main(out: File, seeds: int = SEEDS, *, keep: bool = False) -> int:
+    """Drive, print, draw; return 1 where a target was missed.
 
     Parameters
     ----------
     out : folder of the JSON and the figure.
     seeds : of each course and tires.
+    keep : record the numbers for the documents.
     """
     out.mkdir(parents=True, exist_ok=True)
-    found, targets = drive_all(seeds), Targets()
+    found, targets = drive_all(seeds), Targets("mpc_friction_drop")
     report(found, seeds, targets)
     rows = [{**case._asdict(), "place": case.place, **r._asdict()} for case, r in found.items()]
     (out / "mpc_friction_drop.json").write_text(json.dumps(rows, indent=1))
+    print(f"wrote {out / 'mpc_friction_drop.json'}")
+    status = targets.finish(keep=keep)
     draw(seeds, out / "mpc_friction_drop.png")
-    print(f"wrote {out / 'mpc_friction_drop.json'}; missed: {targets.missed}")
-    return targets.missed
+    return status
 
 
 if __name__ == "__main__":
+    records = keeps()
     if len(sys.argv) not in (2, 3):
-        sys.exit("usage: mpc_friction_drop OUT [SEEDS]")
-    main(File(sys.argv[1]), *(int(word) for word in sys.argv[2:]))
+        sys.exit("usage: mpc_friction_drop OUT [SEEDS] [--record]")
+    sys.exit(main(File(sys.argv[1]), *(int(word) for word in sys.argv[2:]), keep=records))

@@ -20,6 +20,7 @@ from mpc.prediction import build_rk4
 from mpc.realtime import Status, Tracker
 from mpc.realtime.instance import FLAGS
 from mpc.realtime.source_cache import tracker_source
+from mpc.tires.reach import ALL
 from mpc.tires.structure import TireModel
 
 Array = NDArray[np.float64]
@@ -64,7 +65,7 @@ def stagewise(tire: TireModel) -> Stagewise:
     q, q_end = np.sqrt(cost.numbers()), np.sqrt(cost.terminal_numbers())
     r, g, low, high = [], [], [], []
     for k in range(N):
-        x_next = rk4(X[k], U[k][0], road[k], SPEED, PROBLEM.dt, car, w)
+        x_next = rk4(X[k], U[k][0], road[k], SPEED, PROBLEM.dt, car, w, *ALL)
         g += [X[k + 1] - x_next, *([X[0] - x0] if k == 0 else [])]
         g += [x_next[0] - U[k][1], -x_next[0] - U[k][1]]  # |e_y| <= limit + slack
         zeros = [0.0] * (N_X if k else 2 * N_X)

@@ -26,6 +26,7 @@ from benchmarks.mpc_double_lane_change import (
     road,
 )
 from benchmarks.mpc_peers import CondensedDaqp, Ours, Peer, hpipm, ipopt
+from benchmarks.targets import Targets, keeps
 from mpc.converged import build_errors
 from mpc.tires.structure import TireModel
 
@@ -87,20 +88,25 @@ def first_use() -> list[float]:
     return [float(answer.stdout.split()[-1]) for answer in answers]
 
 
-def main() -> dict[str, Array]:
-    """Print the table; return median, p99 and max by solver [ms]."""
+def main(*, keep: bool = False) -> int:
+    """Print the table; return 1 where a target was missed.
+
+    Parameters
+    ----------
+    keep : record the numbers for the documents.
+    """
     tire = network_fitted_to_curve()
     plant = Plant(tire)
-    makers: Mapping[str, Callable[[], Peer]] = {
-        "tireid, Riccati interior point": lambda: Ours(tire),
-        "same linearization, condensed, DAQP": lambda: CondensedDaqp(tire),
-        "CasADi sqpmethod + HPIPM, 1 iteration": lambda: hpipm(tire),
-        "IPOPT, converged": lambda: ipopt(tire),
+    makers: Mapping[str, tuple[str, Callable[[], Peer]]] = {
+        "tireid": ("tireid, Riccati interior point", lambda: Ours(tire)),
+        "daqp": ("same linearization, condensed, DAQP", lambda: CondensedDaqp(tire)),
+        "hpipm": ("CasADi sqpmethod + HPIPM, 1 iteration", lambda: hpipm(tire)),
+        "ipopt": ("IPOPT, converged", lambda: ipopt(tire)),
     }
     times: dict[str, list[Array]] = {name: [] for name in makers}
     built, last = {}, {}
     solvers = {}
-    for name, make in makers.items():
+    for name, (_, make) in makers.items():
         start = time.perf_counter()
         solvers[name] = make()
         built[name] = time.perf_counter() - start
@@ -111,20 +117,31 @@ def main() -> dict[str, Array]:
             times[name].append(1e3 * last[name].times)
     columns = "median ms      p99      max   of its median   of ours   failed   cost   build s"
     print(f"{'':40}{columns}")
-    table = {}
+    targets, median = Targets("mpc_speed"), {}
     for name, rounds in times.items():
         least = np.min(rounds, axis=0)
-        table[name] = np.array([np.median(least), np.percentile(least, 99), least.max()])
-        median, p99, most = table[name]
-        ours = median / next(iter(table.values()))[0]
+        median[name], p99, most = (float(np.percentile(least, q)) for q in (50, 99, 100))
+        of_ours = median[name] / median["tireid"]
         print(
-            f"{name:40}{median:9.4f} {p99:8.4f} {most:8.4f} {p99 / median:11.2f} {ours:13.1f}"
-            f" {last[name].failures:8d} {last[name].cost:8.4f} {built[name]:6.1f}"
+            f"{makers[name][0]:40}{median[name]:9.4f} {p99:8.4f} {most:8.4f}"
+            f" {p99 / median[name]:11.2f} {of_ours:13.1f} {last[name].failures:8d}"
+            f" {last[name].cost:8.4f} {built[name]:6.1f}"
         )
+        targets.record(f"{name}/median", median[name], "ms")
+        targets.record(f"{name}/p99", p99, "ms")
+        targets.record(f"{name}/of_ours", of_ours, "-")
+        targets.record(f"{name}/cost", last[name].cost, "-")
     first, second = first_use()
+    targets.record("first_use", first, "s")
+    targets.record("second_start", second, "s")
     print(f"from nothing to the first solution {first:.1f} s, second start {second:.2f} s")
-    return table
+    ours, *peers = median.values()
+    targets.at_most("median over that of the quickest peer", ours / min(peers), 1.0, "-")
+    loss = 100.0 * (last["tireid"].cost / last["ipopt"].cost - 1.0)
+    targets.at_most("closed-loop cost over the converged one", loss, 1.0, key="loss")
+    targets.at_most("steps that failed", last["tireid"].failures, 0, "")
+    return targets.finish(keep=keep)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main(keep=keeps()))

@@ -7,6 +7,7 @@ UndefinedBehaviorSanitizer, and must steer the same.
 """
 
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Mapping
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.mpc_double_lane_change import HIDDEN, network_fitted_to_curve
+from benchmarks.targets import Targets, keeps
 from codegen import find_compiler
 from models.vehicle import sedan
 from mpc.problem import Limits, Problem
@@ -34,6 +36,7 @@ LATERAL = 7.0  # most lateral acceleration of roads, and of wheels to begin with
 PROBLEM = Problem(limits=Limits(slip=(0.15, 0.15)))
 SPREAD = np.array([1.0, 0.15, 1.2, 0.4])  # of e_y [m], e_psi [rad], v_y [m/s], r [rad/s]
 NOISE = np.array([0.03, 0.005, 0.05, 0.01])
+BEYOND = 1e-14  # of a limit that is kept exactly: rounding
 SANITIZED = ("-std=c99", "-O1", "-g", "-ffp-contract=off", "-fsanitize=address,undefined")
 
 
@@ -127,28 +130,47 @@ def sanitized(tire: TireModel, recorded: bytes) -> tuple[int, int, float]:
     return int(steps), int(failures), float(difference)
 
 
-def main(steps: int = STEPS, seed: int = 0) -> dict[str, Stress]:
-    """Print what came of it for each tire; return it."""
+def main(steps: int = STEPS, seed: int = 0, *, keep: bool = False) -> int:
+    """Print what came of it for each tire; return 1 where something failed.
+
+    Parameters
+    ----------
+    steps : of each tire.
+    seed : of everything that is random.
+    keep : record the numbers for the documents.
+    """
     print(f"{'tire':14} steps  not OK  iterations med p99 max   ms med   p99   angle  rate beyond")
-    results = {}
+    targets, solves, failed, replayed = Targets("mpc_stress"), 0, 0, 0
+    beyond, differs = [], []
     for name, choice in tires().items():
-        came = results[name] = stress(choice, steps, np.random.default_rng(seed))
+        came = stress(choice, steps, np.random.default_rng(seed))
         counts, ms = (
             np.percentile(came.iterations, [50, 99, 100]),
             np.percentile(came.times, [50, 99]),
         )
-        failed = steps - came.statuses.get(Status.OK.name, 0)
+        bad = steps - came.statuses.get(Status.OK.name, 0)
         print(
-            f"{name:14} {steps:5d} {failed:7d} {counts[0]:14.0f} {counts[1]:3.0f} {counts[2]:3.0f}"
+            f"{name:14} {steps:5d} {bad:7d} {counts[0]:14.0f} {counts[1]:3.0f} {counts[2]:3.0f}"
             f" {ms[0]:8.3f} {ms[1]:6.3f} {came.beyond_angle:8.0e} {came.beyond_rate:6.0e}"
         )
-        replayed, failures, difference = sanitized(choice[0], came.recorded)
+        again, failures, difference = sanitized(choice[0], came.recorded)
         print(
-            f"{'':14} sanitizers: {replayed} steps, {failures} not OK,"
+            f"{'':14} sanitizers: {again} steps, {failures} not OK,"
             f" steering differs by {difference:.1e} rad"
         )
-    return results
+        solves, failed, replayed = solves + steps, failed + bad + failures, replayed + again
+        beyond += [came.beyond_angle, came.beyond_rate]
+        differs.append(difference)
+    targets.record("solves", solves)
+    targets.record("swap_every", EPISODE, "steps")
+    targets.at_most("solves that failed", failed, 0, "", key="failed")
+    targets.at_least("steps that sanitizers replayed", replayed, solves, "", key="replayed")
+    label = "angle and rate beyond their limits, in parts of them"
+    targets.at_most(label, max(beyond), BEYOND, "-", key="beyond_limits")
+    label = "steering under sanitizers differs by"
+    targets.at_most(label, max(differs), 0.0, "rad", key="sanitizers_differ")
+    return targets.finish(keep=keep)
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main(keep=keeps()))

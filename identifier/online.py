@@ -10,8 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Stepper
-from identifier.axle import AxleDesign
-from identifier.axle.sway import SwayState
 from identifier.history import IMPOSSIBLE_FORCE, DivergedError
 from identifier.method import FrozenModel, Method, Setup
 from models.recordings import Recording
@@ -139,18 +137,6 @@ class OnlineIdentifier:
             carry = self._setup(np.zeros(2), np.zeros(2), self.method.min_speed).carry
             return {name: np.array(value) for name, value in carry.items()}
         return self._stepper.carried()
-
-    def sway_slip(self) -> Array:
-        """Return the slip that the sway of the body adds at the last sample (2,) [rad].
-
-        Zero for methods that know of none, and before the first sample. Where v_y is measured the
-        body sways over the contact patches; a judge of tires must take that off.
-        """
-        if self._stepper is None or not isinstance(self.method, AxleDesign):
-            return np.zeros(2)
-        state = SwayState(*self._stepper.value("sway"))
-        slip: Array = state.slip * self._stepper.value("own")[:, 1]
-        return slip
 
     def model(self) -> FrozenModel:
         """Return the model with the weights in effect now.

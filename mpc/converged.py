@@ -14,6 +14,7 @@ from mpc.cost import N_ERRORS, tracking_errors
 from mpc.motion import N_CAR, motion, stage_ports, state_size
 from mpc.prediction import build_rk4
 from mpc.problem import Problem
+from mpc.tires.reach import reach_of
 from mpc.tires.structure import PredictionTire, TireModel
 
 Array = NDArray[np.float64]
@@ -65,8 +66,9 @@ def build_nlp(structure: PredictionTire, horizon: int) -> dict[str, Any]:
     car, w = ca.MX.sym("car", N_CAR), ca.MX.sym("w", structure.n_weights)
     q, q_end = ca.MX.sym("q", N_ERRORS), ca.MX.sym("q_end", N_ERRORS)
     bounds, Z = ca.MX.sym("bounds", N_SOFT), ca.MX.sym("Z", N_SOFT)
+    beyond = bounds[1:], ca.MX.sym("rise", 2)
 
-    x_next = build_rk4(structure).map(N)(X[:, :-1], U, road[0, :], road[1, :], dt, car, w)
+    x_next = build_rk4(structure).map(N)(X[:, :-1], U, road[0, :], road[1, :], dt, car, w, *beyond)
     errors = build_errors(structure).map(N)
     y, _ = errors(X[:, :-1], road[0, :], road[1, :], car, w)
     ahead = ca.horzcat(road[:, 1:], road[:, -1])  # of x_1 … x_N; the end has the last stage's road
@@ -82,7 +84,7 @@ def build_nlp(structure: PredictionTire, horizon: int) -> dict[str, Any]:
     gaps = X[:, 1:] - x_next
     return {
         "x": ca.vertcat(ca.vec(X), ca.vec(U), ca.vec(S)),
-        "p": ca.vertcat(ca.vec(road), dt, R, car, w, q, q_end, bounds, Z),
+        "p": ca.vertcat(ca.vec(road), dt, R, car, w, q, q_end, bounds, beyond[1], Z),
         "f": cost,
         "g": ca.vertcat(ca.vec(gaps), ca.vec(soft - most), ca.vec(-soft - most)),
     }
@@ -98,12 +100,13 @@ def numbers(problem: Problem, tire: TireModel, kappa: ArrayLike, v_x: ArrayLike)
     kappa : curvature of each stage [1/m], (N,).
     v_x : speed of each stage [m/s], (N,).
     """
-    cost, limits, N = problem.cost, problem.limits.on(tire), problem.horizon
+    cost, limits, N = problem.cost, problem.limits, problem.horizon
+    reach = reach_of(tire, limits.slip)
     road = np.column_stack([np.broadcast_to(kappa, N), np.broadcast_to(v_x, N)]).ravel()
-    bounds = [limits.e_y, *limits.slip]
+    bounds = [limits.e_y, *reach.slip]
     Z = [limits.soft_e_y, limits.soft_slip, limits.soft_slip]
     parts = [road, [problem.dt, cost.R], tire.car, tire.weights]
-    return np.concatenate([*parts, cost.numbers(), cost.terminal_numbers(), bounds, Z])
+    return np.concatenate([*parts, cost.numbers(), cost.terminal_numbers(), bounds, reach.rise, Z])
 
 
 def bounds(problem: Problem, x0: ArrayLike) -> dict[str, Array]:

@@ -4,19 +4,21 @@ x = [e_y, e_psi, v_y, r, δ] and, where the tire lags, [α_f', α_r']: deviation
 left positive; heading against the path's [rad]; lateral velocity [m/s]; yaw rate [rad/s];
 commanded angle of the front wheels [rad]; lagged slip [rad].   u: steering rate [rad/s].
 κ [1/m], > 0 where the path turns left, and v_x [m/s] are constant over a stage of dt [s].
+Force curves are those of the tire up to the slip that is of use, and rise slightly beyond.
 """
 
 from typing import Any, NamedTuple
 
 import casadi as ca
 
+from mpc.tires.reach import believed_force
 from mpc.tires.structure import Car, Point, PredictionTire
 
 N_CAR = 4
 
 
 class Ports(NamedTuple):
-    """Symbols of a stage, SX: state, input, parameters."""
+    """Symbols of a stage, SX: state, input, parameters; the last two are those of `Reach`."""
 
     x: Any
     u: Any
@@ -25,6 +27,8 @@ class Ports(NamedTuple):
     dt: Any
     car: Any
     w: Any
+    max_slip: Any
+    rise: Any
 
 
 class Motion(NamedTuple):
@@ -55,7 +59,7 @@ def stage_ports(structure: PredictionTire) -> Ports:
     ----------
     structure : of the tire.
     """
-    sizes = (state_size(structure), 1, 1, 1, 1, N_CAR, structure.n_weights)
+    sizes = (state_size(structure), 1, 1, 1, 1, N_CAR, structure.n_weights, 2, 2)
     pairs = zip(Ports._fields, sizes, strict=True)
     return Ports(*(ca.SX.sym(name, size) for name, size in pairs))
 
@@ -73,7 +77,7 @@ def motion(structure: PredictionTire, p: Ports) -> Motion:
     at = Point(v_y, r, delta, p.v_x, car, p.w)
     kinematic = structure.slip(at)
     slip = (lagged[0], lagged[1]) if structure.lagged else kinematic
-    force = ca.vertcat(*structure.force(slip, at))
+    force = believed_force(structure, slip, at, p.max_slip, p.rise)
 
     F = ca.SX.sym("F", 2)
     c, s = ca.cos(e_psi), ca.sin(e_psi)

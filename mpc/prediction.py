@@ -18,7 +18,9 @@ RESULTS = ("x_next", "A", "B", "H", "h", "slip", "slip_x")
 
 
 def build_dynamics(structure: PredictionTire) -> ca.Function:
-    """Return ẋ as a function of x, u, kappa, v_x, dt, car, w; dt only bounds the lag from below.
+    """Return ẋ as a function of x, u, kappa, v_x, dt, car, w, max_slip, rise.
+
+    dt only bounds the lag from below.
 
     Parameters
     ----------
@@ -50,9 +52,9 @@ def build_rk4(structure: PredictionTire) -> ca.Function:
 def build_stage(structure: PredictionTire) -> ca.Function:
     """Return the linearized stage as an SX function with dense ports.
 
-    Ports: x (n_x,), u, kappa [1/m], v_x [m/s], dt [s], car (4,), w (n_w,), q (7,). Results: x_next;
-    A = ∂x_next/∂x, B = ∂x_next/∂u; H (n_x, n_x) and h (n_x,) of the cost at x; slip (2,) [rad], the
-    kinematic one, and slip_x (2, n_x).
+    Ports: x (n_x,), u, kappa [1/m], v_x [m/s], dt [s], car (4,), w (n_w,), max_slip (2,) [rad],
+    rise (2,) [N/rad], q (7,). Results: x_next; A = ∂x_next/∂x, B = ∂x_next/∂u; H (n_x, n_x) and
+    h (n_x,) of the cost at x; slip (2,) [rad], the kinematic one, and slip_x (2, n_x).
 
     Parameters
     ----------
@@ -72,7 +74,7 @@ def build_stage(structure: PredictionTire) -> ca.Function:
 def build_end(structure: PredictionTire) -> ca.Function:
     """Return the cost and the slips at the end of the horizon: H, h, slip, slip_x of `build_stage`.
 
-    Ports: x (n_x,), u, kappa [1/m], v_x [m/s], car (4,), w (n_w,), q (7,), with q of the end.
+    Ports: those of `build_stage` without u and dt, with q of the end.
 
     Parameters
     ----------

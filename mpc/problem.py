@@ -6,13 +6,11 @@ from one Runge-Kutta step of dt and x_0 given, so that
   |e_y,k| <= e_y + s,  |α_k| <= slip + s (front, rear)       soft, k = 1 … N
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from mpc.cost import Cost
-from mpc.tires.reach import useful_slip
-from mpc.tires.structure import TireModel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,9 +22,12 @@ class Limits:
     steering : angle of the front road wheels [rad], kept exactly.
     steering_rate : [rad/s], kept exactly.
     e_y : deviation from the path [m], soft.
-    slip : kinematic slip angle in front and at the rear [rad], soft; see `on`.
+    slip : kinematic slip angle in front and at the rear [rad], soft. A tire whose curves are flat
+        before that has its own, see `mpc.tires.reach`.
     soft_e_y : Z of ½ Z s² where the deviation is s beyond its bound [1/m²].
-    soft_slip : Z of slip angles [1/rad²].
+    soft_slip : Z of slip angles [1/rad²]. Chosen on ISO 3888-1, the slalom and a course of other
+        turns, at 97 % of the grip on friction 0.5: with 3000 and more plans alternate between the
+        limits of the steering rate, with 100 courses are driven up to 1.4 times as far off.
 
     Raises
     ------
@@ -39,22 +40,12 @@ class Limits:
     e_y: float = 1.0
     slip: tuple[float, float] = (0.2, 0.2)
     soft_e_y: float = 1e3
-    soft_slip: float = 1e4
+    soft_slip: float = 1e3
 
     def __post_init__(self) -> None:
         _require_positive(self, ("steering", "steering_rate", "e_y", "soft_e_y", "soft_slip"))
         if len(self.slip) != 2 or not all(0.0 < value < np.inf for value in self.slip):
             raise ValueError(f"slip must be two positive numbers, it is {self.slip}")
-
-    def on(self, tire: TireModel) -> "Limits":
-        """Return the limits with slip held to where the tire's curves are not yet flat.
-
-        Parameters
-        ----------
-        tire : of the prediction.
-        """
-        front, rear = np.minimum(self.slip, useful_slip(tire))
-        return replace(self, slip=(float(front), float(rear)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -54,6 +54,7 @@ class Run:
     problem : of the tracker.
     drive : what happened.
     scores : what it is worth.
+    learner : what changed the tire on the way, if anything could.
     """
 
     label: str
@@ -62,6 +63,7 @@ class Run:
     problem: Problem
     drive: Drive
     scores: Scores
+    learner: Learner | None
 
 
 def told_tire(label: str, setup: Setup, learnt: FrozenModel | None) -> TireModel:
@@ -81,7 +83,13 @@ def told_tire(label: str, setup: Setup, learnt: FrozenModel | None) -> TireModel
     return tire_model(learnt, setup.vehicle)
 
 
-def run_drive(label: str, conditions: Conditions, learnt: FrozenModel | None) -> Run:
+def run_drive(
+    label: str,
+    conditions: Conditions,
+    learnt: FrozenModel | None,
+    *,
+    linearizations: int = 1,
+) -> Run:
     """Drive the path once with the tracker told of a tire.
 
     Parameters
@@ -89,6 +97,7 @@ def run_drive(label: str, conditions: Conditions, learnt: FrozenModel | None) ->
     label : of `TIRES`.
     conditions : what is alike for every tire.
     learnt : what was learnt before the drive.
+    linearizations : a step of the tracker.
 
     Raises
     ------
@@ -99,9 +108,16 @@ def run_drive(label: str, conditions: Conditions, learnt: FrozenModel | None) ->
     model = told_tire(label, setup, learnt)
     lag = setup.vehicle.require_chassis().steering_lag
     try:
-        tracker = Tracker(model, problem, period=PERIOD, delay=conditions.delay * PERIOD + lag)
+        tracker = Tracker(
+            model,
+            problem,
+            period=PERIOD,
+            delay=conditions.delay * PERIOD + lag,
+            linearizations=linearizations,
+        )
     except NoCompilerError as error:
         raise ValueError(str(error)) from None
+    learner = _learner(label, setup, learnt)
     driven = drive(
         setup.path,
         setup.car(),
@@ -110,7 +126,7 @@ def run_drive(label: str, conditions: Conditions, learnt: FrozenModel | None) ->
         sensors=conditions.sensors,
         delay=conditions.delay,
         rng=np.random.default_rng([conditions.seed, 2]),
-        learner=_learner(label, setup, learnt),
+        learner=learner,
         laps=conditions.laps,
         widest=WIDEST,
         plan_every=PLAN_EVERY,
@@ -124,6 +140,7 @@ def run_drive(label: str, conditions: Conditions, learnt: FrozenModel | None) ->
         problem=problem,
         drive=driven,
         scores=scores(driven),
+        learner=learner,
     )
 
 

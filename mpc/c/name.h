@@ -70,7 +70,8 @@ typedef struct {
     @name@_real max_steering;              /* |delta| [rad], hard */
     @name@_real max_rate;                  /* |u| [rad/s], hard */
     @name@_real max_e_y;                   /* |e_y| [m], soft */
-    @name@_real max_slip[2];               /* |alpha|, front and rear [rad], soft */
+    @name@_real max_slip[2];               /* |alpha|, front and rear [rad], soft; curves end there */
+    @name@_real rise[2];                   /* of the axle forces beyond max_slip [N/rad] */
     @name@_real soft_e_y;                  /* Z of 1/2 Z s^2 where |e_y| is s beyond [1/m^2] */
     @name@_real soft_slip;                 /* Z of slip [1/rad^2] */
     @name@_real widest_e_y;                /* |e_y| [m] beyond which the car is off the path */

@@ -9,6 +9,7 @@ from identifier.axle.slip import SHORTEST
 from identifier.export.package import Package
 from identifier.method import CannotFreezeError
 from identifier.network_model import NetworkModel
+from models.vehicle import GRAVITY
 from mpc.export.package import MpcPackage, filled
 
 TEMPLATES = Path(__file__).parent / "pair"
@@ -64,6 +65,7 @@ def handover_sources(identifier: Package, tracker: MpcPackage) -> dict[str, str]
     if isinstance(model, AxleModel):
         values: Mapping[str, Any] = {
             "units": len(model.ladder),
+            "sway": repr(GRAVITY / model.sway.frequency**2),
             "shortest": repr(SHORTEST * model.vehicle.wheelbase),
             "load": _numbers(model.vehicle.axle_loads),
             "ladder": _numbers(model.ladder),

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mpc.motion import state_size
 from mpc.prediction import build_stage
 from mpc.realtime import Measurement, Tracker
+from mpc.tires.reach import ALL
 
 Array = NDArray[np.float64]
 
@@ -101,8 +102,8 @@ class _Car:
     def advance(self, command: float, kappa: float, v_x: float) -> None:
         self.on_the_way.append(command)
         self.x[4] = self.on_the_way.popleft()
-        numbers = (0.0, kappa, v_x, self.period, self.car, self.weights.weights, ca.DM.zeros(7))
-        self.x = np.array(self.step(self.x, *numbers)[0]).ravel()
+        numbers = (0.0, kappa, v_x, self.period, self.car, self.weights.weights)
+        self.x = np.array(self.step(self.x, *numbers, *ALL, ca.DM.zeros(7))[0]).ravel()
 
 
 def _road(n: int, period: float) -> Array:

@@ -25,7 +25,7 @@ def axle_forces(tire: TireModel, weights: Array, samples: Array, dt: float) -> A
     ----------
     tire : structure and car; its weights are not read.
     weights : of k tires (k, n_weights).
-    samples : rows of `window.COLUMNS`, (n, 6).
+    samples : rows of `window.COLUMNS`, (n, 4).
     dt : sampling interval [s].
     """
     k = len(weights)
@@ -57,9 +57,9 @@ def axle_scan(structure: Any, k: int) -> Scan:
     car, w = ca.SX.sym("car", 4), ca.SX.sym("w", structure.n_weights, k)
     slips, forces = [], []
     for i in range(k):
-        v_x, v_y, r, delta, *sway = ca.vertsplit(sample)
+        v_x, v_y, r, delta = ca.vertsplit(sample)
         at = Point(v_y, r, delta, v_x, Car(*ca.vertsplit(car)), w[:, i])
-        slip: Any = ca.vertcat(*structure.slip(at)) + ca.vertcat(*sway)
+        slip: Any = ca.vertcat(*structure.slip(at))
         if structure.lagged:
             sigma = ca.vertcat(*structure.lag_length((lagged[0, i], lagged[1, i]), at))
             share = 1 - ca.exp(-v_x * dt / ca.fmax(sigma, SHORTEST_LAG))

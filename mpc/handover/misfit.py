@@ -110,7 +110,7 @@ class Judge:
         Parameters
         ----------
         tire : the model.
-        samples : rows of `window.COLUMNS`, (n, 6); m = n - settle - stretch, in samples.
+        samples : rows of `window.COLUMNS`, (n, 4); m = n - settle - stretch, in samples.
 
         Raises
         ------

@@ -2,6 +2,7 @@
 
 from mpc.realtime import Tracker
 from mpc.tires import TireModel
+from mpc.tires.reach import reach_of
 
 
 def previewed_rate(tracker: Tracker, tire: TireModel) -> float:
@@ -24,7 +25,10 @@ def previewed_rate(tracker: Tracker, tire: TireModel) -> float:
     instance = tracker.instance
     state, params = instance.state.copy(), instance.params.copy()
     instance.start[:] = state["x"][0]
-    instance.params["weights"], instance.params["car"] = tire.weights, tire.car
+    params_now = instance.params
+    params_now["weights"], params_now["car"] = tire.weights, tire.car
+    reach = reach_of(tire, tracker.problem.limits.slip)
+    params_now["max_slip"], params_now["rise"] = reach
     instance.solve()
     rate = float(instance.state["u"][0])
     instance.state[...], instance.params[...] = state, params

@@ -107,7 +107,7 @@ class Supervisor:
         if self._lost > LOST or not sample[0] >= self.identifier.method.min_speed:
             self._window.clear()
             return None
-        self._window.add((*sample, *self.identifier.sway_slip()))
+        self._window.add(sample)
         self._excitation.add(*sample)
         if self._samples % self._every and self._samples % self._learnt_every:
             return None

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# m/s, m/s, rad/s, rad, and slip that the sway of the body adds, front and rear [rad]
-COLUMNS = ("v_x", "v_y", "r", "delta", "sway_front", "sway_rear")
+COLUMNS = ("v_x", "v_y", "r", "delta")  # m/s, m/s, rad/s, rad
 
 
 class Window:
@@ -59,7 +58,7 @@ class Window:
         return self._kept * self.dt
 
     def last(self, seconds: float) -> Array:
-        """Return the last samples (n, 6), a view; all of them where there are fewer.
+        """Return the last samples (n, 4), a view; all of them where there are fewer.
 
         Parameters
         ----------

@@ -43,6 +43,8 @@ READ: Mapping[str, str] = {
     "dt": "params->stage_time",
     "car": "params->car[{}]",
     "w": "params->weights[{}]",
+    "max_slip": "params->max_slip[{}]",
+    "rise": "params->rise[{}]",
     "q": "q[{}]",
 }
 

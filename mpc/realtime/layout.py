@@ -12,7 +12,8 @@ from mpc.realtime.guards import Guards
 N_COMMANDS = 32
 N_STATUSES = 9
 TIMES = ("cost_rate", "stage_time", "period", "delay")
-LIMITS = ("max_steering", "max_rate", "max_e_y", "max_slip", "soft_e_y", "soft_slip")
+LIMITS = ("max_steering", "max_rate", "max_e_y", "max_slip", "rise", "soft_e_y", "soft_slip")
+OF_AXLES = ("max_slip", "rise")
 GUARDS = (
     *("widest_e_y", "widest_e_psi", "max_v_y", "max_yaw_rate", "min_speed"),
     *("gain_e_y", "gain_e_psi", "gain_yaw_rate", "hold_time"),
@@ -29,7 +30,7 @@ def params_type(n_weights: int, *, single: bool) -> np.dtype[np.void]:
     """
     real = _real(single)
     names = [*TIMES, *LIMITS, *GUARDS, "tolerance"]
-    numbers = [(name, real, (2,)) if name == "max_slip" else (name, real) for name in names]
+    numbers = [(name, real, (2,)) if name in OF_AXLES else (name, real) for name in names]
     arrays = [("car", 4), ("weights", n_weights), ("cost", N_ERRORS), ("cost_end", N_ERRORS)]
     return np.dtype(
         [(name, real, (size,)) for name, size in arrays]

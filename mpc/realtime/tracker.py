@@ -11,6 +11,7 @@ from mpc.realtime.guards import Guards
 from mpc.realtime.instance import Instance
 from mpc.realtime.layout import N_COMMANDS, set_params
 from mpc.realtime.messages import Command, Measurement, Status
+from mpc.tires.reach import reach_of
 from mpc.tires.structure import TireModel
 
 Array = NDArray[np.float64]
@@ -135,7 +136,7 @@ class Tracker:
         if not (np.isfinite(weights).all() and np.isfinite(car).all()):
             raise ValueError("weights and car must be finite")
         params["weights"], params["car"] = weights, car
-        params["max_slip"] = self.problem.limits.on(tire).slip
+        params["max_slip"], params["rise"] = reach_of(tire, self.problem.limits.slip)
         self.tire = tire
 
     def reset(self, steering: float = 0.0) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from identifier.axle.model import AxleModel
 from identifier.axle.slip import SHORTEST
+from models.vehicle import GRAVITY
 from mpc.tires.structure import Array, Pair, Point, TireModel, wheel_slip
 
 N_COMMON = 3
@@ -122,15 +123,19 @@ def ladder_weights(
 
 
 def axle_tire(model: AxleModel) -> TireModel:
-    """Return the prediction tire of a frozen axle model; the sway of its body is left out.
+    """Return the prediction tire of a frozen axle model.
+
+    The sway of its body takes k ρ'/(ω² v_x) off the slip, ρ in steady cornering the force of the
+    axle over its load times g: the body gives way in series with the carcass, and k g/ω² adds to
+    the compliance. That is without the inertia of the roll: ω is above what steering asks for.
 
     Parameters
     ----------
-    model : frozen force curves, their compliance and offsets.
+    model : frozen force curves, their compliance, sway and offsets.
     """
     load, ladder = np.array(model.vehicle.axle_loads), np.array(model.ladder)
     W, shortest = model.W * load[:, None], SHORTEST * model.vehicle.wheelbase
-    compliance = model.own[:, 0] / load
+    compliance = (model.own[:, 0] + GRAVITY / model.sway.frequency**2 * model.own[:, 1]) / load
     slope = np.maximum((model.W / ladder).sum(axis=1), 0.1) * load
     weights = ladder_weights(
         ladder,

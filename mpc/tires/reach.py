@@ -1,19 +1,48 @@
-"""How far slip is of use: up to where an axle's force hardly grows any more.
+"""How far slip is of use, and what the tracker believes beyond: a curve that goes on rising.
 
-Beyond the peak of its curve an axle gives less, and more slip is the wrong way out: a tracker that
-linearizes there would steer on, because that is what lowers the force. So slip is held below.
+Beyond the peak of its curve an axle gives less, and more slip is the wrong way out. A tracker that
+linearizes there and wants less force steers on, farther from where it has to go, and stays there.
+So it believes F(x) + rise (α - x) beyond the slip x that is of use: more slip never gives less.
 """
 
 from functools import cache
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from mpc.tires.structure import Array, Car, Point, PredictionTire, TireModel
+from mpc.tires.structure import Array, Car, Pair, Point, PredictionTire, TireModel
 
 FLAT = 0.05  # of the slope at zero: the peak is reached within a per cent or two of its force
+LEAST_RISE = 0.04  # of the slope at zero; a little less than where slip ends to be of use
 SLIPS = np.linspace(0.0, 0.5, 251)  # rad
 SPEED = 15.0  # m/s; curves of slip do not depend on it
+
+
+class Reach(NamedTuple):
+    """Slip up to which curves are believed [rad], and their slope beyond [N/rad]; (2,) each."""
+
+    slip: Array
+    rise: Array
+
+
+ALL = Reach(np.full(2, np.inf), np.zeros(2))  # the curves as they are
+
+
+def reach_of(tire: TireModel, most: tuple[float, float]) -> Reach:
+    """Return how far the curves of a tire are believed, and how they go on.
+
+    They go on straight, but never with less than 4 % of their slope at zero.
+
+    Parameters
+    ----------
+    tire : structure and weights.
+    most : slip beyond which no curve is believed [rad], front and rear.
+    """
+    slopes = curve_slopes(tire)
+    slip = np.minimum(most, _useful(slopes))
+    there = [np.interp(x, SLIPS, axle) for x, axle in zip(slip, slopes, strict=True)]
+    return Reach(slip, np.maximum(np.maximum(there, LEAST_RISE * slopes[:, 0]), 0.0))
 
 
 def useful_slip(tire: TireModel) -> Array:
@@ -25,10 +54,7 @@ def useful_slip(tire: TireModel) -> Array:
     ----------
     tire : structure and weights.
     """
-    slopes = curve_slopes(tire)
-    flat = slopes < FLAT * slopes[:, :1]
-    found = np.where(flat.any(axis=1), SLIPS[flat.argmax(axis=1)], np.inf)
-    return np.where(slopes[:, 0] > 0.0, found, np.inf)
+    return _useful(curve_slopes(tire))
 
 
 def curve_slopes(tire: TireModel) -> Array:
@@ -39,6 +65,34 @@ def curve_slopes(tire: TireModel) -> Array:
     tire : structure and weights.
     """
     return np.array(_slopes(tire.structure)(SLIPS[None], tire.car, tire.weights))
+
+
+def believed_force(
+    structure: PredictionTire, slip: Pair, at: Point, max_slip: Any, rise: Any
+) -> Any:
+    """Return the axle forces that the tracker believes [N], (2,).
+
+    Parameters
+    ----------
+    structure : of the tire.
+    slip : what makes the force [rad].
+    at : motion, car and weights.
+    max_slip : slip up to which its curves are believed [rad], (2,).
+    rise : slope beyond [N/rad], (2,).
+    """
+    x = ca.SX.sym("x", 2)
+    curves = ca.vertcat(*structure.force((x[0], x[1]), at))
+    alpha = ca.vertcat(*slip)
+    if ca.is_linear(curves, x):  # goes on as it is
+        return ca.substitute(curves, x, alpha)
+    held = ca.fmin(ca.fmax(alpha, -max_slip), max_slip)
+    return ca.substitute(curves, x, held) + rise * (alpha - held)
+
+
+def _useful(slopes: Array) -> Array:
+    flat = slopes < FLAT * slopes[:, :1]
+    found = np.where(flat.any(axis=1), SLIPS[flat.argmax(axis=1)], np.inf)
+    return np.where(slopes[:, 0] > 0.0, found, np.inf)
 
 
 @cache

@@ -80,29 +80,6 @@ def test_a_law_that_diverges_is_noticed_and_freezes_to_nothing(car, drive):
         online.model()
 
 
-def test_the_sway_is_the_one_that_the_frozen_model_sees(car, drive):
-    """Taken off the slip without lag, it leaves the kinematic slip and the offsets."""
-    recording, method = drive(n=300, amplitude=0.08), AxleDesign.for_vehicle(car)
-    history = identify(recording, car, method)
-    online = OnlineIdentifier(method, car, recording.dt)
-    np.testing.assert_array_equal(online.sway_slip(), 0.0)
-    for k, sample in enumerate(zip(recording.x, recording.u, recording.v_x, strict=True)):
-        online.update(*sample)
-        before, after = history.carried["own"][k], history.carried["own"][k + 1]
-        v_y, r = sample[0]
-        front = np.arctan((v_y - before[1, 2] + car.l_f * r) / sample[2])
-        rear = np.arctan((v_y - before[1, 2] - car.l_r * r) / sample[2])
-        kinematic = np.array([sample[1][0] - front + before[0, 2], -rear])
-        added = history.carried["slip"][k + 1][:, 1] - kinematic  # with the share before the sample
-        np.testing.assert_allclose(
-            online.sway_slip() * before[:, 1], added * after[:, 1], atol=1e-12
-        )
-    assert np.abs(online.sway_slip()).max() > 0.0
-    linear = OnlineIdentifier(make_method("linear", car), car, 0.01)
-    linear.update(*sample)
-    np.testing.assert_array_equal(linear.sway_slip(), 0.0)
-
-
 def test_another_interval_and_samples_of_another_shape_are_refused(car):
     method = AxleDesign.for_vehicle(car)
     with pytest.raises(ValueError, match=r"every 0\.02 s, the method wants 0\.01 s"):

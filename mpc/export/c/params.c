@@ -74,6 +74,7 @@ bool @name@_accepts(const @name@_params *params)
         const @name@_real gains[] = { params->gain_e_y, params->gain_e_psi, params->gain_yaw_rate };
         accepted = are_positive(positive, (uint32_t)(sizeof positive / sizeof positive[0]))
             && are_finite(params->weights, @NAME@_WEIGHTS)
+            && are_not_negative(params->rise, 2U)
             && are_not_negative(params->cost, @NAME@_ERRORS)
             && are_not_negative(params->cost_end, @NAME@_ERRORS) && are_finite(gains, 3U)
             && are_not_negative(&params->hold_time, 1U) && are_not_negative(&params->delay, 1U)

@@ -1,2 +1,1 @@
-            params->max_slip[0] = useful_slip(params->weights, 0U);
-            params->max_slip[1] = useful_slip(params->weights, 1U);
+            believe(params);

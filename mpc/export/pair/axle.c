@@ -1,10 +1,12 @@
 #define UNITS @units@U
 #define AXLE (UNITS + 2U)                      /* weights of an axle */
 #define SHORTEST ((real)@shortest@) /* lag that is always there [m] */
+#define SWAY ((real)@sway@) /* g over the square of the roll's frequency [m] */
 #define LEAST_SLOPE ((real)0.1)                /* of a force curve at zero [static loads a rad] */
 #define MAX_SLIP ((real)0.5)                   /* up to which a flat curve is looked for [rad] */
 #define STEPS 250U
 #define FLAT ((real)0.05) /* of the slope at zero: there the peak is reached */
+#define LEAST_RISE ((real)0.04) /* of the slope at zero, beyond the slip that is of use */
 
 static const real load[2] = { @load@ };    /* static, of the axles [N] */
 static const real ladder[UNITS] = { @ladder@ }; /* scales of the units [rad] */
@@ -25,7 +27,8 @@ static bool convert(const @name@_weights *learnt, real w[WEIGHTS])
     }
     for (i = 0U; i < 2U; i++) {
         real *axle = &w[3U + UNITS + (i * AXLE)];
-        const real compliance = (real)learnt->own[i][0] / load[i];
+        const real sways = SWAY * (real)learnt->own[i][1];
+        const real compliance = ((real)learnt->own[i][0] + sways) / load[i];
         real slope = (real)0.0;
         real most = (real)0.0;
         for (j = 0U; j < UNITS; j++) {
@@ -57,9 +60,9 @@ static real slope_at(const real w[WEIGHTS], uint32_t i, real slip)
 }
 
 /* Slip that is of use: up to where the force of the axle hardly grows any more. */
-static real useful_slip(const real w[WEIGHTS], uint32_t i)
+static real useful_slip(const real w[WEIGHTS], uint32_t i, real first)
 {
-    const real least = FLAT * slope_at(w, i, (real)0.0);
+    const real least = FLAT * first;
     real slip = max_slip[i];
     uint32_t k;
     for (k = STEPS; k > 0U; k--) {
@@ -69,5 +72,20 @@ static real useful_slip(const real w[WEIGHTS], uint32_t i)
         }
     }
     return slip;
+}
+
+/* How far the curves of the tire are believed, and how they go on. */
+static void believe(@name@_mpc_params *params)
+{
+    uint32_t i;
+    for (i = 0U; i < 2U; i++) {
+        const real first = slope_at(params->weights, i, (real)0.0);
+        const real slip = useful_slip(params->weights, i, first);
+        const real least = LEAST_RISE * first;
+        real rise = slope_at(params->weights, i, slip);
+        rise = (rise > least) ? rise : least;
+        params->max_slip[i] = slip;
+        params->rise[i] = (rise > (real)0.0) ? rise : (real)0.0;
+    }
 }
 

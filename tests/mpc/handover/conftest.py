@@ -25,13 +25,8 @@ def drive(maneuver, *, friction=None, seed=0, sensors=NOISY):
 
 
 def samples_of(recording):
-    """Rows of v_x, v_y, r, δ; see `window.COLUMNS` for what follows them."""
+    """Rows of `window.COLUMNS`."""
     return np.column_stack([recording.v_x, recording.v_y, recording.r, recording.delta_f])
-
-
-def steady(samples):
-    """Samples of a body that does not sway."""
-    return np.column_stack([samples, np.zeros((len(samples), 2))])
 
 
 @pytest.fixture(scope="session")

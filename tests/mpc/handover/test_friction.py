@@ -11,13 +11,13 @@ from mpc.handover.axle_force import axle_forces
 from mpc.handover.friction import at_friction, can_scale, fit_friction
 from mpc.handover.misfit import Judge
 from mpc.tires import tire_model
-from tests.mpc.handover.conftest import DROP, samples_of, steady
+from tests.mpc.handover.conftest import DROP, samples_of
 
 
 def steady_force(tire, alpha, v_x=20.0):
     """Forces [N] where both axles have one slip, straight ahead, sensors' offsets aside."""
     v_y = -v_x * np.tan(alpha)
-    rows = steady(np.column_stack([np.full_like(alpha, v_x), v_y, 0.0 * alpha, 0.0 * alpha]))
+    rows = np.column_stack([np.full_like(alpha, v_x), v_y, 0.0 * alpha, 0.0 * alpha])
     told = [axle_forces(tire, tire.weights[None], np.tile(row, (2, 1)), 0.01)[0, 0] for row in rows]
     return np.array(told)
 
@@ -59,7 +59,7 @@ def test_what_reads_the_speed_or_knows_no_limit_cannot_be_told_for_a_friction(ca
 
 def test_a_drop_is_found_from_the_last_moments(tire, dropped):
     """0.4 s after the drop, in the bend that follows it."""
-    samples, k = steady(samples_of(dropped[1])), round(100 * (DROP + 0.9))
+    samples, k = samples_of(dropped[1]), round(100 * (DROP + 0.9))
     judge = Judge(0.01)
     fit = fit_friction(judge, tire, samples[k - 42 : k])
     assert 0.42 < fit.ratio < 0.62
@@ -68,7 +68,7 @@ def test_a_drop_is_found_from_the_last_moments(tire, dropped):
 
 
 def test_without_a_drop_no_other_friction_is_worth_it(tire, dry):
-    samples, judge = steady(samples_of(dry[1])), Judge(0.01)
+    samples, judge = samples_of(dry[1]), Judge(0.01)
     gains = [
         fit_friction(judge, tire, samples[k - 42 : k]).gain for k in range(200, len(samples), 20)
     ]
@@ -77,7 +77,7 @@ def test_without_a_drop_no_other_friction_is_worth_it(tire, dry):
 
 
 def test_where_nothing_is_seen_the_friction_stays(tire):
-    straight = np.tile([20.0, 0.0, 0.0, 0.0, 0.0, 0.0], (60, 1))
+    straight = np.tile([20.0, 0.0, 0.0, 0.0], (60, 1))
     fit = fit_friction(Judge(0.01), without_offsets(tire), straight)
     assert abs(np.log(fit.ratio)) < 0.05
     known = fit_friction(Judge(0.01), without_offsets(tire), straight, known=0.5)

@@ -7,7 +7,7 @@ from mpc.handover.axle_force import axle_forces
 from mpc.handover.misfit import ErrorModel, Judge
 from mpc.handover.window import Window
 from mpc.tires import tire_model
-from tests.mpc.handover.conftest import samples_of, steady
+from tests.mpc.handover.conftest import samples_of
 
 
 def forces_by_hand(tire, samples, dt):
@@ -16,14 +16,13 @@ def forces_by_hand(tire, samples, dt):
     (delta_0, bias, sigma_0), per_scale = tire.weights[:3], tire.weights[3 : 3 + n]
     axles = tire.weights[3 + n :].reshape(2, -1)
     lagged, told = None, []
-    for v_x, v_y, r, delta, *sway in samples:
+    for v_x, v_y, r, delta in samples:
         alpha = np.array(
             [
                 delta + delta_0 - np.arctan((v_y - bias + car.l_f * r) / v_x),
                 -np.arctan((v_y - bias - car.l_r * r) / v_x),
             ]
         )
-        alpha += sway
         if lagged is None:
             lagged = alpha
         else:
@@ -41,8 +40,7 @@ def forces_by_hand(tire, samples, dt):
 
 
 def test_forces_along_a_drive_are_those_by_hand(tire, dry, rng):
-    samples = steady(samples_of(dry[1])[:200])
-    samples[:, 4:] = 0.01 * rng.normal(size=(200, 2))
+    samples = samples_of(dry[1])[:200]
     weights = np.stack([tire.weights, 0.9 * tire.weights])
     told = axle_forces(tire, weights, samples, 0.01)
     np.testing.assert_allclose(told[0], forces_by_hand(tire, samples, 0.01), atol=1.0)
@@ -70,7 +68,6 @@ def bicycle_drive(car, n=300, fine=10, dt=0.01, v_x=20.0):
 def test_errors_are_those_of_the_forces(car, tire):
     """The slope over 13 samples is the mean over 12 steps, weighted by a parabola."""
     samples, forces = bicycle_drive(car)
-    samples = steady(samples)
     weights = tire.weights.copy()
     weights[3 + 4 :].reshape(2, -1)[1, 2:] *= 0.8  # a fifth of the rear force is missing
     e, _ = Judge(0.01).errors(tire._replace(weights=weights), samples)
@@ -85,7 +82,7 @@ def test_errors_are_those_of_the_forces(car, tire):
 
 
 def test_a_learnt_tire_fits_and_another_does_not(car, tire, dry):
-    judge, samples = Judge(0.01), steady(samples_of(dry[1]))
+    judge, samples = Judge(0.01), samples_of(dry[1])
     good = judge.misfit(tire, samples)
     assert good.mean < 1.0
     assert judge.misfit(tire_model(car), samples).mean > 2.0 * good.mean  # the linear tire
@@ -95,7 +92,7 @@ def test_a_learnt_tire_fits_and_another_does_not(car, tire, dry):
 
 
 def test_one_fault_counts_as_one(tire, dry):
-    samples = steady(samples_of(dry[1])[:200])
+    samples = samples_of(dry[1])[:200]
     judge = Judge(0.01)
     before = judge.misfit(tire, samples)
     samples[100, 1] += 50.0  # v_y of a broken sensor, for one sample
@@ -116,9 +113,9 @@ def test_a_judge_wants_samples_and_a_stretch(tire):
 def test_a_window_holds_the_last_samples_in_order(count):
     window = Window(0.1, 0.01)
     for k in range(count):
-        window.add(k + 0.1 * np.arange(6))
+        window.add(k + 0.1 * np.arange(4))
     n = min(count, 10)
-    expected = np.arange(count - n, count)[:, None] + 0.1 * np.arange(6)
+    expected = np.arange(count - n, count)[:, None] + 0.1 * np.arange(4)
     np.testing.assert_array_equal(window.last(1.0), expected)
     np.testing.assert_array_equal(window.last(0.03), expected[-3:])
     assert (len(window), window.duration) == (n, n * 0.01)

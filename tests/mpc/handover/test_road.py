@@ -44,7 +44,7 @@ def grip(weights, tire):
 def seen(seconds=4.0):
     window = Window(seconds, 0.01)
     for _ in range(round(seconds / 0.01)):
-        window.add((20.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+        window.add((20.0, 0.0, 0.0, 0.0))
     return window
 
 

@@ -16,7 +16,7 @@ from mpc.handover import supervisor as supervisor_module
 from mpc.handover.friction import at_friction
 from mpc.handover.misfit import Judge, Misfit
 from mpc.tires import tire_model
-from tests.mpc.handover.conftest import DROP, drive, samples_of, steady
+from tests.mpc.handover.conftest import DROP, drive, samples_of
 
 
 def supervisor_of(car, start=None, *, in_use=None, rules=None):
@@ -43,7 +43,7 @@ def test_a_friction_drop_is_believed_within_the_first_bend(car, learnt, dropped)
 
 def test_after_a_drop_the_named_tire_explains_it_and_the_dry_one_does_not(car, learnt, dropped):
     supervisor = watched(supervisor_of(car, learnt), dropped[1])
-    late = steady(samples_of(dropped[1]))[-200:]
+    late = samples_of(dropped[1])[-200:]
     judge = Judge(0.01)
     named, dry = (judge.misfit(tire, late).mean for tire in (supervisor.target, tire_model(learnt)))
     assert named < 1.5
@@ -62,7 +62,7 @@ def test_from_nothing_the_learnt_tire_takes_over_and_is_better(car, dry):
     first = supervisor.decisions[0]
     assert first.verdict is Verdict.LEARNT
     assert 0.5 < first.t < 6.0
-    judge, late = Judge(0.01), steady(samples_of(dry[1]))[-300:]
+    judge, late = Judge(0.01), samples_of(dry[1])[-300:]
     assert judge.misfit(supervisor.target, late).total < judge.misfit(begun, late).total
 
 

@@ -4,6 +4,7 @@ import pytest
 from mpc.prediction import build_rk4
 from mpc.problem import Problem
 from mpc.realtime import Guards, Status, Tracker
+from mpc.tires.reach import ALL
 
 PERIOD = 0.02
 
@@ -28,7 +29,7 @@ def drive(tracker, tire, measure, x, steps, delay_periods, kappa=0.004, v_x=20.0
         waiting.append(commands[-1].steering)
         x[4] = waiting.pop(0)
         for _ in range(4):
-            told = step(x, 0.0, kappa, v_x, PERIOD / 4, tire.car, tire.weights)
+            told = step(x, 0.0, kappa, v_x, PERIOD / 4, tire.car, tire.weights, *ALL)
             x = np.asarray(told).ravel()
     return np.array(states), commands
 

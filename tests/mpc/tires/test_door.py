@@ -8,6 +8,7 @@ import pytest
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
 from mpc.prediction import build_stage
 from mpc.tires import tire_model
+from mpc.tires.reach import ALL
 
 
 def test_a_vehicle_stands_for_the_linear_tire_that_it_states(car):
@@ -28,7 +29,7 @@ def test_every_tire_of_models_comes_in(car):
         model = tire_model(tire, car)
         x = np.array([0.1, 0.02, 0.3, 0.2, 0.05])
         result = build_stage(model.structure)(
-            x, 0.1, 0.0, 20.0, 0.05, model.car, model.weights, np.ones(7)
+            x, 0.1, 0.0, 20.0, 0.05, model.car, model.weights, *ALL, np.ones(7)
         )
         assert all(np.isfinite(np.array(value)).all() for value in result)
         assert model.weights.shape == (model.structure.n_weights,)

@@ -9,12 +9,13 @@ from models.recordings import Recording
 from mpc.motion import N_CAR
 from mpc.prediction import build_dynamics
 from mpc.tires import tire_model
+from mpc.tires.reach import ALL
 from mpc.tires.structure import Car, Point
 
 W = np.array([[0.05, 0.5, 0.5, -0.15], [0.02, 0.6, 0.6, -0.2]])
 
 
-def axle_model(car, *, compliance=(0.05, 0.06), offset=(0.0, 0.0), weights=W):
+def axle_model(car, *, compliance=(0.05, 0.06), sway=(0.0, 0.0), offset=(0.0, 0.0), weights=W):
     design, n = AxleDesign.for_vehicle(car), weights.shape[1]
     return AxleModel(
         vehicle=car,
@@ -22,7 +23,7 @@ def axle_model(car, *, compliance=(0.05, 0.06), offset=(0.0, 0.0), weights=W):
         sway=design.sway,
         plausibility=design.plausibility,
         W=weights,
-        own=np.column_stack([compliance, np.zeros(2), offset]),
+        own=np.column_stack([compliance, sway, offset]),
         covariance=np.tile(np.eye(n + 3), (2, 1, 1)),
         prior_covariance=np.tile(np.eye(n + 3), (2, 1, 1)),
         excitation=np.zeros((2, 9)),
@@ -111,13 +112,45 @@ def test_lagged_slip_follows_as_in_the_frozen_model(car):
                 for signal in (drive.v_y, drive.r, drive.delta_f)
             )
             x = np.concatenate([[0.0, 0.0, v_y, r, delta], behind])
-            x_dot = rates(x, 0.0, 0.0, drive.v_x[k], 1e-9, tire.car, tire.weights)
+            x_dot = rates(x, 0.0, 0.0, drive.v_x[k], 1e-9, tire.car, tire.weights, *ALL)
             behind = behind + 0.01 / fine * np.array(x_dot).ravel()[5:]
     expected = model.lagged_slip(drive)[100:]
     size = np.abs(expected).max(axis=0)
     assert (np.abs(np.array(slips)[100:] - expected).max(axis=0) < 0.03 * size).all()
     kinematic = drive.alpha(car.l_f, car.l_r)[100:]  # without the lag it would show
     assert (np.abs(kinematic - expected).max(axis=0) > 0.1 * size).all()
+
+
+def test_a_body_that_sways_slowly_is_a_softer_carcass(car):
+    """Against the frozen model itself, whose body sways with its inertia, in steady rhythm."""
+    sways, rests = (axle_model(car, sway=(k, k)) for k in (0.35, 0.0))
+    t, v_x, turns = 0.01 * np.arange(1500), 25.0, 2.0 * np.pi * 0.4
+    delta = 0.01 * np.sin(turns * t)
+    tire, rates = tire_model(sways), build_dynamics(tire_model(sways).structure)
+    x, rows, slips = np.zeros(7), [], []
+    for angle in delta:  # a car on these tires: Euler at 2 ms
+        x[4] = angle
+        rows.append(x[2:4].copy())
+        slips.append(x[5:].copy())
+        for _ in range(5):
+            given = (x, 0.0, 0.0, v_x, 1e-9, tire.car, tire.weights)
+            x = x + 0.002 * np.array(rates(*given, *ALL)).ravel()
+            x[:2] = 0.0
+    v_y, r = np.array(rows).T
+    drive = Recording(
+        name="rhythm",
+        t=t,
+        v_x=np.full(t.size, v_x),
+        v_y=v_y,
+        r=r,
+        delta_f=delta,
+        delta_r=np.zeros(t.size),
+    )
+    found, late = np.array(slips)[600:], slice(600, None)
+    with_sway, without = (model.lagged_slip(drive)[late] for model in (sways, rests))
+    size = np.abs(with_sway).max(axis=0)
+    assert (np.abs(found - with_sway).max(axis=0) < 0.04 * size).all()
+    assert (np.abs(found - without).max(axis=0) > 0.05 * size).all()
 
 
 def test_a_model_learnt_anew_is_other_weights_only(car):

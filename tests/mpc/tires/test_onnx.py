@@ -7,6 +7,7 @@ import pytest
 from identifier.onnx_model import OnnxModel
 from mpc.prediction import build_stage
 from mpc.tires import tire_model
+from mpc.tires.reach import ALL
 
 onnx = pytest.importorskip("onnx", reason="needs the package onnx")
 
@@ -81,7 +82,9 @@ def test_its_stage_has_the_derivatives_of_the_network(car, rng):
     model = OnnxModel(vehicle=car, content=network_file(rng))
     tire = tire_model(model)
     x, u, dt = np.array([0.2, 0.05, 0.5, 0.2, 0.05]), 0.1, 1e-4
-    result = build_stage(tire.structure)(x, u, 0.01, 20.0, dt, tire.car, tire.weights, np.ones(7))
+    result = build_stage(tire.structure)(
+        x, u, 0.01, 20.0, dt, tire.car, tire.weights, *ALL, np.ones(7)
+    )
     state, steer = ca.MX.sym("state", 2), ca.MX.sym("steer", 2)
     force = model.step(state, steer, 20.0, car.bicycle)
     slope = ca.Function("slope", [state, steer], [ca.jacobian(force, state)])(x[2:4], [x[4], 0.0])
