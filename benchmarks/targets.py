@@ -115,8 +115,8 @@ class Targets:
             }
             path.write_text(json.dumps(text, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
             print(f"wrote {path}")
-        if self.missed:
-            print(f"{self.script}: MISSED {len(self.missed)} targets: {'; '.join(self.missed)}")
+        names = f": {'; '.join(self.missed)}" if self.missed else ""
+        print(f"{self.script}: {self.met} targets met, {len(self.missed)} missed{names}")
         return MISSED if self.missed else 0
 
 
