@@ -5,9 +5,10 @@ number above it, in their order:
 
     <!-- numbers learn_and_extrapolate: input=5 plant/over_floor/{least,most} target=1.3 -->
 
-    script:          whose recorded values, benchmarks/results/<script>.json, the next keys are of
+    script:          whose recorded values, benchmarks/results/<script>.json, the next keys are of;
+                     tireid_paper has those of the tables that a test computes again
     key              measured: the number is the recorded value, rounded as it is printed
-    key*1e3          times a factor, where the document has another unit
+    key*1e3          times a factor, where the document has another unit; key*1/1024 too
     key~3            rounded to three significant digits, as in 60 800
     a/{b,c}/{d,e}    as in a shell: a/b/d a/b/e a/c/d a/c/e
     reason=3.11,20   given, not measured; the reasons are those of `REASONS`
@@ -25,24 +26,25 @@ import sys
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from benchmarks.targets import RESULTS
 
 ROOT = Path(__file__).resolve().parents[1]
+COMMITTED = {"tireid_paper": ROOT / "tests" / "tireid" / "expected_tables.json"}
 REASONS = ("input", "target", "definition", "formula", "paper", "standard", "version", "name")
 Values = Mapping[str, Mapping[str, float | int | str]]  # by script, by key
 
 CODE = re.compile(r"^(```|~~~).*?^\1[^\n]*$|``[^`].*?``|`[^`\n]*`", re.M | re.S)
 COMMENT = re.compile(r"<!--(.*?)-->", re.S)
 LINK = re.compile(r"(?<=\])\([^)\n]*\)|<[^<>\n]+>")
-NAME = re.compile(r"\bISO \d+(?:-\d+)?|[^\W\d]\w*\d\w*(?:[-.]\d+)*")
+NAME = re.compile(r"\bISO\s\d+(?:-\d+)?|[^\W\d]\w*\d\w*(?:[-.]\d+)*")
 NUMBER = re.compile(
     r"(?:(?<![\w.)\]])[-−])?(?<![\w.])"  # a sign is one where nothing stands before it
     r"(?:\d+:\d+|\d+(?:\.\d+){2,}|\d{1,3}(?: \d{3})+(?!\d)|\d+(?:\.\d+)?(?:e[-+]?\d+)?)"
 )
 GIVEN = re.compile(r"(\w+)=(\S+)")
-MEASURED = re.compile(r"([^\s*~=:]+?)(?:\*([\d.e+-]+))?(?:~(\d+))?")
+MEASURED = re.compile(r"([^\s*~=:]+?)(?:\*([\d.e+/-]+))?(?:~(\d+))?")
 
 
 class Number(NamedTuple):
@@ -163,9 +165,9 @@ def read_items(words: str) -> list[Item]:
                 if not script:
                     raise NotationError(f"{word}: no script is named before it")
                 digits = int(found[3]) if found[3] else None
-                items.append(
-                    Item(script=script, key=found[1], factor=float(found[2] or 1.0), digits=digits)
-                )
+                over, _, under = (found[2] or "1").partition("/")
+                factor = float(over) / float(under or 1.0)
+                items.append(Item(script=script, key=found[1], factor=factor, digits=digits))
     return items
 
 
@@ -290,16 +292,38 @@ def section_at(text: str, position: int) -> str:
 
 
 def recorded(folder: Path = RESULTS) -> dict[str, dict[str, float | int | str]]:
-    """Return what every benchmark recorded, by script and key.
+    """Return what every benchmark recorded, and the tables of commands that tests keep.
 
     Parameters
     ----------
     folder : of the JSON files.
+
+    Returns
+    -------
+    By script or command, by key.
     """
-    return {
+    found = {
         path.stem: json.loads(path.read_text(encoding="utf-8"))["values"]
         for path in sorted(folder.glob("*.json"))
     }
+    for name, path in COMMITTED.items():
+        found[name] = dict(flat(json.loads(path.read_text(encoding="utf-8"))))
+    return found
+
+
+def flat(tree: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, float | int | str]]:
+    """Yield the leaves of nested tables, with their keys joined by slashes.
+
+    Parameters
+    ----------
+    tree : the tables.
+    above : key of the table itself.
+    """
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from flat(value, f"{above}{key}/")
+        else:
+            yield f"{above}{key}", value
 
 
 def documents(root: Path = ROOT) -> list[Path]:

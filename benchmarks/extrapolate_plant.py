@@ -68,6 +68,12 @@ def maneuvers(targets: Targets) -> None:
             show(f"{name}: over the best of all", _spread(ratios["best of all"]))
             label = f"{name}: over the integral law, median"
             targets.at_most(label, law, 1 / 3, "-", key=f"plant/{name}/over_integral")
+    laws = [
+        _median([row[DEFAULT][name].both / row[REFERENCE][name].both for row in rows])
+        for name in names[1:]
+    ]
+    targets.record("plant/over_integral/least", min(laws), "-")
+    targets.record("plant/over_integral/most", max(laws), "-")
     exact = Course(vehicle=car, recordings=_drives(None)[:1], min_speed=slowest)
     (clean,) = _learnt_on_first(DEFAULT, exact, 0).values()
     largest = max(clean.front, clean.rear) / 1e3

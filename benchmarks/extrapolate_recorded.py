@@ -65,6 +65,11 @@ def carmaker(targets: Targets) -> None:
                     targets.record(f"carmaker/{learnt}/{unseen}/{DEFAULT}/{axle}", error[k], "%")
                 targets.record(f"carmaker/{learnt}/{unseen}/floor/{axle}", floor[k], "%")
             show(f"{label}: front / rear", f"{_pair(error)} %; floor {_pair(floor)} %")
+    for name, drive in drives.items():
+        slip = np.degrees(np.abs(drive.alpha(CARMAKER.l_f, CARMAKER.l_r)).max(axis=0))
+        show(f"largest slip of {RUNS[name]}, front / rear", f"{slip[0]:.2f} / {slip[1]:.2f} deg")
+        for axle, value in zip(AXLES, slip.tolist(), strict=True):
+            targets.record(f"carmaker/slip/{name}/{axle}", value, "deg")
     _outside(targets, drives["mild"], drives["hard"])
     _paper(targets, drives)
 
