@@ -11,6 +11,8 @@ number above it, in their order:
     key*1e3          times a factor, where the document has another unit; key*1/1024 too
     key~3            rounded to three significant digits, as in 60 800
     a/{b,c}/{d,e}    as in a shell: a/b/d a/b/e a/c/d a/c/e
+    key@target       the limit of a target that was reached; key@missed of one that was not, so
+                     that a document whose words no longer hold is noticed
     reason=3.11,20   given, not measured; the reasons are those of `REASONS`
 
 Code, names (C99, x86-64, ISO 3888-2), targets of links and other comments hold no numbers.
@@ -302,10 +304,12 @@ def recorded(folder: Path = RESULTS) -> dict[str, dict[str, float | int | str]]:
     -------
     By script or command, by key.
     """
-    found = {
-        path.stem: json.loads(path.read_text(encoding="utf-8"))["values"]
-        for path in sorted(folder.glob("*.json"))
-    }
+    found = {}
+    for path in sorted(folder.glob("*.json")):
+        text = json.loads(path.read_text(encoding="utf-8"))
+        found[path.stem] = text["values"]
+        for key, target in text.get("targets", {}).items():
+            found[path.stem][f"{key}@{'target' if target['met'] else 'missed'}"] = target["limit"]
     for name, path in COMMITTED.items():
         found[name] = dict(flat(json.loads(path.read_text(encoding="utf-8"))))
     return found

@@ -129,9 +129,9 @@ def dart(targets: Targets) -> None:
     targets : collects what is missed.
     """
     runs = tuple(read_recording(DATA / "dart.csv.gz", run=run) for run in REAL_RUNS)
-    found = _compare((DEFAULT, *BASELINES), DART, runs, starts=STARTS)
+    found = _compare((DEFAULT, *BASELINES), DART, runs)
     print("Real 1:10 car, frozen, on the other runs: both axles [% of rms force]")
-    rows = {"floor": found.floors[FLOOR]}
+    rows = {"floor": _compare((DEFAULT,), DART, runs, starts=STARTS).floors[FLOOR]}
     for name, trial in found.trials.items():
         if trial.frozen is None or trial.diverged_at:
             show(name, "diverged")

@@ -106,16 +106,12 @@ def test_what_drifted_is_caught(old, new, complaint):
 
 def test_a_number_that_drifts_in_the_readme_is_caught():
     text, values = (ROOT / "README.md").read_text(encoding="utf-8"), recorded()
-    before = complaints(text, values)
-    changed = 0
-    for mark in marks(text):
-        for number in numbers(text):
-            if mark.start <= number.start < mark.end:
-                other = text[: number.start] + "77.77" + text[number.start + len(number.text) :]
-                assert len(complaints(other, values)) > len(before), number
-                changed += 1
-                break  # the first of each block
-    assert changed >= 10
+    before, found = complaints(text, values), numbers(text)
+    firsts = [next(n for n in found if mark.start <= n.start < mark.end) for mark in marks(text)]
+    assert len(firsts) >= 10
+    for number in firsts:
+        other = text[: number.start] + "77.77" + text[number.start + len(number.text) :]
+        assert len(complaints(other, values)) > len(before), number
 
 
 def test_names_code_and_links_hold_no_numbers():
@@ -161,6 +157,49 @@ def test_recorded_values_are_written_into_a_document():
 def test_writing_leaves_alone_what_it_cannot_serve():
     broken = GOOD.replace("step*1e3", "stop").replace("| 0.01", "| 0.09")
     assert rewritten(broken, VALUES) == broken.replace("| 0.09", "| 0.01")
+
+
+def test_the_command_writes_what_was_recorded_and_says_what_it_cannot(
+    tmp_path, monkeypatch, capsys
+):
+    page = tmp_path / "README.md"
+    monkeypatch.setattr(documents, "ROOT", tmp_path)
+    monkeypatch.setattr(documents, "documents", lambda: [page])
+    monkeypatch.setattr(documents, "recorded", lambda: VALUES)
+    stale = GOOD.replace("12.3", "99.9")
+    page.write_text(stale)
+    assert documents.main(["--check"]) == 1 and page.read_text() == stale
+    assert "README.md:3: 99.9 should be 12.3 (speed: step)" in capsys.readouterr().out
+    assert documents.main([]) == 0 and page.read_text() == GOOD
+    assert "+ A step takes 12.3 ms" in capsys.readouterr().out
+    page.write_text(GOOD + "\nAnd 4 more.\n")
+    assert documents.main([]) == 1
+    assert "README.md:11: 4 has no source" in capsys.readouterr().out
+
+
+def test_headings_in_code_begin_no_section():
+    text = "1\n\n## A\n\n```sh\n## no\n```\n\n2\n\n## B\n\n3\n"
+    found = [documents.section_at(text, number.start) for number in numbers(text)]
+    assert found == ["", "A", "B"]
+
+
+def test_a_target_that_is_met_at_last_or_missed_is_noticed(tmp_path, monkeypatch):
+    monkeypatch.setattr("benchmarks.targets.RESULTS", tmp_path)
+    for value, word in ((2.2, "missed"), (1.9, "target")):
+        targets = Targets("lap")
+        targets.at_most("ratio", value, 2.0, "-", key="ratio")
+        targets.finish(keep=True)
+        values = recorded(tmp_path)
+        text = f"{value} times (target 2{', missed' * (word == 'missed')}).\n"
+        assert complaints(f"{text}<!-- numbers lap: ratio ratio@{word} -->\n", values) == []
+        other = {"missed": "target", "target": "missed"}[word]
+        stale = complaints(f"{text}<!-- numbers lap: ratio ratio@{other} -->\n", values)
+        assert [what for _, what in stale] == [f"lap records no ratio@{other}"]
+
+
+def test_tables_of_commands_are_quoted_by_their_keys():
+    values = recorded()["tireid_paper"]
+    assert values["slalom/integral/online/median"] > 0.0
 
 
 def keys_of(script: str, sources: dict[str, Path]) -> list[str]:
