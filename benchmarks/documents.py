@@ -8,7 +8,7 @@ number above it, in their order:
     script:          whose recorded values, benchmarks/results/<script>.json, the next keys are of;
                      tireid_paper has those of the tables that a test computes again
     key              measured: the number is the recorded value, rounded as it is printed
-    key*1e3          times a factor, where the document has another unit; key*1/1024 too
+    key*1e3          times a factor, where the document has another unit
     key~3            rounded to three significant digits, as in 60 800
     a/{b,c}/{d,e}    as in a shell: a/b/d a/b/e a/c/d a/c/e
     key@target       the limit of a target that was reached; key@missed of one that was not, so
@@ -27,6 +27,7 @@ import re
 import sys
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -46,7 +47,7 @@ NUMBER = re.compile(
     r"(?:\d+:\d+|\d+(?:\.\d+){2,}|\d{1,3}(?: \d{3})+(?!\d)|\d+(?:\.\d+)?(?:e[-+]?\d+)?)"
 )
 GIVEN = re.compile(r"(\w+)=(\S+)")
-MEASURED = re.compile(r"([^\s*~=:]+?)(?:\*([\d.e+/-]+))?(?:~(\d+))?")
+MEASURED = re.compile(r"([^\s*~=:]+?)(?:\*([\d.e+-]+))?(?:~(\d+))?")
 
 
 class Number(NamedTuple):
@@ -167,8 +168,7 @@ def read_items(words: str) -> list[Item]:
                 if not script:
                     raise NotationError(f"{word}: no script is named before it")
                 digits = int(found[3]) if found[3] else None
-                over, _, under = (found[2] or "1").partition("/")
-                factor = float(over) / float(under or 1.0)
+                factor = float(found[2] or 1.0)
                 items.append(Item(script=script, key=found[1], factor=factor, digits=digits))
     return items
 
@@ -266,17 +266,21 @@ def rewritten(text: str, values: Values) -> str:
     found, edits = numbers(text), []
     for mark in marks(text):
         inside = [number for number in found if mark.start <= number.start < mark.end]
-        try:
+        with suppress(NotationError):
             items = read_items(mark.items)
             if len(items) == len(inside):
-                for item, number in zip(items, inside, strict=True):
-                    if not item.reason:
-                        edits.append((number, wanted(item, number, values)))
-        except NotationError:
-            continue
+                pairs = [p for p in zip(items, inside, strict=True) if not p[0].reason]
+                edits += [(number, _known(item, number, values)) for item, number in pairs]
     for number, right in reversed(edits):
         text = text[: number.start] + right + text[number.start + len(number.text) :]
     return text
+
+
+def _known(item: Item, number: Number, values: Values) -> str:
+    """The text that a number should have; the one that it has where nothing is recorded."""
+    with suppress(NotationError):
+        return wanted(item, number, values)
+    return number.text
 
 
 def section_at(text: str, position: int) -> str:
@@ -356,9 +360,10 @@ def main(argv: list[str] | None = None) -> int:
         name = path.relative_to(ROOT)
         if new != old:
             path.write_text(new, encoding="utf-8")
-            for before, after in zip(old.splitlines(), new.splitlines(), strict=True):
+            lines = zip(old.splitlines(), new.splitlines(), strict=True)
+            for line, (before, after) in enumerate(lines, start=1):
                 if before != after:
-                    print(f"{name}\n- {before}\n+ {after}")
+                    print(f"{name}:{line}\n- {before}\n+ {after}")
         for at, what in complaints(new, values):
             bad += 1
             print(f"{name}:{new.count(chr(10), 0, at) + 1}: {what}")

@@ -155,8 +155,11 @@ def test_recorded_values_are_written_into_a_document():
 
 
 def test_writing_leaves_alone_what_it_cannot_serve():
-    broken = GOOD.replace("step*1e3", "stop").replace("| 0.01", "| 0.09")
-    assert rewritten(broken, VALUES) == broken.replace("| 0.09", "| 0.01")
+    broken = GOOD.replace("step*1e3", "stop").replace("| 0.01", "| 0.09").replace("7e", "9e")
+    served = broken.replace("| 0.09", "| 0.01").replace("9e", "7e")
+    assert rewritten(broken, VALUES) == served
+    uneven = broken.replace("| `0.5`", "| 0.5")
+    assert rewritten(uneven, VALUES) == uneven.replace("9e", "7e")
 
 
 def test_the_command_writes_what_was_recorded_and_says_what_it_cannot(
