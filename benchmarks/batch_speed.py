@@ -10,7 +10,7 @@ errors, on every processor, against `identify` one at a time. Fails where a run 
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -37,7 +37,7 @@ METHODS = ("integral", "instantaneous", "pi_lead", "rls", "axle", "magic_formula
 
 
 def shortest(
-    actions: dict[str, Callable[[], object]],
+    actions: Mapping[str, Callable[[], object]],
     turns: int = TURNS,
     clock: Callable[[], float] = time.perf_counter,
 ) -> dict[str, float]:
