@@ -56,12 +56,13 @@ def percent(error: AxleRmse | None, size: AxleRmse | None) -> tuple[float, float
     return 100.0 * error.front / size.front, 100.0 * error.rear / size.rear
 
 
-def main() -> int:
-    """Print one table for each task; record its medians."""
-    targets = Targets("recorded_cars")
-    if not DATA.is_dir():
-        print(f"skipped: the recordings are not there: {DATA} (set TIREID_DATA)")
-        return 0
+def measure(targets: Targets) -> None:
+    """Print one table for each task; record its medians.
+
+    Parameters
+    ----------
+    targets : collects what is recorded.
+    """
     for task, (car, log, learn, other) in TASKS.items():
         learnt, unseen = (read_recording(DATA / log, run=run) for run in (learn, other))
         print(f"{car.name}: learnt on {learn}, frozen, replayed on {other} [% of rms force]")
@@ -87,6 +88,15 @@ def main() -> int:
                 f"  {law:22} online {cells[0]} /{cells[1]}   frozen {cells[2]} /{cells[3]}   "
                 f"other drive {cells[4]} /{cells[5]}"
             )
+
+
+def main() -> int:
+    """Measure where the recordings are there."""
+    targets = Targets("recorded_cars")
+    if not DATA.is_dir():
+        print(f"skipped: the recordings are not there: {DATA} (set TIREID_DATA)")
+        return 0
+    measure(targets)
     return targets.finish(keep=keeps())
 
 
