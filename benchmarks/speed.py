@@ -1,7 +1,8 @@
 """How long things take: a 45 s recording learnt, a 45 s plant run, the first use with compiling.
 
-Times are wall clock of one process, minimum and median of repeated calls; the first use starts from
-an empty cache in a process of its own. Run it by `python -m benchmarks.speed [--record]`.
+Times are of this process on its processor, so that a busy machine does not count, minimum and
+median of repeated calls; the first use is wall clock, and starts from an empty cache in a process
+of its own. Run it by `python -m benchmarks.speed [--record]`.
 """
 
 import os
@@ -32,9 +33,9 @@ def timed(action: Callable[[], object], repeats: int = REPEATS) -> tuple[float, 
     action()
     durations = []
     for _ in range(repeats):
-        start = time.perf_counter()
+        start = time.process_time()
         action()
-        durations.append(time.perf_counter() - start)
+        durations.append(time.process_time() - start)
     return min(durations), statistics.median(durations), max(durations)
 
 
