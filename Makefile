@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 PY := $(VENV)/bin/python
 
-.PHONY: demo test lint bench clean
+.PHONY: demo test lint bench numbers clean
 
 demo: $(VENV)/.demo
 	$(VENV)/bin/tireid demo --out out/demo --force
@@ -17,7 +17,11 @@ lint: $(VENV)/.test
 	$(VENV)/bin/mypy
 
 bench: $(VENV)/.bench
-	$(PY) benchmarks/run_all.py --out out/bench
+	$(PY) -m benchmarks.run_all --out out/bench
+
+# What `python -m benchmarks.run_all --record` measured, written into README.md and docs.
+numbers: $(VENV)/.bench
+	$(PY) -m benchmarks.documents
 
 $(PY):
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "tireid needs Python 3.11 or newer: make PYTHON=/path/to/python3.11"; exit 2; }

@@ -1,7 +1,7 @@
 """What exported C costs on Arm processors, measured in QEMU, beside the targets."""
 
 from benchmarks.targets import Targets, show
-from identifier.export.figures import measure
+from identifier.export.figures import Cost, measure
 from identifier.export.package import build_package
 from identifier.export.processor import CROSS_COMPILER, compiler_version, missing_tools
 from identifier.methods import DEFAULT, REFERENCE, make_method
@@ -9,6 +9,7 @@ from models.vehicle import sedan
 
 METHODS = {REFERENCE: "paper, n_h = 10", DEFAULT: "default, axle curves"}
 SMALL = "Cortex-M4F"
+LIMITS = {"instructions": 2000, "flash_B": 7168, "stack_B": 800, "ram_B": 400}
 
 
 def print_arm_costs(targets: Targets) -> None:
@@ -23,18 +24,31 @@ def print_arm_costs(targets: Targets) -> None:
     costs = {name: measure(build_package(make_method(name, car), car)) for name in METHODS}
     for name, found in costs.items():
         for cost in found:
-            run = cost.replay
+            run, precision = cost.replay, "float" if cost.single else "double"
             print(
-                f"{METHODS[name]:22}{cost.processor:12}{'float' if cost.single else 'double':9}"
-                f"{cost.flash:8}{run.state + run.params:7}{run.stack:7}{run.instructions:8}"
+                f"{METHODS[name]:22}{cost.processor:12}{precision:9}"
+                f"{cost.flash:8}{cost.ram:7}{run.stack:7}{run.instructions:8}"
                 f"{run.most_instructions:9}"
             )
-    small = next(cost for cost in costs[REFERENCE] if cost.processor == SMALL and cost.single)
-    run = small.replay
-    for label, value, limit in (
-        ("instructions of the longest step", run.most_instructions, 2000),
-        ("flash [B]", small.flash, 7168),
-        ("stack [B]", run.stack, 800),
-        ("RAM [B]", run.state + run.params, 400),
-    ):
-        targets.at_most(f"{METHODS[REFERENCE]}, {SMALL}, float: {label}", value, limit, "")
+            for key, value in _figures(cost).items():
+                if cost.processor == SMALL and cost.single and name == REFERENCE:
+                    label = f"{METHODS[name]}, {SMALL}, float: {key}"
+                    targets.at_most(
+                        label,
+                        value,
+                        LIMITS[key],
+                        "",
+                        key=f"arm/{name}/{cost.processor}/{precision}/{key}",
+                    )
+                else:
+                    targets.record(f"arm/{name}/{cost.processor}/{precision}/{key}", value)
+
+
+def _figures(cost: Cost) -> dict[str, int]:
+    """What a step costs at most, by key."""
+    return {
+        "instructions": cost.replay.most_instructions,
+        "flash_B": cost.flash,
+        "stack_B": cost.replay.stack,
+        "ram_B": cost.ram,
+    }

@@ -1,6 +1,6 @@
 """Many gain sets at once in SIMD lanes against the same compiled C one at a time.
 
-    python -m benchmarks.batch_speed [GAIN_SETS]
+    python -m benchmarks.batch_speed [GAIN_SETS] [--record]
 
 45 s of driving (4500 steps), the paper's law, 10 hidden units. Both loops are compiled from the
 same CasADi function and record nothing but where they end; they take turns, the shortest of
@@ -10,11 +10,12 @@ errors, on every processor, against `identify` one at a time. Fails where a run 
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 
+from benchmarks.targets import Targets, keeps
 from codegen import BatchScan
 from codegen.batch import processors
 from codegen.lanes import find_target
@@ -31,11 +32,12 @@ from models.vehicle import Vehicle, sedan
 
 SLALOM = Slalom(amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=44.99)
 TURNS = 15
+GAIN_SETS = 1000
 METHODS = ("integral", "instantaneous", "pi_lead", "rls", "axle", "magic_formula_ekf")
 
 
 def shortest(
-    actions: dict[str, Callable[[], object]],
+    actions: Mapping[str, Callable[[], object]],
     turns: int = TURNS,
     clock: Callable[[], float] = time.perf_counter,
 ) -> dict[str, float]:
@@ -96,18 +98,17 @@ def check(run: BatchRun, history: History) -> None:
         np.testing.assert_array_equal(value, history.carried[port][-1])
 
 
-def main(count: int = 1000) -> dict[str, float]:
-    """Print the table; return the time of the batch [s] and the ratios by method."""
-    car = sedan()
+def main(count: int = GAIN_SETS) -> int:
+    """Print the table; record the times of the batch [s] and the ratios by method."""
+    keep, targets, car = keeps() and count == GAIN_SETS, Targets("batch_speed"), sedan()
     recording = Plant(car).simulate(SLALOM, speed=20.0).recording()
     target = find_target()
     print(f"{target.lanes if target else 1} lanes, {processors()} processors")
     print("one step of one run, one core       alone [ns]   in lanes [ns]   ratio")
-    found = {}
     for name in METHODS:
         alone, lanes = per_step(name, car, recording)
-        found[name] = alone / lanes
-        print(f"{name:34}{1e9 * alone:12.1f}{1e9 * lanes:16.1f}{found[name]:8.1f}")
+        print(f"{name:34}{1e9 * alone:12.1f}{1e9 * lanes:16.1f}{alone / lanes:8.1f}")
+        targets.record(f"lanes/{name}", alone / lanes, "-")
     designs = gain_sets(car, count)
     runs = identify_batch(recording, car, designs)
     for k in range(0, count, max(count // 20, 1)):
@@ -127,8 +128,13 @@ def main(count: int = 1000) -> dict[str, float]:
     print(f"  identify_batch, all cores  {times['all cores']:8.3f} s")
     print(f"  identify, one at a time    {alone:8.3f} s (from {len(few)})")
     print(f"  ratio on all cores         {alone / times['all cores']:8.1f}")
-    return {"batch": times["all cores"], **found}
+    targets.record("gain_sets", count)
+    targets.record("batch/one_core", times["one core"], "s")
+    targets.record("batch/all_cores", times["all cores"], "s")
+    targets.record("batch/one_at_a_time", alone, "s")
+    targets.record("batch/ratio", alone / times["all cores"], "-")
+    return targets.finish(keep=keep)
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    sys.exit(main(*(int(word) for word in sys.argv[1:] if word != "--record")))

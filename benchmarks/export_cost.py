@@ -1,6 +1,6 @@
 """What the exported C costs: on this machine beside other ways to write it, and on Arm.
 
-    python -m benchmarks.export_cost
+    python -m benchmarks.export_cost [--record]
 
 One run of 45 s (4500 steps), the paper's network with 10 units and its integral law, on the sedan.
 The package is built as its CMakeLists.txt says, its guards included; the literal CasADi algebra and
@@ -28,12 +28,12 @@ from benchmarks.c_loops import (
     release_flags,
 )
 from benchmarks.literal_step import Carried, NumpyStep, casadi_step, signals
-from benchmarks.targets import Targets
+from benchmarks.targets import Targets, keeps
 from codegen import find_compiler
-from identifier.defaults import default_design
-from identifier.design import axle_impulse
+from identifier.design import Design, axle_impulse
 from identifier.export.compiled import samples_of
 from identifier.export.package import Package, build_package
+from identifier.methods import REFERENCE, make_method
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan
@@ -48,13 +48,23 @@ ALLOWED = {  # largest difference of a force to that of the package, over the la
     LITERAL: 1e-6,  # whose tanh differs by 1.9e-11
     NUMPY: 1e-6,
 }
+KEYS = {
+    PACKAGE: "package",
+    "exported C, float": "package_float",
+    LITERAL: "literal",
+    LOOP: "hand_written",
+    "exported C, -march=native": "package_native",
+    "hand-written C, -march=native": "hand_written_native",
+    NUMPY: "numpy",
+}
 ROUNDING = 1e-9  # where the same is computed
 
 
 def steps(package: Package) -> dict[str, Loop]:
     """Return every way to write the step, by name; each takes samples and gives forces."""
     car, flags = sedan(), release_flags(package)
-    design = default_design(car)
+    design = make_method(REFERENCE, car)
+    assert isinstance(design, Design)
     gains, network = design.gains, design.network
     assert network.scale is not None
     carry = package.folded.carry
@@ -97,7 +107,7 @@ def steps(package: Package) -> dict[str, Loop]:
     }
 
 
-def check(ways: Mapping[str, Loop], samples: Array) -> None:
+def check(ways: Mapping[str, Loop], samples: Array, targets: Targets) -> None:
     """Fail where two ways to write the step do not give the same forces."""
     expected = ways[PACKAGE](samples)
     largest = np.abs(expected).max()
@@ -105,7 +115,9 @@ def check(ways: Mapping[str, Loop], samples: Array) -> None:
     for name, way in ways.items():
         difference = np.abs(way(samples) - expected).max()
         print(f"  {name:32}{difference:12.2g} N")
+        targets.record(f"difference/{KEYS[name]}", float(difference), "N")
         assert difference <= ALLOWED.get(name, ROUNDING) * largest, name
+    targets.record("largest_force", float(largest), "N")
 
 
 def times(ways: Mapping[str, Loop], samples: Array) -> dict[str, Array]:
@@ -131,31 +143,32 @@ def _spread(ratios: Array) -> str:
 
 def main() -> int:
     """Print the tables; 1 where a target is missed."""
-    car = sedan()
+    car, targets = sedan(), Targets("export_cost")
     samples = samples_of(Plant(car).simulate(SLALOM, speed=20.0).recording())
     assert not samples[0, 1:].any()  # straight ahead: every way starts from rest
-    package = build_package(default_design(car), car)
+    package = build_package(make_method(REFERENCE, car), car)
     compiler = find_compiler()
     assert compiler is not None
     version = subprocess.run([*compiler, "--version"], capture_output=True, text=True, check=True)
     print(f"{platform.machine()}, {os.cpu_count()} cores; {version.stdout.splitlines()[0]}")
     print(f"flags of the package: {' '.join(release_flags(package))}")
     ways = steps(package)
-    check(ways, samples)
+    check(ways, samples, targets)
     measured = times(ways, samples)
     print(f"time of a step over {TURNS} turns [ns]         least    median")
     for name, values in measured.items():
         print(f"  {name:36}{1e9 * values.min():12.1f}{1e9 * np.median(values):10.1f}")
-    targets = Targets()
+        targets.record(f"step/{KEYS[name]}", 1e9 * float(np.median(values)), "ns")
     own, literal, loop = (measured[name] for name in (PACKAGE, LITERAL, LOOP))
-    targets.at_most(
-        f"{PACKAGE} over {LITERAL} {_spread(own / literal)}", _mid(own / literal), 0.7, ""
-    )
-    targets.at_most(f"{PACKAGE} over {LOOP} {_spread(own / loop)}", _mid(own / loop), 2.0, "")
+    label = f"{PACKAGE} over {LITERAL} {_spread(own / literal)}"
+    targets.at_most(label, _mid(own / literal), 0.7, "", key="ratio/literal")
+    label = f"{PACKAGE} over {LOOP} {_spread(own / loop)}"
+    targets.at_most(label, _mid(own / loop), 2.0, "", key="ratio/hand_written")
     slow = measured[NUMPY] / own
-    targets.at_least(f"{NUMPY} over {PACKAGE} {_spread(slow)}", _mid(slow), 200.0, "")
+    label = f"{NUMPY} over {PACKAGE} {_spread(slow)}"
+    targets.at_least(label, _mid(slow), 200.0, "", key="ratio/numpy")
     print_arm_costs(targets)
-    return int(bool(targets.missed))
+    return targets.finish(keep=keeps())
 
 
 if __name__ == "__main__":

@@ -47,8 +47,10 @@ def faults(targets: Targets) -> None:
             if name == DEFAULT and finite:
                 error = course.share(clean.name, course.error(clean, force.axle_force(clean)))
                 show(f"{fault}: {DEFAULT} frozen, on the clean slalom", f"{error:.1f} %")
+                targets.record(f"faults/{_slug(fault)}/{DEFAULT}", error, "%")
         text = f" ({', '.join(lost)})" if lost else ""
-        targets.at_most(f"{fault}: methods that are not finite{text}", len(lost), 0, "")
+        label = f"{fault}: methods that are not finite{text}"
+        targets.at_most(label, len(lost), 0, "", key=f"faults/{_slug(fault)}/lost")
 
 
 def faulty(clean: Recording, rng: np.random.Generator) -> Mapping[str, Recording]:
@@ -77,6 +79,10 @@ def faulty(clean: Recording, rng: np.random.Generator) -> Mapping[str, Recording
         "spikes of 1000": _with(clean, {k: s + 1e3 * spikes for k, s in signals.items()}),
         "standstill": _with(clean, {k: np.where(middle, 0.0, s) for k, s in signals.items()}),
     }
+
+
+def _slug(words: str) -> str:
+    return words.replace(" ", "_")
 
 
 def _with(clean: Recording, signals: Mapping[str, Array]) -> Recording:

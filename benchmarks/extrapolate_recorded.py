@@ -1,29 +1,36 @@
 """Learn on one recorded drive, freeze, predict another: CarMaker both ways and a real 1:10 car.
 
-The recordings of ../shared/data are not part of the project; without them this part is skipped.
+Every number but those inside and outside the known slip is one of `tireid compare`, on the
+vehicles of `recorded_cars`. The recordings of ../shared/data are not part of the project; without
+them this part is skipped.
 """
-
-from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.recorded_cars import CARMAKER, DART, DATA
 from benchmarks.targets import Targets, show
-from identifier.axle import AxleDesign, AxleModel
-from identifier.cross_replay import Course, cross_replay
-from identifier.floors import fit_floors
+from identifier.axle import AxleModel
+from identifier.cross_replay import Course, where_learnt_and_elsewhere
 from identifier.identify import identify
-from identifier.methods import DEFAULT, METHODS, REFERENCE, make_method
+from identifier.methods import DEFAULT, REFERENCE, make_method
+from identifier.pareto import best_candidate
 from identifier.reproducibility import AxleRmse, axle_rms
 from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle
+from tireid.compare_study import Comparison, Frozen, run_comparison
 
 Array = NDArray[np.float64]
-HARD, MILD = "slalom1_14_5ms", "experiment2_40kmh"
-RUNS = ("ramp_steer02", "free_10_02_28", "free_10_12_05")
+RUNS = {"hard": "slalom1_14_5ms", "mild": "experiment2_40kmh"}
+REAL_RUNS = ("ramp_steer02", "free_10_02_28", "free_10_12_05")
 SEEDS = 10
-BASELINES = ("linear", "stiffness_rls", "magic_formula_ekf", "dugoff_ekf", "integral")
+STARTS = 3  # of each floor, as `tireid compare` has it
+DESIGNS = 200  # of each method, tuned in hindsight on the real car
+BASELINES = ("linear", "stiffness_rls", "magic_formula_ekf", "dugoff_ekf", REFERENCE)
+BEST = "magic_formula_ekf"  # of the baselines on the real car, which is a target
+FLOOR = "axle units"
+AXLES = ("front", "rear")
+LIMITS = {("hard", "hard"): (9.0, 5.0), ("hard", "mild"): (15.0, 15.0)}  # front, rear [%]
 
 
 def carmaker(targets: Targets) -> None:
@@ -33,68 +40,85 @@ def carmaker(targets: Targets) -> None:
     ----------
     targets : collects what is missed.
     """
-    hard, mild = (read_recording(DATA / "carmaker.csv.gz", run=run) for run in (HARD, MILD))
-    course = _course(CARMAKER, (hard, mild))
-    floors = fit_floors([DEFAULT], course, starts=3, seed=0, workers=1)["axle units"]
-    print(f"CarMaker, effective vehicle, {DEFAULT} [% of rms force]")
-    frozen = cross_replay(make_method(DEFAULT, CARMAKER), course).frozen
+    drives = {n: read_recording(DATA / "carmaker.csv.gz", run=run) for n, run in RUNS.items()}
+    found = _compare((DEFAULT,), CARMAKER, tuple(drives.values()), starts=STARTS)
+    frozen, floors, course = found.trials[DEFAULT].frozen, found.floors[FLOOR], found.course
     assert frozen is not None
-    limits = {(hard.name, hard.name): (9.0, 5.0), (hard.name, mild.name): (15.0, 15.0)}
-    for learnt in (hard, mild):
-        for unseen in (hard, mild):
+    print(f"CarMaker, effective vehicle, {DEFAULT} [% of rms force]")
+    for learnt, first in drives.items():
+        for unseen, other in drives.items():
             error, floor = (
-                _percent(course, unseen, found[learnt.name][unseen.name])
-                for found in (frozen, floors)
+                _percent(course, other, errors[first.name][other.name])
+                for errors in (frozen, floors)
             )
-            label = f"learnt on {_run(learnt)}, replayed on {_run(unseen)}"
-            for axle, value, limit in zip(
-                ("front", "rear"), error, limits.get((learnt.name, unseen.name), ()), strict=False
-            ):
-                targets.at_most(f"{label}, {axle}", value, limit)
+            label = f"learnt on {RUNS[learnt]}, replayed on {RUNS[unseen]}"
+            for k, axle in enumerate(AXLES):
+                if (learnt, unseen) in LIMITS:
+                    limit = LIMITS[learnt, unseen][k]
+                    targets.at_most(
+                        f"{label}, {axle}",
+                        error[k],
+                        limit,
+                        key=f"carmaker/{learnt}/{unseen}/{DEFAULT}/{axle}",
+                    )
+                else:
+                    targets.record(f"carmaker/{learnt}/{unseen}/{DEFAULT}/{axle}", error[k], "%")
+                targets.record(f"carmaker/{learnt}/{unseen}/floor/{axle}", floor[k], "%")
             show(f"{label}: front / rear", f"{_pair(error)} %; floor {_pair(floor)} %")
-    _outside(targets, mild, hard)
-    _paper(course, hard, mild)
+    for name, drive in drives.items():
+        slip = np.degrees(np.abs(drive.alpha(CARMAKER.l_f, CARMAKER.l_r)).max(axis=0))
+        show(f"largest slip of {RUNS[name]}, front / rear", f"{slip[0]:.2f} / {slip[1]:.2f} deg")
+        for axle, value in zip(AXLES, slip.tolist(), strict=True):
+            targets.record(f"carmaker/slip/{name}/{axle}", value, "deg")
+    _outside(targets, drives["mild"], drives["hard"])
+    _paper(targets, drives)
 
 
 def _outside(targets: Targets, learnt: Recording, unseen: Recording) -> None:
     """Judge the model of a mild drive on a hard one, inside and outside the slip it knows."""
-    history = identify(learnt, CARMAKER, AxleDesign.for_vehicle(CARMAKER))
+    history = identify(learnt, CARMAKER, make_method(DEFAULT, CARMAKER))
     model = history.freeze(float(learnt.t[-1]))
     assert isinstance(model, AxleModel) and unseen.axle_force is not None
     stiffness = [CARMAKER.cornering_stiffness_front, CARMAKER.cornering_stiffness_rear]
     linear = unseen.alpha(CARMAKER.l_f, CARMAKER.l_r) * stiffness
     outside, known = model.outside(unseen), np.degrees(model.known_slip_range)
     force, truth = model.axle_force(unseen), unseen.axle_force
+    targets.record("carmaker/slip_known/front", float(known[0]), "deg")
+    targets.record("carmaker/slip_known/rear", float(known[1]), "deg")
     show("slip known after it, front / rear", f"{known[0]:.2f} / {known[1]:.2f} deg")
-    for axle, name in enumerate(("front", "rear")):
+    for axle, name in enumerate(AXLES):
         inside = ~outside[:, axle]
         share = _error(force[inside, axle], truth[inside, axle])
-        targets.at_most(
-            f"then replayed on {_run(unseen)}, inside the known slip, {name}", share, 15
-        )
+        label = f"then replayed on {RUNS['hard']}, inside the known slip, {name}"
+        targets.at_most(label, share, 15.0, key=f"carmaker/inside/{name}")
         if not inside.all():
             own, line = (_error(f[~inside, axle], truth[~inside, axle]) for f in (force, linear))
             part = 100.0 * np.mean(~inside)
             show(f"  outside, {name}", f"{part:.0f} % of samples; linear tire {line:.1f} %")
-            targets.at_most(f"  outside, {name}, no worse than the linear tire", own, line)
+            label = f"  outside, {name}, no worse than the linear tire"
+            targets.at_most(label, own, line, key=f"carmaker/outside/{name}")
+            targets.record(f"carmaker/outside/{name}_linear", line, "%")
     grid = np.linspace(-0.5, 0.5, 201)
     curve = np.abs(model.force_at(grid)).max(axis=0) / CARMAKER.axle_loads
-    targets.at_most("  largest force up to 29 deg, over the axle's load", curve.max(), 1.5, "-")
+    label = "  largest force up to 29 deg, over the axle's load"
+    targets.at_most(label, float(curve.max()), 1.5, "-", key="carmaker/largest_force")
 
 
-def _paper(course: Course, hard: Recording, mild: Recording) -> None:
+def _paper(targets: Targets, drives: dict[str, Recording]) -> None:
     print(f"The paper's network on the same, median (quartiles) of {SEEDS} seeds [% of rms force]")
     rows: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for seed in range(SEEDS):
-        frozen = cross_replay(make_method(REFERENCE, CARMAKER, seed), course).frozen
-        for learnt, replays in (frozen or {}).items():
-            for recording in (hard, mild):
-                rows.setdefault((learnt, recording.name), []).append(
-                    _percent(course, recording, replays[recording.name])
-                )
-    for (learnt, replayed), values in rows.items():
-        label = f"learnt on {learnt.split(':')[1]}, replayed on {replayed.split(':')[1]}"
+        found = _compare((REFERENCE,), CARMAKER, tuple(drives.values()), seed=seed)
+        frozen = found.trials[REFERENCE].frozen or {}
+        for learnt, first in drives.items():
+            for unseen, other in drives.items():
+                error = frozen[first.name][other.name]
+                rows.setdefault((learnt, unseen), []).append(_percent(found.course, other, error))
+    for (learnt, unseen), values in rows.items():
+        label = f"learnt on {RUNS[learnt]}, replayed on {RUNS[unseen]}"
         show(label, f"{_spread(values, 0)} / {_spread(values, 1)}")
+        for axle, value in zip(AXLES, np.median(values, axis=0).tolist(), strict=True):
+            targets.record(f"carmaker/{learnt}/{unseen}/{REFERENCE}/{axle}", value, "%")
 
 
 def dart(targets: Targets) -> None:
@@ -104,39 +128,70 @@ def dart(targets: Targets) -> None:
     ----------
     targets : collects what is missed.
     """
-    runs = tuple(read_recording(DATA / "dart.csv.gz", run=run) for run in RUNS)
-    course = _course(DART, runs)
+    runs = tuple(read_recording(DATA / "dart.csv.gz", run=run) for run in REAL_RUNS)
+    found = _compare((DEFAULT, *BASELINES), DART, runs)
     print("Real 1:10 car, frozen, on the other runs: both axles [% of rms force]")
-    floors = fit_floors([DEFAULT], course, starts=3, seed=0, workers=1)["axle units"]
-    means = {"floor, axle units": _elsewhere(course, floors)}
-    for name in (DEFAULT, *BASELINES):
-        frozen = cross_replay(make_method(name, DART), course).frozen
-        if frozen is None or len(frozen) < len(runs):
+    rows = {"floor": _compare((DEFAULT,), DART, runs, starts=STARTS).floors[FLOOR]}
+    for name, trial in found.trials.items():
+        if trial.frozen is None or trial.diverged_at:
             show(name, "diverged")
-            continue
-        means[name] = _elsewhere(course, frozen)
-    for name, values in means.items():
-        cells = "  ".join(f"{value:5.1f}" for value in values)
+        else:
+            rows[name] = trial.frozen
+    means: dict[str, float] = {}
+    for name, frozen in rows.items():
+        both, axles = _elsewhere(found.course, frozen)
+        means[name] = float(np.mean(both))
+        cells = "  ".join(f"{value:5.1f}" for value in both)
         show(f"{name}: from ramp to both, from 02_28 to both, from 12_05 to both", cells)
-    best = min((float(np.mean(means[name])), name) for name in BASELINES if name in means)
-    show("best baseline", best[1])
-    targets.at_most(
-        "real car: mean over the six, against it", float(np.mean(means[DEFAULT])), best[0]
+        show(f"{name}: mean, front / rear", f"{means[name]:.1f}, {_pair(axles)}")
+        targets.record(f"dart/{name}/both", means[name], "%")
+        for axle, value in zip(AXLES, axles, strict=True):
+            targets.record(f"dart/{name}/{axle}", value, "%")
+    best = min((name for name in BASELINES if name in means), key=means.__getitem__)
+    targets.record("dart/best_baseline", best)
+    label = f"real car: mean over the six, against {best}"
+    targets.at_most(label, means[DEFAULT], means[best], key="dart/mean_against_best")
+    _in_hindsight(targets, runs)
+
+
+def _in_hindsight(targets: Targets, runs: tuple[Recording, ...]) -> None:
+    """Show what the best of random designs has, chosen on the runs that it is judged on."""
+    found = _compare((DEFAULT, BEST), DART, runs, designs=DESIGNS)
+    for name, candidates in found.sweeps.items():
+        best = best_candidate(candidates)
+        assert best is not None and best.shares.other is not None
+        show(f"{name}: best of {DESIGNS} designs, in hindsight", f"{best.shares.other:.1f} %")
+        targets.record(f"dart/{name}/in_hindsight", best.shares.other, "%")
+
+
+def _compare(
+    names: tuple[str, ...],
+    vehicle: Vehicle,
+    recordings: tuple[Recording, ...],
+    *,
+    seed: int = 0,
+    starts: int = 0,
+    designs: int = 0,
+) -> Comparison:
+    """Compare as `tireid compare` does, in this process."""
+    return run_comparison(
+        names,
+        vehicle,
+        recordings,
+        seed=seed,
+        designs=designs,
+        starts=starts,
+        workers=1,
+        progress=lambda _: None,
     )
 
 
-def _course(vehicle: Vehicle, recordings: tuple[Recording, ...]) -> Course:
-    slowest = max(make_method(name, vehicle).min_speed for name in METHODS)
-    return Course(vehicle=vehicle, recordings=recordings, min_speed=slowest)
-
-
-def _elsewhere(course: Course, frozen: Mapping[str, Mapping[str, AxleRmse]]) -> list[float]:
-    return [
-        course.share(name, error)
-        for learnt, replays in frozen.items()
-        for name, error in replays.items()
-        if name != learnt
-    ]
+def _elsewhere(course: Course, frozen: Frozen) -> tuple[list[float], tuple[float, float]]:
+    """Errors on runs that were not learnt: of both axles, by run, and the mean of each [%]."""
+    _, other = where_learnt_and_elsewhere(frozen)
+    by_name = {recording.name: recording for recording in course.recordings}
+    axles = np.mean([_percent(course, by_name[name], error) for name, error in other], axis=0)
+    return [course.share(name, error) for name, error in other], (float(axles[0]), float(axles[1]))
 
 
 def _percent(course: Course, recording: Recording, error: AxleRmse) -> tuple[float, float]:
@@ -151,10 +206,6 @@ def _error(force: Array, truth: Array) -> float:
         float(np.sqrt(np.mean(truth**2))),
     )
     return 100.0 * error / size
-
-
-def _run(recording: Recording) -> str:
-    return recording.name.split(":")[1]
 
 
 def _pair(values: tuple[float, float]) -> str:

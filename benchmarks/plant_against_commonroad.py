@@ -1,6 +1,6 @@
 """The plant against an independent program: the multi-body car of commonroad-vehicle-models.
 
-    python -m benchmarks.plant_against_commonroad OUT
+    python -m benchmarks.plant_against_commonroad OUT [--record]
 
 drives step steers and a slalom with both at 20 m/s on dry and on slippery road, prints two tables
 and writes the figure OUT/plant_against_commonroad.png. The multi-body car has 29 states and its own
@@ -9,6 +9,7 @@ The first table is against the program as published, the second with its two con
 (see `mpc.cars.commonroad.multi_body`): what remains is the difference of the models.
 The lateral velocity passes through zero near this speed, so that its error in percent of its own
 rms says little; the table gives it as an angle of side slip too. It does not decide about passing.
+Targets: steady values against either, transients against the repaired program.
 """
 
 import sys
@@ -21,12 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.commonroad_multibody import drive
+from benchmarks.targets import Targets, keeps
 from models.friction import Friction
 from models.maneuvers import Maneuver, Slalom, StepSteer
 from models.plant import Driver, Plant
 from mpc.cars.commonroad import CommonRoadTire, bmw
 from mpc.cars.commonroad.multi_body import MultiBody
-from mpc.cars.commonroad.package import bmw_parameters
+from mpc.cars.commonroad.package import bmw_320i, bmw_parameters
 
 Array = NDArray[np.float64]
 
@@ -162,17 +164,47 @@ def draw(published: list[Comparison], repaired: list[Comparison], path: Path) ->
     plt.close(figure)
 
 
-def main(out: Path) -> list[Comparison]:
-    """Compare, print and draw.
+def judge(published: list[Comparison], repaired: list[Comparison], targets: Targets) -> None:
+    """Hold the largest errors against their targets.
+
+    Parameters
+    ----------
+    published, repaired : every maneuver against the program in either state.
+    targets : collects what is missed.
+    """
+    for name, comparisons in {"published": published, "repaired": repaired}.items():
+        steps = [c for c in comparisons if c.steady]
+        slaloms = [c for c in comparisons if not c.steady]
+        steady = 100.0 * max(abs(error) for c in steps for error in c.steady.values())
+        label = f"{name}: steady a_y and r, largest error"
+        targets.at_most(label, steady, 100.0 * STEADY_LIMIT, key=f"{name}/steady")
+        for key in ("a_y", "r"):
+            for kind, some in {"steps": steps, "slaloms": slaloms}.items():
+                errors = [100.0 * c.transient[key] for c in some]
+                targets.record(f"{name}/{kind}/{key}/least", min(errors), "%")
+                targets.record(f"{name}/{kind}/{key}/most", max(errors), "%")
+        transient = 100.0 * max(c.transient[key] for c in comparisons for key in ("a_y", "r"))
+        if name == "repaired":
+            label = "repaired: transient a_y and r, largest rms error"
+            targets.at_most(label, transient, 100.0 * TRANSIENT_LIMIT, key="repaired/transient")
+        targets.record(f"{name}/r/most", 100.0 * max(c.transient["r"] for c in comparisons), "%")
+        slip = max(float(np.degrees(c.side_slip)) for c in comparisons)
+        targets.record(f"{name}/side_slip", slip, "deg")
+    theirs = bmw_320i()
+    behind = (theirs.m_ur * theirs.b - theirs.m_uf * theirs.a) / theirs.m
+    print(f"their unsprung masses put the center of gravity {1e3 * behind:.1f} mm behind")
+    targets.record("center_of_gravity_behind", 1e3 * behind, "mm")
+
+
+def main(out: Path, *, keep: bool = False) -> int:
+    """Compare, print and draw; return 1 where a target is missed.
 
     Parameters
     ----------
     out : folder of the figure.
-
-    Returns
-    -------
-    The comparisons with the repaired program.
+    keep : write what was measured to benchmarks/results.
     """
+    targets = Targets("plant_against_commonroad")
     out.mkdir(parents=True, exist_ok=True)
     published, repaired = (
         [
@@ -185,13 +217,15 @@ def main(out: Path) -> list[Comparison]:
     print_table("against the multi-body car as published", published)
     print()
     print_table("against the multi-body car, repaired", repaired)
+    judge(published, repaired, targets)
     figure = out / "plant_against_commonroad.png"
     draw(published, repaired, figure)
     print(f"wrote {figure}")
-    return repaired
+    return targets.finish(keep=keep)
 
 
 if __name__ == "__main__":
+    keep = keeps()
     if len(sys.argv) != 2:
         sys.exit("usage: plant_against_commonroad.py OUT")
-    main(Path(sys.argv[1]))
+    sys.exit(main(Path(sys.argv[1]), keep=keep))

@@ -4,16 +4,19 @@ Needs the recordings, which are not part of the project, in the folder that TIRE
 ../shared/data beside the checkout; without them it says so and skips. For each law: the online
 error, and the error of the weights frozen at the end, on the drive that was learnt and on another;
 in percent of the rms axle force, front / rear, median over seeds. Run it by
-`python -m benchmarks.recorded_cars`.
+`python -m benchmarks.recorded_cars [--record]`.
 """
 
 import os
+import sys
 from pathlib import Path
 
 import numpy as np
 
-from identifier.defaults import LAWS, default_design
+from benchmarks.targets import Targets, keeps
+from identifier.defaults import LAWS
 from identifier.identify import identify
+from identifier.methods import make_method
 from identifier.reproducibility import AxleRmse, force_rms, online_error, replay
 from models.recordings import read_recording
 from models.vehicle import Vehicle
@@ -39,12 +42,12 @@ DART = Vehicle(
     cornering_stiffness_front=40.0,
     cornering_stiffness_rear=40.0,
 )
-TASKS = (
-    (CARMAKER, "carmaker.csv.gz", "slalom1_14_5ms", "experiment2_40kmh"),
-    (CARMAKER, "carmaker.csv.gz", "experiment2_40kmh", "slalom1_14_5ms"),
-    (DART, "dart.csv.gz", "free_10_02_28", "free_10_12_05"),
-    (DART, "dart.csv.gz", "ramp_steer02", "free_10_12_05"),
-)
+TASKS = {
+    "hard": (CARMAKER, "carmaker.csv.gz", "slalom1_14_5ms", "experiment2_40kmh"),
+    "mild": (CARMAKER, "carmaker.csv.gz", "experiment2_40kmh", "slalom1_14_5ms"),
+    "free": (DART, "dart.csv.gz", "free_10_02_28", "free_10_12_05"),
+    "ramp": (DART, "dart.csv.gz", "ramp_steer02", "free_10_12_05"),
+}
 
 
 def percent(error: AxleRmse | None, size: AxleRmse | None) -> tuple[float, float]:
@@ -53,18 +56,20 @@ def percent(error: AxleRmse | None, size: AxleRmse | None) -> tuple[float, float
     return 100.0 * error.front / size.front, 100.0 * error.rear / size.rear
 
 
-def main() -> None:
-    """Print one table for each task."""
-    if not DATA.is_dir():
-        print(f"skipped: the recordings are not there: {DATA} (set TIREID_DATA)")
-        return
-    for car, log, learn, other in TASKS:
+def measure(targets: Targets) -> None:
+    """Print one table for each task; record its medians.
+
+    Parameters
+    ----------
+    targets : collects what is recorded.
+    """
+    for task, (car, log, learn, other) in TASKS.items():
         learnt, unseen = (read_recording(DATA / log, run=run) for run in (learn, other))
         print(f"{car.name}: learnt on {learn}, frozen, replayed on {other} [% of rms force]")
         for law in LAWS:
             rows = []
             for seed in range(SEEDS):
-                design = default_design(car, law=law, seed=seed)
+                design = make_method(law, car, seed)
                 history = identify(learnt, car, design)
                 model = history.freeze(float(learnt.t[-1]))
                 elsewhere = identify(unseen, car, design)
@@ -74,12 +79,26 @@ def main() -> None:
                     + percent(own.against_truth, force_rms(history))
                     + percent(there.against_truth, force_rms(elsewhere))
                 )
-            cells = [f"{value:5.1f}" for value in np.median(rows, axis=0)]
+            medians = np.median(rows, axis=0).tolist()
+            for k, part in enumerate(("online", "frozen", "other")):
+                targets.record(f"{task}/{law}/{part}/front", medians[2 * k], "%")
+                targets.record(f"{task}/{law}/{part}/rear", medians[2 * k + 1], "%")
+            cells = [f"{value:5.1f}" for value in medians]
             print(
                 f"  {law:22} online {cells[0]} /{cells[1]}   frozen {cells[2]} /{cells[3]}   "
                 f"other drive {cells[4]} /{cells[5]}"
             )
 
 
+def main() -> int:
+    """Measure where the recordings are there."""
+    targets = Targets("recorded_cars")
+    if not DATA.is_dir():
+        print(f"skipped: the recordings are not there: {DATA} (set TIREID_DATA)")
+        return 0
+    measure(targets)
+    return targets.finish(keep=keeps())
+
+
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

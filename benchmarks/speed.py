@@ -1,7 +1,8 @@
 """How long things take: a 45 s recording learnt, a 45 s plant run, the first use with compiling.
 
-Times are wall clock of one process, minimum and median of repeated calls; the first use starts from
-an empty cache in a process of its own. Run it with `python benchmarks/speed.py`.
+Times are of this process on its processor, so that a busy machine does not count, minimum and
+median of repeated calls; the first use is wall clock, and starts from an empty cache in a process
+of its own. Run it by `python -m benchmarks.speed [--record]`.
 """
 
 import os
@@ -12,11 +13,13 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
-from identifier.defaults import default_design
+from benchmarks.targets import Targets, keeps
 from identifier.identify import identify
+from identifier.methods import DEFAULT, REFERENCE, make_method
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan
@@ -30,9 +33,9 @@ def timed(action: Callable[[], object], repeats: int = REPEATS) -> tuple[float, 
     action()
     durations = []
     for _ in range(repeats):
-        start = time.perf_counter()
+        start = time.process_time()
         action()
-        durations.append(time.perf_counter() - start)
+        durations.append(time.process_time() - start)
     return min(durations), statistics.median(durations), max(durations)
 
 
@@ -54,29 +57,37 @@ def first_use(statement: str) -> float:
     return float(answer.stdout.split()[-1])
 
 
-def main() -> dict[str, tuple[float, float, float]]:
-    """Print the table; return minimum, median and maximum by name [s]."""
-    car = sedan()
-    plant, design = Plant(car), default_design(car)
+def main() -> int:
+    """Print the table; record minimum and median of each."""
+    car, targets = sedan(), Targets("speed")
+    plant = Plant(car)
     recording = plant.simulate(SLALOM, speed=20.0).recording()
-    results = {
-        "identifier, 45 s (4500 steps, n_h = 10)": timed(lambda: identify(recording, car, design)),
-        "plant, 45 s at 1 ms": timed(lambda: plant.simulate(SLALOM, speed=20.0), repeats=5),
-    }
+    methods = {name: make_method(name, car) for name in (REFERENCE, DEFAULT)}
     print(f"{platform.processor() or platform.machine()}, Python {platform.python_version()}")
-    for name, (low, median, high) in results.items():
-        times = [f"{1e3 * value:8.2f}" for value in (low, median, high)]
-        print(f"{name:44} [ms] min {times[0]}  median {times[1]}  max {times[2]}")
+    actions: dict[str, tuple[Callable[[], object], int]] = {
+        name: (partial(identify, recording, car, method), REPEATS)
+        for name, method in methods.items()
+    }
+    actions["plant"] = (lambda: plant.simulate(SLALOM, speed=20.0), 5)
+    for name, (action, repeats) in actions.items():
+        low, median, high = (1e3 * value for value in timed(action, repeats))
+        cells = f"min {low:8.2f}  median {median:8.2f}  max {high:8.2f}"
+        print(f"{name + ', 45 s':44} [ms] {cells} of {repeats}")
+        targets.record(f"{name}/least", low, "ms")
+        targets.record(f"{name}/median", median, "ms")
+    simulate = "Plant(sedan()).simulate(SLALOM, speed=20.0)"
     for name, statement in {
-        "plant, first use with compiling": "Plant(sedan()).simulate(SLALOM, speed=20.0)",
-        "plant and identifier, first use": (
-            "identify(Plant(sedan()).simulate(SLALOM, speed=20.0).recording(), sedan(), "
-            "default_design(sedan()))"
-        ),
+        "plant": simulate,
+        "plant_and_identifier": f"identify({simulate}.recording(), sedan(), "
+        f"make_method({REFERENCE!r}, sedan()))",
+        "plant_and_default": f"identify({simulate}.recording(), sedan(), "
+        f"make_method({DEFAULT!r}, sedan()))",
     }.items():
-        print(f"{name:44} {first_use(statement):8.2f} s")
-    return results
+        duration = first_use(statement)
+        print(f"{name + ', first use with compiling':44} {duration:8.2f} s")
+        targets.record(f"first_use/{name}", duration, "s")
+    return targets.finish(keep=keeps())
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -24,6 +24,7 @@ class Targets:
     script : name of the benchmark, without its ending.
     values : by key; what documents may quote, at full precision.
     units : by key.
+    limits : by key, what a target asks for, and whether it was reached.
     missed : labels of the targets that were not reached so far.
     met : how many were reached.
     """
@@ -31,6 +32,7 @@ class Targets:
     script: str = ""
     values: dict[str, float | int | str] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
+    limits: dict[str, tuple[float, bool]] = field(default_factory=dict)
     missed: list[str] = field(default_factory=list)
     met: int = 0
 
@@ -65,7 +67,7 @@ class Targets:
         unit : of both.
         key : under which it is recorded too; none where empty.
         """
-        self._judge(label, value, f"<= {limit:g} {unit}", unit, key, value <= limit)
+        self._judge(label, value, "<=", limit, unit, key, value <= limit)
 
     def at_least(
         self, label: str, value: float, limit: float, unit: str = "%", key: str = ""
@@ -80,10 +82,10 @@ class Targets:
         unit : of both.
         key : under which it is recorded too; none where empty.
         """
-        self._judge(label, value, f">= {limit:g} {unit}", unit, key, value >= limit)
+        self._judge(label, value, ">=", limit, unit, key, value >= limit)
 
     def _judge(
-        self, label: str, value: float, target: str, unit: str, key: str, good: bool
+        self, label: str, value: float, side: str, limit: float, unit: str, key: str, good: bool
     ) -> None:
         if good:
             self.met += 1
@@ -91,8 +93,9 @@ class Targets:
             self.missed.append(label)
         if key:
             self.record(key, value, unit)
+            self.limits[key] = float(limit), bool(good)
         verdict = "ok" if good else "MISSED"
-        print(f"  {label:66} {value:8.2f} {unit:3} target {target}  {verdict}")
+        print(f"  {label:66} {value:8.2f} {unit:3} target {side} {limit:g} {unit}  {verdict}")
 
     def finish(self, *, keep: bool) -> int:
         """Say how many targets were met; return the exit code, 1 where one was missed.
@@ -111,12 +114,15 @@ class Targets:
                 "missed": self.missed,
                 "met": self.met,
                 "units": self.units,
+                "targets": {
+                    key: {"limit": limit, "met": good} for key, (limit, good) in self.limits.items()
+                },
                 "values": self.values,
             }
             path.write_text(json.dumps(text, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
             print(f"wrote {path}")
-        if self.missed:
-            print(f"{self.script}: MISSED {len(self.missed)} targets: {'; '.join(self.missed)}")
+        names = f": {'; '.join(self.missed)}" if self.missed else ""
+        print(f"{self.script}: {self.met} targets met, {len(self.missed)} missed{names}")
         return MISSED if self.missed else 0
 
 

@@ -21,8 +21,9 @@ from tireid.report import write_report
 
 TITLE = "tireid: lateral tire forces, learnt while driving"
 SUMMARY = (
-    "A car drives, its tire forces are learnt from the signals that every log has, the weights are "
-    "frozen, and the frozen model is asked about drives that it has not seen; at the end it steers."
+    "A car drives, its tire forces are learnt from v_x, v_y, yaw rate and steering, the weights "
+    "are frozen, and the frozen model is asked about drives that it has not seen; at the end it "
+    "steers."
 )
 SEEDS = 20
 

@@ -1,0 +1,288 @@
+"""Every number of README and docs carries the script and key that prints it, and is that number."""
+
+import ast
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from benchmarks import documents
+from benchmarks.documents import complaints, expand, marks, numbers, printed, recorded, rewritten
+from benchmarks.run_all import BENCHMARKS
+from benchmarks.targets import RESULTS, Targets
+
+ROOT = Path(__file__).resolve().parents[1]
+BENCHMARK_FILES = {path.stem: path for path in (ROOT / "benchmarks").glob("*.py")}
+DOCUMENTS = documents.documents()
+
+# Sections whose numbers have no source yet. Empty it: a section leaves when its numbers are marked.
+UNMARKED: dict[str, set[str]] = {
+    "README.md": {
+        "Driving on what was learnt",
+        "Is it safe to drive with?",
+    }
+}
+
+VALUES = {"speed": {"step": 0.0123, "count": 60789, "tiny": 6.6e-15, "name": "axle"}}
+GOOD = """# Title
+
+A step takes 12.3 ms with Python 3.11, 60 800 instructions and an error of 7e-15.
+<!-- numbers speed: step*1e3 version=3.11 count~3 tiny -->
+
+| a | b |
+|---|---|
+| 0.01 | `0.5` |
+<!-- numbers speed: step -->
+"""
+
+
+def unmarked(name: str, section: str) -> bool:
+    return section in UNMARKED.get(name, set())
+
+
+def told(text: str) -> list[str]:
+    return [what for _, what in complaints(text, VALUES)]
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+def test_every_number_is_the_recorded_one_or_says_why_it_is_given(path):
+    text, name = path.read_text(encoding="utf-8"), path.relative_to(ROOT).as_posix()
+    wrong = [
+        f"{name}:{text.count(chr(10), 0, at) + 1}: {what}"
+        for at, what in complaints(text, recorded())
+        if not (unmarked(name, documents.section_at(text, at)) and what.endswith("has no source"))
+    ]
+    assert not wrong, "\n".join([*wrong, "`make numbers` writes what was recorded"])
+
+
+def test_a_section_that_is_marked_is_not_listed_as_unmarked():
+    for name, sections in UNMARKED.items():
+        text = (ROOT / name).read_text(encoding="utf-8")
+        bare = {documents.section_at(text, at) for at, _ in complaints(text, recorded())}
+        assert sections <= bare, f"{name}: strike {sections - bare} from UNMARKED"
+
+
+def test_a_true_document_has_no_complaint():
+    assert told(GOOD) == []
+    assert [number.text for number in numbers(GOOD)] == ["12.3", "3.11", "60 800", "7e-15", "0.01"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "complaint"),
+    [
+        ("12.3", "12.4", "12.4 should be 12.3 (speed: step)"),
+        ("12.3", "12.30", None),  # one more digit is printed, and it is the right one
+        ("12.3", "12.31", "12.31 should be 12.30 (speed: step)"),
+        ("60 800", "60 789", "60 789 should be 60 800 (speed: count)"),
+        ("7e-15", "6e-15", "6e-15 should be 7e-15 (speed: tiny)"),
+        ("0.01", "0.02", "0.02 should be 0.01 (speed: step)"),
+        ("3.11", "3.12", "3.12 should be 3.11 (version=3.11)"),
+        ("step*1e3", "stop*1e3", "speed records no stop"),
+        (
+            "numbers speed: step ",
+            "numbers sped: step ",
+            "no benchmarks/results/sped.json is recorded",
+        ),
+        ("tiny", "name", "speed: name is no number but 'axle'"),
+        ("version=", "because=", "because=3.11: a reason is one of input, target"),
+        ("numbers speed: step*", "numbers step*", "step*1e3: no script is named before it"),
+        ("count~3", "count~x", "count~x: neither key"),
+        (" tiny", "", "3 items for 4 numbers: 12.3, 3.11, 60 800, 7e-15"),
+        ("# Title", "# Title 7", "7 has no source"),
+        ("| `0.5`", "| 0.5", "1 items for 2 numbers: 0.01, 0.5"),
+        ("<!-- numbers speed: step -->", "<!-- step -->", "0.01 has no source"),
+    ],
+)
+def test_what_drifted_is_caught(old, new, complaint):
+    assert old in GOOD
+    found = told(GOOD.replace(old, new, 1))
+    if complaint is None:
+        assert found == []
+    else:
+        assert any(complaint in line for line in found), found
+
+
+def test_a_number_that_drifts_in_the_readme_is_caught():
+    text, values = (ROOT / "README.md").read_text(encoding="utf-8"), recorded()
+    before, found = complaints(text, values), numbers(text)
+    firsts = [next(n for n in found if mark.start <= n.start < mark.end) for mark in marks(text)]
+    assert len(firsts) >= 10
+    for number in firsts:
+        other = text[: number.start] + "77.77" + text[number.start + len(number.text) :]
+        assert len(complaints(other, values)) > len(before), number
+
+
+def test_names_code_and_links_hold_no_numbers():
+    text = (
+        "C99, x86-64, Cortex-M4F, PAC2002, F_1, ISO 3888-2, `--mu 0.5`, [words](a/2.png), K⁻¹ "
+        '<img width="3">\n\n```sh\nrun 4\n```\n\n<!-- 5 -->\n'
+    )
+    assert numbers(text) == []
+
+
+def test_signs_ranges_scales_and_versions_are_read():
+    text = "a 1:10 car, 0.75-0.86, −2.1 to -3, (6), 1.2.3, 10 000 drives, 2 s."
+    found = [number.text for number in numbers(text)]
+    assert found == ["1:10", "0.75", "0.86", "−2.1", "-3", "6", "1.2.3", "10 000", "2"]
+
+
+def test_braces_stand_for_what_a_shell_makes_of_them():
+    assert list(expand("a/{b,c}/{d,e}*2")) == ["a/b/d*2", "a/b/e*2", "a/c/d*2", "a/c/e*2"]
+
+
+@pytest.mark.parametrize(
+    ("value", "like", "digits", "text"),
+    [
+        (3.14159, "9.99", None, "3.14"),
+        (1839.6, "1", None, "1840"),
+        (1839.6, "1", 2, "1800"),
+        (60789.0, "1", 3, "60 800"),
+        (0.034567, "1", 2, "0.035"),
+        (9.96, "1", 2, "10"),
+        (4.44e-10, "1e-9", None, "4e-10"),
+        (-2.06, "−9.9", None, "−2.1"),
+    ],
+)
+def test_numbers_are_printed_like_those_that_they_replace(value, like, digits, text):
+    assert printed(value, like, digits) == text
+
+
+def test_recorded_values_are_written_into_a_document():
+    stale = GOOD.replace("12.3", "99.9").replace("60 800", "1").replace("| 0.01", "| 0.09")
+    assert told(stale) and rewritten(stale, VALUES) == GOOD
+
+
+def test_writing_leaves_alone_what_it_cannot_serve():
+    broken = GOOD.replace("step*1e3", "stop").replace("| 0.01", "| 0.09").replace("7e", "9e")
+    served = broken.replace("| 0.09", "| 0.01").replace("9e", "7e")
+    assert rewritten(broken, VALUES) == served
+    uneven = broken.replace("| `0.5`", "| 0.5")
+    assert rewritten(uneven, VALUES) == uneven.replace("9e", "7e")
+
+
+def test_the_command_writes_what_was_recorded_and_says_what_it_cannot(
+    tmp_path, monkeypatch, capsys
+):
+    page = tmp_path / "README.md"
+    monkeypatch.setattr(documents, "ROOT", tmp_path)
+    monkeypatch.setattr(documents, "documents", lambda: [page])
+    monkeypatch.setattr(documents, "recorded", lambda: VALUES)
+    stale = GOOD.replace("12.3", "99.9")
+    page.write_text(stale)
+    assert documents.main(["--check"]) == 1 and page.read_text() == stale
+    assert "README.md:3: 99.9 should be 12.3 (speed: step)" in capsys.readouterr().out
+    assert documents.main([]) == 0 and page.read_text() == GOOD
+    assert "+ A step takes 12.3 ms" in capsys.readouterr().out
+    page.write_text(GOOD + "\nAnd 4 more.\n")
+    assert documents.main([]) == 1
+    assert "README.md:11: 4 has no source" in capsys.readouterr().out
+
+
+def test_headings_in_code_begin_no_section():
+    text = "1\n\n## A\n\n```sh\n## no\n```\n\n2\n\n## B\n\n3\n"
+    found = [documents.section_at(text, number.start) for number in numbers(text)]
+    assert found == ["", "A", "B"]
+
+
+def test_a_target_that_is_met_at_last_or_missed_is_noticed(tmp_path, monkeypatch):
+    monkeypatch.setattr("benchmarks.targets.RESULTS", tmp_path)
+    for value, word in ((2.2, "missed"), (1.9, "target")):
+        targets = Targets("lap")
+        targets.at_most("ratio", value, 2.0, "-", key="ratio")
+        targets.finish(keep=True)
+        values = recorded(tmp_path)
+        text = f"{value} times (target 2{', missed' * (word == 'missed')}).\n"
+        assert complaints(f"{text}<!-- numbers lap: ratio ratio@{word} -->\n", values) == []
+        other = {"missed": "target", "target": "missed"}[word]
+        stale = complaints(f"{text}<!-- numbers lap: ratio ratio@{other} -->\n", values)
+        assert [what for _, what in stale] == [f"lap records no ratio@{other}"]
+
+
+def test_tables_of_commands_are_quoted_by_their_keys():
+    values = recorded()["tireid_paper"]
+    assert values["slalom/integral/online/median"] > 0.0
+
+
+def keys_of(script: str, sources: dict[str, Path]) -> list[str]:
+    """Patterns of the keys that a benchmark, with the benchmarks it imports, can record."""
+    patterns, seen, waiting = [], set(), [script]
+    while waiting:
+        name = waiting.pop()
+        if name in seen or name not in sources:
+            continue
+        seen.add(name)
+        for node in ast.walk(ast.parse(sources[name].read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("benchmarks"):
+                waiting += [node.module.rpartition(".")[2], *(alias.name for alias in node.names)]
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+                key = next((word.value for word in node.keywords if word.arg == "key"), None)
+                if node.func.attr == "record" and node.args:
+                    key = node.args[0]
+                if key is not None:
+                    patterns.append(pattern_of(key))
+    return patterns
+
+
+def pattern_of(key: ast.expr) -> str:
+    if isinstance(key, ast.Constant):
+        return re.escape(str(key.value))
+    if isinstance(key, ast.JoinedStr):
+        parts = (
+            re.escape(str(part.value)) if isinstance(part, ast.Constant) else "[^/]+"
+            for part in key.values
+        )
+        return "".join(parts)
+    return ".+"
+
+
+def vanished(results: Path, sources: dict[str, Path], scripts: set[str]) -> list[str]:
+    """What is recorded though no benchmark of `make bench` prints it any longer."""
+    wrong = []
+    for path in sorted(results.glob("*.json")):
+        text = json.loads(path.read_text(encoding="utf-8"))
+        if path.stem not in sources or path.stem not in scripts:
+            wrong.append(f"{path.name}: make bench has no such script")
+            continue
+        if text["script"] != f"benchmarks/{path.stem}.py":
+            wrong.append(f"{path.name}: is of {text['script']}")
+        patterns = keys_of(path.stem, sources)
+        wrong += [
+            f"{path.stem} records no {key}"
+            for key in text["values"]
+            if not any(re.fullmatch(pattern, key) for pattern in patterns)
+        ]
+    return wrong
+
+
+def test_what_is_recorded_is_what_the_benchmarks_print():
+    assert list(RESULTS.glob("*.json"))
+    wrong = vanished(RESULTS, BENCHMARK_FILES, set(BENCHMARKS))
+    assert not wrong, "\n".join(wrong)
+
+
+def test_a_script_or_key_that_vanished_is_caught(tmp_path, monkeypatch):
+    source = tmp_path / "lap.py"
+    source.write_text(
+        "from benchmarks.helper import more\n"
+        "targets.record('laps', 3)\n"
+        "targets.at_most('time', 1.0, 2.0, key=f'time/{car}')\n"
+    )
+    (tmp_path / "helper.py").write_text("targets.record('cost', 1.0)\n")
+    sources = {path.stem: path for path in tmp_path.glob("*.py")}
+    monkeypatch.setattr("benchmarks.targets.RESULTS", tmp_path)
+    targets = Targets("lap")
+    for key in ("laps", "time/sedan", "cost"):
+        targets.record(key, 1.0)
+    targets.finish(keep=True)
+    assert vanished(tmp_path, sources, {"lap"}) == []
+    assert vanished(tmp_path, sources, set()) == ["lap.json: make bench has no such script"]
+    source.write_text(source.read_text().replace("'laps'", "'rounds'"))
+    (tmp_path / "helper.py").write_text("")
+    assert vanished(tmp_path, sources, {"lap"}) == [
+        "lap records no laps",
+        "lap records no cost",
+    ]
+    source.unlink()
+    gone = {name: path for name, path in sources.items() if name != "lap"}
+    assert vanished(tmp_path, gone, {"lap"}) == ["lap.json: make bench has no such script"]
