@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
+from codegen.escape import mathtext
 from identifier.defaults import LAWS
 from tireid.figures.panels import legend_above
 from tireid.figures.style import AMBER, BLUE, GREEN, ORANGE, PAGE, PURPLE, new_figure, styled
