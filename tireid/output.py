@@ -133,22 +133,21 @@ def _hash(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _read_marker(folder: Path) -> Written:
-    """Return what a folder is said to hold: nothing where it has no marker that can be read."""
-    nothing = Written({}, frozenset())
+def _read_marker(folder: Path) -> Written | None:
+    """Return what a folder is said to hold, None where it has no marker that can be read."""
     marker = folder / MARKER
     if marker.is_symlink() or not marker.is_file():
-        return nothing
+        return None
     try:
         content = json.loads(marker.read_text(encoding="utf-8"))
         if content["format"] != FORMAT:
-            return nothing
+            return None
         files = {
             str(name): (int(size), str(hash)) for name, (size, hash) in content["files"].items()
         }
         return Written(files, frozenset(map(str, content["folders"])))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        return nothing
+        return None
 
 
 def foreign(folder: Path) -> str | None:
@@ -163,7 +162,7 @@ def foreign(folder: Path) -> str | None:
     OSError
         Where it cannot be read.
     """
-    written = _read_marker(folder)
+    written = _read_marker(folder) or Written({}, frozenset())
 
     def first(inside: Path) -> str | None:
         with os.scandir(inside) as found:
@@ -176,7 +175,7 @@ def foreign(folder: Path) -> str | None:
             if entry.is_dir():
                 strange = first(path) if name in written.folders else name
             elif name == MARKER:
-                strange = None if written.files or written.folders else name
+                strange = name if _read_marker(folder) is None else None
             else:
                 strange = None if _is_as_written(path, written.files.get(name)) else name
             if strange is not None:
@@ -253,7 +252,7 @@ def _kept_elsewhere(new: Path, final: Path) -> Path:
 def _discard(folder: Path) -> None:
     """Delete what we wrote; whatever else came to be there in the meantime stays."""
     written = _read_marker(folder)
-    if not written.files and not written.folders:  # half-written, and nobody else's
+    if written is None:  # half-written, and nobody else's
         shutil.rmtree(folder, ignore_errors=True)
         return
     with suppress(OSError):
