@@ -22,6 +22,7 @@ from identifier.export.layout import (
     sum_terms,
     write_expression,
 )
+from identifier.export.weight_rules import conditions, covariance_values, has_amounts
 
 TEMPLATES = Path(__file__).parent / "c"
 MACROS: Mapping[str, tuple[str, str]] = {  # in float and in double
@@ -109,6 +110,7 @@ def _pieces(folded: FoldedStep, *, single: bool) -> dict[str, str]:
             sum_terms([member._replace(learnt=False) for member in learnt], name, "weights->"),
             " " * 12,
         ),
+        "weights_rules": conditions(learnt, name),
         "keep": _keep(name, bool(learnt)),
         "hold": (
             "        if (state->adapts == 0U) {\n"
@@ -142,6 +144,15 @@ def _parts(folded: FoldedStep, values: Values) -> dict[str, str]:
         "decided_prototypes": ("decided.h", decides),
         "decided_functions": ("decided.c", decides),
     }
+    weights = [member for member in carried_members(folded) if member.learnt]
+    covariance = covariance_values(weights)
+    inner = {
+        "covariance_function": _filled("covariance.c", {**values, **covariance})
+        if covariance
+        else "",
+        "amounts_function": _filled("not_negative.c", values) if has_amounts(weights) else "",
+    }
+    values = {**values, **inner}
     parts = {key: _filled(file, values) if there else "" for key, (file, there) in wanted.items()}
     step = "decided_step.c" if decides else "undecided_step.c"
     return {**parts, "compute": _filled(step, {**values, **parts})}

@@ -253,7 +253,7 @@ class CompiledPackage:
         Raises
         ------
         ValueError
-            Where a name or shape is another, or a number not finite.
+            Where a name or shape is another, a number not finite, or a covariance negative.
         """
         shapes = {name: np.shape(value) for name, value in weights.items()}
         if shapes != self._weights:
@@ -262,7 +262,7 @@ class CompiledPackage:
         flat = np.ascontiguousarray(flat, dtype=np.float64)
         answer = self._call("instance_take")(self._instance, ctypes.c_void_p(flat.ctypes.data))
         if answer != Status.OK:
-            raise ValueError("weights must be finite")
+            raise ValueError("weights must be finite, and covariances and errors not negative")
 
     def set_adaptation(self, adapts: bool) -> None:
         """Learn, or hold what is learnt.

@@ -10,6 +10,7 @@ from identifier.export.fold import FoldedStep, fold
 from identifier.export.layout import Member, carried_members, output_members
 from identifier.export.manifest import ingredients, manifest_text, summary
 from identifier.export.vectors import SAMPLES, vectors, vectors_header
+from identifier.export.weight_rules import ruled
 from identifier.method import FrozenModel, Method
 from models.vehicle import Vehicle
 
@@ -73,10 +74,15 @@ def _other_files(folded: FoldedStep, about: Values, *, single: bool) -> dict[str
     name, learnt = folded.name, bool(folded.learnt)
     members = carried_members(folded)
     first = next((m.signal.name + m.first for m in members if m.learnt), "")
+    rules = ruled([member for member in members if member.learnt])
+    negative = {"first_rule": rules[0].signal.name + rules[0].first, **about} if rules else {}
+    about_weights = {
+        "first_weight": first,
+        "negative_test": filled(TEMPLATES / "negative_test.c", negative) if rules else "",
+        **about,
+    }
     values = {
-        "weights_test": filled(TEMPLATES / "weights_test.c", {"first_weight": first, **about})
-        if learnt
-        else "",
+        "weights_test": filled(TEMPLATES / "weights_test.c", about_weights) if learnt else "",
         "weights_call": "    test_modes(&state, &params);\n" if learnt else "",
         "tolerance_double": f"{TOLERANCE_DOUBLE * folded.limits.force:.2g}",
         "tolerance_single": f"{TOLERANCE_SINGLE * folded.limits.force:.2g}",
