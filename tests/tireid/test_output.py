@@ -343,7 +343,13 @@ def test_a_claim_without_locks_is_the_file_itself(tmp_path, monkeypatch):
 def ran(program, folder):
     words = [sys.executable, "-c", textwrap.dedent(program)]
     answer = subprocess.run(
-        words, cwd=folder, capture_output=True, text=True, check=False, timeout=120
+        words,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
     )
     assert answer.returncode == 0, answer.stderr
     return answer.stdout.split()
