@@ -1,5 +1,6 @@
 """What is installed is what the lock lists, and the parts list says so."""
 
+import ast
 import json
 import re
 import runpy
@@ -40,14 +41,17 @@ def test_a_lock_holds_all_that_is_asked_for_with_hashes_and_no_address(lock):
 
 
 def test_every_package_that_is_imported_is_declared():
-    code = "\n".join(
-        path.read_text()
-        for package in ("codegen", "models", "identifier", "mpc", "tireid")
-        for path in (ROOT / package).rglob("*.py")
-    )
-    imported = set(re.findall(r"^\s*(?:import|from) (\w+)", code, re.M))
+    imported = set()
+    for package in ("codegen", "models", "identifier", "mpc", "tireid"):
+        for path in (ROOT / package).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text())):
+                if isinstance(node, ast.Import):
+                    imported |= {name.name.split(".")[0] for name in node.names}
+                elif isinstance(node, ast.ImportFrom) and node.module:
+                    imported.add(node.module.split(".")[0])
     declared = {name.replace("-", "_") for name, _ in wanted(PROJECT["optional-dependencies"])}
-    declared.add("vehiclemodels")  # of commonroad-vehicle-models
+    declared |= {"vehiclemodels", "PIL"}  # of commonroad-vehicle-models and pillow
+    assert "pillow" in declared
     known = set(sys.stdlib_module_names) | declared
     own = {"codegen", "models", "identifier", "mpc", "tireid"}
     assert {"casadi", "scipy"} <= imported
