@@ -18,6 +18,7 @@ BENCHMARKS = {
     "bounds_monte_carlo": [],
     "batch_speed": [],
     "export_cost": [],
+    "kill_and_fill": [],
     "mpc_speed": [],
     "mpc_optimality": [],
     "mpc_stress": [],

@@ -99,6 +99,8 @@ def one_line(error: Exception | str) -> str:
     """
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {(error.strerror or 'cannot be used').lower()}"
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror.lower()  # as of a disk that is full
     return " ".join(str(error).split()) or type(error).__name__
 
 
