@@ -3,7 +3,15 @@ PYTHON ?= python3
 VENV := .venv
 PY := $(VENV)/bin/python
 
-.PHONY: demo test lint bench numbers clean
+# LOCKED=1 installs the files that the lock lists by hash, as continuous integration does.
+LOCKED :=
+# Quick tests of every package, for versions of dependencies beside those of the lock.
+SMOKE := tests/test_imports.py tests/codegen tests/models/test_vehicle.py \
+	tests/identifier/test_network.py tests/identifier/export/test_compiled.py \
+	tests/mpc/path/test_waypoints.py tests/mpc/path/test_gates.py tests/tireid/test_cli.py
+SMOKE_ONNX := tests/identifier/export/test_onnx.py tests/identifier/export/test_onnx_model.py
+
+.PHONY: demo test lint bench numbers newest lowest lock wheel clean
 
 demo: $(VENV)/.demo
 	$(VENV)/bin/tireid demo --out out/demo --force
@@ -31,13 +39,53 @@ $(VENV)/.demo: pyproject.toml | $(PY)
 	$(PY) -m pip install --quiet --editable .
 	touch $@
 
-$(VENV)/.test: pyproject.toml | $(PY)
+$(VENV)/.test: pyproject.toml requirements-test.lock | $(PY)
+ifeq ($(LOCKED),)
 	$(PY) -m pip install --quiet --editable ".[test]"
+else
+	$(PY) -m pip install --quiet --require-hashes --requirement requirements-test.lock
+	$(PY) -m pip install --quiet --no-deps --no-build-isolation --editable .
+endif
 	touch $@
 
 $(VENV)/.bench: pyproject.toml | $(PY)
 	$(PY) -m pip install --quiet --editable ".[bench]"
 	touch $@
 
+# The newest versions that there are, the lowest that pyproject.toml allows: in environments of their
+# own, made anew each time.
+newest:
+	rm -rf $(VENV)-newest && $(PYTHON) -m venv $(VENV)-newest
+	$(VENV)-newest/bin/python -m pip install --quiet --upgrade --editable ".[onnx]" pytest hypothesis
+	$(VENV)-newest/bin/python -m pytest -q -W default -p no:cacheprovider $(SMOKE) $(SMOKE_ONNX)
+
+lowest:
+	rm -rf $(VENV)-lowest && $(PYTHON) -m venv $(VENV)-lowest
+	$(PYTHON) .ci/lowest.py > $(VENV)-lowest/all.txt
+	$(PYTHON) .ci/lowest.py onnx > $(VENV)-lowest/onnx.txt
+	$(VENV)-lowest/bin/python -m pip install --quiet --constraint $(VENV)-lowest/all.txt --editable . \
+		pytest hypothesis
+	$(VENV)-lowest/bin/python -m pytest -q -W default -p no:cacheprovider $(SMOKE)
+	$(VENV)-lowest/bin/python -m pip install --quiet --constraint $(VENV)-lowest/onnx.txt \
+		--editable ".[onnx]"
+	$(VENV)-lowest/bin/python -m pytest -q -W default -p no:cacheprovider $(SMOKE_ONNX)
+
+# Resolve anew for every Python and system that is supported.
+lock:
+	rm -rf $(VENV)-lock && $(PYTHON) -m venv $(VENV)-lock
+	$(VENV)-lock/bin/python -m pip install --quiet uv
+	printf 'hatchling\neditables\n' > $(VENV)-lock/build.in
+	set -e; for lock in "requirements.lock" "requirements-test.lock --extra test $(VENV)-lock/build.in"; do \
+		$(VENV)-lock/bin/uv pip compile pyproject.toml --quiet --universal --python-version 3.11 \
+		--generate-hashes --no-header --no-emit-index-url --no-emit-find-links --upgrade \
+		--output-file $$lock; \
+	done
+	sed -i.bak 's| -r $(VENV)-lock/build.in| the build|' requirements-test.lock
+	rm requirements-test.lock.bak
+
+wheel:
+	rm -rf $(VENV)-wheel && $(PYTHON) -m venv $(VENV)-wheel
+	$(VENV)-wheel/bin/python -m pip wheel --quiet --no-deps --wheel-dir dist .
+
 clean:
-	rm -rf $(VENV) out
+	rm -rf $(VENV) $(VENV)-* out build dist

@@ -30,6 +30,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "hostile_certificates": ["300", "20"],
     "batch_speed": [],
     "export_cost": [],
+    "kill_and_fill": [],
     "mpc_speed": [],
     "mpc_optimality": [],
     "mpc_stress": [],

@@ -16,7 +16,7 @@ import time
 from functools import cache
 from pathlib import Path
 
-from codegen.cache import cache_folder
+from codegen.cache import cache_folder, keep, kept
 
 log = logging.getLogger("tireid.codegen")
 
@@ -34,6 +34,8 @@ FLAGS = (
     "-fPIC",
     "-shared",
 )
+# Before all other flags: words of $CC such as -ffast-math must not delete the guards either.
+KEEP_GUARDS = ("-fno-fast-math", "-fno-finite-math-only")
 
 
 class CompilationError(RuntimeError):
@@ -64,7 +66,7 @@ def _version(compiler: tuple[str, ...]) -> str:
 def load_library(
     source: str, name: str, flags: tuple[str, ...] | None = None
 ) -> ctypes.CDLL | None:
-    """Build C source as `build_library` does and load it; a damaged file is built anew, once.
+    """Build C source as `build_library` does and load it; where that fails build anew, once.
 
     Parameters
     ----------
@@ -89,7 +91,7 @@ def load_library(
     try:
         return ctypes.CDLL(str(library))
     except OSError as error:
-        log.info("%s is damaged (%s): building it anew", library, error)
+        log.info("%s cannot be loaded (%s): building it anew", library, error)
         library.unlink(missing_ok=True)
         rebuilt = build_library(source, name, flags)
         return None if rebuilt is None else ctypes.CDLL(str(rebuilt))
@@ -119,24 +121,25 @@ def build_library(source: str, name: str, flags: tuple[str, ...] | None = None) 
     if compiler is None:
         return None
     flags = FLAGS if flags is None else flags
-    content = "\0".join((source, _version(compiler), *flags))
-    digest = hashlib.sha256(content.encode()).hexdigest()[:20]
-    library = cache_folder() / f"{name}-{digest}.so"
-    if library.exists():
-        return library
-    log.info("compiling %s (once, kept in %s)", name, library.parent)
+    words = [*compiler, *KEEP_GUARDS, *flags]
+    made_of = "\0".join((source, _version(compiler), *words))
+    stem = f"{name}-{hashlib.sha256(made_of.encode()).hexdigest()[:20]}"
+    found = kept(stem, ".so")
+    if found is not None:
+        return found
+    folder = cache_folder()
+    log.info("compiling %s (once, kept in %s)", name, folder)
     start = time.perf_counter()
-    with tempfile.TemporaryDirectory(dir=library.parent) as scratch:
-        c_file = Path(scratch) / f"{name}.c"
-        built = Path(scratch) / library.name
+    with tempfile.TemporaryDirectory(dir=folder) as scratch:
+        c_file, built = Path(scratch) / f"{name}.c", Path(scratch) / name
         c_file.write_text(source)
-        command = [*compiler, *flags, str(c_file), "-o", str(built), "-lm"]
+        command = [*words, str(c_file), "-o", str(built), "-lm"]
         answer = subprocess.run(command, capture_output=True, text=True, check=False)
         if answer.returncode != 0:
             first_lines = "\n".join(answer.stderr.splitlines()[:5])
             raise CompilationError(
                 f"{' '.join(compiler)} refused the generated code of {name}:\n{first_lines}"
             )
-        built.replace(library)  # atomic: two processes may build the same library at once
+        library = keep(stem, ".so", built.read_bytes())
     log.info("compiled %s in %.1f s", name, time.perf_counter() - start)
     return library

@@ -4,6 +4,7 @@ CasADi reads the graph node by node: dense layers and element-wise functions, in
 Signals are those of `identifier.network.SIGNALS`, SI; the two outputs are F_yf and F_yr [N].
 """
 
+import re
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,6 +15,7 @@ import casadi as ca
 from identifier.network import SIGNALS
 
 FORCES = ("F_yf", "F_yr")
+READS_ONNX = (3, 8, 2)  # the first CasADi that knows the operations of such networks
 BY_COUNT = {
     2: ("alpha_f", "alpha_r"),
     5: ("v_x", "v_y", "r", "delta_f", "delta_r"),
@@ -64,10 +66,10 @@ def read_network(content: bytes, inputs: Sequence[str] | None = None) -> ca.Func
 
 def _imported(content: bytes) -> ca.Function:
     """Return the graph for one sample, tensors as they stand in the file."""
-    if not hasattr(ca, "GraphBuilder"):
-        raise UnusableNetworkError(
-            f"reading ONNX needs CasADi 3.8, this is {ca.CasadiMeta.version()}"
-        )
+    version = ca.CasadiMeta.version()
+    if tuple(int(part) for part in re.findall(r"\d+", version)[:3]) < READS_ONNX:
+        needed = ".".join(map(str, READS_ONNX))
+        raise UnusableNetworkError(f"reading ONNX needs CasADi {needed}, this is {version}")
     with tempfile.TemporaryDirectory(prefix="tireid-") as folder:
         path = Path(folder) / "network.onnx"
         path.write_bytes(content)

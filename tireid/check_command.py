@@ -3,6 +3,7 @@
 import argparse
 import json
 import math
+import shlex
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -29,10 +30,11 @@ from models.files import write_atomically
 from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
 from tireid.certificate_table import certificate_of, certificate_text, unit_text
+from tireid.check_figures import FIGURES
 from tireid.inputs import read_log
 from tireid.monte_carlo_table import bound_rows, monte_carlo_numbers, monte_carlo_text
 from tireid.output import OutputError
-from tireid.progress import Stopwatch, say
+from tireid.progress import Stopwatch, say, tell
 
 FAILS = 1
 CONDITIONS = {  # field of the declared driving, and the option that says otherwise
@@ -93,7 +95,7 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--out", type=Path, metavar="FILE", help="for --design: file to write (design.toml)"
     )
-    parser.add_argument("--force", action="store_true", help="replace the file if it exists")
+    parser.add_argument("--force", action="store_true", help="replace the files if they exist")
     parser.set_defaults(run=run)
 
 
@@ -110,9 +112,8 @@ def run(options: argparse.Namespace) -> int:
     driving = _driving(options, stored, vehicle)
     design = _design(options, vehicle, driving) if stored is None else stored
     certificate = certificate_of(design, vehicle, driving)
-    drive = _read(options.log, vehicle, design)  # everything is read before anything is said
-    if options.design:
-        _require_free(options)
+    drive = _read(options.log, vehicle, design)
+    _require_free(options)
     observed = _drive(options, vehicle, driving, design, certificate)
     rows = [] if observed is None else bound_rows(certificate, observed)
     passed = any(row.passed for row in rows) or (observed is not None and observed.diverged > 0)
@@ -121,21 +122,24 @@ def run(options: argparse.Namespace) -> int:
         numbers = {"conditions": asdict(driving), **certificate.to_dict()}
         if observed is not None:
             numbers["monte_carlo"] = monte_carlo_numbers(rows, observed, seed)
-        print(json.dumps(numbers, indent=2))
-        return _finish(options, vehicle, driving, design, certificate, drive) or FAILS * passed
-    if options.file is None:
-        print(
-            f"judged is the paper's law; {DEFAULT}, the default of tireid identify: not certified"
-        )
-    print(_conditions(design, vehicle, driving, _said(options, design, driving)))
-    print(certificate_text(certificate, design.force_unit))
-    if drive is not None:
-        print(_along(drive, vehicle, design))
-    if observed is not None:
-        print(monte_carlo_text(rows, observed, seed, design.force_unit))
-    if certificate.verdict != "pass" and not options.design:
-        print(_proposal(options, design, vehicle, driving))
-    return _finish(options, vehicle, driving, design, certificate, drive) or FAILS * passed
+        told = [json.dumps(numbers, indent=2)]
+    else:
+        told = []
+        if options.file is None:
+            law = f"{DEFAULT}, the default of tireid identify: not certified"
+            told.append(f"judged is the paper's law; {law}")
+        told.append(_conditions(design, vehicle, driving, _said(options, design, driving)))
+        told.append(certificate_text(certificate, design.force_unit))
+        if drive is not None:
+            told.append(_along(drive, vehicle, design))
+        if observed is not None:
+            told.append(monte_carlo_text(rows, observed, seed, design.force_unit))
+        if certificate.verdict != "pass" and not options.design:
+            told.append(_proposal(options, design, vehicle, driving))
+    status = _finish(options, vehicle, driving, design, certificate, drive)
+    for text in told:  # once nothing can fail any more
+        tell(text)
+    return status or FAILS * passed
 
 
 def _finish(
@@ -300,7 +304,9 @@ def _given(options: argparse.Namespace) -> str:
     """Return the options that say which car drives how hard, as they were given."""
     names = ("vehicle", *CONDITIONS.values())
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
-    return "".join(f" --{name.replace('_', '-')} {value}" for name, value in given.items())
+    return "".join(
+        f" --{name.replace('_', '-')} {shlex.quote(str(value))}" for name, value in given.items()
+    )
 
 
 def _draw(
@@ -321,9 +327,12 @@ def _draw(
 
 
 def _require_free(options: argparse.Namespace) -> None:
-    target = _target(options)
-    if target.exists() and not options.force:
-        raise OutputError(f"{target} exists: choose another file, or add --force to replace it")
+    targets = [options.figures / name for name in FIGURES] if options.figures else []
+    if options.design:
+        targets.append(_target(options))
+    for target in targets:
+        if target.exists() and not options.force:
+            raise OutputError(f"{target} exists: choose another, or add --force to replace it")
 
 
 def _target(options: argparse.Namespace) -> Path:

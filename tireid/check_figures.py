@@ -13,6 +13,7 @@ from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid.figures import error_figure, locus_figure, save_figure
 
+FIGURES = ("locus.png", "bounds.png")
 BOUNDS = {
     "error_bound": "proven bound, leakage",
     "projection_bound": "proven bound, projection",
@@ -47,13 +48,14 @@ def draw_check(
     kept = proven_bounds(design.gains, law, operation, D).W
     _, loop, _ = judged_loop(design.gains, law, operation, D, kept)
     history = identify(recording, vehicle, design)
-    figures = {
-        "locus.png": locus_figure(loop, integrator=design.integrator, dt=design.dt),
-        "bounds.png": error_figure(history, error_bounds(certificate)),
-    }
-    for name, figure in figures.items():
-        save_figure(figure, folder / name)
-    return [folder / name for name in figures]
+    figures = (
+        locus_figure(loop, integrator=design.integrator, dt=design.dt),
+        error_figure(history, error_bounds(certificate)),
+    )
+    paths = [folder / name for name in FIGURES]
+    for path, figure in zip(paths, figures, strict=True):
+        save_figure(figure, path)
+    return paths
 
 
 def error_bounds(certificate: Certificate) -> dict[str, float]:

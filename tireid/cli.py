@@ -1,6 +1,7 @@
 """The command line: one subcommand each for what a person wants to do."""
 
 import argparse
+import io
 import os
 import signal
 import sys
@@ -9,7 +10,10 @@ from collections.abc import Sequence
 from types import FrameType
 from typing import NoReturn
 
+from tireid.progress import complain, flush_out, listen_to_library, unwritten
+
 BAD_INPUT = 2
+NOT_TOLD = 74  # EX_IOERR of sysexits.h: all was done, but standard output could not be written
 INTERRUPTED = 130
 
 
@@ -23,7 +27,7 @@ class Parser(argparse.ArgumentParser):
         ----------
         message : what is wrong with the words.
         """
-        print(f"{self.prog}: error: {message} (see {self.prog} --help)", file=sys.stderr)
+        complain(f"{self.prog}: error: {one_line(message)} (see {self.prog} --help)")
         sys.exit(BAD_INPUT)
 
 
@@ -45,7 +49,8 @@ def build_parser() -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; return 0, 1 where a check fails, or 2 where its input was bad.
+    """Run a command; return 0, 1 where a check fails, 2 where its input was bad, 74 where only
+    standard output could not be written.
 
     Parameters
     ----------
@@ -54,45 +59,54 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return _run(arguments)
     except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
+        complain("interrupted")
         return INTERRUPTED
-    except BrokenPipeError:  # who reads our output has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
 
 
 def _run(arguments: Sequence[str] | None) -> int:
     options = build_parser().parse_args(arguments)
-    from tireid.progress import listen_to_library
-
     listen_to_library()
     try:
         status: int = options.run(options) or 0
-        sys.stdout.flush()
-    except BrokenPipeError:
-        raise
-    except (ValueError, ArithmeticError, OSError, ImportError) as error:
+    except _expected_errors() as error:
         if options.debug:
-            traceback.print_exc()
-        print(f"tireid {options.command}: error: {one_line(error)}", file=sys.stderr)
+            complain(traceback.format_exc())
+        complain(f"tireid {options.command}: error: {one_line(error)}")
         return BAD_INPUT
-    return status
+    flush_out()
+    return NOT_TOLD if unwritten() and status == 0 else status
 
 
-def one_line(error: Exception) -> str:
+def _expected_errors() -> tuple[type[Exception], ...]:
+    """Return what may go wrong without a fault in the program: input, system, compiler."""
+    from codegen import CompilationError
+    from identifier.export import compiled, processor
+    from mpc.realtime import instance
+
+    return (
+        *(ValueError, ArithmeticError, OSError, ImportError, MemoryError),
+        *(CompilationError, compiled.NoCompilerError, instance.NoCompilerError),
+        processor.ReplayError,
+    )
+
+
+def one_line(error: Exception | str) -> str:
     """Return what an error says, in one line; files are named first.
 
     Parameters
     ----------
-    error : any error.
+    error : any error, or its text.
     """
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {(error.strerror or 'cannot be used').lower()}"
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror.lower()  # as of a disk that is full
     return " ".join(str(error).split()) or type(error).__name__
 
 
 def entry() -> NoReturn:
     """Run as a program: a termination cleans up as Ctrl-C does."""
+    _open_streams()
 
     def stop(_number: int, _frame: FrameType | None) -> NoReturn:
         raise KeyboardInterrupt
@@ -100,7 +114,24 @@ def entry() -> NoReturn:
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), stop)
-    sys.exit(main())
+    try:
+        status: int | str | None = main()
+    except SystemExit as ended:  # of --help and of wrong words
+        status = ended.code
+    flush_out()
+    sys.exit(status)
+
+
+def _open_streams() -> None:
+    """Open what was closed, lest a file that we write become standard output; print any name."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ from tireid.inputs import read_log
 from tireid.network_option import add_network_arguments, network_model
 from tireid.output import output_folder
 from tireid.plant_drives import plant_recordings
-from tireid.progress import Stopwatch, say
+from tireid.progress import Stopwatch, say, tell
 
 FEW_PAIRS = 4  # of recordings learnt on and replayed, all of which are printed
 
@@ -133,9 +133,10 @@ def run(options: argparse.Namespace) -> None:
             others=others,
         )
         write_comparison(folder, comparison)
-    print(comparison_text(comparison))
-    if len(comparison.names) ** 2 <= FEW_PAIRS:
-        print(pair_tables(comparison))
+        told = [comparison_text(comparison)]
+        if len(comparison.names) ** 2 <= FEW_PAIRS:
+            told.append(pair_tables(comparison))
+    tell("\n".join(told))
     say(f"wrote {options.out}/ in {watch.seconds:.0f} s")
 
 

@@ -16,7 +16,7 @@ from tireid.output import output_folder
 from tireid.paper_results import write_study
 from tireid.paper_study import run_study
 from tireid.paper_tables import table_text
-from tireid.progress import Stopwatch, say
+from tireid.progress import Stopwatch, say, tell
 from tireid.report import write_report
 
 TITLE = "tireid: lateral tire forces, learnt while driving"
@@ -80,13 +80,12 @@ def run(options: argparse.Namespace) -> None:
         sections = demo_sections(story, shipped, study, folder)
         sections.append(drive_section(driven, folder))
         write_report(folder / "report.html", TITLE, sections, summary=SUMMARY)
-    for maneuver in study.errors:
-        print(table_text(maneuver, study))
-    print(certificate_text(story.certificate, story.design.force_unit))
-    print()
-    print(story.text())
-    print()
-    print(shipped_text(shipped))
-    print()
-    print(drive_text(driven))
-    print(f"read {options.out / 'report.html'}  ({watch.seconds:.0f} s)")
+        told = [
+            *(table_text(maneuver, study) for maneuver in study.errors),
+            f"{certificate_text(story.certificate, story.design.force_unit)}\n",
+            f"{story.text()}\n",
+            f"{shipped_text(shipped)}\n",
+            drive_text(driven),
+        ]
+    tell("\n".join(told))
+    tell(f"read {options.out / 'report.html'}  ({watch.seconds:.0f} s)")

@@ -16,7 +16,7 @@ from tireid.drive_table import drive_table
 from tireid.drive_tires import known_curves
 from tireid.network_option import add_network_arguments
 from tireid.output import output_folder
-from tireid.progress import say
+from tireid.progress import say, tell
 
 NOT_COMPLETED = 1
 EPILOG = (
@@ -145,8 +145,7 @@ def run(options: argparse.Namespace) -> int:
             drops=setup.drops,
             film=options.film,
         )
-    print(headline(conditions))
-    print(f"tires: {source}")
-    print(drive_table(runs))
+        told = f"{headline(conditions)}\ntires: {source}\n{drive_table(runs)}"
+    tell(told)
     say(f"wrote {options.out}/")
     return 0 if runs[0].scores.completed else NOT_COMPLETED

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from codegen.escape import visible
 from identifier.axle import AxleModel
 from identifier.axle.design import NOT_CERTIFIED
 from identifier.design import Design
@@ -32,7 +33,7 @@ from tireid.inputs import read_log
 from tireid.network_option import add_network_arguments, network_model
 from tireid.network_results import network_table, write_network_results
 from tireid.output import output_folder
-from tireid.progress import say
+from tireid.progress import say, tell
 
 OWN_PAST = "  its past, against online"
 
@@ -131,14 +132,14 @@ def run(options: argparse.Namespace) -> None:
         histories = [_learn(one, vehicle, law, design, start) for one in (recording, *others)]
         if network is not None:
             replays = write_network_results(folder, options.network, law, network, histories)
-            print(network_table(law, histories, replays))
-            say(f"wrote {options.out}/")
-            return
-        learnt = histories[0]
-        frozen = {t: _replays(t, learnt, histories) for t in freeze_times}
-        write_results(folder, law, learnt, histories[1:], frozen)
-    print_table(histories, frozen)
-    print(_closing_line(learnt.freeze(freeze_times[-1]), design, vehicle))
+            told = network_table(law, histories, replays)
+        else:
+            learnt = histories[0]
+            frozen = {t: _replays(t, learnt, histories) for t in freeze_times}
+            write_results(folder, law, learnt, histories[1:], frozen)
+            closing = _closing_line(learnt.freeze(freeze_times[-1]), design, vehicle)
+            told = f"{error_table(histories, frozen)}\n{closing}"
+    tell(told)
     say(f"wrote {options.out}/")
 
 
@@ -243,8 +244,8 @@ def _replays(t: float, learnt: History, histories: list[History]) -> dict[str, R
     }
 
 
-def print_table(histories: list[History], frozen: dict[float, dict[str, Replay]]) -> None:
-    """Print the errors per axle, and as a share of the force where there is truth.
+def error_table(histories: list[History], frozen: dict[float, dict[str, Replay]]) -> str:
+    """Return a table of the errors per axle, and as a share of the force where there is truth.
 
     Under the recording that was learnt stands the paper's measure: its past, t < T_freeze, against
     what was identified online.
@@ -255,14 +256,15 @@ def print_table(histories: list[History], frozen: dict[float, dict[str, Replay]]
     frozen : freeze time [s] to recording name to replay.
     """
     sizes = {history.recording.name: force_rms(history) for history in histories}
-    print(f"{'frozen at':>10}  {'replayed on':40} {'front':>16} {'rear':>16}")
+    lines = [f"{'frozen at':>10}  {'replayed on':40} {'front':>16} {'rear':>16}"]
     for t, replays in frozen.items():
         for name, result in replays.items():
             error = result.against_truth or result.against_online
             note = "" if sizes[name] is not None else "  (against online, no truth)"
             front, rear = error_cells(error, sizes[name])
-            print(f"{freeze_key(t):>8} s  {name:40} {front:>16} {rear:>16}{note}")
+            lines.append(f"{freeze_key(t):>8} s  {visible(name):40} {front:>16} {rear:>16}{note}")
             sides = result.reproduction
             if sides is not None and sides.past_against_online is not None:
                 front, rear = error_cells(sides.past_against_online, sizes[name])
-                print(f"{'':10}  {OWN_PAST:40} {front:>16} {rear:>16}")
+                lines.append(f"{'':10}  {OWN_PAST:40} {front:>16} {rear:>16}")
+    return "\n".join(lines)

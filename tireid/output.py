@@ -1,21 +1,41 @@
-"""The folder that a command writes: complete or not there, and never over what is not ours."""
+"""The folder that a command writes: complete or not there, and never over what is not ours.
 
+It is written in a scratch folder beside it and takes its place in one step. A marker inside lists
+every file with its size and hash: only a folder that holds these files, as they were written, and
+nothing else, at any depth, is ever replaced. The scratch folder of a run that was killed stays, and
+the next run says so.
+"""
+
+import hashlib
 import json
+import os
 import shutil
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-MARKER = ".tireid"  # in every folder that we write: the names that we put there, one a line
+from tireid.exchange import ClaimedError, claim, exchange
+from tireid.progress import say
+
+MARKER = ".tireid"  # in every folder that we write: what we put there
+FORMAT = "tireid output 1"
+SPARE_NAMES = 1000  # results-2, results-3, ...
 
 
 class OutputError(ValueError):
     """The output folder cannot be used; the message says why and what to do."""
+
+
+class Written(NamedTuple):
+    """What a marker lists: size and SHA-256 of files, and folders, by path."""
+
+    files: Mapping[str, tuple[int, str]]
+    folders: frozenset[str]
 
 
 @contextmanager
@@ -30,44 +50,55 @@ def output_folder(target: Path, *, force: bool) -> Iterator[Path]:
     Raises
     ------
     OutputError
-        Before anything is computed, where `target` is not a folder that may be replaced.
+        Before anything is computed, where `target` is not a folder that may be replaced, or
+        another run is about to write it; at the end, where it has become such a folder meanwhile:
+        then it is left alone, and the message says where the results are.
     """
     final = target.resolve()
     _require_replaceable(target, final, force)
     final.parent.mkdir(parents=True, exist_ok=True)
-    scratch = Path(tempfile.mkdtemp(prefix=f".{final.name}-", dir=final.parent))
-    new = scratch / "new"
-    new.mkdir()
-    try:
-        yield new
-        (new / MARKER).write_text("".join(f"{entry.name}\n" for entry in sorted(new.iterdir())))
-        _put_in_place(new, final, aside=scratch / "old")
-    finally:
-        shutil.rmtree(new, ignore_errors=True)
-        with suppress(OSError):  # it holds the old folder where that could not be put back
-            scratch.rmdir()
+    prefix = f".{final.name}-"
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(claim(final.parent / f"{prefix}claim"))
+        except ClaimedError as error:
+            raise OutputError(
+                f"another run of tireid is writing {target}: wait for it, or choose another folder "
+                f"(where there is none, delete {error})"
+            ) from None
+        _require_replaceable(target, final, force)  # as the last one that held the claim left it
+        for left in sorted(final.parent.glob(f"{_literal(prefix)}*.part")):
+            say(f"a run was stopped and left {left}: look for what you miss, then delete it")
+        scratch = Path(tempfile.mkdtemp(prefix=prefix, suffix=".part", dir=final.parent))
+        new = scratch / "new"
+        try:
+            new.mkdir()
+            yield new
+            _write_marker(new)
+            _put_in_place(new, target, final, force=force, aside=scratch / "old")
+        finally:
+            _discard(new)
+            with suppress(OSError):  # it holds what could not be put back
+                scratch.rmdir()
 
 
 def _require_replaceable(target: Path, final: Path, force: bool) -> None:
     for place, name in ((Path.cwd(), "working folder"), (_home(), "home folder")):
         if place is not None and (final == place or final in place.parents):
             raise OutputError(f"{target} is or holds the {name}: choose a folder inside it")
-    if not final.exists():
+    if not os.path.lexists(final):
         return
     if not final.is_dir():
         raise OutputError(f"{target} is a file, --out needs a folder")
     if final.is_mount():
         raise OutputError(f"{target} is a mount point: choose a folder inside it")
-    held = sorted(entry.name for entry in final.iterdir())
-    marker = final / MARKER
-    ours = {MARKER, *marker.read_text().splitlines()} if marker.is_file() else set()
-    foreign = [name for name in held if name not in ours]
-    if foreign:
+    strange = foreign(final)
+    if strange is not None:
         raise OutputError(
-            f"{target} is not empty and holds {foreign[0]}, which no run of tireid wrote there: "
+            f"{target} is not empty and holds {strange}, which no run of tireid wrote there: "
             "choose another folder"
         )
-    if held and not force:
+    if any(final.iterdir()) and not force:
         raise OutputError(
             f"{target} is not empty: choose another folder, or add --force to replace"
         )
@@ -80,18 +111,158 @@ def _home() -> Path | None:
         return None
 
 
-def _put_in_place(new: Path, final: Path, *, aside: Path) -> None:
-    """Move the old folder aside, the new one in its place, and only then delete the old one."""
-    replaces = final.exists()
-    if replaces:
-        final.rename(aside)
+def _literal(name: str) -> str:
+    """Return a name as a pattern that matches it alone."""
+    return "".join(f"[{one}]" if one in "*?[" else one for one in name)
+
+
+def _write_marker(folder: Path) -> None:
+    files, folders = {}, []
+    for path in sorted(folder.rglob("*")):
+        name = path.relative_to(folder).as_posix()
+        if path.is_dir():
+            folders.append(name)
+        else:
+            files[name] = [path.stat().st_size, _hash(path)]
+    content = {"format": FORMAT, "files": files, "folders": folders}
+    (folder / MARKER).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+
+def _hash(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _read_marker(folder: Path) -> Written | None:
+    """Return what a folder is said to hold, None where it has no marker that can be read."""
+    marker = folder / MARKER
+    if marker.is_symlink() or not marker.is_file():
+        return None
+    try:
+        content = json.loads(marker.read_text(encoding="utf-8"))
+        if content["format"] != FORMAT:
+            return None
+        files = {
+            str(name): (int(size), str(hash)) for name, (size, hash) in content["files"].items()
+        }
+        return Written(files, frozenset(map(str, content["folders"])))
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def foreign(folder: Path) -> str | None:
+    """Return the first thing below a folder that is not as a run of tireid wrote it, or None.
+
+    Parameters
+    ----------
+    folder : any.
+
+    Raises
+    ------
+    OSError
+        Where it cannot be read.
+    """
+    written = _read_marker(folder) or Written({}, frozenset())
+
+    def first(inside: Path) -> str | None:
+        with os.scandir(inside) as found:
+            entries = sorted(found, key=lambda entry: entry.name)
+        for entry in entries:
+            path = Path(entry.path)
+            name = path.relative_to(folder).as_posix()
+            if entry.is_symlink():
+                return name
+            if entry.is_dir():
+                strange = first(path) if name in written.folders else name
+            elif name == MARKER:
+                strange = name if _read_marker(folder) is None else None
+            else:
+                strange = None if _is_as_written(path, written.files.get(name)) else name
+            if strange is not None:
+                return strange
+        return None
+
+    return first(folder)
+
+
+def _is_as_written(path: Path, written: tuple[int, str] | None) -> bool:
+    if written is None or not path.is_file() or path.stat().st_size != written[0]:
+        return False
+    return _hash(path) == written[1]
+
+
+def _put_in_place(new: Path, target: Path, final: Path, *, force: bool, aside: Path) -> None:
+    """Give the new folder its name; what has the name now is kept unless it may be replaced."""
+    try:
+        if _takes_name(new, final):
+            return
+        _require_replaceable(target, final, force)
+        _swap(new, target, final, aside=aside)
+    except OutputError as error:
+        kept = _kept_elsewhere(new, final)
+        raise OutputError(f"{error}; what this run computed is in {kept}") from None
+    _discard(aside)
+
+
+def _takes_name(new: Path, final: Path) -> bool:
+    """Rename where nothing, or an empty folder, has the name; return whether it was so."""
+    if os.name == "nt":  # where no folder is renamed over another
+        with suppress(OSError):
+            final.rmdir()
     try:
         new.rename(final)
+    except OSError:
+        if os.path.lexists(final):
+            return False
+        raise
+    return True
+
+
+def _swap(new: Path, target: Path, final: Path, *, aside: Path) -> None:
+    """Change the places of the new and the old folder, and look again at what the old one held."""
+    at_once = False
+    try:
+        at_once = exchange(new, final)
+        (new if at_once else final).rename(aside)
+        strange = foreign(aside)  # nobody finds it here, so that it stays as it is looked at
+        if strange is not None:
+            raise OutputError(f"{target} came to hold {strange} while this ran")
+        if not at_once:
+            new.rename(final)
     except BaseException:
-        if replaces:
+        if at_once and aside.exists():
+            exchange(aside, final)
+            aside.rename(new)
+        elif at_once:
+            exchange(new, final)
+        elif aside.exists():
             aside.rename(final)
         raise
-    shutil.rmtree(aside, ignore_errors=True)
+
+
+def _kept_elsewhere(new: Path, final: Path) -> Path:
+    """Give the new folder a name that is free, and return it."""
+    for number in range(2, SPARE_NAMES):
+        other = final.with_name(f"{final.name}-{number}")
+        if not os.path.lexists(other) and _takes_name(new, other):
+            return other
+    raise OutputError(f"{final.name}-2 to {final.name}-{SPARE_NAMES} are all taken")
+
+
+def _discard(folder: Path) -> None:
+    """Delete what we wrote; whatever else came to be there in the meantime stays."""
+    written = _read_marker(folder)
+    if written is None:  # half-written, and nobody else's
+        shutil.rmtree(folder, ignore_errors=True)
+        return
+    with suppress(OSError):
+        for name, listed in written.files.items():
+            if _is_as_written(folder / name, listed):
+                (folder / name).unlink()
+        for name in sorted(written.folders, reverse=True):
+            (folder / name).rmdir()
+        (folder / MARKER).unlink()
+        folder.rmdir()
 
 
 def write_json(path: Path, data: Any) -> None:

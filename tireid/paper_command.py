@@ -7,7 +7,7 @@ from typing import Any
 from tireid.output import output_folder
 from tireid.paper_results import study_text, write_study
 from tireid.paper_study import run_study
-from tireid.progress import say
+from tireid.progress import say, tell
 
 
 def add_parser(commands: Any) -> None:
@@ -41,5 +41,6 @@ def run(options: argparse.Namespace) -> None:
     with output_folder(options.out, force=options.force) as folder:
         study = run_study(options.seeds, say)
         write_study(folder, study)
-    print(study_text(study))
+        told = study_text(study)
+    tell(told)
     say(f"wrote {options.out}/")

@@ -1,8 +1,17 @@
-"""What a command tells while it works: short lines on the standard error stream."""
+"""What a command tells: its results on standard output, its progress on standard error.
+
+Both go through `terminal`, so that no name that comes from a file commands the terminal; and a
+stream that nobody reads any more, or that cannot be written, is no reason to stop working.
+"""
 
 import logging
+import os
 import sys
 import time
+from contextlib import suppress
+from typing import TextIO
+
+from codegen.escape import terminal
 
 
 class _Line(logging.Handler):
@@ -18,7 +27,68 @@ def say(text: str) -> None:
     ----------
     text : the line.
     """
-    print(f"  {text}", file=sys.stderr, flush=True)
+    complain(f"  {text}")
+
+
+def complain(text: str) -> None:
+    """Print a text on standard error, where there is one to print on.
+
+    Parameters
+    ----------
+    text : one or several lines.
+    """
+    try:
+        print(terminal(text), file=sys.stderr, flush=True)
+    except OSError:
+        _muffle(sys.stderr)
+
+
+def tell(text: str) -> None:
+    """Print results on standard output; `unwritten` remembers whether they could not be written.
+
+    A reader that went away, as `head` does, has seen enough: the rest is not printed.
+
+    Parameters
+    ----------
+    text : one or several lines.
+    """
+    _write_out(f"{terminal(text)}\n")
+
+
+def flush_out() -> None:
+    """Write what other code printed on standard output, by the rules of `tell`."""
+    _write_out("")
+
+
+def unwritten() -> bool:
+    """Tell whether results were lost because standard output could not be written."""
+    return _lost
+
+
+_lost = False
+
+
+def _write_out(text: str) -> None:
+    global _lost
+    if sys.stdout is None:  # closed before we began
+        return
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _muffle(sys.stdout)
+    except OSError as error:
+        _muffle(sys.stdout)
+        _lost = True
+        complain(f"standard output cannot be written: {(error.strerror or str(error)).lower()}")
+
+
+def _muffle(stream: TextIO) -> None:
+    """Send the rest of a stream, which is buffered too, to nowhere."""
+    with suppress(OSError, ValueError):  # ValueError: it has no file behind it
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
 
 
 def listen_to_library() -> None:

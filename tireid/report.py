@@ -7,9 +7,9 @@ the file can be mailed, archived and printed.
 from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 
+from codegen.escape import html
 from models.files import write_atomically
 
 SIGNATURES = {b"\x89PNG\r\n\x1a\n": "png", b"GIF89a": "gif"}  # of files, by their kind
@@ -151,7 +151,7 @@ def report_html(title: str, sections: Sequence[Section], *, summary: str = "") -
     entries, parts = [], []
     tables = figures = 0
     for number, section in enumerate(sections, start=1):
-        heading = escape(section.heading)
+        heading = html(section.heading)
         entries.append(f'<li><a href="#section-{number}">{heading}</a></li>')
         parts.append(f'<section>\n<h2 id="section-{number}">{number}. {heading}</h2>')
         for block in section.blocks:
@@ -162,7 +162,7 @@ def report_html(title: str, sections: Sequence[Section], *, summary: str = "") -
                 figures += 1
                 parts.append(_picture(block, figures))
             else:
-                parts.append(f"<p>{escape(block.text)}</p>")
+                parts.append(f"<p>{html(block.text)}</p>")
         parts.append("</section>")
     head = [
         "<!DOCTYPE html>",
@@ -170,14 +170,14 @@ def report_html(title: str, sections: Sequence[Section], *, summary: str = "") -
         "<head>",
         '<meta charset="utf-8">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        f"<title>{escape(title)}</title>",
+        f"<title>{html(title)}</title>",
         f"<style>{STYLE}</style>",
         "</head>",
         "<body>",
-        f"<h1>{escape(title)}</h1>",
+        f"<h1>{html(title)}</h1>",
     ]
     if summary:
-        head.append(f'<p class="summary">{escape(summary)}</p>')
+        head.append(f'<p class="summary">{html(summary)}</p>')
     contents = ['<nav aria-label="Contents">', "<ol>", *entries, "</ol>", "</nav>"]
     return "\n".join([*head, *contents, *parts, "</body>", "</html>"]) + "\n"
 
@@ -200,23 +200,23 @@ def _table(table: Table, number: int) -> str:
     numeric = [any(_is_number(cell) for cell in column) for column in columns]
     kinds = [' class="number"' if right else "" for right in numeric]
     header = "".join(
-        f'<th scope="col"{kind}>{escape(name)}</th>'
+        f'<th scope="col"{kind}>{html(name)}</th>'
         for name, kind in zip(table.header, kinds, strict=True)
     )
     lines = [
         '<figure class="table">',
-        f"<figcaption><b>Table {number}.</b> {escape(table.caption)}</figcaption>",
+        f"<figcaption><b>Table {number}.</b> {html(table.caption)}</figcaption>",
         f'<div class="scroll"><table>\n<thead><tr>{header}</tr></thead>\n<tbody>',
     ]
     for row in table.rows:
-        cells = (f"<td{k}>{escape(_text(cell))}</td>" for cell, k in zip(row, kinds, strict=True))
+        cells = (f"<td{k}>{html(_text(cell))}</td>" for cell, k in zip(row, kinds, strict=True))
         lines.append(f"<tr>{''.join(cells)}</tr>")
     return "\n".join([*lines, "</tbody>\n</table></div>", "</figure>"])
 
 
 def _picture(picture: Picture, number: int) -> str:
     assert isinstance(picture.image, bytes)
-    caption, data = escape(picture.caption), b64encode(picture.image).decode("ascii")
+    caption, data = html(picture.caption), b64encode(picture.image).decode("ascii")
     (kind,) = (name for start, name in SIGNATURES.items() if picture.image.startswith(start))
     return "\n".join(
         [

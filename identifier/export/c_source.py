@@ -1,7 +1,6 @@
 """The C files of a folded step: header, equations, state and guards."""
 
 import math
-import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 from codegen.clean_c import Statements, literal
 from codegen.graph import graph_of
 from codegen.recognize import OWN, recognized
+from codegen.template import Values, Words, filled
 from identifier.export.fold import FoldedStep
 from identifier.export.layout import (
     Member,
@@ -22,6 +22,7 @@ from identifier.export.layout import (
     sum_terms,
     write_expression,
 )
+from identifier.export.weight_rules import conditions, covariance_values, has_amounts
 
 TEMPLATES = Path(__file__).parent / "c"
 MACROS: Mapping[str, tuple[str, str]] = {  # in float and in double
@@ -30,31 +31,16 @@ MACROS: Mapping[str, tuple[str, str]] = {  # in float and in double
     "FABS": ("FABS(x) fabsf(x)", "FABS(x) fabs(x)"),
     "FLOOR": ("FLOOR(x) floorf(x)", "FLOOR(x) floor(x)"),
 }
-KEY = re.compile(r"@(\w+)@")
 
 
-def filled(template: str, values: Mapping[str, str]) -> str:
-    """Return a template with every `@key@` replaced, in what replaces it too.
-
-    Parameters
-    ----------
-    template : name of a file beside this one.
-    values : by key.
-    """
-    text = (TEMPLATES / template).read_text(encoding="utf-8")
-    while KEY.search(text):
-        text = KEY.sub(lambda found: values[found[1]], text)
-    return text
-
-
-def c_sources(folded: FoldedStep, *, single: bool, about: Mapping[str, str]) -> dict[str, str]:
+def c_sources(folded: FoldedStep, *, single: bool, about: Values) -> dict[str, str]:
     """Return the C files by their path in the package.
 
     Parameters
     ----------
     folded : the step.
     single : whether float is the default precision.
-    about : title, method, version and hash, as text.
+    about : title, method, version and hash.
 
     Raises
     ------
@@ -70,12 +56,13 @@ def c_sources(folded: FoldedStep, *, single: bool, about: Mapping[str, str]) -> 
         if not math.isfinite(number):
             raise ValueError(f"a carried value must be finite to be exported, it is {number}")
     name = folded.name
-    values = {**about, **_pieces(folded, single=single)}
-    equations, shell = filled("equations.c", values), filled("name.c", values)
+    values: dict[str, str | Words] = {**about, **_pieces(folded, single=single)}
+    values |= _parts(folded, values)
+    equations, shell = _filled("equations.c", values), _filled("name.c", values)
     values |= _macros(name, equations + shell)
     return {
-        f"include/{name}.h": filled("name.h", values),
-        f"src/{name}_equations.h": filled("equations.h", values),
+        f"include/{name}.h": _filled("name.h", values),
+        f"src/{name}_equations.h": _filled("equations.h", values),
         f"src/{name}_equations.c": equations,
         f"src/{name}.c": shell,
     }
@@ -112,19 +99,18 @@ def _pieces(folded: FoldedStep, *, single: bool) -> dict[str, str]:
         ),
         "carry_members": (f"    {name}_weights weights;\n" if learnt else "")
         + _declarations(others, real),
-        "weights_prototypes": _template("weights.h") if learnt else "",
-        "weights_functions": _template("weights.c") if learnt else "",
         "functions": _functions(name, called | called_elsewhere),
         "driving": driving,
+        "at_rest": "driving",
         **decided,
         "start": _start(folded, learnt, others),
         "zeros": _zeros(told, name),
         "sum": total,
-        "sum_function": _template("sum.c") if f"{name}_sum(" in total else "",
         "weights_sum": _sum(
             sum_terms([member._replace(learnt=False) for member in learnt], name, "weights->"),
             " " * 12,
         ),
+        "weights_rules": conditions(learnt, name),
         "keep": _keep(name, bool(learnt)),
         "hold": (
             "        if (state->adapts == 0U) {\n"
@@ -134,9 +120,6 @@ def _pieces(folded: FoldedStep, *, single: bool) -> dict[str, str]:
             else ""
         ),
         "believed": folded.believed or "",
-        "believed_function": _template("believed.c") if folded.believed else "",
-        "judge": _template("judge.c") if folded.believed else "",
-        "begin": _template("begin.c") if folded.rests_first else "",
         "first": (
             "        if (state->started == 0U) {\n"
             f"            {name}_begin(state, params, input, &next, &out);\n"
@@ -145,6 +128,34 @@ def _pieces(folded: FoldedStep, *, single: bool) -> dict[str, str]:
             else ""
         ),
     }
+
+
+def _parts(folded: FoldedStep, values: Values) -> dict[str, str]:
+    """Return the pieces that have a template of their own, filled; empty where not needed."""
+    decides = folded.parts.where_false is not None
+    learns, judges = bool(folded.learnt), bool(folded.believed)
+    wanted = {
+        "weights_prototypes": ("weights.h", learns),
+        "weights_functions": ("weights.c", learns),
+        "sum_function": ("sum.c", f"{folded.name}_sum(" in str(values["sum"])),
+        "believed_function": ("believed.c", judges),
+        "judge": ("judge.c", judges),
+        "begin": ("begin.c", folded.rests_first),
+        "decided_prototypes": ("decided.h", decides),
+        "decided_functions": ("decided.c", decides),
+    }
+    weights = [member for member in carried_members(folded) if member.learnt]
+    covariance = covariance_values(weights)
+    inner = {
+        "covariance_function": _filled("covariance.c", {**values, **covariance})
+        if covariance
+        else "",
+        "amounts_function": _filled("not_negative.c", values) if has_amounts(weights) else "",
+    }
+    values = {**values, **inner}
+    parts = {key: _filled(file, values) if there else "" for key, (file, there) in wanted.items()}
+    step = "decided_step.c" if decides else "undecided_step.c"
+    return {**parts, "compute": _filled(step, {**values, **parts})}
 
 
 def _macros(name: str, text: str) -> dict[str, str]:
@@ -172,8 +183,8 @@ def _sum(terms: Sequence[str], indent: str) -> str:
     return _wrapped(solid, indent).replace("\xa0", " ")
 
 
-def _template(name: str) -> str:
-    return (TEMPLATES / name).read_text(encoding="utf-8")
+def _filled(template: str, values: Values) -> str:
+    return filled(TEMPLATES / template, values)
 
 
 def _number(value: float) -> str:
@@ -197,9 +208,7 @@ def _body(folded: FoldedStep, function: ca.Function) -> tuple[str, set[str]]:
 def _decided(folded: FoldedStep) -> tuple[dict[str, str], set[str]]:
     """Return the pieces that decide between driving and rest, where the method does."""
     if folded.parts.where_false is None:
-        nothing = dict.fromkeys(("decided_prototypes", "decided_functions"), "")
-        step = _template("undecided_step.c")
-        return {**nothing, "compute": step, "at_rest": "driving"}, set()
+        return {}, set()
     elsewhere, called = _body(folded, folded.parts.where_false)
     condition = Statements(
         recognized(graph_of(folded.parts.condition)),
@@ -208,13 +217,8 @@ def _decided(folded: FoldedStep) -> tuple[dict[str, str], set[str]]:
         write=lambda _port, _entry: "",
         returns=True,
     )
-    functions = _template("decided.c").replace("@drives@", condition.block())
-    return {
-        "decided_prototypes": _template("decided.h"),
-        "decided_functions": functions.replace("@elsewhere@", elsewhere),
-        "compute": _template("decided_step.c"),
-        "at_rest": "elsewhere",
-    }, called | condition.called
+    pieces = {"drives": condition.block(), "elsewhere": elsewhere, "at_rest": "elsewhere"}
+    return pieces, called | condition.called
 
 
 def _functions(name: str, called: set[str]) -> str:

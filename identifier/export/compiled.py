@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import load_library
-from identifier.export.c_source import filled
+from codegen.template import filled
+from identifier.export.c_source import TEMPLATES
 from identifier.export.manifest import FORMAT
-from identifier.export.package import Package
+from identifier.export.package import NAME, Package
 from models.recordings import Recording
 
 Array = NDArray[np.float64]
@@ -62,6 +63,8 @@ class CompiledPackage:
         Where there is no C compiler.
     CompilationError
         Where the compiler refuses the package.
+    PackageFileError
+        Where the name that the manifest gives is not one of C.
     """
 
     def __init__(
@@ -72,6 +75,8 @@ class CompiledPackage:
         single: bool | None = None,
     ) -> None:
         self.name = str(manifest["name"])
+        if not NAME.fullmatch(self.name):
+            raise PackageFileError(f"the name of a package is no name in C: {self.name!r}")
         self.single = manifest["precision"] == "float" if single is None else single
         self.dt = float(manifest["sample_time_s"])
         self._outputs = {one["name"]: int(one["size"]) for one in manifest["outputs"]}
@@ -130,9 +135,9 @@ class CompiledPackage:
         order = ("src/{}_equations.h", "src/{}_equations.c", "src/{}.c")
         paths = [f"include/{name}.h", *(path.format(name) for path in order)]
         text = "".join(files[path] for path in paths)
-        glue = filled("glue.c", {"name": name})
+        glue = filled(TEMPLATES / "glue.c", {"name": name})
         if self._weights:
-            glue += filled("glue_weights.c", {"name": name})
+            glue += filled(TEMPLATES / "glue_weights.c", {"name": name})
         return (
             f"#define {name.upper()}_SINGLE {int(self.single)}\n"
             + re.sub(r'^#include "[^"]*"$', "", text, flags=re.M)
@@ -248,7 +253,7 @@ class CompiledPackage:
         Raises
         ------
         ValueError
-            Where a name or shape is another, or a number not finite.
+            Where a name or shape is another, a number not finite, or a covariance negative.
         """
         shapes = {name: np.shape(value) for name, value in weights.items()}
         if shapes != self._weights:
@@ -257,7 +262,7 @@ class CompiledPackage:
         flat = np.ascontiguousarray(flat, dtype=np.float64)
         answer = self._call("instance_take")(self._instance, ctypes.c_void_p(flat.ctypes.data))
         if answer != Status.OK:
-            raise ValueError("weights must be finite")
+            raise ValueError("weights must be finite, and covariances and errors not negative")
 
     def set_adaptation(self, adapts: bool) -> None:
         """Learn, or hold what is learnt.

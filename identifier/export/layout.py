@@ -40,7 +40,7 @@ class Member(NamedTuple):
         real : type of a number.
         """
         sizes = "".join(f"[{size}]" for size in self.dimensions)
-        _, unit, description, _ = self.signal
+        unit, description = self.signal.unit, self.signal.description
         code, words = f"    {real} {self.signal.name}{sizes};", f"/* {description} [{unit}] */"
         line = f"{code} {words}\n"
         return line if len(line) <= 100 else f"    {words}\n{code}\n"

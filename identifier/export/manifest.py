@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from codegen.escape import c_string
+from codegen.template import Words
 from identifier.axle import AxleDesign
 from identifier.axle.design import NOT_CERTIFIED
 from identifier.design import Design
@@ -76,7 +78,7 @@ def certificate(method: Method) -> dict[str, Any]:
     return {"verdict": verdict, "held_by_construction": {}}
 
 
-def summary(folded: FoldedStep, content: Mapping[str, Any]) -> dict[str, str]:
+def summary(folded: FoldedStep, content: Mapping[str, Any]) -> dict[str, str | Words]:
     """Return what texts say about a package: title, method, versions, hash, names and numbers.
 
     Parameters
@@ -86,12 +88,12 @@ def summary(folded: FoldedStep, content: Mapping[str, Any]) -> dict[str, str]:
     """
     short, version = digest(content)[:12], tireid_version()
     return {
-        "title": f"Tire forces of the car {folded.vehicle.name}",
+        "title": Words(f"Tire forces of the car {folded.vehicle.name}"),
         "method": type(folded.method).__name__,
         "version": version,
         "hash": short,
         "certificate": _certificate_text(folded.method),
-        "version_text": f"{folded.name} {short}, tireid {version}",
+        "version_text": c_string(f"{folded.name} {short}, tireid {version}"),
         "single": str(int(content["precision"] == "float")),
         "dt": f"{folded.dt:g}",
         "min_speed": f"{folded.min_speed:.3g}",

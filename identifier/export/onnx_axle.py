@@ -5,6 +5,7 @@ What the whole model adds, the lag of slip and the sway of the body, has a state
 
 import numpy as np
 
+from codegen.escape import visible
 from identifier.axle.model import AxleModel
 from identifier.export.onnx_graph import Graph
 from identifier.export.onnx_network import OUTPUTS, SLIP_SIGN
@@ -37,6 +38,6 @@ def axle_graph(model: AxleModel, *, single: bool = False) -> bytes:
         "axle_force_curves",
         INPUTS,
         OUTPUTS,
-        f"Static axle force over slip angle of {model.vehicle.name}; {SLIP_SIGN}",
-        {"vehicle": model.vehicle.name},
+        f"Static axle force over slip angle of {visible(model.vehicle.name)}; {SLIP_SIGN}",
+        {"vehicle": visible(model.vehicle.name)},
     )

@@ -5,6 +5,7 @@ Rows are samples, as ONNX has it, so that every product is transposed: x̄ᵀ V�
 
 import numpy as np
 
+from codegen.escape import visible
 from identifier.export.onnx_graph import Graph
 from identifier.export.signals import INPUTS, Signal
 from identifier.network_model import NetworkModel
@@ -59,11 +60,12 @@ def network_graph(model: NetworkModel, *, single: bool = False) -> bytes:
     for port, axle in zip(OUTPUTS, ([[1.0], [0.0]], [[0.0], [1.0]]), strict=True):
         pick = graph.constant(f"pick_{port.name}", axle)
         graph.apply("MatMul", [axle_force, pick], port.name)
+    name = visible(model.vehicle.name)
     return graph.model_bytes(
         "frozen_network",
         INPUTS,
         OUTPUTS,
-        f"Axle forces of {model.vehicle.name}, F_y = C alpha + U W tanh(V x_bar), zero below "
+        f"Axle forces of {name}, F_y = C alpha + U W tanh(V x_bar), zero below "
         f"{model.min_speed:g} m/s; {SLIP_SIGN}",
-        {"vehicle": model.vehicle.name, "min_speed_m_s": repr(model.min_speed)},
+        {"vehicle": name, "min_speed_m_s": repr(model.min_speed)},
     )

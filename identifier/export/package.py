@@ -4,11 +4,13 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from identifier.export.c_source import c_sources, filled
+from codegen.template import Values, filled
+from identifier.export.c_source import TEMPLATES, c_sources
 from identifier.export.fold import FoldedStep, fold
 from identifier.export.layout import Member, carried_members, output_members
 from identifier.export.manifest import ingredients, manifest_text, summary
 from identifier.export.vectors import SAMPLES, vectors, vectors_header
+from identifier.export.weight_rules import ruled
 from identifier.method import FrozenModel, Method
 from models.vehicle import Vehicle
 
@@ -26,7 +28,7 @@ class Package(NamedTuple):
 
     folded: FoldedStep
     files: Mapping[str, str]
-    about: Mapping[str, str]
+    about: Values
 
 
 def build_package(
@@ -68,14 +70,19 @@ def build_package(
     return Package(folded, files | {f"{name}.json": manifest_text(content, files)}, about)
 
 
-def _other_files(folded: FoldedStep, about: Mapping[str, str], *, single: bool) -> dict[str, str]:
+def _other_files(folded: FoldedStep, about: Values, *, single: bool) -> dict[str, str]:
     name, learnt = folded.name, bool(folded.learnt)
     members = carried_members(folded)
     first = next((m.signal.name + m.first for m in members if m.learnt), "")
+    rules = ruled([member for member in members if member.learnt])
+    negative = {"first_rule": rules[0].signal.name + rules[0].first, **about} if rules else {}
+    about_weights = {
+        "first_weight": first,
+        "negative_test": filled(TEMPLATES / "negative_test.c", negative) if rules else "",
+        **about,
+    }
     values = {
-        "weights_test": filled("weights_test.c", {"first_weight": first, **about})
-        if learnt
-        else "",
+        "weights_test": filled(TEMPLATES / "weights_test.c", about_weights) if learnt else "",
         "weights_call": "    test_modes(&state, &params);\n" if learnt else "",
         "tolerance_double": f"{TOLERANCE_DOUBLE * folded.limits.force:.2g}",
         "tolerance_single": f"{TOLERANCE_SINGLE * folded.limits.force:.2g}",
@@ -83,9 +90,9 @@ def _other_files(folded: FoldedStep, about: Mapping[str, str], *, single: bool) 
         **about,
     }
     return {
-        "CMakeLists.txt": filled("CMakeLists.txt", values),
-        "examples/main.c": filled("main.c", values),
-        f"tests/test_{name}.c": filled("test.c", values),
+        "CMakeLists.txt": filled(TEMPLATES / "CMakeLists.txt", values),
+        "examples/main.c": filled(TEMPLATES / "main.c", values),
+        f"tests/test_{name}.c": filled(TEMPLATES / "test.c", values),
         "tests/vectors.h": vectors_header(vectors(folded)),
     }
 
@@ -109,7 +116,7 @@ def readme(package: Package, about_figures: str) -> str:
     equations = package.files[f"src/{folded.name}_equations.h"]
     called = [f"`{word}`" for word in ("sqrt", "fabs", "floor") if f" {word}(x)" in equations]
     return filled(
-        "README.md",
+        TEMPLATES / "README.md",
         {
             "input_table": _table([Member(s, (1, 1), False) for s in folded.inputs]),
             "output_table": _table(output_members(folded)),

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import CompilationError
-from identifier.export.c_source import KEY
+from codegen.template import filled
 
 Array = NDArray[np.float64]
 
@@ -255,16 +255,12 @@ def _build(
 ) -> None:
     sources = _write(folder, files)
     for path in TARGET.iterdir():
-        text = path.read_text(encoding="utf-8")
-        (folder / path.name).write_text(_named(text, name))
+        text = filled(path, {"name": name, "NAME": name.upper()})
+        (folder / path.name).write_text(text)
     (folder / "samples.bin").write_bytes(np.ascontiguousarray(samples, dtype="<f8").tobytes())
     own = [f"-D{name.upper()}_SINGLE={int(single)}", "-Iinclude", "-Isrc", "-I."]
     compiler, *words = command
     _compile([compiler, *own, *sources, "replay.c", "samples.S", *words, "-o", "replay"], folder)
-
-
-def _named(text: str, name: str) -> str:
-    return KEY.sub(lambda found: name if found[1].islower() else name.upper(), text)
 
 
 def _compile(command: Sequence[str], folder: Path) -> None:

@@ -7,15 +7,23 @@ from identifier.axle import AxleDesign
 from identifier.method import Method
 
 LOAD = "static axle loads"
+COVARIANCE, NOT_NEGATIVE = "covariance", "not negative"  # rules of weights that are taken over
+RULES: Mapping[str, str] = {"P": COVARIANCE, "Omega": COVARIANCE, "information": NOT_NEGATIVE}
+AXLE_RULES: Mapping[str, str] = {
+    "P": COVARIANCE,
+    "errors": NOT_NEGATIVE,
+    "excitation": NOT_NEGATIVE,
+}
 
 
 class Signal(NamedTuple):
-    """An input, output or carried value: name in C, FMU and JSON; unit; what it is; entries."""
+    """An input, output or carried value: its name in C, FMU and JSON, and what it is."""
 
     name: str
     unit: str
     description: str
     size: int = 1
+    rule: str = ""
 
 
 INPUTS = (
@@ -88,6 +96,8 @@ def describe(method: Method, port: str, size: int) -> Signal:
     port : name of an output or of a carried port.
     size : number of entries.
     """
-    known = {**PORTS, **AXLE_PORTS} if isinstance(method, AxleDesign) else PORTS
+    curves = isinstance(method, AxleDesign)
+    known = {**PORTS, **AXLE_PORTS} if curves else PORTS
     unit, description = known.get(port, ("-", "state of the method"))
-    return Signal(port, unit.replace("U", force_unit_text(method)), description, size)
+    rule = (AXLE_RULES if curves else RULES).get(port, "")
+    return Signal(port, unit.replace("U", force_unit_text(method)), description, size, rule)

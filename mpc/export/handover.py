@@ -4,13 +4,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from codegen.template import filled
 from identifier.axle.model import AxleModel
 from identifier.axle.slip import SHORTEST
 from identifier.export.package import Package
 from identifier.method import CannotFreezeError
 from identifier.network_model import NetworkModel
 from models.vehicle import GRAVITY
-from mpc.export.package import MpcPackage, filled
+from mpc.export.package import MpcPackage
 
 TEMPLATES = Path(__file__).parent / "pair"
 
@@ -82,7 +83,7 @@ def handover_sources(identifier: Package, tracker: MpcPackage) -> dict[str, str]
             "scale": _numbers(model.network.scale),
         }
         conversion, slope_rule, adapt = "network.c", "", ""
-    text = filled(conversion, {**about, **{k: str(v) for k, v in values.items()}}, TEMPLATES)
+    text = filled(TEMPLATES / conversion, {**about, **{k: str(v) for k, v in values.items()}})
     body = {
         **about,
         "include": "#include <math.h>\n" if adapt else "",
@@ -91,8 +92,8 @@ def handover_sources(identifier: Package, tracker: MpcPackage) -> dict[str, str]
         "slope_rule": slope_rule,
     }
     return {
-        f"include/{name}_handover.h": filled("handover.h", body, TEMPLATES),
-        f"src/{name}_handover.c": filled("handover.c", body, TEMPLATES),
+        f"include/{name}_handover.h": filled(TEMPLATES / "handover.h", body),
+        f"src/{name}_handover.c": filled(TEMPLATES / "handover.c", body),
     }
 
 

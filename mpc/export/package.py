@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.export.c_source import KEY
+from codegen.escape import c_string
+from codegen.template import Values, Words, filled
 from identifier.export.manifest import digest, manifest_text, plain, tireid_version
 from identifier.export.package import NAME, PackageNameError
 from identifier.model_format import vehicle_numbers
@@ -41,7 +42,7 @@ class MpcPackage(NamedTuple):
     params: NDArray[np.void]
     files: Mapping[str, str]
     vectors: Vectors
-    about: Mapping[str, str]
+    about: Values
 
 
 def build_mpc_package(
@@ -96,29 +97,16 @@ def build_mpc_package(
         "single_option": "ON" if single else "OFF",
     }
     files |= {
-        f"include/{name}_params.h": filled("params.h", values),
-        f"src/{name}_params.c": filled("params.c", values),
-        f"tests/test_{name}.c": filled("test.c", values),
+        f"include/{name}_params.h": filled(TEMPLATES / "params.h", values),
+        f"src/{name}_params.c": filled(TEMPLATES / "params.c", values),
+        f"tests/test_{name}.c": filled(TEMPLATES / "test.c", values),
         "tests/vectors.h": vectors_header(vectors),
     }
     sources = sorted(path for path in files if path.startswith("src/") and path.endswith(".c"))
     values["sources"] = "\n".join(f"  {path}" for path in sources)
-    files |= {"CMakeLists.txt": filled("CMakeLists.txt", values)}
+    files |= {"CMakeLists.txt": filled(TEMPLATES / "CMakeLists.txt", values)}
     files |= {f"{name}.json": manifest_text(content, files)}
     return MpcPackage(name, tire, tracker.problem, params, files, vectors, about)
-
-
-def filled(template: str, values: Mapping[str, str], folder: Path = TEMPLATES) -> str:
-    """Return a template with every `@key@` replaced.
-
-    Parameters
-    ----------
-    template : name of a file.
-    values : by key.
-    folder : where the file lies.
-    """
-    text = (folder / template).read_text(encoding="utf-8")
-    return KEY.sub(lambda found: values[found[1]], text)
 
 
 def mpc_readme(package: MpcPackage, about_figures: str) -> str:
@@ -134,7 +122,7 @@ def mpc_readme(package: MpcPackage, about_figures: str) -> str:
         f"| `{name}` | {_in_words(value)} |\n" for name, value in p.items() if name != "weights"
     )
     return filled(
-        "README.md",
+        TEMPLATES / "README.md",
         {
             "numbers_table": rows,
             "samples": str(len(package.vectors.measured)),
@@ -176,15 +164,15 @@ def _ingredients(
     }
 
 
-def _summary(tracker: Tracker, content: Mapping[str, Any]) -> dict[str, str]:
+def _summary(tracker: Tracker, content: Mapping[str, Any]) -> dict[str, str | Words]:
     short, version, name = digest(content)[:12], tireid_version(), content["name"]
     times = tracker.times
     return {
-        "title": f"Path tracking of the car {tracker.tire.vehicle.name}",
+        "title": Words(f"Path tracking of the car {tracker.tire.vehicle.name}"),
         "tire": content["tire"]["kind"],
         "version": version,
         "hash": short,
-        "version_text": f"{name} {short}, tireid {version}",
+        "version_text": c_string(f"{name} {short}, tireid {version}"),
         "single": str(int(content["precision"] == "float")),
         "name": name,
         "NAME": name.upper(),
@@ -196,8 +184,8 @@ def _summary(tracker: Tracker, content: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
-def _about_numbers(tracker: Tracker) -> str:
-    return (
+def _about_numbers(tracker: Tracker) -> Words:
+    return Words(
         f"Those of the export: the car {tracker.tire.vehicle.name}, period {tracker.period:g} s, "
         f"delay {tracker.delay:g} s."
     )

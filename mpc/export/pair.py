@@ -3,9 +3,10 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from codegen.template import Words, filled
 from identifier.export.package import Package
 from mpc.export.handover import TEMPLATES, frozen_start, handover_sources
-from mpc.export.package import MpcPackage, build_mpc_package, filled
+from mpc.export.package import MpcPackage, build_mpc_package
 from mpc.problem import Problem
 from mpc.tires import tire_model
 
@@ -60,15 +61,15 @@ def build_pair(
         name=f"{folded.name}_mpc",
         single=single,
     )
-    values = {
+    values: dict[str, str | Words] = {
         "name": folded.name,
         "NAME": folded.name.upper(),
         "version": identifier.about["version"],
-        "vehicle": folded.vehicle.name,
+        "vehicle": Words(folded.vehicle.name),
         "identifier_hash": identifier.about["hash"],
         "mpc_hash": tracker.about["hash"],
         "learnt_peak": LEARNT_PEAK,
     }
-    files = {f"examples/{path}": filled(path, values, TEMPLATES) for path in EXAMPLES}
-    files |= {path: filled(path, values, TEMPLATES) for path in ("CMakeLists.txt", "README.md")}
+    files = {f"examples/{path}": filled(TEMPLATES / path, values) for path in EXAMPLES}
+    files |= {path: filled(TEMPLATES / path, values) for path in ("CMakeLists.txt", "README.md")}
     return Pair(identifier, tracker, files | handover_sources(identifier, tracker))

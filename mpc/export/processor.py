@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from codegen import CompilationError
+from codegen.template import filled
 from identifier.export.processor import (
     CROSS_COMPILER,
     EMULATOR,
@@ -15,7 +16,7 @@ from identifier.export.processor import (
     ReplayError,
 )
 from identifier.export.processor import TARGET as BOARD
-from mpc.export.package import MpcPackage, filled
+from mpc.export.package import MpcPackage
 
 TARGET = Path(__file__).parent / "target"
 PROCESSOR = PROCESSORS[-1]  # the one that computes in double
@@ -113,7 +114,7 @@ def _replayed(
         for board in ("board.c", "host.c", "machine.h", "mps2.ld"):
             (folder / board).write_text((BOARD / board).read_text(encoding="utf-8"))
         values = {"name": name, "NAME": name.upper(), "steps": str(steps)}
-        (folder / "replay.c").write_text(filled("replay.c", values, TARGET))
+        (folder / "replay.c").write_text(filled(TARGET / "replay.c", values))
         sources = sorted(path for path in package.files if path.startswith("src/"))
         own = [f"-D{name.upper()}_SINGLE={int(single)}", "-Iinclude", "-Isrc", "-Itests", "-I."]
         files = [path for path in sources if path.endswith(".c")]

@@ -9,6 +9,7 @@ import casadi as ca
 from codegen.clean_c import Statements
 from codegen.graph import graph_of
 from codegen.recognize import OWN, recognized
+from codegen.template import Values, Words, filled
 from codegen.tuned import tuned
 from mpc.cost import N_ERRORS
 from mpc.motion import state_size
@@ -34,7 +35,6 @@ MACROS: Mapping[str, tuple[str, str]] = {  # in float and in double
     "FABS": ("FABS(x) fabsf(x)", "FABS(x) fabs(x)"),
     "FLOOR": ("FLOOR(x) floorf(x)", "FLOOR(x) floor(x)"),
 }
-KEY = re.compile(r"@(\w+)@")
 READ: Mapping[str, str] = {
     "x": "x[{}]",
     "u": "u",
@@ -55,7 +55,7 @@ def c_sources(
     horizon: int,
     name: str,
     single: bool = False,
-    about: Mapping[str, str],
+    about: Values,
 ) -> dict[str, str]:
     """Return the C files by their path in a package; they depend on nothing but these arguments.
 
@@ -74,7 +74,7 @@ def c_sources(
     )
     n_x = state_size(structure)
     functions = _functions(name, called | called_at_end | called_ahead)
-    values = {
+    values: dict[str, str | Words] = {
         **about,
         "name": name,
         "NAME": name.upper(),
@@ -119,9 +119,8 @@ def _alone(path: str, text: str) -> str:
     return f"{text}{own_types}\n"
 
 
-def _filled(template: str, values: Mapping[str, str]) -> str:
-    text = (TEMPLATES / template).read_text(encoding="utf-8")
-    return KEY.sub(lambda found: values[found[1]], text)
+def _filled(template: str, values: Values) -> str:
+    return filled(TEMPLATES / template, values)
 
 
 def _free_motion(structure: PredictionTire) -> ca.Function:

@@ -1,15 +1,13 @@
 """The text of a tracker in one file, kept between runs: a second start generates nothing."""
 
 import hashlib
-import os
-import tempfile
 from dataclasses import fields, is_dataclass
 from functools import cache
 from pathlib import Path
 
 import casadi as ca
 
-from codegen.cache import cache_folder
+from codegen.cache import keep, kept
 from mpc.realtime.c_source import c_sources, one_file
 from mpc.tires.structure import PredictionTire
 
@@ -32,15 +30,11 @@ def tracker_source(structure: PredictionTire, horizon: int, *, single: bool) -> 
     parts = [f"{field.name}={getattr(structure, field.name)!r}" for field in fields(structure)]
     about = [_generator(), f"{kind.__module__}.{kind.__qualname__}", *parts, horizon, single]
     digest = hashlib.sha256("\0".join(map(str, about)).encode()).hexdigest()[:20]
-    kept = cache_folder() / f"tracker-{digest}.c"
-    if kept.exists():
-        return kept.read_text(encoding="utf-8")
+    found = kept(f"tracker-{digest}", ".c")
+    if found is not None:
+        return found.read_text(encoding="utf-8")
     text = _generated(structure, horizon, single)
-    with tempfile.NamedTemporaryFile(
-        "w", dir=kept.parent, delete=False, suffix=".part", encoding="utf-8"
-    ) as part:
-        part.write(text)
-    os.replace(part.name, kept)  # noqa: PTH105, atomic: two processes may write it at once
+    keep(f"tracker-{digest}", ".c", text.encode())
     return text
 
 

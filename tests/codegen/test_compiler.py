@@ -2,8 +2,10 @@
 
 import ctypes
 import math
+import os
 import platform
 import shutil
+import stat
 import subprocess
 import sys
 from pathlib import Path
@@ -53,6 +55,20 @@ def test_a_compiler_of_several_words_is_run_with_all_of_them(monkeypatch, fresh_
     monkeypatch.setenv("CC", "env TIREID_TEST=1 gcc")
     assert find_compiler() == (shutil.which("env"), "TIREID_TEST=1", "gcc")
     assert load_library(ONE, "one").one() == 1
+
+
+def test_words_of_the_compiler_are_in_the_name_and_cannot_delete_guards(
+    monkeypatch, fresh_cache, ask_again
+):
+    plain = build_library(NAN_GUARD, "guarded")
+    for words in ("gcc -ffast-math", "gcc -Ofast", "gcc -ffinite-math-only"):
+        monkeypatch.setenv("CC", words)
+        find_compiler.cache_clear()
+        assert build_library(NAN_GUARD, "guarded").stem.split(".")[0] != plain.stem.split(".")[0]
+        require_nan_guards_to_work()
+    monkeypatch.delenv("CC")
+    find_compiler.cache_clear()
+    assert build_library(NAN_GUARD, "guarded") == plain
 
 
 def test_the_name_of_a_library_follows_its_content(fresh_cache):
@@ -110,13 +126,87 @@ def test_a_library_appears_whole_or_not_at_all(monkeypatch, fresh_cache):
     assert len(list(fresh_cache.iterdir())) == 1
 
 
-@pytest.mark.parametrize("kept", [0, 100])
-def test_a_damaged_library_is_built_anew(fresh_cache, kept):
+def require_a_new_one(library, caplog):
+    """What is damaged is said and never loaded: a process that maps it may crash."""
+    with caplog.at_level("INFO", logger="tireid"):
+        assert load_library(ONE, "one").one() == 1
+    assert "is damaged: building it anew" in " ".join(caplog.messages)
+    assert list(library.parent.iterdir()) == [library]
+
+
+@pytest.mark.parametrize("share", [i / 22 for i in range(22)])
+def test_a_library_that_was_cut_short_is_built_anew(fresh_cache, caplog, share):
     library = build_library(ONE, "one")
-    library.write_bytes(library.read_bytes()[:kept])
-    with pytest.raises(OSError, match="one"):
-        ctypes.CDLL(str(library))
+    whole = library.read_bytes()
+    library.write_bytes(whole[: int(share * len(whole))])
+    require_a_new_one(library, caplog)
+    assert library.read_bytes() == whole
+
+
+def test_a_library_with_a_bit_turned_is_built_anew(fresh_cache, caplog, rng):
+    library = build_library(ONE, "one")
+    whole = library.read_bytes()
+    for place in rng.integers(8 * len(whole), size=25):
+        turned = bytearray(whole)
+        turned[place // 8] ^= 1 << (place % 8)
+        library.unlink()  # this process has mapped it
+        library.write_bytes(turned)
+        caplog.clear()
+        require_a_new_one(library, caplog)
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs owners of files")
+@pytest.mark.parametrize("mode", [0o777, 0o775, 0o722])
+def test_a_folder_that_others_can_write_is_not_used(fresh_cache, caplog, mode):
+    trap = build_library("int one(void) { return 666; }", "one")
+    trap.rename(build_library(ONE, "one"))
+    fresh_cache.chmod(mode)
     assert load_library(ONE, "one").one() == 1
+    assert cache_folder() != fresh_cache
+    assert [m for m in caplog.messages if "can be written by other users" in m] == caplog.messages
+    assert len(caplog.messages) == 1
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="needs owners of files")
+def test_a_library_that_others_can_write_is_not_loaded(fresh_cache, caplog):
+    library = build_library(ONE, "one")
+    library.chmod(0o666)
+    with caplog.at_level("INFO", logger="tireid"):
+        assert load_library(ONE, "one").one() == 1
+    assert "is not loaded, but built anew" in caplog.messages[0]
+    assert stat.S_IMODE(library.stat().st_mode) == 0o600
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0, reason="needs to be root")
+def test_what_belongs_to_another_user_is_not_loaded(fresh_cache, caplog):
+    library = build_library(ONE, "one")
+    os.chown(library, 65534, 65534)
+    assert load_library(ONE, "one").one() == 1
+    assert "belongs to another user" in caplog.messages[0]
+    assert library.stat().st_uid == 0
+    os.chown(fresh_cache, 65534, 65534)
+    assert cache_folder() != fresh_cache
+
+
+@pytest.mark.skipif(not hasattr(os, "symlink"), reason="needs links")
+def test_a_link_in_place_of_a_library_is_not_loaded(fresh_cache, tmp_path_factory, caplog):
+    library = build_library(ONE, "one")
+    elsewhere = tmp_path_factory.mktemp("elsewhere") / "trap.so"
+    library.rename(elsewhere)
+    library.symlink_to(elsewhere)
+    assert load_library(ONE, "one").one() == 1
+    assert "is a link" in caplog.messages[0]
+    assert not library.is_symlink()
+
+
+def test_a_new_cache_is_for_this_user_only(monkeypatch, tmp_path):
+    monkeypatch.setenv("TIREID_CACHE", str(tmp_path / "deep" / "cache"))
+    before = os.umask(0)
+    try:
+        library = build_library(ONE, "one")
+    finally:
+        os.umask(before)
+    assert [stat.S_IMODE(p.stat().st_mode) for p in (library.parent, library)] == [0o700, 0o600]
 
 
 @pytest.mark.parametrize("below", ["", "deeper"])

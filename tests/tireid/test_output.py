@@ -1,10 +1,27 @@
 """The output folder: whole or as before, and nothing of the user's is ever lost."""
 
+import errno
+import json
+import os
+import subprocess
+import sys
+import textwrap
 from pathlib import Path
 
 import pytest
 
-from tireid.output import MARKER, OutputError, output_folder
+from tireid import exchange as exchange_module
+from tireid import output as output_module
+from tireid.exchange import ClaimedError, claim, exchange
+from tireid.output import MARKER, OutputError, foreign, output_folder
+
+
+@pytest.fixture(params=["at once", "in two steps"])
+def swaps(request, monkeypatch):
+    """Both ways to replace a folder, the second where the system cannot exchange names."""
+    if request.param == "in two steps":
+        monkeypatch.setattr(output_module, "exchange", lambda *_: False)
+    return request.param
 
 
 def write(target, text="new", *, force=False):
@@ -13,11 +30,11 @@ def write(target, text="new", *, force=False):
 
 
 def content(folder):
-    """Every file below a folder and its text."""
+    """Every file below a folder and its text, markers left out."""
     return {
         str(path.relative_to(folder)): path.read_text()
         for path in sorted(folder.rglob("*"))
-        if path.is_file()
+        if path.is_file() and path.name != MARKER
     }
 
 
@@ -30,10 +47,13 @@ def refused(target, *, force=True):
 
 def test_a_folder_appears_with_all_that_was_written(tmp_path):
     write(tmp_path / "deep" / "out")
-    assert content(tmp_path / "deep") == {"out/result.txt": "new", f"out/{MARKER}": "result.txt\n"}
+    assert content(tmp_path / "deep") == {"out/result.txt": "new"}
+    assert [entry.name for entry in (tmp_path / "deep").iterdir()] == ["out"]
+    marker = json.loads((tmp_path / "deep" / "out" / MARKER).read_text())
+    assert marker["files"]["result.txt"][0] == len("new")
 
 
-def test_an_empty_folder_is_filled_and_our_own_replaced_when_asked(tmp_path):
+def test_an_empty_folder_is_filled_and_our_own_replaced_when_asked(tmp_path, swaps):
     out = tmp_path / "out"
     out.mkdir()
     write(out, "first")
@@ -41,7 +61,8 @@ def test_an_empty_folder_is_filled_and_our_own_replaced_when_asked(tmp_path):
     assert content(out)["result.txt"] == "first"
     with output_folder(out, force=True) as folder:
         (folder / "other.txt").write_text("second")
-    assert content(tmp_path) == {"out/other.txt": "second", f"out/{MARKER}": "other.txt\n"}
+    assert content(tmp_path) == {"out/other.txt": "second"}
+    assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
 
 
 def test_a_foreign_folder_survives_force(tmp_path):
@@ -129,6 +150,7 @@ def fail_to_rename(monkeypatch, *, onto):
             raise OSError("disk trouble")
         return rename(self, target)
 
+    monkeypatch.setattr(output_module, "exchange", lambda *_: False)
     monkeypatch.setattr(Path, "rename", failing)
     return failures
 
@@ -139,12 +161,12 @@ def test_a_rename_that_fails_restores_the_old_folder(tmp_path, monkeypatch):
     failures = fail_to_rename(monkeypatch, onto=tmp_path / "out")
     with pytest.raises(OSError, match="disk trouble"):
         write(tmp_path / "out", "new", force=True)
-    assert len(failures) == 1
+    assert len(failures) == 2  # where the place is free, and in place of the old one
     assert content(tmp_path) == before
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
 
 
-def test_an_old_folder_that_cannot_be_put_back_is_kept_aside(tmp_path, monkeypatch):
+def test_an_old_folder_that_cannot_be_put_back_is_kept_aside(tmp_path, monkeypatch, capsys):
     write(tmp_path / "out", "old")
     rename = Path.rename
 
@@ -153,8 +175,296 @@ def test_an_old_folder_that_cannot_be_put_back_is_kept_aside(tmp_path, monkeypat
             raise OSError("disk trouble")
         return rename(self, target)
 
+    monkeypatch.setattr(output_module, "exchange", lambda *_: False)
     monkeypatch.setattr(Path, "rename", failing)
     with pytest.raises(OSError, match="disk trouble"):
         write(tmp_path / "out", "new", force=True)
     (kept,) = tmp_path.iterdir()
     assert content(kept)["old/result.txt"] == "old"
+    monkeypatch.undo()
+    write(tmp_path / "out", "later")
+    assert f"left {kept}" in capsys.readouterr().err
+    assert content(kept)["old/result.txt"] == "old"
+
+
+def write_deep(target):
+    with output_folder(target, force=True) as folder:
+        (folder / "part" / "deep").mkdir(parents=True)
+        (folder / "part" / "deep" / "result.txt").write_text("result")
+        (folder / "part" / "empty").mkdir()
+
+
+def add_file(out):
+    (out / "part" / "deep" / "notes.txt").write_text("precious")
+
+
+def add_to_an_empty_folder(out):
+    (out / "part" / "empty" / "notes.txt").write_text("precious")
+
+
+def add_folder(out):
+    (out / "part" / "mine").mkdir()
+
+
+def add_link(out):
+    (out / "part" / "link").symlink_to(out.parent)
+
+
+def add_pipe(out):
+    os.mkfifo(out / "part" / "pipe")
+
+
+def lengthen(out):
+    (out / "part" / "deep" / "result.txt").write_text("result and more")
+
+
+def change(out):
+    (out / "part" / "deep" / "result.txt").write_text("RESULT")  # of the same size
+
+
+def spoil_marker(out):
+    (out / MARKER).write_text("[" * 100_000)
+
+
+CHANGES = (
+    *(add_file, add_to_an_empty_folder, add_folder, add_link, add_pipe),
+    *(lengthen, change, spoil_marker),
+)
+
+
+@pytest.mark.parametrize("spoil", CHANGES)
+def test_whatever_a_user_did_below_our_folder_survives_force(tmp_path, spoil):
+    out = tmp_path / "out"
+    write_deep(out)
+    write_deep(out)  # as it was written it may be replaced
+    spoil(out)
+    before = content(tmp_path)
+    assert "which no run of tireid wrote" in refused(out)
+    assert content(tmp_path) == before
+
+
+@pytest.mark.parametrize("spoil", CHANGES)
+def test_what_a_user_does_while_a_run_works_survives_force(tmp_path, spoil):
+    out = tmp_path / "out"
+    write_deep(out)
+    with pytest.raises(OutputError, match=r"what this run computed is in .*out-2$"):  # noqa: SIM117
+        with output_folder(out, force=True) as folder:
+            (folder / "result.txt").write_text("hours of work")
+            spoil(out)
+            before = content(out)
+    assert content(out) == before
+    assert content(tmp_path / "out-2") == {"result.txt": "hours of work"}
+    assert foreign(tmp_path / "out-2") is None
+
+
+@pytest.mark.parametrize("spoil", CHANGES)
+def test_what_a_user_does_at_the_last_moment_survives_force(tmp_path, monkeypatch, swaps, spoil):
+    out = tmp_path / "out"
+    write_deep(out)
+
+    calls = []
+
+    def late(one, other):
+        calls.append(one)
+        if len(calls) == 1:
+            spoil(out)
+        return swaps == "at once" and exchange(one, other)
+
+    monkeypatch.setattr(output_module, "exchange", late)
+    with pytest.raises(OutputError, match=r"came to hold .*; what this run computed is in .*out-2"):
+        write(out, force=True)
+    assert foreign(out) is not None
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["out", "out-2"]
+    assert content(tmp_path / "out-2") == {"result.txt": "new"}
+
+
+@pytest.mark.parametrize("theirs", ["folder", "results of tireid", "file"])
+def test_what_appears_while_a_run_works_is_left_alone(tmp_path, theirs):
+    out = tmp_path / "out"
+    with pytest.raises(OutputError, match=r"what this run computed is in .*out-2$"):  # noqa: SIM117
+        with output_folder(out, force=False) as folder:
+            (folder / "result.txt").write_text("hours of work")
+            if theirs == "folder":
+                out.mkdir()
+                (out / "precious.txt").write_text("precious")
+            elif theirs == "file":
+                out.write_text("precious")
+            else:
+                write(tmp_path / "other", "precious")
+                (tmp_path / "other").rename(out)
+    assert "precious" in content(tmp_path).values()
+    assert content(tmp_path / "out-2") == {"result.txt": "hours of work"}
+
+
+def test_an_interruption_at_any_moment_of_the_exchange_leaves_one_folder_whole(
+    tmp_path, monkeypatch, swaps
+):
+    out = tmp_path / "out"
+    write(out, "old")
+    rename = Path.rename
+    for moment in range(1, 9):
+        calls = []
+
+        def interrupted(self, target, calls=calls, moment=moment):
+            calls.append(target)
+            if len(calls) == moment:
+                raise KeyboardInterrupt
+            return rename(self, target)
+
+        monkeypatch.setattr(Path, "rename", interrupted)
+        try:
+            write(out, "new", force=True)
+        except KeyboardInterrupt:
+            assert content(tmp_path) == {"out/result.txt": "old"}
+        else:
+            break
+    assert moment == (3 if swaps == "at once" else 4)  # each rename was interrupted once
+    assert content(tmp_path) == {"out/result.txt": "new"}
+
+
+def test_a_second_run_is_refused_at_once_and_says_why(tmp_path):
+    with output_folder(tmp_path / "out", force=True):
+        assert "another run of tireid is writing" in refused(tmp_path / "out")
+        with output_folder(tmp_path / "beside", force=True):
+            pass
+    write(tmp_path / "out", force=True)
+
+
+def test_a_claim_without_locks_is_the_file_itself(tmp_path, monkeypatch):
+    def unable(*_):
+        raise OSError(errno.ENOLCK, "no locks here")
+
+    monkeypatch.setattr(exchange_module.fcntl, "flock", unable)
+    with claim(tmp_path / "claim"), pytest.raises(ClaimedError), claim(tmp_path / "claim"):
+        pytest.fail("two hold it")
+    assert list(tmp_path.iterdir()) == []
+
+
+def ran(program, folder):
+    words = [sys.executable, "-c", textwrap.dedent(program)]
+    answer = subprocess.run(
+        words,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert answer.returncode == 0, answer.stderr
+    return answer.stdout.split()
+
+
+FORKED = """
+    import os, random, signal, sys, time
+    from pathlib import Path
+    from tireid.output import OutputError, output_folder
+
+    out = Path("out")
+
+    def forked(work):
+        child = os.fork()
+        if child:
+            return child
+        try:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+            work()
+            os._exit(0)
+        except OutputError:
+            os._exit(2)
+        finally:
+            os._exit(9)
+
+    def write(text, *, force, files=30):
+        with output_folder(out, force=force) as folder:
+            (folder / "deep").mkdir()
+            for i in range(files):
+                (folder / "deep" / f"{i}.txt").write_text(text)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+def test_of_twenty_runs_to_one_folder_exactly_one_wins(tmp_path):
+    program = """
+    go, ready = os.pipe(), os.pipe()
+    def work():
+        with output_folder(out, force=False) as folder:
+            (folder / "who.txt").write_text(str(os.getpid()))
+            os.write(ready[1], b"x")
+            os.read(go[0], 1)  # until all others have ended
+    children = {forked(work) for _ in range(20)}
+    os.read(ready[0], 1)
+    codes = {}
+    while len(codes) < 19:
+        child, status = os.wait()
+        codes[child] = os.waitstatus_to_exitcode(status)
+    os.write(go[1], b"x")
+    child, status = os.wait()
+    assert set(codes.values()) == {2}, codes
+    assert os.waitstatus_to_exitcode(status) == 0
+    assert (out / "who.txt").read_text() == str(child)
+    print(*os.listdir())
+    """
+    assert ran(textwrap.dedent(FORKED) + textwrap.dedent(program), tmp_path) == ["out"]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+@pytest.mark.parametrize("at_once", [True, False])
+def test_a_run_that_is_killed_leaves_the_old_folder_or_the_new_one(tmp_path, at_once):
+    program = f"""
+    from tireid import output
+    from tireid.output import foreign
+    if not {at_once}:
+        output.exchange = lambda *_: False
+    random.seed(1)
+    write("start", force=False)
+    start = time.perf_counter()
+    write("begin", force=True)
+    lasts = time.perf_counter() - start
+    seen, lost = {{"begin"}}, 0
+    for i in range(60):
+        child = forked(lambda: write(f"run {{i}}", force=True))
+        time.sleep(random.uniform(0.0, 1.3 * lasts))
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        folder = out
+        if not out.exists():  # between the two renames
+            (folder,) = [p / "old" for p in Path().glob(".out-*.part") if (p / "old").exists()]
+            lost += 1
+        assert foreign(folder) is None
+        texts = {{path.read_text() for path in folder.rglob("*.txt")}}
+        assert len(texts) == 1 and len(list(folder.rglob("*.txt"))) == 30
+        seen |= texts
+        if folder is not out:
+            folder.rename(out)
+        assert (out / "deep").is_dir()
+        for path in Path().glob(".out-*.part"):
+            assert path.is_dir()
+            import shutil
+            shutil.rmtree(path)
+    assert len(seen) > 3, "no kill came after the rename"
+    print("lost" if lost and {at_once} else "kept")
+    """
+    assert ran(textwrap.dedent(FORKED) + textwrap.dedent(program), tmp_path) == ["kept"]
+
+
+def test_a_full_disk_leaves_the_old_folder_whole(tmp_path):
+    pytest.importorskip("resource")
+    program = """
+    import resource
+    write("x" * 10, force=False)
+    before = {path: path.read_text() for path in out.rglob("*.txt")}
+    hard = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
+    for size in (0, 1, 99, 100, 4096):
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+        try:
+            write("y" * 10_000, force=True)
+        except OSError:
+            pass
+        else:
+            raise AssertionError("written")
+    resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
+    assert {path: path.read_text() for path in out.rglob("*.txt")} == before
+    print(*os.listdir())
+    """
+    assert ran(textwrap.dedent(FORKED) + textwrap.dedent(program), tmp_path) == ["out"]

@@ -14,6 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from codegen.escape import mathtext
 from mpc.loop import Drive
 from tireid.animation.camera import Camera, Instant
 from tireid.animation.ground import Ground
@@ -68,7 +69,7 @@ class Scene:
             for axle, axes in enumerate(left):
                 self._parts.append(ForcePanel(axes, first, curves, axle))
             self._parts.append(DeviationPanel(self._axes((0.585, 0.11, 0.39, 0.2)), drives, drops))
-            self._figure.text(0.012, 0.955, title, fontsize=9.0, fontweight="bold")
+            self._figure.text(0.012, 0.955, mathtext(title), fontsize=9.0, fontweight="bold")
             self._figure.legend(
                 *self._parts[0].legend(),
                 loc="center",

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
+from codegen.escape import mathtext
+
 TICKS = ((1, 1.5, 2, 2.5, 3, 4, 5, 6, 8), (1, 1.5, 2, 3, 5, 7), (1, 2, 5), (1, 3), (1,))
 MOST = 6  # ticks of an axis
 FARTHEST = 300.0  # [%], what is worse is drawn at the end of the axis
@@ -19,8 +21,8 @@ def short_names(names: Sequence[str]) -> dict[str, str]:
     """
     files = {name.split(":", 1)[0] for name in names}
     if len(files) > 1 or not all(":" in name for name in names):
-        return {name: name for name in names}
-    return {name: name.split(":", 1)[1] for name in names}
+        return {name: mathtext(name) for name in names}
+    return {name: mathtext(name.split(":", 1)[1]) for name in names}
 
 
 def method_label(name: str) -> str:
@@ -30,7 +32,7 @@ def method_label(name: str) -> str:
     ----------
     name : as in the registry.
     """
-    return name.replace("_", " ")
+    return mathtext(name.replace("_", " "))
 
 
 def percent_axis(axes: Axes, which: str, low: float, high: float) -> None:

@@ -1,4 +1,4 @@
-@name@_status @name@_get_weights(const @name@_state *state, @name@_weights *weights)
+@covariance_function@@amounts_function@@name@_status @name@_get_weights(const @name@_state *state, @name@_weights *weights)
 {
     @name@_status status = @NAME@_BAD_CALL;
     if ((state != NULL) && (weights != NULL)) {
@@ -14,7 +14,7 @@
     if ((state != NULL) && (weights != NULL)) {
         const @name@_real sum =
 @weights_sum@;
-        if (@name@_finite(sum)) {
+        if (@name@_finite(sum)@weights_rules@) {
             state->values.weights = *weights;
             status = @NAME@_OK;
         } else {

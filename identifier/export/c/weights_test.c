@@ -22,5 +22,5 @@ static void test_modes(@name@_state *state, const @name@_params *params)
     broken = learnt;
     broken.@first_weight@ = zero / zero;
     check(@name@_set_weights(state, &broken) == @NAME@_BAD_INPUT, "NaN is no weight");
-}
+@negative_test@}
 

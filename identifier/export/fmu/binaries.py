@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from codegen import CompilationError, find_compiler
+from codegen.compiler import KEEP_GUARDS
 
 log = logging.getLogger("tireid.export")
 
@@ -63,7 +64,7 @@ def build_binary(target: Target, name: str, sources: Mapping[str, bytes]) -> byt
             (folder / file).write_bytes(content)
         c_files = [file for file in sources if file.endswith(".c")]
         library = f"{name}{target.ending}"
-        command = [*target.compiler, *FLAGS, *c_files, "-o", library, *target.flags]
+        command = [*target.compiler, *KEEP_GUARDS, *FLAGS, *c_files, "-o", library, *target.flags]
         answer = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         if answer.returncode != 0:
             first_lines = "\n".join(answer.stderr.splitlines()[:5])

@@ -1,6 +1,6 @@
 """XML as text: elements with attributes in the order in which they are given."""
 
-from xml.sax.saxutils import quoteattr
+from codegen.escape import xml_attribute
 
 DECLARATION = '<?xml version="1.0" encoding="UTF-8"?>\n'
 
@@ -15,7 +15,7 @@ def element(tag: str, attributes: dict[str, object], *children: str) -> str:
     children : elements inside, one a line.
     """
     words = [
-        f"{name}={quoteattr(_text(value))}"
+        f"{name}={xml_attribute(_text(value))}"
         for name, value in attributes.items()
         if value is not None and value != ""
     ]

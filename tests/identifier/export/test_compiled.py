@@ -107,6 +107,76 @@ def test_weights_that_do_not_fit_are_refused(packages):
         run.set_weights({**weights, "W": np.full((2, 10), np.nan)})
 
 
+@pytest.fixture(scope="module")
+def learnt(slalom):
+    """By law and precision, a package that has learnt for 45 s."""
+    found = {}
+    for law in ("axle", "rls", "kreisselmeier", "stiffness_rls"):
+        package = build_package(make_method(law, CAR), CAR)
+        for single in (False, True):
+            found[law, single] = CompiledPackage.of(package, single=single)
+            found[law, single].run(slalom)
+    return found
+
+
+def with_covariance(law, weights, P):
+    """The weights with one covariance (q, q) in place of theirs, as the method lays it out."""
+    if law == "axle":
+        return {**weights, "P": np.tile(P[np.triu_indices(len(P))], (2, 1))}
+    return {**weights, ("Omega" if law == "kreisselmeier" else "P"): P}
+
+
+def refused(run, weights):
+    before = run.state
+    with pytest.raises(ValueError, match="not negative"):
+        run.set_weights(weights)
+    return run.state == before
+
+
+@pytest.mark.parametrize("single", [False, True])
+@pytest.mark.parametrize("law", ["axle", "rls", "kreisselmeier", "stiffness_rls"])
+def test_what_was_learnt_is_taken_back(learnt, law, single):
+    run = learnt[law, single]
+    weights = run.weights
+    run.set_weights(weights)
+    for name, value in run.weights.items():
+        np.testing.assert_array_equal(value, weights[name])
+
+
+@pytest.mark.parametrize("single", [False, True])
+@pytest.mark.parametrize("law", ["axle", "rls", "kreisselmeier"])
+def test_a_covariance_is_taken_where_no_variance_is_negative(learnt, law, single, rng):
+    run = learnt[law, single]
+    weights = run.weights
+    q = 7 if law == "axle" else 10
+    for _ in range(50):
+        root = rng.normal(size=(q, rng.integers(1, q + 1)))  # of any rank
+        scale = np.diag(10.0 ** rng.uniform(-3, 3, q))
+        run.set_weights(with_covariance(law, weights, scale @ root @ root.T @ scale))
+        correlation = np.eye(q)
+        while np.linalg.eigvalsh(correlation)[0] > -0.01:
+            noise = np.triu(rng.uniform(-0.9, 0.9, (q, q)), 1)
+            correlation = np.eye(q) + noise + noise.T
+        assert refused(run, with_covariance(law, weights, scale @ correlation @ scale))
+    run.set_weights(with_covariance(law, weights, np.zeros((q, q))))
+    tied = np.zeros((q, q))
+    tied[0, 1] = tied[1, 0] = 1e-6  # what never varies, varies with something
+    assert refused(run, with_covariance(law, weights, tied))
+
+
+@pytest.mark.parametrize(
+    ("law", "name"),
+    [("axle", "errors"), ("axle", "excitation"), ("stiffness_rls", "information")],
+)
+def test_amounts_that_are_negative_are_refused(learnt, law, name):
+    run = learnt[law, False]
+    weights = run.weights
+    for place in range(weights[name].size):
+        spoilt = weights[name].copy()
+        spoilt.flat[place] = -1e-9
+        assert refused(run, {**weights, name: spoilt})
+
+
 def test_a_signal_has_no_weights(slalom):
     run = CompiledPackage.of(build_package(make_method("eso", CAR), CAR))
     assert run.weights == {}

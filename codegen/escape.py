@@ -1,0 +1,118 @@
+"""Words from data inside a language: one function each, after which they are words and no more.
+
+Names of cars, of recordings and of files come from outside. Wherever they enter a text that a
+program reads, they pass the function of that program's language. What does not print (controls,
+ends of lines, marks that turn the direction of writing, halves of pairs) is shown as an escape, so
+that no name breaks a line, rings a bell or hides what follows it.
+"""
+
+import html as standard_html
+import unicodedata
+from xml.sax.saxutils import quoteattr
+
+MARKDOWN = frozenset("\\`*_{}[]<>#|~!&$@")  # what means something inside a paragraph or a table
+
+
+def visible(text: str, *, keep: str = "") -> str:
+    r"""Return text with escapes, as `\x1b`, in place of all that does not print.
+
+    Parameters
+    ----------
+    text : any.
+    keep : characters that stay as they are.
+    """
+    return "".join(
+        one
+        if one in keep or one.isprintable() or unicodedata.category(one) == "Zs"
+        else one.encode("unicode_escape").decode("ascii")
+        for one in text
+    )
+
+
+def c_comment(text: str) -> str:
+    """Return text for the inside of a C comment between /* and */, with a blank on either side.
+
+    Parameters
+    ----------
+    text : any; it can neither end the comment nor seem to begin another.
+    """
+    shown = visible(text)
+    for pair in ("*/", "/*", "//", "??"):  # ?? begins a trigraph, of which ??/ is a backslash
+        while pair in shown:
+            shown = shown.replace(pair, " ".join(pair))
+    return shown
+
+
+def c_string(text: str) -> str:
+    """Return text for the inside of a C string literal, which then holds it in UTF-8.
+
+    Parameters
+    ----------
+    text : any; halves of surrogate pairs are shown as escapes.
+    """
+    data = text.encode("utf-8", "backslashreplace")
+    return "".join(
+        chr(byte) if 0x20 <= byte < 0x7F and byte not in b'"\\?' else f"\\{byte:03o}"
+        for byte in data
+    )
+
+
+def cmake_comment(text: str) -> str:
+    """Return text for a line comment of CMake, behind the # and a space.
+
+    Parameters
+    ----------
+    text : any; it stays on its line and begins no bracket.
+    """
+    return visible(text).replace("[", "(").replace("]", ")")
+
+
+def markdown(text: str) -> str:
+    """Return text for a paragraph or a table of Markdown.
+
+    Parameters
+    ----------
+    text : any; it is shown as it stands, without marks, links, formulas or HTML.
+    """
+    shown = visible(text)
+    return "".join(f"&#{ord(one)};" if one in MARKDOWN else one for one in shown)
+
+
+def xml_attribute(text: str) -> str:
+    """Return text as the value of an XML attribute, with its quotes.
+
+    Parameters
+    ----------
+    text : any.
+    """
+    return quoteattr(visible(text))
+
+
+def html(text: str) -> str:
+    """Return text for an element or a quoted attribute of HTML.
+
+    Parameters
+    ----------
+    text : any; ends of lines stay.
+    """
+    return standard_html.escape(visible(text, keep="\n"))
+
+
+def mathtext(text: str) -> str:
+    """Return text for a label of a figure, where a dollar begins no formula.
+
+    Parameters
+    ----------
+    text : any.
+    """
+    return visible(text).replace("$", r"\$")
+
+
+def terminal(text: str) -> str:
+    """Return text for a person's terminal, which it cannot command; ends of lines stay.
+
+    Parameters
+    ----------
+    text : any.
+    """
+    return visible(text, keep="\n")

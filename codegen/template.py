@@ -1,0 +1,53 @@
+"""Templates: files with `@key@` for what is filled in, once; what was filled in is never read."""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from codegen.escape import c_comment, cmake_comment, markdown
+
+KEY = re.compile(r"@(\w+)@")
+LANGUAGES: Mapping[str, Callable[[str], str]] = {  # by the ending of the template
+    ".c": c_comment,
+    ".h": c_comment,
+    ".md": markdown,
+    ".txt": cmake_comment,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """Words from data, such as the name of a car: no text of any language.
+
+    Parameters
+    ----------
+    text : any; a template takes it into comments and prose, escaped for its language.
+    """
+
+    text: str
+
+
+Values = Mapping[str, str | Words]
+
+
+def filled(template: Path, values: Values) -> str:
+    """Return a template with every `@key@` replaced, once.
+
+    Parameters
+    ----------
+    template : a file; its ending tells the language.
+    values : by key: text of that language, or `Words`, which are escaped for it.
+
+    Raises
+    ------
+    KeyError
+        Where the template has a key that no value is given for, or words enter a language of which
+        nothing is known.
+    """
+
+    def value(found: re.Match[str]) -> str:
+        given = values[found[1]]
+        return LANGUAGES[template.suffix](given.text) if isinstance(given, Words) else given
+
+    return KEY.sub(value, template.read_text(encoding="utf-8"))

@@ -1,0 +1,86 @@
+"""What is installed is what the lock lists, and the parts list says so."""
+
+import ast
+import json
+import re
+import runpy
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+LOCKS = {"requirements.lock": [], "requirements-test.lock": ["test"]}
+ENTRY = re.compile(r"^([a-z0-9._-]+)==(\S+)", re.M)
+
+
+def wanted(extras):
+    """Names and lowest versions that the project asks for."""
+    texts = [*PROJECT["dependencies"]]
+    texts += [text for extra in extras for text in PROJECT["optional-dependencies"][extra]]
+    return [re.fullmatch(r"([\w.-]+)>=([\d.]+)", text).groups() for text in texts]
+
+
+def number(version):
+    return tuple(int(part) for part in re.findall(r"\d+", version)[:3])
+
+
+@pytest.mark.parametrize("lock", LOCKS)
+def test_a_lock_holds_all_that_is_asked_for_with_hashes_and_no_address(lock):
+    text = (ROOT / lock).read_text()
+    for name, bound in wanted(LOCKS[lock]):
+        versions = [version for found, version in ENTRY.findall(text) if found == name]
+        assert versions, name
+        assert all(number(version) >= number(bound) for version in versions)
+    for block in re.split(r"\n(?=[a-z0-9])", text):
+        assert re.search(r"--hash=sha256:[0-9a-f]{64}", block), block
+    assert not re.search(r"https?:|file:|--index|--find-links|--extra", text)
+
+
+def test_every_package_that_is_imported_is_declared():
+    imported = set()
+    for package in ("codegen", "models", "identifier", "mpc", "tireid"):
+        for path in (ROOT / package).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text())):
+                if isinstance(node, ast.Import):
+                    imported |= {name.name.split(".")[0] for name in node.names}
+                elif isinstance(node, ast.ImportFrom) and node.module:
+                    imported.add(node.module.split(".")[0])
+    declared = {name.replace("-", "_") for name, _ in wanted(PROJECT["optional-dependencies"])}
+    declared |= {"vehiclemodels", "PIL"}  # of commonroad-vehicle-models and pillow
+    assert "pillow" in declared
+    known = set(sys.stdlib_module_names) | declared
+    own = {"codegen", "models", "identifier", "mpc", "tireid"}
+    assert {"casadi", "scipy"} <= imported
+    assert imported - known - own == set()
+
+
+def test_the_parts_list_holds_the_lock():
+    words = [sys.executable, str(ROOT / "sbom.py")]
+    answers = [subprocess.run(words, capture_output=True, text=True, check=True) for _ in range(2)]
+    assert answers[0].stdout == answers[1].stdout
+    parts = json.loads(answers[0].stdout)
+    assert (parts["bomFormat"], parts["specVersion"]) == ("CycloneDX", "1.6")
+    lock = (ROOT / "requirements.lock").read_text()
+    listed = {(one["name"], one["version"]) for one in parts["components"]}
+    assert listed == set(ENTRY.findall(lock))
+    hashes = {h["content"] for one in parts["components"] for h in one["hashes"]}
+    assert hashes == set(re.findall(r"sha256:([0-9a-f]{64})", lock))
+    names = {one["bom-ref"]: one["name"] for one in parts["components"]}
+    needs = {
+        names.get(one["ref"], "tireid"): {names[ref] for ref in one["dependsOn"]}
+        for one in parts["dependencies"]
+    }
+    assert needs["tireid"] == {name for name, _ in wanted([])}
+    assert "numpy" in needs["scipy"]
+
+
+def test_a_dependency_without_a_lower_bound_is_refused():
+    lowest = runpy.run_path(str(ROOT / ".ci" / "lowest.py"))["lowest"]
+    assert lowest(PROJECT, ["onnx"])[0] == "casadi==3.8.2"
+    assert lowest(PROJECT, [])[0] == "casadi==3.7.0"
+    with pytest.raises(SystemExit, match="no lower bound"):
+        lowest({"dependencies": ["numpy"], "optional-dependencies": {}}, [])

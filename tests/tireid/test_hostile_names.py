@@ -1,0 +1,133 @@
+"""The name of a car is words in all that is exported: nothing in it is ever run."""
+
+import json
+import re
+import subprocess
+import zipfile
+from shutil import which
+
+import pytest
+
+from codegen import find_compiler
+from identifier.export import figures
+from models.vehicle import sedan
+from tireid import export_command
+from tireid.cli import main
+
+ORDER = "x\nexecute_process(COMMAND ${CMAKE_COMMAND} -E touch ran)\n#"
+CONSTRUCTOR = (
+    "*/ #include <stdio.h>\n__attribute__((constructor)) static void run(void)\n"
+    '{ fopen("ran", "w"); }\n/*'
+)
+NAMES = {
+    "an order to cmake": ORDER,
+    "a constructor": CONSTRUCTOR,
+    "a key": "@title@",
+    "another key": "me@home@x",
+    "a key of numbers": "@numbers@ @version_text@",
+    "a trigraph": "??/\n*??/\n/ int x; /*",
+    "a bell": "\x1b[2J\x1b]0;owned\x07",
+    "the other way": "\u202e*/ int x; /*\u2066",
+    "generator": "$<1:x> ${HOME} $ENV{HOME} [[ ]]",
+    "markup": "<script>alert(1)</script> | `id` [x](y) & $x^$",
+}
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    monkeypatch.setattr(export_command, "measure", lambda _: [])
+    monkeypatch.setattr(figures, "measure", lambda _: [])
+
+
+def car_called(name, folder):
+    """A car file; JSON's escapes are those of TOML."""
+    text = sedan_text(folder)
+    quoted = json.dumps(name).replace("\x7f", "\\u007f")
+    file = folder / "car.toml"
+    file.write_text(re.sub("^name = .*$", lambda _: f"name = {quoted}", text, flags=re.M))
+    return file
+
+
+def sedan_text(folder):
+    sedan().to_toml(folder / "sedan.toml", overwrite=True)
+    return (folder / "sedan.toml").read_text()
+
+
+def built(folder):
+    """Configure and build a package with its tests, and run them."""
+    options = ["-DCMAKE_C_FLAGS=-Wall -Wextra -Werror -trigraphs"]
+    for words in (
+        ["cmake", "-S", ".", "-B", "build", *options],
+        ["cmake", "--build", "build"],
+        ["ctest", "--test-dir", "build"],
+    ):
+        answer = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
+        assert answer.returncode == 0, answer.stdout + answer.stderr
+
+
+@pytest.mark.skipif(which("cmake") is None, reason="needs cmake")
+@pytest.mark.parametrize("name", NAMES.values(), ids=NAMES)
+def test_a_package_is_built_and_nothing_else_is_run(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    out = tmp_path / "out"
+    assert main(["export", str(out), "--vehicle", str(car_called(name, tmp_path))]) == 0
+    built(out)
+    assert not list(tmp_path.rglob("ran"))
+    assert json.loads((out / "tireid.json").read_text())["vehicle"]["name"] == name
+    for file in out.rglob("*.*"):
+        if file.suffix in (".c", ".h", ".md", ".txt"):
+            text = file.read_text(encoding="utf-8")
+            assert text.replace("\n", "").isprintable(), file
+
+
+@pytest.mark.skipif(which("cmake") is None, reason="needs cmake")
+def test_identifier_and_tracker_are_built_and_nothing_else_is_run(tmp_path, monkeypatch):
+    if find_compiler() is None:
+        pytest.skip("needs a C compiler")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("tireid.export_mpc.measure_mpc", lambda _: [])
+    out = tmp_path / "out"
+    car = car_called(CONSTRUCTOR + ORDER + "@title@", tmp_path)
+    assert main(["export", str(out), "--mpc", "--paper", "--vehicle", str(car)]) == 0
+    for part in (out, out / "mpc", out / "identifier"):
+        words = ["cmake", "-S", str(part), "-B", str(tmp_path / f"build-{part.name}")]
+        answer = subprocess.run(words, capture_output=True, text=True, check=False)
+        assert answer.returncode == 0, answer.stderr
+    built(out / "mpc")
+    assert not list(tmp_path.rglob("ran"))
+
+
+def test_an_fmu_is_loaded_and_nothing_in_it_is_run(tmp_path, monkeypatch):
+    fmpy = pytest.importorskip("fmpy")
+    if find_compiler() is None:
+        pytest.skip("needs a C compiler")
+    monkeypatch.chdir(tmp_path)
+    out = tmp_path / "out"
+    car = car_called(CONSTRUCTOR, tmp_path)
+    assert main(["export", str(out), "--fmu", "--vehicle", str(car)]) == 0
+    for version in (2, 3):
+        fmu = out / f"tireid_fmi{version}.fmu"
+        assert fmpy.simulate_fmu(str(fmu), stop_time=0.1) is not None
+        with zipfile.ZipFile(fmu) as archive:
+            texts = [archive.read(n).decode() for n in archive.namelist() if n.endswith(".h")]
+        assert any("constructor" in text for text in texts)  # in a comment, as words
+    assert not list(tmp_path.rglob("ran"))
+
+
+def test_no_name_and_no_word_commands_the_terminal(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    bell = "\x1b[2J\x1b]0;owned\x07\x9b2J"
+    car = car_called(bell, tmp_path)
+    log = tmp_path / f"log{bell}.csv"
+    log.write_text(f"t,vx{bell}\n0,1\n")
+    assert main(["check", "--vehicle", str(car)]) in (0, 1)
+    assert main(["check", str(tmp_path / f"no{bell}.toml")]) == 2
+    assert main(["identify", str(log), "--vehicle", str(car), "--out", "out"]) == 2
+    assert main(["--debug", "identify", str(log), "--vehicle", str(car), "--out", "out"]) == 2
+    with pytest.raises(SystemExit):
+        main(["check", f"--{bell}"])
+    said = capsys.readouterr()
+    assert "owned" in said.out
+    assert "owned" in said.err
+    for text in said:
+        assert text.replace("\n", "").isprintable()

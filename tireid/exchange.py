@@ -1,0 +1,125 @@
+"""Two names that change places at once, where the system can; and a claim that only one holds."""
+
+import ctypes
+import errno
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+try:
+    import fcntl
+except ImportError:  # not on Windows
+    fcntl = None  # type: ignore[assignment]
+
+AT_FDCWD, RENAME_EXCHANGE = -100, 2  # <fcntl.h> and <linux/fs.h>
+CANNOT = {errno.ENOSYS, errno.EINVAL, errno.EOPNOTSUPP, errno.ENOTSUP}  # here, or on this disk
+UNLOCKABLE = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL}
+
+
+class ClaimedError(OSError):
+    """Another process holds the claim."""
+
+
+@cache
+def _renameat2() -> Any:
+    """Return the function of the C library; None where it has none, as on other than Linux."""
+    try:
+        function = ctypes.CDLL(None, use_errno=True).renameat2
+    except (OSError, AttributeError, TypeError):
+        return None
+    kinds = (ctypes.c_int, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_uint)
+    function.argtypes = list(kinds)
+    return function
+
+
+def exchange(one: Path, other: Path) -> bool:
+    """Let two folders change places in one step; return whether the system could.
+
+    Parameters
+    ----------
+    one, other : both exist, on the same disk.
+
+    Raises
+    ------
+    OSError
+        Where they cannot be renamed.
+    """
+    function = _renameat2()
+    if function is None:
+        return False
+    names = os.fsencode(one), os.fsencode(other)
+    if function(AT_FDCWD, names[0], AT_FDCWD, names[1], RENAME_EXCHANGE) == 0:
+        return True
+    number = ctypes.get_errno()
+    if number in CANNOT:
+        return False
+    raise OSError(number, os.strerror(number), str(other))
+
+
+@contextmanager
+def claim(path: Path) -> Iterator[None]:
+    """Hold a file that only one process can hold; it is gone afterwards.
+
+    The system lets go of it when the process ends, however it ends. Where it locks no files (not on
+    Unix, or on a disk that cannot), the file itself is the claim, and outlives a process that is
+    killed.
+
+    Parameters
+    ----------
+    path : the file; its folder exists.
+
+    Raises
+    ------
+    ClaimedError
+        Where another process holds it.
+    OSError
+        Where it cannot be made.
+    """
+    held = _locked(path)
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            path.unlink()
+        os.close(held)
+
+
+def _locked(path: Path) -> int:
+    """Return the open file of a claim: one that we made, or one that nobody locks any more."""
+    flags = os.O_RDWR | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_NOFOLLOW", 0)
+    while True:
+        try:
+            held, ours = os.open(path, flags | os.O_CREAT | os.O_EXCL, 0o600), True
+        except FileExistsError:
+            try:
+                held, ours = os.open(path, flags), False
+            except FileNotFoundError:  # removed since
+                continue
+        try:
+            _lock(held, ours=ours)
+            if os.path.samestat(os.fstat(held), path.stat()):
+                return held
+        except FileNotFoundError:  # its holder removed it before it let go
+            pass
+        except BlockingIOError as error:
+            os.close(held)
+            raise ClaimedError(str(path)) from error
+        os.close(held)
+
+
+def _lock(held: int, *, ours: bool) -> None:
+    """Lock a file; where that cannot be, who made the file has it, and others are refused."""
+    try:
+        if fcntl is None:
+            raise OSError(errno.ENOLCK, "no locks")
+        fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise
+    except OSError as error:
+        if error.errno not in UNLOCKABLE:
+            raise
+        if not ours:
+            raise BlockingIOError(errno.EAGAIN, "held") from error
