@@ -149,6 +149,7 @@ def _learn(ports: dict[str, Any], limits: BoundNumbers, lesson: Lesson, i: int) 
     direction = ca.vertsplit(ports["friction_direction"] @ ca.vertcat(*w))
     trace = seen.trace + sum(lesson.inflation * d * d for d in direction)
     fits = trace * widest[0] <= 1
+    P = inflated(P, direction, ca.if_else(fits, lesson.inflation, 0))
     learnt = update(
         theta,
         P,
@@ -160,8 +161,7 @@ def _learn(ports: dict[str, Any], limits: BoundNumbers, lesson: Lesson, i: int) 
         limits=widest,
         learns=lesson.learns[i],
     )
-    after = inflated(learnt.P, direction, ca.if_else(fits, lesson.inflation, 0))
     offset = (limits.steering, limits.v_y)[i]
     slope = ca.vertsplit(ports["rising"]) if "rising" in ports else None
     kept = bounded(limits, learnt.theta, seen.weights, offset=offset, slope=slope)
-    return Learnt(kept, after)
+    return Learnt(kept, learnt.P)

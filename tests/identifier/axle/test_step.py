@@ -145,6 +145,7 @@ class ByHand:
             wider = self.sizes(P) + amount * (d @ d) * np.eye(1, 4)[0]
             if wider[0] > self.most[i, 0]:
                 amount, wider = 0.0, self.sizes(P)
+            P[:n, :n] += amount * np.outer(d, d)
             learns = self.peak[i] >= m.error
             if learns:
                 self.time[i] += dt
@@ -160,7 +161,6 @@ class ByHand:
                 if shrink >= 0 or wide <= 1:
                     P -= shrink * np.outer(Ph, Ph)
                     P /= max(wide, 1.0)
-            P[:n, :n] += amount * np.outer(d, d)
             if not learns:
                 continue
             bounds = self.d.bounds
