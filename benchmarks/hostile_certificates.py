@@ -346,6 +346,26 @@ def told(law: str, integrator: str, count: int, before: int, found: Found, t: Ta
     t.at_least(title, share, 90.0, "%", f"{key}/kept")
 
 
+def totals(t: Targets) -> None:
+    """Record sums and extremes over laws and integrators.
+
+    Parameters
+    ----------
+    t : what was recorded of each.
+    """
+
+    def of_all(key: str) -> list[float]:
+        return [float(v) for k, v in list(t.values.items()) if k.endswith(f"/{key}")]
+
+    for key in ("designs", "generations", "passes", "passes_before", "untrue_before"):
+        t.record(f"all/{key}", round(sum(of_all(key))))
+    for key in ("exceeded", "diverged"):
+        t.record(f"all/{key}", round(sum(of_all(key))))
+    t.record("all/kept_least", min(of_all("kept")), "%")
+    t.record("all/kept_most", max(of_all("kept")), "%")
+    t.record("all/error_worst_most", max(of_all("error_worst")))
+
+
 def main(count: int = 2000, rounds: int = 25) -> int:
     """Attack every law and integrator; 1 if a pass was untrue, or too many were lost.
 
@@ -369,6 +389,7 @@ def main(count: int = 2000, rounds: int = 25) -> int:
         ]
         for kind, before, job in zip(kinds, passed, jobs, strict=True):
             told(*kind, count, len(before), job.result(), targets)
+    totals(targets)
     print(f"in {time.perf_counter() - begin:.0f} s")
     return targets.finish(keep=keep)
 
