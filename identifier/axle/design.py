@@ -32,6 +32,7 @@ from models.vehicle import GRAVITY, Vehicle
 Array = NDArray[np.float64]
 
 NOT_CERTIFIED = "not certified"
+STEERING, V_Y = (BoundNumbers._fields.index(name) for name in ("steering", "v_y"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -188,18 +189,17 @@ class AxleDesign:
         """Return what is begun with, within bounds: a file or a prior may lie outside."""
         n, b = len(self.ladder), self.bounds
         slope = self._rising().get("rising")
-        numbers = BoundNumbers(*b.numbers(n))
-        theta = [
-            bounded(
-                numbers,
-                [ca.SX(float(one)) for one in (*W[i], *own[i])],
-                {(j, k): float(P[i, j, k]) for j, k in triangle(n)},
-                offset=(numbers.steering, numbers.v_y)[i],
-                slope=None if slope is None else list(slope),
-            )
-            for i in (0, 1)
-        ]
-        kept = np.array([[float(one) for one in row] for row in theta])
+        numbers = b.numbers(n)
+        row = np.zeros(n) if slope is None else slope
+        project = _projection(n, slope is not None)
+        kept = np.vstack(
+            [
+                np.array(
+                    project(np.append(W[i], own[i]), P[i, :n, :n], numbers, numbers[last], row)
+                )
+                for i, last in enumerate((STEERING, V_Y))
+            ]
+        )
         return kept[:, :n], kept[:, n:]
 
     def _rising(self) -> dict[str, Array]:
@@ -229,6 +229,21 @@ class AxleDesign:
             prior_covariance=self.prior.covariance(vehicle, self.ladder),
             excitation=carried["excitation"].copy(),
         )
+
+
+@cache
+def _projection(n: int, rises: bool) -> ca.Function:
+    """Return `bounded` of one axle: [weights, own], P of the weights, numbers, offset, slope."""
+    theta, P, slope = ca.SX.sym("theta", n + 3), ca.SX.sym("P", n, n), ca.SX.sym("slope", n)
+    numbers, offset = ca.SX.sym("numbers", len(BoundNumbers._fields)), ca.SX.sym("offset")
+    kept = bounded(
+        BoundNumbers(*ca.vertsplit(numbers)),
+        ca.vertsplit(theta),
+        {(j, k): P[j, k] for j, k in triangle(n)},
+        offset=offset,
+        slope=ca.vertsplit(slope) if rises else None,
+    )
+    return ca.Function("bounded", [theta, P, numbers, offset, slope], [ca.horzcat(*kept)])
 
 
 @cache
