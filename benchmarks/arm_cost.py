@@ -6,6 +6,8 @@ from identifier.export.package import build_package
 from identifier.export.processor import CROSS_COMPILER, compiler_version, missing_tools
 from identifier.methods import DEFAULT, REFERENCE, make_method
 from models.vehicle import sedan
+from mpc.export.figures import measure_mpc
+from mpc.export.pair import build_pair
 
 METHODS = {REFERENCE: "paper, n_h = 10", DEFAULT: "default, axle curves"}
 SMALL = "Cortex-M4F"
@@ -42,6 +44,30 @@ def print_arm_costs(targets: Targets) -> None:
                     )
                 else:
                     targets.record(f"arm/{name}/{cost.processor}/{precision}/{key}", value)
+
+
+def print_tracker_costs(targets: Targets) -> None:
+    """Print what the tracker of `tireid export --mpc` costs on a Cortex-M7, default tires.
+
+    Parameters
+    ----------
+    targets : record what is measured.
+    """
+    if missing_tools():
+        return
+    car = sedan()
+    pair = build_pair(build_package(make_method(DEFAULT, car), car))
+    print("tracker              processor   precision   flash    RAM  stack  a step  largest")
+    for cost in measure_mpc(pair.tracker):
+        run, precision = cost.replay, "float" if cost.single else "double"
+        ram = cost.static_ram + run.state + run.params + run.work
+        print(
+            f"{'default, axle curves':21}{cost.processor:12}{precision:9}{cost.flash:8}{ram:7}"
+            f"{run.stack:7}{run.instructions:9}{run.most_instructions:9}"
+        )
+        figures = {"instructions": run.instructions, "flash_B": cost.flash, "ram_B": ram}
+        for key, value in figures.items():
+            targets.record(f"arm/tracker/{cost.processor}/{precision}/{key}", value)
 
 
 def _figures(cost: Cost) -> dict[str, int]:

@@ -19,7 +19,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.arm_cost import print_arm_costs
+from benchmarks.arm_cost import print_arm_costs, print_tracker_costs
 from benchmarks.c_loops import (
     Loop,
     hand_written_loop,
@@ -168,6 +168,7 @@ def main() -> int:
     label = f"{NUMPY} over {PACKAGE} {_spread(slow)}"
     targets.at_least(label, _mid(slow), 200.0, "", key="ratio/numpy")
     print_arm_costs(targets)
+    print_tracker_costs(targets)
     return targets.finish(keep=keeps())
 
 
