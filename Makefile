@@ -11,7 +11,7 @@ SMOKE := tests/test_imports.py tests/codegen tests/models/test_vehicle.py \
 	tests/mpc/path/test_waypoints.py tests/mpc/path/test_gates.py tests/tireid/test_cli.py
 SMOKE_ONNX := tests/identifier/export/test_onnx.py tests/identifier/export/test_onnx_model.py
 
-.PHONY: demo test lint bench numbers newest lowest lock wheel clean
+.PHONY: demo test lint bench mutants numbers newest lowest lock wheel clean
 
 demo: $(VENV)/.demo
 	$(VENV)/bin/tireid demo --out out/demo --force
@@ -30,6 +30,10 @@ bench: $(VENV)/.bench
 # What `python -m benchmarks.run_all --record` measured, written into README.md and docs.
 numbers: $(VENV)/.bench
 	$(PY) -m benchmarks.documents
+
+# Faults that a program draws: how many do the tests catch?
+mutants: $(VENV)/.mutants
+	$(PY) -m benchmarks.mutants --out out/mutants
 
 $(PY):
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "tireid needs Python 3.11 or newer: make PYTHON=/path/to/python3.11"; exit 2; }
@@ -50,6 +54,10 @@ endif
 
 $(VENV)/.bench: pyproject.toml | $(PY)
 	$(PY) -m pip install --quiet --editable ".[bench]"
+	touch $@
+
+$(VENV)/.mutants: pyproject.toml | $(PY)
+	$(PY) -m pip install --quiet --editable ".[mutants]"
 	touch $@
 
 # The newest versions that there are, the lowest that pyproject.toml allows: in environments of their

@@ -1,0 +1,248 @@
+"""Do the tests notice? Faults that a program draws and plants, and how many the tests catch.
+
+`make mutants` draws 150 faults (benchmarks/mutation/draw.py) from all packages and C templates,
+plants one after the other in a copy of the tree, and runs the tests that run its function, quick
+ones first, until one fails. What none catches, and no test around it, survives. The score may not
+fall below benchmarks/mutation/ratchet.toml, and `--record` raises it. Neither mutmut nor cosmic-ray
+does this: the first leaves out C and everything outside functions and draws nothing, the second
+runs the whole suite for each fault.
+"""
+
+import argparse
+import json
+import os
+import sys
+import time
+import tomllib
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Any
+
+from benchmarks.mutation.draw import draw, faults_of
+from benchmarks.mutation.faults import Fault
+from benchmarks.mutation.selection import Traced
+from benchmarks.mutation.workshop import Answer, Workshop
+from benchmarks.targets import Targets, keeps
+
+ROOT = Path(__file__).resolve().parents[1]
+RATCHET = ROOT / "benchmarks" / "mutation" / "ratchet.toml"
+PLANTED = ROOT / "tests" / "planted_faults.toml"
+SEED, COUNT = 2026, 150
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Draw, plant, run and judge; return 1 below the ratchet.
+
+    Parameters
+    ----------
+    argv : words of the command; None takes those of the process.
+    """
+    words = list(sys.argv[1:] if argv is None else argv)
+    record = keeps(words)
+    options = _parser().parse_args(words)
+    faults = _drawn(options)
+    if options.list:
+        for fault in faults:
+            print(f"{fault.kind}: {fault.file}\n{fault.diff(ROOT)}")
+        return 0
+    options.out.mkdir(parents=True, exist_ok=True)
+    shops = [Workshop(ROOT, options.out / f"worker{k}") for k in range(options.workers)]
+    traced = Traced(ROOT, options.out / "trace.json")
+    _trace(shops[0], traced, options.out)
+    targets = Targets("mutants")
+    if not options.planted_only:
+        results = _run_all(faults, shops, traced, options)
+        _judge(results, traced, shops[0], options, targets)
+    if PLANTED.exists() and not options.only:
+        _replay(shops[0], traced, targets)
+    whole = (options.seed, options.count, options.only) == (SEED, COUNT, None)
+    if record and whole and not options.planted_only and not targets.missed:
+        _raise_ratchet(float(targets.values[f"seed_{SEED}/score"]))
+    return targets.finish(keep=record and whole)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seed", type=int, default=SEED)
+    parser.add_argument("--count", type=int, default=COUNT)
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--only", metavar="FILE", help="draw from the faults of one file")
+    parser.add_argument("--list", action="store_true", help="print what is drawn, run nothing")
+    parser.add_argument("--planted-only", action="store_true", help="tests/planted_faults.toml")
+    parser.add_argument("--out", type=Path, default=ROOT / "out" / "mutants")
+    return parser
+
+
+def _drawn(options: argparse.Namespace) -> list[Fault]:
+    if options.only is None:
+        return draw(ROOT, seed=options.seed, count=options.count)
+    count = min(options.count, len(faults_of(ROOT, options.only)))
+    return draw(ROOT, seed=options.seed, count=count, only=options.only)
+
+
+def _trace(shop: Workshop, traced: Traced, out: Path) -> None:
+    """Trace the files of tests that are new or changed; no fault is planted meanwhile."""
+    files = traced.outdated()
+    if files:
+        print(f"tracing {len(files)} files of tests", flush=True)
+        kept = out / "traced.json"
+        kept.unlink(missing_ok=True)
+        (out / "trace.txt").write_text(shop.trace(files, kept), encoding="utf-8")
+        traced.learn(files, json.loads(kept.read_text(encoding="utf-8")))
+
+
+def _run_all(
+    faults: list[Fault], shops: list[Workshop], traced: Traced, options: argparse.Namespace
+) -> list[dict[str, Any]]:
+    """Return what became of each fault; a run that was interrupted goes on where it was."""
+    file = options.out / f"seed_{options.seed}.json"
+    kept = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+    free: SimpleQueue[Workshop] = SimpleQueue()
+    for shop in shops:
+        free.put(shop)
+
+    def one(fault: Fault) -> dict[str, Any]:
+        source = (ROOT / fault.file).read_bytes()
+        key, tests = fault.key(source), traced.state()
+        if key in kept and (kept[key]["caught"] or kept[key]["tests"] == tests):
+            return dict(kept[key])
+        shop = free.get()
+        try:
+            answer, ran = plant(shop, traced, fault)
+        finally:
+            free.put(shop)
+        result = {
+            "kind": fault.kind,
+            "place": f"{fault.file}:{fault.line(source)}",
+            "diff": fault.diff(ROOT),
+            "caught": answer.caught,
+            "by": answer.by,
+            "tests_run": ran,
+            "seconds": round(answer.seconds, 1),
+            "tests": tests,
+        }
+        kept[key] = result
+        scratch = file.with_suffix(f".{key}")
+        scratch.write_text(json.dumps(dict(kept), indent=1, ensure_ascii=False), encoding="utf-8")
+        scratch.replace(file)
+        word = f"caught by {answer.by}" if answer.caught else f"SURVIVED {ran} tests"
+        print(f"{result['seconds']:7.1f} s  {fault.kind}, {result['place']}: {word}", flush=True)
+        if not answer.caught:
+            print(result["diff"], flush=True)
+        return result
+
+    with ThreadPoolExecutor(len(shops)) as pool:
+        return list(pool.map(one, faults))
+
+
+def plant(shop: Workshop, traced: Traced, fault: Fault) -> tuple[Answer, int]:
+    """Run the tests that may catch a fault; return the answer and how many were asked for.
+
+    Parameters
+    ----------
+    shop : where it is planted.
+    traced : what each test runs.
+    fault : of the tree.
+    """
+    near, wide = traced.select(fault)
+    spent, asked = 0.0, 0
+    answer = Answer(False, "", 0.0, "")
+    for tests in (near, wide):
+        if tests and not answer.caught:
+            answer = shop.run(tests, traced.seconds(tests), fault)
+            spent, asked = spent + answer.seconds, asked + len(tests)
+    return answer._replace(seconds=spent), asked
+
+
+def _judge(
+    results: list[dict[str, Any]],
+    traced: Traced,
+    shop: Workshop,
+    options: argparse.Namespace,
+    targets: Targets,
+) -> None:
+    """Print survivors and the score; a test that fails without a fault has caught none."""
+    catchers = sorted({r["by"] for r in results if r["caught"]} & set(traced.tests))
+    false = set()
+    while catchers:
+        clean = shop.run(catchers, traced.seconds(catchers))
+        if not clean.caught:
+            break
+        print(f"{clean.by} fails without a fault:\n{clean.text[-2000:]}")
+        false.add(clean.by)
+        catchers = [name for name in catchers if name != clean.by]
+        if clean.by not in traced.tests:
+            raise RuntimeError(f"the tests do not run on the unharmed tree: {clean.by}")
+    survived = [r for r in results if not r["caught"] or r["by"] in false]
+    print(f"\n{len(survived)} of {len(results)} survived")
+    for result in survived:
+        print(f"{result['kind']}, {result['place']}\n{result['diff']}")
+    score = 100.0 * (1.0 - len(survived) / len(results))
+    name = f"seed_{options.seed}"
+    targets.record(f"{name}/faults", len(results))
+    targets.record(f"{name}/survived", len(survived))
+    if options.only is None:
+        least = tomllib.loads(RATCHET.read_text(encoding="utf-8"))["least_score"]
+        targets.at_least("faults caught", score, least, key=f"{name}/score")
+    for package in sorted({r["place"].split("/")[0] for r in results}):
+        those = [r for r in results if r["place"].startswith(f"{package}/")]
+        lost = sum(r in survived for r in those)
+        print(f"  {package:12} {len(those) - lost} of {len(those)} caught")
+
+
+def _replay(shop: Workshop, traced: Traced, targets: Targets) -> None:
+    """Plant the faults that once went through; each must be caught by the tests it names."""
+    faults = tomllib.loads(PLANTED.read_text(encoding="utf-8"))["fault"]
+    lost = []
+    for entry in faults:
+        answer = shop.run(entry["tests"], _time_of(entry["tests"], traced), written_fault(entry))
+        if not answer.caught:
+            lost.append(entry["name"])
+        print(f"{entry['name']}: {f'caught by {answer.by}' if answer.caught else 'SURVIVED'}")
+    targets.at_most("planted faults that survive", len(lost), 0, "", key="planted/survived")
+    targets.record("planted/faults", len(faults))
+
+
+def _time_of(paths: Sequence[str], traced: Traced) -> float:
+    return traced.seconds(name for name in traced.tests if name.startswith(tuple(paths)))
+
+
+def written_fault(entry: dict[str, Any], root: Path = ROOT) -> Fault:
+    """Return a fault that somebody wrote down.
+
+    Parameters
+    ----------
+    entry : name, file, old (text that stands there once) and new.
+    root : of the tree.
+
+    Raises
+    ------
+    ValueError
+        Where the file holds the old text not exactly once: the list has to follow the code.
+    """
+    source, old = (root / entry["file"]).read_bytes(), entry["old"].encode()
+    if source.count(old) != 1:
+        raise ValueError(
+            f"{entry['name']}: {entry['file']} must hold the old text once, "
+            f"it holds it {source.count(old)} times"
+        )
+    start = source.index(old)
+    return Fault(entry["file"], entry["name"], start, start + len(old), entry["new"])
+
+
+def _raise_ratchet(score: float) -> None:
+    least = tomllib.loads(RATCHET.read_text(encoding="utf-8"))["least_score"]
+    if score > least:
+        text = RATCHET.read_text(encoding="utf-8")
+        RATCHET.write_text(text.replace(f"{least}", f"{int(score * 10) / 10}"), encoding="utf-8")
+        print(f"the least score is now {int(score * 10) / 10} %")
+
+
+if __name__ == "__main__":
+    os.nice(10)
+    began = time.perf_counter()
+    code = main()
+    print(f"{time.perf_counter() - began:.0f} s")
+    sys.exit(code)

@@ -1,0 +1,1 @@
+"""Faults that a program plants, and whether the tests catch them."""
