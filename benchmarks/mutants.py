@@ -16,6 +16,7 @@ import time
 import tomllib
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import repeat
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
@@ -30,6 +31,7 @@ ROOT = Path(__file__).resolve().parents[1]
 RATCHET = ROOT / "benchmarks" / "mutation" / "ratchet.toml"
 PLANTED = ROOT / "tests" / "planted_faults.toml"
 SEED, COUNT = 2026, 150
+CIRCLES = 2
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -96,21 +98,26 @@ def _trace(shop: Workshop, traced: Traced, out: Path) -> None:
 def _run_all(
     faults: list[Fault], shops: list[Workshop], traced: Traced, options: argparse.Namespace
 ) -> list[dict[str, Any]]:
-    """Return what became of each fault; a run that was interrupted goes on where it was."""
+    """Return what became of each fault; a run that was interrupted goes on where it was.
+
+    All faults meet the tests nearest to them before any meets a wider circle.
+    """
     file = options.out / f"seed_{options.seed}.json"
     kept = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
     free: SimpleQueue[Workshop] = SimpleQueue()
     for shop in shops:
         free.put(shop)
+    state = traced.state()
 
-    def one(fault: Fault) -> dict[str, Any]:
+    def one(fault: Fault, circle: int) -> dict[str, Any]:
         source = (ROOT / fault.file).read_bytes()
-        key, tests = fault.key(source), traced.state()
-        if key in kept and (kept[key]["caught"] or kept[key]["tests"] == tests):
-            return dict(kept[key])
+        key = fault.key(source)
+        known = kept.get(key)
+        if known and (known["caught"] or (known["tests"] == state and known["circle"] >= circle)):
+            return dict(known)
         shop = free.get()
         try:
-            answer, ran = plant(shop, traced, fault)
+            answer, asked = plant(shop, traced, fault, circle)
         finally:
             free.put(shop)
         result = {
@@ -119,41 +126,42 @@ def _run_all(
             "diff": fault.diff(ROOT),
             "caught": answer.caught,
             "by": answer.by,
-            "tests_run": ran,
+            "circle": circle,
+            "tests_asked": asked,
             "seconds": round(answer.seconds, 1),
-            "tests": tests,
+            "tests": state,
         }
         kept[key] = result
         scratch = file.with_suffix(f".{key}")
         scratch.write_text(json.dumps(dict(kept), indent=1, ensure_ascii=False), encoding="utf-8")
         scratch.replace(file)
-        word = f"caught by {answer.by}" if answer.caught else f"SURVIVED {ran} tests"
-        print(f"{result['seconds']:7.1f} s  {fault.kind}, {result['place']}: {word}", flush=True)
+        word = f"caught by {answer.by}" if answer.caught else f"NOT CAUGHT by {asked} tests"
+        print(f"{answer.seconds:7.1f} s  {fault.kind}, {result['place']}: {word}", flush=True)
         if not answer.caught:
             print(result["diff"], flush=True)
         return result
 
     with ThreadPoolExecutor(len(shops)) as pool:
-        return list(pool.map(one, faults))
+        for circle in range(CIRCLES):
+            results = list(pool.map(one, faults, repeat(circle)))
+            print(f"circle {circle}: {sum(r['caught'] for r in results)} caught", flush=True)
+    return results
 
 
-def plant(shop: Workshop, traced: Traced, fault: Fault) -> tuple[Answer, int]:
-    """Run the tests that may catch a fault; return the answer and how many were asked for.
+def plant(shop: Workshop, traced: Traced, fault: Fault, circle: int) -> tuple[Answer, int]:
+    """Run tests that may catch a fault; return the answer and how many were asked.
 
     Parameters
     ----------
     shop : where it is planted.
     traced : what each test runs.
     fault : of the tree.
+    circle : 0 asks the tests that run its function, 1 those around them.
     """
-    near, wide = traced.select(fault)
-    spent, asked = 0.0, 0
-    answer = Answer(False, "", 0.0, "")
-    for tests in (near, wide):
-        if tests and not answer.caught:
-            answer = shop.run(tests, traced.seconds(tests), fault)
-            spent, asked = spent + answer.seconds, asked + len(tests)
-    return answer._replace(seconds=spent), asked
+    tests = traced.select(fault)[circle]
+    if not tests:
+        return Answer(False, "", 0.0, ""), 0
+    return shop.run(tests, traced.seconds(tests), fault), len(tests)
 
 
 def _judge(

@@ -7,6 +7,7 @@ arguments do not drown few turned conditions; then one of its kind, all alike, n
 
 import math
 from collections import defaultdict
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -49,8 +50,13 @@ def faults_of(root: Path, file: str) -> list[Fault]:
     root : of the tree.
     file : path from there.
     """
-    source = (root / file).read_bytes()
-    return python_faults(file, source) if file.endswith(".py") else c_faults(file, source)
+    return list(_faults_in(file, (root / file).read_bytes()))
+
+
+@cache
+def _faults_in(file: str, source: bytes) -> tuple[Fault, ...]:
+    rules = python_faults if file.endswith(".py") else c_faults
+    return tuple(rules(file, source))
 
 
 def changes(root: Path, fault: Fault) -> bool:

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 from benchmarks.mutation.faults import PACKAGES, TOP, Fault, function_at
 
-NEAR = 30.0  # s, of the first round
-WIDE = 400.0  # s, of the second
+NEAR = 12.0  # s, of the first round
+WIDE = 150.0  # s, of the second
 
 
 class Selection(NamedTuple):

@@ -26,6 +26,7 @@ class Trace:
         self.coverage = coverage.Coverage(
             data_file=None, source=[str(root / name) for name in PACKAGES], config_file=False
         )
+        self.coverage.set_option("run:disable_warnings", ["no-data-collected"])
         self.coverage.start()
 
     @pytest.hookimpl(wrapper=True)

@@ -111,6 +111,7 @@ class Workshop:
         known = {**os.environ, **environment, "TIREID_CACHE": str(cache)}
         path = [str(self.tree), *filter(None, [os.environ.get("PYTHONPATH")])]
         known["PYTHONPATH"] = os.pathsep.join(path)
+        known["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"  # two of three seconds to start
         known["PYTHONDONTWRITEBYTECODE"] = "1" if limit else ""
         with tempfile.TemporaryFile("w+") as printed:
             process = subprocess.Popen(

@@ -162,7 +162,8 @@ def test_c_that_reads_the_same_is_no_fault():
 
 def test_drawing_is_deterministic_and_covers_every_package_and_its_c():
     faults = draw(ROOT, seed=7, count=60)
-    assert faults == draw(ROOT, seed=7, count=60) != draw(ROOT, seed=8, count=60)
+    again = draw(ROOT, seed=7, count=60)
+    assert faults == again != draw(ROOT, seed=8, count=60)
     assert len(set(faults)) == 60
     assert {fault.file.split("/")[0] for fault in faults} == {
         "codegen",
@@ -234,10 +235,11 @@ def fault_at(root: Path, old: str, new: str) -> Fault:
 
 def test_a_fault_is_caught_where_a_test_looks_and_survives_where_none_does(toy):
     root, shop, traced = toy
-    caught, _ = plant(shop, traced, fault_at(root, "width * height", "width + height"))
-    assert caught.caught and caught.by == "tests/test_toy.py::test_area"
-    survived, asked = plant(shop, traced, fault_at(root, "x + 2", "x - 2"))
-    assert not survived.caught and asked == 2
+    caught, asked = plant(shop, traced, fault_at(root, "width * height", "width + height"), 0)
+    assert caught.caught and caught.by == "tests/test_toy.py::test_area" and asked == 1
+    for circle in (0, 1):
+        survived, asked = plant(shop, traced, fault_at(root, "x + 2", "x - 2"), circle)
+        assert not survived.caught and asked == 1
     assert not shop.run(traced.tests, 1.0).caught, "the tree is whole again"
     assert (root / "models" / "toy.py").read_text() == TOY, "the checkout was not touched"
 
@@ -246,7 +248,7 @@ def test_a_fault_that_never_ends_is_caught_by_time(toy, monkeypatch):
     root, shop, traced = toy
     monkeypatch.setattr("benchmarks.mutation.workshop.START", 3.0)
     endless = fault_at(root, "return width * height", "while True: pass")
-    caught, _ = plant(shop, traced, endless)
+    caught, _ = plant(shop, traced, endless, 0)
     assert caught.caught and caught.by == "time"
 
 
