@@ -171,6 +171,9 @@ def test_wrong_shapes_names_and_samples_are_refused(rng):
         batch(N, good | {"u": good["u"][1:]})
     with pytest.raises(ValueError, match=r"must have shape \(0, "):
         batch(N, good | {"c": np.zeros(())})
+    everywhere = BatchScan(busy_step(), carry=CARRY, over=OVER, lanes_over=EVERY_LANE)
+    with pytest.raises(ValueError, match=r"must have shape \(0, "):
+        everywhere(N, random_values(rng, 0, EVERY_LANE))
     with pytest.raises(ValueError, match="has the inputs"):
         batch(N, {port: value for port, value in good.items() if port != "D"})
     for keep in ((3, 2), (1, 1), (-1,), (N,)):

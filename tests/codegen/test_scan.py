@@ -119,3 +119,15 @@ def test_a_compiler_that_cannot_compile_is_no_error(monkeypatch, tmp_path, caplo
     finally:
         codegen.find_compiler.cache_clear()
     assert "false refused the generated code of leaky" in caplog.messages[0]
+
+
+def test_a_single_sample_may_come_flat_and_one_too_many_is_refused(scan, rng):
+    M, s, u = rng.normal(size=(2, 3)), rng.normal(size=2), rng.normal(size=3)
+    values = {"M": M, "s": s, "u": u, "c": np.array(0.1)}
+    np.testing.assert_allclose(scan(1, values)["y"], [M @ u], rtol=1e-13)
+    with pytest.raises(ValueError, match=r"u must have shape \(1, 3\)"):
+        scan(1, values | {"u": np.zeros(4)})
+    with pytest.raises(ValueError, match=r"M must have shape \(2, 3\)"):
+        scan(1, values | {"M": np.zeros(6)})
+    with pytest.raises(ValueError, match=r"s must have shape \(2, 1\)"):
+        scan(1, values | {"s": np.zeros(3)})

@@ -46,3 +46,24 @@ def test_a_method_without_learning_errs_by_the_same_on_a_drive_wherever_it_learn
     linear = alpha * [car.cornering_stiffness_front, car.cornering_stiffness_rear]
     missed = np.sqrt(np.mean((linear - truth) ** 2, axis=0))
     assert trial.frozen["a"]["b"].front == pytest.approx(missed[0], rel=0.02)
+
+
+def test_the_forces_of_a_toy_car_count_and_silent_ones_are_refused(course, car):
+    toy = replace(course.recordings[0], axle_force=1e-5 * course.recordings[0].axle_force)
+    small = Course(vehicle=car, recordings=(toy,), min_speed=1.0)
+    assert small.size(toy).front == pytest.approx(1e-5 * course.size(course.recordings[0]).front)
+    for silent in ([0.0, 1.0], [1.0, 0.0]):
+        dead = replace(toy, axle_force=toy.axle_force * silent)
+        with pytest.raises(ValueError, match="an axle is always zero"):
+            Course(vehicle=car, recordings=(dead,), min_speed=1.0)
+
+
+def test_a_comparison_needs_recordings_of_different_names_with_forces(course, car):
+    one = course.recordings[0]
+    for recordings, complaint in (
+        ((), "at least one recording"),
+        ((one, one), "a is given twice"),
+        ((replace(one, axle_force=None),), "needs the true forces"),
+    ):
+        with pytest.raises(ValueError, match=complaint):
+            Course(vehicle=car, recordings=recordings, min_speed=1.0)

@@ -40,3 +40,12 @@ def test_bounds_hold_and_the_minimum_on_them_is_that_of_scipy(start):
 def test_a_parameter_that_does_nothing_stays():
     fit = least_squares(lambda p: p[:1] - 3.0, np.array([0.0, 0.7]), -FREE, FREE, steps=30)
     np.testing.assert_allclose(fit.parameters, [3.0, 0.7], atol=1e-6)
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1e6])
+def test_the_unit_of_the_residual_does_not_matter(unit):
+    start = np.array([-1.2, 1.0])
+    fit = least_squares(lambda p: unit * rosenbrock(p), start, -FREE, FREE, steps=12)
+    plain = least_squares(rosenbrock, start, -FREE, FREE, steps=12)
+    np.testing.assert_allclose(fit.parameters, plain.parameters, rtol=1e-5)
+    assert fit.cost == pytest.approx(unit**2 * plain.cost, rel=1e-4)

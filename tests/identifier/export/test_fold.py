@@ -92,3 +92,16 @@ def test_samples_are_in_the_order_of_the_inputs(slalom):
     folded = fold(make_method("integral", CAR), CAR)
     for column, signal in zip(rows.T, folded.inputs, strict=True):
         np.testing.assert_array_equal(column, getattr(slalom, signal.name))
+
+
+def test_the_self_test_starts_at_rest_and_turns_to_both_sides_at_many_speeds():
+    folded = fold(make_method("integral", CAR), CAR)
+    v_x, *signals = synthetic_samples(folded).T
+    n, lowest = v_x.size, folded.min_speed
+    assert v_x[0] == 0.0 and v_x[n // 2] < lowest, "it rests at the start, and once more"
+    assert v_x.max() == pytest.approx(15.0 * lowest)
+    fast = v_x > lowest
+    assert len(np.unique(v_x[fast])) > 50
+    for signal in signals:
+        assert signal[fast].min() < 0.0 < signal[fast].max()
+        assert signal[fast].max() + signal[fast].min() == pytest.approx(0.0, abs=0.4 * signal.max())

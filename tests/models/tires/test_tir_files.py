@@ -259,3 +259,48 @@ def test_a_file_that_is_not_there_is_an_os_error(tmp_path: Path) -> None:
 @pytest.mark.parametrize("raw", [b"\x00\x01\x02\xff" * 100, b"", b"\xff\xfe\x00", b"PK\x03\x04"])
 def test_a_file_that_is_no_text_is_a_tire_error(tmp_path: Path, raw: bytes) -> None:
     assert complaint(tmp_path, raw).startswith("lacks FNOMIN")
+
+
+def test_inflation_pressure_scales_friction_alike_at_every_load(tmp_path: Path) -> None:
+    """All of a friction, PD1 + PD2 df_z, is scaled: the peak keeps its ratio at any load."""
+    spread = {"PDX2": "-0.3", "PDY2": "-0.2", "PKX2": "3"}
+    pressure = {"IP": "220000", "IP_NOM": "200000", "LIP": "1.5"}
+    effects = {"PPX3": "0.5", "PPY3": "-0.4", "PPY4": "1", "PPX1": "0.6"}
+    plain = MagicFormula.from_tir(written(tmp_path, edited(**spread)))
+    blown = MagicFormula.from_tir(written(tmp_path, edited(**spread, **pressure, **effects)))
+    dp = (1.5 * 220.0 - 200.0) / 200.0
+    slips = [0.002 * k for k in range(1, 400)]
+    for F_z in (2000.0, 4000.0, 7000.0):
+        peaks = [
+            (
+                max(tire.forces(0.0, kappa, 0.0, F_z).F_x for kappa in slips),
+                max(tire.forces(alpha, 0.0, 0.0, F_z).F_y for alpha in slips),
+            )
+            for tire in (plain, blown)
+        ]
+        assert peaks[1][0] / peaks[0][0] == pytest.approx(1.0 + 0.5 * dp, rel=1e-3)
+        assert peaks[1][1] / peaks[0][1] == pytest.approx(1.0 - 0.4 * dp + dp**2, rel=1e-3)
+        stiffness = [tire.forces(0.0, 1e-6, 0.0, F_z).F_x for tire in (plain, blown)]
+        assert stiffness[1] / stiffness[0] == pytest.approx(1.0 + 0.6 * dp, rel=1e-4)
+
+
+def test_a_scale_that_is_not_written_is_one_and_a_coefficient_zero(tmp_path: Path) -> None:
+    """Conditions of the format: what a file leaves out changes nothing."""
+    bare = MagicFormula.from_tir(written(tmp_path, PLAIN)).coefficients
+    for name in bare.__dataclass_fields__:
+        if name not in ESSENTIAL:
+            assert getattr(bare, name) == (1.0 if name.startswith("L") else 0.0), name
+
+
+def test_every_size_of_a_tire_is_read_in_the_unit_of_its_kind(tmp_path: Path) -> None:
+    units = "LENGTH = 'mm'\nFORCE = 'kN'\nANGLE = 'deg'\nTIME = 'min'\nMASS = 'g'"
+    expected = {
+        "FNOMIN": 1e3, "FZMIN": 1e3, "FZMAX": 1e3,
+        "UNLOADED_RADIUS": 1e-3, "WIDTH": 1e-3, "RIM_RADIUS": 1e-3, "RIM_WIDTH": 1e-3,
+        "ALPMIN": radians(1.0), "CAMMAX": radians(1.0), "LONGVL": 1e-3 / 60.0,
+        "VXLOW": 1e-3 / 60.0, "VERTICAL_STIFFNESS": 1e6, "VERTICAL_DAMPING": 6e7, "MBELT": 1e-3,
+    }  # fmt: skip
+    lines = "\n".join(f"{key} = 2" for key in expected)
+    tir = read_tir(written(tmp_path, f"[UNITS]\n{units}\n[MODEL]\n{lines}\n"))
+    for key, one in expected.items():
+        assert tir.number(key) == pytest.approx(2.0 * one), key

@@ -1,0 +1,108 @@
+"""The detector of a friction change by its rules, on numbers."""
+
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from identifier.axle.friction_change import (
+    LARGEST_Q,
+    SLOW_Q,
+    ChangeDetector,
+    ChangeNumbers,
+    ErrorState,
+    alarm,
+    error_means,
+    inflated,
+)
+from identifier.axle.piecewise import larger, smaller, within
+
+DT = 0.01
+
+
+def numbers(dt: float = DT) -> ChangeNumbers:
+    return ChangeNumbers(*ChangeDetector().numbers(dt))
+
+
+class Means(NamedTuple):
+    fast: np.ndarray
+    slow: np.ndarray
+
+
+def means(q, *, fast=(1.0, 1.0), slow=(1.0, 1.0), learns=1, dt=DT) -> Means:
+    state = ErrorState(ca.DM(fast), ca.DM(slow), ca.DM([1.0, 1.0]))
+    found = error_means(numbers(dt), state, ca.DM(q), learns)
+    return Means(*(np.array(value).ravel() for value in found))
+
+
+def test_the_means_approach_a_constant_error_with_their_time_constants():
+    detector, state = ChangeDetector(), Means(np.ones(2), np.ones(2))
+    for _ in range(round(detector.fast / 0.001)):
+        state = means([3.0, 2.0], fast=state.fast, slow=state.slow, dt=0.001)
+    reached = 1.0 - np.exp(-1.0)
+    np.testing.assert_allclose(state.fast, [1 + 2 * reached, 1 + reached], rtol=0.01)
+    share = 1.0 - np.exp(-detector.fast / detector.slow)
+    np.testing.assert_allclose(state.slow, [1 + 2 * share, 1 + share], rtol=1e-3)
+
+
+def test_the_slow_mean_is_at_least_one_and_keeps_what_is_above():
+    assert list(means([0.0, 0.0]).slow) == [1.0, 1.0]
+    assert list(means([0.0, 0.0], slow=(3.0, 3.0)).slow) == pytest.approx([2.9985, 2.9985])
+
+
+def test_an_outlier_counts_as_the_largest_error_and_no_more():
+    k = numbers()
+    found = means([1e9, 2.0])
+    assert found.fast[0] == pytest.approx(1.0 + k.fast * (LARGEST_Q - 1.0))
+    assert found.fast[1] == pytest.approx(1.0 + k.fast * 1.0)
+    assert found.slow[0] == pytest.approx(1.0 + k.slow * (SLOW_Q - 1.0))
+
+
+def test_nothing_moves_while_learning_rests():
+    found = means([9.0, 9.0], fast=(2.0, 3.0), slow=(4.0, 5.0), learns=0)
+    assert list(found.fast) == [2.0, 3.0]
+    assert list(found.slow) == [4.0, 5.0]
+
+
+@pytest.mark.parametrize(
+    ("ratio", "expected"),
+    [
+        ((4.0, 4.0), 0.0),
+        ((6.0, 6.0), 0.5),
+        ((6.0, 5.0), 0.25),
+        ((5.0, 6.0), 0.25),
+        ((8.0, 8.0), 1.0),
+        ((90.0, 80.0), 1.0),
+        ((90.0, 1.0), 0.0),
+        ((1.0, 90.0), 0.0),
+    ],
+)
+def test_both_axles_must_alarm_and_twice_the_threshold_is_all(ratio, expected):
+    slow = ca.DM([2.0, 3.0])
+    assert float(alarm(numbers(), ca.DM(ratio) * slow, slow)) == pytest.approx(expected)
+
+
+def test_the_inflation_adds_the_square_of_the_step_in_its_time():
+    detector = ChangeDetector(step=0.4, step_time=0.5)
+    per_sample = detector.numbers(DT)[3]
+    assert per_sample * 0.5 / DT == pytest.approx(0.4**2)
+
+
+def test_covariance_grows_along_the_direction_and_in_the_block_of_the_weights_alone():
+    full = np.array([[2.0, 0.1, 0.3], [0.1, 3.0, 0.2], [0.3, 0.2, 4.0]])
+    P = {(i, j): full[i, j] for i in range(3) for j in range(i, 3)}
+    d = np.array([0.5, -2.0])
+    grown = inflated(P, list(d), 0.7)
+    expected = full.copy()
+    expected[:2, :2] += 0.7 * np.outer(d, d)
+    assert grown == {(i, j): pytest.approx(expected[i, j]) for i, j in P}
+
+
+def test_larger_smaller_and_within_are_those_of_numpy(rng):
+    a, b = rng.normal(size=20), rng.normal(size=20)
+    a[0] = b[0]
+    np.testing.assert_array_equal(np.array(larger(ca.DM(a), ca.DM(b))).ravel(), np.maximum(a, b))
+    np.testing.assert_array_equal(np.array(smaller(ca.DM(a), ca.DM(b))).ravel(), np.minimum(a, b))
+    clipped = np.array(within(ca.DM(a), -0.3, 0.5)).ravel()
+    np.testing.assert_array_equal(clipped, np.clip(a, -0.3, 0.5))

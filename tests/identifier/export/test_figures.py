@@ -1,0 +1,42 @@
+"""What a package says that it costs is what was measured, each number in its own place."""
+
+import json
+
+from identifier.export.figures import Cost, figures_text, with_figures
+from identifier.export.processor import Replay
+
+REPLAY = Replay(
+    hash="ab", steps=900, faults=2, state=1000, params=200, stack=30, instructions=77777,
+    most_instructions=88888,
+)  # fmt: skip
+COST = Cost("Cortex-M4", single=True, flash=5432, replay=REPLAY, static_ram=4)
+
+
+def test_ram_is_static_data_state_and_parameters():
+    assert COST.ram == 1204
+
+
+def test_every_number_stands_in_its_column():
+    row = figures_text([COST]).splitlines()[2]
+    cells = [cell.strip() for cell in row.strip("|").split("|")]
+    assert cells == ["Cortex-M4", "float", "5432", "4 + 1000 + 200", "30", "77777", "88888"]
+    assert "| double |" in figures_text([COST._replace(single=False)])
+    assert "Not measured" in figures_text([])
+
+
+def test_the_manifest_gets_the_same_numbers_and_keeps_the_rest():
+    told = json.loads(with_figures('{"name": "tire"}', [COST, COST._replace(single=False)]))
+    assert told["name"] == "tire"
+    assert [entry["precision"] for entry in told["figures"]] == ["float", "double"]
+    first = told["figures"][0]
+    del first["compiler"], first["processor"], first["precision"]
+    assert first == {
+        "flash_B": 5432,
+        "ram_B": 1204,
+        "static_ram_B": 4,
+        "state_B": 1000,
+        "params_B": 200,
+        "stack_B": 30,
+        "instructions_mean": 77777,
+        "instructions_largest": 88888,
+    }

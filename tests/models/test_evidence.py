@@ -1,0 +1,104 @@
+"""Window means and fits of a recording: their errors are those that a repetition shows."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from models.recordings import Recording, RecordingError, check_against_vehicle
+from models.recordings.evidence import STRIDE, WINDOW, correlation, least_squares, windows
+
+DT = 0.01
+
+
+def overlapping_means(noise: np.ndarray) -> np.ndarray:
+    """Means over windows that overlap as those of a recording do."""
+    width, stride = round(WINDOW / DT), round(STRIDE / DT)
+    total = np.concatenate([[0.0], np.cumsum(noise)])
+    start = np.arange(0, noise.size - width, stride)
+    return (total[start + width] - total[start]) / width
+
+
+def test_the_standard_error_is_the_scatter_of_repeated_fits(rng):
+    """Overlapping windows repeat each other: they are not counted as independent."""
+    claimed, found = [], []
+    for _ in range(300):
+        x = overlapping_means(rng.normal(size=6000))
+        y = 3.0 * x + overlapping_means(rng.normal(size=6000))
+        fit = least_squares(np.column_stack([x]), y)
+        found.append(fit[0][0])
+        claimed.append(fit[1][0])
+    assert np.mean(found) == pytest.approx(3.0, abs=0.05)
+    # Neighbors at a quarter of a window count a little more than once: between 1 and 1.4.
+    assert 0.7 < np.mean(claimed) / np.std(found) < 1.4
+
+
+def test_a_fit_explains_what_it_fits():
+    t = np.linspace(0.0, 10.0, 400)
+    X = np.column_stack([np.sin(t), 1e4 * np.cos(2 * t)])
+    fit = least_squares(X, X @ [2.0, -3e-4])
+    np.testing.assert_allclose(fit[0], [2.0, -3e-4], rtol=1e-9)
+    assert fit[2] == pytest.approx(1.0)
+    assert least_squares(X, np.sign(np.sin(17.0 * t)))[2] < 0.2
+
+
+def test_correlation_is_the_cosine_between_signals(rng):
+    a = rng.normal(size=50)
+    assert correlation(a, 3.0 * a) == pytest.approx(1.0)
+    assert correlation(a, -a) == pytest.approx(-1.0)
+    assert correlation(np.array([1.0, 0.0]), np.array([1.0, 1.0])) == pytest.approx(0.5**0.5)
+    assert correlation(a, 0.0 * a) == 0.0
+
+
+def turning(dt: float = DT, v_y: float = 0.3, rear: float = 0.0) -> Recording:
+    """A car that turns as a sine, with sideslip in proportion."""
+    t = np.arange(0.0, 20.0, dt)
+    r = 0.5 * np.sin(2.0 * t)
+    return Recording(
+        name="turning",
+        t=t,
+        v_x=np.full(t.size, 10.0),
+        v_y=v_y * r,
+        r=r,
+        delta_f=0.1 * np.sin(2.0 * t),
+        delta_r=rear * np.sin(2.0 * t),
+    )
+
+
+@pytest.mark.parametrize("dt", [0.002, 0.01, 0.04])
+def test_window_means_and_slopes_are_those_of_the_signals_at_any_rate(dt):
+    w = windows(turning(dt))
+    width = max(round(WINDOW / dt), 1) * dt
+    stride = max(round(STRIDE / dt), 1) * dt
+    t_mid = np.arange(w.r.size) * stride + 0.5 * width - 0.5 * dt
+    shrink = np.sinc(2.0 * width / 2.0 / np.pi)  # of a sine, averaged over the window
+    np.testing.assert_allclose(w.r, 0.5 * shrink * np.sin(2.0 * t_mid), atol=2e-4)
+    np.testing.assert_allclose(w.r_dot, shrink * np.cos(2.0 * (t_mid + 0.5 * dt)), atol=1e-3)
+    np.testing.assert_allclose(w.v_y_dot, 0.3 * w.r_dot, rtol=1e-9)
+    np.testing.assert_allclose(w.v_x_r, 10.0 * w.r, rtol=1e-9)
+
+
+def test_standing_is_left_out_of_the_windows():
+    moving = turning()
+    stop = (moving.t > 8.0) & (moving.t < 12.0)
+    v_x = np.where(stop, 0.0, moving.v_x)
+    w = windows(Recording(**{**vars_of(moving), "v_x": v_x}))
+    assert w.v_x.min() == 10.0
+    assert (windows(moving).r.size - w.r.size) * STRIDE == pytest.approx(4.0 + WINDOW, abs=0.1)
+
+
+def vars_of(recording: Recording) -> dict[str, object]:
+    names = ("name", "t", "v_x", "v_y", "r", "delta_f", "delta_r")
+    return {name: getattr(recording, name) for name in names}
+
+
+@pytest.mark.parametrize(("l_f", "l_r", "good"), [(0.5, 2.2, True), (2.2, 0.5, False)])
+def test_the_rear_slip_is_that_at_the_rear_axle(l_f, l_r, good):
+    """v_y = 1.2 m times r: a point 1.2 m ahead of the rear axle slips not; l_r decides the sign."""
+    car = SimpleNamespace(l_f=l_f, l_r=l_r, mass=1500.0)
+    recording = turning(v_y=1.2)
+    if good:
+        check_against_vehicle(recording, car)
+    else:
+        with pytest.raises(RecordingError, match="lateral acceleration must rise"):
+            check_against_vehicle(recording, car)
