@@ -3,14 +3,14 @@
 import ast
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from benchmarks.mutation.faults import PACKAGES, TOP, Fault, function_at
 
 NEAR = 15.0  # s, of the first round
-WIDE = 150.0  # s, of the second
+WIDE = 60.0  # s, of the second
 
 
 class Selection(NamedTuple):
@@ -86,14 +86,13 @@ class Traced:
         fault : planted in a file of the tree.
         """
         running = self._running(fault)
-        near = self._within(running, NEAR, _mirror(fault.file))
+        mirror = _mirror(fault.file)
+        near = self._within(running, NEAR, lambda name: not name.startswith(mirror))
         homes = {_file(name) for name in running}
-        around = [
-            name
-            for name in self.tests
-            if _file(name) in homes or name.startswith(_mirror(fault.file))
-        ]
-        wide = self._within([n for n in (*running, *around) if n not in set(near)], WIDE, "")
+        around = [name for name in self.tests if _file(name) in homes or name.startswith(mirror)]
+        asked, runs = set(near), set(running)
+        further = [name for name in (*running, *around) if name not in asked]
+        wide = self._within(further, WIDE, lambda name: name not in runs)
         return Selection(near, wide)
 
     def _present(self) -> dict[str, str]:
@@ -157,12 +156,11 @@ class Traced:
         package = module.rpartition(".")[0]
         return self.importers.get(module, set()) or self.importers.get(package, set())
 
-    def _within(self, names: Iterable[str], budget: float, first: str) -> tuple[str, ...]:
-        """Tests in the order of time, those under `first` before others, as far as time reaches."""
-        order = sorted(
-            dict.fromkeys(names),
-            key=lambda n: (not (first and n.startswith(first)), self.tests[n]["seconds"], n),
-        )
+    def _within(
+        self, names: Iterable[str], budget: float, later: Callable[[str], bool]
+    ) -> tuple[str, ...]:
+        """Tests as far as time reaches, quick ones first, those that are for later after others."""
+        order = sorted(dict.fromkeys(names), key=lambda n: (later(n), self.tests[n]["seconds"], n))
         chosen: list[str] = []
         spent = 0.0
         opened = set[str]()

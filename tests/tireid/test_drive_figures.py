@@ -217,3 +217,72 @@ def test_an_mp4_without_ffmpeg_is_refused_with_what_to_do(tmp_path, monkeypatch)
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(ValueError, match=r"needs ffmpeg.*or ask for a GIF"):
         frames.require_ffmpeg()
+
+
+def curves(axes):
+    """Drawn data by label."""
+    return {line.get_label(): np.column_stack(line.get_data()) for line in axes.get_lines()}
+
+
+def test_a_map_of_a_course_shows_deviations_to_their_side_and_larger_by_what_it_says():
+    X, Y = 120.0 * np.cos(AROUND), 110.0 * np.sin(AROUND)
+    course = Path.from_waypoints(X, Y, closed=True, name="round")
+    drives = {"frozen": made_up(course, 0.1), "linear": made_up(course, -0.8)}
+    whole, part = drive_path_figure(drives).axes[:2]
+    title = whole.get_title() + whole.get_title(loc="left")
+    times = float(re.search(r"drawn (\S+) times", title).group(1))
+    assert times > 1.0
+    for label, drive in drives.items():
+        drawn = curves(whole)[label]
+        center = np.column_stack(course.pose(drive.s)[:2])
+        out = np.hypot(*drawn.T) - np.hypot(*center.T)
+        assert np.sign(out).mean() == -np.sign(drive.e_y).mean(), "left is inside, turning left"
+        away = np.hypot(*(drawn - center).T)
+        np.testing.assert_allclose(away, times * np.abs(drive.e_y), rtol=1e-6)
+        np.testing.assert_allclose(curves(part)[label], np.column_stack([drive.X, drive.Y]))
+
+
+def test_errors_are_drawn_over_arc_length_in_the_units_of_their_axes():
+    panels = drive_errors_figure(ON_LANE, off_path=2.0, drops=[(60.0, 0.5)]).axes
+    for label, drive in ON_LANE.items():
+        for axes, values in zip(
+            panels, (drive.e_y, np.degrees(drive.e_psi), drive.a_y, drive.v_x), strict=True
+        ):
+            np.testing.assert_allclose(curves(axes)[label], np.column_stack([drive.s, values]))
+    for axes in panels:
+        np.testing.assert_allclose(curves(axes)["friction 0.5"][:, 0], 60.0)
+
+
+def test_steering_is_drawn_in_degrees_between_its_limits():
+    drives = {
+        label: replace(
+            drive,
+            command=drive.delta + 0.18 * np.sin(3.0 * drive.t),
+            delta=drive.delta + 0.17 * np.sin(3.0 * drive.t - 0.1),
+        )
+        for label, drive in ON_LANE.items()
+    }
+    figure = drive_steering_figure(drives, angle_limit=0.2, rate_limit=0.6)
+    angle, rate = figure.axes[:2]
+    for label, drive in drives.items():
+        np.testing.assert_allclose(curves(angle)[label][:, 1], np.degrees(drive.command))
+    first = drives["frozen"]
+    np.testing.assert_allclose(
+        curves(angle)["wheels of frozen"][:, 1], np.degrees(first.delta), atol=1e-12
+    )
+    swing = np.diff(np.degrees(first.command)) / PERIOD
+    drawn = [line.get_ydata() for line in rate.get_lines() if np.size(line.get_ydata()) > 2]
+    np.testing.assert_allclose(drawn, [swing], rtol=1e-6, atol=1e-6)
+    for axes, limit in ((angle, np.degrees(0.2)), (rate, np.degrees(0.6))):
+        level = [y[0] for y in (line.get_ydata() for line in axes.get_lines()) if np.ptp(y) == 0.0]
+        for side in (-limit, limit):
+            assert any(abs(y - side) < 1e-9 for y in level), (axes.get_ylabel(), level)
+
+
+def test_solve_times_are_drawn_in_milliseconds():
+    drive = ON_LANE["frozen"]
+    drawn = [
+        line.get_ydata() for axes in drive_solve_figure(drive).axes for line in axes.get_lines()
+    ]
+    longest = max(float(np.max(y)) for y in drawn if np.size(y) > 10)
+    assert longest == pytest.approx(1e3 * drive.solve_time.max(), rel=1e-6)

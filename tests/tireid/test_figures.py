@@ -20,6 +20,7 @@ from identifier.axle import AxleDesign, AxleModel
 from identifier.design import Design
 from identifier.gains import Gains, diagonal
 from identifier.history import History
+from identifier.identify import identify
 from identifier.network import Network
 from identifier.reproducibility import AxleRmse, Replay, Reproduction
 from models.recordings import Recording
@@ -37,6 +38,7 @@ from tireid.figures import (
     slip_figure,
     weights_figure,
 )
+from tireid.figures.learnt_axles import learnt_axles_figure
 from tireid.figures.scheme import BLOCKS, DIFFERENCE, SIGNALS, SUM
 from tireid.figures.style import BLACK
 from tireid.figures.units import force_range, force_unit_of, impulse_unit
@@ -453,3 +455,38 @@ def test_replays_of_another_recording_are_refused() -> None:
 def test_a_window_without_samples_is_refused() -> None:
     with pytest.raises(ValueError, match=r"must lie within 20 s to 22\.99 s"):
         force_figure(made_up(), window=(0.0, 10.0))
+
+
+def test_a_comparison_draws_medians_with_quartiles_on_their_own_sides() -> None:
+    results = {"integral": {"online": (0.5, 0.2, 1.1), "32": (0.4, 0.1, 0.6)}}
+    axes = comparison_figure(results).axes[0]
+    (bars,) = axes.containers
+    line, _, (whiskers,) = bars.lines
+    assert list(line.get_ydata()) == [0.5, 0.4]
+    spans = [tuple(segment[:, 1]) for segment in whiskers.get_segments()]
+    assert spans == [pytest.approx((0.2, 1.1)), pytest.approx((0.1, 0.6))]
+
+
+def test_what_the_axles_learnt_is_drawn_in_the_units_of_its_axes() -> None:
+    car = replace(CAR, cornering_stiffness_front=9e4)
+    design = AxleDesign.for_vehicle(car)
+    history = identify(made_up().recording, car, design)
+    figure = learnt_axles_figure(history)
+    model = history.freeze(float(history.recording.t[-1]))
+    assert "[kN/rad]" in figure.axes[0].get_ylabel()
+    for axle in (0, 1):
+        drawn = [axes.get_lines()[axle].get_ydata() for axes in figure.axes]
+        assert drawn[0][-1] == pytest.approx(1e-3 * model.cornering_stiffness[axle], rel=0.01)
+        assert drawn[1][-1] == pytest.approx(model.relaxation_length[axle], rel=0.02)
+        far = model.force_at(np.array([5.0]))[0, axle] / car.axle_loads[axle]
+        assert drawn[2][-1] == pytest.approx(far, rel=0.01)
+    toy = Vehicle(
+        mass=1.5,
+        yaw_inertia=0.01,
+        l_f=0.08,
+        l_r=0.09,
+        cornering_stiffness_front=60.0,
+        cornering_stiffness_rear=70.0,
+    )
+    small = learnt_axles_figure(identify(made_up(5.0).recording, toy, AxleDesign.for_vehicle(toy)))
+    assert "[N/rad]" in small.axes[0].get_ylabel()

@@ -1,0 +1,99 @@
+"""The carried-over tire against the package's own functions, and what moves a car."""
+
+import importlib.util
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from models.friction import Friction, FrictionChange
+from models.vehicle import sedan
+from mpc.cars.commonroad.motion import axle_force, friction_at
+
+needs_package = pytest.mark.skipif(
+    importlib.util.find_spec("vehiclemodels") is None,
+    reason="needs commonroad-vehicle-models: pip install tireid[commonroad]",
+)
+
+
+def random_coefficients(rng):
+    """The tire of the package with every coefficient awake."""
+    from mpc.cars.commonroad.package import bmw_tire
+
+    return {
+        name: value * rng.uniform(0.8, 1.2) + (0.02 * rng.normal() if abs(value) < 0.05 else 0.0)
+        for name, value in bmw_tire().items()
+    }
+
+
+@needs_package
+@pytest.mark.parametrize("case", range(8))
+def test_the_tire_is_that_of_the_package_for_any_coefficients(case):
+    from vehiclemodels.utils import tire_model
+
+    from mpc.cars.commonroad.tire import CommonRoadTire
+
+    rng = np.random.default_rng(case)
+    coefficients = random_coefficients(rng)
+    tire, p = CommonRoadTire(p=tuple(coefficients.items())), SimpleNamespace(**coefficients)
+    for _ in range(10):
+        alpha, kappa = rng.uniform(-0.4, 0.4), rng.uniform(-0.4, 0.4)
+        gamma, F_z = rng.choice([-1.0, 1.0]) * rng.uniform(0.02, 0.1), rng.uniform(1e3, 7e3)
+        a, s, g = -alpha, -kappa, -gamma
+        F0_x = tire_model.formula_longitudinal(s, g, F_z, p)
+        F0_y, mu_y = tire_model.formula_lateral(a, g, F_z, p)
+        expected = (
+            tire_model.formula_longitudinal_comb(s, a, F0_x, p),
+            tire_model.formula_lateral_comb(s, a, g, mu_y, F_z, F0_y, p),
+        )
+        ours = tire.forces(alpha, kappa, gamma, F_z)
+        np.testing.assert_allclose((float(ours.F_x), float(ours.F_y)), expected, rtol=2e-3)
+
+
+@needs_package
+def test_its_stiffnesses_are_its_slopes_at_zero():
+    from mpc.cars.commonroad.tire import CommonRoadTire
+
+    tire, h = CommonRoadTire.read(), 1e-5
+    for F_z in (2000.0, 5000.0):
+        ahead, back = (tire.forces(s, 0.0, 0.0, F_z).F_y for s in (h, -h))
+        assert tire.cornering_stiffness(F_z) == pytest.approx(float(ahead - back) / 2 / h, rel=0.01)
+        ahead, back = (tire.forces(0.0, s, 0.0, F_z).F_x for s in (h, -h))
+        assert tire.slip_stiffness(F_z) == pytest.approx(float(ahead - back) / 2 / h, rel=0.01)
+
+
+@needs_package
+def test_the_repair_moves_unsprung_mass_until_both_axles_balance():
+    from mpc.cars.commonroad.package import bmw_parameters
+
+    plain, repaired = bmw_parameters(), bmw_parameters(repaired=True)
+    assert repaired.m_uf + repaired.m_ur == pytest.approx(plain.m_uf + plain.m_ur)
+    assert repaired.m_uf * repaired.a == pytest.approx(repaired.m_ur * repaired.b)
+    assert repaired.m_uf - plain.m_uf == pytest.approx(6.6, abs=0.1)
+
+
+@needs_package
+def test_friction_scales_both_directions_of_a_parameter_set():
+    from mpc.cars.commonroad.package import bmw_parameters, bmw_tire
+
+    slippery, tire = bmw_parameters(0.4).tire, bmw_tire()
+    assert slippery.p_dx1 == pytest.approx(0.4 * tire["p_dx1"])
+    assert slippery.p_dy1 == pytest.approx(0.4 * tire["p_dy1"])
+    assert tire == bmw_tire(), "the package's own set is not changed"
+
+
+@pytest.mark.parametrize(("a_y", "r_dot"), [(3.0, 0.0), (0.0, 2.0), (-4.0, 1.5)])
+def test_axle_forces_are_those_that_move_the_car_by_newton_and_euler(a_y, r_dot):
+    car = sedan()
+    front, rear = axle_force(car, a_y, r_dot)
+    assert front + rear == pytest.approx(car.mass * a_y, abs=1e-9)
+    assert car.l_f * front - car.l_r * rear == pytest.approx(car.yaw_inertia * r_dot, abs=1e-9)
+
+
+def test_the_friction_under_a_car_is_that_of_its_time_or_place():
+    in_time = Friction(scale=0.9, changes=(FrictionChange(scale=0.4, at_time=5.0),))
+    assert friction_at(in_time, 4.0, 1e3) == pytest.approx(0.9)
+    assert friction_at(in_time, 8.0, 0.0) == pytest.approx(0.4)
+    in_place = Friction(scale=0.9, changes=(FrictionChange(scale=0.4, at_place=50.0),))
+    assert friction_at(in_place, 99.0, 20.0) == pytest.approx(0.9)
+    assert friction_at(in_place, 0.0, 80.0) == pytest.approx(0.4)
