@@ -11,6 +11,7 @@ from benchmarks.mutation.faults import PACKAGES, TOP, Fault, function_at
 
 NEAR = 15.0  # s, of the first round
 WIDE = 60.0  # s, of the second
+FIXTURES = 5.0  # s, at most, where a trace does not tell them from the test
 
 
 class Selection(NamedTuple):
@@ -182,7 +183,8 @@ class Traced:
             self.openings = {}
             for name, entry in self.tests.items():
                 known = self.openings.get(_file(name), 0.0)
-                self.openings[_file(name)] = max(known, entry["seconds"])
+                slowest = entry.get("setup", min(entry["seconds"], FIXTURES))
+                self.openings[_file(name)] = max(known, slowest)
         return self.openings[file]
 
 

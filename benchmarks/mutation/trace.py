@@ -1,8 +1,8 @@
 """A pytest plugin that keeps, for every test, which functions it runs and how long it takes.
 
 `pytest -p benchmarks.mutation.trace` writes `$MUTATION_TRACE`, a JSON object by test:
-{"seconds": s, "runs": {file: [function, ...]}}, and "outcome": "failed" where it failed. Functions
-are qualified names; `<module>` stands for what runs when a file is imported.
+{"seconds": s, "setup": s, "runs": {file: [function, ...]}}, and "outcome": "failed" where it
+failed. Functions are qualified names; `<module>` stands for what runs when a file is imported.
 """
 
 import json
@@ -23,6 +23,8 @@ class Trace:
     def __init__(self, root: Path, out: Path) -> None:
         self.root, self.out = root, out
         self.tests: dict[str, dict[str, object]] = {}
+        self.setup: dict[str, float] = {}
+        self.failed: set[str] = set()
         self.coverage = coverage.Coverage(
             data_file=None, source=[str(root / name) for name in PACKAGES], config_file=False
         )
@@ -35,13 +37,20 @@ class Trace:
         self.coverage.switch_context(item.nodeid)
         start = time.perf_counter()
         answer = yield
-        self.tests[item.nodeid] = {"seconds": time.perf_counter() - start}
+        self.tests[item.nodeid] = {
+            "seconds": time.perf_counter() - start,
+            "setup": self.setup.get(item.nodeid, 0.0),
+        }
+        if item.nodeid in self.failed:
+            self.tests[item.nodeid]["outcome"] = "failed"
         return answer
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Keep whether the test failed."""
+        """Keep how long its fixtures took, and whether it failed."""
+        if report.when == "setup":
+            self.setup[report.nodeid] = report.duration
         if report.failed:
-            self.tests.setdefault(report.nodeid, {})["outcome"] = "failed"
+            self.failed.add(report.nodeid)
 
     def pytest_sessionfinish(self) -> None:
         """Write the map."""

@@ -8,8 +8,16 @@ import pytest
 
 from identifier.defaults import default_design
 from identifier.design_file import design_text, read_design
+from identifier.stability.property import Certificate, Property
 from models.vehicle import sedan
-from tireid.certificate_table import certificate_of, number, unit_text, verdict_line
+from tireid.certificate_table import (
+    advised,
+    certificate_of,
+    certificate_text,
+    number,
+    unit_text,
+    verdict_line,
+)
 from tireid.cli import main
 from tireid.paper_study import paper_design
 
@@ -138,3 +146,26 @@ def test_without_a_file_it_says_which_law_it_judges(capsys, unstable):
     said = checked(capsys)[1].out
     assert "judged is the paper's law; axle, the default of tireid identify: not certified" in said
     assert "not certified" not in checked(capsys, unstable)[1].out
+
+
+def test_advice_is_given_for_what_does_not_pass_and_says_what_to_do():
+    def entry(name, status, advice):
+        return Property(
+            name=name, title=name, value=1.0, limit=2.0, margin=2.0, status=status, unit="-",
+            advice=advice,
+        )  # fmt: skip
+
+    certificate = Certificate(
+        properties=(
+            entry("good", "pass", ""),
+            entry("fine", "pass", "could be better"),
+            entry("weak", "warn", "turn it down"),
+            entry("mute", "warn", ""),
+            entry("bad", "fail", "turn it off"),
+        )
+    )
+    assert [line.name for line in advised(certificate)] == ["weak", "bad"]
+    told = certificate_text(certificate, 1.0)
+    assert "warn: weak: turn it down" in told and "fail: bad: turn it off" in told
+    assert "could be better" not in told
+    assert told.endswith("verdict: fail")

@@ -38,7 +38,6 @@ from tireid.figures import (
     slip_figure,
     weights_figure,
 )
-from tireid.figures.learnt_axles import learnt_axles_figure
 from tireid.figures.scheme import BLOCKS, DIFFERENCE, SIGNALS, SUM
 from tireid.figures.style import BLACK
 from tireid.figures.units import force_range, force_unit_of, impulse_unit
@@ -490,3 +489,21 @@ def test_what_the_axles_learnt_is_drawn_in_the_units_of_its_axes() -> None:
     )
     small = learnt_axles_figure(identify(made_up(5.0).recording, toy, AxleDesign.for_vehicle(toy)))
     assert "[N/rad]" in small.axes[0].get_ylabel()
+
+
+def test_weights_that_run_away_downward_do_not_flatten_the_panel_either() -> None:
+    history = made_up()
+    W = history.carried["W"].copy()
+    W[150:250] = -1e200
+    W[250:] = np.nan
+    force = history.axle_force.copy()
+    force[250:] = np.nan
+    wild = replace(history, axle_force=force, carried={**history.carried, "W": W})
+    assert weights_figure(wild).axes[0].get_ylim()[0] > -1e3
+
+
+def test_a_comparison_over_decades_is_logarithmic_and_one_within_is_not() -> None:
+    near = {"integral": {"online": (0.5, 0.4, 0.6), "32": (0.7, 0.6, 0.8)}}
+    far = {"integral": {"online": (0.5, 0.4, 0.6), "32": (700.0, 600.0, 800.0)}}
+    assert comparison_figure(near).axes[0].get_yscale() == "linear"
+    assert comparison_figure(far).axes[0].get_yscale() == "log"

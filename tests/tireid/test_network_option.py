@@ -13,6 +13,7 @@ from identifier.model_file import load_model
 from identifier.network import Network, Weights
 from identifier.network_model import NetworkModel
 from identifier.onnx_model import OnnxModel
+from identifier.tire_network import UnusableNetworkError, read_network
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tireid import network_results
@@ -200,3 +201,27 @@ def test_its_options_do_not_stand_alone(command, logs, tmp_path, capsys):
     words = [command, str(logs / "slalom.csv"), "--vehicle", str(logs / "car.toml")]
     assert main([*words, "--out", str(tmp_path / "out"), "--network-iso"]) == 2
     assert "go with --network FILE.onnx" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("shape", [[2], ["batch", 2], [1, 2]])
+def test_rows_of_signals_are_a_tire(tmp_path, shape):
+    step = read_network(shaped_file(tmp_path / "t.onnx", shape).read_bytes())
+    assert step.n_out() == 1 and step.numel_out(0) == 2
+
+
+@pytest.mark.parametrize("shape", [[], [1, 1, 2], ["batch", 1, 2], [3, 2], [1, 0]])
+def test_a_tensor_that_is_no_row_of_signals_is_refused(tmp_path, shape):
+    content = shaped_file(tmp_path / "t.onnx", shape).read_bytes()
+    with pytest.raises(UnusableNetworkError, match="must be"):
+        read_network(content)
+
+
+def shaped_file(path, shape):
+    """A tire whose input and output have a shape."""
+    kind = onnx.TensorProto.DOUBLE
+    node = onnx.helper.make_node("Tanh", ["slip"], ["force"])
+    ports = [onnx.helper.make_tensor_value_info(name, kind, shape) for name in ("slip", "force")]
+    graph = onnx.helper.make_graph([node], "tire", ports[:1], ports[1:])
+    opset = [onnx.helper.make_opsetid("", 13)]
+    onnx.save(onnx.helper.make_model(graph, opset_imports=opset, ir_version=7), path)
+    return path

@@ -144,3 +144,9 @@ def test_report_replaces_the_old_one_whole(tmp_path: Path, monkeypatch: pytest.M
         write_report(path, "Second", SECTIONS)
     assert path.read_text(encoding="utf-8") == first
     assert [entry.name for entry in tmp_path.iterdir()] == ["report.html"]
+
+
+def test_a_table_without_rows_still_names_all_its_columns() -> None:
+    table = Table(caption="c", header=["a", "b", "c"], rows=[])
+    html = report_html("t", [Section(heading="s", blocks=[table])])
+    assert re.findall(r'<th scope="col"[^>]*>(\w)</th>', html) == ["a", "b", "c"]

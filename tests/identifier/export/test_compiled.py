@@ -1,5 +1,7 @@
 """The shipped C from Python."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -210,3 +212,26 @@ def test_a_recording_of_another_interval_is_refused(packages, drive):
 def test_samples_of_another_shape_are_refused(packages):
     with pytest.raises(ValueError, match=r"\(n, 5\)"):
         CompiledPackage.of(packages["integral"]).run_samples(np.zeros((3, 4)))
+
+
+def test_an_input_on_its_limit_is_taken_and_one_beyond_is_not(packages):
+    package = packages["integral"]
+    text = "\n".join(package.files.values())
+    limit = {
+        name: float(re.search(rf"params->{name} = \(\w+\)(\S+);", text).group(1))
+        for name in ("max_speed", "max_yaw_rate", "max_steering")
+    }
+    names = ("max_speed", "max_speed", "max_yaw_rate", "max_steering", "max_steering")
+    run = CompiledPackage.of(package)
+    for place, name in enumerate(names):
+        for side in (1.0, -1.0):
+            for size, refused in (
+                (limit[name], False),
+                (np.nextafter(limit[name], np.inf), True),
+                (np.inf, True),
+                (np.nan, True),
+            ):
+                run.init()
+                sample = [20.0, 0.1, 0.1, 0.01, 0.0]
+                sample[place] = side * size
+                assert (run.step(*sample)[0] == Status.BAD_INPUT) == refused, (name, side, size)
