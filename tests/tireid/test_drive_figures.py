@@ -286,3 +286,17 @@ def test_solve_times_are_drawn_in_milliseconds():
     ]
     longest = max(float(np.max(y)) for y in drawn if np.size(y) > 10)
     assert longest == pytest.approx(1e3 * drive.solve_time.max(), rel=1e-6)
+
+
+def test_wheels_and_body_have_the_size_of_the_car():
+    small = car_shape(CAR, 0.0, 0.0, 0.0)
+    large = car_shape(replace(CAR, l_f=2 * CAR.l_f, l_r=2 * CAR.l_r, chassis=None), 0.0, 0.0, 0.0)
+    for wheel in small.wheels:
+        length, width = np.ptp(wheel, axis=0)
+        assert 0.55 < length < 0.75 and 0.15 < width < 0.3
+    np.testing.assert_allclose(
+        np.ptp(large.wheels, axis=1), 2.0 * np.ptp(small.wheels, axis=1), rtol=1e-9
+    )
+    assert np.ptp(small.body[:, 0]) == pytest.approx(1.68 * CAR.wheelbase)
+    front, rear = small.wheels[:2, :, 0].mean(), small.wheels[2:, :, 0].mean()
+    assert (front, rear) == (pytest.approx(CAR.l_f), pytest.approx(-CAR.l_r))

@@ -224,3 +224,14 @@ def test_where_V_learns_the_margins_hold_up_to_the_weights_that_are_kept():
     assert certify(projected, integral, narrow)["weight_range"].status == "pass"
     free = replace(design, rho_W=0.0)  # nothing keeps W
     assert certify(free, integral, CITY)["weight_range"].status == "warn"
+
+
+def test_a_margin_is_the_ratio_of_value_and_limit_and_one_is_the_limit():
+    gentle, strong = (certify(gains(eta_W=eta), integral, CITY) for eta in (0.5, 50.0))
+    for certificate in (gentle, strong):
+        theta = certificate["small_gain"]
+        assert theta.margin * theta.value == pytest.approx(1.0)
+        assert (theta.margin > 1.0) == (theta.status == "pass")
+    assert gentle["small_gain"].margin == pytest.approx(100.0 * strong["small_gain"].margin)
+    quiet = certify(gains(eta_W=1e-300), integral, CITY)["small_gain"]
+    assert quiet.status == "pass" and quiet.margin > 1e100

@@ -1,0 +1,56 @@
+"""The curves beside a drive: which tires are shown, under which name, and that they are theirs."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from models.vehicle import sedan
+from mpc.path import Path
+from mpc.tires import tire_model
+from tireid.drive_options import SpeedWish
+from tireid.drive_runs import FROZEN, LEARNING, LINEAR, ORACLE
+from tireid.drive_setup import Setup
+from tireid.drive_tires import known_curves, steady_curve
+from tireid.figures.drive_look import AT_THE_END
+
+CAR = sedan()
+X = np.linspace(0.0, 120.0, 81)
+LANE = Path.from_waypoints(X, 2.0 * np.tanh((X - 40.0) / 6.0), name="lane")
+
+
+@pytest.fixture(scope="module")
+def setup():
+    return Setup(
+        path=LANE,
+        vehicle=CAR,
+        plant="double-track",
+        mu=0.9,
+        drops=((60.0, 0.4),),
+        wish=SpeedWish(None, 16.0),
+    )
+
+
+def test_the_linear_tire_is_a_line_of_its_stiffness():
+    curve = steady_curve("linear", tire_model(CAR), 16.0)
+    slope = [CAR.cornering_stiffness_front, CAR.cornering_stiffness_rear]
+    small = np.abs(curve.alpha) < 0.02
+    np.testing.assert_allclose(curve.force[small], curve.alpha[small, None] * slope, rtol=1e-6)
+
+
+def test_the_true_tire_is_shown_on_the_first_and_on_the_last_friction(setup):
+    curves = {curve.label: curve for curve in known_curves([], setup, None)}
+    assert list(curves) == [LINEAR, ORACLE, ORACLE + AT_THE_END]
+    most, last = (curves[name].force.max(axis=0) for name in (ORACLE, ORACLE + AT_THE_END))
+    np.testing.assert_allclose(last / most, 0.4 / 0.9, rtol=0.1)
+    assert most.sum() == pytest.approx(CAR.mass * setup.grip, rel=0.1)
+
+
+def test_what_a_tracker_was_told_later_is_shown_as_the_end(setup):
+    soft = tire_model(replace(CAR, cornering_stiffness_front=4e4))
+    same = SimpleNamespace(label=FROZEN, model=soft, final=soft)
+    changed = SimpleNamespace(label=LEARNING, model=tire_model(CAR), final=soft)
+    labels = [curve.label for curve in known_curves([same, changed], setup, None)]
+    assert FROZEN in labels and FROZEN + AT_THE_END not in labels
+    assert LEARNING + AT_THE_END in labels and LEARNING not in labels
