@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from benchmarks.mutation.faults import PACKAGES, TOP, Fault, function_at
 
 NEAR = 15.0  # s, of the first round
-WIDE = 60.0  # s, of the second
+WIDE = 45.0  # s, of the second
 FIXTURES = 5.0  # s, at most, where a trace does not tell them from the test
 
 
