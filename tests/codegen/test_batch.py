@@ -194,3 +194,32 @@ def test_a_function_that_is_not_straight_line_code_runs_one_at_a_time(caplog):
         record = batch(3, {"a": np.ones(2), "b": b_values})
     np.testing.assert_array_equal(record["a_final"], [[1.0, 1.0], [8.0, 8.0]])
     assert "must be an SX function" in caplog.text
+
+
+@pytest.mark.parametrize("everywhere", [True, False])
+def test_samples_that_are_matrices_come_by_columns_as_in_a_run_alone(rng, everywhere):
+    s, A = ca.SX.sym("s", 2), ca.SX.sym("A", 2, 3)
+    step = ca.Function("matrix", [s, A], [0.5 * s + A @ ca.DM([1, 2, 3]), A.T @ s],
+                       ["s", "A"], ["s_next", "y"])  # fmt: skip
+    runs, n = 3, 5
+    start, matrices = rng.normal(size=(runs, 2)), rng.normal(size=(runs, n, 2, 3))
+    flat = matrices.swapaxes(-1, -2).reshape(runs, n, 6)
+    if not everywhere:
+        flat, matrices = flat[0], np.broadcast_to(matrices[:1], matrices.shape)
+    batch = BatchScan(step, carry=("s",), over=("A",), lanes_over=("s", "A")[: 1 + everywhere])
+    record = batch(n, {"s": start, "A": flat}, keep=range(n))
+    for i in range(runs):
+        state = start[i]
+        for k in range(n):
+            np.testing.assert_allclose(record["y"][i, k], matrices[i, k].T @ state, rtol=1e-12)
+            state = 0.5 * state + matrices[i, k] @ [1.0, 2.0, 3.0]
+        np.testing.assert_allclose(record["s_final"][i], state, rtol=1e-12)
+    with pytest.raises(ValueError, match=r"A must have shape"):
+        batch(n, {"s": start, "A": flat[..., :2]})
+
+
+def test_numbers_of_the_right_count_in_the_wrong_order_are_refused(rng):
+    batch = BatchScan(busy_step(), carry=CARRY, over=OVER, lanes_over=("c", "s"))
+    good = random_values(rng, 5, ("c", "s"))
+    with pytest.raises(ValueError, match=r"s must have shape \(5, 2, 1\), not \(2, 5\)"):
+        batch(N, good | {"s": good["s"].T})

@@ -224,3 +224,29 @@ def test_an_operation_without_plain_c_is_refused():
     x = ca.SX.sym("x")
     with pytest.raises(UnknownOperationError, match="f: there is no plain C for erf"):
         function_of(graph, ca.Function("f", [x], [x]))
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_choice_in_two_halves_is_one_choice_whichever_comes_first(turned, rng):
+    c, a, b = (ca.SX.sym(name) for name in "cab")
+    halves = [ca.if_else(c > 0, a, 0), ca.if_else(ca.logic_not(c > 0), b, 0)]
+    one, two = reversed(halves) if turned else halves
+    function = ca.Function("choose", [c, a, b], [one + two])
+    graph = recognized(graph_of(function))
+    assert "select" in operations(graph)
+    assert "if_else_zero" not in operations(graph)
+    for sign in (1.0, -1.0):
+        first, second = rng.normal(size=2)
+        chosen = float(function_of(graph, function)(sign, first, second))
+        assert chosen == (first if sign > 0.0 else second)
+
+
+def test_halves_of_different_choices_stay_two(rng):
+    c, d, a, b = (ca.SX.sym(name) for name in "cdab")
+    both = ca.if_else(c > 0, a, 0) + ca.if_else(ca.logic_not(d > 0), b, 0)
+    function = ca.Function("halves", [c, d, a, b], [both])
+    graph = recognized(graph_of(function))
+    assert "select" not in operations(graph)
+    for c_, d_ in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):
+        expected = 2.0 * (c_ > 0) + 3.0 * (d_ <= 0)
+        assert float(function_of(graph, function)(c_, d_, 2.0, 3.0)) == expected
