@@ -138,3 +138,14 @@ def test_a_sweep_of_anything_else_is_another(course, tmp_path):
     ):
         with pytest.raises(AssertionError, match="nothing was left to do"):
             sweep(["integral"], other, elsewhere=refuse, **{**options, **changed})
+
+
+def test_a_digest_sees_every_entry_the_shape_and_the_type_of_an_array():
+    long = np.zeros(5000)
+    other = long.copy()
+    other[2500] = 1e-12  # repr leaves the middle of long arrays out
+    parts = [long, other, long.reshape(50, 100), long.astype(np.float32), long[:-1], "x", 1, 1.0]
+    assert len({content_digest(part) for part in parts}) == len(parts)
+    assert content_digest(long, 2.0) == content_digest(np.zeros(5000), 2.0)
+    assert content_digest(long[::2]) == content_digest(np.zeros(2500)), "strides do not matter"
+    assert content_digest("a", "b") != content_digest("ab")
