@@ -32,6 +32,7 @@ RATCHET = ROOT / "benchmarks" / "mutation" / "ratchet.toml"
 PLANTED = ROOT / "tests" / "planted_faults.toml"
 SEED, COUNT = 2026, 150
 CIRCLES = 2
+UNKNOWN = 120.0  # s, for tests that were not traced
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -52,9 +53,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     options.out.mkdir(parents=True, exist_ok=True)
     shops = [Workshop(ROOT, options.out / f"worker{k}") for k in range(options.workers)]
     traced = Traced(ROOT, options.out / "trace.json")
-    _trace(shops[0], traced, options.out)
     targets = Targets("mutants")
     if not options.planted_only:
+        _trace(shops[0], traced, options.out)
         results = _run_all(faults, shops, traced, options)
         _judge(results, traced, shops[0], options, targets)
     if PLANTED.exists() and not options.only:
@@ -208,13 +209,16 @@ def _replay(shop: Workshop, traced: Traced, targets: Targets) -> None:
         answer = shop.run(entry["tests"], _time_of(entry["tests"], traced), written_fault(entry))
         if not answer.caught:
             lost.append(entry["name"])
-        print(f"{entry['name']}: {f'caught by {answer.by}' if answer.caught else 'SURVIVED'}")
+        word = f"caught by {answer.by}" if answer.caught else "SURVIVED"
+        print(f"{answer.seconds:7.1f} s  {entry['name']}: {word}", flush=True)
     targets.at_most("planted faults that survive", len(lost), 0, "", key="planted/survived")
     targets.record("planted/faults", len(faults))
 
 
 def _time_of(paths: Sequence[str], traced: Traced) -> float:
-    return traced.seconds(name for name in traced.tests if name.startswith(tuple(paths)))
+    """Return how long tests take, long where nobody traced them [s]."""
+    known = [name for name in traced.tests if name.startswith(tuple(paths))]
+    return traced.seconds(known) if known else UNKNOWN
 
 
 def written_fault(entry: dict[str, Any], root: Path = ROOT) -> Fault:
