@@ -204,6 +204,10 @@ def _judge(
 def _replay(shop: Workshop, traced: Traced, targets: Targets) -> None:
     """Plant the faults that once went through; each must be caught by the tests it names."""
     faults = tomllib.loads(PLANTED.read_text(encoding="utf-8"))["fault"]
+    named = list(dict.fromkeys(name for entry in faults for name in entry["tests"]))
+    clean = shop.run(named, max(UNKNOWN, _time_of(named, traced)))
+    if clean.caught:
+        raise RuntimeError(f"{clean.by} fails without a fault:\n{clean.text[-2000:]}")
     lost = []
     for entry in faults:
         answer = shop.run(entry["tests"], _time_of(entry["tests"], traced), written_fault(entry))
