@@ -105,3 +105,10 @@ def test_the_self_test_starts_at_rest_and_turns_to_both_sides_at_many_speeds():
     for signal in signals:
         assert signal[fast].min() < 0.0 < signal[fast].max()
         assert signal[fast].max() + signal[fast].min() == pytest.approx(0.0, abs=0.4 * signal.max())
+
+
+def test_the_self_test_begins_gently_and_grows():
+    r = synthetic_samples(fold(make_method("integral", CAR), CAR))[:, 2]
+    first, middle, last = (np.abs(part).max() for part in np.array_split(r, 3))
+    assert first < 0.8 * middle and middle < 1.3 * last
+    assert np.abs(r[: r.size // 20]).max() < 0.2 * last
