@@ -201,3 +201,14 @@ def test_spikes_of_all_signals_at_once_are_not_believed(car, drive, law, rng):
     assert np.isfinite(history.axle_force).all()
     assert history.diverged_at is None
     assert np.abs(history.axle_force).max() < 3.0 * np.abs(recording.axle_force).max()
+
+
+def test_weights_keep_their_forces_in_a_design_of_another_force_unit(car, drive):
+    recording = drive(n=600)
+    design = default_design(car)
+    model = identify(recording, car, design).freeze(5.0)
+    other = replace(design, force_unit=4.0 * design.force_unit)
+    start = identify(recording, car, other, start=model).freeze(float(recording.t[0]))
+    expected = model.axle_force(recording)
+    assert np.abs(expected).max() > 100.0
+    np.testing.assert_allclose(start.axle_force(recording), expected, rtol=1e-9, atol=1e-6)

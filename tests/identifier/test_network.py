@@ -49,3 +49,9 @@ def test_output_is_odd(rng):
 def test_impossible_structures_are_refused(wrong):
     with pytest.raises(ValueError, match="must"):
         Network(**wrong)
+
+
+def test_a_list_of_scales_makes_the_same_network_as_a_tuple():
+    one = Network(inputs=["v_y", "r"], scale=[2.0, 3.0])
+    two = Network(inputs=("v_y", "r"), scale=(2.0, 3.0))
+    assert one == two and hash(one) == hash(two)

@@ -14,7 +14,7 @@ from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan
 from mpc.export.handover import NoHandoverError
-from mpc.export.pair import build_pair
+from mpc.export.pair import DELAY, build_pair
 from mpc.realtime import Tracker
 from mpc.tires import tire_model
 from tests.mpc.export.conftest import LAWS, STRICT, c_files, put
@@ -172,3 +172,9 @@ def test_a_curve_that_falls_is_no_tire(taught, pairs, libraries):
 def test_what_cannot_be_handed_over_is_said(law, complaint):
     with pytest.raises(NoHandoverError, match=complaint):
         build_pair(build_package(make_method(law, CAR), CAR))
+
+
+def test_a_pair_holds_each_package_under_its_own_name(pairs):
+    for pair in pairs.values():
+        assert pair.identifier.folded.name + "_mpc" == pair.tracker.name
+        assert pair.tracker.params["delay"] == DELAY
