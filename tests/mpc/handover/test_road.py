@@ -172,3 +172,17 @@ def test_a_change_waits_until_enough_was_seen_for_it(tire):
     assert look(half, wet, judge, usual=1.0, window=seen(0.7)).verdict is Verdict.RECOVERY
     fresh = half._replace(changed_at=9.5)
     assert look(fresh, wet, judge, usual=1.0, window=seen(0.4)).verdict is Verdict.CORRECTION
+
+
+def test_a_drop_is_sought_down_to_ice_and_in_the_last_moments_alone(tire):
+    lengths = []
+
+    class Watching(Formula):
+        def misfit(self, tire, samples):
+            lengths.append(len(samples))
+            return super().misfit(tire, samples)
+
+    change = look(Road(tire), tire, Watching(tire, true=0.16, least=1.0, slope=90.0), usual=1.0)
+    assert change.verdict is Verdict.FRICTION
+    assert 0.15 <= change.road.ratio < 0.18
+    assert lengths[0] == pytest.approx(Rules().last_moments / 0.01, abs=1)
