@@ -39,6 +39,7 @@ from tireid.figures import (
     weights_figure,
 )
 from tireid.figures.scheme import BLOCKS, DIFFERENCE, SIGNALS, SUM
+from tireid.figures.side_by_side import side_by_side_figure
 from tireid.figures.style import BLACK
 from tireid.figures.units import force_range, force_unit_of, impulse_unit
 
@@ -511,3 +512,32 @@ def test_a_comparison_over_decades_is_logarithmic_and_one_within_is_not() -> Non
     far = {"integral": {"online": (0.5, 0.4, 0.6), "32": (700.0, 600.0, 800.0)}}
     assert comparison_figure(near).axes[0].get_yscale() == "linear"
     assert comparison_figure(far).axes[0].get_yscale() == "log"
+
+
+@pytest.mark.parametrize("scale", [5000.0, 5.0])
+def test_models_side_by_side_are_drawn_in_the_unit_of_the_axis_with_what_they_miss(scale) -> None:
+    history = made_up(scale)
+    truth = history.recording.axle_force
+    assert truth is not None
+    near = replace(replayed(history), axle_force=0.9 * truth)
+    figure = side_by_side_figure({"near": near})
+    newtons = 1000.0 if scale > 100.0 else 1.0
+    assert f"[{'kN' if newtons > 1.0 else 'N'}]" in figure.axes[0].get_ylabel()
+    for axle in (0, 1):
+        upper, lower = figure.axes[axle], figure.axes[2 + axle]
+        drawn = {line.get_label(): np.asarray(line.get_ydata()) for line in upper.get_lines()}
+        assert drawn["near"] == pytest.approx(0.9 * truth[:, axle] / newtons)
+        (missed,) = lower.get_lines()
+        assert np.asarray(missed.get_ydata()) == pytest.approx(-0.1 * truth[:, axle] / newtons)
+
+
+def test_the_slip_figure_shows_truth_where_there_is_one_and_else_the_online_force() -> None:
+    known, blind = made_up(), made_up(truth=False)
+    for history, label in ((known, "truth"), (blind, "online")):
+        figure = slip_figure(history.freeze(22.0), history.recording, history)
+        labels = {text.get_text() for legend in figure.legends for text in legend.get_texts()}
+        labels |= {line.get_label() for axes in figure.axes for line in axes.get_lines()}
+        labels |= {dots.get_label() for axes in figure.axes for dots in axes.collections}
+        assert any(label in text for text in labels), labels
+        other = "online" if label == "truth" else "truth"
+        assert not any(other in text for text in labels), labels

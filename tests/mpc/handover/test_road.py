@@ -186,3 +186,10 @@ def test_a_drop_is_sought_down_to_ice_and_in_the_last_moments_alone(tire):
     assert change.verdict is Verdict.FRICTION
     assert 0.15 <= change.road.ratio < 0.18
     assert lengths[0] == pytest.approx(Rules().last_moments / 0.01, abs=1)
+
+
+@pytest.mark.parametrize("true", [0.237, 0.411, 0.683])
+def test_a_friction_is_found_finer_than_the_grid_of_the_first_look(tire, true):
+    judge = Formula(tire, true=true, least=1.0, slope=900.0)
+    change = look(Road(tire), tire, judge, usual=1.0)
+    assert change.road.ratio == pytest.approx(true, rel=0.02)
