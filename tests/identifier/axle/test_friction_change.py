@@ -14,7 +14,6 @@ from identifier.axle.friction_change import (
     ErrorState,
     alarm,
     error_means,
-    inflated,
 )
 from identifier.axle.piecewise import larger, smaller, within
 
@@ -87,16 +86,6 @@ def test_the_inflation_adds_the_square_of_the_step_in_its_time():
     detector = ChangeDetector(step=0.4, step_time=0.5)
     per_sample = detector.numbers(DT)[3]
     assert per_sample * 0.5 / DT == pytest.approx(0.4**2)
-
-
-def test_covariance_grows_along_the_direction_and_in_the_block_of_the_weights_alone():
-    full = np.array([[2.0, 0.1, 0.3], [0.1, 3.0, 0.2], [0.3, 0.2, 4.0]])
-    P = {(i, j): full[i, j] for i in range(3) for j in range(i, 3)}
-    d = np.array([0.5, -2.0])
-    grown = inflated(P, list(d), 0.7)
-    expected = full.copy()
-    expected[:2, :2] += 0.7 * np.outer(d, d)
-    assert grown == {(i, j): pytest.approx(expected[i, j]) for i, j in P}
 
 
 def test_larger_smaller_and_within_are_those_of_numpy(rng):
