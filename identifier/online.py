@@ -152,4 +152,6 @@ class OnlineIdentifier:
         """
         if self._diverged:
             raise DivergedError(f"the law diverged within {self.counts.samples} samples")
+        if self._stepper is None and self._start is not None:
+            return self._start
         return self.method.frozen(self.vehicle, self.carried())

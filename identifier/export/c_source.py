@@ -22,7 +22,12 @@ from identifier.export.layout import (
     sum_terms,
     write_expression,
 )
-from identifier.export.weight_rules import conditions, covariance_values, has_amounts
+from identifier.export.weight_rules import (
+    conditions,
+    covariance_values,
+    factor_values,
+    has_amounts,
+)
 
 TEMPLATES = Path(__file__).parent / "c"
 MACROS: Mapping[str, tuple[str, str]] = {  # in float and in double
@@ -145,11 +150,12 @@ def _parts(folded: FoldedStep, values: Values) -> dict[str, str]:
         "decided_functions": ("decided.c", decides),
     }
     weights = [member for member in carried_members(folded) if member.learnt]
-    covariance = covariance_values(weights)
+    covariance, factors = covariance_values(weights), factor_values(weights)
     inner = {
         "covariance_function": _filled("covariance.c", {**values, **covariance})
         if covariance
         else "",
+        "factors_function": _filled("factors.c", {**values, **factors}) if factors else "",
         "amounts_function": _filled("not_negative.c", values) if has_amounts(weights) else "",
     }
     values = {**values, **inner}

@@ -7,10 +7,11 @@ from identifier.axle import AxleDesign
 from identifier.method import Method
 
 LOAD = "static axle loads"
-COVARIANCE, NOT_NEGATIVE = "covariance", "not negative"  # rules of weights that are taken over
+# Rules of weights that are taken over.
+COVARIANCE, FACTORS, NOT_NEGATIVE = "covariance", "factors of a covariance", "not negative"
 RULES: Mapping[str, str] = {"P": COVARIANCE, "Omega": COVARIANCE, "information": NOT_NEGATIVE}
 AXLE_RULES: Mapping[str, str] = {
-    "P": COVARIANCE,
+    "UD": FACTORS,
     "errors": NOT_NEGATIVE,
     "excitation": NOT_NEGATIVE,
 }

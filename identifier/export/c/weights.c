@@ -1,4 +1,4 @@
-@covariance_function@@amounts_function@@name@_status @name@_get_weights(const @name@_state *state, @name@_weights *weights)
+@covariance_function@@factors_function@@amounts_function@@name@_status @name@_get_weights(const @name@_state *state, @name@_weights *weights)
 {
     @name@_status status = @NAME@_BAD_CALL;
     if ((state != NULL) && (weights != NULL)) {
