@@ -17,7 +17,7 @@ demo: $(VENV)/.demo
 	$(VENV)/bin/tireid demo --out out/demo --force
 
 test: $(VENV)/.test lint
-	$(PY) -m pytest
+	$(PY) -m pytest -n auto --dist worksteal
 
 lint: $(VENV)/.test
 	$(VENV)/bin/ruff check .
