@@ -136,6 +136,19 @@ def test_the_bound_solves_its_own_circle(noise, integrator):
     assert bounds.xi_tilde == pytest.approx(by_weights.xi_tilde, rel=1e-6)
 
 
+def test_the_noise_of_the_sensors_is_in_the_error_that_they_show():
+    """No force, no network: an error of n that turns at every sample, which Euler follows."""
+    a, dt, n = 6.0, 0.02, 0.3
+    e, largest = -n, 0.0  # of the estimate that begins at the first measurement
+    for k in range(200):
+        seen = e + n * (-1.0) ** k
+        largest, e = max(largest, abs(seen)), e - dt * a * seen
+    acting, A_d = Disturbance(residual=1e-9, noise=n), -a * np.eye(2)
+    error = error_gains(A_d, "euler", dt)
+    bound = by_projection(error, A_d, acting, n_h=4, W_max=0.0).xi_tilde
+    assert n < largest <= bound == pytest.approx(3.0 * n)  # 1 from the start, 1 from A_d n, 1 seen
+
+
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
 def test_weights_keep_their_bound_whatever_the_error_does_within_its_own(share):
     """φ = |W| + (g/λ) m, integrated with |ξ̃| = X all the time or none of it, from resumed weights.
