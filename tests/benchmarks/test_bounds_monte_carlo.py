@@ -9,7 +9,7 @@ from benchmarks import bounds_monte_carlo
 from benchmarks.bounds_monte_carlo import designs, driven, random_driving, record, run
 from benchmarks.random_drives import random_vehicle
 from benchmarks.targets import Targets
-from identifier.defaults import natural_network
+from identifier.network import Network
 from identifier.stability.property import Certificate
 from tireid.certificate_table import certificate_of
 
@@ -19,7 +19,7 @@ def a_case():
     rng = np.random.default_rng(2)
     vehicle = random_vehicle(rng)
     driving = random_driving(rng, vehicle)
-    return vehicle, list(designs(rng, vehicle, driving, natural_network(vehicle, hidden=5)))
+    return vehicle, list(designs(rng, vehicle, driving, Network(hidden=5)))
 
 
 def test_a_design_leaks_or_is_projected_and_its_bounds_are_those_of_the_command(case):
