@@ -3,14 +3,18 @@
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from identifier.defaults import natural_operation
 from identifier.design import Design
 from identifier.driving import Driving
 from identifier.laws import DRIVING_ERRORS
+from identifier.network import Weights
 from identifier.stability import Certificate, Property, certify
 from models.vehicle import Vehicle
 from tireid.figures.units import force_unit_name
 
+ROUNDING = 1e-9  # of weights that lie on their projection, in parts of its radius
 HEADER = ("property", "value", "limit", "margin", "")
 
 
@@ -103,6 +107,33 @@ def verdict_line(certificate: Certificate) -> str:
         f"certificate: {certificate.verdict}{reason}; sampled gain margin {number(gain.margin)}, "
         f"phase margin {phase.value:.0f} deg, damping {certificate['damping'].value:.2f}"
     )
+
+
+def resumed_line(certificate: Certificate, design: Design, first: Weights) -> str:
+    """Return what the certificate says of resumed weights: nothing where it covers them.
+
+    Its bounds hold from first weights that keep them.
+
+    Parameters
+    ----------
+    certificate : of the design.
+    design : with its projection.
+    first : weights that learning begins with.
+    """
+    known = {entry.name: entry.value for entry in certificate.properties}
+    W, V = known.get("weight_bound", math.inf), known.get("V_bound", math.inf)
+    layers = (
+        ("|W|", first.W, min(W, design.gains.W_max), unit_text("U", design.force_unit)),
+        ("|V|", first.V, V, ""),
+    )
+    beyond = [
+        f"{name} is {number(size)} {unit}".rstrip() + f", proven up to {number(bound)}"
+        for name, values, bound, unit in layers
+        if not (size := float(np.linalg.norm(values))) <= bound * (1.0 + ROUNDING)
+    ]
+    if not beyond:
+        return ""
+    return f"the certificate does not cover these resumed weights: {'; '.join(beyond)}"
 
 
 def unit_text(unit: str, force_unit: float) -> str:

@@ -17,6 +17,7 @@ from identifier.identify import identify
 from identifier.method import CannotFreezeError, FrozenModel, Method
 from identifier.methods import DEFAULT, METHODS, REFERENCE, draws_weights, make_method
 from identifier.model_file import load_model
+from identifier.network import Weights
 from identifier.reproducibility import (
     Replay,
     counted_samples,
@@ -27,7 +28,7 @@ from identifier.reproducibility import (
 )
 from models.recordings import Recording
 from models.vehicle import Vehicle
-from tireid.certificate_table import certificate_of, verdict_line
+from tireid.certificate_table import certificate_of, resumed_line, verdict_line
 from tireid.identify_results import error_cells, file_name, write_results
 from tireid.inputs import read_log
 from tireid.network_option import add_network_arguments, network_model
@@ -137,7 +138,7 @@ def run(options: argparse.Namespace) -> None:
             learnt = histories[0]
             frozen = {t: _replays(t, learnt, histories) for t in freeze_times}
             write_results(folder, law, learnt, histories[1:], frozen)
-            closing = _closing_line(learnt.freeze(freeze_times[-1]), design, vehicle)
+            closing = _closing_line(learnt, freeze_times[-1], vehicle, resumed=start is not None)
             told = f"{error_table(histories, frozen)}\n{closing}"
     tell(told)
     say(f"wrote {options.out}/")
@@ -151,10 +152,14 @@ def _require_model(law: str, design: Method, recording: Recording, vehicle: Vehi
         raise CannotFreezeError(f"--law {law}: {error}; tireid compare shows it") from None
 
 
-def _closing_line(model: FrozenModel, design: Method, vehicle: Vehicle) -> str:
+def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool) -> str:
     """Return the certificate of the paper's identifier, or what the axle identifier knows."""
+    model, design = learnt.freeze(t), learnt.design
     if isinstance(design, Design):
-        return verdict_line(certificate_of(design, vehicle))
+        certificate = certificate_of(design, vehicle)
+        first = Weights(W=learnt.carried["W"][0], V=learnt.carried["V"][0])
+        beyond = resumed_line(certificate, design, first) if resumed else ""
+        return "\n".join(line for line in (verdict_line(certificate), beyond) if line)
     if not isinstance(model, AxleModel):
         return "frozen; `tireid compare` sets it beside the other methods"
     stiffness, length = model.cornering_stiffness, model.relaxation_length

@@ -5,7 +5,7 @@ L' <= |ξ̃| (-λ_min(Q) |ξ̃|/2 + |P| w_bar + 2 k_b y - y²), hence L' < 0 whe
 w_bar bounds f - W tanh(V_hat x_bar): it includes W [tanh(V x_bar) - tanh(V_hat x_bar)].
 |.| spectral, Frobenius for weights. Forces in U (kN), ξ̃ in U s. `residual_bound` is sup|f| [U].
 
-(14) is proved for the instantaneous law. The integral law can exceed it; see `state_bound.py`.
+(14) is proved for the instantaneous law. The integral law can exceed it; see `sampled_bound.py`.
 """
 
 import math
@@ -137,29 +137,6 @@ def bound_14(pair: LyapunovPair, *, w_bar: float, k_b: float) -> float:
     k_b : of `printed_k_b`, `tight_k_b` or `k_b_with_V` [U].
     """
     return float(2.0 * (np.linalg.norm(pair.P, 2) * w_bar + k_b**2) / np.linalg.eigvalsh(pair.Q)[0])
-
-
-def best_printed_bound(
-    pair: LyapunovPair, *, w_bar: float, W_M: float, n_h: int, eta_W: float, rho_W: float
-) -> float:
-    """(14) with the printed k_b, minimized over the scale of P: b depends on it, the loop does not.
-
-    2 |P| (w_bar + √n_h W_M + n_h (η/ρ) |A_d⁻¹|)/λ_min(Q), at |P| = W_M/√n_h + (η/ρ) |A_d⁻¹|.
-    The first two terms are already what an identifier without a network has.
-
-    Parameters
-    ----------
-    pair : A_d, P and Q of A_dᵀ P + P A_d = -Q.
-    w_bar : bound on the approximation error [U].
-    W_M : bound on the ideal weights (Frobenius) [U].
-    n_h : hidden units; |s| <= √n_h.
-    eta_W : learning rate of (11).
-    rho_W : leakage gain of (11) [1/(U s²)].
-    """
-    require_positive(rho_W=rho_W)
-    inverse = float(np.linalg.norm(np.linalg.inv(pair.A_d), 2))
-    force = w_bar + math.sqrt(n_h) * W_M + n_h * eta_W / rho_W * inverse
-    return float(2.0 * np.linalg.norm(pair.P, 2) * force / np.linalg.eigvalsh(pair.Q)[0])
 
 
 def trivial_bound(A_d: npt.ArrayLike, residual_bound: float) -> float:

@@ -8,7 +8,7 @@ import pytest
 
 from identifier.defaults import default_design
 from identifier.design_file import design_text
-from identifier.methods import METHODS, draws_weights
+from identifier.methods import METHODS, draws_weights, make_method
 from identifier.model_file import load_model
 from models.recordings import read_recording
 from models.vehicle import sedan
@@ -357,6 +357,40 @@ def test_learning_goes_on_from_stored_weights(result, law, logs, tmp_path):
         summary = json.loads((tmp_path / name / "summary.json").read_text())
         errors[name] = summary["rmse_N"]["online"]["quick"]["front"]
     assert errors["stored"] < 0.9 * errors["afresh"]
+
+
+@pytest.mark.parametrize("layer", ["W", "V"])
+def test_resumed_weights_beyond_what_is_proven_are_told(logs, tmp_path, capsys, layer):
+    """On either side of the bound that `tireid check` states of the same gains."""
+    check = ["check", "--vehicle", str(logs / "car.toml"), "--json"]
+    assert main(check) == 0
+    name = {"W": "weight_bound", "V": "V_bound"}[layer]
+    bound = json.loads(capsys.readouterr().out)["properties"][name]["value"]
+    design = make_method("integral", sedan(), 0)
+    drawn = design.network.initial_weights(np.random.default_rng(0))
+    carried = {"W": np.ones_like(drawn.W), "V": drawn.V}
+    words = ["identify", logs / "quick.csv", "--vehicle", logs / "car.toml", "--paper"]
+    told = {}
+    for share in (0.99, 1.01):
+        size = np.linalg.norm(carried[layer])
+        weights = tmp_path / f"{share}.json"
+        design.frozen(sedan(), {**carried, layer: share * bound / size * carried[layer]}).save(
+            weights
+        )
+        more = ["--weights", weights, "--out", tmp_path / f"out{share}"]
+        assert main([str(word) for word in [*words, *more]]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        told[share] = [line for line in lines if "does not cover" in line]
+    assert told[0.99] == []
+    (line,) = told[1.01]
+    assert f"these resumed weights: |{layer}| is {1.01 * bound:.4g}" in line
+    assert f"proven up to {bound:.4g}" in line
+
+
+def test_drawn_weights_are_no_resumed_ones(logs, tmp_path, capsys):
+    words = ["identify", str(logs / "quick.csv"), "--vehicle", str(logs / "car.toml"), "--paper"]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 0
+    assert "does not cover" not in capsys.readouterr().out
 
 
 def test_weights_of_another_structure_are_refused(logs, tmp_path, capsys, result, law):

@@ -7,7 +7,7 @@ from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, euler, exac
 from identifier.stability.margins import phase_margin
 from identifier.stability.operation import Operation, worst_loop
 from identifier.stability.pi_lead import pi_lead
-from identifier.stability.state_bound import V_bound, steady_capacity
+from identifier.stability.state_bound import steady_capacity
 
 TASK = {
     "bandwidth": 0.7,
@@ -83,14 +83,10 @@ def test_a_design_keeps_its_rules(law):
         n_h=10,
     )
     assert capacity == pytest.approx(3.0 * 4.0)
-    V = V_bound(
-        gains.matrix,
-        bounds,
-        law=law,
-        forgetting=gains.forgetting,
-        eta_V=gains.eta_V,
-        rho_V=gains.rho_V,
-        x_bar_max=2.5,
+    drive, lam = gains.eta_V / a * bounds.W * 2.5, gains.forgetting  # of V, at the bounds
+    V = (
+        drive * (law.z / lam + law.xi_tilde) / gains.rho_V
+        + law.z * drive * bounds.xi_tilde / lam**2
     )
     assert pytest.approx(12.0) == V
 

@@ -18,7 +18,6 @@ from identifier.stability.monte_carlo import Beginning, largest_norms, monte_car
 from identifier.stability.operation import proven_bounds
 from identifier.stability.random_drives import measured, random_drives, within
 from identifier.stability.sampled_bound import by_leakage, by_projection, error_gains, output_layer
-from identifier.stability.state_bound import state_bounds
 from identifier.step import GAINS, build_step
 from models.vehicle import sedan
 
@@ -47,10 +46,12 @@ def test_without_noise_euler_has_the_bounds_of_the_closed_form(A_d, law):
     D, acting = -np.linalg.inv(A_d).T, Disturbance(residual=6.0)
     learning = output_layer(gains, law, D, n_h=4, integrator="euler", dt=0.01)
     found = by_leakage(error_gains(A_d, "euler", 0.01), learning, A_d, acting, 4)
-    numbers = {"law": law, "forgetting": 5.0, "eta_W": 40.0, "rho_W": 2.0, "n_h": 4}
-    expected = state_bounds(A_d, **numbers, residual_bound=6.0, dt=0.01)
-    assert found.xi_tilde == pytest.approx(expected.xi_tilde, rel=1e-6)
-    assert pytest.approx(expected.W, rel=1e-6) == found.W
+    powers = [np.linalg.matrix_power(np.eye(2) + 0.01 * A_d, k) for k in range(800)]
+    gamma, g = 0.01 * np.linalg.norm(powers, 2, axis=(1, 2)).sum(), 40.0 * np.linalg.norm(D, 2) * 2
+    balance, theta = g * (law.z / 5.0 + law.xi_tilde) / 2.0, law.z * gamma * 2 * g / 5.0**2
+    X = gamma * (6.0 + 2 * balance) / (1.0 - theta)
+    assert found.xi_tilde == pytest.approx(X, rel=1e-6)
+    assert pytest.approx(balance + law.z * g * X / 5.0**2, rel=1e-6) == found.W
 
 
 def test_the_gains_of_rk4_are_those_of_its_own_step():

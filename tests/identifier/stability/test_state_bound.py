@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -7,24 +5,18 @@ from identifier.design import Design
 from identifier.gains import Gains, diagonal
 from identifier.identify import identify
 from identifier.network import Network
+from identifier.stability.disturbance import Disturbance
 from identifier.stability.gain_limit import integral_euler_limit
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL
 from identifier.stability.lyapunov import lyapunov
+from identifier.stability.operation import Operation, proven_bounds
 from identifier.stability.pi_lead import pi_lead
-from identifier.stability.state_bound import (
-    NoBoundError,
-    Start,
-    V_bound,
-    projection_bound,
-    small_gain,
-    state_bounds,
-    steady_capacity,
-    transient_peak,
-)
+from identifier.stability.sampled_bound import by_leakage, by_projection, error_gains, output_layer
+from identifier.stability.state_bound import small_gain, steady_capacity, transient_peak
 from identifier.stability.ultimate_bound import (
-    best_printed_bound,
     bound_14,
     canceling_pair,
+    printed_k_b,
     tight_k_b,
     trivial_bound,
 )
@@ -33,13 +25,33 @@ SKEWED = np.array([[-4.0, 3.0], [-0.5, -6.0]])
 LAWS = {"integral": INTEGRAL, "instantaneous": INSTANTANEOUS, "pi_lead": pi_lead(0.3)}
 
 
-def simulated(A_d, law, lam, eta, rho, f, s, start=0.0, dt=2e-3, leak_scale=1.0, z=0.0, W=0.0):
-    """Largest |ξ̃| and |W| of the laws under given f (n, 2) and s (n, n_h), Euler.
+def learning_of(A_d, law, *, lam, eta_W, rho_W, n_h, integrator="euler", dt=2e-3):
+    """How W learns and leaks, along -A_d⁻ᵀ."""
+    gains = Gains(
+        A_d=tuple(map(tuple, np.asarray(A_d).tolist())),
+        forgetting=lam,
+        eta_W=eta_W,
+        eta_V=0.0,
+        rho_W=rho_W,
+        rho_V=0.0,
+    )
+    return output_layer(gains, law, -np.linalg.inv(A_d).T, n_h=n_h, integrator=integrator, dt=dt)
 
-    ξ̃ and z start along the first axle, W with the norm that is given, the way that z drives it.
+
+def leakage_bounds(A_d, law, f_max, *, n_h, integrator="euler", dt=2e-3, noise=0.0, **gains):
+    """The certificate's bounds by the leakage."""
+    learning = learning_of(A_d, law, n_h=n_h, integrator=integrator, dt=dt, **gains)
+    acting = Disturbance(residual=f_max, noise=noise)
+    return by_leakage(error_gains(A_d, integrator, dt), learning, A_d, acting, n_h)
+
+
+def simulated(A_d, law, lam, eta, rho, f, s, dt=2e-3, leak_scale=1.0, W=0.0):
+    """Largest |ξ̃| and |W| of the laws under given f (n, 2) and s (n, n_h), Euler, from ξ̃ = z = 0.
+
+    W starts along the first axle and the first units, with the norm that is given.
     """
     n_h = s.shape[1]
-    xi, z = np.array([start, 0.0]), np.array([z, 0.0])
+    xi, z = np.zeros(2), np.zeros(2)
     W = W / np.sqrt(n_h) * np.outer([1.0, 0.0], s[0])
     inverse, largest = np.linalg.inv(A_d).T, [0.0, 0.0]
     for force, units in zip(f, s, strict=True):
@@ -74,13 +86,10 @@ def test_error_and_weights_stay_within_their_bounds_for_the_worst_inputs_that_we
         eta = 0.6 / unit if unit > 0 else 20.0
         capacity = f_max * rng.uniform(0.5, 3.0)
         rho = steady_capacity(A_d, law=law, forgetting=lam, eta_W=eta, rho_W=capacity, n_h=n_h)
-        start = rng.choice([0.0, 1.0])
-        numbers = {"law": law, "forgetting": lam, "eta_W": eta, "rho_W": rho, "n_h": n_h}
-        bounds = state_bounds(
-            A_d, **numbers, residual_bound=f_max, start=Start(xi_tilde=start), dt=2e-3
-        )
+        bounds = leakage_bounds(A_d, law, f_max, lam=lam, eta_W=eta, rho_W=rho, n_h=n_h)
         f, s = nasty_inputs(rng, 5000, n_h, f_max)
-        error, W = simulated(A_d, law, lam, eta, rho, f, s, start)
+        resumed = rng.choice([0.0, 1.0]) * bounds.W
+        error, W = simulated(A_d, law, lam, eta, rho, f, s, W=resumed)
         assert error <= bounds.xi_tilde
         assert W <= bounds.W
         closest = [min(closest[0], bounds.xi_tilde / error), min(closest[1], bounds.W / W)]
@@ -88,8 +97,8 @@ def test_error_and_weights_stay_within_their_bounds_for_the_worst_inputs_that_we
 
 
 def test_weights_that_do_not_leak_pass_the_bound_that_leaking_ones_keep():
-    numbers = {"law": INSTANTANEOUS, "forgetting": 1.0, "eta_W": 20.0, "n_h": 4}
-    bounds = state_bounds(-4 * np.eye(2), **numbers, rho_W=5.0, residual_bound=20.0)
+    numbers = {"lam": 1.0, "eta_W": 20.0, "rho_W": 5.0, "n_h": 4}
+    bounds = leakage_bounds(-4 * np.eye(2), INSTANTANEOUS, 20.0, **numbers)
     f, s = np.tile([20.0, 0.0], (10000, 1)), np.ones((10000, 4))
     gains = (1.0, 20.0, 5.0)
     _, leaking = simulated(-4 * np.eye(2), INSTANTANEOUS, *gains, f, s)
@@ -107,82 +116,57 @@ def test_the_weights_settle_at_the_capacity_where_the_residual_is_larger():
 
 
 def test_the_bound_is_refused_where_the_circle_does_not_close():
-    numbers = {"law": INTEGRAL, "forgetting": 2.0, "rho_W": 1.0, "n_h": 4, "residual_bound": 1.0}
+    A_d, numbers = -3 * np.eye(2), {"lam": 2.0, "rho_W": 1.0, "n_h": 4, "integrator": "exact"}
     assert small_gain(
         -3 * np.eye(2), law=INTEGRAL, forgetting=2.0, eta_W=9.0, n_h=4
     ) == pytest.approx(1.0)  # η n_h = a² λ²
-    with pytest.raises(NoBoundError, match="below 1"):
-        state_bounds(-3 * np.eye(2), **numbers, eta_W=9.0)
-    assert state_bounds(-3 * np.eye(2), **{**numbers, "law": INSTANTANEOUS}, eta_W=1e6).W > 0
+    assert leakage_bounds(A_d, INTEGRAL, 1.0, **numbers, eta_W=9.01) is None
+    assert leakage_bounds(A_d, INTEGRAL, 1.0, **numbers, eta_W=8.99).W > 0
+    assert leakage_bounds(A_d, INSTANTANEOUS, 1.0, **numbers, eta_W=1e6).W > 0
 
 
-STARTS = [
-    Start(),
-    Start(xi_tilde=0.4),
-    Start(z=0.3),
-    Start(z=40.0),
-    Start(W=50.0),
-    Start(xi_tilde=0.4, z=8.0, W=50.0),
-]
+@pytest.mark.parametrize("noise", [0.0, 0.3])
+@pytest.mark.parametrize("integrator", ["exact", "euler"])
+def test_the_bound_solves_its_own_circle(noise, integrator):
+    numbers = {"lam": 2.0, "eta_W": 1.0, "rho_W": 0.7, "n_h": 4, "noise": noise, "dt": 0.02}
+    bounds = leakage_bounds(SKEWED, INTEGRAL, 1.5, integrator=integrator, **numbers)
+    acting = Disturbance(residual=1.5, noise=noise)
+    error = error_gains(SKEWED, integrator, 0.02)
+    by_weights = by_projection(error, SKEWED, acting, n_h=4, W_max=bounds.W)
+    assert bounds.xi_tilde == pytest.approx(by_weights.xi_tilde, rel=1e-6)
 
 
-@pytest.mark.parametrize("start", STARTS)
-@pytest.mark.parametrize("dt", [None, 0.02])
-def test_the_bound_solves_its_own_circle(start, dt):
-    numbers = {"forgetting": 2.0, "eta_W": 1.0, "n_h": 4}
-    bounds = state_bounds(
-        SKEWED, law=INTEGRAL, rho_W=0.7, residual_bound=1.5, start=start, dt=dt, **numbers
-    )
-    by_weights = projection_bound(
-        SKEWED, W_max=bounds.W, n_h=4, residual_bound=1.5, start=start, dt=dt
-    )
-    assert bounds.xi_tilde == pytest.approx(by_weights, rel=1e-12)
+def test_the_noise_of_the_sensors_is_in_the_error_that_they_show():
+    """No force, no network: an error of n that turns at every sample, which Euler follows."""
+    a, dt, n = 6.0, 0.02, 0.3
+    e, largest = -n, 0.0  # of the estimate that begins at the first measurement
+    for k in range(200):
+        seen = e + n * (-1.0) ** k
+        largest, e = max(largest, abs(seen)), e - dt * a * seen
+    acting, A_d = Disturbance(residual=1e-9, noise=n), -a * np.eye(2)
+    error = error_gains(A_d, "euler", dt)
+    bound = by_projection(error, A_d, acting, n_h=4, W_max=0.0).xi_tilde
+    assert n < largest <= bound == pytest.approx(3.0 * n)  # 1 from the start, 1 from A_d n, 1 seen
 
 
-@pytest.mark.parametrize("start", STARTS)
-def test_weights_keep_their_bound_whatever_the_error_does_within_its_own(start):
-    """φ = |W| + (g/λ) m and its sister for V, integrated with |ξ̃| = X all the time or none of it.
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_weights_keep_their_bound_whatever_the_error_does_within_its_own(share):
+    """φ = |W| + (g/λ) m, integrated with |ξ̃| = X all the time or none of it, from resumed weights.
 
-    With φ' and m' as in the text above the bounds: what a proof says of them, in small steps.
+    With φ' and m' as in the text above `small_gain`: what a proof says of them, in small steps.
     """
-    lam, eta, rho, n_h, x_bar = 2.0, 1.0, 30.0, 4, 2.5
-    size = np.linalg.norm(np.linalg.inv(SKEWED), 2)
-    start = replace(start, V=60.0)
-    numbers = {"law": INTEGRAL, "forgetting": lam}
-    bounds = state_bounds(
-        SKEWED, eta_W=eta, rho_W=rho, n_h=n_h, residual_bound=1.5, start=start, **numbers
-    )
-    V_limit = V_bound(SKEWED, bounds, eta_V=0.7, rho_V=rho, x_bar_max=x_bar, start=start, **numbers)
-    for gain, first, limit in (
-        (eta * size * np.sqrt(n_h), start.W, bounds.W),
-        (0.7 * size * bounds.W * x_bar, start.V, V_limit),
-    ):
-        for X in (bounds.xi_tilde, 1e-3):
-            m, dt = start.z, 0.02 / (rho * bounds.xi_tilde + lam)
-            phi, largest = first + gain / lam * m, 0.0
-            for _ in range(20000):
-                largest = max(largest, phi)
-                rate = X * (gain / lam + rho * gain / lam * m - rho * phi)
-                phi, m = phi + dt * rate, m + dt * (X - lam * m)
-            assert largest <= limit * (1 + 1e-9)
-
-
-@pytest.mark.parametrize("start", [Start(z=6.0, W=4.0), Start(z=6.0), Start(z=3.0, W=9.0)])
-def test_what_the_filter_remembers_at_the_start_is_counted(start):
-    """z(0) alone drives the weights; without it in the bound they would pass."""
-    lam, n_h, rho = 2.0, 4, 2.0
-    A_d = -4.0 * np.eye(2)
-    numbers = {"law": INTEGRAL, "forgetting": lam, "eta_W": 5.0, "n_h": n_h}
-    numbers |= {"rho_W": rho, "residual_bound": 1e-3}
-    bounds = state_bounds(A_d, start=start, **numbers)
-    s = np.ones((5000, n_h))
-    error, W = simulated(
-        A_d, INTEGRAL, lam, 5.0, rho, 0.0 * s[:, :2], s, dt=1e-3, z=start.z, W=start.W
-    )
-    assert error <= bounds.xi_tilde
-    assert W <= bounds.W
-    forgotten = state_bounds(A_d, start=replace(start, z=0.0), **numbers)
-    assert error > forgotten.xi_tilde or W > forgotten.W
+    lam, rho, n_h = 2.0, 30.0, 4
+    numbers = {"lam": lam, "eta_W": 1.0, "rho_W": rho, "n_h": n_h, "integrator": "exact"}
+    bounds = leakage_bounds(SKEWED, INTEGRAL, 1.5, **numbers)
+    gain = np.linalg.norm(np.linalg.inv(SKEWED), 2) * np.sqrt(n_h)
+    nearest = 0.0
+    for X in (bounds.stage, 1e-3):
+        m, dt, phi = 0.0, 0.02 / (rho * bounds.stage + lam), share * bounds.W
+        for _ in range(20000):
+            nearest = max(nearest, phi / bounds.W)
+            rate = X * (gain / lam + rho * gain / lam * m - rho * phi)
+            phi, m = phi + dt * rate, m + dt * (X - lam * m)
+    assert 0.9 < nearest <= 1.0 + 1e-9
 
 
 def sum_of_powers(A_d, dt):
@@ -199,11 +183,13 @@ def test_sampled_bounds_hold_the_gain_of_the_sampled_error_dynamics():
     assert gamma > 1.3 * sum_of_powers(A_d, 4e-3)
     theta = small_gain(A_d, law=INTEGRAL, forgetting=3.0, eta_W=0.4, n_h=4, dt=dt)
     assert theta == pytest.approx(gamma * 0.4 * size * 4 / 9.0, rel=1e-9)
-    projected = projection_bound(A_d, W_max=3.0, n_h=4, residual_bound=2.0, dt=dt)
-    assert projected == pytest.approx(gamma * (2.0 + 2.0 * 3.0), rel=1e-9)
-    numbers = {"forgetting": 3.0, "eta_W": 0.4, "rho_W": 0.5, "n_h": 4, "residual_bound": 2.0}
-    bounds = state_bounds(A_d, law=INSTANTANEOUS, dt=dt, **numbers)
-    assert bounds.xi_tilde == pytest.approx(gamma * (2.0 + 2.0 * 0.4 * size * 2.0 / 0.5), rel=1e-9)
+    error, acting = error_gains(A_d, "euler", dt), Disturbance(residual=2.0)
+    projected = by_projection(error, A_d, acting, n_h=4, W_max=3.0)
+    assert projected.xi_tilde == pytest.approx(gamma * (2.0 + 2.0 * 3.0), rel=1e-6)
+    numbers = {"lam": 3.0, "eta_W": 0.05, "rho_W": 0.5, "n_h": 4, "dt": dt}
+    bounds = leakage_bounds(A_d, INSTANTANEOUS, 2.0, **numbers)
+    expected = gamma * (2.0 + 2.0 * 0.05 * size * 2.0 / 0.5)
+    assert bounds.xi_tilde == pytest.approx(expected, rel=1e-6)
 
 
 def test_the_transient_of_skewed_error_dynamics_is_bounded():
@@ -244,28 +230,31 @@ def test_the_identifier_itself_keeps_the_bounds_of_leakage_and_of_projection(run
     history, residual = run(eta_W=100.0)
     f_max = np.linalg.norm(residual, axis=1).max()
     assert 1.0 < f_max < 20.0
-    numbers = {"law": INTEGRAL, "forgetting": 6.0}
     V_start = float(np.linalg.norm(history.carried["V"][0]))
-    bounds = state_bounds(
-        -6 * np.eye(2), **numbers, eta_W=100.0, rho_W=5.0, n_h=8, residual_bound=f_max, dt=0.01
+    signals = np.hstack([history.recording.x, history.recording.u])
+    x_bar_max = np.linalg.norm(signals / np.array(history.design.network.scale), axis=1).max()
+    operation = Operation(
+        n_h=8,
+        dt=0.01,
+        integrator="euler",
+        bandwidth=0.7,
+        disturbance=Disturbance(residual=f_max),
+        needed_force=f_max,
+        x_bar_max=x_bar_max,
+        input_feedback=None,
+        W_M=0.0,
+        w_bar=f_max,
+        V_start=V_start,
     )
+    inverse = np.eye(2) / 6.0
+    proven = proven_bounds(history.design.gains, INTEGRAL, operation, inverse)
+    bounds = proven.leakage
     error = np.linalg.norm(history.told["xi_tilde"], axis=1).max()
     assert 0.02 * bounds.xi_tilde < error <= bounds.xi_tilde
     assert np.linalg.norm(history.carried["W"], axis=(1, 2)).max() <= bounds.W
-    signals = np.hstack([history.recording.x, history.recording.u])
-    x_bar_max = np.linalg.norm(signals / np.array(history.design.network.scale), axis=1).max()
-    limit = V_bound(
-        -6 * np.eye(2),
-        bounds,
-        **numbers,
-        eta_V=5.0,
-        rho_V=5.0,
-        x_bar_max=x_bar_max,
-        start=Start(V=V_start),
-    )
-    assert np.linalg.norm(history.carried["V"], axis=(1, 2)).max() <= limit
+    assert np.linalg.norm(history.carried["V"], axis=(1, 2)).max() <= proven.V
     wild, residual = run(eta_W=1e5, rho_W=0.0, rho_V=0.0, W_max=3.0, V_max=9.0)
-    bound = projection_bound(-6 * np.eye(2), W_max=3.0, n_h=8, residual_bound=f_max, dt=0.01)
+    bound = proven_bounds(wild.design.gains, INTEGRAL, operation, inverse).projection.xi_tilde
     assert 0.1 * bound < np.linalg.norm(wild.told["xi_tilde"], axis=1).max() <= bound
 
 
@@ -288,7 +277,8 @@ def test_the_integral_law_passes_even_the_printed_route_where_a_is_slow():
     f, s = np.zeros((60000, 2)), np.ones((60000, n_h))
     f[:50] = 1e-3
     error, _ = simulated(-a * np.eye(2), INTEGRAL, lam, eta, rho, f, s, dt=dt)
-    pair = lyapunov(-a * np.eye(2), np.eye(2))
-    printed = best_printed_bound(pair, w_bar=0.0, W_M=0.0, n_h=n_h, eta_W=eta, rho_W=rho)
+    pair = lyapunov(-a * np.eye(2), 2.0 * eta / rho * np.eye(2))  # |P| = (η/ρ)/a: b is smallest
+    k_b = printed_k_b(pair, W_M=0.0, n_h=n_h, eta_W=eta, rho_W=rho)
+    printed = bound_14(pair, w_bar=0.0, k_b=k_b)
     assert error > 1.2 * printed
     assert trivial_bound(-a * np.eye(2), 1e-3) < printed

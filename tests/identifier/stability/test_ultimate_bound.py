@@ -1,9 +1,13 @@
 import numpy as np
 import pytest
 
+from identifier.gains import Gains
+from identifier.stability.disturbance import Disturbance
+from identifier.stability.loop import INSTANTANEOUS
 from identifier.stability.lyapunov import LyapunovError, lyapunov
+from identifier.stability.operation import Operation
+from identifier.stability.printed_bounds import printed_bounds
 from identifier.stability.ultimate_bound import (
-    best_printed_bound,
     bound_14,
     canceling_pair,
     k_b_with_V,
@@ -82,23 +86,47 @@ def test_the_canceling_pair_gives_the_closed_form_of_the_tight_bound():
         canceling_pair(np.array([[-1.0, 9.0], [0.0, -1.0]]), eta_W=1.0, rho_W=1.0)
 
 
+def best_printed(*, w_bar, W_M, n_h, eta_W, rho_W):
+    """The certificate's "printed_bound" for SKEWED."""
+    gains = Gains(
+        A_d=tuple(map(tuple, SKEWED.tolist())),
+        forgetting=1.0,
+        eta_W=eta_W,
+        eta_V=0.0,
+        rho_W=rho_W,
+        rho_V=0.0,
+    )
+    operation = Operation(
+        n_h=n_h,
+        dt=0.01,
+        integrator="exact",
+        bandwidth=1.0,
+        disturbance=Disturbance(residual=1.0),
+        needed_force=1.0,
+        x_bar_max=1.0,
+        input_feedback=None,
+        W_M=W_M,
+        w_bar=w_bar,
+    )
+    entries = printed_bounds(gains, INSTANTANEOUS, operation, trivial=1.0)
+    return {entry.name: entry.value for entry in entries}["printed_bound"]
+
+
 def test_the_best_scale_of_the_printed_bound_is_found_by_a_search_too():
     numbers = {**NUMBERS, "w_bar": 0.4}
-    unit = lyapunov(SKEWED, np.eye(2))
     found = min(
         bound_14(pair, w_bar=0.4, k_b=printed_k_b(pair, **NUMBERS))
         for scale in np.geomspace(0.1, 1e3, 2000)
         for pair in [lyapunov(SKEWED, scale * np.eye(2))]
     )
-    assert best_printed_bound(unit, **numbers) == pytest.approx(found, rel=1e-4)
+    assert best_printed(**numbers) == pytest.approx(found, rel=1e-4)
 
 
 def test_the_printed_bound_is_never_below_that_of_an_identifier_without_a_network():
     rng = np.random.default_rng(6)
     for _ in range(50):
         W_M, w_bar, eta, rho = np.exp(rng.uniform(-3, 3, 4))
-        pair = lyapunov(SKEWED, np.eye(2))
-        b = best_printed_bound(pair, w_bar=w_bar, W_M=W_M, n_h=6, eta_W=eta, rho_W=rho)
+        b = best_printed(w_bar=w_bar, W_M=W_M, n_h=6, eta_W=eta, rho_W=rho)
         assert b > trivial_bound(SKEWED, w_bar + np.sqrt(6) * W_M)
 
 
