@@ -99,8 +99,8 @@ class Plant:
         PlantError
             When a state stops being a finite number.
         """
-        every = round(sample_time / dt)
-        if not (dt > 0.0 and every >= 1 and abs(every * dt - sample_time) < 1e-9 * sample_time):
+        every = round(sample_time / dt) if dt > 0.0 else 0
+        if not (every >= 1 and abs(every * dt - sample_time) < 1e-9 * sample_time):
             raise ValueError(f"sample_time {sample_time} must be a multiple of dt {dt}")
         n = every * round(maneuver.duration / sample_time) + 1
         t = dt * np.arange(n, dtype=np.float64)

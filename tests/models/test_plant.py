@@ -481,3 +481,10 @@ def test_any_tire_can_be_mounted(tire):
     gradient = (CAR.axle_loads[0] - CAR.axle_loads[1]) / 12e4
     r = 0.004 * 20.0 / (CAR.wheelbase + gradient * 400.0 / GRAVITY)
     assert run.r[-1] == pytest.approx(r, rel=0.02)
+
+
+@pytest.mark.parametrize("dt", [0.0, -1e-3, 3e-3, float("nan")])
+def test_a_step_that_does_not_fit_the_samples_is_refused(dt):
+    slalom = Slalom(amplitude=0.02, frequency=0.5, onset=0.1, rate_limit=0.5, duration=0.5)
+    with pytest.raises(ValueError, match="multiple of dt"):
+        Plant(sedan()).simulate(slalom, speed=20.0, dt=dt)
