@@ -27,7 +27,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "gain_limit": [],
     "limit_cycle": [],
     "bounds_monte_carlo": [],
-    "hostile_certificates": ["300", "20"],
+    "hostile_certificates": [],
     "batch_speed": [],
     "export_cost": [],
     "kill_and_fill": [],

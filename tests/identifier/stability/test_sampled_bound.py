@@ -8,6 +8,7 @@ import pytest
 from identifier.defaults import default_design, design_for, natural_driving, natural_operation
 from identifier.design import Design
 from identifier.gains import Gains, diagonal
+from identifier.identify import identify
 from identifier.integrators import rk4
 from identifier.laws import DRIVING_ERRORS
 from identifier.network import Network
@@ -19,6 +20,8 @@ from identifier.stability.operation import proven_bounds
 from identifier.stability.random_drives import measured, random_drives, within
 from identifier.stability.sampled_bound import by_leakage, by_projection, error_gains, output_layer
 from identifier.step import GAINS, build_step
+from models.maneuvers import Slalom
+from models.plant import Plant
 from models.vehicle import sedan
 
 CAR = sedan()
@@ -215,3 +218,15 @@ def test_the_tight_route_claims_no_less_than_an_identifier_without_a_network():
         certificate = judged(default_design(CAR, law=law))
         for name in ("printed_bound", "tight_bound", "ultimate_bound"):
             assert certificate[name].value >= certificate["trivial_bound"].value * (1 - 1e-9)
+
+
+def test_the_sedan_in_its_own_slalom_keeps_the_bound_of_the_slip_that_it_reaches():
+    """At 20 m/s and 0.06 rad it slips less than 0.0597 rad, and misses force all the same."""
+    gentle = replace(DRIVING, v_x=20.0, slip=0.0597, bandwidth=0.5)
+    design = design_for(CAR, gentle)
+    slalom = Slalom(amplitude=0.06, frequency=0.5, onset=1.0, rate_limit=0.5, duration=20.0)
+    recording = Plant(CAR).simulate(slalom, speed=20.0).recording()
+    assert np.abs(recording.alpha(CAR.l_f, CAR.l_r)).max() < gentle.slip
+    told = identify(recording, CAR, design).told["xi_tilde"]
+    largest = np.linalg.norm(told.reshape(len(recording), 2), axis=1).max()
+    assert 0.039 < largest <= bounds_of(design, gentle).xi_tilde
