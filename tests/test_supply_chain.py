@@ -21,7 +21,8 @@ def wanted(extras):
     """Names and lowest versions that the project asks for."""
     texts = [*PROJECT["dependencies"]]
     texts += [text for extra in extras for text in PROJECT["optional-dependencies"][extra]]
-    return [re.fullmatch(r"([\w.-]+)>=([\d.]+)", text).groups() for text in texts]
+    others = [text for text in texts if not text.startswith(f"{PROJECT['name']}[")]
+    return [re.fullmatch(r"([\w.-]+)>=([\d.]+)", text).groups() for text in others]
 
 
 def number(version):
