@@ -117,6 +117,20 @@ class OnlineIdentifier:
             self._stepper = None
 
     @property
+    def start(self) -> FrozenModel | None:
+        """Stored weights that the run began with, None where it began afresh."""
+        return self._start
+
+    def restart(self, start: FrozenModel | None) -> None:
+        """Begin again at the next sample; the counts go on.
+
+        Parameters
+        ----------
+        start : stored weights to begin with; None begins afresh.
+        """
+        self._start, self._stepper, self._diverged = start, None, False
+
+    @property
     def diverged(self) -> bool:
         """Whether a force was not finite or a hundred times the weight."""
         return self._diverged

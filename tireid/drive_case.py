@@ -3,6 +3,7 @@
 import argparse
 import hashlib
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -13,7 +14,7 @@ import numpy as np
 from identifier.method import FrozenModel
 from identifier.model_format import vehicle_numbers
 from models.vehicle import Vehicle
-from tireid.drive_options import parse_drop, parse_speed, require_friction
+from tireid.drive_options import parse_drop, parse_fault, parse_speed, require_friction
 from tireid.drive_runs import FROZEN, LEARNING, LINEAR, ORACLE, Conditions
 from tireid.drive_setup import PERIOD, make_setup, named_path
 
@@ -66,6 +67,7 @@ def conditions_of(options: argparse.Namespace) -> Conditions:
         noise=options.noise,
         seed=options.seed,
         laps=options.laps,
+        faults=tuple(parse_fault(text) for text in options.fault),
     )
 
 
@@ -99,6 +101,7 @@ def headline(conditions: Conditions) -> str:
     share = "" if wish is None else f", {100.0 * wish:.0f} % of a grip of {setup.grip:.1f} m/s²"
     drops = "".join(f", {mu:g} from {s:g} m on" for s, mu in setup.drops)
     noise = "sensor noise" if conditions.noise else "no noise"
+    noise += "".join(f", {fault}" for fault in conditions.faults)
     return (
         f"{setup.path.name} at {speed}{share}; friction {setup.mu:g}{drops}; "
         f"{setup.plant} {setup.vehicle.name}, {1e3 * PERIOD * conditions.delay:g} ms delay, "
@@ -140,8 +143,14 @@ def inputs_of(
         "delay_ms": 1e3 * PERIOD * conditions.delay,
         "period_ms": 1e3 * PERIOD,
         "noise": conditions.noise,
+        "faults": [_finite(asdict(fault)) for fault in conditions.faults],
         "seed": conditions.seed,
     }
+
+
+def _finite(numbers: dict[str, Any]) -> dict[str, Any]:
+    """Return the numbers with null for what has no end, which JSON cannot say."""
+    return {key: None if value == math.inf else value for key, value in numbers.items()}
 
 
 def _chassis(vehicle: Vehicle) -> dict[str, Any]:

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from models.faults import KINDS
 from mpc.path import BUILT_IN
 from tireid.animation import FORMATS, require_ffmpeg
 from tireid.drive_case import ALL, conditions_of, headline, inputs_of, labels_of
@@ -98,6 +99,14 @@ def add_parser(commands: Any) -> None:
         action=argparse.BooleanOptionalAction,
         default=True,
         help="of the sensors (on)",
+    )
+    parser.add_argument(
+        "--fault",
+        action="append",
+        default=[],
+        metavar="CHANNEL:KIND:START:DURATION[:SIZE]",
+        help=f"a sensor that breaks on the path, times in s (v_y:biased:3:inf:0.5); kinds: "
+        f"{', '.join(KINDS)}; may be repeated",
     )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of noise and learning")
     parser.add_argument(

@@ -4,6 +4,9 @@ import math
 import re
 from typing import NamedTuple
 
+from models.faults import SIZED, SensorFault
+from mpc.loop import CarSensors, FaultySensors
+
 PERCENT, METERS, KILOMETERS = "%", "m/s", "km/h"
 PLAIN = 1.5  # a number without a unit up to here is a share of the grip
 
@@ -70,6 +73,34 @@ def parse_drop(text: str) -> tuple[float, float]:
     if not (math.isfinite(s) and s >= 0.0):
         raise ValueError(f"--mu-drop: the place must not be negative, it is {s:g} m")
     return s, require_friction("--mu-drop", mu)
+
+
+def parse_fault(text: str) -> SensorFault:
+    """Return what --fault says of a sensor.
+
+    Parameters
+    ----------
+    text : CHANNEL:KIND:START:DURATION[:SIZE], such as v_y:biased:3:inf:0.5.
+
+    Raises
+    ------
+    ValueError
+        Where it is not of that form, or not a fault that a sensor of the loop can have.
+    """
+    words = text.split(":")
+    try:
+        channel, kind, *numbers = words
+        start, duration, *size = map(float, numbers)
+        (most,) = size or [0.0]
+    except ValueError:
+        raise ValueError(
+            f"--fault wants CHANNEL:KIND:START:DURATION[:SIZE], times in s, not {text!r}"
+        ) from None
+    if kind in SIZED and not size:
+        raise ValueError(f"--fault {text}: {kind} needs a size")
+    fault = SensorFault(channel=channel, kind=kind, start=start, duration=duration, size=most)
+    FaultySensors(CarSensors(), [fault])  # refuses what is no channel
+    return fault
 
 
 def require_friction(word: str, mu: float) -> float:

@@ -5,7 +5,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from identifier.method import FrozenModel
-from mpc.loop import CarSensors, Drive, Learner, Scores, drive, inertial_unit, scores
+from models.faults import SensorFault
+from mpc.loop import (
+    CarSensors,
+    Drive,
+    FaultySensors,
+    Learner,
+    Measures,
+    Scores,
+    drive,
+    inertial_unit,
+    scores,
+)
 from mpc.problem import Problem
 from mpc.realtime import NoCompilerError, Tracker
 from mpc.tires import TireModel, tire_model
@@ -29,6 +40,7 @@ class Conditions:
     noise : whether sensors are noisy.
     seed : of the noise.
     laps : of a closed path.
+    faults : of the sensors, while the path is driven.
     """
 
     setup: Setup
@@ -36,11 +48,17 @@ class Conditions:
     noise: bool
     seed: int
     laps: float
+    faults: tuple[SensorFault, ...] = ()
 
     @property
     def sensors(self) -> CarSensors:
-        """The sensors of the car."""
+        """The sensors of the car, in order."""
         return inertial_unit() if self.noise else CarSensors()
+
+    @property
+    def driving_sensors(self) -> Measures:
+        """The sensors on the path, new ones for each drive: broken ones remember."""
+        return FaultySensors(self.sensors, self.faults) if self.faults else self.sensors
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,7 +141,7 @@ def run_drive(
         setup.car(),
         tracker,
         speed=setup.profile(),
-        sensors=conditions.sensors,
+        sensors=conditions.driving_sensors,
         delay=conditions.delay,
         rng=np.random.default_rng([conditions.seed, 2]),
         learner=learner,

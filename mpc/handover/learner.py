@@ -1,33 +1,15 @@
 """The whole of learning while driving, beside a tracker: observe, decide, move the weights."""
 
+from collections import deque
 from functools import partial
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from mpc.handover.blend import blended
+from mpc.handover.consistency import Consistency, FullSample
 from mpc.handover.preview import previewed_rate
 from mpc.handover.rules import Decision, Verdict
 from mpc.handover.supervisor import Supervisor
 from mpc.realtime import Tracker
-
-
-class Sample(Protocol):
-    """What a learner reads of a measurement, SI: `mpc.loop.sensing.Measured` is one."""
-
-    @property
-    def v_x(self) -> float:
-        """Longitudinal speed [m/s]."""
-
-    @property
-    def v_y(self) -> float:
-        """Lateral velocity [m/s]."""
-
-    @property
-    def r(self) -> float:
-        """Yaw rate [rad/s]."""
-
-    @property
-    def delta(self) -> float:
-        """Angle of the front road wheels [rad]."""
 
 
 class Moved(NamedTuple):
@@ -66,10 +48,12 @@ class Learner:
         self.supervisor = supervisor
         self.moves: list[Moved] = []
         self._jump, self._quick_jump = largest_jump, quick_jump
+        self._sensors = Consistency(supervisor.identifier.method.dt)
+        self._steered: deque[float] = deque()  # what was asked of the wheels, newest last [rad]
         self._left = 0.0  # time in which to arrive [s]
         self._quick = False
 
-    def observe(self, measured: Sample, tracker: Tracker) -> str | None:
+    def observe(self, measured: FullSample, tracker: Tracker) -> str | None:
         """Take a sample before the tracker steps; return what was decided, where that matters.
 
         Parameters
@@ -77,12 +61,32 @@ class Learner:
         measured : by the sensors.
         tracker : which steers; its tire is moved.
         """
-        decision = self.supervisor.observe(measured.v_x, measured.v_y, measured.r, measured.delta)
+        agree = self._sensors.observe(measured, self._asked(tracker))
+        decision = self.supervisor.observe(
+            measured.v_x,
+            measured.v_y,
+            measured.r,
+            measured.delta,
+            doubt=None if agree else str(self._sensors.worst),
+        )
         changed = decision is not None and decision.verdict is not Verdict.KEEP
         if decision is not None and changed:
             self._begin(decision)
         self._move(tracker)
         return f"{decision.verdict.value}: {decision.reason}" if decision and changed else None
+
+    def _asked(self, tracker: Tracker) -> float | None:
+        """Return the angle that the wheels should have by now [rad], None before it is known."""
+        ago = tracker.delay / tracker.period
+        self._steered.append(tracker.steering)
+        if len(self._steered) < ago + 2.0:
+            return None
+        while len(self._steered) > ago + 3.0:
+            self._steered.popleft()
+        # The newest was decided a period ago.
+        whole, part = divmod(max(ago - 1.0, 0.0), 1.0)
+        k = len(self._steered) - 1 - int(whole)
+        return self._steered[k] + part * (self._steered[k - 1] - self._steered[k])
 
     def _begin(self, decision: Decision) -> None:
         rules = self.supervisor.rules

@@ -30,6 +30,8 @@ class Rules:
     follow : time for which a new friction is corrected as more is seen of it [s].
     correction : evidence that is enough for that [-].
     usual_time : over which the usual size of misfits is averaged [s].
+    revoke : what was handed over this long before the sensors were found to disagree is taken back
+        [s].
     blend, quick_blend : time in which weights move to those handed over [s], for a learnt tire and
         for another friction.
 
@@ -53,6 +55,7 @@ class Rules:
     follow: float = 2.0
     correction: float = 2.0
     usual_time: float = 10.0
+    revoke: float = 1.0
     blend: float = 0.4
     quick_blend: float = 0.08
 
@@ -68,6 +71,7 @@ class Verdict(Enum):
     FRICTION = "friction lost"
     CORRECTION = "friction corrected"
     RECOVERY = "friction regained"
+    DOUBT = "sensors in doubt"
 
 
 class Decision(NamedTuple):

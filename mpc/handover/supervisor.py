@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from identifier.history import DivergedError
-from identifier.method import CannotFreezeError
+from identifier.method import CannotFreezeError, FrozenModel
 from identifier.online import OnlineIdentifier
 from mpc.handover.certificate import law_complaint, tire_complaint
 from mpc.handover.excitation import Excitation
@@ -66,6 +66,10 @@ class Supervisor:
         self._usual = 1.0  # mean misfit of the tire in use
         self._proven = proven
         self._road = Road(in_use)
+        # What was steered with and what was learnt, and since when [s], to go back to.
+        self._steered = [(-math.inf, in_use, self._road)]
+        self._models: list[tuple[float, FrozenModel | None]] = [(-math.inf, identifier.start)]
+        self._agreed = True
         self.decisions: list[Decision] = []
         self.last = Decision(0.0, Verdict.KEEP, "nothing was driven yet", 0.0, 0.0)
 
@@ -85,8 +89,13 @@ class Supervisor:
         """Time since the first sample [s]."""
         return self._samples * self._dt
 
-    def observe(self, v_x: float, v_y: float, r: float, delta: float) -> Decision | None:
+    def observe(
+        self, v_x: float, v_y: float, r: float, delta: float, *, doubt: str | None = None
+    ) -> Decision | None:
         """Take a sample; return a decision where one was due.
+
+        A sample in doubt teaches nothing. Where doubt begins, what is steered with and what was
+        learnt go back to what they were before its cause can have been at work.
 
         Parameters
         ----------
@@ -94,9 +103,13 @@ class Supervisor:
         v_y : lateral velocity [m/s].
         r : yaw rate [rad/s].
         delta : angle of the front road wheels [rad].
+        doubt : why the sensors are not to be believed, in words; None where they are.
         """
-        self.identifier.update(np.array([v_y, r]), np.array([delta, 0.0]), v_x)
         self._samples += 1
+        if doubt is not None:
+            return self._doubted(doubt)
+        self._agreed = True
+        self.identifier.update(np.array([v_y, r]), np.array([delta, 0.0]), v_x)
         if all(map(math.isfinite, (v_x, v_y, r, delta))):
             self._lost = 0
             sample = (v_x, v_y, r, delta)
@@ -111,9 +124,37 @@ class Supervisor:
         self._excitation.add(*sample)
         if self._samples % self._every and self._samples % self._learnt_every:
             return None
+        if not self._samples % self._learnt_every:
+            self._remember()
         self.last = self._decide(sample[0])
         if self.last.verdict is not Verdict.KEEP:
             self.decisions.append(self.last)
+            self._steered.append((self.t, self.target, self._road))
+        return self.last
+
+    def _remember(self) -> None:
+        """Keep what was learnt by now, and of what is older only the newest that may be needed."""
+        try:
+            model = self.identifier.model()
+        except (DivergedError, CannotFreezeError, ValueError):
+            return
+        self._models.append((self.t, model))
+        old = [one for one in self._models if one[0] <= self.t - self.rules.revoke]
+        self._models = self._models[max(len(old) - 1, 0) :]
+
+    def _doubted(self, doubt: str) -> Decision | None:
+        """Take a sample that is not believed; return the decision where doubt begins."""
+        self._window.clear()
+        if not self._agreed:
+            return None
+        self._agreed = False
+        before = self.t - self.rules.revoke
+        self._steered = [one for one in self._steered if one[0] <= before]
+        self._models = [one for one in self._models if one[0] <= before] or self._models[:1]
+        _, self.target, self._road = self._steered[-1]
+        self.identifier.restart(self._models[-1][1])
+        self.last = Decision(self.t, Verdict.DOUBT, doubt, 0.0, 0.0)
+        self.decisions.append(self.last)
         return self.last
 
     def _keep(self, reason: str, in_use: float = 0.0, candidate: float = 0.0) -> Decision:

@@ -5,15 +5,17 @@ from mpc.loop.limit import cornering_limit
 from mpc.loop.profile import Preview, SpeedProfile
 from mpc.loop.record import Drive, Plan
 from mpc.loop.scores import Scores, scores
-from mpc.loop.sensing import CarSensors, Measured, inertial_unit
+from mpc.loop.sensing import CarSensors, FaultySensors, Measured, Measures, inertial_unit
 from mpc.loop.tracking import PathTracker
 
 __all__ = [
     "COMPLETED",
     "CarSensors",
     "Drive",
+    "FaultySensors",
     "Learner",
     "Measured",
+    "Measures",
     "PathTracker",
     "Plan",
     "Preview",

@@ -7,7 +7,7 @@ d periods later.
 import math
 from collections import deque
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from mpc.cars import Car, CarState
 from mpc.loop.profile import SpeedProfile
 from mpc.loop.record import Drive
 from mpc.loop.recorder import Recorder
-from mpc.loop.sensing import CarSensors, Measured
+from mpc.loop.sensing import CarSensors, Measured, Measures
 from mpc.loop.tracking import PathTracker
 from mpc.path.path import Path
 from mpc.path.projection import Projection
@@ -45,7 +45,7 @@ def drive(
     tracker: PathTracker,
     *,
     speed: SpeedProfile | float,
-    sensors: CarSensors | None = None,
+    sensors: Measures | None = None,
     delay: int = 1,
     rng: np.random.Generator,
     learner: Learner | None = None,
@@ -92,10 +92,12 @@ def drive(
     waiting = deque([0.0] * delay)
     record = Recorder(plan_every)
     here, believed = path.project(state.X, state.Y, 0.0), 0.0
+    place = Place(state.X, state.Y, state.psi, state.v_x, 0.0, 0.0)
     ending = ""
     while not ending:
         measured = sensors.measure(state, rng)
-        seen = path.project(measured.X, measured.Y, believed)
+        place = _located(measured, place, car.period)
+        seen = path.project(place.X, place.Y, believed)
         believed = seen.s
         if learner is not None:
             record.note(state.t, learner.observe(measured, tracker))
@@ -103,7 +105,7 @@ def drive(
         command = tracker.step(
             Measurement(
                 e_y=seen.e_y,
-                e_psi=seen.heading_error(measured.psi),
+                e_psi=seen.heading_error(place.psi),
                 v_y=measured.v_y,
                 r=measured.r,
                 kappa=ahead.kappa,
@@ -133,6 +135,36 @@ def drive(
         completed=ending == COMPLETED,
         ending=ending,
     )
+
+
+class Place(NamedTuple):
+    """Where the car is taken to be [m, rad], and the last motion that was a number [m/s, rad/s]."""
+
+    X: float
+    Y: float
+    psi: float
+    v_x: float
+    v_y: float
+    r: float
+
+
+def _located(measured: Measured, last: Place, dt: float) -> Place:
+    """Return the measured place; a coordinate that is no number goes on by dead reckoning."""
+    v_x, v_y, r = (
+        value if math.isfinite(value) else old
+        for value, old in zip((measured.v_x, measured.v_y, measured.r), last[3:], strict=True)
+    )
+    psi = measured.psi if math.isfinite(measured.psi) else last.psi + dt * r
+    cos_psi, sin_psi = math.cos(psi), math.sin(psi)
+    reckoned = (
+        last.X + dt * (v_x * cos_psi - v_y * sin_psi),
+        last.Y + dt * (v_x * sin_psi + v_y * cos_psi),
+    )
+    X, Y = (
+        value if math.isfinite(value) else old
+        for value, old in zip((measured.X, measured.Y), reckoned, strict=True)
+    )
+    return Place(X, Y, psi, v_x, v_y, r)
 
 
 def _at_the_start(path: Path, car: Car, profile: SpeedProfile) -> CarState:

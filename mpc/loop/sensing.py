@@ -1,10 +1,12 @@
 """What a driving car measures of itself, sample by sample."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from models.faults import FaultError, SensorFault
 from models.sensors import Sensor, SensorError
 from mpc.cars.car import CarState
 
@@ -23,6 +25,19 @@ class Measured(NamedTuple):
     r: float
     delta: float
     a_y: float
+
+
+class Measures(Protocol):
+    """What a loop measures a car with."""
+
+    def measure(self, state: CarState, rng: np.random.Generator) -> Measured:
+        """Return what is measured at one instant.
+
+        Parameters
+        ----------
+        state : the truth.
+        rng : source of the noise.
+        """
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,3 +109,47 @@ def inertial_unit() -> CarSensors:
         delta=Sensor(noise=0.0005),
         a_y=Sensor(noise=0.1),
     )
+
+
+class FaultySensors:
+    """Sensors of which some channels break for some time; a stuck one shows its last good value.
+
+    Parameters
+    ----------
+    sensors : the good ones.
+    faults : what breaks, where channels are those of `Measured`.
+
+    Raises
+    ------
+    FaultError
+        For a channel that is not measured.
+    """
+
+    def __init__(self, sensors: CarSensors, faults: Sequence[SensorFault]) -> None:
+        for fault in faults:
+            if fault.channel not in Measured._fields[1:]:
+                channels = ", ".join(Measured._fields[1:])
+                raise FaultError(f"channel must be one of {channels}, it is {fault.channel!r}")
+        self._sensors, self._faults = sensors, tuple(faults)
+        self._good: Measured | None = None
+
+    def measure(self, state: CarState, rng: np.random.Generator) -> Measured:
+        """Return what is measured at one instant, calls in the order of time.
+
+        Parameters
+        ----------
+        state : the truth.
+        rng : source of the noise; of a fault's own noise too, so that it changes no other draw.
+        """
+        shown = self._sensors.measure(state, rng)
+        held = self._good if self._good is not None else shown
+        good = shown
+        for fault in self._faults:
+            name = fault.channel
+            if fault.active(state.t):
+                own = np.random.default_rng(round(1e6 * state.t)).standard_normal()
+                value = fault.shown(state.t, getattr(shown, name), getattr(held, name), own)
+                shown = shown._replace(**{name: float(value)})
+                good = good._replace(**{name: getattr(held, name)})
+        self._good = good
+        return shown

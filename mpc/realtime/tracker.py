@@ -105,6 +105,11 @@ class Tracker:
         return max(self.delay - 0.5 * self.period, 0.0)
 
     @property
+    def steering(self) -> float:
+        """Angle that the last step told to steer [rad]."""
+        return float(self.instance.steering)
+
+    @property
     def faults(self) -> dict[Status, int]:
         """Steps of each status since the tracker was made."""
         return {status: int(self.instance.state["faults"][status]) for status in Status}

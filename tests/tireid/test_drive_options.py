@@ -1,8 +1,17 @@
 """How fast and on what road: words with units, and one clear line for what is no speed."""
 
+import math
+
 import pytest
 
-from tireid.drive_options import SpeedWish, parse_drop, parse_speed, require_friction
+from models.faults import SensorFault
+from tireid.drive_options import (
+    SpeedWish,
+    parse_drop,
+    parse_fault,
+    parse_speed,
+    require_friction,
+)
 
 
 @pytest.mark.parametrize(
@@ -67,3 +76,27 @@ def test_a_friction_names_the_word_that_gave_it():
     assert require_friction("--mu", 0.5) == 0.5
     with pytest.raises(ValueError, match="--mu: friction must be"):
         require_friction("--mu", 2.0)
+
+
+def test_a_fault_is_a_channel_a_kind_times_and_a_size():
+    assert parse_fault("v_y:biased:3:inf:0.5") == SensorFault(
+        channel="v_y", kind="biased", start=3.0, duration=math.inf, size=0.5
+    )
+    assert parse_fault("r:stuck:1:2").duration == 2.0
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("v_y", "wants CHANNEL:KIND"),
+        ("v_y:biased:soon:1:2", "wants CHANNEL:KIND"),
+        ("v_y:biased:1:2:3:4", "wants CHANNEL:KIND"),
+        ("v_y:biased:1:2", "biased needs a size"),
+        ("v_z:zero:1:2", "channel must be one of"),
+        ("v_y:tired:1:2", "kind must be one of"),
+        ("v_y:zero:-1:2", "start must be"),
+    ],
+)
+def test_what_is_no_fault_is_refused_with_its_rule(text, said):
+    with pytest.raises(ValueError, match=said):
+        parse_fault(text)

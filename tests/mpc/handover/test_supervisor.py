@@ -231,3 +231,45 @@ def test_a_tire_that_cannot_be_told_for_a_friction_still_learns(car, dry):
     assert all(d.verdict is Verdict.LEARNT for d in supervisor.decisions)
     with pytest.raises(ValueError, match="another friction"):
         at_friction(supervisor.target, 0.5)
+
+
+def test_doubt_takes_back_what_was_handed_over_just_before_and_teaches_nothing(
+    car, learnt, dropped
+):
+    """A friction that was believed a moment before the sensors disagree may be their fault."""
+    supervisor, rows = supervisor_of(car, learnt), samples_of(dropped[1])
+    k = 0
+    while not any(d.verdict is Verdict.FRICTION for d in supervisor.decisions):
+        supervisor.observe(*rows[k])
+        k += 1
+    before = [d for d in supervisor.decisions if d.t <= supervisor.t - supervisor.rules.revoke]
+    samples, wet = supervisor.identifier.counts.samples, supervisor.target
+    decision = supervisor.observe(*rows[k], doubt="sensors disagree")
+    assert (decision.verdict, decision.reason) == (Verdict.DOUBT, "sensors disagree")
+    assert supervisor.target is not wet
+    if not before:
+        np.testing.assert_array_equal(supervisor.target.weights, tire_model(learnt).weights)
+    for row in rows[k + 1 : k + 60]:
+        assert supervisor.observe(*row, doubt="sensors disagree") is None
+    assert supervisor.identifier.counts.samples == samples
+    assert supervisor.t == pytest.approx(0.01 * (k + 60))
+
+
+def test_after_doubt_learning_goes_on_from_what_was_known_before_it(car, learnt, dry):
+    supervisor, rows = supervisor_of(car, learnt), samples_of(dry[1])
+    for row in rows[:600]:
+        supervisor.observe(*row)
+    known = next(
+        model for t, model in reversed(supervisor._models) if t <= 6.0 - supervisor.rules.revoke
+    )
+    supervisor.observe(*rows[600], doubt="sensors disagree")
+    assert supervisor.identifier.model().to_dict() == known.to_dict()
+    for row in rows[700:900]:
+        supervisor.observe(*row)
+    assert supervisor.identifier.model().to_dict() != known.to_dict()
+
+
+def test_what_is_kept_to_go_back_to_does_not_grow(car, learnt, dry):
+    supervisor = watched(supervisor_of(car, learnt), dry[1])
+    rules = supervisor.rules
+    assert len(supervisor._models) <= rules.revoke / rules.learnt_every + 3

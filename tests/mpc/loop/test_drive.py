@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from models.faults import FaultError, SensorFault
 from models.friction import Friction
 from models.sensors import Sensor, SensorError
 from models.vehicle import sedan
@@ -12,6 +13,7 @@ from mpc.cars import DoubleTrackCar
 from mpc.loop import (
     COMPLETED,
     CarSensors,
+    FaultySensors,
     SpeedProfile,
     drive,
     inertial_unit,
@@ -199,3 +201,29 @@ def test_what_does_not_fit_together_is_refused(bump):
         drive(bump, car(), Driver(), speed=10.0, delay=-1, rng=seeded())
     with pytest.raises(SensorError, match="belongs to the loop"):
         CarSensors(r=Sensor(delay=0.01))
+
+
+@pytest.mark.parametrize("channel", ["X", "Y", "psi"])
+def test_a_place_that_is_no_number_goes_on_by_dead_reckoning(bump, channel):
+    """Half a second without it, and the car is where it was steered to, to some centimeters."""
+    fault = SensorFault(channel=channel, kind="lost", start=1.0, duration=0.5)
+    driven = drive(
+        bump,
+        DoubleTrackCar(sedan()),
+        driver := Driver(),
+        speed=15.0,
+        sensors=FaultySensors(inertial_unit(), [fault]),
+        rng=np.random.default_rng(0),
+    )
+    assert driven.completed
+    assert np.isfinite([[m.e_y, m.e_psi] for m in driver.seen]).all()
+    lost = fault.active(driven.t)
+    told = np.array([m.e_y for m in driver.seen])
+    assert np.abs(told - driven.e_y)[lost].max() < 0.15
+    assert np.isnan(driven.measured[channel][lost]).all()
+
+
+def test_a_fault_of_a_channel_that_is_not_measured_is_refused():
+    fault = SensorFault(channel="v_z", kind="lost", start=1.0, duration=0.5)
+    with pytest.raises(FaultError, match="channel must be one of X, Y"):
+        FaultySensors(CarSensors(), [fault])

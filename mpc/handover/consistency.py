@@ -1,0 +1,193 @@
+"""Do the sensors agree? Every channel that teaches is held against others that do not share it.
+
+Observers run beside the car, each a signal predicted from others and pulled to its own measurement
+with the rate l; l times what is left, averaged over 1/l, is the disagreement:
+    position   (X, Y)' = R(ψ) (v_x, v_y)     along and across the body      [m/s]
+    heading    ψ' = r                                                       [rad/s]
+    lateral    v_y' = a_y - v_x r                                           [m/s²]
+    steering   δ = what was asked of the wheels a delay ago                 [rad]
+A bias b of v_y shows as b (1 - (1 + l t) exp(-l t)) across, so that one of twice the tolerance is
+seen after 1.7/l. A channel that is stuck, flipped, scaled or noisy breaks the same relations.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+from identifier.axle.checks import require_positive
+
+
+class FullSample(Protocol):
+    """What is read of a measurement, SI: `mpc.loop.sensing.Measured` is one."""
+
+    @property
+    def X(self) -> float:
+        """Position [m]."""
+
+    @property
+    def Y(self) -> float:
+        """Position [m]."""
+
+    @property
+    def psi(self) -> float:
+        """Heading [rad]."""
+
+    @property
+    def v_x(self) -> float:
+        """Longitudinal speed [m/s]."""
+
+    @property
+    def v_y(self) -> float:
+        """Lateral velocity [m/s]."""
+
+    @property
+    def r(self) -> float:
+        """Yaw rate [rad/s]."""
+
+    @property
+    def delta(self) -> float:
+        """Angle of the front road wheels [rad]."""
+
+    @property
+    def a_y(self) -> float:
+        """Lateral acceleration [m/s²]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tolerances:
+    """How far good sensors may disagree.
+
+    Parameters
+    ----------
+    rate : l, at which an observer is pulled to its measurement [1/s].
+    along : of v_x against the position [m/s], and ...
+    along_share : ... for each m/s of speed [-]: a wheel's radius is known to about that.
+    across : of v_y against the position [m/s].
+    heading : of r against the heading [rad/s].
+    lateral : of v_y against a_y and v_x r [m/s²].
+    steering : of δ against what was asked [rad], and ...
+    steering_time : ... for each rad/s of steering: the actuator's lag is known to about that [s].
+    calm : time of agreement after which learning goes on [s].
+
+    Raises
+    ------
+    ValueError
+        Where a number is not positive.
+    """
+
+    rate: float = 5.0
+    along: float = 0.2
+    along_share: float = 0.02
+    across: float = 0.15
+    heading: float = 0.02
+    lateral: float = 0.6
+    steering: float = 0.01
+    steering_time: float = 0.03
+    calm: float = 0.5
+
+    def __post_init__(self) -> None:
+        require_positive(self)
+
+
+class Disagreement(NamedTuple):
+    """The worst relation: its name, what is left of it, and that over what is tolerated."""
+
+    relation: str
+    value: float
+    unit: str
+    share: float
+
+    def __str__(self) -> str:
+        """Return it in words."""
+        return f"{self.relation} disagree by {self.value:.2g} {self.unit}"
+
+
+NONE = Disagreement("", 0.0, "", 0.0)
+NOT_A_NUMBER = Disagreement("a sensor shows no number: sensors", math.inf, "", math.inf)
+
+
+class Consistency:
+    """Watches the sensors of a car, sample by sample.
+
+    Attributes: agrees, whether they do and did for a while; worst, of the last sample.
+
+    Parameters
+    ----------
+    dt : sampling interval [s].
+    tolerances : how far good sensors may disagree; None takes the default.
+    """
+
+    def __init__(self, dt: float, tolerances: Tolerances | None = None) -> None:
+        self._dt, self._allowed = dt, tolerances or Tolerances()
+        self._calm = math.inf
+        self._begin()
+        self.agrees, self.worst = True, NONE
+
+    def _begin(self) -> None:
+        self._told: tuple[float, ...] | None = None  # X, Y, ψ, v_y as predicted
+        self._rates: tuple[float, ...] = ()
+        self._means: tuple[float, ...] = (0.0,) * 6
+        self._last_asked = 0.0
+
+    def observe(self, measured: FullSample, asked: float | None = None) -> bool:
+        """Take a sample; return whether the sensors agree.
+
+        Parameters
+        ----------
+        measured : by the sensors.
+        asked : angle asked of the wheels that should have been reached by now [rad]; None where it
+            is not known.
+        """
+        self.worst = self._judged(measured, asked)
+        self._calm = 0.0 if self.worst.share > 1.0 else self._calm + self._dt
+        self.agrees = self._calm >= self._allowed.calm
+        return self.agrees
+
+    def _judged(self, m: FullSample, asked: float | None) -> Disagreement:
+        allowed, pull, dt = self._allowed, self._allowed.rate, self._dt
+        if not all(map(math.isfinite, (m.X, m.Y, m.psi, m.v_x, m.v_y, m.r, m.delta, m.a_y))):
+            self._begin()
+            return NOT_A_NUMBER
+        cos_psi, sin_psi = math.cos(m.psi), math.sin(m.psi)
+        rates = (
+            m.v_x * cos_psi - m.v_y * sin_psi,
+            m.v_x * sin_psi + m.v_y * cos_psi,
+            m.r,
+            m.a_y - m.v_x * m.r,
+        )
+        shown = (m.X, m.Y, m.psi, m.v_y)
+        if self._told is None:
+            self._told, self._rates = shown, rates
+            self._last_asked = m.delta if asked is None else asked
+        # Trapezoidal: half a sample of a turning car is 0.1 m/s across.
+        moved = [0.5 * dt * (a + b) for a, b in zip(self._rates, rates, strict=True)]
+        told = [a + b for a, b in zip(self._told, moved, strict=True)]
+        left = [a - b for a, b in zip(shown, told, strict=True)]
+        left[2] = math.remainder(left[2], math.tau)
+        self._told = tuple(x + pull * dt * e for x, e in zip(told, left, strict=True))
+        self._rates = rates
+        along, across = (
+            left[0] * cos_psi + left[1] * sin_psi,
+            left[1] * cos_psi - left[0] * sin_psi,
+        )
+        steering, turning = self._means[4:]
+        if asked is not None:
+            steering, turning = m.delta - asked, abs(asked - self._last_asked) / dt
+            self._last_asked = asked
+        rates_left = [pull * one for one in (along, across, left[2], left[3])]
+        now = (*rates_left, steering, turning)
+        self._means = tuple(a + pull * dt * (b - a) for a, b in zip(self._means, now, strict=True))
+        along, across, heading, lateral, steering, turning = self._means
+        steers = allowed.steering + allowed.steering_time * turning
+        relations = (
+            ("v_x and position", along, "m/s", allowed.along + allowed.along_share * abs(m.v_x)),
+            ("v_y, heading and position", across, "m/s", allowed.across),
+            ("yaw rate and heading", heading, "rad/s", allowed.heading),
+            ("v_y, a_y and yaw rate", lateral, "m/s²", allowed.lateral),
+            ("steering and what was asked of it", steering, "rad", steers),
+        )
+        found = [
+            Disagreement(relation, value, unit, abs(value) / most)
+            for relation, value, unit, most in relations
+        ]
+        return max(found, key=lambda one: one.share)
