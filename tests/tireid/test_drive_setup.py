@@ -1,14 +1,13 @@
 """What is driven: when the car is expected where, where its road changes, and what a case is."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from models.vehicle import sedan
 from mpc.path import Path
 from tireid.drive_case import headline
-from tireid.drive_options import SpeedWish
+from tireid.drive_options import SpeedWish, parse_fault
+from tireid.drive_runs import Conditions
 from tireid.drive_setup import Setup
 
 AROUND = np.linspace(0.0, 2.0 * np.pi, 101)[:-1]
@@ -52,14 +51,17 @@ def test_a_drop_comes_at_a_place_along_x_and_at_a_time_elsewhere():
     assert setup(LANE, SpeedWish(None, 16.0), mu=0.7).friction().scale == 0.7
 
 
-def said(drive, delay=2, noise=True):
-    return headline(SimpleNamespace(setup=drive, delay=delay, noise=noise, seed=7))
+def said(drive, delay=2, noise=True, faults=()):
+    case = Conditions(setup=drive, delay=delay, noise=noise, seed=7, laps=1.0, faults=tuple(faults))
+    return headline(case)
 
 
 def test_a_case_is_said_with_its_speeds_share_drops_delay_and_seed():
     words = said(setup(LANE, SpeedWish(None, 16.0), ((60.0, 0.5),), mu=0.9))
     assert words.startswith("lane at 16.0 m/s; friction 0.9, 0.5 from 60 m on; double-track")
     assert words.endswith("20 ms delay, sensor noise, seed 7")
+    broken = said(setup(LANE, SpeedWish(None, 16.0)), faults=[parse_fault("r:scaled:1:2:0.8")])
+    assert "sensor noise, r scaled 0.8 from 1 s on for 2 s, seed 7" in broken
     drive = setup(COURSE, SpeedWish(0.8, None))
     words = said(drive, delay=0, noise=False)
     low, high = drive.speeds().min(), drive.speeds().max()
