@@ -131,3 +131,22 @@ def test_a_single_sample_may_come_flat_and_one_too_many_is_refused(scan, rng):
         scan(1, values | {"M": np.zeros(6)})
     with pytest.raises(ValueError, match=r"s must have shape \(2, 1\)"):
         scan(1, values | {"s": np.zeros(3)})
+
+
+def test_a_matrix_for_each_sample_is_laid_out_by_columns_in_one_row(monkeypatch, tmp_path, rng):
+    monkeypatch.setenv("TIREID_CACHE", str(tmp_path))
+    s, A = ca.SX.sym("s", 2), ca.SX.sym("A", 2, 3)
+    step = ca.Function("turned", [s, A], [A[:, :2] @ s, A], ["s", "A"], ["s_next", "seen"])
+    matrices = rng.normal(size=(5, 2, 3))
+    rows = np.array([matrix.ravel(order="F") for matrix in matrices])
+    compiled, machine = (Scan(step, carry=("s",), over=("A",)) for _ in range(2))
+    machine.__dict__["loop"] = None
+    expected = np.array([1.0, -2.0])
+    for matrix in matrices:
+        expected = matrix[:, :2] @ expected
+    for scan in (compiled, machine):
+        record = scan(5, {"s": np.array([1.0, -2.0]), "A": rows})
+        np.testing.assert_allclose(record["seen"], matrices, rtol=1e-13)
+        np.testing.assert_allclose(record["s_final"], expected, rtol=1e-12)
+    with pytest.raises(ValueError, match=r"A must have shape \(5, 6\), not \(5, 2\)"):
+        compiled(5, {"s": np.ones(2), "A": np.ones((5, 2))})

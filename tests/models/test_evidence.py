@@ -102,3 +102,17 @@ def test_the_rear_slip_is_that_at_the_rear_axle(l_f, l_r, good):
     else:
         with pytest.raises(RecordingError, match="lateral acceleration must rise"):
             check_against_vehicle(recording, car)
+
+
+def test_what_counts_as_moving_is_three_tenths_of_the_usual_speed_and_not_of_a_short_peak():
+    still = turning()
+    v_x = np.full(still.t.size, 20.0)
+    v_x[still.t > 19.5] = 60.0  # a fortieth of the time
+    crawling = (still.t > 8.0) & (still.t < 12.0)
+    for slow, counts in ((5.9, False), (6.1, True)):
+        now = np.where(crawling, slow, v_x)
+        w = windows(Recording(**{**vars_of(still), "v_x": now}))
+        assert (w.v_x.min() == pytest.approx(slow)) == counts
+        assert (w.v_x.min() == pytest.approx(20.0)) != counts
+    walking = windows(Recording(**{**vars_of(still), "v_x": np.where(crawling, 0.49, 1.0)}))
+    assert walking.v_x.min() == pytest.approx(1.0)  # noise, whatever share of the usual it is

@@ -314,3 +314,16 @@ def test_a_mirrored_drive_gives_mirrored_forces(car, drive):
     right = replace(left, v_y=-left.v_y, r=-left.r, delta_f=-left.delta_f)
     forces = [identify(recording, car, design).axle_force for recording in (left, right)]
     np.testing.assert_allclose(forces[0], -forces[1], atol=1e-6)
+
+
+def test_a_change_of_friction_too_large_for_the_limit_teaches_as_if_none_were_seen(car, drive):
+    """What is not added to the covariance does not take up its room either."""
+    recording, P = disturbed(drive(n=900, amplitude=0.08)), {}
+    alarms = {"none": {"threshold": 1e6}, "too large": {"step": 1e6}, "fits": {"step": 0.05}}
+    for name, change in alarms.items():
+        design = AxleDesign.for_vehicle(car)
+        rung = replace(design.change, **({"threshold": 0.3, "fast": 0.1, "slow": 5.0} | change))
+        history = identify(recording, car, replace(design, change=rung))
+        P[name] = history.freeze(1e9).covariance
+    np.testing.assert_allclose(P["too large"], P["none"], rtol=1e-12)
+    assert np.abs(P["fits"] / P["none"] - 1.0).max() > 0.01, "the alarm rings"

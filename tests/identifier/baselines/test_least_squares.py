@@ -49,3 +49,25 @@ def test_the_unit_of_the_residual_does_not_matter(unit):
     plain = least_squares(rosenbrock, start, -FREE, FREE, steps=12)
     np.testing.assert_allclose(fit.parameters, plain.parameters, rtol=1e-5)
     assert fit.cost == pytest.approx(unit**2 * plain.cost, rel=1e-4)
+
+
+@pytest.mark.parametrize("start", [0.5, 0.7, 0.8, 0.9, 1.0, 1.05])
+def test_the_damping_of_the_second_step_follows_nielsens_rule(start):
+    """r = tanh p, whose steps overshoot: by the length of the second step, its damping."""
+
+    def after(steps):
+        first = np.array([start])
+        free = np.array([np.inf])
+        return float(least_squares(np.tanh, first, -free, free, steps=steps).parameters[0])
+
+    def damping(p, then):
+        return -np.tanh(p) * np.cosh(p) ** 2 / (then - p) - 1.0
+
+    one, two = after(1), after(2)
+    slope = 1.0 / np.cosh(start) ** 2
+    linear = np.tanh(start) + slope * (one - start)
+    cost = np.tanh(start) ** 2
+    gained = (cost - np.tanh(one) ** 2) / (cost - linear**2)
+    assert 0.0 < gained < 1.0
+    ratio = damping(one, two) / damping(start, one)
+    assert ratio == pytest.approx(max(1 / 3, 1 - (2 * gained - 1) ** 3), rel=5e-3)

@@ -102,3 +102,10 @@ def test_the_sampled_peak_gain_is_the_sum_of_the_powers():
     assert sampled_peak_gain(-5.0 * np.eye(2), 0.02) == pytest.approx(0.2, rel=1e-12)
     with pytest.raises(NotHurwitzError, match="unit circle"):
         sampled_peak_gain(-5.0 * np.eye(2), 0.4)
+
+
+@pytest.mark.parametrize("share", [1e-4, 1e-2, 1e3])
+@pytest.mark.parametrize("A_d", [SKEWED, [[-1.0, 50.0], [0.0, -1.5]], [[-1.0, 30.0], [-0.2, -1.0]]])
+def test_the_peak_gain_of_slower_dynamics_is_longer_by_as_much(A_d, share):
+    """Time in another unit: exp(c A_d t) at t is exp(A_d t) at c t."""
+    assert peak_gain(share * np.array(A_d)) == pytest.approx(peak_gain(A_d) / share, rel=1e-8)
