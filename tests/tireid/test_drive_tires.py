@@ -6,6 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from identifier.network import Network, Weights
+from identifier.network_model import NetworkModel
 from models.vehicle import sedan
 from mpc.path import Path
 from mpc.tires import tire_model
@@ -54,3 +56,22 @@ def test_what_a_tracker_was_told_later_is_shown_as_the_end(setup):
     labels = [curve.label for curve in known_curves([same, changed], setup, None)]
     assert FROZEN in labels and FROZEN + AT_THE_END not in labels
     assert LEARNING + AT_THE_END in labels and LEARNING not in labels
+
+
+@pytest.mark.parametrize("v_x", [8.0, 16.0])
+def test_a_network_is_shown_sliding_sideways_as_fast_as_the_slip_says(v_x):
+    """It looks at v_y = -v_x tan(alpha) and at nothing else; the linear tire below it has slip."""
+    W, V = np.array([[2.0, -1.0], [0.5, 1.5]]), np.array([[1.0], [0.3]])
+    model = NetworkModel(
+        vehicle=CAR,
+        network=Network(hidden=2, inputs=("v_y",), scale=(4.0,)),
+        weights=Weights(W=W, V=V),
+        force_unit=1500.0,
+        min_speed=1.0,
+    )
+    curve = steady_curve("network", tire_model(model), v_x)
+    v_y = -v_x * np.tan(curve.alpha)
+    slope = np.array([CAR.cornering_stiffness_front, CAR.cornering_stiffness_rear])
+    learnt = 1500.0 * W @ np.tanh(V * v_y / 4.0)
+    expected = curve.alpha[:, None] * slope + learnt.T
+    np.testing.assert_allclose(curve.force, expected, rtol=1e-6, atol=1e-3)

@@ -161,3 +161,23 @@ def test_the_same_file_gives_the_same_verdict_and_options_are_said(tmp_path, cap
     assert "conditions: as stored in the design\n" in capsys.readouterr().out
     main(["check", str(path), "--slip", "0.2"])
     assert "as stored in the design, but for --slip" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("share", [0.5, 2.0, np.inf])
+def test_drives_resume_with_the_smaller_of_proven_and_projected_weights(
+    monkeypatch, tmp_path, share
+):
+    """A projection beyond what the leakage keeps, or none, lets no drive begin beyond the bound."""
+    seen, design = [], default_design(sedan())
+    bound = certificate_of(design, sedan())["weight_bound"].value
+    path = tmp_path / "design.toml"
+    gains = replace(design.gains, W_max=share * bound)
+    path.write_text(design_text(replace(design, gains=gains)))
+
+    def resumed(*_, beginning, **__):
+        seen.append(beginning.W)
+        return observed([0.5])
+
+    monkeypatch.setattr(check_command, "monte_carlo", resumed)
+    main(["check", str(path), "--monte-carlo", "1"])
+    assert seen == [pytest.approx(min(share, 1.0) * bound, rel=1e-3)]

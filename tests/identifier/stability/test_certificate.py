@@ -3,6 +3,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import solve_continuous_lyapunov
 
 from identifier.gains import Gains, diagonal
 from identifier.laws import instantaneous, integral
@@ -235,3 +236,38 @@ def test_a_margin_is_the_ratio_of_value_and_limit_and_one_is_the_limit():
     assert gentle["small_gain"].margin == pytest.approx(100.0 * strong["small_gain"].margin)
     quiet = certify(gains(eta_W=1e-300), integral, CITY)["small_gain"]
     assert quiet.status == "pass" and quiet.margin > 1e100
+
+
+def test_the_lead_holds_a_force_along_its_own_direction():
+    """P of A_dᵀ P + P A_d = -2 I; far from normal it is not as large as A_d⁻ᵀ."""
+    A_d = np.array([[-4.0, 30.0], [-6.0, -9.0]])
+    lead = replace(gains(lam=5.0, lead=0.4), A_d=tuple(map(tuple, A_d.tolist())))
+    P = solve_continuous_lyapunov(A_d.T, -2.0 * np.eye(2))
+    driven = 10 * lead.eta_W * np.linalg.norm(P, 2) * (1.0 / 5.0 + 0.4)
+    entry = certify(lead, lead_law, CITY)["capacity"]
+    assert entry.value == pytest.approx(driven / lead.rho_W)
+    assert entry.margin == pytest.approx(driven / lead.rho_W / CITY.needed_force)
+
+
+def test_a_small_phase_margin_comes_with_advice_that_repairs_it():
+    poor = gains(eta_W=0.9 * integral_euler_limit(8.0, 8.0, 0.01) / 10)
+    before = certify(poor, integral, CITY)["phase_margin"]
+    assert (before.status, before.advice) == ("warn", "lower eta_W")
+    after = certify(replace(poor, eta_W=0.05 * poor.eta_W), integral, CITY)["phase_margin"]
+    assert after.value > 3.0 * before.value
+    assert (after.status, after.advice) == ("pass", "")
+
+
+def test_the_bound_of_V_counts_the_weights_of_inner_stages():
+    """RK4 asks for slopes at weights beyond those of the samples, and leaks on slopes."""
+    design = gains(eta_W=50.0, eta_V=0.5, rho_W=10.0, rho_V=2.0)
+    bounds = certify(design, instantaneous, replace(CITY, integrator="rk4"))
+    kept, leaks = bounds["weight_bound"].value, bounds["leakage_step"].value
+    slope = (
+        50.0 * np.sqrt(10.0) / 8.0 * leaks / 10.0
+    )  # what moves W in one step: η_W |D| √n_h T |ξ̃|
+    beyond = slope * (leaks / 2.0 + leaks**2 / 4.0)
+    assert 0.001 * kept < beyond < kept
+    driven = 0.5 / 8.0 * (kept + beyond) * CITY.x_bar_max
+    weaker = 2.0 * (1.0 - bounds["leakage_step_V"].value)
+    assert bounds["V_bound"].value == pytest.approx(driven / weaker, rel=1e-9)

@@ -6,10 +6,12 @@ import pytest
 from identifier.defaults import default_design
 from identifier.driving import Driving
 from identifier.laws import DRIVING_ERRORS
+from identifier.network import Network
 from identifier.stability import certify
 from identifier.stability.driving_limits import (
     disturbance,
     expected_residual,
+    input_per_error,
     largest_signals,
     operation,
     residual_bound,
@@ -104,3 +106,28 @@ def test_a_network_that_reads_the_estimate_brings_its_feedback_along(car):
     task = operation(design, car, DRIVING)
     assert task.input_feedback is not None
     assert 5.0 < minimal_decay(task.input_feedback) < 12.0
+
+
+def test_a_speed_that_errs_by_half_of_itself_is_refused():
+    """A slip angle divides by what the sensor shows: an error near the speed leaves nothing."""
+    half = 0.5 * DRIVING.v_x
+    assert replace(DRIVING, noise_v_x=0.99 * half).noise_v_x == 0.99 * half
+    for wrong in (half, 1.2 * half):
+        with pytest.raises(ValueError, match="noise_v_x must be below half the speed"):
+            replace(DRIVING, noise_v_x=wrong)
+
+
+def test_an_error_of_the_estimate_adds_most_to_the_input_at_the_slowest_speed_that_is_shown(car):
+    """Slip angles that the network reads, by hand, where the sensor shows its least."""
+    names = ("alpha_f", "alpha_r")
+    network = Network(hidden=4, inputs=names, scale=(0.1, 0.2))
+    design = replace(default_design(car), network=network, input_source="estimated")
+    noisy = replace(DRIVING, noise_v_x=4.0)
+    K_inv = np.array(
+        [[car.mass * car.l_r, car.yaw_inertia], [car.mass * car.l_f, -car.yaw_inertia]]
+    )
+    K = np.linalg.inv(K_inv / car.wheelbase)
+    shown = 0.95 * 20.0 - 4.0
+    angles = np.array([[1.0, car.l_f], [1.0, -car.l_r]]) / shown
+    expected = np.linalg.norm(angles / [[0.1], [0.2]] @ K * design.force_unit, 2)
+    assert input_per_error(design, car, noisy) == pytest.approx(expected, rel=1e-9)

@@ -168,3 +168,15 @@ def test_slips_are_those_of_the_paper(drives):
     small = np.abs(slips(CAR, drives)[2]) < 0.05
     alpha = recording.alpha(CAR.l_f, CAR.l_r)
     np.testing.assert_allclose(slips(CAR, drives)[2][small], alpha[small], atol=2e-4)
+
+
+def test_first_weights_of_V_are_shrunk_to_the_largest_that_a_drive_may_begin_with():
+    """Drawn larger they keep their direction, drawn smaller they stay as they were drawn."""
+    design, norms = default_design(CAR), {}
+    for largest in (2.0, 100.0):
+        begun = first_weights(design, COUNT, Beginning(W=0.0, V=largest), np.random.default_rng(8))
+        norms[largest] = begun.V, np.linalg.norm(begun.V, axis=(1, 2))
+    (shrunk, short), (drawn, long) = norms[2.0], norms[100.0]
+    assert long.min() > 2.0
+    np.testing.assert_allclose(short, 2.0, rtol=1e-12)
+    np.testing.assert_allclose(shrunk * (long / 2.0)[:, None, None], drawn, rtol=1e-12)
