@@ -53,7 +53,8 @@ def test_a_drop_comes_at_a_place_along_x_and_at_a_time_elsewhere():
 
 
 def said(drive, delay=2, noise=True):
-    return headline(SimpleNamespace(setup=drive, delay=delay, noise=noise, seed=7))
+    case = SimpleNamespace(setup=drive, delay=delay, noise=noise, seed=7, faults=())
+    return headline(case)
 
 
 def test_a_case_is_said_with_its_speeds_share_drops_delay_and_seed():
