@@ -4,8 +4,8 @@ Left alone is what cannot change behavior or is none of it: docstrings, annotati
 decorators; what an error, a warning, a log line, a progress line or the help of a command says; in
 files that draw, constants, and the calls and keywords that only place, color, size or name; the
 encoding of a file and the strictness of `zip`. A fault whose bytecode is that of the original file
-is none. A limit moved onto its bound (< to <=) is one only beside a number or a length: two
-computed numbers are never equal.
+is none, nor are swapped arguments whose order is nothing to their function. A limit moved onto its
+bound (< to <=) is one only beside a number or a length: two computed numbers are never equal.
 """
 
 import ast
@@ -49,6 +49,7 @@ EXCHANGED = {
     "mean": "median",
 }
 EXCHANGED |= {new: old for old, new in EXCHANGED.items()}
+SYMMETRIC = {"minimum", "maximum", "fmin", "fmax", "hypot"}  # of their first two arguments
 DROPPED_CALLS = {"abs", "fabs", "sqrt", "reversed", "sorted", "round", "flip", "cumsum", "conj"}
 OPERATOR = r"\*\*|//|[-+*/%]|[<>=!]=|[<>]|\bis not\b|\bis\b|\bnot in\b|\bin\b|\band\b|\bor\b"
 AXLES = re.compile(r"(?<![a-z])(front|rear)(?![a-z])|(?<=_)([fr])(?![a-zA-Z0-9])")
@@ -309,7 +310,8 @@ class _Rules(ast.NodeVisitor):
         if name in DROPPED_CALLS and len(node.args) == 1:
             self._replace("dropped call", node, f"({self._text(node.args[0])})")
         for one, two in zip(node.args, node.args[1:], strict=False):
-            if not (isinstance(one, ast.Starred) or isinstance(two, ast.Starred)):
+            starred = isinstance(one, ast.Starred) or isinstance(two, ast.Starred)
+            if not (starred or _symmetric(node)):
                 first, second = self._span(one), self._span(two)
                 middle = self.source[first[1] : second[0]].decode()
                 swapped = f"{self._text(two)}{middle}{self._text(one)}"
@@ -378,6 +380,13 @@ def _called(node: ast.Call) -> str:
     if isinstance(node.func, ast.Attribute):
         return node.func.attr
     return node.func.id if isinstance(node.func, ast.Name) else ""
+
+
+def _symmetric(node: ast.Call) -> bool:
+    """Whether a call takes its arguments in any order; np.max(a, 0) and max(a, b, key=f) do not."""
+    if isinstance(node.func, ast.Name) and node.func.id in ("min", "max"):
+        return not node.keywords
+    return _called(node) in SYMMETRIC and len(node.args) == 2
 
 
 def _is_text(statement: ast.stmt) -> bool:

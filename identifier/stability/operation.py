@@ -182,8 +182,8 @@ def _kept_V(
     X, W = found.stage, found.W
     if not math.isfinite(X):
         return gains.V_max
-    if found.leakage is not None and found.projection is None:
-        W += max(learning.beyond(X))
+    if found.leakage is not None:  # inner stages go beyond, as far as the projection lets them
+        W = min(found.leakage.W + max(learning.beyond(X)), gains.W_max)
     x_bar = operation.x_bar_max + operation.input_per_error * X
     drive = gains.eta_V * float(np.linalg.norm(direction, 2)) * W * x_bar
     if drive == 0.0 and gains.rho_V == 0.0:

@@ -99,6 +99,23 @@ def test_what_cannot_change_behavior_is_left_alone(source):
         assert "a + b" not in faulty and "3.0" not in faulty and "0.75" not in faulty
 
 
+@pytest.mark.parametrize(
+    "call",
+    ["max(a, b)", "min(a, b, c)", "np.minimum(a, b)", "ca.fmax(a, b)", "math.hypot(a, b)"],
+)
+def test_arguments_are_not_swapped_where_their_order_is_nothing(call):
+    assert "swapped arguments" not in planted(call)
+    (inner,) = planted(call.replace("a,", "f(a, d),"))["swapped arguments"]
+    assert inner == call.replace("a,", "f(d, a),"), "a call inside is swapped all the same"
+
+
+@pytest.mark.parametrize(
+    "call", ["f(a, b)", "np.max(a, b)", "max(a, b, key=f)", "larger(a, b)", "np.arctan2(a, b)"]
+)
+def test_arguments_are_swapped_where_their_order_matters(call):
+    assert planted(call)["swapped arguments"] == [call.replace("a, b", "b, a")]
+
+
 def test_a_fault_that_compiles_to_the_same_is_none():
     assert not changes_bytecode(b"x = 1 + 1  # two", b"x = (1 + 1)")
     assert not changes_bytecode(b"x = 1", b"x = = 1"), "does not compile: caught by nobody's merit"

@@ -1,14 +1,16 @@
 """The end of the demo: the car drives on what it learnt, and the report shows the film."""
 
 import json
+from types import SimpleNamespace
 
 import pytest
 
 from codegen import find_compiler
+from models.vehicle import sedan
 from tireid import demo_drive, drive_results
 from tireid.animation import frames
 from tireid.demo_drive import NO_COMPILER, drive_section, drive_story, drive_text
-from tireid.demo_story import run_story
+from tireid.demo_story import FREEZE, run_story
 from tireid.report import Picture
 
 
@@ -61,3 +63,26 @@ def test_without_a_compiler_the_report_says_so(story, tmp_path, monkeypatch):
     assert driven == {} and list(tmp_path.iterdir()) == []
     assert drive_text(driven) == NO_COMPILER
     assert NO_COMPILER in str(drive_section(driven, tmp_path))
+
+
+def test_with_a_compiler_the_learnt_car_drives_both_roads(tmp_path, monkeypatch):
+    """The drives themselves are left out: which they are, on which tires, into which folder."""
+    asked = []
+
+    def written(folder, runs, *_, **__):
+        asked.append((folder.relative_to(tmp_path).as_posix(), runs))
+
+    learnt = SimpleNamespace(freeze=lambda t: f"frozen at {t:g} s")
+    monkeypatch.setattr(demo_drive, "find_compiler", lambda: "cc")
+    monkeypatch.setattr(demo_drive, "run_drive", lambda label, _, tires: (label, tires))
+    monkeypatch.setattr(demo_drive, "known_curves", lambda *_: {})
+    monkeypatch.setattr(demo_drive, "inputs_of", lambda *_: {})
+    monkeypatch.setattr(demo_drive, "write_drives", written)
+    told = SimpleNamespace(car=sedan(), default=SimpleNamespace(learnt=learnt))
+    driven = drive_story(told, tmp_path)
+    frozen = f"frozen at {FREEZE:g} s"
+    assert asked == [
+        ("drive", [(label, frozen) for label in ("frozen", "linear", "oracle")]),
+        ("drive_slippery", [(label, frozen) for label in ("learning", "frozen", "linear")]),
+    ]
+    assert [one.conditions.setup.drops for one in driven.values()] == [(), ((110.0, 0.5),)]

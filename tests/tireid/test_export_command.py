@@ -103,3 +103,17 @@ def test_missing_tools_are_said_in_the_readme(monkeypatch, tmp_path):
     monkeypatch.setattr(figures, "missing_tools", lambda: ("arm-none-eabi-gcc",))
     assert main(["export", str(tmp_path / "a"), "--paper"]) == 0
     assert "Not measured: arm-none-eabi-gcc" in (tmp_path / "a" / "README.md").read_text()
+
+
+def test_beside_a_tracker_the_identifier_lies_in_a_folder_of_its_own(monkeypatch, tmp_path):
+    def seen(folder, package, single):
+        return [str(path.relative_to(folder)) for path in sorted(folder.iterdir())]
+
+    said = []
+    monkeypatch.setattr(export_command, "_write_tracker", seen)
+    monkeypatch.setattr(export_command, "say", said.append)
+    out = tmp_path / "package"
+    assert main(["export", str(out), "--paper", "--mpc"]) == 0
+    assert said[0] == "identifier", "and nothing else, when the tracker is to be written"
+    assert (out / "identifier" / "include" / "tireid.h").is_file()
+    assert not (out / "include").exists()

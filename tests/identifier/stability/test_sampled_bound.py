@@ -230,3 +230,11 @@ def test_the_sedan_in_its_own_slalom_keeps_the_bound_of_the_slip_that_it_reaches
     told = identify(recording, CAR, design).told["xi_tilde"]
     largest = np.linalg.norm(told.reshape(len(recording), 2), axis=1).max()
     assert 0.039 < largest <= bounds_of(design, gentle).xi_tilde
+
+
+def test_a_projection_far_beyond_what_the_leakage_keeps_changes_no_bound_on_v():
+    """Inner stages of RK4 go beyond the W of samples, with such a projection as without."""
+    free = replace(default_design(CAR), integrator="rk4")
+    bound = bounds_of(free)
+    far = replace(free, gains=replace(free.gains, W_max=2.0 * bound.W))
+    assert pytest.approx(bound.V, rel=1e-12) == bounds_of(far).V

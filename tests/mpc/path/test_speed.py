@@ -73,3 +73,11 @@ def test_limits_must_be_positive(name, value):
         grip_speed(Path.from_waypoints([0.0, 9.0], [0.0, 0.0]), **{**LIMITS, name: value})
     with pytest.raises(PathError, match="share must be positive"):
         steady_speed(handling_course(spacing=1.0), a_y_max=1.0, share=value)
+
+
+def test_a_circle_is_a_turn_however_wide_it_is():
+    angle, radius = np.linspace(0.0, 2 * np.pi, 60)[:-1], 2e6
+    X, Y = radius * np.cos(angle), radius * np.sin(angle)
+    wide = Path.from_waypoints(X, Y, closed=True, spacing=2e4)
+    assert wide.peak_curvature < 1e-6, "of 1 m nearly a straight, of a lap a full turn"
+    assert steady_speed(wide, a_y_max=8.0) == pytest.approx(np.sqrt(8.0 * radius), rel=2e-3)

@@ -229,3 +229,13 @@ def test_numbers_out_of_range_are_refused_by_name(linear, wrong):
 def test_guards_are_checked(wrong):
     with pytest.raises(ValueError, match=f"{next(iter(wrong))} must be"):
         Guards(**wrong)
+
+
+def test_the_longest_delay_is_that_of_the_commands_it_remembers(linear, problem, measure):
+    """The delay must end while the oldest command that is remembered still acts."""
+    remembered = Tracker(linear, problem, period=PERIOD).instance.state["commands"].size
+    told = f"delay must be between 0 and {(remembered - 1) * PERIOD:g} s"
+    with pytest.raises(ValueError, match=told):
+        Tracker(linear, problem, period=PERIOD, delay=remembered * PERIOD)
+    longest = Tracker(linear, problem, period=PERIOD, delay=(remembered - 1) * PERIOD)
+    assert longest.step(measure(e_y=0.1)).status == Status.OK

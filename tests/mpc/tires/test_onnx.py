@@ -12,8 +12,8 @@ from mpc.tires.reach import ALL
 onnx = pytest.importorskip("onnx", reason="needs the package onnx")
 
 
-def network_file(rng, *, hidden=6, activation="Tanh", scale=0.1):
-    """[α_f, α_r] over a scale, a biased hidden layer, forces in kN times 1000."""
+def network_file(rng, *, hidden=6, activation="Tanh", scale=0.1, unit=1000.0):
+    """[α_f, α_r] over a scale, a biased hidden layer, forces times a unit (of kN in N)."""
     make, tensor = onnx.helper.make_node, onnx.numpy_helper.from_array
     first, second = np.zeros((2, hidden)), np.zeros((hidden, 2))
     half = hidden // 2
@@ -24,7 +24,7 @@ def network_file(rng, *, hidden=6, activation="Tanh", scale=0.1):
         "W": first,
         "b": np.concatenate([rng.normal(0.0, 0.1, hidden - 1), [0.0]]),
         "U": second,
-        "k": np.array(1000.0),
+        "k": np.array(unit),
     }
     nodes = [
         make("Div", ["x", "s"], ["x_bar"]),
@@ -93,3 +93,11 @@ def test_its_stage_has_the_derivatives_of_the_network(car, rng):
     np.testing.assert_allclose(
         (np.array(result[1])[2:4, 2:4] - np.eye(2)) / dt, expected, rtol=0.01
     )
+
+
+@pytest.mark.parametrize(("unit", "learnt"), [(0.5, 0), (2.0, 0), (1 / 3, 1), (1000.0, 1)])
+def test_halves_and_small_whole_numbers_are_of_the_formula_others_are_weights(
+    car, rng, unit, learnt
+):
+    tire = tire_model(OnnxModel(vehicle=car, content=network_file(rng, unit=unit)))
+    assert np.count_nonzero(tire.weights == unit) == learnt
