@@ -4,7 +4,7 @@ import math
 import re
 from typing import NamedTuple
 
-from models.faults import SIZED, SensorFault
+from models.faults import SIZED, FaultError, SensorFault
 from mpc.loop import CarSensors, FaultySensors
 
 PERCENT, METERS, KILOMETERS = "%", "m/s", "km/h"
@@ -98,8 +98,11 @@ def parse_fault(text: str) -> SensorFault:
         ) from None
     if kind in SIZED and not size:
         raise ValueError(f"--fault {text}: {kind} needs a size")
-    fault = SensorFault(channel=channel, kind=kind, start=start, duration=duration, size=most)
-    FaultySensors(CarSensors(), [fault])  # refuses what is no channel
+    try:
+        fault = SensorFault(channel=channel, kind=kind, start=start, duration=duration, size=most)
+        FaultySensors(CarSensors(), [fault])  # refuses what is no channel
+    except FaultError as error:
+        raise ValueError(f"--fault {text}: {error}") from None
     return fault
 
 

@@ -98,5 +98,6 @@ def test_a_fault_is_a_channel_a_kind_times_and_a_size():
     ],
 )
 def test_what_is_no_fault_is_refused_with_its_rule(text, said):
-    with pytest.raises(ValueError, match=said):
+    with pytest.raises(ValueError, match=r"^--fault") as refusal:
         parse_fault(text)
+    assert said in str(refusal.value)
