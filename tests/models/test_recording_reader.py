@@ -58,6 +58,10 @@ def test_runs_are_listed_chosen_and_named(tmp_path: Path) -> None:
     assert read_recording(path, "a").t[0] == 7.0
     assert refusal(path).endswith("name one of its runs: b, a")
     assert "no run 'c', the runs are: b, a" in refusal(path, "c")
+    spoiled = [line + ",b" for line in rows()] + [
+        "nan" + line[line.index(",") :] + ",a" for line in rows()
+    ]
+    assert refusal(write(tmp_path / "bad.csv", HEADER + ",run", spoiled), "a").startswith(":a: ")
     single = write(tmp_path / "one.csv", HEADER + ",run", [line + ",only" for line in rows()])
     assert read_recording(single).name == "one:only"
     plain = write(tmp_path / "plain.csv", HEADER, rows())
@@ -100,7 +104,11 @@ def test_parquet_without_pyarrow_names_the_extra(
         ("a.csv", gzip.compress(b"t", mtime=0), "is gzip, rename"),
         ("a.csv.gz", b"t,vx,vy,r,delta_f\n", "is not gzip"),
         ("a.csv.gz", gzip.compress(b"t,vx\n" * 9, mtime=0)[:-9], "damaged or cut off"),
-        ("a.csv.gz", gzip.compress(b"t,vx\n" * 9, mtime=0)[:12] + b"junkjunk", "damaged or cut off"),
+        (
+            "a.csv.gz",
+            gzip.compress(b"t,vx\n" * 9, mtime=0)[:12] + b"junkjunk",
+            "damaged or cut off",
+        ),
         ("a.parquet", b"t,vx,vy,r,delta_f\n", "not a Parquet file"),
         ("a.parquet", b"", "not a Parquet file"),
         ("a.mat", b"MATLAB", "must end in one of .csv"),

@@ -155,17 +155,18 @@ def test_forces_may_be_named_in_any_order(car, drive, rng):
     assert np.array_equal(OnnxModel(vehicle=car, content=named).axle_force(recording), plain)
 
 
-def test_it_is_stored_and_read_again(car, drive, rng, tmp_path):
+@pytest.mark.parametrize("inputs", [None, ("alpha_r", "alpha_f")])
+def test_it_is_stored_and_read_again(car, drive, rng, tmp_path, inputs):
     recording = drive(50)
-    model = OnnxModel(
-        vehicle=car, content=network_file(tire(rng, -1.0)), min_speed=2.0, slip_sign=-1
-    )
+    content = network_file(tire(rng, -1.0))
+    model = OnnxModel(vehicle=car, content=content, min_speed=2.0, slip_sign=-1, inputs=inputs)
     model.save(tmp_path / "weights.json")
     again = load_model(tmp_path / "weights.json")
     assert again == model
     assert np.array_equal(again.axle_force(recording), model.axle_force(recording))
     (tmp_path / "tire.onnx").write_bytes(model.content)
-    assert OnnxModel.from_onnx(tmp_path / "tire.onnx", car, min_speed=2.0, slip_sign=-1) == model
+    numbers = {"min_speed": 2.0, "slip_sign": -1, "inputs": inputs}
+    assert OnnxModel.from_onnx(tmp_path / "tire.onnx", car, **numbers) == model
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identifier.export.layout import Member, sum_terms
 from identifier.export.package import PackageNameError, build_package, readme
+from identifier.export.signals import Signal
 from identifier.methods import METHODS, make_method
 from identifier.network import Network
 from models.recordings import write_recording
@@ -18,6 +20,17 @@ from tests.identifier.export.conftest import STRICT
 CAR = sedan()
 MISRA_FINDINGS = 2  # may only become fewer: one operator ##, one macro for users alone
 ALLOWED = {"sqrt", "sqrtf", "floor", "floorf", "memcpy", "memset"}
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (2, 3), (2, 5), (3, 40)])
+def test_every_number_of_a_structure_is_in_the_sum_that_sees_what_is_not_finite(shape):
+    """Each entry once by itself, or all of them by a call that is told how many they are."""
+    terms = sum_terms([Member(Signal("m", "-", "numbers"), shape, False)], "tireid", "now->")
+    size = shape[0] * shape[1]
+    if len(terms) > 1 or size == 1:
+        assert len(set(terms)) == size
+    else:
+        assert re.fullmatch(rf"tireid_sum\(&now->m\S*, {size}U\)", terms[0])
 
 
 @pytest.mark.parametrize("law", ["integral", "axle"])

@@ -9,6 +9,8 @@ from identifier.laws import DRIVING_ERRORS
 from identifier.network import Network
 from identifier.stability import certify
 from identifier.stability.driving_limits import (
+    SPEED_SPREAD,
+    declared_signals,
     disturbance,
     expected_residual,
     input_per_error,
@@ -88,6 +90,27 @@ def test_the_samples_of_drives_show_no_more_than_the_disturbance(car):
     assert 0.15 * acting.known < largest(known(seen)) <= acting.known
     noise = largest((seen.x - drives.x) @ K_inv.T)
     assert 0.9 * acting.noise < noise <= acting.noise * (1 + 1e-12)
+
+
+def test_what_each_sensor_adds_is_the_force_of_the_slip_and_of_the_turn_that_it_feigns(car):
+    """By hand, with all sensors wrong at once; told nothing of noise, there is none."""
+    assert (DRIVING.noise_v_x, DRIVING.noise_v_y, DRIVING.noise_r, DRIVING.noise_delta) == (0,) * 4
+    d_v_x, d_v_y, d_r, d_delta = 0.3, 0.1, 0.02, 0.003
+    noisy = replace(DRIVING, noise_v_x=d_v_x, noise_v_y=d_v_y, noise_r=d_r, noise_delta=d_delta)
+    clean, wrong = (disturbance(car, of, dt=0.01, unit=1000.0) for of in (DRIVING, noisy))
+    signals, added = declared_signals(car, DRIVING), []
+    slow, fast = (1 - SPEED_SPREAD) * DRIVING.v_x, (1 + SPEED_SPREAD) * DRIVING.v_x
+    for lever, other, C in (
+        (car.l_f, car.l_r, car.cornering_stiffness_front),
+        (car.l_r, car.l_f, car.cornering_stiffness_rear),
+    ):
+        sway = signals["v_y"] + lever * signals["r"]
+        slip = d_delta + (d_v_y + lever * d_r + sway * d_v_x / slow) / (slow - d_v_x)
+        turn = fast * d_r + d_v_x * (signals["r"] + d_r)
+        added.append((C * slip + car.mass * other / car.wheelbase * turn) / 1000.0)
+    told = np.linalg.norm(added)
+    assert wrong.residual - clean.residual == pytest.approx(told, rel=1e-9)
+    assert wrong.known - clean.known == pytest.approx(told, rel=1e-9)
 
 
 def test_the_operation_of_a_design_is_enough_for_its_certificate(car):

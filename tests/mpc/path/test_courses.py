@@ -71,13 +71,20 @@ def test_cones_stand_beside_the_path(course):
     assert len(cones) == 2 * round(course.length / 10.0)
 
 
+def test_the_samples_of_a_course_lie_a_quarter_of_a_meter_apart_at_most(course):
+    steps = np.hypot(np.diff(course.X), np.diff(course.Y))
+    assert 0.2 < steps.max() <= 0.25 + 1e-9
+
+
 def test_the_names_of_the_command_line_build_paths():
     assert set(BUILT_IN) == {"iso-3888-1", "iso-3888-2", "slalom", "circle", "course"}
     with pytest.raises(TypeError):
         BUILT_IN["mine"] = handling_course
 
 
-@pytest.mark.parametrize("numbers", [{"radius": -1.0}, {"turns": 0.0}, {"radius": np.nan}])
+@pytest.mark.parametrize(
+    "numbers", [{"radius": -1.0}, {"turns": 0.0}, {"radius": np.nan}, {"radius": np.inf}]
+)
 def test_circles_that_are_none_are_refused(numbers):
     with pytest.raises(PathError, match="radius must be positive"):
         constant_radius(**{"radius": 30.0, **numbers})
