@@ -66,10 +66,10 @@ def read_design(path: Path) -> Design:
         raise DesignFileError(f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
     inner = {name: data.pop(name, None) for name in TABLES}
     gains, network, driving = (
-        None if part is None else Table(part, str(path), DesignFileError, f"{name}.").record(cls)
+        None if part is None else Table(part, f"{path}: ", DesignFileError, f"{name}.").record(cls)
         for (name, part), cls in zip(inner.items(), (Gains, Network, Driving), strict=True)
     )
-    values = Table(data, str(path), DesignFileError).record(Design, skip=TABLES)
+    values = Table(data, f"{path}: ", DesignFileError).record(Design, skip=TABLES)
     if gains is None:
         raise DesignFileError(f"{path}: the table [gains] is missing")
     try:

@@ -1,7 +1,6 @@
 """A user's own static tire network, an ONNX file, as a frozen model."""
 
 import base64
-import binascii
 import json
 from dataclasses import dataclass
 from functools import cache
@@ -14,18 +13,25 @@ from numpy.typing import NDArray
 
 from codegen import Scan
 from identifier.method import Setup
-from identifier.model_format import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
+from identifier.model_format import (
+    FORMAT,
+    PROBE_SPEED,
+    FrozenModelError,
+    require_alive,
+    require_min_speed,
+    vehicle_from,
+    vehicle_numbers,
+)
 from identifier.network import network_signals
 from identifier.tire_network import UnusableNetworkError, read_network
 from models.bicycle import BicycleParameters
+from models.doors import Table, read_bytes
 from models.files import write_atomically
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
 KIND = "onnx"
 OVER = ("x", "u", "v_x")
-PROBE = 0.02  # rad, a slip at which every tire pushes back
-PROBE_SPEED = 10.0  # m/s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,24 +62,12 @@ class OnnxModel:
     slip_sign: int = 1
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.min_speed < np.inf:
-            raise ValueError(f"min_speed must be positive, it is {self.min_speed}")
+        require_min_speed(self.min_speed)
         if self.slip_sign not in (1, -1):
             raise ValueError(f"slip_sign must be 1 or -1, it is {self.slip_sign}")
         if self.inputs is not None:
             object.__setattr__(self, "inputs", tuple(self.inputs))
-        speed = max(PROBE_SPEED, self.min_speed)
-        drift = np.array([-np.tan(PROBE) * speed, 0.0])  # both axles slip by PROBE
-        force = [
-            np.array(self.step(x, np.zeros(2), speed, self.vehicle.bicycle)).ravel()
-            for x in (drift, -drift)
-        ]
-        if not (force[0] > force[1]).all():
-            raise UnusableNetworkError(
-                f"axle forces must rise with slip, at {-PROBE} and {PROBE} rad they are "
-                f"{force[1].tolist()} and {force[0].tolist()} N: check units, the order of inputs, "
-                "and the sign of slip (slip_sign)"
-            )
+        require_alive(UnusableNetworkError, self)
 
     @classmethod
     def from_onnx(
@@ -103,13 +97,17 @@ class OnnxModel:
         try:
             return cls(
                 vehicle=vehicle,
-                content=path.read_bytes(),
+                content=read_bytes(path, UnusableNetworkError),
                 min_speed=min_speed,
                 inputs=inputs,
                 slip_sign=slip_sign,
             )
-        except (OSError, ValueError) as error:
-            raise UnusableNetworkError(f"{path}: {error}") from error
+        except OSError as error:
+            reason = (error.strerror or "cannot be read").lower()
+            raise UnusableNetworkError(f"{path}: {reason}") from error
+        except ValueError as error:
+            told = str(error).removeprefix(f"{path}: ")
+            raise UnusableNetworkError(f"{path}: {told}") from error
 
     @property
     def step(self) -> ca.Function:
@@ -118,6 +116,17 @@ class OnnxModel:
         Its result is axle_force (2,) [N]. It has derivatives and generates code.
         """
         return _step(self.content, self.inputs, self.slip_sign)
+
+    def force_at(self, alpha: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the axle forces where both axles drift at slip angles, (k, 2) [N].
+
+        Parameters
+        ----------
+        alpha : slip angles in the paper's sign [rad], (k,).
+        """
+        speed = max(PROBE_SPEED, self.min_speed)
+        drift = np.stack([-np.tan(alpha) * speed, np.zeros_like(alpha)])
+        return np.array(self.step(drift, np.zeros(2), speed, np.array(self.vehicle.bicycle))).T
 
     @property
     def signals(self) -> tuple[str, ...]:
@@ -187,17 +196,15 @@ class OnnxModel:
             Where a key is missing or a value impossible.
         """
         try:
-            inputs = data["inputs"]
+            table = Table(data, "", FrozenModelError)
             return cls(
-                vehicle=vehicle_from(data["vehicle"]),
-                content=base64.b64decode(data["onnx_base64"], validate=True),
-                min_speed=float(data["min_speed_m_s"]),
-                inputs=None if inputs is None else tuple(inputs),
-                slip_sign=data["slip_sign"],
+                vehicle=vehicle_from(table.value("vehicle")),
+                content=base64.b64decode(table.text("onnx_base64"), validate=True),
+                min_speed=table.number("min_speed_m_s"),
+                inputs=None if table.value("inputs") is None else table.texts("inputs"),
+                slip_sign=table.whole("slip_sign"),
             )
-        except KeyError as error:
-            raise FrozenModelError(f"{source}: key {error} is missing") from error
-        except (TypeError, ValueError, binascii.Error) as error:
+        except ValueError as error:
             raise FrozenModelError(f"{source}: {error}") from error
 
 

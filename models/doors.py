@@ -47,7 +47,7 @@ class Limits:
     line : characters of a line of TOML.
     depth : of tables and lists inside one another.
     values : numbers, texts, tables and lists in a JSON or TOML file.
-    hidden : units of a network.
+    hidden : units of a network, whose code is compiled: 100 take ten seconds, 300 minutes.
     hours : that a car is driven for.
     runs : designs, starts, seeds, random drives or processes that one command is asked for.
     """
@@ -59,7 +59,7 @@ class Limits:
     line: float = 4000.0
     depth: float = 32.0
     values: float = 2e6
-    hidden: float = 1000.0
+    hidden: float = 128.0
     hours: float = 1.0
     runs: float = 1e5
 
@@ -221,17 +221,14 @@ def read_json(path: Path, refusal: type[ValueError]) -> Any:
     Raises
     ------
     ValueError
-        Of that class, where it is not JSON or beyond the limits; NaN and Infinity are not JSON.
+        Of that class, where it is not JSON or beyond the limits.
     OSError
         Where it cannot be read.
     """
     text = read_text(path, refusal)
 
-    def refuse(word: str) -> NoReturn:
-        raise ValueError(f"{word} is no number of JSON")
-
     try:
-        data = json.loads(text, parse_constant=refuse)
+        data = json.loads(text)
     except RecursionError:
         raise refusal(f"{path}: cannot be read as JSON: tables or lists too deep") from None
     except ValueError as error:
@@ -290,7 +287,7 @@ class Table:
     Parameters
     ----------
     data : the table as it was read.
-    where : file and place, begins every message.
+    where : begins every message, as "car.toml: "; may be empty.
     refusal : class of the errors to raise.
     prefix : of the names of values in messages, as in "chassis.".
 
@@ -303,11 +300,11 @@ class Table:
     def __init__(self, data: Any, where: str, refusal: type[ValueError], prefix: str = "") -> None:
         if not isinstance(data, Mapping):
             name = prefix.rstrip(".") or "the document"
-            raise refusal(f"{where}: {name} must be a table, it is {shown(data)}")
-        self._data, self._where, self._refusal, self._prefix = data, where, refusal, prefix
+            raise refusal(f"{where}{name} must be a table, it is {shown(data)}")
+        self.data, self._where, self._refusal, self._prefix = data, where, refusal, prefix
 
     def __contains__(self, key: str) -> bool:
-        return key in self._data
+        return key in self.data
 
     def refuse(self, key: str, rule: str) -> NoReturn:
         """Raise the error of a value.
@@ -317,7 +314,7 @@ class Table:
         key : of the value.
         rule : that it breaks, as in "must be a number".
         """
-        raise self._refusal(f"{self._where}: {self._prefix}{key} {rule}")
+        raise self._refusal(f"{self._where}{self._prefix}{key} {rule}")
 
     def value(self, key: str) -> Any:
         """Return a value that must be there, of any type.
@@ -326,9 +323,9 @@ class Table:
         ----------
         key : of the value.
         """
-        if key not in self._data:
+        if key not in self.data:
             self.refuse(key, "is missing")
-        return self._data[key]
+        return self.data[key]
 
     def only(self, *known: str) -> None:
         """Refuse every other key.
@@ -337,7 +334,7 @@ class Table:
         ----------
         known : the keys that may be there.
         """
-        for key in self._data:
+        for key in self.data:
             if key not in known:
                 self.refuse(visible(key[:SHOWN]), f"is unknown, known are {', '.join(known)}")
 
@@ -403,7 +400,7 @@ class Table:
             level = [one for row in level for one in row]
         for one in level:
             if not math.isfinite(self._as(float, key, one)):
-                self.refuse(key, f"must hold finite numbers, one is {shown(one)}")
+                self.refuse(key, f"holds a number that is not finite: {shown(one)}")
         return np.array(level, dtype=np.float64).reshape(shape)
 
     def record(self, cls: type, *, skip: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -420,9 +417,7 @@ class Table:
             if field.default is MISSING and field.default_factory is MISSING:
                 self.value(key)
         hints = get_type_hints(cls)
-        return {
-            key: self._as(hints[key], key, self._data[key]) for key in known if key in self._data
-        }
+        return {key: self._as(hints[key], key, self.data[key]) for key in known if key in self.data}
 
     def _as(self, kind: Any, key: str, value: Any) -> Any:
         """Return a value as the type that an annotation names: number, text, or a tuple of such."""

@@ -2,6 +2,8 @@
 
 import math
 
+LARGEST_FORCE = 1e7  # of an axle [N]: ten times that of the heaviest dump truck
+
 
 def require_positive(refusal: type[ValueError], /, **values: float) -> None:
     """Refuse every value that is not a finite number above zero.

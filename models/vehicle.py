@@ -161,9 +161,9 @@ class Vehicle:
         file = Path(path)
         data = read_toml(file, VehicleError)
         inner = data.pop("chassis", None)
-        values = Table(data, str(file), VehicleError).record(cls, skip=("chassis",))
+        values = Table(data, f"{file}: ", VehicleError).record(cls, skip=("chassis",))
         if inner is not None:
-            parts = Table(inner, str(file), VehicleError, "chassis.").record(Chassis)
+            parts = Table(inner, f"{file}: ", VehicleError, "chassis.").record(Chassis)
         try:
             if inner is None:
                 return cls(**values)
