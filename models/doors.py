@@ -42,6 +42,7 @@ class Limits:
     ----------
     megabytes : of a recording or of way-points, unpacked.
     samples : rows of a recording or of way-points, steps of a recording or of a path.
+    columns : of a recording or of way-points.
     document : megabytes of a JSON, ONNX or tire file.
     toml : megabytes of a TOML file.
     line : characters of a line of TOML.
@@ -54,6 +55,7 @@ class Limits:
 
     megabytes: float = 256.0
     samples: float = 2e6
+    columns: float = 1e4
     document: float = 32.0
     toml: float = 0.1
     line: float = 4000.0
@@ -126,6 +128,29 @@ def shown(value: Any) -> str:
     return visible(text if len(text) <= SHOWN else f"{text[:SHOWN]}...")
 
 
+def require_file(path: Path, refusal: type[ValueError], *, limit: str) -> None:
+    """Refuse what is no regular file, and files that are too large.
+
+    Parameters
+    ----------
+    path : to be read.
+    refusal : class of the error to raise.
+    limit : field of `Limits` that says how many megabytes it may hold.
+
+    Raises
+    ------
+    ValueError
+        Of that class.
+    OSError
+        Where it cannot be looked at.
+    """
+    about = path.stat()
+    if not stat.S_ISREG(about.st_mode):
+        kind = "a folder" if stat.S_ISDIR(about.st_mode) else "a device, pipe or socket"
+        raise refusal(f"{path}: must be a file, it is {kind}")
+    _require_size(path, refusal, about.st_size, limit)
+
+
 def read_bytes(path: Path, refusal: type[ValueError], *, limit: str = "document") -> bytes:
     """Read a file.
 
@@ -142,13 +167,9 @@ def read_bytes(path: Path, refusal: type[ValueError], *, limit: str = "document"
     OSError
         Where it cannot be read.
     """
-    mode = path.stat().st_mode
-    if not stat.S_ISREG(mode):
-        kind = "a folder" if stat.S_ISDIR(mode) else "a device, pipe or socket"
-        raise refusal(f"{path}: must be a file, it is {kind}")
+    require_file(path, refusal, limit=limit)
     most = int(min(1e6 * getattr(limits(), limit), 2.0**62))
     with path.open("rb") as file:
-        _require_size(path, refusal, os.fstat(file.fileno()).st_size, limit)
         data = file.read(most + 1)
     _require_size(path, refusal, len(data), limit)  # which grew, or has no size as in /proc
     return data
