@@ -28,9 +28,11 @@ from models.bicycle import BicycleParameters
 from models.doors import Table, read_bytes
 from models.files import write_atomically
 from models.recordings import Recording
+from models.rules import LARGEST_FORCE
 from models.vehicle import Vehicle
 
 KIND = "onnx"
+STATES = ((1.0, 10.0, 60.0), *([(-most, 0.0, most) for most in (5.0, 2.0, 0.6, 0.6)]))  # SI
 OVER = ("x", "u", "v_x")
 
 
@@ -68,6 +70,20 @@ class OnnxModel:
         if self.inputs is not None:
             object.__setattr__(self, "inputs", tuple(self.inputs))
         require_alive(UnusableNetworkError, self)
+        self._require_bounded()
+
+    def _require_bounded(self) -> None:
+        """Refuse forces that are not finite, or of no tire, where a car may come to be."""
+        v_x, v_y, r, delta_f, delta_r = (axis.ravel() for axis in np.meshgrid(*STATES))
+        v_x = np.maximum(v_x, self.min_speed)
+        x, u = np.stack([v_y, r]), np.stack([delta_f, delta_r])
+        force = np.array(self.step(x, u, v_x[None], np.array(self.vehicle.bicycle)))
+        largest = float(np.abs(force).max())
+        if not largest <= LARGEST_FORCE:
+            raise UnusableNetworkError(
+                f"axle forces must be finite and below {LARGEST_FORCE:g} N, at speeds of "
+                f"{STATES[0][0]:g} to {STATES[0][-1]:g} m/s they reach {largest:g} N"
+            )
 
     @classmethod
     def from_onnx(

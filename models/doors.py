@@ -50,7 +50,8 @@ class Limits:
     values : numbers, texts, tables and lists in a JSON or TOML file.
     hidden : units of a network, whose code is compiled: 100 take ten seconds, 300 minutes.
     hours : that a car is driven for.
-    runs : designs, starts, seeds, random drives or processes that one command is asked for.
+    runs : designs, starts, seeds or random drives that one command is asked for.
+    processes : that one command is asked for.
     """
 
     megabytes: float = 256.0
@@ -64,6 +65,7 @@ class Limits:
     hidden: float = 128.0
     hours: float = 1.0
     runs: float = 1e5
+    processes: float = 256.0
 
 
 def limits() -> Limits:

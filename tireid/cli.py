@@ -15,6 +15,7 @@ from tireid.progress import complain, flush_out, listen_to_library, unwritten
 BAD_INPUT = 2
 NOT_TOLD = 74  # EX_IOERR of sysexits.h: all was done, but standard output could not be written
 INTERRUPTED = 130
+LONGEST_LINE = 2000  # characters of a message
 
 
 class Parser(argparse.ArgumentParser):
@@ -81,12 +82,14 @@ def _expected_errors() -> tuple[type[Exception], ...]:
     """Return what may go wrong without a fault in the program: input, system, compiler."""
     from codegen import CompilationError
     from identifier.export import compiled, processor
+    from mpc.converged import NotConvergedError
     from mpc.realtime import instance
+    from tireid.self_test import SelfTestError
 
     return (
         *(ValueError, ArithmeticError, OSError, ImportError, MemoryError),
         *(CompilationError, compiled.NoCompilerError, instance.NoCompilerError),
-        processor.ReplayError,
+        *(processor.ReplayError, NotConvergedError, SelfTestError),
     )
 
 
@@ -101,7 +104,10 @@ def one_line(error: Exception | str) -> str:
         return f"{error.filename}: {(error.strerror or 'cannot be used').lower()}"
     if isinstance(error, OSError) and error.strerror:
         return error.strerror.lower()  # as of a disk that is full
-    return " ".join(str(error).split()) or type(error).__name__
+    text = " ".join(str(error).split()) or type(error).__name__
+    if isinstance(error, MemoryError):
+        return f"not enough memory: {text}"
+    return text if len(text) <= LONGEST_LINE else f"{text[:LONGEST_LINE]}..."
 
 
 def entry() -> NoReturn:
@@ -119,7 +125,7 @@ def entry() -> NoReturn:
     except SystemExit as ended:  # of --help and of wrong words
         status = ended.code
     flush_out()
-    sys.exit(status)
+    sys.exit(NOT_TOLD if unwritten() and not status else status)
 
 
 def _open_streams() -> None:
