@@ -255,7 +255,7 @@ def read_json(path: Path, refusal: type[ValueError]) -> Any:
     except RecursionError:
         raise refusal(f"{path}: cannot be read as JSON: tables or lists too deep") from None
     except ValueError as error:
-        raise refusal(f"{path}: cannot be read as JSON: {error}") from None
+        raise refusal(f"{path}: cannot be read as JSON: {_said(error)}") from None
     _require_small(path, data, refusal)
     return data
 
@@ -283,9 +283,15 @@ def read_toml(path: Path, refusal: type[ValueError]) -> dict[str, Any]:
     except RecursionError:
         raise refusal(f"{path}: cannot be read as TOML: tables or lists too deep") from None
     except ValueError as error:
-        raise refusal(f"{path}: cannot be read as TOML: {error}") from None
+        raise refusal(f"{path}: cannot be read as TOML: {_said(error)}") from None
     _require_small(path, data, refusal)
     return data
+
+
+def _said(error: ValueError) -> str:
+    """Return what a parser says; of a long number it is Python that speaks, to programmers."""
+    known = isinstance(error, json.JSONDecodeError | tomllib.TOMLDecodeError)
+    return str(error) if known else "a number or date that cannot be"
 
 
 def _require_small(path: Path, data: Any, refusal: type[ValueError]) -> None:

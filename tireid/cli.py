@@ -10,12 +10,13 @@ from collections.abc import Sequence
 from types import FrameType
 from typing import NoReturn
 
+from models.doors import LimitError
 from tireid.progress import complain, flush_out, listen_to_library, unwritten
 
 BAD_INPUT = 2
 NOT_TOLD = 74  # EX_IOERR of sysexits.h: all was done, but standard output could not be written
 INTERRUPTED = 130
-LONGEST_LINE = 2000  # characters of a message
+LONGEST_LINE = 1000  # characters of a message
 
 
 class Parser(argparse.ArgumentParser):
@@ -65,7 +66,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    options = build_parser().parse_args(arguments)
+    try:
+        parser = build_parser()
+    except LimitError as error:  # of the environment
+        complain(f"tireid: error: {one_line(error)}")
+        return BAD_INPUT
+    options = parser.parse_args(arguments)
     listen_to_library()
     try:
         status: int = options.run(options) or 0

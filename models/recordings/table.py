@@ -66,7 +66,7 @@ def read_table(path: Path, only_runs: bool = False, columns: Mapping[str, str] =
     RecordingError
         If the file cannot be read, or a column is missing, doubled or not numeric.
     """
-    if not path.is_file():
+    if path.is_dir() or not path.exists():
         raise RecordingError(f"{path}: there is no such file")
     name = path.name.lower()
     if not name.endswith(ENDINGS):
