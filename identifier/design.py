@@ -20,9 +20,12 @@ from identifier.observer import INPUT_SOURCES
 from identifier.step import CARRY, GAINS, OVER, Structure, build_step
 from models.bicycle import BicycleParameters, bicycle
 from models.recordings import Recording
+from models.rules import require_within
 from models.vehicle import GRAVITY, Vehicle
 
 Array = NDArray[np.float64]
+
+SHORTEST_STEP, LONGEST_STEP = 1e-4, 0.1  # [s]: finer is only work, coarser is blind
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +50,7 @@ class Design:
     Raises
     ------
     ValueError
-        Where a name is unknown or a number not positive.
+        Where a name is unknown, or a number not one of a sampled car: dt 0.1 ms to 0.1 s.
     """
 
     gains: Gains
@@ -71,9 +74,10 @@ class Design:
                 raise ValueError(
                     f"{name} must be one of {list(known)}, not {getattr(self, name)!r}"
                 )
-        for name in ("dt", "force_unit", "min_speed"):
-            if not 0.0 < getattr(self, name) < np.inf:
-                raise ValueError(f"{name} must be positive, it is {getattr(self, name)}")
+        require_within(ValueError, SHORTEST_STEP, LONGEST_STEP, dt=self.dt)
+        require_within(ValueError, 1e-6, 1e9, force_unit=self.force_unit)
+        require_within(ValueError, 1e-6, 200.0, min_speed=self.min_speed)
+        require_within(ValueError, 0, 2**63 - 1, seed=self.seed)
 
     @property
     def structure(self) -> Structure:

@@ -2,9 +2,7 @@
 
 import json
 import math
-import tomllib
-from collections.abc import Mapping
-from dataclasses import MISSING, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +10,7 @@ from identifier.design import Design
 from identifier.driving import Driving
 from identifier.gains import Gains
 from identifier.network import Network
+from models.doors import Table, read_toml
 
 COMMENTS = {
     "law": "integral | instantaneous | pi_lead",
@@ -62,43 +61,26 @@ def read_design(path: Path) -> Design:
         One line with file, key and rule.
     """
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise DesignFileError(f"{path}: cannot be read as TOML: {error}") from None
+        data = read_toml(path, DesignFileError)
+    except OSError as error:
+        raise DesignFileError(f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
+    inner = {name: data.pop(name, None) for name in TABLES}
+    gains, network, driving = (
+        None if part is None else Table(part, f"{path}: ", DesignFileError, f"{name}.").record(cls)
+        for (name, part), cls in zip(inner.items(), (Gains, Network, Driving), strict=True)
+    )
+    values = Table(data, f"{path}: ", DesignFileError).record(Design, skip=TABLES)
+    if gains is None:
+        raise DesignFileError(f"{path}: the table [gains] is missing")
     try:
-        gains = _record(data.pop("gains", {}), Gains, "gains.")
-        network = _record(data.pop("network", {}), Network, "network.")
-        stored = data.pop("driving", None)
-        driving = None if stored is None else Driving(**_record(stored, Driving, "driving."))
-        values = _record(data, Design, "", skip=TABLES)
-        return Design(gains=Gains(**gains), network=Network(**network), driving=driving, **values)
+        return Design(
+            gains=Gains(**gains),
+            network=Network(**(network or {})),
+            driving=None if driving is None else Driving(**driving),
+            **values,
+        )
     except ValueError as error:
         raise DesignFileError(f"{path}: {error}") from None
-
-
-def _record(table: Any, cls: type, where: str, skip: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Check the keys and types of a table against a dataclass; lists become tuples."""
-    if not isinstance(table, Mapping):
-        raise DesignFileError(f"{where.rstrip('.')} must be a table")
-    known = {field.name: field for field in fields(cls) if field.name not in skip}
-    for key in table:
-        if key not in known:
-            raise DesignFileError(f"{where}{key} is unknown, known are {', '.join(known)}")
-    for key, field in known.items():
-        if key not in table and field.default is MISSING and field.default_factory is MISSING:
-            raise DesignFileError(f"{where}{key} is missing")
-    return {key: _value(table[key], f"{where}{key}", known[key].type) for key in table}
-
-
-def _value(value: Any, name: str, kind: Any) -> Any:
-    if isinstance(value, list):
-        return tuple(_value(item, name, None) for item in value)
-    wants_text = kind in (str, "str")
-    if kind is not None and wants_text != isinstance(value, str):
-        raise DesignFileError(f"{name} must be {'a text' if wants_text else 'a number'}: {value!r}")
-    if isinstance(value, bool) or (kind in (int, "int") and not isinstance(value, int)):
-        raise DesignFileError(f"{name} must be a whole number: {value!r}")
-    return float(value) if kind in (float, "float") else value
 
 
 def design_text(design: Design) -> str:

@@ -7,7 +7,18 @@ nothing. They stand in design.toml, so that the same file is judged alike wherev
 import math
 from dataclasses import dataclass, fields
 
+from models.rules import require_within
+
 SPEED_SPREAD = 0.05  # of the speed, give or take
+RANGES = {  # SI, of what is driven on wheels
+    "v_x": (0.01, 150.0),
+    "slip": (1e-4, 1.5),
+    "friction": (1e-3, 10.0),
+    "bandwidth": (1e-3, 1e3),
+    "noise_v_y": (0.0, 150.0),
+    "noise_r": (0.0, 100.0),
+    "noise_delta": (0.0, 1.5),
+}
 YAW_OVERSHOOT = 1.5  # largest yaw rate, of the steady one at the friction limit
 
 
@@ -32,7 +43,8 @@ class Driving:
     Raises
     ------
     ValueError
-        Where a condition is not positive, or a noise negative, not a number or beyond the speed.
+        Where a condition is not positive or outside `RANGES`, or a noise negative, not a number or
+        beyond the speed.
     """
 
     v_x: float
@@ -51,5 +63,7 @@ class Driving:
             if not (lowest and math.isfinite(value)):
                 rule = "not be negative" if field.name.startswith("noise") else "be positive"
                 raise ValueError(f"{field.name} must {rule} and finite, it is {value}")
+        for name, (least, most) in RANGES.items():
+            require_within(ValueError, least, most, **{name: getattr(self, name)})
         if not self.noise_v_x < 0.5 * self.v_x:
             raise ValueError(f"noise_v_x must be below half the speed, it is {self.noise_v_x}")

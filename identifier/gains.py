@@ -8,6 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from models.rules import require_within
+
+LARGEST = 1e12  # of a gain, in its unit: the fastest loop is sampled ten thousand times a second
+
 
 class NotHurwitzError(ValueError):
     """A_d has an eigenvalue whose real part is not negative."""
@@ -34,7 +38,8 @@ class Gains:
     NotHurwitzError
         Where A_d is not Hurwitz.
     ValueError
-        Where a gain is negative or not a number, λ or a radius not positive, or A_d not 2x2.
+        Where a gain is negative, not a number or above `LARGEST`, λ or a radius not positive, or
+        A_d not 2x2.
     """
 
     A_d: tuple[tuple[float, float], tuple[float, float]]
@@ -51,6 +56,7 @@ class Gains:
         A_d = np.array(self.A_d, dtype=np.float64)
         if A_d.shape != (2, 2) or not np.isfinite(A_d).all():
             raise ValueError(f"A_d must be a 2x2 matrix of finite numbers, it is {self.A_d}")
+        require_within(ValueError, 0.0, LARGEST, **{"|A_d|": np.abs(A_d).max()})
         poles = np.linalg.eigvals(A_d)
         if not poles.real.max() < 0.0:
             raise NotHurwitzError(f"A_d must be Hurwitz, its eigenvalues are {poles}")
@@ -59,6 +65,8 @@ class Gains:
                 raise ValueError(f"{name} must not be negative, it is {getattr(self, name)}")
         if not 0.0 < self.forgetting < np.inf:
             raise ValueError(f"forgetting must be positive, it is {self.forgetting}")
+        for name in ("forgetting", "eta_W", "eta_V", "rho_W", "rho_V", "lead"):
+            require_within(ValueError, 0.0, LARGEST, **{name: getattr(self, name)})
         for name in ("W_max", "V_max"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"{name} must be positive, it is {getattr(self, name)}")

@@ -33,6 +33,14 @@ class FrozenModel(Protocol):
     def min_speed(self) -> float:
         """Below this speed [m/s] the forces read zero."""
 
+    def force_at(self, alpha: Array) -> Array:
+        """Return the steady axle forces at slip angles, (k, 2) [N].
+
+        Parameters
+        ----------
+        alpha : slip angles in the paper's sign [rad], (k,).
+        """
+
     def axle_force(self, recording: Recording) -> Array:
         """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
 

@@ -1,27 +1,26 @@
 """Frozen models as JSON files: weights.json, whatever kind of model it holds."""
 
-import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from identifier.axle.gate import Plausibility
+from identifier.axle.model import ARRAYS, AxleModel
 from identifier.axle.model import KIND as AXLE
-from identifier.axle.model import AxleModel
+from identifier.axle.sway import Sway
 from identifier.baselines.curve_model import KIND as CURVE
 from identifier.baselines.curve_model import CurveModel
 from identifier.method import FrozenModel
-from identifier.model_format import FORMAT, FrozenModelError
+from identifier.model_format import FORMAT, FrozenModelError, require_alive
 from identifier.network_model import KIND as NETWORK
 from identifier.network_model import NetworkModel
 from identifier.onnx_model import KIND as ONNX
 from identifier.onnx_model import OnnxModel
+from models.doors import Table, read_json, shown
 
-READERS: Mapping[str, Callable[[dict[str, Any], str], FrozenModel]] = {
-    NETWORK: NetworkModel.from_dict,
-    AXLE: AxleModel.from_dict,
-    CURVE: CurveModel.from_dict,
-    ONNX: OnnxModel.from_dict,
-}
+LARGEST = 1e9  # of the numbers of an axle model, SI and static axle loads
 
 
 def load_model(path: Path) -> FrozenModel:
@@ -37,13 +36,38 @@ def load_model(path: Path) -> FrozenModel:
         Where the file is not such a model; one line that names it.
     """
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise FrozenModelError(f"{path}: cannot be read as a frozen model: {error}") from error
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        table = Table(read_json(path, FrozenModelError), f"{path}: ", FrozenModelError)
+    except OSError as error:
+        reason = error.strerror or "not a file"
+        raise FrozenModelError(f"{path}: cannot be read: {reason.lower()}") from error
+    if "format" not in table or table.value("format") != FORMAT:
         raise FrozenModelError(f"{path}: not a frozen model, format must be {FORMAT!r}")
-    if data.get("kind") not in READERS:
-        raise FrozenModelError(
-            f"{path}: kind must be one of {list(READERS)}, is {data.get('kind')}"
-        )
-    return READERS[data["kind"]](data, str(path))
+    kind = table.text("kind")
+    if kind not in READERS:
+        table.refuse("kind", f"must be one of {list(READERS)}, it is {shown(kind)}")
+    model = READERS[kind](dict(table.data), str(path))
+    try:
+        require_alive(FrozenModelError, model)
+    except FrozenModelError as error:
+        raise FrozenModelError(f"{path}: {error}") from None
+    return model
+
+
+def _axle(data: dict[str, Any], source: str) -> AxleModel:
+    """Judge the types and sizes of an axle model's values before they become one."""
+    table = Table(data, f"{source}: ", FrozenModelError)
+    for name, record in (("sway", Sway), ("plausibility", Plausibility)):
+        table.table(name).record(record)
+    for name in ("ladder", "edges", *ARRAYS):
+        largest = float(np.abs(table.array(name)).max(initial=0.0))
+        if largest > LARGEST:
+            table.refuse(name, f"must hold numbers below {LARGEST:g}, it reaches {largest:g}")
+    return AxleModel.from_dict(data, source)
+
+
+READERS: Mapping[str, Callable[[dict[str, Any], str], FrozenModel]] = {
+    NETWORK: NetworkModel.from_dict,
+    AXLE: _axle,
+    CURVE: CurveModel.from_dict,
+    ONNX: OnnxModel.from_dict,
+}

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from codegen.tanh import tanh
 from models.bicycle import BicycleParameters, slip_angles
+from models.doors import require_few
 
 # Signals that may enter the network, each with the value that counts as large for a passenger car.
 SIGNALS: Mapping[str, float] = {
@@ -60,6 +61,7 @@ class Network:
             object.__setattr__(self, "scale", tuple(self.scale))
         if self.hidden < 1:
             raise ValueError(f"hidden must be at least 1, it is {self.hidden}")
+        require_few(ValueError, "hidden", self.hidden, "hidden", "units")
         unknown = [name for name in self.inputs if name not in SIGNALS]
         if unknown or not self.inputs or len(set(self.inputs)) < len(self.inputs):
             raise ValueError(f"inputs must be chosen among {list(SIGNALS)}, they are {self.inputs}")

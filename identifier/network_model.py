@@ -12,14 +12,25 @@ from numpy.typing import NDArray
 
 from codegen import Scan
 from identifier.method import Setup
-from identifier.model_format import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
+from identifier.model_format import (
+    FORMAT,
+    PROBE_SPEED,
+    FrozenModelError,
+    require_min_speed,
+    vehicle_from,
+    vehicle_numbers,
+)
 from identifier.network import Network, Weights, hidden_layer, network_signals
 from models.bicycle import BicycleParameters, linear_axle_force
+from models.doors import Table
 from models.files import write_atomically
 from models.recordings import Recording
+from models.rules import require_positive, require_within
 from models.vehicle import Vehicle
 
 KIND = "network"
+LARGEST_SUM = 1e9  # of the units of an axle together [N]: what cancels may be large
+LARGEST_V = 1e9  # [-], beyond which tanh is a sign at the slip of a resting car
 
 
 def build_frozen(network: Network) -> ca.Function:
@@ -71,6 +82,11 @@ def build_replay(network: Network) -> ca.Function:
 
 
 @cache
+def _frozen(network: Network) -> ca.Function:
+    return build_frozen(network)
+
+
+@cache
 def _replay_scan(network: Network) -> Scan:
     return Scan(build_replay(network), carry=(), over=("x", "u", "v_x"))
 
@@ -100,9 +116,8 @@ class NetworkModel:
     min_speed: float
 
     def __post_init__(self) -> None:
-        for label in ("force_unit", "min_speed"):
-            if not 0.0 < getattr(self, label) < np.inf:
-                raise ValueError(f"{label} must be positive, it is {getattr(self, label)}")
+        require_positive(ValueError, force_unit=self.force_unit)
+        require_min_speed(self.min_speed)
         n_h, n_in = self.network.hidden, len(self.network.inputs)
         for name, value, shape in (
             ("W", self.weights.W, (2, n_h)),
@@ -112,6 +127,23 @@ class NetworkModel:
                 raise ValueError(f"{name} must have shape {shape}, it has {value.shape}")
             if not np.isfinite(value).all():
                 raise ValueError(f"{name} holds a number that is not finite: the law has diverged")
+        largest = self.force_unit * np.abs(self.weights.W).sum(axis=1).max()
+        require_within(ValueError, 0.0, LARGEST_SUM, **{"force_unit times |W|": largest})
+        require_within(ValueError, 0.0, LARGEST_V, **{"|V|": np.abs(self.weights.V).max()})
+
+    def force_at(self, alpha: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the axle forces where both axles drift at slip angles, (k, 2) [N].
+
+        Parameters
+        ----------
+        alpha : slip angles in the paper's sign [rad], (k,).
+        """
+        speed = max(PROBE_SPEED, self.min_speed)
+        drift = np.stack([-np.tan(alpha) * speed, np.zeros_like(alpha)])
+        numbers = np.array(self.vehicle.bicycle)
+        W, V = self.weights
+        _, force = _frozen(self.network)(W, V, drift, np.zeros(2), speed, numbers, self.force_unit)
+        return np.array(force).T
 
     def setup(self, recording: Recording) -> Setup:
         """Return what a replay needs.
@@ -180,22 +212,13 @@ class NetworkModel:
             Where a key is missing or a value impossible.
         """
         try:
-            structure = dict(data["network"])
-            network = Network(
-                hidden=structure["hidden"],
-                inputs=tuple(structure["inputs"]),
-                scale=tuple(structure["scale"]),
-            )
+            table = Table(data, "", FrozenModelError)
             return cls(
-                vehicle=vehicle_from(data["vehicle"]),
-                network=network,
-                weights=Weights(
-                    W=np.array(data["W"], dtype=np.float64), V=np.array(data["V"], dtype=np.float64)
-                ),
-                force_unit=float(data["force_unit_N"]),
-                min_speed=float(data["min_speed_m_s"]),
+                vehicle=vehicle_from(table.value("vehicle")),
+                network=Network(**table.table("network").record(Network)),
+                weights=Weights(W=table.array("W"), V=table.array("V")),
+                force_unit=table.number("force_unit_N"),
+                min_speed=table.number("min_speed_m_s"),
             )
-        except KeyError as error:
-            raise FrozenModelError(f"{source}: key {error} is missing") from error
-        except (TypeError, ValueError) as error:
+        except ValueError as error:
             raise FrozenModelError(f"{source}: {error}") from error

@@ -1,7 +1,6 @@
 """A user's own static tire network, an ONNX file, as a frozen model."""
 
 import base64
-import binascii
 import json
 from dataclasses import dataclass
 from functools import cache
@@ -14,18 +13,27 @@ from numpy.typing import NDArray
 
 from codegen import Scan
 from identifier.method import Setup
-from identifier.model_format import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
+from identifier.model_format import (
+    FORMAT,
+    PROBE_SPEED,
+    FrozenModelError,
+    require_alive,
+    require_min_speed,
+    vehicle_from,
+    vehicle_numbers,
+)
 from identifier.network import network_signals
 from identifier.tire_network import UnusableNetworkError, read_network
 from models.bicycle import BicycleParameters
+from models.doors import Table, read_bytes
 from models.files import write_atomically
 from models.recordings import Recording
+from models.rules import LARGEST_FORCE
 from models.vehicle import Vehicle
 
 KIND = "onnx"
+STATES = ((1.0, 10.0, 60.0), *([(-most, 0.0, most) for most in (5.0, 2.0, 0.6, 0.6)]))  # SI
 OVER = ("x", "u", "v_x")
-PROBE = 0.02  # rad, a slip at which every tire pushes back
-PROBE_SPEED = 10.0  # m/s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,23 +64,25 @@ class OnnxModel:
     slip_sign: int = 1
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.min_speed < np.inf:
-            raise ValueError(f"min_speed must be positive, it is {self.min_speed}")
+        require_min_speed(self.min_speed)
         if self.slip_sign not in (1, -1):
             raise ValueError(f"slip_sign must be 1 or -1, it is {self.slip_sign}")
         if self.inputs is not None:
             object.__setattr__(self, "inputs", tuple(self.inputs))
-        speed = max(PROBE_SPEED, self.min_speed)
-        drift = np.array([-np.tan(PROBE) * speed, 0.0])  # both axles slip by PROBE
-        force = [
-            np.array(self.step(x, np.zeros(2), speed, self.vehicle.bicycle)).ravel()
-            for x in (drift, -drift)
-        ]
-        if not (force[0] > force[1]).all():
+        require_alive(UnusableNetworkError, self)
+        self._require_bounded()
+
+    def _require_bounded(self) -> None:
+        """Refuse forces that are not finite, or of no tire, where a car may come to be."""
+        v_x, v_y, r, delta_f, delta_r = (axis.ravel() for axis in np.meshgrid(*STATES))
+        v_x = np.maximum(v_x, self.min_speed)
+        x, u = np.stack([v_y, r]), np.stack([delta_f, delta_r])
+        force = np.array(self.step(x, u, v_x[None], np.array(self.vehicle.bicycle)))
+        largest = float(np.abs(force).max())
+        if not largest <= LARGEST_FORCE:
             raise UnusableNetworkError(
-                f"axle forces must rise with slip, at {-PROBE} and {PROBE} rad they are "
-                f"{force[1].tolist()} and {force[0].tolist()} N: check units, the order of inputs, "
-                "and the sign of slip (slip_sign)"
+                f"axle forces must be finite and below {LARGEST_FORCE:g} N, at speeds of "
+                f"{STATES[0][0]:g} to {STATES[0][-1]:g} m/s they reach {largest:g} N"
             )
 
     @classmethod
@@ -103,13 +113,17 @@ class OnnxModel:
         try:
             return cls(
                 vehicle=vehicle,
-                content=path.read_bytes(),
+                content=read_bytes(path, UnusableNetworkError),
                 min_speed=min_speed,
                 inputs=inputs,
                 slip_sign=slip_sign,
             )
-        except (OSError, ValueError) as error:
-            raise UnusableNetworkError(f"{path}: {error}") from error
+        except OSError as error:
+            reason = (error.strerror or "cannot be read").lower()
+            raise UnusableNetworkError(f"{path}: {reason}") from error
+        except ValueError as error:
+            told = str(error).removeprefix(f"{path}: ")
+            raise UnusableNetworkError(f"{path}: {told}") from error
 
     @property
     def step(self) -> ca.Function:
@@ -118,6 +132,17 @@ class OnnxModel:
         Its result is axle_force (2,) [N]. It has derivatives and generates code.
         """
         return _step(self.content, self.inputs, self.slip_sign)
+
+    def force_at(self, alpha: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the axle forces where both axles drift at slip angles, (k, 2) [N].
+
+        Parameters
+        ----------
+        alpha : slip angles in the paper's sign [rad], (k,).
+        """
+        speed = max(PROBE_SPEED, self.min_speed)
+        drift = np.stack([-np.tan(alpha) * speed, np.zeros_like(alpha)])
+        return np.array(self.step(drift, np.zeros(2), speed, np.array(self.vehicle.bicycle))).T
 
     @property
     def signals(self) -> tuple[str, ...]:
@@ -187,17 +212,15 @@ class OnnxModel:
             Where a key is missing or a value impossible.
         """
         try:
-            inputs = data["inputs"]
+            table = Table(data, "", FrozenModelError)
             return cls(
-                vehicle=vehicle_from(data["vehicle"]),
-                content=base64.b64decode(data["onnx_base64"], validate=True),
-                min_speed=float(data["min_speed_m_s"]),
-                inputs=None if inputs is None else tuple(inputs),
-                slip_sign=data["slip_sign"],
+                vehicle=vehicle_from(table.value("vehicle")),
+                content=base64.b64decode(table.text("onnx_base64"), validate=True),
+                min_speed=table.number("min_speed_m_s"),
+                inputs=None if table.value("inputs") is None else table.texts("inputs"),
+                slip_sign=table.whole("slip_sign"),
             )
-        except KeyError as error:
-            raise FrozenModelError(f"{source}: key {error} is missing") from error
-        except (TypeError, ValueError, binascii.Error) as error:
+        except ValueError as error:
             raise FrozenModelError(f"{source}: {error}") from error
 
 

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from identifier.workers import Map
+from models.doors import read_json
 from models.files import write_atomically
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -77,7 +78,7 @@ class Store:
         item : whose result.
         """
         try:
-            return self.from_json(json.loads(self._path(item).read_text(encoding="utf-8")))
+            return self.from_json(read_json(self._path(item), ValueError))
         except (OSError, KeyError, TypeError, ValueError):
             return None
 

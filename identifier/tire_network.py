@@ -11,10 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from identifier.network import SIGNALS
 
 FORCES = ("F_yf", "F_yr")
+LARGEST = 1e9  # of a weight, SI: a stiffness in N/rad fits
 READS_ONNX = (3, 8, 2)  # the first CasADi that knows the operations of such networks
 BY_COUNT = {
     2: ("alpha_f", "alpha_r"),
@@ -84,9 +86,27 @@ def _imported(content: bytes) -> ca.Function:
                 graph.bind_shape(name, [abs(size) for size in graph.dimension(name)])
             for parameter in graph.dynamic_params():
                 graph.bind_dim(parameter, 1)
-            return graph.create("tire_network", {"symbolic": True})
+            network = graph.create("tire_network", {"symbolic": True})
         except (RuntimeError, NotImplementedError) as error:
             raise UnusableNetworkError(f"CasADi cannot read it: {_reason(error)}") from error
+    _require_plausible(network)
+    return network
+
+
+def _require_plausible(network: ca.Function) -> None:
+    """Refuse numbers that no tire network holds; a single one may be a limit, as infinity is."""
+    if not network.is_a("MXFunction"):
+        raise UnusableNetworkError("CasADi reads it as another kind of graph than is known")
+    for k in range(network.n_instructions()):
+        if network.instruction_id(k) != ca.OP_CONST:
+            continue
+        values = np.array(network.instruction_MX(k).to_DM())
+        limit = values.size == 1 and not np.isnan(values).any()
+        if not (limit or (np.abs(values) <= LARGEST).all()):
+            raise UnusableNetworkError(
+                f"weights must be finite and below {LARGEST:g}, one is "
+                f"{values.flat[np.argmax(~(np.abs(values) <= LARGEST))]:g}"
+            )
 
 
 def _check_tensor(name: str, shape: Sequence[int], dtype: str) -> None:

@@ -7,29 +7,11 @@ plant never starts from a value that is not physical.
 from dataclasses import dataclass
 from pathlib import Path
 
-from models.rules import require_positive
+from models.rules import require_positive, require_within
 
 
 class VehicleError(ValueError):
     """A vehicle parameter breaks a rule; the message names the key, the rule and the value."""
-
-
-def require_within(low: float, high: float, **values: float) -> None:
-    """Refuse every value outside the closed interval from `low` to `high`.
-
-    Parameters
-    ----------
-    low, high : ends of the interval, in the unit of the values.
-    **values : what to check, by name.
-
-    Raises
-    ------
-    VehicleError
-        Naming the first key that breaks the rule and its value; NaN breaks it too.
-    """
-    for key, value in values.items():
-        if not low <= value <= high:
-            raise VehicleError(f"{key} must lie between {low} and {high}, it is {value}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +41,7 @@ class Chassis:
     Raises
     ------
     VehicleError
-        For a value that is not positive, a height or share outside its range, or NaN.
+        For a value that is not positive, outside what any chassis has, or NaN.
     """
 
     track_front: float
@@ -93,18 +75,45 @@ class Chassis:
             steering_lag=self.steering_lag,
         )
         require_within(
+            VehicleError,
+            1e-3,
+            30.0,
+            track_front=self.track_front,
+            track_rear=self.track_rear,
+            cg_height=self.cg_height,
+        )
+        require_within(
+            VehicleError,
+            1e-9,
+            1e12,
+            roll_stiffness=self.roll_stiffness,
+            roll_damping=self.roll_damping,
+            roll_inertia=self.roll_inertia,
+        )
+        require_within(
+            VehicleError,
+            1e-4,
+            100.0,
+            relaxation_length_front=self.relaxation_length_front,
+            relaxation_length_rear=self.relaxation_length_rear,
+            steering_lag=self.steering_lag,
+        )
+        require_within(
+            VehicleError,
             0.0,
             1.0,
             roll_stiffness_front_share=self.roll_stiffness_front_share,
             drive_front_share=self.drive_front_share,
         )
         require_within(
+            VehicleError,
             -1.0,
             1.0,
             roll_camber_front=self.roll_camber_front,
             roll_camber_rear=self.roll_camber_rear,
         )
         require_within(
+            VehicleError,
             0.0,
             self.cg_height,
             roll_center_height_front=self.roll_center_height_front,

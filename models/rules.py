@@ -2,6 +2,8 @@
 
 import math
 
+LARGEST_FORCE = 1e7  # of an axle [N]: ten times that of the heaviest dump truck
+
 
 def require_positive(refusal: type[ValueError], /, **values: float) -> None:
     """Refuse every value that is not a finite number above zero.
@@ -19,3 +21,22 @@ def require_positive(refusal: type[ValueError], /, **values: float) -> None:
     for name, value in values.items():
         if not (value > 0.0 and math.isfinite(value)):
             raise refusal(f"{name} must be positive and finite, it is {value}")
+
+
+def require_within(refusal: type[ValueError], low: float, high: float, /, **values: float) -> None:
+    """Refuse every value outside the closed interval from `low` to `high`.
+
+    Parameters
+    ----------
+    refusal : class of the error to raise.
+    low, high : ends of the interval, in the unit of the values.
+    **values : what to check, by name.
+
+    Raises
+    ------
+    ValueError
+        Of that class, with the first name that breaks the rule and its value; NaN breaks it too.
+    """
+    for name, value in values.items():
+        if not low <= value <= high:
+            raise refusal(f"{name} must lie between {low:g} and {high:g}, it is {value:.10g}")

@@ -11,8 +11,9 @@ from pathlib import Path
 from models import vehicle_file
 from models.bicycle import BicycleParameters
 from models.chassis import Chassis, VehicleError
+from models.doors import Table, read_toml, require_name
 from models.files import write_atomically
-from models.rules import require_positive
+from models.rules import require_positive, require_within
 
 GRAVITY = 9.81  # standard acceleration of free fall, rounded as usual [m/s^2]
 
@@ -50,6 +51,7 @@ class Vehicle:
     chassis: Chassis | None = None
 
     def __post_init__(self) -> None:
+        require_name(VehicleError, "name", self.name)
         require_positive(
             VehicleError,
             mass=self.mass,
@@ -70,6 +72,8 @@ class Vehicle:
 
     def _require_plausible(self) -> None:
         """Refuse values that no car of any size has: a wrong unit, or a digit too many."""
+        require_within(VehicleError, 1e-2, 1e6, mass=self.mass)  # a toy; a dump truck has 6e5
+        require_within(VehicleError, 1e-3, 30.0, l_f=self.l_f, l_r=self.l_r)
         usual = self.mass * self.l_f * self.l_r  # about that; 0.4 times it in models
         if not 0.05 < self.yaw_inertia / usual < 20.0:
             raise VehicleError(
@@ -155,19 +159,18 @@ class Vehicle:
             When there is no such file.
         """
         file = Path(path)
+        data = read_toml(file, VehicleError)
+        inner = data.pop("chassis", None)
+        values = Table(data, f"{file}: ", VehicleError).record(cls, skip=("chassis",))
+        if inner is not None:
+            parts = Table(inner, f"{file}: ", VehicleError, "chassis.").record(Chassis)
         try:
-            table = vehicle_file.read_table(file)
-            chassis = table.pop("chassis", None)
-            values = vehicle_file.checked(table, cls, where="", skip=("chassis",))
-            if chassis is None:
+            if inner is None:
                 return cls(**values)
-            if not isinstance(chassis, dict):
-                raise VehicleError(f"chassis must be a table, it is {chassis!r}")
-            parts = vehicle_file.checked(chassis, Chassis, where="chassis.")
             if "tire" in parts:
                 parts["tire"] = (file.parent / parts["tire"]).resolve()
             return cls(**values, chassis=Chassis(**parts))
-        except VehicleError as error:
+        except (ValueError, RuntimeError) as error:  # RuntimeError: a link that leads to itself
             raise VehicleError(f"{file}: {error}") from None
 
     def to_toml(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:

@@ -4,8 +4,10 @@ import argparse
 import json
 import math
 import shlex
+from contextlib import ExitStack
 from dataclasses import asdict, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -26,6 +28,7 @@ from identifier.identify import identify
 from identifier.methods import DEFAULT
 from identifier.stability import Certificate, DesignError
 from identifier.stability.monte_carlo import Beginning, Observed, monte_carlo
+from models.doors import require_few
 from models.files import write_atomically
 from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
@@ -150,11 +153,20 @@ def _finish(
     certificate: Certificate,
     drive: Recording | None,
 ) -> int:
-    """Write what was asked for; return the exit code."""
-    if options.figures:
-        _draw(options, vehicle, driving, design, certificate, drive)
-    if options.design:
-        _write(options, design)
+    """Write what was asked for; return the exit code. Where a part fails, none is there."""
+    with ExitStack() as stack:
+        drawn = None
+        if options.figures:
+            options.figures.mkdir(parents=True, exist_ok=True)
+            scratch = TemporaryDirectory(prefix=".tireid-", dir=options.figures)
+            drawn = Path(stack.enter_context(scratch))
+            _draw(drawn, vehicle, driving, design, certificate, drive)
+        if options.design:
+            _write(options, design)
+        if drawn is not None:
+            for name in FIGURES:
+                (drawn / name).replace(options.figures / name)
+                say(f"wrote {options.figures / name}")
     return FAILS if certificate.verdict == "fail" else 0
 
 
@@ -177,6 +189,7 @@ def _require_sense(options: argparse.Namespace) -> None:
         raise ValueError("--seed, not negative, goes with --monte-carlo")
     if options.monte_carlo is not None and options.monte_carlo < 1:
         raise ValueError(f"--monte-carlo must be at least 1, it is {options.monte_carlo}")
+    require_few(ValueError, "--monte-carlo", options.monte_carlo or 0, "runs", "runs")
     if options.slip is not None and options.slip > 1.0:
         raise ValueError(f"--slip must be in rad and below 1, it is {options.slip:g}")
 
@@ -310,7 +323,7 @@ def _given(options: argparse.Namespace) -> str:
 
 
 def _draw(
-    options: argparse.Namespace,
+    folder: Path,
     vehicle: Vehicle,
     driving: Driving,
     design: Design,
@@ -322,8 +335,7 @@ def _draw(
 
     recording = drive_to_learn() if drive is None else drive
     operation = natural_operation(design, vehicle, driving)
-    for path in draw_check(options.figures, recording, vehicle, design, operation, certificate):
-        say(f"wrote {path}")
+    draw_check(folder, recording, vehicle, design, operation, certificate)
 
 
 def _require_free(options: argparse.Namespace) -> None:

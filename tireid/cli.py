@@ -10,11 +10,13 @@ from collections.abc import Sequence
 from types import FrameType
 from typing import NoReturn
 
+from models.doors import LimitError
 from tireid.progress import complain, flush_out, listen_to_library, unwritten
 
 BAD_INPUT = 2
 NOT_TOLD = 74  # EX_IOERR of sysexits.h: all was done, but standard output could not be written
 INTERRUPTED = 130
+LONGEST_LINE = 1000  # characters of a message
 
 
 class Parser(argparse.ArgumentParser):
@@ -64,7 +66,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    options = build_parser().parse_args(arguments)
+    try:
+        parser = build_parser()
+    except LimitError as error:  # of the environment
+        complain(f"tireid: error: {one_line(error)}")
+        return BAD_INPUT
+    options = parser.parse_args(arguments)
     listen_to_library()
     try:
         status: int = options.run(options) or 0
@@ -81,12 +88,14 @@ def _expected_errors() -> tuple[type[Exception], ...]:
     """Return what may go wrong without a fault in the program: input, system, compiler."""
     from codegen import CompilationError
     from identifier.export import compiled, processor
+    from mpc.converged import NotConvergedError
     from mpc.realtime import instance
+    from tireid.self_test import SelfTestError
 
     return (
         *(ValueError, ArithmeticError, OSError, ImportError, MemoryError),
         *(CompilationError, compiled.NoCompilerError, instance.NoCompilerError),
-        processor.ReplayError,
+        *(processor.ReplayError, NotConvergedError, SelfTestError),
     )
 
 
@@ -101,7 +110,10 @@ def one_line(error: Exception | str) -> str:
         return f"{error.filename}: {(error.strerror or 'cannot be used').lower()}"
     if isinstance(error, OSError) and error.strerror:
         return error.strerror.lower()  # as of a disk that is full
-    return " ".join(str(error).split()) or type(error).__name__
+    text = " ".join(str(error).split()) or type(error).__name__
+    if isinstance(error, MemoryError):
+        return f"not enough memory: {text}"
+    return text if len(text) <= LONGEST_LINE else f"{text[:LONGEST_LINE]}..."
 
 
 def entry() -> NoReturn:
@@ -119,7 +131,7 @@ def entry() -> NoReturn:
     except SystemExit as ended:  # of --help and of wrong words
         status = ended.code
     flush_out()
-    sys.exit(status)
+    sys.exit(NOT_TOLD if unwritten() and not status else status)
 
 
 def _open_streams() -> None:

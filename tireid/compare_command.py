@@ -12,6 +12,7 @@ from identifier.defaults import default_design
 from identifier.frozen_method import FrozenMethod
 from identifier.method import Method
 from identifier.methods import METHODS
+from models.doors import require_few
 from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
 from tireid.cluster import cluster
@@ -107,6 +108,8 @@ def run(options: argparse.Namespace) -> None:
     for name, least in (("sweep", 0), ("floor", 0), ("seed", 0), ("workers", 1)):
         if getattr(options, name) < least:
             raise ValueError(f"--{name} must be at least {least}, it is {getattr(options, name)}")
+    for name, limit in (("sweep", "runs"), ("floor", "runs"), ("workers", "processes")):
+        require_few(ValueError, f"--{name}", getattr(options, name), limit, limit)
     names = list(dict.fromkeys(options.methods or METHODS))
     unknown = [name for name in names if name not in METHODS]
     if unknown:
@@ -119,7 +122,7 @@ def run(options: argparse.Namespace) -> None:
     there = cluster(options.scheduler) if options.scheduler else nullcontext()
     vehicle = sedan() if options.vehicle is None else Vehicle.from_toml(options.vehicle)
     others = _network(options, vehicle)
-    with there as elsewhere, output_folder(options.out, force=options.force) as folder:
+    with output_folder(options.out, force=options.force) as folder, there as elsewhere:
         comparison = run_comparison(
             names,
             vehicle,

@@ -13,6 +13,7 @@ import numpy as np
 
 from identifier.method import FrozenModel
 from identifier.model_format import vehicle_numbers
+from models.doors import require_few
 from models.vehicle import Vehicle
 from tireid.drive_options import parse_drop, parse_fault, parse_speed, require_friction
 from tireid.drive_runs import FROZEN, LEARNING, LINEAR, ORACLE, Conditions
@@ -61,6 +62,8 @@ def conditions_of(options: argparse.Namespace) -> Conditions:
         drops=[parse_drop(text) for text in options.mu_drop],
         wish=parse_speed(options.speed),
     )
+    hours = options.laps * setup.time_at(setup.path.s[-2]) / 3600.0
+    require_few(ValueError, f"--path {path.name}", hours, "hours", "hours of driving")
     return Conditions(
         setup=setup,
         delay=_periods(options.delay),

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from models.doors import read_json
 from tireid.exchange import ClaimedError, claim, exchange
 from tireid.progress import say
 
@@ -139,14 +140,14 @@ def _read_marker(folder: Path) -> Written | None:
     if marker.is_symlink() or not marker.is_file():
         return None
     try:
-        content = json.loads(marker.read_text(encoding="utf-8"))
+        content = read_json(marker, OutputError)
         if content["format"] != FORMAT:
             return None
         files = {
             str(name): (int(size), str(hash)) for name, (size, hash) in content["files"].items()
         }
         return Written(files, frozenset(map(str, content["folders"])))
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, ArithmeticError):
         return None
 
 

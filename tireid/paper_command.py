@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from models.doors import require_few
 from tireid.output import output_folder
 from tireid.paper_results import study_text, write_study
 from tireid.paper_study import run_study
@@ -38,6 +39,7 @@ def run(options: argparse.Namespace) -> None:
     """
     if options.seeds < 1:
         raise ValueError(f"--seeds must be at least 1, it is {options.seeds}")
+    require_few(ValueError, "--seeds", options.seeds, "runs", "runs")
     with output_folder(options.out, force=options.force) as folder:
         study = run_study(options.seeds, say)
         write_study(folder, study)

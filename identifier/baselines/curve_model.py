@@ -14,7 +14,15 @@ from codegen import Scan
 from identifier.baselines.curves import CURVES
 from identifier.baselines.ports import OVER, axle_loads, sample_ports
 from identifier.method import Setup
-from identifier.model_format import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
+from identifier.model_format import (
+    FORMAT,
+    PROBE_SPEED,
+    FrozenModelError,
+    require_min_speed,
+    vehicle_from,
+    vehicle_numbers,
+)
+from models.doors import Table
 from models.files import write_atomically
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
@@ -78,8 +86,7 @@ class CurveModel:
     def __post_init__(self) -> None:
         if self.curve not in CURVES:
             raise ValueError(f"curve must be one of {list(CURVES)}, not {self.curve!r}")
-        if not 0.0 < self.min_speed < np.inf:
-            raise ValueError(f"min_speed must be positive, it is {self.min_speed}")
+        require_min_speed(self.min_speed)
         shape = (2, len(CURVES[self.curve].parameters))
         if self.parameters.shape != shape:
             raise ValueError(
@@ -87,6 +94,21 @@ class CurveModel:
             )
         if not (np.isfinite(self.parameters) & (self.parameters > 0.0)).all():
             raise ValueError(f"parameters must be positive, they are {self.parameters.tolist()}")
+
+    def force_at(self, alpha: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the axle forces where both axles drift at slip angles, (k, 2) [N].
+
+        Parameters
+        ----------
+        alpha : slip angles in the paper's sign [rad], (k,).
+        """
+        speed = max(PROBE_SPEED, self.min_speed)
+        drift = np.stack([-np.tan(alpha) * speed, np.zeros_like(alpha)])
+        numbers, sampling = np.array(self.vehicle.bicycle), np.array([0.01, self.min_speed])
+        force = build_curve(self.curve)(
+            self.parameters, drift, np.zeros(2), speed, numbers, sampling
+        )
+        return np.array(force).T
 
     def setup(self, recording: Recording) -> Setup:
         """Return what a replay needs.
@@ -151,18 +173,19 @@ class CurveModel:
             Where a key is missing or a value impossible.
         """
         try:
-            curve = data["curve"]
+            table = Table(data, "", FrozenModelError)
+            curve = table.text("curve")
             if curve not in CURVES:
                 raise ValueError(f"curve must be one of {list(CURVES)}, not {curve!r}")
             names = CURVES[curve].parameters
-            axles = [[float(data[axle][name]) for name in names] for axle in ("front", "rear")]
+            axles = [
+                [table.table(axle).number(name) for name in names] for axle in ("front", "rear")
+            ]
             return cls(
-                vehicle=vehicle_from(data["vehicle"]),
+                vehicle=vehicle_from(table.value("vehicle")),
                 curve=curve,
                 parameters=np.array(axles),
-                min_speed=float(data["min_speed_m_s"]),
+                min_speed=table.number("min_speed_m_s"),
             )
-        except KeyError as error:
-            raise FrozenModelError(f"{source}: key {error} is missing") from error
-        except (TypeError, ValueError) as error:
+        except ValueError as error:
             raise FrozenModelError(f"{source}: {error}") from error

@@ -5,11 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
+from models.doors import require_few, shown
 from models.recordings.checks import check_physics
-from models.recordings.record import MINIMUM_SAMPLES, Array, Recording, RecordingError
+from models.recordings.record import LARGEST, MINIMUM_SAMPLES, Array, Recording, RecordingError
 from models.recordings.resampling import resample
 from models.recordings.table import ENDINGS, NO_NAMES, Table, read_table
 
+FIELDS = {"vx": "v_x", "vy": "v_y", "ay": "a_y", "Fyf": "axle_force", "Fyr": "axle_force"}
+SOME = 30  # names in a message
 LONGEST_GAP = 0.1  # [s]: a car can build up or lose all its lateral force meanwhile
 
 
@@ -55,6 +58,8 @@ def read_recording(
     label = str(path) if run is None else f"{path}:{run}"
     _check_values(label, table)
     _check_time(label, table)
+    steps = (table.columns["t"][-1] - table.columns["t"][0]) / dt
+    require_few(RecordingError, label, steps, "samples", f"steps of {dt:g} s")
     signals = dict(table.columns)
     t, signals = resample(signals.pop("t"), signals, dt)
     if t.size < MINIMUM_SAMPLES:
@@ -128,23 +133,35 @@ def _one_run(path: Path, table: Table, run: str | None) -> tuple[Table, str | No
         return table, None
     names = list(dict.fromkeys(table.run.tolist()))
     if run is None and len(names) > 1:
-        raise RecordingError(f"{path}: name one of its runs: {', '.join(names)}")
+        raise RecordingError(f"{path}: name one of its runs: {_some(names)}")
     if run is not None and run not in names:
-        raise RecordingError(f"{path}: there is no run {run!r}, the runs are: {', '.join(names)}")
+        raise RecordingError(f"{path}: there is no run {shown(run)}, the runs are: {_some(names)}")
     run = names[0] if run is None else run
     keep = table.run == run
     columns = {name: value[keep] for name, value in table.columns.items()}
     return Table(columns, None, table.row[keep], table.unit), run
 
 
+def _some(names: list[str]) -> str:
+    """Return names, or the first of many."""
+    return ", ".join(names[:SOME]) + (f", ... ({len(names)})" if len(names) > SOME else "")
+
+
 def _check_values(label: str, table: Table) -> None:
-    """Refuse NaN, infinity and empty cells."""
+    """Refuse NaN, infinity, empty cells, and sizes that no computation is asked to bear."""
     for name, value in table.columns.items():
         bad = np.flatnonzero(~np.isfinite(value))
         if bad.size:
             raise RecordingError(
                 f"{label}: {name} must be finite, {bad.size} of {value.size} values are empty, NaN "
                 f"or infinite, the first in {table.unit} {table.row[bad[0]]}; fill or cut them out"
+            )
+        most = LARGEST[FIELDS.get(name, name)]
+        bad = np.flatnonzero(np.abs(value) > most)
+        if bad.size:
+            raise RecordingError(
+                f"{label}: {name} must be of a car, within +-{most:g}, {table.unit} "
+                f"{table.row[bad[0]]} has {value[bad[0]]:.4g}"
             )
 
 

@@ -9,10 +9,25 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from models.rules import LARGEST_FORCE
+
 Array = NDArray[np.float64]
 
 MINIMUM_SAMPLES = 10
 JITTER = 0.02  # largest departure of a sample from the uniform grid, as a share of one step
+
+
+# Beyond these, in SI, a number is no signal of a car whatever its unit: degrees, g and km/h fit.
+LARGEST = {
+    "t": 1e12,
+    "v_x": 1e4,
+    "v_y": 1e4,
+    "r": 1e4,
+    "delta_f": 1e5,
+    "delta_r": 1e5,
+    "a_y": 1e5,
+    "axle_force": LARGEST_FORCE,
+}
 
 
 class RecordingError(ValueError):
@@ -39,7 +54,8 @@ class Recording:
     Raises
     ------
     RecordingError
-        If lengths differ, a value is not finite, time is not uniform, or n < 10.
+        If lengths differ, a value is not finite or beyond `LARGEST`, time is not uniform, or
+        n < 10.
     """
 
     name: str
@@ -72,6 +88,12 @@ class Recording:
             if bad:
                 raise RecordingError(
                     f"{self.name}: {field.name} must be finite, {bad} of its values are not"
+                )
+            peak = float(np.abs(array).max())
+            if peak > LARGEST[field.name]:
+                raise RecordingError(
+                    f"{self.name}: {field.name} must be of a car, within +-"
+                    f"{LARGEST[field.name]:g}, its peak is {peak:.4g}"
                 )
             object.__setattr__(self, field.name, array)
         step = (self.t[-1] - self.t[0]) / (n - 1)

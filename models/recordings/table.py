@@ -2,9 +2,10 @@
 
 import csv
 import difflib
-import gzip
 import io
-import zlib
+import math
+import sys
+from array import array
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,6 +13,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from models.doors import (
+    LONGEST_NAME,
+    limits,
+    read_bytes,
+    require_few,
+    require_file,
+    shown,
+    unpack,
+)
 from models.recordings.record import Array, RecordingError
 
 NEEDED = ("t", "vx", "vy", "r", "delta_f")
@@ -37,7 +47,7 @@ class Table(NamedTuple):
     """
 
     columns: dict[str, Array]
-    run: NDArray[np.str_] | None
+    run: NDArray[Any] | None
     row: NDArray[np.int64]
     unit: str
 
@@ -56,7 +66,7 @@ def read_table(path: Path, only_runs: bool = False, columns: Mapping[str, str] =
     RecordingError
         If the file cannot be read, or a column is missing, doubled or not numeric.
     """
-    if not path.is_file():
+    if path.is_dir() or not path.exists():
         raise RecordingError(f"{path}: there is no such file")
     name = path.name.lower()
     if not name.endswith(ENDINGS):
@@ -67,58 +77,68 @@ def read_table(path: Path, only_runs: bool = False, columns: Mapping[str, str] =
 
 
 def _read_csv(path: Path, only_runs: bool, columns_named: Mapping[str, str]) -> Table:
-    """Read a CSV, plain or gzipped."""
-    reader = csv.reader(io.StringIO(_text(path), newline=""))
-    rows: list[list[str]] = []
+    """Read a CSV, plain or gzipped, line by line; columns that nobody asks for are not kept."""
+    reader = csv.reader(io.TextIOWrapper(io.BytesIO(_text(path)), "utf-8-sig", newline=""))
+    most = limits().samples
     lines: list[int] = []
+    runs: list[str] = []
     try:
         header = [cell.strip() for cell in next(reader, [])]
+        require_few(RecordingError, str(path), len(header), "columns", "columns")
+        header = _standard_names(path, header, columns_named)
+        names = _choose(path, header, only_runs)
+        places = [header.index(name) for name in names]
+        columns = [array("d") for _ in names]
+        run = header.index(RUN) if RUN in header else None
         for cells in reader:
-            if cells:
-                rows.append(cells)
-                lines.append(reader.line_num)
+            if not cells:
+                continue
+            line = reader.line_num
+            if len(cells) != len(header):
+                raise RecordingError(
+                    f"{path}: line {line} has {len(cells)} cells, the header has {len(header)}; "
+                    "was the file cut off?"
+                )
+            if len(lines) >= most:
+                require_few(RecordingError, str(path), len(lines) + 1, "samples", "rows")
+            lines.append(line)
+            for name, place, column in zip(names, places, columns, strict=True):
+                column.append(_number(path, name, cells[place], line))
+            if run is not None:
+                runs.append(_run_name(path, cells[run], line))
     except csv.Error as error:
         raise RecordingError(f"{path}: line {reader.line_num} is not CSV ({error})") from None
-    header = _standard_names(path, header, columns_named)
-    names = _choose(path, header, only_runs)
-    if not rows:
+    if not lines:
         raise RecordingError(f"{path}: there is a header but no row of data")
-    for cells, line in zip(rows, lines, strict=True):
-        if len(cells) != len(header):
-            raise RecordingError(
-                f"{path}: line {line} has {len(cells)} cells, the header has {len(header)}; "
-                "was the file cut off?"
-            )
-    cells_of = dict(zip(header, zip(*rows, strict=True), strict=True))
-    columns = {name: _numbers(path, name, cells_of[name], lines) for name in names}
-    run = np.array([cell.strip() for cell in cells_of[RUN]]) if RUN in header else None
-    return Table(columns, run, np.array(lines), "line")
+    return Table(
+        {name: np.array(column) for name, column in zip(names, columns, strict=True)},
+        None if run is None else np.array(runs, dtype=object),
+        np.array(lines),
+        "line",
+    )
 
 
-def _text(path: Path) -> str:
-    """Read, decompress and decode a file."""
-    data = path.read_bytes()
+def _text(path: Path) -> bytes:
+    """Read and decompress a file, which holds text in UTF-8."""
+    data = read_bytes(path, RecordingError, limit="megabytes")
     zipped = data.startswith(b"\x1f\x8b")
     if path.name.lower().endswith(".gz"):
         if not zipped:
             raise RecordingError(f"{path}: is not gzip, although its name ends in .gz")
-        try:
-            data = gzip.decompress(data)
-        except (OSError, EOFError, zlib.error) as error:
-            raise RecordingError(f"{path}: gzip data are damaged or cut off ({error})") from None
+        data = unpack(path, data, RecordingError, limit="megabytes")
     elif zipped:
         raise RecordingError(f"{path}: is gzip, rename it to end in .csv.gz")
     try:
-        text = data.decode("utf-8-sig")
+        data.decode("utf-8")
     except UnicodeDecodeError as error:
         raise RecordingError(
             f"{path}: is not a text file in UTF-8 (byte {error.start}); a recording is CSV"
         ) from None
-    if "\0" in text:
+    if b"\0" in data:
         raise RecordingError(f"{path}: is a binary file (it has NUL bytes); a recording is CSV")
-    if not text.strip():
+    if not data.strip():
         raise RecordingError(f"{path}: is empty")
-    return text
+    return data
 
 
 def _read_parquet(path: Path, only_runs: bool, columns_named: Mapping[str, str]) -> Table:
@@ -130,16 +150,18 @@ def _read_parquet(path: Path, only_runs: bool, columns_named: Mapping[str, str])
         raise RecordingError(
             f"{path}: reading Parquet needs pyarrow: pip install tireid[parquet]"
         ) from None
+    require_file(path, RecordingError, limit="megabytes")
     try:
         with pyarrow.parquet.ParquetFile(path) as file:
+            _require_small(path, file.metadata)
             found = list(file.schema_arrow.names)
             header = _standard_names(path, found, columns_named)
             names = _choose(path, header, only_runs)
             wanted = names + [RUN] * (RUN in header)
             data: Any = file.read(columns=[found[header.index(name)] for name in wanted])
             data = data.rename_columns(wanted)
-    except (pyarrow.ArrowException, OSError) as error:
-        reason = str(error).splitlines()[0]
+    except (pyarrow.ArrowException, OSError, UnicodeDecodeError) as error:
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise RecordingError(f"{path}: is not a Parquet file ({reason})") from None
     if data.num_rows == 0:
         raise RecordingError(f"{path}: has columns but no row of data")
@@ -153,8 +175,18 @@ def _read_parquet(path: Path, only_runs: bool, columns_named: Mapping[str, str])
         columns[name] = np.array(values.to_numpy(), dtype=np.float64)
     run = None
     if RUN in header:
-        run = np.array([str(value) for value in data.column(RUN).to_pylist()])
+        cells = data.column(RUN).to_pylist()
+        names_of_runs = [_run_name(path, str(cell), k) for k, cell in enumerate(cells, start=1)]
+        run = np.array(names_of_runs, dtype=object)
     return Table(columns, run, row, "row")
+
+
+def _require_small(path: Path, about: Any) -> None:
+    """Refuse a Parquet file that unpacks to more than is allowed, by what it says of itself."""
+    require_few(RecordingError, str(path), about.num_columns, "columns", "columns")
+    require_few(RecordingError, str(path), about.num_rows, "samples", "rows")
+    size = sum(about.row_group(k).total_byte_size for k in range(about.num_row_groups))
+    require_few(RecordingError, str(path), size / 1e6, "megabytes", "megabytes")
 
 
 def _standard_names(path: Path, header: list[str], columns: Mapping[str, str]) -> list[str]:
@@ -212,18 +244,21 @@ def _similar(name: str, header: list[str]) -> str | None:
     return lower[close[0]] if close else None
 
 
-def _numbers(path: Path, name: str, cells: tuple[str, ...], lines: list[int]) -> Array:
-    """Convert the cells of a column; an empty cell is NaN."""
+def _number(path: Path, name: str, cell: str, line: int) -> float:
+    """Convert a cell; an empty one is NaN."""
     try:
-        return np.array([float(cell or "nan") for cell in cells])
+        if "_" not in cell:  # which Python takes for a mark between digits
+            return float(cell) if cell else math.nan
     except ValueError:
-        pass
-    values = np.empty(len(cells))
-    for k, cell in enumerate(cells):
-        try:
-            values[k] = float(cell.strip() or "nan")
-        except ValueError:
-            raise RecordingError(
-                f"{path}: {name} must be numeric, line {lines[k]} has {cell[:30]!r}"
-            ) from None
-    return values
+        if not cell.strip():
+            return math.nan
+    raise RecordingError(f"{path}: {name} must be numeric, line {line} has {shown(cell)}")
+
+
+def _run_name(path: Path, cell: str, line: int) -> str:
+    name = sys.intern(cell.strip())  # the same in every row
+    if len(name) > LONGEST_NAME:
+        raise RecordingError(
+            f"{path}: run must be at most {LONGEST_NAME} characters, line {line} has {shown(name)}"
+        )
+    return name

@@ -8,11 +8,14 @@ import math
 from dataclasses import dataclass, fields, replace
 from typing import Self
 
+from models.rules import require_within
 from models.tires.forces import Expression
 
 ESSENTIAL = ("FNOMIN", "PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")
 # Conicity and ply-steer: these change sign when the tire is mounted on the other side
 ASYMMETRIC = ("PHY1", "PHY2", "PVY1", "PVY2", "PEY3", "RHX1", "RBY3", "RVY1", "RVY2")
+LARGEST = 1e5  # of a coefficient: those of real tires reach about 100
+MOST = {"FNOMIN": 1e7, "PDX1": 100.0, "PDY1": 100.0}  # N, and frictions
 _POSITIVE = ("FNOMIN", "LFZO", "PKY2", "PDX1", "PDY1", "PKX1")
 _POSITIVE_SCALES = ("LCX", "LMUX", "LKX", "LCY", "LMUY", "LKY")
 
@@ -32,7 +35,8 @@ class Coefficients:
     Raises
     ------
     ValueError
-        A value is not finite or breaks the sign given here; the message names it.
+        A value is not finite, beyond what any tire has, or breaks the sign given here; the message
+        names it.
     """
 
     FNOMIN: float
@@ -118,6 +122,8 @@ class Coefficients:
         for field in fields(self):
             if not math.isfinite(getattr(self, field.name)):
                 raise ValueError(f"{field.name} must be finite, it is {getattr(self, field.name)}")
+            most = MOST.get(field.name, LARGEST)
+            require_within(ValueError, -most, most, **{field.name: getattr(self, field.name)})
         for name in (*_POSITIVE, "PCX1", "PCY1", *_POSITIVE_SCALES):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"{name} must be positive, it is {getattr(self, name):g}")

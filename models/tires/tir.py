@@ -14,8 +14,11 @@ from os import PathLike
 from pathlib import Path
 from typing import NamedTuple
 
+from models.doors import read_bytes, shown
 from models.tires.tir_units import DIMENSIONS, unit_in_si
 
+LARGEST = 1e12  # of a number, in the unit of the file: a stiffness in N/km fits
+SOME = 10  # lines in a message
 _KEY = re.compile(r"[A-Za-z_]\w*")
 _SECTION = re.compile(r"\[(.*?)\]")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([EeDd][+-]?\d+)?")
@@ -87,7 +90,7 @@ class TirFile:
             return None
         values = {self._parsed(key, entry): entry.line for entry in self.entries[key]}
         if len(values) > 1:
-            lines = ", ".join(str(line) for line in values.values())
+            lines = ", ".join(str(line) for line in list(values.values())[:SOME])
             raise self.error(f"{key} has different values in lines {lines}")
         return next(iter(values)) * self._unit(key)
 
@@ -103,9 +106,13 @@ class TirFile:
     def _parsed(self, key: str, entry: Entry) -> float:
         if _NUMBER.fullmatch(entry.value):
             value = float(entry.value.upper().replace("D", "E"))
+            if LARGEST < abs(value) < math.inf:
+                raise self.error(f"line {entry.line}: {key} must be below {LARGEST:g}, is {value}")
             if math.isfinite(value):
                 return value
-        raise self.error(f"line {entry.line}: {key} must be a finite number, it is {entry.value!r}")
+        raise self.error(
+            f"line {entry.line}: {key} must be a finite number, it is {shown(entry.value)}"
+        )
 
     def _unit(self, key: str) -> float:
         factor = 1.0
@@ -128,24 +135,27 @@ def read_tir(path: str | PathLike[str]) -> TirFile:
 
     Raises
     ------
+    TirError
+        It is no file, or too large.
     OSError
         The file cannot be read.
     """
     path = Path(path)
-    entries: dict[str, tuple[Entry, ...]] = {}
+    entries: dict[str, list[Entry]] = {}
     without_sign: dict[str, int] = {}
     section = ""
-    for number, raw in enumerate(_decoded(path.read_bytes()).splitlines(), start=1):
+    for number, raw in enumerate(_decoded(read_bytes(path, TirError)).splitlines(), start=1):
         line = _without_comment(raw).strip()
         key, sign, value = (part.strip() for part in line.partition("="))
         if header := _SECTION.match(line):
             section = header.group(1).strip().upper()
         elif sign and _KEY.fullmatch(key):
             entry = Entry(_unquoted(value), number, section)
-            entries[key.upper()] = (*entries.get(key.upper(), ()), entry)
+            entries.setdefault(key.upper(), []).append(entry)
         elif word := _KEY.match(line):
             without_sign[word.group().upper()] = number
-    return TirFile(path=path, entries=entries, without_sign=without_sign)
+    together = {key: tuple(lines) for key, lines in entries.items()}
+    return TirFile(path=path, entries=together, without_sign=without_sign)
 
 
 def _decoded(raw: bytes) -> str:

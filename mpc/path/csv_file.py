@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from models.doors import limits, read_text, require_few, shown
 from mpc.path.line import Array, PathError
 from mpc.path.waypoints import Waypoints
 
@@ -27,6 +28,7 @@ def read_waypoints(file: Path) -> Waypoints:
     """
     rows = _rows(file)
     header = [cell.strip().lstrip("#").strip() for cell in rows[0][1]]
+    require_few(PathError, str(file), len(header), "columns", "columns")
     points = [(line, cells) for line, cells in rows[1:] if not cells[0].lstrip().startswith("#")]
     if not points:
         raise PathError(f"{file}: there is a header but no way-point")
@@ -39,17 +41,20 @@ def read_waypoints(file: Path) -> Waypoints:
 
 def _rows(file: Path) -> list[tuple[int, list[str]]]:
     """Return the cells of every line that has some, with its number."""
-    if not file.is_file():
+    if not file.exists():
         raise PathError(f"{file}: there is no such file")
     try:
-        text = file.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise PathError(f"{file}: is not a text file in UTF-8 (byte {error.start})") from None
+        text = read_text(file, PathError, limit="megabytes", encoding="utf-8-sig")
     except OSError as error:
         raise PathError(f"{file}: cannot be read ({error.strerror})") from None
     reader = csv.reader(io.StringIO(text, newline=""))
+    rows, most = [], limits().samples
     try:
-        rows = [(reader.line_num, cells) for cells in reader if any(map(str.strip, cells))]
+        for cells in reader:
+            if any(map(str.strip, cells)):
+                rows.append((reader.line_num, cells))
+            if len(rows) > most:
+                require_few(PathError, str(file), len(rows), "samples", "rows")
     except csv.Error as error:
         raise PathError(f"{file}: line {reader.line_num} is not CSV ({error})") from None
     if not rows:
@@ -83,7 +88,7 @@ def _is_number(cell: str) -> bool:
         float(cell)
     except ValueError:
         return False
-    return True
+    return "_" not in cell  # which Python takes for a mark between digits
 
 
 def _numbers(file: Path, name: str, column: int, points: list[tuple[int, list[str]]]) -> Array:
@@ -93,7 +98,7 @@ def _numbers(file: Path, name: str, column: int, points: list[tuple[int, list[st
         cell = cells[column].strip() if column < len(cells) else ""
         if not (_is_number(cell) and np.isfinite(float(cell))):
             raise PathError(
-                f"{file}: {name} must be a finite number, line {line} has {cell[:30]!r}"
+                f"{file}: {name} must be a finite number, line {line} has {shown(cell)}"
             )
         values.append(float(cell))
     return np.array(values)

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from models.doors import require_few
+
 Array = NDArray[np.float64]
 
 
@@ -36,13 +38,15 @@ def uniform_grid(length: float, spacing: float) -> Array:
     Raises
     ------
     PathError
-        Where spacing is not positive or leaves fewer than four steps.
+        Where spacing is not positive or leaves fewer than four steps, or too many.
     """
     if not 0.0 < spacing <= length / 4.0:
         raise PathError(
             f"spacing must be positive and at most a quarter of the length {length:.4g} m, "
             f"it is {spacing}"
         )
+    steps = length / spacing
+    require_few(PathError, f"a path of {length:.4g} m", steps, "samples", f"steps of {spacing:g} m")
     return np.linspace(0.0, length, int(np.ceil(length / spacing - 1e-9)) + 1)
 
 

@@ -14,6 +14,7 @@ from mpc.path.line import Array, Line, PathError, uniform_grid
 from mpc.path.smoothing import smooth
 
 FITS = 4
+FARTHEST = 1e8  # of a way-point from the origin [m]: every map of the earth fits
 SAME = 1e-6  # of the median gap: way-points as near as this are one
 PIECES = 8  # of every interval between knots, for its length
 LOBES, SHARES = np.polynomial.legendre.leggauss(8)  # nodes on -1 to 1, and weights
@@ -143,6 +144,12 @@ def _checked(X: ArrayLike, Y: ArrayLike, closed: bool, name: str) -> Array:
     if bad.size:
         raise PathError(
             f"{name}: way-points must be finite, number {bad[0] + 1} is {points[bad[0]].tolist()}"
+        )
+    far = np.flatnonzero(np.abs(points).max(axis=1) > FARTHEST)
+    if far.size:
+        raise PathError(
+            f"{name}: way-points must lie within +-{FARTHEST:g} m, number {far[0] + 1} is "
+            f"{points[far[0]].tolist()}"
         )
     gaps = _norm(np.diff(points, axis=0))
     if closed and gaps.size and _norm(points[0] - points[-1]) <= SAME * np.median(gaps):

@@ -91,7 +91,7 @@ def test_six_flat_keys_are_a_vehicle(tmp_path):
         (SIX + "chassis = 3\n", "chassis must be a table"),
         (SIX + "[chassis]\ntrack = 1.5\n", "chassis.track is unknown"),
         (SIX + "[chassis]\ntrack_front = 1.5\n", "chassis.track_rear is missing"),
-        ("mass = = 3", "must be TOML"),
+        ("mass = = 3", "cannot be read as TOML"),
     ],
 )
 def test_a_wrong_file_is_one_line_with_file_key_and_rule(tmp_path, text, said):

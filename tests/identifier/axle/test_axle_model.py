@@ -151,13 +151,13 @@ def test_a_model_survives_its_file_bit_for_bit(car, drive, tmp_path):
 @pytest.mark.parametrize(
     ("key", "value", "rule"),
     [
-        ("W", None, "key 'W' is missing"),
+        ("W", None, "W is missing"),
         ("W", [[1.0, 2.0]], r"W must have shape \(2, 4\)"),
         ("own", [[float("nan"), 0, 0], [0, 0, 0]], "own holds a number that is not finite"),
         ("own", [[-0.1, 0, 0], [0, 0, 0]], "compliance must not be negative"),
         ("ladder", [0.01, 0.03, 0.1, 0.2], "ladder must rise by powers of two"),
         ("sway", {"frequency": -1.0, "damping": 0.3}, "frequency must be positive"),
-        ("plausibility", {"color": 1}, "unexpected keyword"),
+        ("plausibility", {"color": 1}, "plausibility.color is unknown"),
         ("edges", [0.0, 1.0], "edges must be"),
     ],
 )

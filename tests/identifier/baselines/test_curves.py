@@ -82,8 +82,8 @@ def test_a_model_comes_back_from_its_file(curve, car, drive, tmp_path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda d: d.pop("rear"), "key 'rear' is missing"),
-        (lambda d: d["front"].pop("C"), "key 'C' is missing"),
+        (lambda d: d.pop("rear"), "rear is missing"),
+        (lambda d: d["front"].pop("C"), "C is missing"),
         (lambda d: d["front"].update(C=-1.0), "must be positive"),
         (lambda d: d["front"].update(C=float("nan")), "must be positive"),
         (lambda d: d.update(curve="brush"), "curve must be one of"),

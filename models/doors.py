@@ -1,0 +1,498 @@
+"""The doors that every file comes in by: what it may hold, which types, and one line where it errs.
+
+A file is a regular file of limited size, also when unpacked; JSON and TOML are limited in depth and
+number of values; a table gives its values by name and type. Which numbers are possible is for the
+records that are made of them. A refusal is one line: file, place, rule, and the value, shortened.
+"""
+
+import gzip
+import io
+import json
+import math
+import os
+import stat
+import tomllib
+import types
+import zlib
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, fields
+from pathlib import Path
+from typing import Any, NoReturn, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.escape import visible
+
+VARIABLE = "TIREID_LIMITS"
+CHUNK = 1 << 20  # bytes that are unpacked at a time
+SHOWN = 60  # characters of a value in a message
+LONGEST_NAME = 200  # characters
+
+
+class LimitError(ValueError):
+    """The limits that the environment asks for are none."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """How much may be asked for. `TIREID_LIMITS="samples=1e7 megabytes=4000"` raises limits.
+
+    Parameters
+    ----------
+    megabytes : of a recording or of way-points, unpacked.
+    samples : rows of a recording or of way-points, steps of a recording or of a path.
+    columns : of a recording or of way-points.
+    document : megabytes of a JSON, ONNX or tire file.
+    toml : megabytes of a TOML file.
+    line : characters of a line of TOML.
+    depth : of tables and lists inside one another.
+    values : numbers, texts, tables and lists in a JSON or TOML file.
+    hidden : units of a network, whose code is compiled: 100 take ten seconds, 300 minutes.
+    hours : that a car is driven for.
+    runs : designs, starts, seeds or random drives that one command is asked for.
+    processes : that one command is asked for.
+    """
+
+    megabytes: float = 256.0
+    samples: float = 2e6
+    columns: float = 1e4
+    document: float = 32.0
+    toml: float = 0.1
+    line: float = 4000.0
+    depth: float = 32.0
+    values: float = 2e6
+    hidden: float = 128.0
+    hours: float = 1.0
+    runs: float = 1e5
+    processes: float = 256.0
+
+
+def limits() -> Limits:
+    """Return the limits, as the environment raises or lowers them.
+
+    Raises
+    ------
+    LimitError
+        Where the environment's words are not NAME=NUMBER.
+    """
+    known = [field.name for field in fields(Limits)]
+    asked: dict[str, float] = {}
+    for word in os.environ.get(VARIABLE, "").replace(",", " ").split():
+        name, _, number = word.partition("=")
+        try:
+            asked[name] = float(number)
+        except ValueError:
+            asked[name] = math.nan
+        if name not in known or not asked[name] > 0.0:
+            raise LimitError(
+                f"{VARIABLE} must hold NAME=NUMBER of {', '.join(known)}, not {shown(word)}"
+            )
+    return Limits(**asked)
+
+
+def require_few(refusal: type[ValueError], where: str, count: float, limit: str, what: str) -> None:
+    """Refuse more than a limit allows, and tell how to raise it.
+
+    Parameters
+    ----------
+    refusal : class of the error to raise.
+    where : file or option, begins the message.
+    count : what is asked for.
+    limit : field of `Limits`.
+    what : is counted, in the plural.
+
+    Raises
+    ------
+    ValueError
+        Of that class; a count that is not a number is too many.
+    """
+    most = getattr(limits(), limit)
+    if not count <= most:
+        raise refusal(
+            f"{where}: {what} must be at most {most:g}, here are {count:.10g}; "
+            f"{VARIABLE}={limit}=NUMBER in the environment raises the limit"
+        )
+
+
+def shown(value: Any) -> str:
+    """Return a value as a message shows it: short, on one line, without controls.
+
+    Parameters
+    ----------
+    value : as it was read.
+    """
+    if isinstance(value, int) and value.bit_length() > 128:
+        return f"a whole number of {value.bit_length()} bits"
+    if isinstance(value, dict | list | tuple):
+        return f"a {'table' if isinstance(value, dict) else 'list'} of {len(value)}"
+    text = repr(value[: SHOWN + 1] if isinstance(value, str | bytes) else value)
+    return visible(text if len(text) <= SHOWN else f"{text[:SHOWN]}...")
+
+
+def require_file(path: Path, refusal: type[ValueError], *, limit: str) -> None:
+    """Refuse what is no regular file, and files that are too large.
+
+    Parameters
+    ----------
+    path : to be read.
+    refusal : class of the error to raise.
+    limit : field of `Limits` that says how many megabytes it may hold.
+
+    Raises
+    ------
+    ValueError
+        Of that class.
+    OSError
+        Where it cannot be looked at.
+    """
+    about = path.stat()
+    if not stat.S_ISREG(about.st_mode):
+        kind = "a folder" if stat.S_ISDIR(about.st_mode) else "a device, pipe or socket"
+        raise refusal(f"{path}: must be a file, it is {kind}")
+    _require_size(path, refusal, about.st_size, limit)
+
+
+def read_bytes(path: Path, refusal: type[ValueError], *, limit: str = "document") -> bytes:
+    """Read a file.
+
+    Parameters
+    ----------
+    path : a regular file: no device, pipe or folder, which may have no end.
+    refusal : class of the error to raise.
+    limit : field of `Limits` that says how many megabytes it may hold.
+
+    Raises
+    ------
+    ValueError
+        Of that class, where it is no such file or too large.
+    OSError
+        Where it cannot be read.
+    """
+    require_file(path, refusal, limit=limit)
+    most = int(min(1e6 * getattr(limits(), limit), 2.0**62))
+    with path.open("rb") as file:
+        data = file.read(most + 1)
+    _require_size(path, refusal, len(data), limit)  # which grew, or has no size as in /proc
+    return data
+
+
+def unpack(path: Path, data: bytes, refusal: type[ValueError], *, limit: str) -> bytes:
+    """Return what gzip data hold.
+
+    Parameters
+    ----------
+    path : for messages.
+    data : of one or several gzip members.
+    refusal : class of the error to raise.
+    limit : field of `Limits` that says how many megabytes they may become.
+
+    Raises
+    ------
+    ValueError
+        Of that class, where they are damaged or become too many.
+    """
+    parts, size = [], 0
+    try:
+        with gzip.GzipFile(fileobj=io.BytesIO(data)) as file:
+            while part := file.read(CHUNK):
+                parts.append(part)
+                size += len(part)
+                _require_size(path, refusal, size, limit)
+    except (OSError, EOFError, zlib.error) as error:
+        raise refusal(f"{path}: gzip data are damaged or cut off ({error})") from None
+    return b"".join(parts)
+
+
+def _require_size(path: Path, refusal: type[ValueError], size: int, limit: str) -> None:
+    require_few(refusal, str(path), size / 1e6, limit, "megabytes")
+
+
+def read_text(
+    path: Path, refusal: type[ValueError], *, limit: str = "document", encoding: str = "utf-8"
+) -> str:
+    """Read a text file.
+
+    Parameters
+    ----------
+    path : a regular file.
+    refusal : class of the error to raise.
+    limit : field of `Limits` that says how many megabytes it may hold.
+    encoding : utf-8, or utf-8-sig where a byte order mark may begin it.
+
+    Raises
+    ------
+    ValueError
+        Of that class, where it is no such file, too large, or not UTF-8.
+    OSError
+        Where it cannot be read.
+    """
+    try:
+        return read_bytes(path, refusal, limit=limit).decode(encoding)
+    except UnicodeDecodeError as error:
+        raise refusal(f"{path}: is not a text file in UTF-8 (byte {error.start})") from None
+
+
+def read_json(path: Path, refusal: type[ValueError]) -> Any:
+    """Read a JSON file.
+
+    Parameters
+    ----------
+    path : a regular file.
+    refusal : class of the error to raise.
+
+    Raises
+    ------
+    ValueError
+        Of that class, where it is not JSON or beyond the limits.
+    OSError
+        Where it cannot be read.
+    """
+    text = read_text(path, refusal)
+
+    try:
+        data = json.loads(text)
+    except RecursionError:
+        raise refusal(f"{path}: cannot be read as JSON: tables or lists too deep") from None
+    except ValueError as error:
+        raise refusal(f"{path}: cannot be read as JSON: {_said(error)}") from None
+    _require_small(path, data, refusal)
+    return data
+
+
+def read_toml(path: Path, refusal: type[ValueError]) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Parameters
+    ----------
+    path : a regular file.
+    refusal : class of the error to raise.
+
+    Raises
+    ------
+    ValueError
+        Of that class, where it is not TOML or beyond the limits.
+    OSError
+        Where it cannot be read.
+    """
+    text = read_text(path, refusal, limit="toml")
+    longest = max(map(len, text.splitlines()), default=0)  # its parser takes the square of it
+    require_few(refusal, str(path), longest, "line", "characters of a line")
+    try:
+        data = tomllib.loads(text)
+    except RecursionError:
+        raise refusal(f"{path}: cannot be read as TOML: tables or lists too deep") from None
+    except ValueError as error:
+        raise refusal(f"{path}: cannot be read as TOML: {_said(error)}") from None
+    _require_small(path, data, refusal)
+    return data
+
+
+def _said(error: ValueError) -> str:
+    """Return what a parser says; of a long number it is Python that speaks, to programmers."""
+    known = isinstance(error, json.JSONDecodeError | tomllib.TOMLDecodeError)
+    return str(error) if known else "a number or date that cannot be"
+
+
+def _require_small(path: Path, data: Any, refusal: type[ValueError]) -> None:
+    """Refuse a document that is deep or has many values, level by level."""
+    level, depth, count = [data], 0, 0
+    while level:
+        require_few(refusal, str(path), depth, "depth", "levels of tables and lists")
+        count += len(level)
+        require_few(refusal, str(path), count, "values", "values")
+        inner: list[Any] = []
+        for one in level:
+            if isinstance(one, dict):
+                inner += one.values()
+            elif isinstance(one, list):
+                inner += one
+        level, depth = inner, depth + 1
+
+
+class Table:
+    """A table of a document; its values are asked for by name and type.
+
+    Parameters
+    ----------
+    data : the table as it was read.
+    where : begins every message, as "car.toml: "; may be empty.
+    refusal : class of the errors to raise.
+    prefix : of the names of values in messages, as in "chassis.".
+
+    Raises
+    ------
+    ValueError
+        Of that class, where the data are no table.
+    """
+
+    def __init__(self, data: Any, where: str, refusal: type[ValueError], prefix: str = "") -> None:
+        if not isinstance(data, Mapping):
+            name = prefix.rstrip(".") or "the document"
+            raise refusal(f"{where}{name} must be a table, it is {shown(data)}")
+        self.data, self._where, self._refusal, self._prefix = data, where, refusal, prefix
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.data
+
+    def refuse(self, key: str, rule: str) -> NoReturn:
+        """Raise the error of a value.
+
+        Parameters
+        ----------
+        key : of the value.
+        rule : that it breaks, as in "must be a number".
+        """
+        raise self._refusal(f"{self._where}{self._prefix}{key} {rule}")
+
+    def value(self, key: str) -> Any:
+        """Return a value that must be there, of any type.
+
+        Parameters
+        ----------
+        key : of the value.
+        """
+        if key not in self.data:
+            self.refuse(key, "is missing")
+        return self.data[key]
+
+    def only(self, *known: str) -> None:
+        """Refuse every other key.
+
+        Parameters
+        ----------
+        known : the keys that may be there.
+        """
+        for key in self.data:
+            if key not in known:
+                self.refuse(visible(key[:SHOWN]), f"is unknown, known are {', '.join(known)}")
+
+    def number(self, key: str) -> float:
+        """Return a number as float; it may be infinite, which the record that it is for refuses.
+
+        Parameters
+        ----------
+        key : of the value.
+        """
+        return float(self._as(float, key, self.value(key)))
+
+    def whole(self, key: str) -> int:
+        """Return a whole number.
+
+        Parameters
+        ----------
+        key : of the value.
+        """
+        return int(self._as(int, key, self.value(key)))
+
+    def text(self, key: str) -> str:
+        """Return a text.
+
+        Parameters
+        ----------
+        key : of the value.
+        """
+        return str(self._as(str, key, self.value(key)))
+
+    def table(self, key: str) -> "Table":
+        """Return a table inside.
+
+        Parameters
+        ----------
+        key : of the value.
+        """
+        prefix = f"{self._prefix}{key}."
+        return Table(self.value(key), self._where, self._refusal, prefix)
+
+    def texts(self, key: str) -> tuple[str, ...]:
+        """Return a list of texts.
+
+        Parameters
+        ----------
+        key : of the value.
+        """
+        return tuple(self._as(tuple[str, ...], key, self.value(key)))
+
+    def array(self, key: str) -> NDArray[np.float64]:
+        """Return nested lists of finite numbers, all rows alike, as an array of any shape.
+
+        Parameters
+        ----------
+        key : of the value.
+        """
+        value = self.value(key)
+        shape, level = [], [value]
+        while level and isinstance(level[0], list):
+            if any(not isinstance(row, list) or len(row) != len(level[0]) for row in level):
+                self.refuse(key, "must be lists of equal length")
+            shape.append(len(level[0]))
+            level = [one for row in level for one in row]
+        for one in level:
+            if not math.isfinite(self._as(float, key, one)):
+                self.refuse(key, f"holds a number that is not finite: {shown(one)}")
+        return np.array(level, dtype=np.float64).reshape(shape)
+
+    def record(self, cls: type, *, skip: tuple[str, ...] = ()) -> dict[str, Any]:
+        """Return the arguments of a dataclass, each of the type that its field declares.
+
+        Parameters
+        ----------
+        cls : the dataclass; its fields are the keys that may be there.
+        skip : fields that do not come from this table.
+        """
+        known = {field.name: field for field in fields(cls) if field.name not in skip}
+        self.only(*known)
+        for key, field in known.items():
+            if field.default is MISSING and field.default_factory is MISSING:
+                self.value(key)
+        hints = get_type_hints(cls)
+        return {key: self._as(hints[key], key, self.data[key]) for key in known if key in self.data}
+
+    def _as(self, kind: Any, key: str, value: Any) -> Any:
+        """Return a value as the type that an annotation names: number, text, or a tuple of such."""
+        if get_origin(kind) in (Union, types.UnionType):  # X | None: a document has no None
+            kind = next(one for one in get_args(kind) if one is not types.NoneType)
+        if get_origin(kind) is tuple:
+            return self._tuple(get_args(kind), key, value)
+        if kind in (str, Path):
+            if not isinstance(value, str):
+                self.refuse(key, f"must be a text, it is {shown(value)}")
+            return value
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            wanted = "a whole number" if kind is int else "a number"
+            self.refuse(key, f"must be {wanted}, it is {shown(value)}")
+        if kind is int and not (isinstance(value, int) and abs(value) < 2**63):
+            self.refuse(key, f"must be a whole number of 64 bits, it is {shown(value)}")
+        try:
+            return value if kind is int else float(value)
+        except OverflowError:
+            self.refuse(key, f"must be a number, it is {shown(value)}")
+
+    def _tuple(self, kinds: tuple[Any, ...], key: str, value: Any) -> tuple[Any, ...]:
+        if not isinstance(value, list):
+            self.refuse(key, f"must be a list, it is {shown(value)}")
+        if kinds[-1] is not Ellipsis and len(value) != len(kinds):
+            self.refuse(key, f"must be a list of {len(kinds)}, it is {shown(value)}")
+        return tuple(self._as(kinds[0], key, one) for one in value)
+
+
+def require_name(refusal: type[ValueError], key: str, name: Any) -> None:
+    """Refuse what cannot be the name of a car in files, figures and reports.
+
+    Parameters
+    ----------
+    refusal : class of the error to raise.
+    key : what the name is of.
+    name : any.
+
+    Raises
+    ------
+    ValueError
+        Of that class, where it is no text, longer than 200 characters, or not Unicode.
+    """
+    if not isinstance(name, str) or len(name) > LONGEST_NAME:
+        raise refusal(
+            f"{key} must be a text of at most {LONGEST_NAME} characters, not {shown(name)}"
+        )
+    if any("\ud800" <= one <= "\udfff" for one in name):
+        raise refusal(f"{key} must be Unicode, it has half a surrogate pair: {shown(name)}")
