@@ -137,9 +137,7 @@ def _pieces(folded: FoldedStep, *, single: bool) -> dict[str, str]:
             "            }\n"
         ),
         "stale_time": _number(STALE_TIME),
-        "nowhere": ", ".join(
-            [literal(NOWHERE, name), *[literal(0.0, name)] * (len(folded.inputs) - 1)]
-        ),
+        "nowhere": literal(NOWHERE, name),
         "missed_params": f", const {name}_params *params" if folded.believed else "",
         "missed_arguments": ", params" if folded.believed else "",
     }
