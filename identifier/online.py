@@ -1,6 +1,7 @@
 """A method beside a car that drives: sample in, axle forces out, and the model learnt so far.
 
-The compiled step is that of `identify`, so that a drive and its recording teach the same bits.
+The compiled step is that of `identify`, so that a drive and its recording teach the same bits. What
+becomes of samples that are refused is in `identifier.refused`.
 """
 
 import math
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from codegen import Stepper
 from identifier.history import IMPOSSIBLE_FORCE, DivergedError
 from identifier.method import FrozenModel, Method, Setup
+from identifier.refused import NOWHERE, STALE_TIME, Limits, judges_samples, stale_samples
 from models.recordings import Recording
 from models.recordings.record import MINIMUM_SAMPLES
 from models.vehicle import Vehicle
@@ -26,15 +28,17 @@ class Counts:
     Parameters
     ----------
     samples : that the method took.
-    refused : that held a number which is not finite; nothing moved on.
+    refused : that held a number which is not finite or beyond what any car reaches.
+    missed : of these, the newest in a row.
     """
 
     samples: int = 0
     refused: int = 0
+    missed: int = 0
 
 
 class OnlineIdentifier:
-    """A method that is told sample by sample; attributes vehicle, method, counts.
+    """A method that is told sample by sample; attributes vehicle, method, counts, limits.
 
     Parameters
     ----------
@@ -42,28 +46,41 @@ class OnlineIdentifier:
     vehicle : the car as the method is told of it.
     dt : interval at which `update` is called [s].
     start : stored weights to begin with; None begins afresh.
+    stale_time : time of refused samples after which no force is told any more [s].
 
     Raises
     ------
     ValueError
-        Where the interval is not that of the method.
+        Where the interval is not that of the method, or the time is not positive and finite.
     """
 
     def __init__(
-        self, method: Method, vehicle: Vehicle, dt: float, start: FrozenModel | None = None
+        self,
+        method: Method,
+        vehicle: Vehicle,
+        dt: float,
+        start: FrozenModel | None = None,
+        *,
+        stale_time: float = STALE_TIME,
     ) -> None:
         if not abs(dt - method.dt) <= 1e-6 * method.dt:
             raise ValueError(f"samples come every {dt:g} s, the method wants {method.dt:g} s")
+        if not 0.0 < stale_time < math.inf:
+            raise ValueError(f"stale_time must be positive and finite, it is {stale_time}")
         self.vehicle, self.method, self.counts = vehicle, method, Counts()
+        self.limits = Limits.of(vehicle)
+        self.stale_time = stale_time
+        self._most_missed = stale_samples(stale_time, method.dt)
         self._start = start
         self._force = np.zeros(2)
         self._stepper: Stepper | None = None
+        self._judges = False
         self._diverged = False
 
     def update(self, x: Array, u: Array, v_x: float) -> Array:
         """Take a sample; return the axle forces (2,) [N], told with the weights before it.
 
-        Forces stay as they were where a number is not finite: such a sample is refused.
+        Where the sample is refused, those of the last one it believed, and zero once it is `stale`.
 
         Parameters
         ----------
@@ -77,25 +94,48 @@ class OnlineIdentifier:
             Where x or u are not pairs.
         """
         (v_y, r), (delta_f, delta_r) = x, u
-        if not all(map(math.isfinite, (v_y, r, delta_f, delta_r, v_x))):
-            self.counts.refused += 1
-            return self._force.copy()
-        stepper = self._stepper or self._begun(x, u, v_x)
-        values = {"x": (v_y, r), "u": (delta_f, delta_r), "v_x": (v_x,)}
+        if not self.limits.accept(v_x, v_y, r, delta_f, delta_r):
+            return self._refused()
+        if self._stepper is None:
+            self._begun(x, u, v_x)
+        elif self.counts.missed and not self._judges:
+            self._take((v_y, r), (delta_f, delta_r), 0.0)  # a rest, so that the step begins anew
+        self._take((v_y, r), (delta_f, delta_r), v_x)
+        self.counts.samples += 1
+        self.counts.missed = 0
+        return self._force.copy()
+
+    def _take(self, x: tuple[float, float], u: tuple[float, float], v_x: float) -> None:
+        stepper = self._stepper
+        assert stepper is not None
+        values = {"x": x, "u": u, "v_x": (v_x,)}
         for port, array in stepper.inputs.items():
             array[:] = values[port]
         stepper.advance()
-        self.counts.samples += 1
         self._force = stepper.outputs["axle_force"].copy()
         if not np.abs(self._force).max() < IMPOSSIBLE_FORCE * self.vehicle.weight:
             self._diverged = True
+
+    def _refused(self) -> Array:
+        """Let time go on without a sample; return the forces."""
+        self.counts.refused += 1
+        self.counts.missed += 1
+        if self._stepper is not None and self._judges:
+            self._take((0.0, 0.0), (0.0, 0.0), NOWHERE)
+        if self.stale:
+            self._force = np.zeros(2)
         return self._force.copy()
 
-    def _begun(self, x: Array, u: Array, v_x: float) -> Stepper:
-        """Return the step, set up where `identify` would: at the first sample."""
+    @property
+    def stale(self) -> bool:
+        """Whether samples have been refused for so long that no force is told: do not trust it."""
+        return self.counts.missed >= self._most_missed
+
+    def _begun(self, x: Array, u: Array, v_x: float) -> None:
+        """Set the step up where `identify` would: at the first sample."""
         setup = self._setup(x, u, v_x)
         self._stepper = Stepper(setup.scan, {**setup.carry, **setup.constants})
-        return self._stepper
+        self._judges = judges_samples(setup.carry)
 
     def _setup(self, x: Array, u: Array, v_x: float) -> Setup:
         n = MINIMUM_SAMPLES  # all alike: a setup looks at the first one
@@ -137,10 +177,14 @@ class OnlineIdentifier:
 
     @property
     def told(self) -> dict[str, Array]:
-        """What the step told about the last sample, by port, matrices by columns; copies."""
+        """What the step told about the last sample, by port, matrices by columns; copies.
+
+        Zero while it is `stale`.
+        """
         if self._stepper is None:
             return {}
-        return {name: array.copy() for name, array in self._stepper.outputs.items()}
+        told = {name: array.copy() for name, array in self._stepper.outputs.items()}
+        return {name: np.zeros_like(array) for name, array in told.items()} if self.stale else told
 
     def carried(self) -> dict[str, Array]:
         """Return the values that the next sample will meet, by port; copies.

@@ -128,7 +128,7 @@ def gate(limits: Any, dt: Any, last: GateState, x: Any, u: Any, v_x: Any) -> Gat
     at = dict(zip(names, ca.vertsplit(limits), strict=True))
     v_y, r, delta_f, delta_r = x[0], x[1], u[0], u[1]
     possible = _all(
-        v_x < at["max_speed"],
+        ca.fabs(v_x) < at["max_speed"],
         ca.fabs(v_y) < at["max_sideslip"] * larger(ca.fabs(v_x), at["slow"]),
         ca.fabs(r) < at["max_yaw_rate"],
         ca.fabs(delta_f) < at["max_steering"],

@@ -28,8 +28,14 @@ from identifier.export.weight_rules import (
     factor_values,
     has_amounts,
 )
+from identifier.refused import NOWHERE, STALE_TIME
 
 TEMPLATES = Path(__file__).parent / "c"
+# Where a step begins anew, by whether it does so at the first sample of all.
+_BEGINS: Mapping[bool, str] = {
+    True: "(state->started == 0U) || (state->missed > 0U)",
+    False: "(state->started != 0U) && (state->missed > 0U)",
+}
 MACROS: Mapping[str, tuple[str, str]] = {  # in float and in double
     "PICK": ("PICK(x, y) x##F", "PICK(x, y) y"),
     "SQRT": ("SQRT(x) sqrtf(x)", "SQRT(x) sqrt(x)"),
@@ -118,20 +124,22 @@ def _pieces(folded: FoldedStep, *, single: bool) -> dict[str, str]:
         "weights_rules": conditions(learnt, name),
         "keep": _keep(name, bool(learnt)),
         "hold": (
-            "        if (state->adapts == 0U) {\n"
-            "            next.weights = state->values.weights;\n"
-            "        }\n"
+            "    if (state->adapts == 0U) {\n        next.weights = state->values.weights;\n    }\n"
             if learnt
             else ""
         ),
         "believed": folded.believed or "",
         "first": (
-            "        if (state->started == 0U) {\n"
-            f"            {name}_begin(state, params, input, &next, &out);\n"
-            "        }\n"
-            if folded.rests_first
-            else ""
+            ""
+            if folded.believed
+            else f"            if ({_BEGINS[folded.rests_first]}) {{\n"
+            f"                {name}_begin(state, params, input);\n"
+            "            }\n"
         ),
+        "stale_time": _number(STALE_TIME),
+        "nowhere": literal(NOWHERE, name),
+        "missed_params": f", const {name}_params *params" if folded.believed else "",
+        "missed_arguments": ", params" if folded.believed else "",
     }
 
 
@@ -145,7 +153,8 @@ def _parts(folded: FoldedStep, values: Values) -> dict[str, str]:
         "sum_function": ("sum.c", f"{folded.name}_sum(" in str(values["sum"])),
         "believed_function": ("believed.c", judges),
         "judge": ("judge.c", judges),
-        "begin": ("begin.c", folded.rests_first),
+        "begin": ("begin.c", not judges),
+        "pass": ("pass.c", judges),
         "decided_prototypes": ("decided.h", decides),
         "decided_functions": ("decided.c", decides),
     }
@@ -161,7 +170,10 @@ def _parts(folded: FoldedStep, values: Values) -> dict[str, str]:
     values = {**values, **inner}
     parts = {key: _filled(file, values) if there else "" for key, (file, there) in wanted.items()}
     step = "decided_step.c" if decides else "undecided_step.c"
-    return {**parts, "compute": _filled(step, {**values, **parts})}
+    parts["compute"] = _filled(step, {**values, **parts})
+    for part in ("advance", "missed"):
+        parts[f"{part}_function"] = _filled(f"{part}.c", {**values, **parts})
+    return parts
 
 
 def _macros(name: str, text: str) -> dict[str, str]:

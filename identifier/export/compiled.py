@@ -30,6 +30,7 @@ class Status(IntEnum):
     BAD_INPUT = 3
     BAD_RESULT = 4
     BAD_CALL = 5
+    STALE = 6
 
 
 class NoCompilerError(RuntimeError):

@@ -4,7 +4,6 @@ Gains, T_s, vehicle and K⁻¹ become literals, so that only signals and carried
 (carried, x = [v_y, r], u = [δ_f, δ_r], v_x) -> (carried next, axle_force [N], other outputs), SI.
 """
 
-import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -18,26 +17,14 @@ from identifier.baselines import StiffnessRls
 from identifier.design import Design
 from identifier.export.signals import INPUTS, Signal, describe
 from identifier.method import FrozenModel, Method, Setup
+from identifier.refused import GATE, Limits, judges_samples
 from identifier.regression import RegressionDesign
 from models.recordings import Recording
-from models.vehicle import GRAVITY, Vehicle
+from models.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
 SAMPLED = ("x", "u", "v_x")
-FROUDE = 60.0  # largest speed, in sqrt(g wheelbase): 300 m/s for a sedan
-TURN = 4.0  # largest yaw rate, in sqrt(g/wheelbase): 8 rad/s for a sedan
-STEERING = 1.5  # rad
-WEIGHTS = 5.0  # largest force of an axle, in weights of the car
-
-
-class Limits(NamedTuple):
-    """What no car reaches: speed [m/s], yaw rate [rad/s], steering [rad], axle force [N]."""
-
-    speed: float
-    yaw_rate: float
-    steering: float
-    force: float
 
 
 class FoldedStep(NamedTuple):
@@ -138,13 +125,8 @@ def fold(
         rests_first=any(
             not np.array_equal(setup.carry[port], moved.carry[port]) for port in setup.carry
         ),
-        believed="gate" if isinstance(method, AxleDesign) else None,
-        limits=Limits(
-            speed=FROUDE * math.sqrt(GRAVITY * vehicle.wheelbase),
-            yaw_rate=TURN * math.sqrt(GRAVITY / vehicle.wheelbase),
-            steering=STEERING,
-            force=WEIGHTS * vehicle.weight,
-        ),
+        believed=GATE if judges_samples(setup.carry) else None,
+        limits=Limits.of(vehicle),
     )
 
 

@@ -12,6 +12,7 @@ from identifier.export.manifest import ingredients, manifest_text, summary
 from identifier.export.vectors import SAMPLES, vectors, vectors_header
 from identifier.export.weight_rules import ruled
 from identifier.method import FrozenModel, Method
+from identifier.refused import STALE_TIME
 from models.vehicle import Vehicle
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,30}")
@@ -83,6 +84,7 @@ def _other_files(folded: FoldedStep, about: Values, *, single: bool) -> dict[str
     }
     values = {
         "weights_test": filled(TEMPLATES / "weights_test.c", about_weights) if learnt else "",
+        "weights_held": filled(TEMPLATES / "held_test.c", about) if learnt else "",
         "weights_call": "    test_modes(&state, &params);\n" if learnt else "",
         "tolerance_double": f"{TOLERANCE_DOUBLE * folded.limits.force:.2g}",
         "tolerance_single": f"{TOLERANCE_SINGLE * folded.limits.force:.2g}",
@@ -123,6 +125,8 @@ def readme(package: Package, about_figures: str) -> str:
             "carry_table": carry_table,
             "modes": modes,
             "implausible_row": _implausible_row(folded),
+            "stale_time": f"{STALE_TIME:g}",
+            **_about_gaps(folded),
             "libraries": f"{', '.join(called) or 'nothing'} of `<math.h>`, copies of structures",
             "samples": str(SAMPLES),
             "tolerance_double": f"{tolerance[0]:.2g}",
@@ -156,6 +160,20 @@ def _implausible_row(folded: FoldedStep) -> str:
     if folded.parts.where_false is not None:
         return "| 2 `IMPLAUSIBLE` | no car can be there | zero | hold | yes |\n"
     return ""
+
+
+def _about_gaps(folded: FoldedStep) -> dict[str, str]:
+    """Return what becomes of forces while samples are refused, and of the state after it."""
+    if folded.believed is not None:
+        return {
+            "refused_forces": "of the last sample that was believed, zero where that lasts",
+            "after_gap": "After a moment the step rests, and restarts with the next good sample.",
+        }
+    return {
+        "refused_forces": "as before",
+        "after_gap": "With the next good sample observers and filters begin anew, and what was "
+        "learnt stays.",
+    }
 
 
 def _table(members: Sequence[Member]) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identifier.export.fold import FoldedStep
+from identifier.refused import NOWHERE, STALE_TIME, stale_samples
 
 Array = NDArray[np.float64]
 
@@ -47,24 +48,38 @@ def _triangle(phase: Array) -> Array:
 def run_in_virtual_machine(folded: FoldedStep, samples: Array) -> tuple[Array, dict[str, Array]]:
     """Return the outputs (n, k) of a folded step, one beside the other, and what it carries then.
 
+    Samples that are refused count as time, as `identifier.refused` says.
+
     Parameters
     ----------
     folded : the step.
     samples : (n, 5) in the order of the inputs.
     """
     carry = [ca.DM(value) for value in folded.carry.values()]
-    told = []
-    for i, (v_x, v_y, r, delta_f, delta_r) in enumerate(samples):
-        x, u = ca.DM([v_y, r]), ca.DM([delta_f, delta_r])
-        if i == 0 and folded.rests_first:
-            carry = list(folded.function(*carry, x, u, 0.0))[: len(carry)]
-        results = list(folded.function(*carry, x, u, v_x))
-        carry = results[: len(carry)]
-        told.append(
-            np.concatenate([np.array(value).ravel(order="F") for value in results[len(carry) :]])
-        )
-    final = dict(zip(folded.carry, map(np.array, carry), strict=True))
-    return np.array(told), final
+    n, size = len(carry), sum(port.size for port in folded.outputs)
+    told, now, missed, started = [], np.zeros(size), 0, False
+
+    def step(sample: Array) -> tuple[list[ca.DM], Array]:
+        v_x, v_y, r, delta_f, delta_r = sample
+        results = list(folded.function(*carry, ca.DM([v_y, r]), ca.DM([delta_f, delta_r]), v_x))
+        flat = [np.array(value).ravel(order="F") for value in results[n:]]
+        return results[:n], np.concatenate(flat)
+
+    for sample in samples:
+        if folded.limits.accept(*sample):
+            anew = folded.believed is None and missed > 0
+            if anew if started else folded.rests_first:
+                carry, _ = step(np.array([0.0, *sample[1:]]))
+            carry, now = step(sample)
+            missed, started = 0, True
+        else:
+            missed += 1
+            if folded.believed is not None and started:
+                carry, now = step(np.array([NOWHERE, 0.0, 0.0, 0.0, 0.0]))
+            if missed >= stale_samples(STALE_TIME, folded.dt):
+                now = np.zeros(size)
+        told.append(now)
+    return np.array(told), dict(zip(folded.carry, map(np.array, carry), strict=True))
 
 
 def vectors(folded: FoldedStep) -> Vectors:

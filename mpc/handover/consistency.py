@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 from identifier.axle.checks import require_positive
+from mpc.shown import LARGEST, is_shown
 
 
 class FullSample(Protocol):
@@ -145,7 +146,7 @@ class Consistency:
 
     def _judged(self, m: FullSample, asked: float | None) -> Disagreement:
         allowed, pull, dt = self._allowed, self._allowed.rate, self._dt
-        if not all(map(math.isfinite, (m.X, m.Y, m.psi, m.v_x, m.v_y, m.r, m.delta, m.a_y))):
+        if not all(is_shown(channel, getattr(m, channel)) for channel in LARGEST):
             self._begin()
             return NOT_A_NUMBER
         cos_psi, sin_psi = math.cos(m.psi), math.sin(m.psi)

@@ -95,7 +95,8 @@ class Supervisor:
         """Take a sample; return a decision where one was due.
 
         A sample in doubt teaches nothing. Where doubt begins, what is steered with and what was
-        learnt go back to what they were before its cause can have been at work.
+        learnt go back to what they were before its cause can have been at work. An identifier that
+        is stale is in doubt by itself.
 
         Parameters
         ----------
@@ -106,11 +107,14 @@ class Supervisor:
         doubt : why the sensors are not to be believed, in words; None where they are.
         """
         self._samples += 1
+        if doubt is None:
+            self.identifier.update(np.array([v_y, r]), np.array([delta, 0.0]), v_x)
+            if self.identifier.stale:
+                doubt = f"no sample could be taken for {self.identifier.stale_time:g} s"
         if doubt is not None:
             return self._doubted(doubt)
         self._agreed = True
-        self.identifier.update(np.array([v_y, r]), np.array([delta, 0.0]), v_x)
-        if all(map(math.isfinite, (v_x, v_y, r, delta))):
+        if self.identifier.limits.accept(v_x, v_y, r, delta, 0.0):
             self._lost = 0
             sample = (v_x, v_y, r, delta)
         else:

@@ -20,8 +20,15 @@ from mpc.loop.tracking import PathTracker
 from mpc.path.path import Path
 from mpc.path.projection import Projection
 from mpc.realtime.messages import Measurement
+from mpc.shown import is_shown
 
 COMPLETED = "reached the end"
+GUIDES = (
+    "X",
+    "Y",
+    "psi",
+    "v_x",
+)  # channels without which a car does not know where it is, for long
 SPUN = math.radians(45.0)  # side slip of the center of gravity [rad]
 SLOWEST = 1.0  # m/s
 
@@ -52,6 +59,7 @@ def drive(
     laps: float = 1.0,
     time_limit: float = 300.0,
     widest: float = 2.0,
+    blind: float = 2.0,
     plan_every: int = 10,
     name: str | None = None,
     progress: Callable[[float], None] | None = None,
@@ -71,6 +79,8 @@ def drive(
     laps : how often to drive a closed path; an open one is driven once.
     time_limit : after which the drive is given up [s].
     widest : deviation at which the car has left the path [m].
+    blind : longest time without a number of a position, heading or speed [s]: until then the car
+        goes on by dead reckoning, then the drive ends.
     plan_every : periods between two plans that are kept; 0 keeps none.
     name : of the drive; None takes that of the path.
     progress : called with the share of the way at every period.
@@ -78,12 +88,14 @@ def drive(
     Raises
     ------
     ValueError
-        Where the tracker's period is not the car's, or a delay is negative.
+        Where the tracker's period is not the car's, a delay is negative, or blind is not positive.
     """
     if abs(car.period - tracker.period) > 1e-9:
         raise ValueError(f"the car steps {car.period} s, the tracker {tracker.period} s")
     if delay < 0:
         raise ValueError(f"delay must not be negative, it is {delay}")
+    if not blind > 0.0:
+        raise ValueError(f"blind must be positive, it is {blind}")
     profile = speed if isinstance(speed, SpeedProfile) else SpeedProfile(path, speed)
     sensors = sensors if sensors is not None else CarSensors()
     goal = path.length * (laps if path.closed else 1.0)
@@ -92,29 +104,31 @@ def drive(
     waiting = deque([0.0] * delay)
     record = Recorder(plan_every)
     here, believed = path.project(state.X, state.Y, 0.0), 0.0
-    place = Place(state.X, state.Y, state.psi, state.v_x, 0.0, 0.0)
+    place = Place(state.X, state.Y, state.psi, state.v_x, 0.0, 0.0, (0.0,) * len(GUIDES))
     ending = ""
     while not ending:
         measured = sensors.measure(state, rng)
         place = _located(measured, place, car.period)
+        for channel in place.just_lost(car.period):
+            record.note(state.t, f"{channel} shows no number: dead reckoning")
         seen = path.project(place.X, place.Y, believed)
         believed = seen.s
         if learner is not None:
             record.note(state.t, learner.observe(measured, tracker))
-        ahead = profile.ahead(seen.s, measured.v_x, tracker.times, car.speed_gain)
+        ahead = profile.ahead(seen.s, place.v_x, tracker.times, car.speed_gain)
         command = tracker.step(
             Measurement(
                 e_y=seen.e_y,
                 e_psi=seen.heading_error(place.psi),
-                v_y=measured.v_y,
-                r=measured.r,
+                v_y=measured.v_y if is_shown("v_y", measured.v_y) else math.nan,
+                r=measured.r if is_shown("r", measured.r) else math.nan,
                 kappa=ahead.kappa,
                 v_x=ahead.v_x,
             )
         )
         v_ref = profile.reference(here.s, car.speed_gain)
         if record.plan_is_due:
-            there = profile.ahead(seen.s, measured.v_x, tracker.plan_times, car.speed_gain)
+            there = profile.ahead(seen.s, place.v_x, tracker.plan_times, car.speed_gain)
             record.plan(command, there.s)
         record.add(state, here, measured, v_ref, command)
         waiting.append(command.steering)
@@ -126,7 +140,7 @@ def drive(
         here = path.project(state.X, state.Y, here.s)
         if progress is not None:
             progress(min(here.s / goal, 1.0))
-        ending = _ending(state, here, goal, widest, time_limit)
+        ending = _ending(state, here, goal, widest, time_limit) or place.complaint(blind)
     return record.drive(
         name=name or path.name,
         vehicle=car.vehicle,
@@ -138,7 +152,10 @@ def drive(
 
 
 class Place(NamedTuple):
-    """Where the car is taken to be [m, rad], and the last motion that was a number [m/s, rad/s]."""
+    """Where the car is taken to be, [m, rad], and how it moves, [m/s, rad/s].
+
+    silent : for how long each of `GUIDES` has shown no number [s].
+    """
 
     X: float
     Y: float
@@ -146,25 +163,47 @@ class Place(NamedTuple):
     v_x: float
     v_y: float
     r: float
+    silent: tuple[float, ...]
+
+    def just_lost(self, dt: float) -> tuple[str, ...]:
+        """Return the guides that show no number since this sample.
+
+        Parameters
+        ----------
+        dt : period [s].
+        """
+        pairs = zip(GUIDES, self.silent, strict=True)
+        return tuple(channel for channel, time in pairs if 0.0 < time < 1.5 * dt)
+
+    def complaint(self, blind: float) -> str:
+        """Return which guide has been silent for too long, or nothing.
+
+        Parameters
+        ----------
+        blind : longest time [s].
+        """
+        pairs = zip(GUIDES, self.silent, strict=True)
+        lost = ", ".join(channel for channel, time in pairs if time >= blind * (1.0 - 1e-9))
+        return f"no number of {lost} for {blind:g} s" if lost else ""
 
 
 def _located(measured: Measured, last: Place, dt: float) -> Place:
-    """Return the measured place; a coordinate that is no number goes on by dead reckoning."""
-    v_x, v_y, r = (
-        value if math.isfinite(value) else old
-        for value, old in zip((measured.v_x, measured.v_y, measured.r), last[3:], strict=True)
-    )
-    psi = measured.psi if math.isfinite(measured.psi) else last.psi + dt * r
+    """Return the measured place; what shows no number goes on by dead reckoning."""
+
+    def shown(channel: str, otherwise: float) -> float:
+        value: float = getattr(measured, channel)
+        return value if is_shown(channel, value) else otherwise
+
+    v_x, v_y, r = shown("v_x", last.v_x), shown("v_y", last.v_y), shown("r", last.r)
+    psi = shown("psi", last.psi + dt * r)
     cos_psi, sin_psi = math.cos(psi), math.sin(psi)
-    reckoned = (
-        last.X + dt * (v_x * cos_psi - v_y * sin_psi),
-        last.Y + dt * (v_x * sin_psi + v_y * cos_psi),
+    X = shown("X", last.X + dt * (v_x * cos_psi - v_y * sin_psi))
+    Y = shown("Y", last.Y + dt * (v_x * sin_psi + v_y * cos_psi))
+    silent = tuple(
+        0.0 if is_shown(channel, getattr(measured, channel)) else time + dt
+        for channel, time in zip(GUIDES, last.silent, strict=True)
     )
-    X, Y = (
-        value if math.isfinite(value) else old
-        for value, old in zip((measured.X, measured.Y), reckoned, strict=True)
-    )
-    return Place(X, Y, psi, v_x, v_y, r)
+    return Place(X, Y, psi, v_x, v_y, r, silent)
 
 
 def _at_the_start(path: Path, car: Car, profile: SpeedProfile) -> CarState:

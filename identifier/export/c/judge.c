@@ -1,3 +1,3 @@
-        if (!@name@_believed(&next, input)) {
-            status = @NAME@_IMPLAUSIBLE;
-        }
+    if (!@name@_believed(&next, input)) {
+        status = @NAME@_IMPLAUSIBLE;
+    }

@@ -60,6 +60,7 @@ static bool @name@_believes(const @name@_params *params, const @name@_values *va
         state->values = @name@_start;
         state->output = nothing;
         state->faults = 0U;
+        state->missed = 0U;
         state->started = 0U;
         state->adapts = 1U;
         status = @NAME@_OK;
@@ -73,33 +74,33 @@ static bool @name@_believes(const @name@_params *params, const @name@_values *va
     if (state != NULL) {
         const @name@_output nothing = { @zeros@ };
 @keep@        state->output = nothing;
+        state->missed = 0U;
         state->started = 0U;
         status = @NAME@_OK;
     }
     return status;
 }
 
-@believed_function@@begin@@name@_status @name@_step(@name@_state *state, const @name@_params *params, const @name@_input *input)
+@believed_function@@advance_function@@begin@@missed_function@@name@_status @name@_step(@name@_state *state, const @name@_params *params, const @name@_input *input)
 {
-    @name@_values next;
-    @name@_output out;
     @name@_status status;
     if ((state == NULL) || (params == NULL) || (input == NULL)) {
         status = @NAME@_BAD_CALL;
-    } else if (!@name@_accepts(params, input)) {
-        status = @NAME@_BAD_INPUT;
     } else {
-@first@@compute@@hold@        if (@name@_believes(params, &next, &out)) {
-            state->values = next;
-            state->output = out;
-            state->started = 1U;
-        } else {
-            status = @NAME@_BAD_RESULT;
+        status = @NAME@_BAD_INPUT;
+        if (@name@_accepts(params, input)) {
+@first@            status = @name@_advance(state, params, input);
         }
-    }
-    if ((status == @NAME@_IMPLAUSIBLE) || (status == @NAME@_BAD_INPUT)
-        || (status == @NAME@_BAD_RESULT)) {
-        state->faults += (state->faults < UINT32_MAX) ? 1U : 0U;
+        if (status < @NAME@_BAD_INPUT) {
+            state->missed = 0U;
+        } else if (@name@_is_stale(state@missed_arguments@)) {
+            status = @NAME@_STALE;
+        } else {
+            /* refused, but not for long */
+        }
+        if (status >= @NAME@_IMPLAUSIBLE) {
+            state->faults += (state->faults < UINT32_MAX) ? 1U : 0U;
+        }
     }
     return status;
 }

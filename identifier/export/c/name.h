@@ -40,13 +40,21 @@ typedef double @name@_real;
 #define @NAME@_SAMPLE_TIME (@dt@)
 #define @NAME@_MIN_SPEED (@min_speed@)
 
+/* Time [s] without a sample that could be taken after which no force is told any more; and the same
+ * in samples. May be set by who compiles the library. */
+#ifndef @NAME@_STALE_TIME
+#define @NAME@_STALE_TIME (@stale_time@)
+#endif
+#define @NAME@_STALE_SAMPLES ((uint32_t)((@NAME@_STALE_TIME / @NAME@_SAMPLE_TIME) + 0.5))
+
 typedef enum {
     @NAME@_OK = 0,          /* the step was taken */
     @NAME@_REST = 1,        /* slower than @NAME@_MIN_SPEED: forces are zero, weights hold */
     @NAME@_IMPLAUSIBLE = 2, /* a sample no car can be in: nothing is learnt from it; a fault */
-    @NAME@_BAD_INPUT = 3,   /* not finite or beyond the limits: the state is as before; a fault */
-    @NAME@_BAD_RESULT = 4,  /* not finite or beyond the limits: the state is as before; a fault */
-    @NAME@_BAD_CALL = 5     /* a null pointer: nothing was done */
+    @NAME@_BAD_INPUT = 3,   /* not finite or beyond the limits: refused, but time goes on; a fault */
+    @NAME@_BAD_RESULT = 4,  /* not finite or beyond the limits: refused, but time goes on; a fault */
+    @NAME@_BAD_CALL = 5,    /* a null pointer: nothing was done */
+    @NAME@_STALE = 6        /* refused for @NAME@_STALE_TIME or longer: forces are zero; a fault */
 } @name@_status;
 
 /* Limits of what is accepted; see @name@_default_params. */
@@ -71,6 +79,7 @@ typedef struct {
     @name@_values values;
     @name@_output output;
     uint32_t faults;  /* steps that were refused or implausible, since @name@_init */
+    uint32_t missed;  /* steps in a row that were refused */
     uint32_t started; /* 0 until the first sample */
     uint32_t adapts;  /* 0: frozen, weights hold their values */
 } @name@_state;

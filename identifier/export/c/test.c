@@ -53,24 +53,42 @@ static double drive(@name@_state *state, const @name@_params *params, int n)
     return worst;
 }
 
+static void refuse(@name@_state *state, const @name@_params *params, const @name@_input *input,
+    const char *rule)
+{
+    const bool lasts = (state->missed + 1U) >= @NAME@_STALE_SAMPLES;
+    check(@name@_step(state, params, input) == (lasts ? @NAME@_STALE : @NAME@_BAD_INPUT), rule);
+}
+
 static void test_guards(@name@_state *state, const @name@_params *params)
 {
     const @name@_state before = *state;
     @name@_input input = sample(VECTORS - 1);
+    @name@_real force[2];
     const @name@_real zero = 0;
     input.v_y = zero / zero;
-    check(@name@_step(state, params, &input) == @NAME@_BAD_INPUT, "NaN is refused");
+    refuse(state, params, &input, "NaN is refused");
     input.v_y = (@name@_real)1.0 / zero;
-    check(@name@_step(state, params, &input) == @NAME@_BAD_INPUT, "infinity is refused");
+    refuse(state, params, &input, "infinity is refused");
     input = sample(VECTORS - 1);
     input.r = params->max_yaw_rate * 2;
-    check(@name@_step(state, params, &input) == @NAME@_BAD_INPUT, "limits are kept");
+    refuse(state, params, &input, "limits are kept");
     check(state->faults == (before.faults + 3U), "faults are counted");
-    state->faults = before.faults;
-    check(memcmp(state, &before, sizeof before) == 0, "a bad input leaves the state as it is");
+    check(state->missed == 3U, "what is refused counts as time");
+@weights_held@    while (state->missed < @NAME@_STALE_SAMPLES) {
+        refuse(state, params, &input, "what is refused for long is stale");
+    }
+    refuse(state, params, &input, "what is stale stays so");
+    (void)@name@_get_forces(state, force);
+    check((force[0] == zero) && (force[1] == zero), "stale forces are zero");
+    input = sample(VECTORS - 1);
+    check(@name@_step(state, params, &input) <= @NAME@_IMPLAUSIBLE, "a good sample ends a gap");
+    check(state->missed == 0U, "a gap ends");
+    *state = before;
     check(@name@_step(NULL, params, &input) == @NAME@_BAD_CALL, "a null state is refused");
     check(@name@_step(state, NULL, &input) == @NAME@_BAD_CALL, "null parameters are refused");
     check(@name@_step(state, params, NULL) == @NAME@_BAD_CALL, "a null input is refused");
+    check(memcmp(state, &before, sizeof before) == 0, "a bad call leaves the state as it is");
 }
 
 @weights_test@int main(void)

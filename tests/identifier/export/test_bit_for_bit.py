@@ -5,7 +5,7 @@ import shutil
 import numpy as np
 import pytest
 
-from identifier.export.compiled import CompiledPackage, samples_of
+from identifier.export.compiled import CompiledPackage, Status, samples_of
 from identifier.export.processor import PROCESSORS, missing_tools, replay_here, replay_on
 from identifier.export.vectors import run_in_virtual_machine
 
@@ -82,11 +82,15 @@ def test_precisions_differ(here):
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_c_computes_the_bits_of_casadi_in_double(law, packages, slalom):
+@pytest.mark.parametrize("gaps", [False, True])
+def test_c_computes_the_bits_of_casadi_in_double(law, gaps, packages, slalom):
     rows = samples_of(slalom)
+    if gaps:
+        rows[:5, 0], rows[1000:1020, 1], rows[2000:2200, 2] = np.inf, np.nan, 1e308
     run = CompiledPackage.of(packages[law], single=False)
     told, carried = run_in_virtual_machine(packages[law].folded, rows)
-    shipped = run.run(slalom)
+    shipped = run.run_samples(rows)
+    assert ((shipped.status >= Status.BAD_INPUT).sum() == 225) == gaps
     np.testing.assert_array_equal(shipped.axle_force, told[:, :2])
     np.testing.assert_array_equal(np.column_stack(list(shipped.outputs.values())), told)
     for name, value in run.weights.items():

@@ -56,6 +56,7 @@ def test_a_million_hostile_samples_find_nothing(law, single, packages, write, ru
     assert sum(counts.values()) == 1_000_000
     assert counts["ok"] > 100_000
     assert counts["bad_input"] > 50_000
+    assert counts["stale"] > 50_000
 
 
 @pytest.mark.parametrize(
@@ -72,7 +73,7 @@ def test_bounds_narrower_than_the_declared_are_broken(changed, complaint, packag
 @pytest.mark.parametrize(
     ("guard", "complaint"),
     [
-        ("tireid_accepts(params, input)", "not finite|beyond the limit|changed the state"),
+        ("tireid_accepts(params, input)", "not finite|beyond the limit|changed the weights"),
         ("tireid_believes(params, &next, &out)", "not finite|beyond the limit"),
     ],
 )

@@ -10,6 +10,7 @@ from identifier.defaults import default_design
 from identifier.export.fmu import binaries, export_fmu
 from identifier.export.fold import fold
 from identifier.identify import identify
+from identifier.online import OnlineIdentifier
 from models.recordings import Recording
 from models.vehicle import sedan
 
@@ -299,17 +300,29 @@ def test_without_adaptation_it_is_the_frozen_model(master):
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("column", range(5))
-def test_a_bad_sample_is_told_and_changes_nothing(master, bad, column):
+def test_a_bad_sample_is_told_and_counts_as_time(master, bad, column):
     inputs, one = rows(swaying(60)), master()
     before = one.run(inputs[:30], 0.01)[-1]
-    spoiled = inputs[30].copy()
-    spoiled[column] = bad
-    held = one.run(spoiled[None], 0.01, first=30)[0]
+    inputs[30, column] = bad
+    held = one.run(inputs[30:31], 0.01, first=30)[0]
     assert one.count(STATUS) == 3
     assert (held == before).all()
-    after = one.run(inputs[30:], 0.01, first=31)
+    after = one.run(inputs[31:], 0.01, first=31)
     assert one.count(STATUS) == 0
-    assert (after == in_python(swaying(60))["axle_force"][30:]).all()
+    online = OnlineIdentifier(design(), CAR, 0.01)
+    beside = np.array([online.update(row[1:3], row[3:], row[0]) for row in inputs])
+    assert np.abs(after - beside[31:]).max() < 1e-9
+
+
+def test_forces_are_zero_and_stale_where_no_sample_comes_for_half_a_second(master):
+    inputs, one = rows(swaying(120)), master()
+    inputs[30:90, 2] = np.nan
+    forces = one.run(inputs[:79], 0.01)
+    assert (one.count(STATUS), (forces[-1] == forces[29]).all()) == (3, True)
+    forces = one.run(inputs[79:90], 0.01, first=79)
+    assert (one.count(STATUS), (forces == 0.0).all()) == (6, True)
+    assert (one.run(inputs[90:], 0.01, first=90) != 0.0).all()
+    assert one.count(STATUS) == 0
 
 
 def test_a_sample_that_no_car_can_be_in_is_told(master):

@@ -130,3 +130,20 @@ def test_a_stuck_sensor_shows_its_last_good_value_and_disturbs_no_other():
             assert shown.r == right.r
             held = right.r
     assert isinstance(shown, Measured)
+
+
+@pytest.mark.parametrize("channel", Measured._fields[1:])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -1e308])
+def test_one_sample_that_is_no_number_is_noticed_and_forgotten(channel, value):
+    class Once:
+        def measure(self, state, rng):
+            shown = inertial_unit().measure(state, rng)
+            return shown._replace(**{channel: value}) if state.t == BREAKS else shown
+
+    watcher, rng, doubted = Consistency(DT), np.random.default_rng(0), []
+    for state in states(8.0):
+        if not watcher.observe(Once().measure(state, rng), float(steering(state.t - DELAY))):
+            doubted.append(state.t)
+    assert doubted[0] == BREAKS
+    assert doubted[-1] == pytest.approx(BREAKS + 0.5, abs=0.02)
+    assert len(doubted) == pytest.approx(50, abs=2)

@@ -136,6 +136,23 @@ def test_many_lost_samples_and_standing_still_decide_nothing(car, learnt, droppe
     assert supervisor.last.reason == "too few samples"
 
 
+@pytest.mark.parametrize("broken", [np.nan, np.inf, 1e308])
+def test_a_stale_identifier_is_in_doubt_and_the_last_good_tire_stays(car, learnt, dropped, broken):
+    supervisor = supervisor_of(car, learnt)
+    first = supervisor.target
+    rows = samples_of(dropped[1])
+    for k, row in enumerate(rows[:400]):
+        supervisor.observe(*(np.full(4, broken) if 100 <= k < 300 else row))
+        if k == 140:
+            assert supervisor.decisions == []  # 0.4 s: not yet
+    doubts = [one for one in supervisor.decisions if one.verdict is Verdict.DOUBT]
+    assert len(doubts) == 1
+    assert doubts[0].t == pytest.approx(1.5)
+    assert doubts[0].reason == "no sample could be taken for 0.5 s"
+    assert supervisor.target is first
+    assert not supervisor.identifier.stale
+
+
 class Told:
     """A judge whose mean misfits are given: of the tire in use, and of any other."""
 

@@ -14,11 +14,13 @@ from mpc.loop import (
     COMPLETED,
     CarSensors,
     FaultySensors,
+    Measured,
     SpeedProfile,
     drive,
     inertial_unit,
     scores,
 )
+from mpc.loop.drive import GUIDES
 from mpc.path.path import Path
 from mpc.realtime import Command
 
@@ -221,6 +223,70 @@ def test_a_place_that_is_no_number_goes_on_by_dead_reckoning(bump, channel):
     told = np.array([m.e_y for m in driver.seen])
     assert np.abs(told - driven.e_y)[lost].max() < 0.15
     assert np.isnan(driven.measured[channel][lost]).all()
+
+
+class Broken:
+    """Sensors of which one channel shows something that is no number of a car, for some time."""
+
+    def __init__(self, channel, value, start=1.0, duration=math.inf):
+        self.channel, self.value, self.start, self.end = channel, value, start, start + duration
+
+    def measure(self, state, rng):
+        shown = inertial_unit().measure(state, rng)
+        if not self.start <= state.t < self.end:
+            return shown
+        channels = Measured._fields[1:] if self.channel == "all" else (self.channel,)
+        return shown._replace(**dict.fromkeys(channels, self.value))
+
+
+def broken_drive(bump, tracker, sensors, **keys):
+    rng = np.random.default_rng(0)
+    return drive(bump, car(), tracker, speed=15.0, sensors=sensors, rng=rng, **keys)
+
+
+NO_NUMBERS = (math.nan, math.inf, -math.inf, 1e308, -1e308)
+
+
+@pytest.mark.parametrize("channel", [*Measured._fields[1:], "all"])
+@pytest.mark.parametrize("value", NO_NUMBERS)
+def test_half_a_second_without_a_number_is_driven_through(channel, value, bump):
+    run = broken_drive(bump, driver := Driver(), Broken(channel, value, duration=0.5))
+    assert run.completed, run.ending
+    assert np.isfinite([[m.e_y, m.e_psi, *m.kappa, *m.v_x] for m in driver.seen]).all()
+    assert all(abs(m.v_y) < 300.0 or math.isnan(m.v_y) for m in driver.seen)
+    assert all(abs(m.r) < 10.0 or math.isnan(m.r) for m in driver.seen)
+    lost = [channel] if channel != "all" else list(GUIDES)
+    noted = [(1.0, f"{one} shows no number: dead reckoning") for one in lost if one in GUIDES]
+    assert [(round(t, 6), text) for t, text in run.notes] == noted
+
+
+@pytest.mark.parametrize("channel", GUIDES)
+@pytest.mark.parametrize("value", NO_NUMBERS)
+def test_a_car_that_stays_blind_ends_its_drive_and_says_why(channel, value, bump):
+    run = broken_drive(bump, Driver(), Broken(channel, value), blind=1.5)
+    assert (run.completed, run.ending) == (False, f"no number of {channel} for 1.5 s")
+    assert run.t[-1] == pytest.approx(1.0 + 1.5, abs=0.011)
+    assert np.abs(run.e_y).max() < 0.6
+
+
+def test_channels_that_do_not_guide_end_no_drive(bump):
+    for channel in ("v_y", "r", "delta", "a_y"):
+        assert broken_drive(bump, Driver(), Broken(channel, math.nan)).completed
+
+
+def test_a_car_that_is_blind_now_and_then_goes_on(bump):
+    class Flickers(Broken):
+        def measure(self, state, rng):
+            self.start = 0.0 if round(100 * state.t) % 50 else 1e9  # one good sample in 0.5 s
+            return super().measure(state, rng)
+
+    assert broken_drive(bump, Driver(), Flickers("all", math.nan)).completed
+
+
+def test_a_time_of_blindness_must_be_positive(bump):
+    for wrong in (0.0, -1.0, math.nan):
+        with pytest.raises(ValueError, match="blind must be positive"):
+            broken_drive(bump, Driver(), inertial_unit(), blind=wrong)
 
 
 def test_a_fault_of_a_channel_that_is_not_measured_is_refused():

@@ -1,0 +1,87 @@
+"""Samples that are refused, and the gap in time that they leave: one rule for Python, C and FMU.
+
+A sample is refused where a number is not finite or beyond what any car reaches (`Limits`). It
+counts as time. A method that judges samples itself, whose step carries a gate, is shown a sample
+at `NOWHERE` in its place, which no gate believes: it holds its last one for a moment, then rests.
+The others rest at the first sample after the gap, once, before they take it: observers take the
+measurement and filters begin anew, as at a start, and what was learnt stays. So no difference over
+the gap is ever taken for one over a sampling interval. From `STALE_TIME` on forces read zero.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from models.vehicle import GRAVITY, Vehicle
+
+FROUDE = 60.0  # largest speed, in sqrt(g wheelbase): 300 m/s for a sedan
+TURN = 4.0  # largest yaw rate, in sqrt(g/wheelbase): 8 rad/s for a sedan
+STEERING = 1.5  # rad
+WEIGHTS = 5.0  # largest force of an axle, in weights of the car
+STALE_TIME = 0.5  # s: a driver's reaction; forces follow steering and yaw within less
+NOWHERE = 1e6  # m/s, of a car that nobody has seen; its square is a number in float too
+GATE = "gate"  # the carried port of a step that judges samples itself
+
+
+class Limits(NamedTuple):
+    """What no car reaches: speed [m/s], yaw rate [rad/s], steering [rad], axle force [N]."""
+
+    speed: float
+    yaw_rate: float
+    steering: float
+    force: float
+
+    @classmethod
+    def of(cls, vehicle: Vehicle) -> "Limits":
+        """Return the limits of a car, by its size and weight.
+
+        Parameters
+        ----------
+        vehicle : the car.
+        """
+        return cls(
+            speed=FROUDE * math.sqrt(GRAVITY * vehicle.wheelbase),
+            yaw_rate=TURN * math.sqrt(GRAVITY / vehicle.wheelbase),
+            steering=STEERING,
+            force=WEIGHTS * vehicle.weight,
+        )
+
+    def accept(self, v_x: float, v_y: float, r: float, delta_f: float, delta_r: float) -> bool:
+        """Return whether a sample holds numbers within them; NaN is not.
+
+        Parameters
+        ----------
+        v_x : longitudinal speed [m/s].
+        v_y : lateral velocity [m/s].
+        r : yaw rate [rad/s].
+        delta_f : steering in front [rad].
+        delta_r : steering at the rear [rad].
+        """
+        return (
+            abs(v_x) <= self.speed
+            and abs(v_y) <= self.speed
+            and abs(r) <= self.yaw_rate
+            and abs(delta_f) <= self.steering
+            and abs(delta_r) <= self.steering
+        )
+
+
+def judges_samples(carry: Mapping[str, Any]) -> bool:
+    """Return whether a step judges samples itself.
+
+    Parameters
+    ----------
+    carry : its carried ports.
+    """
+    return GATE in carry
+
+
+def stale_samples(stale_time: float, dt: float) -> int:
+    """Return how many refused samples in a row make forces stale, at least one.
+
+    Parameters
+    ----------
+    stale_time : [s].
+    dt : sampling interval [s].
+    """
+    return max(1, int(stale_time / dt + 0.5))

@@ -1,0 +1,116 @@
+"""Refused samples in the shipped C: the same rule as beside a car in Python, and its status."""
+
+import re
+
+import numpy as np
+import pytest
+
+from codegen import find_compiler
+from identifier.export.compiled import CompiledPackage, Status, samples_of
+from identifier.export.package import build_package
+from identifier.methods import make_method
+from identifier.online import OnlineIdentifier
+from identifier.refused import STALE_TIME
+from models.vehicle import sedan
+
+CAR = sedan()
+LAWS = ("axle", "integral", "rls", "stiffness_rls", "eso")
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
+
+
+@pytest.fixture(scope="module")
+def shipped(packages):
+    """By law, what a package is computed with; each test begins anew."""
+    others = {law: build_package(make_method(law, CAR), CAR) for law in LAWS[2:]}
+    return {law: CompiledPackage.of(one) for law, one in {**packages, **others}.items()}
+
+
+@pytest.fixture
+def rows(slalom):
+    """15 s of a slalom with gaps of 0.03 to 2 s, in one channel each, in all, and of each kind."""
+    rows = samples_of(slalom)[:1500]
+    rows[300:303, 1] = np.nan
+    rows[400:420, 2] = np.inf
+    rows[500:550, 0] = np.nan
+    rows[700:900, 3] = 1e308
+    rows[1000:1060] = np.nan
+    rows[1100:1110, 4] = -np.inf
+    return rows
+
+
+def in_python(law, rows):
+    online = OnlineIdentifier(make_method(law, CAR), CAR, 0.01)
+    forces, stale = [], []
+    for row in rows:
+        forces.append(online.update(row[1:3], row[3:], row[0]))
+        stale.append(online.stale)
+    return np.array(forces), np.array(stale), online
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_gaps_are_met_as_beside_a_car_in_python(law, shipped, rows):
+    shipped[law].init()
+    run = shipped[law].run_samples(rows)
+    forces, stale, online = in_python(law, rows)
+    assert np.abs(run.axle_force - forces).max() < 1e-6
+    np.testing.assert_array_equal(run.status == Status.STALE, stale)
+    refused = ~(np.abs(rows) < 1e3).all(axis=1)
+    np.testing.assert_array_equal(np.isin(run.status, [Status.BAD_INPUT, Status.STALE]), refused)
+    assert shipped[law].faults >= refused.sum() == online.counts.refused
+    for name, value in shipped[law].weights.items():
+        kept = online.carried()[name]
+        if name == "UD" or kept.shape != value.shape:
+            kept = kept.reshape(value.shape)
+        np.testing.assert_allclose(value, kept, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("channel", range(5))
+@pytest.mark.parametrize("gap", [20, 50, 200])
+def test_every_channel_heals(law, channel, gap, shipped, slalom):
+    rows = samples_of(slalom)[:1500]
+    shipped[law].init()
+    clean = shipped[law].run_samples(rows).axle_force
+    rows[800 : 800 + gap, channel] = np.nan
+    shipped[law].init()
+    force = shipped[law].run_samples(rows).axle_force
+    after = slice(800 + gap + 30, 1500)
+    size = np.sqrt((clean[after] ** 2).mean(0))
+    assert (np.sqrt(((force - clean)[after] ** 2).mean(0)) < 0.03 * size).all()
+
+
+def test_the_time_that_makes_forces_stale_may_be_set(packages, rows):
+    package = packages["axle"]
+    header = "include/tireid.h"
+    assert f"#define TIREID_STALE_TIME ({STALE_TIME})" in package.files[header]
+    files = {**package.files, header: "#define TIREID_STALE_TIME 0.1\n" + package.files[header]}
+    run = CompiledPackage.of(package._replace(files=files)).run_samples(rows)
+    assert (run.status[500:509] == Status.BAD_INPUT).all()
+    assert (run.status[509:550] == Status.STALE).all()
+    assert (run.axle_force[509:550] == 0.0).all()
+    assert run.status[550 + 60] == Status.OK
+
+
+def test_a_result_that_is_refused_is_a_gap_too(packages, slalom):
+    """Forces beyond what the caller allows: held, then stale, and back with the next good one."""
+    limit, place = r"(params->max_force = \(tireid_real\))\S+;", "src/tireid.c"
+    text, count = re.subn(limit, r"\g<1>1000.0;", packages["integral"].files[place])
+    assert count == 1
+    files = {**packages["integral"].files, place: text}
+    run = CompiledPackage.of(packages["integral"]._replace(files=files)).run(slalom)
+    assert {Status.BAD_RESULT, Status.OK} <= set(run.status)
+    assert np.abs(run.axle_force).max() <= 1000.0
+    long = run.status == Status.STALE
+    assert (run.axle_force[long] == 0.0).all()
+
+
+@pytest.mark.parametrize("law", ["axle", "integral"])
+def test_frozen_weights_hold_through_a_gap(law, shipped, rows):
+    run = shipped[law]
+    run.init()
+    run.run_samples(rows[:300])
+    run.set_adaptation(False)
+    before = run.weights
+    run.run_samples(rows[300:])
+    for name, value in run.weights.items():
+        np.testing.assert_array_equal(value, before[name])

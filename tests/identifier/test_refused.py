@@ -1,0 +1,184 @@
+"""Samples that are refused count as time: what a gap costs, and when no force is told any more."""
+
+import itertools
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from identifier.axle import AxleDesign
+from identifier.export.fold import fold
+from identifier.export.vectors import synthetic_samples
+from identifier.methods import METHODS, make_method
+from identifier.online import OnlineIdentifier
+from identifier.refused import Limits, stale_samples
+from models.maneuvers import Slalom
+from models.plant import Plant
+from models.vehicle import sedan
+
+CAR = sedan()
+BEGIN = 1200  # sample at which a gap begins
+RESTART = 30  # samples in which a restarted filter or observer may settle
+BROKEN = (np.nan, np.inf, -np.inf, 1e308, -1e308)
+
+
+@pytest.fixture(scope="module")
+def slalom():
+    """25 s of a slalom of the sedan, with its true forces."""
+    maneuver = Slalom(
+        amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=24.99
+    )
+    return Plant(CAR).simulate(maneuver, speed=20.0).recording()
+
+
+def rows_of(recording):
+    columns = (recording.v_x, recording.v_y, recording.r, recording.delta_f, recording.delta_r)
+    return np.column_stack(columns)
+
+
+def update(online, row):
+    return online.update(row[1:3], row[3:], row[0])
+
+
+def driven(method, rows):
+    online = OnlineIdentifier(method, CAR, method.dt)
+    return np.array([update(online, row) for row in rows]), online
+
+
+def error(force, truth):
+    return float((np.sqrt(((force - truth) ** 2).mean(0) / (truth**2).mean(0))).max())
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_a_gap_of_refused_samples_costs_less_than_two_percent(name, slalom):
+    rows, truth, method = rows_of(slalom), slalom.axle_force, make_method(name, CAR)
+    clean = driven(method, rows)[0]
+    for begin, gap in itertools.product((BEGIN, BEGIN + 30, BEGIN + 70), (20, 50, 100, 200)):
+        broken = rows.copy()
+        broken[begin : begin + gap, 2] = np.nan
+        force, online = driven(method, broken)
+        after = slice(begin + gap + RESTART, len(rows))
+        cost = error(force[after], truth[after]) - error(clean[after], truth[after])
+        assert cost < 0.02, (begin, gap)
+        assert online.counts.refused == gap
+        assert not online.stale
+
+
+def test_a_gap_that_does_not_count_as_time_costs_more(slalom):
+    """What the rule is for: the same samples left out, so that two far ones follow each other."""
+    rows, truth = rows_of(slalom), slalom.axle_force
+    method = AxleDesign.for_vehicle(CAR)
+    clean, worst = driven(method, rows)[0], 0.0
+    for begin in range(BEGIN, BEGIN + 200, 25):
+        left_out = driven(method, np.delete(rows, slice(begin, begin + 50), axis=0))[0]
+        after = slice(begin + 50 + RESTART, len(rows))
+        cost = error(left_out[begin + RESTART :], truth[after]) - error(clean[after], truth[after])
+        worst = max(worst, cost)
+    assert worst > 0.02
+
+
+@pytest.mark.parametrize("channel", range(5))
+@pytest.mark.parametrize("broken", BROKEN)
+def test_no_channel_without_a_number_changes_what_was_learnt(channel, broken, slalom):
+    rows = rows_of(slalom)[:700]
+    rows[500:600, channel] = broken
+    method = AxleDesign.for_vehicle(CAR)
+    online = OnlineIdentifier(method, CAR, method.dt)
+    for k, row in enumerate(rows):
+        if k == 500:
+            before = online.carried()
+        force = update(online, row)
+        assert np.isfinite(force).all()
+        if 500 <= k < 600:
+            for port in ("W", "own", "UD", "errors", "excitation"):
+                np.testing.assert_array_equal(online.carried()[port], before[port])
+    assert (online.counts.samples, online.counts.refused) == (600, 100)
+    assert np.abs(force).max() > 100.0
+
+
+def test_no_input_brings_a_number_into_the_axle_identifier_that_is_none():
+    """The step alone, without the door before it: every channel and all of them, in any state."""
+    folded, rng = fold(AxleDesign.for_vehicle(CAR), CAR), np.random.default_rng(3)
+    n, gate = len(folded.carry), list(folded.carry).index("gate")
+    carry = [ca.DM(value) for value in folded.carry.values()]
+    states = [carry]
+    for v_x, v_y, r, delta_f, delta_r in synthetic_samples(folded, 400):
+        carry = list(folded.function(*carry, [v_y, r], [delta_f, delta_r], v_x))[:n]
+        if rng.random() < 0.1:
+            states += [carry, [*carry[:gate], np.array(carry[gate]), *carry[gate + 1 :]]]
+            states[-1][gate][5] = 0.0  # just switched off: whatever comes first is near
+    channels = [*((k,) for k in range(5)), tuple(range(5)), *itertools.combinations(range(5), 2)]
+    for state, which, broken in itertools.product(states, channels, BROKEN):
+        sample = np.array([20.0, 0.1, 0.1, 0.01, 0.0])
+        sample[list(which)] = broken
+        told = folded.function(*state, sample[1:3], sample[3:], sample[0])
+        for port, value in zip([*folded.carry, "axle_force"], told, strict=False):
+            assert np.abs(np.array(value)).max() < 1e9, (port, which, broken)  # NaN is not
+
+
+@pytest.mark.parametrize("name", ["axle", "rls", "integral", "eso"])
+def test_forces_are_zero_and_stale_after_half_a_second_without_a_sample(name, slalom):
+    rows, method = rows_of(slalom)[:700], make_method(name, CAR)
+    rows[400:500, 0] = np.nan
+    online = OnlineIdentifier(method, CAR, method.dt)
+    for k, row in enumerate(rows):
+        force = update(online, row)
+        assert online.stale == (449 <= k < 500)
+        if online.stale:
+            np.testing.assert_array_equal(force, 0.0)
+            assert all((value == 0.0).all() for value in online.told.values())
+    assert np.abs(force).max() > 100.0
+    assert online.counts.missed == 0
+
+
+def test_a_held_force_is_told_until_it_is_stale(slalom):
+    rows, method = rows_of(slalom)[:421], make_method("rls", CAR)
+    rows[400:, 1] = np.inf
+    online = OnlineIdentifier(method, CAR, 0.01, stale_time=0.2)
+    forces = np.array([update(online, row) for row in rows])
+    np.testing.assert_array_equal(forces[400:419], np.tile(forces[399], (19, 1)))
+    np.testing.assert_array_equal(forces[419:], 0.0)
+    assert stale_samples(0.2, 0.01) == 20
+    assert stale_samples(1e-9, 0.01) == 1  # the first one already
+
+
+@pytest.mark.parametrize("time", [0.0, -1.0, np.nan, np.inf])
+def test_a_time_that_is_none_is_refused(time):
+    with pytest.raises(ValueError, match="stale_time must be positive and finite"):
+        OnlineIdentifier(make_method("rls", CAR), CAR, 0.01, stale_time=time)
+
+
+def test_a_run_that_is_begun_anew_stays_stale_until_a_sample_comes(slalom):
+    rows, method = rows_of(slalom)[:200], AxleDesign.for_vehicle(CAR)
+    online = OnlineIdentifier(method, CAR, method.dt)
+    for row in rows:
+        update(online, row)
+    for _ in range(60):
+        update(online, np.full(5, np.nan))
+    online.restart(None)
+    assert online.stale
+    np.testing.assert_array_equal(update(online, np.full(5, np.nan)), 0.0)
+    update(online, rows[0])
+    assert not online.stale
+
+
+def test_before_the_first_sample_nothing_begins(slalom):
+    rows, method = rows_of(slalom)[:300], make_method("integral", CAR)
+    late, clean = (OnlineIdentifier(method, CAR, 0.01) for _ in range(2))
+    for _ in range(10):
+        update(late, np.full(5, np.nan))
+    for row in rows:
+        np.testing.assert_array_equal(update(late, row), update(clean, row))
+
+
+def test_the_limits_are_those_of_the_car_s_size():
+    limits = Limits.of(CAR)
+    good = (20.0, 0.5, 0.3, 0.05, 0.0)
+    assert limits.accept(*good)
+    for channel, most in enumerate((limits.speed, limits.speed, limits.yaw_rate, 1.5, 1.5)):
+        for side in (-1.0, 1.0):
+            sample = list(good)
+            sample[channel] = side * most
+            assert limits.accept(*sample)
+            sample[channel] = side * most * 1.001
+            assert not limits.accept(*sample)
