@@ -356,9 +356,7 @@ def main(runs: int = 200, drives: int = 16, *, keep: bool = False) -> int:
     targets.record("dead_zone/identified", runs * drives)
     record(found, targets)
     seconds = time.perf_counter() - begin
-    print(
-        f"{runs} cars and networks, each designed three times, {drives} drives each, {seconds:.0f} s"
-    )
+    print(f"{runs} cars and networks, three designs of each, {drives} drives each, {seconds:.0f} s")
     targets.record("seconds", seconds, "s")
     return targets.finish(keep=keep)
 

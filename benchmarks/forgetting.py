@@ -9,8 +9,7 @@ weights are kept by the paper's leakage (`tireid identify --paper`), or as `tire
 and 10 hours the frozen network is asked about a lane change and a slalom that it never drove.
 Ordinary: of the minutes three in four are calm and one is brisk, nothing is known at first. Calm:
 six brisk minutes are learnt, then all are calm. An hour is simulated, and driven again with other
-noise. The sedan has ten hours; CARS random cars, on which the default of `--keep` was chosen, have
-three hours.
+noise. The sedan has ten hours, CARS random cars have three: they judge the default of `--keep`.
 """
 
 import sys

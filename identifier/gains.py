@@ -29,11 +29,11 @@ class Gains:
     eta_V : learning rate of V: η2 [1/(U² s⁴)], or [1/(U² s³)] for the instantaneous law.
     rho_W : leakage of W, ρ1 [1/(U s²)]; 0 where a projection bounds W.
     rho_V : leakage of V, ρ2 [1/(U s²)]; 0 where a projection bounds V.
+    W_max : radius of the projection of W, Frobenius norm [U]; infinite: no projection.
+    V_max : radius of the projection of V, Frobenius norm [-]; infinite: no projection.
     W_free : radius of the dead zone of the leakage of W, Frobenius norm [U]: within it nothing
         leaks, beyond it what lies beyond; 0, the paper's: all of W leaks.
     V_free : radius of the dead zone of the leakage of V, Frobenius norm [-]; 0, the paper's.
-    W_max : radius of the projection of W, Frobenius norm [U]; infinite: no projection.
-    V_max : radius of the projection of V, Frobenius norm [-]; infinite: no projection.
     lead : τ of the PI-lead law z + τ ξ̃ [s]; the other laws do not read it.
 
     Raises
