@@ -70,7 +70,7 @@ class Gains:
                 raise ValueError(f"{name} must not be negative, it is {getattr(self, name)}")
         if not 0.0 < self.forgetting < np.inf:
             raise ValueError(f"forgetting must be positive, it is {self.forgetting}")
-        for name in ("forgetting", "eta_W", "eta_V", "rho_W", "rho_V", "lead"):
+        for name in ("forgetting", "eta_W", "eta_V", "rho_W", "rho_V", "W_free", "V_free", "lead"):
             require_within(ValueError, 0.0, LARGEST, **{name: getattr(self, name)})
         for name in ("W_max", "V_max"):
             if not getattr(self, name) > 0.0:
