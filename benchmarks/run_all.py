@@ -27,6 +27,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "gain_limit": [],
     "limit_cycle": [],
     "bounds_monte_carlo": [],
+    "forgetting": [],
     "hostile_certificates": [],
     "batch_speed": [],
     "export_cost": [],

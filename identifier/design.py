@@ -88,6 +88,7 @@ class Design:
             input_source=self.input_source,
             integrator=self.integrator,
             projects=bool(np.isfinite(self.gains.W_max) or np.isfinite(self.gains.V_max)),
+            rests=bool(self.gains.W_free > 0.0 or self.gains.V_free > 0.0),
         )
 
     def setup(

@@ -28,6 +28,8 @@ COMMENTS = {
     "rho_V": "1/(U s^2)",
     "W_max": "U, projection of W (inf: none)",
     "V_max": "projection of V (inf: none)",
+    "W_free": "U, dead zone of the leakage of W (0: all of W leaks, the paper's)",
+    "V_free": "dead zone of the leakage of V (0: all of V leaks, the paper's)",
     "lead": "s, tau of pi_lead",
     "hidden": "units",
     "inputs": "what the network reads",

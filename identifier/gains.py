@@ -31,6 +31,9 @@ class Gains:
     rho_V : leakage of V, ρ2 [1/(U s²)]; 0 where a projection bounds V.
     W_max : radius of the projection of W, Frobenius norm [U]; infinite: no projection.
     V_max : radius of the projection of V, Frobenius norm [-]; infinite: no projection.
+    W_free : radius of the dead zone of the leakage of W, Frobenius norm [U]: within it nothing
+        leaks, beyond it what lies beyond; 0, the paper's: all of W leaks.
+    V_free : radius of the dead zone of the leakage of V, Frobenius norm [-]; 0, the paper's.
     lead : τ of the PI-lead law z + τ ξ̃ [s]; the other laws do not read it.
 
     Raises
@@ -38,8 +41,8 @@ class Gains:
     NotHurwitzError
         Where A_d is not Hurwitz.
     ValueError
-        Where a gain is negative, not a number or above `LARGEST`, λ or a radius not positive, or
-        A_d not 2x2.
+        Where a gain is negative, not a number or above `LARGEST`, λ or the radius of a projection
+        not positive, a dead zone without a leakage, or A_d not 2x2.
     """
 
     A_d: tuple[tuple[float, float], tuple[float, float]]
@@ -50,6 +53,8 @@ class Gains:
     rho_V: float
     W_max: float = np.inf
     V_max: float = np.inf
+    W_free: float = 0.0
+    V_free: float = 0.0
     lead: float = 0.0
 
     def __post_init__(self) -> None:
@@ -60,16 +65,21 @@ class Gains:
         poles = np.linalg.eigvals(A_d)
         if not poles.real.max() < 0.0:
             raise NotHurwitzError(f"A_d must be Hurwitz, its eigenvalues are {poles}")
-        for name in ("eta_W", "eta_V", "rho_W", "rho_V", "lead"):
+        for name in ("eta_W", "eta_V", "rho_W", "rho_V", "W_free", "V_free", "lead"):
             if not 0.0 <= getattr(self, name) < np.inf:
                 raise ValueError(f"{name} must not be negative, it is {getattr(self, name)}")
         if not 0.0 < self.forgetting < np.inf:
             raise ValueError(f"forgetting must be positive, it is {self.forgetting}")
-        for name in ("forgetting", "eta_W", "eta_V", "rho_W", "rho_V", "lead"):
+        for name in ("forgetting", "eta_W", "eta_V", "rho_W", "rho_V", "W_free", "V_free", "lead"):
             require_within(ValueError, 0.0, LARGEST, **{name: getattr(self, name)})
         for name in ("W_max", "V_max"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"{name} must be positive, it is {getattr(self, name)}")
+        for free, rho in (("W_free", "rho_W"), ("V_free", "rho_V")):
+            if getattr(self, free) > 0.0 and getattr(self, rho) == 0.0:
+                raise ValueError(
+                    f"{free} is the dead zone of a leakage, and {rho} is 0: it must be positive"
+                )
 
     @property
     def matrix(self) -> NDArray[np.float64]:

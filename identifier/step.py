@@ -14,7 +14,15 @@ from typing import Any
 import casadi as ca
 
 from identifier.integrators import INTEGRATORS
-from identifier.laws import DIRECTIONS, DRIVING_ERRORS, ball, unbounded, weight_rates
+from identifier.laws import (
+    DIRECTIONS,
+    DRIVING_ERRORS,
+    ball,
+    beyond_ball,
+    unbounded,
+    weight_rates,
+    whole,
+)
 from identifier.network import Network, hidden_layer, network_signals
 from identifier.observer import INPUT_SOURCES, filter_rate, observer_rate
 from models.bicycle import BicycleParameters, bicycle, linear_axle_force
@@ -22,7 +30,18 @@ from models.bicycle import BicycleParameters, bicycle, linear_axle_force
 CARRY = ("xi_hat", "z", "W", "V")
 OVER = ("x", "u", "v_x")
 LARGEST_SPEED, LARGEST_ANGLE = 300.0, 1.5  # m/s and rad: no car is faster, no wheel turns more
-GAINS = ("eta_W", "eta_V", "rho_W", "rho_V", "forgetting", "W_max", "V_max", "lead")
+GAINS = (
+    "eta_W",
+    "eta_V",
+    "rho_W",
+    "rho_V",
+    "forgetting",
+    "W_max",
+    "V_max",
+    "lead",
+    "W_free",
+    "V_free",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,6 +55,7 @@ class Structure:
     input_source : where the network reads the state.
     integrator : name of the integrator.
     projects : whether a projection bounds the weights.
+    rests : whether the leakage has a dead zone.
     """
 
     network: Network
@@ -43,6 +63,7 @@ class Structure:
     input_source: str
     integrator: str
     projects: bool
+    rests: bool = False
 
 
 def plausible(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
@@ -81,7 +102,7 @@ def build_step(structure: Structure) -> ca.Function:
     gains, sampling = ca.SX.sym("gains", len(GAINS)), ca.SX.sym("sampling", 3)
 
     parameters = BicycleParameters(*ca.vertsplit(vehicle))
-    eta_W, eta_V, rho_W, rho_V, lam, W_max, V_max, lead = ca.vertsplit(gains)
+    eta_W, eta_V, rho_W, rho_V, lam, W_max, V_max, lead, W_free, V_free = ca.vertsplit(gains)
     dt, unit, min_speed = ca.vertsplit(sampling)
     speed = ca.fmax(v_x, min_speed)
     model = bicycle(parameters, speed)
@@ -111,6 +132,9 @@ def build_step(structure: Structure) -> ca.Function:
             rho_W=rho_W,
             rho_V=rho_V,
             direction=DIRECTIONS[drive],
+            leaking=beyond_ball if structure.rests else whole,
+            W_free=W_free,
+            V_free=V_free,
         )
         xi_hat_dot = observer_rate(A_d, model.A_xi, model.B_xi / unit, xi, xi_hat, u, W @ sigma)
         return [xi_hat_dot, filter_rate(lam, z, xi_tilde), *rates]

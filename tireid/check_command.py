@@ -24,7 +24,9 @@ from identifier.defaults import (
 from identifier.design import Design
 from identifier.design_file import design_text, read_design
 from identifier.driving import Driving
+from identifier.gains import Gains
 from identifier.identify import identify
+from identifier.keeping import DEFAULT_KEEPING, KEEPINGS, with_keeping
 from identifier.methods import DEFAULT
 from identifier.stability import Certificate, DesignError
 from identifier.stability.monte_carlo import Beginning, Observed, monte_carlo
@@ -94,6 +96,13 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("--design", action="store_true", help="find gains and write them")
     parser.add_argument(
         "--phase-margin", type=float, metavar="DEG", help=f"for --design ({PHASE_MARGIN:g} deg)"
+    )
+    parser.add_argument(
+        "--keep",
+        choices=KEEPINGS,
+        help="for --design: what keeps the weights over hours, the paper's leakage (which forgets "
+        "them), a leakage with a dead zone, or a projection in its place "
+        f"({DEFAULT_KEEPING})",
     )
     parser.add_argument(
         "--out", type=Path, metavar="FILE", help="for --design: file to write (design.toml)"
@@ -175,8 +184,10 @@ def _require_sense(options: argparse.Namespace) -> None:
         raise ValueError("--design finds gains: give no DESIGN file to judge with it")
     if options.file is not None and options.law is not None:
         raise ValueError("--law is for the default design: the law stands in the DESIGN file")
-    if not options.design and (options.phase_margin is not None or options.out is not None):
-        raise ValueError("--phase-margin and --out go with --design")
+    if not options.design:
+        for name in ("phase_margin", "keep", "out"):
+            if getattr(options, name) is not None:
+                raise ValueError("--phase-margin, --keep and --out go with --design")
     for name in ("bandwidth", "speed", "slip", "friction", "phase_margin"):
         value = getattr(options, name)
         if value is not None and not 0.0 < value < float("inf"):
@@ -224,7 +235,9 @@ def _design(options: argparse.Namespace, vehicle: Vehicle, driving: Driving) -> 
         if law == "instantaneous_scaled":
             raise ValueError("--law instantaneous_scaled is a control, design one of the others")
         margin = options.phase_margin or PHASE_MARGIN
-        return design_for(vehicle, driving, law=law, phase_margin=margin)
+        found = design_for(vehicle, driving, law=law, phase_margin=margin)
+        known = natural_operation(found, vehicle, driving)
+        return with_keeping(found, known, options.keep or DEFAULT_KEEPING)
     return replace(default_design(vehicle, law=law), driving=driving)
 
 
@@ -267,8 +280,14 @@ def _conditions(design: Design, vehicle: Vehicle, driving: Driving, said: str) -
         f"{design.law} law, {design.network.hidden} units, {design.integrator} at "
         f"{1e3 * design.dt:g} ms, forces in {unit}: A_d {rows}, lambda "
         f"{gains.forgetting:.4g}, eta_W {gains.eta_W:.4g}, eta_V {gains.eta_V:.4g}, rho_W "
-        f"{gains.rho_W:.4g}, rho_V {gains.rho_V:.4g}\n"
+        f"{gains.rho_W:.4g}, rho_V {gains.rho_V:.4g}{_radii(gains)}\n"
     )
+
+
+def _radii(gains: Gains) -> str:
+    """Return the balls that the weights are kept in, as far as there are any."""
+    radii = {name: getattr(gains, name) for name in ("W_free", "V_free", "W_max", "V_max")}
+    return "".join(f", {name} {r:.4g}" for name, r in radii.items() if 0.0 < r < math.inf)
 
 
 def _read(log: str | None, vehicle: Vehicle, design: Design) -> Recording | None:
@@ -302,13 +321,15 @@ def _proposal(
             integrator=design.integrator,
             dt=design.dt,
         )
+        known = natural_operation(better, vehicle, driving)
+        better = with_keeping(better, known, DEFAULT_KEEPING)
     except DesignError as error:
         return f"no better gains at this bandwidth: {error}"
     gains, verdict = better.gains, certificate_of(better, vehicle, driving).verdict
     return (
         f"proposal ({verdict}): A_d = -{-gains.A_d[0][0]:.4g} I, lambda {gains.forgetting:.4g}, "
         f"eta_W {gains.eta_W:.4g}, eta_V {gains.eta_V:.4g}, rho_W {gains.rho_W:.4g}, rho_V "
-        f"{gains.rho_V:.4g}{f', lead {gains.lead:.4g}' if gains.lead else ''}\n"
+        f"{gains.rho_V:.4g}{_radii(gains)}{f', lead {gains.lead:.4g}' if gains.lead else ''}\n"
         f"write it with: tireid check --design --law {design.law}{_given(options)}"
     )
 

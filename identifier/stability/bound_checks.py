@@ -62,10 +62,9 @@ def bound_checks(
         _leakage("leakage_step_V", "V", proven.leakage_step_V, gains.rho_V),
     ]
     if gains.rho_W > 0.0:
-        entries += [
-            _capacity(gains, law, operation, direction),
-            *printed_bounds(gains, law, operation, trivial),
-        ]
+        entries.append(_capacity(gains, law, operation, direction))
+        if gains.W_free == gains.V_free == 0.0:  # (14) is of a leakage that never rests
+            entries += printed_bounds(gains, law, operation, trivial)
     return entries
 
 
@@ -144,8 +143,9 @@ def _leakage(name: str, layer: str, step: float, rho: float) -> Property:
 
 
 def _capacity(gains: Gains, law: Law, operation: Operation, direction: Matrix) -> Property:
-    """Judge the force that leakage lets W hold."""
-    capacity = steady_capacity(
+    """Judge the force that leakage lets W hold: beyond the dead zone it holds what it did."""
+    resting = math.sqrt(operation.n_h) * gains.W_free
+    capacity = resting + steady_capacity(
         gains.matrix,
         law=law,
         forgetting=gains.forgetting,
@@ -164,5 +164,7 @@ def _capacity(gains: Gains, law: Law, operation: Operation, direction: Matrix) -
         margin=capacity / need,
         status=at_least(capacity, good=need, bad=None),
         unit="U",
-        advice="" if enough else f"rho_W below {gains.rho_W * capacity / need:.3g}",
+        advice=""
+        if enough
+        else f"rho_W below {gains.rho_W * (capacity - resting) / (need - resting):.3g}",
     )

@@ -188,7 +188,7 @@ def _kept_V(
     drive = gains.eta_V * float(np.linalg.norm(direction, 2)) * W * x_bar
     if drive == 0.0 and gains.rho_V == 0.0:
         return min(operation.V_start, gains.V_max)
-    kept = replace(learning, leakage=gains.rho_V, drive=drive).kept(X)
+    kept = replace(learning, leakage=gains.rho_V, drive=drive, free=gains.V_free).kept(X)
     return min(max(operation.V_start, kept), gains.V_max)
 
 

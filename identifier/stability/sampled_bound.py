@@ -14,6 +14,16 @@ step of Euler and keeps the bound; with p = dt g' X c_z μ/λ and w = dt g' X (c
 the third sees up to p/2 + w q/4 more and the fourth p (1 + μ/2) + w (q/2 + q²/4), unless a
 projection keeps them. X bounds |ξ̃| at every stage. The same holds for V_hat.
 
+A dead zone, in which nothing leaks, adds its radius W_free to that, and nothing else. With Π the
+nearest point of the ball and q the share of stage i, all that leaks of a step is
+∑ θ_i (W_hat_i - Π_i): linear in the W_hat and the Π. Where W_hat, the slopes d_i and the Π were all
+the same C there would be no step, so that the weights of a full step, W_hat⁺ = (1 - ∑ θ_i) W_hat +
+∑ θ_i (Π_i + d_i/ρ_i |ξ̃_i|), sum to one; none is negative while q <= 1, for RK4 too (d_1 has
+(1 - q_2 + q_2 q_3/2 - q_2 q_3 q_4/4)/6). So |W_hat⁺| - W_free <= (1 - ∑ θ_i) (|W_hat| - W_free) +
+∑ θ_i |d_i|/ρ_i |ξ̃_i|: the recursion of the leakage without a dead zone, for what is beyond W_free.
+The inner stages go beyond the sample as far as before, since |W_hat - Π| = max(0, |W_hat| - W_free)
+never grows faster than |W_hat|.
+
 The start: ξ_hat at the first measurement, z = 0, |W_hat(0)| within the bound on W_hat: so weights
 that were learnt within the declared conditions may be resumed.
 """
@@ -125,6 +135,7 @@ class Learning:
     drive : g', what |driving error| moves the weights by.
     dt : sampling interval [s]; 0 in continuous time.
     staged : whether the step has inner stages (RK4).
+    free : radius of the dead zone of the leakage, in the unit of the weights.
     """
 
     law: Law
@@ -133,6 +144,7 @@ class Learning:
     drive: float
     dt: float
     staged: bool
+    free: float = 0.0
 
     def kept(self, X: float) -> float:
         """Bound on the weights while |ξ̃| <= X; inf where the leakage of a step is too large.
@@ -143,13 +155,13 @@ class Learning:
         """
         (c_z, c_xi), lam = self.law, self.forgetting
         if self.drive == 0.0:
-            return 0.0 if self.leakage * self.dt * X <= 1.0 else math.inf
+            return self.free if self.leakage * self.dt * X <= 1.0 else math.inf
         q, mu = self.leakage * self.dt * X, lam * self.dt
         if self.leakage == 0.0 or q > 1.0 or mu > 1.0 or (self.staged and q == 1.0):
             return math.inf
         late, weak = (mu**2, q) if self.staged else (0.0, 0.0)
         balance = self.drive * (c_z * (1.0 + late) / lam + c_xi) / (self.leakage * (1.0 - weak))
-        return balance + c_z * self.drive * X / lam**2
+        return self.free + balance + c_z * self.drive * X / lam**2
 
     def beyond(self, X: float) -> tuple[float, ...]:
         """What inner stages may lie beyond the weights of the sample, one for each stage.
@@ -189,6 +201,7 @@ def output_layer(
         drive=gains.eta_W * _norm(direction) * math.sqrt(n_h),
         dt=0.0 if integrator == "exact" else dt,
         staged=integrator == "rk4",
+        free=gains.W_free,
     )
 
 

@@ -23,17 +23,19 @@ def a_case():
 
 
 def test_a_design_leaks_or_is_projected_and_its_bounds_are_those_of_the_command(case):
-    vehicle, ((leaking, first), (projected, second)) = case
+    vehicle, ((leaking, first), (projected, second), (resting, third)) = case
     assert first["error_bound"].value < np.inf
     assert second["projection_bound"].value < np.inf
-    for design, certificate in ((leaking, first), (projected, second)):
+    for design, certificate in case[1]:
         assert certificate == certificate_of(design, vehicle)
     assert leaking.gains.W_max == np.inf
     assert projected.gains.rho_W == 0.0
+    assert resting.gains.W_free > 0.0 and resting.gains.V_free > 0.0
+    assert third["weight_bound"].value > resting.gains.W_free
 
 
 def test_weights_are_resumed_and_sensors_err_on_the_drives(case, monkeypatch):
-    vehicle, ((design, certificate), _) = case
+    vehicle, ((design, certificate), *_) = case
     asked = {}
 
     def told(design, vehicle, driving, count, *, beginning, rng):
@@ -68,4 +70,4 @@ def test_a_bound_that_is_passed_misses_the_target(monkeypatch, share):
         assert set(passed.values()) == {0}
     else:
         assert targets.finish(keep=False) == 1
-        assert passed["leakage"] == passed["projection"] == 4
+        assert passed["leakage"] == passed["projection"] == passed["dead_zone"] == 4

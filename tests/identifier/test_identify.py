@@ -42,9 +42,15 @@ def by_hand(recording, design, car):
         direction = np.linalg.inv(A_d).T @ error
         if design.law == "pi_lead":  # along P of the Lyapunov equation, P = -A_d⁻ᵀ if symmetric
             direction = -solve_continuous_lyapunov(A_d.T, -2.0 * np.eye(2)) @ error
-        W_dot = -g.eta_W * np.outer(direction, sigma) - g.rho_W * np.linalg.norm(xi_t) * W
+        W_dot = -g.eta_W * np.outer(direction, sigma) - g.rho_W * np.linalg.norm(xi_t) * (
+            W * max(0.0, 1.0 - g.W_free / max(np.linalg.norm(W), 1e-300))
+        )
         V_dot = -g.eta_V * np.outer((1 - sigma**2) * (W.T @ direction), x_bar)
-        V_dot -= g.rho_V * np.linalg.norm(xi_t) * V
+        V_dot -= (
+            g.rho_V
+            * np.linalg.norm(xi_t)
+            * (V * max(0.0, 1.0 - g.V_free / max(np.linalg.norm(V), 1e-300)))
+        )
         coriolis = K_inv @ np.array([-v_x * x[1], 0.0]) / U
         xi_hat_dot = A_d @ xi_hat + linear / U + coriolis - A_d @ xi + f_hat
         forces.append(linear + U * f_hat)
@@ -67,6 +73,31 @@ def test_step_repeats_the_equations_by_hand(law, source, radius, car, drive):
     np.testing.assert_allclose(history.axle_force, forces, rtol=1e-9, atol=1e-6)
     np.testing.assert_allclose(history.carried["W"][-1], W, rtol=1e-9, atol=1e-10)
     np.testing.assert_allclose(history.carried["V"][-1], V, rtol=1e-9, atol=1e-10)
+
+
+@pytest.mark.parametrize(("W_free", "V_free"), [(0.4, 3.0), (0.4, 0.0), (0.0, 3.0)])
+def test_a_dead_zone_leaks_what_lies_beyond_it(W_free, V_free, car, drive):
+    gains = replace(GAINS, rho_W=8.0, rho_V=8.0, W_free=W_free, V_free=V_free)
+    recording, ends = drive(n=400), []
+    for one in (gains, replace(gains, W_free=0.0, V_free=0.0)):
+        design = Design(gains=one, network=Network(hidden=6))
+        history = identify(recording, car, design)
+        forces, W, V = by_hand(recording, design, car)
+        np.testing.assert_allclose(history.axle_force, forces, rtol=1e-9, atol=1e-6)
+        np.testing.assert_allclose(history.carried["W"][-1], W, rtol=1e-9, atol=1e-10)
+        np.testing.assert_allclose(history.carried["V"][-1], V, rtol=1e-9, atol=1e-10)
+        ends.append((np.linalg.norm(W), np.linalg.norm(V)))
+    kept, leaked = ends
+    assert W_free == 0.0 or kept[0] > 1.1 * leaked[0]
+    assert V_free == 0.0 or kept[1] > 1.1 * leaked[1]
+
+
+def test_without_error_of_the_model_a_dead_zone_that_is_never_left_is_no_leakage_at_all(car, drive):
+    wide = replace(GAINS, W_free=1e9, V_free=1e9)
+    none = replace(GAINS, rho_W=0.0, rho_V=0.0)
+    found = [identify(drive(n=400), car, Design(gains=gains)) for gains in (wide, none)]
+    for name in ("W", "V"):
+        np.testing.assert_array_equal(*(history.carried[name] for history in found))
 
 
 def test_finer_steps_of_both_integrators_meet(car, drive):

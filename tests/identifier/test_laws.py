@@ -4,7 +4,16 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.laws import DRIVING_ERRORS, ball, instantaneous, integral, pi_lead, weight_rates
+from identifier.laws import (
+    DRIVING_ERRORS,
+    ball,
+    beyond_ball,
+    instantaneous,
+    integral,
+    pi_lead,
+    weight_rates,
+    whole,
+)
 from identifier.network import hidden_layer
 from identifier.observer import filter_rate, observer_rate
 
@@ -216,3 +225,44 @@ def test_projection_keeps_the_ball_and_leaves_its_inside_alone(rng):
     np.testing.assert_allclose(outside / np.linalg.norm(outside), W / norm, rtol=1e-12)
     np.testing.assert_array_equal(numbers(ball(ca.DM.zeros(2, 3), 1.0)), np.zeros((2, 3)))
     np.testing.assert_array_equal(numbers(ball(ca.DM(W), np.inf)), W)
+
+
+def test_without_a_dead_zone_the_laws_are_the_printed_ones_bit_for_bit(rng):
+    """(11)-(12) written out, in the order of the paper: the option costs the paper's law no bit."""
+    names = {"drive": (2,), "xi_tilde": (2,), "W": (2, N_H), "V": (N_H, N_IN)}
+    names |= {"x_bar": (N_IN,), "sigma": (N_H,), "A_d": (2, 2)}
+    p = {name: ca.SX.sym(name, *shape) for name, shape in names.items()}
+    eta_W, eta_V, rho_W, rho_V = 3.1, 0.7, 0.3, 0.2
+    g, leak = ca.solve(p["A_d"].T, p["drive"]), ca.norm_2(p["xi_tilde"])
+    W_dot = -eta_W * g @ p["sigma"].T - rho_W * leak * p["W"]
+    V_dot = -eta_V * ((1 - p["sigma"] ** 2) * (p["W"].T @ g)) @ p["x_bar"].T - rho_V * leak * p["V"]
+    gains = {"eta_W": eta_W, "eta_V": eta_V, "rho_W": rho_W, "rho_V": rho_V}
+    printed = ca.Function("printed", [*p.values()], [W_dot, V_dot])
+
+    def differ(**option):
+        ours = ca.Function("ours", [*p.values()], [*weight_rates(**p, **gains, **option)])
+        values = [[rng.normal(size=symbol.shape) for symbol in p.values()] for _ in range(50)]
+        pairs = [
+            (np.array(a), np.array(b))
+            for v in values
+            for a, b in zip(ours(*v), printed(*v), strict=True)
+        ]
+        return any((a != b).any() for a, b in pairs)
+
+    assert not differ()
+    assert not differ(leaking=whole, W_free=1.0, V_free=1.0)
+    assert differ(leaking=beyond_ball, W_free=1.0, V_free=1.0)
+
+
+def test_what_leaks_beyond_a_ball_is_the_way_to_its_nearest_point(rng):
+    for radius in (0.0, 0.5, 3.0):
+        for size in (1e-3, 0.4999, 0.5, 0.5001, 2.9, 40.0):
+            W = rng.normal(size=(2, N_H))
+            W *= size / np.linalg.norm(W)
+            way = numbers(beyond_ball(ca.DM(W), radius))
+            assert np.linalg.norm(way) == pytest.approx(max(0.0, size - radius), abs=1e-12)
+            if size <= radius:
+                assert not way.any()  # exactly: what is within leaks nothing
+            else:
+                np.testing.assert_allclose(W - way, W * radius / size, atol=1e-12)
+    assert not numbers(beyond_ball(ca.DM.zeros(2, N_H), 0.0)).any()

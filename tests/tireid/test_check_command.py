@@ -4,10 +4,12 @@ import json
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from identifier.defaults import default_design
+from identifier.defaults import default_design, design_for, natural_driving, natural_operation
 from identifier.design_file import design_text, read_design
+from identifier.keeping import DEFAULT_KEEPING, KEEPINGS, with_keeping
 from identifier.stability.property import Certificate, Property
 from models.vehicle import sedan
 from tireid.certificate_table import (
@@ -169,3 +171,29 @@ def test_advice_is_given_for_what_does_not_pass_and_says_what_to_do():
     assert "warn: weak: turn it down" in told and "fail: bad: turn it off" in told
     assert "could be better" not in told
     assert told.endswith("verdict: fail")
+
+
+@pytest.mark.parametrize("keeping", KEEPINGS)
+def test_weights_of_a_found_design_are_kept_as_asked(capsys, tmp_path, keeping):
+    path = tmp_path / "design.toml"
+    code, said = checked(capsys, "--design", "--keep", keeping, "--out", path)
+    gains = read_design(path).gains
+    radii = {"dead_zone": gains.W_free * gains.V_free, "projection": gains.W_max * gains.V_max}
+    found = [name for name, radius in radii.items() if 0.0 < radius < np.inf]
+    assert (code, found) == (0, [keeping] * (keeping != "leakage"))
+    assert (gains.rho_W > 0.0) == (keeping != "projection")
+    assert ("W_free" in said.out, "W_max" in said.out) == tuple(name in found for name in radii)
+    assert checked(capsys, path)[0] == 0
+    code, said = checked(capsys, path, "--monte-carlo", "16")
+    assert code == 0
+    assert ("by the projection" in said.out) == (keeping == "projection")
+    assert checked(capsys, "--keep", keeping)[0] == 2
+
+
+def test_the_default_of_keep_is_not_the_leakage_that_forgets(capsys, tmp_path):
+    path = tmp_path / "design.toml"
+    assert checked(capsys, "--design", "--out", path)[0] == 0
+    assert DEFAULT_KEEPING != "leakage"
+    design = design_for(sedan(), natural_driving(sedan()))
+    kept = with_keeping(design, natural_operation(design, sedan()), DEFAULT_KEEPING)
+    assert read_design(path) == kept
