@@ -62,6 +62,8 @@ def test_every_keeping_of_a_found_design_passes_its_certificate(law, integrator)
     for keeping in KEEPINGS:
         certificate = certificate_of(kept(keeping, design), CAR)
         assert certificate.verdict == "pass", keeping
+        loop = design.network.hidden * design.gains.eta_W  # V costs no margin
+        assert certificate["gain_sampled"].value == pytest.approx(loop, rel=1e-6)
         name = "projection_bound" if keeping == "projection" else "error_bound"
         bounds[keeping] = certificate[name].value
     assert bounds["projection"] < bounds["leakage"] < bounds["dead_zone"] < np.inf

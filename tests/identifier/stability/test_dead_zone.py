@@ -169,6 +169,17 @@ def test_too_small_a_capacity_advises_the_leakage_that_is_just_enough():
     assert certificate_of(short, CAR)["capacity"].status == "warn"
 
 
+@pytest.mark.parametrize("integrator", ["euler", "rk4"])
+def test_the_dead_zone_of_each_layer_widens_its_own_bound(integrator):
+    design = replace(default_design(CAR), integrator=integrator)
+    wide = replace(design, gains=replace(design.gains, V_free=20.0))
+    before, after = (certificate_of(one, CAR) for one in (design, wide))
+    assert after["V_bound"].value == pytest.approx(before["V_bound"].value + 20.0, rel=0.03)
+    assert after["weight_bound"].value == before["weight_bound"].value
+    wide = replace(design, gains=replace(design.gains, W_free=5.0))
+    assert certificate_of(wide, CAR)["weight_bound"].value > before["weight_bound"].value + 5.0
+
+
 def test_bound_14_is_not_stated_of_a_leakage_that_rests():
     def names(design):
         return {entry.name for entry in certificate_of(design, CAR).properties}
