@@ -37,8 +37,8 @@ def backwards(signals, rng):
 
 
 def huge(signals, rng):
-    signals["v_y"][700:] = 1e30
-    signals["r"][800:] = -1e300
+    signals["v_y"][700:] = 1e4
+    signals["r"][800:] = -1e4
 
 
 def chattering(signals, rng):
