@@ -41,7 +41,8 @@ class Limits:
     Parameters
     ----------
     megabytes : of a recording or of way-points, unpacked.
-    samples : rows of a recording or of way-points, steps of a recording or of a path.
+    samples : rows of a recording or of way-points, steps of a recording.
+    path : samples of a path.
     columns : of a recording or of way-points.
     document : megabytes of a JSON, ONNX or tire file.
     toml : megabytes of a TOML file.
@@ -56,6 +57,7 @@ class Limits:
 
     megabytes: float = 256.0
     samples: float = 2e6
+    path: float = 4e5
     columns: float = 1e4
     document: float = 32.0
     toml: float = 0.1
