@@ -415,6 +415,28 @@ class Table:
         """
         return tuple(self._as(tuple[str, ...], key, self.value(key)))
 
+    def wholes(self, key: str) -> tuple[int, ...]:
+        """Return a list of whole numbers.
+
+        Parameters
+        ----------
+        key : of the value.
+        """
+        return tuple(self._as(tuple[int, ...], key, self.value(key)))
+
+    def tables(self, key: str) -> list["Table"]:
+        """Return a list of tables.
+
+        Parameters
+        ----------
+        key : of the value.
+        """
+        found = self.value(key)
+        if not isinstance(found, list):
+            self.refuse(key, f"must be a list, it is {shown(found)}")
+        prefix = f"{self._prefix}{key}."
+        return [Table(one, self._where, self._refusal, prefix) for one in found]
+
     def array(self, key: str) -> NDArray[np.float64]:
         """Return nested lists of finite numbers, all rows alike, as an array of any shape.
 
