@@ -15,7 +15,7 @@ import tomllib
 import types
 import zlib
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, NoReturn, Union, get_args, get_origin, get_type_hints
 
@@ -91,6 +91,15 @@ def limits() -> Limits:
                 f"{VARIABLE} must hold NAME=NUMBER of {', '.join(known)}, not {shown(word)}"
             )
     return Limits(**asked)
+
+
+def limits_text() -> str:
+    """Return the limits that hold, and how to raise them, for the help of commands."""
+    values = " ".join(f"{name}={value:g}" for name, value in asdict(limits()).items())
+    return (
+        f"What files may hold and commands may ask for is limited: {values}. The environment "
+        f'{VARIABLE}="samples=1e7 megabytes=4000" raises limits, or lowers them.'
+    )
 
 
 def require_few(refusal: type[ValueError], where: str, count: float, limit: str, what: str) -> None:

@@ -13,6 +13,7 @@ from models.doors import (
     Limits,
     Table,
     limits,
+    limits_text,
     read_bytes,
     read_json,
     read_toml,
@@ -215,3 +216,9 @@ def test_what_cannot_be_a_name_is_refused(name):
 def test_a_count_that_is_no_number_is_too_many():
     with pytest.raises(RefusedError, match="here are nan"):
         require_few(RefusedError, "--laps", float("nan"), "runs", "laps")
+
+
+def test_the_limits_that_hold_are_told(monkeypatch):
+    assert "samples=2e+06" in limits_text()
+    monkeypatch.setenv(VARIABLE, "samples=7")
+    assert "samples=7 " in limits_text()
