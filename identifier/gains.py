@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from models.rules import require_within
 
-LARGEST = 1e12  # of a gain, in its unit: the fastest loop is sampled ten thousand times a second
+LEAST, LARGEST = 1e-15, 1e12  # of a gain that is not 0, in its unit, whatever U is
 
 
 class NotHurwitzError(ValueError):
@@ -41,8 +41,8 @@ class Gains:
     NotHurwitzError
         Where A_d is not Hurwitz.
     ValueError
-        Where a gain is negative, not a number or above `LARGEST`, λ or the radius of a projection
-        not positive, a dead zone without a leakage, or A_d not 2x2.
+        Where a gain is negative, not a number, above `LARGEST` or below `LEAST`, λ or a radius not
+        positive, a dead zone without a leakage, or A_d not 2x2.
     """
 
     A_d: tuple[tuple[float, float], tuple[float, float]]
@@ -71,10 +71,13 @@ class Gains:
         if not 0.0 < self.forgetting < np.inf:
             raise ValueError(f"forgetting must be positive, it is {self.forgetting}")
         for name in ("forgetting", "eta_W", "eta_V", "rho_W", "rho_V", "W_free", "V_free", "lead"):
-            require_within(ValueError, 0.0, LARGEST, **{name: getattr(self, name)})
+            if getattr(self, name) != 0.0:
+                require_within(ValueError, LEAST, LARGEST, **{name: getattr(self, name)})
         for name in ("W_max", "V_max"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"{name} must be positive, it is {getattr(self, name)}")
+            if getattr(self, name) != np.inf:
+                require_within(ValueError, LEAST, LARGEST, **{name: getattr(self, name)})
         for free, rho in (("W_free", "rho_W"), ("V_free", "rho_V")):
             if getattr(self, free) > 0.0 and getattr(self, rho) == 0.0:
                 raise ValueError(

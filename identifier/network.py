@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from codegen.tanh import tanh
 from models.bicycle import BicycleParameters, slip_angles
 from models.doors import require_few
+from models.rules import require_within
 
 # Signals that may enter the network, each with the value that counts as large for a passenger car.
 SIGNALS: Mapping[str, float] = {
@@ -71,6 +72,9 @@ class Network:
             raise ValueError(
                 f"scale must hold {len(self.inputs)} positive numbers, is {self.scale}"
             )
+        assert self.scale is not None
+        require_within(ValueError, 1e-6, 1e6, scale=min(self.scale))
+        require_within(ValueError, 1e-6, 1e6, scale=max(self.scale))
 
     def initial_weights(self, rng: np.random.Generator) -> Weights:
         """Return W = 0, which starts at the linear tire, and random V.

@@ -15,7 +15,7 @@ import tomllib
 import types
 import zlib
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, NoReturn, Union, get_args, get_origin, get_type_hints
 
@@ -41,7 +41,8 @@ class Limits:
     Parameters
     ----------
     megabytes : of a recording or of way-points, unpacked.
-    samples : rows of a recording or of way-points, steps of a recording or of a path.
+    samples : rows of a recording or of way-points, steps of a recording.
+    path : samples of a path.
     columns : of a recording or of way-points.
     document : megabytes of a JSON, ONNX or tire file.
     toml : megabytes of a TOML file.
@@ -56,6 +57,7 @@ class Limits:
 
     megabytes: float = 256.0
     samples: float = 2e6
+    path: float = 4e5
     columns: float = 1e4
     document: float = 32.0
     toml: float = 0.1
@@ -89,6 +91,15 @@ def limits() -> Limits:
                 f"{VARIABLE} must hold NAME=NUMBER of {', '.join(known)}, not {shown(word)}"
             )
     return Limits(**asked)
+
+
+def limits_text() -> str:
+    """Return the limits that hold, and how to raise them, for the help of commands."""
+    values = " ".join(f"{name}={value:g}" for name, value in asdict(limits()).items())
+    return (
+        f"What files may hold and commands may ask for is limited: {values}. The environment "
+        f'{VARIABLE}="samples=1e7 megabytes=4000" raises limits, or lowers them.'
+    )
 
 
 def require_few(refusal: type[ValueError], where: str, count: float, limit: str, what: str) -> None:
@@ -412,6 +423,28 @@ class Table:
         key : of the value.
         """
         return tuple(self._as(tuple[str, ...], key, self.value(key)))
+
+    def wholes(self, key: str) -> tuple[int, ...]:
+        """Return a list of whole numbers.
+
+        Parameters
+        ----------
+        key : of the value.
+        """
+        return tuple(self._as(tuple[int, ...], key, self.value(key)))
+
+    def tables(self, key: str) -> list["Table"]:
+        """Return a list of tables.
+
+        Parameters
+        ----------
+        key : of the value.
+        """
+        found = self.value(key)
+        if not isinstance(found, list):
+            self.refuse(key, f"must be a list, it is {shown(found)}")
+        prefix = f"{self._prefix}{key}."
+        return [Table(one, self._where, self._refusal, prefix) for one in found]
 
     def array(self, key: str) -> NDArray[np.float64]:
         """Return nested lists of finite numbers, all rows alike, as an array of any shape.

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from types import FrameType
 from typing import NoReturn
 
-from models.doors import LimitError
+from models.doors import LimitError, limits_text
 from tireid.progress import complain, flush_out, listen_to_library, unwritten
 
 BAD_INPUT = 2
@@ -41,6 +41,7 @@ def build_parser() -> Parser:
     parser = Parser(
         prog="tireid",
         description="Learns a car's lateral tire forces while it drives and freezes them.",
+        epilog=limits_text(),
     )
     parser.add_argument("--version", action="version", version=f"tireid {program_version()}")
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")

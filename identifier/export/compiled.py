@@ -16,6 +16,7 @@ from codegen.template import filled
 from identifier.export.c_source import TEMPLATES
 from identifier.export.manifest import FORMAT
 from identifier.export.package import NAME, Package
+from models.doors import Table, read_json, read_text, shown
 from models.recordings import Recording
 
 Array = NDArray[np.float64]
@@ -65,7 +66,7 @@ class CompiledPackage:
     CompilationError
         Where the compiler refuses the package.
     PackageFileError
-        Where the name that the manifest gives is not one of C.
+        Where the manifest is none, or the name that it gives is not one of C.
     """
 
     def __init__(
@@ -75,14 +76,15 @@ class CompiledPackage:
         *,
         single: bool | None = None,
     ) -> None:
-        self.name = str(manifest["name"])
+        table = Table(manifest, "", PackageFileError)
+        self.name = table.text("name")
         if not NAME.fullmatch(self.name):
-            raise PackageFileError(f"the name of a package is no name in C: {self.name!r}")
-        self.single = manifest["precision"] == "float" if single is None else single
-        self.dt = float(manifest["sample_time_s"])
-        self._outputs = {one["name"]: int(one["size"]) for one in manifest["outputs"]}
-        learnt = [one for one in manifest["carried"] if one["learnt"]]
-        self._weights = {one["name"]: tuple(one["shape"]) for one in learnt}
+            raise PackageFileError(f"the name of a package is no name in C: {shown(self.name)}")
+        self.single = table.text("precision") == "float" if single is None else single
+        self.dt = table.number("sample_time_s")
+        self._outputs = {one.text("name"): one.whole("size") for one in table.tables("outputs")}
+        learnt = [one for one in table.tables("carried") if one.value("learnt")]
+        self._weights = {one.text("name"): one.wholes("shape") for one in learnt}
         library = load_library(self._source(files), f"{self.name}_package")
         if library is None:
             raise NoCompilerError("no C compiler found: the package cannot be built")
@@ -117,14 +119,14 @@ class CompiledPackage:
         Raises
         ------
         PackageFileError
-            Where the folder holds no package.
+            Where the folder holds no package, or one of its files is none of a package.
         """
         for path in sorted(folder.glob("*.json")):
-            manifest = json.loads(path.read_text(encoding="utf-8"))
+            manifest = read_json(path, PackageFileError)
             if isinstance(manifest, dict) and manifest.get("format") == FORMAT:
                 parts = [*(folder / "include").glob("*.h"), *(folder / "src").glob("*.[ch]")]
                 files = {
-                    part.relative_to(folder).as_posix(): part.read_text(encoding="utf-8")
+                    part.relative_to(folder).as_posix(): read_text(part, PackageFileError)
                     for part in parts
                 }
                 return cls(manifest, files, single=single)

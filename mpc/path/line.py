@@ -46,7 +46,7 @@ def uniform_grid(length: float, spacing: float) -> Array:
             f"it is {spacing}"
         )
     steps = length / spacing
-    require_few(PathError, f"a path of {length:.4g} m", steps, "samples", f"steps of {spacing:g} m")
+    require_few(PathError, f"a path of {length:.4g} m", steps, "path", f"steps of {spacing:g} m")
     return np.linspace(0.0, length, int(np.ceil(length / spacing - 1e-9)) + 1)
 
 

@@ -1,0 +1,383 @@
+"""Hostile files and words end in one line and exit code 2, soon, with nothing written."""
+
+import gzip
+import json
+import re
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from codegen import compiler
+from identifier.axle import AxleDesign
+from identifier.defaults import default_design
+from identifier.design_file import design_text
+from identifier.network import Network
+from models.recordings import RecordingError, read_recording
+from models.vehicle import sedan
+from tireid.cli import main
+from tireid.output import MARKER, OutputError, output_folder
+
+NINES = "9" * 5000
+HEADER = "t,vx,vy,r,delta_f,Fyf,Fyr"
+
+
+def refused(capsys, words, said):
+    """The command refuses its input in one line that holds what is said, and prints no result."""
+    assert main([str(word) for word in words]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    lines = [line for line in err.splitlines() if "error:" in line]
+    assert lines == err.splitlines()[-1:]
+    assert said in lines[0]
+    assert len(lines[0]) < 1200
+
+
+def changed(text, key, value):
+    """A TOML text with another value of one key."""
+    new, count = re.subn(
+        rf"^{key} = [^#\n]*", lambda _: f"{key} = {value} ", text, flags=re.MULTILINE
+    )
+    assert count == 1
+    return new
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("hidden", "1e9", "network.hidden must be a whole number"),
+        ("hidden", "1000000000", "units must be at most 128, here are 1000000000; TIREID_LIMITS="),
+        ("hidden", NINES, "must be at most 4000"),
+        ("hidden", "0x" + "f" * 3000, "network.hidden must be a whole number of 64 bits"),
+        ("dt", "1e-6", "dt must lie between 0.0001 and 0.1, it is 1e-06"),
+        ("dt", "true", "dt must be a number"),
+        ("dt", "1" + "0" * 400, "dt must be a number, it is a whole number of 1329 bits"),
+        ("dt", "[" * 3000, "too deep"),
+        ("law", "[]", "law must be a text, it is a list of 0"),
+        ("law", "{}", "law must be a text, it is a table of 0"),
+        ("integrator", "[[1]]", "integrator must be a text"),
+        ("inputs", '"v_y"', "network.inputs must be a list"),
+        ("inputs", "[[]]", "network.inputs must be a text"),
+        ("inputs", '[{a = 1}, "r"]', "network.inputs must be a text"),
+        ("scale", '["1", "1", "1", "1"]', "network.scale must be a number"),
+        ("A_d", "[[-1e308, 0.0], [0.0, -1e308]]", "|A_d| must lie between 0 and 1e+12"),
+        ("A_d", "3", "gains.A_d must be a list"),
+        ("A_d", "[[-1.0, 0.0], 3]", "gains.A_d must be a list"),
+        ("eta_W", "1e308", "eta_W must lie between 0 and 1e+12"),
+        ("forgetting", "1e-300", "forgetting must lie between 1e-15 and 1e+12"),
+        ("rho_W", "1e-300", "rho_W must lie between 1e-15 and 1e+12"),
+        ("scale", "[1.0, 1e-300, 1.0, 1.0]", "scale must lie between 1e-06 and 1e+06"),
+        ("seed", "-1", "seed must lie between 0 and"),
+        ("force_unit", "1e-300", "force_unit must lie between"),
+        ("min_speed", "2026-01-01", "min_speed must be a number"),
+    ],
+)
+def test_a_hostile_design_is_refused_by_its_key(capsys, tmp_path, key, value, said):
+    path = tmp_path / "design.toml"
+    path.write_text(changed(design_text(default_design(sedan())), key, value))
+    refused(capsys, ["check", path], said)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("mass", "1e308", "mass must lie between 0.01 and 1e+06"),
+        ("l_f", "1e-300", "l_f must lie between"),
+        ("name", "[]", "name must be a text"),
+        ("name", '"' + "a" * 300 + '"', "name must be a text of at most 200 characters"),
+        ("tire", '"a\\u0000b"', "car.toml: "),
+        ("tire", '"/dev/zero"', "a device, pipe or socket"),
+        ("roll_damping", "1e300", "roll_damping must lie between"),
+        ("steering_lag", "1e-300", "steering_lag must lie between"),
+    ],
+)
+def test_a_hostile_vehicle_is_refused_by_its_key(capsys, tmp_path, key, value, said):
+    path = tmp_path / "car.toml"
+    sedan().to_toml(path)
+    path.write_text(changed(path.read_text(), key, value))
+    refused(capsys, ["drive", "--vehicle", path, "--out", tmp_path / "out"], said)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.fixture(scope="module")
+def weights():
+    """The axle model of the sedan before it has learnt, as it is stored."""
+    car = sedan()
+    design = AxleDesign.for_vehicle(car)
+    recording = read_recording_of(np.zeros(50))
+    return design.frozen(car, design.setup(car, recording).carry).to_dict()
+
+
+def read_recording_of(r):
+    from models.recordings import Recording
+
+    n = len(r)
+    return Recording(
+        name="a",
+        t=0.01 * np.arange(n),
+        v_x=np.full(n, 20.0),
+        v_y=np.zeros(n),
+        r=r,
+        delta_f=np.zeros(n),
+        delta_r=np.zeros(n),
+    )
+
+
+@pytest.mark.parametrize(
+    ("keys", "value", "said"),
+    [
+        (["kind"], [], "kind must be a text, it is a list of 0"),
+        (["kind"], {}, "kind must be a text, it is a table of 0"),
+        (["format"], [[]], "not a frozen model"),
+        (["vehicle"], [], "vehicle must be a table"),
+        (["vehicle", "mass"], 10**400, "vehicle.mass must be a number"),
+        (["vehicle", "name"], "half \ud800", "must be Unicode"),
+        (["sway"], "a", "sway must be a table"),
+        (["sway", "frequency"], "1.0", "sway.frequency must be a number"),
+        (["plausibility", "hold"], None, "plausibility.hold must be a number"),
+        (["W"], "a", "W must be a number"),
+        (["W", 0, 0], "1.0", "W must be a number"),
+        (["W", 0, 0], 1e308, "W must hold numbers below 1e+09, it reaches 1e+308"),
+        (["W", 0, 0], float("inf"), "W holds a number that is not finite: inf"),
+        (["W"], [[0.0] * 4, [0.0] * 4], "axle forces must rise with slip"),
+        (["covariance", 0], 3, "covariance must be a number, it is a list"),
+        (["excitation", 0, 0], 1e308, "excitation must hold numbers below"),
+        (["ladder"], {}, "ladder must be a number"),
+    ],
+)
+def test_hostile_weights_are_refused_by_their_key(capsys, tmp_path, weights, keys, value, said):
+    data = json.loads(json.dumps(weights))
+    place = data
+    for key in keys[:-1]:
+        place = place[key]
+    place[keys[-1]] = value
+    path = tmp_path / "weights.json"
+    path.write_text(json.dumps(data))
+    refused(capsys, ["export", tmp_path / "out", "--weights", path], said)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"format": ' + NINES + "}", "", "nul", "3"])
+def test_weights_that_are_no_model_are_refused(capsys, tmp_path, text):
+    path = tmp_path / "weights.json"
+    path.write_text(text)
+    refused(capsys, ["export", tmp_path / "out", "--weights", path], f"{path}: ")
+
+
+def log(path, column, value, *, rows=300):
+    """A log of a car that goes straight on, one column of which has another value throughout."""
+    names = HEADER.split(",")
+    lines = [HEADER]
+    for k in range(rows):
+        cells = [f"{0.01 * k:.2f}", "20", "0", "0", "0", "0", "0"]
+        if column is not None:
+            cells[names.index(column)] = value
+        lines.append(",".join(cells))
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "said"),
+    [
+        ("r", "-1e308", "r must be of a car, within +-10000, line 2 has -1e+308"),
+        ("vy", "-1e308", "vy must be of a car"),
+        ("delta_f", "1e300", "delta_f must be of a car"),
+        ("Fyf", "1e30", "Fyf must be of a car, within +-1e+07, line 2 has 1e+30"),
+        ("t", "1e308", "t must be of a car"),
+        ("r", "1_0", "r must be numeric, line 2 has '1_0'"),
+        ("r", "9" * 4000, "r must be finite"),
+    ],
+)
+@pytest.mark.parametrize("unchecked", [[], ["--no-check"]])
+def test_numbers_of_no_car_never_reach_linear_algebra(
+    capsys, tmp_path, column, value, said, unchecked
+):
+    path = log(tmp_path / "log.csv", column, value)
+    sedan().to_toml(tmp_path / "car.toml")
+    words = ["identify", path, "--vehicle", tmp_path / "car.toml", "--out", tmp_path / "out"]
+    refused(capsys, [*words, *unchecked], said)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_recording_of_such_numbers_is_not_made_either():
+    with pytest.raises(RecordingError, match=r"r must be of a car, within \+-10000, its peak"):
+        read_recording_of(np.full(50, -1e308))
+
+
+def test_a_gzip_bomb_and_too_many_rows_are_refused(capsys, tmp_path, monkeypatch):
+    sedan().to_toml(tmp_path / "car.toml")
+    rest = ["--vehicle", tmp_path / "car.toml", "--out", tmp_path / "out"]
+    path = tmp_path / "bomb.csv.gz"
+    with gzip.open(path, "wb") as file:
+        file.write(f"{HEADER}\n".encode())
+        for _ in range(9):
+            file.write(bytes(1_000_000))
+    assert path.stat().st_size < 20_000
+    monkeypatch.setenv("TIREID_LIMITS", "megabytes=5")
+    refused(capsys, ["identify", path, *rest], "megabytes must be at most 5, here are")
+    monkeypatch.setenv("TIREID_LIMITS", "samples=250")
+    path = log(tmp_path / "log.csv", None, "")
+    refused(capsys, ["identify", path, *rest], "rows must be at most 250, here are 251")
+    with pytest.raises(RecordingError, match=r"steps of 0\.001 s must be at most 250"):
+        read_recording(log(tmp_path / "log.csv", None, "", rows=200), dt=0.001)
+
+
+def test_a_log_without_end_is_refused(capsys, tmp_path):
+    sedan().to_toml(tmp_path / "car.toml")
+    (tmp_path / "log.csv").symlink_to("/dev/zero")
+    words = ["identify", tmp_path / "log.csv", "--vehicle", tmp_path / "car.toml"]
+    refused(capsys, [*words, "--out", tmp_path / "out"], "a device, pipe or socket")
+    refused(capsys, ["check", "/dev/zero"], "a device, pipe or socket")
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        (["0,0", "10000000,0", "20000000,0"], "steps of 0.25 m must be at most 400000"),
+        (["0,0", "1e308,0", "2,0"], "way-points must lie within +-1e+08 m"),
+        (["0,0", "10,1e400", "2,0"], "must be a finite number, line 3"),
+        (["0,0", "1_0,0", "20,0"], "must be a finite number, line 3 has '1_0'"),
+        ([f"{200 * k},0" for k in range(200)], "hours of driving must be at most 1"),
+    ],
+)
+def test_a_path_without_end_is_refused(capsys, tmp_path, rows, said):
+    path = tmp_path / "path.csv"
+    path.write_text("X_m,Y_m\n" + "\n".join(rows) + "\n")
+    words = ["drive", "--path", path, "--speed", "10m/s", "--out", tmp_path / "out"]
+    refused(capsys, words, said)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("bad", [np.inf, -np.inf, np.nan, 1e308, 1e30])
+@pytest.mark.parametrize("layer", [0, 1])
+def test_a_network_of_impossible_weights_is_refused(capsys, tmp_path, bad, layer):
+    onnx = pytest.importorskip("onnx", reason="needs the package onnx")
+    first, second = np.diag([10.0, 10.0]), np.diag([4000.0, 4000.0])
+    (first, second)[layer][0, 1] = bad
+    kind = onnx.TensorProto.DOUBLE
+    graph = onnx.helper.make_graph(
+        [
+            onnx.helper.make_node("MatMul", ["alpha", "A"], ["z"]),
+            onnx.helper.make_node("Tanh", ["z"], ["a"]),
+            onnx.helper.make_node("MatMul", ["a", "B"], ["F"]),
+        ],
+        "tire",
+        [onnx.helper.make_tensor_value_info("alpha", kind, [1, 2])],
+        [onnx.helper.make_tensor_value_info("F", kind, [1, 2])],
+        [onnx.numpy_helper.from_array(m, name) for m, name in ((first, "A"), (second, "B"))],
+    )
+    opset = [onnx.helper.make_opsetid("", 13)]
+    model = onnx.helper.make_model(graph, opset_imports=opset, ir_version=7)
+    path = tmp_path / "tire.onnx"
+    path.write_bytes(model.SerializeToString())
+    words = ["drive", "--network", path, "--film", "none", "--out", tmp_path / "out"]
+    refused(capsys, words, f"{path}: weights must be finite and below 1e+09")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["check", "--speed", "1e300"], "v_x must lie between"),
+        (["check", "--bandwidth", "1e300"], "bandwidth must lie between"),
+        (["check", "--bandwidth", "1e-300"], "bandwidth must lie between"),
+        (["check", "--friction", "nan"], "--friction must be positive"),
+        (["check", "--noise-r", "1e308"], "noise_r must lie between"),
+        (["check", "--monte-carlo", "10000000000"], "--monte-carlo: runs must be at most 100000"),
+        (["paper", "--seeds", "10000000000"], "--seeds: runs must be at most 100000"),
+        (["compare", "--sweep", "10000000000"], "--sweep: runs must be at most 100000"),
+        (["compare", "--floor", "10000000000"], "--floor: runs must be at most 100000"),
+        (["compare", "--workers", "10000000"], "--workers: processes must be at most 256"),
+    ],
+)
+def test_numbers_of_the_command_line_are_bounded(capsys, tmp_path, words, said):
+    out = [] if words[0] == "check" else ["--out", tmp_path / "out"]
+    refused(capsys, [*words, *out], said)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_limits_that_are_none_are_said_by_the_command(capsys, monkeypatch):
+    monkeypatch.setenv("TIREID_LIMITS", "hidden=lots")
+    refused(capsys, ["check"], "TIREID_LIMITS must hold NAME=NUMBER")
+
+
+def test_a_limit_that_is_raised_lets_the_file_in(tmp_path, monkeypatch):
+    text = design_text(replace(default_design(sedan()), network=Network(hidden=128)))
+    path = tmp_path / "design.toml"
+    path.write_text(changed(text, "hidden", "129"))
+    assert main(["check", str(path)]) == 2
+    monkeypatch.setenv("TIREID_LIMITS", "hidden=129")
+    assert main(["check", str(path)]) in (0, 1)
+
+
+def test_a_compiler_that_refuses_is_one_line(capsys, tmp_path, monkeypatch):
+    refusing = tmp_path / "refusing"
+    refusing.write_text("#!/bin/sh\necho 'fatal: no' >&2\nexit 1\n")
+    refusing.chmod(0o755)
+    monkeypatch.setenv("CC", str(refusing))
+
+    def compiles(*_, **__):
+        return compiler.build_library("int one(void) { return 1; }", "one")
+
+    monkeypatch.setattr("tireid.export_command.build_package", compiles)
+    compiler.find_compiler.cache_clear()
+    try:
+        assert main(["export", str(tmp_path / "out")]) == 2
+    finally:
+        compiler.find_compiler.cache_clear()
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said.endswith("refused the generated code of one: fatal: no")
+    assert list(tmp_path.iterdir()) == [refusing]
+
+
+def test_figures_are_not_left_where_the_design_cannot_be_written(capsys, tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("tireid.check_command.write_atomically", full)
+    monkeypatch.setattr("tireid.check_command.draw_check", _drawn, raising=False)
+    monkeypatch.setattr("tireid.check_figures.draw_check", _drawn)
+    figures = tmp_path / "figures"
+    words = ["check", "--design", "--out", tmp_path / "d.toml", "--figures", figures]
+    refused(capsys, words, "no space left on device")
+    assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == []
+
+
+def _drawn(folder, *_):
+    for name in ("locus.png", "bounds.png"):
+        (folder / name).write_bytes(b"drawn")
+
+
+@pytest.mark.parametrize(
+    "marker",
+    [
+        "[" * 100_000,
+        NINES,
+        '{"format": "tireid output 1", "files": {"a": [1e999, "b"]}, "folders": []}',
+        '{"format": "tireid output 1", "files": {"a": 1}, "folders": []}',
+        '{"format": "tireid output 1", "files": [], "folders": {}}',
+        '{"format": "tireid output 1", "files": {}, "folders": 3}',
+    ],
+)
+def test_a_hostile_marker_makes_a_folder_foreign(tmp_path, marker):
+    target = tmp_path / "out"
+    target.mkdir()
+    (target / MARKER).write_text(marker)
+    with (
+        pytest.raises(OutputError, match="which no run of tireid wrote there"),
+        output_folder(target, force=True),
+    ):
+        pass
+    assert (target / MARKER).read_text() == marker
+
+
+@pytest.mark.parametrize("redirection", [">&-", ">/dev/full", "| true", ">&- 2>&- <&-"])
+def test_a_closed_standard_output_is_no_traceback(redirection):
+    command = f"{sys.executable} -m tireid.cli --help {redirection}"
+    ran = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
+    assert ran.returncode == (74 if "full" in redirection else 0)
+    assert "Traceback" not in ran.stderr
