@@ -74,6 +74,8 @@ class Run:
         try:
             os.dup2(says, 1)
             os.dup2(says, 2)
+            sys.stdout = os.fdopen(1, "w", buffering=1, closefd=False)  # nothing of the parent's
+            sys.stderr = os.fdopen(2, "w", buffering=1, closefd=False)
             os.environ["PATH"] = ""  # no compilers for boards: nothing is measured on them
             if limit is not None:
                 resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
