@@ -1,10 +1,11 @@
 """Runs that are killed, that find the disk full, and that write one folder at once: what is lost?
 
 `tireid export DIR --force` is run again and again, each time in a process of its own that starts
-warm: killed at a random moment, drawn from the whole run, from its writing, and from its last step,
-which renames; with a limit on the size of files, and on a disk that is too small; twenty times at
-once. After each the folder must be whole, the old one or the new one, with the user's files beside
-it; where there was none, whole or not there; and what was said must be one clear line.
+warm: killed at a random moment of its time, or before a random one of the system calls by which it
+writes, or by which it renames and tidies up, which no load of the machine can hide; with a limit on
+the size of files, and on a disk that is too small; twenty times at once. After each the folder must
+be whole, the old one or the new one, with the user's files beside it; where there was none, whole
+or not there; and what was said must be one clear line.
 
     python -m benchmarks.kill_and_fill [KILLS] [--record]
 """
@@ -12,11 +13,13 @@ it; where there was none, whole or not there; and what was said must be one clea
 import hashlib
 import io
 import json
+import mmap
 import os
 import random
 import resource
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
@@ -36,8 +39,7 @@ DISKS = 20
 PAGES, SPARE = 200, 24  # of the small disk, and of those the most that are left of it
 SEED = 7
 NOTHING_THERE = 4  # of so many runs one finds no folder in its way
-POLL = 1e-4  # s
-LONGEST = 60.0  # s, of a run
+AUDITED = ("open", "os.", "ctypes.", "shutil.")  # of Python, before it asks the system
 STAGES = ("before", "writing", "written", "renamed", "after")
 NOTES = {"notes.txt": "beside", "old/data.csv": "1,2,3"}  # of the user
 
@@ -62,9 +64,12 @@ class Run:
     ----------
     words : of the command.
     limit : on the size of a file that it writes [bytes]; None for none.
+    steps : counts those of its writing, and may kill it at one of them.
     """
 
-    def __init__(self, words: list[str], limit: int | None = None) -> None:
+    def __init__(
+        self, words: list[str], limit: int | None = None, steps: "Steps | None" = None
+    ) -> None:
         self._said, says = os.pipe()
         self.child = os.fork()
         if self.child:
@@ -79,15 +84,11 @@ class Run:
             os.environ["PATH"] = ""  # no compilers for boards: nothing is measured on them
             if limit is not None:
                 resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+            if steps is not None:
+                sys.addaudithook(steps.hook)
             code = tireid(words)
         finally:
             os._exit(code)
-
-    @property
-    def ended(self) -> bool:
-        """Whether it is over."""
-        kind = os.WEXITED | os.WNOHANG | os.WNOWAIT
-        return os.waitid(os.P_PID, self.child, kind) is not None
 
     def kill(self) -> None:
         """End it at once."""
@@ -98,6 +99,40 @@ class Run:
         with os.fdopen(self._said, errors="replace") as said:
             text = said.read()
         return Ended(os.waitstatus_to_exitcode(os.waitpid(self.child, 0)[1]), text)
+
+
+class Steps:
+    """Counts what a run asks of the system from its scratch folder on.
+
+    Parameters
+    ----------
+    kill_at : the step before which the run is killed; 0 for none.
+    """
+
+    def __init__(self, kill_at: int = 0) -> None:
+        self._kill_at = kill_at
+        self._shared = mmap.mmap(-1, 8)  # which a child shares with its parent
+
+    @property
+    def count(self) -> int:
+        """How many there were."""
+        return int(struct.unpack_from("<i", self._shared, 0)[0])
+
+    @property
+    def marker(self) -> int:
+        """At which of them the marker was opened, the last file that is written."""
+        return int(struct.unpack_from("<i", self._shared, 4)[0])
+
+    def hook(self, event: str, args: tuple[object, ...]) -> None:
+        """Take a step; see `sys.addaudithook`."""
+        begins = event == "tempfile.mkdtemp" and str(args[0]).endswith(".part")
+        if not begins and not (self.count and event.startswith(AUDITED)):
+            return
+        struct.pack_into("<i", self._shared, 0, self.count + 1)
+        if event == "open" and str(args[0]).endswith(MARKER) and not self.marker:
+            struct.pack_into("<i", self._shared, 4, self.count)
+        if self.count == self._kill_at:
+            os.kill(os.getpid(), signal.SIGKILL)
 
 
 class Bench:
@@ -194,63 +229,32 @@ def warm(place: Path) -> None:
         raise RuntimeError(f"the command ends with {code} before anything is done to it")
 
 
-def reached(run: Run, bench: Bench, was: int, stages: tuple[str, ...]) -> None:
-    """Wait until a run is at one of some stages, or over."""
-    while not run.ended and bench.stage(was) not in stages:
-        time.sleep(POLL)
-
-
-class Pace(NamedTuple):
-    """How long a run takes until it writes, from there to its last step, and for that [s]."""
-
-    work: float
-    writing: float
-    last: float
-
-
-def pace(bench: Bench) -> Pace:
-    """Return it, of the slowest of a few runs that nobody kills."""
-    found = []
-    for number in range(5):
-        was, start = bench.number, time.perf_counter()
-        run = Run(bench.words(f"pace{number}"))
-        reached(run, bench, was, STAGES[1:])
-        writes = time.perf_counter()
-        reached(run, bench, was, STAGES[2:])
-        written = time.perf_counter()
-        while not run.ended:
-            time.sleep(POLL)
-        found.append(Pace(writes - start, written - writes, time.perf_counter() - written))
-        if run.end().code != 0:
-            raise RuntimeError("a run fails before anything is done to it")
-    return Pace(*map(max, zip(*found, strict=True)))
-
-
 def kill(bench: Bench, count: int, rng: random.Random) -> dict[str, int]:
     """Kill runs; return how many lost something, and at which stage they were."""
-    usual = pace(bench)
-    print(
-        f"a run works {usual.work:.3f} s, writes {usual.writing:.3f} s, "
-        f"and its last step takes {usual.last:.3f} s",
-        flush=True,
-    )
+    lasts, steps = 0.0, Steps()
+    for name in ("first", "second"):
+        start, steps = time.perf_counter(), Steps()
+        code, said = Run(bench.words(name), steps=steps).end()
+        lasts = time.perf_counter() - start
+        if code != 0:
+            raise RuntimeError(f"a run fails before anything is done to it: {said}")
+    print(f"a run takes {lasts:.2f} s and {steps.marker} + {steps.count - steps.marker} steps")
     seen = dict.fromkeys(("lost", "unsaid", *STAGES), 0)
     for number in range(count):
         nothing_there = number % NOTHING_THERE == NOTHING_THERE - 1
         if nothing_there:
             bench.clear()
         was = bench.number
-        run = Run(bench.words(f"run{number}"))
+        words = bench.words(f"run{number}")
         match rng.randrange(3):
             case 0:
-                time.sleep(rng.uniform(0.0, sum(usual)))
+                run = Run(words)
+                time.sleep(rng.uniform(0.0, lasts))
+                run.kill()
             case 1:
-                reached(run, bench, was, STAGES[1:])
-                time.sleep(rng.uniform(0.0, usual.writing))
+                run = Run(words, steps=Steps(rng.randint(1, steps.marker)))
             case _:
-                reached(run, bench, was, STAGES[2:])
-                time.sleep(rng.uniform(0.0, usual.last))
-        run.kill()
+                run = Run(words, steps=Steps(rng.randint(steps.marker + 1, steps.count)))
         run.end()
         seen[bench.stage(was)] += 1
         lost = bench.lost(nothing_there=nothing_there)
