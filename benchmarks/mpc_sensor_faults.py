@@ -259,8 +259,9 @@ def record(name: str, rows: list[Row], targets: Targets) -> None:
         targets.record(f"{name}/{tires}/left", sum(row.left(tires) for row in rows))
         targets.record(f"{name}/{tires}/peak", max(row.peak(tires) for row in rows), "m")
     targets.record(f"{name}/noticed", len(times))
-    targets.record(f"{name}/median", float(np.median(times)) if times else math.inf, "s")
-    targets.record(f"{name}/latest", max(times, default=math.inf), "s")
+    if times:
+        targets.record(f"{name}/median", float(np.median(times)), "s")
+        targets.record(f"{name}/latest", max(times), "s")
 
 
 def main(out: Path, *, keep: bool = False) -> int:
