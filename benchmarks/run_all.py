@@ -37,6 +37,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "mpc_stress": [],
     "mpc_worth": ["{out}"],
     "mpc_friction_drop": ["{out}"],
+    "mpc_sensor_faults": ["{out}"],
 }
 
 

@@ -68,7 +68,9 @@ class Tolerances:
     lateral : of v_y against a_y and v_x r [m/s²].
     steering : of δ against what was asked [rad], and ...
     steering_time : ... for each rad/s of steering: the actuator's lag is known to about that [s].
-    calm : time of agreement after which learning goes on [s].
+    calm : time of agreement after which learning goes on [s]. It doubles each time a disagreement
+        comes back within ...
+    relapse : ... this time of agreement, and to no more than this [s].
 
     Raises
     ------
@@ -85,6 +87,7 @@ class Tolerances:
     steering: float = 0.01
     steering_time: float = 0.03
     calm: float = 0.5
+    relapse: float = 10.0
 
     def __post_init__(self) -> None:
         require_positive(self)
@@ -120,7 +123,7 @@ class Consistency:
 
     def __init__(self, dt: float, tolerances: Tolerances | None = None) -> None:
         self._dt, self._allowed = dt, tolerances or Tolerances()
-        self._calm = math.inf
+        self._calm, self._calm_asked = math.inf, self._allowed.calm
         self._begin()
         self.agrees, self.worst = True, NONE
 
@@ -140,8 +143,16 @@ class Consistency:
             is not known.
         """
         self.worst = self._judged(measured, asked)
-        self._calm = 0.0 if self.worst.share > 1.0 else self._calm + self._dt
-        self.agrees = self._calm >= self._allowed.calm
+        calm, relapse = self._allowed.calm, self._allowed.relapse
+        if self.worst.share > 1.0:
+            if self.agrees and self._calm < relapse:  # a channel that is bad now and then
+                self._calm_asked = min(2.0 * self._calm_asked, relapse)
+            self._calm = 0.0
+        else:
+            self._calm += self._dt
+            if self._calm >= relapse:
+                self._calm_asked = calm
+        self.agrees = self._calm >= self._calm_asked
         return self.agrees
 
     def _judged(self, m: FullSample, asked: float | None) -> Disagreement:

@@ -32,6 +32,8 @@ class Rules:
     usual_time : over which the usual size of misfits is averaged [s].
     revoke : what was handed over this long before the sensors were found to disagree is taken back
         [s].
+    relapse : what was learnt or handed over since they were believed again is taken back too, where
+        that was less than this before [s].
     blend, quick_blend : time in which weights move to those handed over [s], for a learnt tire and
         for another friction.
 
@@ -56,6 +58,7 @@ class Rules:
     correction: float = 2.0
     usual_time: float = 10.0
     revoke: float = 1.0
+    relapse: float = 10.0
     blend: float = 0.4
     quick_blend: float = 0.08
 

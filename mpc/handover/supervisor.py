@@ -69,7 +69,7 @@ class Supervisor:
         # What was steered with and what was learnt, and since when [s], to go back to.
         self._steered = [(-math.inf, in_use, self._road)]
         self._models: list[tuple[float, FrozenModel | None]] = [(-math.inf, identifier.start)]
-        self._agreed = True
+        self._agreed, self._believed_since = True, -math.inf
         self.decisions: list[Decision] = []
         self.last = Decision(0.0, Verdict.KEEP, "nothing was driven yet", 0.0, 0.0)
 
@@ -113,7 +113,8 @@ class Supervisor:
                 doubt = f"no sample could be taken for {self.identifier.stale_time:g} s"
         if doubt is not None:
             return self._doubted(doubt)
-        self._agreed = True
+        if not self._agreed:
+            self._agreed, self._believed_since = True, self.t
         if self.identifier.limits.accept(v_x, v_y, r, delta, 0.0):
             self._lost = 0
             sample = (v_x, v_y, r, delta)
@@ -143,7 +144,7 @@ class Supervisor:
         except (DivergedError, CannotFreezeError, ValueError):
             return
         self._models.append((self.t, model))
-        old = [one for one in self._models if one[0] <= self.t - self.rules.revoke]
+        old = [one for one in self._models if one[0] <= self._beyond_doubt]
         self._models = self._models[max(len(old) - 1, 0) :]
 
     def _doubted(self, doubt: str) -> Decision | None:
@@ -152,7 +153,7 @@ class Supervisor:
         if not self._agreed:
             return None
         self._agreed = False
-        before = self.t - self.rules.revoke
+        before = self._beyond_doubt
         self._steered = [one for one in self._steered if one[0] <= before]
         self._models = [one for one in self._models if one[0] <= before] or self._models[:1]
         _, self.target, self._road = self._steered[-1]
@@ -160,6 +161,13 @@ class Supervisor:
         self.last = Decision(self.t, Verdict.DOUBT, doubt, 0.0, 0.0)
         self.decisions.append(self.last)
         return self.last
+
+    @property
+    def _beyond_doubt(self) -> float:
+        """Time until which nothing was spoilt by a fault that would be noticed now [s]."""
+        before = self.t - self.rules.revoke
+        relapsed = self.t - self._believed_since < self.rules.relapse
+        return min(before, self._believed_since) if relapsed else before
 
     def _keep(self, reason: str, in_use: float = 0.0, candidate: float = 0.0) -> Decision:
         return Decision(self.t, Verdict.KEEP, reason, in_use, candidate)

@@ -286,6 +286,23 @@ def test_after_doubt_learning_goes_on_from_what_was_known_before_it(car, learnt,
     assert supervisor.identifier.model().to_dict() != known.to_dict()
 
 
+@pytest.mark.parametrize("relapse", [6.0, 2.0])
+def test_a_doubt_that_comes_back_soon_takes_back_what_was_learnt_between(car, learnt, dry, relapse):
+    rules, calm = Rules(relapse=relapse), 4.0
+    supervisor, rows = supervisor_of(car, learnt, rules=rules), samples_of(dry[1])
+    for row in rows[:300]:
+        supervisor.observe(*row)
+    supervisor.observe(*rows[300], doubt="sensors disagree")
+    known = supervisor.identifier.model().to_dict()
+    for row in rows[301 : 301 + round(100 * calm)]:
+        supervisor.observe(*row)
+    assert supervisor.identifier.model().to_dict() != known
+    supervisor.observe(*rows[-1], doubt="sensors disagree")
+    assert (supervisor.identifier.model().to_dict() == known) is (calm < relapse)
+    most = relapse / rules.learnt_every + 3
+    assert len(supervisor._models) <= most
+
+
 def test_what_is_kept_to_go_back_to_does_not_grow(car, learnt, dry):
     supervisor = watched(supervisor_of(car, learnt), dry[1])
     rules = supervisor.rules

@@ -1,0 +1,68 @@
+"""The benchmark of broken sensors counts what it should, of drives that a user can ask for."""
+
+import pytest
+
+from benchmarks.mpc_cases import options_of
+from benchmarks.mpc_sensor_faults import FAULTS, TIRES, Outcome, Row, cases_of, fault_word, judge
+from benchmarks.targets import Targets
+from models.faults import KINDS
+from mpc.loop import Measured
+from tireid.drive_case import conditions_of
+from tireid.drive_options import parse_fault
+from tireid.drive_runs import FROZEN, LEARNING
+
+
+def row(learning, frozen, begins=(3.0, 9.0)):
+    return Row("r", "r stuck", begins, {LEARNING: learning, FROZEN: frozen})
+
+
+KEPT, LEFT = Outcome(True, 0.1, (), 20.0), Outcome(False, 2.0, (), 12.0)
+
+
+def test_there_are_34_faults_of_every_channel_and_kind():
+    assert len(set(FAULTS)) == len(FAULTS) == 34
+    assert {channel for channel, *_ in FAULTS} == set(Measured._fields[1:])
+    assert {kind for _, kind, *_ in FAULTS} == set(KINDS)
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=str)
+def test_a_fault_is_what_the_command_is_told(fault):
+    told = parse_fault(fault_word(fault, 9.0))
+    assert (told.channel, told.kind, told.duration, told.size) == fault and told.start == 9.0
+
+
+@pytest.mark.parametrize("tires", TIRES)
+def test_every_drive_is_one_of_the_command_and_goes_on_after_its_fault_began(tires):
+    cases = cases_of(FAULTS[0], tires)
+    assert len(set(cases)) == len(cases) == 6
+    for case in cases:
+        conditions = conditions_of(options_of(case.words))
+        (fault,) = conditions.faults
+        setup = conditions.setup
+        assert fault.start == case.begins
+        assert case.begins < 0.8 * setup.time_at(setup.path.length * conditions.laps)
+
+
+def test_only_what_learning_alone_loses_counts_as_worse():
+    assert row([KEPT, LEFT], [KEPT, KEPT]).worse == 1
+    assert row([KEPT, LEFT], [LEFT, LEFT]).worse == 0
+    assert row([KEPT, LEFT], [KEPT, KEPT]).left(LEARNING) == 1
+
+
+def test_the_first_alarm_after_the_fault_is_its_detection_and_one_before_it_is_false(capsys):
+    early = Outcome(True, 0.1, (2.0, 3.25, 5.0), 20.0)
+    rows = [row([early, KEPT], [KEPT, KEPT])]
+    assert rows[0].times == [0.25]
+    for quiet, alarms in (([KEPT], 1), ([KEPT, early], 4)):
+        targets = Targets("mpc_sensor_faults")
+        judge(rows, quiet, targets)
+        assert targets.values["quiet/alarms"] == alarms
+        assert targets.finish(keep=False) == 1
+    assert targets.values["r/noticed"] == 1 and targets.values["worse"] == 0
+
+
+def test_a_drive_that_learning_alone_loses_misses_the_target():
+    targets = Targets("mpc_sensor_faults")
+    judge([row([KEPT, LEFT], [KEPT, KEPT])], [KEPT], targets)
+    assert targets.values["worse"] == 1 and targets.finish(keep=False) == 1
+    assert targets.values["r/noticed"] == 0 and "r/latest" not in targets.values
