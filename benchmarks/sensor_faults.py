@@ -7,7 +7,8 @@ and of random cars, taken sample by sample as a car would. Forces are right wher
 3 s after the sensor is good again, they differ from those told without the fault by at most 5 % of
 the rms force. The same faults are told to a method that never doubts: those that it does not get
 over are harmful, and of these the time is told until the first sample is not believed or the
-weights are in doubt; a drift is small at first and is told apart. No number of the method was chosen on these drives.
+weights are in doubt; a drift is small at first and is told apart. No number of the method was
+chosen on these drives.
 """
 
 import argparse
@@ -108,7 +109,7 @@ def random_car_drive(rng: np.random.Generator) -> tuple[Vehicle, Recording]:
     x, u = drives.x[0], drives.u[0]
     recording = Recording(
         name="random car",
-        t=DT * np.arange(len(x)),
+        t=DT * np.arange(len(x), dtype=np.float64),
         v_x=drives.v_x[0],
         v_y=x[:, 0],
         r=x[:, 1],
@@ -256,8 +257,8 @@ def _result(drive_: Drive, rng: np.random.Generator) -> Result:
     (forces, noticed), (unwatched, _) = (
         drive(one, drive_.car, seen[:until], fault) for one in (design, blind)
     )
-    errors = (after_fault(drive_, fault, one) for one in (forces, unwatched))
-    return Result(fault, *errors, noticed)
+    error, without = (after_fault(drive_, fault, one) for one in (forces, unwatched))
+    return Result(fault, error, without, noticed)
 
 
 def report(results: dict[str, list[Result]], doubt: float, targets: Targets) -> None:
@@ -270,10 +271,8 @@ def report(results: dict[str, list[Result]], doubt: float, targets: Targets) -> 
     targets : collects what is missed.
     """
     everything = [one for some in results.values() for one in some]
-    print(
-        "  after the fault  cases  right  without the watch  harmful  noticed: median, 90 %, max [s]"
-    )
-    groups = {name: some for name, some in results.items()}
+    print(f"  {'right [%]':15} cases  watch  without  harmful  noticed: median, 90 %, longest [s]")
+    groups = dict(results)
     groups |= {kind: [one for one in everything if one.fault.kind == kind] for kind in KINDS}
     groups |= {name: [one for one in everything if one.fault.channel == name] for name in SIZES}
     for name, some in groups.items():
