@@ -11,7 +11,8 @@ learning, whose lag and offsets rest as do the usual error s and what counts as 
 lead out:
   the kept weights explain forces that are there     the sensor is good again: go back to them
   after `give_up` only the new ones explain them     the road is another: go on with them
-  after twice that neither does                      go on all the same: nothing waits for ever
+  after twice that it is still not known             the kept weights where they explain what is
+                                                     measured, else the new: none waits for ever
 Forces are told with the weights that learn throughout. A change of friction is thus followed as
 ever, and what a broken sensor taught is gone once it is good.
 """
@@ -154,9 +155,10 @@ def watched(
     doubt = ca.if_else(rests, state.doubt + time, 0)
     explained = ca.logic_and(rests, worst_kept < numbers.calm)
     again = ca.if_else(explained, state.again + time * moving, 0)
-    returns = again > numbers.again
-    another_road = ca.logic_and(doubt > numbers.give_up, worst < numbers.calm)
-    goes_on = ca.logic_or(another_road, doubt > 2 * numbers.give_up)
+    late = doubt > 2 * numbers.give_up
+    returns = ca.logic_and(explained, ca.logic_or(again > numbers.again, late))
+    waited = ca.logic_and(doubt > numbers.give_up, worst < numbers.calm)
+    goes_on = ca.logic_and(ca.logic_or(waited, late), ca.logic_not(explained))
     over = ca.logic_or(returns, goes_on)
     calm = ca.logic_and(worst < numbers.calm, ca.logic_not(rests))
     # What is gone back to begins with its own mean; what is gone on with, as if it were right.

@@ -186,11 +186,12 @@ class ByHand:
             self.doubt += dt
             self.theta[:, n:] = before[:, n:]
             moving = np.abs(y).max() > 2 * m.error
-            self.again = self.again + dt * moving if self.q_kept.max() < w.calm else 0.0
-            calm = self.q_learnt.max() < w.calm
-            if self.again > w.again:
+            explained, calm = self.q_kept.max() < w.calm, self.q_learnt.max() < w.calm
+            self.again = self.again + dt * moving if explained else 0.0
+            late = self.doubt > 2 * w.give_up
+            if explained and (late or self.again > w.again):
                 end, self.theta, self.q_learnt = "returns", self.kept.copy(), self.q_kept.copy()
-            elif self.doubt > 2 * w.give_up or (self.doubt > w.give_up and calm):
+            elif not explained and (late or (self.doubt > w.give_up and calm)):
                 end, self.q_learnt = "goes on", np.minimum(self.q_learnt, 1.0)
         self.bound(metric)
         if end:

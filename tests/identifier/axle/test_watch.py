@@ -82,6 +82,14 @@ def test_another_road_is_believed_after_a_while_and_nothing_is_waited_for_for_ev
         assert (end - begin) * DT == pytest.approx(wait, abs=2 * DT)
 
 
+def test_without_forces_that_tell_them_apart_the_kept_weights_are_believed_in_the_end():
+    quiet = [(1.0, 1.0, 1, 0)] * 1400
+    told, _ = judged([BAD] * 10 + quiet)
+    (back,), begin = np.flatnonzero(told[:, 1]), np.argmax(told[:, 0] > 0)
+    assert (back - begin) * DT == pytest.approx(2 * Watch().give_up, abs=2 * DT)
+    assert not (told[:, 2] == 1.0).any()
+
+
 def test_nothing_changes_where_learning_does_not_run():
     for begun in (BEGIN, WatchState(3.0, 0.2, 9.0, 8.0, 1.0, 1.5), WatchState(7.0, 0, 3, 3, 5, 5)):
         _, state = judged([(20.0, 0.1, 0, 1), (0.1, 20.0, 0, 1)] * 50, begun)
