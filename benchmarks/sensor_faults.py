@@ -283,6 +283,9 @@ def report(results: dict[str, list[Result]], doubt: float, targets: Targets) -> 
     right = float(100.0 * np.mean([one.error <= RIGHT for one in everything]))
     targets.record("cases", len(everything))
     targets.at_least("forces right 3 s after the fault", right, 99.0, "%", key="right")
+    unwatched = float(100.0 * np.mean([one.unwatched <= RIGHT for one in everything]))
+    targets.record("unwatched", unwatched, "%")
+    show("the same without the watch", f"{unwatched:.1f} %")
     at_once = [one.noticed for one in harmful if one.fault.kind != "drifting"]
     targets.record("harmful", len(harmful))
     targets.record("at_once", len(at_once))
