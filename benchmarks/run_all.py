@@ -21,6 +21,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "speed": [],
     "recorded_cars": [],
     "learn_and_extrapolate": [],
+    "sensor_faults": [],
     "plant_against_commonroad": ["{out}"],
     "paper_gains": [],
     "stability_formulas": [],

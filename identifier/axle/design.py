@@ -25,6 +25,7 @@ from identifier.axle.slip import SensitivityState
 from identifier.axle.step import CARRY, build_step
 from identifier.axle.sway import Sway, SwayState
 from identifier.axle.units import LADDER, doublings
+from identifier.axle.watch import BEGIN, Watch
 from identifier.method import FrozenModel, Setup
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
@@ -47,6 +48,7 @@ class AxleDesign:
     plausibility : which samples are believed, and the lowest speeds.
     regression : filter, error model and memory.
     change : detector of a change of friction.
+    watch : when what is measured is not what was learnt, and how long to wait for it.
     ladder : slip scales of the units [rad], rising by powers of two.
     rising_until : slip at which force curves shall not fall yet [rad]; None leaves them free. At
         0 the cornering stiffness cannot turn negative, where steering has play or data mislead.
@@ -65,6 +67,7 @@ class AxleDesign:
     plausibility: Plausibility
     regression: Regression = field(default_factory=Regression)
     change: ChangeDetector = field(default_factory=ChangeDetector)
+    watch: Watch = field(default_factory=Watch)
     ladder: tuple[float, ...] = LADDER
     rising_until: float | None = 0.0
     dt: float = 0.01
@@ -169,6 +172,8 @@ class AxleDesign:
                 "filters": np.zeros((2, n + 4)),
                 "errors": np.tile([0.0, 1.0, 0.0], (2, 1)),
                 "excitation": excitation,
+                "watch": np.array(BEGIN),
+                "kept": np.hstack([W, own]),
             },
             constants={
                 "dt": np.array(self.dt),
@@ -178,6 +183,7 @@ class AxleDesign:
                 "roll": self.sway.numbers(),
                 "regression": self.regression.numbers(self.dt),
                 "change": self.change.numbers(self.dt),
+                "watching": self.watch.numbers(self.dt),
                 "bounds": self.bounds.numbers(n),
                 "friction_direction": friction_direction(self.ladder),
                 "per_variance": widest,

@@ -8,15 +8,20 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from identifier.axle.covariance import Factors, Spread, excited, scaled, updated, width
+from identifier.axle.covariance import Factors, Spread, Symmetric, excited, scaled, updated, width
 from identifier.axle.piecewise import reciprocal
 
 
 class Learnt(NamedTuple):
-    """Parameters (q entries) and factors of the covariance after an update."""
+    """Parameters (q entries) and factors of the covariance after an update.
+
+    uncertainty : h'Ph before it.   weights : block of the weights of P before it, by place.
+    """
 
     theta: list[Any]
     P: Factors
+    uncertainty: Any
+    weights: Symmetric
 
 
 def update(
@@ -62,4 +67,5 @@ def update(
     c = ca.if_else(moves, kappa / (a * R * (1 + forgetting)), 0)
     gain = learns * error * a * share
     theta = [one + along * gain for one, along in zip(theta, v, strict=True)]
-    return Learnt(theta, scaled(updated(P, seen, c), moves * wide))
+    after = scaled(updated(P, seen, c), moves * wide)
+    return Learnt(theta, after, a, spread.weights)

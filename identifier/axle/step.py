@@ -2,9 +2,9 @@
 
 Carried, rows front and rear: W (2, n) and own (2, 3), what is learnt; UD (2, q (q + 1)/2) the
 factors of its covariance P = U D U', D on the diagonal, q = n + 3; gate, sway, slip as in
-`forward`; sensitivity (2, 3); filters (2, q + 1); errors (2, 3); excitation (2, 9). Sampled: x, u,
-v_x. Everything else is a number that stays an input. Forces are told with the weights before the
-sample.
+`forward`; sensitivity (2, 3); filters (2, q + 1); errors (2, 3); excitation (2, 9); watch (6,) and
+kept (2, q), the weights that are gone back to after a fault. Sampled: x, u, v_x. Everything else is
+a number that stays an input. Forces are told with the weights before the sample.
 """
 
 from typing import Any, NamedTuple
@@ -27,10 +27,13 @@ from identifier.axle.ports import axle_port, named_port
 from identifier.axle.regression import RegressionNumbers, filtered
 from identifier.axle.rls import Learnt, update
 from identifier.axle.slip import SensitivityState, force_gradient, sensitivity
+from identifier.axle.watch import Watched, WatchNumbers, WatchState, watched
 from models.vehicle import GRAVITY
 
+MOVING = 2.0  # errors of y that a force must have to tell weights apart
 LEARNT = ("W", "own", "UD")
-CARRY = (*LEARNT, "gate", "sway", "slip", "sensitivity", "filters", "errors", "excitation")
+BESIDE = ("errors", "excitation", "watch", "kept")
+CARRY = (*LEARNT, "gate", "sway", "slip", "sensitivity", "filters", *BESIDE)
 
 
 class Lesson(NamedTuple):
@@ -62,15 +65,19 @@ def build_step(steps: tuple[int, ...], *, rises: bool = False) -> ca.Function:
     ports["friction_direction"] = ca.SX.sym("friction_direction", n, n)
     ports["per_variance"] = ca.SX.sym("per_variance", 2, 4)
     h, y, carried = _regression(f, ports)
-    lesson, judged = _lesson(f, ports, h, y)
+    lesson, means = _lesson(f, ports, h, y)
     ports["bounds"], limits = named_port(BoundNumbers, "bounds")
     if rises:
         ports["rising"] = ca.SX.sym("rising", n)
-    axles = [_learn(ports, limits, lesson, i) for i in (0, 1)]
-    theta = ca.vertcat(*(ca.horzcat(*axle.theta) for axle in axles))
-    carried |= judged | f.carried
+    axles = [_learn(ports, lesson, i) for i in (0, 1)]
+    watch = _watch(f, ports, lesson, y, ca.vertcat(*(axle.uncertainty for axle in axles)))
+    theta = ca.vertcat(*(_kept(ports, limits, axles[i], watch, i) for i in (0, 1)))
+    carried |= f.carried
     carried["W"], carried["own"] = theta[:, :n], theta[:, n:]
     carried["UD"] = ca.vertcat(*(ca.horzcat(*row_of(axle.P)) for axle in axles))
+    carried |= _kept_books(f, ports, lesson, means, watch)
+    carried["watch"] = watch.state
+    carried["kept"] = ports["kept"] + watch.follow * (theta - ports["kept"])
     return ca.Function(
         "_".join(["axle_step", *map(str, steps), *["rising"] * rises]),
         list(ports.values()),
@@ -106,8 +113,8 @@ def _regression(f: Forward, ports: dict[str, Any]) -> tuple[Any, Any, dict[str, 
     return low[:, :q], xi - low[:, q], carried
 
 
-def _lesson(f: Forward, ports: dict[str, Any], h: Any, y: Any) -> tuple[Lesson, dict[str, Any]]:
-    """Return what the sample teaches, and the states behind it; adds its ports."""
+def _lesson(f: Forward, ports: dict[str, Any], h: Any, y: Any) -> tuple[Lesson, ErrorState]:
+    """Return what the sample teaches, and means of its errors; adds its ports."""
     ports["errors"], errors = axle_port(ErrorState, "errors")
     ports["excitation"] = ca.SX.sym("excitation", 2, 1 + len(EDGES))
     ports["change"], change = named_port(ChangeNumbers, "change")
@@ -127,18 +134,52 @@ def _lesson(f: Forward, ports: dict[str, Any], h: Any, y: Any) -> tuple[Lesson, 
         inflation=learns * change.inflation * alarm(change, fast, slow),
         learns=ca.logic_and(learns, peak >= numbers.error),
     )
+    return lesson, ErrorState(fast, slow, peak)
+
+
+def _watch(f: Forward, ports: dict[str, Any], lesson: Lesson, y: Any, uncertainty: Any) -> Watched:
+    """Return whether weights are in doubt; adds its ports."""
+    n = f.curve.units.shape[1]
+    ports["watch"], state = named_port(WatchState, "watch")
+    ports["watching"], numbers = named_port(WatchNumbers, "watching")
+    ports["kept"] = ca.SX.sym("kept", 2, n + 3)
+    expected = RegressionNumbers(*ca.vertsplit(ports["regression"]))
+    slow = ports["errors"][:, 1]
+
+    def normalized(W: Any) -> Any:
+        y_hat = ca.sum2(W * lesson.h[:, :n])
+        sigma = expected.error + expected.relative_error * ca.fabs(y_hat)
+        return (y - y_hat) ** 2 / (sigma**2 * slow + uncertainty)
+
+    size = ca.fabs(y)
+    return watched(
+        numbers,
+        state,
+        normalized(ports["W"]),
+        normalized(ports["kept"][:, :n]),
+        dt=ports["dt"],
+        learns=f.seen.learns,
+        moving=larger(size[0], size[1]) > MOVING * expected.error,
+    )
+
+
+def _kept_books(
+    f: Forward, ports: dict[str, Any], lesson: Lesson, means: ErrorState, watch: Watched
+) -> dict[str, Any]:
+    """Return means of errors and excitation; in doubt the usual error and what is known rest."""
+    slow = ca.if_else(watch.rests, ports["errors"][:, 1], means.slow)
     times = excited(
         ports["excitation"],
         f.size,
         dt=ports["dt"],
-        samples=numbers.samples,
-        learns=lesson.learns,
+        samples=RegressionNumbers(*ca.vertsplit(ports["regression"])).samples,
+        learns=ca.logic_and(lesson.learns, ca.logic_not(watch.rests)),
     )
-    return lesson, {"errors": ca.horzcat(fast, slow, peak), "excitation": times}
+    return {"errors": ca.horzcat(means.fast, slow, means.peak), "excitation": times}
 
 
-def _learn(ports: dict[str, Any], limits: BoundNumbers, lesson: Lesson, i: int) -> Learnt:
-    """Return parameters and covariance of axle i after the sample."""
+def _learn(ports: dict[str, Any], lesson: Lesson, i: int) -> Learnt:
+    """Return parameters, before they are bounded, and covariance of axle i after the sample."""
     w = ca.horzsplit(ports["W"][i, :])
     theta = [*w, *ca.horzsplit(ports["own"][i, :])]
     n, q = len(w), len(theta)
@@ -150,7 +191,7 @@ def _learn(ports: dict[str, Any], limits: BoundNumbers, lesson: Lesson, i: int) 
     trace = seen.trace + sum(lesson.inflation * d * d for d in direction)
     fits = trace * widest[0] <= 1
     P = inflated(P, direction, ca.if_else(fits, lesson.inflation, 0))
-    learnt = update(
+    return update(
         theta,
         P,
         ca.horzsplit(lesson.h[i, :]),
@@ -161,7 +202,20 @@ def _learn(ports: dict[str, Any], limits: BoundNumbers, lesson: Lesson, i: int) 
         limits=widest,
         learns=lesson.learns[i],
     )
+
+
+def _kept(
+    ports: dict[str, Any], limits: BoundNumbers, learnt: Learnt, watch: Watched, i: int
+) -> Any:
+    """Return the parameters of axle i that are gone on with, within their bounds (1, q)."""
+    n = ports["W"].shape[1]
+    before = [*[None] * n, *ca.horzsplit(ports["own"][i, :])]
+    theta = [
+        ca.if_else(watch.returns, old, one if own is None else ca.if_else(watch.rests, own, one))
+        for one, own, old in zip(
+            learnt.theta, before, ca.horzsplit(ports["kept"][i, :]), strict=True
+        )
+    ]
     offset = (limits.steering, limits.v_y)[i]
     slope = ca.vertsplit(ports["rising"]) if "rising" in ports else None
-    kept = bounded(limits, learnt.theta, seen.weights, offset=offset, slope=slope)
-    return Learnt(kept, learnt.P)
+    return ca.horzcat(*bounded(limits, theta, learnt.weights, offset=offset, slope=slope))

@@ -77,7 +77,7 @@ def learnt_ports(method: Method, carry: Mapping[str, Array]) -> tuple[str, ...]:
         case Design():
             moving = {"W", "V"}
         case AxleDesign():
-            moving = {"W", "own", "UD", "errors", "excitation"}
+            moving = {"W", "own", "UD", "errors", "excitation", "watch", "kept"}
         case RegressionDesign():
             moving = set(carry) - {"target_lag", "regressor_lag", "fresh"}
         case StiffnessRls():

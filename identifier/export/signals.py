@@ -14,6 +14,7 @@ AXLE_RULES: Mapping[str, str] = {
     "UD": FACTORS,
     "errors": NOT_NEGATIVE,
     "excitation": NOT_NEGATIVE,
+    "watch": NOT_NEGATIVE,
 }
 
 
@@ -74,6 +75,12 @@ AXLE_PORTS: Mapping[str, tuple[str, str]] = {
     "filters": (LOAD, "filters of the regressors and of the target, per axle"),
     "errors": (f"-; -; {LOAD}", "fast and slow mean squared error, peak force, per axle"),
     "excitation": ("rad; s", "largest slip, then time of learning above each edge, per axle"),
+    "watch": (
+        "s; s; -",
+        "time in doubt, and in which kept explained again; mean squared error of W and of kept, "
+        "front and rear",
+    ),
+    "kept": ("of W and own", "W and own that are gone back to after a fault, front and rear"),
 }
 
 

@@ -38,6 +38,10 @@ class ByHand:
         self.steady = 0.0
         self.fast, self.slow, self.peak = np.zeros(2), np.ones(2), np.zeros(2)
         self.longest, self.time = np.zeros(2), np.zeros(2)
+        self.kept = self.theta.copy()
+        self.doubt = self.again = 0.0
+        self.q_learnt, self.q_kept = np.ones(2), np.ones(2)
+        self.ends = []  # of doubts
 
     def sizes(self, P):
         """Trace of the weights' block and the other variances, which are bounded."""
@@ -130,6 +134,7 @@ class ByHand:
     def learn(self, y, size):
         q, n, dt, c, m = self.n + 3, self.n, self.d.dt, self.d.change, self.d.regression
         h = self.low[:, :q]
+        before = self.theta.copy(), self.slow.copy()
         y_hat = (self.theta[:, :n] * h[:, :n]).sum(1)
         error, sd = y - y_hat, m.error + m.relative_error * np.abs(y_hat)
         squared = np.minimum((error / sd) ** 2, 25)
@@ -138,40 +143,74 @@ class ByHand:
         self.slow = np.maximum(self.slow, 1)
         alarm = np.clip((self.fast / self.slow).min() / c.threshold - 1, 0, 1)
         self.peak = np.maximum(np.abs(y_hat), self.peak * np.exp(-dt / m.excitation_time))
+        learns, metric, excited = self.peak >= m.error, self.P[:, :n, :n].copy(), np.zeros(2)
         for i in (0, 1):
             P, theta = self.P[i], self.theta[i]
-            d, before = self.M @ theta[:n], P.copy()
+            d = self.M @ theta[:n]
             amount = alarm * dt * c.step**2 / c.step_time
             wider = self.sizes(P) + amount * (d @ d) * np.eye(1, 4)[0]
             if wider[0] > self.most[i, 0]:
                 amount, wider = 0.0, self.sizes(P)
             P[:n, :n] += amount * np.outer(d, d)
-            learns = self.peak[i] >= m.error
-            if learns:
-                self.time[i] += dt
+            Ph = P @ h[i]
+            excited[i] = h[i] @ Ph
+            if learns[i]:
                 R = sd[i] ** 2 * self.slow[i] * m.correlation_time / dt
                 reach = m.clip * sd[i] * self.slow[i]
-                Ph = P @ h[i]
-                excited = h[i] @ Ph
                 lam = np.exp(-dt / m.memory)
-                shrink = (1 - (1 - lam) / lam * R / excited) / (R + excited)
+                shrink = (1 - (1 - lam) / lam * R / excited[i]) / (R + excited[i])
                 moved = np.array([Ph[:n] @ Ph[:n], *Ph[n:] ** 2])
                 wide = ((wider - shrink * moved) / self.most[i]).max()
-                theta += Ph * np.clip(error[i], -reach, reach) / (R + excited)
+                theta += Ph * np.clip(error[i], -reach, reach) / (R + excited[i])
                 if shrink >= 0 or wide <= 1:
                     P -= shrink * np.outer(Ph, Ph)
                     P /= max(wide, 1.0)
-            if not learns:
-                continue
-            bounds = self.d.bounds
-            grip = theta[:n].sum()
-            P1 = before[:n, :n].sum(1)
+        rests = self.watch(y, h, *before, excited, metric)
+        if rests:
+            self.slow = before[1]
+            return
+        gain = min(1.0, dt / m.correlation_time)
+        self.time += dt * learns
+        self.longest += gain * learns * np.maximum(0.0, size - self.longest)
+
+    def watch(self, y, h, before, slow, excited, metric):
+        """Doubt, and what follows of it for the parameters; whether the books rest."""
+        n, dt, m, w = self.n, self.d.dt, self.d.regression, self.d.watch
+        for q, theta in ((self.q_learnt, before), (self.q_kept, self.kept)):
+            y_hat = (theta[:, :n] * h[:, :n]).sum(1)
+            S = (m.error + m.relative_error * np.abs(y_hat)) ** 2 * slow + excited
+            q += min(dt / w.moment, 1.0) * (np.minimum((y - y_hat) ** 2 / S, 25) - q)
+        end = ""
+        rests = self.doubt > 0 or self.q_learnt.max() > w.noticed
+        if rests:
+            self.doubt += dt
+            self.theta[:, n:] = before[:, n:]
+            moving = np.abs(y).max() > 2 * m.error
+            explained, calm = self.q_kept.max() < w.calm, self.q_learnt.max() < w.calm
+            self.again = self.again + dt * moving if explained else 0.0
+            late = self.doubt > 2 * w.give_up
+            if explained and (late or self.again > w.again):
+                end, self.theta, self.q_learnt = "returns", self.kept.copy(), self.q_kept.copy()
+            elif not explained and (late or (self.doubt > w.give_up and calm)):
+                end, self.q_learnt = "goes on", np.minimum(self.q_learnt, 1.0)
+        self.bound(metric)
+        if end:
+            self.ends.append(end)
+            self.doubt = self.again = 0.0
+        if end == "goes on":
+            self.kept = self.theta.copy()
+        elif not rests and self.q_learnt.max() < w.calm:
+            self.kept += min(dt / w.behind, 1.0) * (self.theta - self.kept)
+        return rests
+
+    def bound(self, metric):
+        """Grip by the least move in the metric of the covariance; boxes by clipping."""
+        bounds, n = self.d.bounds, self.n
+        for theta, P, last in zip(self.theta, metric, (bounds.steering, bounds.v_y), strict=True):
+            grip, P1 = theta[:n].sum(), P.sum(1)
             theta[:n] += P1 / P1.sum() * (np.clip(grip, bounds.least_grip, bounds.most_grip) - grip)
             theta[:n] = np.clip(theta[:n], -bounds.weight, bounds.weight)
-            last = (bounds.steering, bounds.v_y)[i]
             theta[n:] = np.clip(theta[n:], [0, 0, -last], [bounds.compliance, 1, last])
-            gain = min(1.0, dt / m.correlation_time)
-            self.longest[i] += gain * max(0.0, size[i] - self.longest[i])
 
 
 def disturbed(recording):
@@ -211,6 +250,10 @@ def assert_by_hand(design, car, recording):
     np.testing.assert_allclose(model.covariance, hand.P, rtol=1e-4, atol=1e-7)
     np.testing.assert_allclose(model.excitation[:, 0], hand.longest, rtol=1e-5)
     np.testing.assert_allclose(model.excitation[:, 1], hand.time, atol=0.5 * design.dt)
+    last = history.carried_at(1e9)
+    np.testing.assert_allclose(last["kept"], hand.kept, rtol=1e-4, atol=1e-6)
+    means = [hand.doubt, hand.again, *hand.q_learnt, *hand.q_kept]
+    np.testing.assert_allclose(last["watch"], means, rtol=1e-3, atol=1e-6)
     return hand
 
 
@@ -276,6 +319,18 @@ def test_step_repeats_the_equations_where_limits_act(rare, dt, car, drive):
     limited, free = learnt
     assert np.abs(limited.P / free.P - 1.0).max() > 0.1
     assert np.abs(limited.theta - free.theta).max() > 1e-4
+
+
+@pytest.mark.parametrize(
+    ("broken", "ends"), [((5.0, 7.0), ["returns"]), ((5.0, 30.0), ["goes on"])], ids=str
+)
+def test_step_repeats_the_equations_through_doubt(broken, ends, car, drive):
+    """A yaw rate a quarter too large for two seconds, or for ever."""
+    recording = drive(n=2400, amplitude=0.06)
+    wrong = (recording.t >= broken[0]) & (recording.t < broken[1])
+    recording = replace(recording, r=np.where(wrong, 1.25 * recording.r, recording.r))
+    hand = assert_by_hand(AxleDesign.for_vehicle(car), car, recording)
+    assert hand.ends[: len(ends)] == ends
 
 
 def test_covariance_grows_again_only_while_it_is_no_wider_than_told(car, drive):

@@ -190,7 +190,12 @@ def test_factors_are_taken_where_no_variance_is_negative(learnt, single, rng):
 
 @pytest.mark.parametrize(
     ("law", "name"),
-    [("axle", "errors"), ("axle", "excitation"), ("stiffness_rls", "information")],
+    [
+        ("axle", "errors"),
+        ("axle", "excitation"),
+        ("axle", "watch"),
+        ("stiffness_rls", "information"),
+    ],
 )
 def test_amounts_that_are_negative_are_refused(learnt, law, name):
     run = learnt[law, False]
