@@ -65,7 +65,7 @@ def changed(text, key, value):
         ("A_d", "[[-1e308, 0.0], [0.0, -1e308]]", "|A_d| must lie between 0 and 1e+12"),
         ("A_d", "3", "gains.A_d must be a list"),
         ("A_d", "[[-1.0, 0.0], 3]", "gains.A_d must be a list"),
-        ("eta_W", "1e308", "eta_W must lie between 0 and 1e+12"),
+        ("eta_W", "1e308", "eta_W must lie between 1e-15 and 1e+12"),
         ("forgetting", "1e-300", "forgetting must lie between 1e-15 and 1e+12"),
         ("rho_W", "1e-300", "rho_W must lie between 1e-15 and 1e+12"),
         ("scale", "[1.0, 1e-300, 1.0, 1.0]", "scale must lie between 1e-06 and 1e+06"),
