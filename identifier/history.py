@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.method import FrozenModel, Method
+from identifier.method import Method
+from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
@@ -39,7 +40,7 @@ def carried_index(recording: Recording, t: float) -> int:
     return int(np.searchsorted(times, t + tolerance, side="right")) - 1
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class History:
     """An online run over n samples.
 
@@ -82,12 +83,12 @@ class History:
         index = carried_index(self.recording, t)
         return {name: values[index] for name, values in self.carried.items()}
 
-    def freeze(self, t: float) -> FrozenModel:
+    def freeze(self, t: float | None = None) -> TireModel:
         """Return the model with the weights in effect at a time.
 
         Parameters
         ----------
-        t : time in the recording's own clock [s].
+        t : time in the recording's own clock [s]; None is the end.
 
         Raises
         ------
@@ -98,8 +99,13 @@ class History:
         ValueError
             Where the recording begins after that time.
         """
+        t = float(self.recording.t[-1]) if t is None else t
         carried = self.carried_at(t)
         diverged_at = self.diverged_at
         if diverged_at is not None and diverged_at <= t:
             raise DivergedError(f"the law diverged at {diverged_at:g} s, before {t:g} s")
         return self.design.frozen(self.vehicle, carried)
+
+    def __repr__(self) -> str:
+        diverged = "" if self.diverged_at is None else f", diverged at {self.diverged_at:g} s"
+        return f"<{type(self.design).__name__} over {self.recording!r}{diverged}>"

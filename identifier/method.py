@@ -5,13 +5,13 @@ the same code; they differ in the `Method` that is handed over.
 """
 
 from collections.abc import Mapping
-from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Scan
+from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
@@ -22,43 +22,7 @@ class CannotFreezeError(ValueError):
     """The method estimates a signal: there is no model of the tire to freeze."""
 
 
-class FrozenModel(Protocol):
-    """Axle forces from weights that no longer change; attributes vehicle and min_speed [m/s]."""
-
-    @property
-    def vehicle(self) -> Vehicle:
-        """The car."""
-
-    @property
-    def min_speed(self) -> float:
-        """Below this speed [m/s] the forces read zero."""
-
-    def force_at(self, alpha: Array) -> Array:
-        """Return the steady axle forces at slip angles, (k, 2) [N].
-
-        Parameters
-        ----------
-        alpha : slip angles in the paper's sign [rad], (k,).
-        """
-
-    def axle_force(self, recording: Recording) -> Array:
-        """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
-
-        Parameters
-        ----------
-        recording : its signals are the input; its forces are not looked at.
-        """
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the model as plain numbers and words, ready for JSON."""
-
-    def save(self, path: Path) -> None:
-        """Write the model as JSON.
-
-        Parameters
-        ----------
-        path : the file.
-        """
+FrozenModel = TireModel
 
 
 class Setup(NamedTuple):

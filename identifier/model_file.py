@@ -1,6 +1,7 @@
 """Frozen models as JSON files: weights.json, whatever kind of model it holds."""
 
 from collections.abc import Callable, Mapping
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from models.doors import Table, read_json, shown
 LARGEST = 1e9  # of the numbers of an axle model, SI and static axle loads
 
 
-def load_model(path: Path) -> FrozenModel:
+def load_model(path: str | PathLike[str]) -> FrozenModel:
     """Read a frozen model of any kind.
 
     Parameters
@@ -35,6 +36,7 @@ def load_model(path: Path) -> FrozenModel:
     FrozenModelError
         Where the file is not such a model; one line that names it.
     """
+    path = Path(path)
     try:
         table = Table(read_json(path, FrozenModelError), f"{path}: ", FrozenModelError)
     except OSError as error:

@@ -1,9 +1,7 @@
 """The paper's network, frozen: weights at one instant and all that axle forces need."""
 
-import json
 from dataclasses import asdict, dataclass
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -14,16 +12,15 @@ from codegen import Scan
 from identifier.method import Setup
 from identifier.model_format import (
     FORMAT,
-    PROBE_SPEED,
     FrozenModelError,
     require_min_speed,
     vehicle_from,
     vehicle_numbers,
 )
 from identifier.network import Network, Weights, hidden_layer, network_signals
+from identifier.tire_model import TireModel, drift
 from models.bicycle import BicycleParameters, linear_axle_force
 from models.doors import Table
-from models.files import write_atomically
 from models.recordings import Recording
 from models.rules import require_positive, require_within
 from models.vehicle import Vehicle
@@ -91,8 +88,8 @@ def _replay_scan(network: Network) -> Scan:
     return Scan(build_replay(network), carry=(), over=("x", "u", "v_x"))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NetworkModel:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class NetworkModel(TireModel):
     """Axle forces F_y = C α + U Ŵ tanh(V̂ x̄) with weights that no longer change.
 
     Parameters
@@ -131,20 +128,6 @@ class NetworkModel:
         require_within(ValueError, 0.0, LARGEST_SUM, **{"force_unit times |W|": largest})
         require_within(ValueError, 0.0, LARGEST_V, **{"|V|": np.abs(self.weights.V).max()})
 
-    def force_at(self, alpha: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the axle forces where both axles drift at slip angles, (k, 2) [N].
-
-        Parameters
-        ----------
-        alpha : slip angles in the paper's sign [rad], (k,).
-        """
-        speed = max(PROBE_SPEED, self.min_speed)
-        drift = np.stack([-np.tan(alpha) * speed, np.zeros_like(alpha)])
-        numbers = np.array(self.vehicle.bicycle)
-        W, V = self.weights
-        _, force = _frozen(self.network)(W, V, drift, np.zeros(2), speed, numbers, self.force_unit)
-        return np.array(force).T
-
     def setup(self, recording: Recording) -> Setup:
         """Return what a replay needs.
 
@@ -174,6 +157,38 @@ class NetworkModel:
         """
         return self.setup(recording).run(recording)["axle_force"]
 
+    def curve_expression(self, alpha: Any, v_x: Any) -> Any:
+        """Return the steady axle forces (2,) [N] as a CasADi expression.
+
+        Parameters
+        ----------
+        alpha : slip angles (2,) [rad], the wheels straight ahead.
+        v_x : longitudinal speed [m/s].
+        """
+        return self._static_force(drift(self.vehicle, alpha, v_x), 0.0, v_x)
+
+    def force_expression(
+        self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
+    ) -> tuple[Any, Any]:
+        """Return the axle forces (2,) [N] as a CasADi expression, and no rate: nothing lags.
+
+        Parameters
+        ----------
+        slip : empty.
+        x : [v_y, r] (2,).
+        delta : angle of the front wheels [rad].
+        v_x : longitudinal speed [m/s], positive.
+        least_lag : not looked at.
+        """
+        del slip, least_lag
+        return self._static_force(x, delta, v_x), ca.MX(0, 1)
+
+    def _static_force(self, x: Any, delta: Any, v_x: Any) -> Any:
+        W, V = self.weights
+        vehicle, unit = self.vehicle.bicycle, self.force_unit
+        u = ca.vertcat(delta, 0)
+        return build_frozen(self.network)(W, V, x, u, v_x, ca.vertcat(*vehicle), unit)[1]
+
     def to_dict(self) -> dict[str, Any]:
         """Return the model as plain numbers and words, ready for JSON."""
         return {
@@ -187,15 +202,6 @@ class NetworkModel:
             "W": self.weights.W.tolist(),
             "V": self.weights.V.tolist(),
         }
-
-    def save(self, path: Path) -> None:
-        """Write the model as JSON.
-
-        Parameters
-        ----------
-        path : the file.
-        """
-        write_atomically(path, json.dumps(self.to_dict(), indent=2) + "\n")
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str) -> "NetworkModel":

@@ -1,9 +1,9 @@
 """A user's own static tire network, an ONNX file, as a frozen model."""
 
 import base64
-import json
 from dataclasses import dataclass
 from functools import cache
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,6 @@ from codegen import Scan
 from identifier.method import Setup
 from identifier.model_format import (
     FORMAT,
-    PROBE_SPEED,
     FrozenModelError,
     require_alive,
     require_min_speed,
@@ -23,10 +22,10 @@ from identifier.model_format import (
     vehicle_numbers,
 )
 from identifier.network import network_signals
+from identifier.tire_model import TireModel, drift
 from identifier.tire_network import UnusableNetworkError, read_network
 from models.bicycle import BicycleParameters
 from models.doors import Table, read_bytes
-from models.files import write_atomically
 from models.recordings import Recording
 from models.rules import LARGEST_FORCE
 from models.vehicle import Vehicle
@@ -36,8 +35,8 @@ STATES = ((1.0, 10.0, 60.0), *([(-most, 0.0, most) for most in (5.0, 2.0, 0.6, 0
 OVER = ("x", "u", "v_x")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OnnxModel:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class OnnxModel(TireModel):
     """Axle forces of a static network in the frame of the body, left positive.
 
     A network that reads slip angles is given them in the paper's sign, α = δ - atan(v/v_x),
@@ -88,7 +87,7 @@ class OnnxModel:
     @classmethod
     def from_onnx(
         cls,
-        path: Path,
+        path: str | PathLike[str],
         vehicle: Vehicle,
         *,
         min_speed: float = 1.0,
@@ -113,7 +112,7 @@ class OnnxModel:
         try:
             return cls(
                 vehicle=vehicle,
-                content=read_bytes(path, UnusableNetworkError),
+                content=read_bytes(Path(path), UnusableNetworkError),
                 min_speed=min_speed,
                 inputs=inputs,
                 slip_sign=slip_sign,
@@ -132,17 +131,6 @@ class OnnxModel:
         Its result is axle_force (2,) [N]. It has derivatives and generates code.
         """
         return _step(self.content, self.inputs, self.slip_sign)
-
-    def force_at(self, alpha: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the axle forces where both axles drift at slip angles, (k, 2) [N].
-
-        Parameters
-        ----------
-        alpha : slip angles in the paper's sign [rad], (k,).
-        """
-        speed = max(PROBE_SPEED, self.min_speed)
-        drift = np.stack([-np.tan(alpha) * speed, np.zeros_like(alpha)])
-        return np.array(self.step(drift, np.zeros(2), speed, np.array(self.vehicle.bicycle))).T
 
     @property
     def signals(self) -> tuple[str, ...]:
@@ -175,6 +163,35 @@ class OnnxModel:
         """
         return self.setup(recording).run(recording)["axle_force"]
 
+    def curve_expression(self, alpha: Any, v_x: Any) -> Any:
+        """Return the steady axle forces (2,) [N] as a CasADi expression.
+
+        Parameters
+        ----------
+        alpha : slip angles (2,) [rad], the wheels straight ahead.
+        v_x : longitudinal speed [m/s].
+        """
+        return self._static_force(drift(self.vehicle, alpha, v_x), 0.0, v_x)
+
+    def force_expression(
+        self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
+    ) -> tuple[Any, Any]:
+        """Return the axle forces (2,) [N] as a CasADi expression, and no rate: nothing lags.
+
+        Parameters
+        ----------
+        slip : empty.
+        x : [v_y, r] (2,).
+        delta : angle of the front wheels [rad].
+        v_x : longitudinal speed [m/s], positive.
+        least_lag : not looked at.
+        """
+        del slip, least_lag
+        return self._static_force(x, delta, v_x), ca.MX(0, 1)
+
+    def _static_force(self, x: Any, delta: Any, v_x: Any) -> Any:
+        return self.step(x, ca.vertcat(delta, 0), v_x, ca.vertcat(*self.vehicle.bicycle))
+
     def to_dict(self) -> dict[str, Any]:
         """Return the model as plain numbers and words, ready for JSON; the network in base64."""
         return {
@@ -187,15 +204,6 @@ class OnnxModel:
             "slip_sign": self.slip_sign,
             "onnx_base64": base64.b64encode(self.content).decode("ascii"),
         }
-
-    def save(self, path: Path) -> None:
-        """Write the model as JSON.
-
-        Parameters
-        ----------
-        path : the file.
-        """
-        write_atomically(path, json.dumps(self.to_dict(), indent=2) + "\n")
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str) -> "OnnxModel":

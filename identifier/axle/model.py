@@ -1,16 +1,16 @@
 """The axle model, frozen: force curves of slip, their lag and sway, and where they are known."""
 
-import json
 from dataclasses import asdict, dataclass
 from functools import cache
-from pathlib import Path
 from typing import Any
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Scan
-from identifier.axle.car import car_numbers
+from identifier.axle.car import Car, car_numbers
+from identifier.axle.dynamics import lagged_force, series_compliance, static_curve
 from identifier.axle.excitation import EDGES
 from identifier.axle.forward import CARRY, OVER, build_frozen
 from identifier.axle.gate import GateState, Plausibility
@@ -19,7 +19,7 @@ from identifier.axle.sway import Sway, SwayState
 from identifier.axle.units import doublings, unit_matrix
 from identifier.method import Setup
 from identifier.model_format import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
-from models.files import write_atomically
+from identifier.tire_model import Fact, TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
@@ -32,8 +32,8 @@ ROUNDING = 1e-6  # of correlations, as learning in float leaves them
 DOUBT = 0.25  # standard deviation over the prior's, above which a slip is not known
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AxleModel:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class AxleModel(TireModel):
     """Axle forces φ(x) = Σ w_j tanh(x/α_j) of lagged slip x, in static axle loads.
 
     Odd in slip up to the sensor offsets, saturating at Σ w_j. Rows are axles, front and rear.
@@ -155,6 +155,66 @@ class AxleModel:
         return known
 
     @property
+    def known_slip(self) -> Array:
+        """Slip [rad] up to which the forces were learnt, (2,)."""
+        return self.known_slip_range
+
+    def facts(self) -> tuple[Fact, ...]:
+        """Return the lines of `summary`."""
+        known = self.known_slip_range
+        lines = [
+            Fact("cornering stiffness", self.cornering_stiffness, "N/rad"),
+            Fact("relaxation length", self.relaxation_length, "m"),
+            Fact("known up to a slip of", np.degrees(known), "deg"),
+        ]
+        if (known > 0.0).all():
+            unsure = 100.0 * np.diag(self.doubt(known))
+            lines.append(Fact("standard deviation there over the prior's", unsure, "%"))
+        lines.append(Fact("time of learning", self.learning_time.sum(axis=1), "s"))
+        return tuple(lines)
+
+    @property
+    def lagged(self) -> bool:
+        """Whether the force follows a lagged slip, two more states."""
+        return True
+
+    def curve_expression(self, alpha: Any, v_x: Any) -> Any:
+        """Return the steady axle forces (2,) [N] as a CasADi expression.
+
+        Parameters
+        ----------
+        alpha : slip angles (2,) [rad], the wheels straight ahead.
+        v_x : not looked at.
+        """
+        del v_x
+        return static_curve(alpha, self.W, self.ladder).force * ca.DM(self._loads)
+
+    def force_expression(
+        self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
+    ) -> tuple[Any, Any]:
+        """Return the axle forces (2,) [N] and the rate of lagged slip (2,) [rad/s].
+
+        Parameters
+        ----------
+        slip : lagged slip (2,) [rad].
+        x : [v_y, r] (2,), as the sensors read them while learning.
+        delta : angle of the front wheels [rad].
+        v_x : longitudinal speed [m/s], positive.
+        least_lag : time under which no lag falls [s].
+        """
+        return lagged_force(
+            Car(*car_numbers(self.vehicle).T),
+            static_curve(slip, self.W, self.ladder),
+            series_compliance(self.own, self.sway.frequency),
+            self.own[:, 2],
+            slip=slip,
+            x=x,
+            delta=delta,
+            v_x=v_x,
+            least_lag=least_lag,
+        )
+
+    @property
     def learning_time(self) -> Array:
         """Time of learning in each range of slip between `EDGES`, the last open [s], (2, 8)."""
         above = self.excitation[:, 1:]
@@ -238,15 +298,6 @@ class AxleModel:
             "relaxation_length_m": self.relaxation_length.tolist(),
             "known_slip_range_rad": self.known_slip_range.tolist(),
         }
-
-    def save(self, path: Path) -> None:
-        """Write the model as JSON.
-
-        Parameters
-        ----------
-        path : the file.
-        """
-        write_atomically(path, json.dumps(self.to_dict(), indent=2) + "\n")
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str) -> "AxleModel":

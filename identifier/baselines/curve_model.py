@@ -1,9 +1,7 @@
 """A frozen curve of axle force over slip angle: linear, Magic Formula or Dugoff."""
 
-import json
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -16,14 +14,13 @@ from identifier.baselines.ports import OVER, axle_loads, sample_ports
 from identifier.method import Setup
 from identifier.model_format import (
     FORMAT,
-    PROBE_SPEED,
     FrozenModelError,
     require_min_speed,
     vehicle_from,
     vehicle_numbers,
 )
+from identifier.tire_model import TireModel, drift
 from models.doors import Table
-from models.files import write_atomically
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 
@@ -61,8 +58,8 @@ def curve_scan(name: str) -> Scan:
     return Scan(build_curve(name), carry=(), over=OVER)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CurveModel:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class CurveModel(TireModel):
     """Axle forces of a curve with parameters that no longer change.
 
     Parameters
@@ -95,21 +92,6 @@ class CurveModel:
         if not (np.isfinite(self.parameters) & (self.parameters > 0.0)).all():
             raise ValueError(f"parameters must be positive, they are {self.parameters.tolist()}")
 
-    def force_at(self, alpha: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the axle forces where both axles drift at slip angles, (k, 2) [N].
-
-        Parameters
-        ----------
-        alpha : slip angles in the paper's sign [rad], (k,).
-        """
-        speed = max(PROBE_SPEED, self.min_speed)
-        drift = np.stack([-np.tan(alpha) * speed, np.zeros_like(alpha)])
-        numbers, sampling = np.array(self.vehicle.bicycle), np.array([0.01, self.min_speed])
-        force = build_curve(self.curve)(
-            self.parameters, drift, np.zeros(2), speed, numbers, sampling
-        )
-        return np.array(force).T
-
     def setup(self, recording: Recording) -> Setup:
         """Return what a replay needs.
 
@@ -136,6 +118,38 @@ class CurveModel:
         """
         return self.setup(recording).run(recording)["axle_force"]
 
+    def curve_expression(self, alpha: Any, v_x: Any) -> Any:
+        """Return the steady axle forces (2,) [N] as a CasADi expression.
+
+        Parameters
+        ----------
+        alpha : slip angles (2,) [rad], the wheels straight ahead.
+        v_x : longitudinal speed [m/s].
+        """
+        slope = alpha if self.curve == "linear" else ca.tan(alpha)
+        return self._static_force(drift(self.vehicle, slope, v_x), 0.0, v_x)
+
+    def force_expression(
+        self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
+    ) -> tuple[Any, Any]:
+        """Return the axle forces (2,) [N] as a CasADi expression, and no rate: nothing lags.
+
+        Parameters
+        ----------
+        slip : empty.
+        x : [v_y, r] (2,).
+        delta : angle of the front wheels [rad].
+        v_x : longitudinal speed [m/s], positive.
+        least_lag : not looked at.
+        """
+        del slip, least_lag
+        return self._static_force(x, delta, v_x), ca.MX(0, 1)
+
+    def _static_force(self, x: Any, delta: Any, v_x: Any) -> Any:
+        q, p = ca.DM(self.parameters), self.vehicle.bicycle
+        loads = ca.DM(self.vehicle.axle_loads)
+        return CURVES[self.curve].force(p, q, loads, v_x, x, ca.vertcat(delta, 0))
+
     def to_dict(self) -> dict[str, Any]:
         """Return the model as plain numbers and words, ready for JSON."""
         names = CURVES[self.curve].parameters
@@ -148,15 +162,6 @@ class CurveModel:
             "front": dict(zip(names, self.parameters[0].tolist(), strict=True)),
             "rear": dict(zip(names, self.parameters[1].tolist(), strict=True)),
         }
-
-    def save(self, path: Path) -> None:
-        """Write the model as JSON.
-
-        Parameters
-        ----------
-        path : the file.
-        """
-        write_atomically(path, json.dumps(self.to_dict(), indent=2) + "\n")
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str) -> "CurveModel":

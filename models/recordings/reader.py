@@ -51,11 +51,33 @@ def read_recording(
         One line: file and run, column, rule, value, remedy.
     """
     path = Path(path)
-    if not (np.isfinite(dt) and dt > 0.0):
-        raise RecordingError(f"{path}: the sample time dt must be positive, it is {dt}")
+    _require_positive(str(path), dt)
     table = read_table(path, columns=columns)
-    table, run = _one_run(path, table, run)
-    label = str(path) if run is None else f"{path}:{run}"
+    return recording_from_table(str(path), _stem(path), table, run=run, dt=dt, check=check)
+
+
+def recording_from_table(
+    source: str, name: str, table: Table, *, run: str | None, dt: float, check: bool
+) -> Recording:
+    """Return one run of a table, judged and brought to a uniform sample time.
+
+    Parameters
+    ----------
+    source : where the table is from, for messages.
+    name : of the recording, without its run.
+    table : columns as they came.
+    run : name of the run; None where there is only one.
+    dt : sample time T_s of the result [s].
+    check : whether to judge signs, axes and units by physics.
+
+    Raises
+    ------
+    RecordingError
+        One line: source and run, column, rule, value, remedy.
+    """
+    _require_positive(source, dt)
+    table, run = _one_run(source, table, run)
+    label = source if run is None else f"{source}:{run}"
     _check_values(label, table)
     _check_time(label, table)
     steps = (table.columns["t"][-1] - table.columns["t"][0]) / dt
@@ -69,7 +91,7 @@ def read_recording(
         )
     force = np.column_stack([signals["Fyf"], signals["Fyr"]]) if "Fyf" in signals else None
     recording = Recording(
-        name=_stem(path) if run is None else f"{_stem(path)}:{run}",
+        name=name if run is None else f"{name}:{run}",
         t=t,
         v_x=signals["vx"],
         v_y=signals["vy"],
@@ -117,6 +139,11 @@ def split_log_argument(argument: str) -> tuple[Path, str | None]:
     return Path(argument), None
 
 
+def _require_positive(source: str, dt: float) -> None:
+    if not (np.isfinite(dt) and dt > 0.0):
+        raise RecordingError(f"{source}: the sample time dt must be positive, it is {dt}")
+
+
 def _stem(path: Path) -> str:
     """File name without folder and known endings."""
     for ending in sorted(ENDINGS, key=len, reverse=True):
@@ -125,7 +152,7 @@ def _stem(path: Path) -> str:
     return path.name
 
 
-def _one_run(path: Path, table: Table, run: str | None) -> tuple[Table, str | None]:
+def _one_run(path: str, table: Table, run: str | None) -> tuple[Table, str | None]:
     """Keep the rows of the named run, or of the only one."""
     if table.run is None:
         if run is not None:

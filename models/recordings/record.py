@@ -4,7 +4,9 @@ x = [v_y, r]: lateral velocity [m/s], yaw rate [rad/s].   u = [delta_f, delta_r]
 ISO axes: x forward, y left, z up; r and delta turn left when positive, forces push left.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +36,7 @@ class RecordingError(ValueError):
     """A log or a recording breaks a rule; one line: file or name, column, rule, value, remedy."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Recording:
     """Signals of one run, all of the same length n, uniformly sampled and read-only.
 
@@ -103,6 +105,40 @@ class Recording:
                 f"{self.name}: t must rise in equal steps, mean step {step:.6g} s, "
                 f"largest departure {off_grid:.3g} s; read the log with read_recording"
             )
+
+    @classmethod
+    def from_dataframe(
+        cls,
+        data: Any,
+        *,
+        name: str = "recording",
+        run: str | None = None,
+        dt: float = 0.01,
+        check: bool = True,
+        columns: Mapping[str, str] | None = None,
+    ) -> "Recording":
+        """Return one run of a data frame, checked and brought to a uniform time as a file is.
+
+        Parameters
+        ----------
+        data : a pandas data frame, or a mapping of arrays of one length, by column. Names, units
+            and signs are those of `read_recording`; `delta_r` may be missing.
+        name : of the recording, in place of a file's.
+        run : which run of the column "run", where there are several.
+        dt : sample time T_s to resample to [s].
+        check : whether data that contradict physics are refused.
+        columns : by our name of a column, the name that it has in `data`, where they differ.
+
+        Raises
+        ------
+        RecordingError
+            One line: name and run, column, rule, value, remedy.
+        """
+        from models.recordings.reader import recording_from_table
+        from models.recordings.table import table_of_arrays
+
+        table = table_of_arrays(name, data, columns or {})
+        return recording_from_table(name, name, table, run=run, dt=dt, check=check)
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -174,6 +210,13 @@ class Recording:
             if getattr(self, field.name) is not None
         }
         return replace(self, **cut)
+
+    def __repr__(self) -> str:
+        truth = "" if self.axle_force is None else ", with axle forces"
+        return (
+            f"<Recording {self.name!r}: {self.t.size} samples of {self.dt:g} s at "
+            f"{self.v_x.min():.3g} to {self.v_x.max():.3g} m/s{truth}>"
+        )
 
 
 def _read_only(value: object) -> Array:

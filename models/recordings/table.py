@@ -76,6 +76,55 @@ def read_table(path: Path, only_runs: bool = False, columns: Mapping[str, str] =
     return _read_csv(path, only_runs, columns)
 
 
+def table_of_arrays(name: str, data: Any, columns: Mapping[str, str] = NO_NAMES) -> Table:
+    """Return the columns that a recording needs of arrays in memory; others are ignored.
+
+    Parameters
+    ----------
+    name : of the data, for messages.
+    data : a data frame or a mapping, by column: what `data[column]` is has one axis.
+    columns : by our name of a column, the name that it has in `data`, where they differ.
+
+    Raises
+    ------
+    RecordingError
+        If there are no columns, one is missing or not numeric, or their lengths differ.
+    """
+    found = getattr(data, "columns", data)  # of a data frame; a mapping yields its keys
+    try:
+        header = [str(column) for column in found]
+        arrays = dict(zip(header, (np.asarray(data[column]) for column in found), strict=True))
+    except (TypeError, KeyError, IndexError):
+        raise RecordingError(
+            f"{name}: a data frame or a mapping of arrays is needed, not {type(data).__name__}"
+        ) from None
+    ours = dict(zip(_standard_names(name, header, columns), header, strict=True))
+    values = {key: _array(name, key, arrays[ours[key]]) for key in _choose(name, list(ours), False)}
+    sizes = {key: value.size for key, value in values.items()}
+    run = None
+    if RUN in ours:
+        run = np.array([str(word) for word in arrays[ours[RUN]].tolist()], dtype=object)
+    if run is not None:
+        sizes[RUN] = run.size
+    if len(set(sizes.values())) > 1:
+        raise RecordingError(f"{name}: columns must have one length, they have {sizes}")
+    return Table(values, run, np.arange(values["t"].size), "index")
+
+
+def _array(name: str, column: str, value: NDArray[Any]) -> Array:
+    """Return one column as numbers."""
+    if value.ndim != 1:
+        raise RecordingError(f"{name}: {column} must have one axis, its shape is {value.shape}")
+    try:
+        if value.dtype.kind in "MmSU":  # a time of the calendar, or words, is no number of ours
+            raise TypeError
+        return value.astype(np.float64)
+    except (TypeError, ValueError):
+        raise RecordingError(
+            f"{name}: {column} must be numeric, its type is {value.dtype}"
+        ) from None
+
+
 def _read_csv(path: Path, only_runs: bool, columns_named: Mapping[str, str]) -> Table:
     """Read a CSV, plain or gzipped, line by line; columns that nobody asks for are not kept."""
     reader = csv.reader(io.TextIOWrapper(io.BytesIO(_text(path)), "utf-8-sig", newline=""))
@@ -189,7 +238,7 @@ def _require_small(path: Path, about: Any) -> None:
     require_few(RecordingError, str(path), size / 1e6, "megabytes", "megabytes")
 
 
-def _standard_names(path: Path, header: list[str], columns: Mapping[str, str]) -> list[str]:
+def _standard_names(path: str | Path, header: list[str], columns: Mapping[str, str]) -> list[str]:
     """Return the header with our names for the columns that the file calls otherwise."""
     known = (*NEEDED, *OPTIONAL, RUN)
     renamed = list(header)
@@ -205,7 +254,7 @@ def _standard_names(path: Path, header: list[str], columns: Mapping[str, str]) -
     return renamed
 
 
-def _choose(path: Path, header: list[str], only_runs: bool) -> list[str]:
+def _choose(path: str | Path, header: list[str], only_runs: bool) -> list[str]:
     """Check the header and return the numeric columns to read."""
     wanted = (*NEEDED, *OPTIONAL, RUN)
     doubled = [name for name in wanted if header.count(name) > 1]

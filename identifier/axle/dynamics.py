@@ -1,0 +1,77 @@
+"""The frozen axle model in continuous time: force curves of a slip that lags by a first order.
+
+F = F_z Σ w_j tanh(α'/α_j) cos δ   and   σ dα'/dt = v_x (α - α'),   σ = (s + k g/ω²) C(α') + σ_0.
+The sway of the body gives way in series with the carcass: its share k adds k g/ω² to the
+compliance s. That is without the inertia of the roll: ω is above what steering asks for.
+"""
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from identifier.axle.car import Car
+from identifier.axle.slip import SHORTEST
+from identifier.axle.units import Curve, curve, doublings
+from models.vehicle import GRAVITY
+
+Array = NDArray[np.float64]
+
+
+def static_curve(slip: Any, W: Array, ladder: tuple[float, ...]) -> Curve:
+    """Return the force curve at a slip, in static axle loads.
+
+    Parameters
+    ----------
+    slip : (2,) [rad].
+    W : weights [static axle loads], (2, n).
+    ladder : slip scales [rad], (n,).
+    """
+    scales = ca.DM(1.0 / np.array(ladder)[None])
+    return curve(slip, ca.DM(W), scales, doublings(ladder))
+
+
+def series_compliance(own: Array, roll_frequency: float) -> Array:
+    """Return the deflection of carcass and body per static axle load [m], (2,).
+
+    Parameters
+    ----------
+    own : compliance, sway share and offset of the axles, (2, 3).
+    roll_frequency : ω [rad/s].
+    """
+    return own[:, 0] + GRAVITY / roll_frequency**2 * own[:, 1]
+
+
+def lagged_force(
+    car: Car,
+    at: Curve,
+    compliance: Array,
+    offset: Array,
+    *,
+    slip: Any,
+    x: Any,
+    delta: Any,
+    v_x: Any,
+    least_lag: Any,
+) -> tuple[Any, Any]:
+    """Return the axle forces (2,) [N] and dα'/dt (2,) [rad/s].
+
+    Parameters
+    ----------
+    car : the car.
+    at : force curve at the lagged slip.
+    compliance : of `series_compliance`.
+    offset : zero of the front steering [rad] and bias of v_y [m/s], (2,).
+    slip : lagged slip α' (2,) [rad].
+    x : [v_y, r] (2,).
+    delta : angle of the front wheels [rad].
+    v_x : longitudinal speed [m/s], positive.
+    least_lag : time under which no lag falls [s].
+    """
+    sideways = x[0] - offset[1] + ca.DM(car.arm) * x[1]
+    alpha = ca.vertcat(delta + offset[0], 0) - ca.atan(sideways / v_x)
+    sigma = ca.DM(compliance) * at.carcass_slope + SHORTEST * float(car.arm[0] - car.arm[1])
+    cos_delta = ca.vertcat(1 - delta**2 / 2 + delta**4 / 24, 1)
+    force = at.force * ca.DM(car.load) * cos_delta
+    return force, (alpha - slip) / ca.fmax(sigma / v_x, least_lag)

@@ -1,0 +1,297 @@
+"""The tire that was learnt, asked: its force, how stiff, how sure, as CasADi functions, as a file.
+
+Slip angles α = δ - (v_y ± l r)/v_x have the paper's sign, the negative of ISO 8855, so that
+F = +C α. Axle forces are lateral, in the frame of the body, left positive.
+"""
+
+import json
+import math
+from abc import ABC, abstractmethod
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from models.files import write_atomically
+from models.recordings import Recording
+from models.vehicle import GRAVITY, Vehicle
+
+Array = NDArray[np.float64]
+Axle = Literal["front", "rear"]
+AXLES: tuple[Axle, ...] = ("front", "rear")
+
+
+class TireFunctions(NamedTuple):
+    """What a tire is to one's own optimal control problem: named CasADi functions, SI.
+
+    x = [v_y, r] [m/s, rad/s] and, where the force follows a lagged slip, [α'_f, α'_r] [rad].
+    """
+
+    force_curve: ca.Function
+    """(alpha (2,), v_x) -> axle_force (2,) [N]: steady, the wheels straight ahead."""
+    dynamics: ca.Function
+    """(x, delta, v_x) -> x_dot, axle_force (2,): what a collocation asks for."""
+    step: ca.Function
+    """(x, delta, v_x, dt) -> x_next: one step of Runge-Kutta with δ and v_x held."""
+
+
+class Fact(NamedTuple):
+    """A line of a summary: what, its values in front and at the rear (2,), their unit."""
+
+    title: str
+    values: Array
+    unit: str
+
+
+class TireModel(ABC):
+    """Axle forces from weights that no longer change: the front and the rear tires of one car."""
+
+    __slots__ = ()
+
+    if TYPE_CHECKING:  # at run time they would be taken for the defaults of a dataclass's fields
+
+        @property
+        def vehicle(self) -> Vehicle:
+            """The car."""
+
+        @property
+        def min_speed(self) -> float:
+            """Below this speed [m/s] the forces read zero."""
+
+    @abstractmethod
+    def axle_force(self, recording: Recording) -> Array:
+        """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
+
+        Parameters
+        ----------
+        recording : its signals are the input; its forces are not looked at.
+        """
+
+    @abstractmethod
+    def to_dict(self) -> dict[str, Any]:
+        """Return the model as plain numbers and words, ready for JSON."""
+
+    @abstractmethod
+    def curve_expression(self, alpha: Any, v_x: Any) -> Any:
+        """Return the steady axle forces (2,) [N] as a CasADi expression.
+
+        Parameters
+        ----------
+        alpha : slip angles (2,) [rad], the wheels straight ahead.
+        v_x : longitudinal speed [m/s].
+        """
+
+    @abstractmethod
+    def force_expression(
+        self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
+    ) -> tuple[Any, Any]:
+        """Return the axle forces (2,) [N] and the rate of lagged slip [rad/s], CasADi expressions.
+
+        Parameters
+        ----------
+        slip : lagged slip, (2,) where `lagged`, else empty [rad].
+        x : [v_y, r] (2,).
+        delta : angle of the front wheels [rad].
+        v_x : longitudinal speed [m/s], positive.
+        least_lag : time under which no lag falls [s].
+        """
+
+    @property
+    def lagged(self) -> bool:
+        """Whether the force follows a lagged slip, two more states."""
+        return False
+
+    @property
+    def reference_speed(self) -> float:
+        """Speed [m/s] at which a force that depends on it is told, 4 sqrt(g L): brisk driving."""
+        return max(4.0 * math.sqrt(GRAVITY * self.vehicle.wheelbase), self.min_speed)
+
+    def predict(self, recording: Recording) -> Array:
+        """Return the axle forces that the model predicts of a drive, (n, 2) [N].
+
+        Parameters
+        ----------
+        recording : its signals are the input; its forces are not looked at.
+        """
+        return self.axle_force(recording)
+
+    @overload
+    def force(self, alpha: float, axle: Axle, *, v_x: float | None = None) -> float: ...
+    @overload
+    def force(
+        self, alpha: ArrayLike, axle: Axle | None = None, *, v_x: float | None = None
+    ) -> Array: ...
+
+    def force(
+        self, alpha: ArrayLike, axle: Axle | None = None, *, v_x: float | None = None
+    ) -> float | Array:
+        """Return the steady lateral force at slip angles, the wheels straight ahead [N].
+
+        Both axles slip alike: only a network that reads more than slip sees a difference.
+
+        Parameters
+        ----------
+        alpha : slip angles in the paper's sign [rad], a number or an array of any shape.
+        axle : "front" or "rear", for a result of the shape of `alpha`; None gives both, (..., 2).
+        v_x : speed [m/s]; None takes `reference_speed`. A curve of slip does not look at it.
+
+        Raises
+        ------
+        ValueError
+            Where the axle has another name.
+        """
+        if axle is not None and axle not in AXLES:
+            raise ValueError(f"axle must be front or rear, it is {axle!r}")
+        slip = np.asarray(alpha, dtype=np.float64)
+        pairs = np.tile(slip.ravel(), (2, 1))
+        told = (
+            self._force_curve()(pairs, self.reference_speed if v_x is None else v_x)
+            if slip.size
+            else pairs
+        )
+        both: Array = np.array(told, dtype=np.float64).T.reshape(*slip.shape, 2)
+        if axle is None:
+            return both
+        one: Array = both[..., AXLES.index(axle)]
+        return float(one) if slip.ndim == 0 else one
+
+    def force_at(self, alpha: Array) -> Array:
+        """Return the steady axle forces at slip angles, (k, 2) [N].
+
+        Parameters
+        ----------
+        alpha : slip angles in the paper's sign [rad], (k,).
+        """
+        return self.force(alpha)
+
+    @property
+    def stiffness(self) -> Array:
+        """Cornering stiffness: slope of the steady force at zero slip [N/rad], (2,)."""
+        alpha = ca.MX.sym("alpha", 2)
+        force = self.curve_expression(alpha, self.reference_speed)
+        slope = ca.Function("stiffness", [alpha], [ca.jacobian(force, alpha)])
+        both = np.array([1.0, 1.0])  # the axles slip alike
+        stiffness: Array = np.array(slope(np.zeros(2))) @ both
+        return stiffness
+
+    @property
+    def known_slip(self) -> Array | None:
+        """Slip [rad] up to which the forces were learnt, (2,); None where the model cannot tell."""
+        return None
+
+    def facts(self) -> tuple[Fact, ...]:
+        """Return the lines of `summary`."""
+        lines = [Fact("cornering stiffness", self.stiffness, "N/rad")]
+        if self.known_slip is not None:
+            lines.append(Fact("known up to a slip of", np.degrees(self.known_slip), "deg"))
+        return tuple(lines)
+
+    def summary(self) -> str:
+        """Return what was learnt, in a few lines."""
+        facts = self.facts()
+        width = max(len(fact.title) for fact in facts)
+        lines = [
+            f"{type(self).__name__} of {self.vehicle.name!r}",
+            f"{'':{width}}  {'front':>10}  {'rear':>10}",
+            *(
+                f"{title:{width}}  {front:>10.4g}  {rear:>10.4g}  {unit}"
+                for title, (front, rear), unit in facts
+            ),
+        ]
+        return "\n".join(lines)
+
+    def casadi_function(self) -> TireFunctions:
+        """Return force curve, equations of motion and prediction step, the weights in them.
+
+        Speed must be positive. Where the slip lags, a step holds the lag above half of itself.
+        """
+        x = ca.MX.sym("x", 4 if self.lagged else 2)
+        delta, v_x, dt = ca.MX.sym("delta"), ca.MX.sym("v_x"), ca.MX.sym("dt")
+        x_dot, force = self._motion(x, delta, v_x, 0.0)
+        dynamics = ca.Function(
+            "car_dynamics",
+            [x, delta, v_x],
+            [x_dot, force],
+            ["x", "delta", "v_x"],
+            ["x_dot", "axle_force"],
+        )
+        rate = ca.Function("rate", [x, delta, v_x, dt], [self._motion(x, delta, v_x, dt / 2)[0]])
+        at = (delta, v_x, dt)
+        k1 = rate(x, *at)
+        k2 = rate(x + dt / 2 * k1, *at)
+        k3 = rate(x + dt / 2 * k2, *at)
+        k4 = rate(x + dt * k3, *at)
+        step = ca.Function(
+            "car_step",
+            [x, *at],
+            [x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)],
+            ["x", "delta", "v_x", "dt"],
+            ["x_next"],
+        )
+        return TireFunctions(self._force_curve(), dynamics.expand(), step.expand())
+
+    def _force_curve(self) -> ca.Function:
+        alpha, v_x = ca.MX.sym("alpha", 2), ca.MX.sym("v_x")
+        force = ca.densify(self.curve_expression(alpha, v_x))
+        ports = (["alpha", "v_x"], ["axle_force"])
+        return ca.Function("tire_force_curve", [alpha, v_x], [force], *ports).expand()
+
+    def _motion(self, x: Any, delta: Any, v_x: Any, least_lag: Any) -> tuple[Any, Any]:
+        """Return ẋ and the axle forces; m (v̇_y + v_x r) = F_f + F_r, I_z ṙ = l_f F_f - l_r F_r."""
+        m, I_z, l_f, l_r = self.vehicle.bicycle[:4]
+        force, slip_rate = self.force_expression(x[2:], x[:2], delta, v_x, least_lag)
+        v_y_dot = (force[0] + force[1]) / m - v_x * x[1]
+        r_dot = (l_f * force[0] - l_r * force[1]) / I_z
+        return ca.densify(ca.vertcat(v_y_dot, r_dot, slip_rate)), ca.densify(force)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the model as JSON.
+
+        Parameters
+        ----------
+        path : the file.
+        """
+        write_atomically(path, json.dumps(self.to_dict(), indent=2) + "\n")
+
+    @staticmethod
+    def load(path: str | PathLike[str]) -> "TireModel":
+        """Read a model of any kind, as `save` wrote it.
+
+        Parameters
+        ----------
+        path : the file.
+
+        Raises
+        ------
+        FrozenModelError
+            Where the file is not such a model; one line that names it.
+        """
+        from identifier.model_file import load_model
+
+        return load_model(Path(path))
+
+    def __repr__(self) -> str:
+        front, rear = self.stiffness
+        known = (
+            ""
+            if self.known_slip is None
+            else ", known to {:.1f} / {:.1f} deg".format(*np.degrees(self.known_slip))
+        )
+        name = f"{type(self).__name__} of {self.vehicle.name!r}"
+        return f"<{name}: stiffness {front:.4g} / {rear:.4g} N/rad{known}>"
+
+
+def drift(vehicle: Vehicle, slope: Any, v_x: Any) -> Any:
+    """Return x = [v_y, r] at which straight wheels meet the road at some slopes, (2,).
+
+    Parameters
+    ----------
+    vehicle : the car.
+    slope : -(v_y ± l r)/v_x at the axles, (2,): the slip angle where it is small.
+    v_x : longitudinal speed [m/s].
+    """
+    r = v_x * (slope[1] - slope[0]) / vehicle.wheelbase
+    return ca.vertcat(-v_x * slope[0] - vehicle.l_f * r, r)
