@@ -46,7 +46,8 @@ def options_of(words: Sequence[str]) -> argparse.Namespace:
     ----------
     words : after `tireid drive`, but for the folder, which nobody writes here.
     """
-    return build_parser().parse_args(["drive", *words, "--film", "none", "--out", "nowhere"])
+    line = ["drive", *words, "--film", "none", "--out", "nowhere"]
+    return build_parser(line).parse_args(line)
 
 
 def run(case: Case) -> Run:

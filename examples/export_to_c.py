@@ -18,7 +18,7 @@ from models.plant import Plant
 from models.recordings import Recording
 from models.sensors import Sensor, Sensors
 from models.vehicle import Vehicle, sedan
-from tireid.export_command import write_files
+from tireid.exporting import write_files
 from tireid.self_test import self_test
 
 EXPECTED_BELOW = 1.0  # N, of forces of 8 kN

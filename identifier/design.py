@@ -91,6 +91,28 @@ class Design:
             rests=bool(self.gains.W_free > 0.0 or self.gains.V_free > 0.0),
         )
 
+    @classmethod
+    def for_vehicle(
+        cls, vehicle: Vehicle, *, law: str = "integral", dt: float = 0.01, seed: int = 0
+    ) -> "Design":
+        """Return the identifier of the paper with gains that follow from the car.
+
+        Parameters
+        ----------
+        vehicle : the car.
+        law : "integral", "instantaneous", "instantaneous_scaled" (at η/λ) or "pi_lead".
+        dt : sampling interval [s].
+        seed : seed of the initial weights.
+
+        Raises
+        ------
+        ValueError
+            Where the law is unknown.
+        """
+        from identifier.defaults import default_design  # it finds gains for designs like this one
+
+        return default_design(vehicle, law=law, dt=dt, seed=seed)
+
     def setup(
         self, vehicle: Vehicle, recording: Recording, start: FrozenModel | None = None
     ) -> Setup:

@@ -6,7 +6,7 @@ returns a method whose numbers follow from the vehicle alone.
 
 from collections.abc import Callable, Mapping
 
-from identifier.axle import AxleDesign
+from identifier.axle import AxleDesign, AxleModel
 from identifier.baselines import (
     ExtendedStateObserver,
     ForceEkf,
@@ -17,7 +17,9 @@ from identifier.baselines import (
 )
 from identifier.defaults import LAWS, default_design
 from identifier.method import Method
+from identifier.network_model import NetworkModel
 from identifier.regression import RegressionDesign
+from identifier.tire_model import TireModel
 from models.vehicle import Vehicle
 
 Factory = Callable[[Vehicle, int], Method]
@@ -82,3 +84,26 @@ def make_method(name: str, vehicle: Vehicle, seed: int = 0) -> Method:
     if name not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, not {name!r}")
     return METHODS[name](vehicle, seed)
+
+
+def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01) -> Method:
+    """Return the method that goes on learning from a model.
+
+    Parameters
+    ----------
+    model : what was learnt.
+    vehicle : the car.
+    dt : sampling interval [s].
+
+    Raises
+    ------
+    ValueError
+        Where no method goes on from such a model.
+    """
+    match model:
+        case AxleModel():
+            return AxleDesign.for_vehicle(vehicle, dt=dt)
+        case NetworkModel():
+            return default_design(vehicle, network=model.network, dt=dt)
+        case _:
+            raise ValueError(f"no method can go on learning from a {type(model).__name__}")

@@ -74,6 +74,34 @@ class Reproduction:
     after_against_truth: AxleRmse | None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Prediction:
+    """One recording as a frozen model predicts it.
+
+    Parameters
+    ----------
+    recording : what was predicted.
+    axle_force : forces of the frozen model (n, 2) [N].
+    against_truth : error over the samples that count, against the true force; None without truth.
+    true_force : root mean square of the true force over the same samples, None without truth.
+    """
+
+    recording: Recording
+    axle_force: Array
+    against_truth: AxleRmse | None
+    true_force: AxleRmse | None
+
+    def __repr__(self) -> str:
+        name, error, size = self.recording.name, self.against_truth, self.true_force
+        if error is None or size is None:
+            return f"<Prediction of {name!r}: no true forces to compare with>"
+        front, rear = 100.0 * error.front / size.front, 100.0 * error.rear / size.rear
+        return (
+            f"<Prediction of {name!r}: {error.front:.0f} / {error.rear:.0f} N rms missed, "
+            f"{front:.1f} / {rear:.1f} % of the force, front / rear>"
+        )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Replay:
     """One recording replayed with frozen weights.
@@ -134,6 +162,31 @@ def counted_samples(
     return counted
 
 
+def predict(model: FrozenModel, recording: Recording, *, since: float | None = None) -> Prediction:
+    """Replay a recording with frozen weights and compare with its true forces, where it has any.
+
+    Parameters
+    ----------
+    model : the frozen model; samples below its minimum speed do not count.
+    recording : what is replayed.
+    since : samples before this time [s] do not count; None counts all.
+
+    Raises
+    ------
+    ValueError
+        Where no sample counts.
+    """
+    force = model.axle_force(recording)
+    counted = counted_samples(recording, model.min_speed, since)
+    truth = recording.axle_force
+    return Prediction(
+        recording=recording,
+        axle_force=force,
+        against_truth=None if truth is None else axle_rms(force - truth, counted),
+        true_force=None if truth is None else axle_rms(truth, counted),
+    )
+
+
 def replay(model: FrozenModel, online: History, *, since: float | None = None) -> Replay:
     """Replay a recording with frozen weights and compare over all of it.
 
@@ -149,15 +202,13 @@ def replay(model: FrozenModel, online: History, *, since: float | None = None) -
     ValueError
         Where no sample counts.
     """
-    recording = online.recording
-    force = model.axle_force(recording)
-    counted = counted_samples(recording, model.min_speed, since)
-    truth = recording.axle_force
+    told = predict(model, online.recording, since=since)
+    counted = counted_samples(online.recording, model.min_speed, since)
     return Replay(
-        recording=recording,
-        axle_force=force,
-        against_truth=None if truth is None else axle_rms(force - truth, counted),
-        against_online=axle_rms(force - online.axle_force, counted),
+        recording=told.recording,
+        axle_force=told.axle_force,
+        against_truth=told.against_truth,
+        against_online=axle_rms(told.axle_force - online.axle_force, counted),
     )
 
 

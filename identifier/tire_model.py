@@ -147,11 +147,8 @@ class TireModel(ABC):
             raise ValueError(f"axle must be front or rear, it is {axle!r}")
         slip = np.asarray(alpha, dtype=np.float64)
         pairs = np.tile(slip.ravel(), (2, 1))
-        told = (
-            self._force_curve()(pairs, self.reference_speed if v_x is None else v_x)
-            if slip.size
-            else pairs
-        )
+        speed = self.reference_speed if v_x is None else v_x
+        told = self._force_curve()(pairs, speed) if slip.size else pairs
         both: Array = np.array(told, dtype=np.float64).T.reshape(*slip.shape, 2)
         if axle is None:
             return both

@@ -9,13 +9,12 @@ import gzip
 import io
 import json
 import math
-import os
 import stat
 import tomllib
 import types
 import zlib
 from collections.abc import Mapping
-from dataclasses import MISSING, asdict, dataclass, fields
+from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any, NoReturn, Union, get_args, get_origin, get_type_hints
 
@@ -23,83 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.escape import visible
+from models.limits import VARIABLE, limits
+from models.limits import LimitError as LimitError
+from models.limits import Limits as Limits
+from models.limits import limits_text as limits_text
 
-VARIABLE = "TIREID_LIMITS"
 CHUNK = 1 << 20  # bytes that are unpacked at a time
 SHOWN = 60  # characters of a value in a message
 LONGEST_NAME = 200  # characters
-
-
-class LimitError(ValueError):
-    """The limits that the environment asks for are none."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Limits:
-    """How much may be asked for. `TIREID_LIMITS="samples=1e7 megabytes=4000"` raises limits.
-
-    Parameters
-    ----------
-    megabytes : of a recording or of way-points, unpacked.
-    samples : rows of a recording or of way-points, steps of a recording.
-    path : samples of a path.
-    columns : of a recording or of way-points.
-    document : megabytes of a JSON, ONNX or tire file.
-    toml : megabytes of a TOML file.
-    line : characters of a line of TOML.
-    depth : of tables and lists inside one another.
-    values : numbers, texts, tables and lists in a JSON or TOML file.
-    hidden : units of a network, whose code is compiled: 100 take ten seconds, 300 minutes.
-    hours : that a car is driven for.
-    runs : designs, starts, seeds or random drives that one command is asked for.
-    processes : that one command is asked for.
-    """
-
-    megabytes: float = 256.0
-    samples: float = 2e6
-    path: float = 4e5
-    columns: float = 1e4
-    document: float = 32.0
-    toml: float = 0.1
-    line: float = 4000.0
-    depth: float = 32.0
-    values: float = 2e6
-    hidden: float = 128.0
-    hours: float = 1.0
-    runs: float = 1e5
-    processes: float = 256.0
-
-
-def limits() -> Limits:
-    """Return the limits, as the environment raises or lowers them.
-
-    Raises
-    ------
-    LimitError
-        Where the environment's words are not NAME=NUMBER.
-    """
-    known = [field.name for field in fields(Limits)]
-    asked: dict[str, float] = {}
-    for word in os.environ.get(VARIABLE, "").replace(",", " ").split():
-        name, _, number = word.partition("=")
-        try:
-            asked[name] = float(number)
-        except ValueError:
-            asked[name] = math.nan
-        if name not in known or not asked[name] > 0.0:
-            raise LimitError(
-                f"{VARIABLE} must hold NAME=NUMBER of {', '.join(known)}, not {shown(word)}"
-            )
-    return Limits(**asked)
-
-
-def limits_text() -> str:
-    """Return the limits that hold, and how to raise them, for the help of commands."""
-    values = " ".join(f"{name}={value:g}" for name, value in asdict(limits()).items())
-    return (
-        f"What files may hold and commands may ask for is limited: {values}. The environment "
-        f'{VARIABLE}="samples=1e7 megabytes=4000" raises limits, or lowers them.'
-    )
 
 
 def require_few(refusal: type[ValueError], where: str, count: float, limit: str, what: str) -> None:

@@ -1,1 +1,99 @@
-"""The command line, its reports and figures."""
+"""Learns a car's lateral tire forces while it drives, and freezes them: `import tireid as ti`.
+
+    car = ti.Vehicle.from_toml("car.toml")      # or ti.sedan()
+    log = ti.read_recording("log.csv")          # or ti.Recording.from_dataframe(df)
+    tire = ti.identify(log, car).freeze()
+    print(tire.summary(), tire.force(0.05, "front"))
+
+What is not used is not imported: each name is fetched where it is asked for.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from identifier.axle import AxleDesign as AxleIdentifier
+    from identifier.certification import certify
+    from identifier.design import Design as PaperIdentifier
+    from identifier.history import History
+    from identifier.method import Method
+    from identifier.methods import make_method
+    from identifier.reproducibility import Prediction
+    from identifier.tire_model import TireModel
+    from models.recordings import Recording, read_recording
+    from models.vehicle import Vehicle, sedan
+    from mpc import path as paths
+    from tireid.driving import drive, sample_recording
+    from tireid.exporting import export
+    from tireid.learning import identify, replay
+
+    __version__: str
+
+_HOMES = {
+    "AxleIdentifier": ("identifier.axle", "AxleDesign"),
+    "History": ("identifier.history", "History"),
+    "Method": ("identifier.method", "Method"),
+    "PaperIdentifier": ("identifier.design", "Design"),
+    "Prediction": ("identifier.reproducibility", "Prediction"),
+    "Recording": ("models.recordings", "Recording"),
+    "TireModel": ("identifier.tire_model", "TireModel"),
+    "Vehicle": ("models.vehicle", "Vehicle"),
+    "certify": ("identifier.certification", "certify"),
+    "drive": ("tireid.driving", "drive"),
+    "export": ("tireid.exporting", "export"),
+    "identify": ("tireid.learning", "identify"),
+    "make_method": ("identifier.methods", "make_method"),
+    "paths": ("mpc.path", ""),
+    "read_recording": ("models.recordings", "read_recording"),
+    "replay": ("tireid.learning", "replay"),
+    "sample_recording": ("tireid.driving", "sample_recording"),
+    "sedan": ("models.vehicle", "sedan"),
+}
+__all__ = [
+    "AxleIdentifier",
+    "History",
+    "Method",
+    "PaperIdentifier",
+    "Prediction",
+    "Recording",
+    "TireModel",
+    "Vehicle",
+    "__version__",
+    "certify",
+    "drive",
+    "export",
+    "identify",
+    "make_method",
+    "paths",
+    "read_recording",
+    "replay",
+    "sample_recording",
+    "sedan",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Return a name of the interface, fetched at its first use."""
+    if name == "__version__":
+        value: Any = _version()
+    elif name in _HOMES:
+        module, attribute = _HOMES[name]
+        home = importlib.import_module(module)
+        value = getattr(home, attribute) if attribute else home
+    else:
+        raise AttributeError(f"module 'tireid' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("tireid")
+    except PackageNotFoundError:  # run from a checkout that is not installed
+        return "unknown"

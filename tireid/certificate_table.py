@@ -5,12 +5,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identifier.defaults import natural_operation
+from identifier.certification import certify
 from identifier.design import Design
 from identifier.driving import Driving
-from identifier.laws import DRIVING_ERRORS
 from identifier.network import Weights
-from identifier.stability import Certificate, Property, certify
+from identifier.stability import Certificate, Property
 from models.vehicle import Vehicle
 from tireid.figures.units import force_unit_name
 
@@ -27,9 +26,7 @@ def certificate_of(design: Design, vehicle: Vehicle, driving: Driving | None = N
     vehicle : the car.
     driving : how hard it is driven; None takes `natural_driving`.
     """
-    return certify(
-        design.gains, DRIVING_ERRORS[design.law], natural_operation(design, vehicle, driving)
-    )
+    return certify(design, vehicle, driving)
 
 
 def certificate_rows(certificate: Certificate, force_unit: float) -> list[list[str]]:

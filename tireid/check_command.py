@@ -36,6 +36,7 @@ from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
 from tireid.certificate_table import certificate_of, certificate_text, unit_text
 from tireid.check_figures import FIGURES
+from tireid.commands import COMMANDS
 from tireid.inputs import read_log
 from tireid.monte_carlo_table import bound_rows, monte_carlo_numbers, monte_carlo_text
 from tireid.output import OutputError
@@ -63,7 +64,7 @@ def add_parser(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "check",
-        help="certificate of a design: margins, bounds, advice; or a design from a bandwidth",
+        help=COMMANDS["check"],
         description="Judge the gains of DESIGN at the worst regressor: poles, sampling, gain and "
         "phase margin, damping, drift, proven bounds. Exit code 0: pass or warn, 1: fails, 2: bad "
         "input. With --design, find gains instead and write them.",

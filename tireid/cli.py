@@ -10,7 +10,9 @@ from collections.abc import Sequence
 from types import FrameType
 from typing import NoReturn
 
-from models.doors import LimitError, limits_text
+import tireid
+from models.limits import limits_text
+from tireid.commands import COMMANDS, add_command
 from tireid.progress import complain, flush_out, listen_to_library, unwritten
 
 BAD_INPUT = 2
@@ -33,21 +35,27 @@ class Parser(argparse.ArgumentParser):
         sys.exit(BAD_INPUT)
 
 
-def build_parser() -> Parser:
-    """Return the parser of all commands."""
-    from tireid.commands import COMMANDS
-    from tireid.summary import program_version
+def build_parser(words: Sequence[str]) -> Parser:
+    """Return the parser of a command line: all commands, and the options of the one it names.
 
+    Parameters
+    ----------
+    words : after `tireid`.
+    """
     parser = Parser(
         prog="tireid",
         description="Learns a car's lateral tire forces while it drives and freezes them.",
         epilog=limits_text(),
     )
-    parser.add_argument("--version", action="version", version=f"tireid {program_version()}")
+    parser.add_argument("--version", action="store_true", help="show the version and exit")
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for module in COMMANDS:
-        module.add_parser(commands)
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
+    named = next((word for word in words if word in COMMANDS), None)
+    for name, summary in COMMANDS.items():
+        if name == named:
+            add_command(name, commands)
+        else:
+            commands.add_parser(name, help=summary)
     return parser
 
 
@@ -67,12 +75,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
+    words = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        parser = build_parser()
-    except LimitError as error:  # of the environment
+        parser = build_parser(words)
+    except ValueError as error:  # a limit that the environment sets
         complain(f"tireid: error: {one_line(error)}")
         return BAD_INPUT
-    options = parser.parse_args(arguments)
+    options = parser.parse_args(words)
+    if options.version or options.command is None:
+        print(f"tireid {tireid.__version__}" if options.version else parser.format_help().rstrip())
+        return 0
     listen_to_library()
     try:
         status: int = options.run(options) or 0

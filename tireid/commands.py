@@ -1,21 +1,33 @@
-"""The commands of tireid, in the order in which a person meets them."""
+"""The commands of tireid, in the order in which a person meets them.
 
-from tireid import (
-    check_command,
-    compare_command,
-    demo_command,
-    drive_command,
-    export_command,
-    identify_command,
-    paper_command,
+Each lies in a module of its name, `tireid.NAME_command` with `add_parser` and `run`, which is
+imported when the command is named: the list alone costs nothing.
+"""
+
+import importlib
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+COMMANDS: Mapping[str, str] = MappingProxyType(
+    {
+        "demo": "the whole story on the built-in car, with a report",
+        "paper": "Tables I and II of the paper, beside ours, over many seeds",
+        "identify": "learn tire forces from a recording, freeze the weights and test them",
+        "compare": "learn, freeze and replay with every method, side by side",
+        "check": "certificate of a design: margins, bounds, advice; or a design from a bandwidth",
+        "export": "the identifier as clean C for a microcontroller, as FMU and ONNX for simulators",
+        "drive": "steer a car along a path at the limit of grip, on the tires that were learnt",
+    }
 )
 
-COMMANDS = (
-    demo_command,
-    paper_command,
-    identify_command,
-    compare_command,
-    check_command,
-    export_command,
-    drive_command,
-)
+
+def add_command(name: str, commands: Any) -> None:
+    """Add one command with all its options to the parser.
+
+    Parameters
+    ----------
+    name : one of `COMMANDS`.
+    commands : subparsers of `tireid`.
+    """
+    importlib.import_module(f"tireid.{name}_command").add_parser(commands)

@@ -16,6 +16,7 @@ from models.doors import require_few
 from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
 from tireid.cluster import cluster
+from tireid.commands import COMMANDS
 from tireid.compare_results import comparison_text, write_comparison
 from tireid.compare_study import run_comparison
 from tireid.compare_table import pair_tables
@@ -37,7 +38,7 @@ def add_parser(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "compare",
-        help="learn, freeze and replay with every method, side by side",
+        help=COMMANDS["compare"],
         description="Learn on each recording, freeze at its end and replay on all of them, with "
         "every method; write compare.json, compare.csv, tables.txt and figures. Recordings need "
         "the true forces. Without a LOG the plant of the car drives slaloms, a step steer and a "

@@ -17,12 +17,12 @@ from identifier.model_format import vehicle_numbers
 from identifier.pareto import best_candidate, pareto_front
 from identifier.reproducibility import AxleRmse
 from identifier.sweep import Candidate
+from tireid import __version__
 from tireid.compare_study import Comparison, Frozen
 from tireid.compare_table import pair_tables, summary_table, sweep_table
 from tireid.figures import matrix_figure, methods_figure, pareto_figure, save_figure
 from tireid.output import write_json
 from tireid.progress import say
-from tireid.summary import program_version
 
 Row = tuple[str | float | int, ...]
 
@@ -93,7 +93,7 @@ def comparison_numbers(comparison: Comparison) -> dict[str, Any]:
         "vehicle": vehicle_numbers(course.vehicle),
         "min_speed_m_s": course.min_speed,
         "seed": comparison.seed,
-        "version": program_version(),
+        "version": __version__,
     }
 
 

@@ -7,6 +7,7 @@ from typing import Any
 from identifier.defaults import natural_operation
 from tireid.certificate_table import certificate_text
 from tireid.check_figures import draw_check
+from tireid.commands import COMMANDS
 from tireid.demo_drive import drive_section, drive_story, drive_text
 from tireid.demo_package import FOLDER, ship, shipped_text
 from tireid.demo_report import demo_sections
@@ -37,7 +38,7 @@ def add_parser(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "demo",
-        help="the whole story on the built-in car, with a report",
+        help=COMMANDS["demo"],
         description="Drive the built-in sedan, learn its tires, freeze them, test them on another "
         "maneuver, export them as a C package that is compiled and tested, repeat the paper's "
         "tables, and steer the car along a path on what it learnt; leaves one report.html to read.",

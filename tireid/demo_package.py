@@ -13,7 +13,7 @@ from identifier.export.package import Package, build_package
 from identifier.export.processor import CROSS_COMPILER, EMULATOR, missing_tools
 from identifier.identify import identify
 from tireid.demo_story import FREEZE, Story
-from tireid.export_command import write_files
+from tireid.exporting import write_files
 from tireid.report import Paragraph, Section, Table
 from tireid.self_test import Verdict, self_test
 

@@ -7,6 +7,7 @@ from typing import Any
 from models.faults import KINDS
 from mpc.path import BUILT_IN
 from tireid.animation import FORMATS, require_ffmpeg
+from tireid.commands import COMMANDS
 from tireid.drive_case import ALL, conditions_of, headline, inputs_of, labels_of
 from tireid.drive_learn import DURATION
 from tireid.drive_results import NO_FILM, write_drives
@@ -39,7 +40,7 @@ def add_parser(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "drive",
-        help="steer a car along a path at the limit of grip, on the tires that were learnt",
+        help=COMMANDS["drive"],
         description="Learn the tires on one drive, freeze them, and let a model predictive tracker "
         "that is told of them steer the car along a path; write summary.json, every signal as "
         "CSV, figures and a film.",

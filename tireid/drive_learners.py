@@ -2,10 +2,8 @@
 
 from typing import Any
 
-from identifier.axle import AxleDesign, AxleModel
-from identifier.defaults import default_design
-from identifier.method import FrozenModel, Method
-from identifier.network_model import NetworkModel
+from identifier.method import FrozenModel
+from identifier.methods import continuing
 from identifier.online import OnlineIdentifier
 from models.friction import Friction
 from models.vehicle import Vehicle
@@ -72,17 +70,9 @@ def make_learner(learnt: FrozenModel, vehicle: Vehicle) -> Learner:
     ValueError
         Where no method can go on from there, or its law has no certificate.
     """
-    identifier = OnlineIdentifier(_method(learnt, vehicle), vehicle, PERIOD, learnt)
+    try:
+        method = continuing(learnt, vehicle, PERIOD)
+    except ValueError as error:
+        raise ValueError(f"--tires learning: {error}") from None
+    identifier = OnlineIdentifier(method, vehicle, PERIOD, learnt)
     return Learner(Supervisor(identifier, tire_model(learnt, vehicle)))
-
-
-def _method(learnt: FrozenModel, vehicle: Vehicle) -> Method:
-    match learnt:
-        case AxleModel():
-            return AxleDesign.for_vehicle(vehicle, dt=PERIOD)
-        case NetworkModel():
-            return default_design(vehicle, network=learnt.network)
-        case _:
-            raise ValueError(
-                f"--tires learning: no method can go on learning from a {type(learnt).__name__}"
-            )

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpc.loop import Drive
+from tireid import __version__
 from tireid.animation import write_film
 from tireid.drive_case import digest
 from tireid.drive_runs import WIDEST, Run
@@ -23,7 +24,6 @@ from tireid.figures import (
 )
 from tireid.output import write_csv, write_json
 from tireid.progress import say
-from tireid.summary import program_version
 
 NO_FILM = "none"
 
@@ -87,7 +87,7 @@ def summarize_drives(runs: Sequence[Run], inputs: Mapping[str, Any]) -> dict[str
         "drives": by_label,
         "inputs": dict(inputs),
         "hash": digest(inputs),
-        "version": program_version(),
+        "version": __version__,
     }
 
 

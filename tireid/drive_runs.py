@@ -61,7 +61,7 @@ class Conditions:
         return FaultySensors(self.sensors, self.faults) if self.faults else self.sensors
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Run:
     """A drive and what is known of it.
 
@@ -82,6 +82,13 @@ class Run:
     drive: Drive
     scores: Scores
     learner: Learner | None
+
+    def __repr__(self) -> str:
+        rms, peak = self.scores.rms_e_y_m, self.scores.peak_e_y_m
+        return (
+            f"<Run on {self.label} tires along {self.drive.path.name}: {self.drive.ending}; "
+            f"{rms:.3f} m rms off the path, {peak:.3f} m at most>"
+        )
 
 
 def told_tire(label: str, setup: Setup, learnt: FrozenModel | None) -> TireModel:

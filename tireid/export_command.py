@@ -1,25 +1,17 @@
 """`tireid export DIR`: the identifier as clean C, and as FMU and ONNX."""
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from identifier.axle import AxleDesign
-from identifier.axle.model import AxleModel
-from identifier.defaults import default_design
 from identifier.design_file import read_design
-from identifier.export.figures import Cost, figures_text, measure, with_figures
-from identifier.export.package import Package, build_package, readme
-from identifier.method import CannotFreezeError, FrozenModel, Method
-from identifier.methods import DEFAULT, METHODS, REFERENCE, make_method
+from identifier.method import FrozenModel, Method
+from identifier.methods import DEFAULT, METHODS, REFERENCE, continuing, make_method
 from identifier.model_file import load_model
-from identifier.network_model import NetworkModel
 from models.vehicle import Vehicle, sedan
-from tireid.output import output_folder
+from tireid.commands import COMMANDS
+from tireid.exporting import export_method
 from tireid.progress import say
-
-IDENTIFIER = "identifier"  # folder of the package where a tracker lies beside it
 
 
 def add_parser(commands: Any) -> None:
@@ -31,7 +23,7 @@ def add_parser(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "export",
-        help="the identifier as clean C for a microcontroller, as FMU and ONNX for simulators",
+        help=COMMANDS["export"],
         description="Write a C99 package to DIR: library, example, self-test, CMakeLists.txt, "
         "README with its cost on Arm processors where the tools are there, and a JSON file of all "
         "that went in.",
@@ -71,42 +63,20 @@ def run(options: argparse.Namespace) -> None:
     start = None if options.weights is None else load_model(options.weights)
     vehicle = _vehicle(options.vehicle, start)
     method = _method(options, vehicle, start)
-    package = build_package(method, vehicle, start, name=options.name, single=options.single)
-    with output_folder(options.folder, force=options.force) as folder:
-        costs = measure(package)
-        place = folder / IDENTIFIER if options.mpc else folder
-        write_files(place, package, figures_text(costs), costs)
-        told = _write_tracker(folder, package, options.single) if options.mpc else []
-        if options.fmu:
-            _write_fmus(folder, package)
-        if options.onnx:
-            _write_onnx(folder, method, vehicle, package, start)
-    for cost in costs:
-        kind = "float" if cost.single else "double"
-        say(
-            f"{cost.processor}, {kind}: {cost.replay.instructions} instructions a step, "
-            f"{cost.flash} B flash, {cost.ram} B RAM, {cost.replay.stack} B stack"
-        )
-    for line in told:
+    exported = export_method(
+        method,
+        vehicle,
+        start,
+        options.folder,
+        name=options.name,
+        single=options.single,
+        fmu=options.fmu,
+        onnx=options.onnx,
+        mpc=options.mpc,
+        overwrite=options.force,
+    )
+    for line in str(exported).splitlines():
         say(line)
-    say(f"wrote {options.folder}/, hash {package.about['hash']}")
-
-
-def write_files(folder: Path, package: Package, figures: str, costs: Sequence[Cost] = ()) -> None:
-    """Write a package.
-
-    Parameters
-    ----------
-    folder : an empty folder.
-    package : the package.
-    figures : what it costs, as Markdown.
-    costs : what it costs, for the JSON file.
-    """
-    manifest = f"{package.folded.name}.json"
-    texts = {**package.files, "README.md": readme(package, figures)}
-    for path, text in {**texts, manifest: with_figures(texts[manifest], costs)}.items():
-        (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_text(text, encoding="utf-8")
 
 
 def _vehicle(path: Path | None, start: FrozenModel | None) -> Vehicle:
@@ -125,41 +95,4 @@ def _method(options: argparse.Namespace, vehicle: Vehicle, start: FrozenModel | 
         return read_design(options.design)
     if law is not None:
         return make_method(law, vehicle)
-    match start:
-        case NetworkModel():
-            return default_design(vehicle, network=start.network)
-        case AxleModel():
-            return AxleDesign.for_vehicle(vehicle)
-        case None:
-            return make_method(DEFAULT, vehicle)
-        case _:
-            raise ValueError(
-                f"{options.weights} holds a {type(start).__name__}, from which no method can go "
-                "on learning"
-            )
-
-
-def _write_tracker(folder: Path, package: Package, single: bool) -> list[str]:
-    from tireid.export_mpc import write_tracker
-
-    return write_tracker(folder, package, single=single)
-
-
-def _write_fmus(folder: Path, package: Package) -> None:
-    from identifier.export.fmu import export_fmu
-
-    name = package.folded.name
-    export_fmu(package.folded, folder / f"{name}_fmi2.fmu", 2)
-    export_fmu(package.folded, folder / f"{name}_fmi3.fmu", 3)
-
-
-def _write_onnx(
-    folder: Path, method: Method, vehicle: Vehicle, package: Package, start: FrozenModel | None
-) -> None:
-    from identifier.export.onnx_export import export_onnx
-
-    try:
-        model = start or method.frozen(vehicle, package.folded.carry)
-    except CannotFreezeError as error:
-        raise ValueError(f"--onnx: {error}") from error
-    export_onnx(model, folder / f"{package.folded.name}.onnx")
+    return make_method(DEFAULT, vehicle) if start is None else continuing(start, vehicle)

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from models.doors import require_few
+from tireid.commands import COMMANDS
 from tireid.output import output_folder
 from tireid.paper_results import study_text, write_study
 from tireid.paper_study import run_study
@@ -20,7 +21,7 @@ def add_parser(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "paper",
-        help="Tables I and II of the paper, beside ours, over many seeds",
+        help=COMMANDS["paper"],
         description="Repeat the paper's step steer and slalom on the built-in plant with both laws "
         "and the control 'instantaneous at eta/lambda'; write tables and figures.",
     )

@@ -1,7 +1,8 @@
 """What a command tells: its results on standard output, its progress on standard error.
 
-Both go through `terminal`, so that no name that comes from a file commands the terminal; and a
-stream that nobody reads any more, or that cannot be written, is no reason to stop working.
+Both go through `codegen.escape.terminal`, so that no name that comes from a file commands the
+terminal; and a stream that nobody reads any more, or that cannot be written, is no reason to stop
+working.
 """
 
 import logging
@@ -11,13 +12,17 @@ import time
 from contextlib import suppress
 from typing import TextIO
 
-from codegen.escape import terminal
-
 
 class _Line(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Print one message of the library."""
         say(record.getMessage())
+
+
+def _escaped(text: str) -> str:
+    from codegen.escape import terminal  # with all of codegen: what says nothing does not need it
+
+    return terminal(text)
 
 
 def say(text: str) -> None:
@@ -38,7 +43,7 @@ def complain(text: str) -> None:
     text : one or several lines.
     """
     try:
-        print(terminal(text), file=sys.stderr, flush=True)
+        print(_escaped(text), file=sys.stderr, flush=True)
     except OSError:
         _muffle(sys.stderr)
 
@@ -52,7 +57,7 @@ def tell(text: str) -> None:
     ----------
     text : one or several lines.
     """
-    _write_out(f"{terminal(text)}\n")
+    _write_out(f"{_escaped(text)}\n")
 
 
 def flush_out() -> None:

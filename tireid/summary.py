@@ -2,11 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any, cast
 
-from identifier.axle import AxleDesign
-from identifier.axle.design import NOT_CERTIFIED
+from identifier.certification import certify
 from identifier.design import Design
 from identifier.history import History
 from identifier.method import Method
@@ -20,15 +18,7 @@ from identifier.reproducibility import (
     online_error,
 )
 from models.vehicle import Vehicle
-from tireid.certificate_table import certificate_of
-
-
-def program_version() -> str:
-    """Return the version of tireid."""
-    try:
-        return version("tireid")
-    except PackageNotFoundError:  # run from a checkout that is not installed
-        return "unknown"
+from tireid import __version__
 
 
 def _axles(error: AxleRmse | None) -> dict[str, float] | None:
@@ -77,19 +67,13 @@ def method_numbers(design: Method) -> dict[str, Any]:
 def certificate_numbers(design: Method, vehicle: Vehicle) -> dict[str, Any]:
     """Return the verdict on a method, and which bounds hold of it whatever is measured.
 
-    Only the paper's laws have a certificate.
-
     Parameters
     ----------
     design : any method.
     vehicle : the car.
     """
-    if isinstance(design, Design):
-        verdict = certificate_of(design, vehicle).verdict
-        return {"verdict": verdict, "held_by_construction": {}}
-    if isinstance(design, AxleDesign):
-        return design.certificate
-    return {"verdict": NOT_CERTIFIED, "held_by_construction": {}}
+    certificate = certify(design, vehicle)
+    return {"verdict": certificate.verdict, "held_by_construction": certificate.held}
 
 
 def summarize(
@@ -151,5 +135,5 @@ def summarize_replays(
         "certificate": certificate_numbers(learnt.design, learnt.vehicle),
         "vehicle": vehicle_numbers(learnt.vehicle),
         "diverged_at_s": learnt.diverged_at,
-        "version": program_version(),
+        "version": __version__,
     }

@@ -1,10 +1,13 @@
 """One line of a certificate, and the verdict over all of them."""
 
 import math
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
 Status = Literal["pass", "warn", "fail"]
+Verdict = Literal["pass", "warn", "fail", "not certified"]
+NOT_CERTIFIED: Verdict = "not certified"
 SEVERITY: tuple[Status, ...] = ("pass", "warn", "fail")
 
 
@@ -34,21 +37,34 @@ class Property:
     advice: str = ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Certificate:
-    """All properties of a design.
+    """All properties of a design, and what its construction holds.
 
     Parameters
     ----------
-    properties : in the order of the table.
+    properties : in the order of the table; none where nothing is proven of stability and errors.
+    held : by name and unit, what holds after every sample whatever is measured: plain data.
     """
 
-    properties: tuple[Property, ...]
+    properties: tuple[Property, ...] = ()
+    held: Mapping[str, Any] = field(default_factory=dict)
 
     @property
-    def verdict(self) -> Status:
-        """The worst status."""
+    def verdict(self) -> Verdict:
+        """The worst status; "not certified" without a property."""
+        if not self.properties:
+            return NOT_CERTIFIED
         return max((entry.status for entry in self.properties), key=SEVERITY.index)
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.properties)} properties, {len(self.held)} boxes held"
+        return f"<Certificate: {self.verdict}; {counts}>"
+
+    def __str__(self) -> str:
+        lines = [f"{e.status}: {e.title}: {e.value:.4g} {e.unit}".rstrip() for e in self.properties]
+        lines += [f"held by construction: {name}: {value}" for name, value in self.held.items()]
+        return "\n".join([*lines, f"verdict: {self.verdict}"])
 
     def __getitem__(self, name: str) -> Property:
         """Return the property of that name."""

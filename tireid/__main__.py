@@ -1,0 +1,5 @@
+"""`python -m tireid`: the command line."""
+
+from tireid.cli import entry
+
+entry()

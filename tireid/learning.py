@@ -1,0 +1,65 @@
+"""Learning from a recording and asking what was learnt about another, as commands and users do."""
+
+from identifier.axle import AxleDesign
+from identifier.history import DivergedError, History
+from identifier.identify import identify as run_over
+from identifier.method import Method
+from identifier.reproducibility import Prediction, counted_samples, freeze_key, predict
+from identifier.tire_model import TireModel
+from models.recordings import Recording, check_against_vehicle
+from models.vehicle import Vehicle
+
+
+def identify(
+    recording: Recording,
+    vehicle: Vehicle,
+    method: Method | None = None,
+    *,
+    start: TireModel | None = None,
+    check: bool = True,
+) -> History:
+    """Learn the tires of a car from a drive, sample by sample.
+
+    Parameters
+    ----------
+    recording : what was driven; its axle forces are not looked at.
+    vehicle : the car that drove.
+    method : the identifier; None takes `AxleIdentifier.for_vehicle` at the recording's interval.
+    start : model to go on learning from; None begins afresh.
+    check : whether a recording that this vehicle cannot have driven is refused.
+
+    Raises
+    ------
+    RecordingError
+        Where the recording contradicts the vehicle.
+    DivergedError
+        Where the method runs away.
+    ValueError
+        Where the car never drives, or recording and method differ in their sampling interval.
+    """
+    design = AxleDesign.for_vehicle(vehicle, dt=recording.dt) if method is None else method
+    if check:
+        check_against_vehicle(recording, vehicle)
+    counted_samples(recording, design.min_speed)  # refuses a car that never drives
+    history = run_over(recording, vehicle, design, start)
+    if history.diverged_at is not None:
+        at = freeze_key(history.diverged_at)
+        raise DivergedError(f"{recording.name}: {type(design).__name__} diverged at {at} s")
+    return history
+
+
+def replay(tire: TireModel, recording: Recording, *, since: float | None = None) -> Prediction:
+    """Predict the axle forces of a drive and compare them with its true ones, where it has any.
+
+    Parameters
+    ----------
+    tire : what was learnt.
+    recording : another drive; samples below the model's minimum speed do not count.
+    since : samples before this time [s] do not count; None counts all.
+
+    Raises
+    ------
+    ValueError
+        Where no sample counts.
+    """
+    return predict(tire, recording, since=since)
