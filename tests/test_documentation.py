@@ -63,6 +63,11 @@ def needs_parameters(node: Documented) -> bool:
     return any("dataclass" in ast.unparse(decorator) for decorator in node.decorator_list)
 
 
+def is_overload(node: Documented) -> bool:
+    """Whether a function is only a signature for type checkers: its body has the docstring."""
+    return "overload" in {ast.unparse(decorator) for decorator in node.decorator_list}
+
+
 def public_definitions(source: str) -> list[Documented]:
     """Public functions, classes and methods."""
     found: list[Documented] = []
@@ -75,7 +80,7 @@ def public_definitions(source: str) -> list[Documented]:
                     for item in node.body
                     if isinstance(item, ast.FunctionDef) and not item.name.startswith("_")
                 ]
-    return found
+    return [node for node in found if not is_overload(node)]
 
 
 def complaints(source: str) -> list[str]:

@@ -80,9 +80,14 @@ def export(
     ------
     ValueError
         Where no method goes on from the model, or what is asked for cannot be made of the method.
+    FileExistsError
+        Where the folder is not empty and is not to be replaced.
     OSError
-        Where the folder exists or cannot be written.
+        Where it cannot be written.
     """
+    target = Path(folder)
+    if not overwrite and target.is_dir() and any(target.iterdir()):
+        raise FileExistsError(f"{target} is not empty: overwrite=True replaces it")
     start: TireModel | None = None
     if isinstance(source, History):
         method, car = source.design, vehicle or source.vehicle
@@ -99,7 +104,7 @@ def export(
         method,
         car,
         start,
-        Path(folder),
+        target,
         name=name,
         single=single,
         fmu=fmu,
@@ -142,7 +147,7 @@ def export_method(
     ValueError
         Where what is asked for cannot be made of the method.
     OSError
-        Where the folder exists or cannot be written.
+        Where the folder cannot be written.
     """
     package = build_package(method, vehicle, start, name=name, single=single)
     with output_folder(folder, force=overwrite) as scratch:

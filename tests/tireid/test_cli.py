@@ -7,7 +7,7 @@ from tireid.cli import main, one_line
 
 @pytest.mark.parametrize(
     "words",
-    [[], ["fly"], ["identify"], ["identify", "log.csv"], ["paper", "--seeds", "many"]],
+    [["fly"], ["identify"], ["identify", "log.csv"], ["paper", "--seeds", "many"]],
 )
 def test_wrong_words_are_one_line_with_exit_code_2(capsys, words):
     with pytest.raises(SystemExit) as stop:

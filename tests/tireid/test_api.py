@@ -1,0 +1,381 @@
+"""The one import: complete, lazy, typed, and the same numbers as the rooms behind it."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import tireid as ti
+from identifier.export.package import build_package
+from identifier.methods import make_method
+from models.recordings import RecordingError
+from mpc.prediction import build_dynamics
+from mpc.tires import tire_model
+from tireid.cli import main
+from tireid.commands import COMMANDS
+
+HEAVY = {"matplotlib", "control", "scipy", "casadi", "numpy"}
+KINDS = ("axle", "integral", "rls", "linear", "magic_formula_ekf", "dugoff_ekf")
+STATES = ((0.0, 0.0, 0.02), (0.3, 0.4, 0.05), (-1.2, 0.2, -0.1))  # v_y, r, delta
+
+
+@pytest.fixture(scope="module")
+def car():
+    return ti.sedan()
+
+
+@pytest.fixture(scope="module")
+def log(logs):
+    return ti.read_recording(logs / "slalom.csv")
+
+
+@pytest.fixture(scope="module")
+def run(log, car):
+    return ti.identify(log, car)
+
+
+@pytest.fixture(scope="module")
+def tires(log, car):
+    """What every kind of method froze to, by its name."""
+    return {name: ti.identify(log, car, make_method(name, car)).freeze() for name in KINDS}
+
+
+def imported_by(code: str) -> set[str]:
+    """Packages that a fresh Python has imported after some code."""
+    script = f"import sys\n{code}\nprint(*(m.split('.')[0] for m in sys.modules), file=sys.stderr)"
+    command = [sys.executable, "-c", script]
+    told = subprocess.run(command, capture_output=True, text=True, check=True)
+    return set(told.stderr.split())
+
+
+def help_of(words: str) -> str:
+    return (
+        "from tireid.cli import main\n"
+        f"try:\n    main({words})\nexcept SystemExit as stop:\n    assert not stop.code"
+    )
+
+
+@pytest.mark.parametrize("code", ["import tireid", help_of("[]"), help_of("['--help']")])
+def test_the_door_opens_without_what_stands_behind_it(code):
+    assert not imported_by(code) & HEAVY
+
+
+def test_what_is_used_is_imported_and_drawing_still_is_not():
+    packages = imported_by("import tireid as ti; ti.sedan(); ti.identify; ti.read_recording")
+    assert "casadi" in packages and "matplotlib" not in packages
+
+
+def test_every_promised_name_is_there_and_an_unknown_one_is_refused():
+    for name in ti.__all__:
+        assert getattr(ti, name) is not None
+    assert set(ti.__all__) <= set(dir(ti))
+    with pytest.raises(AttributeError, match="no attribute 'identifyy'"):
+        ti.identifyy  # noqa: B018
+
+
+def test_python_m_tireid_is_the_command_line():
+    told = subprocess.run(
+        [sys.executable, "-m", "tireid", "--version"], capture_output=True, text=True, check=True
+    )
+    assert told.stdout == f"tireid {ti.__version__}\n"
+
+
+def test_tireid_alone_prints_help(capsys):
+    assert main([]) == 0
+    alone = capsys.readouterr().out
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert alone == capsys.readouterr().out
+    assert all(command in alone for command in COMMANDS)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_of_the_list_is_one(name, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main([name, "--help"])
+    assert stop.value.code == 0
+    assert f"usage: tireid {name}" in capsys.readouterr().out
+
+
+def test_the_shortest_way_learns_the_tires(run, log):
+    tire = run.freeze()
+    assert np.array_equal(tire.predict(log), run.freeze(t=log.t[-1]).axle_force(log))
+    missed = ti.replay(tire, log)
+    rms = np.sqrt(np.mean((tire.predict(log) - log.axle_force) ** 2, axis=0))
+    assert np.allclose([missed.against_truth.front, missed.against_truth.rear], rms)
+    assert missed.against_truth.rear < 0.15 * missed.true_force.rear
+    assert missed.against_truth.front < 0.15 * missed.true_force.front
+
+
+def test_the_command_and_the_function_write_the_same_model(logs, run, tmp_path):
+    out = tmp_path / "out"
+    words = ["identify", str(logs / "slalom.csv"), "--vehicle", str(logs / "car.toml")]
+    assert main([*words, "--out", str(out)]) == 0
+    assert json.loads((out / "weights.json").read_text()) == run.freeze().to_dict()
+
+
+def test_a_recording_of_another_car_is_refused(log, car):
+    from dataclasses import replace
+
+    swapped = replace(car, l_f=4.0 * car.l_f, l_r=4.0 * car.l_r, yaw_inertia=16 * car.yaw_inertia)
+    with pytest.raises(RecordingError):
+        ti.identify(log, swapped)
+    ti.identify(log, swapped, check=False)
+
+
+def columns_of(log):
+    return {"t": log.t, "vx": log.v_x, "vy": log.v_y, "r": log.r, "delta_f": log.delta_f}
+
+
+class Frame:
+    """As much of a data frame as pandas and polars share."""
+
+    def __init__(self, columns):
+        self._columns, self.columns = columns, list(columns)
+
+    def __getitem__(self, name):
+        return self._columns[name]
+
+
+@pytest.mark.parametrize("kind", [dict, Frame])
+def test_arrays_are_read_as_a_file_is(kind, log):
+    same = ti.Recording.from_dataframe(kind(columns_of(log)), name="mine")
+    assert same.name == "mine"
+    assert np.allclose(same.x, log.x, atol=1e-12) and not same.delta_r.any()
+    assert same.a_y is None and same.axle_force is None
+
+
+def test_a_pandas_frame_is_read(log):
+    pandas = pytest.importorskip("pandas", reason="needs pandas, which is no dependency")
+    frame = pandas.DataFrame({**columns_of(log), "run": "lap 2", "comment": "x"})
+    assert ti.Recording.from_dataframe(frame).name == "recording:lap 2"
+
+
+def test_columns_of_another_name_and_runs_are_chosen(log):
+    columns = columns_of(log)
+    columns["yaw_rate"] = columns.pop("r")
+    twice = {name: np.concatenate([value, value]) for name, value in columns.items()}
+    twice["run"] = np.repeat(["a", "b"], log.t.size)
+    read = ti.Recording.from_dataframe(twice, run="b", columns={"r": "yaw_rate"})
+    assert read.name == "recording:b" and np.allclose(read.r, log.r)
+    with pytest.raises(RecordingError, match="name one of its runs: a, b"):
+        ti.Recording.from_dataframe(twice, columns={"r": "yaw_rate"})
+    with pytest.raises(RecordingError, match="did you mean 'yaw_rate' for r"):
+        ti.Recording.from_dataframe(twice, run="b")
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "said"),
+    [
+        ("r", np.negative, "delta_f must turn the car to the left"),
+        ("r", np.degrees, "degrees per second"),
+        ("vy", lambda v: v[:-1], "columns must have one length"),
+        ("vy", lambda v: v[:, None], "one axis"),
+        ("vx", lambda v: np.where(v > 0, np.nan, v), "must be finite"),
+        ("vx", lambda v: v.astype(str), "must be numeric"),
+        ("t", lambda t: 1e3 * t, "milliseconds"),
+        ("t", lambda t: t[::-1], "must increase"),
+    ],
+)
+def test_arrays_are_judged_as_a_file_is(log, name, change, said):
+    columns = columns_of(log)
+    columns[name] = change(columns[name])
+    with pytest.raises(RecordingError, match=f"^recording: .*{said}"):
+        ti.Recording.from_dataframe(columns)
+
+
+@pytest.mark.parametrize("data", [[1.0, 2.0], 3.0, None])
+def test_what_has_no_columns_is_refused(data):
+    with pytest.raises(RecordingError, match="a data frame or a mapping"):
+        ti.Recording.from_dataframe(data)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_force_takes_numbers_and_arrays_of_any_shape(tires, name):
+    tire = tires[name]
+    grid = np.array([[-0.05, 0.01, 0.0], [0.02, 0.1, 0.2]])
+    both = tire.force(grid)
+    assert both.shape == (2, 3, 2)
+    assert np.array_equal(tire.force(grid, "rear"), both[..., 1])
+    assert tire.force([], "front").shape == (0,)
+    one = tire.force(0.1, axle="front")
+    assert isinstance(one, float) and one == both[1, 1, 0]
+    with pytest.raises(ValueError, match="front or rear, it is 'middle'"):
+        tire.force(0.1, "middle")
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_force_is_what_a_straight_drifting_car_would_be_told(tires, car, name):
+    """δ = 0, r = 0 and v_y = -v_x tan α: both axles slip by α, and the lag has settled."""
+    tire, n, alpha, v_x = tires[name], 400, 0.03, 15.0
+    small = name in ("integral", "rls", "linear")  # their slip angle is that of (3)
+    v_y = -v_x * (alpha if small else np.tan(alpha))
+    if name == "axle":  # which takes off the offsets that its sensors had
+        v_y += tire.own[1, 2]
+    drifting = ti.Recording(
+        name="drift",
+        t=0.01 * np.arange(n),
+        v_x=np.full(n, v_x),
+        v_y=np.full(n, v_y),
+        **{signal: np.zeros(n) for signal in ("r", "delta_f", "delta_r")},
+    )
+    told = tire.predict(drifting)[-1]
+    if name == "axle":
+        offset = tire.own[0, 2]
+        expected = np.array([tire.force(alpha + offset, "front"), tire.force(alpha, "rear")])
+    else:
+        expected = tire.force(alpha, v_x=v_x)
+    assert np.allclose(told, expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_stiffness_is_the_slope_at_zero(tires, name):
+    tire, small = tires[name], 1e-5
+    slope = (tire.force(small) - tire.force(-small)) / (2.0 * small)
+    assert np.allclose(tire.stiffness, slope, rtol=1e-3)
+    if name == "linear":
+        assert np.array_equal(tire.stiffness, tire.vehicle.bicycle[4:])
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_the_equations_of_motion_are_those_of_the_tracker(tires, name):
+    """In the frame of a straight path at heading 0 the tracker's v̇_y, ṙ are the car's."""
+    tire = tires[name]
+    theirs = tire_model(tire)
+    tracker, dynamics = build_dynamics(theirs.structure), tire.casadi_function().dynamics
+    for v_y, r, delta in STATES:
+        slips = [0.03, -0.02] if tire.lagged else []
+        x = np.array([0.0, 0.0, v_y, r, delta, *slips])
+        told = tracker(
+            x, 0.0, 0.0, 18.0, 1e-9, theirs.car, theirs.weights, [np.inf, np.inf], [0.0, 0.0]
+        )
+        ours = dynamics([v_y, r, *slips], delta, 18.0)[0]
+        rows = [2, 3, *([5, 6] if tire.lagged else [])]
+        assert np.allclose(np.array(ours).ravel(), np.array(told).ravel()[rows], rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_the_step_integrates_the_equations_of_motion(tires, name):
+    tire = tires[name]
+    functions = tire.casadi_function()
+    assert [f.name() for f in functions] == ["tire_force_curve", "car_dynamics", "car_step"]
+    assert functions.step.name_in() == ["x", "delta", "v_x", "dt"]
+    x = x0 = np.array([0.2, 0.1, *([0.02, 0.01] if tire.lagged else [])])
+    dt, parts = 0.02, 4000
+    for _ in range(parts):  # Euler, in steps that are small enough
+        x = x + dt / parts * np.array(functions.dynamics(x, 0.04, 20.0)[0]).ravel()
+    once = np.array(functions.step(x0, 0.04, 20.0, dt)).ravel()
+    assert np.allclose(once, x, atol=1e-3 * np.abs(x - x0).max())
+
+
+def test_the_lag_of_a_step_is_bounded_so_that_it_stays_stable(tires):
+    step = tires["axle"].casadi_function().step
+    x = np.array([0.0, 0.0, 0.1, -0.1])
+    for _ in range(50):
+        x = np.array(step(x, 0.0, 40.0, 0.2)).ravel()
+    assert np.abs(x).max() < 1.0
+
+
+def test_the_functions_have_derivatives(tires):
+    for tire in tires.values():
+        dynamics = tire.casadi_function().dynamics
+        x = ca.MX.sym("x", dynamics.size1_in("x"))
+        J = ca.Function("J", [x], [ca.jacobian(dynamics(x, 0.05, 20.0)[0], x)])
+        at = np.full(x.numel(), 0.01)
+        assert np.isfinite(np.array(J(at))).all()
+
+
+@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("as_path", [str, Path])
+def test_a_saved_model_comes_back(tires, log, tmp_path, name, as_path):
+    path = as_path(tmp_path / "tire.json")
+    tires[name].save(path)
+    again = ti.TireModel.load(path)
+    assert type(again) is type(tires[name])
+    assert np.array_equal(again.predict(log), tires[name].predict(log))
+
+
+def test_a_summary_says_what_the_numbers_are(tires):
+    tire = tires["axle"]
+    lines = tire.summary().splitlines()
+    stiffness = next(line for line in lines if line.startswith("cornering stiffness"))
+    values = [float(word) for word in re.findall(r"[\d.]+e\+05|\d{4,}", stiffness)]
+    assert np.allclose(values, tire.stiffness, rtol=1e-3)
+    for word in ("relaxation length", "known up to", "standard deviation", "time of learning"):
+        assert word in tire.summary()
+    assert tires["linear"].known_slip is None and "known" not in tires["linear"].summary()
+    assert np.array_equal(tire.known_slip, tire.known_slip_range)
+
+
+def test_representations_are_short(tires, run, log, car):
+    certificate = ti.certify(ti.PaperIdentifier.for_vehicle(car), car)
+    for shown in (*tires.values(), run, log, certificate, ti.replay(tires["axle"], log)):
+        assert len(repr(shown)) < 160 and "\n" not in repr(shown)
+    assert "sedan" in repr(tires["axle"])
+
+
+def test_only_the_paper_s_identifier_is_certified(car):
+    axle = ti.certify(ti.AxleIdentifier.for_vehicle(car), car)
+    assert axle.verdict == "not certified" and not axle.properties
+    assert axle.held["grip_static_axle_loads"] == [0.1, 1.5]
+    assert "not certified" in str(axle)
+    paper = ti.certify(ti.PaperIdentifier.for_vehicle(car), car)
+    assert paper.verdict in ("pass", "warn") and paper["phase_margin"].value > 30.0
+    assert ti.certify(ti.make_method("eso", car), car).verdict == "not certified"
+    wild = ti.PaperIdentifier.for_vehicle(car)
+    from dataclasses import replace
+
+    gains = replace(wild.gains, eta_W=1e4 * wild.gains.eta_W)
+    assert ti.certify(replace(wild, gains=gains), car).verdict == "fail"
+
+
+def test_a_run_a_model_and_a_method_are_exported(run, car, tmp_path):
+    written = ti.export(run, tmp_path / "run", name="axle")
+    assert (tmp_path / "run" / "include" / "axle.h").is_file()
+    expected = build_package(run.design, car, run.freeze(), name="axle", single=False)
+    assert written.package.about["hash"] == expected.about["hash"]
+    assert str(written).endswith(f"wrote {tmp_path / 'run'}/, hash {expected.about['hash']}")
+    from_model = ti.export(run.freeze(), str(tmp_path / "model"), name="axle")
+    assert from_model.package.about["hash"] == expected.about["hash"]
+    fresh = ti.export(run.design, tmp_path / "method", vehicle=car, name="axle")
+    assert fresh.package.about["hash"] != expected.about["hash"]
+    with pytest.raises(FileExistsError, match="overwrite=True replaces it"):
+        ti.export(run, tmp_path / "run")
+    again = ti.export(run, tmp_path / "run", name="other", overwrite=True)
+    assert (again.folder / "include" / "other.h").is_file()
+    assert not (again.folder / "include" / "axle.h").exists()
+
+
+def test_no_method_goes_on_from_a_curve(tires, tmp_path):
+    with pytest.raises(ValueError, match="no method can go on learning from a CurveModel"):
+        ti.export(tires["linear"], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_learnt_tires_steer_better_than_linear_ones(car):
+    log = ti.sample_recording(car)
+    tire, path = ti.identify(log, car).freeze(), ti.paths.iso_3888_2()
+    learnt, linear = ti.drive(path, car, tire), ti.drive(path, car)
+    assert learnt.scores.completed
+    assert learnt.scores.rms_e_y_m < 0.5 * linear.scores.rms_e_y_m
+    assert "frozen tires" in repr(learnt) and len(repr(learnt)) < 160
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ({"delay": 0.015}, "steps of 0.01 s"),
+        ({"share": 0.0}, "share must be positive"),
+        ({"friction": 9.0}, "friction must be"),
+        ({"laps": 2.0}, "laps are of a closed path"),
+        ({"learning": True}, "none is given"),
+    ],
+)
+def test_a_drive_that_cannot_be_is_refused(car, words, said):
+    with pytest.raises(ValueError, match=said):
+        ti.drive(ti.paths.iso_3888_2(), car, **words)
