@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.axle.model import AxleModel
 from identifier.method import FrozenModel
 from models.vehicle import Vehicle
 from mpc.handover.certificate import LARGEST_SLIP
@@ -57,10 +56,10 @@ class Excitation:
         for axle, time in zip(("front", "rear"), self._time, strict=True):
             if not time >= self._least_time:
                 return f"the {axle} axle learnt for {time:.1f} s, not {self._least_time:g} s"
-        if isinstance(model, AxleModel):
+        if model.known_slip is not None:
             driven = np.quantile(np.abs(slips(samples, self._vehicle)), 0.95, axis=0)
             for i, axle in enumerate(("front", "rear")):
-                known = BEYOND * model.known_slip_range[i] + LEARNS
+                known = BEYOND * model.known_slip[i] + LEARNS
                 if driven[i] > known:
                     return (
                         f"the {axle} axle slips {driven[i]:.3f} rad, it is known to {known:.3f} rad"

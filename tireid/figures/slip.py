@@ -6,7 +6,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from identifier.axle import AxleModel
 from identifier.history import History
 from identifier.method import FrozenModel
 from models.recordings import Recording
@@ -84,8 +83,9 @@ def slip_figure(model: FrozenModel, recording: Recording, online: History | None
         margin = 0.04 * (high - low) or 1.0
         ends = np.array([low - margin, high + margin])
         axes.plot(ends, stiffness[axle] / unit.newtons * np.deg2rad(ends), **LINEAR)
-        if isinstance(model, AxleModel):
+        if model.known_slip is not None:
             _draw_curve(axes, model, axle, ends, unit.newtons)
+            _shade_unknown(axes, float(np.rad2deg(model.known_slip[axle])), ends)
         axes.set(
             xlim=ends, ylim=limits, title=name, xlabel=rf"slip angle $\alpha_{'fr'[axle]}$ [deg]"
         )
@@ -96,18 +96,21 @@ def slip_figure(model: FrozenModel, recording: Recording, online: History | None
 
 
 def _draw_curve(
-    axes: Axes, model: AxleModel, axle: int, ends: NDArray[np.float64], newtons: float
+    axes: Axes, model: FrozenModel, axle: int, ends: NDArray[np.float64], newtons: float
 ) -> None:
-    """Draw the steady curve of an axle, and shade the slip that the model does not know."""
+    """Draw the steady curve of an axle."""
     slip = np.linspace(np.deg2rad(ends[0]), np.deg2rad(ends[1]), 200)
     axes.plot(
         np.rad2deg(slip),
-        model.force_at(slip)[:, axle] / newtons,
+        model.force(slip)[:, axle] / newtons,
         color=BLUE,
         linewidth=1.2,
         label="frozen curve, steady",
     )
-    known = float(np.rad2deg(model.known_slip_range[axle]))
+
+
+def _shade_unknown(axes: Axes, known: float, ends: NDArray[np.float64]) -> None:
+    """Shade the slip [deg] that the model does not know."""
     for low, high in ((ends[0], -known), (known, ends[1])):
         if low < high:
             axes.axvspan(low, high, color="#EFE9DD", linewidth=0.0, zorder=0, label=UNKNOWN)
