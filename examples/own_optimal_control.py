@@ -47,7 +47,8 @@ def lane_change(tire: ti.TireModel) -> tuple[NDArray[np.float64], NDArray[np.flo
     problem.set_initial(T, 2.0)
     problem.solver("ipopt", {"print_time": False}, {"print_level": 0, "sb": "yes"})
     solution = problem.solve()
-    return np.linspace(0.0, float(solution.value(T)), STEPS + 1), solution.value(S[2, :])
+    delta = np.asarray(solution.value(S[2, :]))
+    return np.linspace(0.0, float(solution.value(T)), STEPS + 1), delta
 
 
 def driven(t: NDArray[np.float64], delta: NDArray[np.float64]) -> float:
