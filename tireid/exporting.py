@@ -154,11 +154,7 @@ def export_method(
         costs = measure(package)
         place = scratch / IDENTIFIER if mpc else scratch
         write_files(place, package, figures_text(costs), costs)
-        told: Sequence[str] = ()
-        if mpc:
-            from tireid.export_mpc import write_tracker
-
-            told = write_tracker(scratch, package, single=single)
+        told = _write_tracker(scratch, package, single) if mpc else []
         if fmu:
             from identifier.export.fmu import export_fmu
 
@@ -186,6 +182,12 @@ def write_files(folder: Path, package: Package, figures: str, costs: Sequence[Co
     for path, text in {**texts, manifest: with_figures(texts[manifest], costs)}.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, encoding="utf-8")
+
+
+def _write_tracker(folder: Path, package: Package, single: bool) -> list[str]:
+    from tireid.export_mpc import write_tracker
+
+    return write_tracker(folder, package, single=single)
 
 
 def _write_onnx(

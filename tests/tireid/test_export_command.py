@@ -12,7 +12,7 @@ from identifier.identify import identify
 from identifier.methods import make_method
 from models.recordings import read_recording
 from models.vehicle import sedan
-from tireid import export_command
+from tireid import export_command, exporting
 from tireid.cli import main
 
 CAR = sedan()
@@ -21,7 +21,7 @@ CAR = sedan()
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
     """Costs on Arm have tests of their own."""
-    monkeypatch.setattr(export_command, "measure", lambda _: [])
+    monkeypatch.setattr(exporting, "measure", lambda _: [])
 
 
 def test_a_package_is_complete(tmp_path):
@@ -110,7 +110,7 @@ def test_beside_a_tracker_the_identifier_lies_in_a_folder_of_its_own(monkeypatch
         return [str(path.relative_to(folder)) for path in sorted(folder.iterdir())]
 
     said = []
-    monkeypatch.setattr(export_command, "_write_tracker", seen)
+    monkeypatch.setattr(exporting, "_write_tracker", seen)
     monkeypatch.setattr(export_command, "say", said.append)
     out = tmp_path / "package"
     assert main(["export", str(out), "--paper", "--mpc"]) == 0

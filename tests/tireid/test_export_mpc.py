@@ -15,7 +15,7 @@ from models.recordings import read_recording
 from models.vehicle import sedan
 from mpc.export import figures
 from mpc.tires import tire_model
-from tireid import export_command
+from tireid import exporting
 from tireid.cli import main
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
@@ -25,7 +25,7 @@ CAR = sedan()
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
     """Costs on Arm have tests of their own."""
-    monkeypatch.setattr(export_command, "measure", lambda _: [])
+    monkeypatch.setattr(exporting, "measure", lambda _: [])
     monkeypatch.setattr(figures, "missing_tools", lambda: ("arm-none-eabi-gcc",))
 
 

@@ -11,7 +11,7 @@ import pytest
 from codegen import find_compiler
 from identifier.export import figures
 from models.vehicle import sedan
-from tireid import export_command
+from tireid import exporting
 from tireid.cli import main
 
 ORDER = "x\nexecute_process(COMMAND ${CMAKE_COMMAND} -E touch ran)\n#"
@@ -35,7 +35,7 @@ NAMES = {
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    monkeypatch.setattr(export_command, "measure", lambda _: [])
+    monkeypatch.setattr(exporting, "measure", lambda _: [])
     monkeypatch.setattr(figures, "measure", lambda _: [])
 
 
