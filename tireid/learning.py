@@ -44,7 +44,8 @@ def identify(
     history = run_over(recording, vehicle, design, start)
     if history.diverged_at is not None:
         at = freeze_key(history.diverged_at)
-        raise DivergedError(f"{recording.name}: {type(design).__name__} diverged at {at} s")
+        law = getattr(design, "law", type(design).__name__)
+        raise DivergedError(f"{recording.name}: the {law} law diverged at {at} s")
     return history
 
 
