@@ -78,7 +78,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     words = sys.argv[1:] if arguments is None else list(arguments)
     try:
         parser = build_parser(words)
-    except ValueError as error:  # a limit that the environment sets
+    except LimitError as error:  # of the environment
         complain(f"tireid: error: {one_line(error)}")
         return BAD_INPUT
     options = parser.parse_args(words)
