@@ -22,9 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.escape import visible
-from models.limits import VARIABLE, limits
+from models.limits import VARIABLE
 from models.limits import LimitError as LimitError
 from models.limits import Limits as Limits
+from models.limits import limits as limits
 from models.limits import limits_text as limits_text
 
 CHUNK = 1 << 20  # bytes that are unpacked at a time

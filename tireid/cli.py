@@ -11,7 +11,7 @@ from types import FrameType
 from typing import NoReturn
 
 import tireid
-from models.limits import limits_text
+from models.limits import LimitError, limits_text
 from tireid.commands import COMMANDS, add_command
 from tireid.progress import complain, flush_out, listen_to_library, unwritten
 
