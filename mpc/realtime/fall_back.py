@@ -6,7 +6,6 @@ The linear bicycle with the vehicle's own cornering stiffness, so that nothing t
 may be what the solver failed at, reaches it. The delay is a lag of its length.
 """
 
-from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +21,8 @@ SPEEDS = np.round(np.geomspace(2.0, 100.0, 8), 3)  # m/s; the C takes what lies 
 N_SPEEDS = SPEEDS.size
 STEERING = 0.2  # rad that cost as much as `e_y`, where the car hardly moves
 DIGITS = 9  # of what is exported: other digits depend on the machine
-DOUBLINGS = 40
+DOUBLINGS = 40  # at most; ten are usual
+ENOUGH = 1e-13  # change of the cost, in parts
 
 
 class FallBack(NamedTuple):
@@ -106,32 +106,26 @@ def feedback(A: Array, B: Array, Q: Array, R: Array) -> Array:
     Q : (n, n), symmetric, not negative.
     R : (m, m), symmetric, positive.
     """
-    P = _last(_doubled(A, B @ np.linalg.solve(R, B.T), Q))
+    P = _riccati(A, B @ np.linalg.solve(R, B.T), Q)
     gains: Array = np.linalg.solve(R + B.T @ P @ B, B.T @ P @ A)
     return gains
 
 
-def _doubled(A: Array, G: Array, P: Array) -> Iterator[Array]:
-    """Yield P behind 1, 2, 4, … samples until it stays."""
-    eye = np.eye(len(A))
+def _riccati(A: Array, G: Array, Q: Array) -> Array:
+    """Return P of the cost behind 1, 2, 4, … samples, until it stays; G = B R⁻¹ B'."""
+    P, eye = Q, np.eye(len(A))
     for _ in range(DOUBLINGS):
         W = np.linalg.solve(eye + G @ P, np.hstack([A, G]))
         A_1, G_1 = W[:, : len(A)], W[:, len(A) :]
-        last, P = P, P + A.T @ P @ A_1
-        A, G = A @ A_1, G + A @ G_1 @ A.T
-        P, G = 0.5 * (P + P.T), 0.5 * (G + G.T)
-        yield P
-        if np.abs(P - last).max() <= 1e-13 * np.abs(P).max():
-            return
-
-
-def _last(found: Iterator[Array]) -> Array:
-    *_, last = found
-    return last
+        step: Array = A.T @ P @ A_1
+        A, G, P = A @ A_1, G + A @ G_1 @ A.T, P + 0.5 * (step + step.T)
+        if np.abs(step).max() <= ENOUGH * np.abs(P).max():
+            break
+    return P
 
 
 def _sampled(A: Array, B: Array, period: float) -> tuple[Array, Array]:
-    """Return A and B of samples with u held, by the exponential of the series, halved and squared."""
+    """Return A and B of samples with u held: the series of the exponential, halved and squared."""
     n, m = B.shape
     M = period * np.vstack([np.hstack([A, B]), np.zeros((m, n + m))])
     halvings = max(0, int(np.ceil(np.log2(max(np.abs(M).sum(axis=1).max(), 1e-300)))) + 3)

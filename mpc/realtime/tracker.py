@@ -164,10 +164,10 @@ class Tracker:
         Raises
         ------
         ValueError
-            Where the angle is not finite.
+            Where the angle is not finite, or beyond 3.2 rad.
         """
         if self.instance.reset(steering) != Status.OK:
-            raise ValueError(f"steering must be finite, it is {steering}")
+            raise ValueError(f"steering must be finite and at most 3.2 rad, it is {steering}")
 
     def step(self, measurement: Measurement) -> Command:
         """Return what to steer from `delay` after the measurement on.
