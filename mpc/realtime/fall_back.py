@@ -106,16 +106,19 @@ def feedback(A: Array, B: Array, Q: Array, R: Array) -> Array:
     Q : (n, n), symmetric, not negative.
     R : (m, m), symmetric, positive.
     """
-    P = _riccati(A, B @ np.linalg.solve(R, B.T), Q)
-    gains: Array = np.linalg.solve(R + B.T @ P @ B, B.T @ P @ A)
-    return gains
+    P = _riccati(A, B @ _solved(R, B.T), Q)
+    return _solved(R + B.T @ P @ B, B.T @ P @ A)
+
+
+def _solved(M: Array, right: Array) -> Array:
+    return np.asarray(np.linalg.solve(M, right), dtype=np.float64)
 
 
 def _riccati(A: Array, G: Array, Q: Array) -> Array:
     """Return P of the cost behind 1, 2, 4, … samples, until it stays; G = B R⁻¹ B'."""
     P, eye = Q, np.eye(len(A))
     for _ in range(DOUBLINGS):
-        W = np.linalg.solve(eye + G @ P, np.hstack([A, G]))
+        W = _solved(eye + G @ P, np.hstack([A, G]))
         A_1, G_1 = W[:, : len(A)], W[:, len(A) :]
         step: Array = A.T @ P @ A_1
         A, G, P = A @ A_1, G + A @ G_1 @ A.T, P + 0.5 * (step + step.T)
