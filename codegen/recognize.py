@@ -1,7 +1,8 @@
 """Finding again, in the scalars of a function, what a person would have written there.
 
-a·[c] + b·[not c] is a choice; the scalars of our own tanh, exp, atan and sin are one call each.
-Those of C libraries become calls of our own: they would differ from machine to machine.
+a·[c] + b·[not c] is a choice, and so is the derivative of fmax and fmin; the scalars of our own
+tanh, exp, atan and sin are one call each. Those of C libraries become calls of our own: they would
+differ from machine to machine.
 """
 
 import math
@@ -49,7 +50,7 @@ def _with_choices(graph: Graph) -> Graph:
     result, place_of = Graph(), dict[int, int]()
     for place, node in enumerate(graph.nodes):
         moved = _mapped(node, place_of)
-        place_of[place] = result.add(_choice(result, moved) or moved)
+        place_of[place] = result.add(_choice(result, moved) or _slope(result, moved) or moved)
     result.outputs = [[place_of[p] for p in entries] for entries in graph.outputs]
     return result
 
@@ -65,6 +66,24 @@ def _choice(graph: Graph, node: Node) -> Node | None:
             if negated.op == "not" and negated.args[0] == first.args[0]:
                 return Node("select", (first.args[0], first.args[1], second.args[1]))
     return None
+
+
+def _slope(graph: Graph, node: Node) -> Node | None:
+    """Return CasADi's derivative of fmax or fmin, [a <= b]/([a <= b] + [b <= a]), as choices.
+
+    Half where a is b, and zero in place of 0/0 where one is NaN.
+    """
+    if node.op != "div":
+        return None
+    holds, both = (graph.nodes[a] for a in node.args)
+    if holds.op != "le" or both.op != "add" or node.args[0] not in both.args:
+        return None
+    other = both.args[1] if both.args[0] == node.args[0] else both.args[0]
+    if graph.nodes[other] != Node("le", holds.args[::-1]):
+        return None
+    half, one = graph.constant(0.5), graph.constant(1.0)
+    slope = graph.add(Node("select", (other, half, one)))
+    return Node("select", (node.args[0], slope, graph.constant(0.0)))
 
 
 def _by_sines(graph: Graph, node: Node) -> int:

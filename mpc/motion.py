@@ -15,6 +15,8 @@ from mpc.tires.reach import believed_force
 from mpc.tires.structure import Car, Point, PredictionTire
 
 N_CAR = 4
+# Least 1 - κ e_y that is believed: towards the center of a turn it vanishes, and ṡ has no bound.
+NEAREST = 0.1
 
 
 class Ports(NamedTuple):
@@ -81,7 +83,7 @@ def motion(structure: PredictionTire, p: Ports) -> Motion:
 
     F = ca.SX.sym("F", 2)
     c, s = ca.cos(e_psi), ca.sin(e_psi)
-    s_dot = (p.v_x * c - v_y * s) * (1 / (1 - p.kappa * e_y))
+    s_dot = (p.v_x * c - v_y * s) * (1 / ca.fmax(1 - p.kappa * e_y, NEAREST))
     rates = [
         p.v_x * s + v_y * c,
         r - p.kappa * s_dot,

@@ -10,6 +10,7 @@
 #define N @NAME@_HORIZON
 #define NX @NAME@_STATES
 #define STEERING 4U /* place of the angle among the states */
+#define MOST @NAME@_C(1e12) /* of a number that is carried: what is computed of it does not overflow */
 
 #define real @name@_real
 
@@ -30,6 +31,34 @@ bool @name@_within(real x, real limit)
     return (x <= limit) && (x >= -limit);
 }
 
+bool @name@_carriable(const real *x, uint32_t n)
+{
+    uint32_t beyond = 0U;
+    uint32_t i;
+    for (i = 0U; i < n; i++) {
+        beyond += @name@_within(x[i], MOST) ? 0U : 1U;
+    }
+    return beyond == 0U;
+}
+
+void @name@_clear(@name@_state *state)
+{
+    uint32_t k;
+    uint32_t i;
+    for (k = 0U; k <= N; k++) {
+        for (i = 0U; i < NX; i++) {
+            state->x[k][i] = @NAME@_C(0.0);
+        }
+    }
+    for (k = 0U; k < N; k++) {
+        state->u[k] = @NAME@_C(0.0);
+        for (i = 0U; i < NX; i++) {
+            state->feedback[k][i] = @NAME@_C(0.0);
+        }
+    }
+    state->guessed = 1U;
+}
+
 bool @name@_on_map(const @name@_params *params, const real *x)
 {
     return @name@_within(x[0], params->widest_e_y) && @name@_within(x[1], params->widest_e_psi)
@@ -38,7 +67,8 @@ bool @name@_on_map(const @name@_params *params, const real *x)
 
 void @name@_shift(@name@_state *state, const @name@_params *params)
 {
-    const real share = params->period / params->stage_time;
+    const real told = params->period / params->stage_time;
+    const real share = ((told >= @NAME@_C(0.0)) && (told <= @NAME@_C(1.0))) ? told : @NAME@_C(1.0);
     uint32_t k;
     uint32_t i;
     for (k = 0U; k < N; k++) {
@@ -60,6 +90,7 @@ void @name@_guess(@name@_state *state, const @name@_params *params, const real *
 {
     const real length = params->car[2] + params->car[3];
     real left = @NAME@_C(1.0); /* share of the way to the path that is left */
+    bool finite = true;
     uint32_t k;
     uint32_t i;
     for (k = 0U; k <= N; k++) {
@@ -71,6 +102,7 @@ void @name@_guess(@name@_state *state, const @name@_params *params, const real *
         for (i = 0U; i < NX; i++) {
             state->x[k][i] = rest[i] + (left * (x[i] - rest[i]));
         }
+        finite = @name@_carriable(state->x[k], NX) && finite;
         left *= @NAME@_C(1.0) - (params->stage_time / (params->stage_time + @NAME@_C(0.5)));
     }
     for (k = 0U; k < N; k++) {
@@ -81,6 +113,9 @@ void @name@_guess(@name@_state *state, const @name@_params *params, const real *
         }
     }
     state->guessed = 1U;
+    if (!finite || !@name@_carriable(state->u, N)) {
+        @name@_clear(state);
+    }
 }
 
 /* Input of the plan, fed back what the car is off it, within the hard limits. */
@@ -156,39 +191,39 @@ static void measure_rows(const @name@_params *params, @name@_work *work)
     }
 }
 
-/* Take the step, and keep the hard limits to the last bit. False where it is not finite. */
-static bool take(@name@_state *state, const @name@_params *params, const @name@_work *work)
+/* Whether the step leads to a plan that may be carried. */
+static bool is_plan(const @name@_work *work)
 {
-    real sum = @NAME@_C(0.0);
+    bool plan = @name@_carriable(work->x[0], NX) && @name@_carriable(work->du, N);
+    uint32_t k;
+    for (k = 0U; k < N; k++) {
+        plan = plan && @name@_carriable(work->x[k + 1U], NX)
+            && @name@_carriable(work->dx[k + 1U], NX) && @name@_carriable(work->feedback[k], NX);
+    }
+    return plan;
+}
+
+/* Take the step, and keep the hard limits to the last bit. */
+static void take(@name@_state *state, const @name@_params *params, const @name@_work *work)
+{
     uint32_t k;
     uint32_t i;
-    bool finite;
+    state->guessed = 0U;
+    for (i = 0U; i < NX; i++) {
+        state->x[0][i] = work->x[0][i];
+    }
     for (k = 0U; k < N; k++) {
-        sum += work->du[k];
+        const real before = state->x[k][STEERING];
+        const real u = @name@_clipped(work->u[k] + work->du[k], params->max_rate);
+        const real wanted = before + (params->stage_time * u);
+        const real after = @name@_clipped(wanted, params->max_steering);
         for (i = 0U; i < NX; i++) {
-            sum += work->dx[k + 1U][i];
+            state->x[k + 1U][i] = work->x[k + 1U][i] + work->dx[k + 1U][i];
+            state->feedback[k][i] = work->feedback[k][i];
         }
+        state->x[k + 1U][STEERING] = after;
+        state->u[k] = @name@_clipped((after - before) / params->stage_time, params->max_rate);
     }
-    finite = @name@_finite(sum);
-    if (finite) {
-        state->guessed = 0U;
-        for (i = 0U; i < NX; i++) {
-            state->x[0][i] = work->x[0][i];
-        }
-        for (k = 0U; k < N; k++) {
-            const real before = state->x[k][STEERING];
-            const real u = @name@_clipped(work->u[k] + work->du[k], params->max_rate);
-            const real wanted = before + (params->stage_time * u);
-            const real after = @name@_clipped(wanted, params->max_steering);
-            for (i = 0U; i < NX; i++) {
-                state->x[k + 1U][i] = work->x[k + 1U][i] + work->dx[k + 1U][i];
-                state->feedback[k][i] = work->feedback[k][i];
-            }
-            state->x[k + 1U][STEERING] = after;
-            state->u[k] = @name@_clipped((after - before) / params->stage_time, params->max_rate);
-        }
-    }
-    return finite;
 }
 
 @name@_status @name@_solve(@name@_state *state, const @name@_params *params, @name@_work *work,
@@ -201,8 +236,11 @@ static bool take(@name@_state *state, const @name@_params *params, const @name@_
         measure_rows(params, work);
         status = @name@_qp(work, params);
         state->iterations = work->iterations;
-        if ((status != @NAME@_QP_FAILED) && !take(state, params, work)) {
+        if ((status != @NAME@_QP_FAILED) && !is_plan(work)) {
             status = @NAME@_QP_FAILED;
+        }
+        if (status != @NAME@_QP_FAILED) {
+            take(state, params, work);
         }
     }
     return status;

@@ -10,28 +10,47 @@
 #define NX @NAME@_STATES
 #define STEERING 4U /* place of the angle among the states */
 #define LAGGED 5U   /* of lagged slip, where there is */
+#define TURN 5U     /* column of the table: steering that a curvature of 1/m asks for [rad m] */
+#define DRIFT 6U    /* v_y in that turn [m^2/s] */
+#define NEAREST @NAME@_C(0.1)  /* 1 - kappa e_y: nearer to the center of a turn is no place */
+#define MOST_ANGLE @NAME@_C(3.2) /* of wheels [rad] that a caller may tell */
 
 #define real @name@_real
+
+/* Whether all of a measurement are numbers: x - x is zero, and does not overflow. */
+static bool is_number(const @name@_input *in)
+{
+    real sum = (in->e_y - in->e_y) + (in->e_psi - in->e_psi) + (in->v_y - in->v_y)
+        + (in->r - in->r);
+    uint32_t k;
+    for (k = 0U; k <= N; k++) {
+        sum += (in->kappa[k] - in->kappa[k]) + (in->v_x[k] - in->v_x[k]);
+    }
+    return @name@_finite(sum);
+}
 
 /* What can be said of a measurement before anything is computed. */
 static @name@_status judge(const @name@_params *params, const @name@_input *in)
 {
     @name@_status status = @NAME@_OK;
-    real sum = in->e_y + in->e_psi + in->v_y + in->r;
     bool slow = false;
+    bool known = @name@_within(in->v_y, params->max_v_y)
+        && @name@_within(in->r, params->max_yaw_rate);
     uint32_t k;
     for (k = 0U; k <= N; k++) {
-        sum += in->kappa[k] + in->v_x[k];
         slow = slow || (in->v_x[k] < params->min_speed);
+        known = known && (in->v_x[k] <= params->max_speed)
+            && @name@_within(in->kappa[k], params->max_curvature);
     }
-    if (!@name@_finite(sum)) {
+    if (!is_number(in)) {
         status = @NAME@_NOT_FINITE;
     } else if (!@name@_within(in->e_y, params->widest_e_y)
         || !@name@_within(in->e_psi, params->widest_e_psi)) {
         status = @NAME@_OFF_PATH;
-    } else if (!@name@_within(in->v_y, params->max_v_y)
-        || !@name@_within(in->r, params->max_yaw_rate)) {
+    } else if (!known) {
         status = @NAME@_OFF_MAP;
+    } else if ((@NAME@_C(1.0) - (in->kappa[0] * in->e_y)) < NEAREST) {
+        status = @NAME@_OFF_PATH;
     } else if (slow) {
         status = @NAME@_TOO_SLOW;
     } else {
@@ -90,14 +109,66 @@ static bool follows_plan(const @name@_state *state, const @name@_params *params)
     return (state->planned != 0U) && (((real)state->age * params->period) <= params->hold_time);
 }
 
-/* Steering [rad] that damped tracking asks for; where nothing is known the wheels stay. */
+/* A number of the fall-back's table at a speed, between its rows; that of the ends beyond them. */
+static real at_speed(const @name@_params *params, uint32_t column, real v_x)
+{
+    const real *speeds = params->speeds;
+    real found = params->gains[0][column];
+    uint32_t k;
+    for (k = 1U; k < @NAME@_SPEEDS; k++) {
+        if (v_x > speeds[k - 1U]) {
+            const real width = speeds[k] - speeds[k - 1U];
+            const real way = v_x - speeds[k - 1U];
+            const real share = (way < width) ? (way / width) : @NAME@_C(1.0);
+            const real row = params->gains[k][column];
+            found = params->gains[k - 1U][column]
+                + (share * (row - params->gains[k - 1U][column]));
+        }
+    }
+    return found;
+}
+
+/* Angle [rad] at which the wheels are when a measurement is taken. */
+static real wheels(const @name@_state *state, const @name@_params *params)
+{
+    const real behind = params->delay / params->period;
+    uint32_t j = 0U;
+    while ((j < (@NAME@_COMMANDS - 1U)) && ((real)j < behind)) {
+        j++;
+    }
+    return state->commands[(j > 0U) ? (j - 1U) : 0U];
+}
+
+/* x, not beyond +-limit; `missing` where it is no number. */
+static real known(real x, real limit, real missing)
+{
+    return @name@_finite(x) ? @name@_clipped(x, limit) : missing;
+}
+
+/* Steering [rad] that brings the car back to its path without a plan: feedback of what it is off the
+ * steady turn on the path, by gains of its speed. What is not a number is taken as in that turn;
+ * without heading or yaw rate the turn alone is steered; without curvature or speed wheels stay. */
 static real track(const @name@_state *state, const @name@_params *params, const @name@_input *in)
 {
-    const real rolling = in->kappa[0] * (params->car[2] + params->car[3]);
-    const real wanted = rolling - (params->gain_e_y * in->e_y) - (params->gain_e_psi * in->e_psi)
-        - (params->gain_yaw_rate * (in->r - (in->kappa[0] * in->v_x[0])));
-    const real without = @name@_finite(rolling) ? rolling : state->commands[0];
-    return @name@_finite(wanted) ? wanted : without;
+    real wanted = state->commands[0];
+    if (@name@_finite(in->kappa[0]) && @name@_finite(in->v_x[0])) {
+        const real kappa = @name@_clipped(in->kappa[0], params->max_curvature);
+        const real v_x = @name@_clipped(in->v_x[0], params->max_speed);
+        const real turn = kappa * at_speed(params, TURN, v_x);
+        const real v_y = kappa * at_speed(params, DRIFT, v_x);
+        const real forward = (v_x > params->min_speed) ? v_x : params->min_speed;
+        const real e_psi = in->e_psi + (v_y / forward);
+        const real r = in->r - (kappa * v_x);
+        wanted = turn;
+        if (@name@_finite(e_psi) && @name@_finite(r)) {
+            wanted -= (at_speed(params, 0U, v_x) * known(in->e_y, params->max_e_y, @NAME@_C(0.0)))
+                + (at_speed(params, 1U, v_x) * @name@_clipped(e_psi, params->widest_e_psi))
+                + (at_speed(params, 2U, v_x) * (known(in->v_y, params->max_v_y, v_y) - v_y))
+                + (at_speed(params, 3U, v_x) * @name@_clipped(r, params->max_yaw_rate))
+                + (at_speed(params, 4U, v_x) * (wheels(state, params) - turn));
+        }
+    }
+    return @name@_finite(wanted) ? wanted : state->commands[0];
 }
 
 /* Steering [rad] of the plan, or else of damped tracking, within the hard limits. */
@@ -108,7 +179,9 @@ static real next_steering(const @name@_state *state, const @name@_params *params
     const real most = params->period * params->max_rate;
     const real wanted = follows_plan(state, params) ? (last + (params->period * state->u[0]))
                                                     : track(state, params, in);
-    return @name@_clipped(last + @name@_clipped(wanted - last, most), params->max_steering);
+    const real next = @name@_clipped(last + @name@_clipped(wanted - last, most),
+        params->max_steering);
+    return @name@_finite(next) ? next : last;
 }
 
 static void remember(@name@_state *state, real steering)
@@ -140,21 +213,9 @@ static void count(@name@_state *state, @name@_status status)
 @name@_status @name@_reset(@name@_state *state, real steering)
 {
     @name@_status status = @NAME@_BAD_CALL;
-    if ((state != NULL) && @name@_finite(steering)) {
-        uint32_t k;
+    if ((state != NULL) && @name@_within(steering, MOST_ANGLE)) {
         uint32_t i;
-        for (k = 0U; k <= N; k++) {
-            for (i = 0U; i < NX; i++) {
-                state->x[k][i] = @NAME@_C(0.0);
-            }
-        }
-        for (k = 0U; k < N; k++) {
-            state->u[k] = @NAME@_C(0.0);
-            for (i = 0U; i < NX; i++) {
-                state->feedback[k][i] = @NAME@_C(0.0);
-            }
-        }
-        state->guessed = 1U;
+        @name@_clear(state);
         for (i = 0U; i < @NAME@_COMMANDS; i++) {
             state->commands[i] = steering;
         }
@@ -180,19 +241,12 @@ static bool is_sound(const @name@_state *state, const @name@_params *params)
     return sound;
 }
 
-/* Make the plan new from a measurement, `now`; without one the plan stays, if there is one. */
-static @name@_status plan(@name@_state *state, const @name@_params *params, @name@_work *work,
-    const @name@_input *in, const real *now)
+/* Make the plan new from where the car is when its command acts. */
+static @name@_status plan_from(@name@_state *state, const @name@_params *params,
+    @name@_work *work, const @name@_input *in, const real *x)
 {
-    const real ahead = params->delay - (@NAME@_C(0.5) * params->period);
-    real x[NX];
     @name@_status status;
     uint32_t i;
-    for (i = 0U; i < NX; i++) {
-        x[i] = now[i];
-    }
-    lead(state, params, in, params->delay, ahead, x);
-    x[STEERING] = state->commands[0];
     if (!follows_plan(state, params) || !is_sound(state, params)) {
         @name@_guess(state, params, x, &in->kappa[1], &in->v_x[1]);
         state->planned = 0U;
@@ -204,6 +258,25 @@ static @name@_status plan(@name@_state *state, const @name@_params *params, @nam
     if ((status == @NAME@_OK) || (status == @NAME@_ITERATION_LIMIT)) {
         state->planned = 1U;
         state->age = 0U;
+    }
+    return status;
+}
+
+/* Make the plan new from a measurement, `now`; without one the plan stays, if there is one. */
+static @name@_status plan(@name@_state *state, const @name@_params *params, @name@_work *work,
+    const @name@_input *in, const real *now)
+{
+    const real ahead = params->delay - (@NAME@_C(0.5) * params->period);
+    real x[NX];
+    @name@_status status = @NAME@_QP_FAILED;
+    uint32_t i;
+    for (i = 0U; i < NX; i++) {
+        x[i] = now[i];
+    }
+    lead(state, params, in, params->delay, ahead, x);
+    x[STEERING] = state->commands[0];
+    if (@name@_carriable(x, NX)) {
+        status = plan_from(state, params, work, in, x);
     }
     return status;
 }
@@ -229,10 +302,10 @@ static @name@_status plan(@name@_state *state, const @name@_params *params, @nam
         remember(state, next_steering(state, params, input));
         if ((LAGGED < NX) && (status <= @NAME@_QP_FAILED)) {
             lead(state, params, input, params->delay + params->period, params->period, x);
+            state->started = @name@_carriable(x, NX) ? 1U : 0U; /* 0: slip begins anew */
             for (i = LAGGED; i < NX; i++) {
-                state->lagged[i - LAGGED] = x[i];
+                state->lagged[i - LAGGED] = (state->started != 0U) ? x[i] : @NAME@_C(0.0);
             }
-            state->started = 1U;
         }
         count(state, status);
         *steering = state->commands[0];
@@ -243,7 +316,7 @@ static @name@_status plan(@name@_state *state, const @name@_params *params, @nam
 @name@_status @name@_late(@name@_state *state, real steering)
 {
     @name@_status status = @NAME@_BAD_CALL;
-    if ((state != NULL) && @name@_finite(steering)) {
+    if ((state != NULL) && @name@_within(steering, MOST_ANGLE)) {
         state->commands[0] = steering;
         count(state, @NAME@_LATE);
         status = @NAME@_OK;

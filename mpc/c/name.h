@@ -45,17 +45,19 @@ typedef double @name@_real;
 #define @NAME@_ROWS 5U     /* bounds a stage: rate, angle, deviation, slip in front, at the rear */
 #define @NAME@_COMMANDS 32U /* past commands that a delay may reach back */
 #define @NAME@_STATUSES 9U
+#define @NAME@_SPEEDS @speeds@U /* of the fall-back's table */
+#define @NAME@_GAINS @gains@U  /* a speed: of e_y, e_psi, v_y, r, wheels; steering and v_y that a turn asks for */
 
 typedef enum {
     @NAME@_OK = 0,              /* the plan is new */
     @NAME@_ITERATION_LIMIT = 1, /* the plan is new, not quite the best one */
     @NAME@_QP_FAILED = 2,       /* no plan: not convex, or not finite */
     @NAME@_NOT_FINITE = 3,      /* an input is not a number */
-    @NAME@_OFF_PATH = 4,        /* |e_y| or |e_psi| beyond the limits */
-    @NAME@_OFF_MAP = 5,         /* |v_y| or |r| beyond the limits */
+    @NAME@_OFF_PATH = 4,        /* |e_y| or |e_psi| beyond the limits, or kappa e_y > 0.9 */
+    @NAME@_OFF_MAP = 5,         /* |v_y|, |r|, speed or curvature beyond the limits */
     @NAME@_TOO_SLOW = 6,        /* slower than min_speed, now or ahead */
     @NAME@_LATE = 7,            /* set by the caller: the command came after its time */
-    @NAME@_BAD_CALL = 8         /* a null pointer: nothing was done */
+    @NAME@_BAD_CALL = 8         /* a null pointer, no angle: nothing was done */
 } @name@_status;
 
 typedef struct {
@@ -78,10 +80,11 @@ typedef struct {
     @name@_real widest_e_psi;              /* |e_psi| [rad] */
     @name@_real max_v_y;                   /* |v_y| [m/s] beyond which the tire is not known */
     @name@_real max_yaw_rate;              /* |r| [rad/s] */
-    @name@_real min_speed;                 /* v_x [m/s], positive */
-    @name@_real gain_e_y;                  /* of steering without a plan [rad/m] */
-    @name@_real gain_e_psi;                /* [rad/rad] */
-    @name@_real gain_yaw_rate;             /* [rad/(rad/s)] */
+    @name@_real min_speed;                 /* v_x [m/s], positive, now and ahead */
+    @name@_real max_speed;                 /* v_x [m/s] beyond which no input is believed */
+    @name@_real max_curvature;             /* |kappa| [1/m], likewise */
+    @name@_real speeds[@NAME@_SPEEDS];   /* of the rows below [m/s], rising */
+    @name@_real gains[@NAME@_SPEEDS][@NAME@_GAINS]; /* of steering without a plan, SI */
     @name@_real hold_time;                 /* how long an old plan is followed [s] */
     @name@_real tolerance;                 /* of the solver, in parts: 1e-8, in float 1e-5 */
     uint32_t max_iterations;                /* of the solver */
@@ -151,20 +154,22 @@ typedef struct {
 /* Begin with the wheels straight and no plan; faults are forgotten. */
 @name@_status @name@_init(@name@_state *state);
 
-/* Begin with the wheels at an angle [rad] and no plan; faults are kept. */
+/* Begin with the wheels at an angle [rad], at most 3.2, and no plan; faults are kept. */
 @name@_status @name@_reset(@name@_state *state, @name@_real steering);
 
-/* Take a measurement; steering [rad] is what to command now, whatever the status. */
+/* Take a measurement; steering [rad] is what to command now, whatever the status. No number that is
+ * not finite enters the state: what is refused leaves the plan that there was. */
 @name@_status @name@_step(@name@_state *state, const @name@_params *params, @name@_work *work,
     const @name@_input *input, @name@_real *steering);
 
-/* One iteration from the plan in the state, which is not shifted. x0 is the car at the beginning of
- * the first stage; kappa and v_x are those of the stages. */
+/* One iteration from the plan in the state, which is not shifted, and stays where there is no other.
+ * x0 is the car at the beginning of the first stage; kappa and v_x are those of the stages. */
 @name@_status @name@_solve(@name@_state *state, const @name@_params *params, @name@_work *work,
     const @name@_real x0[@NAME@_STATES], const @name@_real kappa[@NAME@_HORIZON],
     const @name@_real v_x[@NAME@_HORIZON]);
 
-/* Say that the command of the last step came too late, and what was steered instead [rad]. */
+/* Say that the command of the last step came too late, and what was steered instead [rad], at most
+ * 3.2 to either side. */
 @name@_status @name@_late(@name@_state *state, @name@_real steering);
 
 const char *@name@_version(void);

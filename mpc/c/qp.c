@@ -8,6 +8,7 @@
 #include "@name@_qp.h"
 
 #include "@name@_equations.h"
+#include "@name@_iteration.h"
 #include "@name@_riccati.h"
 
 #define SIDE (@NAME@_HORIZON * @NAME@_ROWS) /* rows of all stages */
@@ -230,6 +231,8 @@ static bool improve(@name@_work *work, const @name@_params *params, real mu, out
             status = @NAME@_QP_FAILED;
         } else if (improve(work, params, mu, &seen)) {
             status = @NAME@_OK;
+        } else if (!@name@_finite(seen.product)) {
+            status = @NAME@_QP_FAILED; /* and will be after every other step */
         } else if (near && (seen.primal < BLOCKED)) {
             near = false;
             mu = FAR;

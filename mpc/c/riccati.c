@@ -92,7 +92,7 @@ static bool look_behind(@name@_work *work, uint32_t k, real R, const real *restr
         work->Pc[k][i] = pc;
         lambda += stage->B[i] * pb;
     }
-    work->per_lambda[k] = @NAME@_C(1.0) / lambda;
+    work->per_lambda[k] = (lambda > @NAME@_C(0.0)) ? (@NAME@_C(1.0) / lambda) : @NAME@_C(0.0);
     return lambda > @NAME@_C(0.0);
 }
 

@@ -22,6 +22,7 @@ from mpc.realtime.tracker import TOLERANCE as SOLVER_TOLERANCE
 from mpc.tires import TireModel
 
 TEMPLATES = Path(__file__).parent / "c"
+UNTOLD = ("weights", "speeds", "gains")  # in the manifest; the gains have a table of their own
 FORMAT = "tireid mpc package 1"
 # Largest differences of the steering that the self-test allows [rad]. In double compilers differ by
 # nothing; float solves each problem to a tolerance of its own.
@@ -119,12 +120,16 @@ def mpc_readme(package: MpcPackage, about_figures: str) -> str:
     """
     p = plain_params(package.params)
     rows = "".join(
-        f"| `{name}` | {_in_words(value)} |\n" for name, value in p.items() if name != "weights"
+        f"| `{name}` | {_in_words(value)} |\n" for name, value in p.items() if name not in UNTOLD
     )
     return filled(
         TEMPLATES / "README.md",
         {
             "numbers_table": rows,
+            "gains_table": "".join(
+                f"| {speed:.3g} | {' | '.join(f'{gain:.3g}' for gain in row)} |\n"
+                for speed, row in zip(p["speeds"], p["gains"], strict=True)
+            ),
             "samples": str(len(package.vectors.measured)),
             "tolerance_double": f"{TOLERANCE_DOUBLE:g}",
             "tolerance_single": f"{TOLERANCE_SINGLE:g}",

@@ -14,6 +14,7 @@ from codegen.tuned import tuned
 from mpc.cost import N_ERRORS
 from mpc.motion import state_size
 from mpc.prediction import build_end, build_rk4, build_stage
+from mpc.realtime.fall_back import N_GAINS, N_SPEEDS
 from mpc.tires.structure import PredictionTire
 
 TEMPLATES = Path(__file__).parents[1] / "c"
@@ -84,6 +85,8 @@ def c_sources(
         "lagged_states": ", lagged slip in front and at the rear" if n_x > 5 else "",
         "weights": str(structure.n_weights),
         "errors": str(N_ERRORS),
+        "speeds": str(N_SPEEDS),
+        "gains": str(N_GAINS),
         "stage": stage,
         "end": end,
         "predict": predict,

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from mpc.cost import N_ERRORS
 from mpc.problem import Problem
+from mpc.realtime.fall_back import N_GAINS, N_SPEEDS
 from mpc.realtime.guards import Guards
 
 N_COMMANDS = 32
@@ -16,7 +17,7 @@ LIMITS = ("max_steering", "max_rate", "max_e_y", "max_slip", "rise", "soft_e_y",
 OF_AXLES = ("max_slip", "rise")
 GUARDS = (
     *("widest_e_y", "widest_e_psi", "max_v_y", "max_yaw_rate", "min_speed"),
-    *("gain_e_y", "gain_e_psi", "gain_yaw_rate", "hold_time"),
+    *("max_speed", "max_curvature", "speeds", "gains", "hold_time"),
 )
 
 
@@ -30,7 +31,8 @@ def params_type(n_weights: int, *, single: bool) -> np.dtype[np.void]:
     """
     real = _real(single)
     names = [*TIMES, *LIMITS, *GUARDS, "tolerance"]
-    numbers = [(name, real, (2,)) if name in OF_AXLES else (name, real) for name in names]
+    shapes = {**dict.fromkeys(OF_AXLES, (2,)), "speeds": (N_SPEEDS,), "gains": (N_SPEEDS, N_GAINS)}
+    numbers = [(name, real, shapes.get(name, ())) for name in names]
     arrays = [("car", 4), ("weights", n_weights), ("cost", N_ERRORS), ("cost_end", N_ERRORS)]
     return np.dtype(
         [(name, real, (size,)) for name, size in arrays]
@@ -79,7 +81,7 @@ def input_type(horizon: int, *, single: bool) -> np.dtype[np.void]:
 
 
 def set_params(params: NDArray[Any], problem: Problem, guards: Guards) -> None:
-    """Write what is to be solved and guarded; tire, timing and solver are left as they are.
+    """Write what is to be solved and guarded; tire, timing, solver and gains of the fall-back stay.
 
     Parameters
     ----------
@@ -95,7 +97,7 @@ def set_params(params: NDArray[Any], problem: Problem, guards: Guards) -> None:
     params["soft_e_y"], params["soft_slip"] = limits.soft_e_y, limits.soft_slip
     params["widest_e_y"], params["widest_e_psi"] = guards.e_y, guards.e_psi
     params["max_v_y"], params["max_yaw_rate"] = guards.v_y, guards.yaw_rate
-    for name in ("min_speed", "hold_time", "gain_e_y", "gain_e_psi", "gain_yaw_rate"):
+    for name in ("min_speed", "max_speed", "max_curvature", "hold_time"):
         params[name] = getattr(guards, name)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mpc.problem import Problem
+from mpc.realtime.fall_back import fall_back
 from mpc.realtime.guards import Guards
 from mpc.realtime.instance import Instance
 from mpc.realtime.layout import N_COMMANDS, set_params
@@ -84,7 +85,16 @@ class Tracker:
         self._budget, self._clock = budget, clock
         self.instance = Instance(tire.structure, problem.horizon, single=single)
         params = self.instance.params
-        set_params(params, problem, guards or Guards())
+        guards = guards or Guards()
+        set_params(params, problem, guards)
+        table = fall_back(
+            tire.vehicle,
+            period=period,
+            delay=delay,
+            e_y=guards.fall_back_e_y,
+            acceleration=guards.fall_back_acceleration,
+        )
+        params["speeds"], params["gains"] = table
         for name, value in {"period": period, "delay": delay, **solver}.items():
             params[name] = value
         self.set_tire(tire)
@@ -154,10 +164,10 @@ class Tracker:
         Raises
         ------
         ValueError
-            Where the angle is not finite.
+            Where the angle is not finite, or beyond 3.2 rad.
         """
         if self.instance.reset(steering) != Status.OK:
-            raise ValueError(f"steering must be finite, it is {steering}")
+            raise ValueError(f"steering must be finite and at most 3.2 rad, it is {steering}")
 
     def step(self, measurement: Measurement) -> Command:
         """Return what to steer from `delay` after the measurement on.

@@ -250,3 +250,25 @@ def test_halves_of_different_choices_stay_two(rng):
     for c_, d_ in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):
         expected = 2.0 * (c_ > 0) + 3.0 * (d_ <= 0)
         assert float(function_of(graph, function)(c_, d_, 2.0, 3.0)) == expected
+
+
+@pytest.mark.parametrize(
+    ("extreme", "wanted"), [(ca.fmax, (0.0, 0.5, 1.0)), (ca.fmin, (1.0, 0.5, 0.0))]
+)
+def test_the_slope_of_an_extreme_is_chosen_and_not_divided(extreme, wanted):
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    slope = ca.Function("slope", [x, y], [ca.densify(ca.jacobian(extreme(x, y), x))])
+    graph = recognized(graph_of(slope))
+    assert "div" in operations(graph_of(slope))
+    assert "div" not in operations(graph)
+    again = function_of(graph, slope)
+    for value, expected in zip((-1.0, 0.3, 2.0), wanted, strict=True):
+        assert float(again(value, 0.3)) == float(slope(value, 0.3)) == expected
+    assert np.isnan(float(slope(np.nan, 0.3)))  # 0/0
+    assert float(again(np.nan, 0.3)) == 0.0
+
+
+def test_what_only_looks_like_such_a_slope_is_still_divided():
+    x, y, z = (ca.SX.sym(name) for name in "xyz")
+    other = ca.Function("other", [x, y, z], [(x <= y) / ((x <= y) + (z <= x))])
+    assert "div" in operations(recognized(graph_of(other)))

@@ -5,6 +5,9 @@
 
 #define R(x) ((@name@_real)(x))
 
+#define LARGEST R(1e12)   /* of a number that is accepted: equations do not overflow */
+#define SMALLEST R(1e-12) /* of one that must be positive */
+
 #if @NAME@_SINGLE
 #define TOLERANCE R(@solver_single@) /* the least that float comes to in every problem */
 #else
@@ -14,21 +17,20 @@
 static const @name@_params exported = {
 @numbers@};
 
-/* The difference of infinities, and of NaN, is not zero. */
-static bool is_finite(@name@_real x)
+/* Whether x is a number that a car has use for; NaN is not. */
+static bool is_told(@name@_real x)
 {
-    const @name@_real difference = x - x;
-    return (difference <= R(0.0)) && (difference >= R(0.0));
+    return (x <= LARGEST) && (x >= -LARGEST);
 }
 
-static bool are_finite(const @name@_real *x, uint32_t n)
+static bool are_told(const @name@_real *x, uint32_t n)
 {
-    bool finite = true;
+    bool told = true;
     uint32_t i;
     for (i = 0U; i < n; i++) {
-        finite = finite && is_finite(x[i]);
+        told = told && is_told(x[i]);
     }
-    return finite;
+    return told;
 }
 
 static bool are_positive(const @name@_real *const x[], uint32_t n)
@@ -36,14 +38,26 @@ static bool are_positive(const @name@_real *const x[], uint32_t n)
     bool positive = true;
     uint32_t i;
     for (i = 0U; i < n; i++) {
-        positive = positive && (*x[i] > R(0.0)) && is_finite(*x[i]);
+        positive = positive && (*x[i] >= SMALLEST) && is_told(*x[i]);
     }
     return positive;
 }
 
+/* Whether the fall-back's table can be read: rising speeds, gains that are numbers. */
+static bool is_table(const @name@_params *params)
+{
+    bool table = params->speeds[0] > R(0.0);
+    uint32_t k;
+    for (k = 0U; k < @NAME@_SPEEDS; k++) {
+        table = table && are_told(params->gains[k], @NAME@_GAINS)
+            && ((k == 0U) || (params->speeds[k] > params->speeds[k - 1U]));
+    }
+    return table && are_told(params->speeds, @NAME@_SPEEDS);
+}
+
 static bool are_not_negative(const @name@_real *x, uint32_t n)
 {
-    bool not_negative = are_finite(x, n);
+    bool not_negative = are_told(x, n);
     uint32_t i;
     for (i = 0U; i < n; i++) {
         not_negative = not_negative && (x[i] >= R(0.0));
@@ -70,13 +84,12 @@ bool @name@_accepts(const @name@_params *params)
             &params->max_steering, &params->max_rate, &params->max_e_y, &params->max_slip[0],
             &params->max_slip[1], &params->soft_e_y, &params->soft_slip, &params->widest_e_y,
             &params->widest_e_psi, &params->max_v_y, &params->max_yaw_rate, &params->min_speed,
-            &params->tolerance };
-        const @name@_real gains[] = { params->gain_e_y, params->gain_e_psi, params->gain_yaw_rate };
+            &params->max_speed, &params->max_curvature, &params->tolerance };
         accepted = are_positive(positive, (uint32_t)(sizeof positive / sizeof positive[0]))
-            && are_finite(params->weights, @NAME@_WEIGHTS)
+            && are_told(params->weights, @NAME@_WEIGHTS)
             && are_not_negative(params->rise, 2U)
             && are_not_negative(params->cost, @NAME@_ERRORS)
-            && are_not_negative(params->cost_end, @NAME@_ERRORS) && are_finite(gains, 3U)
+            && are_not_negative(params->cost_end, @NAME@_ERRORS) && is_table(params)
             && are_not_negative(&params->hold_time, 1U) && are_not_negative(&params->delay, 1U)
             && (params->delay <= (R(@NAME@_COMMANDS - 1U) * params->period))
             && (params->period <= params->stage_time) && (params->max_iterations > 0U);
@@ -90,7 +103,7 @@ bool @name@_accepts(const @name@_params *params)
     @name@_status status = @NAME@_BAD_CALL;
     if ((params != NULL) && (weights != NULL)) {
         status = @NAME@_NOT_FINITE;
-        if (are_finite(weights, @NAME@_WEIGHTS)) {
+        if (are_told(weights, @NAME@_WEIGHTS)) {
             uint32_t i;
             for (i = 0U; i < @NAME@_WEIGHTS; i++) {
                 params->weights[i] = weights[i];

@@ -115,15 +115,21 @@ def test_then_the_old_plan_steers_and_later_damped_tracking(tracker, measure, pr
         last = command.steering
     for _ in range(60):
         command = tracker.step(measure(**{"kappa": 0.002, **WRONG[status]}))
-    length = tracker.tire.vehicle.wheelbase
-    e_y, v_y_is_off = WRONG[status].get("e_y", 0.0), status == Status.OFF_MAP
-    v_x = WRONG[status].get("v_x", 20.0)
-    wanted = 0.002 * length + Guards().gain_yaw_rate * 0.002 * v_x - Guards().gain_e_y * e_y
-    if status == Status.NOT_FINITE:
-        wanted = 0.002 * length  # all that is known
-    assert v_y_is_off or command.steering == pytest.approx(
-        np.clip(wanted, -problem.limits.steering, problem.limits.steering), abs=1e-9
+    wanted = steady_steering(tracker, command.steering, {"kappa": 0.002, **WRONG[status]})
+    assert command.steering == pytest.approx(wanted, abs=1e-9)
+
+
+def steady_steering(tracker, wheels, told):
+    """What the table says for a car that is measured so again and again, by the formula."""
+    p, v_x, kappa = tracker.params, told.get("v_x", 20.0), told["kappa"]
+    k_e_y, k_e_psi, k_v_y, k_r, k_delta, turn, drift = (
+        np.interp(v_x, p["speeds"], column) for column in p["gains"].T
     )
+    turn, v_y = kappa * turn, kappa * drift
+    e_y = np.nan_to_num(np.clip(told.get("e_y", 0.0), -p["max_e_y"], p["max_e_y"]))
+    off = [e_y, v_y / max(v_x, p["min_speed"]), told.get("v_y", 0.0) - v_y, -kappa * v_x]
+    off[2] = np.clip(told.get("v_y", 0.0), -p["max_v_y"], p["max_v_y"]) - v_y
+    return turn - np.dot([k_e_y, k_e_psi, k_v_y, k_r], off) - k_delta * (wheels - turn)
 
 
 def test_after_a_fault_it_plans_again(tracker, measure):
@@ -134,12 +140,31 @@ def test_after_a_fault_it_plans_again(tracker, measure):
 
 
 def test_damped_tracking_alone_brings_the_car_back(tire, problem, measure):
-    guards = Guards(min_speed=50.0, hold_time=0.0)  # it never plans
-    tracker = Tracker(tire, problem, period=PERIOD, guards=guards)
+    tracker = Tracker(tire, problem, period=PERIOD, guards=Guards(hold_time=0.0))
+
+    def lost(*state, **road):
+        told = measure(*state, **road)
+        told.kappa[-1] = np.nan  # it never plans
+        return told
+
     for speed in (10.0, 20.0, 30.0):
         tracker.reset()
-        states, _ = drive(tracker, tire, measure, [0.5, 0.02, 0.0, 0.0], 400, 1, 0.0, speed)
+        states, _ = drive(tracker, tire, lost, [0.5, 0.02, 0.0, 0.0], 400, 1, 0.0, speed)
         assert np.abs(states[-50:, 0]).max() < 0.05, speed
+
+
+def test_a_missing_v_y_or_e_y_is_done_without(tracker, measure):
+    told = {"e_psi": 0.05, "r": 0.1, "kappa": 0.002}
+    steered = {}
+    for missing in ({}, {"v_y": np.nan}, {"e_y": np.nan}, {"e_psi": np.nan}, {"r": np.nan}):
+        tracker.reset()
+        for _ in range(200):
+            command = tracker.step(measure(**{**told, "e_y": 9.0, **missing}))
+        steered[next(iter(missing), "")] = command.steering
+    turn = 0.002 * np.interp(20.0, tracker.params["speeds"], tracker.params["gains"][:, 5])
+    assert steered["e_psi"] == steered["r"] == pytest.approx(turn)  # the turn alone
+    assert steered[""] < steered["e_y"] < turn - 0.01  # heading and yaw rate are answered
+    assert steered["v_y"] == pytest.approx(steered[""], abs=2e-3)
 
 
 def test_weights_swap_without_a_build_and_act_at_once(tracker, tire, measure):
@@ -225,7 +250,9 @@ def test_numbers_out_of_range_are_refused_by_name(linear, wrong):
         Tracker(linear, Problem(dt=0.05), **wrong)
 
 
-@pytest.mark.parametrize("wrong", [{"e_y": 0.0}, {"min_speed": np.nan}, {"gain_e_y": -0.1}])
+@pytest.mark.parametrize(
+    "wrong", [{"e_y": 0.0}, {"min_speed": np.nan}, {"hold_time": -0.1}, {"fall_back_e_y": 0.0}]
+)
 def test_guards_are_checked(wrong):
     with pytest.raises(ValueError, match=f"{next(iter(wrong))} must be"):
         Guards(**wrong)

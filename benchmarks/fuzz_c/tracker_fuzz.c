@@ -1,0 +1,307 @@
+/* Every input is a drive of an exported tracker: calls with sense and without, rules after each.
+ *
+ * Nothing but the public headers is read. A refused sample must do to the plan what any other
+ * refused sample does, which is to move it on by a period. */
+#include "reader.h"
+
+#include "@name@.h"
+#include "@name@_params.h"
+
+#define REALS(type) (sizeof(type) / sizeof(@name@_real))
+#define NUMBERS ((sizeof(@name@_params) - (2U * sizeof(uint32_t))) / sizeof(@name@_real))
+#define CARRIED 1e13 /* more than any number that is carried */
+
+static @name@_params exported;
+static @name@_params params;
+static @name@_state state;
+static @name@_state twin;
+static @name@_work work;
+static @name@_input input;
+
+/* Where the car is and what the road does, of a drive with sense. */
+static struct {
+    double v_x, e_y, e_psi, v_y, r, kappa;
+} car;
+
+static int are_carried(const @name@_real *x, size_t n)
+{
+    size_t i;
+    for (i = 0U; i < n; i++) {
+        if (!(fabs((double)x[i]) <= CARRIED)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+static void check_state(void)
+{
+    CHECK(are_carried(&state.x[0][0], REALS(state.x)));
+    CHECK(are_carried(state.u, REALS(state.u)));
+    CHECK(are_carried(&state.feedback[0][0], REALS(state.feedback)));
+    CHECK(are_carried(state.commands, REALS(state.commands)));
+    CHECK(are_carried(state.lagged, REALS(state.lagged)));
+}
+
+/* What of the state a refused sample may not touch but by a period. */
+static int same_plan(const @name@_state *a, const @name@_state *b)
+{
+    return (memcmp(a->x, b->x, sizeof a->x) == 0) && (memcmp(a->u, b->u, sizeof a->u) == 0)
+        && (memcmp(a->feedback, b->feedback, sizeof a->feedback) == 0)
+        && (memcmp(a->lagged, b->lagged, sizeof a->lagged) == 0) && (a->planned == b->planned)
+        && (a->age == b->age) && (a->guessed == b->guessed) && (a->started == b->started);
+}
+
+static void check_refused(const @name@_state *before)
+{
+    static @name@_input nothing;
+    @name@_real steering;
+    twin = *before;
+    nothing = input;
+    nothing.e_y = (@name@_real)NAN;
+    CHECK(@name@_step(&twin, &params, &work, &nothing, &steering) == @NAME@_NOT_FINITE);
+    CHECK(same_plan(&state, &twin));
+}
+
+static double take_step(void)
+{
+    static @name@_state before;
+    @name@_real steering = (@name@_real)NAN;
+    @name@_status status;
+    double most, moved;
+    unsigned i;
+    before = state;
+    status = @name@_step(&state, &params, &work, &input, &steering);
+    CHECK((unsigned)status < @NAME@_STATUSES);
+    CHECK((status != @NAME@_LATE) && (status != @NAME@_BAD_CALL));
+    CHECK(fabs((double)steering) <= ((double)params.max_steering * 1.000001));
+    most = (double)params.max_rate * (double)params.period;
+    moved = fabs((double)steering - (double)before.commands[0]);
+    if (fabs((double)before.commands[0]) <= (double)params.max_steering) { /* not told otherwise */
+        CHECK(moved <= ((most * 1.000001) + (fabs((double)steering) * 1e-6)));
+    }
+    CHECK(memcmp(&steering, &state.commands[0], sizeof steering) == 0);
+    CHECK(state.iterations <= params.max_iterations);
+    for (i = 0U; i < @NAME@_STATUSES; i++) {
+        CHECK(state.faults[i] == (before.faults[i] + ((i == (unsigned)status) ? 1U : 0U)));
+    }
+    check_state();
+    for (i = 0U; (status <= @NAME@_ITERATION_LIMIT) && (i < @NAME@_HORIZON); i++) {
+        CHECK(fabs((double)state.u[i]) <= ((double)params.max_rate * 1.000001));
+        CHECK(fabs((double)state.x[i][4]) <= ((double)params.max_steering * 1.000001));
+    }
+    if (status >= @NAME@_NOT_FINITE) {
+        check_refused(&before);
+    }
+    count_step((unsigned)status);
+    return (double)steering;
+}
+
+/* The car as it moves, and the road ahead of it. */
+static void sense(void)
+{
+    unsigned k;
+    input.e_y = (@name@_real)car.e_y;
+    input.e_psi = (@name@_real)car.e_psi;
+    input.v_y = (@name@_real)car.v_y;
+    input.r = (@name@_real)car.r;
+    for (k = 0U; k <= @NAME@_HORIZON; k++) {
+        input.kappa[k] = (@name@_real)car.kappa;
+        input.v_x[k] = (@name@_real)car.v_x;
+    }
+}
+
+static void go_on(double steering)
+{
+    const double T = 0.01;
+    const double r = car.v_x * steering / (2.7 + (0.003 * car.v_x * car.v_x));
+    car.r += (r - car.r) * T / 0.1;
+    car.v_y += ((1.5 - (0.01 * car.v_x * car.v_x)) * car.r - car.v_y) * T / 0.1;
+    car.e_psi += (car.r - (car.kappa * car.v_x)) * T;
+    car.e_y += ((car.v_x * sin(car.e_psi)) + (car.v_y * cos(car.e_psi))) * T;
+}
+
+static void begin_road(reader *from)
+{
+    const double lateral = between(from, -9.0, 9.0);
+    car.v_x = between(from, 2.0, 50.0);
+    car.kappa = lateral / (car.v_x * car.v_x);
+    car.kappa = fmin(fmax(car.kappa, -0.15), 0.15);
+}
+
+/* Steps with sense, in which some signals may be held or wrong. */
+static void drive(reader *from)
+{
+    const uint32_t fault = take_byte(from);
+    unsigned n = 1U + (take_byte(from) % 16U);
+    const @name@_input held = input;
+    const double wrong = ((fault & 0xF0U) == 0xF0U) ? hostile(from) : between(from, -2.0, 2.0);
+    for (; n > 0U; n--) {
+        sense();
+        switch (fault % 16U) {
+        case 8: input.e_y = held.e_y; break;
+        case 9: input.e_psi = held.e_psi; break;
+        case 10: input.v_y = held.v_y; break;
+        case 11: input.r = held.r; break;
+        case 12: input.e_y += (@name@_real)wrong; break;
+        case 13: input.e_psi += (@name@_real)wrong; break;
+        case 14: input.v_y = (@name@_real)wrong; break;
+        case 15: input.r = (@name@_real)wrong; break;
+        default: break;
+        }
+        go_on(take_step());
+        if (!(fabs(car.e_y) < 20.0) || !(fabs(car.e_psi) < 3.0)) {
+            car.e_y = car.e_psi = car.v_y = car.r = 0.0;
+        }
+    }
+}
+
+/* Steps with any number anywhere; between two of them the car is as it was. */
+static void strike(reader *from)
+{
+    const uint32_t kind = take_byte(from);
+    unsigned n = 1U + (kind % 4U);
+    unsigned again = 1U + ((kind >> 4U) % 8U);
+    @name@_real number[REALS(@name@_input)];
+    sense();
+    (void)memcpy(number, &input, sizeof number);
+    for (; n > 0U; n--) {
+        const unsigned at = (take_byte(from) << 8U) | take_byte(from);
+        number[at % REALS(@name@_input)] = (@name@_real)hostile(from);
+    }
+    (void)memcpy(&input, number, sizeof number);
+    for (; again > 0U; again--) {
+        (void)take_step();
+    }
+}
+
+/* Curvature and deviation together: the center of the turn, and beyond. */
+static void strike_center(reader *from)
+{
+    const double e_y = between(from, -6.0, 6.0);
+    const double near = between(from, 0.0, 2.0);
+    unsigned k;
+    sense();
+    input.e_y = (@name@_real)e_y;
+    for (k = 0U; k <= @NAME@_HORIZON; k++) {
+        input.kappa[k] = (@name@_real)((e_y != 0.0) ? (near / e_y) : near);
+    }
+    if ((take_byte(from) % 2U) == 0U) {
+        input.kappa[0] = (@name@_real)0; /* the center comes later */
+    }
+    (void)take_step();
+}
+
+static void swap_weights(reader *from)
+{
+    @name@_real weights[@NAME@_WEIGHTS];
+    const uint32_t kind = take_byte(from);
+    const double share = between(from, 0.4, 1.4);
+    @name@_params before = params;
+    int sane = 1;
+    unsigned i;
+    for (i = 0U; i < @NAME@_WEIGHTS; i++) {
+        weights[i] = (@name@_real)(share * (double)exported.weights[i]);
+    }
+    for (i = 0U; i < (kind % 4U); i++) {
+        weights[take_byte(from) % @NAME@_WEIGHTS] = (@name@_real)hostile(from);
+    }
+    for (i = 0U; i < @NAME@_WEIGHTS; i++) {
+        sane = sane && isfinite(weights[i]);
+    }
+    if (@name@_set_weights(&params, weights) == @NAME@_OK) {
+        CHECK(sane);
+    } else {
+        CHECK(memcmp(&before, &params, sizeof before) == 0);
+    }
+}
+
+/* Any number in any place of the parameters, as far as they are accepted. */
+static void set_param(reader *from)
+{
+    const @name@_params before = params;
+    @name@_real number[NUMBERS];
+    const unsigned at = (take_byte(from) << 8U) | take_byte(from);
+    (void)memcpy(number, &params, sizeof number);
+    number[at % NUMBERS] = ((at & 0x8000U) != 0U)
+        ? (@name@_real)hostile(from)
+        : (@name@_real)(between(from, 0.2, 3.0) * (double)number[at % NUMBERS]);
+    (void)memcpy(&params, number, sizeof number);
+    params.max_iterations = 1U + (take_byte(from) % 40U);
+    params.linearizations = take_byte(from) % 3U;
+    if (!@name@_accepts(&params)) {
+        params = before;
+    }
+}
+
+static void tell_angle(reader *from)
+{
+    const uint32_t kind = take_byte(from);
+    const double angle = ((kind % 2U) == 0U) ? between(from, -0.7, 0.7) : hostile(from);
+    const @name@_state before = state;
+    const @name@_status status = ((kind & 2U) != 0U) ? @name@_late(&state, (@name@_real)angle)
+                                                      : @name@_reset(&state, (@name@_real)angle);
+    CHECK((status == @NAME@_OK) || (status == @NAME@_BAD_CALL));
+    CHECK((status == @NAME@_OK) || (memcmp(&before, &state, sizeof before) == 0));
+    check_state();
+}
+
+/* An iteration from any place. */
+static void solve(reader *from)
+{
+    @name@_real x0[@NAME@_STATES];
+    @name@_status status;
+    const @name@_state before = state;
+    unsigned i;
+    sense();
+    for (i = 0U; i < @NAME@_STATES; i++) {
+        x0[i] = (@name@_real)((take_byte(from) < 64U) ? hostile(from) : between(from, -1.0, 1.0));
+    }
+    if (take_byte(from) < 64U) {
+        input.kappa[1U + (take_byte(from) % @NAME@_HORIZON)] = (@name@_real)hostile(from);
+    }
+    status = @name@_solve(&state, &params, &work, x0, &input.kappa[1], &input.v_x[1]);
+    CHECK(status <= @NAME@_QP_FAILED);
+    CHECK((status != @NAME@_QP_FAILED) || same_plan(&before, &state));
+    check_state();
+    count_step((unsigned)status);
+}
+
+static void call_without(reader *from)
+{
+    const @name@_state before = state;
+    const uint32_t kind = take_byte(from) % 5U;
+    @name@_real steering = 0;
+    CHECK(@name@_step((kind == 0U) ? NULL : &state, (kind == 1U) ? NULL : &params,
+              (kind == 2U) ? NULL : &work, (kind == 3U) ? NULL : &input,
+              (kind == 4U) ? NULL : &steering)
+        == @NAME@_BAD_CALL);
+    CHECK(memcmp(&before, &state, sizeof before) == 0);
+    (void)memset(&work, (int)take_byte(from), sizeof work); /* means nothing between two steps */
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    reader from = { data, size };
+    inputs++;
+    CHECK(@name@_default_params(&exported) == @NAME@_OK);
+    params = exported;
+    CHECK(@name@_init(&state) == @NAME@_OK);
+    car.e_y = car.e_psi = car.v_y = car.r = 0.0;
+    begin_road(&from);
+    sense();
+    while (from.left > 0U) {
+        switch (take_byte(&from) % 16U) {
+        case 0: case 1: case 2: case 3: case 4: case 5: case 6: drive(&from); break;
+        case 7: begin_road(&from); break;
+        case 8: case 9: strike(&from); break;
+        case 10: strike_center(&from); break;
+        case 11: swap_weights(&from); break;
+        case 12: set_param(&from); break;
+        case 13: tell_angle(&from); break;
+        case 14: solve(&from); break;
+        default: call_without(&from); break;
+        }
+    }
+    return 0;
+}

@@ -1,0 +1,146 @@
+"""Steering without a plan: optimal feedback to the path, by speed, of the car that its file states.
+
+x = [e_y, e_ψ, v_y, r, δ] off the steady turn of the path: deviation [m], heading [rad], lateral
+velocity [m/s], yaw rate [rad/s], angle of the wheels [rad].   u: steering that is told [rad].
+The linear bicycle with the vehicle's own cornering stiffness, so that nothing that was learnt, and
+may be what the solver failed at, reaches it. The delay is a lag of its length.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+N_STATES = 5
+N_GAINS = N_STATES + 2  # of x, and what the steady turn asks for
+SPEEDS = np.round(np.geomspace(2.0, 100.0, 8), 3)  # m/s; the C takes what lies between by line
+N_SPEEDS = SPEEDS.size
+STEERING = 0.2  # rad that cost as much as `e_y`, where the car hardly moves
+DIGITS = 9  # of what is exported: other digits depend on the machine
+DOUBLINGS = 40  # at most; ten are usual
+ENOUGH = 1e-13  # change of the cost, in parts
+
+
+class FallBack(NamedTuple):
+    """Rows by speed [m/s] (k,): gains of x, then steering [rad m] and v_y [m²/s] a curvature."""
+
+    speeds: Array
+    gains: Array
+
+
+def fall_back(
+    vehicle: Vehicle, *, period: float, delay: float, e_y: float, acceleration: float
+) -> FallBack:
+    """Return the table that the tracker steers by where it has no plan.
+
+    Minimizes Σ (e_y/`e_y`)² + (a/`acceleration`)² + (u/0.2 rad)², where a [m/s²] is the lateral
+    acceleration of the steady turn that u steers: at speed, steering is worth less of it.
+
+    Parameters
+    ----------
+    vehicle : the car.
+    period : between two steps [s].
+    delay : from a measurement until its command acts [s].
+    e_y : deviation [m] that is worth as much as `acceleration`.
+    acceleration : lateral [m/s²].
+    """
+    rows = []
+    for v_x in SPEEDS:
+        A, B = motion(vehicle, float(v_x), delay + 0.5 * period)
+        A_d, B_d = _sampled(A, B, period)
+        turn, drift = steady_turn(vehicle, float(v_x))
+        # Near the critical speed of an oversteering car a turn needs no steering at all.
+        per_steering = v_x**2 / max(abs(turn), 0.2 * vehicle.wheelbase)
+        Q = np.diag([1.0 / e_y**2, 0.0, 0.0, 0.0, 0.0])
+        R = np.array([[1.0 / STEERING**2 + (per_steering / acceleration) ** 2]])
+        rows.append([*feedback(A_d, B_d, Q, R).ravel(), turn, drift])
+    return FallBack(SPEEDS.copy(), np.array([[_rounded(x) for x in row] for row in rows]))
+
+
+def motion(vehicle: Vehicle, v_x: float, lag: float) -> tuple[Array, Array]:
+    """Return A (5, 5) and B (5, 1) of ẋ = A x + B u at a speed.
+
+    Parameters
+    ----------
+    vehicle : the car.
+    v_x : longitudinal speed [m/s].
+    lag : of the wheels behind what is told [s].
+    """
+    m, I_z, l_f, l_r, C_f, C_r = vehicle.bicycle
+    moment = C_f * l_f - C_r * l_r
+    A = np.zeros((N_STATES, N_STATES))
+    A[0, 1], A[0, 2], A[1, 3] = v_x, 1.0, 1.0
+    A[2, 2:] = -(C_f + C_r) / (m * v_x), -moment / (m * v_x) - v_x, C_f / m
+    A[3, 2:4] = -moment / (I_z * v_x), -(C_f * l_f**2 + C_r * l_r**2) / (I_z * v_x)
+    A[3, 4], A[4, 4] = C_f * l_f / I_z, -1.0 / lag
+    return A, np.array([[0.0], [0.0], [0.0], [0.0], [1.0 / lag]])
+
+
+def steady_turn(vehicle: Vehicle, v_x: float) -> tuple[float, float]:
+    """Return δ [rad m] and v_y [m²/s] of a steady turn, each a curvature.
+
+    Parameters
+    ----------
+    vehicle : the car.
+    v_x : longitudinal speed [m/s].
+    """
+    m, _, l_f, l_r, C_f, C_r = vehicle.bicycle
+    length = l_f + l_r
+    slip_f, slip_r = (m * v_x**2 * a / (length * C) for a, C in ((l_r, C_f), (l_f, C_r)))
+    return length + slip_f - slip_r, v_x * (l_r - slip_r)
+
+
+def feedback(A: Array, B: Array, Q: Array, R: Array) -> Array:
+    """Return K (1, n) of u = -K x that minimizes Σ x'Q x + u'R u, x⁺ = A x + B u.
+
+    By structure-preserving doubling (Chu, Fan, Lin and Wang 2004), which converges quadratically.
+
+    Parameters
+    ----------
+    A : (n, n).
+    B : (n, m).
+    Q : (n, n), symmetric, not negative.
+    R : (m, m), symmetric, positive.
+    """
+    P = _riccati(A, B @ _solved(R, B.T), Q)
+    return _solved(R + B.T @ P @ B, B.T @ P @ A)
+
+
+def _solved(M: Array, right: Array) -> Array:
+    return np.asarray(np.linalg.solve(M, right), dtype=np.float64)
+
+
+def _riccati(A: Array, G: Array, Q: Array) -> Array:
+    """Return P of the cost behind 1, 2, 4, … samples, until it stays; G = B R⁻¹ B'."""
+    P, eye = Q, np.eye(len(A))
+    for _ in range(DOUBLINGS):
+        W = _solved(eye + G @ P, np.hstack([A, G]))
+        A_1, G_1 = W[:, : len(A)], W[:, len(A) :]
+        step: Array = A.T @ P @ A_1
+        A, G, P = A @ A_1, G + A @ G_1 @ A.T, P + 0.5 * (step + step.T)
+        if np.abs(step).max() <= ENOUGH * np.abs(P).max():
+            break
+    return P
+
+
+def _sampled(A: Array, B: Array, period: float) -> tuple[Array, Array]:
+    """Return A and B of samples with u held: the series of the exponential, halved and squared."""
+    n, m = B.shape
+    M = period * np.vstack([np.hstack([A, B]), np.zeros((m, n + m))])
+    halvings = max(0, int(np.ceil(np.log2(max(np.abs(M).sum(axis=1).max(), 1e-300)))) + 3)
+    term = total = np.eye(n + m)
+    M = M / 2.0**halvings
+    for k in range(1, 13):
+        term = term @ M / k
+        total = total + term
+    for _ in range(halvings):
+        total = total @ total
+    return total[:n, :n], total[:n, n:]
+
+
+def _rounded(x: Any) -> float:
+    return float(f"{x:.{DIGITS}g}")

@@ -1,0 +1,84 @@
+"""A minute of libFuzzer on the exported C; and a planted fault, which it finds."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from benchmarks import fuzz_c
+
+needs_fuzzer = pytest.mark.skipif(not fuzz_c.has_fuzzer(), reason=fuzz_c.MISSING)
+STEPS = {"identifier": 150_000, "tracker": 30_000}
+NAMES = [f"{kind}/{law}" for law in fuzz_c.LAWS for kind in STEPS]
+
+
+@pytest.fixture(scope="module")
+def packages():
+    found = {name: subject for name, _, subject in fuzz_c.subjects(1)}
+    return {name: found.get(name) or found[f"{name}/{fuzz_c.SHORT}"] for name in NAMES}
+
+
+@needs_fuzzer
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_is_found(name, packages, tmp_path):
+    steps = STEPS[name.split("/")[0]]
+    outcome = fuzz_c.fuzz(fuzz_c.build(packages[name], tmp_path), steps, seed=2)
+    assert outcome.found == ""
+    assert outcome.steps == steps == sum(outcome.statuses)
+    assert outcome.statuses[0] > steps / 10  # there is driving among it
+    assert sum(outcome.statuses[2:]) > steps / 50  # and there are refusals
+
+
+@needs_fuzzer
+@pytest.mark.parametrize(
+    ("name", "file", "pattern", "replacement", "complaint"),
+    [
+        ("tracker/axle", "src/tireid_mpc.c", r"!is_number\(in\)", "false", "BROKEN|runtime error"),
+        ("tracker/axle", "src/tireid_mpc_iteration.c", r"beyond == 0U", "true", "BROKEN|runtime"),
+        (
+            "identifier/axle",
+            "src/tireid.c",
+            r"\[at\] >= TIREID_C\(0.0\)",
+            "[at + 9999] > 0",
+            "ERROR|runtime",
+        ),
+    ],
+)
+def test_a_planted_fault_is_found(name, file, pattern, replacement, complaint, packages, tmp_path):
+    subject = packages[name]
+    planted = re.sub(pattern, replacement, subject.files[file])
+    assert planted != subject.files[file]
+    files = {**subject.files, file: planted}
+    outcome = fuzz_c.fuzz(fuzz_c.build(subject._replace(files=files), tmp_path), 3_000_000, seed=2)
+    assert outcome.steps == 0
+    assert re.search(complaint, outcome.found), outcome.found
+
+
+def test_without_libfuzzer_it_is_said_what_to_install(monkeypatch, capsys):
+    monkeypatch.setattr(fuzz_c, "has_fuzzer", lambda: False)
+    assert fuzz_c.main([]) == 2
+    assert "libclang-rt-dev" in capsys.readouterr().err
+
+
+def test_a_compiler_without_libfuzzer_is_known(tmp_path):
+    refuses = tmp_path / "cc"
+    refuses.write_text("#!/bin/sh\nexit 1\n")
+    refuses.chmod(0o755)
+    assert not fuzz_c.has_fuzzer(str(refuses))
+    assert not fuzz_c.has_fuzzer(str(tmp_path / "none"))
+
+
+def test_harnesses_read_public_headers_only():
+    for harness in fuzz_c.HARNESSES.glob("*_fuzz.c"):
+        included = re.findall(r'#include "(.*)"', Path(harness).read_text(encoding="utf-8"))
+        assert set(included) <= {"reader.h", "@name@.h", "@name@_params.h"}
+
+
+def test_what_a_program_says_is_told_where_it_fails(tmp_path):
+    program = tmp_path / "fuzz"
+    program.write_text("#!/bin/sh\necho 'BROKEN: rule, line 3'\necho 'Base64: AAA='\nexit 77\n")
+    program.chmod(0o755)
+    outcome = fuzz_c.fuzz(program, 10, seed=1)
+    assert (outcome.steps, outcome.found) == (0, "BROKEN: rule, line 3\nBase64: AAA=")
+    assert subprocess.run([program], check=False, capture_output=True).returncode == 77
