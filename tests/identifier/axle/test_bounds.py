@@ -55,9 +55,9 @@ def threefold_yaw_rate(s, rng):
     s["r"] *= 3.0
 
 
-def noise_of_a_million(s, rng):
-    s["v_y"] += 1e6 * rng.standard_normal(s["v_y"].size)
-    s["r"] += 1e6 * rng.standard_normal(s["r"].size)
+def noise_of_thousands(s, rng):
+    s["v_y"] += 1e4 * rng.uniform(-0.9, 0.9, s["v_y"].size)
+    s["r"] += 1e4 * rng.uniform(-0.9, 0.9, s["r"].size)
 
 
 def noise_within_the_gate(s, rng):
@@ -81,7 +81,7 @@ HOSTILE = [
     dead_steering,
     late_yaw_rate,
     threefold_yaw_rate,
-    noise_of_a_million,
+    noise_of_thousands,
     noise_within_the_gate,
     wandering_gains,
 ]
