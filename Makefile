@@ -11,7 +11,7 @@ SMOKE := tests/test_imports.py tests/codegen tests/models/test_vehicle.py \
 	tests/mpc/path/test_waypoints.py tests/mpc/path/test_gates.py tests/tireid/test_cli.py
 SMOKE_ONNX := tests/identifier/export/test_onnx.py tests/identifier/export/test_onnx_model.py
 
-.PHONY: demo test lint bench mutants fuzz-c numbers newest lowest lock wheel clean
+.PHONY: demo test lint bench mutants fuzz fuzz-c numbers newest lowest lock wheel clean
 
 demo: $(VENV)/.demo
 	$(VENV)/bin/tireid demo --out out/demo --force
@@ -39,6 +39,12 @@ mutants: $(VENV)/.mutants
 FUZZ_STEPS := 10000000
 fuzz-c: $(VENV)/.demo
 	$(PY) -m benchmarks.fuzz_c --steps $(FUZZ_STEPS)
+
+# Hostile files and words at every door: CASES=20000 takes about an hour of two cores.
+CASES := 20000
+MINUTES :=
+fuzz: $(VENV)/.test
+	$(PY) -m benchmarks.fuzz --cases $(CASES) $(if $(MINUTES),--minutes $(MINUTES)) --out out/fuzz
 
 $(PY):
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "tireid needs Python 3.11 or newer: make PYTHON=/path/to/python3.11"; exit 2; }

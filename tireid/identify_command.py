@@ -13,9 +13,10 @@ from identifier.axle.design import NOT_CERTIFIED
 from identifier.design import Design
 from identifier.design_file import read_design
 from identifier.history import History
-from identifier.method import CannotFreezeError, FrozenModel, Method
+from identifier.method import CannotFreezeError, FrozenModel, Method, steady_stiffness
 from identifier.methods import DEFAULT, METHODS, REFERENCE, draws_weights, make_method
 from identifier.model_file import load_model
+from identifier.model_format import require_alive
 from identifier.network import Weights
 from identifier.reproducibility import (
     Replay,
@@ -37,7 +38,12 @@ from tireid.network_results import network_table, write_network_results
 from tireid.output import output_folder
 from tireid.progress import say, tell
 
+DEAD = 0.02  # of the stiffness told, below which an axle does not push
 OWN_PAST = "  its past, against online"
+
+
+class NotTrustedError(ValueError):
+    """What was learnt is no tire: the recording, or the vehicle file, is not that of a car."""
 
 
 def add_parser(commands: Any) -> None:
@@ -137,6 +143,8 @@ def run(options: argparse.Namespace) -> None:
             told = network_table(law, histories, replays)
         else:
             learnt = histories[0]
+            for t in freeze_times:
+                _require_trusted(learnt, t, law)
             frozen = {t: _replays(t, learnt, histories) for t in freeze_times}
             write_results(folder, law, learnt, histories[1:], frozen)
             closing = _closing_line(learnt, freeze_times[-1], vehicle, resumed=start is not None)
@@ -190,6 +198,27 @@ def _design(options: argparse.Namespace, vehicle: Vehicle) -> tuple[str, Method]
             raise ValueError(f"--{name} is for the default design: it stands in {options.design}")
     design = read_design(options.design)
     return design.law, design
+
+
+def _require_trusted(learnt: History, t: float, law: str) -> None:
+    """Refuse tires that do not push: what was learnt then is not the car's."""
+    model, vehicle = learnt.freeze(t), learnt.vehicle
+    where = (
+        f"{learnt.recording.name}: what {law} learnt until {freeze_key(t)} s is not to be trusted"
+    )
+    try:
+        require_alive(NotTrustedError, model)
+    except NotTrustedError as error:
+        raise NotTrustedError(f"{where}: {error}") from None
+    v_x = learnt.recording.v_x
+    stiffness = steady_stiffness(model, float(v_x[v_x >= model.min_speed].mean()))
+    told = np.array([vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear])
+    for axle, learnt_one, told_one in zip(("front", "rear"), stiffness, told, strict=True):
+        if not learnt_one >= DEAD * told_one:
+            raise NotTrustedError(
+                f"{where}: the {axle} axle has {learnt_one:.4g} N/rad, the vehicle file says "
+                f"{told_one:.4g}; check signs, units and sensors of the recording"
+            )
 
 
 def _learn(

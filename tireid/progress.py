@@ -32,7 +32,9 @@ def say(text: str) -> None:
     ----------
     text : the line.
     """
-    complain(f"  {text}")
+    from codegen.escape import visible
+
+    complain(f"  {visible(text)}")
 
 
 def complain(text: str) -> None:

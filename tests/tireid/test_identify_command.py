@@ -6,11 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identifier.axle import AxleModel
 from identifier.defaults import default_design
 from identifier.design_file import design_text
+from identifier.method import SLIP, steady_stiffness
 from identifier.methods import METHODS, draws_weights, make_method
 from identifier.model_file import load_model
-from models.recordings import read_recording
+from models.recordings import Recording, read_recording
 from models.vehicle import sedan
 from tireid.cli import main
 
@@ -429,3 +431,39 @@ def test_a_recorded_car_is_identified_by_every_law(shared_data, tmp_path, name):
     assert online["rear"] < missed[1]
     (frozen,) = summary["rmse_N"]["frozen"].values()
     assert set(frozen) == {"carmaker:slalom1_14_5ms", "carmaker:experiment2_40kmh"}
+
+
+def test_an_axle_that_does_not_push_is_not_handed_on(logs, tmp_path, capsys, monkeypatch):
+    whole = AxleModel.axle_force
+    words = ["identify", logs / "slalom.csv", "--vehicle", logs / "car.toml", "--freeze", 4]
+    for share in ([1.0, 0.004], [np.nan, 1.0], [1.0, -1.0]):
+        dying = np.array(share)
+        monkeypatch.setattr(
+            AxleModel, "axle_force", lambda self, drive, dying=dying: whole(self, drive) * dying
+        )
+        said = refusal(capsys, [*words, "--out", tmp_path / "out"])
+        assert "what axle learnt until 4 s is not to be trusted" in said
+        assert not (tmp_path / "out").exists()
+    monkeypatch.setattr(AxleModel, "axle_force", lambda self, drive: 0.1 * whole(self, drive))
+    assert main([str(word) for word in [*words, "--out", tmp_path / "out"]]) == 0
+
+
+@pytest.mark.parametrize("law", ["axle", "integral", "magic_formula_ekf"])
+def test_the_stiffness_of_a_slide_is_the_slope_of_the_steady_curve(law):
+    car = sedan()
+    method = make_method(law, car)
+    rest = np.zeros(20)
+    still = Recording(
+        name="still",
+        t=0.01 * np.arange(20),
+        v_x=rest + 10.0,
+        v_y=rest,
+        r=rest,
+        delta_f=rest,
+        delta_r=rest,
+    )
+    model = method.frozen(car, method.setup(car, still).carry)
+    force = model.force_at(np.array([-SLIP, SLIP]))
+    slope = (force[1] - force[0]) / (2.0 * SLIP)
+    assert steady_stiffness(model, 10.0) == pytest.approx(slope, rel=0.02)
+    assert (slope > 1e4).all()

@@ -1,0 +1,147 @@
+"""What is mutated: small files that are right, of every format, written by the program itself."""
+
+import json
+from collections.abc import Collection, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from identifier.defaults import default_design
+from identifier.design_file import design_text
+from identifier.export.onnx_export import export_onnx
+from identifier.identify import identify
+from identifier.method import FrozenModel
+from identifier.methods import make_method
+from identifier.onnx_model import OnnxModel
+from models.maneuvers import Slalom
+from models.plant import Plant
+from models.recordings import Recording, write_recording
+from models.sensors import Sensor, Sensors
+from models.vehicle import Vehicle, sedan
+
+DATA = Path(__file__).resolve().parents[2] / "models" / "data"
+SPEED, DURATION = 20.0, 6.0  # m/s and s
+FRONT = ("name", "mass", "yaw_inertia", "l_f", "l_r")  # of a vehicle file without a chassis
+FROZEN = {  # file of weights, and the method that learnt it
+    "axle.json": "axle",
+    "network.json": "integral",
+    "regression.json": "rls",
+    "curve.json": "magic_formula_ekf",
+}
+DESIGNS = {"integral.toml": "integral", "lead.toml": "pi_lead"}
+
+
+def write_seeds(folder: Path, needed: Collection[str]) -> Mapping[str, bytes]:
+    """Write the files that cases begin with; return their contents by name.
+
+    Parameters
+    ----------
+    folder : an empty folder.
+    needed : names of those that are needed; what takes little is written anyway.
+    """
+    car = sedan()
+    recording = short_drive(car)
+    for name in ("log.csv", "other.csv", "log.csv.gz"):
+        write_recording(recording, folder / name)
+    for name in ("sedan.toml", "sedan.tir"):
+        (folder / name).write_bytes((DATA / name).read_bytes())
+    (folder / "car.toml").write_text(_plain_car(car))
+    for name, law in DESIGNS.items():
+        (folder / name).write_text(design_text(default_design(car, law=law)), encoding="utf-8")
+    _write_path(folder / "path.csv")
+    if "log.parquet" in needed:
+        _write_parquet(recording, folder / "log.parquet")
+    for name, law in FROZEN.items():
+        if name in needed:
+            _learnt(law, recording, car).save(folder / name)
+    if {"slip.onnx", "own.json"} & set(needed):
+        _write_network(folder / "slip.onnx")
+        OnnxModel.from_onnx(folder / "slip.onnx", car).save(folder / "own.json")
+    if "exported.onnx" in needed:
+        export_onnx(_learnt("integral", recording, car), folder / "exported.onnx")
+    return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+
+
+def short_drive(car: Vehicle) -> Recording:
+    """Return a few seconds of slalom with sensor noise.
+
+    Parameters
+    ----------
+    car : what drives.
+    """
+    maneuver = Slalom(
+        amplitude=np.radians(4.0),
+        frequency=0.6,
+        onset=0.5,
+        rate_limit=np.radians(40.0),
+        duration=DURATION,
+    )
+    sensors = Sensors(v_y=Sensor(noise=0.02), r=Sensor(noise=0.002))
+    drive = Plant(car).simulate(maneuver, speed=SPEED, name="log")
+    return drive.recording(sensors, np.random.default_rng(1))
+
+
+def _learnt(law: str, recording: Recording, car: Vehicle) -> FrozenModel:
+    history = identify(recording, car, make_method(law, car))
+    return history.freeze(float(recording.t[-1]))
+
+
+def _write_parquet(recording: Recording, path: Path) -> None:
+    import pyarrow
+    import pyarrow.parquet
+
+    assert recording.axle_force is not None
+    columns = {
+        "t": recording.t,
+        "vx": recording.v_x,
+        "vy": recording.v_y,
+        "r": recording.r,
+        "delta_f": recording.delta_f,
+        "Fyf": recording.axle_force[:, 0],
+        "Fyr": recording.axle_force[:, 1],
+    }
+    pyarrow.parquet.write_table(pyarrow.table(columns), path)
+
+
+def _plain_car(car: Vehicle) -> str:
+    lines = [f"{name} = {json.dumps(getattr(car, name))}" for name in FRONT]
+    stiffness = [field.name for field in fields(car) if field.name.startswith("cornering")]
+    return "\n".join([*lines, *(f"{name} = {getattr(car, name)!r}" for name in stiffness)]) + "\n"
+
+
+def _write_network(path: Path) -> None:
+    """Write a dense network of two slip angles, as other tools write one."""
+    import onnx
+
+    first, second = np.zeros((2, 8)), np.zeros((8, 2))
+    first[0, :4] = first[1, 4:] = (4.0, 6.0, 9.0, 14.0)
+    second[:4, 0], second[4:, 1] = (1200.0, 1500.0, 1800.0, 900.0), (1000.0, 1300.0, 1500.0, 800.0)
+    real = onnx.TensorProto.FLOAT
+    nodes = [
+        onnx.helper.make_node("MatMul", ["input", "first"], ["z"]),
+        onnx.helper.make_node("Tanh", ["z"], ["a"]),
+        onnx.helper.make_node("MatMul", ["a", "second"], ["output"]),
+    ]
+    graph = onnx.helper.make_graph(
+        nodes,
+        "tire",
+        [onnx.helper.make_tensor_value_info("input", real, ["batch", 2])],
+        [onnx.helper.make_tensor_value_info("output", real, ["batch", 2])],
+        [
+            onnx.numpy_helper.from_array(first.astype(np.float32), "first"),
+            onnx.numpy_helper.from_array(second.astype(np.float32), "second"),
+        ],
+    )
+    opset = [onnx.helper.make_opsetid("", 13)]
+    model: Any = onnx.helper.make_model(graph, opset_imports=opset, ir_version=7)
+    path.write_bytes(model.SerializeToString())
+
+
+def _write_path(path: Path) -> None:
+    """Write way-points of a lane change 40 m long."""
+    x = np.linspace(0.0, 40.0, 21)
+    y = 1.0 - np.cos(np.pi * np.clip((x - 10.0) / 20.0, 0.0, 1.0))
+    rows = [f"{a:.3f},{b:.3f}" for a, b in zip(x, y, strict=True)]
+    path.write_text("\n".join(["X_m,Y_m", *rows]) + "\n")
