@@ -128,7 +128,7 @@ def test_the_paper_s_measure_does_not_see_the_future_nor_the_truth(history):
 
 
 def test_a_law_that_does_not_learn_reproduces_its_past_exactly(history, car):
-    gains = replace(history.design.gains, eta_W=1e-300, eta_V=1e-300, rho_W=1e-300, rho_V=1e-300)
+    gains = replace(history.design.gains, eta_W=1e-15, eta_V=1e-15, rho_W=1e-15, rho_V=1e-15)
     still = identify(history.recording, car, replace(history.design, gains=gains))
     sides = reproduce(still, 4.0).reproduction
     assert sides.past_against_online.both < 1e-9

@@ -156,7 +156,7 @@ def test_side_force_follows_slip_over_the_relaxation_length():
     sigma, speed, stiffness = 0.6, 20.0, 60e3
     stiff = {"cornering_stiffness_front": 1e8, "cornering_stiffness_rear": 1e8}  # not read here
     chassis = replace(CHASSIS, roll_stiffness=1e9)
-    heavy = replace(CAR, mass=1e7, yaw_inertia=1e8, chassis=chassis, **stiff)
+    heavy = replace(CAR, mass=1e6, yaw_inertia=1e7, chassis=chassis, **stiff)
     tire = LinearTire(C_alpha=stiffness, C_kappa=1e9)
     step = StepSteer(amplitude=0.01, onset=0.2, rate_limit=10.0, duration=1.0)
     fast = replace(heavy, chassis=replace(heavy.chassis, steering_lag=0.002))

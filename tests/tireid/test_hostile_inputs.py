@@ -323,7 +323,7 @@ def test_a_compiler_that_refuses_is_one_line(capsys, tmp_path, monkeypatch):
     def compiles(*_, **__):
         return compiler.build_library("int one(void) { return 1; }", "one")
 
-    monkeypatch.setattr("tireid.export_command.build_package", compiles)
+    monkeypatch.setattr("tireid.exporting.build_package", compiles)
     compiler.find_compiler.cache_clear()
     try:
         assert main(["export", str(tmp_path / "out")]) == 2

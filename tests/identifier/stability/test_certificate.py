@@ -234,8 +234,8 @@ def test_a_margin_is_the_ratio_of_value_and_limit_and_one_is_the_limit():
         assert theta.margin * theta.value == pytest.approx(1.0)
         assert (theta.margin > 1.0) == (theta.status == "pass")
     assert gentle["small_gain"].margin == pytest.approx(100.0 * strong["small_gain"].margin)
-    quiet = certify(gains(eta_W=1e-300), integral, CITY)["small_gain"]
-    assert quiet.status == "pass" and quiet.margin > 1e100
+    quiet = certify(gains(eta_W=1e-15), integral, CITY)["small_gain"]
+    assert quiet.status == "pass" and quiet.margin > 1e12
 
 
 def test_the_lead_holds_a_force_along_its_own_direction():
