@@ -4,8 +4,9 @@ import json
 
 import pytest
 
+from identifier.export import processor
 from identifier.export.figures import figures_text, measure, with_figures
-from identifier.export.processor import PROCESSORS, missing_tools, replay_on, size_on
+from identifier.export.processor import PROCESSORS, ReplayError, missing_tools, replay_on, size_on
 
 pytestmark = pytest.mark.skipif(bool(missing_tools()), reason=f"needs {', '.join(missing_tools())}")
 
@@ -61,3 +62,10 @@ def test_the_table_has_a_row_for_each_processor_and_precision(packages):
     assert [one["ram_B"] for one in manifest["figures"]] == [cost.ram for cost in costs]
     assert manifest["hash"].startswith(packages["integral"].about["hash"])
     assert str(costs[0].replay.instructions) in text
+
+
+def test_a_processor_that_does_not_end_is_told(monkeypatch, tmp_path):
+    """A program that would sleep for an hour ends at the limit, which is a second here."""
+    monkeypatch.setattr(processor, "TIMEOUT", 1.0)
+    with pytest.raises(ReplayError, match="sleep did not end within 1 s"):
+        processor._result(["sleep", "10"], tmp_path)

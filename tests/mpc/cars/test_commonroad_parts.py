@@ -97,3 +97,23 @@ def test_the_friction_under_a_car_is_that_of_its_time_or_place():
     in_place = Friction(scale=0.9, changes=(FrictionChange(scale=0.4, at_place=50.0),))
     assert friction_at(in_place, 99.0, 20.0) == pytest.approx(0.9)
     assert friction_at(in_place, 0.0, 80.0) == pytest.approx(0.4)
+
+
+@needs_package
+def test_a_tire_slips_by_the_velocity_of_its_axle(monkeypatch):
+    """Front pair, then rear pair: each is told what its axle moves sideways beside the body."""
+    from vehiclemodels.utils import tire_model
+
+    from mpc.cars.commonroad.multi_body import V_X, V_Y, V_Y_FRONT, V_Y_REAR, YAW_RATE
+    from mpc.cars.commonroad.multi_body import slip_at_the_axles as at_the_axles
+
+    seen = []
+    monkeypatch.setattr(tire_model, "formula_lateral", lambda alpha, *_: seen.append(alpha))
+    x, car = np.zeros(29), SimpleNamespace(a=1.2, b=1.6)
+    x[[V_X, V_Y, YAW_RATE]] = 20.0, 0.5, 0.3
+    x[V_Y_FRONT], x[V_Y_REAR] = 0.5 + 1.2 * 0.3 + 0.04, 0.5 - 1.6 * 0.3 - 0.06
+    with at_the_axles(car) as prepare:
+        prepare(x)
+        for _ in range(4):
+            tire_model.formula_lateral(0.1)
+    assert seen == pytest.approx([0.1 + 0.002] * 2 + [0.1 - 0.003] * 2)

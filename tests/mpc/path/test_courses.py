@@ -72,8 +72,9 @@ def test_cones_stand_beside_the_path(course):
 
 
 def test_the_samples_of_a_course_lie_a_quarter_of_a_meter_apart_at_most(course):
-    steps = np.hypot(np.diff(course.X), np.diff(course.Y))
-    assert 0.2 < steps.max() <= 0.25 + 1e-9
+    for path in (course, constant_radius(30.0)):
+        steps = np.hypot(np.diff(path.X), np.diff(path.Y))
+        assert 0.2 < steps.max() <= 0.25 + 1e-9
 
 
 def test_the_names_of_the_command_line_build_paths():
