@@ -23,10 +23,10 @@ onnx = pytest.importorskip("onnx", reason="needs the package onnx")
 CAR = sedan()
 
 
-def tire_file(path, *, iso=False, swapped=False, forces=2):
+def tire_file(path, *, iso=False, swapped=False, forces=2, peak=4e4):
     """[alpha_f, alpha_r] -> F = 40 kN tanh(5 alpha) of each axle, or as other people order it."""
     sign = -1.0 if iso else 1.0
-    first, second = 5.0 * sign * np.eye(2), 4e4 * np.eye(2)[:, :forces]
+    first, second = 5.0 * sign * np.eye(2), peak * np.eye(2)[:, :forces]
     if swapped:
         first = first[::-1]
     kind = onnx.TensorProto.DOUBLE
@@ -225,3 +225,12 @@ def shaped_file(path, shape):
     opset = [onnx.helper.make_opsetid("", 13)]
     onnx.save(onnx.helper.make_model(graph, opset_imports=opset, ir_version=7), path)
     return path
+
+
+def test_a_network_in_kilonewtons_is_refused_before_anything_is_learnt(words, tmp_path, capsys):
+    path = tire_file(tmp_path / "tire.onnx", peak=40.0)
+    assert main([*words, "--network", str(path)]) == 2
+    said = capsys.readouterr().err
+    assert f"{path} is not to be trusted: the front axle has 199.4 N/rad" in said
+    assert "check its unit of force" in said
+    assert not (tmp_path / "out").exists()
