@@ -2,6 +2,7 @@
 #ifndef READER_H
 #define READER_H
 
+#include <float.h>
 #include <math.h>
 #include <stddef.h>
 #include <stdint.h>
