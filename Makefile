@@ -11,7 +11,7 @@ SMOKE := tests/test_imports.py tests/codegen tests/models/test_vehicle.py \
 	tests/mpc/path/test_waypoints.py tests/mpc/path/test_gates.py tests/tireid/test_cli.py
 SMOKE_ONNX := tests/identifier/export/test_onnx.py tests/identifier/export/test_onnx_model.py
 
-.PHONY: demo test lint bench mutants fuzz fuzz-c numbers newest lowest lock wheel clean
+.PHONY: demo test lint docs bench mutants fuzz fuzz-c numbers newest lowest lock wheel clean
 
 demo: $(VENV)/.demo
 	$(VENV)/bin/tireid demo --out out/demo --force
@@ -23,6 +23,10 @@ lint: $(VENV)/.test
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
+
+# The documents as a site, out/docs/index.html; a warning is an error.
+docs: $(VENV)/.docs
+	$(PY) -m sphinx --builder html --fail-on-warning --keep-going --nitpicky --quiet docs out/docs
 
 bench: $(VENV)/.bench
 	$(PY) -m benchmarks.run_all --out out/bench
@@ -65,6 +69,10 @@ endif
 
 $(VENV)/.bench: pyproject.toml | $(PY)
 	$(PY) -m pip install --quiet --editable ".[bench]"
+	touch $@
+
+$(VENV)/.docs: pyproject.toml | $(PY)
+	$(PY) -m pip install --quiet --editable ".[docs]"
 	touch $@
 
 $(VENV)/.mutants: pyproject.toml | $(PY)

@@ -4,8 +4,11 @@ import ast
 import re
 from pathlib import Path
 
+import tireid as ti
+
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("codegen", "models", "identifier", "mpc", "tireid")
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 Documented = ast.FunctionDef | ast.ClassDef
 
 
@@ -151,3 +154,54 @@ class Corner(NamedTuple):
         "Box documents none of its parameters ['width']",
         "scaled documents none of its parameters ['factor']",
     ]
+
+
+def missing_names(page: str) -> set[str]:
+    """Public names of `tireid` that a page of the API does not list."""
+    listed = set(re.findall(r"^\.\. auto\w+:: tireid\.(\w+)$", page, re.M))
+    return {name for name in ti.__all__ if not name.startswith("_")} ^ listed
+
+
+def test_the_page_of_the_api_lists_every_public_name():
+    page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    assert missing_names(page) == set()
+    assert missing_names(page.replace(":: tireid.certify", ":: tireid.cert")) == {"certify", "cert"}
+
+
+def dead_links(path: Path, text: str) -> list[str]:
+    """Targets of relative links and pictures that are no file."""
+    prose = re.sub(r"^```.*?^```$|`[^`\n]*`", "", text, flags=re.M | re.S)
+    targets = re.findall(r"\]\(([^)\s]+)\)", prose)
+    relative = [target.split("#")[0] for target in targets if "://" not in target]
+    return [target for target in relative if not (path.parent / target).is_file()]
+
+
+def test_links_of_documents_lead_to_files():
+    for path in DOCUMENTS:
+        assert not dead_links(path, path.read_text(encoding="utf-8")), path
+    assert dead_links(ROOT / "README.md", "[a](docs/nowhere.md), [b](docs/index.md)") == [
+        "docs/nowhere.md"
+    ]
+
+
+def unknown_names(text: str) -> set[str]:
+    """Names of `tireid` in the Python of a document that are none."""
+    used = set()
+    for block in re.findall(r"^```python\n(.*?)^```$", text, re.M | re.S):
+        for node in ast.walk(ast.parse(block)):
+            if isinstance(node, ast.Attribute) and ast.unparse(node.value) == "ti":
+                used.add(node.attr)
+    return used - set(ti.__all__)
+
+
+def test_python_in_documents_is_python_and_names_what_there_is():
+    for path in DOCUMENTS:
+        assert not unknown_names(path.read_text(encoding="utf-8")), path
+    assert unknown_names("```python\nti.learn(ti.sedan())\n```\n") == {"learn"}
+
+
+def test_every_page_is_in_the_table_of_contents():
+    index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    listed = set(re.findall(r"^[\w/]+$", index, re.M))
+    pages = {p.relative_to(ROOT / "docs").with_suffix("").as_posix() for p in DOCUMENTS[2:]}
+    assert listed == pages - {"index"}

@@ -1,4 +1,4 @@
-"""What the README promises: its example learns the tire, its table is the committed one."""
+"""What README and documents promise: the example learns the tire, the table is the committed one."""
 
 import json
 import re
@@ -11,12 +11,13 @@ import tireid as ti
 from tireid.paper_tables import printed_values, row_labels
 
 ROOT = Path(__file__).resolve().parents[1]
-README = (ROOT / "README.md").read_text()
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAPER = (ROOT / "docs" / "methods" / "paper.md").read_text(encoding="utf-8")
 EXPECTED = json.loads((ROOT / "tests" / "tireid" / "expected_tables.json").read_text())
 
 
 def printed_tables(text: str) -> dict[str, dict[str, list[str]]]:
-    """By maneuver, by the label of a row: the five cells of the README's table."""
+    """By maneuver, by the label of a row: the five cells of the document's table."""
     tables: dict[str, dict[str, list[str]]] = {}
     for line in text.splitlines():
         label, *cells = [cell.strip() for cell in line.strip("|").split("|")]
@@ -45,21 +46,21 @@ def check_tables(text: str) -> None:
 
 
 def test_the_table_is_the_committed_one():
-    check_tables(README)
+    check_tables(PAPER)
 
 
 def test_a_number_that_drifted_would_be_seen():
-    online = next(line for line in README.splitlines() if line.startswith("| online, against"))
+    online = next(line for line in PAPER.splitlines() if line.startswith("| online, against"))
     cells = online.split("|")
     cells[4] = " 0.99 "
     with pytest.raises(AssertionError):
-        check_tables(README.replace(online, "|".join(cells)))
+        check_tables(PAPER.replace(online, "|".join(cells)))
     with pytest.raises(AssertionError):
-        check_tables(README.replace(online, ""))
+        check_tables(PAPER.replace(online, ""))
 
 
 def test_a_value_of_the_paper_beside_the_wrong_measure_would_be_seen():
-    lines = README.splitlines()
+    lines = PAPER.splitlines()
     own = next(k for k, line in enumerate(lines) if "(the paper's measure)" in line)
     cells, below = lines[own].split("|"), lines[own + 1].split("|")
     cells[3], below[3] = below[3], cells[3]

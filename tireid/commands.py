@@ -12,6 +12,7 @@ from typing import Any
 COMMANDS: Mapping[str, str] = MappingProxyType(
     {
         "demo": "the whole story on the built-in car, with a report",
+        "sample": "a log to learn from, driven by the built-in car, where there is none",
         "paper": "Tables I and II of the paper, beside ours, over many seeds",
         "identify": "learn tire forces from a recording, freeze the weights and test them",
         "compare": "learn, freeze and replay with every method, side by side",

@@ -1,0 +1,40 @@
+"""How the documents become a site: `make docs`."""
+
+import re
+from importlib.metadata import version as installed
+from typing import Any
+
+project = "tireid"
+author = "The tireid developers"
+release = version = installed("tireid")
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+myst_heading_anchors = 3
+html_theme = "furo"
+html_title = "tireid"
+html_copy_source = False
+smartquotes = False
+default_role = "literal"  # in docstrings single back-ticks are code
+
+autodoc_member_order = "bysource"
+autodoc_typehints_format = "short"
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+nitpick_ignore_regex = [(r"py:.*", r".*")]  # types of other packages have no page here
+
+ENTRY = re.compile(r"^([\w*]+(?:, [\w*]+)*) : (.*)$")
+
+
+def describe(_app: Any, _what: str, _name: str, _it: Any, _options: Any, lines: list[str]) -> None:
+    """Turn "name : words" of a section into a name with its words below; types are in the signature."""
+    section, out = "", []
+    for k, line in enumerate(lines):
+        if k + 1 < len(lines) and re.fullmatch(r"-{3,}", lines[k + 1]):
+            section = line
+        entry = ENTRY.match(line) if section == "Parameters" else None
+        out += [entry[1], f"    {entry[2]}"] if entry else [line]
+    lines[:] = [line.replace("|", r"\|") for line in out]
+
+
+def setup(app: Any) -> None:
+    """Rewrite docstrings before napoleon reads them."""
+    app.connect("autodoc-process-docstring", describe, priority=400)
