@@ -25,7 +25,7 @@ ENTRY = re.compile(r"^([\w*]+(?:, [\w*]+)*) : (.*)$")
 
 
 def describe(_app: Any, _what: str, _name: str, _it: Any, _options: Any, lines: list[str]) -> None:
-    """Turn "name : words" of a section into a name with its words below; types are in the signature."""
+    """Put the words of "name : words" below the name: the type is in the signature."""
     section, out = "", []
     for k, line in enumerate(lines):
         if k + 1 < len(lines) and re.fullmatch(r"-{3,}", lines[k + 1]):

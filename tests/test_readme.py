@@ -1,4 +1,4 @@
-"""What README and documents promise: the example learns the tire, the table is the committed one."""
+"""What documents promise: the example learns the tire, the table is the committed one."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""`tireid sample`: the log that it writes is the recording of the library, and can be learnt from."""
+"""`tireid sample`: the log that it writes is the drive of the library, and can be learnt from."""
 
 import numpy as np
 import pytest
