@@ -19,8 +19,11 @@ autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
 napoleon_google_docstring = False
 napoleon_use_rtype = False
+napoleon_attr_annotations = False  # the signature has them
+python_maximum_signature_line_length = 88
 nitpick_ignore_regex = [(r"py:.*", r".*")]  # types of other packages have no page here
 
+ARRAY = "~numpy.ndarray[tuple[~typing.Any, ...], ~numpy.dtype[~numpy.float64]]"
 ENTRY = re.compile(r"^([\w*]+(?:, [\w*]+)*) : (.*)$")
 
 
@@ -35,6 +38,12 @@ def describe(_app: Any, _what: str, _name: str, _it: Any, _options: Any, lines: 
     lines[:] = [line.replace("|", r"\|") for line in out]
 
 
+def shorten(*event: Any) -> tuple[str | None, ...]:
+    """Say Array, as the code does, where the signature spells it out."""
+    return tuple(text.replace(ARRAY, "Array") if text else None for text in event[-2:])
+
+
 def setup(app: Any) -> None:
-    """Rewrite docstrings before napoleon reads them."""
+    """Rewrite docstrings before napoleon reads them, and signatures."""
+    app.connect("autodoc-process-signature", shorten)
     app.connect("autodoc-process-docstring", describe, priority=400)

@@ -158,7 +158,7 @@ class Corner(NamedTuple):
 
 def missing_names(page: str) -> set[str]:
     """Public names of `tireid` that a page of the API does not list."""
-    listed = set(re.findall(r"^\.\. auto\w+:: tireid\.(\w+)$", page, re.M))
+    listed = set(re.findall(r"^(?:\.\. auto\w+:: |## .*`)tireid\.(\w+)`?$", page, re.M))
     return {name for name in ti.__all__ if not name.startswith("_")} ^ listed
 
 
