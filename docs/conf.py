@@ -12,6 +12,7 @@ myst_heading_anchors = 3
 html_theme = "furo"
 html_title = "tireid"
 html_copy_source = False
+html_show_copyright = False
 smartquotes = False
 default_role = "literal"  # in docstrings single back-ticks are code
 
