@@ -63,7 +63,7 @@ static void check_kept(const void *now, const void *then, size_t size)
     for (at = 0U; (at + sizeof a) <= size; at += sizeof a) {
         (void)memcpy(&a, (const char *)now + at, sizeof a);
         (void)memcpy(&b, (const char *)then + at, sizeof b);
-        CHECK(fabs((double)a - (double)b) <= (32.0 * ulp * fabs((double)b)));
+        CHECK(fabs((double)a - (double)b) <= (64.0 * ulp * (1.0 + fabs((double)b))));
     }
 }
 #endif
