@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
+APART = ("mutants", "fuzz", "fuzz_c")  # have targets of make of their own: they take longest
 BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "front_door": [],
     "speed": [],

@@ -14,7 +14,7 @@ from identifier.axle.sway import Sway
 from identifier.baselines.curve_model import KIND as CURVE
 from identifier.baselines.curve_model import CurveModel
 from identifier.method import FrozenModel
-from identifier.model_format import FORMAT, FrozenModelError, require_alive
+from identifier.model_format import DEAD, FORMAT, PROBE, FrozenModelError, require_alive
 from identifier.network_model import KIND as NETWORK
 from identifier.network_model import NetworkModel
 from identifier.onnx_model import KIND as ONNX
@@ -50,9 +50,21 @@ def load_model(path: str | PathLike[str]) -> FrozenModel:
     model = READERS[kind](dict(table.data), str(path))
     try:
         require_alive(FrozenModelError, model)
+        _require_push(model)
     except FrozenModelError as error:
         raise FrozenModelError(f"{path}: {error}") from None
     return model
+
+
+def _require_push(model: FrozenModel) -> None:
+    """Refuse an axle that has next to nothing of the stiffness that the file's car is told."""
+    slope = np.diff(model.force_at(np.array([-PROBE, PROBE])), axis=0)[0] / (2.0 * PROBE)
+    told = np.array(model.vehicle.bicycle)[4:]
+    for axle, here, there in zip(("front", "rear"), slope, told, strict=True):
+        if not here >= DEAD * there:
+            raise FrozenModelError(
+                f"the {axle} axle has {here:.4g} N/rad, its vehicle {there:.4g}: it does not push"
+            )
 
 
 def _axle(data: dict[str, Any], source: str) -> AxleModel:

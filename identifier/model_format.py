@@ -19,6 +19,7 @@ class FrozenModelError(ValueError):
     """A file does not hold a frozen model; the message names the file and what is wrong."""
 
 
+DEAD = 0.02  # of the stiffness told, below which an axle does not push
 PROBE = 0.02  # rad, a slip at which every tire pushes back
 WIDE = 0.3  # rad, beyond the slip of every tire's peak
 PROBE_SPEED = 10.0  # m/s

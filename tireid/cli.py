@@ -18,7 +18,7 @@ from tireid.progress import complain, flush_out, listen_to_library, unwritten
 BAD_INPUT = 2
 NOT_TOLD = 74  # EX_IOERR of sysexits.h: all was done, but standard output could not be written
 INTERRUPTED = 130
-LONGEST_LINE = 1000  # characters of a message
+LONGEST_LINE = 900  # characters of a message, command and option not counted
 
 
 class Parser(argparse.ArgumentParser):
@@ -120,12 +120,14 @@ def one_line(error: Exception | str) -> str:
     error : any error, or its text.
     """
     if isinstance(error, OSError) and error.filename is not None:
-        return f"{error.filename}: {(error.strerror or 'cannot be used').lower()}"
-    if isinstance(error, OSError) and error.strerror:
-        return error.strerror.lower()  # as of a disk that is full
-    text = " ".join(str(error).split()) or type(error).__name__
+        words = f"{error.filename}: {(error.strerror or 'cannot be used').lower()}"
+    elif isinstance(error, OSError) and error.strerror:
+        words = error.strerror.lower()  # as of a disk that is full
+    else:
+        words = str(error)
+    text = " ".join(words.split()) or type(error).__name__
     if isinstance(error, MemoryError):
-        return f"not enough memory: {text}"
+        text = f"not enough memory: {text}"
     return text if len(text) <= LONGEST_LINE else f"{text[:LONGEST_LINE]}..."
 
 

@@ -16,7 +16,7 @@ from identifier.history import History
 from identifier.method import CannotFreezeError, FrozenModel, Method, steady_stiffness
 from identifier.methods import DEFAULT, METHODS, REFERENCE, draws_weights, make_method
 from identifier.model_file import load_model
-from identifier.model_format import require_alive
+from identifier.model_format import DEAD, require_alive
 from identifier.network import Weights
 from identifier.reproducibility import (
     Replay,
@@ -38,7 +38,6 @@ from tireid.network_results import network_table, write_network_results
 from tireid.output import output_folder
 from tireid.progress import say, tell
 
-DEAD = 0.02  # of the stiffness told, below which an axle does not push
 OWN_PAST = "  its past, against online"
 
 

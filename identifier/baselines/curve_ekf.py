@@ -158,7 +158,13 @@ class CurveEkf:
         if start is not None:
             if not isinstance(start, CurveModel) or start.curve != self.curve:
                 raise ValueError(f"the stored model is not a curve {self.curve!r}")
-            theta = encode(vehicle, self.friction, start.parameters)
+            with np.errstate(invalid="ignore", divide="ignore"):  # judged below
+                theta = encode(vehicle, self.friction, start.parameters)
+            if not np.isfinite(theta).all():
+                raise ValueError(
+                    "a curve to begin with must have positive stiffness and friction and a shape "
+                    f"between 1 and 2, its parameters are {start.parameters.tolist()}"
+                )
         spread = [getattr(self, SPREADS[kind]) for kind in kinds]
         return Setup(
             scan=_scan(self.curve),

@@ -109,7 +109,11 @@ def least_squares(X: Array, y: Array) -> Fit:
     independent = max(y.size * STRIDE / WINDOW - X.shape[1], 1.0)
     covariance = np.linalg.pinv((X / size).T @ (X / size) / y.size) * np.mean(rest**2) / independent
     total = float(np.sum((y - y.mean()) ** 2)) + 1e-300
-    return Fit(theta / size, np.sqrt(np.diag(covariance)) / size, 1 - float(rest @ rest) / total)
+    return Fit(
+        theta / size,
+        np.sqrt(np.maximum(np.diag(covariance), 0.0)) / size,
+        1 - float(rest @ rest) / total,
+    )
 
 
 def correlation(a: Array, b: Array) -> float:

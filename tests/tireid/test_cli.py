@@ -41,3 +41,8 @@ def test_an_interruption_is_said_and_leaves_nothing(monkeypatch, capsys, tmp_pat
     assert main(["paper", "--out", str(tmp_path / "out")]) == 130
     assert "interrupted" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("error", [OSError(36, "File name too long", "x" * 5000), "y" * 5000])
+def test_what_is_said_of_an_error_is_never_longer_than_a_thousand_characters(error):
+    assert len(one_line(error)) < 950

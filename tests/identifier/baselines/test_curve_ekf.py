@@ -1,5 +1,7 @@
 """Filters of tire parameters find the tire that made the data."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -62,3 +64,13 @@ def test_stored_parameters_begin_the_next_run(make, car, drive):
     other = CurveModel(vehicle=car, curve="linear", parameters=np.ones((2, 1)), min_speed=1.0)
     with pytest.raises(ValueError, match="stored model is not a curve"):
         identify(recording, car, method, start=other)
+
+
+@pytest.mark.parametrize("shape", [0.5, 2.5])
+def test_a_stored_shape_that_no_filter_reaches_is_no_start(shape, car, drive):
+    recording, method = drive(n=200), magic_formula_ekf(car)
+    model = identify(recording, car, method).freeze(99.0)
+    parameters = model.parameters.copy()
+    parameters[0, 1] = shape
+    with pytest.raises(ValueError, match="a curve to begin with must have positive stiffness"):
+        identify(recording, car, method, start=replace(model, parameters=parameters))

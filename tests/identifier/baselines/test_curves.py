@@ -99,3 +99,16 @@ def test_a_wrong_file_is_refused_in_one_line(change, said, car, tmp_path):
         load_model(path)
     assert str(error.value).startswith(str(path))
     assert "\n" not in str(error.value)
+
+
+def test_a_model_whose_axle_does_not_push_is_not_read(car, tmp_path):
+    model, path = model_of("dugoff", car), tmp_path / "weights.json"
+    for share, good in ((0.05, True), (0.01, False)):
+        parameters = model.parameters.copy()
+        parameters[1, 0] *= share
+        replace(model, parameters=parameters).save(path)
+        if good:
+            load_model(path)
+        else:
+            with pytest.raises(FrozenModelError, match=r"the rear axle has .* it does not push"):
+                load_model(path)
