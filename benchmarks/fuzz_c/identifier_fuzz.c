@@ -86,8 +86,9 @@ static void take_step(void)
     CHECK((state.faults - before.faults) <= 1U);
     CHECK((status != @NAME@_BAD_INPUT) || (state.faults == (before.faults + 1U)));
 #ifdef LEARNT
-    if ((state.adapts == 0U) || (status == @NAME@_BAD_INPUT) || (status == @NAME@_BAD_RESULT)) {
-        @name@_weights now, then; /* what is refused teaches nothing */
+    if ((told == 0)
+        && ((state.adapts == 0U) || (status == @NAME@_BAD_INPUT) || (status == @NAME@_BAD_RESULT))) {
+        @name@_weights now, then; /* what is refused teaches nothing; told ones enter their boxes */
         CHECK(@name@_get_weights(&state, &now) == @NAME@_OK);
         CHECK(@name@_get_weights(&before, &then) == @NAME@_OK);
         check_kept(now.LEARNT, then.LEARNT, sizeof now.LEARNT);
