@@ -87,7 +87,9 @@ def other_kind(rng: random.Random, path: Path) -> str:
     path : of the file, which is there.
     """
     kind = rng.choice(("missing", "empty", "folder", "itself", "dangling", "pipe", "zeros", "full"))
-    path.unlink()
+    if path.is_dir() and not path.is_symlink():
+        return  # it has become a folder already
+    path.unlink(missing_ok=True)
     match kind:
         case "empty":
             path.write_bytes(b"")
