@@ -88,7 +88,7 @@ def other_kind(rng: random.Random, path: Path) -> str:
     """
     kind = rng.choice(("missing", "empty", "folder", "itself", "dangling", "pipe", "zeros", "full"))
     if path.is_dir() and not path.is_symlink():
-        return  # it has become a folder already
+        return "folder"  # it has become one already
     path.unlink(missing_ok=True)
     match kind:
         case "empty":
