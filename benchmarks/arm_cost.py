@@ -1,13 +1,18 @@
 """What exported C costs on Arm processors, measured in QEMU, beside the targets."""
 
 from benchmarks.targets import Targets, show
-from identifier.export.figures import Cost, measure
 from identifier.export.package import build_package
-from identifier.export.processor import CROSS_COMPILER, compiler_version, missing_tools
+from identifier.export.processor import (
+    CROSS_COMPILER,
+    Cost,
+    compiler_version,
+    measure,
+    missing_tools,
+)
 from identifier.methods import DEFAULT, REFERENCE, make_method
 from models.vehicle import sedan
-from mpc.export.figures import measure_mpc
 from mpc.export.pair import build_pair
+from mpc.export.processor import measure_mpc
 
 METHODS = {REFERENCE: "paper, n_h = 10", DEFAULT: "default, axle curves"}
 SMALL = "Cortex-M4F"

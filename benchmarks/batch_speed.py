@@ -19,12 +19,11 @@ from benchmarks.targets import Targets, keeps
 from codegen import BatchScan
 from codegen.batch import processors
 from codegen.lanes import find_target
-from identifier.batch import BatchRun, identify_batch
+from identifier.compare.batch import BatchRun, identify_batch
 from identifier.defaults import default_design
-from identifier.design import Design
-from identifier.history import History
-from identifier.identify import identify
 from identifier.methods import make_method
+from identifier.paper.design import Design
+from identifier.run import History, identify
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.recordings import Recording

@@ -31,18 +31,15 @@ from numpy.typing import NDArray
 from benchmarks.random_drives import FORCE_UNIT, random_vehicle
 from benchmarks.targets import Targets, keeps
 from identifier.defaults import natural_driving, natural_operation
-from identifier.design import Design
-from identifier.driving import Driving
-from identifier.gains import Gains
-from identifier.laws import DRIVING_ERRORS
-from identifier.network import Network
+from identifier.paper.design import Design, Driving
+from identifier.paper.laws import DRIVING_ERRORS, Gains
+from identifier.paper.network import Network
 from identifier.stability import Certificate
+from identifier.stability.bounds import small_gain, steady_capacity
 from identifier.stability.loop import direction_matrix, linear_law
 from identifier.stability.monte_carlo import Beginning, Observed, monte_carlo
-from identifier.stability.state_bound import small_gain, steady_capacity
 from models.vehicle import Vehicle
-from tireid.certificate_table import certificate_of
-from tireid.monte_carlo_table import bound_rows
+from tireid.commands.certificate_table import bound_rows, certificate_of
 
 Array = NDArray[np.float64]
 SEED, PROCESSES = 5, 2

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from models.maneuvers import Maneuver
 from models.plant import Driver
-from mpc.cars.commonroad.motion import runge_kutta_step
-from mpc.cars.commonroad.multi_body import ROLL, V_X, YAW_RATE, MultiBody
+from mpc.cars.commonroad import ROLL, V_X, YAW_RATE, MultiBody, runge_kutta_step
 
 Array = NDArray[np.float64]
 

@@ -30,10 +30,10 @@ from benchmarks.c_loops import (
 from benchmarks.literal_step import Carried, NumpyStep, casadi_step, signals
 from benchmarks.targets import Targets, keeps
 from codegen import find_compiler
-from identifier.design import Design, axle_impulse
 from identifier.export.compiled import samples_of
 from identifier.export.package import Package, build_package
 from identifier.methods import REFERENCE, make_method
+from identifier.paper.design import Design, axle_impulse
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan

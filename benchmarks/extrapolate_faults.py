@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.targets import Targets, show
-from identifier.cross_replay import Course
-from identifier.identify import identify
+from identifier.compare.course import Course
 from identifier.method import CannotFreezeError
 from identifier.methods import DEFAULT, METHODS, make_method
+from identifier.run import identify
 from models.recordings import Recording
 from models.vehicle import sedan
-from tireid.plant_drives import plant_recordings
+from tireid.commands.demo_story import plant_recordings
 
 Array = NDArray[np.float64]
 SIGNALS = ("v_x", "v_y", "r", "delta_f")

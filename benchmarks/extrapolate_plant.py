@@ -5,17 +5,17 @@ from numpy.typing import NDArray
 
 from benchmarks.targets import Targets, show
 from identifier.baselines import fit_floor, structure_of
-from identifier.cross_replay import Course
-from identifier.floors import STRUCTURES
-from identifier.identify import identify
+from identifier.compare.course import Course
+from identifier.compare.floors import STRUCTURES
 from identifier.methods import DEFAULT, METHODS, REFERENCE, make_method
 from identifier.reproducibility import AxleRmse
+from identifier.run import identify
 from models.friction import Friction, FrictionChange
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.recordings import Recording
 from models.vehicle import sedan
-from tireid.plant_drives import DRIVES, RATE_LIMIT, SENSORS, SLALOM, plant_recordings
+from tireid.commands.demo_story import DRIVES, RATE_LIMIT, SENSORS, SLALOM, plant_recordings
 
 Array = NDArray[np.float64]
 SEEDS = 5

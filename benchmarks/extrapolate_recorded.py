@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from benchmarks.recorded_cars import CARMAKER, DART, DATA
 from benchmarks.targets import Targets, show
 from identifier.axle import AxleModel
-from identifier.cross_replay import Course, where_learnt_and_elsewhere
-from identifier.identify import identify
+from identifier.compare.course import Course, where_learnt_and_elsewhere
+from identifier.compare.study import Comparison, Frozen, run_comparison
+from identifier.compare.sweep import best_candidate
 from identifier.methods import DEFAULT, REFERENCE, make_method
-from identifier.pareto import best_candidate
 from identifier.reproducibility import AxleRmse, axle_rms
+from identifier.run import identify
 from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle
-from tireid.compare_study import Comparison, Frozen, run_comparison
 
 Array = NDArray[np.float64]
 RUNS = {"hard": "slalom1_14_5ms", "mild": "experiment2_40kmh"}

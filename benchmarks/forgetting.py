@@ -24,17 +24,17 @@ from numpy.typing import NDArray
 
 from benchmarks.targets import Targets, keeps
 from identifier.defaults import design_for, natural_driving, natural_operation
-from identifier.design import Design
-from identifier.identify import identify
-from identifier.keeping import DEFAULT_KEEPING, KEEPINGS, with_keeping
 from identifier.methods import REFERENCE, make_method
-from identifier.network_model import NetworkModel
+from identifier.paper.design import Design
+from identifier.paper.network import NetworkModel
+from identifier.run import identify
+from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS, with_keeping
 from models.friction import Friction
 from models.maneuvers import RandomSteer
 from models.plant import Plant
 from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
-from tireid.plant_drives import DRIVES, RATE_LIMIT, SENSORS
+from tireid.commands.demo_story import DRIVES, RATE_LIMIT, SENSORS
 
 Array = NDArray[np.float64]
 SEED, CARS, PROCESSES = 11, 6, 2

@@ -18,14 +18,14 @@ import numpy as np
 from benchmarks.random_drives import FORCE_UNIT
 from benchmarks.steady_cornering import Corner, loop_at, random_corner
 from benchmarks.targets import Targets, keeps
-from identifier.design import Design
-from identifier.gains import Gains
-from identifier.identify import identify
-from identifier.network import Network, Weights
-from identifier.stability.estimated_input import estimated_input_feedback, minimal_decay
-from identifier.stability.gain_limit import integral_limit
+from identifier.paper.design import Design
+from identifier.paper.laws import Gains
+from identifier.paper.network import Network, Weights
+from identifier.run import identify
+from identifier.stability.limits import integral_limit
 from identifier.stability.loop import INTEGRAL, INTEGRATORS, Loop
 from identifier.stability.margins import gain_margin
+from identifier.stability.operation import estimated_input_feedback, minimal_decay
 
 ALLOWED = {"measured": 1.0, "estimated": 8.0}  # %
 SETTLE, WATCH = 150.0, 40.0  # s

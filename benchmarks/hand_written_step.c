@@ -1,7 +1,7 @@
 /* The paper's identifier as a person would write it for speed: plain loops, no guards, one copy of
  * the state. The limit that exported C is measured against, compiled with the same flags.
  *
- * xi [kN s], z [kN s^2], W [kN], V [-]; Euler steps of DT; the rational tanh of codegen/tanh.py.
+ * xi [kN s], z [kN s^2], W [kN], V [-]; Euler steps of DT; the rational tanh of codegen/elementary.py.
  * Numbers of car and gains come from outside, so that nothing of a generator is in here.
  */
 #include <math.h>

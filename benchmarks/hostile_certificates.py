@@ -30,19 +30,27 @@ from numpy.typing import NDArray
 
 from benchmarks.hostile_designs import HIDDEN, INPUTS, INTEGRATORS, LAWS, UNIT, Case, random_cases
 from benchmarks.targets import Targets, keeps
-from identifier.design import Design
-from identifier.driving import SPEED_SPREAD, Driving
-from identifier.gains import Gains
-from identifier.laws import DRIVING_ERRORS
-from identifier.network import Network
+from identifier.paper.design import SPEED_SPREAD, Design, Driving
+from identifier.paper.laws import DRIVING_ERRORS, Gains
+from identifier.paper.network import Network
 from identifier.stability import Certificate, certify
-from identifier.stability.bound_checks import bound_checks
-from identifier.stability.driving_limits import declared_signals, largest_steering_rate, operation
+from identifier.stability.checks import bound_checks, drift_check, dynamics_checks
 from identifier.stability.loop import direction_matrix, linear_law
-from identifier.stability.loop_checks import drift_check, dynamics_checks
-from identifier.stability.monte_carlo import Beginning, first_weights, largest_norms
-from identifier.stability.operation import proven_bounds
-from identifier.stability.random_drives import Drives, driven, measured, within
+from identifier.stability.monte_carlo import (
+    Beginning,
+    Drives,
+    driven,
+    first_weights,
+    largest_norms,
+    measured,
+    within,
+)
+from identifier.stability.operation import (
+    declared_signals,
+    largest_steering_rate,
+    operation,
+    proven_bounds,
+)
 from models.vehicle import Vehicle
 
 Array = NDArray[np.float64]

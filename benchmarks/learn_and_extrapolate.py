@@ -15,11 +15,11 @@ from benchmarks.extrapolate_plant import friction_drop, maneuvers
 from benchmarks.extrapolate_recorded import carmaker, dart
 from benchmarks.recorded_cars import DATA
 from benchmarks.targets import Targets, keeps, show
-from identifier.identify import identify
+from identifier.compare.course import step_times
 from identifier.methods import DEFAULT, REFERENCE, make_method
-from identifier.step_time import step_times
+from identifier.run import identify
 from models.vehicle import sedan
-from tireid.plant_drives import plant_recordings
+from tireid.commands.demo_story import plant_recordings
 
 
 def cost(targets: Targets) -> None:

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from benchmarks.random_drives import FORCE_UNIT, sampled_residual
 from benchmarks.steady_cornering import network_input, random_corner
 from benchmarks.targets import Targets, keeps
-from identifier.design import Design
-from identifier.gains import Gains, diagonal
-from identifier.identify import identify
-from identifier.network import Network
-from identifier.stability.gain_limit import integral_euler_limit
+from identifier.paper.design import Design
+from identifier.paper.laws import Gains, diagonal
+from identifier.paper.network import Network
+from identifier.run import identify
 from identifier.stability.limit_cycle import LimitCycle, sampled_limit_cycle
+from identifier.stability.limits import integral_euler_limit
 
 Array = NDArray[np.float64]
 ALLOWED = 5.0  # %

@@ -1,8 +1,9 @@
 """The paper's step as a person first writes it, to measure tuned code against.
 
-Both have the equations of `identifier.step` as they are printed, Euler steps, no guards: once as a
-CasADi SX function with the tanh of the C library and every number an input of it, once in NumPy.
-Signals and units as there; gains = [eta_W, eta_V, rho_W, rho_V, lambda], sampling = [T_s, U].
+Both have the equations of `identifier.paper.step` as they are printed, Euler steps, no guards: once
+as a CasADi SX function with the tanh of the C library and every number an input of it, once in
+NumPy. Signals and units as there; gains = [eta_W, eta_V, rho_W, rho_V, lambda], sampling = [T_s,
+U].
 """
 
 from typing import Any, NamedTuple
@@ -11,9 +12,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.laws import weight_rates
-from identifier.network import Network, network_signals
-from identifier.observer import filter_rate, observer_rate
+from identifier.paper.laws import filter_rate, observer_rate, weight_rates
+from identifier.paper.network import Network, network_signals
 from models.bicycle import BicycleParameters, bicycle, linear_axle_force
 from models.vehicle import Vehicle
 

@@ -13,12 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.vehicle import sedan
-from mpc.cost import Cost
 from mpc.prediction import build_rk4
-from mpc.problem import Limits, Problem
+from mpc.problem import Cost, Limits, Problem
 from mpc.tires.network import NetworkAxles
-from mpc.tires.reach import ALL
-from mpc.tires.structure import TireModel
+from mpc.tires.tire import ALL, TireModel
 
 Array = NDArray[np.float64]
 

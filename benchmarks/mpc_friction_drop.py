@@ -29,15 +29,13 @@ import numpy as np
 
 from benchmarks.mpc_cases import drive_with, options_of
 from benchmarks.targets import Targets, keeps, show
-from identifier.workers import spread
+from identifier.compare.work import spread
 from models.vehicle import sedan
 from mpc.handover import Learner
-from mpc.loop.limit import cornering_limit
+from mpc.loop.sensing import cornering_limit
 from mpc.path import Path, iso_3888_1, slalom, steady_speed
-from tireid.drive_case import conditions_of
-from tireid.drive_options import SpeedWish
-from tireid.drive_runs import Conditions, Run
-from tireid.drive_setup import make_setup
+from tireid.commands.drive import conditions_of
+from tireid.commands.drive_runs import Conditions, Run, SpeedWish, make_setup
 
 TIRES = ("linear", "frozen", "learning", "oracle")
 GAPS = {"slalom 24 m": 24.0, "slalom 30 m": 30.0, "slalom 36 m": 36.0}  # of the cones [m]

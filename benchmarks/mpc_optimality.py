@@ -14,12 +14,11 @@ import numpy as np
 
 from benchmarks.mpc_cases import Case, options_of
 from benchmarks.targets import Targets, keeps
-from mpc.cost import tracking_errors
 from mpc.loop import Drive
 from mpc.path import BUILT_IN
-from mpc.problem import Problem
-from tireid.drive_case import conditions_of
-from tireid.drive_runs import ORACLE, run_drive
+from mpc.problem import Problem, tracking_errors
+from tireid.commands.drive import conditions_of
+from tireid.commands.drive_runs import ORACLE, run_drive
 
 TRIED, CONVERGED = (1, 3), 20  # linearizations a step
 SHARE, TIRES, SEEDS = 0.9, "oracle", 3

@@ -18,10 +18,8 @@ from codegen import load_library
 from mpc.converged import build_errors
 from mpc.prediction import build_rk4
 from mpc.realtime import Status, Tracker
-from mpc.realtime.instance import FLAGS
-from mpc.realtime.source_cache import tracker_source
-from mpc.tires.reach import ALL
-from mpc.tires.structure import TireModel
+from mpc.realtime.instance import FLAGS, tracker_source
+from mpc.tires.tire import ALL, TireModel
 
 Array = NDArray[np.float64]
 N, N_X, WIDTH = PROBLEM.horizon, 5, 7  # a stage: x, u and the slack of the deviation behind it

@@ -25,11 +25,10 @@ import numpy as np
 
 from benchmarks.mpc_cases import drive_with, options_of
 from benchmarks.targets import Targets, keeps
-from identifier.workers import spread
+from identifier.compare.work import spread
 from mpc.handover.rules import Verdict
-from tireid.drive_case import conditions_of
-from tireid.drive_options import parse_fault
-from tireid.drive_runs import FROZEN, LEARNING
+from tireid.commands.drive import conditions_of, parse_fault
+from tireid.commands.drive_runs import FROZEN, LEARNING
 
 TIRES = (FROZEN, LEARNING)
 FAULTS = (  # channel, kind, how long [s], size: `tireid drive --fault` with a time

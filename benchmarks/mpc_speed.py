@@ -28,7 +28,7 @@ from benchmarks.mpc_double_lane_change import (
 from benchmarks.mpc_peers import CondensedDaqp, Ours, Peer, hpipm, ipopt
 from benchmarks.targets import Targets, keeps
 from mpc.converged import build_errors
-from mpc.tires.structure import TireModel
+from mpc.tires.tire import TireModel
 
 Array = NDArray[np.float64]
 

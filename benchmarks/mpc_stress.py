@@ -23,9 +23,9 @@ from codegen import find_compiler
 from models.vehicle import sedan
 from mpc.problem import Limits, Problem
 from mpc.realtime import Measurement, Status, Tracker
-from mpc.realtime.source_cache import tracker_source
+from mpc.realtime.instance import tracker_source
 from mpc.tires import TireModel, tire_model
-from mpc.tires.oracle import oracle_tire
+from mpc.tires.ladder import oracle_tire
 
 Array = NDArray[np.float64]
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from benchmarks.mpc_cases import TIRES, Case, run
 from benchmarks.targets import Targets, keeps
-from identifier.workers import spread
+from identifier.compare.work import spread
 
 PATHS = ("iso-3888-2", "course")
 SHARES = (0.9, 0.97)

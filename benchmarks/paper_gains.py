@@ -19,12 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.targets import Targets, keeps
-from identifier.gains import Gains, diagonal
-from identifier.network import Network
-from models.recordings import Recording
-from models.vehicle import sedan
-from tireid.certificate_table import certificate_of
-from tireid.paper_study import (
+from identifier.paper.laws import Gains, diagonal
+from identifier.paper.network import Network
+from identifier.paper_study import (
     ALL,
     FREEZES,
     GAINS,
@@ -36,6 +33,9 @@ from tireid.paper_study import (
     paper_design,
     run_trial,
 )
+from models.recordings import Recording
+from models.vehicle import sedan
+from tireid.commands.certificate_table import certificate_of
 
 Array = NDArray[np.float64]
 DESIGNS = 1500
@@ -156,7 +156,9 @@ def main(designs: int = DESIGNS, *, keep: bool = False) -> int:
         if seed == SEED:
             print(f"  the calmest is design {found.number}")
             same = found.design == (GAINS, NETWORK)
-            targets.at_most("gains of tireid.paper_study that are not the calmest", not same, 0, "")
+            targets.at_most(
+                "gains of identifier.paper_study that are not the calmest", not same, 0, ""
+            )
     certificate = certificate_of(paper_design("instantaneous", 0), sedan())
     margin = certificate["gain_sampled"].margin
     assert margin is not None

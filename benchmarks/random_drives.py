@@ -3,10 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.stability.random_drives import (
-    Drives,
-    residuals,
-)
+from identifier.stability.monte_carlo import Drives, residuals
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 

@@ -3,8 +3,8 @@
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from tireid.demo_drive import LANE_CHANGE, drive_story
-from tireid.demo_story import run_story
+from tireid.commands.demo_parts import LANE_CHANGE, drive_story
+from tireid.commands.demo_story import run_story
 from tireid.figures import figure_png, side_by_side_figure
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"

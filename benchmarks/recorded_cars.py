@@ -15,9 +15,9 @@ import numpy as np
 
 from benchmarks.targets import Targets, keeps
 from identifier.defaults import LAWS
-from identifier.identify import identify
 from identifier.methods import make_method
 from identifier.reproducibility import AxleRmse, force_rms, online_error, replay
+from identifier.run import identify
 from models.recordings import read_recording
 from models.vehicle import Vehicle
 

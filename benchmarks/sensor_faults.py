@@ -25,11 +25,10 @@ from benchmarks.random_drives import random_vehicle
 from benchmarks.targets import Targets, keeps, show
 from identifier.axle import AxleDesign
 from identifier.axle.gate import GateState
-from identifier.driving import Driving
-from identifier.identify import identify
 from identifier.methods import DEFAULT, make_method
-from identifier.online import OnlineIdentifier
-from identifier.stability.random_drives import random_drives, within
+from identifier.paper.design import Driving
+from identifier.run import OnlineIdentifier, identify
+from identifier.stability.monte_carlo import random_drives, within
 from models.faults import KINDS, SIZED, SensorFault
 from models.friction import Friction
 from models.maneuvers import RandomSteer

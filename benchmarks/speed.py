@@ -18,8 +18,8 @@ from functools import partial
 import numpy as np
 
 from benchmarks.targets import Targets, keeps
-from identifier.identify import identify
 from identifier.methods import DEFAULT, REFERENCE, make_method
+from identifier.run import identify
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan

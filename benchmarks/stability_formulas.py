@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import eigvals
 
 from benchmarks.targets import Targets, keeps
-from identifier.stability.gain_limit import (
+from identifier.stability.limits import (
     critical_frequency,
     instantaneous_euler_limit,
     integral_euler_limit,

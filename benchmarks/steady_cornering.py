@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.random_drives import FORCE_UNIT, random_vehicle
-from identifier.design import Design
-from identifier.network import Weights
-from identifier.stability.estimated_input import jacobian_feedback
-from identifier.stability.regressor_gain import regressor_gains
+from identifier.paper.design import Design
+from identifier.paper.network import Weights
+from identifier.stability.loop import regressor_gains
+from identifier.stability.operation import jacobian_feedback
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 

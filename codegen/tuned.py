@@ -4,9 +4,8 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from codegen.branches import assumed, decision
-from codegen.graph import Graph, function_of, graph_of, simplifying
-from codegen.recognize import EXPANDED, recognized
+from codegen.clean_c import EXPANDED, recognized
+from codegen.graph import Graph, assumed, decision, function_of, graph_of, simplifying
 from codegen.simplify import simplified
 
 WORTHWHILE = 0.5  # share of nodes that the smaller part may have, else nothing is decided

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from identifier.observer import observer_rate
+from identifier.paper.laws import observer_rate
 from models.bicycle import BicycleParameters, bicycle
 
 EXPECTED_BELOW = 1e-12

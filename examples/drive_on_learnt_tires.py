@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from identifier.axle import AxleDesign
-from identifier.identify import identify
+from identifier.run import identify
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan

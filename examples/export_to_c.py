@@ -12,14 +12,14 @@ import numpy as np
 from identifier.axle import AxleDesign
 from identifier.export.compiled import CompiledPackage
 from identifier.export.package import build_package
-from identifier.identify import identify
+from identifier.run import identify
 from models.maneuvers import DoubleLaneChange, Slalom
 from models.plant import Plant
 from models.recordings import Recording
 from models.sensors import Sensor, Sensors
 from models.vehicle import Vehicle, sedan
+from tireid.commands.demo_parts import self_test
 from tireid.exporting import write_files
-from tireid.self_test import self_test
 
 EXPECTED_BELOW = 1.0  # N, of forces of 8 kN
 SENSORS = Sensors(v_y=Sensor(noise=0.02), r=Sensor(noise=0.002))  # m/s and rad/s, rms

@@ -4,7 +4,7 @@ Three laws learn on the same slalom: integral, instantaneous, and instantaneous 
 32 s they replay the past; how far they miss what they said online is what the paper looks at.
 """
 
-from tireid.paper_study import LAWS, drive_maneuvers, paper_design, run_trial
+from identifier.paper_study import LAWS, drive_maneuvers, paper_design, run_trial
 
 EXPECTED_BELOW = 1.0
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from identifier.defaults import default_design
-from identifier.identify import identify
 from identifier.reproducibility import replay
+from identifier.run import identify
 from models.maneuvers import DoubleLaneChange, Slalom
 from models.plant import Plant
 from models.vehicle import sedan

@@ -6,10 +6,9 @@ none: what it learns stays inside boxes whatever is measured. Of the others noth
 
 from identifier.axle.design import AxleDesign
 from identifier.defaults import natural_operation
-from identifier.design import Design
-from identifier.driving import Driving
-from identifier.laws import DRIVING_ERRORS
 from identifier.method import Method
+from identifier.paper.design import Design, Driving
+from identifier.paper.laws import DRIVING_ERRORS
 from identifier.stability import Certificate
 from identifier.stability import certify as certify_gains
 from models.vehicle import Vehicle

@@ -10,16 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from identifier.design import Design, natural_force_unit
-from identifier.driving import Driving
-from identifier.gains import Gains, diagonal
-from identifier.laws import DRIVING_ERRORS
-from identifier.network import SIGNALS, Network
-from identifier.stability.driving_limits import operation
-from identifier.stability.estimated_input import minimal_decay
+from identifier.paper.design import Design, Driving, natural_force_unit
+from identifier.paper.laws import DRIVING_ERRORS, Gains, diagonal
+from identifier.paper.network import SIGNALS, Network
 from identifier.stability.gain_design import decay_rate, design_gains
 from identifier.stability.loop import linear_law
-from identifier.stability.operation import Operation
+from identifier.stability.operation import Operation, minimal_decay, operation
 from models.vehicle import GRAVITY, Vehicle
 
 REFERENCE_WHEELBASE = 2.7  # m: the car for which the scales of SIGNALS are meant

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.history import History
 from identifier.method import FrozenModel
+from identifier.run import History
 from models.recordings import Recording
 
 Array = NDArray[np.float64]

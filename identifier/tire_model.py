@@ -266,7 +266,7 @@ class TireModel(ABC):
         FrozenModelError
             Where the file is not such a model; one line that names it.
         """
-        from identifier.model_file import load_model
+        from identifier.methods import load_model
 
         return load_model(Path(path))
 

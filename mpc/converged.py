@@ -10,12 +10,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mpc.cost import N_ERRORS, tracking_errors
-from mpc.motion import N_CAR, motion, stage_ports, state_size
-from mpc.prediction import build_rk4
-from mpc.problem import Problem
-from mpc.tires.reach import reach_of
-from mpc.tires.structure import PredictionTire, TireModel
+from mpc.prediction import N_CAR, build_rk4, motion, stage_ports, state_size
+from mpc.problem import N_ERRORS, Problem, tracking_errors
+from mpc.tires.tire import PredictionTire, TireModel, reach_of
 
 Array = NDArray[np.float64]
 N_SOFT = 3  # e_y, slip in front, slip at the rear

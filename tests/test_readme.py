@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tireid as ti
-from tireid.paper_tables import printed_values, row_labels
+from tireid.commands.paper import printed_values, row_labels
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

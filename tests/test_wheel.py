@@ -32,11 +32,11 @@ reveal_type(ti.__version__)
 """
 REVEALED = (
     "numpy.ndarray",
-    "identifier.history.History",
+    "identifier.run.History",
     "numpy.ndarray",
     "identifier.reproducibility.AxleRmse | None",
     "Literal['not certified']",
-    "mpc.loop.scores.Scores",
+    "mpc.loop.record.Scores",
     "str",
 )
 WRONG = """import tireid as ti

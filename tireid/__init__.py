@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from identifier.axle import AxleDesign as AxleIdentifier
     from identifier.certification import certify
-    from identifier.design import Design as PaperIdentifier
-    from identifier.history import History
     from identifier.method import Method
     from identifier.methods import make_method
+    from identifier.paper.design import Design as PaperIdentifier
     from identifier.reproducibility import Prediction
+    from identifier.run import History
     from identifier.tire_model import TireModel
     from models.recordings import Recording, read_recording
     from models.vehicle import Vehicle, sedan
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "AxleIdentifier": ("identifier.axle", "AxleDesign"),
-    "History": ("identifier.history", "History"),
+    "History": ("identifier.run", "History"),
     "Method": ("identifier.method", "Method"),
-    "PaperIdentifier": ("identifier.design", "Design"),
+    "PaperIdentifier": ("identifier.paper.design", "Design"),
     "Prediction": ("identifier.reproducibility", "Prediction"),
     "Recording": ("models.recordings", "Recording"),
     "TireModel": ("identifier.tire_model", "TireModel"),

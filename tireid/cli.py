@@ -103,7 +103,7 @@ def _expected_errors() -> tuple[type[Exception], ...]:
     from identifier.export import compiled, processor
     from mpc.converged import NotConvergedError
     from mpc.realtime import instance
-    from tireid.self_test import SelfTestError
+    from tireid.commands.demo_parts import SelfTestError
 
     return (
         *(ValueError, ArithmeticError, OSError, ImportError, MemoryError),

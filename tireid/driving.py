@@ -10,10 +10,19 @@ from models.vehicle import Vehicle, sedan
 from mpc.cars import DoubleTrackCar
 from mpc.loop import cornering_limit, inertial_unit
 from mpc.path import Path
-from tireid.drive_learn import learning_drive
-from tireid.drive_options import SpeedWish, require_friction
-from tireid.drive_runs import FROZEN, LEARNING, LINEAR, Conditions, Run, run_drive
-from tireid.drive_setup import PERIOD, Setup
+from tireid.commands.drive import require_friction
+from tireid.commands.drive_runs import (
+    FROZEN,
+    LEARNING,
+    LINEAR,
+    PERIOD,
+    Conditions,
+    Run,
+    Setup,
+    SpeedWish,
+    run_drive,
+)
+from tireid.commands.drive_source import learning_drive
 
 
 def drive(

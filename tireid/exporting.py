@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from identifier.export.figures import Cost, figures_text, measure, with_figures
 from identifier.export.package import Package, build_package, readme
-from identifier.history import History
+from identifier.export.processor import Cost, figures_text, measure, with_figures
 from identifier.method import CannotFreezeError, Method
 from identifier.methods import continuing
+from identifier.run import History
 from identifier.tire_model import TireModel
 from models.vehicle import Vehicle, sedan
 from tireid.output import output_folder
@@ -185,7 +185,7 @@ def write_files(folder: Path, package: Package, figures: str, costs: Sequence[Co
 
 
 def _write_tracker(folder: Path, package: Package, single: bool) -> list[str]:
-    from tireid.export_mpc import write_tracker
+    from tireid.commands.export import write_tracker
 
     return write_tracker(folder, package, single=single)
 
@@ -193,7 +193,7 @@ def _write_tracker(folder: Path, package: Package, single: bool) -> list[str]:
 def _write_onnx(
     folder: Path, method: Method, vehicle: Vehicle, package: Package, start: TireModel | None
 ) -> None:
-    from identifier.export.onnx_export import export_onnx
+    from identifier.export.onnx import export_onnx
 
     try:
         model = start or method.frozen(vehicle, package.folded.carry)

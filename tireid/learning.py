@@ -1,10 +1,10 @@
 """Learning from a recording and asking what was learnt about another, as commands and users do."""
 
 from identifier.axle import AxleDesign
-from identifier.history import DivergedError, History
-from identifier.identify import identify as run_over
 from identifier.method import Method
 from identifier.reproducibility import Prediction, counted_samples, freeze_key, predict
+from identifier.run import DivergedError, History
+from identifier.run import identify as run_over
 from identifier.tire_model import TireModel
 from models.recordings import Recording, check_against_vehicle
 from models.vehicle import Vehicle

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from identifier.defaults import default_design
-from identifier.design_file import design_text
-from identifier.export.onnx_export import export_onnx
-from identifier.identify import identify
+from identifier.export.onnx import export_onnx
 from identifier.method import FrozenModel
 from identifier.methods import make_method
-from identifier.onnx_model import OnnxModel
+from identifier.own_network import OnnxModel
+from identifier.paper.design import design_text
+from identifier.run import identify
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.recordings import Recording, write_recording

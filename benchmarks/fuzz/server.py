@@ -27,7 +27,7 @@ from matplotlib.figure import Figure
 import tireid.cli
 import tireid.output
 from identifier.method import steady_stiffness
-from identifier.model_file import load_model
+from identifier.methods import load_model
 from tireid.figures import style
 
 MEMORY = 3 << 30  # more than the warm process has [bytes]

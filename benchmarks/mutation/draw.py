@@ -18,7 +18,7 @@ from benchmarks.mutation.python_faults import changes_bytecode, python_faults
 
 C_FOLDERS = (
     "identifier/export/c",
-    "identifier/export/fmu/sources",
+    "identifier/export/c_fmu",
     "mpc/c",
     "mpc/export/c",
 )

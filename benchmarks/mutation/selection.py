@@ -144,7 +144,7 @@ class Traced:
 
     def _readers(self, file: str) -> list[str]:
         """Python files that stand beside a folder of C, or use what does."""
-        beside = file.split("/c/")[0].split("/fmu/sources/")[0]
+        beside = file.split("/c/")[0].split("/c_fmu/")[0]
         home = self.root / beside
         found = [str(path.relative_to(self.root)) for path in sorted(home.rglob("*.py"))]
         if beside == "mpc":
@@ -201,6 +201,6 @@ def _file(test: str) -> str:
 def _mirror(file: str) -> str:
     """Return the folder of tests that mirrors the folder of a file."""
     folder = str(Path(file).parent)
-    for c in ("/c", "/fmu/sources"):
+    for c in ("/c", "/c_fmu"):
         folder = folder.removesuffix(c)
     return f"tests/{folder}"

@@ -3,11 +3,23 @@
 Rows are axles, front and rear.   F_z = m g l_o/L: static load [N], l_o distance to the other axle.
 φ = F_y/F_z [-].   ξ_i = v_y/g ± I_z r/(L F_z,i) [s], the axle impulse of (7) over F_z, obeys
 dξ_i/dt = φ_i cos δ_i - v_x r/g exactly: one axle, one equation, no stiffness in it.
+
+Ports of a compiled step whose numbers have names: a NamedTuple says what is in a vector.
+
+Numbers are computed once in Python and read by name in the equations, where they are symbols.
+
+Larger, smaller, within: as comparisons, since fmin and fmax of C are calls that cost more.
+
+And one division for many quotients: CasADi writes x (1/y) as x/y, once for each x.
+
+The check that every record of design numbers makes.
 """
 
 import math
-from typing import Any, NamedTuple
+from dataclasses import fields
+from typing import Any, NamedTuple, TypeVar
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -62,3 +74,92 @@ def axle_impulse(car: Car, v_y: Any, r: Any) -> Any:
     r : yaw rate [rad/s].
     """
     return v_y / GRAVITY + car.inertia * r
+
+
+Record = TypeVar("Record", bound=tuple[Any, ...])
+
+
+def named_port(kind: type[Record], name: str) -> tuple[Any, Record]:
+    """Return a symbol (k,) and its k numbers by name.
+
+    Parameters
+    ----------
+    kind : a NamedTuple of k fields.
+    name : of the port.
+    """
+    port = ca.SX.sym(name, len(kind._fields))  # type: ignore[attr-defined]
+    return port, kind(*ca.vertsplit(port))
+
+
+def axle_port(kind: type[Record], name: str) -> tuple[Any, Record]:
+    """Return a symbol (2, k), rows front and rear, and its k columns (2, 1) by name.
+
+    Parameters
+    ----------
+    kind : a NamedTuple of k fields.
+    name : of the port.
+    """
+    port = ca.SX.sym(name, 2, len(kind._fields))  # type: ignore[attr-defined]
+    return port, kind(*ca.horzsplit(port))
+
+
+def larger(a: Any, b: Any) -> Any:
+    """Return the larger of two, where neither is NaN.
+
+    Parameters
+    ----------
+    a : expression.
+    b : expression of the same shape, or a number.
+    """
+    return ca.if_else(a > b, a, b)
+
+
+def smaller(a: Any, b: Any) -> Any:
+    """Return the smaller of two, where neither is NaN.
+
+    Parameters
+    ----------
+    a : expression.
+    b : expression of the same shape, or a number.
+    """
+    return ca.if_else(a < b, a, b)
+
+
+def within(a: Any, least: Any, most: Any) -> Any:
+    """Return a number clipped to a range.
+
+    Parameters
+    ----------
+    a : expression.
+    least : lower end.
+    most : upper end.
+    """
+    return smaller(larger(a, least), most)
+
+
+def reciprocal(x: Any) -> Any:
+    """Return 1/x, rounded once, as a number that products share; 1 where x is 1.
+
+    Parameters
+    ----------
+    x : expression.
+    """
+    return 2 / (x + x)
+
+
+def require_positive(record: Any) -> None:
+    """Refuse numbers that are not positive and finite.
+
+    Parameters
+    ----------
+    record : a dataclass whose fields are all numbers.
+
+    Raises
+    ------
+    ValueError
+        With the name and the value.
+    """
+    for field in fields(record):
+        value = getattr(record, field.name)
+        if not 0.0 < value < float("inf"):
+            raise ValueError(f"{field.name} must be positive and finite, it is {value}")

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.axle.piecewise import larger, reciprocal
+from identifier.axle.car import larger, reciprocal
 
 Array = NDArray[np.float64]
 Symmetric = dict[tuple[int, int], Any]

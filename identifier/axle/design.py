@@ -11,20 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Scan
-from identifier.axle.bounds import BoundNumbers, Bounds, bounded
 from identifier.axle.car import car_numbers, froude_speed
 from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
-from identifier.axle.excitation import EDGES
-from identifier.axle.forward import OVER
-from identifier.axle.friction_change import ChangeDetector
+from identifier.axle.curve import EDGES, LADDER, doublings
 from identifier.axle.gate import GateState, Plausibility
+from identifier.axle.learning import BoundNumbers, Bounds, ChangeDetector, Regression, bounded
 from identifier.axle.model import AxleModel
 from identifier.axle.prior import Prior, friction_direction
-from identifier.axle.regression import Regression
-from identifier.axle.slip import SensitivityState
-from identifier.axle.step import CARRY, build_step
-from identifier.axle.sway import Sway, SwayState
-from identifier.axle.units import LADDER, doublings
+from identifier.axle.slip import SensitivityState, Sway, SwayState
+from identifier.axle.step import CARRY, OVER, build_step
 from identifier.axle.watch import BEGIN, Watch
 from identifier.method import FrozenModel, Setup
 from models.recordings import Recording

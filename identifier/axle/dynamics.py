@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identifier.axle.car import Car
+from identifier.axle.curve import Curve, curve, doublings
 from identifier.axle.slip import SHORTEST
-from identifier.axle.units import Curve, curve, doublings
 from models.vehicle import GRAVITY
 
 Array = NDArray[np.float64]

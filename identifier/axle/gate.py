@@ -12,8 +12,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.axle.checks import require_positive
-from identifier.axle.piecewise import larger
+from identifier.axle.car import larger, require_positive
 
 Array = NDArray[np.float64]
 

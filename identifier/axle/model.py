@@ -10,15 +10,12 @@ from numpy.typing import NDArray
 
 from codegen import Scan
 from identifier.axle.car import Car, car_numbers
+from identifier.axle.curve import EDGES, doublings, unit_matrix
 from identifier.axle.dynamics import lagged_force, series_compliance, static_curve
-from identifier.axle.excitation import EDGES
-from identifier.axle.forward import CARRY, OVER, build_frozen
 from identifier.axle.gate import GateState, Plausibility
-from identifier.axle.slip import SHORTEST
-from identifier.axle.sway import Sway, SwayState
-from identifier.axle.units import doublings, unit_matrix
-from identifier.method import Setup
-from identifier.model_format import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
+from identifier.axle.slip import SHORTEST, Sway, SwayState
+from identifier.axle.step import FROZEN_CARRY, OVER, build_frozen
+from identifier.method import FORMAT, FrozenModelError, Setup, vehicle_from, vehicle_numbers
 from identifier.tire_model import Fact, TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle
@@ -340,4 +337,4 @@ def _is_covariance(P: Array) -> bool:
 
 @cache
 def _frozen_scan(steps: tuple[int, ...]) -> Scan:
-    return Scan(build_frozen(steps), carry=CARRY, over=OVER)
+    return Scan(build_frozen(steps), carry=FROZEN_CARRY, over=OVER)

@@ -11,8 +11,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.axle.checks import require_positive
-from identifier.axle.units import unit_matrix
+from identifier.axle.car import require_positive
+from identifier.axle.curve import unit_matrix
 from models.vehicle import Vehicle
 
 Array = NDArray[np.float64]

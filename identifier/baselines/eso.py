@@ -16,8 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Scan
-from identifier.baselines.ports import OVER, impulse, sample_ports, turning_force
-from identifier.baselines.similarity import around, lowest_speed, require_positive, scales
+from identifier.baselines.ports import (
+    OVER,
+    around,
+    impulse,
+    lowest_speed,
+    require_positive,
+    sample_ports,
+    scales,
+    turning_force,
+)
 from identifier.method import CannotFreezeError, FrozenModel, Setup
 from identifier.tuning import Range
 from models.recordings import Recording

@@ -2,21 +2,113 @@
 
 minimize  Σ over recordings and axles of (RMSE/rms of the true force)²  over all parameters of the
 frozen model, by nonlinear least squares from several random starts.
+
+Levenberg-Marquardt within bounds, by normal equations: short and wide problems, many residuals.
+
+min |r(p)|²,   lower <= p <= upper;   (JᵀJ + μ D) d = -Jᵀ r over the parameters that are free to
+move, D = diag(JᵀJ), and the step is clipped to the bounds. A step is taken only downhill; μ follows
+Nielsen's rule. Source: Madsen, Nielsen and Tingleff, Methods for Non-Linear Least Squares Problems,
+2nd ed., 2004, section 3.2.
+
+What a method freezes to, as a function of parameters that may be fitted offline.
 """
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import partial, singledispatch
 from typing import NamedTuple
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.baselines.least_squares import least_squares
-from identifier.method import FrozenModel
+from identifier.axle import AxleDesign, AxleModel
+from identifier.baselines.curve_ekf import LIMITS, PARAMETRIZATIONS, SPREADS, CurveEkf
+from identifier.baselines.curves import CurveModel
+from identifier.baselines.linear import LinearBaseline, StiffnessRls
+from identifier.method import CannotFreezeError, FrozenModel
+from identifier.paper.design import Design
+from identifier.paper.network import NetworkModel, Weights
 from identifier.reproducibility import axle_rms, counted_samples
 from models.recordings import Recording
+from models.vehicle import Vehicle
 
 Array = NDArray[np.float64]
+STEP = 1e-6  # of the one-sided differences, for parameters of order one
+FIRST_DAMPING = 1e-2
+LARGEST_DAMPING = 1e12
+GAIN = 1e-7  # a step that lowers the cost by a smaller share is the last
+TINY = 1e-12  # keeps the normal equations solvable where a parameter does nothing
+
+
+class Fit(NamedTuple):
+    """Parameters (k,), and the sum of squares that they leave."""
+
+    parameters: Array
+    cost: float
+
+
+def least_squares(
+    residual: Callable[[Array], Array], start: Array, lower: Array, upper: Array, *, steps: int
+) -> Fit:
+    """Return a local minimum of the sum of squares.
+
+    Parameters
+    ----------
+    residual : r(p), any length.
+    start : first parameters (k,), each of order one; moved into the bounds.
+    lower : bounds (k,).
+    upper : bounds (k,).
+    steps : largest number of steps downhill.
+    """
+    p = np.clip(start, lower, upper)
+    r = residual(p)
+    cost, damping = float(r @ r), FIRST_DAMPING
+    for _ in range(steps):
+        J = _jacobian(residual, p, r, upper)
+        slope, normal = J.T @ r, J.T @ J
+        growth = 2.0
+        while damping < LARGEST_DAMPING:
+            trial = np.clip(p + _step(normal, slope, damping, p, lower, upper), lower, upper)
+            r_trial = residual(trial)
+            now = float(r_trial @ r_trial)
+            if now < cost:
+                break
+            damping, growth = damping * growth, 2.0 * growth
+        else:
+            return Fit(p, cost)
+        d = trial - p
+        expected = -float(d @ (2.0 * slope + normal @ d))
+        quality = (cost - now) / expected if expected > 0.0 else 0.0
+        damping = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * quality - 1.0) ** 3), 1e-12)
+        small = cost - now < GAIN * cost
+        p, r, cost = trial, r_trial, now
+        if small:
+            break
+    return Fit(p, cost)
+
+
+def _step(
+    normal: Array, slope: Array, damping: float, p: Array, lower: Array, upper: Array
+) -> Array:
+    """Solve the damped normal equations for what does not press against its bound."""
+    free = ~(((p <= lower) & (slope > 0.0)) | ((p >= upper) & (slope < 0.0)))
+    d = np.zeros_like(p)
+    A = normal[np.ix_(free, free)]
+    scale = np.diag(A) + TINY * max(float(np.trace(A)), TINY)
+    d[free] = np.linalg.solve(A + damping * np.diag(scale), -slope[free])
+    return d
+
+
+def _jacobian(residual: Callable[[Array], Array], p: Array, r: Array, upper: Array) -> Array:
+    columns = []
+    for i in range(p.size):
+        ahead = p.copy()
+        step = STEP * max(1.0, abs(float(p[i])))
+        ahead[i] += step if p[i] + step <= upper[i] else -step
+        columns.append((residual(ahead) - r) / (ahead[i] - p[i]))
+    return np.column_stack(columns)
+
+
 RIDGE = 1e-4  # of a parameter's distance to its start: 1 % of error for a hundred units of it
 
 
@@ -106,3 +198,123 @@ def _residual(
     model = structure.model(parameters)
     errors = [_errors(model, recording).ravel() for recording in recordings]
     return np.concatenate([*errors, RIDGE * (parameters - start)])
+
+
+SCATTER = 0.3  # of starts, in standard deviations of the method's own prior
+
+
+@singledispatch
+def structure_of(method: object, vehicle: Vehicle) -> Structure:
+    """Return what a method freezes to, with its parameters free.
+
+    Parameters
+    ----------
+    method : a design of the paper's, an axle design, or a baseline that has a model.
+    vehicle : the car.
+
+    Raises
+    ------
+    CannotFreezeError
+        Where the method has no model that could be fitted.
+    """
+    del vehicle
+    raise CannotFreezeError(f"{type(method).__name__} has no structure that could be fitted")
+
+
+@structure_of.register
+def _network(method: Design, vehicle: Vehicle) -> Structure:
+    """All weights of the paper's network: W in the force unit, then V, by rows."""
+    n_h, n_in = method.network.hidden, len(method.network.inputs)
+    free = np.full(n_h * (2 + n_in), np.inf)
+
+    def start(rng: np.random.Generator) -> Array:
+        first = method.network.initial_weights(rng)
+        return np.concatenate([first.W.ravel(), first.V.ravel()])
+
+    def model(parameters: Array) -> NetworkModel:
+        W, V = parameters[: 2 * n_h].reshape(2, n_h), parameters[2 * n_h :].reshape(n_h, n_in)
+        return NetworkModel(
+            vehicle=vehicle,
+            network=method.network,
+            weights=Weights(W=W.copy(), V=V.copy()),
+            force_unit=method.force_unit,
+            min_speed=method.min_speed,
+        )
+
+    return Structure(start, model, -free, free)
+
+
+@structure_of.register
+def _axle(method: AxleDesign, vehicle: Vehicle) -> Structure:
+    """Weights of the units, and compliance, sway and offsets over their bounds, by rows."""
+    n, limits = len(method.ladder), method.bounds
+    W, own = method.prior.means(vehicle, method.ladder)
+    offsets = (limits.steering, limits.v_y)
+    scale = np.array([[limits.compliance, 1.0, offset] for offset in offsets])
+    prior = method.prior.covariance(vehicle, method.ladder)
+    upper = np.concatenate([np.full(2 * n, limits.weight), np.ones(6)])
+    lower = -upper
+    lower[2 * n + np.array([0, 1, 3, 4])] = 0.0  # compliance and share of the sway
+
+    def start(rng: np.random.Generator) -> Array:
+        scattered = W + SCATTER * method.prior.sd_shape * rng.standard_normal(W.shape)
+        return np.concatenate([scattered.ravel(), (own / scale).ravel()])
+
+    def model(parameters: Array) -> AxleModel:
+        return AxleModel(
+            vehicle=vehicle,
+            ladder=method.ladder,
+            sway=method.sway,
+            plausibility=method.plausibility,
+            W=parameters[: 2 * n].reshape(2, n).copy(),
+            own=parameters[2 * n :].reshape(2, 3) * scale,
+            covariance=prior,
+            prior_covariance=prior,
+            excitation=np.zeros((2, 9)),
+        )
+
+    return Structure(start, model, lower, upper)
+
+
+@structure_of.register
+def _curve(method: CurveEkf, vehicle: Vehicle) -> Structure:
+    """The filter's own coordinates of a Magic Formula or Dugoff's tire."""
+    kinds, decode, _ = PARAMETRIZATIONS[method.curve]
+    spread = np.array([getattr(method, SPREADS[kind]) for kind in kinds])
+    limit = np.array([LIMITS[kind] for kind in kinds])
+    loads = ca.DM(vehicle.axle_loads)
+
+    def start(rng: np.random.Generator) -> Array:
+        return SCATTER * spread * rng.standard_normal(spread.size)
+
+    def model(parameters: Array) -> CurveModel:
+        values = decode(vehicle.bicycle, method.friction, loads, ca.DM(parameters))
+        return CurveModel(
+            vehicle=vehicle,
+            curve=method.curve,
+            parameters=np.array(ca.DM(values)),
+            min_speed=method.min_speed,
+        )
+
+    return Structure(start, model, -limit, limit)
+
+
+@structure_of.register(LinearBaseline)
+@structure_of.register(StiffnessRls)
+def _linear(method: LinearBaseline | StiffnessRls, vehicle: Vehicle) -> Structure:
+    """Logarithms of both stiffnesses over those that the car states."""
+    told = np.array([vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear])
+    limit = np.full(2, 4.0)
+
+    def start(rng: np.random.Generator) -> Array:
+        return SCATTER * rng.standard_normal(2)
+
+    def model(parameters: Array) -> CurveModel:
+        return CurveModel(
+            vehicle=vehicle,
+            curve="linear",
+            parameters=(told * np.exp(parameters)).reshape(2, 1),
+            min_speed=method.min_speed,
+        )
+
+    return Structure(start, model, -limit, limit)

@@ -1,15 +1,39 @@
-"""The linear tire that the car was told of: no learning, the least that a method must beat."""
+"""The linear tire that the car was told of: no learning, the least that a method must beat.
 
+Cornering stiffness of each axle, online: recursive least squares with forgetting.
+
+ξ̇ = C α - n filtered by 1/(s/κ + 1), which needs no derivative and couples no axles:
+y = κ ξ - LP[κ ξ - n] = C LP[α].   Per axle J = Σ λ^(k-i) h_i² T_s [rad² s] and
+C ← C + h (y - h C) T_s/J: least squares in its information form.
+J never falls below what the prior is worth, so that straight driving forgets nothing for good.
+Source: Ljung, System Identification, 2nd ed., section 11.2.
+"""
+
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Self
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.baselines.curve_model import CurveModel, curve_scan
-from identifier.baselines.similarity import lowest_speed, require_positive
+from codegen import Scan
+from identifier.baselines.curves import CurveModel, curve_scan
+from identifier.baselines.ports import (
+    OVER,
+    around,
+    impulse,
+    lowest_speed,
+    require_positive,
+    sample_ports,
+    scales,
+    turning_force,
+)
 from identifier.method import FrozenModel, Setup
+from identifier.tuning import Range
+from models.bicycle import slip_angles
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
@@ -86,5 +110,168 @@ class LinearBaseline:
             vehicle=vehicle,
             curve="linear",
             parameters=np.array(stiffness),
+            min_speed=self.min_speed,
+        )
+
+
+CARRY = ("stiffness", "information", "filters", "inputs", "running")
+NUMBERS = ("cutoff", "memory", "prior_slip", "learning_speed")
+SMALLEST = 0.02  # of the stiffness told: a tire pushes, whatever the noise says
+
+
+def build_step() -> ca.Function:
+    """Return the step; all numbers stay inputs of it.
+
+    Carried: stiffness (2,) [N/rad], information J (2,) [rad² s], filters (4,) = LP of [κ ξ - n, α],
+    inputs (4,) = those before the filter at the last sample, running (samples since the start).
+    Constant: told (2,) [N/rad] and numbers in the order of `NUMBERS`.
+    """
+    s = sample_ports()
+    p, dt = s.parameters, s.sampling[0]
+    stiffness, J = ca.SX.sym("stiffness", 2), ca.SX.sym("information", 2)
+    filters, inputs = ca.SX.sym("filters", 4), ca.SX.sym("inputs", 4)
+    running, numbers = ca.SX.sym("running"), ca.SX.sym("numbers", len(NUMBERS))
+    kappa, memory, prior_slip, learning_speed = ca.vertsplit(numbers)
+    xi = impulse(p, s.x)
+    alpha = slip_angles(p.l_f, p.l_r, s.speed, s.x, s.u)
+    arriving = ca.vertcat(kappa * xi - turning_force(p, s.v_x, s.x), alpha)
+    keep = ca.exp(-kappa * dt)
+    filtered = keep * filters + (1 - keep) / 2 * (inputs + arriving)
+    filtered = ca.if_else(running > 0, filtered, arriving)
+    y, h = kappa * xi - filtered[:2], filtered[2:]
+    warm = running * dt * kappa > 2  # the filters have forgotten their start
+    J_next = ca.fmax(ca.exp(-dt / memory) * J + h**2 * dt, prior_slip**2 * memory)
+    told = ca.vertcat(p.C_f, p.C_r)
+    C_next = ca.fmax(stiffness + h * (y - h * stiffness) * dt / J_next, SMALLEST * told)
+    fast = s.v_x >= learning_speed
+    learning = ca.logic_and(fast, warm)
+    return ca.Function(
+        "stiffness_rls",
+        [stiffness, J, filters, inputs, running, s.x, s.u, s.v_x, numbers, s.vehicle, s.sampling],
+        [
+            ca.if_else(learning, C_next, stiffness),
+            ca.if_else(learning, J_next, J),
+            filtered,
+            arriving,
+            ca.if_else(fast, running + 1, 0),
+            ca.if_else(s.moving, stiffness * alpha, 0),
+        ],
+        [*CARRY, *OVER, "numbers", "vehicle", "sampling"],
+        [*(f"{name}_next" for name in CARRY), "axle_force"],
+    )
+
+
+@cache
+def _scan() -> Scan:
+    return Scan(build_step(), carry=CARRY, over=OVER)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StiffnessRls:
+    """The best linear tire of the recent past; it freezes to a linear tire.
+
+    Parameters
+    ----------
+    cutoff : κ of the filters [1/s].
+    memory : time constant of forgetting [s].
+    prior_slip : the prior is worth driving with this root mean square of slip [rad] for as long
+        as the memory.
+    dt : sampling interval [s].
+    learning_speed : below this speed [m/s] learning rests.
+    min_speed : below this speed [m/s] forces read zero.
+
+    Raises
+    ------
+    ValueError
+        Where a number is not positive.
+    """
+
+    cutoff: float
+    memory: float
+    prior_slip: float = 0.003
+    dt: float = 0.01
+    learning_speed: float = 3.0
+    min_speed: float = 1.0
+
+    def __post_init__(self) -> None:
+        require_positive(**{name: getattr(self, name) for name in (*NUMBERS, "dt", "min_speed")})
+
+    @classmethod
+    def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> Self:
+        """Return the method for a car: κ = 3 sqrt(g/L), memory of 20 sqrt(L/g), 10 s for a sedan.
+
+        Parameters
+        ----------
+        vehicle : the car.
+        dt : sampling interval [s].
+        """
+        time, speed = scales(vehicle).time, scales(vehicle).speed
+        return cls(
+            cutoff=3.0 / time,
+            memory=20.0 * time,
+            dt=dt,
+            learning_speed=0.6 * speed,
+            min_speed=lowest_speed(vehicle),
+        )
+
+    @property
+    def tunables(self) -> Mapping[str, Range]:
+        """What a search may vary, around the numbers that it has."""
+        return {
+            "cutoff": around(self.cutoff, 4.0),
+            "memory": around(self.memory, 10.0),
+            "prior_slip": around(self.prior_slip, math.sqrt(10.0)),
+        }
+
+    def setup(
+        self, vehicle: Vehicle, recording: Recording, start: FrozenModel | None = None
+    ) -> Setup:
+        """Return what a run needs.
+
+        Parameters
+        ----------
+        vehicle : the car; its stiffness is the prior.
+        recording : what it will run over.
+        start : a linear tire to begin with; None takes the vehicle's.
+
+        Raises
+        ------
+        ValueError
+            Where the stored model is of another kind.
+        """
+        del recording
+        first = np.array([vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear])
+        if start is not None:
+            if not isinstance(start, CurveModel) or start.curve != "linear":
+                raise ValueError("the stored model is not a linear tire")
+            first = start.parameters[:, 0]
+        return Setup(
+            scan=_scan(),
+            carry={
+                "stiffness": first,
+                "information": np.full(2, self.prior_slip**2 * self.memory),
+                "filters": np.zeros(4),
+                "inputs": np.zeros(4),
+                "running": np.zeros(1),
+            },
+            constants={
+                "numbers": np.array([getattr(self, name) for name in NUMBERS]),
+                "vehicle": np.array(vehicle.bicycle),
+                "sampling": np.array([self.dt, self.min_speed]),
+            },
+        )
+
+    def frozen(self, vehicle: Vehicle, carried: Mapping[str, Array]) -> CurveModel:
+        """Return the linear tire with the carried stiffness.
+
+        Parameters
+        ----------
+        vehicle : the car.
+        carried : stiffness (2,) [N/rad].
+        """
+        return CurveModel(
+            vehicle=vehicle,
+            curve="linear",
+            parameters=carried["stiffness"].reshape(2, 1).copy(),
             min_speed=self.min_speed,
         )

@@ -8,25 +8,22 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
-from codegen.clean_c import Statements, literal
+from codegen.clean_c import OWN, Statements, literal, recognized
 from codegen.graph import graph_of
-from codegen.recognize import OWN, recognized
 from codegen.template import Values, Words, filled
 from identifier.export.fold import FoldedStep
 from identifier.export.layout import (
     Member,
     carried_members,
+    conditions,
+    covariance_values,
+    factor_values,
+    has_amounts,
     initializer,
     output_members,
     read_expression,
     sum_terms,
     write_expression,
-)
-from identifier.export.weight_rules import (
-    conditions,
-    covariance_values,
-    factor_values,
-    has_amounts,
 )
 from identifier.refused import NOWHERE, STALE_TIME
 

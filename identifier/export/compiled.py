@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from codegen import load_library
 from codegen.template import filled
 from identifier.export.c_source import TEMPLATES
-from identifier.export.manifest import FORMAT
-from identifier.export.package import NAME, Package
+from identifier.export.package import FORMAT, NAME, Package
 from models.doors import Table, read_json, read_text, shown
 from models.recordings import Recording
 

@@ -1,19 +1,299 @@
-"""The package: C sources, example, self-test, build file, README and manifest, as texts by path."""
+"""The package: C sources, example, self-test, build file, README and manifest, as texts by path.
 
+<name>.json: everything that went into a package, what is in it, and their hashes.
+
+Samples for the self-test of a package, and the forces that CasADi gives for them.
+"""
+
+import hashlib
+import json
+import math
 import re
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from dataclasses import asdict, is_dataclass
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any, NamedTuple
 
-from codegen.template import Values, filled
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.escape import c_string
+from codegen.template import Values, Words, filled
+from identifier.axle import AxleDesign
+from identifier.axle.design import NOT_CERTIFIED
 from identifier.export.c_source import TEMPLATES, c_sources
-from identifier.export.fold import FoldedStep, fold
-from identifier.export.layout import Member, carried_members, output_members
-from identifier.export.manifest import ingredients, manifest_text, summary
-from identifier.export.vectors import SAMPLES, vectors, vectors_header
-from identifier.export.weight_rules import ruled
-from identifier.method import FrozenModel, Method
-from identifier.refused import STALE_TIME
+from identifier.export.fold import FoldedStep, Signal, fold
+from identifier.export.layout import Member, carried_members, output_members, ruled
+from identifier.method import FrozenModel, Method, vehicle_numbers
+from identifier.paper.design import Design
+from identifier.refused import NOWHERE, STALE_TIME, stale_samples
 from models.vehicle import Vehicle
+
+FORMAT = "tireid package 1"
+
+
+def ingredients(folded: FoldedStep, *, single: bool) -> dict[str, Any]:
+    """Return everything that a package is made of, ready for JSON.
+
+    Parameters
+    ----------
+    folded : the step.
+    single : whether float is the default precision.
+    """
+    method = folded.method
+    numbers: dict[str, Any] = (
+        asdict(method) if is_dataclass(method) and not isinstance(method, type) else {}
+    )
+    return {
+        "format": FORMAT,
+        "name": folded.name,
+        "tireid": tireid_version(),
+        "precision": "float" if single else "double",
+        "method": {"kind": type(method).__name__, **plain(numbers)},
+        "certificate": certificate(method),
+        "vehicle": plain(vehicle_numbers(folded.vehicle)),
+        "sample_time_s": folded.dt,
+        "min_speed_m_s": folded.min_speed,
+        "limits": {
+            "speed_m_s": folded.limits.speed,
+            "yaw_rate_rad_s": folded.limits.yaw_rate,
+            "steering_rad": folded.limits.steering,
+            "force_N": folded.limits.force,
+        },
+        "inputs": [_described(signal) for signal in folded.inputs],
+        "outputs": [_described(signal) for signal in folded.outputs],
+        "carried": [
+            {
+                **_described(signal),
+                "learnt": signal.name in folded.learnt,
+                "shape": list(folded.carry[signal.name].shape),
+                "start": plain(folded.carry[signal.name].tolist()),
+            }
+            for signal in folded.carried
+        ],
+    }
+
+
+def certificate(method: Method) -> dict[str, Any]:
+    """Return what is proven of a method, as the manifest says it.
+
+    Parameters
+    ----------
+    method : what was exported.
+    """
+    if isinstance(method, AxleDesign):
+        return method.certificate
+    verdict = "judged by tireid check" if isinstance(method, Design) else NOT_CERTIFIED
+    return {"verdict": verdict, "held_by_construction": {}}
+
+
+def summary(folded: FoldedStep, content: Mapping[str, Any]) -> dict[str, str | Words]:
+    """Return what texts say about a package: title, method, versions, hash, names and numbers.
+
+    Parameters
+    ----------
+    folded : the step.
+    content : what `ingredients` returned.
+    """
+    short, version = digest(content)[:12], tireid_version()
+    return {
+        "title": Words(f"Tire forces of the car {folded.vehicle.name}"),
+        "method": type(folded.method).__name__,
+        "version": version,
+        "hash": short,
+        "certificate": _certificate_text(folded.method),
+        "version_text": c_string(f"{folded.name} {short}, tireid {version}"),
+        "single": str(int(content["precision"] == "float")),
+        "dt": f"{folded.dt:g}",
+        "min_speed": f"{folded.min_speed:.3g}",
+        "name": folded.name,
+        "NAME": folded.name.upper(),
+    }
+
+
+def _certificate_text(method: Method) -> str:
+    proven = certificate(method)
+    if isinstance(method, Design):
+        return (
+            "Stability and error bounds of this law depend on its gains: `tireid check` on its\n"
+            "design file gives the certificate. None is part of this package."
+        )
+    verdict, held = proven["verdict"], proven["held_by_construction"]
+    lines = [f"This method is **{verdict}**: no stability margin and no error bound is proven."]
+    if held:
+        lines.append("What holds by construction after every sample, whatever is measured, in both")
+        lines.append("precisions, of what it learns:\n")
+        lines += ["| bound | |", "|---|---|", *(f"| {key} | {held[key]} |" for key in held)]
+    return "\n".join(lines)
+
+
+def digest(content: Any) -> str:
+    """Return the SHA-256 of data as JSON, 64 hexadecimal digits.
+
+    Parameters
+    ----------
+    content : ready for JSON.
+    """
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def manifest_text(content: Mapping[str, Any], files: Mapping[str, str]) -> str:
+    """Return <name>.json.
+
+    Parameters
+    ----------
+    content : what `ingredients` returned.
+    files : text of the other files by path.
+    """
+    hashes = {path: hashlib.sha256(text.encode()).hexdigest() for path, text in files.items()}
+    data = {**content, "hash": digest(content), "files_sha256": dict(sorted(hashes.items()))}
+    return json.dumps(data, indent=2) + "\n"
+
+
+def plain(value: Any) -> Any:
+    """Return data with plain numbers, lists and texts; infinity becomes a text.
+
+    Parameters
+    ----------
+    value : any of what dataclasses of methods hold.
+    """
+    match value:
+        case Mapping():
+            return {str(key): plain(item) for key, item in value.items()}
+        case np.ndarray():
+            return plain(value.tolist())
+        case list() | tuple():
+            return [plain(item) for item in value]
+        case float() | np.floating():
+            return float(value) if math.isfinite(value) else str(float(value))
+        case None | bool() | int() | str():
+            return value
+        case _:
+            return str(value)
+
+
+def tireid_version() -> str:
+    """Return the version of tireid."""
+    try:
+        return version("tireid")
+    except PackageNotFoundError:  # run from a checkout that is not installed
+        return "unknown"
+
+
+def _described(signal: Signal) -> dict[str, Any]:
+    return {
+        "name": signal.name,
+        "size": signal.size,
+        "unit": signal.unit,
+        "description": signal.description,
+    }
+
+
+Array = NDArray[np.float64]
+
+SAMPLES = 240
+REST = 10  # samples at rest, and some as long in between
+
+
+class Vectors(NamedTuple):
+    """Samples (n, 5) in the order of the inputs, SI, and axle forces (n, 2) [N]."""
+
+    samples: Array
+    force: Array
+
+
+def synthetic_samples(folded: FoldedStep, n: int = SAMPLES) -> Array:
+    """Return a start from rest and turns to both sides, (n, 5); arithmetic only, no noise.
+
+    Parameters
+    ----------
+    folded : its lowest speed sets the scale.
+    n : number of samples.
+    """
+    k = np.arange(n, dtype=np.float64)
+    wave, slow = _triangle(k / 60.0), _triangle(k / 97.0 + 0.2)
+    v_x = folded.min_speed * np.minimum(0.0973 * np.maximum(k - REST, 0.0), 15.0)
+    v_x = np.where((k >= n // 2) & (k < n // 2 + REST), 0.5 * folded.min_speed, v_x)
+    v_y = 0.03 * v_x * slow
+    r = 0.4 * folded.min_speed * wave * np.minimum(k / n, 0.5)
+    delta_f, delta_r = 0.05 * wave, 0.005 * slow
+    return np.column_stack([v_x, v_y, r, delta_f, delta_r])
+
+
+def _triangle(phase: Array) -> Array:
+    wave: Array = 4.0 * np.abs(phase - np.floor(phase + 0.5)) - 1.0
+    return wave
+
+
+def run_in_virtual_machine(folded: FoldedStep, samples: Array) -> tuple[Array, dict[str, Array]]:
+    """Return the outputs (n, k) of a folded step, one beside the other, and what it carries then.
+
+    Samples that are refused count as time, as `identifier.refused` says.
+
+    Parameters
+    ----------
+    folded : the step.
+    samples : (n, 5) in the order of the inputs.
+    """
+    carry = [ca.DM(value) for value in folded.carry.values()]
+    n, size = len(carry), sum(port.size for port in folded.outputs)
+    told, now, missed, started = [], np.zeros(size), 0, False
+
+    def step(sample: Array) -> tuple[list[ca.DM], Array]:
+        v_x, v_y, r, delta_f, delta_r = sample
+        results = list(folded.function(*carry, ca.DM([v_y, r]), ca.DM([delta_f, delta_r]), v_x))
+        flat = [np.array(value).ravel(order="F") for value in results[n:]]
+        return results[:n], np.concatenate(flat)
+
+    for sample in samples:
+        if folded.limits.accept(*sample):
+            anew = folded.believed is None and missed > 0
+            if anew if started else folded.rests_first:
+                carry, _ = step(np.array([0.0, *sample[1:]]))
+            carry, now = step(sample)
+            missed, started = 0, True
+        else:
+            missed += 1
+            if folded.believed is not None and started:
+                carry, now = step(np.array([NOWHERE, 0.0, 0.0, 0.0, 0.0]))
+            if missed >= stale_samples(STALE_TIME, folded.dt):
+                now = np.zeros(size)
+        told.append(now)
+    return np.array(told), dict(zip(folded.carry, map(np.array, carry), strict=True))
+
+
+def vectors(folded: FoldedStep) -> Vectors:
+    """Return the self-test of a package.
+
+    Parameters
+    ----------
+    folded : the step.
+    """
+    samples = synthetic_samples(folded)
+    outputs, _ = run_in_virtual_machine(folded, samples)
+    return Vectors(samples, outputs[:, :2])
+
+
+def vectors_header(found: Vectors) -> str:
+    """Return the vectors as a C header.
+
+    Parameters
+    ----------
+    found : the vectors.
+    """
+    return (
+        "/* Generated. Samples v_x, v_y, r, delta_f, delta_r [SI] and forces front, rear [N]. */\n"
+        f"#define VECTORS {len(found.samples)}\n\n"
+        f"static const double vector_input[VECTORS][5] = {{\n{_rows(found.samples)}}};\n\n"
+        f"static const double vector_force[VECTORS][2] = {{\n{_rows(found.force)}}};\n"
+    )
+
+
+def _rows(table: Array) -> str:
+    return "".join(f"    {{ {', '.join(repr(float(v)) for v in row)} }},\n" for row in table)
+
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,30}")
 # Largest differences of a force that the self-test allows, in parts of the limit of forces.

@@ -10,12 +10,10 @@ from numpy.typing import NDArray
 
 from codegen import Scan
 from identifier.defaults import natural_network
-from identifier.design import natural_force_unit
 from identifier.method import FrozenModel, Setup
-from identifier.network import Network, Weights
-from identifier.network_model import NetworkModel
-from identifier.regression.law import Numbers
-from identifier.regression.laws import LAWS
+from identifier.paper.design import natural_force_unit
+from identifier.paper.network import Network, NetworkModel, Weights
+from identifier.regression.laws import LAWS, Numbers
 from identifier.regression.step import OVER, Structure, build_step
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle

@@ -14,11 +14,9 @@ from typing import Any
 
 import casadi as ca
 
-from identifier.laws import ball
-from identifier.network import Network, hidden_layer, network_signals
-from identifier.regression.filtered import Lags, filtered_pair
-from identifier.regression.law import Numbers, Weights
-from identifier.regression.laws import LAWS
+from identifier.paper.laws import ball
+from identifier.paper.network import Network, hidden_layer, network_signals
+from identifier.regression.laws import LAWS, Lags, Numbers, Weights, filtered_pair
 from models.bicycle import BicycleParameters, bicycle, linear_axle_force
 
 CARRY = ("W", "V", "target_lag", "regressor_lag", "fresh")

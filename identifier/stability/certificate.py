@@ -2,34 +2,44 @@
 
 Judged at the worst regressor (|s|² = n_h, no leakage), so that a pass holds on every road; the
 same loop at the regressors of a recorded run is `along_run`.
+
+The learning loop along a recorded run: how large its gain was, how close to the limit.
 """
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 import numpy.typing as npt
+from numpy.typing import NDArray
 
-from identifier.gains import Gains
-from identifier.laws import DrivingError
-from identifier.stability.bound_checks import bound_checks
+from identifier.paper.design import Design
+from identifier.paper.laws import DRIVING_ERRORS, DrivingError, Gains
+from identifier.paper.network import network_signals
+from identifier.run import History
+from identifier.stability.checks import (
+    bound_checks,
+    drift_check,
+    dynamics_checks,
+    margin_checks,
+    weight_check,
+)
 from identifier.stability.loop import (
     INTEGRATORS,
     Law,
     Loop,
     direction_matrix,
     linear_law,
+    regressor_gains,
     spectral_radius,
-)
-from identifier.stability.loop_checks import (
-    drift_check,
-    dynamics_checks,
-    margin_checks,
-    weight_check,
+    strongest,
 )
 from identifier.stability.lyapunov import Matrix
+from identifier.stability.margins import gain_margin
 from identifier.stability.operation import Operation, proven_bounds, worst_loop
 from identifier.stability.property import Certificate, Property
+from models.bicycle import BicycleParameters
 
 
 def certify(gains: Gains, driving_error: DrivingError, operation: Operation) -> Certificate:
@@ -38,7 +48,7 @@ def certify(gains: Gains, driving_error: DrivingError, operation: Operation) -> 
     Parameters
     ----------
     gains : of (8) to (12).
-    driving_error : of `identifier.laws`; the PI-lead law takes its τ from the gains.
+    driving_error : of `identifier.paper.laws`; the PI-lead law takes its τ from the gains.
     operation : where it runs.
     """
     law, D = linear_law(driving_error, gains.lead), direction_matrix(driving_error, gains.matrix)
@@ -95,3 +105,80 @@ def along_run(loop: Loop, gains_along: npt.ArrayLike, integrator: str, dt: float
     stack = np.repeat(unit[None], G.shape[0], axis=0)
     stack[:, 4:, :4] = G @ unit[4:, :4]
     return spectral_radius(stack, INTEGRATORS[integrator], dt)
+
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopAlongRun:
+    """The sampled loop at the regressor of every moving sample.
+
+    Parameters
+    ----------
+    t : time (n,) [s].
+    gain : largest eigenvalue of the loop gain (n,).
+    radius : spectral radius of the sampled loop without leakage (n,); above one it is unstable,
+        one where nothing is learnt.
+    strongest : index of the sample with the largest gain.
+    margin : sampled gain margin there [-].
+    """
+
+    t: Array
+    gain: Array
+    radius: Array
+    strongest: int
+    margin: float
+
+
+def loop_along(history: History, design: Design) -> LoopAlongRun:
+    """Evaluate the loop at the regressors and weights of a run.
+
+    The network's input is taken from the measured state, which the estimate follows closely.
+
+    Parameters
+    ----------
+    history : a run that did not diverge.
+    design : the design that ran.
+    """
+    recording = history.recording
+    moving = recording.v_x >= design.min_speed
+    x_bar = network_inputs(history, design)[moving]
+    W, V = history.carried["W"][:-1][moving], history.carried["V"][:-1][moving]
+    s = np.tanh(np.einsum("nij,nj->ni", V, x_bar))
+    gains = regressor_gains(
+        eta_W=design.gains.eta_W, eta_V=design.gains.eta_V, s=s, x_bar=x_bar, W=W
+    )
+    worst, _ = strongest(gains)
+    loop = Loop(
+        A_d=design.gains.matrix,
+        forgetting=design.gains.forgetting,
+        law=linear_law(DRIVING_ERRORS[design.law], design.gains.lead),
+        G=gains[worst],
+        direction=direction_matrix(DRIVING_ERRORS[design.law], design.gains.matrix),
+    )
+    return LoopAlongRun(
+        t=recording.t[moving],
+        gain=np.asarray(np.linalg.eigvalsh(gains)[:, -1], dtype=np.float64),
+        radius=along_run(loop, gains, design.integrator, design.dt),
+        strongest=worst,
+        margin=gain_margin(loop, INTEGRATORS[design.integrator], design.dt).factor,
+    )
+
+
+def network_inputs(history: History, design: Design) -> Array:
+    """Return x̄ at every sample, (n, n_in).
+
+    Parameters
+    ----------
+    history : a run; samples below the minimum speed count as driven at it.
+    design : the design that ran.
+    """
+    recording, network = history.recording, design.network
+    x, u, v_x = ca.SX.sym("x", 2), ca.SX.sym("u", 2), ca.SX.sym("v_x")
+    parameters = BicycleParameters(*history.vehicle.bicycle)
+    signals = network_signals(parameters, v_x, x, u)
+    evaluate = ca.Function("x_bar", [x, u, v_x], [network.normalized_input(signals)])
+    speed = np.maximum(recording.v_x, design.min_speed)
+    columns = evaluate.map(recording.t.size)(recording.x.T, recording.u.T, speed[None, :])
+    return np.array(columns).T

@@ -24,11 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from identifier.stability.gain_limit import (
-    integral_euler_limit,
-    integral_limit,
-    require_positive,
-)
+from identifier.stability.limits import integral_euler_limit, integral_limit, require_positive
 
 
 class NoLimitCycleError(ValueError):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from identifier.gains import NotHurwitzError
+from identifier.paper.laws import NotHurwitzError
 
 Matrix = npt.NDArray[np.float64]
 

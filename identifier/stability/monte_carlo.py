@@ -4,32 +4,259 @@ Each drive has its own road, steering and initial weights; the identifier runs o
 once, one in each lane, and keeps nothing but the largest norms. Sensors err as much as is declared.
 Only drives that break a declared condition (slip, speed, steering, yaw rate) are left out: a bound
 that is passed is wrong.
+
+Random smooth drives of a bicycle on saturating tires, many at once in compiled code.
+
+The tire is F = μ F_z sin(1.5 atan(C α/(1.5 μ F_z))): the stiffness that the vehicle states, and the
+friction limit. The residual f that the identifier sees of a drive is known exactly:
+(ξ_{k+1} - ξ_k)/dt - A_ξ ξ_k - B_ξ u_k.
 """
 
 from collections.abc import Callable
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from codegen import BatchScan
-from identifier.design import Design
-from identifier.driving import Driving
-from identifier.network import Weights
-from identifier.stability.random_drives import (
-    Drives,
-    measured,
-    random_drives,
-    residuals,
-    within,
-)
-from identifier.step import CARRY, GAINS, OVER, Structure, build_step
-from models.bicycle import bicycle
-from models.vehicle import Vehicle
+from identifier.paper.design import SPEED_SPREAD, Design, Driving
+from identifier.paper.network import Weights
+from identifier.paper.step import CARRY, GAINS, OVER, Structure, build_step
+from identifier.stability.operation import declared_signals, largest_steering_rate
+from models.bicycle import BicycleParameters, bicycle, slip_angles
+from models.vehicle import GRAVITY, Vehicle
 
 Array = NDArray[np.float64]
+SUBSTEPS = 10  # of the plant in a sample
+HARD = (0.6, 1.3)  # lateral acceleration that is asked of the linear car, over friction x g
+UNDERSTEER = 0.05  # rad/g, up to which steering makes up for it
+
+
+class Drives(NamedTuple):
+    """Drives of n samples: v_x (N, n) [m/s], x = [v_y, r] and u = [δ_f, δ_r] (N, n, 2), SI."""
+
+    v_x: Array
+    x: Array
+    u: Array
+
+
+def smooth_steering(rng: np.random.Generator, t: Array, *, highest: float, peak: float) -> Array:
+    """Return a sum of sines up to a frequency, faded in, (n, 2) [rad]; both axles may steer.
+
+    Parameters
+    ----------
+    rng : source of randomness.
+    t : times [s].
+    highest : largest frequency [Hz].
+    peak : largest angle of the front axle [rad].
+    """
+    frequencies = rng.uniform(min(0.05, highest / 2), highest, 6)
+    sines = np.sin(2 * np.pi * np.outer(t, frequencies) + rng.uniform(0, 2 * np.pi, 6))
+    wave = sines @ rng.standard_normal(6) * np.clip(t, 0.0, 1.0) ** 2
+    rear = rng.choice([0.0, rng.uniform(-0.15, 0.15)])
+    angles: Array = peak * np.column_stack([wave, rear * wave]) / np.abs(wave).max()
+    return angles
+
+
+def random_drives(
+    vehicle: Vehicle,
+    rng: np.random.Generator,
+    count: int,
+    *,
+    driving: Driving,
+    duration: float,
+    dt: float,
+) -> Drives:
+    """Return drives straight from rest in the car's frame (v_y = r = 0), some of them too hard.
+
+    Parameters
+    ----------
+    vehicle : the car.
+    rng : source of randomness.
+    count : number of drives N.
+    driving : how hard; each drive has a friction from 0.3 times the declared one on.
+    duration : of a drive [s].
+    dt : sampling interval [s].
+    """
+    n = round(duration / dt)
+    t: Array = np.arange(n, dtype=np.float64) * dt
+    road = driving.friction * rng.uniform(0.3, 1.0, count)
+    stiffness = np.array([vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear])
+    slips_at = driving.slip * float((stiffness / np.array(vehicle.axle_loads)).min())  # in g
+    lateral = np.minimum(road, slips_at) * GRAVITY * rng.uniform(*HARD, count)
+    peak = vehicle.wheelbase * lateral / driving.v_x**2
+    peak = peak + lateral / GRAVITY * rng.uniform(0.0, UNDERSTEER, count)
+    highest = driving.bandwidth * rng.uniform(0.3, 1.0, count)
+    u = np.array(
+        [smooth_steering(rng, t, highest=h, peak=p) for h, p in zip(highest, peak, strict=True)]
+    )
+    swing = np.sin(2 * np.pi * np.outer(rng.uniform(0.05, 0.1, count), t))
+    speed = driving.v_x * (1.0 + SPEED_SPREAD * swing)
+    return driven(vehicle, u, speed, road, dt)
+
+
+def driven(vehicle: Vehicle, u: Array, speed: Array, road: Array, dt: float) -> Drives:
+    """Drive the bicycle on saturating tires from v_y = r = 0.
+
+    Parameters
+    ----------
+    vehicle : the car.
+    u : steering (N, n, 2) [rad].
+    speed : v_x (N, n) [m/s].
+    road : friction (N,).
+    dt : sampling interval [s].
+    """
+    count, n = speed.shape
+    record = _plant()(
+        n,
+        {
+            "x": np.zeros((count, 2)),
+            "u": u,
+            "u_ahead": np.concatenate([u[:, 1:], u[:, -1:]], axis=1),
+            "v_x": speed[:, :, None],
+            "vehicle": np.array(vehicle.bicycle),
+            "road": np.column_stack([road, np.full(count, dt)]),
+        },
+        keep=range(n),
+    )
+    return Drives(speed, record["x"], u)
+
+
+def within(vehicle: Vehicle, drives: Drives, driving: Driving, dt: float) -> NDArray[np.bool_]:
+    """Return which drives keep every condition but friction, the road's own, (N,).
+
+    Parameters
+    ----------
+    vehicle : the car.
+    drives : what it drove.
+    driving : what was declared.
+    dt : sampling interval [s].
+    """
+    most, rates = declared_signals(vehicle, driving), largest_steering_rate(vehicle, driving)
+    speed = driving.v_x * (1.0 + SPEED_SPREAD * (1.0 + 1e-9))
+    slowest = driving.v_x * (1.0 - SPEED_SPREAD * (1.0 + 1e-9))
+    kept = (np.abs(slips(vehicle, drives)) <= driving.slip).all(axis=(1, 2))
+    kept &= ((drives.v_x <= speed) & (drives.v_x >= slowest)).all(axis=1)
+    kept &= (np.abs(np.diff(drives.v_x)) <= driving.friction * GRAVITY * dt).all(axis=1)
+    for values, names in ((drives.x, ("v_y", "r")), (drives.u, ("delta_f", "delta_r"))):
+        kept &= (np.abs(values) <= [most[name] for name in names]).all(axis=(1, 2))
+    moved = np.abs(np.diff(drives.u, axis=1)) / dt
+    kept &= (moved <= rates).all(axis=(1, 2))
+    return np.asarray(kept)
+
+
+def measured(drives: Drives, driving: Driving, rng: np.random.Generator) -> Drives:
+    """Return what sensors within the declared errors tell of the drives.
+
+    On each drive their errors are white, or as large as declared with a sign that stays, that
+    turns at every sample, or that turns at random.
+
+    Parameters
+    ----------
+    drives : the true signals.
+    driving : what was declared.
+    rng : source of randomness.
+    """
+    count, n = drives.v_x.shape
+    kind = np.asarray(rng.integers(0, 4, count))[:, None, None]
+    sign = np.where(rng.random((count, 1, 5)) < 0.5, -1.0, 1.0)
+    turning = np.where(np.arange(n) % 2 == 0, 1.0, -1.0)[None, :, None]
+    white = rng.uniform(-1.0, 1.0, (count, n, 5))
+    pattern = np.choose(
+        kind, [white, sign + 0.0 * white, sign * turning + 0.0 * white, np.sign(white)]
+    )
+    size = (driving.noise_v_x, driving.noise_v_y, driving.noise_r, *(driving.noise_delta,) * 2)
+    errors = pattern * np.array(size)
+    return Drives(
+        drives.v_x + errors[..., 0], drives.x + errors[..., 1:3], drives.u + errors[..., 3:]
+    )
+
+
+def residuals(vehicle: Vehicle, drives: Drives, dt: float) -> Array:
+    """Return what the samples show of f, (N, n - 1, 2) [N].
+
+    Parameters
+    ----------
+    vehicle : the car, whose linear tire is taken off.
+    drives : its drives.
+    dt : sampling interval [s].
+    """
+    model = bicycle(vehicle.bicycle, 1.0)
+    K_inv = np.array(ca.DM(model.K_inv))
+    v_y, r = drives.x[..., 0], drives.x[..., 1]
+    alpha = slips(vehicle, drives)
+    linear = alpha * [vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear]
+    turning = np.stack([-drives.v_x * r, np.zeros_like(v_y)], axis=-1) @ K_inv.T
+    known = linear + turning  # A_ξ ξ + B_ξ u of (7)
+    found: Array = np.diff(drives.x @ K_inv.T, axis=1) / dt - known[:, :-1]
+    return found
+
+
+def slips(vehicle: Vehicle, drives: Drives) -> Array:
+    """Return [α_f, α_r] of (3), small angles, (N, n, 2) [rad].
+
+    Parameters
+    ----------
+    vehicle : the car.
+    drives : its drives.
+    """
+    lever = np.array([vehicle.l_f, -vehicle.l_r])
+    v_y, r = drives.x[..., :1], drives.x[..., 1:]
+    angles: Array = drives.u - (v_y + lever * r) / drives.v_x[..., None]
+    return angles
+
+
+@cache
+def _plant() -> BatchScan:
+    step = saturating_bicycle()
+    over = ("u", "u_ahead", "v_x")
+    return BatchScan(step, carry=("x",), over=over, lanes_over=("x", *over, "road"))
+
+
+def _magic(y: Any) -> Any:
+    """sin(1.5 atan(y)) = 3 s - 4 s³ with s = sin(atan(y)/2): roots only, which run in lanes."""
+    c = 1.0 / ca.sqrt(1.0 + y * y)
+    s = y * c / ca.sqrt(2.0 + 2.0 * c)
+    return s * (3.0 - 4.0 * s * s)
+
+
+def saturating_bicycle() -> ca.Function:
+    """Return a sample of the bicycle: x (2,), u and u_ahead (2,), v_x, vehicle (6,) -> x_next.
+
+    Its input road = [μ, sampling interval [s]]; the steering moves from u to u_ahead meanwhile.
+    """
+    x, u, u_ahead, v_x = (
+        ca.SX.sym(n, k) for n, k in (("x", 2), ("u", 2), ("u_ahead", 2), ("v_x", 1))
+    )
+    parameters, road = ca.SX.sym("vehicle", 6), ca.SX.sym("road", 2)
+    p = BicycleParameters(*ca.vertsplit(parameters))
+    friction, dt = ca.vertsplit(road)
+    load = p.m * GRAVITY / (p.l_f + p.l_r)
+
+    def rate(x: Any, u: Any) -> Any:
+        alpha = slip_angles(p.l_f, p.l_r, v_x, x, u)
+        peak = ca.vertcat(friction * load * p.l_r, friction * load * p.l_f)
+        C = ca.vertcat(p.C_f, p.C_r)
+        F = peak * _magic(C * alpha / (1.5 * peak))
+        return ca.vertcat((F[0] + F[1]) / p.m - v_x * x[1], (p.l_f * F[0] - p.l_r * F[1]) / p.I_z)
+
+    now = x
+    for k in range(SUBSTEPS):
+        h = dt / SUBSTEPS
+        here = u + (k + 0.5) / SUBSTEPS * (u_ahead - u)
+        middle = now + h / 2 * rate(now, here)
+        now = now + h * rate(middle, here)
+    return ca.Function(
+        "saturating_bicycle",
+        [x, u, u_ahead, v_x, parameters, road],
+        [now],
+        ["x", "u", "u_ahead", "v_x", "vehicle", "road"],
+        ["x_next"],
+    )
+
+
 PEAKS = ("peak_xi_tilde", "peak_W", "peak_V")
 DURATION = 15.0  # s
 FEWEST = 256  # drives that are drawn at a time
@@ -187,7 +414,7 @@ def with_peaks(step: ca.Function) -> ca.Function:
 
     Parameters
     ----------
-    step : of `identifier.step`.
+    step : of `identifier.paper.step`.
     """
     inputs = [ca.SX.sym(step.name_in(i), step.sparsity_in(i)) for i in range(step.n_in())]
     outputs = dict(zip(step.name_out(), step.call(inputs), strict=True))

@@ -6,7 +6,7 @@ S = [ξ̃ z] P [ξ̃ z]ᵀ / 2 gives S' = y e - [ξ̃ z] Q [ξ̃ z]ᵀ / 2, y = 
 P = [[τ/a, 1/a], [1/a, (a + λ)/a]] and Q = diag(2 (τ - 1/a), 2 λ (a + λ)/a).
 
 Any Hurwitz A_d: the printed direction -A_d⁻ᵀ is not enough (its high-frequency gain is not
-symmetric), so the law runs along P of `identifier.laws.lyapunov_direction` in its place.
+symmetric), so the law runs along P of `identifier.paper.laws.lyapunov_direction` in its place.
 With A_dᵀ P + P A_d = -Q and W_hat' = η P (z + τ ξ̃) sᵀ, the storage
 M = [[τ P, P], [P, R]], R = λ P + Q/2, leaves the dissipation
 N = [[τ Q - 2 P, -Sᵀ], [-S, 2 λ R]], S = (P A_d - A_dᵀ P)/2, positive for τ above `lead_time`.
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from identifier.stability.gain_limit import require_positive
+from identifier.stability.limits import require_positive
 from identifier.stability.loop import Law
 from identifier.stability.lyapunov import LyapunovPair, Matrix
 

@@ -26,6 +26,8 @@ never grows faster than |W_hat|.
 
 The start: ξ_hat at the first measurement, z = 0, |W_hat(0)| within the bound on W_hat: so weights
 that were learnt within the declared conditions may be resumed.
+
+What acts on the error dynamics from outside: bounds that hold on every declared drive.
 """
 
 import math
@@ -33,11 +35,38 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identifier.gains import Gains
-from identifier.stability.disturbance import Disturbance
+from identifier.paper.laws import Gains
+from identifier.stability.bounds import transient_peak
+from identifier.stability.limits import require_positive
 from identifier.stability.loop import Law
 from identifier.stability.lyapunov import Matrix, peak_gain, power_norms
-from identifier.stability.state_bound import transient_peak
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Disturbance:
+    """Bounds of the residual, of the noise, and of what a held input leaves out.
+
+    Parameters
+    ----------
+    residual : sup|f|, the force the linear tire misses as the samples show it, with what sensors
+        add to A_ξ ξ + B_ξ u [U].
+    noise : sup of the sensors' error of ξ, which is in every measured ξ̃ [U s].
+    rate : sup|ξ'| of the car [U]; RK4 adds dt (1 - φ) ξ' to the error.
+    known : sup|A_ξ ξ + B_ξ u| as measured, which the observer is told [U].
+    """
+
+    residual: float
+    noise: float = 0.0
+    rate: float = 0.0
+    known: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_positive(residual=self.residual)
+        for name in ("noise", "rate", "known"):
+            value = getattr(self, name)
+            if not 0.0 <= value < float("inf"):
+                raise ValueError(f"{name} must not be negative, it is {value}")
+
 
 NEWTON_STEPS = 100
 

@@ -8,18 +8,194 @@ The wheel loads follow the forces through a lag of 10 ms, the vertical motion of
 it also breaks the algebraic loop between load and force.
 Assumed away: pitch, steer by the suspension, aligning moments of the tires, spin of the wheels
 (longitudinal slip follows from the wanted force at once), rolling and air resistance.
+
+Slip and force of the four wheels in the paper's sign: α = δ - atan2(v_y, v_x), F_y = +C α.
+
+The tires of the two sides mirror each other: what a tire does at zero slip (conicity, ply steer)
+pulls both inwards or both outwards and cancels straight ahead.
+
+Vertical load of each wheel from roll, axle side force and longitudinal acceleration.
+
+Order of wheels everywhere: front left, front right, rear left, rear right.
+
+The driver who holds the speed: proportional plus integral, with a limit and no wind-up.
 """
 
-from typing import Any
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import casadi as ca
 
+from models.files import require_positive
 from models.friction import MAX_PLACES, place_change
-from models.plant.driver import Driver
-from models.plant.loads import wheel_loads
-from models.plant.wheels import mounted, relax, tire_force, wheels
-from models.tires import Tire
+from models.tires import MagicFormula, Tire
 from models.vehicle import Vehicle
+
+LEAST_SPEED = 1.0  # below this wheel speed slip decays as if at it [m/s]
+LEAST_LOAD = 1.0  # a tire is asked at this load or more, and its force scaled down below it [N]
+LARGEST_KAPPA = 0.1  # about where a passenger tire has its largest longitudinal force [-]
+
+
+class Wheel(NamedTuple):
+    """Position [m] in the body frame, y > 0 left, and the axle it belongs to (0 front, 1 rear)."""
+
+    x: float
+    y: float
+    axle: int
+
+    def velocity(self, v_x: Any, v_y: Any, r: Any) -> tuple[Any, Any]:
+        """Velocity of the wheel center [m/s] in the body frame.
+
+        Parameters
+        ----------
+        v_x, v_y : velocity of the center of gravity, body frame [m/s].
+        r : yaw rate [rad/s].
+        """
+        return v_x - self.y * r, v_y + self.x * r
+
+
+def wheels(vehicle: Vehicle) -> tuple[Wheel, Wheel, Wheel, Wheel]:
+    """Return the wheels: front left, front right, rear left, rear right.
+
+    Parameters
+    ----------
+    vehicle : the car, with chassis.
+    """
+    c = vehicle.require_chassis()
+    front, rear = 0.5 * c.track_front, 0.5 * c.track_rear
+    return (
+        Wheel(vehicle.l_f, front, 0),
+        Wheel(vehicle.l_f, -front, 0),
+        Wheel(-vehicle.l_r, rear, 1),
+        Wheel(-vehicle.l_r, -rear, 1),
+    )
+
+
+def mounted(tire: Tire, wheel: Wheel) -> Tire:
+    """Return the tire for the side of the wheel; only measured tires have sides.
+
+    Parameters
+    ----------
+    tire : any of `models.tires`.
+    wheel : where it goes.
+    """
+    if isinstance(tire, MagicFormula):
+        return tire.mounted("left" if wheel.y > 0.0 else "right")
+    return tire
+
+
+def relax(slip: Any, delta: Any, velocity: tuple[Any, Any], length: float) -> Any:
+    """Return the derivative [1/s] of the lagged lateral slip tan(α').
+
+    σ d(tan α')/dt + |V_cx| tan α' = -V_cy with the velocity V_c of the contact point in the frame
+    of the wheel (Pacejka, Tire and Vehicle Dynamics, 3rd ed., section 7.2; no division by speed,
+    so it is well posed down to standstill).
+
+    Parameters
+    ----------
+    slip : lagged slip tan(α') [-].
+    delta : steering angle of the wheel [rad].
+    velocity : of the wheel, body frame [m/s].
+    length : relaxation length σ [m].
+    """
+    v_x, v_y = velocity
+    along = v_x * ca.cos(delta) + v_y * ca.sin(delta)
+    aside = v_y * ca.cos(delta) - v_x * ca.sin(delta)
+    return (-aside - ca.fmax(ca.fabs(along), LEAST_SPEED) * slip) / length
+
+
+def tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: Any) -> Any:
+    """Return [F_x, F_y] [N] of one tire in the frame of the wheel.
+
+    Parameters
+    ----------
+    tire : as mounted on this side.
+    slip : lagged slip tan(α') [-].
+    camber : γ > 0 when the top leans right [rad].
+    drive : wanted longitudinal force [N]; the tire gives less at large side slip.
+    load : vertical load [N].
+    mu : friction over the tire's own [-].
+    """
+    carried = ca.fmax(load, LEAST_LOAD)
+    # A tire may push at zero slip (its shifts); a free wheel then slips to where it does not.
+    at_rest = tire.forces(0.0, 0.0, 0.0, carried, mu)[0]
+    kappa = (drive - at_rest) / tire.slip_stiffness(carried)
+    kappa = ca.fmin(ca.fmax(kappa, -LARGEST_KAPPA), LARGEST_KAPPA)
+    F_x, F_y = tire.forces(ca.atan(slip), kappa, camber, carried, mu)
+    return ca.vertcat(F_x, F_y) * (load / carried)
+
+
+def wheel_loads(vehicle: Vehicle, roll: Any, roll_rate: Any, axle_force: Any, a_x: Any) -> Any:
+    """Return the four wheel loads [N]; none is negative and their sum is m g exactly.
+
+    An axle takes its share of the spring and damper moment and, through its roll center, the
+    moment of its own side force. A wheel that would pull on the road is lifted: its load is zero
+    and the other wheel of the axle carries all; the moment beyond that is lost.
+
+    Parameters
+    ----------
+    vehicle : the car, with chassis.
+    roll, roll_rate : angle [rad] and rate [rad/s] of the body, positive when the right side dips.
+    axle_force : side force of the front and the rear axle, body frame, (2,) [N].
+    a_x : longitudinal acceleration [m/s^2].
+    """
+    c = vehicle.require_chassis()
+    total = vehicle.weight
+    share = c.roll_stiffness_front_share
+    body_moment = c.roll_stiffness * roll + c.roll_damping * roll_rate
+    to_rear = vehicle.mass * a_x * c.cg_height / vehicle.wheelbase
+    front = ca.fmin(ca.fmax(vehicle.axle_loads[0] - to_rear, 0.0), total)
+    rear = total - front
+    loads = []
+    for axle, part, force, height, track in (
+        (front, share, axle_force[0], c.roll_center_height_front, c.track_front),
+        (rear, 1.0 - share, axle_force[1], c.roll_center_height_rear, c.track_rear),
+    ):
+        transfer = (part * body_moment + height * force) / track
+        right = ca.fmin(ca.fmax(0.5 * axle + transfer, 0.0), axle)
+        loads += [axle - right, right]
+    return ca.vertcat(*loads)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Driver:
+    """Gains of the speed controller; the defaults hold the speed within about 0.1 m/s.
+
+    Parameters
+    ----------
+    gain : acceleration per speed error [1/s].
+    integral_gain : acceleration per integrated speed error [1/s^2], zero for none.
+    acceleration_limit : largest demand, driving and braking [m/s^2].
+
+    Raises
+    ------
+    ValueError
+        For a gain that is negative, zero where it must not be, or NaN.
+    """
+
+    gain: float = 2.0
+    integral_gain: float = 0.5
+    acceleration_limit: float = 3.0
+
+    def __post_init__(self) -> None:
+        require_positive(ValueError, gain=self.gain, acceleration_limit=self.acceleration_limit)
+        if not (self.integral_gain >= 0.0 and math.isfinite(self.integral_gain)):
+            raise ValueError(f"integral_gain must not be negative, it is {self.integral_gain}")
+
+    def demand(self, error: Any, integral: Any) -> tuple[Any, Any]:
+        """Return the demanded acceleration [m/s^2] and the derivative of the integral [m/s].
+
+        Parameters
+        ----------
+        error : wanted minus actual speed [m/s].
+        integral : of the error [m].
+        """
+        wanted = self.gain * error + self.integral_gain * integral
+        limit = self.acceleration_limit
+        demand = ca.fmin(ca.fmax(wanted, -limit), limit)
+        return demand, error + (demand - wanted) / self.gain  # the integral stops at the limit
+
 
 N_STATES = 18
 LOAD_LAG = 0.01  # unsprung mass on the tire spring, about 15 Hz [s]

@@ -1,10 +1,8 @@
 """Recordings of driven cars: read, judged, resampled, sliced and written."""
 
-from models.recordings.against_vehicle import check_against_vehicle
-from models.recordings.checks import check_physics
+from models.recordings.checks import check_against_vehicle, check_physics
 from models.recordings.reader import read_recording, runs, split_log_argument
-from models.recordings.record import Recording, RecordingError
-from models.recordings.writer import write_recording
+from models.recordings.record import Recording, RecordingError, write_recording
 
 __all__ = [
     "Recording",

@@ -2,16 +2,28 @@
 
 x = [v_y, r]: lateral velocity [m/s], yaw rate [rad/s].   u = [delta_f, delta_r]: steering [rad].
 ISO axes: x forward, y left, z up; r and delta turn left when positive, forces push left.
+
+Write a recording as a CSV that `read_recording` reads back bit for bit.
+
+Bring the columns of a log to a uniform grid.
+
+Linear interpolation when the log is slower than the grid. When it is faster, every value is the
+mean over one step about its instant: no phase, 1.6 % loss at a tenth of the sampling frequency,
+zeros at its multiples. The ends keep the logged values.
 """
 
+import csv
+import gzip
+import io
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from models.rules import LARGEST_FORCE
+from models.files import LARGEST_FORCE, write_atomically
 
 Array = NDArray[np.float64]
 
@@ -134,8 +146,7 @@ class Recording:
         RecordingError
             One line: name and run, column, rule, value, remedy.
         """
-        from models.recordings.reader import recording_from_table
-        from models.recordings.table import table_of_arrays
+        from models.recordings.reader import recording_from_table, table_of_arrays
 
         table = table_of_arrays(name, data, columns or {})
         return recording_from_table(name, name, table, run=run, dt=dt, check=check)
@@ -224,3 +235,98 @@ def _read_only(value: object) -> Array:
     array = np.array(value, dtype=np.float64)
     array.setflags(write=False)
     return array
+
+
+def write_recording(recording: Recording, path: str | Path) -> Path:
+    """Write t [s], vx, vy [m/s], r [rad/s], delta_f, delta_r [rad], ay [m/s^2], Fyf, Fyr [N].
+
+    Columns that the recording lacks are left out. Numbers are the shortest that read back the
+    same. The file appears whole or not at all; an existing one is replaced.
+
+    Parameters
+    ----------
+    recording : what to write.
+    path : a name that ends in .csv or .csv.gz.
+
+    Returns
+    -------
+    Path
+        The file written.
+
+    Raises
+    ------
+    RecordingError
+        If the name ends otherwise.
+    """
+    path = Path(path)
+    if not path.name.lower().endswith((".csv", ".csv.gz")):
+        raise RecordingError(f"{path}: the name must end in .csv or .csv.gz")
+    columns = {
+        "t": recording.t,
+        "vx": recording.v_x,
+        "vy": recording.v_y,
+        "r": recording.r,
+        "delta_f": recording.delta_f,
+        "delta_r": recording.delta_r,
+    }
+    if recording.a_y is not None:
+        columns["ay"] = recording.a_y
+    if recording.axle_force is not None:
+        columns["Fyf"], columns["Fyr"] = recording.axle_force.T
+    text = io.StringIO(newline="")
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(columns)
+    table.writerows(np.column_stack(list(columns.values())).tolist())
+    data = text.getvalue().encode()
+    if path.name.lower().endswith(".gz"):
+        data = gzip.compress(data, mtime=0)  # without a time stamp: same recording, same bytes
+    write_atomically(path, data)
+    return path
+
+
+ON_GRID = 0.01  # share of a step within which time stamps are those of the grid, with jitter
+SAME = 1e-6  # share of a step within which they already are the grid, but for rounding
+
+
+def resample(t: Array, columns: dict[str, Array], dt: float) -> tuple[Array, dict[str, Array]]:
+    """Return time and columns on the grid t[0], t[0] + dt, ...
+
+    Time stamps that are that grid keep their bits. Those that only jitter about it, or drift by
+    less than 1 % of a step, are replaced by it, and the values stay.
+
+    Parameters
+    ----------
+    t : rising time stamps [s], shape (n,).
+    columns : name -> values, shape (n,).
+    dt : step of the grid [s].
+    """
+    grid = t[0] + dt * np.arange(t.size)
+    off = np.abs(t - grid).max()
+    if off <= ON_GRID * dt:
+        return t if off <= SAME * dt else grid, columns
+    count = int(np.floor((t[-1] - t[0]) / dt + 1e-6)) + 1
+    grid = np.minimum(t[0] + dt * np.arange(count), t[-1])
+    if float(np.median(np.diff(t))) > dt / 1.5:
+        return grid, {name: np.interp(grid, t, value) for name, value in columns.items()}
+    half = np.minimum(dt / 2.0, np.minimum(grid - t[0], t[-1] - grid))
+    inside = half > 1e-9 * dt
+    resampled = {}
+    for name, value in columns.items():
+        new = np.interp(grid, t, value)
+        area = _integral(t, value, (grid + half)[inside]) - _integral(
+            t, value, (grid - half)[inside]
+        )
+        new[inside] = area / (2.0 * half[inside])
+        resampled[name] = new
+    return grid, resampled
+
+
+def _integral(t: Array, value: Array, at: Array) -> Array:
+    """Integrate the straight lines between samples from t[0] to each time `at`, exactly."""
+    steps = np.diff(t)
+    total = np.concatenate([[0.0], np.cumsum(steps * (value[1:] + value[:-1]) / 2.0)])
+    k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 2)
+    ahead = at - t[k]
+    slope = (value[k + 1] - value[k]) / steps[k]
+    area: Array = total[k] + ahead * (value[k] + slope * ahead / 2.0)
+    return area

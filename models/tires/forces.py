@@ -3,6 +3,12 @@
 Wheel frame: x forward along the wheel, y to the left, z up. α has the paper's sign, the negative
 of ISO 8855: F_y = +C α. κ = (ω R - V_x)/|V_x| > 0 when driving. γ > 0 turns about +x: the top of
 the wheel leans to the right.
+
+The slip of a tread element, common to the brush tires.
+
+σ = [κ, tan α]/(1 + κ): sliding over rolling speed (Pacejka, Tyre and Vehicle Dynamics, ch. 3).
+
+The two slopes of a tire whose stiffness is the same at every load: methods of such tires.
 """
 
 from typing import Any, NamedTuple, Protocol, TypeAlias
@@ -101,3 +107,73 @@ def folded(alpha: Expression) -> Expression:
     alpha : slip angle [rad], any real number.
     """
     return ca.atan2(ca.sin(alpha), ca.fabs(ca.cos(alpha)))
+
+
+ROLLING_FLOOR = 1e-3  # 1 + κ of a locked wheel: slides in the same direction, divides by no zero
+COSINE_FLOOR = 1e-3  # |cos α| of a wheel that moves sideways
+NO_FORCE = 1e-6  # N; rounds the root of a sum of squares at zero, so that its derivative exists
+
+
+class Slips(NamedTuple):
+    """The demand of a tread that never slides, and the speed it refers to.
+
+    Attributes
+    ----------
+    p_x, p_y : C_κ κ and C_α tan α [N].
+    size : length of (p_x, p_y) [N], never zero.
+    rolling : 1 + κ, rolling over forward speed [-], never zero.
+    """
+
+    p_x: Expression
+    p_y: Expression
+    size: Expression
+    rolling: Expression
+
+
+def slips(alpha: Expression, kappa: Expression, C_alpha: float, C_kappa: float) -> Slips:
+    """Slips weighed by their stiffnesses, safe for a locked wheel and for any angle.
+
+    Parameters
+    ----------
+    alpha : slip angle, paper's sign [rad].
+    kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
+    C_alpha : cornering stiffness [N/rad].
+    C_kappa : longitudinal slip stiffness [N].
+    """
+    tan_alpha = ca.sin(alpha) / ca.fmax(ca.fabs(ca.cos(alpha)), COSINE_FLOOR)
+    p_x = C_kappa * kappa
+    p_y = C_alpha * tan_alpha
+    size = ca.sqrt(p_x**2 + p_y**2 + NO_FORCE**2)
+    return Slips(p_x, p_y, size, ca.fmax(1.0 + kappa, ROLLING_FLOOR))
+
+
+class ConstantStiffness(Protocol):
+    """A tire with stiffnesses that do not depend on load."""
+
+    @property
+    def C_alpha(self) -> float:
+        """Cornering stiffness of one tire [N/rad]."""
+
+    @property
+    def C_kappa(self) -> float:
+        """Longitudinal slip stiffness of one tire [N]."""
+
+
+def slip_stiffness(self: ConstantStiffness, F_z: Expression) -> Expression:
+    """∂F_x/∂κ at zero slip [N]: C_κ, and 0 in the air.
+
+    Parameters
+    ----------
+    F_z : wheel load [N].
+    """
+    return self.C_kappa * (F_z > 0)
+
+
+def cornering_stiffness(self: ConstantStiffness, F_z: Expression) -> Expression:
+    """∂F_y/∂α at zero slip [N/rad]: C_α, and 0 in the air.
+
+    Parameters
+    ----------
+    F_z : wheel load [N].
+    """
+    return self.C_alpha * (F_z > 0)

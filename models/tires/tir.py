@@ -3,19 +3,111 @@
 Both comment signs ($ and !), quoted strings, tables after a {header}, CRLF, tabs, any case of the
 keys, Fortran exponents (1.5D-3), UTF-8 or Latin-1, a byte order mark. A key means the same in every
 section, but units count in [UNITS] only. Unknown keys are kept and do nothing.
+
+Units of a tire property file: which keys have one, and what it is in SI.
+
+Only the keys of `DIMENSIONS` are converted. The coefficients of the Magic Formula (P.., R.., Q..,
+L..) are dimensionless or in radian whatever [UNITS] says: their equations are written in SI.
+
+From a tire property file to the Magic Formula 5.2: that model, complete, and possible.
 """
 
 import codecs
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from math import inf, pi
 from os import PathLike
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from models.doors import read_bytes, shown
-from models.tires.tir_units import DIMENSIONS, unit_in_si
+from models.tires.magic_formula_coefficients import ESSENTIAL, Coefficients
+
+DIMENSIONS: Mapping[str, Mapping[str, int]] = {
+    "FNOMIN": {"FORCE": 1},
+    "FZMIN": {"FORCE": 1},
+    "FZMAX": {"FORCE": 1},
+    "UNLOADED_RADIUS": {"LENGTH": 1},
+    "WIDTH": {"LENGTH": 1},
+    "RIM_RADIUS": {"LENGTH": 1},
+    "RIM_WIDTH": {"LENGTH": 1},
+    "ALPMIN": {"ANGLE": 1},
+    "ALPMAX": {"ANGLE": 1},
+    "CAMMIN": {"ANGLE": 1},
+    "CAMMAX": {"ANGLE": 1},
+    "LONGVL": {"LENGTH": 1, "TIME": -1},
+    "VXLOW": {"LENGTH": 1, "TIME": -1},
+    "VERTICAL_STIFFNESS": {"FORCE": 1, "LENGTH": -1},
+    "VERTICAL_DAMPING": {"FORCE": 1, "TIME": 1, "LENGTH": -1},
+    "MBELT": {"MASS": 1},
+}
+
+_POUND = 0.45359237  # kg
+_GRAVITY = 9.80665  # m/s², standard
+_INCH = 0.0254  # m
+
+UNITS: Mapping[str, Mapping[str, float]] = {
+    "LENGTH": {
+        "m": 1.0, "meter": 1.0, "metre": 1.0,
+        "mm": 1e-3, "millimeter": 1e-3, "millimetre": 1e-3,
+        "cm": 1e-2, "centimeter": 1e-2, "centimetre": 1e-2,
+        "km": 1e3, "kilometer": 1e3, "kilometre": 1e3,
+        "in": _INCH, "inch": _INCH, "inche": _INCH,
+        "ft": 12.0 * _INCH, "foot": 12.0 * _INCH, "feet": 12.0 * _INCH,
+        "mile": 63360.0 * _INCH,
+    },
+    "FORCE": {
+        "n": 1.0, "newton": 1.0,
+        "kn": 1e3, "knewton": 1e3, "kilonewton": 1e3, "kilo_newton": 1e3,
+        "mn": 1e-3, "millinewton": 1e-3, "cn": 1e-2, "centinewton": 1e-2,
+        "kgf": _GRAVITY, "kilogram_force": _GRAVITY, "kg_force": _GRAVITY,
+        "lbf": _POUND * _GRAVITY, "pound_force": _POUND * _GRAVITY,
+        "klbf": 1e3 * _POUND * _GRAVITY, "kpound_force": 1e3 * _POUND * _GRAVITY,
+        "ounce_force": _POUND * _GRAVITY / 16.0, "dyne": 1e-5,
+    },
+    "ANGLE": {"rad": 1.0, "radian": 1.0, "deg": pi / 180.0, "degree": pi / 180.0},
+    "MASS": {
+        "kg": 1.0, "kilogram": 1.0, "g": 1e-3, "gram": 1e-3,
+        "tonne": 1e3, "megagram": 1e3,
+        "lbm": _POUND, "pound_mass": _POUND, "kpound_mass": 1e3 * _POUND,
+        "ounce_mass": _POUND / 16.0, "slug": _POUND * _GRAVITY / (12.0 * _INCH),
+    },
+    "TIME": {
+        "s": 1.0, "sec": 1.0, "second": 1.0,
+        "ms": 1e-3, "milli": 1e-3, "millisecond": 1e-3,
+        "min": 60.0, "minute": 60.0, "h": 3600.0, "hour": 3600.0,
+    },
+}  # fmt: skip
+
+
+def unit_in_si(dimension: str, unit: str) -> float:
+    """One of the unit, in SI.
+
+    Case and a plural s do not matter; from five letters on the beginning of a name will do,
+    because some programs cut names after twelve letters.
+
+    Parameters
+    ----------
+    dimension : "LENGTH", "FORCE", "ANGLE", "MASS" or "TIME".
+    unit : as written in the file.
+
+    Raises
+    ------
+    ValueError
+        No such unit; the message lists the known ones.
+    """
+    known = UNITS[dimension]
+    word = unit.strip().lower().replace(" ", "_").replace("-", "_")
+    for candidate in (word, word.removesuffix("s")):
+        if candidate in known:
+            return known[candidate]
+    begun = {factor for name, factor in known.items() if len(word) > 4 and name.startswith(word)}
+    if len(begun) == 1:
+        return begun.pop()
+    raise ValueError(f"[UNITS] {dimension} = {unit!r} is not one of {', '.join(known)}")
+
 
 LARGEST = 1e12  # of a number, in the unit of the file: a stiffness in N/km fits
 SOME = 10  # lines in a message
@@ -185,3 +277,164 @@ def _unquoted(value: str) -> str:
     if len(value) >= 2 and value[0] == value[-1] and value[0] in "'\"":
         return value[1:-1].strip()
     return value
+
+
+FITTYPS = (5, 6, 21, 51, 52)  # MF-Tyre up to 5.2 under its several numbers; 60 and above is 6.x
+FORMATS = ("PAC2002", "MF52", "MFTYRE", "MFTYRE52", "DELFTTYRE", "USER")
+PRESSURE = ("PPX1", "PPX2", "PPX3", "PPX4", "PPY1", "PPY2", "PPY3", "PPY4")
+MARKS_OF_6 = ("PKY4", "PKY6", "PPY5", "RBX3", "RBY4", "NOMPRES")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ValidRange:
+    """What the tire was measured for, as (least, greatest); infinite where the file does not say.
+
+    Parameters
+    ----------
+    alpha : slip angle, paper's sign [rad]; the file has the ISO sign, so its limits change places.
+    kappa : longitudinal slip [-].
+    gamma : camber [rad].
+    F_z : wheel load [N].
+    """
+
+    alpha: tuple[float, float]
+    kappa: tuple[float, float]
+    gamma: tuple[float, float]
+    F_z: tuple[float, float]
+
+    def covers(self, alpha: float, kappa: float, gamma: float, F_z: float) -> bool:
+        """Whether the formula interpolates there.
+
+        Parameters
+        ----------
+        alpha : slip angle, paper's sign [rad].
+        kappa : longitudinal slip [-].
+        gamma : camber [rad].
+        F_z : wheel load [N].
+        """
+        limits = (self.alpha, self.kappa, self.gamma, self.F_z)
+        values = (alpha, kappa, gamma, F_z)
+        return all(low <= x <= high for (low, high), x in zip(limits, values, strict=True))
+
+
+class MagicFormulaFile(NamedTuple):
+    """What a file tells about its tire.
+
+    Attributes
+    ----------
+    coefficients : of the force equations, at the inflation pressure of the file.
+    side : of the car the file is valid for.
+    valid_range : of the measurement.
+    name : file name without extension.
+    """
+
+    coefficients: Coefficients
+    side: Literal["left", "right"]
+    valid_range: ValidRange
+    name: str
+
+
+def read_magic_formula(path: str | PathLike[str]) -> MagicFormulaFile:
+    """Read a PAC2002 or MF-Tyre 5.2 property file.
+
+    Parameters
+    ----------
+    path : the `.tir` file.
+
+    Raises
+    ------
+    TirError
+        Another model, missing essential coefficients (all are named), or an impossible value.
+    OSError
+        The file cannot be read.
+    """
+    tir = read_tir(path)
+    _require_mf52(tir)
+    c = _inflated(_coefficients(tir), tir)
+    side = tir.text("TYRESIDE", "LEFT").upper()
+    if side not in ("LEFT", "RIGHT", "SYMMETRIC", "UNKNOWN"):
+        raise tir.error(f"TYRESIDE must be LEFT, RIGHT or SYMMETRIC, it is {side!r}")
+    if side == "SYMMETRIC":
+        c = c.symmetric()
+    return MagicFormulaFile(
+        c, "right" if side == "RIGHT" else "left", _valid_range(tir), tir.path.stem
+    )
+
+
+def _require_mf52(tir: TirFile) -> None:
+    """Refuse other models, whose coefficients have the same names and another meaning."""
+    fittyp = tir.number("FITTYP")
+    model = tir.text("PROPERTY_FILE_FORMAT", "")
+    if fittyp is not None and fittyp not in FITTYPS:
+        what = "Magic Formula 6.x" if fittyp >= 60 else "an unknown model"
+        raise tir.error(
+            f"FITTYP = {fittyp:g} is {what}; its equations differ, only MF 5.2 and PAC2002 are read"
+        )
+    plain = re.sub(r"[^A-Z0-9]", "", model.upper())
+    if model and plain not in FORMATS:
+        raise tir.error(
+            f"PROPERTY_FILE_FORMAT = {model!r} is another tire model; only PAC2002 and MF 5.2 "
+            "(MF-TYRE or USER with FITTYP 6, 21 or 52) are read"
+        )
+    marks = [key for key in MARKS_OF_6 if key in tir]
+    if fittyp is None and plain != "PAC2002" and marks:
+        raise tir.error(f"{', '.join(marks)} belong to Magic Formula 6.x, only MF 5.2 is read")
+
+
+def _coefficients(tir: TirFile) -> Coefficients:
+    values: dict[str, float] = {}
+    for name in (field.name for field in fields(Coefficients)):
+        value = tir.number(name)
+        if name == "LKYG" and value is None:
+            value = tir.number("LKG")
+        if value is not None:
+            values[name] = value
+    if missing := [name for name in ESSENTIAL if name not in values]:
+        raise tir.error(f"lacks {', '.join(missing)}, without which there is no Magic Formula 5.2")
+    try:
+        return Coefficients(**values)
+    except ValueError as error:
+        raise tir.error(str(error)) from None
+
+
+def _inflated(c: Coefficients, tir: TirFile) -> Coefficients:
+    """PAC2002's effect of inflation pressure, a constant of the file: scales eight coefficients."""
+    p, p_0 = tir.number("IP"), tir.number("IP_NOM")
+    if p is None or p_0 is None:
+        return c
+    if not (p > 0.0 and p_0 > 0.0):
+        raise tir.error(f"IP and IP_NOM must be positive, they are {p:g} and {p_0:g}")
+    scale = tir.number("LIP")
+    dp = ((1.0 if scale is None else scale) * p - p_0) / p_0
+    PPX1, PPX2, PPX3, PPX4, PPY1, PPY2, PPY3, PPY4 = (tir.number(name) or 0.0 for name in PRESSURE)
+    K_x = 1.0 + PPX1 * dp + PPX2 * dp**2
+    mu_x = 1.0 + PPX3 * dp + PPX4 * dp**2
+    mu_y = 1.0 + PPY3 * dp + PPY4 * dp**2
+    try:
+        return replace(
+            c,
+            PKX1=c.PKX1 * K_x, PKX2=c.PKX2 * K_x,
+            PDX1=c.PDX1 * mu_x, PDX2=c.PDX2 * mu_x,
+            PDY1=c.PDY1 * mu_y, PDY2=c.PDY2 * mu_y,
+            PKY1=c.PKY1 * (1.0 + PPY1 * dp), PKY2=c.PKY2 * (1.0 + PPY2 * dp),
+        )  # fmt: skip
+    except ValueError as error:
+        raise tir.error(f"at its inflation pressure {error}") from None
+
+
+def _valid_range(tir: TirFile) -> ValidRange:
+    alpha = _limits(tir, "ALPMIN", "ALPMAX")
+    return ValidRange(
+        alpha=(-alpha[1], -alpha[0]),
+        kappa=_limits(tir, "KPUMIN", "KPUMAX"),
+        gamma=_limits(tir, "CAMMIN", "CAMMAX"),
+        F_z=_limits(tir, "FZMIN", "FZMAX"),
+    )
+
+
+def _limits(tir: TirFile, least: str, greatest: str) -> tuple[float, float]:
+    low, high = tir.number(least), tir.number(greatest)
+    low, high = -inf if low is None else low, inf if high is None else high
+    if not low < high:
+        raise tir.error(f"{least} must be below {greatest}, they are {low:g} and {high:g}")
+    return low, high

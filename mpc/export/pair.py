@@ -1,14 +1,110 @@
-"""Identifier and tracker together: both packages, what hands tires over, and a car to drive."""
+"""Identifier and tracker together: both packages, what hands tires over, and a car to drive.
+
+C that turns what an identifier has learnt into the weights of the prediction.
+"""
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from codegen.template import Words, filled
+from identifier.axle.model import AxleModel
+from identifier.axle.slip import SHORTEST
 from identifier.export.package import Package
-from mpc.export.handover import TEMPLATES, frozen_start, handover_sources
+from identifier.method import CannotFreezeError
+from identifier.paper.network import NetworkModel
+from models.vehicle import GRAVITY
 from mpc.export.package import MpcPackage, build_mpc_package
 from mpc.problem import Problem
 from mpc.tires import tire_model
+
+TEMPLATES = Path(__file__).parent / "pair"
+
+
+class NoHandoverError(ValueError):
+    """What a method learns cannot be handed over in C."""
+
+
+def frozen_start(package: Package) -> NetworkModel | AxleModel:
+    """Return the model that an exported identifier begins with.
+
+    Parameters
+    ----------
+    package : of the identifier.
+
+    Raises
+    ------
+    NoHandoverError
+        Where the method learns neither a network nor axle curves.
+    """
+    folded = package.folded
+    try:
+        model = folded.method.frozen(folded.vehicle, folded.carry)
+    except CannotFreezeError as error:
+        raise NoHandoverError(f"no tire to hand over: {error}") from error
+    if not isinstance(model, NetworkModel | AxleModel):
+        kind = type(model).__name__
+        raise NoHandoverError(f"only networks and axle curves are handed over in C, not {kind}")
+    return model
+
+
+def handover_sources(identifier: Package, tracker: MpcPackage) -> dict[str, str]:
+    """Return header and source by path.
+
+    Parameters
+    ----------
+    identifier : package of the identifier.
+    tracker : package of the tracker, `<name>_mpc`, for the tire of `frozen_start`.
+
+    Raises
+    ------
+    NoHandoverError
+        Where the method learns neither a network nor axle curves.
+    """
+    name, model = identifier.folded.name, frozen_start(identifier)
+    about = {
+        "name": name,
+        "NAME": name.upper(),
+        "version": identifier.about["version"],
+        "max_force": repr(round(identifier.folded.limits.force, 1)),
+    }
+    if isinstance(model, AxleModel):
+        values: Mapping[str, Any] = {
+            "units": len(model.ladder),
+            "sway": repr(GRAVITY / model.sway.frequency**2),
+            "shortest": repr(SHORTEST * model.vehicle.wheelbase),
+            "load": _numbers(model.vehicle.axle_loads),
+            "ladder": _numbers(model.ladder),
+            "max_slip": _numbers(tracker.problem.limits.slip),
+        }
+        adapt = (TEMPLATES / "adapt_axle.c").read_text(encoding="utf-8")
+        conversion, slope_rule = "axle.c", ",\n * or force that does not rise with slip"
+    else:
+        values = {
+            "units": model.network.hidden,
+            "inputs": len(model.network.inputs),
+            "force_unit": repr(float(model.force_unit)),
+            "stiffness": _numbers(model.vehicle.bicycle[4:]),
+            "scale": _numbers(model.network.scale),
+        }
+        conversion, slope_rule, adapt = "network.c", "", ""
+    text = filled(TEMPLATES / conversion, {**about, **{k: str(v) for k, v in values.items()}})
+    body = {
+        **about,
+        "include": "#include <math.h>\n" if adapt else "",
+        "conversion": text,
+        "adapt": adapt,
+        "slope_rule": slope_rule,
+    }
+    return {
+        f"include/{name}_handover.h": filled(TEMPLATES / "handover.h", body),
+        f"src/{name}_handover.c": filled(TEMPLATES / "handover.c", body),
+    }
+
+
+def _numbers(values: Any) -> str:
+    return ", ".join(f"(real){float(value)!r}" for value in values)
+
 
 EXAMPLES = (
     "closed_loop.c",

@@ -1,7 +1,7 @@
 """Handing weights over while driving: when a learnt tire is fit to steer with, and how gently."""
 
+from mpc.handover.judge import ErrorModel, Judge, Misfit
 from mpc.handover.learner import Learner
-from mpc.handover.misfit import ErrorModel, Judge, Misfit
 from mpc.handover.rules import Decision, Rules, Verdict
 from mpc.handover.supervisor import Supervisor
 

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from identifier.axle.car import car_numbers
 from identifier.defaults import natural_operation
-from identifier.design import Design
-from identifier.laws import DRIVING_ERRORS
 from identifier.method import Method
+from identifier.paper.design import Design
+from identifier.paper.laws import DRIVING_ERRORS
 from identifier.stability import certify
 from models.vehicle import GRAVITY, Vehicle
 from mpc.tires import TireModel
-from mpc.tires.structure import Car, Point
+from mpc.tires.tire import Car, Point
 
 Array = NDArray[np.float64]
 

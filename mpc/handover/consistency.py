@@ -14,7 +14,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
-from identifier.axle.checks import require_positive
+from identifier.axle.car import require_positive
 from mpc.shown import LARGEST, is_shown
 
 

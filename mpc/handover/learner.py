@@ -1,15 +1,110 @@
-"""The whole of learning while driving, beside a tracker: observe, decide, move the weights."""
+"""The whole of learning while driving, beside a tracker: observe, decide, move the weights.
+
+Moving weights to new ones so gently that the plan does not jump.
+
+What a tracker would plan with other weights, in the situation that it is in.
+"""
 
 from collections import deque
+from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
-from mpc.handover.blend import blended
+import numpy as np
+
 from mpc.handover.consistency import Consistency, FullSample
-from mpc.handover.preview import previewed_rate
 from mpc.handover.rules import Decision, Verdict
 from mpc.handover.supervisor import Supervisor
 from mpc.realtime import Tracker
+from mpc.tires import TireModel
+from mpc.tires.tire import reach_of
+
+HALVINGS = 6
+
+
+class Step(NamedTuple):
+    """A move of the weights.
+
+    tire : to steer with now.   share : of the way that was left [-], 0 where nothing could move.
+    jump : of the steering rate that comes from it [rad/s].   arrived : whether nothing is left.
+    """
+
+    tire: TireModel
+    share: float
+    jump: float
+    arrived: bool
+
+
+def blended(
+    now: TireModel,
+    target: TireModel,
+    share: float,
+    *,
+    planned: Callable[[TireModel], float],
+    most: float,
+) -> Step:
+    """Return the next weights on the way to a target, on which the plan does not jump.
+
+    The share is halved until the tracker, asked what it would plan with the weights in the same
+    situation, answers within the bound; where no share of the way is small enough, weights stay.
+
+    Parameters
+    ----------
+    now : tire in use.
+    target : tire to arrive at, of the same structure.
+    share : of the way that is left, to go at most [-], in (0, 1].
+    planned : first steering rate of the plan that a tire leads to, in one situation [rad/s].
+    most : change of it that is allowed [rad/s].
+
+    Raises
+    ------
+    ValueError
+        Where the structures differ.
+    """
+    if now.structure != target.structure:
+        raise ValueError(f"weights of {now.structure} cannot move to those of {target.structure}")
+    way = target.weights - now.weights
+    if not np.any(way):
+        return Step(target, 1.0, 0.0, True)
+    reference = planned(now)
+    for _ in range(HALVINGS):
+        whole = share >= 1.0
+        tire = target if whole else now._replace(weights=now.weights + share * way)
+        jump = abs(planned(tire) - reference)
+        if jump <= most:
+            return Step(tire, share, jump, whole)
+        share *= 0.5
+    return Step(now, 0.0, 0.0, False)
+
+
+def previewed_rate(tracker: Tracker, tire: TireModel) -> float:
+    """Return the first steering rate of the plan after one more iteration with a tire [rad/s].
+
+    From the plan and the road of the last step; the tracker is left as it was.
+
+    Parameters
+    ----------
+    tracker : after a step.
+    tire : of the same structure.
+
+    Raises
+    ------
+    ValueError
+        Where the structure is another.
+    """
+    if tire.structure != tracker.tire.structure:
+        raise ValueError(f"the tracker is built for {tracker.tire.structure}, not {tire.structure}")
+    instance = tracker.instance
+    state, params = instance.state.copy(), instance.params.copy()
+    instance.start[:] = state["x"][0]
+    params_now = instance.params
+    params_now["weights"], params_now["car"] = tire.weights, tire.car
+    reach = reach_of(tire, tracker.problem.limits.slip)
+    params_now["max_slip"], params_now["rise"] = reach
+    instance.solve()
+    rate = float(instance.state["u"][0])
+    instance.state[...], instance.params[...] = state, params
+    return rate
 
 
 class Moved(NamedTuple):

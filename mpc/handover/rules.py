@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
-from identifier.axle.checks import require_positive
+from identifier.axle.car import require_positive
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

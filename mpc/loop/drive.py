@@ -2,6 +2,8 @@
 
 At t_k the car is measured and the tracker decides; what it decides acts from t_{k+d} to t_{k+d+1},
 d periods later.
+
+What the loop asks of a tracker, whatever solves its problem.
 """
 
 import math
@@ -10,17 +12,44 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mpc.cars import Car, CarState
-from mpc.loop.profile import SpeedProfile
-from mpc.loop.record import Drive
-from mpc.loop.recorder import Recorder
-from mpc.loop.sensing import CarSensors, Measured, Measures
-from mpc.loop.tracking import PathTracker
-from mpc.path.path import Path
-from mpc.path.projection import Projection
-from mpc.realtime.messages import Measurement
+from mpc.loop.record import Drive, Recorder
+from mpc.loop.sensing import CarSensors, Measured, Measures, SpeedProfile
+from mpc.path.path import Path, Projection
+from mpc.realtime.instance import Command, Measurement
 from mpc.shown import is_shown
+
+Array = NDArray[np.float64]
+
+
+class PathTracker(Protocol):
+    """Steers a car along a path, one control period at a time; `mpc.realtime.Tracker` is one."""
+
+    @property
+    def period(self) -> float:
+        """Control period [s]."""
+
+    @property
+    def times(self) -> Array:
+        """Times after the measurement at which it wants to know the road [s], (k,)."""
+
+    @property
+    def plan_times(self) -> Array:
+        """Times after the measurement of the states of its plan [s], (N + 1,)."""
+
+    def step(self, measurement: Measurement) -> Command:
+        """Return what to steer.
+
+        Parameters
+        ----------
+        measurement : the car against the path, and the road ahead.
+        """
+
+    def reset(self) -> None:
+        """Forget what was planned and steered."""
+
 
 COMPLETED = "reached the end"
 GUIDES = (
@@ -33,7 +62,7 @@ SPUN = math.radians(45.0)  # side slip of the center of gravity [rad]
 SLOWEST = 1.0  # m/s
 
 
-class Learner(Protocol):
+class LearningTires(Protocol):
     """What runs beside the tracker and may hand it another tire."""
 
     def observe(self, measured: Measured, tracker: Any) -> str | None:
@@ -55,7 +84,7 @@ def drive(
     sensors: Measures | None = None,
     delay: int = 1,
     rng: np.random.Generator,
-    learner: Learner | None = None,
+    learner: LearningTires | None = None,
     laps: float = 1.0,
     time_limit: float = 300.0,
     widest: float = 2.0,

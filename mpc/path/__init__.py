@@ -1,12 +1,9 @@
 """Paths to follow: from way-points or a CSV, built-in tests and courses, and speeds along them."""
 
-from mpc.path.built_in import BUILT_IN
-from mpc.path.courses import constant_radius, handling_course
-from mpc.path.iso_3888 import iso_3888_1, iso_3888_2
+from mpc.path.courses import BUILT_IN, constant_radius, handling_course
+from mpc.path.gates import iso_3888_1, iso_3888_2, slalom
 from mpc.path.line import PathError
-from mpc.path.path import Path
-from mpc.path.projection import Projection
-from mpc.path.slalom import slalom
+from mpc.path.path import Path, Projection
 from mpc.path.speed import grip_speed, steady_speed
 
 __all__ = [

@@ -1,9 +1,15 @@
 """A plane curve, sampled: X, Y [m] and heading ψ [rad] over arc length s [m], dψ/ds = κ [1/m].
 
 ISO axes seen from above: ψ = 0 along X, κ > 0 turns left.
+
+Whether samples are one curve over its arc length.
+
+What lies between two samples of a line, from their values, slopes and second derivatives.
 """
 
-from typing import NamedTuple
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,3 +84,129 @@ def line_from_heading(
         place.append(np.asarray(origin + np.append(0.0, np.cumsum(steps)), dtype=np.float64))
     s = np.linspace(0.0, spacing * (place[0].size - 1), place[0].size)
     return Line(s, place[0], place[1], psi[::4], kappa[::4])
+
+
+LARGEST_TURN = 0.3  # rad in one step; coarser samples would not carry the cubics between them
+DISAGREEMENT = 0.02  # of a step, or rad; beside what cubics leave out at that turn
+
+
+def check_line(line: Line, name: str, closed: bool) -> None:
+    """Refuse samples that do not fit one another.
+
+    Parameters
+    ----------
+    line : finite samples of equal shape.
+    name : for messages.
+    closed : whether the last sample must be the first one again.
+
+    Raises
+    ------
+    PathError
+        Where s is not uniform from 0, samples are too few, too coarse or disagree, or the ends of a
+        closed path differ.
+    """
+    s, X, Y, psi, kappa = line
+    if s.size < 5:
+        raise PathError(f"{name}: a path needs at least 5 samples, it has {s.size}")
+    h = float(s[-1]) / (s.size - 1)
+    if not (h > 0.0 and np.abs(s - h * np.arange(s.size)).max() <= 1e-6 * h):
+        raise PathError(f"{name}: s must rise from 0 in equal steps")
+    turn = float(h * np.abs(kappa).max())
+    if turn > LARGEST_TURN:
+        raise PathError(
+            f"{name}: a step may turn by at most {LARGEST_TURN} rad, one turns by {turn:.3g}; "
+            f"sample it finer than {h:.3g} m"
+        )
+    middle = 0.5 * (psi[:-1] + psi[1:])
+    dX, dY = np.diff(X) / h, np.diff(Y) / h
+    along, across = dX * np.cos(middle) + dY * np.sin(middle), dY * np.cos(middle)
+    across = across - dX * np.sin(middle)
+    turned = np.diff(psi) - 0.5 * h * (kappa[:-1] + kappa[1:])
+    wrong = np.maximum(np.abs(along - 1.0), np.maximum(np.abs(across), np.abs(turned)))
+    worst = int(wrong.argmax())
+    if wrong[worst] > DISAGREEMENT + 0.25 * turn**2:
+        raise PathError(
+            f"{name}: X, Y, psi and kappa must be one curve over s, at s = {s[worst]:.4g} m they "
+            f"disagree by {wrong[worst]:.2g} of a step"
+        )
+    if closed:
+        _check_ends(line, name, h)
+
+
+def _check_ends(line: Line, name: str, h: float) -> None:
+    """Refuse a closed path that does not close."""
+    gap = math.hypot(line.X[-1] - line.X[0], line.Y[-1] - line.Y[0])
+    bend = math.remainder(line.psi[-1] - line.psi[0], 2.0 * math.pi)
+    kink = float(line.kappa[-1] - line.kappa[0])
+    if gap > 1e-3 * h or abs(bend) > 1e-3 * h or abs(kink) * h > 1e-3:
+        raise PathError(
+            f"{name}: a closed path must end as it starts, its ends differ by {gap:.3g} m, "
+            f"{bend:.3g} rad and {kink:.3g} 1/m"
+        )
+
+
+Pair: TypeAlias = tuple[Any, Any]  # at both ends of a step, numbers or arrays
+
+
+class Ends(NamedTuple):
+    """Both ends of a step: X, Y [m], ψ [rad], κ [1/m]; numbers, or arrays for many steps."""
+
+    X: Pair
+    Y: Pair
+    psi: Pair
+    kappa: Pair
+
+    def between(
+        self, u: Any, h: float, cos: Callable[[Any], Any], sin: Callable[[Any], Any]
+    ) -> tuple[Any, Any, Any, Any]:
+        """Return X, Y [m], ψ [rad], κ [1/m] inside the step.
+
+        Parameters
+        ----------
+        u : place in the step, 0 to 1 [-].
+        h : length of the step [m].
+        cos : cosine, for what the ends are made of.
+        sin : sine.
+        """
+        (psi_0, psi_1), (kappa_0, kappa_1) = self.psi, self.kappa
+        cos_0, cos_1, sin_0, sin_1 = cos(psi_0), cos(psi_1), sin(psi_0), sin(psi_1)
+        return (
+            quintic(u, h, self.X, (cos_0, cos_1), (-kappa_0 * sin_0, -kappa_1 * sin_1)),
+            quintic(u, h, self.Y, (sin_0, sin_1), (kappa_0 * cos_0, kappa_1 * cos_1)),
+            cubic(u, h, self.psi, self.kappa),
+            kappa_0 + u * (kappa_1 - kappa_0),
+        )
+
+
+def cubic(u: Any, h: float, p: Pair, d: Pair) -> Any:
+    """Return the cubic that has values and slopes given at both ends of a step.
+
+    Parameters
+    ----------
+    u : place in the step, 0 to 1 [-].
+    h : length of the step.
+    p : values at u = 0 and 1.
+    d : slopes there, per unit of h.
+    """
+    chord = p[1] - p[0]
+    bend_0, bend_1 = h * d[0] - chord, chord - h * d[1]
+    return p[0] + u * chord + u * (1.0 - u) * ((1.0 - u) * bend_0 + u * bend_1)
+
+
+def quintic(u: Any, h: float, p: Pair, d: Pair, dd: Pair) -> Any:
+    """Return the quintic that has values, slopes and second derivatives given at both ends.
+
+    Parameters
+    ----------
+    u : place in the step, 0 to 1 [-].
+    h : length of the step.
+    p : values at u = 0 and 1.
+    d : slopes there, per unit of h.
+    dd : second derivatives there, per unit of h².
+    """
+    chord = p[1] - p[0]
+    bend_0, bend_1 = h * d[0] - chord, chord - h * d[1]
+    more_0 = 0.5 * h * h * dd[0] + 2.0 * bend_0 - bend_1  # beyond those of the cubic
+    more_1 = 0.5 * h * h * dd[1] - bend_0 + 2.0 * bend_1
+    lack = u * (1.0 - u) * ((1.0 - u) * more_0 + u * more_1)
+    return cubic(u, h, p, d) + u * (1.0 - u) * lack

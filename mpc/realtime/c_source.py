@@ -6,16 +6,14 @@ from pathlib import Path
 
 import casadi as ca
 
-from codegen.clean_c import Statements
+from codegen.clean_c import OWN, Statements, recognized
 from codegen.graph import graph_of
-from codegen.recognize import OWN, recognized
 from codegen.template import Values, Words, filled
 from codegen.tuned import tuned
-from mpc.cost import N_ERRORS
-from mpc.motion import state_size
-from mpc.prediction import build_end, build_rk4, build_stage
+from mpc.prediction import build_end, build_rk4, build_stage, state_size
+from mpc.problem import N_ERRORS
 from mpc.realtime.fall_back import N_GAINS, N_SPEEDS
-from mpc.tires.structure import PredictionTire
+from mpc.tires.tire import PredictionTire
 
 TEMPLATES = Path(__file__).parents[1] / "c"
 FILES: Mapping[str, str] = {  # template: path in a package

@@ -1,17 +1,218 @@
-"""One instance of the compiled C: its structures in memory, and its functions."""
+"""One instance of the compiled C: its structures in memory, and its functions.
+
+What goes into a tracker and what comes out.
+
+The structures of the C tracker as NumPy types: Python writes and reads them in place.
+
+The text of a tracker in one file, kept between runs: a second start generates nothing.
+"""
 
 import ctypes
-from typing import Any
+import hashlib
+from dataclasses import fields, is_dataclass
+from enum import IntEnum
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
 
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from codegen import load_library
-from mpc.motion import state_size
-from mpc.realtime.layout import input_type, params_type, state_type
-from mpc.realtime.messages import Status
-from mpc.realtime.source_cache import tracker_source
-from mpc.tires.structure import PredictionTire
+from codegen.compiler import keep, kept
+from mpc.prediction import state_size
+from mpc.problem import N_ERRORS, Guards, Problem
+from mpc.realtime.c_source import c_sources, one_file
+from mpc.realtime.fall_back import N_GAINS, N_SPEEDS
+from mpc.tires.tire import PredictionTire
+
+Array = NDArray[np.float64]
+
+
+class Status(IntEnum):
+    """What a step did; below QP_FAILED the plan is new, above the steering is a fall-back."""
+
+    OK = 0
+    ITERATION_LIMIT = 1
+    QP_FAILED = 2
+    NOT_FINITE = 3
+    OFF_PATH = 4
+    OFF_MAP = 5
+    TOO_SLOW = 6
+    LATE = 7
+    BAD_CALL = 8
+
+
+class Measurement(NamedTuple):
+    """The car against the path, and the road ahead.
+
+    e_y [m], e_psi [rad], v_y [m/s], r [rad/s]; curvature [1/m] and speed [m/s] at the tracker's
+    times, (N + 1,).
+    """
+
+    e_y: float
+    e_psi: float
+    v_y: float
+    r: float
+    kappa: Array
+    v_x: Array
+
+
+class Command(NamedTuple):
+    """What to steer with the front road wheels [rad], and the plan that it is from.
+
+    status: of `Status`; plan_x (N + 1, n_x), plan_u (N,) [rad/s]; solve_time_s; iterations of the
+    solver, zero where it was not asked.
+    """
+
+    steering: float
+    status: int
+    plan_x: Array
+    plan_u: Array
+    solve_time_s: float
+    iterations: int
+
+
+N_COMMANDS = 32
+N_STATUSES = 9
+TIMES = ("cost_rate", "stage_time", "period", "delay")
+LIMITS = ("max_steering", "max_rate", "max_e_y", "max_slip", "rise", "soft_e_y", "soft_slip")
+OF_AXLES = ("max_slip", "rise")
+GUARDS = (
+    *("widest_e_y", "widest_e_psi", "max_v_y", "max_yaw_rate", "min_speed"),
+    *("max_speed", "max_curvature", "speeds", "gains", "hold_time"),
+)
+
+
+def params_type(n_weights: int, *, single: bool) -> np.dtype[np.void]:
+    """Return the type of the parameters.
+
+    Parameters
+    ----------
+    n_weights : numbers of the tire.
+    single : whether numbers are float.
+    """
+    real = _real(single)
+    names = [*TIMES, *LIMITS, *GUARDS, "tolerance"]
+    shapes = {**dict.fromkeys(OF_AXLES, (2,)), "speeds": (N_SPEEDS,), "gains": (N_SPEEDS, N_GAINS)}
+    numbers = [(name, real, shapes.get(name, ())) for name in names]
+    arrays = [("car", 4), ("weights", n_weights), ("cost", N_ERRORS), ("cost_end", N_ERRORS)]
+    return np.dtype(
+        [(name, real, (size,)) for name, size in arrays]
+        + numbers
+        + [(name, np.uint32) for name in ("max_iterations", "linearizations")],
+        align=True,
+    )
+
+
+def state_type(horizon: int, n_x: int, *, single: bool) -> np.dtype[np.void]:
+    """Return the type of the state.
+
+    Parameters
+    ----------
+    horizon : number of stages.
+    n_x : states of the car.
+    single : whether numbers are float.
+    """
+    real, counts = _real(single), ("iterations", "age", "planned", "guessed", "started")
+    return np.dtype(
+        [
+            ("x", real, (horizon + 1, n_x)),
+            ("u", real, (horizon,)),
+            ("feedback", real, (horizon, n_x)),
+            ("commands", real, (N_COMMANDS,)),
+            ("lagged", real, (2,)),
+            ("faults", np.uint32, (N_STATUSES,)),
+            *((name, np.uint32) for name in counts),
+        ],
+        align=True,
+    )
+
+
+def input_type(horizon: int, *, single: bool) -> np.dtype[np.void]:
+    """Return the type of a measurement.
+
+    Parameters
+    ----------
+    horizon : number of stages.
+    single : whether numbers are float.
+    """
+    real = _real(single)
+    numbers = [(name, real) for name in ("e_y", "e_psi", "v_y", "r")]
+    ahead = [(name, real, (horizon + 1,)) for name in ("kappa", "v_x")]
+    return np.dtype([*numbers, *ahead], align=True)
+
+
+def set_params(params: NDArray[Any], problem: Problem, guards: Guards) -> None:
+    """Write what is to be solved and guarded; tire, timing, solver and gains of the fall-back stay.
+
+    Parameters
+    ----------
+    params : of `params_type`, written in place.
+    problem : cost and limits.
+    guards : bounds and fall-back.
+    """
+    cost, limits = problem.cost, problem.limits
+    params["cost"], params["cost_end"] = cost.numbers(), cost.terminal_numbers()
+    params["cost_rate"], params["stage_time"] = cost.R, problem.dt
+    params["max_steering"], params["max_rate"] = limits.steering, limits.steering_rate
+    params["max_e_y"], params["max_slip"] = limits.e_y, limits.slip
+    params["soft_e_y"], params["soft_slip"] = limits.soft_e_y, limits.soft_slip
+    params["widest_e_y"], params["widest_e_psi"] = guards.e_y, guards.e_psi
+    params["max_v_y"], params["max_yaw_rate"] = guards.v_y, guards.yaw_rate
+    for name in ("min_speed", "max_speed", "max_curvature", "hold_time"):
+        params[name] = getattr(guards, name)
+
+
+def _real(single: bool) -> type[np.floating]:
+    return np.float32 if single else np.float64
+
+
+NAME = "mpc"
+PACKAGES = ("codegen", "models", "identifier", "mpc")  # whose text makes the text
+
+
+def tracker_source(structure: PredictionTire, horizon: int, *, single: bool) -> str:
+    """Return the C of a tracker, generated or found again by everything that it depends on.
+
+    Parameters
+    ----------
+    structure : of the prediction tire.
+    horizon : number of stages.
+    single : whether to compute in float.
+    """
+    if not is_dataclass(structure):
+        return _generated(structure, horizon, single)
+    kind = type(structure)
+    parts = [f"{field.name}={getattr(structure, field.name)!r}" for field in fields(structure)]
+    about = [_generator(), f"{kind.__module__}.{kind.__qualname__}", *parts, horizon, single]
+    digest = hashlib.sha256("\0".join(map(str, about)).encode()).hexdigest()[:20]
+    found = kept(f"tracker-{digest}", ".c")
+    if found is not None:
+        return found.read_text(encoding="utf-8")
+    text = _generated(structure, horizon, single)
+    keep(f"tracker-{digest}", ".c", text.encode())
+    return text
+
+
+def _generated(structure: PredictionTire, horizon: int, single: bool) -> str:
+    about = {"title": "The tracker", "version": "", "version_text": NAME}
+    files = c_sources(structure, horizon=horizon, name=NAME, about=about)
+    return one_file(files, name=NAME, single=single)
+
+
+@cache
+def _generator() -> str:
+    """Return a hash of the code that generates, its templates, and the version of CasADi."""
+    digest = hashlib.sha256(ca.CasadiMeta.version().encode())
+    root = Path(__file__).parents[2]
+    for package in PACKAGES:
+        for path in sorted((root / package).rglob("*")):
+            if path.suffix in (".py", ".c", ".h"):
+                digest.update(path.read_bytes())
+    return digest.hexdigest()
+
 
 # -O3 is twice as fast as -O2 here; the rest as in `codegen.compiler.FLAGS`.
 FLAGS = (

@@ -6,14 +6,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mpc.problem import Problem
+from mpc.problem import Guards, Problem
 from mpc.realtime.fall_back import fall_back
-from mpc.realtime.guards import Guards
-from mpc.realtime.instance import Instance
-from mpc.realtime.layout import N_COMMANDS, set_params
-from mpc.realtime.messages import Command, Measurement, Status
-from mpc.tires.reach import reach_of
-from mpc.tires.structure import TireModel
+from mpc.realtime.instance import N_COMMANDS, Command, Instance, Measurement, Status, set_params
+from mpc.tires.tire import TireModel, reach_of
 
 Array = NDArray[np.float64]
 
@@ -126,7 +122,7 @@ class Tracker:
 
     @property
     def params(self) -> NDArray[np.void]:
-        """A copy of the numbers that the C reads, of `mpc.realtime.layout.params_type`."""
+        """A copy of the numbers that the C reads, of `mpc.realtime.instance.params_type`."""
         return self.instance.params.copy()
 
     def set_tire(self, tire: TireModel) -> None:

@@ -2,14 +2,18 @@
 
 Sources: Dugoff, Fancher and Segel, SAE 700377 (1970); Pacejka, Tyre and Vehicle Dynamics, ch. 3.2
 (Fiala's brush) and 2nd ed., (4.49). No longitudinal slip.
+
+The linear tire of the textbook: F = C α of the paper's (3), without a limit.
 """
 
 from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
-from mpc.tires.structure import Pair, Point, no_lag, wheel_slip
+from models.vehicle import Vehicle
+from mpc.tires.tire import Array, Pair, Point, TireModel, no_lag, small_slip, wheel_slip
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,3 +103,37 @@ def _fiala(alpha: Any, C: Any, N: Any) -> Any:
     x = ca.fmin(ca.fabs(demand) / (3 * N), 1)
     gentle = demand * (1 - x + x * x / 3)
     return ca.if_else(x < 1, gentle, N * ca.sign(demand))
+
+
+@dataclass(frozen=True, slots=True)
+class LinearAxles:
+    """F = C α; w = [C_f, C_r] [N/rad]."""
+
+    n_weights = 2
+    lagged = False
+
+    slip = small_slip
+    lag_length = no_lag
+
+    def force(self, slip: Pair, at: Point) -> Pair:
+        """Return the axle forces [N], frame of the body.
+
+        Parameters
+        ----------
+        slip : what makes the force [rad].
+        at : motion, car and weights.
+        """
+        w = at.w
+        return w[0] * slip[0], w[1] * slip[1]
+
+
+def linear_tire(vehicle: Vehicle, stiffness: Array | None = None) -> TireModel:
+    """Return the tire of the linear bicycle.
+
+    Parameters
+    ----------
+    vehicle : the car.
+    stiffness : C_f, C_r per axle [N/rad] (2,); None takes those that the vehicle states.
+    """
+    weights = vehicle.bicycle[4:] if stiffness is None else stiffness
+    return TireModel(LinearAxles(), np.array(weights, dtype=np.float64), vehicle)

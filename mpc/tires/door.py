@@ -6,18 +6,15 @@ from typing import Any
 import numpy as np
 
 from identifier.axle.model import AxleModel
-from identifier.baselines.curve_model import CurveModel
-from identifier.network_model import NetworkModel
-from identifier.onnx_model import OnnxModel
+from identifier.baselines.curves import CurveModel
+from identifier.own_network import OnnxModel
+from identifier.paper.network import NetworkModel
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
 from models.vehicle import Vehicle
-from mpc.tires.curves import DugoffAxles, FialaAxles, MagicAxles
-from mpc.tires.ladder import axle_tire
-from mpc.tires.linear import linear_tire
-from mpc.tires.network import network_tire
-from mpc.tires.onnx import onnx_tire
-from mpc.tires.oracle import mounted_tire
-from mpc.tires.structure import TireModel
+from mpc.tires.curves import DugoffAxles, FialaAxles, MagicAxles, linear_tire
+from mpc.tires.ladder import axle_tire, mounted_tire
+from mpc.tires.network import network_tire, onnx_tire
+from mpc.tires.tire import TireModel
 
 
 def tire_model(source: Any, vehicle: Vehicle | None = None) -> TireModel:

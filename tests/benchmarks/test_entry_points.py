@@ -11,9 +11,9 @@ Name = tuple[str, str]  # module, name in it
 
 # Formulas that a benchmark checks against another road; no number of a user comes from them.
 CHECKED = {
-    ("identifier.stability.estimated_input", "jacobian_feedback"),
-    ("identifier.stability.gain_limit", "critical_frequency"),
-    ("identifier.stability.gain_limit", "instantaneous_euler_limit"),
+    ("identifier.stability.operation", "jacobian_feedback"),
+    ("identifier.stability.limits", "critical_frequency"),
+    ("identifier.stability.limits", "instantaneous_euler_limit"),
     ("identifier.stability.limit_cycle", "sampled_limit_cycle"),
 }
 

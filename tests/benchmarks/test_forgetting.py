@@ -19,8 +19,8 @@ from benchmarks.forgetting import (
     random_car,
 )
 from benchmarks.targets import Targets
-from identifier.keeping import KEEPINGS
 from identifier.methods import make_method
+from identifier.stability.gain_design import KEEPINGS
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan

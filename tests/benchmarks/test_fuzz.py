@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-import tireid.check_command
+import tireid.commands.check
 from benchmarks.fuzz import server
 from benchmarks.fuzz.__main__ import main
 from benchmarks.fuzz.cases import MUTATORS, Case, draw, lay_out
 from benchmarks.fuzz.doors import DOORS
 from benchmarks.fuzz.session import Session
 from identifier.defaults import default_design
-from identifier.design_file import design_text
+from identifier.paper.design import design_text
 from models.vehicle import sedan
 
 pytestmark = pytest.mark.skipif(
@@ -122,7 +122,7 @@ def test_nothing_is_found_behind_a_door_that_is_sound(session):
 
 @pytest.mark.parametrize("fault", PLANTED, ids=lambda fault: fault.__name__)
 def test_what_is_planted_behind_a_door_is_found(session, monkeypatch, fault):
-    monkeypatch.setattr(tireid.check_command, "run", fault)
+    monkeypatch.setattr(tireid.commands.check, "run", fault)
     assert kinds(session) == [PLANTED[fault]]
 
 
@@ -131,7 +131,7 @@ def test_a_command_that_tells_how_far_it_came_does_not_hang(session, monkeypatch
         while True:
             print("  another share", file=sys.stderr, flush=True)
 
-    monkeypatch.setattr(tireid.check_command, "run", works)
+    monkeypatch.setattr(tireid.commands.check, "run", works)
     assert kinds(session) == []
 
 
@@ -140,7 +140,7 @@ def test_an_axle_that_does_not_push_is_found(session, monkeypatch):
         Path("out").mkdir()
         Path("out/weights.json").write_text("{}")
 
-    monkeypatch.setattr(tireid.check_command, "run", freezes)
+    monkeypatch.setattr(tireid.commands.check, "run", freezes)
     monkeypatch.setattr(server, "stiffness_shares", lambda path: [0.9, 0.004])
     assert kinds(session) == ["dead axle"]
     monkeypatch.setattr(server, "stiffness_shares", lambda path: [0.9, float("nan")])
@@ -156,7 +156,7 @@ def test_a_door_without_a_check_is_found_by_mutations(session, monkeypatch):
     def unchecked(options):
         return min(0, int(tomllib.loads(options.file.read_text())["network"]["hidden"]))
 
-    monkeypatch.setattr(tireid.check_command, "run", unchecked)
+    monkeypatch.setattr(tireid.commands.check, "run", unchecked)
     found = set()
     for number in range(40):
         found.update(kinds(session, draw(1, number, [CHECK])))

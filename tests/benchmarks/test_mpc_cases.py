@@ -6,8 +6,8 @@ import pytest
 
 from benchmarks.mpc_cases import TIRES, Case, learnt_before, run
 from codegen import find_compiler
-from tireid import drive_results
 from tireid.cli import main
+from tireid.commands import drive_results
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
 

@@ -8,11 +8,11 @@ import pytest
 from benchmarks import recorded_cars
 from benchmarks.documents import recorded
 from benchmarks.targets import Targets
-from identifier.cross_replay import Course
-from identifier.identify import identify
+from identifier.compare.course import Course
 from identifier.methods import DEFAULT, make_method
+from identifier.run import identify
 from models.vehicle import sedan
-from tireid.plant_drives import plant_recordings
+from tireid.commands.demo_story import plant_recordings
 
 
 def test_the_errors_on_recorded_cars_are_those_recorded():

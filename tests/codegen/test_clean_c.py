@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from codegen import clean_c, find_compiler, load_library
-from codegen.clean_c import Statements, literal
+from codegen.clean_c import Statements, literal, recognized
 from codegen.graph import UnknownOperationError, graph_of
-from codegen.recognize import recognized
 
 PREAMBLE = """#include <math.h>
 #include <stdbool.h>

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from codegen import CompilationError, build_library, cache_folder, find_compiler, load_library
-from codegen import cache as cache_module
+from codegen import compiler as cache_module
 from codegen import compiler as compiler_module
 
 ONE = "int one(void) { return 1; }"

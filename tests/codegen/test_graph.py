@@ -4,13 +4,20 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from codegen import recognize
-from codegen.branches import assumed, decision
-from codegen.elementary import atan, exp, sin
-from codegen.graph import Graph, Node, UnknownOperationError, function_of, graph_of, simplifying
-from codegen.recognize import EXPANDED, recognized
+from codegen import clean_c as recognize
+from codegen.clean_c import EXPANDED, recognized
+from codegen.elementary import atan, exp, sin, tanh
+from codegen.graph import (
+    Graph,
+    Node,
+    UnknownOperationError,
+    assumed,
+    decision,
+    function_of,
+    graph_of,
+    simplifying,
+)
 from codegen.simplify import simplified
-from codegen.tanh import tanh
 from codegen.tuned import tuned
 
 

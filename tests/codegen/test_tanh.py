@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from codegen import elementary
-from codegen.tanh import LIMIT, tanh
+from codegen.elementary import LIMIT, tanh
 
 X = np.linspace(-20.0, 20.0, 200_001)
 

@@ -6,17 +6,14 @@ import numpy as np
 import pytest
 
 import codegen.batch
-from identifier.batch import identify_batch
-from identifier.batch_replay import replay_batch
-from identifier.batch_trials import cross_replay_batch
-from identifier.cross_replay import Course, cross_replay, shares
+from identifier.compare.batch import cross_replay_batch, identify_batch, replay_batch
+from identifier.compare.course import Course, cross_replay, shares
 from identifier.defaults import default_design
-from identifier.history import DivergedError
-from identifier.identify import identify
 from identifier.method import CannotFreezeError
 from identifier.methods import METHODS, make_method
-from identifier.network_model import NetworkModel
+from identifier.paper.network import NetworkModel
 from identifier.reproducibility import axle_rms, counted_samples
+from identifier.run import DivergedError, identify
 from models.recordings import Recording
 
 FREEZE = (4.0, 12.345)

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from identifier.baselines import LinearBaseline
-from identifier.cross_replay import Course, cross_replay, frozen_shares, where_learnt_and_elsewhere
+from identifier.compare.course import (
+    Course,
+    cross_replay,
+    frozen_shares,
+    where_learnt_and_elsewhere,
+)
 from identifier.reproducibility import AxleRmse
 
 

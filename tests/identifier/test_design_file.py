@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from identifier.defaults import default_design
-from identifier.design_file import DesignFileError, design_text, read_design
+from identifier.paper.design import DesignFileError, design_text, read_design
 
 
 def test_a_design_comes_back_from_its_file(car, tmp_path):

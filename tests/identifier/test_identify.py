@@ -7,11 +7,10 @@ import pytest
 from scipy.linalg import solve_continuous_lyapunov
 
 from identifier.defaults import default_design
-from identifier.design import Design
-from identifier.gains import Gains, NotHurwitzError
-from identifier.history import DivergedError
-from identifier.identify import identify
-from identifier.network import Network
+from identifier.paper.design import Design
+from identifier.paper.laws import Gains, NotHurwitzError
+from identifier.paper.network import Network
+from identifier.run import DivergedError, identify
 
 GAINS = Gains(
     A_d=((-8.0, 1.0), (0.5, -6.0)),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identifier.integrators import INTEGRATORS, euler, rk4
+from identifier.paper.laws import INTEGRATORS, euler, rk4
 
 ROTATION = np.array([[0.0, 1.0], [-4.0, -0.4]])
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from identifier.defaults import LAWS, default_design, design_for, natural_driving, natural_operation
-from identifier.identify import identify
-from identifier.keeping import DEFAULT_KEEPING, KEEPINGS, with_keeping
 from identifier.methods import make_method
+from identifier.run import identify
+from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS, with_keeping
 from models.maneuvers import RandomSteer, Slalom
 from models.plant import Plant
 from models.vehicle import sedan
-from tireid.certificate_table import certificate_of
-from tireid.plant_drives import SENSORS
+from tireid.commands.certificate_table import certificate_of
+from tireid.commands.demo_story import SENSORS
 
 CAR = sedan()
 

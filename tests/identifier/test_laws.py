@@ -4,18 +4,19 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.laws import (
+from identifier.paper.laws import (
     DRIVING_ERRORS,
     ball,
     beyond_ball,
+    filter_rate,
     instantaneous,
     integral,
+    observer_rate,
     pi_lead,
     weight_rates,
     whole,
 )
-from identifier.network import hidden_layer
-from identifier.observer import filter_rate, observer_rate
+from identifier.paper.network import hidden_layer
 
 RESIDUAL = 1e-12
 N_H, N_IN = 5, 4

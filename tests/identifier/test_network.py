@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.network import SIGNALS, Network, hidden_layer, network_signals
+from identifier.paper.network import SIGNALS, Network, hidden_layer, network_signals
 
 
 def test_every_signal_can_be_read(car):

@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 
 from identifier.axle import AxleDesign
-from identifier.history import DivergedError
-from identifier.identify import identify
 from identifier.method import CannotFreezeError
 from identifier.methods import METHODS, make_method
-from identifier.online import OnlineIdentifier
+from identifier.run import DivergedError, OnlineIdentifier, identify
 
 
 def driven(identifier, recording):

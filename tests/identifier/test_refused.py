@@ -8,10 +8,10 @@ import pytest
 
 from identifier.axle import AxleDesign
 from identifier.export.fold import fold
-from identifier.export.vectors import synthetic_samples
+from identifier.export.package import synthetic_samples
 from identifier.methods import METHODS, make_method
-from identifier.online import OnlineIdentifier
 from identifier.refused import Limits, stale_samples
+from identifier.run import OnlineIdentifier
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from identifier.defaults import default_design
-from identifier.identify import identify
-from identifier.model_file import load_model
-from identifier.model_format import FrozenModelError
+from identifier.method import FrozenModelError
+from identifier.methods import load_model
 from identifier.reproducibility import (
     AxleRmse,
     axle_rms,
@@ -20,6 +19,7 @@ from identifier.reproducibility import (
     replay,
     reproduce,
 )
+from identifier.run import identify
 
 
 @pytest.fixture(name="history")

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import identifier.resume
-from identifier.cross_replay import Course
-from identifier.resume import Store, content_digest, run_resumably
-from identifier.sweep import CHUNK, sweep
+import identifier.compare.work
+from identifier.compare.course import Course
+from identifier.compare.sweep import CHUNK, sweep
+from identifier.compare.work import Store, content_digest, run_resumably
 
 
 class Killed(BaseException):
@@ -87,18 +87,18 @@ def test_a_digest_tells_apart_what_differs(monkeypatch):
     assert len(digests) == len(different) + 1
     assert content_digest(*arrays) == content_digest(*(array.copy() for array in arrays))
     before = content_digest(1)
-    monkeypatch.setattr(identifier.resume, "source_digest", lambda: "another version")
+    monkeypatch.setattr(identifier.compare.work, "source_digest", lambda: "another version")
     assert content_digest(1) != before
 
 
 def test_another_source_text_has_another_digest(monkeypatch, tmp_path):
     digests = set()
     for text in ("x = 1", "x = 2"):
-        for package in identifier.resume.PACKAGES:
+        for package in identifier.compare.work.PACKAGES:
             (tmp_path / package).mkdir(exist_ok=True)
             (tmp_path / package / "step.py").write_text(text)
-        monkeypatch.setattr(identifier.resume, "ROOT", tmp_path)
-        digests.add(identifier.resume.source_digest.__wrapped__())
+        monkeypatch.setattr(identifier.compare.work, "ROOT", tmp_path)
+        digests.add(identifier.compare.work.source_digest.__wrapped__())
     assert len(digests) == 2
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from codegen import Scan
-from identifier.score import rmse, run_scored
+from identifier.compare.course import rmse, run_scored
 
 
 def proportional() -> Scan:

@@ -3,13 +3,18 @@
 import numpy as np
 import pytest
 
-from identifier.cross_replay import Course, Shares, cross_replay, shares
+from identifier.compare.course import Course, Shares, cross_replay, shares
+from identifier.compare.sweep import Candidate, best_candidate, pareto_front, random_values, sweep
+from identifier.compare.tunables import (
+    SIZES,
+    TUNABLES,
+    largest_loop_gain,
+    tunables,
+    tuned_design,
+    tuned_method,
+)
 from identifier.methods import METHODS, make_method
-from identifier.paper_tuning import SIZES, TUNABLES, largest_loop_gain, tuned_design
-from identifier.pareto import best_candidate, pareto_front
-from identifier.stability.gain_limit import instantaneous_euler_limit, integral_euler_limit
-from identifier.sweep import Candidate, random_values, sweep
-from identifier.tuned import tunables, tuned_method
+from identifier.stability.limits import instantaneous_euler_limit, integral_euler_limit
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan

@@ -14,8 +14,7 @@ import pytest
 from models.friction import Friction, FrictionChange, FrictionError, place_change
 from models.maneuvers import RandomSteer, Slalom, SlowlyIncreasingSteer, StepSteer
 from models.plant import Driver, Plant, PlantError
-from models.plant.loads import wheel_loads
-from models.plant.wheels import relax, tire_force
+from models.plant.dynamics import relax, tire_force, wheel_loads
 from models.sensors import Sensor, Sensors
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
 from models.vehicle import GRAVITY, Vehicle, VehicleError, sedan

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.recordings.resampling import resample
+from models.recordings.record import resample
 
 N, DT = 1000, 0.01
 

@@ -10,13 +10,12 @@ import pytest
 
 from models.vehicle import sedan
 from mpc.converged import NotConvergedError, build_errors, numbers, solve_converged
-from mpc.cost import Cost
 from mpc.prediction import build_rk4
-from mpc.problem import Limits, Problem
+from mpc.problem import Cost, Limits, Problem
 from mpc.realtime import Status, Tracker
 from mpc.tires import tire_model
-from mpc.tires.oracle import oracle_tire
-from mpc.tires.reach import reach_of
+from mpc.tires.ladder import oracle_tire
+from mpc.tires.tire import reach_of
 
 PROBLEM = Problem(
     horizon=25,

@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from mpc.cost import SCALES, STEERING_RATE_SCALE, Cost
+from mpc.problem import SCALES, STEERING_RATE_SCALE, Cost
 
 
 def test_a_weight_of_one_costs_a_half_at_its_scale():

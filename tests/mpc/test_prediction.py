@@ -5,17 +5,15 @@ import numpy as np
 import pytest
 
 from codegen.graph import OPERATIONS
-from identifier.baselines.curve_model import CurveModel
-from identifier.network import Network, Weights
-from identifier.network_model import NetworkModel
+from identifier.baselines.curves import CurveModel
+from identifier.paper.network import Network, NetworkModel, Weights
 from models.tires import DugoffTire, FialaTire
 from models.vehicle import sedan
-from mpc.cost import Cost, tracking_errors
-from mpc.motion import state_size
-from mpc.prediction import build_dynamics, build_end, build_rk4, build_stage
+from mpc.prediction import build_dynamics, build_end, build_rk4, build_stage, state_size
+from mpc.problem import Cost, tracking_errors
 from mpc.tires import TireModel, oracle_tire, tire_model
 from mpc.tires.ladder import LadderAxles, ladder_weights
-from mpc.tires.reach import ALL, reach_of
+from mpc.tires.tire import ALL, reach_of
 
 CAR, DT, MOST = sedan(), 0.05, (0.06, 0.05)  # situations lie on both sides of these slips
 

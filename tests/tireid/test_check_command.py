@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from identifier.defaults import default_design, design_for, natural_driving, natural_operation
-from identifier.design_file import design_text, read_design
-from identifier.keeping import DEFAULT_KEEPING, KEEPINGS, with_keeping
+from identifier.paper.design import design_text, read_design
+from identifier.paper_study import paper_design
+from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS, with_keeping
 from identifier.stability.property import Certificate, Property
 from models.vehicle import sedan
-from tireid.certificate_table import (
+from tireid.cli import main
+from tireid.commands.certificate_table import (
     advised,
     certificate_of,
     certificate_text,
@@ -20,8 +22,6 @@ from tireid.certificate_table import (
     unit_text,
     verdict_line,
 )
-from tireid.cli import main
-from tireid.paper_study import paper_design
 
 
 def checked(capsys, *words):

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-import tireid.cluster
-from identifier.cross_replay import Course
-from identifier.sweep import CHUNK, sweep
+import tireid.commands.compare
+from identifier.compare.course import Course
+from identifier.compare.sweep import CHUNK, sweep
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tireid.cli import main
-from tireid.cluster import ClusterError, cluster
+from tireid.commands.compare import ClusterError, cluster
 
 pytest.importorskip("distributed", reason="needs Dask: pip install 'tireid[cluster]'")
 pytestmark = pytest.mark.filterwarnings("default")  # Dask's own
@@ -99,7 +99,7 @@ def test_an_error_of_a_worker_arrives_here(address):
 
 
 def test_a_worker_of_another_version_is_refused(address, monkeypatch):
-    monkeypatch.setattr(tireid.cluster, "source_digest", another_version)
+    monkeypatch.setattr(tireid.commands.compare, "source_digest", another_version)
     with pytest.raises(ClusterError, match="has another version of tireid"), cluster(address):
         pass
 
@@ -109,7 +109,7 @@ def another_version():
 
 
 def test_a_scheduler_without_workers_is_told_of(monkeypatch, tmp_path):
-    monkeypatch.setattr(tireid.cluster, "PATIENCE", 2.0)
+    monkeypatch.setattr(tireid.commands.compare, "PATIENCE", 2.0)
     port = free_port()
     lonely = f"tcp://127.0.0.1:{port}"
     process = start("scheduler", ["--host", "127.0.0.1", "--port", str(port)], tmp_path)
@@ -152,7 +152,7 @@ def test_the_command_writes_the_same_sweep_from_a_cluster(words, address, tmp_pa
 
 
 def test_the_command_names_what_is_wrong_with_the_cluster(words, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(tireid.cluster, "PATIENCE", 1.0)
+    monkeypatch.setattr(tireid.commands.compare, "PATIENCE", 1.0)
     nobody = f"tcp://127.0.0.1:{free_port()}"
     out = ["--out", str(tmp_path / "out")]
     assert main([*words, *out, "--sweep", "4", "--scheduler", nobody]) == 2

@@ -10,8 +10,8 @@ from identifier.methods import METHODS
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tireid.cli import main
-from tireid.compare_results import ERROR_COLUMNS, SWEEP_COLUMNS
-from tireid.figures.compare_labels import short_names
+from tireid.commands.compare_results import ERROR_COLUMNS, SWEEP_COLUMNS
+from tireid.figures.compare import short_names
 
 METHODS_TRIED = ("integral", "linear", "eso")
 

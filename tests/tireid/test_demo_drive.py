@@ -7,10 +7,11 @@ import pytest
 
 from codegen import find_compiler
 from models.vehicle import sedan
-from tireid import demo_drive, drive_results
-from tireid.animation import frames
-from tireid.demo_drive import NO_COMPILER, drive_section, drive_story, drive_text
-from tireid.demo_story import FREEZE, run_story
+from tireid.animation import film as frames
+from tireid.commands import demo_parts as demo_drive
+from tireid.commands import drive_results
+from tireid.commands.demo_parts import NOT_DRIVEN, drive_section, drive_story, drive_text
+from tireid.commands.demo_story import FREEZE, run_story
 from tireid.report import Picture
 
 
@@ -61,8 +62,8 @@ def test_without_a_compiler_the_report_says_so(story, tmp_path, monkeypatch):
     monkeypatch.setattr(demo_drive, "find_compiler", lambda: None)
     driven = drive_story(story, tmp_path)
     assert driven == {} and list(tmp_path.iterdir()) == []
-    assert drive_text(driven) == NO_COMPILER
-    assert NO_COMPILER in str(drive_section(driven, tmp_path))
+    assert drive_text(driven) == NOT_DRIVEN
+    assert NOT_DRIVEN in str(drive_section(driven, tmp_path))
 
 
 def test_with_a_compiler_the_learnt_car_drives_both_roads(tmp_path, monkeypatch):

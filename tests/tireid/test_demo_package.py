@@ -3,10 +3,10 @@
 import pytest
 
 from codegen import find_compiler
-from tireid import demo_package, self_test
-from tireid.demo_package import NO_COMPILER, package_section, ship, shipped_text
-from tireid.demo_story import run_story
-from tireid.self_test import SelfTestError
+from tireid.commands import demo_parts as demo_package
+from tireid.commands import demo_parts as self_test
+from tireid.commands.demo_parts import NOT_BUILT, SelfTestError, package_section, ship, shipped_text
+from tireid.commands.demo_story import run_story
 
 
 @pytest.fixture(scope="module")
@@ -40,8 +40,8 @@ def test_without_a_compiler_the_report_says_so(story, tmp_path, monkeypatch):
     monkeypatch.setattr(demo_package, "find_compiler", lambda: None)
     shipped = ship(story, tmp_path / "package")
     assert (tmp_path / "package" / "src" / "tireid.c").is_file()
-    assert NO_COMPILER in shipped_text(shipped)
-    assert NO_COMPILER in str(package_section(shipped))
+    assert NOT_BUILT in shipped_text(shipped)
+    assert NOT_BUILT in str(package_section(shipped))
     monkeypatch.setattr(self_test, "find_compiler", lambda: None)
     assert self_test.self_test(tmp_path / "package", "tireid", single=False) is None
 

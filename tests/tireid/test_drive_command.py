@@ -6,18 +6,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.model_file import load_model
+from identifier.methods import load_model
+from models.files import digest
 from models.friction import Friction
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
 from mpc.loop import CarSensors
-from mpc.loop.limit import cornering_limit
+from mpc.loop.sensing import cornering_limit
 from mpc.realtime import NoCompilerError
 from mpc.tires import oracle_tire, tire_model
-from tireid import drive_learn, drive_results, drive_runs
 from tireid.cli import main
-from tireid.drive_case import digest
-from tireid.drive_tires import steady_curve
+from tireid.commands import drive_results, drive_runs
+from tireid.commands import drive_source as drive_learn
+from tireid.commands.drive_results import steady_curve
 
 SIDE = 3.0 * (1.0 - np.cos(np.linspace(0.0, 2.0 * np.pi, 9)))
 BEND = np.column_stack([np.linspace(0.0, 70.0, 9), SIDE])

@@ -11,8 +11,9 @@ from PIL import Image, ImageSequence
 from models.vehicle import sedan
 from mpc.loop import Drive, Plan
 from mpc.path import Path
-from tireid.animation import frames, write_film
-from tireid.animation.camera import Camera
+from tireid.animation import film as frames
+from tireid.animation import write_film
+from tireid.animation.ground import Camera
 from tireid.figures import (
     TireCurve,
     axle_slip,
@@ -22,7 +23,7 @@ from tireid.figures import (
     drive_steering_figure,
     drive_tires_figure,
 )
-from tireid.figures.car_shape import car_shape
+from tireid.figures.drive import car_shape
 
 CAR = sedan()
 SPEED, PERIOD = 16.0, 0.02

@@ -5,13 +5,8 @@ import math
 import pytest
 
 from models.faults import SensorFault
-from tireid.drive_options import (
-    SpeedWish,
-    parse_drop,
-    parse_fault,
-    parse_speed,
-    require_friction,
-)
+from tireid.commands.drive import parse_drop, parse_fault, parse_speed, require_friction
+from tireid.commands.drive_runs import SpeedWish
 
 
 @pytest.mark.parametrize(

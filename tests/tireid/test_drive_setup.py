@@ -5,10 +5,8 @@ import pytest
 
 from models.vehicle import sedan
 from mpc.path import Path
-from tireid.drive_case import headline
-from tireid.drive_options import SpeedWish, parse_fault
-from tireid.drive_runs import Conditions
-from tireid.drive_setup import Setup
+from tireid.commands.drive import headline, parse_fault
+from tireid.commands.drive_runs import Conditions, Setup, SpeedWish
 
 AROUND = np.linspace(0.0, 2.0 * np.pi, 101)[:-1]
 COURSE = Path.from_waypoints(90.0 * np.cos(AROUND), 40.0 * np.sin(AROUND), closed=True, name="oval")

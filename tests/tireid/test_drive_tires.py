@@ -6,16 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from identifier.network import Network, Weights
-from identifier.network_model import NetworkModel
+from identifier.paper.network import Network, NetworkModel, Weights
 from models.vehicle import sedan
 from mpc.path import Path
 from mpc.tires import tire_model
-from tireid.drive_options import SpeedWish
-from tireid.drive_runs import FROZEN, LEARNING, LINEAR, ORACLE
-from tireid.drive_setup import Setup
-from tireid.drive_tires import known_curves, steady_curve
-from tireid.figures.drive_look import AT_THE_END
+from tireid.commands.drive_results import known_curves, steady_curve
+from tireid.commands.drive_runs import FROZEN, LEARNING, LINEAR, ORACLE, Setup, SpeedWish
+from tireid.figures.drive import AT_THE_END
 
 CAR = sedan()
 X = np.linspace(0.0, 120.0, 81)

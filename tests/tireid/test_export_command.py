@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from codegen import find_compiler
-from identifier.export import figures
+from identifier.export import processor as figures
 from identifier.export.compiled import CompiledPackage
-from identifier.identify import identify
 from identifier.methods import make_method
+from identifier.run import identify
 from models.recordings import read_recording
 from models.vehicle import sedan
-from tireid import export_command, exporting
+from tireid import exporting
 from tireid.cli import main
+from tireid.commands import export as export_command
 
 CAR = sedan()
 

@@ -9,11 +9,11 @@ import pytest
 
 from codegen import find_compiler
 from identifier.export.compiled import CompiledPackage
-from identifier.identify import identify
 from identifier.methods import make_method
+from identifier.run import identify
 from models.recordings import read_recording
 from models.vehicle import sedan
-from mpc.export import figures
+from mpc.export import processor as figures
 from mpc.tires import tire_model
 from tireid import exporting
 from tireid.cli import main

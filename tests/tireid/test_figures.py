@@ -17,12 +17,11 @@ from matplotlib.ticker import FixedLocator
 from matplotlib.transforms import Bbox
 
 from identifier.axle import AxleDesign, AxleModel
-from identifier.design import Design
-from identifier.gains import Gains, diagonal
-from identifier.history import History
-from identifier.identify import identify
-from identifier.network import Network
+from identifier.paper.design import Design
+from identifier.paper.laws import Gains, diagonal
+from identifier.paper.network import Network
 from identifier.reproducibility import AxleRmse, Replay, Reproduction
+from identifier.run import History, identify
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid.figures import (
@@ -38,10 +37,9 @@ from tireid.figures import (
     slip_figure,
     weights_figure,
 )
+from tireid.figures.forces import side_by_side_figure
 from tireid.figures.scheme import BLOCKS, DIFFERENCE, SIGNALS, SUM
-from tireid.figures.side_by_side import side_by_side_figure
-from tireid.figures.style import BLACK
-from tireid.figures.units import force_range, force_unit_of, impulse_unit
+from tireid.figures.style import BLACK, force_range, force_unit_of, impulse_unit
 
 N = 300
 CAR = Vehicle(

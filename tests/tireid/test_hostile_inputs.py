@@ -13,8 +13,8 @@ import pytest
 from codegen import compiler
 from identifier.axle import AxleDesign
 from identifier.defaults import default_design
-from identifier.design_file import design_text
-from identifier.network import Network
+from identifier.paper.design import design_text
+from identifier.paper.network import Network
 from models.recordings import RecordingError, read_recording
 from models.vehicle import sedan
 from tireid.cli import main
@@ -338,9 +338,9 @@ def test_figures_are_not_left_where_the_design_cannot_be_written(capsys, tmp_pat
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("tireid.check_command.write_atomically", full)
-    monkeypatch.setattr("tireid.check_command.draw_check", _drawn, raising=False)
-    monkeypatch.setattr("tireid.check_figures.draw_check", _drawn)
+    monkeypatch.setattr("tireid.commands.check.write_atomically", full)
+    monkeypatch.setattr("tireid.commands.check.draw_check", _drawn, raising=False)
+    monkeypatch.setattr("tireid.commands.check.draw_check", _drawn)
     figures = tmp_path / "figures"
     words = ["check", "--design", "--out", tmp_path / "d.toml", "--figures", figures]
     refused(capsys, words, "no space left on device")

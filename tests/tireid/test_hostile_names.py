@@ -9,7 +9,7 @@ from shutil import which
 import pytest
 
 from codegen import find_compiler
-from identifier.export import figures
+from identifier.export import processor as figures
 from models.vehicle import sedan
 from tireid import exporting
 from tireid.cli import main
@@ -85,7 +85,7 @@ def test_identifier_and_tracker_are_built_and_nothing_else_is_run(tmp_path, monk
     if find_compiler() is None:
         pytest.skip("needs a C compiler")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("tireid.export_mpc.measure_mpc", lambda _: [])
+    monkeypatch.setattr("tireid.commands.export.measure_mpc", lambda _: [])
     out = tmp_path / "out"
     car = car_called(CONSTRUCTOR + ORDER + "@title@", tmp_path)
     assert main(["export", str(out), "--mpc", "--paper", "--vehicle", str(car)]) == 0

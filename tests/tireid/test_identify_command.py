@@ -8,10 +8,9 @@ import pytest
 
 from identifier.axle import AxleModel
 from identifier.defaults import default_design
-from identifier.design_file import design_text
 from identifier.method import SLIP, steady_stiffness
-from identifier.methods import METHODS, draws_weights, make_method
-from identifier.model_file import load_model
+from identifier.methods import METHODS, draws_weights, load_model, make_method
+from identifier.paper.design import design_text
 from models.recordings import Recording, read_recording
 from models.vehicle import sedan
 from tireid.cli import main

@@ -7,16 +7,14 @@ import numpy as np
 import pytest
 
 from identifier.defaults import default_design, natural_driving
-from identifier.design_file import design_text, read_design
-from identifier.driving import Driving
+from identifier.paper.design import Driving, design_text, read_design
 from identifier.stability import Certificate
 from identifier.stability.monte_carlo import Beginning, Observed, monte_carlo
 from identifier.stability.property import statement
 from models.vehicle import sedan
-from tireid import check_command
-from tireid.certificate_table import certificate_of
 from tireid.cli import main
-from tireid.monte_carlo_table import bound_rows
+from tireid.commands import check as check_command
+from tireid.commands.certificate_table import bound_rows, certificate_of
 
 
 def observed(xi_tilde):

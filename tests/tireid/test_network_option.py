@@ -5,19 +5,15 @@ import json
 import numpy as np
 import pytest
 
-from identifier.export.onnx_export import export_onnx
-from identifier.frozen_method import FrozenMethod
-from identifier.identify import identify
-from identifier.methods import make_method
-from identifier.model_file import load_model
-from identifier.network import Network, Weights
-from identifier.network_model import NetworkModel
-from identifier.onnx_model import OnnxModel
-from identifier.tire_network import UnusableNetworkError, read_network
+from identifier.export.onnx import export_onnx
+from identifier.methods import load_model, make_method
+from identifier.own_network import FrozenMethod, OnnxModel, UnusableNetworkError, read_network
+from identifier.paper.network import Network, NetworkModel, Weights
+from identifier.run import identify
 from models.recordings import read_recording
 from models.vehicle import sedan
-from tireid import network_results
 from tireid.cli import main
+from tireid.commands import identify_results as network_results
 
 onnx = pytest.importorskip("onnx", reason="needs the package onnx")
 CAR = sedan()

@@ -9,15 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import tireid.demo_command
-import tireid.paper_results
+import tireid.commands.demo
+import tireid.commands.paper
 from benchmarks.paper_gains import random_designs
-from models.vehicle import sedan
-from tireid.certificate_table import certificate_of
-from tireid.cli import main
-from tireid.figures import force_figure
-from tireid.paper_results import write_study
-from tireid.paper_study import (
+from identifier.paper_study import (
     FREEZES,
     GAINS,
     LAWS,
@@ -29,8 +24,11 @@ from tireid.paper_study import (
     run_study,
     run_trial,
 )
-from tireid.paper_tables import table_text
-from tireid.paper_values import PAPER
+from models.vehicle import sedan
+from tireid.cli import main
+from tireid.commands.certificate_table import certificate_of
+from tireid.commands.paper import PAPER, table_text, write_study
+from tireid.figures import force_figure
 
 EXPECTED = Path(__file__).parent / "expected_tables.json"
 
@@ -157,7 +155,7 @@ def test_figures_say_the_errors_of_the_tables(study, tmp_path, monkeypatch):
     """Both count from the onset on: before it there is no force to miss."""
     drawn = {}
     monkeypatch.setattr(
-        tireid.paper_results, "save_figure", lambda figure, path: drawn.update({path.name: figure})
+        tireid.commands.paper, "save_figure", lambda figure, path: drawn.update({path.name: figure})
     )
     write_study(tmp_path, study)
     for name, maneuver in (("fig3", "step_steer"), ("fig5", "slalom")):
@@ -242,9 +240,9 @@ def test_paper_command_writes_tables_and_figures(tmp_path, capsys):
 
 
 def test_demo_leaves_one_self_contained_report(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(tireid.demo_command, "SEEDS", 2)
-    monkeypatch.setattr("tireid.demo_package.measure", lambda _: [])  # has tests of its own
-    monkeypatch.setattr("tireid.demo_command.drive_story", lambda *_: {})  # so has this
+    monkeypatch.setattr(tireid.commands.demo, "SEEDS", 2)
+    monkeypatch.setattr("tireid.commands.demo_parts.measure", lambda _: [])  # has tests of its own
+    monkeypatch.setattr("tireid.commands.demo.drive_story", lambda *_: {})  # so has this
     assert main(["demo", "--out", str(tmp_path / "demo")]) == 0
     page = (tmp_path / "demo" / "report.html").read_text()
     assert page.count("data:image/png;base64,") >= 12

@@ -1,23 +1,45 @@
-"""Axle forces over time as in the paper's Figs. 2-5: online above, frozen replays below."""
+"""Axle forces over time as in the paper's Figs. 2-5: online above, frozen replays below.
+
+A frozen model on a recording that it did not learn from, and what it misses there.
+
+Frozen models side by side on a drive that none of them has learnt.
+
+What the identifier was given: speed, steering and motion of a recording over time.
+"""
 
 from collections.abc import Mapping
 
+import numpy as np
 from matplotlib.figure import Figure
 
-from identifier.history import History
 from identifier.reproducibility import Replay, freeze_key, online_error
-from tireid.figures.panels import (
+from identifier.run import History
+from models.recordings import Recording
+from tireid.figures.style import (
     AXLES,
+    BLUE,
+    FROZEN,
+    GREEN,
+    ONLINE,
+    ORANGE,
+    PAGE,
+    PURPLE,
     TIME,
+    TRUTH,
+    ForceUnit,
     Window,
+    drawable,
+    force_range,
+    force_unit_of,
     legend_above,
+    legend_beside,
     mark_freeze,
+    new_figure,
     note,
     shown,
+    styled,
     time_window,
 )
-from tireid.figures.style import FROZEN, ONLINE, PAGE, TRUTH, new_figure, styled
-from tireid.figures.units import ForceUnit, drawable, force_range, force_unit_of
 
 
 @styled
@@ -101,3 +123,165 @@ def _errors(replay: Replay, unit: ForceUnit, axle: int) -> str:
     if sides is None or sides.past_against_online is None:
         return said
     return f"{said}\npast to online {unit.format(sides.past_against_online, axle)}"
+
+
+@styled
+def prediction_figure(
+    replay: Replay, online: History | None = None, *, window: Window = None
+) -> Figure:
+    """Draw a frozen model on a recording it did not learn from, with what it misses below.
+
+    The residual is the frozen force minus the true force, or minus the online force where there is
+    no truth; with neither there is no residual.
+
+    Parameters
+    ----------
+    replay : the replay.
+    online : an online run over the same recording, drawn where there is no truth.
+    window : first and last time to show [s]; None shows all.
+
+    Raises
+    ------
+    ValueError
+        Where the online run is of another recording, or the window holds no sample.
+    """
+    recording, truth = replay.recording, replay.recording.axle_force
+    if online is not None and online.axle_force.shape != replay.axle_force.shape:
+        raise ValueError(
+            f"the replay is of {recording.name}, the online run of {online.recording.name}"
+        )
+    ends = time_window(recording.t, window)
+    part = shown(recording.t, ends)
+    t = recording.t[part]
+    curve, known = TRUTH, truth
+    if truth is None and online is not None:
+        curve, known = ONLINE, online.axle_force
+    reference = replay.axle_force[part] if known is None else known[part]
+    unit = force_unit_of(reference)
+    frozen = replay.axle_force[part] / unit.newtons
+    reference = reference / unit.newtons
+    limits = force_range(reference, frozen)
+    residual = frozen - reference
+    missed_limits = force_range(reference[:0], np.clip(residual, *limits))
+
+    ratios = [2.0] if known is None else [2.0, 1.0]
+    figure = new_figure(PAGE, 1.0 + sum(ratios))
+    panels = figure.subplots(
+        len(ratios), 2, sharex=True, sharey="row", squeeze=False, height_ratios=ratios
+    )
+    error = replay.against_truth
+    for axle, name in enumerate(AXLES):
+        upper = panels[0, axle]
+        upper.set(xlim=ends, ylim=limits, title=name)
+        if known is not None:
+            upper.plot(t, drawable(reference[:, axle], limits), **curve)
+            missed = drawable(residual[:, axle], missed_limits)
+            panels[1, axle].axhline(0.0, color=curve["color"], linewidth=0.6)
+            panels[1, axle].plot(t, missed, color=FROZEN["color"], linewidth=0.9)
+            panels[1, axle].set_ylim(missed_limits)
+        upper.plot(t, drawable(frozen[:, axle], limits), **FROZEN)
+        if error is not None:
+            note(upper, f"RMSE {unit.format(error, axle)}")
+        elif known is not None:
+            note(upper, f"RMSE to online {unit.format(replay.against_online, axle)}")
+        panels[-1, axle].set_xlabel(TIME)
+    panels[0, 0].set_ylabel(f"lateral force [{unit.name}]")
+    if known is not None:
+        panels[1, 0].set_ylabel(f"residual [{unit.name}]")
+    legend_above(figure)
+    return figure
+
+
+COLORS = (ORANGE, BLUE, GREEN, PURPLE)
+
+
+@styled
+def side_by_side_figure(replays: Mapping[str, Replay]) -> Figure:
+    """Draw the forces of several frozen models over one drive, and what each misses.
+
+    Parameters
+    ----------
+    replays : by the name in the legend, replays of one recording that has true forces.
+
+    Raises
+    ------
+    ValueError
+        Where the recordings differ, or there is no truth.
+    """
+    recordings = [replay.recording for replay in replays.values()]
+    recording, truth = recordings[0], recordings[0].axle_force
+    if truth is None or any(other.name != recording.name for other in recordings):
+        raise ValueError("replays of one recording with true forces are needed")
+    unit = force_unit_of(truth)
+    t = recording.t
+    drawn = [replay.axle_force / unit.newtons for replay in replays.values()]
+    limits = force_range(truth / unit.newtons, *drawn)
+    missed = {name: (r.axle_force - truth) / unit.newtons for name, r in replays.items()}
+    margin = 1.1 * max(float(np.abs(m).max()) for m in missed.values())
+
+    figure = new_figure(PAGE, 3.6)
+    panels = figure.subplots(2, 2, sharex=True, sharey="row", height_ratios=(2, 1))
+    for axle, name in enumerate(AXLES):
+        upper, lower = panels[:, axle]
+        upper.plot(t, truth[:, axle] / unit.newtons, **TRUTH)
+        for (label, replay), color in zip(replays.items(), COLORS, strict=False):
+            force = drawable(replay.axle_force[:, axle] / unit.newtons, limits)
+            upper.plot(t, force, color=color, linewidth=1.1, label=label)
+            lower.plot(t, missed[label][:, axle], color=color, linewidth=0.9)
+        upper.set(title=name, ylim=limits, xlim=(t[0], t[-1]))
+        lower.set(xlabel=TIME, ylim=(-margin, margin))
+    panels[0, 0].set_ylabel(f"lateral force [{unit.name}]")
+    panels[1, 0].set_ylabel(f"missed [{unit.name}]")
+    legend_above(figure)
+    return figure
+
+
+@styled
+def inputs_figure(recording: Recording, *, window: Window = None) -> Figure:
+    """Draw the signals of a recording; rear steering and a_y only where there are any.
+
+    Parameters
+    ----------
+    recording : what to draw.
+    window : first and last time to show [s]; None shows all.
+
+    Raises
+    ------
+    ValueError
+        Where the window holds no sample.
+    """
+    ends = time_window(recording.t, window)
+    part = shown(recording.t, ends)
+    signals = {
+        "$v_x$ [m/s]": recording.v_x,
+        "steering [deg]": np.rad2deg(recording.delta_f),
+        "$v_y$ [m/s]": recording.v_y,
+        "$r$ [deg/s]": np.rad2deg(recording.r),
+    }
+    if recording.a_y is not None:
+        signals["$a_y$ [m/s²]"] = recording.a_y
+
+    figure = new_figure(PAGE, 0.5 + 1.05 * len(signals))
+    panels = figure.subplots(len(signals), 1, sharex=True)
+    panels[0].set_xlim(ends)
+    for axes, (label, values) in zip(panels, signals.items(), strict=True):
+        axes.plot(recording.t[part], values[part], color=BLUE, linewidth=0.9, label=label)
+        axes.set_ylabel(label)
+        span = float(np.ptp(values[part]))
+        middle = float(values[part].min()) + span / 2
+        if span < 0.05 * abs(middle):  # a speed that is held shows as held
+            axes.set_ylim(middle - 0.05 * abs(middle), middle + 0.05 * abs(middle))
+    if np.any(recording.delta_r):
+        steering = panels[1]
+        steering.lines[0].set_label(r"front $\delta_f$")
+        steering.plot(
+            recording.t[part],
+            np.rad2deg(recording.delta_r[part]),
+            color=ORANGE,
+            linewidth=0.9,
+            label=r"rear $\delta_r$",
+        )
+        legend_beside(steering)
+    panels[-1].set_xlabel(TIME)
+    figure.align_ylabels()
+    return figure

@@ -2,17 +2,29 @@
 
 Truth is black, what was identified online blue, frozen weights orange and dashed, the linear tire
 grey and dotted; the colors are those of Okabe and Ito, which color-blind readers tell apart.
+
+Parts that several figures share: time axes, freeze marks, legends, errors in titles.
+
+Units that suit the size of what is drawn: kN for cars, N for models, and the impulse of each.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from io import BytesIO
 from pathlib import Path
-from typing import Any, ParamSpec
+from typing import Any, NamedTuple, ParamSpec
 
+import numpy as np
 from matplotlib import style
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+from numpy.typing import NDArray
+
+from identifier.paper.design import Design
+from identifier.reproducibility import AxleRmse
+from identifier.run import History
 
 P = ParamSpec("P")
 
@@ -121,3 +133,249 @@ def save_figure(figure: Figure, path: Path) -> None:
     path : the file.
     """
     path.write_bytes(figure_png(figure))
+
+
+Array = NDArray[np.float64]
+Window = tuple[float, float] | None
+
+TIME = "time [s]"
+AXLES = ("Front axle", "Rear axle")
+FREEZE, PREDICTION = "freeze", "after the freeze (prediction)"
+
+
+def time_window(t: Array, window: Window) -> tuple[float, float]:
+    """Return the ends of a time axis.
+
+    Parameters
+    ----------
+    t : times of the samples (n,) [s].
+    window : first and last time to show [s], or None for all.
+
+    Raises
+    ------
+    ValueError
+        Where the window is empty or holds no sample.
+    """
+    if window is None:
+        return float(t[0]), float(t[-1])
+    first, last = window
+    if not (first < last and first < t[-1] and last > t[0]):
+        raise ValueError(
+            f"a window must lie within {t[0]:g} s to {t[-1]:g} s, it is {first:g} s to {last:g} s"
+        )
+    return max(first, float(t[0])), min(last, float(t[-1]))
+
+
+def shown(t: Array, ends: tuple[float, float]) -> NDArray[np.bool_]:
+    """Return which samples lie within the ends of a time axis, (n,).
+
+    Parameters
+    ----------
+    t : times of the samples (n,) [s].
+    ends : first and last time [s].
+    """
+    within: NDArray[np.bool_] = (t >= ends[0]) & (t <= ends[1])
+    return within
+
+
+def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool) -> None:
+    """Draw the freeze as a line and, where the replay goes on, shade what it predicts.
+
+    The limits of the time axis must be set before.
+
+    Parameters
+    ----------
+    axes : panel over time.
+    t_freeze : time of the freeze [s].
+    prediction : whether the panel shows a replay.
+    """
+    first, last = axes.get_xlim()
+    if prediction and t_freeze < last:
+        axes.axvspan(
+            max(t_freeze, first),
+            last,
+            facecolor="#F1EDE4",
+            edgecolor="none",
+            zorder=0,
+            label=PREDICTION,
+        )
+    if first <= t_freeze <= last:
+        axes.axvline(t_freeze, color=GREY, linewidth=0.8, linestyle=(0, (4, 2)), label=FREEZE)
+
+
+def note(axes: Axes, text: str) -> None:
+    """Write a short text above the right end of a panel, opposite to its title.
+
+    Parameters
+    ----------
+    axes : the panel.
+    text : what to write.
+    """
+    axes.set_title(text, loc="right", color="#444444")
+
+
+def legend_above(
+    figure: Figure, *, columns: int | None = None, order: Sequence[str] = (FREEZE, PREDICTION)
+) -> None:
+    """Put one legend of all labeled curves above all panels, where it covers no data.
+
+    Parameters
+    ----------
+    figure : figure with a constrained layout.
+    columns : entries in a row; None puts all in one.
+    order : labels that come after all others, in this order.
+    """
+    entries: dict[str, Any] = {}
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            entries.setdefault(label, handle)
+    for label in order:
+        if label in entries:
+            entries[label] = entries.pop(label)
+    legend = figure.legend(
+        list(entries.values()),
+        list(entries),
+        loc="outside upper center",
+        ncols=columns or len(entries),
+        borderaxespad=0.2,
+    )
+    _bolder(legend)
+
+
+def legend_beside(axes: Axes) -> None:
+    """Put the legend of one panel to its right, where it covers no data.
+
+    Parameters
+    ----------
+    axes : a panel that is as wide as its figure.
+    """
+    handles, labels = axes.get_legend_handles_labels()
+    entries = dict(zip(labels, handles, strict=True))
+    legend = axes.legend(
+        list(entries.values()),
+        list(entries),
+        loc="upper left",
+        bbox_to_anchor=(1.01, 1.0),
+        borderaxespad=0.0,
+    )
+    _bolder(legend)
+
+
+def _bolder(legend: Legend) -> None:
+    """Make thin lines and faint dots of a legend large enough to tell their colors."""
+    for line in legend.get_lines():
+        line.set_linewidth(max(line.get_linewidth(), 1.2))
+        if line.get_marker() == ".":
+            line.set_markersize(7.0)
+            line.set_alpha(1.0)
+
+
+FARTHEST = 3.0  # an axis reaches at most this many times beyond the force it is compared with
+
+
+class ForceUnit(NamedTuple):
+    """A unit of force on an axis: its name and its size [N]."""
+
+    name: str
+    newtons: float
+
+    def format(self, error: AxleRmse, axle: int) -> str:
+        """Return an axle's error as text with its unit.
+
+        Parameters
+        ----------
+        error : of both axles [N].
+        axle : 0 is the front axle, 1 the rear.
+        """
+        value = (error.front, error.rear)[axle] / self.newtons
+        digits = f"{value:.3g}" if value >= 1.0 else f"{value:.2f}"
+        return f"{digits} {self.name}" if np.isfinite(value) else "not finite"
+
+
+KILONEWTON, NEWTON = ForceUnit("kN", 1000.0), ForceUnit("N", 1.0)
+
+
+def force_unit_of(force: Array) -> ForceUnit:
+    """Return kN where a force reaches 1 kN, else N.
+
+    Parameters
+    ----------
+    force : any shape [N]; what is not finite does not count.
+    """
+    return KILONEWTON if np.abs(_finite(force)).max(initial=0.0) >= 1000.0 else NEWTON
+
+
+def impulse_unit(force_unit: float) -> str:
+    """Return the name of the unit of ξ, the force unit times one second.
+
+    Parameters
+    ----------
+    force_unit : U [N].
+    """
+    return f"{force_unit_name(force_unit)} s"
+
+
+def paper_design(history: History) -> Design:
+    """Return the design of a run of the paper's identifier, whose weights and error have units.
+
+    Parameters
+    ----------
+    history : an online run.
+
+    Raises
+    ------
+    TypeError
+        Where another method ran.
+    """
+    if not isinstance(history.design, Design):
+        raise TypeError(f"a run of the paper's identifier is needed, not of {history.design}")
+    return history.design
+
+
+def force_unit_name(force_unit: float) -> str:
+    """Return the name of a unit of force.
+
+    Parameters
+    ----------
+    force_unit : U [N].
+    """
+    names = {1.0: "N", 1000.0: "kN"}
+    return names.get(force_unit, f"{force_unit:g} N")
+
+
+def force_range(reference: Array, *others: Array) -> tuple[float, float]:
+    """Return the ends of an axis that shows all curves, but no more than thrice the reference.
+
+    A law that diverges or a model that is far off leaves the panel instead of flattening the rest.
+
+    Parameters
+    ----------
+    reference : curves that are seen in full as long as they are finite.
+    others : curves that may be cut.
+    """
+    largest = _finite(reference)
+    bound = FARTHEST * float(np.abs(largest).max(initial=0.0)) or np.inf
+    every = np.concatenate([largest, *(_finite(other) for other in others)])
+    every = every[np.abs(every) <= 1e12]
+    low = max(float(every.min(initial=0.0)), -bound)
+    high = min(float(every.max(initial=0.0)), bound)
+    margin = 0.06 * (high - low) or 1.0
+    return low - margin, high + margin
+
+
+def drawable(curve: Array, limits: tuple[float, float]) -> Array:
+    """Return a curve whose values far outside the axis are brought close to it, NaN left out.
+
+    Parameters
+    ----------
+    curve : any shape, in the unit of the axis.
+    limits : ends of the axis.
+    """
+    low, high = limits
+    reach = 10.0 * (high - low)
+    return np.clip(curve, low - reach, high + reach)
+
+
+def _finite(values: Array) -> Array:
+    kept: Array = values[np.isfinite(values)]
+    return kept

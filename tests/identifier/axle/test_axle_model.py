@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from identifier.axle import AxleDesign, AxleModel
-from identifier.identify import identify
-from identifier.model_file import load_model
-from identifier.model_format import FrozenModelError
+from identifier.method import FrozenModelError
+from identifier.methods import load_model
+from identifier.run import identify
 
 
 def learnt(recording, car, start=None):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identifier.axle import AxleDesign
-from identifier.identify import identify
+from identifier.run import identify
 from models.friction import Friction, FrictionChange
 from models.maneuvers import DoubleLaneChange, Slalom, StepSteer
 from models.plant import Plant

@@ -7,10 +7,11 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.axle import AxleDesign, bounds
+from identifier.axle import AxleDesign
+from identifier.axle import learning as bounds
 from identifier.axle.covariance import LEAST_VARIANCE, narrowed, packed, per_variance, unpacked
-from identifier.axle.units import LADDER
-from identifier.identify import identify
+from identifier.axle.curve import LADDER
+from identifier.run import identify
 
 ROW = 1 / np.array(LADDER) / np.sum(1 / np.array(LADDER))
 

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.axle.excitation import EDGES, excited
+from identifier.axle.curve import EDGES, excited
 
 DT = 0.02
 

@@ -6,7 +6,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.axle.friction_change import (
+from identifier.axle.car import larger, smaller, within
+from identifier.axle.learning import (
     LARGEST_Q,
     SLOW_Q,
     ChangeDetector,
@@ -15,7 +16,6 @@ from identifier.axle.friction_change import (
     alarm,
     error_means,
 )
-from identifier.axle.piecewise import larger, smaller, within
 
 DT = 0.01
 

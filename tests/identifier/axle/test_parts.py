@@ -6,11 +6,14 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.axle import covariance, rls, slip, sway, units
+from identifier.axle import covariance, slip
+from identifier.axle import curve as units
+from identifier.axle import learning as rls
+from identifier.axle import slip as sway
 from identifier.axle.car import Car, axle_impulse, car_numbers
+from identifier.axle.curve import LADDER
 from identifier.axle.prior import SLIPS, Prior, fiala_force, fiala_weights, friction_direction
-from identifier.axle.sway import Sway, SwayNumbers, SwayState
-from identifier.axle.units import LADDER
+from identifier.axle.slip import Sway, SwayNumbers, SwayState
 
 STEPS = units.doublings(LADDER)
 SCALES = 1 / np.array(LADDER)[None]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identifier.axle import AxleDesign
-from identifier.identify import identify
+from identifier.run import identify
 
 
 def spikes(signals, rng):

@@ -9,7 +9,7 @@ import pytest
 
 from identifier.axle import AxleDesign
 from identifier.axle.watch import BEGIN, Watch, WatchNumbers, WatchState, watched
-from identifier.identify import identify
+from identifier.run import identify
 from models.faults import SensorFault
 from models.maneuvers import RandomSteer
 from models.plant import Plant

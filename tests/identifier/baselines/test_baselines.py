@@ -14,7 +14,7 @@ from identifier.baselines import (
     magic_formula_ekf,
     share_of_force,
 )
-from identifier.identify import identify
+from identifier.run import identify
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.recordings import Recording

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identifier.baselines import CurveModel, dugoff_ekf, magic_formula_ekf
-from identifier.identify import identify
+from identifier.run import identify
 
 MAGIC = np.array([[12.0, 1.5, 6000.0], [14.0, 1.3, 5200.0]])  # B, C, D
 DUGOFF = np.array([[8e4, 0.7], [1.0e5, 0.7]])  # C, mu

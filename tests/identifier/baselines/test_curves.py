@@ -8,9 +8,9 @@ import pytest
 
 from identifier.baselines import CurveModel, LinearBaseline
 from identifier.baselines.curves import CURVES
-from identifier.identify import identify
-from identifier.model_file import load_model
-from identifier.model_format import FrozenModelError
+from identifier.method import FrozenModelError
+from identifier.methods import load_model
+from identifier.run import identify
 from models.tires import DugoffTire
 
 PARAMETERS = {

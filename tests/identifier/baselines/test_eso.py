@@ -5,8 +5,8 @@ import pytest
 
 from identifier.baselines import ExtendedStateObserver
 from identifier.baselines.eso import build_step
-from identifier.identify import identify
 from identifier.method import CannotFreezeError
+from identifier.run import identify
 
 
 def error_matrix(step, car, bandwidth, dt):

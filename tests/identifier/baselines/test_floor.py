@@ -16,8 +16,8 @@ from identifier.baselines import (
     structure_of,
 )
 from identifier.defaults import default_design, natural_network
-from identifier.identify import identify
 from identifier.method import CannotFreezeError
+from identifier.run import identify
 from models.recordings import read_recording
 from models.vehicle import Vehicle
 

@@ -8,7 +8,7 @@ import pytest
 
 from identifier.baselines import ForceEkf, dugoff_ekf, magic_formula_ekf
 from identifier.baselines.kalman import correct
-from identifier.identify import identify
+from identifier.run import identify
 from models.vehicle import GRAVITY
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from identifier.baselines.least_squares import least_squares
+from identifier.baselines.floor import least_squares
 
 FREE = np.full(2, np.inf)
 

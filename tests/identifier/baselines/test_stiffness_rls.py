@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from identifier.baselines import CurveModel, StiffnessRls
-from identifier.identify import identify
+from identifier.run import identify
 
 METHOD = StiffnessRls(cutoff=4.0, memory=3.0, prior_slip=0.002)
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from identifier.export.compiled import CompiledPackage, Status, samples_of
+from identifier.export.package import run_in_virtual_machine
 from identifier.export.processor import PROCESSORS, missing_tools, replay_here, replay_on
-from identifier.export.vectors import run_in_virtual_machine
 
 needs_arm = pytest.mark.skipif(bool(missing_tools()), reason=f"needs {', '.join(missing_tools())}")
 LAWS = ("integral", "axle")

@@ -15,9 +15,9 @@ from identifier.export.compiled import (
     samples_of,
 )
 from identifier.export.package import build_package
-from identifier.identify import identify
-from identifier.keeping import with_keeping
 from identifier.methods import make_method
+from identifier.run import identify
+from identifier.stability.gain_design import with_keeping
 from models.vehicle import sedan
 
 CAR = sedan()

@@ -5,8 +5,16 @@ import json
 import pytest
 
 from identifier.export import processor
-from identifier.export.figures import figures_text, measure, with_figures
-from identifier.export.processor import PROCESSORS, ReplayError, missing_tools, replay_on, size_on
+from identifier.export.processor import (
+    PROCESSORS,
+    ReplayError,
+    figures_text,
+    measure,
+    missing_tools,
+    replay_on,
+    size_on,
+    with_figures,
+)
 
 pytestmark = pytest.mark.skipif(bool(missing_tools()), reason=f"needs {', '.join(missing_tools())}")
 

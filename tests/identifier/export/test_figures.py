@@ -2,8 +2,7 @@
 
 import json
 
-from identifier.export.figures import Cost, figures_text, with_figures
-from identifier.export.processor import Replay
+from identifier.export.processor import Cost, Replay, figures_text, with_figures
 
 REPLAY = Replay(
     hash="ab", steps=900, faults=2, state=1000, params=200, stack=30, instructions=77777,

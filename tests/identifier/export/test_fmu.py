@@ -7,10 +7,10 @@ import pytest
 
 from codegen import Scan
 from identifier.defaults import default_design
-from identifier.export.fmu import binaries, export_fmu
+from identifier.export import fmu as binaries
+from identifier.export.fmu import export_fmu
 from identifier.export.fold import fold
-from identifier.identify import identify
-from identifier.online import OnlineIdentifier
+from identifier.run import OnlineIdentifier, identify
 from models.recordings import Recording
 from models.vehicle import sedan
 

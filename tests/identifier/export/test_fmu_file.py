@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from identifier.defaults import default_design
-from identifier.export.fmu import binaries, export_fmu, package
-from identifier.export.fmu.package import fmu_text
+from identifier.export import fmu as binaries
+from identifier.export import fmu as package
+from identifier.export.fmu import export_fmu, fmu_text
 from identifier.export.fold import fold
 from identifier.export.package import build_package
 from models.vehicle import sedan

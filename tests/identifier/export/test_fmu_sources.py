@@ -9,8 +9,8 @@ import pytest
 
 from codegen import find_compiler
 from identifier.defaults import default_design
-from identifier.export.fmu import binaries, export_fmu
-from identifier.export.fmu.package import OF_VERSION, SHARED, fmu_text
+from identifier.export import fmu as binaries
+from identifier.export.fmu import OF_VERSION, SHARED, export_fmu, fmu_text
 from identifier.export.fold import fold
 from models.vehicle import sedan
 

@@ -6,9 +6,9 @@ import pytest
 from codegen import Scan
 from identifier.export.compiled import samples_of
 from identifier.export.fold import FoldedStep, fold
-from identifier.export.vectors import run_in_virtual_machine, synthetic_samples
-from identifier.identify import identify
+from identifier.export.package import run_in_virtual_machine, synthetic_samples
 from identifier.methods import METHODS, make_method
+from identifier.run import identify
 from models.vehicle import sedan
 
 CAR = sedan()

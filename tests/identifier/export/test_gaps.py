@@ -9,8 +9,8 @@ from codegen import find_compiler
 from identifier.export.compiled import CompiledPackage, Status, samples_of
 from identifier.export.package import build_package
 from identifier.methods import make_method
-from identifier.online import OnlineIdentifier
 from identifier.refused import STALE_TIME
+from identifier.run import OnlineIdentifier
 from models.vehicle import sedan
 
 CAR = sedan()

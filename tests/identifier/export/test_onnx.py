@@ -6,13 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.export.onnx_export import NoOnnxError, export_onnx, onnx_bytes
-from identifier.export.onnx_graph import MissingOnnxError
-from identifier.identify import identify
+from identifier.export.onnx import MissingOnnxError, NoOnnxError, export_onnx, onnx_bytes
 from identifier.methods import make_method
-from identifier.network import SIGNALS, Network, Weights
-from identifier.network_model import NetworkModel
-from identifier.onnx_model import OnnxModel
+from identifier.own_network import OnnxModel
+from identifier.paper.network import SIGNALS, Network, NetworkModel, Weights
+from identifier.run import identify
 
 onnx = pytest.importorskip("onnx", reason="needs the package onnx")
 runtime = pytest.importorskip("onnxruntime", reason="needs the package onnxruntime")

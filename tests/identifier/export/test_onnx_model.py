@@ -7,13 +7,11 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.export.onnx_export import onnx_bytes
-from identifier.model_file import load_model
-from identifier.model_format import FrozenModelError
-from identifier.network import Network, Weights
-from identifier.network_model import NetworkModel
-from identifier.onnx_model import OnnxModel
-from identifier.tire_network import UnusableNetworkError, read_network
+from identifier.export.onnx import onnx_bytes
+from identifier.method import FrozenModelError
+from identifier.methods import load_model
+from identifier.own_network import OnnxModel, UnusableNetworkError, read_network
+from identifier.paper.network import Network, NetworkModel, Weights
 from models.bicycle import slip_angles
 
 onnx = pytest.importorskip("onnx", reason="needs the package onnx")

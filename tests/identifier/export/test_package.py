@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identifier.export.fold import Signal
 from identifier.export.layout import Member, sum_terms
 from identifier.export.package import PackageNameError, build_package, readme
-from identifier.export.signals import Signal
 from identifier.methods import METHODS, make_method
-from identifier.network import Network
+from identifier.paper.network import Network
 from models.recordings import write_recording
 from models.vehicle import sedan
 from tests.identifier.export.conftest import STRICT

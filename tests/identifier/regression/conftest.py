@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identifier.network import Network
+from identifier.paper.network import Network
 from identifier.regression import RegressionDesign
 
 

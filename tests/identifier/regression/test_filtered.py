@@ -6,8 +6,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.identify import identify
-from identifier.regression.filtered import Lags, filtered_pair
+from identifier.regression.laws import Lags, filtered_pair
+from identifier.run import identify
 from models.bicycle import bicycle
 
 UNIT, DT, SPEED = 1000.0, 0.01, 20.0

@@ -3,7 +3,7 @@
 import casadi as ca
 import numpy as np
 
-from identifier.identify import identify
+from identifier.run import identify
 
 
 def weighted_cost(W, s, y, forgetting, dt):

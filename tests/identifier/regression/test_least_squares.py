@@ -6,8 +6,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.identify import identify
-from identifier.regression.forgetting import bounded_trace, directional, exponential
+from identifier.regression.laws import bounded_trace, directional, exponential
+from identifier.run import identify
 
 
 def test_without_forgetting_it_is_batch_ridge_regression(car, drive, design, pairs):

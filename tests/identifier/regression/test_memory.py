@@ -4,9 +4,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.identify import identify
-from identifier.regression.filtered import Pair
-from identifier.regression.memory import WORTH, Memory, determinant_gains, remember
+from identifier.regression.laws import WORTH, Memory, Pair, determinant_gains, remember
+from identifier.run import identify
 
 WEIGHT, RIDGE, N_H, PLACES = 0.25, 1e-3, 3, 4
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from identifier.defaults import default_design, natural_network
-from identifier.identify import identify
-from identifier.network import Network
+from identifier.paper.network import Network
 from identifier.regression import LAWS, RegressionDesign
-from identifier.regression.memory import WORTH
+from identifier.regression.laws import WORTH
 from identifier.reproducibility import online_error, replay
+from identifier.run import identify
 
 
 def small_design(vehicle, law, dt=0.01):

@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_lyapunov
 
-from identifier.gains import Gains, diagonal
-from identifier.laws import instantaneous, integral
-from identifier.laws import pi_lead as lead_law
+from identifier.paper.laws import Gains, diagonal, instantaneous, integral
+from identifier.paper.laws import pi_lead as lead_law
 from identifier.stability import (
     Certificate,
     Operation,
@@ -16,15 +15,11 @@ from identifier.stability import (
     design_gains,
     linear_law,
 )
-from identifier.stability.disturbance import Disturbance
-from identifier.stability.gain_limit import (
-    instantaneous_damping,
-    integral_euler_limit,
-    integral_limit,
-)
+from identifier.stability.limits import instantaneous_damping, integral_euler_limit, integral_limit
 from identifier.stability.loop import direction_matrix
 from identifier.stability.operation import worst_loop
 from identifier.stability.property import Property, at_least, at_most
+from identifier.stability.sampled_bound import Disturbance
 
 CITY = Operation(
     n_h=10,

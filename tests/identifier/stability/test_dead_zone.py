@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from identifier.defaults import default_design, natural_driving, natural_operation
-from identifier.keeping import with_keeping
+from identifier.stability.gain_design import with_keeping
 from identifier.stability.loop import INTEGRAL, Law
 from identifier.stability.monte_carlo import Beginning, monte_carlo
 from identifier.stability.sampled_bound import Learning
 from models.vehicle import sedan
-from tireid.certificate_table import certificate_of
-from tireid.monte_carlo_table import bound_rows
+from tireid.commands.certificate_table import bound_rows, certificate_of
 
 CAR = sedan()
 DT, LAM, RHO, DRIVE = 0.01, 8.0, 3.0, 40.0

@@ -1,14 +1,14 @@
 import numpy as np
 import pytest
 
-from identifier.stability.drift import (
+from identifier.stability.loop import INSTANTANEOUS, INTEGRAL
+from identifier.stability.lyapunov import lyapunov
+from identifier.stability.margins import (
     drift_frequency,
     passivity_shortage,
     shortage_formula,
     sufficient_leakage,
 )
-from identifier.stability.loop import INSTANTANEOUS, INTEGRAL
-from identifier.stability.lyapunov import lyapunov
 from identifier.stability.pi_lead import lead_time, pi_lead
 
 SKEWED = np.array([[-4.0, 6.0], [-0.5, -3.0]])

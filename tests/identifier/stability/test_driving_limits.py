@@ -4,22 +4,22 @@ import numpy as np
 import pytest
 
 from identifier.defaults import default_design
-from identifier.driving import Driving
-from identifier.laws import DRIVING_ERRORS
-from identifier.network import Network
+from identifier.paper.design import Driving
+from identifier.paper.laws import DRIVING_ERRORS
+from identifier.paper.network import Network
 from identifier.stability import certify
-from identifier.stability.driving_limits import (
+from identifier.stability.monte_carlo import Drives, measured, random_drives, within
+from identifier.stability.operation import (
     SPEED_SPREAD,
     declared_signals,
     disturbance,
     expected_residual,
     input_per_error,
     largest_signals,
+    minimal_decay,
     operation,
     residual_bound,
 )
-from identifier.stability.estimated_input import minimal_decay
-from identifier.stability.random_drives import Drives, measured, random_drives, within
 
 HARD = {"v_x": 20.0, "slip": 0.12, "friction": 0.9}
 DRIVING = Driving(**HARD, bandwidth=0.5)

@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
-from identifier.stability.disturbance import Disturbance
+from identifier.stability.bounds import steady_capacity
 from identifier.stability.gain_design import DesignError, design_gains, gain_for_phase_margin
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, euler, exact
 from identifier.stability.margins import phase_margin
 from identifier.stability.operation import Operation, worst_loop
 from identifier.stability.pi_lead import pi_lead
-from identifier.stability.state_bound import steady_capacity
+from identifier.stability.sampled_bound import Disturbance
 
 TASK = {
     "bandwidth": 0.7,

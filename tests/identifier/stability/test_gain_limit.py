@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from identifier.stability.gain_limit import (
+from identifier.stability.checks import worst_damping
+from identifier.stability.limits import (
     critical_frequency,
     instantaneous_damping,
     instantaneous_euler_limit,
@@ -9,7 +10,6 @@ from identifier.stability.gain_limit import (
     integral_limit,
 )
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, euler, exact, growth_rate, rk4
-from identifier.stability.loop_checks import worst_damping
 from identifier.stability.margins import gain_margin
 
 

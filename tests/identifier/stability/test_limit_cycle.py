@@ -1,11 +1,6 @@
 import numpy as np
 import pytest
 
-from identifier.stability.gain_limit import (
-    critical_frequency,
-    integral_euler_limit,
-    integral_limit,
-)
 from identifier.stability.limit_cycle import (
     NoLimitCycleError,
     _line_leak,
@@ -13,6 +8,7 @@ from identifier.stability.limit_cycle import (
     limit_cycle,
     sampled_limit_cycle,
 )
+from identifier.stability.limits import critical_frequency, integral_euler_limit, integral_limit
 
 
 def simulated(a, lam, g, rho, dt, duration=150.0):

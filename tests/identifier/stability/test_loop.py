@@ -3,12 +3,11 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from identifier import laws
-from identifier.integrators import euler as euler_step
-from identifier.integrators import rk4 as rk4_step
-from identifier.laws import weight_rates
-from identifier.network import hidden_layer
-from identifier.observer import filter_rate
+from identifier.paper import laws
+from identifier.paper.laws import euler as euler_step
+from identifier.paper.laws import filter_rate, weight_rates
+from identifier.paper.laws import rk4 as rk4_step
+from identifier.paper.network import hidden_layer
 from identifier.stability.loop import (
     INSTANTANEOUS,
     INTEGRAL,
@@ -17,12 +16,12 @@ from identifier.stability.loop import (
     exact,
     growth_rate,
     linear_law,
+    regressor_gains,
     rk4,
     root_locus,
     spectral_radius,
 )
 from identifier.stability.pi_lead import pi_lead
-from identifier.stability.regressor_gain import regressor_gains
 
 A_D = np.array([[-6.0, 2.5], [-0.7, -4.0]])
 

@@ -2,7 +2,7 @@ import control
 import numpy as np
 import pytest
 
-from identifier.gains import NotHurwitzError
+from identifier.paper.laws import NotHurwitzError
 from identifier.stability.lyapunov import (
     LyapunovError,
     lyapunov,

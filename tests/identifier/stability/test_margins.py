@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigvals
 
-from identifier.stability.gain_limit import integral_limit
+from identifier.stability.limits import integral_limit
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, euler, exact, growth_rate, rk4
 from identifier.stability.margins import gain_margin, phase_margin, scalar_loop, scalar_margins
 from identifier.stability.pi_lead import pi_lead

@@ -7,20 +7,16 @@ import numpy as np
 import pytest
 
 from identifier.defaults import default_design, natural_driving, natural_operation
-from identifier.design import Design
-from identifier.history import History
-from identifier.identify import identify
-from identifier.network import Weights
-from identifier.network_model import NetworkModel
+from identifier.paper.design import Design
+from identifier.paper.network import NetworkModel, Weights
+from identifier.run import History, identify
 from identifier.stability import monte_carlo as module
 from identifier.stability.monte_carlo import (
     Beginning,
+    Drives,
     first_weights,
     largest_norms,
     monte_carlo,
-)
-from identifier.stability.random_drives import (
-    Drives,
     random_drives,
     residuals,
     saturating_bicycle,

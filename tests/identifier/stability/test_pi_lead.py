@@ -4,14 +4,12 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier import laws
-from identifier.gains import Gains
+from identifier.paper import laws
+from identifier.paper.laws import Gains
 from identifier.stability import Operation, certify
-from identifier.stability.disturbance import Disturbance
-from identifier.stability.drift import drift_frequency
 from identifier.stability.loop import INTEGRAL, Loop, direction_matrix
 from identifier.stability.lyapunov import lyapunov
-from identifier.stability.margins import gain_margin
+from identifier.stability.margins import drift_frequency, gain_margin
 from identifier.stability.pi_lead import (
     Storage,
     lead_time,
@@ -20,6 +18,7 @@ from identifier.stability.pi_lead import (
     storage,
     storage_residual,
 )
+from identifier.stability.sampled_bound import Disturbance
 
 SKEWED = np.array([[-4.0, 6.0], [-0.5, -3.0]])
 

@@ -3,11 +3,11 @@
 import numpy as np
 
 from identifier.defaults import default_design, natural_operation
-from identifier.identify import identify
-from identifier.laws import DRIVING_ERRORS
+from identifier.paper.laws import DRIVING_ERRORS
+from identifier.run import identify
+from identifier.stability.certificate import loop_along, network_inputs
 from identifier.stability.loop import direction_matrix, linear_law
 from identifier.stability.operation import proven_bounds, worst_loop
-from identifier.stability.recorded_run import loop_along, network_inputs
 
 
 def test_gain_along_a_run_is_the_formula_at_one_sample(car, drive):

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from identifier.stability.regressor_gain import regressor_gains, strongest, worst_gain
+from identifier.stability.loop import regressor_gains, strongest, worst_gain
 
 
 def test_no_random_regressor_exceeds_the_worst_gain_and_the_corners_reach_it():

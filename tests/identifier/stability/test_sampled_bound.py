@@ -6,20 +6,29 @@ import numpy as np
 import pytest
 
 from identifier.defaults import default_design, design_for, natural_driving, natural_operation
-from identifier.design import Design
-from identifier.gains import Gains, diagonal
-from identifier.identify import identify
-from identifier.integrators import rk4
-from identifier.laws import DRIVING_ERRORS
-from identifier.network import Network
+from identifier.paper.design import Design
+from identifier.paper.laws import DRIVING_ERRORS, Gains, diagonal, rk4
+from identifier.paper.network import Network
+from identifier.paper.step import GAINS, build_step
+from identifier.run import identify
 from identifier.stability import certify
-from identifier.stability.disturbance import Disturbance
 from identifier.stability.loop import INTEGRAL, Law, direction_matrix, linear_law
-from identifier.stability.monte_carlo import Beginning, largest_norms, monte_carlo
+from identifier.stability.monte_carlo import (
+    Beginning,
+    largest_norms,
+    measured,
+    monte_carlo,
+    random_drives,
+    within,
+)
 from identifier.stability.operation import proven_bounds
-from identifier.stability.random_drives import measured, random_drives, within
-from identifier.stability.sampled_bound import by_leakage, by_projection, error_gains, output_layer
-from identifier.step import GAINS, build_step
+from identifier.stability.sampled_bound import (
+    Disturbance,
+    by_leakage,
+    by_projection,
+    error_gains,
+    output_layer,
+)
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan

@@ -1,24 +1,29 @@
 import numpy as np
 import pytest
 
-from identifier.design import Design
-from identifier.gains import Gains, diagonal
-from identifier.identify import identify
-from identifier.network import Network
-from identifier.stability.disturbance import Disturbance
-from identifier.stability.gain_limit import integral_euler_limit
+from identifier.paper.design import Design
+from identifier.paper.laws import Gains, diagonal
+from identifier.paper.network import Network
+from identifier.run import identify
+from identifier.stability.bounds import small_gain, steady_capacity, transient_peak
+from identifier.stability.limits import integral_euler_limit
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL
 from identifier.stability.lyapunov import lyapunov
 from identifier.stability.operation import Operation, proven_bounds
 from identifier.stability.pi_lead import pi_lead
-from identifier.stability.sampled_bound import by_leakage, by_projection, error_gains, output_layer
-from identifier.stability.state_bound import small_gain, steady_capacity, transient_peak
-from identifier.stability.ultimate_bound import (
+from identifier.stability.printed import (
     bound_14,
     canceling_pair,
     printed_k_b,
     tight_k_b,
     trivial_bound,
+)
+from identifier.stability.sampled_bound import (
+    Disturbance,
+    by_leakage,
+    by_projection,
+    error_gains,
+    output_layer,
 )
 
 SKEWED = np.array([[-4.0, 3.0], [-0.5, -6.0]])

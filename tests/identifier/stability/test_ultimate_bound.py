@@ -1,21 +1,21 @@
 import numpy as np
 import pytest
 
-from identifier.gains import Gains
-from identifier.stability.disturbance import Disturbance
+from identifier.paper.laws import Gains
 from identifier.stability.loop import INSTANTANEOUS
 from identifier.stability.lyapunov import LyapunovError, lyapunov
 from identifier.stability.operation import Operation
-from identifier.stability.printed_bounds import printed_bounds
-from identifier.stability.ultimate_bound import (
+from identifier.stability.printed import (
     bound_14,
     canceling_pair,
     k_b_with_V,
+    printed_bounds,
     printed_k_b,
     tight_k_b,
     trivial_bound,
     ultimate_bound,
 )
+from identifier.stability.sampled_bound import Disturbance
 
 SKEWED = np.array([[-4.0, 3.0], [-0.5, -6.0]])
 NUMBERS = {"W_M": 1.5, "n_h": 6, "eta_W": 3.0, "rho_W": 0.8}

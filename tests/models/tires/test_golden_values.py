@@ -18,7 +18,7 @@ from typing import NamedTuple
 import pytest
 
 from models.tires import MagicFormula
-from models.tires.magic_formula_lateral import combined_lateral, pure_lateral
+from models.tires.magic_formula import combined_lateral, pure_lateral
 
 FILES = ("Sedan_Pac02Tire", "HMMWV_Pac02Tire", "MagicFormula52_Parameters")
 

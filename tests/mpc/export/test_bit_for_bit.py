@@ -5,8 +5,15 @@ import shutil
 import pytest
 
 from identifier.export.processor import missing_tools
-from mpc.export.figures import MpcCost, mpc_figures_text, time_here, with_mpc_figures
-from mpc.export.processor import PROCESSOR, replay_here, replay_on_processor
+from mpc.export.processor import (
+    PROCESSOR,
+    MpcCost,
+    mpc_figures_text,
+    replay_here,
+    replay_on_processor,
+    time_here,
+    with_mpc_figures,
+)
 
 CASES = [("axle", True), ("integral", False), ("integral", True)]
 needs_arm = pytest.mark.skipif(bool(missing_tools()), reason=f"needs {', '.join(missing_tools())}")

@@ -10,9 +10,8 @@ import pytest
 
 from identifier.export.package import PackageNameError
 from models.vehicle import sedan
-from mpc.cost import Cost
 from mpc.export.package import build_mpc_package, mpc_readme
-from mpc.problem import Problem
+from mpc.problem import Cost, Problem
 from mpc.realtime import Tracker
 from mpc.tires import tire_model
 from tests.mpc.export.conftest import LAWS, STRICT, c_files

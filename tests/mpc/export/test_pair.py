@@ -13,8 +13,7 @@ from identifier.methods import make_method
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan
-from mpc.export.handover import NoHandoverError
-from mpc.export.pair import DELAY, build_pair
+from mpc.export.pair import DELAY, NoHandoverError, build_pair
 from mpc.realtime import Tracker
 from mpc.tires import tire_model
 from tests.mpc.export.conftest import LAWS, STRICT, c_files, put

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mpc.handover.blend import blended
-from mpc.handover.friction import at_friction
+from mpc.handover.learner import blended
+from mpc.handover.road import at_friction
 from mpc.tires import tire_model
 
 

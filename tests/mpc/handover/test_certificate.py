@@ -9,10 +9,10 @@ import pytest
 
 from identifier.methods import make_method
 from mpc.handover.certificate import law_complaint, tire_complaint
-from mpc.handover.excitation import Excitation, slips
-from mpc.handover.friction import at_friction
+from mpc.handover.road import at_friction
+from mpc.handover.supervisor import Excitation, slips
 from mpc.tires import TireModel, oracle_tire, tire_model
-from mpc.tires.structure import no_lag, wheel_slip
+from mpc.tires.tire import no_lag, wheel_slip
 
 
 def edited(tire, axle, change):

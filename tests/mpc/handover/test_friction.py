@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from identifier.methods import make_method
-from identifier.network import Network
-from mpc.handover.axle_force import axle_forces
-from mpc.handover.friction import at_friction, can_scale, fit_friction
-from mpc.handover.misfit import Judge
+from identifier.paper.network import Network
+from mpc.handover.judge import Judge, axle_forces
+from mpc.handover.road import at_friction, can_scale, fit_friction
 from mpc.tires import tire_model
 from tests.mpc.handover.conftest import DROP, samples_of
 

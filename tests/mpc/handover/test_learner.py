@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from identifier.axle import AxleDesign
-from identifier.online import OnlineIdentifier
+from identifier.run import OnlineIdentifier
 from models.friction import Friction, FrictionChange
 from mpc.cars import DoubleTrackCar
 from mpc.handover import Learner, Supervisor
-from mpc.handover.friction import at_friction
-from mpc.handover.preview import previewed_rate
+from mpc.handover.learner import previewed_rate
+from mpc.handover.road import at_friction
 from mpc.loop import drive, inertial_unit
 from mpc.path import iso_3888_1
 from mpc.realtime import Measurement, Tracker

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from mpc.handover.axle_force import axle_forces
-from mpc.handover.misfit import ErrorModel, Judge
-from mpc.handover.window import Window
+from mpc.handover.judge import ErrorModel, Judge, Window, axle_forces
 from mpc.tires import tire_model
 from tests.mpc.handover.conftest import samples_of
 

@@ -6,11 +6,9 @@ from itertools import product
 import numpy as np
 import pytest
 
-from mpc.handover.friction import at_friction
-from mpc.handover.misfit import Misfit
-from mpc.handover.road import Road, look_at_road
+from mpc.handover.judge import Misfit, Window
+from mpc.handover.road import Road, at_friction, look_at_road
 from mpc.handover.rules import Rules, Verdict
-from mpc.handover.window import Window
 
 COUNT = 10.0  # independent errors, whatever the samples
 

@@ -7,14 +7,14 @@ import pytest
 
 from identifier.axle import AxleDesign
 from identifier.methods import make_method
-from identifier.network import Network
-from identifier.online import OnlineIdentifier
+from identifier.paper.network import Network
+from identifier.run import OnlineIdentifier
 from models.friction import Friction, FrictionChange
 from models.maneuvers import RandomSteer, Slalom
 from mpc.handover import Rules, Supervisor, Verdict
 from mpc.handover import supervisor as supervisor_module
-from mpc.handover.friction import at_friction
-from mpc.handover.misfit import Judge, Misfit
+from mpc.handover.judge import Judge, Misfit
+from mpc.handover.road import at_friction
 from mpc.tires import tire_model
 from tests.mpc.handover.conftest import DROP, drive, samples_of
 

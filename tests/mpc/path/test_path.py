@@ -147,7 +147,7 @@ def test_a_closed_path_must_close():
 
 def test_examples_in_the_documentation_are_true():
     tried = 0
-    for name in ("path", "iso_3888", "courses"):
+    for name in ("path", "gates", "courses"):
         module = importlib.import_module(f"mpc.path.{name}")
         failed, count = doctest.testmod(module, extraglobs={"np": np})
         assert not failed

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from mpc.path import BUILT_IN, Path, PathError, constant_radius, handling_course
-from mpc.path.sections import Straight, Turn, line_along
+from mpc.path.courses import Straight, Turn, line_along
 
 # Two legs, 6 m apart, 40 m long, joined by a turn of 3 m with easings.
 HAIRPIN = Path.from_line(

@@ -3,8 +3,8 @@ import pytest
 from scipy.integrate import quad
 
 from mpc.path import Path, PathError
+from mpc.path.courses import Straight, Turn, close, line_along
 from mpc.path.line import line_from_heading
-from mpc.path.sections import Straight, Turn, close, line_along
 
 RIGHT = Turn(radius=20.0, angle=-1.2, easing=8.0)
 

@@ -7,7 +7,7 @@ from models.vehicle import sedan
 from mpc.problem import Limits, Problem
 from mpc.realtime import Measurement
 from mpc.tires import tire_model
-from mpc.tires.oracle import oracle_tire
+from mpc.tires.ladder import oracle_tire
 
 PROBLEM = Problem(horizon=20, limits=Limits(steering=0.2, steering_rate=0.5, slip=(0.1, 0.1)))
 

@@ -9,8 +9,7 @@ import pytest
 from benchmarks.mpc_stress import sanitized, stress
 from codegen import find_compiler
 from mpc.realtime.c_source import c_sources
-from mpc.realtime.layout import N_COMMANDS, N_STATUSES
-from mpc.realtime.messages import Status
+from mpc.realtime.instance import N_COMMANDS, N_STATUSES, Status
 
 ABOUT = {"title": "A test", "version": "0", "version_text": "0"}
 WARNINGS = ("all", "extra", "pedantic", "conversion", "shadow", "double-promotion")

@@ -17,7 +17,7 @@ from mpc.path.path import Path
 from mpc.problem import Problem
 from mpc.realtime import Guards, Measurement, Status, Tracker
 from mpc.realtime.fall_back import fall_back, feedback, motion, steady_turn
-from mpc.realtime.layout import input_type, params_type, state_type
+from mpc.realtime.instance import input_type, params_type, state_type
 from mpc.tires import tire_model
 
 CAR = sedan()

@@ -5,7 +5,7 @@ import pytest
 
 from mpc.prediction import build_stage
 from mpc.realtime import Status, Tracker
-from mpc.tires.reach import reach_of
+from mpc.tires.tire import reach_of
 
 PERIOD = 0.02
 HUGE = [1e308, -1e308, 1e30, np.inf, np.nan]

@@ -6,7 +6,7 @@ import pytest
 
 from mpc.prediction import build_end, build_stage
 from mpc.realtime import Status, Tracker
-from mpc.tires.reach import reach_of
+from mpc.tires.tire import reach_of
 
 SOFT = 3  # e_y, slip in front, slip at the rear
 

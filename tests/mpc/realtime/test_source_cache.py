@@ -2,8 +2,8 @@ from pathlib import Path
 
 import pytest
 
-from mpc.realtime import source_cache
-from mpc.realtime.source_cache import tracker_source
+from mpc.realtime import instance as source_cache
+from mpc.realtime.instance import tracker_source
 from mpc.tires.network import NetworkAxles
 
 

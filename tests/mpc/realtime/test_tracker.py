@@ -4,7 +4,7 @@ import pytest
 from mpc.prediction import build_rk4
 from mpc.problem import Problem
 from mpc.realtime import Guards, Status, Tracker
-from mpc.tires.reach import ALL
+from mpc.tires.tire import ALL
 
 PERIOD = 0.02
 

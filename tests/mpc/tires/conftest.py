@@ -6,7 +6,7 @@ import pytest
 
 from models.recordings import Recording
 from models.vehicle import sedan
-from mpc.tires.structure import Car, Point
+from mpc.tires.tire import Car, Point
 
 
 def forces(model, v_x, v_y, r, delta, lagged=None):

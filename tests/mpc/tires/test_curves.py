@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identifier.baselines.curve_model import CurveModel
+from identifier.baselines.curves import CurveModel
 from models.tires import DugoffTire, FialaTire, LinearTire
 from mpc.tires import tire_model
 

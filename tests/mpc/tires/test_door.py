@@ -8,7 +8,7 @@ import pytest
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
 from mpc.prediction import build_stage
 from mpc.tires import tire_model
-from mpc.tires.reach import ALL
+from mpc.tires.tire import ALL
 
 
 def test_a_vehicle_stands_for_the_linear_tire_that_it_states(car):

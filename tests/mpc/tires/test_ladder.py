@@ -6,11 +6,9 @@ import pytest
 
 from identifier.axle import AxleDesign, AxleModel
 from models.recordings import Recording
-from mpc.motion import N_CAR
-from mpc.prediction import build_dynamics
+from mpc.prediction import N_CAR, build_dynamics
 from mpc.tires import tire_model
-from mpc.tires.reach import ALL
-from mpc.tires.structure import Car, Point
+from mpc.tires.tire import ALL, Car, Point
 
 W = np.array([[0.05, 0.5, 0.5, -0.15], [0.02, 0.6, 0.6, -0.2]])
 

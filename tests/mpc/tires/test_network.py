@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.network import Network, Weights
-from identifier.network_model import NetworkModel
+from identifier.paper.network import Network, NetworkModel, Weights
 from mpc.tires import tire_model
 
 

@@ -4,10 +4,10 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.onnx_model import OnnxModel
+from identifier.own_network import OnnxModel
 from mpc.prediction import build_stage
 from mpc.tires import tire_model
-from mpc.tires.reach import ALL
+from mpc.tires.tire import ALL
 
 onnx = pytest.importorskip("onnx", reason="needs the package onnx")
 

@@ -11,9 +11,8 @@ from models.plant import Plant
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
 from models.vehicle import VehicleError
 from mpc.tires import CurveFitError, oracle_tire, tire_model
-from mpc.tires.ladder_fit import fitted_ladder, slip_grid
-from mpc.tires.oracle import cornering_force
-from mpc.tires.structure import Car, Point
+from mpc.tires.ladder import cornering_force, fitted_ladder, slip_grid
+from mpc.tires.tire import Car, Point
 
 
 def at_slip(forces, model, alpha):

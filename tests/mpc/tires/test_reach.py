@@ -4,16 +4,14 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.network import Network, Weights
-from identifier.network_model import NetworkModel
+from identifier.paper.network import Network, NetworkModel, Weights
 from models.tires import FialaTire
 from models.vehicle import sedan
 from mpc.prediction import build_dynamics, build_rk4
 from mpc.problem import Limits, Problem
 from mpc.realtime import Tracker
 from mpc.tires import oracle_tire, tire_model
-from mpc.tires.reach import ALL, LEAST_RISE, believed_force, reach_of, useful_slip
-from mpc.tires.structure import Car, Point
+from mpc.tires.tire import ALL, LEAST_RISE, Car, Point, believed_force, reach_of, useful_slip
 
 CAR = sedan()
 SLIPS = np.linspace(-0.4, 0.4, 161)

@@ -1,0 +1,450 @@
+"""From motion to a regression that is linear in the weights, without derivative and stiffness.
+
+dξ/dt = φ cos δ - v_x r/g, filtered by L(p) = 1/(p/κ + 1):
+y = κ ξ - L(κ ξ - v_x r/g) = L(φ cos δ) = Σ θ_j L(g_j),  so y is measured and h = L(g) known.
+The filter is trapezoidal: f⁺ = e f + (1 - e)/2 (u⁺ + u), e = exp(-κ dt), with the state
+v = e f + (1 - e)/2 u.
+
+Recursive least squares with directional forgetting (R. Kulhavy, Automatica 23, 1987).
+
+Only the direction that the regressor excites is forgotten: no wind-up while the rest is not
+excited, and none that would make the covariance wider than its limit.
+
+A change of the road's friction: noticed at both axles at once, followed along one direction.
+
+q = e²/S is one where the error model is right. Its fast mean over its slow mean rises at a change;
+then the covariance is inflated along d = M w, the change of weights that a change of friction
+makes (φ = μ φ₀(α/μ)), so that the weights move along it at once and the shape is kept. Both axles
+must alarm: a faulty steering disturbs only one.
+
+Bounds of what is learnt, kept after every sample, exactly: also in float, whatever was learnt.
+
+The saturated force W = Σ w_j and the slope S = Σ a_j w_j of an axle are kept in their ranges by the
+least move in the metric of the covariance, which finds both at once: moving one unit alone, or
+clipping each, would break what was learnt. Rounding, and the box on each weight, are the business
+of what comes last: a move on the straight line towards the center of the set, where all units are
+equal, by just so much that every bound holds. The numbers of that test lie inside the declared
+bounds by more than rounding in float can do, so that what is declared holds of the stored numbers.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from identifier.axle.car import larger, reciprocal, require_positive, smaller, within
+from identifier.axle.covariance import Factors, Spread, Symmetric, excited, scaled, updated, width
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Regression:
+    """Filter, error model and memory; times belong to drivers and sensors, not to the car's size.
+
+    Parameters
+    ----------
+    bandwidth : κ [1/s].
+    memory : of directional forgetting, in time with excitation [s].
+    error : additive error of y [static axle loads]: 0.02 is 0.2 m/s².
+    relative_error : of y [-], the model's.
+    correlation_time : of these errors [s]; it makes the result independent of the sampling.
+    clip : largest error that counts in full [its standard deviation].
+    widest : trace of the covariance of weights at which forgetting stops, over the prior's [-].
+    excitation_time : a force above `error` is excitation for this long [s].
+
+    Raises
+    ------
+    ValueError
+        Where a number is not positive.
+    """
+
+    bandwidth: float = 4.0
+    memory: float = 10.0
+    error: float = 0.02
+    relative_error: float = 0.04
+    correlation_time: float = 0.1
+    clip: float = 5.0
+    widest: float = 2.0
+    excitation_time: float = 1.0
+
+    def __post_init__(self) -> None:
+        require_positive(self)
+
+    def numbers(self, dt: float) -> Array:
+        """Return the numbers of `RegressionNumbers`, (9,).
+
+        Parameters
+        ----------
+        dt : sampling interval [s].
+        """
+        e = math.exp(-self.bandwidth * dt)
+        return np.array(
+            [
+                self.bandwidth,
+                e,
+                0.5 * (1.0 - e),
+                math.expm1(dt / self.memory),
+                self.error,
+                self.relative_error,
+                self.correlation_time / dt,
+                self.clip,
+                math.exp(-dt / self.excitation_time),
+            ]
+        )
+
+
+class RegressionNumbers(NamedTuple):
+    """κ, e, (1 - e)/2; (1 - λ)/λ; errors; correlated samples; clip; decay of excitation."""
+
+    bandwidth: Any
+    e: Any
+    half: Any
+    forgetting: Any
+    error: Any
+    relative_error: Any
+    samples: Any
+    clip: Any
+    decay: Any
+
+
+def filtered(numbers: RegressionNumbers, v: Any, u: Any, first: Any) -> tuple[Any, Any]:
+    """Return f and the next state of the filter.
+
+    Parameters
+    ----------
+    numbers : of the filter.
+    v : its state.
+    u : its input now, which is also its output at a restart.
+    first : 1 at a restart, else 0.
+    """
+    f = first * u + (1 - first) * (v + numbers.half * u)
+    return f, numbers.e * f + numbers.half * u
+
+
+class Learnt(NamedTuple):
+    """Parameters (q entries) and factors of the covariance after an update.
+
+    uncertainty : h'Ph before it.   weights : block of the weights of P before it, by place.
+    """
+
+    theta: list[Any]
+    P: Factors
+    uncertainty: Any
+    weights: Symmetric
+
+
+def update(
+    theta: list[Any],
+    P: Factors,
+    h: list[Any],
+    *,
+    error: Any,
+    R: Any,
+    forgetting: Any,
+    spread: Spread,
+    limits: list[Any],
+    learns: Any,
+) -> Learnt:
+    """Return parameters and covariance after one sample.
+
+    θ⁺ = θ + P h e/(R + a), a = h'Ph;  P⁺ = P - κ P h h'P/((R + a) a), κ = a - R (1 - λ)/λ, which
+    keeps P positive definite for every a, also where κ < 0 and P grows: 1/h'P⁻¹h stays positive.
+
+    Parameters
+    ----------
+    theta : parameters, q entries.
+    P : factors of their covariance.
+    h : regressor, q entries.
+    error : e = y - h'θ, clipped.
+    R : variance of the error.
+    forgetting : (1 - λ)/λ.
+    spread : of P, and of what is added to it otherwise in this step.
+    limits : as in `width`; where P would grow beyond them it stays as it is.
+    learns : whether to update at all.
+    """
+    seen = excited(P, h, 1e-12 * R)
+    v, a = seen.v, seen.a
+    kappa = a - forgetting * R
+    share = reciprocal((R + a) * a)
+    growth = -kappa * share  # of P along v v'
+    n = len(v) - len(spread.others)
+    trace = spread.trace + sum(growth * one * one for one in v[:n])
+    others = [p + growth * one * one for p, one in zip(spread.others, v[n:], strict=True)]
+    wide = width(trace, others, limits)
+    moves = ca.logic_and(learns, ca.logic_or(kappa >= 0, wide <= 1))
+    # β_q = 1 + c a = (R + a)/(R + R (1 - λ)/λ), so that c/β_q = κ/((R + a) a)
+    c = ca.if_else(moves, kappa / (a * R * (1 + forgetting)), 0)
+    gain = learns * error * a * share
+    theta = [one + along * gain for one, along in zip(theta, v, strict=True)]
+    after = scaled(updated(P, seen, c), moves * wide)
+    return Learnt(theta, after, a, spread.weights)
+
+
+LARGEST_Q = 25.0  # one outlier alone is no alarm
+SLOW_Q = 4.0  # and the slow mean shall not follow a change
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChangeDetector:
+    """When friction is taken to have changed, and how fast it is followed.
+
+    Parameters
+    ----------
+    threshold : of fast over slow mean of q [-]; from twice it on the inflation is full.
+    fast, slow : time constants of the means [s].
+    step : change of ln μ [-] that ...
+    step_time : ... may happen in this time [s] during an alarm.
+
+    Raises
+    ------
+    ValueError
+        Where a number is not positive.
+    """
+
+    threshold: float = 4.0
+    fast: float = 0.2
+    slow: float = 20.0
+    step: float = 0.5
+    step_time: float = 0.3
+
+    def __post_init__(self) -> None:
+        require_positive(self)
+
+    def numbers(self, dt: float) -> Array:
+        """Return [1/threshold, dt/fast, dt/slow, inflation a sample], (4,).
+
+        Parameters
+        ----------
+        dt : sampling interval [s].
+        """
+        inflation = dt * self.step**2 / self.step_time
+        return np.array([1.0 / self.threshold, dt / self.fast, dt / self.slow, inflation])
+
+
+class ChangeNumbers(NamedTuple):
+    """1/threshold, gains of fast and slow mean, inflation a sample."""
+
+    per_threshold: Any
+    fast: Any
+    slow: Any
+    inflation: Any
+
+
+class ErrorState(NamedTuple):
+    """Columns (2,): fast and slow mean of q [-], recent peak of |ŷ| [static axle loads]."""
+
+    fast: Any
+    slow: Any
+    peak: Any
+
+
+def error_means(numbers: ChangeNumbers, state: ErrorState, q: Any, learns: Any) -> tuple[Any, Any]:
+    """Return fast and slow mean of q after a sample, (2,) each.
+
+    Parameters
+    ----------
+    numbers : of the detector.
+    state : before the sample.
+    q : squared error over its variance, (2,).
+    learns : 1 where learning runs, else 0.
+    """
+    q = smaller(q, LARGEST_Q)
+    fast = state.fast + learns * numbers.fast * (q - state.fast)
+    slow = state.slow + learns * numbers.slow * (smaller(q, SLOW_Q * state.slow) - state.slow)
+    return fast, larger(slow, 1)
+
+
+def alarm(numbers: ChangeNumbers, fast: Any, slow: Any) -> Any:
+    """Return how much the friction is taken to have changed, from 0 to 1.
+
+    Parameters
+    ----------
+    numbers : of the detector.
+    fast : mean of q (2,).
+    slow : mean of q (2,).
+    """
+    ratio = fast / slow
+    excess = smaller(ratio[0], ratio[1]) * numbers.per_threshold - 1
+    return smaller(larger(excess, 0), 1)
+
+
+FLOAT = float(np.finfo(np.float32).eps)
+TINY = 1e-12  # of a size that is divided by
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bounds:
+    """Limits of parameters.
+
+    Parameters
+    ----------
+    least_grip, most_grip : of the saturated force [static axle loads].
+    weight : of each weight [static axle loads].
+    compliance : [m per static axle load].
+    steering : of the steering's zero [rad].
+    v_y : of the bias of v_y [m/s].
+
+    Raises
+    ------
+    ValueError
+        Where a number is not positive, or least_grip is not below most_grip.
+    """
+
+    least_grip: float = 0.1
+    most_grip: float = 1.5
+    weight: float = 3.0
+    compliance: float
+    steering: float = 0.01
+    v_y: float
+
+    def __post_init__(self) -> None:
+        require_positive(self)
+        if not self.least_grip < self.most_grip:
+            raise ValueError(
+                f"least_grip must be below most_grip, they are {self.least_grip}, {self.most_grip}"
+            )
+
+    def numbers(self, n: int) -> Array:
+        """Return the numbers of `BoundNumbers`, (10,).
+
+        n products of weights that lie in the box sum up to within n + 8 roundings.
+
+        Parameters
+        ----------
+        n : number of units.
+
+        Raises
+        ------
+        ValueError
+            Where n weights within their box, all equal, cannot carry the middle of the grip.
+        """
+        rounding = (n + 8) * FLOAT * self.weight
+        least, most = self.least_grip + n * rounding, self.most_grip - n * rounding
+        center = 0.5 * (least + most) / n
+        radius = self.weight - center - rounding
+        if not (least < most and radius > 0.0 and center > rounding):
+            raise ValueError(
+                f"{n} weights up to {self.weight} cannot carry a grip of {self.least_grip} to "
+                f"{self.most_grip}"
+            )
+        return np.array(
+            [
+                least,
+                most,
+                rounding,
+                center,
+                2.0 / (most - least),
+                1.0 / (center - rounding),
+                1.0 / radius,
+                _inward(self.compliance),
+                _inward(self.steering),
+                _inward(self.v_y),
+            ]
+        )
+
+
+def _inward(limit: float) -> float:
+    """Return the largest float that is not above a limit."""
+    nearest = np.float32(limit)
+    return float(nearest if float(nearest) <= limit else np.nextafter(nearest, np.float32(0)))
+
+
+class BoundNumbers(NamedTuple):
+    """Ends of grip and slope, the center, 1/half width of grip, slope and weight; other limits.
+
+    Grip, slope and weight are inside the declared bounds by what rounding may do.
+    """
+
+    least_grip: Any
+    most_grip: Any
+    least_slope: Any
+    center: Any
+    per_grip: Any
+    per_slope: Any
+    per_weight: Any
+    compliance: Any
+    steering: Any
+    v_y: Any
+
+
+def bounded(
+    numbers: BoundNumbers,
+    theta: list[Any],
+    P: Symmetric,
+    *,
+    offset: Any,
+    slope: list[Any] | None = None,
+) -> list[Any]:
+    """Return [w, s, k, offset] of an axle within its bounds; what is within them is not moved.
+
+    Parameters
+    ----------
+    numbers : the bounds.
+    theta : parameters, n + 3 entries.
+    P : covariance of the weights, the metric: upper triangle by place.
+    offset : bound of the last one.
+    slope : derivatives of the units at a slip over their sum, n entries; the curve shall not fall
+        there.
+    """
+    n = len(theta) - 3
+    w, (s, k, o) = theta[:n], theta[n:]
+    w = _gripping(numbers, w, P) if slope is None else _rising(numbers, w, P, slope)
+    return [
+        *_towards_center(numbers, w, slope),
+        within(s, 0, numbers.compliance),
+        within(k, 0, 1),
+        within(o, -offset, offset),
+    ]
+
+
+def _dot(a: list[Any], b: list[Any]) -> Any:
+    return sum(x * y for x, y in zip(a, b, strict=True))
+
+
+def _times(P: Symmetric, row: list[Any]) -> list[Any]:
+    n = len(row)
+    return [sum(P[min(i, j), max(i, j)] * row[j] for j in range(n)) for i in range(n)]
+
+
+def _gripping(numbers: BoundNumbers, w: list[Any], P: Symmetric) -> list[Any]:
+    """Move w by the least, in the metric of P, so that its grip is in range."""
+    along = _times(P, [1] * len(w))
+    grip = sum(w)
+    move = (within(grip, numbers.least_grip, numbers.most_grip) - grip) / (sum(along) + TINY)
+    return [a + b * move for a, b in zip(w, along, strict=True)]
+
+
+def _rising(numbers: BoundNumbers, w: list[Any], P: Symmetric, slope: list[Any]) -> list[Any]:
+    """Move w by the least, in the metric of P, so that its grip is in range and its slope rises.
+
+    Where the curve falls once the grip alone is mended, the slope ends at its bound: the move to
+    it, then one along it (P-orthogonal, which leaves the slope) to the grip.
+    """
+    by_grip, by_slope = _times(P, [1] * len(w)), _times(P, slope)
+    A, B, C = sum(by_grip), sum(by_slope), _dot(slope, by_slope)
+    least, most = numbers.least_grip, numbers.most_grip
+    grip, missing = sum(w), numbers.least_slope - _dot(slope, w)
+    falls = missing * A > B * (within(grip, least, most) - grip)
+    per_C = ca.if_else(falls, reciprocal(C + TINY), 0)
+    to_slope, share = missing * per_C, B * per_C
+    grip = grip + B * to_slope
+    to_grip = (within(grip, least, most) - grip) / (A - B * share + TINY)
+    to_slope = to_slope - to_grip * share
+    return [a + b * to_grip + c * to_slope for a, b, c in zip(w, by_grip, by_slope, strict=True)]
+
+
+def _towards_center(numbers: BoundNumbers, w: list[Any], slope: list[Any] | None) -> list[Any]:
+    """Move w towards the center of the set until every bound holds."""
+    away = [one - numbers.center for one in w]
+    over = larger(ca.fabs(sum(away)) * numbers.per_grip, 1)
+    if slope is not None:
+        over = larger(-_dot(slope, away) * numbers.per_slope, over)
+    for one in away:
+        over = larger(ca.fabs(one) * numbers.per_weight, over)
+    part = reciprocal(over)
+    rest = (1 - part) * numbers.center
+    return [part * one + rest for one in w]

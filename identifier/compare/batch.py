@@ -1,0 +1,249 @@
+"""Many methods over one recording at once: those with the same compiled step share its lanes.
+
+A run has the bits of the same run by `identify`; its error is summed up while it runs.
+
+Many frozen models over one recording at once, as `identify_batch` runs many methods.
+
+`cross_replay` of many methods at once.
+"""
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen import Scan
+from identifier.compare.course import INFINITE, Course, Scores, Trial, rmse, run_scored
+from identifier.method import CannotFreezeError, FrozenModel, Method, Setup
+from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
+from identifier.run import IMPOSSIBLE_FORCE, DivergedError, carried_index, check_sampling
+from models.recordings import Recording
+from models.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BatchRun:
+    """One run of a batch: what is left of a `History` once its samples are summed up.
+
+    Parameters
+    ----------
+    vehicle : the car the method was told of.
+    design : the method that ran.
+    online : error of the forces that were identified online [N], not a number where the law
+        diverged to none; None without true forces.
+    diverged_at : time [s] from which a force is not finite or a hundred times the weight, or None.
+    carried : by freeze time, and at the end as infinity, the carried values in effect.
+    """
+
+    vehicle: Vehicle
+    design: Method
+    online: AxleRmse | None
+    diverged_at: float | None
+    carried: Mapping[float, Mapping[str, Array]]
+
+    def freeze(self, t: float = np.inf) -> FrozenModel:
+        """Return the model with the weights in effect at a freeze time, or at the end.
+
+        Parameters
+        ----------
+        t : one of the freeze times of the batch [s]; infinity is the end.
+
+        Raises
+        ------
+        DivergedError
+            Where the law had diverged by then.
+        CannotFreezeError
+            Where the method estimates a signal, not a model.
+        ValueError
+            Where the weights were not kept at that time, or are not finite.
+        """
+        if t not in self.carried:
+            raise ValueError(f"weights were kept at {sorted(self.carried)} s, not at {t:g} s")
+        if self.diverged_at is not None and self.diverged_at <= t:
+            raise DivergedError(f"the law diverged at {self.diverged_at:g} s, before {t:g} s")
+        return self.design.frozen(self.vehicle, self.carried[t])
+
+
+def identify_batch(
+    recording: Recording,
+    vehicle: Vehicle | Sequence[Vehicle],
+    designs: Sequence[Method],
+    *,
+    freeze_times: Sequence[float] = (),
+    min_speed: float | None = None,
+    workers: int | None = None,
+) -> tuple[BatchRun, ...]:
+    """Run many methods over a recording.
+
+    Parameters
+    ----------
+    recording : signals, sampled at the designs' interval; its forces only judge.
+    vehicle : the car as every method is told of it, or one car for each method.
+    designs : methods, in any order; those that differ in numbers only run side by side.
+    freeze_times : when carried values are kept, in the recording's own clock [s].
+    min_speed : samples below this speed [m/s] do not count in the error; None takes the highest
+        min_speed of the designs.
+    workers : threads; None takes one for each processor.
+
+    Raises
+    ------
+    ValueError
+        Where the sampling intervals of recording and design differ, the recording begins after a
+        freeze time, or there are not as many cars as designs.
+    """
+    cars = [vehicle] * len(designs) if isinstance(vehicle, Vehicle) else list(vehicle)
+    if len(cars) != len(designs):
+        raise ValueError(f"{len(designs)} designs need as many vehicles, there are {len(cars)}")
+    for design in designs:
+        check_sampling(recording, design)
+    slowest = max((design.min_speed for design in designs), default=0.0)
+    counts = counted_samples(recording, slowest if min_speed is None else min_speed)
+    instants = {np.inf: len(recording)} | {t: carried_index(recording, t) for t in freeze_times}
+    kept = sorted(set(instants.values()) - {len(recording)})
+    setups = [design.setup(car, recording) for design, car in zip(designs, cars, strict=True)]
+    groups: dict[Scan, list[int]] = defaultdict(list)
+    for i, setup in enumerate(setups):
+        groups[setup.scan].append(i)
+    runs: dict[int, BatchRun] = {}
+    for scan, members in groups.items():
+        scores = run_scored(
+            scan,
+            [{**setups[i].carry, **setups[i].constants} for i in members],
+            recording,
+            impossible=[IMPOSSIBLE_FORCE * cars[i].weight for i in members],
+            counts=counts,
+            keep=kept,
+            workers=workers,
+        )
+        for row, i in enumerate(members):
+            sane = int(scores.sane_samples[row])
+            runs[i] = BatchRun(
+                vehicle=cars[i],
+                design=designs[i],
+                online=None if recording.axle_force is None else rmse(scores.squares[row]),
+                diverged_at=None if sane == len(recording) else float(recording.t[sane]),
+                carried={
+                    t: _carried(scores, scan.carry, row, kept.index(k) if k in kept else None)
+                    for t, k in instants.items()
+                },
+            )
+    return tuple(runs[i] for i in range(len(designs)))
+
+
+def _carried(
+    scores: Scores, ports: tuple[str, ...], row: int, place: int | None
+) -> dict[str, Array]:
+    """Carried values of one run at one of the kept samples; None: after the last."""
+    if place is None:
+        return {port: scores.record[f"{port}_final"][row] for port in ports}
+    return {port: scores.record[port][row, place] for port in ports}
+
+
+@runtime_checkable
+class Replayable(Protocol):
+    """A frozen model that runs as a compiled step does."""
+
+    def setup(self, recording: Recording) -> Setup:
+        """Return what a replay needs.
+
+        Parameters
+        ----------
+        recording : what is replayed.
+        """
+
+
+def replay_batch(
+    recording: Recording,
+    models: Sequence[FrozenModel],
+    *,
+    counts: NDArray[np.bool_],
+    workers: int | None = None,
+) -> tuple[AxleRmse, ...]:
+    """Return the error of each frozen model over a recording [N].
+
+    Parameters
+    ----------
+    recording : with true forces.
+    models : in any order; those that are not `Replayable` run one at a time.
+    counts : samples that count (n,).
+    workers : threads; None takes one for each processor.
+
+    Raises
+    ------
+    ValueError
+        Where the recording has no true forces.
+    """
+    if recording.axle_force is None:
+        raise ValueError(f"{recording.name} has no true forces to compare a replay with")
+    found: dict[int, AxleRmse] = {}
+    groups: dict[Scan, dict[int, Setup]] = defaultdict(dict)
+    for i, model in enumerate(models):
+        if isinstance(model, Replayable):
+            setup = model.setup(recording)
+            groups[setup.scan][i] = setup
+        else:
+            found[i] = axle_rms(model.axle_force(recording) - recording.axle_force, counts)
+    for scan, setups in groups.items():
+        scores = run_scored(
+            scan,
+            [{**setup.carry, **setup.constants} for setup in setups.values()],
+            recording,
+            impossible=[np.inf] * len(setups),
+            counts=counts,
+            workers=workers,
+        )
+        found |= dict(zip(setups, map(rmse, scores.squares), strict=True))
+    return tuple(found[i] for i in range(len(models)))
+
+
+def cross_replay_batch(
+    methods: Sequence[Method], course: Course, *, workers: int | None = None
+) -> tuple[Trial, ...]:
+    """Let each method learn on each recording afresh, freeze at its end and replay on all.
+
+    Parameters
+    ----------
+    methods : in any order; those of one structure share the lanes of one compiled loop.
+    course : car and recordings.
+    workers : threads; None takes one for each processor.
+    """
+    online: list[dict[str, AxleRmse]] = [{} for _ in methods]
+    diverged_at: list[dict[str, float]] = [{} for _ in methods]
+    freezes = [True] * len(methods)
+    models: dict[tuple[int, str], FrozenModel] = {}
+    for learnt in course.recordings:
+        runs = identify_batch(
+            learnt, course.vehicle, methods, min_speed=course.min_speed, workers=workers
+        )
+        for i, run in enumerate(runs):
+            assert run.online is not None  # a course has true forces
+            online[i][learnt.name] = _finite(run.online)
+            time = run.diverged_at
+            try:
+                if time is None:
+                    models[i, learnt.name] = run.freeze()
+            except CannotFreezeError:
+                freezes[i] = False
+            except ValueError:  # the last update left weights that are not finite
+                time = float(learnt.t[-1])
+            if time is not None:
+                diverged_at[i][learnt.name] = time
+    frozen: list[dict[str, dict[str, AxleRmse]]] = [{} for _ in methods]
+    for target in course.recordings:
+        counts = counted_samples(target, course.min_speed)
+        errors = replay_batch(target, [*models.values()], counts=counts, workers=workers)
+        for (i, name), error in zip(models, errors, strict=True):
+            frozen[i].setdefault(name, {})[target.name] = _finite(error)
+    return tuple(
+        Trial(online=o, frozen=f if can else None, diverged_at=d)
+        for o, f, can, d in zip(online, frozen, freezes, diverged_at, strict=True)
+    )
+
+
+def _finite(error: AxleRmse) -> AxleRmse:
+    return error if np.isfinite([error.front, error.rear]).all() else INFINITE

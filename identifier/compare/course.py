@@ -1,0 +1,375 @@
+"""Learn on every recording, freeze at its end, replay on every recording: does it extrapolate?
+
+All methods are judged on the same samples. Shares are RMSE over the rms of the true force, both
+axles together, in percent.
+
+A step that sums up its own errors, so that nothing else of a run need be recorded.
+
+Added are, sampled: truth (2,) [N] and counts, 1 where the sample counts; constant: impossible [N],
+a force that no tire makes; carried: squares (2,) [N²], the sum of squared errors over the samples
+that count, and sane_samples, the samples before the first impossible force, and sane, 1 till then.
+
+How long one step of a method takes, in compiled code.
+"""
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen import BatchScan, Scan
+from identifier.method import CannotFreezeError, FrozenModel, Method
+from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
+from identifier.run import identify
+from models.recordings import Recording
+from models.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+INFINITE = AxleRmse(front=np.inf, rear=np.inf)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Course:
+    """What methods are compared on.
+
+    Parameters
+    ----------
+    vehicle : the car as every method is told of it.
+    recordings : with true forces, each with a name of its own.
+    min_speed : samples below this speed [m/s] do not count, for any method.
+
+    Raises
+    ------
+    ValueError
+        Where there is no recording, two have the same name, one lacks forces or has none to learn.
+    """
+
+    vehicle: Vehicle
+    recordings: tuple[Recording, ...]
+    min_speed: float
+
+    def __post_init__(self) -> None:
+        names = [recording.name for recording in self.recordings]
+        if not names:
+            raise ValueError("a comparison needs at least one recording")
+        for recording in self.recordings:
+            if names.count(recording.name) > 1:
+                raise ValueError(f"{recording.name} is given twice: each needs its own name")
+            if recording.axle_force is None:
+                raise ValueError(f"{recording.name}: a comparison needs the true forces Fyf, Fyr")
+            size = self.size(recording)
+            if not min(size.front, size.rear) > 0.0:
+                raise ValueError(f"{recording.name}: the true force of an axle is always zero")
+
+    def size(self, recording: Recording) -> AxleRmse:
+        """Return the rms of the true forces over the samples that count.
+
+        Parameters
+        ----------
+        recording : one of them.
+        """
+        return self.error(recording, np.zeros((len(recording), 2)))
+
+    def error(self, recording: Recording, force: Array) -> AxleRmse:
+        """Return the RMSE of forces over the samples that count; infinite where not finite.
+
+        Parameters
+        ----------
+        recording : one of them.
+        force : (n, 2) [N].
+        """
+        assert recording.axle_force is not None
+        found = axle_rms(force - recording.axle_force, counted_samples(recording, self.min_speed))
+        return found if np.isfinite([found.front, found.rear]).all() else INFINITE
+
+    def replays(self, model: FrozenModel) -> dict[str, AxleRmse]:
+        """Return by recording the error of a frozen model.
+
+        Parameters
+        ----------
+        model : the model.
+        """
+        return {rec.name: self.error(rec, model.axle_force(rec)) for rec in self.recordings}
+
+    def share(self, name: str, error: AxleRmse) -> float:
+        """Return an error as a share of the true force, both axles together [%].
+
+        Parameters
+        ----------
+        name : of a recording.
+        error : over it [N].
+        """
+        (recording,) = (rec for rec in self.recordings if rec.name == name)
+        return 100.0 * error.both / self.size(recording).both
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trial:
+    """One method on a course.
+
+    Parameters
+    ----------
+    online : by recording, error of what was identified online [N].
+    frozen : by recording learnt on and recording replayed, error of the frozen model [N]; lacks
+        what diverged; None for a method that estimates a signal.
+    diverged_at : by recording on which the method diverged, when [s].
+    """
+
+    online: Mapping[str, AxleRmse]
+    frozen: Mapping[str, Mapping[str, AxleRmse]] | None
+    diverged_at: Mapping[str, float]
+
+
+class Shares(NamedTuple):
+    """Means over recordings [%]: online, frozen where learnt, frozen elsewhere.
+
+    Infinite where a run diverged; None where there is nothing to take the mean of.
+    """
+
+    online: float
+    in_sample: float | None
+    other: float | None
+
+
+def cross_replay(method: Method, course: Course) -> Trial:
+    """Learn on each recording afresh, freeze at its end and replay on all.
+
+    Parameters
+    ----------
+    method : the method.
+    course : car and recordings.
+    """
+    online, frozen, diverged_at, freezes = {}, {}, {}, True
+    for recording in course.recordings:
+        history = identify(recording, course.vehicle, method)
+        end = float(recording.t[-1])
+        online[recording.name] = course.error(recording, history.axle_force)
+        if history.diverged_at is not None:
+            diverged_at[recording.name] = history.diverged_at
+            continue
+        try:
+            frozen[recording.name] = course.replays(history.freeze(end))
+        except CannotFreezeError:
+            freezes = False
+        except ValueError:  # the last update left weights that are not finite
+            diverged_at[recording.name] = end
+    return Trial(online=online, frozen=frozen if freezes else None, diverged_at=diverged_at)
+
+
+def shares(trial: Trial, course: Course) -> Shares:
+    """Return the means of a trial over its recordings [%].
+
+    Parameters
+    ----------
+    trial : one method on the course.
+    course : car and recordings.
+    """
+    names = [recording.name for recording in course.recordings]
+    if trial.diverged_at:
+        frozen = None if trial.frozen is None else np.inf
+        return Shares(np.inf, frozen, frozen if len(names) > 1 else None)
+    online = float(np.mean([course.share(name, trial.online[name]) for name in names]))
+    if trial.frozen is None:
+        return Shares(online, None, None)
+    return Shares(online, *frozen_shares(trial.frozen, course))
+
+
+def frozen_shares(
+    frozen: Mapping[str, Mapping[str, AxleRmse]], course: Course
+) -> tuple[float | None, float | None]:
+    """Return the mean errors of frozen models where they learnt and elsewhere [%].
+
+    Parameters
+    ----------
+    frozen : by recording learnt on and recording replayed [N].
+    course : car and recordings.
+    """
+    own, other = where_learnt_and_elsewhere(frozen)
+    return (
+        _mean([course.share(name, error) for name, error in own]),
+        _mean([course.share(name, error) for name, error in other]),
+    )
+
+
+def where_learnt_and_elsewhere(
+    frozen: Mapping[str, Mapping[str, AxleRmse]],
+) -> tuple[list[tuple[str, AxleRmse]], list[tuple[str, AxleRmse]]]:
+    """Return name and error of replays of the drive that was learnt, and of every other drive.
+
+    Parameters
+    ----------
+    frozen : by recording learnt on and recording replayed [N].
+    """
+    own: list[tuple[str, AxleRmse]] = []
+    other: list[tuple[str, AxleRmse]] = []
+    for learnt, replays in frozen.items():
+        for name, error in replays.items():
+            (own if name == learnt else other).append((name, error))
+    return own, other
+
+
+def _mean(values: Sequence[float]) -> float | None:
+    return float(np.mean(values)) if values else None
+
+
+CARRY = ("squares", "sane_samples", "sane")
+OVER = ("truth", "counts")
+
+
+class Scores(NamedTuple):
+    """What is left of many runs.
+
+    squares : mean squared error of either axle over the samples that count (runs, 2) [N²].
+    sane_samples : samples before the first impossible force (runs,).
+    record : by port, what a `BatchScan` records.
+    """
+
+    squares: Array
+    sane_samples: NDArray[np.int64]
+    record: Mapping[str, Array]
+
+
+def scored(step: ca.Function) -> ca.Function:
+    """Return the step with further ports, which hold the score of its output axle_force.
+
+    Parameters
+    ----------
+    step : SX function with an output axle_force (2,) [N].
+    """
+    inputs = [ca.SX.sym(step.name_in(i), step.sparsity_in(i)) for i in range(step.n_in())]
+    outputs = step.call(inputs)
+    squares, samples, sane = ca.SX.sym("squares", 2), ca.SX.sym("samples"), ca.SX.sym("sane")
+    truth, counts, impossible = ca.SX.sym("truth", 2), ca.SX.sym("counts"), ca.SX.sym("impossible")
+    force = outputs[step.index_out("axle_force")]
+    possible = ca.logic_and(ca.fabs(force[0]) < impossible, ca.fabs(force[1]) < impossible)
+    sane_next = ca.logic_and(sane, possible)
+    score = [
+        squares + ca.if_else(counts, (force - truth) ** 2, 0),
+        samples + sane_next,
+        sane_next,
+    ]
+    return ca.Function(
+        f"{step.name()}_scored",
+        [*inputs, squares, samples, sane, truth, counts, impossible],
+        [*outputs, *score],
+        [*step.name_in(), *CARRY, *OVER, "impossible"],
+        [*step.name_out(), *(f"{name}_next" for name in CARRY)],
+    )
+
+
+@cache
+def _scored_scan(scan: Scan) -> BatchScan:
+    differ = [port for port in scan.step.name_in() if port not in scan.over]
+    return BatchScan(
+        scored(scan.step),
+        carry=(*scan.carry, *CARRY),
+        over=(*scan.over, *OVER),
+        lanes_over=(*differ, "impossible"),
+    )
+
+
+def run_scored(
+    scan: Scan,
+    values: Sequence[Mapping[str, Array]],
+    recording: Recording,
+    *,
+    impossible: Sequence[float],
+    counts: NDArray[np.bool_],
+    keep: Sequence[int] = (),
+    workers: int | None = None,
+) -> Scores:
+    """Run a step over a recording with many sets of numbers.
+
+    Parameters
+    ----------
+    scan : its step reads x, u and v_x sample by sample and tells axle_force (2,) [N].
+    values : for each run, what it starts from and its constants, by port.
+    recording : its forces are the truth; without them every error is that of no force.
+    impossible : for each run, a force that no tire makes [N].
+    counts : samples that count in the error (n,).
+    keep : samples whose values are recorded.
+    workers : threads; None takes one for each processor.
+    """
+    n = len(recording)
+    signals = {"x": recording.x, "u": recording.u, "v_x": recording.v_x}
+    truth = np.zeros((n, 2)) if recording.axle_force is None else recording.axle_force
+    record = _scored_scan(scan)(
+        n,
+        {
+            **{port: np.stack([one[port] for one in values]) for port in values[0]},
+            **{port: signals[port] for port in scan.over},
+            "truth": truth,
+            "counts": counts.astype(np.float64),
+            "impossible": np.array(impossible),
+            "squares": np.zeros(2),
+            "sane_samples": np.zeros(()),
+            "sane": np.ones(()),
+        },
+        keep=keep,
+        workers=workers,
+    )
+    return Scores(
+        squares=record["squares_final"] / counts.sum(),
+        sane_samples=record["sane_samples_final"][:, 0].astype(np.int64),
+        record=record,
+    )
+
+
+def rmse(squares: Array) -> AxleRmse:
+    """Return the root of mean squares.
+
+    Parameters
+    ----------
+    squares : of front and rear axle (2,) [N²].
+    """
+    front, rear = np.sqrt(squares)
+    return AxleRmse(front=float(front), rear=float(rear))
+
+
+LONG = 10_000  # samples, beside which the call of the loop does not count
+
+
+def step_times(
+    methods: Mapping[str, Method], vehicle: Vehicle, recording: Recording, *, repeats: int = 30
+) -> dict[str, float]:
+    """Return by method the shortest time per sample of a compiled run over a recording [s].
+
+    Setting up is left out. Times are those of this thread on its processor, so that waiting for a
+    busy machine does not count, and the methods take turns. A short recording is run forward and
+    backward in time until it is long enough.
+
+    Parameters
+    ----------
+    methods : by name.
+    vehicle : the car.
+    recording : what is run over.
+    repeats : turns; the shortest counts.
+    """
+    signals = {"x": recording.x, "u": recording.u, "v_x": recording.v_x}
+    signals = {port: _long(signal) for port, signal in signals.items()}
+    n = len(signals["v_x"])
+    runs = {}
+    for name, method in methods.items():
+        setup = method.setup(vehicle, recording)
+        sampled = {port: signals[port] for port in setup.scan.over}
+        runs[name] = setup.scan, {**setup.carry, **sampled, **setup.constants}
+        setup.scan(n, runs[name][1])  # compiled and warm
+    shortest = dict.fromkeys(methods, math.inf)
+    for _ in range(repeats):
+        for name, (scan, values) in runs.items():
+            start = time.thread_time()
+            scan(n, values, every=n)
+            shortest[name] = min(shortest[name], time.thread_time() - start)
+    return {name: duration / n for name, duration in shortest.items()}
+
+
+def _long(signal: Array) -> Array:
+    """Return a signal (n, ...) forward and backward in turn, without a jump."""
+    there_and_back = np.concatenate([signal, signal[::-1]])
+    return np.concatenate([there_and_back] * math.ceil(LONG / len(there_and_back)))

@@ -1,0 +1,147 @@
+"""What `tireid compare` finds out: every method on every recording, its time, its sweep."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from codegen import cache_folder
+from identifier.compare.course import Course, Shares, Trial, cross_replay, shares, step_times
+from identifier.compare.floors import fit_floors
+from identifier.compare.sweep import Candidate, frozen_share, sweep
+from identifier.compare.work import Map
+from identifier.method import Method
+from identifier.methods import REFERENCE, make_method
+from identifier.reproducibility import AxleRmse
+from models.recordings import Recording
+from models.vehicle import Vehicle
+
+Frozen = Mapping[str, Mapping[str, AxleRmse]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """Methods side by side.
+
+    Parameters
+    ----------
+    course : car and recordings.
+    seed : of initial weights and draws.
+    trials : by method, its errors with the numbers that follow from the vehicle.
+    floors : by structure of the network, errors of its offline fit to the true forces of one
+        recording, on every recording.
+    step_times : by method, time of one compiled step [s]; REFERENCE is always among them.
+    sweeps : by method, its random designs; empty without a sweep.
+    """
+
+    course: Course
+    seed: int
+    trials: Mapping[str, Trial]
+    floors: Mapping[str, Frozen]
+    step_times: Mapping[str, float]
+    sweeps: Mapping[str, tuple[Candidate, ...]]
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the recordings."""
+        return [recording.name for recording in self.course.recordings]
+
+    def shares(self, method: str) -> Shares:
+        """Return the mean errors of a method over the recordings [%].
+
+        Parameters
+        ----------
+        method : its name.
+        """
+        return shares(self.trials[method], self.course)
+
+    def time_ratio(self, method: str) -> float:
+        """Return the time of a step over that of the paper's law.
+
+        Parameters
+        ----------
+        method : its name.
+        """
+        return self.step_times[method] / self.step_times[REFERENCE]
+
+
+def run_comparison(
+    names: Sequence[str],
+    vehicle: Vehicle,
+    recordings: Sequence[Recording],
+    *,
+    seed: int,
+    designs: int,
+    starts: int,
+    workers: int,
+    progress: Callable[[str], None],
+    elsewhere: Map | None = None,
+    others: Mapping[str, Method] | None = None,
+) -> Comparison:
+    """Run every method over every recording.
+
+    Parameters
+    ----------
+    names : of methods.
+    vehicle : the car.
+    recordings : with true forces.
+    seed : of initial weights and of the sweep.
+    designs : random designs of each method; 0 leaves the sweep out.
+    starts : of each offline fit to the true forces; 0 leaves the floors out.
+    workers : processes of fits and sweep.
+    progress : told what is being done.
+    elsewhere : does the sweep in place of processes of this machine, as a cluster's map does.
+    others : further methods by name, which have neither sweep nor floor.
+
+    Raises
+    ------
+    ValueError
+        Where a method is unknown or the recordings cannot be compared on.
+    """
+    methods: dict[str, Method] = {name: make_method(name, vehicle, seed) for name in names}
+    methods |= others or {}
+    slowest = max(method.min_speed for method in methods.values())
+    course = Course(vehicle=vehicle, recordings=tuple(recordings), min_speed=slowest)
+    trials = {}
+    for name, method in methods.items():
+        trials[name] = cross_replay(method, course)
+        lost = "".join(f", diverged on {rec}" for rec in trials[name].diverged_at)
+        progress(f"{name}: learnt on {len(recordings)} recordings, replayed on all{lost}")
+    floors: Mapping[str, Frozen] = {}
+    if starts:
+        floors = fit_floors(
+            names, course, starts=starts, seed=seed, workers=workers, progress=progress
+        )
+    timed = {REFERENCE: make_method(REFERENCE, vehicle, seed)} | methods
+    longest = max(recordings, key=len)
+    times = step_times(timed, vehicle, longest)
+    sweeps: dict[str, tuple[Candidate, ...]] = {}
+    if designs:
+        progress(f"sweep: {designs} random designs of each method")
+        sweeps = sweep(
+            names,
+            course,
+            designs=designs,
+            seed=seed,
+            workers=workers,
+            progress=progress,
+            elsewhere=elsewhere,
+            folder=cache_folder() / "sweeps",
+        )
+    return Comparison(
+        course=course, seed=seed, trials=trials, floors=floors, step_times=times, sweeps=sweeps
+    )
+
+
+def ranking(comparison: Comparison) -> list[str]:
+    """Return the methods, smallest frozen error elsewhere first; those that cannot freeze last.
+
+    Parameters
+    ----------
+    comparison : the methods.
+    """
+
+    def key(name: str) -> tuple[bool, float]:
+        found = comparison.shares(name)
+        error = frozen_share(found)
+        return (error is None, found.online if error is None else error)
+
+    return sorted(comparison.trials, key=key)

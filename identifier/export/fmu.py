@@ -1,0 +1,549 @@
+"""A folded step as an FMU for Co-Simulation: description, sources and binaries in one archive.
+
+Shared libraries of an FMU, for the machine at hand and, with MinGW, for Windows.
+
+C source of a folded step for the FMU: the files of the C package, and model.h, which names them.
+
+What is simulated is what is shipped: the same equations, guards and status codes, in double.
+
+The variables of the FMU, the same in FMI 2.0 and 3.0.
+
+Value references and states are those of sources/memory.h.
+
+XML as text: elements with attributes in the order in which they are given.
+
+modelDescription.xml of FMI 2.0 and 3.0, and the list of sources for whoever builds it again.
+
+FMUs for Co-Simulation: a folded step as a component of a simulation.
+"""
+
+import hashlib
+import io
+import logging
+import platform
+import shutil
+import subprocess
+import tempfile
+import zipfile
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path, PurePosixPath
+from typing import Literal, NamedTuple
+
+from codegen import CompilationError, find_compiler
+from codegen.compiler import KEEP_GUARDS
+from codegen.escape import xml_attribute
+from identifier.export.c_source import c_sources
+from identifier.export.fold import FoldedStep
+from identifier.export.package import ingredients, summary
+from models.files import write_atomically
+
+log = logging.getLogger("tireid.export")
+
+MINGW = "x86_64-w64-mingw32-gcc"
+# As elsewhere: no contraction, the same bits on every machine; guards against NaN stay.
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden")
+
+
+class Target(NamedTuple):
+    """A platform: its folder in FMI 2.0 and 3.0, ending of a library, and how it is built."""
+
+    folder_2: str
+    folder_3: str
+    ending: str
+    compiler: tuple[str, ...]
+    flags: tuple[str, ...]
+
+
+def targets() -> tuple[Target, ...]:
+    """Return the platforms that can be built for here; none where there is no compiler."""
+    found = []
+    compiler = find_compiler()
+    if compiler and (platform.system(), platform.machine()) == ("Linux", "x86_64"):
+        found.append(
+            Target("linux64", "x86_64-linux", ".so", compiler, ("-fPIC", "-shared", "-lm"))
+        )
+    mingw = shutil.which(MINGW)
+    if mingw:
+        flags = ("-shared", "-static-libgcc", "-Wl,--no-insert-timestamp", "-s")
+        found.append(Target("win64", "x86_64-windows", ".dll", (mingw,), flags))
+    return tuple(found)
+
+
+def build_binary(target: Target, name: str, sources: Mapping[str, bytes]) -> bytes:
+    """Compile sources to a shared library and return its content.
+
+    Parameters
+    ----------
+    target : the platform.
+    name : model identifier, name of the library.
+    sources : content of C files and headers by name.
+
+    Raises
+    ------
+    CompilationError
+        Where the compiler refuses them.
+    """
+    with tempfile.TemporaryDirectory(prefix="tireid-") as scratch:
+        folder = Path(scratch)
+        for file, content in sources.items():
+            (folder / file).write_bytes(content)
+        c_files = [file for file in sources if file.endswith(".c")]
+        library = f"{name}{target.ending}"
+        command = [*target.compiler, *KEEP_GUARDS, *FLAGS, *c_files, "-o", library, *target.flags]
+        answer = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+        if answer.returncode != 0:
+            first_lines = "\n".join(answer.stderr.splitlines()[:5])
+            raise CompilationError(
+                f"{target.compiler[0]} refused the FMU's sources:\n{first_lines}"
+            )
+        log.info("compiled %s for %s", library, target.folder_2)
+        return (folder / library).read_bytes()
+
+
+HEADER = """/* Generated: which component the FMU holds. */
+#ifndef MODEL_H
+#define MODEL_H
+
+#include "{name}.h"
+
+/* All names begin with that of the component, for programs that hold several. */
+#define MODEL(name) {name}_##name
+
+#define MODEL_TOKEN "{token}"
+#define MODEL_DT {NAME}_SAMPLE_TIME
+#define MODEL_MIN_SPEED {NAME}_MIN_SPEED
+
+#endif
+"""
+
+
+def model_header(name: str, token: str) -> str:
+    """Return model.h.
+
+    Parameters
+    ----------
+    name : of the step.
+    token : GUID of FMI 2.0, instantiation token of FMI 3.0.
+    """
+    return HEADER.format(name=name, NAME=name.upper(), token=token)
+
+
+def model_files(folded: FoldedStep) -> dict[str, str]:
+    """Return header and sources of the C package by file name.
+
+    Parameters
+    ----------
+    folded : the step.
+
+    Raises
+    ------
+    UnknownOperationError
+        Where the method needs an operation that has no plain C.
+    ValueError
+        Where nothing is carried from step to step, or a carried value is not finite.
+    """
+    about = summary(folded, ingredients(folded, single=False))
+    sources = c_sources(folded, single=False, about=about)
+    return {PurePosixPath(path).name: text for path, text in sources.items()}
+
+
+# What a unit is made of in SI, as attributes of BaseUnit; a radian counts as one of its own.
+UNITS: Mapping[str, Mapping[str, int]] = {
+    "s": {"s": 1},
+    "m/s": {"m": 1, "s": -1},
+    "rad": {"rad": 1},
+    "rad/s": {"rad": 1, "s": -1},
+    "N": {"kg": 1, "m": 1, "s": -2},
+}
+DEGREES = 57.29577951308232  # of a radian: display units of angles
+
+Kind = Literal["real", "integer", "boolean"]
+Causality = Literal["input", "output", "parameter", "local"]
+
+
+class Variable(NamedTuple):
+    """One variable of modelDescription.xml.
+
+    reference : value reference.   start : as text, empty where it is calculated.
+    """
+
+    reference: int
+    name: str
+    kind: Kind
+    causality: Causality
+    variability: Literal["continuous", "discrete", "tunable", "constant"]
+    start: str
+    unit: str
+    description: str
+
+
+def variables(folded: FoldedStep) -> tuple[Variable, ...]:
+    """Return the variables of a step.
+
+    Parameters
+    ----------
+    folded : the step.
+    """
+    inputs = (
+        Variable(1 + i, port.name, "real", "input", "continuous", "0", port.unit, port.description)
+        for i, port in enumerate(folded.inputs)
+    )
+    side = "left positive, frame of the body"
+    learnt = ", ".join(folded.learnt) or "nothing: this method has no memory of the tire"
+    return (
+        *inputs,
+        _output(6, "F_yf", "real", "N", f"lateral force of the front axle, {side}"),
+        _output(7, "F_yr", "real", "N", f"lateral force of the rear axle, {side}"),
+        _output(
+            8,
+            "status",
+            "integer",
+            "",
+            "of the last sample: 0 taken; 1 below the minimum speed, forces are zero; 2 it is one "
+            "that no car can be in, not learnt from; 3 an input or 4 a result is not finite or "
+            "beyond what any car reaches, nothing is learnt; 6 that for half a second or more, "
+            "forces are zero",
+        ),
+        _output(9, "samples", "integer", "", "number of samples taken, those ignored included"),
+        Variable(
+            10,
+            "adaptation",
+            "boolean",
+            "parameter",
+            "tunable",
+            "true",
+            "",
+            f"whether it learns; false holds {learnt}",
+        ),
+        _constant(11, "sample_time", "s", folded.dt, "sampling interval, inside and fixed"),
+        _constant(
+            12, "min_speed", "m/s", folded.min_speed, "below it forces are zero, learning rests"
+        ),
+    )
+
+
+def _output(reference: int, name: str, kind: Kind, unit: str, description: str) -> Variable:
+    return Variable(reference, name, kind, "output", "discrete", "", unit, description)
+
+
+def _constant(reference: int, name: str, unit: str, value: float, description: str) -> Variable:
+    return Variable(
+        reference, name, "real", "local", "constant", repr(float(value)), unit, description
+    )
+
+
+DECLARATION = '<?xml version="1.0" encoding="UTF-8"?>\n'
+
+
+def element(tag: str, attributes: dict[str, object], *children: str) -> str:
+    """Return an element; attributes that are empty strings or None are left out.
+
+    Parameters
+    ----------
+    tag : its name.
+    attributes : by name; True and False become true and false.
+    children : elements inside, one a line.
+    """
+    words = [
+        f"{name}={xml_attribute(_text(value))}"
+        for name, value in attributes.items()
+        if value is not None and value != ""
+    ]
+    head = " ".join([tag, *words])
+    if not children:
+        return f"<{head}/>"
+    inside = "\n".join(f"  {line}" for child in children for line in child.splitlines())
+    return f"<{head}>\n{inside}\n</{tag}>"
+
+
+def _text(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+TOOL = "tireid"
+
+
+def description_2(folded: FoldedStep, token: str, sources: Sequence[str]) -> str:
+    """Return modelDescription.xml of FMI 2.0.
+
+    Parameters
+    ----------
+    folded : the step.
+    token : the GUID.
+    sources : names of the C files.
+    """
+    table = variables(folded)
+    unknowns = [
+        element("Unknown", {"index": i})
+        for i, variable in enumerate(table, start=1)
+        if variable.causality == "output"
+    ]
+    model = element(
+        "fmiModelDescription",
+        {
+            "fmiVersion": "2.0",
+            "modelName": folded.name,
+            "guid": token,
+            "description": _sentence(folded),
+            "generationTool": TOOL,
+            "variableNamingConvention": "flat",
+        },
+        element(
+            "CoSimulation",
+            {
+                "modelIdentifier": folded.name,
+                "canHandleVariableCommunicationStepSize": True,
+                "canNotUseMemoryManagementFunctions": True,
+                "canGetAndSetFMUstate": True,
+                "canSerializeFMUstate": True,
+            },
+            element("SourceFiles", {}, *(element("File", {"name": name}) for name in sources)),
+        ),
+        _units(),
+        _experiment(folded),
+        element("ModelVariables", {}, *(_variable_2(variable) for variable in table)),
+        element(
+            "ModelStructure",
+            {},
+            element("Outputs", {}, *unknowns),
+            element("InitialUnknowns", {}, *unknowns),
+        ),
+    )
+    return f"{DECLARATION}{model}\n"
+
+
+def description_3(folded: FoldedStep, token: str) -> str:
+    """Return modelDescription.xml of FMI 3.0.
+
+    Parameters
+    ----------
+    folded : the step.
+    token : the instantiation token.
+    """
+    table = variables(folded)
+    outputs = [variable for variable in table if variable.causality == "output"]
+    time = element(
+        "Float64",
+        {"name": "time", "valueReference": 0, "causality": "independent", "unit": "s"}
+        | {"variability": "continuous", "description": "simulation time"},
+    )
+    model = element(
+        "fmiModelDescription",
+        {
+            "fmiVersion": "3.0",
+            "modelName": folded.name,
+            "instantiationToken": token,
+            "description": _sentence(folded),
+            "generationTool": TOOL,
+            "variableNamingConvention": "flat",
+        },
+        element(
+            "CoSimulation",
+            {
+                "modelIdentifier": folded.name,
+                "canGetAndSetFMUState": True,
+                "canSerializeFMUState": True,
+                "canHandleVariableCommunicationStepSize": True,
+            },
+        ),
+        _units(),
+        _experiment(folded),
+        element("ModelVariables", {}, time, *(_variable_3(variable) for variable in table)),
+        element(
+            "ModelStructure",
+            {},
+            *(
+                element(tag, {"valueReference": variable.reference})
+                for tag in ("Output", "InitialUnknown")
+                for variable in outputs
+            ),
+        ),
+    )
+    return f"{DECLARATION}{model}\n"
+
+
+def build_description(folded: FoldedStep, sources: Sequence[str]) -> str:
+    """Return sources/buildDescription.xml of FMI 3.0.
+
+    Parameters
+    ----------
+    folded : the step.
+    sources : names of the C files.
+    """
+    files = (element("SourceFile", {"name": name}) for name in sources)
+    text = element(
+        "fmiBuildDescription",
+        {"fmiVersion": "3.0"},
+        element(
+            "BuildConfiguration",
+            {"modelIdentifier": folded.name},
+            element("SourceFileSet", {"language": "C99"}, *files),
+        ),
+    )
+    return f"{DECLARATION}{text}\n"
+
+
+def _sentence(folded: FoldedStep) -> str:
+    return (
+        f"Lateral tire forces of a car, identified while it drives, every {folded.dt:g} s. Outputs "
+        "are those of the last sample; slip angles inside have the sign in which F_y = +C alpha."
+    )
+
+
+def _units() -> str:
+    angle = {"rad": ("deg", DEGREES), "rad/s": ("deg/s", DEGREES)}
+    units = []
+    for name, base in UNITS.items():
+        children = [element("BaseUnit", dict(base))]
+        if name in angle:
+            shown, factor = angle[name]
+            children.append(element("DisplayUnit", {"name": shown, "factor": factor}))
+        units.append(element("Unit", {"name": name}, *children))
+    return element("UnitDefinitions", {}, *units)
+
+
+def _experiment(folded: FoldedStep) -> str:
+    return element("DefaultExperiment", {"startTime": 0.0, "stopTime": 10.0, "stepSize": folded.dt})
+
+
+def _variable_2(variable: Variable) -> str:
+    tag = {"real": "Real", "integer": "Integer", "boolean": "Boolean"}[variable.kind]
+    return element(
+        "ScalarVariable",
+        {
+            "name": variable.name,
+            "valueReference": variable.reference,
+            "description": variable.description,
+            "causality": variable.causality,
+            "variability": variable.variability,
+            "initial": _initial(variable),
+        },
+        element(tag, {"unit": variable.unit, "start": variable.start}),
+    )
+
+
+def _variable_3(variable: Variable) -> str:
+    tag = {"real": "Float64", "integer": "Int32", "boolean": "Boolean"}[variable.kind]
+    return element(
+        tag,
+        {
+            "name": variable.name,
+            "valueReference": variable.reference,
+            "description": variable.description,
+            "causality": variable.causality,
+            "variability": variable.variability,
+            "initial": _initial(variable),
+            "unit": variable.unit,
+            "start": variable.start,
+        },
+    )
+
+
+def _initial(variable: Variable) -> str:
+    """Return what the standard wants to be said of an initial value; of an input, nothing."""
+    if variable.causality == "input":
+        return ""
+    return "exact" if variable.start else "calculated"
+
+
+Version = Literal[2, 3]
+SHARED = ("memory.h", "memory.c")
+OF_VERSION: Mapping[Version, tuple[str, ...]] = {
+    2: ("fmi2Functions.h", "fmi2.c"),
+    3: ("fmi3Functions.h", "fmi3.c", "fmi3_stubs.c"),
+}
+
+
+def export_fmu(folded: FoldedStep, path: Path, version: Version = 2) -> None:
+    """Write an FMU for Co-Simulation; the same step gives the same bytes.
+
+    Inputs v_x, v_y, r, delta_f, delta_r and outputs F_yf, F_yr, SI; see
+    `identifier.export.fmu`. Samples are taken at multiples of the step's interval after
+    the start, whatever the communication step; a step from t to t + h takes those in [t, t + h).
+
+    Parameters
+    ----------
+    folded : the step; its name is the model identifier.
+    path : the file, usually ending in .fmu.
+    version : of FMI, 2 or 3.
+
+    Raises
+    ------
+    ValueError
+        Where the version is another, nothing is carried, or a carried value is not finite.
+    CompilationError
+        Where a compiler refuses the sources.
+    OSError
+        Where the file cannot be written.
+    """
+    if version not in OF_VERSION:
+        raise ValueError(f"version must be 2 or 3, it is {version}")
+    built = targets()
+    if not built:
+        log.warning("no C compiler found: %s holds sources only", path)
+    members = {name: text.encode("utf-8") for name, text in fmu_text(folded, version).items()}
+    sources = {
+        name.removeprefix("sources/"): content
+        for name, content in members.items()
+        if name.endswith((".c", ".h"))
+    }
+    for target in built:
+        folder = target.folder_2 if version == 2 else target.folder_3
+        library = f"binaries/{folder}/{folded.name}{target.ending}"
+        members[library] = build_binary(target, folded.name, sources)
+    write_atomically(path, _archive(members))
+
+
+def fmu_text(folded: FoldedStep, version: Version) -> dict[str, str]:
+    """Return the text files of an FMU by their path inside it.
+
+    Parameters
+    ----------
+    folded : the step.
+    version : of FMI, 2 or 3.
+    """
+    shared = model_files(folded)
+    blank = _text_with(folded, shared, version, "")
+    content = "\0".join(f"{name}\0{text}" for name, text in sorted(blank.items()))
+    return _text_with(folded, shared, version, _token(content))
+
+
+def _text_with(
+    folded: FoldedStep, shared: Mapping[str, str], version: Version, token: str
+) -> dict[str, str]:
+    templates = files("identifier.export") / "c_fmu"
+    text = {
+        name: (templates / name).read_text(encoding="utf-8")
+        for name in (*SHARED, *OF_VERSION[version])
+    }
+    text |= {**shared, "model.h": model_header(folded.name, token)}
+    c_files = sorted(name for name in text if name.endswith(".c"))
+    members = {f"sources/{name}": content for name, content in text.items()}
+    if version == 2:
+        members["modelDescription.xml"] = description_2(folded, token, c_files)
+    else:
+        members["modelDescription.xml"] = description_3(folded, token)
+        members["sources/buildDescription.xml"] = build_description(folded, c_files)
+    return members
+
+
+def _token(content: str) -> str:
+    """Return a GUID made of the content: another model has another."""
+    digest = hashlib.sha256(content.encode("utf-8")).hexdigest()
+    return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
+
+
+def _archive(members: Mapping[str, bytes]) -> bytes:
+    """Return a zip archive that depends on its members only, not on the time."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, content in sorted(members.items()):
+            member = zipfile.ZipInfo(name)  # of 1980
+            member.compress_type = zipfile.ZIP_DEFLATED
+            member.external_attr = 0o644 << 16
+            archive.writestr(member, content)
+    return buffer.getvalue()
+
+
+__all__ = ["export_fmu"]

@@ -1,0 +1,290 @@
+"""A frozen model as an ONNX file, for whoever runs networks in a tool of their own.
+
+An ONNX graph, node by node: every value is a name, every operation returns that of its result.
+
+Tensors are (batch, columns) of one number type; the batch may have any size. Operators are those of
+opset 13, which every runtime of the last years knows, and of which CasADi reads back all.
+
+The paper's network, frozen, as ONNX: F_y = C α + U Ŵ tanh(V̂ x̄), zero below the minimum speed.
+
+Rows are samples, as ONNX has it, so that every product is transposed: x̄ᵀ V̂ᵀ, σᵀ Ŵᵀ.
+
+The axle model's static force curve as ONNX: F_i = load_i Σ_j w_ij tanh(α_i/α_j).
+
+What the whole model adds, the lag of slip and the sway of the body, has a state and stays out.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from codegen.escape import visible
+from identifier.axle.model import AxleModel
+from identifier.export.fold import INPUTS, Signal
+from identifier.method import FrozenModel
+from identifier.own_network import OnnxModel
+from identifier.paper.network import NetworkModel
+from models.files import write_atomically
+
+OPSET = 13
+IR_VERSION = 7  # of the file format that came with opset 13
+
+
+class MissingOnnxError(ImportError):
+    """The package onnx is not installed; `pip install tireid[onnx]` brings it."""
+
+
+def onnx_package() -> Any:
+    """Return the package onnx, which is an extra.
+
+    Raises
+    ------
+    MissingOnnxError
+        Where it is not installed.
+    """
+    try:
+        import onnx
+    except ImportError as error:
+        raise MissingOnnxError(
+            "writing ONNX needs the package onnx: pip install tireid[onnx]"
+        ) from error
+    return onnx
+
+
+@dataclass(slots=True)
+class Graph:
+    """Nodes and constants of a graph that is being written.
+
+    Parameters
+    ----------
+    single : whether numbers are float32; else they are float64.
+    """
+
+    single: bool
+    nodes: list[Any] = field(default_factory=list)
+    constants: list[Any] = field(default_factory=list)
+
+    def constant(self, name: str, value: ArrayLike) -> str:
+        """Store a matrix and return its name.
+
+        Parameters
+        ----------
+        name : name of the constant.
+        value : its numbers.
+        """
+        number = np.float32 if self.single else np.float64
+        array = np.ascontiguousarray(np.asarray(value), dtype=number)
+        self.constants.append(onnx_package().numpy_helper.from_array(array, name))
+        return name
+
+    def apply(self, operator: str, inputs: Sequence[str], result: str, **attributes: Any) -> str:
+        """Add a node and return the name of its result.
+
+        Parameters
+        ----------
+        operator : of ONNX, such as "MatMul".
+        inputs : names of its inputs.
+        result : name of its result.
+        attributes : of the operator.
+        """
+        node = onnx_package().helper.make_node(
+            operator, list(inputs), [result], name=result, **attributes
+        )
+        self.nodes.append(node)
+        return result
+
+    def model_bytes(
+        self,
+        name: str,
+        inputs: Sequence[Signal],
+        outputs: Sequence[Signal],
+        doc: str,
+        metadata: dict[str, str],
+    ) -> bytes:
+        """Return the finished, checked model as the content of its file.
+
+        Parameters
+        ----------
+        name : name of the graph.
+        inputs : what it reads.
+        outputs : what it gives; results of nodes have their names.
+        doc : what it computes, for people.
+        metadata : facts for programs.
+        """
+        onnx = onnx_package()
+        helper = onnx.helper
+        number = onnx.TensorProto.FLOAT if self.single else onnx.TensorProto.DOUBLE
+
+        def column(port: Signal) -> Any:
+            return helper.make_tensor_value_info(
+                port.name, number, ["batch", 1], doc_string=f"{port.description} [{port.unit}]"
+            )
+
+        graph = helper.make_graph(
+            self.nodes,
+            name,
+            [column(port) for port in inputs],
+            [column(port) for port in outputs],
+            self.constants,
+            doc_string=doc,
+        )
+        model = helper.make_model(
+            graph,
+            opset_imports=[helper.make_opsetid("", OPSET)],
+            ir_version=IR_VERSION,
+            producer_name="tireid",
+            doc_string=doc,
+        )
+        helper.set_model_props(model, metadata)
+        onnx.checker.check_model(model, full_check=True)
+        content: bytes = model.SerializeToString(deterministic=True)
+        return content
+
+
+SLIP_SIGN = "slip angle δ - atan(v/v_x), the negative of ISO 8855; force to the left is positive"
+OUTPUTS = (
+    Signal("F_yf", "N", "lateral force of the front axle in the frame of the body, left positive"),
+    Signal("F_yr", "N", "lateral force of the rear axle in the frame of the body, left positive"),
+)
+
+
+def network_graph(model: NetworkModel, *, single: bool = False) -> bytes:
+    """Return a frozen network as ONNX: v_x, v_y, r, delta_f, delta_r to F_yf, F_yr, (batch, 1).
+
+    Parameters
+    ----------
+    model : the frozen network.
+    single : whether numbers are float32; else they are float64.
+    """
+    graph = Graph(single)
+    _, _, l_f, l_r, C_f, C_r = model.vehicle.bicycle
+    speed_floor = graph.constant("min_speed", [[model.min_speed]])
+    speed = graph.apply("Max", ["v_x", speed_floor], "speed")
+    x = graph.apply("Concat", ["v_y", "r"], "x", axis=1)
+    u = graph.apply("Concat", ["delta_f", "delta_r"], "u", axis=1)
+    lever = graph.constant("lever", [[1.0, 1.0], [l_f, -l_r]])
+    axle_v_y = graph.apply("MatMul", [x, lever], "axle_v_y")
+    drift = graph.apply("Div", [axle_v_y, speed], "drift")
+    alpha = graph.apply("Sub", [u, drift], "alpha")  # (3), in the paper's sign
+    linear = graph.apply("Mul", [alpha, graph.constant("C", [[C_f, C_r]])], "linear")
+
+    signals = ("v_y", "r", "delta_f", "delta_r", "v_x", "alpha_f", "alpha_r")
+    everything = graph.apply("Concat", [x, u, speed, alpha], "signals", axis=1)
+    network = model.network
+    assert network.scale is not None
+    choice = np.zeros((len(signals), len(network.inputs)))
+    for column, (name, scale) in enumerate(zip(network.inputs, network.scale, strict=True)):
+        choice[signals.index(name), column] = 1 / scale
+    x_bar = graph.apply("MatMul", [everything, graph.constant("scaling", choice)], "x_bar")
+    activation = graph.apply(
+        "MatMul", [x_bar, graph.constant("V_T", model.weights.V.T)], "activation"
+    )
+    sigma = graph.apply("Tanh", [activation], "sigma")
+    W_T = graph.constant("W_T", model.force_unit * model.weights.W.T)
+    learnt = graph.apply("MatMul", [sigma, W_T], "learnt")
+    force = graph.apply("Add", [linear, learnt], "force")
+
+    moving = graph.apply("GreaterOrEqual", ["v_x", speed_floor], "moving")
+    axle_force = graph.apply(
+        "Where", [moving, force, graph.constant("rest", [[0.0]])], "axle_force"
+    )
+    for port, axle in zip(OUTPUTS, ([[1.0], [0.0]], [[0.0], [1.0]]), strict=True):
+        pick = graph.constant(f"pick_{port.name}", axle)
+        graph.apply("MatMul", [axle_force, pick], port.name)
+    name = visible(model.vehicle.name)
+    return graph.model_bytes(
+        "frozen_network",
+        INPUTS,
+        OUTPUTS,
+        f"Axle forces of {name}, F_y = C alpha + U W tanh(V x_bar), zero below "
+        f"{model.min_speed:g} m/s; {SLIP_SIGN}",
+        {"vehicle": name, "min_speed_m_s": repr(model.min_speed)},
+    )
+
+
+FROZEN_INPUTS = (
+    Signal("alpha_f", "rad", "slip angle of the front axle, paper's sign"),
+    Signal("alpha_r", "rad", "slip angle of the rear axle, paper's sign"),
+)
+
+
+def axle_graph(model: AxleModel, *, single: bool = False) -> bytes:
+    """Return the static curves as ONNX; inputs alpha_f, alpha_r, outputs F_yf, F_yr, (batch, 1).
+
+    Parameters
+    ----------
+    model : the frozen axle model.
+    single : whether numbers are float32; else they are float64.
+    """
+    graph = Graph(single)
+    scales = graph.constant("inverse_scales", 1.0 / np.array(model.ladder)[None])
+    for slip, force, weights, load in zip(
+        FROZEN_INPUTS, OUTPUTS, model.W, model.vehicle.axle_loads, strict=True
+    ):
+        bent = graph.apply("MatMul", [slip.name, scales], f"{slip.name}_over_scales")
+        units = graph.apply("Tanh", [bent], f"{slip.name}_units")
+        share = graph.constant(f"{force.name}_weights", load * weights[:, None])
+        graph.apply("MatMul", [units, share], force.name)
+    return graph.model_bytes(
+        "axle_force_curves",
+        FROZEN_INPUTS,
+        OUTPUTS,
+        f"Static axle force over slip angle of {visible(model.vehicle.name)}; {SLIP_SIGN}",
+        {"vehicle": visible(model.vehicle.name)},
+    )
+
+
+class NoOnnxError(ValueError):
+    """A frozen model of a kind that has no ONNX form."""
+
+
+def onnx_bytes(model: FrozenModel, *, single: bool = False) -> bytes:
+    """Return a frozen model as the content of an ONNX file; the same model gives the same bytes.
+
+    Parameters
+    ----------
+    model : the whole model for a network, the static force curves for an axle model, and the
+        network itself for one that came from an ONNX file.
+    single : whether numbers are float32; else they are float64.
+
+    Raises
+    ------
+    NoOnnxError
+        For any other kind of model.
+    MissingOnnxError
+        Where the package onnx is not installed.
+    """
+    match model:
+        case NetworkModel():
+            return network_graph(model, single=single)
+        case AxleModel():
+            return axle_graph(model, single=single)
+        case OnnxModel():
+            return model.content
+        case _:
+            raise NoOnnxError(
+                f"{type(model).__name__} has no ONNX form, only networks and axle curves have"
+            )
+
+
+def export_onnx(model: FrozenModel, path: Path, *, single: bool = False) -> None:
+    """Write a frozen model as an ONNX file.
+
+    Parameters
+    ----------
+    model : see `onnx_bytes`.
+    path : the file.
+    single : whether numbers are float32; else they are float64.
+
+    Raises
+    ------
+    NoOnnxError
+        For a kind of model that has no ONNX form.
+    MissingOnnxError
+        Where the package onnx is not installed.
+    """
+    write_atomically(path, onnx_bytes(model, single=single))

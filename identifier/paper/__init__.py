@@ -1,0 +1,1 @@
+"""The identifier of Hong and Choi: network, adaptive laws, step and design."""

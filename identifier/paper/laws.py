@@ -1,0 +1,434 @@
+"""The adaptive laws (11)-(13): which error drives them, how they leak, how weights are bounded.
+
+The leakage of (11)-(12) never rests: whatever |ξ̃| is, noise or what no network can learn, takes
+W and V towards zero, and in hours of driving the network is gone. Two things keep it. A dead zone:
+only what lies beyond a ball leaks, W - Π(W), Π(W) the point of the ball that is nearest, which is
+the switching σ of Ioannou and Sun, Robust Adaptive Control (1996), 8.4.1, with the factor
+1 - W_free/|W| beyond the radius in place of their ramp from one to two radii: it too is continuous,
+and since W - Π(W) never grows faster than W, all that is proven of the leakage holds of what lies
+beyond the ball. Or a projection (8.4.2 there) in place of the leakage, which keeps weights in a
+ball; it is done after the step.
+
+ξ̃ = ξ - ξ̂ [U s], z = ∫ exp(-λ (t - τ)) ξ̃ dτ [U s²], σ = tanh(V̂ x̄), U the force unit.
+The paper never defines ξ̃. Only with ξ - ξ̂, so that dξ̃/dt = A_d ξ̃ + f - f̂, do (11)-(12) descend.
+
+The series-parallel observer (8), the error filter (10), and where the network reads the state.
+
+ξ, ξ̂ [U s]: axle impulse, measured and estimated.   u = [δ_f, δ_r] [rad].   f̂ [U]: network output.
+
+One step of an ordinary differential equation, with its inputs held over the step.
+
+Gains of the identifier, with their units.
+
+With the force unit U (kN for a car) the axle impulse ξ is in U s, the filtered error z in U s².
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from models.files import require_within
+
+DrivingError = Callable[[Any, Any, Any], Any]
+Direction = Callable[[Any, Any], Any]
+
+
+def integral(z: Any, xi_tilde: Any, lead: Any) -> Any:
+    """Drive the laws by the exponentially filtered error z, as (11)-(12) do; (2,).
+
+    Parameters
+    ----------
+    z : filtered error (2,).
+    xi_tilde : error (2,).
+    lead : not read.
+    """
+    del xi_tilde, lead
+    return z
+
+
+def instantaneous(z: Any, xi_tilde: Any, lead: Any) -> Any:
+    """Drive the laws by the error itself, the conventional scheme; (2,).
+
+    Parameters
+    ----------
+    z : filtered error (2,).
+    xi_tilde : error (2,).
+    lead : not read.
+    """
+    del z, lead
+    return xi_tilde
+
+
+def pi_lead(z: Any, xi_tilde: Any, lead: Any) -> Any:
+    """Drive the laws by z + τ ξ̃: with τ long enough the loop is positive real.
+
+    Together with `lyapunov_direction` no gain is then too high, whatever the Hurwitz A_d; for
+    A_d = -a I long enough is 1/a, else `identifier.stability.pi_lead.lead_time`.
+
+    Parameters
+    ----------
+    z : filtered error (2,).
+    xi_tilde : error (2,).
+    lead : lead time τ [s].
+    """
+    return z + lead * xi_tilde
+
+
+DRIVING_ERRORS: Mapping[str, DrivingError] = {
+    "integral": integral,
+    "instantaneous": instantaneous,
+    "pi_lead": pi_lead,
+}
+
+
+def static_direction(A_d: Any, drive: Any) -> Any:
+    """Return (driveᵀ A_d⁻¹)ᵀ, along which (11)-(12) descend, (2,).
+
+    Parameters
+    ----------
+    A_d : Hurwitz matrix (2, 2) [1/s].
+    drive : the error that drives the laws (2,).
+    """
+    return ca.solve(A_d.T, drive)  # with A_dᵀ: it differs where A_d is not symmetric
+
+
+def lyapunov_direction(A_d: Any, drive: Any) -> Any:
+    """Return -P drive with A_dᵀ P + P A_d = -2 I, (2,): -A_d⁻¹ where A_d is symmetric.
+
+    P = [det(A_d) I + Sᵀ S]/(-tr(A_d) det(A_d)), S = A_d - tr(A_d) I, solves the equation of a
+    2x2 matrix in closed form.
+
+    Parameters
+    ----------
+    A_d : Hurwitz matrix (2, 2) [1/s].
+    drive : the error that drives the laws (2,).
+    """
+    trace = A_d[0, 0] + A_d[1, 1]
+    determinant = A_d[0, 0] * A_d[1, 1] - A_d[0, 1] * A_d[1, 0]
+    S = A_d - trace * ca.DM.eye(2)
+    return (determinant * drive + S.T @ (S @ drive)) / (trace * determinant)
+
+
+DIRECTIONS: Mapping[DrivingError, Direction] = {
+    integral: static_direction,
+    instantaneous: static_direction,
+    pi_lead: lyapunov_direction,  # only with P is the lead passive where A_d is not symmetric
+}
+
+
+def unbounded(weights: Any, radius: Any) -> Any:
+    """Return the weights as they are: the leakage alone bounds them.
+
+    Parameters
+    ----------
+    weights : matrix.
+    radius : ignored.
+    """
+    del radius
+    return weights
+
+
+def ball(weights: Any, radius: Any) -> Any:
+    """Return the weights, projected on the ball |weights|_F <= radius.
+
+    Parameters
+    ----------
+    weights : matrix.
+    radius : Frobenius norm that is kept, positive.
+    """
+    return weights * ca.fmin(1, radius / ca.fmax(ca.norm_fro(weights), 1e-300))
+
+
+def whole(weights: Any, radius: Any) -> Any:
+    """Return the weights as they are: all of them leak, as in (11)-(12).
+
+    Parameters
+    ----------
+    weights : matrix.
+    radius : ignored.
+    """
+    del radius
+    return weights
+
+
+def beyond_ball(weights: Any, radius: Any) -> Any:
+    """Return what of the weights lies beyond the ball: zero within it, and continuous.
+
+    Parameters
+    ----------
+    weights : matrix.
+    radius : Frobenius norm within which nothing leaks, not negative.
+    """
+    return weights - ball(weights, radius)
+
+
+class WeightRates(NamedTuple):
+    """Time derivatives of the weights: W_dot (2, n_h) and V_dot (n_h, n_in)."""
+
+    W_dot: Any
+    V_dot: Any
+
+
+def weight_rates(
+    *,
+    drive: Any,
+    xi_tilde: Any,
+    W: Any,
+    V: Any,
+    x_bar: Any,
+    sigma: Any,
+    A_d: Any,
+    eta_W: Any,
+    eta_V: Any,
+    rho_W: Any,
+    rho_V: Any,
+    direction: Direction = static_direction,
+    leaking: Callable[[Any, Any], Any] = whole,
+    W_free: Any = 0.0,
+    V_free: Any = 0.0,
+) -> WeightRates:
+    """Return (11)-(12), each a descent along the static gradient with a leakage.
+
+    Parameters
+    ----------
+    drive : the error that drives the laws, z, ξ̃ or z + τ ξ̃ (2,).
+    xi_tilde : error ξ - ξ̂ (2,), whose norm scales the leakage.
+    W : weights (2, n_h).
+    V : weights (n_h, n_in).
+    x_bar : network input (n_in,).
+    sigma : hidden layer tanh(V x̄) (n_h,).
+    A_d : Hurwitz matrix (2, 2) [1/s].
+    eta_W : learning rate η1.
+    eta_V : learning rate η2.
+    rho_W : leakage ρ1.
+    rho_V : leakage ρ2.
+    direction : of the descent, from A_d and the driving error; one of `DIRECTIONS`.
+    leaking : what of the weights leaks, from them and the radius: `whole` or `beyond_ball`.
+    W_free : radius of the dead zone of W, which `whole` does not read [U].
+    V_free : radius of the dead zone of V, which `whole` does not read [-].
+    """
+    g = direction(A_d, drive)  # (zᵀ A_d⁻¹)ᵀ as printed
+    leak = ca.norm_2(xi_tilde)
+    slope = 1 - sigma**2  # diagonal of I - Λ, (13)
+    W_dot = -eta_W * g @ sigma.T - rho_W * leak * leaking(W, W_free)  # (11)
+    V_dot = -eta_V * (slope * (W.T @ g)) @ x_bar.T - rho_V * leak * leaking(V, V_free)  # (12)
+    return WeightRates(W_dot, V_dot)
+
+
+InputSource = Callable[[Any, Any], Any]
+
+
+def observer_rate(A_d: Any, A_xi: Any, B_xi: Any, xi: Any, xi_hat: Any, u: Any, f_hat: Any) -> Any:
+    """Return dξ̂/dt of (8), (2,) [U].
+
+    Parameters
+    ----------
+    A_d : Hurwitz matrix (2, 2) [1/s].
+    A_xi : A_ξ of (7) at the present speed (2, 2) [1/s].
+    B_xi : B_ξ of (7) (2, 2) [U/rad].
+    xi : measured axle impulse (2,).
+    xi_hat : estimated axle impulse (2,).
+    u : steering (2,) [rad].
+    f_hat : network output (2,) [U].
+    """
+    return A_d @ xi_hat + (A_xi @ xi + B_xi @ u - A_d @ xi) + f_hat  # (8)
+
+
+def filter_rate(forgetting: Any, z: Any, xi_tilde: Any) -> Any:
+    """Return dz/dt of (10), (2,) [U s].
+
+    Parameters
+    ----------
+    forgetting : λ [1/s].
+    z : filtered error (2,) [U s²].
+    xi_tilde : error (2,) [U s].
+    """
+    return -forgetting * z + xi_tilde  # (10)
+
+
+def measured(xi: Any, xi_hat: Any) -> Any:
+    """Read the network's input from the measured state, which opens the loop through x̂.
+
+    Parameters
+    ----------
+    xi : measured axle impulse (2,).
+    xi_hat : estimated axle impulse (2,).
+    """
+    del xi_hat
+    return xi
+
+
+def estimated(xi: Any, xi_hat: Any) -> Any:
+    """Read the network's input from the estimated state, as (8) prints it.
+
+    It closes a loop: A_d must then be fast against the slope of the tire.
+
+    Parameters
+    ----------
+    xi : measured axle impulse (2,).
+    xi_hat : estimated axle impulse (2,).
+    """
+    del xi
+    return xi_hat
+
+
+INPUT_SOURCES: Mapping[str, InputSource] = {"measured": measured, "estimated": estimated}
+
+Derivative = Callable[[list[Any]], list[Any]]
+Projection = Callable[[list[Any]], list[Any]]
+Integrator = Callable[[Derivative, list[Any], Any, Projection], list[Any]]
+
+
+def _ahead(state: list[Any], rate: list[Any], h: Any) -> list[Any]:
+    return [s + h * r for s, r in zip(state, rate, strict=True)]
+
+
+def free(state: list[Any]) -> list[Any]:
+    """Return the state as it is: nothing bounds it.
+
+    Parameters
+    ----------
+    state : parts of the state.
+    """
+    return state
+
+
+def euler(
+    derivative: Derivative, state: list[Any], dt: Any, project: Projection = free
+) -> list[Any]:
+    """Return the state one explicit Euler step later.
+
+    Parameters
+    ----------
+    derivative : time derivative of each part of the state.
+    state : parts of the state, matrices of any shape.
+    dt : step [s].
+    project : puts a state back within its bounds; Euler has no inner stage that needs it.
+    """
+    del project
+    return _ahead(state, derivative(state), dt)
+
+
+def rk4(derivative: Derivative, state: list[Any], dt: Any, project: Projection = free) -> list[Any]:
+    """Return the state one classical fourth-order Runge-Kutta step later.
+
+    The inner stages are projected: else a high gain leaves the bounds within the step, and the
+    slopes there carry it beyond them.
+
+    Parameters
+    ----------
+    derivative : time derivative of each part of the state.
+    state : parts of the state, matrices of any shape.
+    dt : step [s].
+    project : puts a state back within its bounds.
+    """
+    k1 = derivative(state)
+    k2 = derivative(project(_ahead(state, k1, dt / 2)))
+    k3 = derivative(project(_ahead(state, k2, dt / 2)))
+    k4 = derivative(project(_ahead(state, k3, dt)))
+    mean = [(a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
+    return _ahead(state, mean, dt)
+
+
+INTEGRATORS: Mapping[str, Integrator] = {"euler": euler, "rk4": rk4}
+
+LEAST, LARGEST = 1e-15, 1e12  # of a gain that is not 0, in its unit, whatever U is
+
+
+class NotHurwitzError(ValueError):
+    """A_d has an eigenvalue whose real part is not negative."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gains:
+    """Gains of the observer (8), the filter (10) and the laws (11)-(12).
+
+    Parameters
+    ----------
+    A_d : Hurwitz matrix of the prescribed error dynamics (2x2), by rows [1/s].
+    forgetting : λ of (9)-(10) [1/s].
+    eta_W : learning rate of W: η1 [1/s⁴], or [1/s³] for the instantaneous law.
+    eta_V : learning rate of V: η2 [1/(U² s⁴)], or [1/(U² s³)] for the instantaneous law.
+    rho_W : leakage of W, ρ1 [1/(U s²)]; 0 where a projection bounds W.
+    rho_V : leakage of V, ρ2 [1/(U s²)]; 0 where a projection bounds V.
+    W_max : radius of the projection of W, Frobenius norm [U]; infinite: no projection.
+    V_max : radius of the projection of V, Frobenius norm [-]; infinite: no projection.
+    W_free : radius of the dead zone of the leakage of W, Frobenius norm [U]: within it nothing
+        leaks, beyond it what lies beyond; 0, the paper's: all of W leaks.
+    V_free : radius of the dead zone of the leakage of V, Frobenius norm [-]; 0, the paper's.
+    lead : τ of the PI-lead law z + τ ξ̃ [s]; the other laws do not read it.
+
+    Raises
+    ------
+    NotHurwitzError
+        Where A_d is not Hurwitz.
+    ValueError
+        Where a gain is negative, not a number, above `LARGEST` or below `LEAST`, λ or a radius not
+        positive, a dead zone without a leakage, or A_d not 2x2.
+    """
+
+    A_d: tuple[tuple[float, float], tuple[float, float]]
+    forgetting: float
+    eta_W: float
+    eta_V: float
+    rho_W: float
+    rho_V: float
+    W_max: float = np.inf
+    V_max: float = np.inf
+    W_free: float = 0.0
+    V_free: float = 0.0
+    lead: float = 0.0
+
+    def __post_init__(self) -> None:
+        A_d = np.array(self.A_d, dtype=np.float64)
+        if A_d.shape != (2, 2) or not np.isfinite(A_d).all():
+            raise ValueError(f"A_d must be a 2x2 matrix of finite numbers, it is {self.A_d}")
+        require_within(ValueError, 0.0, LARGEST, **{"|A_d|": np.abs(A_d).max()})
+        poles = np.linalg.eigvals(A_d)
+        if not poles.real.max() < 0.0:
+            raise NotHurwitzError(f"A_d must be Hurwitz, its eigenvalues are {poles}")
+        for name in ("eta_W", "eta_V", "rho_W", "rho_V", "W_free", "V_free", "lead"):
+            if not 0.0 <= getattr(self, name) < np.inf:
+                raise ValueError(f"{name} must not be negative, it is {getattr(self, name)}")
+        if not 0.0 < self.forgetting < np.inf:
+            raise ValueError(f"forgetting must be positive, it is {self.forgetting}")
+        for name in ("forgetting", "eta_W", "eta_V", "rho_W", "rho_V", "W_free", "V_free", "lead"):
+            if getattr(self, name) != 0.0:
+                require_within(ValueError, LEAST, LARGEST, **{name: getattr(self, name)})
+        for name in ("W_max", "V_max"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name} must be positive, it is {getattr(self, name)}")
+            if getattr(self, name) != np.inf:
+                require_within(ValueError, LEAST, LARGEST, **{name: getattr(self, name)})
+        for free, rho in (("W_free", "rho_W"), ("V_free", "rho_V")):
+            if getattr(self, free) > 0.0 and getattr(self, rho) == 0.0:
+                raise ValueError(
+                    f"{free} is the dead zone of a leakage, and {rho} is 0: it must be positive"
+                )
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """A_d as an array (2, 2) [1/s]."""
+        return np.array(self.A_d, dtype=np.float64)
+
+    def scaled_by_forgetting(self) -> "Gains":
+        """Return these gains with η/λ in place of η.
+
+        Below the frequency λ the filtered error is z ≈ ξ̃/λ, so that the integral law at η acts as
+        the instantaneous law at η/λ: the control of every comparison of the two.
+        """
+        return replace(self, eta_W=self.eta_W / self.forgetting, eta_V=self.eta_V / self.forgetting)
+
+
+def diagonal(a: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return A_d = -a I by rows.
+
+    Parameters
+    ----------
+    a : rate of the error dynamics [1/s].
+    """
+    return ((-a, 0.0), (0.0, -a))

@@ -1,0 +1,353 @@
+"""The one-hidden-layer network f̂ = Ŵ tanh(V̂ x̄) and its inputs.
+
+x̄ = (chosen signals) / (their scales), (n_in,).   Ŵ: (2, n_h) in the force unit.   V̂: (n_h, n_in).
+There is no bias: f̂ is odd in x̄, as the residual of a symmetric tire is, and f̂(0) = 0.
+
+The paper's network, frozen: weights at one instant and all that axle forces need.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cache
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen import Scan
+from codegen.elementary import tanh
+from identifier.method import (
+    FORMAT,
+    FrozenModelError,
+    Setup,
+    require_min_speed,
+    vehicle_from,
+    vehicle_numbers,
+)
+from identifier.tire_model import TireModel, drift
+from models.bicycle import BicycleParameters, linear_axle_force, slip_angles
+from models.doors import Table, require_few
+from models.files import require_positive, require_within
+from models.recordings import Recording
+from models.vehicle import Vehicle
+
+# Signals that may enter the network, each with the value that counts as large for a passenger car.
+SIGNALS: Mapping[str, float] = {
+    "v_y": 1.0,  # m/s
+    "r": 0.5,  # rad/s
+    "delta_f": 0.1,  # rad
+    "delta_r": 0.1,  # rad
+    "v_x": 20.0,  # m/s
+    "alpha_f": 0.1,  # rad
+    "alpha_r": 0.1,  # rad
+}
+
+
+class Weights(NamedTuple):
+    """Weights of the network: W (2, n_h) in the force unit and V (n_h, n_in)."""
+
+    W: NDArray[np.float64]
+    V: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Network:
+    """Structure of the network: size, inputs and their scales.
+
+    Parameters
+    ----------
+    hidden : number of hidden units n_h.
+    inputs : signals of x̄, chosen among `SIGNALS`, each at most once.
+    scale : divisor of each input in its own unit (m/s, rad/s, rad); None takes those of `SIGNALS`.
+
+    Raises
+    ------
+    ValueError
+        Where the size is not positive, an input unknown or repeated, or a scale not positive.
+    """
+
+    hidden: int = 10
+    inputs: tuple[str, ...] = ("v_y", "r", "delta_f", "delta_r")
+    scale: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "inputs", tuple(self.inputs))  # a list would not hash
+        if self.scale is not None:
+            object.__setattr__(self, "scale", tuple(self.scale))
+        if self.hidden < 1:
+            raise ValueError(f"hidden must be at least 1, it is {self.hidden}")
+        require_few(ValueError, "hidden", self.hidden, "hidden", "units")
+        unknown = [name for name in self.inputs if name not in SIGNALS]
+        if unknown or not self.inputs or len(set(self.inputs)) < len(self.inputs):
+            raise ValueError(f"inputs must be chosen among {list(SIGNALS)}, they are {self.inputs}")
+        if self.scale is None:
+            object.__setattr__(self, "scale", tuple(SIGNALS[name] for name in self.inputs))
+        elif len(self.scale) != len(self.inputs) or not all(0 < s < np.inf for s in self.scale):
+            raise ValueError(
+                f"scale must hold {len(self.inputs)} positive numbers, is {self.scale}"
+            )
+        assert self.scale is not None
+        require_within(ValueError, 1e-6, 1e6, scale=min(self.scale))
+        require_within(ValueError, 1e-6, 1e6, scale=max(self.scale))
+
+    def initial_weights(self, rng: np.random.Generator) -> Weights:
+        """Return W = 0, which starts at the linear tire, and random V.
+
+        Parameters
+        ----------
+        rng : generator of V, drawn from a normal distribution of standard deviation 1.
+        """
+        return Weights(
+            W=np.zeros((2, self.hidden)), V=rng.standard_normal((self.hidden, len(self.inputs)))
+        )
+
+    def normalized_input(self, signals: Mapping[str, Any]) -> Any:
+        """Return x̄ (n_in,), without unit.
+
+        Parameters
+        ----------
+        signals : the CasADi expression of every signal of `inputs`, SI.
+        """
+        assert self.scale is not None
+        pairs = zip(self.inputs, self.scale, strict=True)
+        return ca.vertcat(*(signals[name] * (1 / scale) for name, scale in pairs))
+
+
+def hidden_layer(V: Any, x_bar: Any) -> Any:
+    """Return σ = tanh(V x̄), (n_h,), by the rational tanh that every machine computes alike.
+
+    Parameters
+    ----------
+    V : weights (n_h, n_in).
+    x_bar : scaled input (n_in,).
+    """
+    return tanh(V @ x_bar)
+
+
+def network_signals(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> dict[str, Any]:
+    """Return every signal that a network may read, by name, SI.
+
+    Parameters
+    ----------
+    parameters : of the bicycle.
+    v_x : longitudinal speed [m/s], not zero.
+    x : [v_y, r] (2,).
+    u : [δ_f, δ_r] (2,).
+    """
+    alpha = slip_angles(parameters.l_f, parameters.l_r, v_x, x, u)
+    return {
+        "v_y": x[0],
+        "r": x[1],
+        "delta_f": u[0],
+        "delta_r": u[1],
+        "v_x": v_x,
+        "alpha_f": alpha[0],
+        "alpha_r": alpha[1],
+    }
+
+
+KIND = "network"
+LARGEST_SUM = 1e9  # of the units of an axle together [N]: what cancels may be large
+LARGEST_V = 1e9  # [-], beyond which tanh is a sign at the slip of a resting car
+
+
+def build_frozen(network: Network) -> ca.Function:
+    """Return the frozen model as a function of weights, state and steering.
+
+    Ports: W (2, n_h) and V (n_h, n_in); x = [v_y, r], u = [δ_f, δ_r], v_x, SI; vehicle (6,) = m,
+    I_z, l_f, l_r, C_f, C_r; force_unit [N]. Results: f_hat (2,) in the force unit and axle_force
+    (2,) [N].
+
+    Parameters
+    ----------
+    network : structure of the network.
+    """
+    n_h, n_in = network.hidden, len(network.inputs)
+    W, V = ca.SX.sym("W", 2, n_h), ca.SX.sym("V", n_h, n_in)
+    x, u, v_x = ca.SX.sym("x", 2), ca.SX.sym("u", 2), ca.SX.sym("v_x")
+    vehicle, unit = ca.SX.sym("vehicle", 6), ca.SX.sym("force_unit")
+    parameters = BicycleParameters(*ca.vertsplit(vehicle))
+    x_bar = network.normalized_input(network_signals(parameters, v_x, x, u))
+    f_hat = W @ hidden_layer(V, x_bar)
+    return ca.Function(
+        "frozen_network",
+        [W, V, x, u, v_x, vehicle, unit],
+        [f_hat, linear_axle_force(parameters, v_x, x, u) + unit * f_hat],
+        ["W", "V", "x", "u", "v_x", "vehicle", "force_unit"],
+        ["f_hat", "axle_force"],
+    )
+
+
+def build_replay(network: Network) -> ca.Function:
+    """Return the frozen model as it is replayed: no force below min_speed [m/s], a further port.
+
+    Parameters
+    ----------
+    network : structure of the network.
+    """
+    frozen = build_frozen(network)
+    ports = {name: ca.SX.sym(name, *frozen.size_in(name)) for name in frozen.name_in()}
+    min_speed, v_x = ca.SX.sym("min_speed"), ports["v_x"]
+    read = {**ports, "v_x": ca.fmax(v_x, min_speed)}
+    force = frozen(*read.values())[1]
+    return ca.Function(
+        "replayed_network",
+        [*ports.values(), min_speed],
+        [ca.if_else(v_x >= min_speed, force, 0)],
+        [*ports, "min_speed"],
+        ["axle_force"],
+    )
+
+
+@cache
+def _frozen(network: Network) -> ca.Function:
+    return build_frozen(network)
+
+
+@cache
+def _replay_scan(network: Network) -> Scan:
+    return Scan(build_replay(network), carry=(), over=("x", "u", "v_x"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class NetworkModel(TireModel):
+    """Axle forces F_y = C α + U Ŵ tanh(V̂ x̄) with weights that no longer change.
+
+    Parameters
+    ----------
+    vehicle : the car, whose linear tire the network corrects.
+    network : structure of the network.
+    weights : W (2, n_h) in the force unit and V (n_h, n_in).
+    force_unit : U [N].
+    min_speed : below this speed [m/s] the forces read zero.
+
+    Raises
+    ------
+    ValueError
+        Where a weight has the wrong shape or is not finite.
+    """
+
+    vehicle: Vehicle
+    network: Network
+    weights: Weights
+    force_unit: float
+    min_speed: float
+
+    def __post_init__(self) -> None:
+        require_positive(ValueError, force_unit=self.force_unit)
+        require_min_speed(self.min_speed)
+        n_h, n_in = self.network.hidden, len(self.network.inputs)
+        for name, value, shape in (
+            ("W", self.weights.W, (2, n_h)),
+            ("V", self.weights.V, (n_h, n_in)),
+        ):
+            if value.shape != shape:
+                raise ValueError(f"{name} must have shape {shape}, it has {value.shape}")
+            if not np.isfinite(value).all():
+                raise ValueError(f"{name} holds a number that is not finite: the law has diverged")
+        with np.errstate(over="ignore"):  # beyond the limit, too
+            largest = self.force_unit * np.abs(self.weights.W).sum(axis=1).max()
+        require_within(ValueError, 0.0, LARGEST_SUM, **{"force_unit times |W|": largest})
+        require_within(ValueError, 0.0, LARGEST_V, **{"|V|": np.abs(self.weights.V).max()})
+
+    def setup(self, recording: Recording) -> Setup:
+        """Return what a replay needs.
+
+        Parameters
+        ----------
+        recording : what is replayed; it is not looked at.
+        """
+        del recording
+        return Setup(
+            scan=_replay_scan(self.network),
+            carry={},
+            constants={
+                "W": self.weights.W,
+                "V": self.weights.V,
+                "vehicle": np.array(self.vehicle.bicycle),
+                "force_unit": np.array(self.force_unit),
+                "min_speed": np.array(self.min_speed),
+            },
+        )
+
+    def axle_force(self, recording: Recording) -> NDArray[np.float64]:
+        """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
+
+        Parameters
+        ----------
+        recording : its signals are the input; its forces are not looked at.
+        """
+        return self.setup(recording).run(recording)["axle_force"]
+
+    def curve_expression(self, alpha: Any, v_x: Any) -> Any:
+        """Return the steady axle forces (2,) [N] as a CasADi expression.
+
+        Parameters
+        ----------
+        alpha : slip angles (2,) [rad], the wheels straight ahead.
+        v_x : longitudinal speed [m/s].
+        """
+        return self._static_force(drift(self.vehicle, alpha, v_x), 0.0, v_x)
+
+    def force_expression(
+        self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
+    ) -> tuple[Any, Any]:
+        """Return the axle forces (2,) [N] as a CasADi expression, and no rate: nothing lags.
+
+        Parameters
+        ----------
+        slip : empty.
+        x : [v_y, r] (2,).
+        delta : angle of the front wheels [rad].
+        v_x : longitudinal speed [m/s], positive.
+        least_lag : not looked at.
+        """
+        del slip, least_lag
+        return self._static_force(x, delta, v_x), ca.MX(0, 1)
+
+    def _static_force(self, x: Any, delta: Any, v_x: Any) -> Any:
+        W, V = self.weights
+        vehicle, unit = self.vehicle.bicycle, self.force_unit
+        u = ca.vertcat(delta, 0)
+        return build_frozen(self.network)(W, V, x, u, v_x, ca.vertcat(*vehicle), unit)[1]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the model as plain numbers and words, ready for JSON."""
+        return {
+            "format": FORMAT,
+            "kind": KIND,
+            "units": {"W": "force_unit_N newtons", "V": "-", "scale": "SI, by input"},
+            "vehicle": vehicle_numbers(self.vehicle),
+            "network": asdict(self.network),
+            "force_unit_N": self.force_unit,
+            "min_speed_m_s": self.min_speed,
+            "W": self.weights.W.tolist(),
+            "V": self.weights.V.tolist(),
+        }
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any], source: str) -> "NetworkModel":
+        """Return the model that `to_dict` describes.
+
+        Parameters
+        ----------
+        data : as from `to_dict`.
+        source : name of the file, for errors.
+
+        Raises
+        ------
+        FrozenModelError
+            Where a key is missing or a value impossible.
+        """
+        try:
+            table = Table(data, "", FrozenModelError)
+            return cls(
+                vehicle=vehicle_from(table.value("vehicle")),
+                network=Network(**table.table("network").record(Network)),
+                weights=Weights(W=table.array("W"), V=table.array("V")),
+                force_unit=table.number("force_unit_N"),
+                min_speed=table.number("min_speed_m_s"),
+            )
+        except ValueError as error:
+            raise FrozenModelError(f"{source}: {error}") from error

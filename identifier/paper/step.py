@@ -1,0 +1,173 @@
+"""The identifier's step: one casadi.Function that is simulation, test subject and C source.
+
+Carried: xi_hat (2,), z (2,), W (2, n_h), V (n_h, n_in).
+Sampled: x = [v_y, r] (2,), u = [δ_f, δ_r] (2,), v_x.
+Constant: vehicle (6,) = m, I_z, l_f, l_r, C_f, C_r; A_d (2, 2); gains, in the order of `GAINS`;
+sampling (3,) = T_s, force unit U, minimum speed.
+Outputs: the next carried values; f_hat (2,) [U], the network's force; axle_force (2,) [N], linear
+tire and network together; xi_tilde (2,) [U s].
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from identifier.paper.laws import (
+    DIRECTIONS,
+    DRIVING_ERRORS,
+    INPUT_SOURCES,
+    INTEGRATORS,
+    ball,
+    beyond_ball,
+    filter_rate,
+    observer_rate,
+    unbounded,
+    weight_rates,
+    whole,
+)
+from identifier.paper.network import Network, hidden_layer, network_signals
+from models.bicycle import BicycleParameters, bicycle, linear_axle_force
+
+CARRY = ("xi_hat", "z", "W", "V")
+OVER = ("x", "u", "v_x")
+LARGEST_SPEED, LARGEST_ANGLE = 300.0, 1.5  # m/s and rad: no car is faster, no wheel turns more
+GAINS = (
+    "eta_W",
+    "eta_V",
+    "rho_W",
+    "rho_V",
+    "forgetting",
+    "W_max",
+    "V_max",
+    "lead",
+    "W_free",
+    "V_free",
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Structure:
+    """What the step is built from; all numbers stay inputs of it.
+
+    Parameters
+    ----------
+    network : structure of the network.
+    law : name of the driving error.
+    input_source : where the network reads the state.
+    integrator : name of the integrator.
+    projects : whether a projection bounds the weights.
+    rests : whether the leakage has a dead zone.
+    """
+
+    network: Network
+    law: str
+    input_source: str
+    integrator: str
+    projects: bool
+    rests: bool = False
+
+
+def plausible(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
+    """Return whether a car can be in this state: its axles slide less than 63°, its wheels turn.
+
+    A sample that is not (a spike, a dropout of a sensor) is not learnt from, and no force is told:
+    one of 1000 m/s would carry the weights beyond any number.
+
+    Parameters
+    ----------
+    parameters : of the bicycle.
+    v_x : longitudinal speed, at least the minimum speed [m/s].
+    x : [v_y, r] (2,).
+    u : [δ_f, δ_r] (2,).
+    """
+    reach = 2 * v_x  # tan 63°
+    front, rear = x[0] + parameters.l_f * x[1], x[0] - parameters.l_r * x[1]
+    inside = ca.logic_and(ca.fabs(front) <= reach, ca.fabs(rear) <= reach)
+    steering = ca.logic_and(ca.fabs(u[0]) <= LARGEST_ANGLE, ca.fabs(u[1]) <= LARGEST_ANGLE)
+    return ca.logic_and(inside, steering)
+
+
+def build_step(structure: Structure) -> ca.Function:
+    """Return the step; vehicle, gains and sampling stay inputs of it.
+
+    Parameters
+    ----------
+    structure : network, law, input source and integrator.
+    """
+    network = structure.network
+    n_h, n_in = network.hidden, len(network.inputs)
+    xi_hat, z = ca.SX.sym("xi_hat", 2), ca.SX.sym("z", 2)
+    W, V = ca.SX.sym("W", 2, n_h), ca.SX.sym("V", n_h, n_in)
+    x, u, v_x = ca.SX.sym("x", 2), ca.SX.sym("u", 2), ca.SX.sym("v_x")
+    vehicle, A_d = ca.SX.sym("vehicle", 6), ca.SX.sym("A_d", 2, 2)
+    gains, sampling = ca.SX.sym("gains", len(GAINS)), ca.SX.sym("sampling", 3)
+
+    parameters = BicycleParameters(*ca.vertsplit(vehicle))
+    eta_W, eta_V, rho_W, rho_V, lam, W_max, V_max, lead, W_free, V_free = ca.vertsplit(gains)
+    dt, unit, min_speed = ca.vertsplit(sampling)
+    speed = ca.fmax(v_x, min_speed)
+    model = bicycle(parameters, speed)
+    xi = model.K_inv @ x / unit
+    drive, source = DRIVING_ERRORS[structure.law], INPUT_SOURCES[structure.input_source]
+    bounded = ball if structure.projects else unbounded
+
+    def layers(xi_hat: Any, V: Any) -> tuple[Any, Any]:
+        x_read = unit * model.K @ source(xi, xi_hat)
+        x_bar = network.normalized_input(network_signals(parameters, speed, x_read, u))
+        return x_bar, hidden_layer(V, x_bar)
+
+    def derivative(state: list[Any]) -> list[Any]:
+        xi_hat, z, W, V = state
+        x_bar, sigma = layers(xi_hat, V)
+        xi_tilde = xi - xi_hat
+        rates = weight_rates(
+            drive=drive(z, xi_tilde, lead),
+            xi_tilde=xi_tilde,
+            W=W,
+            V=V,
+            x_bar=x_bar,
+            sigma=sigma,
+            A_d=A_d,
+            eta_W=eta_W,
+            eta_V=eta_V,
+            rho_W=rho_W,
+            rho_V=rho_V,
+            direction=DIRECTIONS[drive],
+            leaking=beyond_ball if structure.rests else whole,
+            W_free=W_free,
+            V_free=V_free,
+        )
+        xi_hat_dot = observer_rate(A_d, model.A_xi, model.B_xi / unit, xi, xi_hat, u, W @ sigma)
+        return [xi_hat_dot, filter_rate(lam, z, xi_tilde), *rates]
+
+    def kept(state: list[Any]) -> list[Any]:
+        """Return a state within its projections, which inner stages must see too."""
+        return [state[0], state[1], bounded(state[2], W_max), bounded(state[3], V_max)]
+
+    moving = v_x >= min_speed
+    believed = ca.logic_and(plausible(parameters, speed, x, u), v_x <= LARGEST_SPEED)
+    used = ca.logic_and(moving, believed)
+    f_hat = ca.if_else(used, W @ layers(xi_hat, V)[1], 0)
+    linear = ca.if_else(used, linear_axle_force(parameters, speed, x, u), 0)
+    ahead = ca.if_else(used, dt, 0)  # else nothing moves on: weights keep their values
+    xi_hat_next, z_next, W_next, V_next = INTEGRATORS[structure.integrator](
+        derivative, [xi_hat, z, W, V], ahead, kept
+    )
+    return ca.Function(
+        f"identifier_{structure.law}",
+        [xi_hat, z, W, V, x, u, v_x, vehicle, A_d, gains, sampling],
+        [
+            # at rest the observer follows the measurement, as far as it can be believed
+            ca.if_else(ca.logic_or(moving, ca.logic_not(believed)), xi_hat_next, xi),
+            ca.if_else(moving, z_next, 0),
+            bounded(W_next, W_max),
+            bounded(V_next, V_max),
+            f_hat,
+            linear + unit * f_hat,
+            ca.if_else(used, xi - xi_hat, 0),
+        ],
+        [*CARRY, *OVER, "vehicle", "A_d", "gains", "sampling"],
+        [*(f"{name}_next" for name in CARRY), "f_hat", "axle_force", "xi_tilde"],
+        {"cse": True},
+    )

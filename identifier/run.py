@@ -1,0 +1,366 @@
+"""What a method did over a recording: forces, and everything that its step carries and tells.
+
+Running a method over a recording, in compiled code.
+
+A method beside a car that drives: sample in, axle forces out, and the model learnt so far.
+
+The compiled step is that of `identify`, so that a drive and its recording teach the same bits. What
+becomes of samples that are refused is in `identifier.refused`.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen import Stepper
+from identifier.method import FrozenModel, Method, Setup
+from identifier.refused import NOWHERE, STALE_TIME, Limits, judges_samples, stale_samples
+from identifier.tire_model import TireModel
+from models.recordings import Recording
+from models.recordings.record import MINIMUM_SAMPLES
+from models.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+IMPOSSIBLE_FORCE = 100.0  # times the car's weight: no tire reaches it, so the law has diverged
+
+
+class DivergedError(ArithmeticError):
+    """The law diverged before the instant that was asked for."""
+
+
+def carried_index(recording: Recording, t: float) -> int:
+    """Return which carried values are in effect at a time: those before that sample; n at the end.
+
+    Parameters
+    ----------
+    recording : n samples.
+    t : time in the recording's own clock [s].
+
+    Raises
+    ------
+    ValueError
+        Where the recording begins after that time.
+    """
+    times, tolerance = recording.t, 1e-6 * recording.dt
+    if not t >= times[0]:
+        raise ValueError(f"cannot freeze at {t:g} s, the recording begins at {times[0]:g} s")
+    if t > times[-1] - tolerance:
+        return int(times.size)
+    return int(np.searchsorted(times, t + tolerance, side="right")) - 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class History:
+    """An online run over n samples.
+
+    Parameters
+    ----------
+    vehicle : the car the method was told of.
+    design : the method that ran.
+    recording : what it ran over.
+    axle_force : forces that were identified online (n, 2) [N].
+    carried : by port, the carried values in effect at each sample and after the last (n + 1, ...).
+    told : by port, the other outputs of the step at each sample (n, ...).
+    """
+
+    vehicle: Vehicle
+    design: Method
+    recording: Recording
+    axle_force: Array
+    carried: Mapping[str, Array]
+    told: Mapping[str, Array]
+
+    @property
+    def diverged_at(self) -> float | None:
+        """Time [s] from which a force is not finite or a hundred times the weight, or None."""
+        possible = np.abs(self.axle_force) < IMPOSSIBLE_FORCE * self.vehicle.weight
+        sane = possible.all(axis=1)
+        return None if sane.all() else float(self.recording.t[np.argmin(sane)])
+
+    def carried_at(self, t: float) -> dict[str, Array]:
+        """Return the carried values in effect at a time; from the end on, those after the last.
+
+        Parameters
+        ----------
+        t : time in the recording's own clock [s].
+
+        Raises
+        ------
+        ValueError
+            Where the recording begins after that time.
+        """
+        index = carried_index(self.recording, t)
+        return {name: values[index] for name, values in self.carried.items()}
+
+    def freeze(self, t: float | None = None) -> TireModel:
+        """Return the model with the weights in effect at a time.
+
+        Parameters
+        ----------
+        t : time in the recording's own clock [s]; None is the end.
+
+        Raises
+        ------
+        DivergedError
+            Where the law had diverged by then.
+        CannotFreezeError
+            Where the method estimates a signal, not a model.
+        ValueError
+            Where the recording begins after that time.
+        """
+        t = float(self.recording.t[-1]) if t is None else t
+        carried = self.carried_at(t)
+        diverged_at = self.diverged_at
+        if diverged_at is not None and diverged_at <= t:
+            raise DivergedError(f"the law diverged at {diverged_at:g} s, before {t:g} s")
+        return self.design.frozen(self.vehicle, carried)
+
+    def __repr__(self) -> str:
+        diverged = "" if self.diverged_at is None else f", diverged at {self.diverged_at:g} s"
+        return f"<{type(self.design).__name__} over {self.recording!r}{diverged}>"
+
+
+def check_sampling(recording: Recording, design: Method) -> None:
+    """Refuse a recording that is not sampled at the design's interval.
+
+    Parameters
+    ----------
+    recording : what the design is to run over.
+    design : the method.
+
+    Raises
+    ------
+    ValueError
+        Where the two differ.
+    """
+    if abs(recording.dt - design.dt) > 1e-6 * design.dt:
+        raise ValueError(
+            f"{recording.name} is sampled at {recording.dt:g} s, the design at {design.dt:g} s"
+        )
+
+
+def identify(
+    recording: Recording, vehicle: Vehicle, design: Method, start: FrozenModel | None = None
+) -> History:
+    """Run a method over a recording, sample by sample.
+
+    Parameters
+    ----------
+    recording : signals, sampled at the design's interval; its forces are not looked at.
+    vehicle : the car as the method is told of it.
+    design : the method: a `Design` of the paper's identifier, or any other.
+    start : stored weights to begin with; None begins afresh.
+
+    Raises
+    ------
+    ValueError
+        Where recording and design differ in their sampling interval.
+    """
+    check_sampling(recording, design)
+    setup = design.setup(vehicle, recording, start)
+    record = setup.run(recording)
+    return History(
+        vehicle=vehicle,
+        design=design,
+        recording=recording,
+        axle_force=record["axle_force"],
+        carried={name: record[f"{name}_all"] for name in setup.scan.carry},
+        told={name: record[name] for name in setup.scan.outputs if name != "axle_force"},
+    )
+
+
+@dataclass(slots=True)
+class Counts:
+    """What became of the samples.
+
+    Parameters
+    ----------
+    samples : that the method took.
+    refused : that held a number which is not finite or beyond what any car reaches.
+    missed : of these, the newest in a row.
+    """
+
+    samples: int = 0
+    refused: int = 0
+    missed: int = 0
+
+
+class OnlineIdentifier:
+    """A method that is told sample by sample; attributes vehicle, method, counts, limits.
+
+    Parameters
+    ----------
+    method : the method.
+    vehicle : the car as the method is told of it.
+    dt : interval at which `update` is called [s].
+    start : stored weights to begin with; None begins afresh.
+    stale_time : time of refused samples after which no force is told any more [s].
+
+    Raises
+    ------
+    ValueError
+        Where the interval is not that of the method, or the time is not positive and finite.
+    """
+
+    def __init__(
+        self,
+        method: Method,
+        vehicle: Vehicle,
+        dt: float,
+        start: FrozenModel | None = None,
+        *,
+        stale_time: float = STALE_TIME,
+    ) -> None:
+        if not abs(dt - method.dt) <= 1e-6 * method.dt:
+            raise ValueError(f"samples come every {dt:g} s, the method wants {method.dt:g} s")
+        if not 0.0 < stale_time < math.inf:
+            raise ValueError(f"stale_time must be positive and finite, it is {stale_time}")
+        self.vehicle, self.method, self.counts = vehicle, method, Counts()
+        self.limits = Limits.of(vehicle)
+        self.stale_time = stale_time
+        self._most_missed = stale_samples(stale_time, method.dt)
+        self._start = start
+        self._force = np.zeros(2)
+        self._stepper: Stepper | None = None
+        self._judges = False
+        self._diverged = False
+
+    def update(self, x: Array, u: Array, v_x: float) -> Array:
+        """Take a sample; return the axle forces (2,) [N], told with the weights before it.
+
+        Where the sample is refused, those of the last one it believed, and zero once it is `stale`.
+
+        Parameters
+        ----------
+        x : [v_y, r] (2,) [m/s, rad/s].
+        u : [δ_f, δ_r] (2,), angles of the road wheels [rad].
+        v_x : longitudinal speed [m/s].
+
+        Raises
+        ------
+        ValueError
+            Where x or u are not pairs.
+        """
+        (v_y, r), (delta_f, delta_r) = x, u
+        if not self.limits.accept(v_x, v_y, r, delta_f, delta_r):
+            return self._refused()
+        if self._stepper is None:
+            self._begun(x, u, v_x)
+        elif self.counts.missed and not self._judges:
+            self._take((v_y, r), (delta_f, delta_r), 0.0)  # a rest, so that the step begins anew
+        self._take((v_y, r), (delta_f, delta_r), v_x)
+        self.counts.samples += 1
+        self.counts.missed = 0
+        return self._force.copy()
+
+    def _take(self, x: tuple[float, float], u: tuple[float, float], v_x: float) -> None:
+        stepper = self._stepper
+        assert stepper is not None
+        values = {"x": x, "u": u, "v_x": (v_x,)}
+        for port, array in stepper.inputs.items():
+            array[:] = values[port]
+        stepper.advance()
+        self._force = stepper.outputs["axle_force"].copy()
+        if not np.abs(self._force).max() < IMPOSSIBLE_FORCE * self.vehicle.weight:
+            self._diverged = True
+
+    def _refused(self) -> Array:
+        """Let time go on without a sample; return the forces."""
+        self.counts.refused += 1
+        self.counts.missed += 1
+        if self._stepper is not None and self._judges:
+            self._take((0.0, 0.0), (0.0, 0.0), NOWHERE)
+        if self.stale:
+            self._force = np.zeros(2)
+        return self._force.copy()
+
+    @property
+    def stale(self) -> bool:
+        """Whether samples have been refused for so long that no force is told: do not trust it."""
+        return self.counts.missed >= self._most_missed
+
+    def _begun(self, x: Array, u: Array, v_x: float) -> None:
+        """Set the step up where `identify` would: at the first sample."""
+        setup = self._setup(x, u, v_x)
+        self._stepper = Stepper(setup.scan, {**setup.carry, **setup.constants})
+        self._judges = judges_samples(setup.carry)
+
+    def _setup(self, x: Array, u: Array, v_x: float) -> Setup:
+        n = MINIMUM_SAMPLES  # all alike: a setup looks at the first one
+        first = Recording(
+            name="first sample",
+            t=self.method.dt * np.arange(n, dtype=np.float64),
+            v_x=np.full(n, v_x),
+            v_y=np.full(n, x[0]),
+            r=np.full(n, x[1]),
+            delta_f=np.full(n, u[0]),
+            delta_r=np.full(n, u[1]),
+        )
+        return self.method.setup(self.vehicle, first, self._start)
+
+    def prepare(self) -> None:
+        """Compile the step before the first sample comes, where that takes a while."""
+        if self._stepper is None:
+            self._begun(np.zeros(2), np.zeros(2), self.method.min_speed)
+            self._stepper = None
+
+    @property
+    def start(self) -> FrozenModel | None:
+        """Stored weights that the run began with, None where it began afresh."""
+        return self._start
+
+    def restart(self, start: FrozenModel | None) -> None:
+        """Begin again at the next sample; the counts go on.
+
+        Parameters
+        ----------
+        start : stored weights to begin with; None begins afresh.
+        """
+        self._start, self._stepper, self._diverged = start, None, False
+
+    @property
+    def diverged(self) -> bool:
+        """Whether a force was not finite or a hundred times the weight."""
+        return self._diverged
+
+    @property
+    def told(self) -> dict[str, Array]:
+        """What the step told about the last sample, by port, matrices by columns; copies.
+
+        Zero while it is `stale`.
+        """
+        if self._stepper is None:
+            return {}
+        told = {name: array.copy() for name, array in self._stepper.outputs.items()}
+        return {name: np.zeros_like(array) for name, array in told.items()} if self.stale else told
+
+    def carried(self) -> dict[str, Array]:
+        """Return the values that the next sample will meet, by port; copies.
+
+        Before the first sample those of a car that rolls straight ahead.
+        """
+        if self._stepper is None:
+            carry = self._setup(np.zeros(2), np.zeros(2), self.method.min_speed).carry
+            return {name: np.array(value) for name, value in carry.items()}
+        return self._stepper.carried()
+
+    def model(self) -> FrozenModel:
+        """Return the model with the weights in effect now.
+
+        Raises
+        ------
+        DivergedError
+            Where the law has diverged.
+        CannotFreezeError
+            Where the method estimates a signal, not a model.
+        ValueError
+            Where a weight is not what the model allows.
+        """
+        if self._diverged:
+            raise DivergedError(f"the law diverged within {self.counts.samples} samples")
+        if self._stepper is None and self._start is not None:
+            return self._start
+        return self.method.frozen(self.vehicle, self.carried())

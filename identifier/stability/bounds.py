@@ -1,0 +1,111 @@
+"""What bounds every law that is linear in (z, ξ̃): small gain θ, and the force that leakage holds.
+
+That needs a bounded residual f and bounded inputs only: no ideal weights, no approximation error,
+no excitation. γ = ∫ |exp(A_d t)| dt; forces in U (kN), ξ̃ in U s; |.| Frobenius for weights.
+
+Law c_z z + c_ξ ξ̃ in (11), (12). m' = -λ m + |ξ̃| dominates |z|; with g' = η_W |A_d⁻¹| √n_h,
+φ = |W_hat| + c_z (g'/λ) m obeys φ' <= |ξ̃| (g' (c_z/λ + c_ξ) + ρ_W c_z (g'/λ) m - ρ_W φ), so that
+φ cannot pass g' (c_z/λ + c_ξ)/ρ_W + c_z g' X/λ² while |ξ̃| <= X; and
+|ξ̃| <= γ (sup|f| + √n_h |W_hat|). The circle closes where θ = c_z γ √n_h g'/λ² < 1: always for the
+instantaneous law, for η_W n_h < a² λ² for the integral law with A_d = -a I.
+
+That is continuous time from rest. `sampled_bound.py` carries it to the identifier as it runs, with
+γ of the sampled A_d and f as the samples see it, (ξ_{k+1} - ξ_k)/dt - A_ξ ξ_k - B_ξ u_k: a jump of
+the steering inside a sample makes that large.
+"""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from identifier.stability.limits import require_positive
+from identifier.stability.loop import Law
+from identifier.stability.lyapunov import (
+    Matrix,
+    lyapunov,
+    peak_gain,
+    require_hurwitz,
+    sampled_peak_gain,
+)
+
+
+def small_gain(
+    A_d: npt.ArrayLike,
+    *,
+    law: Law,
+    forgetting: float,
+    eta_W: float,
+    n_h: int,
+    dt: float | None = None,
+    direction: Matrix | None = None,
+) -> float:
+    """θ = c_z γ η_W |A_d⁻¹| n_h/λ² [-]; below 1 the law is bounded.
+
+    Parameters
+    ----------
+    A_d : (2, 2) Hurwitz error dynamics [1/s].
+    law : coefficients of z and ξ̃ in the driving error.
+    forgetting : λ [1/s].
+    eta_W : learning rate of (11).
+    n_h : hidden units; |s|² <= n_h.
+    dt : step of explicit Euler [s]; None for continuous time.
+    direction : (2, 2) D [s], None for -A_d⁻ᵀ.
+    """
+    require_positive(forgetting=forgetting)
+    c_z, _ = law
+    return c_z * _peak(A_d, dt) * eta_W * _size(A_d, direction) * n_h / forgetting**2
+
+
+def steady_capacity(
+    A_d: npt.ArrayLike,
+    *,
+    law: Law,
+    forgetting: float,
+    eta_W: float,
+    rho_W: float,
+    n_h: int,
+    direction: Matrix | None = None,
+) -> float:
+    """n_h η_W |A_d⁻¹| (c_z/λ + c_ξ)/ρ_W [U]: the largest force that leakage lets W hold.
+
+    In steady state learning balances leakage, η_W |s|² |A_d⁻¹| (c_z/λ + c_ξ) |ξ̃| = ρ_W |ξ̃| |f_hat|:
+    a residual above it leaves an error however long one learns. It shrinks with |s|²/n_h.
+
+    Parameters
+    ----------
+    A_d : (2, 2) Hurwitz error dynamics [1/s].
+    law : coefficients of z and ξ̃ in the driving error.
+    forgetting : λ [1/s].
+    eta_W : learning rate of (11).
+    rho_W : leakage gain of (11) [1/(U s²)].
+    n_h : hidden units.
+    direction : (2, 2) D [s], None for -A_d⁻ᵀ.
+    """
+    require_positive(forgetting=forgetting, rho_W=rho_W)
+    c_z, c_xi = law
+    return n_h * eta_W * _size(A_d, direction) * (c_z / forgetting + c_xi) / rho_W
+
+
+def transient_peak(A_d: npt.ArrayLike) -> float:
+    """A bound on max over t of |exp(A_d t)| [-]: 1, or sqrt(cond P), A_dᵀ P + P A_d = -I.
+
+    Parameters
+    ----------
+    A_d : (2, 2) Hurwitz error dynamics [1/s].
+    """
+    matrix = require_hurwitz(A_d)
+    if np.linalg.eigvalsh(matrix + matrix.T)[-1] <= 0.0:
+        return 1.0  # |exp(A_d t)| never grows
+    return math.sqrt(float(np.linalg.cond(lyapunov(matrix, np.eye(2)).P)))
+
+
+def _peak(A_d: npt.ArrayLike, dt: float | None) -> float:
+    """γ of continuous time or of the Euler step [s]."""
+    return peak_gain(A_d) if dt is None else sampled_peak_gain(A_d, dt)
+
+
+def _size(A_d: npt.ArrayLike, direction: Matrix | None) -> float:
+    """|D| [s]."""
+    dynamics = require_hurwitz(A_d)
+    return float(np.linalg.norm(np.linalg.inv(dynamics) if direction is None else direction, 2))

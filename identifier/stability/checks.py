@@ -1,0 +1,422 @@
+"""Properties of the learning loop: poles, sampling, margins, damping, drift.
+
+Properties that bound error and weights, beside the bound of an identifier without a network.
+"""
+
+import math
+
+import numpy as np
+
+from identifier.paper.laws import Gains
+from identifier.stability.bounds import small_gain, steady_capacity
+from identifier.stability.loop import ComplexArray, Law, Loop, eigenvalues, exact
+from identifier.stability.lyapunov import Matrix, lyapunov
+from identifier.stability.margins import (
+    drift_frequency,
+    gain_margin,
+    phase_margin,
+    sufficient_leakage,
+)
+from identifier.stability.operation import Operation, Proven
+from identifier.stability.printed import printed_bounds, trivial_bound
+from identifier.stability.property import Property, Status, at_least, at_most, statement
+
+ENOUGH_GAIN, ENOUGH_PHASE, ENOUGH_DAMPING = 2.0, 30.0, 0.2
+LARGEST_STEP = 0.2  # fastest pole times dt that Euler resolves well
+
+
+def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
+    """A_d and λ: stable as they are sampled, resolved by the step, faster than the x_hat loop.
+
+    Parameters
+    ----------
+    gains : of (8) to (12).
+    operation : where it runs.
+    """
+    A_d = gains.matrix
+    poles = state_space_poles(A_d)
+    step = float(np.abs(poles).max()) * operation.dt
+    sampled = np.abs(operation.step(poles * operation.dt))
+    slowest = -math.log(float(sampled.max())) / operation.dt
+    filtered = gains.forgetting * operation.dt
+    resolved = operation.resolves(A_d)
+    lyapunov(A_d, np.eye(2))  # raises where P does not solve its equation
+    entries = [
+        _above_zero(
+            "error_dynamics",
+            "decay of the slowest pole of A_d, as sampled",
+            slowest,
+            "give A_d poles with a negative real part that the step resolves",
+        ),
+        Property(
+            name="filter_step",
+            title="lambda times the sampling interval",
+            value=filtered,
+            limit=1.0,
+            margin=1.0 / filtered,
+            status=at_most(filtered, good=1.0, bad=1.0),
+            unit="-",
+            advice=""
+            if filtered <= 1.0
+            else f"lambda below {1.0 / operation.dt:.3g} 1/s, or sample faster",
+        ),
+        Property(
+            name="sampling",
+            title="fastest pole of A_d times the sampling interval",
+            value=step,
+            limit=LARGEST_STEP,
+            margin=LARGEST_STEP / step,
+            status=at_most(step, good=LARGEST_STEP, bad=None) if resolved else "fail",
+            unit="-",
+            advice=""
+            if step <= LARGEST_STEP and resolved
+            else f"slow A_d down or sample every {1e3 * operation.dt * LARGEST_STEP / step:.3g} ms",
+        ),
+    ]
+    if operation.input_feedback is not None:
+        need = float(np.linalg.eigvals(operation.input_feedback).real.max())
+        entries.append(
+            _above_zero(
+                "estimated_input",
+                "decay left where the network reads the estimate on a saturated tire",
+                -float(np.linalg.eigvals(A_d + operation.input_feedback).real.max()),
+                f"make A_d faster than {need:.3g} 1/s, or let the network read the measured state",
+            )
+        )
+    return entries
+
+
+def margin_checks(loop: Loop, operation: Operation) -> list[Property]:
+    """Gain margin in continuous time and sampled, phase margin, damping.
+
+    Parameters
+    ----------
+    loop : the loop at the worst regressor.
+    operation : where it runs.
+    """
+    phase = phase_margin(loop, operation.step, operation.dt)
+    damping = worst_damping(loop)
+    advice = ("lower eta_W", "raise A_d and forgetting, or lower eta_W")
+    return [
+        _gain_check(
+            "gain_continuous", "loop gain, continuous time", loop, operation, sampled=False
+        ),
+        _gain_check("gain_sampled", "loop gain, sampled", loop, operation, sampled=True),
+        Property(
+            name="phase_margin",
+            title="phase margin of the sampled loop",
+            value=phase,
+            limit=ENOUGH_PHASE,
+            margin=phase / ENOUGH_PHASE,
+            status=at_least(phase, good=ENOUGH_PHASE, bad=1e-9),
+            unit="deg",
+            advice="" if phase >= ENOUGH_PHASE else advice[0],
+        ),
+        Property(
+            name="damping",
+            title="damping ratio of the learning loop",
+            value=damping,
+            limit=ENOUGH_DAMPING,
+            margin=damping / ENOUGH_DAMPING,
+            status=at_least(damping, good=ENOUGH_DAMPING, bad=1e-9),
+            unit="-",
+            advice="" if damping >= ENOUGH_DAMPING else advice[1],
+        ),
+    ]
+
+
+def weight_check(gains: Gains, operation: Operation, kept: float, judged: float) -> Property:
+    """Whether |W_hat| stays where the margins were judged; beside the point unless V learns.
+
+    Up to sqrt(η_V⁻¹ η_W)/x_bar_max the V layer adds nothing to the worst loop gain, however large
+    the weights at which the margins were judged.
+
+    Parameters
+    ----------
+    gains : of (8) to (12).
+    operation : where it runs.
+    kept : |W_hat| that is proven [U].
+    judged : |W_hat| at which the margins were judged [U].
+    """
+    limit = math.inf
+    if gains.eta_V > 0.0:
+        free = math.sqrt(gains.eta_W / gains.eta_V) / operation.x_bar_max
+        limit = max(judged, free)
+    holds = math.isfinite(kept) and kept <= limit * (1.0 + 1e-9)
+    advice = "project W, or raise rho_W and keep theta below 1"
+    if math.isfinite(limit):
+        advice = f"the margins hold up to |W| = {limit:.3g}: set W_max to it, or raise rho_W"
+    return Property(
+        name="weight_range",
+        title="largest |W| that is proven, against the one that the margins are judged at",
+        value=kept,
+        limit=limit,
+        margin=limit / kept if math.isfinite(kept) else 0.0,
+        status="pass" if holds else "warn",
+        unit="U",
+        advice="" if holds else advice,
+    )
+
+
+def state_space_poles(A_d: Matrix) -> ComplexArray:
+    """Poles of ξ̃' = A_d ξ̃ + (f - f_hat), by python-control (2,) [1/s].
+
+    Parameters
+    ----------
+    A_d : (2, 2) error dynamics [1/s].
+    """
+    import control  # takes a second to import, so only where it is needed
+
+    eye = np.eye(2)
+    error_dynamics = control.ss(A_d, eye, eye, np.zeros((2, 2)))
+    return np.asarray(control.poles(error_dynamics), dtype=np.complex128)
+
+
+def drift_check(gains: Gains, law: Law, operation: Operation, direction: Matrix) -> Property:
+    """Whether a regressor that moves at the maneuver's bandwidth makes the weights drift.
+
+    Parameters
+    ----------
+    gains : of (8) to (12).
+    law : coefficients of z and ξ̃ in the driving error.
+    operation : where it runs.
+    direction : (2, 2) D [s].
+    """
+    found = drift_frequency(
+        A_d=gains.matrix, forgetting=gains.forgetting, law=law, direction=direction
+    )
+    limit = found / (2 * math.pi)
+    advice = ""
+    if operation.bandwidth > limit:
+        leakage = sufficient_leakage(
+            A_d=gains.matrix,
+            forgetting=gains.forgetting,
+            law=law,
+            eta_W=gains.eta_W,
+            n_h=operation.n_h,
+            direction=direction,
+        )
+        advice = f"raise A_d and forgetting; a leakage of {leakage:.3g} 1/s would stop the drift"
+    return Property(
+        name="drift",
+        title="steering bandwidth, against the frequency above which weights drift",
+        value=operation.bandwidth,
+        limit=limit,
+        margin=limit / operation.bandwidth,
+        status=at_most(operation.bandwidth, good=limit, bad=None),
+        unit="Hz",
+        advice=advice,
+    )
+
+
+def worst_damping(loop: Loop) -> float:
+    """Smallest -Re/|.| of the oscillating eigenvalues of the loop, 1 if none oscillates.
+
+    sqrt(a³/g)/2 for the instantaneous law with A_d = -a I; negative where the loop is unstable.
+
+    Parameters
+    ----------
+    loop : the loop.
+    """
+    mu = eigenvalues(loop.matrix())
+    turning = mu[np.abs(mu.imag) > 1e-9 * np.abs(mu).max()]
+    if turning.size == 0:
+        return 1.0 if float(mu.real.max()) <= 0.0 else -1.0
+    return float(np.min(-turning.real / np.abs(turning)))
+
+
+def _gain_check(
+    name: str, title: str, loop: Loop, operation: Operation, *, sampled: bool
+) -> Property:
+    found = gain_margin(loop, operation.step if sampled else exact, operation.dt)
+    value = float(np.linalg.eigvalsh(loop.G)[-1])
+    status: Status = at_least(found.factor, good=ENOUGH_GAIN, bad=1.0)
+    advice = ""
+    if status != "pass":
+        factor = found.factor / ENOUGH_GAIN
+        advice = f"multiply eta_W and eta_V by {factor:.2g}" if factor > 0.0 else "change A_d"
+        if math.isfinite(found.frequency):
+            advice += f"; at the limit it oscillates at {found.frequency / (2 * math.pi):.2g} Hz"
+    return Property(
+        name=name,
+        title=title,
+        value=value,
+        limit=value * found.factor,
+        margin=found.factor,
+        status=status,
+        unit="1/s^4" if loop.law.z > 0.0 else "1/s^3",
+        advice=advice,
+    )
+
+
+def _above_zero(name: str, title: str, value: float, advice: str) -> Property:
+    good = value > 0.0
+    return Property(
+        name=name,
+        title=title,
+        value=value,
+        limit=0.0,
+        margin=value,
+        status="pass" if good else "fail",
+        unit="1/s",
+        advice="" if good else advice,
+    )
+
+
+CONDITION = (
+    "it holds while slip, friction, speed, steering, yaw rate and noise are as declared, no sample "
+    "is left out as impossible, and the first weights keep it (resumed ones too)"
+)
+
+
+def bound_checks(
+    gains: Gains, law: Law, operation: Operation, direction: Matrix, proven: Proven
+) -> list[Property]:
+    """Small gain, bounds of |ξ̃|, |W_hat| and |V_hat|, leakage, capacity, (14).
+
+    Parameters
+    ----------
+    gains : of (8) to (12).
+    law : coefficients of z and ξ̃ in the driving error.
+    operation : where it runs.
+    direction : (2, 2) D [s].
+    proven : of `proven_bounds`.
+    """
+    A_d = gains.matrix
+    if not operation.resolves(A_d):
+        return []  # sampled like this, nothing is bounded
+    trivial = trivial_bound(A_d, operation.disturbance.residual)
+    theta = small_gain(
+        A_d,
+        law=law,
+        forgetting=gains.forgetting,
+        eta_W=gains.eta_W,
+        n_h=operation.n_h,
+        dt=operation.dt if operation.integrator == "euler" else None,
+        direction=direction,
+    )
+    entries = [
+        Property(
+            name="small_gain",
+            title="theta: below 1 error and weights are proven bounded",
+            value=theta,
+            limit=1.0,
+            margin=1.0 / theta if theta > 0.0 else math.inf,
+            status=at_most(theta, good=math.nextafter(1.0, 0.0), bad=None),
+            unit="-",
+            advice="" if theta < 1.0 else f"multiply eta_W by {0.9 / theta:.2g}, or project W",
+        ),
+        statement(
+            "trivial_bound", "error bound of an identifier without a network", trivial, "U s"
+        ),
+        *_stated(proven),
+        _leakage("leakage_step", "W", proven.leakage_step, gains.rho_W),
+        _leakage("leakage_step_V", "V", proven.leakage_step_V, gains.rho_V),
+    ]
+    if gains.rho_W > 0.0:
+        entries.append(_capacity(gains, law, operation, direction))
+        if gains.W_free == gains.V_free == 0.0:  # (14) is of a leakage that never rests
+            entries += printed_bounds(gains, law, operation, trivial)
+    return entries
+
+
+def _stated(proven: Proven) -> list[Property]:
+    """State what is proven; warn where nothing bounds the error or a layer."""
+    entries = []
+    if proven.leakage is not None:
+        entries += [
+            statement(
+                "error_bound",
+                "proven bound of |xi - xi_hat| by the leakage",
+                proven.leakage.xi_tilde,
+                "U s",
+                CONDITION,
+            ),
+            statement("weight_bound", "proven bound of |W|", proven.leakage.W, "U", CONDITION),
+        ]
+    if proven.projection is not None:
+        entries.append(
+            statement(
+                "projection_bound",
+                "proven bound of |xi - xi_hat| by the projection",
+                proven.projection.xi_tilde,
+                "U s",
+                CONDITION,
+            )
+        )
+    if not math.isfinite(proven.xi_tilde):
+        entries.append(
+            _unproven(
+                "error_bound",
+                "proven bound of |xi - xi_hat|: there is none",
+                "U s",
+                "lower eta_W until theta is below 1 and give W a leakage, or project W",
+            )
+        )
+    if math.isfinite(proven.V):
+        entries.append(statement("V_bound", "proven bound of |V|", proven.V, "-", CONDITION))
+    else:
+        entries.append(
+            _unproven(
+                "V_bound",
+                "proven bound of |V|: there is none",
+                "-",
+                "give V a leakage below that of one sample, or project V",
+            )
+        )
+    return entries
+
+
+def _unproven(name: str, title: str, unit: str, advice: str) -> Property:
+    return Property(
+        name=name,
+        title=title,
+        value=math.inf,
+        limit=None,
+        margin=None,
+        status="warn",
+        unit=unit,
+        advice=advice,
+    )
+
+
+def _leakage(name: str, layer: str, step: float, rho: float) -> Property:
+    """Judge ρ dt |ξ̃|: up to 1 leakage shrinks the weights, beyond 2 it throws them about."""
+    return Property(
+        name=name,
+        title=f"largest share of {layer} that leaks in one sample",
+        value=step,
+        limit=1.0,
+        margin=1.0 / step if step > 0.0 else math.inf,
+        status=at_most(step, good=1.0, bad=2.0),
+        unit="-",
+        advice="" if step <= 1.0 else f"rho_{layer} below {rho / step:.3g}, or sample faster",
+    )
+
+
+def _capacity(gains: Gains, law: Law, operation: Operation, direction: Matrix) -> Property:
+    """Judge the force that leakage lets W hold: beyond the dead zone it holds what it did."""
+    resting = math.sqrt(operation.n_h) * gains.W_free
+    capacity = resting + steady_capacity(
+        gains.matrix,
+        law=law,
+        forgetting=gains.forgetting,
+        eta_W=gains.eta_W,
+        rho_W=gains.rho_W,
+        n_h=operation.n_h,
+        direction=direction,
+    )
+    need = operation.needed_force
+    enough = capacity >= need
+    return Property(
+        name="capacity",
+        title="largest steady force that the leakage lets the network hold",
+        value=capacity,
+        limit=need,
+        margin=capacity / need,
+        status=at_least(capacity, good=need, bad=None),
+        unit="U",
+        advice=""
+        if enough
+        else f"rho_W below {gains.rho_W * (capacity - resting) / (need - resting):.3g}",
+    )

@@ -1,0 +1,361 @@
+"""A plant ready to drive: the car, its tires and the compiled loop over time.
+
+What a plant recorded: the motion, and the forces behind it, which no car measures.
+
+The plant one control period at a time: for a driver or a controller that looks before it steers.
+
+The same compiled loop as `Plant.simulate`, so that the same commands give the same numbers.
+"""
+
+import os
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen import Scan
+from models.friction import Friction
+from models.maneuvers import Maneuver
+from models.plant.dynamics import N_STATES, Driver, dynamics, runge_kutta
+from models.recordings import Recording
+from models.sensors import Sensors
+from models.tires import MagicFormula, Tire
+from models.vehicle import Vehicle, VehicleError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlantRun:
+    """The truth of a run: n samples, SI, ISO axes; wheels in the order FL, FR, RL, RR.
+
+    Parameters
+    ----------
+    name : of the run.
+    vehicle : the car that drove.
+    t : time [s], (n,).
+    v_x, v_y : velocity of the center of gravity in the body frame [m/s], (n,).
+    r : yaw rate [rad/s], (n,).
+    a_x, a_y : acceleration of the center of gravity, a_y = dv_y/dt + v_x r [m/s^2], (n,).
+    command : steering asked for, [δ_f, δ_r] [rad], (n, 2).
+    delta_f, delta_r : actual angles of the road wheels [rad], (n,).
+    roll, roll_rate : of the body, positive when the right side dips [rad], [rad/s], (n,).
+    X, Y, psi : position [m] and heading [rad], (n,).
+    F_x, F_y : forces of the wheels in their own frame [N], (n, 4).
+    F_z : loads of the wheels [N], (n, 4).
+    alpha : slip angles of the wheels in the paper's sign, δ - atan2(v_y, v_x) [rad], (n, 4); the
+        force follows them over the relaxation length.
+    axle_force : sum of F_y cos δ + F_x sin δ over each axle [N], (n, 2).
+    """
+
+    name: str
+    vehicle: Vehicle
+    t: Array
+    v_x: Array
+    v_y: Array
+    r: Array
+    a_x: Array
+    a_y: Array
+    command: Array
+    delta_f: Array
+    delta_r: Array
+    roll: Array
+    roll_rate: Array
+    X: Array
+    Y: Array
+    psi: Array
+    F_x: Array
+    F_y: Array
+    F_z: Array
+    alpha: Array
+    axle_force: Array
+
+    @classmethod
+    def from_record(
+        cls, name: str, vehicle: Vehicle, t: Array, command: Array, record: Mapping[str, Array]
+    ) -> "PlantRun":
+        """Name the columns of what the compiled loop recorded.
+
+        Parameters
+        ----------
+        name : of the run.
+        vehicle : the car that drove.
+        t : time [s], (n,).
+        command : steering asked for [rad], (n, 2).
+        record : state "x" (n, 18) in the order of `models.plant.dynamics`, and its outputs.
+        """
+        names = ("v_x", "v_y", "r", "roll", "roll_rate", "X", "Y", "psi")
+        motion = dict(zip(names, record["x"].T, strict=False))
+        delta_f, delta_r = record["x"][:, 12], record["x"][:, 13]
+        a_x, a_y = record["acceleration"].T
+        forces = {key: record[key] for key in ("F_x", "F_y", "F_z", "alpha", "axle_force")}
+        return cls(
+            name=name,
+            vehicle=vehicle,
+            t=t,
+            a_x=a_x,
+            a_y=a_y,
+            command=command,
+            delta_f=delta_f,
+            delta_r=delta_r,
+            **motion,
+            **forces,
+        )
+
+    def recording(
+        self, sensors: Sensors | None = None, rng: np.random.Generator | None = None
+    ) -> Recording:
+        """Return what a log of this run would hold, with the axle forces as truth.
+
+        Parameters
+        ----------
+        sensors : what the signals go through; None measures exactly.
+        rng : source of the noise; needed when there are sensors.
+
+        Raises
+        ------
+        ValueError
+            When sensors come without a generator.
+        """
+        exact = Recording(
+            name=self.name,
+            t=self.t,
+            v_x=self.v_x,
+            v_y=self.v_y,
+            r=self.r,
+            delta_f=self.delta_f,
+            delta_r=self.delta_r,
+            a_y=self.a_y,
+            axle_force=self.axle_force,
+        )
+        if sensors is None:
+            return exact
+        if rng is None:
+            raise ValueError("sensors need a random generator: pass rng")
+        return sensors.apply(exact, rng)
+
+
+Speed = float | Callable[[Array], Array]
+
+
+class PlantError(ArithmeticError):
+    """The car left the range of its equations; the message says when."""
+
+
+@cache
+def compiled_loop(vehicle: Vehicle, tire: Tire, driver: Driver, dt: float) -> Scan:
+    """Return the compiled loop of a plant over time, built once.
+
+    Parameters
+    ----------
+    vehicle : the car, with chassis.
+    tire : of all four wheels, hashable.
+    driver : who holds the speed.
+    dt : step of the integration [s].
+    """
+    step = runge_kutta(dynamics(vehicle, tire, driver), dt)
+    return Scan(step, carry=("x",), over=("command", "v_ref", "mu"))
+
+
+class Plant:
+    """A double-track car on its tires.
+
+    Parameters
+    ----------
+    vehicle : the car; it needs a chassis.
+    tire : of all four wheels, a frozen record; None reads the file named by the chassis.
+    driver : who holds the speed.
+
+    Raises
+    ------
+    VehicleError
+        When the vehicle has no chassis, or names no tire where none is given.
+    """
+
+    def __init__(
+        self, vehicle: Vehicle, tire: Tire | None = None, *, driver: Driver | None = None
+    ) -> None:
+        file = vehicle.require_chassis().tire
+        if tire is None and file is None:
+            raise VehicleError(f"vehicle '{vehicle.name}' names no tire file and none was given")
+        self.vehicle = vehicle
+        if tire is None:
+            tire = MagicFormula.from_tir(os.fspath(file or ""))
+        self.tire: Tire = tire
+        self.driver = driver if driver is not None else Driver()
+
+    def simulate(
+        self,
+        maneuver: Maneuver,
+        *,
+        speed: Speed,
+        friction: Friction | None = None,
+        dt: float = 1e-3,
+        sample_time: float = 0.01,
+        name: str | None = None,
+    ) -> PlantRun:
+        """Drive a maneuver from straight ahead, with classical Runge-Kutta steps.
+
+        Parameters
+        ----------
+        maneuver : what the wheels are asked to do, and for how long.
+        speed : wanted speed [m/s], a number or a function of the times (n,) [s].
+        friction : of the road; None is what the tire was measured on.
+        dt : step of the integration [s].
+        sample_time : step of the record [s], a multiple of `dt`.
+        name : of the run; None takes the name of the maneuver's class.
+
+        Returns
+        -------
+        The run at every `sample_time` from 0 to the maneuver's duration.
+
+        Raises
+        ------
+        ValueError
+            For steps that do not fit, or a speed that is not positive at the start.
+        PlantError
+            When a state stops being a finite number.
+        """
+        every = round(sample_time / dt) if dt > 0.0 else 0
+        if not (every >= 1 and abs(every * dt - sample_time) < 1e-9 * sample_time):
+            raise ValueError(f"sample_time {sample_time} must be a multiple of dt {dt}")
+        n = every * round(maneuver.duration / sample_time) + 1
+        t = dt * np.arange(n, dtype=np.float64)
+        middle = t + 0.5 * dt  # inputs are held over a step: at its middle they are not late
+        command = maneuver.steering(middle)
+        v_ref = speed(middle) if callable(speed) else np.full(n, float(speed))
+        for label, given, shape in (("steering", command, (n, 2)), ("speed", v_ref, (n,))):
+            if np.shape(given) != shape or not np.isfinite(given).all():
+                raise ValueError(f"{label} must be finite and of shape {shape}")
+        if not v_ref[0] > 0.0:
+            raise ValueError(f"speed must be positive at the start, it is {v_ref[0]}")
+        road = friction if friction is not None else Friction()
+        start = np.zeros(N_STATES)
+        start[0] = v_ref[0]
+        values = {"x": start, "command": command, "v_ref": v_ref}
+        values |= {"mu": road.over_time(middle), "places": road.over_place()}
+        record = compiled_loop(self.vehicle, cast(Hashable, self.tire), self.driver, dt)(
+            n, values, every=every
+        )
+        finite = np.isfinite(record["x"]).all(axis=1)
+        if not finite.all():
+            raise PlantError(f"the car's state is not finite from t = {t[::every][~finite][0]} s")
+        name = name if name is not None else type(maneuver).__name__
+        t = t[::every]
+        return PlantRun.from_record(name, self.vehicle, t, maneuver.steering(t), record)
+
+
+class PlantState(NamedTuple):
+    """The plant at one instant; nothing changes it, `StepwisePlant.step` returns the next.
+
+    Forces and acceleration are those under the inputs of the period that ends here.
+    """
+
+    steps: int
+    """Steps of the integration since the start."""
+    x: Array
+    """State (18,) in the order of `models.plant.dynamics`."""
+    axle_force: Array
+    """Side force of the front and the rear axle, frame of the body, (2,) [N]."""
+    acceleration: Array
+    """Of the center of gravity along the axes of the body, (2,) [m/s^2]."""
+    alpha: Array
+    """Slip angles of the wheels FL, FR, RL, RR in the paper's sign, (4,) [rad]."""
+    F_z: Array
+    """Loads of the wheels, (4,) [N]."""
+
+
+class StepwisePlant:
+    """A plant that is driven period by period.
+
+    Parameters
+    ----------
+    plant : the car on its tires.
+    friction : of the road; None is what the tire was measured on.
+    period : for which command and wanted speed are held [s], a multiple of `dt`.
+    dt : step of the integration [s].
+
+    Raises
+    ------
+    ValueError
+        When the period is not a multiple of the step.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        *,
+        friction: Friction | None = None,
+        period: float = 0.01,
+        dt: float = 1e-3,
+    ) -> None:
+        every = round(period / dt)
+        if not (dt > 0.0 and every >= 1 and abs(every * dt - period) < 1e-9 * period):
+            raise ValueError(f"period {period} must be a multiple of dt {dt}")
+        self.plant = plant
+        self.friction = friction if friction is not None else Friction()
+        self.period = period
+        self.dt = dt
+        self._every = every
+        self._places = self.friction.over_place()
+        self._scan = compiled_loop(plant.vehicle, cast(Hashable, plant.tire), plant.driver, dt)
+
+    def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> PlantState:
+        """Return the car rolling straight ahead.
+
+        Parameters
+        ----------
+        v_x : speed [m/s].
+        X, Y : position of the center of gravity [m].
+        psi : heading [rad].
+
+        Raises
+        ------
+        ValueError
+            When the speed is not positive.
+        """
+        if not v_x > 0.0:
+            raise ValueError(f"v_x must be positive at the start, it is {v_x}")
+        x = np.zeros(N_STATES)
+        x[[0, 5, 6, 7]] = v_x, X, Y, psi
+        return self._run(0, 1, x, np.zeros(2), v_x)
+
+    def step(self, state: PlantState, command: Array, v_ref: float) -> PlantState:
+        """Return the plant one period later.
+
+        Parameters
+        ----------
+        state : now.
+        command : steering angles asked for, [δ_f, δ_r] [rad].
+        v_ref : wanted speed [m/s].
+
+        Raises
+        ------
+        ValueError
+            When the inputs are not finite.
+        PlantError
+            When a state stops being a finite number.
+        """
+        if not np.isfinite([*command, v_ref]).all():
+            raise ValueError(f"command and v_ref must be finite, they are {command} and {v_ref}")
+        # One step more than the period has: its outputs are those of the period's end.
+        return self._run(state.steps, self._every + 1, state.x, command, v_ref)
+
+    def _run(self, start: int, n: int, x: Array, command: Array, v_ref: float) -> PlantState:
+        middle = self.dt * np.arange(start, start + n, dtype=np.float64) + 0.5 * self.dt
+        values = {
+            "x": x,
+            "command": np.tile(command, (n, 1)),
+            "v_ref": np.full(n, v_ref),
+            "mu": self.friction.over_time(middle),
+            "places": self._places,
+        }
+        record = self._scan(n, values, every=max(n - 1, 1))
+        now = start + n - 1
+        if not np.isfinite(record["x"][-1]).all():
+            raise PlantError(f"the car's state is not finite from t = {now * self.dt:.3f} s")
+        outputs = (record[name][-1] for name in PlantState._fields[2:])
+        return PlantState(now, record["x"][-1], *outputs)

@@ -1,0 +1,176 @@
+"""The tire of the linear bicycle: force proportional to slip, without limit.
+
+Fiala's brush tire in combined slip: parabolic pressure, one friction coefficient.
+
+A tread that never slides would give γ = |(C_κ σ_x, C_α σ_y)|, σ = [κ, tan α]/(1 + κ). Sliding
+starts at the rear edge of the contact and takes all of it at γ = 3 μ F_z:
+    F = γ - γ²/(3 μ F_z) + γ³/(27 μ² F_z²),   γ < 3 μ F_z;   F = μ F_z otherwise,
+along (C_κ σ_x, C_α σ_y).
+Source: Pacejka, Tyre and Vehicle Dynamics, ch. 3.2-3.3; Fiala, VDI-Z 96 (1954).
+
+Dugoff's tire: linear until half the friction is used, then a hyperbola; combined slip for free.
+
+F_x = C_κ κ f(λ)/(1 + κ),   F_y = C_α tan α f(λ)/(1 + κ),   f(λ) = λ (2 - λ), λ < 1;   1 otherwise,
+λ = μ F_z (1 + κ) / (2 |(C_κ κ, C_α tan α)|).
+Source: Dugoff, Fancher and Segel, SAE 700377 (1970), constant friction coefficient.
+"""
+
+from dataclasses import dataclass
+
+from models.files import require_positive
+from models.tires import forces as constant_stiffness
+from models.tires.forces import NO_FORCE, Expression, TireForces, positive, slips, smaller
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinearTire:
+    """F_x = C_κ κ, F_y = C_α α while the wheel touches the ground.
+
+    Load only decides about contact; friction and camber do nothing: no limit, by definition.
+
+    Parameters
+    ----------
+    C_alpha : cornering stiffness of one tire [N/rad], > 0.
+    C_kappa : longitudinal slip stiffness of one tire [N], > 0.
+
+    Raises
+    ------
+    ValueError
+        A stiffness is not positive and finite.
+    """
+
+    C_alpha: float
+    C_kappa: float
+
+    def __post_init__(self) -> None:
+        require_positive(ValueError, C_alpha=self.C_alpha, C_kappa=self.C_kappa)
+
+    def forces(
+        self,
+        alpha: Expression,
+        kappa: Expression,
+        gamma: Expression,  # noqa: ARG002
+        F_z: Expression,
+        mu: Expression = 1.0,  # noqa: ARG002
+    ) -> TireForces:
+        """Longitudinal and lateral force in the wheel frame [N].
+
+        Parameters
+        ----------
+        alpha : slip angle, paper's sign [rad].
+        kappa : longitudinal slip [-].
+        gamma : camber [rad]; without effect.
+        F_z : wheel load [N]; no force at F_z <= 0.
+        mu : friction of the road over that of the measurement [-]; without effect.
+        """
+        return TireForces(self.slip_stiffness(F_z) * kappa, self.cornering_stiffness(F_z) * alpha)
+
+    slip_stiffness = constant_stiffness.slip_stiffness
+    cornering_stiffness = constant_stiffness.cornering_stiffness
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FialaTire:
+    """Brush tire: |F| <= μ F_z exactly, smooth into full sliding; camber does nothing.
+
+    Parameters
+    ----------
+    C_alpha : cornering stiffness of one tire [N/rad], > 0, at every load.
+    C_kappa : longitudinal slip stiffness of one tire [N], > 0, at every load.
+    friction : friction coefficient of the tire as measured [-], > 0.
+
+    Raises
+    ------
+    ValueError
+        A parameter is not positive and finite.
+    """
+
+    C_alpha: float
+    C_kappa: float
+    friction: float
+
+    def __post_init__(self) -> None:
+        require_positive(
+            ValueError, C_alpha=self.C_alpha, C_kappa=self.C_kappa, friction=self.friction
+        )
+
+    def forces(
+        self,
+        alpha: Expression,
+        kappa: Expression,
+        gamma: Expression,  # noqa: ARG002
+        F_z: Expression,
+        mu: Expression = 1.0,
+    ) -> TireForces:
+        """Longitudinal and lateral force in the wheel frame [N].
+
+        Parameters
+        ----------
+        alpha : slip angle, paper's sign [rad].
+        kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
+        gamma : camber [rad]; without effect.
+        F_z : wheel load [N]; no force at F_z <= 0.
+        mu : friction of the road over that of the measurement [-].
+        """
+        s = slips(alpha, kappa, self.C_alpha, self.C_kappa)
+        sliding = 3.0 * mu * self.friction * positive(F_z)  # demand at which all contact slides
+        demand = s.size / s.rolling
+        x = smaller(demand / (sliding + NO_FORCE), 1.0)
+        per_demand = (1.0 - x + x**2 / 3.0) * smaller(1.0 / s.rolling, sliding / s.size)
+        return TireForces(s.p_x * per_demand, s.p_y * per_demand)
+
+    slip_stiffness = constant_stiffness.slip_stiffness
+    cornering_stiffness = constant_stiffness.cornering_stiffness
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DugoffTire:
+    """Friction-limited linear tire: |F| < μ F_z, reached only in the limit; camber does nothing.
+
+    Parameters
+    ----------
+    C_alpha : cornering stiffness of one tire [N/rad], > 0, at every load.
+    C_kappa : longitudinal slip stiffness of one tire [N], > 0, at every load.
+    friction : friction coefficient of the tire as measured [-], > 0.
+
+    Raises
+    ------
+    ValueError
+        A parameter is not positive and finite.
+    """
+
+    C_alpha: float
+    C_kappa: float
+    friction: float
+
+    def __post_init__(self) -> None:
+        require_positive(
+            ValueError, C_alpha=self.C_alpha, C_kappa=self.C_kappa, friction=self.friction
+        )
+
+    def forces(
+        self,
+        alpha: Expression,
+        kappa: Expression,
+        gamma: Expression,  # noqa: ARG002
+        F_z: Expression,
+        mu: Expression = 1.0,
+    ) -> TireForces:
+        """Longitudinal and lateral force in the wheel frame [N].
+
+        Parameters
+        ----------
+        alpha : slip angle, paper's sign [rad].
+        kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
+        gamma : camber [rad]; without effect.
+        F_z : wheel load [N]; no force at F_z <= 0.
+        mu : friction of the road over that of the measurement [-].
+        """
+        s = slips(alpha, kappa, self.C_alpha, self.C_kappa)
+        half = mu * self.friction * positive(F_z) / (2.0 * s.size)  # λ/(1 + κ)
+        lam = smaller(half * s.rolling, 1.0)
+        per_demand = smaller(half, 1.0 / s.rolling) * (2.0 - lam)  # f(λ)/(1 + κ), no 0/0 at lock
+        return TireForces(s.p_x * per_demand, s.p_y * per_demand)
+
+    slip_stiffness = constant_stiffness.slip_stiffness
+    cornering_stiffness = constant_stiffness.cornering_stiffness

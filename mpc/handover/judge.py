@@ -1,0 +1,318 @@
+"""How badly a tire explains what the car did: forces against impulses, without a derivative.
+
+ξ_i = v_y/g ± I_z r/(L F_z,i) [s], the impulse of axle i over its static load, obeys
+dξ_i/dt = F_i/F_z,i - v_x r/g exactly. So the slope over a stretch of time of
+    ξ - ∫ (F/F_z - v_x r/g) dt,
+by least squares, is the mean error e of the force that a tire tells from the measured motion, in
+static axle loads: 0.1 at both axles are 1 m/s². (The slope has two thirds of the noise of a
+difference of two samples.) The misfit Σ (e/σ)² is -2 ln of the likelihood, up to a constant.
+
+The last seconds of a drive: what models are judged on.
+
+The axle forces that prediction tires tell from measured motion, sample by sample.
+"""
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, NamedTuple, cast
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen import Scan
+from identifier.axle.car import car_numbers, require_positive
+from models.vehicle import GRAVITY
+from mpc.tires import TireModel
+from mpc.tires.tire import Car, Point
+
+Array = NDArray[np.float64]
+
+COLUMNS = ("v_x", "v_y", "r", "delta")  # m/s, m/s, rad/s, rad
+
+
+class Window:
+    """The last samples in the order of `COLUMNS`, oldest first, always in one piece of memory.
+
+    Parameters
+    ----------
+    seconds : longest time that can be looked back on [s].
+    dt : sampling interval [s].
+
+    Raises
+    ------
+    ValueError
+        Where there is not room for two samples.
+    """
+
+    def __init__(self, seconds: float, dt: float) -> None:
+        n = round(seconds / dt)
+        if not n >= 2:
+            raise ValueError(f"a window of {seconds:g} s holds no two samples every {dt:g} s")
+        self.dt = dt
+        self._n = n
+        self._rows = np.zeros((3 * n, len(COLUMNS)))
+        self._end = 0
+        self._kept = 0
+
+    def add(self, sample: Sequence[float]) -> None:
+        """Take a sample.
+
+        Parameters
+        ----------
+        sample : in the order of `COLUMNS`.
+        """
+        if self._end == len(self._rows):
+            self._rows[: self._n] = self._rows[-self._n :]
+            self._end = self._n
+        self._rows[self._end] = sample
+        self._end += 1
+        self._kept = min(self._kept + 1, self._n)
+
+    def __len__(self) -> int:
+        """Return the number of samples at hand."""
+        return self._kept
+
+    @property
+    def duration(self) -> float:
+        """Time that can be looked back on [s]."""
+        return self._kept * self.dt
+
+    def last(self, seconds: float) -> Array:
+        """Return the last samples (n, 4), a view; all of them where there are fewer.
+
+        Parameters
+        ----------
+        seconds : time to look back [s].
+        """
+        n = min(round(seconds / self.dt), self._kept)
+        return self._rows[self._end - n : self._end]
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._kept = 0
+
+
+SHORTEST_LAG = 1e-3  # m
+
+
+def axle_forces(tire: TireModel, weights: Array, samples: Array, dt: float) -> Array:
+    """Return the axle forces (k, n, 2) [N] of k tires, frame of the body; a lag begins settled.
+
+    Parameters
+    ----------
+    tire : structure and car; its weights are not read.
+    weights : of k tires (k, n_weights).
+    samples : rows of `window.COLUMNS`, (n, 4).
+    dt : sampling interval [s].
+    """
+    k = len(weights)
+    run = axle_scan(cast(Hashable, tire.structure), k)(
+        len(samples),
+        {
+            "lagged": np.zeros((2, k)),
+            "begun": np.zeros(1),
+            "sample": samples,
+            "dt": np.array(dt),
+            "car": tire.car,
+            "w": weights.T,
+        },
+    )
+    return run["axle_force"].reshape(len(samples), k, 2).swapaxes(0, 1)
+
+
+@cache
+def axle_scan(structure: Any, k: int) -> Scan:
+    """Return the compiled loop: slip, its lag held exactly over a sample, force of k tires.
+
+    Parameters
+    ----------
+    structure : of the tires.
+    k : number of tires.
+    """
+    lagged, begun = ca.SX.sym("lagged", 2, k), ca.SX.sym("begun")
+    sample, dt = ca.SX.sym("sample", len(COLUMNS)), ca.SX.sym("dt")
+    car, w = ca.SX.sym("car", 4), ca.SX.sym("w", structure.n_weights, k)
+    slips, forces = [], []
+    for i in range(k):
+        v_x, v_y, r, delta = ca.vertsplit(sample)
+        at = Point(v_y, r, delta, v_x, Car(*ca.vertsplit(car)), w[:, i])
+        slip: Any = ca.vertcat(*structure.slip(at))
+        if structure.lagged:
+            sigma = ca.vertcat(*structure.lag_length((lagged[0, i], lagged[1, i]), at))
+            share = 1 - ca.exp(-v_x * dt / ca.fmax(sigma, SHORTEST_LAG))
+            slip = ca.if_else(begun > 0, lagged[:, i] + share * (slip - lagged[:, i]), slip)
+        slips.append(slip)
+        forces.append(ca.vertcat(*structure.force((slip[0], slip[1]), at)))
+    step = ca.Function(
+        f"axle_forces_{k}",
+        [lagged, begun, sample, dt, car, w],
+        [ca.densify(value) for value in (ca.horzcat(*slips), ca.SX(1), ca.vertcat(*forces))],
+        ["lagged", "begun", "sample", "dt", "car", "w"],
+        ["lagged_next", "begun_next", "axle_force"],
+        {"cse": True},
+    )
+    return Scan(step, carry=("lagged", "begun"), over=("sample",))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ErrorModel:
+    """What errors are expected of a good tire.
+
+    Parameters
+    ----------
+    stretch : time over which forces are averaged [s].
+    settle : time before the first judged stretch, for the lag of the tire [s].
+    error : standard deviation [static axle loads]; 0.02 is 0.2 m/s².
+    relative_error : the same, as a share of the force [-].
+    accelerating : added to that share for each g of acceleration or braking, which shifts load
+        between the axles and takes grip [-].
+    largest : error that counts in full [standard deviations]: one fault alone proves nothing.
+
+    Raises
+    ------
+    ValueError
+        Where a number is not positive.
+    """
+
+    stretch: float = 0.12
+    settle: float = 0.1
+    error: float = 0.02
+    relative_error: float = 0.05
+    accelerating: float = 0.3
+    largest: float = 5.0
+
+    def __post_init__(self) -> None:
+        require_positive(self)
+
+
+class Misfit(NamedTuple):
+    """Σ (e/σ)² over independent stretches and both axles [-], the number of those, rms of e (2,).
+
+    The rms is in static axle loads, front and rear.
+    """
+
+    total: float
+    independent: float
+    rms: Array
+
+    @property
+    def mean(self) -> float:
+        """Mean of (e/σ)² [-]: about 1 or less for a tire as good as is expected."""
+        return self.total / self.independent
+
+
+class Judge:
+    """Misfits of tires over samples that come at one interval.
+
+    Parameters
+    ----------
+    dt : sampling interval [s].
+    expected : errors of a good tire; None takes the default.
+
+    Raises
+    ------
+    ValueError
+        Where a stretch has no three samples.
+    """
+
+    def __init__(self, dt: float, expected: ErrorModel | None = None) -> None:
+        self.expected = expected or ErrorModel()
+        self.dt = dt
+        self._h = round(self.expected.stretch / dt)
+        self._settle = round(self.expected.settle / dt)
+        if self._h < 2:
+            raise ValueError(f"a stretch of {self.expected.stretch:g} s has no three samples")
+        centered = np.arange(self._h + 1) - 0.5 * self._h
+        self._slope = centered / (dt * np.sum(centered**2))
+        self._mean = np.full(self._h + 1, 1.0 / (self._h + 1))
+
+    def reach(self, seconds: float) -> float:
+        """Return how far back samples must go to judge the last seconds [s].
+
+        Parameters
+        ----------
+        seconds : in which the judged stretches end [s].
+        """
+        return seconds + (self._settle + self._h + 1) * self.dt
+
+    def errors(self, tire: TireModel, samples: Array) -> tuple[Array, Array]:
+        """Return e (m, 2) and the forces that it is the error of (m, 2) [static axle loads].
+
+        Parameters
+        ----------
+        tire : the model.
+        samples : rows of `window.COLUMNS`, (n, 4); m = n - settle - stretch, in samples.
+
+        Raises
+        ------
+        ValueError
+            Where there are too few samples.
+        """
+        e, force = self._errors(tire, tire.weights[None], samples)
+        return e[0], force[0]
+
+    def misfit(self, tire: TireModel, samples: Array) -> Misfit:
+        """Return how badly a tire explains samples.
+
+        Parameters
+        ----------
+        tire : the model.
+        samples : as for `errors`.
+
+        Raises
+        ------
+        ValueError
+            Where there are too few samples.
+        """
+        return self.misfits(tire, tire.weights[None], samples)[0]
+
+    def misfits(self, tire: TireModel, weights: Array, samples: Array) -> list[Misfit]:
+        """Return how badly k tires explain samples.
+
+        Parameters
+        ----------
+        tire : structure and car; its weights are not read.
+        weights : of k tires (k, n_weights).
+        samples : as for `errors`.
+
+        Raises
+        ------
+        ValueError
+            Where there are too few samples.
+        """
+        e, force = self._errors(tire, weights, samples)
+        expected = self.expected
+        a_x = _along(samples[self._settle :, :1], self._slope) / GRAVITY
+        share = expected.relative_error + expected.accelerating * np.abs(a_x)
+        sigma = expected.error + share * np.abs(force)
+        size = np.minimum(np.abs(e) / sigma, self.expected.largest)
+        size = np.where(np.isfinite(size), size, self.expected.largest)
+        mean = np.mean(size**2, axis=(1, 2))
+        rms = np.sqrt(np.mean(e**2, axis=1))
+        independent = 2.0 * (1.0 + (e.shape[1] - 1) / self._h)
+        return [
+            Misfit(float(one) * independent, independent, error)
+            for one, error in zip(mean, rms, strict=True)
+        ]
+
+    def _errors(self, tire: TireModel, weights: Array, samples: Array) -> tuple[Array, Array]:
+        """Return e and forces of k tires (k, m, 2) [static axle loads]."""
+        n, least = len(samples), self._settle + self._h
+        if n <= least:
+            raise ValueError(f"to judge a tire takes more than {least} samples, there are {n}")
+        inertia, load = car_numbers(tire.vehicle)[:, 2:].T
+        phi = axle_forces(tire, weights, samples, self.dt)[:, self._settle :] / load
+        v_x, v_y, r = samples[self._settle :, :3].T
+        xi = v_y[:, None] / GRAVITY + inertia * r[:, None]
+        rate = phi - (v_x * r / GRAVITY)[:, None]
+        told = np.cumsum(0.5 * (rate[:, 1:] + rate[:, :-1]), axis=1) * self.dt  # trapezoidal
+        gap = xi - xi[0] - np.concatenate([np.zeros((len(phi), 1, 2)), told], axis=1)
+        return _along(gap, self._slope), _along(phi, self._mean)
+
+
+def _along(signals: Array, kernel: Array) -> Array:
+    """Return Σ_j kernel_j s(i + j) along the samples of signals (..., n, 2): (..., m, 2)."""
+    stretches = np.lib.stride_tricks.sliding_window_view(signals, len(kernel), axis=-2)
+    return np.asarray(stretches @ kernel, dtype=np.float64)

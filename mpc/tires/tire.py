@@ -1,0 +1,232 @@
+"""What a tire is to the prediction: a structure of formulas, and numbers that fill it at run time.
+
+v_y [m/s], r [rad/s] and δ of the front wheel [rad] make slip angles α = δ - (v_y ± l r)/v_x in the
+paper's sign, the negative of ISO 8855, and slip makes lateral axle forces F = +C α [N] in the frame
+of the body. Only the structure is compiled; the car and the weights are read while driving.
+
+How far slip is of use, and what the tracker believes beyond: a curve that goes on rising.
+
+Beyond the peak of its curve an axle gives less, and more slip is the wrong way out. A tracker that
+linearizes there and wants less force steers on, farther from where it has to go, and stays there.
+So it believes F(x) + rise (α - x) beyond the slip x that is of use: more slip never gives less.
+"""
+
+from functools import cache
+from typing import Any, NamedTuple, Protocol, TypeAlias
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from models.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+Pair: TypeAlias = tuple[Any, Any]  # front, rear: SX expressions or numbers
+
+
+class Car(NamedTuple):
+    """What the equations of motion read: m [kg], I_z [kg m²], l_f and l_r [m]."""
+
+    m: Any
+    I_z: Any
+    l_f: Any
+    l_r: Any
+
+
+class Point(NamedTuple):
+    """Where a tire is asked: v_y [m/s], r [rad/s], δ in front [rad], v_x > 0 [m/s], car, w."""
+
+    v_y: Any
+    r: Any
+    delta: Any
+    v_x: Any
+    car: Car
+    w: Any
+
+
+class PredictionTire(Protocol):
+    """Formulas of the axle forces, hashable and equal where they compile to the same code.
+
+    Written with `ca.tanh`, `ca.atan` and the like: the stage replaces them by our own, after it has
+    taken the derivatives.
+    """
+
+    def __hash__(self) -> int: ...
+
+    @property
+    def n_weights(self) -> int:
+        """Numbers in w."""
+
+    @property
+    def lagged(self) -> bool:
+        """Whether force follows a lagged slip, two more states [rad]."""
+
+    def slip(self, at: Point) -> Pair:
+        """Return the kinematic slip angles [rad], paper's sign.
+
+        Parameters
+        ----------
+        at : motion, car and weights.
+        """
+
+    def force(self, slip: Pair, at: Point) -> Pair:
+        """Return the axle forces [N], frame of the body.
+
+        Parameters
+        ----------
+        slip : what makes the force [rad]: lagged slip where `lagged`, else the kinematic one.
+        at : motion, car and weights.
+        """
+
+    def lag_length(self, slip: Pair, at: Point) -> Pair:
+        """Return the relaxation lengths [m]; asked only where `lagged`.
+
+        Parameters
+        ----------
+        slip : lagged slip [rad].
+        at : motion, car and weights.
+        """
+
+
+class TireModel(NamedTuple):
+    """A structure with its weights (n_weights,), and the car that they are of."""
+
+    structure: PredictionTire
+    weights: Array
+    vehicle: Vehicle
+
+    @property
+    def car(self) -> Array:
+        """The numbers of `Car`, (4,)."""
+        return np.array(self.vehicle.bicycle[:4])
+
+
+def wheel_slip(self: PredictionTire, at: Point) -> Pair:
+    """Return α = δ - atan((v_y ± l r)/v_x) [rad]; the rear wheels do not steer. A method `slip`.
+
+    Parameters
+    ----------
+    at : motion and car.
+    """
+    del self
+    v_y, r, delta, v_x, car, _ = at
+    per_speed = 1 / v_x
+    front = delta - ca.atan((v_y + car.l_f * r) * per_speed)
+    return front, -ca.atan((v_y - car.l_r * r) * per_speed)
+
+
+def small_slip(self: PredictionTire, at: Point) -> Pair:
+    """Return α = δ - (v_y ± l r)/v_x [rad], as the paper's (3) has it. A method `slip`.
+
+    Parameters
+    ----------
+    at : motion and car.
+    """
+    del self
+    v_y, r, delta, v_x, car, _ = at
+    per_speed = 1 / v_x
+    return delta - (v_y + car.l_f * r) * per_speed, -(v_y - car.l_r * r) * per_speed
+
+
+def no_lag(self: PredictionTire, slip: Pair, at: Point) -> Pair:
+    """Return 0 m: force follows slip at once. A method `lag_length`.
+
+    Parameters
+    ----------
+    slip : not looked at.
+    at : not looked at.
+    """
+    del self, slip, at
+    return 0.0, 0.0
+
+
+FLAT = 0.05  # of the slope at zero: the peak is reached within a per cent or two of its force
+LEAST_RISE = 0.04  # of the slope at zero; a little less than where slip ends to be of use
+SLIPS = np.linspace(0.0, 0.5, 251)  # rad
+SPEED = 15.0  # m/s; curves of slip do not depend on it
+
+
+class Reach(NamedTuple):
+    """Slip up to which curves are believed [rad], and their slope beyond [N/rad]; (2,) each."""
+
+    slip: Array
+    rise: Array
+
+
+ALL = Reach(np.full(2, np.inf), np.zeros(2))  # the curves as they are
+
+
+def reach_of(tire: TireModel, most: tuple[float, float]) -> Reach:
+    """Return how far the curves of a tire are believed, and how they go on.
+
+    They go on straight, but never with less than 4 % of their slope at zero.
+
+    Parameters
+    ----------
+    tire : structure and weights.
+    most : slip beyond which no curve is believed [rad], front and rear.
+    """
+    slopes = curve_slopes(tire)
+    slip = np.minimum(most, _useful(slopes))
+    there = [np.interp(x, SLIPS, axle) for x, axle in zip(slip, slopes, strict=True)]
+    return Reach(slip, np.maximum(np.maximum(there, LEAST_RISE * slopes[:, 0]), 0.0))
+
+
+def useful_slip(tire: TireModel) -> Array:
+    """Return the slip [rad] where the slope of each axle's force falls below 5 % of its first.
+
+    Infinite where it never does: a linear tire, and a network that reads other signals than slip.
+
+    Parameters
+    ----------
+    tire : structure and weights.
+    """
+    return _useful(curve_slopes(tire))
+
+
+def curve_slopes(tire: TireModel) -> Array:
+    """Return dF/dα of the axles at `SLIPS` (2, k) [N/rad], straight ahead.
+
+    Parameters
+    ----------
+    tire : structure and weights.
+    """
+    return np.array(_slopes(tire.structure)(SLIPS[None], tire.car, tire.weights))
+
+
+def believed_force(
+    structure: PredictionTire, slip: Pair, at: Point, max_slip: Any, rise: Any
+) -> Any:
+    """Return the axle forces that the tracker believes [N], (2,).
+
+    Parameters
+    ----------
+    structure : of the tire.
+    slip : what makes the force [rad].
+    at : motion, car and weights.
+    max_slip : slip up to which its curves are believed [rad], (2,).
+    rise : slope beyond [N/rad], (2,).
+    """
+    x = ca.SX.sym("x", 2)
+    curves = ca.vertcat(*structure.force((x[0], x[1]), at))
+    alpha = ca.vertcat(*slip)
+    if ca.is_linear(curves, x):  # goes on as it is
+        return ca.substitute(curves, x, alpha)
+    held = ca.fmin(ca.fmax(alpha, -max_slip), max_slip)
+    return ca.substitute(curves, x, held) + rise * (alpha - held)
+
+
+def _useful(slopes: Array) -> Array:
+    flat = slopes < FLAT * slopes[:, :1]
+    found = np.where(flat.any(axis=1), SLIPS[flat.argmax(axis=1)], np.inf)
+    return np.where(slopes[:, 0] > 0.0, found, np.inf)
+
+
+@cache
+def _slopes(structure: PredictionTire) -> ca.Function:
+    """Return dF/dα (2, k) of slips (1, k), straight ahead."""
+    slip, w, numbers = ca.SX.sym("slip"), ca.SX.sym("w", structure.n_weights), ca.SX.sym("car", 4)
+    at = Point(0.0, 0.0, 0.0, SPEED, Car(*ca.vertsplit(numbers)), w)
+    force = ca.vertcat(*structure.force((slip, slip), at))
+    slope = ca.Function("slope", [slip, numbers, w], [ca.densify(ca.jacobian(force, slip))])
+    return slope.map(SLIPS.size, [False, True, True], [False])

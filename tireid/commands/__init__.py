@@ -1,0 +1,34 @@
+"""The commands of tireid, in the order in which a person meets them.
+
+Each lies in a module of its name, `tireid.commands.NAME` with `add_parser` and `run`, which is
+imported when the command is named: the list alone costs nothing.
+"""
+
+import importlib
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+COMMANDS: Mapping[str, str] = MappingProxyType(
+    {
+        "demo": "the whole story on the built-in car, with a report",
+        "sample": "a log to learn from, driven by the built-in car, where there is none",
+        "paper": "Tables I and II of the paper, beside ours, over many seeds",
+        "identify": "learn tire forces from a recording, freeze the weights and test them",
+        "compare": "learn, freeze and replay with every method, side by side",
+        "check": "certificate of a design: margins, bounds, advice; or a design from a bandwidth",
+        "export": "the identifier as clean C for a microcontroller, as FMU and ONNX for simulators",
+        "drive": "steer a car along a path at the limit of grip, on the tires that were learnt",
+    }
+)
+
+
+def add_command(name: str, commands: Any) -> None:
+    """Add one command with all its options to the parser.
+
+    Parameters
+    ----------
+    name : one of `COMMANDS`.
+    commands : subparsers of `tireid`.
+    """
+    importlib.import_module(f"tireid.commands.{name}").add_parser(commands)

@@ -1,0 +1,283 @@
+"""A certificate as a person reads it: a table with a line of advice for what does not pass.
+
+`tireid check --monte-carlo`: the proven bounds beside what happened on random drives.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identifier.certification import certify
+from identifier.paper.design import Design, Driving
+from identifier.paper.network import Weights
+from identifier.stability import Certificate, Property
+from identifier.stability.monte_carlo import Observed
+from models.vehicle import Vehicle
+from tireid.figures.style import force_unit_name
+
+ROUNDING = 1e-9  # of weights that lie on their projection, in parts of its radius
+HEADER = ("property", "value", "limit", "margin", "")
+
+
+def certificate_of(design: Design, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
+    """Return the certificate of a design.
+
+    Parameters
+    ----------
+    design : the design.
+    vehicle : the car.
+    driving : how hard it is driven; None takes `natural_driving`.
+    """
+    return certify(design, vehicle, driving)
+
+
+def certificate_rows(certificate: Certificate, force_unit: float) -> list[list[str]]:
+    """Return title with unit, value, limit, margin and status of every property.
+
+    Parameters
+    ----------
+    certificate : the properties.
+    force_unit : the unit U of the design [N].
+    """
+    return [
+        [
+            f"{entry.title} [{unit_text(entry.unit, force_unit)}]",
+            number(entry.value),
+            number(entry.limit),
+            number(entry.margin),
+            entry.status if entry.limit is not None else "stated",
+        ]
+        for entry in certificate.properties
+    ]
+
+
+def certificate_text(certificate: Certificate, force_unit: float) -> str:
+    """Return the certificate as lines of text, ending with advice and the verdict.
+
+    Parameters
+    ----------
+    certificate : the properties.
+    force_unit : the unit U of the design [N].
+    """
+    rows = [list(HEADER), *certificate_rows(certificate, force_unit)]
+    width = [max(len(row[i]) for row in rows) for i in range(len(HEADER))]
+    lines = [_line(row, width) for row in rows]
+    lines += [f"{e.status}: {e.title}: {e.advice}" for e in advised(certificate)]
+    lines += [f"note: {note}" for note in notes(certificate)]
+    return "\n".join([*lines, f"verdict: {certificate.verdict}"])
+
+
+def advised(certificate: Certificate) -> list[Property]:
+    """Return the properties that do not pass and say what to do.
+
+    Parameters
+    ----------
+    certificate : the properties.
+    """
+    return [e for e in certificate.properties if e.advice and e.status != "pass"]
+
+
+def notes(certificate: Certificate) -> list[str]:
+    """Return what is to be said of values that are only stated, each remark once.
+
+    Parameters
+    ----------
+    certificate : the properties.
+    """
+    titles: dict[str, list[str]] = {}
+    for entry in certificate.properties:
+        if entry.limit is None and entry.advice:
+            for remark in entry.advice.split("; "):
+                titles.setdefault(remark, []).append(entry.title)
+    return [f"{remark} ({' | '.join(about)})" for remark, about in titles.items()]
+
+
+def verdict_line(certificate: Certificate) -> str:
+    """Return the verdict and the margins in one line.
+
+    Parameters
+    ----------
+    certificate : the properties.
+    """
+    gain, phase = certificate["gain_sampled"], certificate["phase_margin"]
+    worst = [e.title for e in certificate.properties if e.status == certificate.verdict]
+    reason = "" if certificate.verdict == "pass" else f" ({'; '.join(worst)})"
+    return (
+        f"certificate: {certificate.verdict}{reason}; sampled gain margin {number(gain.margin)}, "
+        f"phase margin {phase.value:.0f} deg, damping {certificate['damping'].value:.2f}"
+    )
+
+
+def resumed_line(certificate: Certificate, design: Design, first: Weights) -> str:
+    """Return what the certificate says of resumed weights: nothing where it covers them.
+
+    Its bounds hold from first weights that keep them.
+
+    Parameters
+    ----------
+    certificate : of the design.
+    design : with its projection.
+    first : weights that learning begins with.
+    """
+    known = {entry.name: entry.value for entry in certificate.properties}
+    W, V = known.get("weight_bound", math.inf), known.get("V_bound", math.inf)
+    layers = (
+        ("|W|", first.W, min(W, design.gains.W_max), unit_text("U", design.force_unit)),
+        ("|V|", first.V, V, ""),
+    )
+    beyond = [
+        f"{name} is {number(size)} {unit}".rstrip() + f", proven up to {number(bound)}"
+        for name, values, bound, unit in layers
+        if not (size := float(np.linalg.norm(values))) <= bound * (1.0 + ROUNDING)
+    ]
+    if not beyond:
+        return ""
+    return f"the certificate does not cover these resumed weights: {'; '.join(beyond)}"
+
+
+def unit_text(unit: str, force_unit: float) -> str:
+    """Return a unit with the force unit written out, kN or N where it is one.
+
+    Parameters
+    ----------
+    unit : with U for the force unit.
+    force_unit : U [N].
+    """
+    name = force_unit_name(force_unit)
+    return " ".join(name if word == "U" else word for word in unit.split())
+
+
+def number(value: float | None) -> str:
+    """Return four significant digits, a dash for none, "inf" for infinity.
+
+    Parameters
+    ----------
+    value : the number.
+    """
+    if value is None or math.isnan(value):
+        return "-"
+    return "inf" if math.isinf(value) else f"{value:.4g}"
+
+
+def _line(row: Sequence[str], width: Sequence[int]) -> str:
+    first, *others = row
+    cells = [first.ljust(width[0])]
+    cells += [cell.rjust(w) for cell, w in zip(others[:-1], width[1:-1], strict=True)]
+    return "  ".join([*cells, others[-1]]).rstrip()
+
+
+TOLERANCE = 1e-9  # of rounding, in parts of a bound
+BOUNDS = (  # name in the certificate, what it bounds, and how a table calls it
+    ("error_bound", "xi_tilde", "|xi - xi_hat|, by the leakage"),
+    ("projection_bound", "xi_tilde", "|xi - xi_hat|, by the projection"),
+    ("weight_bound", "W", "|W|, by the leakage"),
+    ("V_bound", "V", "|V|"),
+)
+
+
+class Row(NamedTuple):
+    """A bound beside what was seen.
+
+    name, title, unit : of the bound.   bound : its value.   largest : seen on any drive.
+    passed : drives on which it was exceeded.   tightness : bound over seen: least, median, 90 %.
+    """
+
+    name: str
+    title: str
+    unit: str
+    bound: float
+    largest: float
+    passed: int
+    tightness: tuple[float, float, float]
+
+
+def bound_rows(certificate: Certificate, observed: Observed) -> list[Row]:
+    """Return every proven bound that the certificate holds, beside what was seen.
+
+    Parameters
+    ----------
+    certificate : of the design.
+    observed : the drives.
+    """
+    known = {entry.name: entry for entry in certificate.properties}
+    rows = []
+    for name, what, title in BOUNDS:
+        if name in known and np.isfinite(known[name].value):
+            seen: NDArray[np.float64] = getattr(observed, what)
+            bound = known[name].value
+            passed = int(np.count_nonzero(~(seen <= bound * (1.0 + TOLERANCE))))
+            ratio = bound / seen[np.isfinite(seen) & (seen > 0.0)]
+            low, middle, high = np.quantile(ratio, [0.0, 0.5, 0.9]) if ratio.size else [np.nan] * 3
+            largest = float(seen.max())
+            tightness = float(low), float(middle), float(high)
+            rows.append(Row(name, title, known[name].unit, bound, largest, passed, tightness))
+    return rows
+
+
+def monte_carlo_text(rows: list[Row], observed: Observed, seed: int, force_unit: float) -> str:
+    """Return the comparison as lines of text.
+
+    Parameters
+    ----------
+    rows : from `bound_rows`.
+    observed : the drives.
+    seed : that they were drawn with.
+    force_unit : the unit U of the design [N].
+    """
+    unit = unit_text("U s", force_unit)
+    lines = [
+        f"\n{observed.xi_tilde.size} random drives within what is judged, seed {seed} "
+        f"({observed.outside} harder ones left out): largest error "
+        f"{number(float(observed.xi_tilde.max()))} {unit}, diverged on {observed.diverged}"
+    ]
+    if not rows:
+        return "\n".join([*lines, "nothing is proven of these gains that a drive could contradict"])
+    lines.append(
+        f"{'proven bound':42} {'value':>9} {'largest':>9} {'passed':>7}   over seen: "
+        f"{'least':>7} {'median':>7} {'90 %':>7}"
+    )
+    for row in rows:
+        title = f"{row.title} [{unit_text(row.unit, force_unit)}]"
+        ratios = " ".join(f"{number(value):>7}" for value in row.tightness)
+        lines.append(
+            f"{title:42} {number(row.bound):>9} {number(row.largest):>9} {row.passed:>7}   "
+            f"{'':10} {ratios}"
+        )
+    return "\n".join(lines)
+
+
+def monte_carlo_numbers(rows: list[Row], observed: Observed, seed: int) -> dict[str, Any]:
+    """Return the comparison for JSON.
+
+    Parameters
+    ----------
+    rows : from `bound_rows`.
+    observed : the drives.
+    seed : that they were drawn with.
+    """
+    return {
+        "drives": observed.xi_tilde.size,
+        "left_out": observed.outside,
+        "seed": seed,
+        "diverged": observed.diverged,
+        "largest_error": _finite(float(observed.xi_tilde.max())),
+        "bounds": {
+            row.name: {
+                "value": row.bound,
+                "unit": row.unit,
+                "largest": _finite(row.largest),
+                "passed": row.passed,
+                "over_seen": dict(
+                    zip(("least", "median", "q90"), map(_finite, row.tightness), strict=True)
+                ),
+            }
+            for row in rows
+        },
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,351 @@
+"""The files of `tireid compare`: compare.json, whose keys are stable, tables, CSV and figures.
+
+compare.json: recordings (samples, duration, rms_force_N); methods: by name online_N by recording,
+frozen_N by recording learnt on and recording replayed (null: a signal, no model), diverged_at_s by
+recording, percent (means of both axles: online, in_sample, other), step_s and step_ratio; floors:
+by network frozen_N and percent; sweep: by method designs, diverged, default, best, front, trials.
+Errors are {"front", "rear"} in N; null stands for what diverged or is not there.
+
+The tables of `tireid compare` as text: percent of the rms force and newtons, front and rear.
+"""
+
+import csv
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from identifier.compare.course import Shares, Trial, frozen_shares, where_learnt_and_elsewhere
+from identifier.compare.study import Comparison, Frozen, ranking
+from identifier.compare.sweep import Candidate, best_candidate, frozen_share, pareto_front
+from identifier.method import vehicle_numbers
+from identifier.reproducibility import AxleRmse
+from tireid import __version__
+from tireid.figures import matrix_figure, methods_figure, pareto_figure, save_figure
+from tireid.output import write_json
+from tireid.progress import say
+
+HINDSIGHT = (
+    "The best design of a sweep is chosen with the recordings that it is judged on, for every "
+    "method alike."
+)
+
+
+def summary_table(comparison: Comparison) -> str:
+    """Return the means over recordings of every method, best on other recordings first.
+
+    Parameters
+    ----------
+    comparison : the methods.
+    """
+    n = len(comparison.names)
+    lines = [["method", "online", "frozen, where learnt", "frozen, elsewhere", "step"]]
+    for name in ranking(comparison):
+        trial = comparison.trials[name]
+        online = [(rec, error) for rec, error in trial.online.items()]
+        time = f"{1e9 * comparison.step_times[name]:.0f} ns x{comparison.time_ratio(name):.2f}"
+        cells = ["diverged" if trial.diverged_at else _mean(comparison, online)]
+        lines.append([name, *cells, *_frozen_cells(comparison, trial), time])
+    for name, frozen in comparison.floors.items():
+        cells = [_mean(comparison, pairs) for pairs in where_learnt_and_elsewhere(frozen)]
+        lines.append([f"floor, {name}", "", *cells, ""])
+    title = f"Axle force RMSE, front / rear, % of rms (N), mean over {n} recordings"
+    return _text(title, lines)
+
+
+def pair_tables(comparison: Comparison) -> str:
+    """Return one table for each recording learnt on and recording replayed.
+
+    Parameters
+    ----------
+    comparison : the methods.
+    """
+    blocks = []
+    for learnt in comparison.names:
+        for replayed in comparison.names:
+            lines = []
+            for name in ranking(comparison):
+                frozen = comparison.trials[name].frozen
+                if frozen is not None:
+                    error = frozen.get(learnt, {}).get(replayed)
+                    cell = "diverged" if error is None else cell_text(comparison, replayed, error)
+                    lines.append([name, cell])
+            for name, frozen in comparison.floors.items():
+                cell = cell_text(comparison, replayed, frozen[learnt][replayed])
+                lines.append([f"floor, {name}", cell])
+            blocks.append(_text(f"learnt on {learnt}, frozen, replayed on {replayed}", lines))
+    return "\n".join(blocks)
+
+
+def sweep_table(comparison: Comparison) -> str:
+    """Return the best design of every method's sweep [% of rms, both axles].
+
+    Parameters
+    ----------
+    comparison : with a sweep.
+    """
+    lines = [["method", "designs", "diverged", "default", "best", "online then", "on the front"]]
+    for name, candidates in comparison.sweeps.items():
+        best, own = best_candidate(candidates), frozen_share(comparison.shares(name))
+        lost = sum(bool(candidate.diverged_on) for candidate in candidates)
+        cells = ["signal", "signal", "signal"]
+        if best is None:
+            cells = [percent(own), "diverged", ""]
+        elif own is not None:
+            cells = [percent(own), percent(frozen_share(best.shares)), percent(best.shares.online)]
+        elif frozen_share(best.shares) is None:
+            cells = ["", "", percent(best.shares.online)]
+        front = len(pareto_front(candidates))
+        lines.append([name, str(len(candidates)), str(lost), *cells, str(front or "")])
+    title = "Sweep: frozen error elsewhere, % of rms of both axles, mean over recordings"
+    return _text(title, lines) + HINDSIGHT + "\n"
+
+
+def percent(value: float | None) -> str:
+    """Return a share as text.
+
+    Parameters
+    ----------
+    value : [%], infinite where a run diverged, None where there is none.
+    """
+    if value is None:
+        return ""
+    return f"{value:.1f} %" if np.isfinite(value) else "diverged"
+
+
+def cell_text(comparison: Comparison, name: str, error: AxleRmse) -> str:
+    """Return an error as percent of the rms force and in newtons, front / rear.
+
+    Parameters
+    ----------
+    comparison : knows the true forces.
+    name : of the recording.
+    error : over it [N].
+    """
+    return _mean(comparison, [(name, error)])
+
+
+def newton_text(value: float) -> str:
+    """Return a force with three digits, more where it is above 1000 N.
+
+    Parameters
+    ----------
+    value : [N].
+    """
+    return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
+
+
+def _frozen_cells(comparison: Comparison, trial: Trial) -> list[str]:
+    if trial.frozen is None:
+        return ["a signal, no model", ""]
+    if trial.diverged_at:
+        return ["diverged", "diverged"]
+    return [_mean(comparison, pairs) for pairs in where_learnt_and_elsewhere(trial.frozen)]
+
+
+def _mean(comparison: Comparison, pairs: list[tuple[str, AxleRmse]]) -> str:
+    if not pairs:
+        return ""
+    sizes = {rec.name: comparison.course.size(rec) for rec in comparison.course.recordings}
+    newtons = np.mean([(error.front, error.rear) for _, error in pairs], axis=0)
+    if not np.isfinite(newtons).all():
+        return "diverged"
+    parts = np.mean(
+        [(e.front / sizes[name].front, e.rear / sizes[name].rear) for name, e in pairs], axis=0
+    )
+    front, rear = (
+        f"{100.0 * p:.1f} ({newton_text(n)})" for p, n in zip(parts, newtons, strict=True)
+    )
+    return f"{front} / {rear}"
+
+
+def _text(title: str, lines: list[list[str]]) -> str:
+    widths = [max(len(row[i]) for row in lines) for i in range(len(lines[0]))]
+    rows = ["  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)) for row in lines]
+    return "\n".join([title, *(f"  {row.rstrip()}" for row in rows), ""])
+
+
+Row = tuple[str | float | int, ...]
+
+
+def write_comparison(folder: Path, comparison: Comparison) -> None:
+    """Write everything that was found out into a folder.
+
+    Parameters
+    ----------
+    folder : an empty folder.
+    comparison : the methods.
+    """
+    write_json(folder / "compare.json", comparison_numbers(comparison))
+    (folder / "tables.txt").write_text(comparison_text(comparison) + pair_tables(comparison))
+    _write_rows(folder / "compare.csv", ERROR_COLUMNS, _error_rows(comparison))
+    if comparison.sweeps:
+        _write_rows(folder / "sweep.csv", SWEEP_COLUMNS, _sweep_rows(comparison))
+    say("drawing figures")
+    save_figure(methods_figure(comparison), folder / "methods.png")
+    if any(trial.frozen for trial in comparison.trials.values()):
+        save_figure(matrix_figure(comparison), folder / "matrix.png")
+    if comparison.sweeps:
+        save_figure(pareto_figure(comparison), folder / "pareto.png")
+
+
+def comparison_text(comparison: Comparison) -> str:
+    """Return the summary, and that of the sweep, as lines of text.
+
+    Parameters
+    ----------
+    comparison : the methods.
+    """
+    text = summary_table(comparison)
+    return text + (sweep_table(comparison) if comparison.sweeps else "")
+
+
+def comparison_numbers(comparison: Comparison) -> dict[str, Any]:
+    """Return what compare.json holds.
+
+    Parameters
+    ----------
+    comparison : the methods.
+    """
+    course = comparison.course
+    return {
+        "recordings": {
+            recording.name: {
+                "samples": len(recording),
+                "duration_s": recording.duration,
+                "rms_force_N": _axles(course.size(recording)),
+            }
+            for recording in course.recordings
+        },
+        "methods": {name: _method_numbers(comparison, name) for name in comparison.trials},
+        "floors": {
+            name: {
+                "frozen_N": _pairs(frozen),
+                "percent": dict(
+                    zip(("in_sample", "other"), frozen_shares(frozen, course), strict=True)
+                ),
+            }
+            for name, frozen in comparison.floors.items()
+        },
+        "sweep": {
+            name: _sweep_numbers(comparison, name, candidates)
+            for name, candidates in comparison.sweeps.items()
+        },
+        "vehicle": vehicle_numbers(course.vehicle),
+        "min_speed_m_s": course.min_speed,
+        "seed": comparison.seed,
+        "version": __version__,
+    }
+
+
+def _method_numbers(comparison: Comparison, name: str) -> dict[str, Any]:
+    trial = comparison.trials[name]
+    return {
+        "online_N": {recording: _axles(error) for recording, error in trial.online.items()},
+        "frozen_N": None if trial.frozen is None else _pairs(trial.frozen),
+        "diverged_at_s": dict(trial.diverged_at),
+        "percent": _percent(comparison.shares(name)),
+        "step_s": comparison.step_times[name],
+        "step_ratio": comparison.time_ratio(name),
+    }
+
+
+def _sweep_numbers(
+    comparison: Comparison, name: str, candidates: tuple[Candidate, ...]
+) -> dict[str, Any]:
+    best = best_candidate(candidates)
+    return {
+        "designs": len(candidates),
+        "diverged": sum(bool(candidate.diverged_on) for candidate in candidates),
+        "default": _percent(comparison.shares(name)),
+        "best": None if best is None else _candidate(best),
+        "front": [_candidate(candidate) for candidate in pareto_front(candidates)],
+        "trials": [_candidate(candidate) for candidate in candidates],
+    }
+
+
+def _candidate(candidate: Candidate) -> dict[str, Any]:
+    return {
+        "values": dict(candidate.values),
+        "percent": _percent(candidate.shares),
+        "diverged_on": list(candidate.diverged_on),
+    }
+
+
+def _percent(found: Shares) -> dict[str, float | None]:
+    return found._asdict()
+
+
+def _axles(error: AxleRmse) -> dict[str, float]:
+    return {"front": error.front, "rear": error.rear}
+
+
+def _pairs(frozen: Frozen) -> dict[str, dict[str, dict[str, float]]]:
+    return {
+        learnt: {name: _axles(error) for name, error in replays.items()}
+        for learnt, replays in frozen.items()
+    }
+
+
+ERROR_COLUMNS = (
+    "method",
+    "kind",
+    "learnt_on",
+    "replayed_on",
+    "front_N",
+    "rear_N",
+    "front_percent",
+    "rear_percent",
+    "both_percent",
+)
+SWEEP_COLUMNS = (
+    "method",
+    "number",
+    "diverged",
+    "online_percent",
+    "in_sample_percent",
+    "other_percent",
+    "values",
+)
+
+
+def _error_rows(comparison: Comparison) -> Iterator[Row]:
+    sizes = {rec.name: comparison.course.size(rec) for rec in comparison.course.recordings}
+
+    def row(method: str, kind: str, learnt: str, name: str, error: AxleRmse) -> Row:
+        front, rear = error.front / sizes[name].front, error.rear / sizes[name].rear
+        both = comparison.course.share(name, error)
+        return method, kind, learnt, name, error.front, error.rear, 100 * front, 100 * rear, both
+
+    def frozen_rows(method: str, kind: str, frozen: Frozen) -> Iterator[Row]:
+        for learnt, replays in frozen.items():
+            for name, error in replays.items():
+                yield row(method, kind, learnt, name, error)
+
+    for method, trial in comparison.trials.items():
+        for name, error in trial.online.items():
+            yield row(method, "online", name, name, error)
+        yield from frozen_rows(method, "frozen", trial.frozen or {})
+    for network, frozen in comparison.floors.items():
+        yield from frozen_rows(network, "floor", frozen)
+
+
+def _sweep_rows(comparison: Comparison) -> Iterator[Row]:
+    for method, candidates in comparison.sweeps.items():
+        for number, candidate in enumerate(candidates):
+            found = ["" if value is None else value for value in candidate.shares]
+            values = _words(candidate.values)
+            yield method, number, " ".join(candidate.diverged_on), *found, values
+
+
+def _words(values: Mapping[str, float]) -> str:
+    return " ".join(f"{name}={value:.6g}" for name, value in values.items())
+
+
+def _write_rows(path: Path, columns: tuple[str, ...], rows: Iterator[Row]) -> None:
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        for row in rows:
+            writer.writerow(f"{cell:.9g}" if isinstance(cell, float) else cell for cell in row)

@@ -1,0 +1,373 @@
+"""What the demo learnt as a C package: written, compiled, self-tested, set beside Python.
+
+The car of the demo drives on what it learnt: a lane change, and a road that becomes slippery.
+
+The self-test of an exported package, compiled and run as an embedded engineer would.
+"""
+
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from codegen import find_compiler
+from identifier.export.compiled import CompiledPackage
+from identifier.export.package import Package, build_package
+from identifier.export.processor import (
+    CROSS_COMPILER,
+    EMULATOR,
+    Cost,
+    figures_text,
+    measure,
+    missing_tools,
+)
+from identifier.run import identify
+from mpc.path import BUILT_IN
+from tireid.commands.demo_story import FREEZE, Story
+from tireid.commands.drive import headline, inputs_of
+from tireid.commands.drive_results import drive_table, known_curves, write_drives
+from tireid.commands.drive_runs import (
+    FROZEN,
+    LEARNING,
+    LINEAR,
+    ORACLE,
+    Conditions,
+    Run,
+    Setup,
+    SpeedWish,
+    run_drive,
+)
+from tireid.exporting import write_files
+from tireid.report import Block, Paragraph, Picture, Section, Table
+
+LANE_CHANGE, SLIPPERY = "drive", "drive_slippery"  # folders beside the report
+DELAY = 2  # periods of 10 ms
+SOURCE = "frozen ones learnt on the slalom"
+NOT_DRIVEN = "No C compiler (gcc) was found: the tracker cannot be built, the car did not drive."
+
+
+class Driven(NamedTuple):
+    """Drives along one path: what they were like, and what came of them."""
+
+    conditions: Conditions
+    runs: Sequence[Run]
+
+
+def drive_story(story: Story, folder: Path) -> dict[str, Driven]:
+    """Drive the cases of the demo and write what `tireid drive` writes; nothing without a compiler.
+
+    Parameters
+    ----------
+    story : what was learnt.
+    folder : of the report.
+    """
+    if find_compiler() is None:
+        return {}
+    lane_change = _setup(story, "iso-3888-2", 0.9, ())
+    slippery = _setup(story, "slalom", 0.57, ((110.0, 0.5),))
+    return {
+        LANE_CHANGE: _drive(story, lane_change, (FROZEN, LINEAR, ORACLE), folder / LANE_CHANGE),
+        SLIPPERY: _drive(story, slippery, (LEARNING, FROZEN, LINEAR), folder / SLIPPERY),
+    }
+
+
+def drive_text(driven: dict[str, Driven]) -> str:
+    """Return what came of the drives, as lines of text.
+
+    Parameters
+    ----------
+    driven : by folder.
+    """
+    blocks = [f"{headline(one.conditions)}\n{drive_table(one.runs)}" for one in driven.values()]
+    return "\n\n".join(["Driving on what was learnt:", *blocks]) if blocks else NOT_DRIVEN
+
+
+def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
+    """Return the section of the report.
+
+    Parameters
+    ----------
+    driven : by folder.
+    folder : of the report, with the pictures.
+    """
+    heading = "The car drives on what was learnt"
+    if not driven:
+        return Section(heading=heading, blocks=[Paragraph(text=NOT_DRIVEN)])
+    lane, slippery = folder / LANE_CHANGE, folder / SLIPPERY
+    blocks: list[Block] = [
+        Paragraph(
+            text="A model predictive tracker steers the double-track car along the lane change of "
+            "ISO 3888-2, at 90 % of the lateral acceleration that the tires can give. It plans 2 s "
+            "ahead, 100 times a second, with noisy sensors and 20 ms of delay. Told of the model "
+            "that was frozen after the slalom it is set beside the same tracker told of the linear "
+            "tire, and of the true one."
+        ),
+        _table(driven[LANE_CHANGE]),
+        Picture(
+            image=lane / "drive.gif",
+            caption="The drive on frozen tires. Outlines are the other cars; below, force over "
+            f"slip of both axles and the deviation. The film is {LANE_CHANGE}/drive.gif.",
+        ),
+        Picture(image=lane / "errors.png", caption="Deviation, heading, acceleration and speed."),
+        Picture(
+            image=lane / "tires.png",
+            caption="The forces of the drive, and what the trackers believe of the tires.",
+        ),
+        Paragraph(
+            text="Then the friction drops to half in the middle of a slalom, which takes all that "
+            "is left, and nobody tells the car. One tracker goes on learning: it is told of "
+            "another tire where the last moments say so, and where what is learnt explains the "
+            "last seconds better."
+        ),
+        _table(driven[SLIPPERY]),
+        Picture(image=slippery / "drive.gif", caption="The drive of the learning car."),
+        Picture(
+            image=slippery / "errors.png",
+            caption="Deviation and the rest over arc length; diamonds mark other tires.",
+        ),
+    ]
+    return Section(heading=heading, blocks=blocks)
+
+
+def _setup(story: Story, path: str, share: float, drops: tuple[tuple[float, float], ...]) -> Setup:
+    return Setup(
+        path=BUILT_IN[path](),
+        vehicle=story.car,
+        plant="double-track",
+        mu=1.0,
+        drops=drops,
+        wish=SpeedWish(share, None),
+    )
+
+
+def _drive(story: Story, setup: Setup, labels: Sequence[str], folder: Path) -> Driven:
+    learnt = story.default.learnt.freeze(FREEZE)
+    conditions = Conditions(setup=setup, delay=DELAY, noise=True, seed=0, laps=1.0)
+    runs = [run_drive(label, conditions, learnt) for label in labels]
+    folder.mkdir()
+    write_drives(
+        folder,
+        runs,
+        known_curves(runs, setup, learnt),
+        inputs=inputs_of(conditions, labels, SOURCE, learnt),
+        drops=setup.drops,
+        film="gif",
+    )
+    return Driven(conditions, runs)
+
+
+def _table(driven: Driven) -> Table:
+    rows = []
+    for run in driven.runs:
+        score = run.scores
+        ending = "completed" if score.completed else run.drive.ending
+        rms, peak = f"{score.rms_e_y_m:.3f}", f"{score.peak_e_y_m:.3f}"
+        rows.append([run.label, rms, peak, ending, f"{score.solve_ms['median']:.3f}"])
+    return Table(
+        caption=f"{headline(driven.conditions)}.",
+        header=["tires", "rms deviation [m]", "peak [m]", "end", "a step takes [ms], median"],
+        rows=rows,
+    )
+
+
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-Iinclude", "-Isrc")
+
+
+class SelfTestError(RuntimeError):
+    """A package does not compile or fails its own test; the message holds what was printed."""
+
+
+class Verdict(NamedTuple):
+    """What a self-test printed: version and precision, the largest difference, "passed"."""
+
+    version: str
+    difference: str
+    verdict: str
+
+
+def self_test(folder: Path, name: str, *, single: bool) -> Verdict | None:
+    """Compile and run the self-test of a package; None where there is no C compiler.
+
+    Parameters
+    ----------
+    folder : with the package.
+    name : prefix of its symbols.
+    single : whether to compute in float.
+
+    Raises
+    ------
+    SelfTestError
+        Where it does not compile or does not pass.
+    """
+    compiler = find_compiler()
+    if compiler is None:
+        return None
+    sources = [str(p.relative_to(folder)) for p in sorted((folder / "src").glob("*.c"))]
+    with tempfile.TemporaryDirectory(prefix="tireid-") as scratch:
+        program = Path(scratch) / "self_test"
+        own = [f"-D{name.upper()}_SINGLE={int(single)}", *sources, f"tests/test_{name}.c"]
+        build = [*compiler, *FLAGS, *own, "-o", str(program), "-lm"]
+        for command in (build, [str(program)]):
+            answer = subprocess.run(
+                command, cwd=folder, capture_output=True, text=True, check=False
+            )
+            if answer.returncode != 0:
+                lines = (answer.stdout + answer.stderr).splitlines()
+                raise SelfTestError(f"the package {folder} fails its self-test: {lines[:5]}")
+    return Verdict(*answer.stdout.splitlines()[-3:])
+
+
+FOLDER = "package"
+NOT_BUILT = (
+    "No C compiler (gcc) was found: the package was written, but neither compiled nor tested."
+)
+
+
+class Check(NamedTuple):
+    """A build of the package on this machine.
+
+    precision : float or double.   verdict : of its self-test.   difference : largest of a force
+    from the one that Python computes over the slalom [N].   refused, samples : of the slalom.
+    """
+
+    precision: str
+    verdict: Verdict
+    difference: float
+    refused: int
+    samples: int
+
+
+class Shipped(NamedTuple):
+    """The package, its builds here (none without a compiler) and its costs on Arm (or none)."""
+
+    package: Package
+    checks: Sequence[Check]
+    costs: Sequence[Cost]
+
+
+def ship(story: Story, folder: Path) -> Shipped:
+    """Export what the default method learnt, compile it and test it.
+
+    Parameters
+    ----------
+    story : the drives and what was learnt.
+    folder : an empty folder for the package.
+
+    Raises
+    ------
+    SelfTestError
+        Where the package does not compile or does not pass.
+    """
+    learnt = story.default.learnt
+    model = learnt.freeze(FREEZE)
+    package = build_package(learnt.design, story.car, model)
+    costs = measure(package)
+    write_files(folder, package, figures_text(costs), costs)
+    checks: list[Check] = []
+    if find_compiler() is not None:
+        expected = identify(learnt.recording, story.car, learnt.design, model).axle_force
+        for single in (False, True):
+            verdict = self_test(folder, package.folded.name, single=single)
+            assert verdict is not None
+            run = CompiledPackage.from_folder(folder, single=single).run(learnt.recording)
+            difference = float(np.abs(run.axle_force - expected).max())
+            precision, refused = "float" if single else "double", np.count_nonzero(run.status)
+            checks.append(Check(precision, verdict, difference, int(refused), len(run.status)))
+    return Shipped(package, checks, costs)
+
+
+def shipped_text(shipped: Shipped) -> str:
+    """Return what came of the package, as lines of text.
+
+    Parameters
+    ----------
+    shipped : the package.
+    """
+    about = shipped.package.about
+    lines = [f"As a C package ({FOLDER}/, hash {about['hash']}):"]
+    lines += [
+        f"  {check.precision:8} self-test {check.verdict.verdict}; over the slalom within "
+        f"{check.difference:.2g} N of Python, {check.refused} samples refused"
+        for check in shipped.checks
+    ] or [f"  {NOT_BUILT}"]
+    lines += [
+        f"  {cost.processor}, {_precision(cost)}: {cost.replay.instructions} instructions a step, "
+        f"{cost.flash} B flash, {cost.replay.stack} B stack"
+        for cost in shipped.costs
+        if cost.single
+    ]
+    return "\n".join(lines)
+
+
+def package_section(shipped: Shipped) -> Section:
+    """Return the section of the report.
+
+    Parameters
+    ----------
+    shipped : the package.
+    """
+    name, about = shipped.package.folded.name, shipped.package.about
+    blocks: list[Paragraph | Table] = [
+        Paragraph(
+            text="The default method, beginning with what it has just learnt, is written as a C99 "
+            f"package to the folder {FOLDER}/ beside this report: library, example, self-test and "
+            f"README, every symbol begins with {name}_; hash {about['hash']}. It is what "
+            "`tireid export` writes."
+        )
+    ]
+    if shipped.checks:
+        blocks.append(
+            Table(
+                caption="The package, compiled and run on this machine: its self-test, and the "
+                "slalom again beside Python, which begins with the same model.",
+                header=["precision", "self-test", "its vectors", "from Python [N]", "refused"],
+                rows=[
+                    [
+                        check.precision,
+                        check.verdict.verdict,
+                        check.verdict.difference,
+                        f"{check.difference:.2g}",
+                        f"{check.refused} of {check.samples}",
+                    ]
+                    for check in shipped.checks
+                ],
+            )
+        )
+    else:
+        blocks.append(Paragraph(text=NOT_BUILT))
+    if shipped.costs:
+        blocks.append(
+            Table(
+                caption=f"What a step costs, {CROSS_COMPILER} -O2 in {EMULATOR}.",
+                header=[
+                    "processor",
+                    "precision",
+                    "instructions",
+                    "flash [B]",
+                    "RAM [B]",
+                    "stack [B]",
+                ],
+                rows=[
+                    [
+                        cost.processor,
+                        _precision(cost),
+                        f"{cost.replay.instructions}",
+                        f"{cost.flash}",
+                        f"{cost.replay.state + cost.replay.params}",
+                        f"{cost.replay.stack}",
+                    ]
+                    for cost in shipped.costs
+                ],
+            )
+        )
+    else:
+        missing = ", ".join(missing_tools())
+        blocks.append(Paragraph(text=f"Costs on Arm are not measured, missing: {missing}."))
+    return Section(heading="What was learnt becomes C for a controller", blocks=blocks)
+
+
+def _precision(cost: Cost) -> str:
+    return "float" if cost.single else "double"

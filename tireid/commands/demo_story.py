@@ -1,0 +1,239 @@
+"""What the demo drives: the sedan learns on a slalom with sensor noise and is asked elsewhere.
+
+Drives of a plant that methods are compared on: the first to learn on, the others to predict.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identifier.defaults import default_design
+from identifier.method import Method
+from identifier.methods import DEFAULT, REFERENCE, make_method
+from identifier.paper.design import Design
+from identifier.reproducibility import Replay, force_rms, online_error, replay, reproduce
+from identifier.run import History, identify
+from identifier.stability import Certificate
+from models.maneuvers import DoubleLaneChange, Maneuver, Slalom, StepSteer
+from models.plant import Plant
+from models.recordings import Recording
+from models.sensors import Sensor, Sensors
+from models.vehicle import Vehicle, sedan
+from tireid.commands.certificate_table import certificate_of
+
+SPEED = 20.0  # m/s
+FREEZE = 30.0  # s, the end of the first drive
+RATE_LIMIT = np.radians(30.0)  # rad/s at the road wheels
+SENSORS = Sensors(v_y=Sensor(noise=0.02), r=Sensor(noise=0.002))  # m/s and rad/s, rms
+LEARN: Maneuver = Slalom(
+    amplitude=np.radians(4.0), frequency=0.5, onset=2.0, rate_limit=RATE_LIMIT, duration=30.0
+)
+PREDICT: Mapping[str, Maneuver] = {
+    "double_lane_change": DoubleLaneChange(
+        amplitude=np.radians(4.5),
+        frequency=0.6,
+        pause=1.0,
+        onset=2.0,
+        rate_limit=RATE_LIMIT,
+        duration=10.0,
+    ),
+    "step_steer": StepSteer(
+        amplitude=np.radians(4.0), onset=2.0, rate_limit=RATE_LIMIT, duration=8.0
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Learning:
+    """What one method learnt on the first drive, and what it says of the others.
+
+    Parameters
+    ----------
+    law : name of the method.
+    learnt : the online run that the weights come from.
+    others : online runs over the drives that the frozen model predicts.
+    frozen : freeze time [s] to recording name to replay.
+    """
+
+    law: str
+    learnt: History
+    others: Sequence[History]
+    frozen: Mapping[float, Mapping[str, Replay]]
+
+    def errors(self, drive: History) -> tuple[float, float, float]:
+        """Return online and frozen error of both axles [kN], and the frozen share of the rms [-].
+
+        Parameters
+        ----------
+        drive : `learnt`, or one of `others`.
+        """
+        frozen = self.frozen[FREEZE][drive.recording.name].against_truth
+        online, size = online_error(drive), force_rms(drive)
+        assert size is not None and frozen is not None and online is not None
+        return online.both / 1e3, frozen.both / 1e3, frozen.both / size.both
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Story:
+    """The demo's drives, learnt by the default method and by the paper's beside it.
+
+    Parameters
+    ----------
+    car : what drives, and what the identifier is told of.
+    design : the design of the paper's identifier.
+    default : what the default method learnt.
+    paper : what the paper's network and law learnt.
+    """
+
+    car: Vehicle
+    design: Design
+    default: Learning
+    paper: Learning
+
+    @property
+    def certificate(self) -> Certificate:
+        """What is known of the paper's design before the car drives."""
+        return certificate_of(self.design, self.car)
+
+    def rows(self) -> list[list[str]]:
+        """Return by drive, for default and paper: online and frozen error, share of the force."""
+        rows = []
+        methods = self.default, self.paper
+        for drives in zip(*([m.learnt, *m.others] for m in methods), strict=True):
+            row = [drives[0].recording.name]
+            for method, drive in zip(methods, drives, strict=True):
+                online, frozen, share = method.errors(drive)
+                row += [f"{online:.3f}", f"{frozen:.3f}", f"{100.0 * share:.0f} %"]
+            rows.append(row)
+        return rows
+
+    def side_by_side(self, drive: str) -> dict[str, Replay]:
+        """Return the replays of both methods over a drive, by the name in a legend.
+
+        Parameters
+        ----------
+        drive : name of the recording.
+        """
+        return {
+            "default (axle curves)": self.default.frozen[FREEZE][drive],
+            "paper (network, integral law)": self.paper.frozen[FREEZE][drive],
+        }
+
+    def text(self) -> str:
+        """Return the rows as lines of text."""
+        lines = [
+            "Frozen after the slalom, asked about drives that were not learnt: RMSE [kN]",
+            f"  {'':20} {'default (axle)':>26}   {'paper (network, integral)':>26}",
+            f"  {'drive':20} {'online':>8} {'frozen':>8} {'of rms':>8}"
+            f"   {'online':>8} {'frozen':>8} {'of rms':>8}",
+        ]
+        for name, *cells in self.rows():
+            first, second = cells[:3], cells[3:]
+            numbers = "   ".join(" ".join(f"{c:>8}" for c in part) for part in (first, second))
+            lines.append(f"  {name:20} {numbers}")
+        return "\n".join(lines)
+
+
+def drives(maneuvers: Mapping[str, Maneuver]) -> dict[str, Recording]:
+    """Drive the sedan; sensors are noisy with a fixed seed.
+
+    Parameters
+    ----------
+    maneuvers : by the name of the recording.
+    """
+    plant, rng = Plant(sedan()), np.random.default_rng(1)
+    return {
+        name: plant.simulate(maneuver, speed=SPEED, name=name).recording(SENSORS, rng)
+        for name, maneuver in maneuvers.items()
+    }
+
+
+def drive_to_learn() -> Recording:
+    """Return the slalom of the demo."""
+    return drives({"slalom": LEARN})["slalom"]
+
+
+def run_story() -> Story:
+    """Drive, learn, freeze and predict, with both methods."""
+    car = sedan()
+    recordings = drives({"slalom": LEARN, **PREDICT})
+    design = default_design(car)
+    return Story(
+        car=car,
+        design=design,
+        default=_learning(DEFAULT, make_method(DEFAULT, car), car, recordings),
+        paper=_learning(REFERENCE, design, car, recordings),
+    )
+
+
+def _learning(
+    law: str, method: Method, car: Vehicle, recordings: Mapping[str, Recording]
+) -> Learning:
+    histories = {name: identify(rec, car, method) for name, rec in recordings.items()}
+    model = histories["slalom"].freeze(FREEZE)
+    return Learning(
+        law=law,
+        learnt=histories["slalom"],
+        others=[histories[name] for name in PREDICT],
+        frozen={
+            FREEZE: {name: replay(model, history) for name, history in histories.items()}
+            | {"slalom": reproduce(histories["slalom"], FREEZE)}
+        },
+    )
+
+
+SLALOM = Slalom(
+    amplitude=np.radians(4.0), frequency=0.5, onset=2.0, rate_limit=RATE_LIMIT, duration=30.0
+)
+DRIVES: Mapping[str, tuple[Maneuver, float]] = {  # and the speed [m/s]
+    "slalom_20": (SLALOM, 20.0),
+    "step_steer": (
+        StepSteer(amplitude=np.radians(4.0), onset=2.0, rate_limit=RATE_LIMIT, duration=8.0),
+        20.0,
+    ),
+    "lane_change": (
+        DoubleLaneChange(
+            amplitude=np.radians(4.5),
+            frequency=0.6,
+            pause=1.0,
+            onset=2.0,
+            rate_limit=RATE_LIMIT,
+            duration=10.0,
+        ),
+        20.0,
+    ),
+    "slalom_25": (
+        Slalom(
+            amplitude=np.radians(3.5),
+            frequency=0.6,
+            onset=2.0,
+            rate_limit=RATE_LIMIT,
+            duration=20.0,
+        ),
+        25.0,
+    ),
+}
+
+
+def plant_recordings(
+    vehicle: Vehicle, rng: np.random.Generator | None = None
+) -> tuple[Recording, ...]:
+    """Drive the plant of a vehicle through every maneuver.
+
+    Parameters
+    ----------
+    vehicle : the car, with a chassis.
+    rng : of the noise of `SENSORS`; None measures exactly.
+
+    Raises
+    ------
+    VehicleError
+        Where the vehicle has no chassis or no tire file.
+    """
+    plant = Plant(vehicle)
+    sensors = None if rng is None else SENSORS
+    return tuple(
+        plant.simulate(maneuver, speed=speed, name=name).recording(sensors, rng)
+        for name, (maneuver, speed) in DRIVES.items()
+    )

@@ -1,0 +1,227 @@
+"""The files of `tireid drive`: numbers as JSON, every signal as CSV, figures as PNG, the film.
+
+What a tracker is told of the tires, as curves.
+
+What `tireid drive` prints: one line a drive.
+"""
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from identifier.method import FrozenModel
+from models.files import digest
+from mpc.loop import Drive
+from mpc.tires import Car, CurveFitError, TireModel, tire_model
+from mpc.tires.tire import Point
+from tireid import __version__
+from tireid.animation import write_film
+from tireid.commands.drive_runs import FROZEN, LEARNING, LINEAR, ORACLE, WIDEST, Run, Setup
+from tireid.figures import (
+    axle_slip,
+    drive_errors_figure,
+    drive_path_figure,
+    drive_solve_figure,
+    drive_steering_figure,
+    drive_tires_figure,
+    save_figure,
+)
+from tireid.figures.drive import AT_THE_END
+from tireid.figures.tires import TireCurve
+from tireid.output import write_csv, write_json
+from tireid.progress import say
+
+NO_FILM = "none"
+
+
+def write_drives(
+    folder: Path,
+    runs: Sequence[Run],
+    curves: Sequence[TireCurve],
+    *,
+    inputs: Mapping[str, Any],
+    drops: Sequence[tuple[float, float]],
+    film: str,
+) -> None:
+    """Write everything about drives along one path.
+
+    Parameters
+    ----------
+    folder : an empty folder.
+    runs : the drives, the one that it is about first.
+    curves : tires to draw behind the forces of the first.
+    inputs : all that went in, ready for JSON.
+    drops : arc length [m] and friction from there on.
+    film : gif, mp4 or none.
+    """
+    first = runs[0]
+    write_json(folder / "summary.json", summarize_drives(runs, inputs))
+    for run in runs:
+        name = "drive.csv" if run is first else f"drive_{run.label}.csv"
+        write_csv(folder / name, drive_columns(run.drive))
+    say("drawing figures")
+    drives = {run.label: run.drive for run in runs}
+    limits = first.problem.limits
+    figures = {
+        "path": drive_path_figure(drives),
+        "errors": drive_errors_figure(drives, off_path=WIDEST, drops=drops),
+        "steering": drive_steering_figure(
+            drives, angle_limit=limits.steering, rate_limit=limits.steering_rate, drops=drops
+        ),
+        "tires": drive_tires_figure(first.drive, curves),
+        "solve_times": drive_solve_figure(first.drive),
+    }
+    for name, figure in figures.items():
+        save_figure(figure, folder / f"{name}.png")
+    if film != NO_FILM:
+        title = f"{first.drive.path.name}: {first.label} tires"
+        write_film(folder / f"drive.{film}", drives, curves, drops=drops, title=title)
+
+
+def summarize_drives(runs: Sequence[Run], inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what summary.json holds: scores of the first drive and of each, and what went in.
+
+    Parameters
+    ----------
+    runs : the drives.
+    inputs : all that went in, ready for JSON.
+    """
+    by_label = {run.label: _scores(run) for run in runs}
+    return {
+        **by_label[runs[0].label],
+        "tires": runs[0].label,
+        "drives": by_label,
+        "inputs": dict(inputs),
+        "hash": digest(inputs),
+        "version": __version__,
+    }
+
+
+def _scores(run: Run) -> dict[str, Any]:
+    notes = [{"t_s": t, "note": text} for t, text in run.drive.notes]
+    return {**run.scores.to_dict(), "ending": run.drive.ending, "notes": notes}
+
+
+def drive_columns(drive: Drive) -> dict[str, NDArray[np.float64]]:
+    """Return every signal of a drive by the name of its column, with its unit.
+
+    Parameters
+    ----------
+    drive : the drive.
+    """
+    slip = axle_slip(drive)
+    units = {"t": "s", "psi": "rad", "r": "rad_s", "delta": "rad", "v_x": "m_s", "v_y": "m_s"}
+    measured = {
+        f"{name}_measured_{units.get(name, 'm_s2' if name == 'a_y' else 'm')}": values
+        for name, values in drive.measured.items()
+        if name != "t"
+    }
+    return {
+        "t_s": drive.t,
+        "s_m": drive.s,
+        "X_m": drive.X,
+        "Y_m": drive.Y,
+        "psi_rad": drive.psi,
+        "v_x_m_s": drive.v_x,
+        "v_y_m_s": drive.v_y,
+        "r_rad_s": drive.r,
+        "a_x_m_s2": drive.a_x,
+        "a_y_m_s2": drive.a_y,
+        "delta_rad": drive.delta,
+        "command_rad": drive.command,
+        "e_y_m": drive.e_y,
+        "e_psi_rad": drive.e_psi,
+        "kappa_1_m": drive.kappa,
+        "v_ref_m_s": drive.v_ref,
+        "alpha_f_rad": slip[:, 0],
+        "alpha_r_rad": slip[:, 1],
+        "Fyf_N": drive.axle_force[:, 0],
+        "Fyr_N": drive.axle_force[:, 1],
+        "status": drive.status.astype(np.float64),
+        "solve_time_s": drive.solve_time,
+        **measured,
+    }
+
+
+LARGEST = 0.35  # slip up to which curves are drawn [rad]
+POINTS = 281
+
+
+def steady_curve(label: str, model: TireModel, v_x: float) -> TireCurve:
+    """Return the steady axle forces of a tire over slip, by sliding sideways without yawing.
+
+    Parameters
+    ----------
+    label : what legends call it.
+    model : the tire.
+    v_x : speed [m/s], which a network may look at.
+    """
+    a = ca.SX.sym("alpha")
+    car = Car(*(float(value) for value in model.car))
+    at = Point(-v_x * ca.tan(a), ca.SX(0.0), ca.SX(0.0), ca.SX(v_x), car, ca.SX(model.weights))
+    force = model.structure.force((a, a), at)
+    evaluate = ca.Function("curve", [a], [ca.vertcat(*force)])
+    alpha = np.linspace(-LARGEST, LARGEST, POINTS)
+    return TireCurve(label=label, alpha=alpha, force=np.array(evaluate(alpha[None])).T)
+
+
+def known_curves(runs: Sequence[Run], setup: Setup, learnt: FrozenModel | None) -> list[TireCurve]:
+    """Return what the trackers were told, and the linear and the true tire beside it.
+
+    Parameters
+    ----------
+    runs : the drives.
+    setup : path, car and road.
+    learnt : the frozen tires, if there are any.
+    """
+    models = {LINEAR: tire_model(setup.vehicle)}
+    if learnt is not None:
+        models[FROZEN] = tire_model(learnt, setup.vehicle)
+    for run in runs:
+        if run.label != LEARNING:
+            models[run.label] = run.model
+        if run.label != ORACLE and run.final is not run.model:
+            models[run.label + AT_THE_END] = run.final
+    with suppress(CurveFitError):  # a true tire that no curve can follow is not drawn
+        models[ORACLE] = setup.oracle()
+        if setup.drops:
+            models[ORACLE + AT_THE_END] = setup.oracle(setup.drops[-1][1])
+    v_x = float(setup.speeds().mean())
+    return [steady_curve(label, model, v_x) for label, model in models.items()]
+
+
+COLUMNS = ("tires", "rms e_y", "peak e_y", "completed", "failures", "median", "p99", "max")
+
+
+def drive_table(runs: Sequence[Run]) -> str:
+    """Return the scores of drives as lines of text.
+
+    Parameters
+    ----------
+    runs : the drives.
+    """
+    wide = max(9, *(len(_completed(run)) for run in runs))
+    head = f"{'tires':10} {'rms e_y':>9} {'peak e_y':>9}  {'completed':{wide}} {'failures':>9}"
+    lines = [f"{head}   {'wall time: median / p99 / max':>32}"]
+    for run in runs:
+        score = run.scores
+        failures = ", ".join(f"{n} {name}" for name, n in score.failures.items()) or "0"
+        times = " / ".join(f"{score.solve_ms[key]:.3f}" for key in ("median", "p99", "max"))
+        lines.append(
+            f"{run.label:10} {score.rms_e_y_m:7.3f} m {score.peak_e_y_m:7.3f} m  "
+            f"{_completed(run):{wide}} {failures:>9}   {times:>29} ms"
+        )
+    for run in runs:
+        lines += [f"{run.label} at {t:.2f} s: {note}" for t, note in run.drive.notes]
+    return "\n".join(lines)
+
+
+def _completed(run: Run) -> str:
+    if run.scores.completed:
+        return "yes"
+    return f"no: {run.drive.ending} at {run.drive.s[-1]:.0f} m"

@@ -1,0 +1,322 @@
+"""`tireid identify LOG --vehicle FILE --out DIR`: learn the tires of a recording, freeze them."""
+
+import argparse
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from codegen.escape import visible
+from identifier.axle import AxleModel
+from identifier.axle.design import NOT_CERTIFIED
+from identifier.method import (
+    DEAD,
+    CannotFreezeError,
+    FrozenModel,
+    Method,
+    require_alive,
+    steady_stiffness,
+)
+from identifier.methods import DEFAULT, METHODS, REFERENCE, draws_weights, load_model, make_method
+from identifier.paper.design import Design, read_design
+from identifier.paper.network import Weights
+from identifier.reproducibility import (
+    Replay,
+    counted_samples,
+    force_rms,
+    freeze_key,
+    replay,
+    reproduce,
+)
+from identifier.run import History
+from models.recordings import Recording
+from models.vehicle import Vehicle
+from tireid.commands import COMMANDS
+from tireid.commands.certificate_table import certificate_of, resumed_line, verdict_line
+from tireid.commands.identify_results import (
+    error_cells,
+    file_name,
+    network_table,
+    write_network_results,
+    write_results,
+)
+from tireid.commands.options import add_network_arguments, network_model, read_log
+from tireid.learning import identify
+from tireid.output import output_folder
+from tireid.progress import say, tell
+
+OWN_PAST = "  its past, against online"
+
+
+class NotTrustedError(ValueError):
+    """What was learnt is no tire: the recording, or the vehicle file, is not that of a car."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : subparsers of `tireid`.
+    """
+    parser = commands.add_parser(
+        "identify",
+        help=COMMANDS["identify"],
+        description="Learn axle forces over LOG sample by sample, freeze the weights, replay LOG "
+        "and other recordings; write summary.json, weights.json, curves as CSV and figures.",
+        epilog="LOG is CSV, CSV.gz or Parquet with the columns t [s], vx, vy [m/s], r [rad/s], "
+        "delta_f [rad] and, where known, delta_r [rad], ay [m/s2], Fyf, Fyr [N] (or Fyf_inv, "
+        "Fyr_inv: forces computed backwards from the motion), run; "
+        "x forward, y left, delta and r positive to the left.",
+    )
+    parser.add_argument("log", metavar="LOG", help="recording; LOG:RUN names one of its runs")
+    parser.add_argument("--vehicle", required=True, type=Path, metavar="FILE", help="car as TOML")
+    parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
+    parser.add_argument(
+        "--law", choices=METHODS, metavar="NAME", help=f"{', '.join(METHODS)} (default: {DEFAULT})"
+    )
+    parser.add_argument(
+        "--paper", action="store_true", help=f"the paper's network and law: --law {REFERENCE}"
+    )
+    parser.add_argument(
+        "--design", type=Path, metavar="FILE", help="design.toml, in place of the default design"
+    )
+    parser.add_argument(
+        "--freeze",
+        nargs="+",
+        action="extend",
+        type=float,
+        metavar="T",
+        help="freeze at these times [s] (the end)",
+    )
+    parser.add_argument(
+        "--replay",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="LOG[:RUN]",
+        help="recordings to predict",
+    )
+    parser.add_argument(
+        "--columns",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME=COLUMN",
+        help="read column COLUMN of the logs as NAME, for example r=yaw_rate",
+    )
+    parser.add_argument(
+        "--no-check", action="store_true", help="accept a log that contradicts physics"
+    )
+    parser.add_argument(
+        "--weights", type=Path, metavar="FILE", help="weights.json to begin learning with"
+    )
+    parser.add_argument(
+        "--seed", type=int, metavar="N", help="of the initial weights of the paper's network (0)"
+    )
+    add_network_arguments(parser, "freeze nothing, judge this network instead")
+    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder to write")
+    parser.add_argument("--force", action="store_true", help="replace the folder if it exists")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run the command.
+
+    Parameters
+    ----------
+    options : parsed arguments.
+    """
+    vehicle = Vehicle.from_toml(options.vehicle)
+    law, design = _design(options, vehicle)
+    if options.network is not None and options.freeze is not None:
+        raise ValueError("--freeze is for what is learnt: the network of --network is frozen")
+    start = None if options.weights is None else load_model(options.weights)
+    recording = _read(options.log, options.run_name, vehicle, design, options)
+    others = [_read(log, None, vehicle, design, options) for log in options.replay]
+    _require_distinct([recording, *others])
+    network = network_model(options, vehicle, design.min_speed)
+    if network is not None:
+        _require_trusted(network, recording, str(options.network), "its unit of force and of slip")
+    freeze_times = sorted(set(options.freeze or [float(recording.t[-1])]))
+    _require_inside(freeze_times, recording)
+    if network is None:
+        _require_model(law, design, recording, vehicle)
+    if isinstance(start, AxleModel) and start.vehicle != vehicle:
+        say(f"{options.weights} is of the car {start.vehicle.name!r}: scaled by the axle loads")
+    with output_folder(options.out, force=options.force) as folder:
+        histories = [_learn(one, vehicle, law, design, start) for one in (recording, *others)]
+        if network is not None:
+            replays = write_network_results(folder, options.network, law, network, histories)
+            told = network_table(law, histories, replays)
+        else:
+            learnt = histories[0]
+            for t in freeze_times:
+                words = f"{recording.name}: what {law} learnt until {freeze_key(t)} s"
+                _require_trusted(learnt.freeze(t), recording, words, "signs, units and sensors")
+            frozen = {t: _replays(t, learnt, histories) for t in freeze_times}
+            write_results(folder, law, learnt, histories[1:], frozen)
+            closing = _closing_line(learnt, freeze_times[-1], vehicle, resumed=start is not None)
+            told = f"{error_table(histories, frozen)}\n{closing}"
+    tell(told)
+    say(f"wrote {options.out}/")
+
+
+def _require_model(law: str, design: Method, recording: Recording, vehicle: Vehicle) -> None:
+    """Refuse a filter of forces before it runs: there would be nothing to freeze."""
+    try:
+        design.frozen(vehicle, design.setup(vehicle, recording).carry)
+    except CannotFreezeError as error:
+        raise CannotFreezeError(f"--law {law}: {error}; tireid compare shows it") from None
+
+
+def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool) -> str:
+    """Return the certificate of the paper's identifier, or what the axle identifier knows."""
+    model, design = learnt.freeze(t), learnt.design
+    if isinstance(design, Design):
+        certificate = certificate_of(design, vehicle)
+        first = Weights(W=learnt.carried["W"][0], V=learnt.carried["V"][0])
+        beyond = resumed_line(certificate, design, first) if resumed else ""
+        return "\n".join(line for line in (verdict_line(certificate), beyond) if line)
+    if not isinstance(model, AxleModel):
+        return "frozen; `tireid compare` sets it beside the other methods"
+    stiffness, length = model.cornering_stiffness, model.relaxation_length
+    known = np.degrees(model.known_slip_range)
+    return (
+        f"learnt: cornering stiffness {stiffness[0]:.4g} / {stiffness[1]:.4g} N/rad, relaxation "
+        f"length {length[0]:.2g} / {length[1]:.2g} m, known to {known[0]:.1f} / {known[1]:.1f} deg "
+        "of slip (front / rear)\n"
+        f"certificate: {NOT_CERTIFIED}; grip, cornering stiffness, weights, offsets and covariance "
+        "stay in their boxes by construction (summary.json lists them)"
+    )
+
+
+def _design(options: argparse.Namespace, vehicle: Vehicle) -> tuple[str, Method]:
+    """Return the name of the law and the method."""
+    if options.seed is not None and options.seed < 0:
+        raise ValueError(f"--seed must not be negative, it is {options.seed}")
+    if options.paper and (options.law or options.design):
+        raise ValueError("--paper names the law already: give no --law or --design with it")
+    if options.design is None:
+        law = options.law or (REFERENCE if options.paper else DEFAULT)
+        if options.seed is not None and not draws_weights(law):
+            raise ValueError(f"--seed is of random initial weights, and {law} begins with none")
+        return law, make_method(law, vehicle, options.seed or 0)
+    for name in ("law", "seed"):
+        if getattr(options, name) is not None:
+            raise ValueError(f"--{name} is for the default design: it stands in {options.design}")
+    design = read_design(options.design)
+    return design.law, design
+
+
+def _require_trusted(model: FrozenModel, recording: Recording, words: str, doubtful: str) -> None:
+    """Refuse tires that do not push at the speed driven: they are not the car's.
+
+    Parameters
+    ----------
+    model : the tires.
+    recording : the drive.
+    words : what is refused.
+    doubtful : what a user should look at.
+    """
+    vehicle, where = model.vehicle, f"{words} is not to be trusted"
+    try:
+        require_alive(NotTrustedError, model)
+    except NotTrustedError as error:
+        raise NotTrustedError(f"{where}: {error}") from None
+    stiffness = steady_stiffness(model, _driven_speed(model, recording))
+    told = np.array([vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear])
+    for axle, learnt_one, told_one in zip(("front", "rear"), stiffness, told, strict=True):
+        if not learnt_one >= DEAD * told_one:
+            raise NotTrustedError(
+                f"{where}: the {axle} axle has {learnt_one:.4g} N/rad, the vehicle file says "
+                f"{told_one:.4g}; check {doubtful}"
+            )
+
+
+def _driven_speed(model: FrozenModel, recording: Recording) -> float:
+    """Return the mean speed of the samples at which a model tells forces [m/s]."""
+    moving = recording.v_x >= model.min_speed
+    return float(recording.v_x[moving].mean()) if moving.any() else model.min_speed
+
+
+def _learn(
+    recording: Recording,
+    vehicle: Vehicle,
+    law: str,
+    design: Method,
+    start: FrozenModel | None,
+) -> History:
+    history = identify(recording, vehicle, design, start=start, check=False)  # it was when read
+    say(f"learnt {law} over {recording.name}")
+    return history
+
+
+def _read(
+    log: str, run_name: str | None, vehicle: Vehicle, design: Method, options: argparse.Namespace
+) -> Recording:
+    recording = read_log(
+        log,
+        vehicle,
+        run_name=run_name,
+        columns=options.columns,
+        check=not options.no_check,
+        dt=design.dt,
+    )
+    counted_samples(recording, design.min_speed)  # refuses a car that never drives
+    return recording
+
+
+def _require_distinct(recordings: list[Recording]) -> None:
+    files = [file_name(recording) for recording in recordings]
+    for recording, name in zip(recordings, files, strict=True):
+        if files.count(name) > 1:
+            raise ValueError(
+                f"{recording.name} is given twice, or its files would be named as those of another "
+                f"recording, {name}: every recording needs a name of its own"
+            )
+
+
+def _require_inside(freeze_times: list[float], recording: Recording) -> None:
+    first, last = float(recording.t[0]), float(recording.t[-1])
+    for t in freeze_times:
+        if not first <= t <= last:
+            lasts = f"{recording.name} lasts from {freeze_key(first)} to {freeze_key(last)} s"
+            raise ValueError(f"--freeze {freeze_key(t)} is outside the recording: {lasts}")
+    for earlier, later in pairwise(map(freeze_key, freeze_times)):
+        if earlier == later:
+            raise ValueError(f"--freeze {later} is given twice: the times differ too little")
+
+
+def _replays(t: float, learnt: History, histories: list[History]) -> dict[str, Replay]:
+    model, others = learnt.freeze(t), histories[1:]
+    return {learnt.recording.name: reproduce(learnt, t)} | {
+        history.recording.name: replay(model, history) for history in others
+    }
+
+
+def error_table(histories: list[History], frozen: dict[float, dict[str, Replay]]) -> str:
+    """Return a table of the errors per axle, and as a share of the force where there is truth.
+
+    Under the recording that was learnt stands the paper's measure: its past, t < T_freeze, against
+    what was identified online.
+
+    Parameters
+    ----------
+    histories : the online runs over all recordings.
+    frozen : freeze time [s] to recording name to replay.
+    """
+    sizes = {history.recording.name: force_rms(history) for history in histories}
+    lines = [f"{'frozen at':>10}  {'replayed on':40} {'front':>16} {'rear':>16}"]
+    for t, replays in frozen.items():
+        for name, result in replays.items():
+            error = result.against_truth or result.against_online
+            note = "" if sizes[name] is not None else "  (against online, no truth)"
+            front, rear = error_cells(error, sizes[name])
+            lines.append(f"{freeze_key(t):>8} s  {visible(name):40} {front:>16} {rear:>16}{note}")
+            sides = result.reproduction
+            if sides is not None and sides.past_against_online is not None:
+                front, rear = error_cells(sides.past_against_online, sizes[name])
+                lines.append(f"{'':10}  {OWN_PAST:40} {front:>16} {rear:>16}")
+    return "\n".join(lines)

@@ -1,0 +1,359 @@
+"""The files of `tireid identify`: numbers as JSON, every curve as CSV, figures as PNG.
+
+The machine-readable result of `tireid identify`: summary.json, whose keys are stable.
+
+What `tireid identify --network` finds: a network of one's own over recordings.
+
+summary.json has the keys of a learnt model; in place of a freeze time stands "network". What the
+identifier finds online over the same recordings stands beside it.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, is_dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identifier.axle import AxleDesign
+from identifier.certification import certify
+from identifier.method import Method, vehicle_numbers
+from identifier.own_network import OnnxModel
+from identifier.paper.design import Design
+from identifier.reproducibility import (
+    AxleRmse,
+    Replay,
+    Reproduction,
+    force_rms,
+    freeze_key,
+    online_error,
+    replay,
+)
+from identifier.run import History
+from models.recordings import Recording
+from models.vehicle import Vehicle
+from tireid import __version__
+from tireid.figures import (
+    error_figure,
+    force_figure,
+    inputs_figure,
+    learnt_axles_figure,
+    prediction_figure,
+    save_figure,
+    slip_figure,
+    weights_figure,
+)
+from tireid.output import write_csv, write_json
+from tireid.progress import say
+
+
+def _axles(error: AxleRmse | None) -> dict[str, float] | None:
+    return None if error is None else {"front": error.front, "rear": error.rear}
+
+
+def _sides(sides: Reproduction) -> dict[str, dict[str, float] | None]:
+    return {
+        "past_against_online": _axles(sides.past_against_online),
+        "past_against_truth": _axles(sides.past_against_truth),
+        "after_against_truth": _axles(sides.after_against_truth),
+    }
+
+
+def method_numbers(design: Method) -> dict[str, Any]:
+    """Return gains, network, the rest of the design, and the seed (None without random weights).
+
+    A method that is not the paper's has all its numbers under "gains" and no network.
+
+    Parameters
+    ----------
+    design : any method.
+    """
+    if isinstance(design, Design):
+        return {
+            "gains": asdict(design.gains),
+            "network": asdict(design.network),
+            "design": {
+                "input_source": design.input_source,
+                "integrator": design.integrator,
+                "dt_s": design.dt,
+                "force_unit_N": design.force_unit,
+                "min_speed_m_s": design.min_speed,
+            },
+            "seed": design.seed,
+        }
+    numbers: dict[str, Any] = asdict(cast(Any, design)) if is_dataclass(design) else {}
+    return {
+        "gains": numbers,
+        "network": numbers.get("network"),
+        "design": {"dt_s": design.dt, "min_speed_m_s": design.min_speed},
+        "seed": numbers.get("seed"),
+    }
+
+
+def certificate_numbers(design: Method, vehicle: Vehicle) -> dict[str, Any]:
+    """Return the verdict on a method, and which bounds hold of it whatever is measured.
+
+    Parameters
+    ----------
+    design : any method.
+    vehicle : the car.
+    """
+    certificate = certify(design, vehicle)
+    return {"verdict": certificate.verdict, "held_by_construction": certificate.held}
+
+
+def summarize(
+    *,
+    law: str,
+    learnt: History,
+    others: Sequence[History],
+    frozen: Mapping[float, Mapping[str, Replay]],
+) -> dict[str, Any]:
+    """Return what summary.json holds: errors by recording and freeze time, and all that went in.
+
+    All sums, of forces and of errors, are over the samples above the design's minimum speed. Those
+    of `frozen` and `frozen_against_online` are over the whole recording; `reproducibility` splits
+    the recording that was learnt at the freeze, and its `past_against_online` is the measure of the
+    paper's section IV-A.
+
+    Parameters
+    ----------
+    law : the law as the user named it.
+    learnt : the online run that the weights come from.
+    others : online runs of the same design over the other recordings.
+    frozen : freeze time [s] to recording name to replay.
+    """
+    by_key = {freeze_key(t): replays for t, replays in frozen.items()}
+    return summarize_replays(law, [learnt, *others], by_key)
+
+
+def summarize_replays(
+    law: str, runs: Sequence[History], frozen: Mapping[str, Mapping[str, Replay]]
+) -> dict[str, Any]:
+    """Return the same of any replays.
+
+    Parameters
+    ----------
+    law : the law as the user named it.
+    runs : online runs of one design, the first the one that was learnt.
+    frozen : key in the summary to recording name to replay.
+    """
+    learnt = runs[0]
+    return {
+        "rms_force_N": {h.recording.name: _axles(force_rms(h)) for h in runs},
+        "rmse_N": {
+            "online": {h.recording.name: _axles(online_error(h)) for h in runs},
+            "frozen": {
+                key: {name: _axles(r.against_truth) for name, r in replays.items()}
+                for key, replays in frozen.items()
+            },
+            "frozen_against_online": {
+                key: {name: _axles(r.against_online) for name, r in replays.items()}
+                for key, replays in frozen.items()
+            },
+            "reproducibility": {
+                key: {name: _sides(r.reproduction) for name, r in replays.items() if r.reproduction}
+                for key, replays in frozen.items()
+            },
+        },
+        "law": law,
+        **method_numbers(learnt.design),
+        "certificate": certificate_numbers(learnt.design, learnt.vehicle),
+        "vehicle": vehicle_numbers(learnt.vehicle),
+        "diverged_at_s": learnt.diverged_at,
+        "version": __version__,
+    }
+
+
+Frozen = Mapping[float, Mapping[str, Replay]]
+WEIGHTS = ("W", "V", "own")  # carried matrices that are the learnt model, by whatever method
+
+
+def write_results(
+    folder: Path, law: str, learnt: History, others: Sequence[History], frozen: Frozen
+) -> None:
+    """Write everything that was learnt into a folder.
+
+    Parameters
+    ----------
+    folder : an empty folder.
+    law : the law as the user named it.
+    learnt : the online run that the weights come from.
+    others : online runs of the same design over the recordings to predict.
+    frozen : freeze time [s] to recording name to replay.
+    """
+    write_json(
+        folder / "summary.json", summarize(law=law, learnt=learnt, others=others, frozen=frozen)
+    )
+    for t in frozen:
+        name = "weights.json" if t == max(frozen) else f"weights_{freeze_key(t)}s.json"
+        learnt.freeze(t).save(folder / name)
+    _write_curves(folder, learnt, others, frozen)
+    say("drawing figures")
+    _draw(folder, learnt, others, frozen)
+
+
+def file_name(recording: Recording) -> str:
+    """Return the name of a recording as part of a file name.
+
+    Parameters
+    ----------
+    recording : named FILE or FILE:RUN.
+    """
+    return re.sub(r"[^\w.-]+", "_", recording.name)
+
+
+def error_cells(error: AxleRmse, size: AxleRmse | None) -> tuple[str, str]:
+    """Return front and rear error as text, with their share of the rms force where it is known.
+
+    Parameters
+    ----------
+    error : [N].
+    size : rms of the true forces [N], None without truth.
+    """
+    forces = (0.0, 0.0) if size is None else (size.front, size.rear)
+    front, rear = (
+        f"{newtons:8.4g} N{f' {100 * newtons / force:.0f} %' if force > 0.0 else '':>6}"
+        for newtons, force in zip((error.front, error.rear), forces, strict=True)
+    )
+    return front, rear
+
+
+def _write_curves(folder: Path, learnt: History, others: Sequence[History], frozen: Frozen) -> None:
+    for history in (learnt, *others):
+        replays = {
+            f"frozen_{freeze_key(t)}s": by_name[history.recording.name]
+            for t, by_name in frozen.items()
+        }
+        name = "forces.csv" if history is learnt else f"forces_{file_name(history.recording)}.csv"
+        write_csv(folder / name, force_columns(history, replays))
+    t, n = learnt.recording.t, learnt.recording.t.size
+    if isinstance(learnt.design, Design):
+        write_csv(
+            folder / "errors.csv",
+            {
+                "t_s": t,
+                "xi_tilde_f_Us": learnt.told["xi_tilde"][:, 0],
+                "xi_tilde_r_Us": learnt.told["xi_tilde"][:, 1],
+                "z_f_Us2": learnt.carried["z"][:-1, 0],
+                "z_r_Us2": learnt.carried["z"][:-1, 1],
+            },
+        )
+    weights = {"t_s": t}
+    for matrix in [name for name in WEIGHTS if name in learnt.carried]:
+        values = learnt.carried[matrix]
+        for i, j in np.ndindex(values.shape[1:]):
+            weights[f"{matrix}_{i + 1}_{j + 1}"] = values[:n, i, j]
+    write_csv(folder / "weights.csv", weights)
+
+
+def force_columns(
+    history: History, replays: Mapping[str, Replay]
+) -> dict[str, NDArray[np.float64]]:
+    """Return the curves of forces.csv: slip angles, true, online and frozen forces.
+
+    Parameters
+    ----------
+    history : an online run.
+    replays : replays of the same recording by the name of their columns.
+    """
+    recording, car = history.recording, history.vehicle
+    alpha = recording.alpha(car.l_f, car.l_r)
+    columns = {
+        "t_s": recording.t,
+        "v_x_m_s": recording.v_x,
+        "v_y_m_s": recording.v_y,
+        "r_rad_s": recording.r,
+        "delta_f_rad": recording.delta_f,
+        "delta_r_rad": recording.delta_r,
+        "alpha_f_rad": alpha[:, 0],
+        "alpha_r_rad": alpha[:, 1],
+    }
+    curves = {"online": history.axle_force}
+    curves |= {label: replay.axle_force for label, replay in replays.items()}
+    if recording.axle_force is not None:
+        curves = {"true": recording.axle_force} | curves
+    for name, force in curves.items():
+        columns |= {f"Fyf_{name}_N": force[:, 0], f"Fyr_{name}_N": force[:, 1]}
+    return columns
+
+
+def _draw(folder: Path, learnt: History, others: Sequence[History], frozen: Frozen) -> None:
+    name, last = learnt.recording.name, max(frozen)
+    own = {t: replays[name] for t, replays in frozen.items()}
+    figures = {
+        "forces": force_figure(learnt, own),
+        "slip": slip_figure(learnt.freeze(last), learnt.recording, learnt),
+        "inputs": inputs_figure(learnt.recording),
+    }
+    if isinstance(learnt.design, Design):
+        figures["error"] = error_figure(learnt, freeze_times=list(frozen))
+        figures["weights"] = weights_figure(learnt, list(frozen))
+    elif isinstance(learnt.design, AxleDesign):
+        figures["learnt"] = learnt_axles_figure(learnt, list(frozen))
+    for other in others:
+        replay = frozen[last][other.recording.name]
+        figures[f"replay_{file_name(other.recording)}"] = prediction_figure(replay, other)
+    for label, figure in figures.items():
+        save_figure(figure, folder / f"{label}.png")
+
+
+NETWORK = "network"
+
+
+def write_network_results(
+    folder: Path, file: Path, law: str, model: OnnxModel, histories: Sequence[History]
+) -> Mapping[str, Replay]:
+    """Write everything that is known of a network into a folder; return replays by recording.
+
+    Parameters
+    ----------
+    folder : an empty folder.
+    file : where the network came from.
+    law : what learns beside it, as the user named it.
+    model : the network.
+    histories : what was identified online over each recording.
+    """
+    replays = {history.recording.name: replay(model, history) for history in histories}
+    about = {
+        "file": file.name,
+        "inputs": list(model.signals),
+        "slip_sign": model.slip_sign,
+    }
+    summary = summarize_replays(law, histories, {NETWORK: replays})
+    write_json(folder / "summary.json", {**summary, NETWORK: about})
+    model.save(folder / "weights.json")
+    say("drawing figures")
+    for history in histories:
+        recording = history.recording
+        name, own = file_name(recording), replays[recording.name]
+        last = "" if history is histories[0] else f"_{name}"
+        write_csv(folder / f"forces{last}.csv", force_columns(history, {NETWORK: own}))
+        save_figure(slip_figure(model, recording, history), folder / f"slip{last}.png")
+        save_figure(prediction_figure(own, history), folder / f"replay_{name}.png")
+    save_figure(inputs_figure(histories[0].recording), folder / "inputs.png")
+    return replays
+
+
+def network_table(law: str, histories: Sequence[History], replays: Mapping[str, Replay]) -> str:
+    """Return the errors of the network, and of what was learnt online beside it, as text.
+
+    Parameters
+    ----------
+    law : what learns beside it.
+    histories : what was identified online over each recording.
+    replays : of the network, by recording.
+    """
+    lines = [f"{'':24} {'replayed on':40} {'front':>16} {'rear':>16}"]
+    for history in histories:
+        name, size, online = history.recording.name, force_rms(history), online_error(history)
+        own = replays[name]
+        rows = [(NETWORK, own.against_truth or own.against_online)]
+        rows += [] if online is None else [(f"{law}, learning online", online)]
+        note = "  (against online, no truth)" if size is None else ""
+        for title, error in rows:
+            front, rear = error_cells(error, size)
+            lines.append(f"{title:24} {name:40} {front:>16} {rear:>16}{note}")
+    return "\n".join(lines)

@@ -1,0 +1,302 @@
+"""The norm of the identifier's error over time, beside the bounds that hold for it.
+
+The weights over time: what was learnt when, and whether it settled.
+
+A table as a picture: medians and quartiles by law and column, with the paper's values.
+
+How far the learning loop is from instability: its sampled poles at any gain.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from identifier.defaults import LAWS
+from identifier.run import History
+from identifier.stability.loop import INTEGRATORS, Loop, eigenvalues, scaled_matrices
+from identifier.stability.margins import gain_margin, phase_margin
+from tireid.figures.style import (
+    AMBER,
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PAGE,
+    PURPLE,
+    SERIES,
+    TIME,
+    Window,
+    drawable,
+    force_range,
+    force_unit_name,
+    impulse_unit,
+    legend_above,
+    legend_beside,
+    mark_freeze,
+    new_figure,
+    paper_design,
+    shown,
+    styled,
+    time_window,
+)
+
+WIDE = 20.0  # from this ratio between what is drawn on, the axis is logarithmic
+
+
+@styled
+def error_figure(
+    history: History,
+    bounds: Mapping[str, float] | None = None,
+    freeze_times: Sequence[float] = (),
+    *,
+    window: Window = None,
+) -> Figure:
+    """Draw the norm of ξ̃ = ξ - ξ̂ over time and its bounds.
+
+    The axis is logarithmic where a bound lies far above the error.
+
+    Parameters
+    ----------
+    history : the online run.
+    bounds : by name, bounds on the norm [U s]; one that is not finite is left out.
+    freeze_times : times at which weights were taken [s].
+    window : first and last time to show [s]; None shows all.
+
+    Raises
+    ------
+    ValueError
+        Where the window holds no sample.
+    """
+    recording = history.recording
+    ends = time_window(recording.t, window)
+    part = shown(recording.t, ends)
+    # A root of squares would overflow where a law diverges; hypot does not.
+    norm = np.hypot(history.told["xi_tilde"][part, 0], history.told["xi_tilde"][part, 1])
+    known = {name: bound for name, bound in (bounds or {}).items() if np.isfinite(bound)}
+    drawn = norm[np.isfinite(norm) & (norm > 0.0) & (norm < 1e12)]
+    typical, peak = (float(np.median(drawn)), float(drawn.max())) if drawn.size else (1.0, 1.0)
+    top = max(peak, *known.values()) if known else peak
+
+    figure = new_figure(PAGE, 2.6)
+    axes = figure.subplots()
+    axes.set_xlim(ends)
+    if top > WIDE * peak or peak > 100.0 * WIDE * typical:
+        axes.set_yscale("log")
+        axes.set_ylim(typical / 30.0, 2.0 * top)
+    else:
+        axes.set_ylim(0.0, 1.08 * top)
+    axes.plot(
+        recording.t[part],
+        np.minimum(norm, 1e3 * top),
+        color=BLUE,
+        linewidth=0.9,
+        label=r"$|\tilde{\xi}|$ online",
+    )
+    styles = ((PURPLE, "-"), (GREEN, (0, (5, 1.5))), (AMBER, (0, (5, 1.5, 1, 1.5))))
+    for number, (name, bound) in enumerate(known.items()):
+        color, dashes = styles[number % len(styles)]
+        axes.axhline(bound, color=color, linestyle=dashes, linewidth=1.1, label=name)
+    for t_freeze in freeze_times:
+        mark_freeze(axes, t_freeze, prediction=False)
+    axes.set(
+        xlabel=TIME,
+        ylabel=rf"error norm $|\tilde{{\xi}}|$ [{impulse_unit(paper_design(history).force_unit)}]",
+    )
+    legend_above(figure, columns=min(4, 1 + len(known) + bool(freeze_times)))
+    return figure
+
+
+Array = NDArray[np.float64]
+SYMBOLS = {
+    "v_y": "$v_y$",
+    "r": "$r$",
+    "delta_f": r"$\delta_f$",
+    "delta_r": r"$\delta_r$",
+    "v_x": "$v_x$",
+    "alpha_f": r"$\alpha_f$",
+    "alpha_r": r"$\alpha_r$",
+}
+
+
+@styled
+def weights_figure(
+    history: History, freeze_times: Sequence[float] = (), *, window: Window = None
+) -> Figure:
+    """Draw every entry of W and V over time: W by axle, V by the input it weighs.
+
+    Parameters
+    ----------
+    history : the online run.
+    freeze_times : times at which weights were taken [s].
+    window : first and last time to show [s]; None shows all.
+
+    Raises
+    ------
+    ValueError
+        Where the window holds no sample.
+    """
+    recording, design = history.recording, paper_design(history)
+    ends = time_window(recording.t, window)
+    part = shown(recording.t, ends)
+    t, W, V = recording.t[part], history.carried["W"][:-1][part], history.carried["V"][:-1][part]
+
+    figure = new_figure(PAGE, 4.2)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    upper.set_xlim(ends)
+    _lines(upper, t, W[:, 0, :], GREEN, "front axle")
+    _lines(upper, t, W[:, 1, :], PURPLE, "rear axle")
+    upper.set_ylabel(rf"weights $\hat{{W}}$ [{force_unit_name(design.force_unit)}]")
+    for number, name in enumerate(design.network.inputs):
+        _lines(lower, t, V[:, :, number], SERIES[number % len(SERIES)], SYMBOLS[name])
+    lower.set(xlabel=TIME, ylabel=r"weights $\hat{V}$ [-]")
+    for axes, values in ((upper, W), (lower, V)):
+        axes.set_ylim(force_range(_settled(values) if history.diverged_at is not None else values))
+        for t_freeze in freeze_times:
+            mark_freeze(axes, t_freeze, prediction=False)
+        legend_beside(axes)
+    figure.align_ylabels()
+    return figure
+
+
+def _lines(axes: Axes, t: Array, values: Array, color: str, label: str) -> None:
+    """Draw the columns of `values` (n, k) in one color under one label."""
+    lines = axes.plot(t, drawable(values, force_range(values)), color=color, linewidth=0.7)
+    lines[0].set_label(label)
+
+
+def _settled(values: Array) -> Array:
+    """Return the samples of `values` (n, i, k) before a law that diverges runs away."""
+    peak = np.abs(values).max(axis=(1, 2))
+    kept: Array = values[peak <= 10.0 * np.median(peak[np.isfinite(peak)])]
+    return kept
+
+
+Quartiles = tuple[float, float, float]  # median, lower and upper quartile
+MARKS: Mapping[str, tuple[str, str]] = {  # color, marker
+    "instantaneous": (ORANGE, "s"),
+    "integral": (BLUE, "o"),
+    "instantaneous_scaled": (GREEN, "D"),
+}
+FURTHER = ((PURPLE, "^"), (AMBER, "v"))
+OFFSET = 0.2  # between neighboring laws, as a share of the distance of columns
+
+
+@styled
+def comparison_figure(
+    results: Mapping[str, Mapping[str, Quartiles]],
+    paper: Mapping[str, Mapping[str, float]] | None = None,
+) -> Figure:
+    """Draw medians of the force RMSE with whiskers from quartile to quartile, the paper's hollow.
+
+    Parameters
+    ----------
+    results : by law, by column as it is to be labeled: median, lower, upper quartile [kN]; a law
+        that diverged has no column or values that are not finite, which are left out.
+    paper : by law, by column: the value that the paper prints [kN].
+
+    Raises
+    ------
+    ValueError
+        Where there is nothing to draw.
+    """
+    columns = list(dict.fromkeys(name for row in results.values() for name in row))
+    if not columns:
+        raise ValueError("a comparison needs at least one law with one column")
+    figure = new_figure(PAGE, 2.9)
+    axes = figure.subplots()
+    drawn: list[float] = []
+    order: list[str] = []
+    for number, (law, row) in enumerate(results.items()):
+        if not row:
+            continue
+        label = LAWS.get(law, law).replace("eta/lambda", "η/λ")
+        color, marker = MARKS.get(law, FURTHER[number % len(FURTHER)])
+        order += [label, f"{label} (paper)"]
+        shift = OFFSET * (number - (len(results) - 1) / 2)
+        middle, low, high = np.array(list(row.values()), dtype=np.float64).T
+        middle = np.where(np.isfinite(middle), middle, np.nan)
+        whiskers = [np.where(np.isfinite(end), abs(middle - end), 0.0) for end in (low, high)]
+        axes.errorbar(
+            [columns.index(name) + shift for name in row],
+            middle,
+            yerr=whiskers,
+            fmt=marker,
+            color=color,
+            markersize=4.5,
+            elinewidth=1.2,
+            capsize=3.0,
+            label=label,
+        )
+        printed = {name: value for name, value in (paper or {}).get(law, {}).items() if name in row}
+        if printed:
+            axes.plot(
+                [columns.index(name) + shift + 0.07 for name in printed],
+                list(printed.values()),
+                linestyle="",
+                marker=marker,
+                markersize=5.0,
+                markerfacecolor="white",
+                markeredgecolor=color,
+                markeredgewidth=1.1,
+                label=f"{label} (paper)",
+            )
+        drawn += [*middle, *(middle - whiskers[0]), *(middle + whiskers[1]), *printed.values()]
+    positive = [value for value in drawn if value > 0.0]
+    if positive and max(positive) > WIDE * min(positive):
+        axes.set(yscale="log", ylim=(min(positive) / 1.5, max(positive) * 1.5))
+    else:
+        axes.set_ylim(0.0, 1.08 * max(positive, default=1.0))
+    axes.set_xticks(range(len(columns)), columns)
+    axes.tick_params(axis="x", length=0.0)
+    axes.grid(visible=False, axis="x")
+    axes.set(xlim=(-0.5, len(columns) - 0.5), ylabel="force RMSE [kN]")
+    for boundary in range(1, len(columns)):
+        axes.axvline(boundary - 0.5, color="#DDDDDD", linewidth=0.6)
+    legend_above(figure, columns=len(results), order=order)
+    return figure
+
+
+FACTORS = np.geomspace(1e-3, 1e3, 1500)  # on the loop gain, along the locus
+
+
+@styled
+def locus_figure(loop: Loop, *, integrator: str, dt: float) -> Figure:
+    """Draw the root locus of the sampled loop, with the design on it and the gain at its limit.
+
+    Left all of the unit circle, right the part near z = 1, where slow poles are.
+
+    Parameters
+    ----------
+    loop : the loop at the worst regressor.
+    integrator : "euler" or "rk4".
+    dt : sampling interval [s].
+    """
+    step = INTEGRATORS[integrator]
+    locus = step(eigenvalues(scaled_matrices(loop, FACTORS)) * dt).ravel()
+    design = step(eigenvalues(loop.matrix()) * dt)
+    margin = gain_margin(loop, step, dt)
+    circle = np.exp(1j * np.linspace(-np.pi, np.pi, 2881))
+    figure = new_figure(PAGE, 3.5)
+    panels = figure.subplots(1, 2)
+    span = 1.3 * float(np.abs(1.0 - design).max())
+    views = (-1.1, 1.1, 1.1), (1.0 - 1.5 * span, 1.0 + 0.5 * span, span)
+    for axes, (left, right, height) in zip(panels, views, strict=True):
+        axes.plot(circle.real, circle.imag, color=BLACK, linewidth=0.9, label="stability limit")
+        axes.plot(locus.real, locus.imag, ".", color=GREY, markersize=1.0, label="any gain")
+        axes.plot(design.real, design.imag, "o", color=BLUE, markersize=4.5, label="design")
+        if 0.0 < margin.factor < np.inf:
+            edge = step(eigenvalues(loop.scaled(margin.factor).matrix()) * dt)
+            name = f"{margin.factor:.3g} times its gain"
+            axes.plot(edge.real, edge.imag, "x", color=ORANGE, markersize=5.5, label=name)
+        axes.set(xlim=(left, right), ylim=(-height, height), aspect="equal")
+        axes.set_xlabel("real part of z [-]")
+    panels[0].set_ylabel("imaginary part of z [-]")
+    panels[0].set_title("Poles of the sampled loop")
+    phase = phase_margin(loop, step, dt)
+    panels[1].set_title(f"Near z = 1; phase margin {phase:.0f}°")
+    legend_above(figure)
+    return figure

@@ -1,0 +1,275 @@
+"""Axle force against slip angle: the shape of the tire, as measured and as learnt.
+
+What pictures of a drive say of tires: the slip of its axles, and curves of force over slip.
+
+Axle force over slip on the drive: what the tires did, what the tracker believed, the truth.
+
+What the axle identifier has learnt over time, in the numbers an engineer reads.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from identifier.axle import AxleDesign
+from identifier.axle.slip import SHORTEST
+from identifier.method import FrozenModel
+from identifier.run import History
+from models.recordings import Recording
+from mpc.loop import Drive
+from tireid.figures.drive import tire_look
+from tireid.figures.style import (
+    AXLES,
+    BLACK,
+    BLUE,
+    GREEN,
+    LINEAR,
+    ORANGE,
+    PAGE,
+    PURPLE,
+    SKY,
+    TIME,
+    drawable,
+    force_range,
+    force_unit_of,
+    legend_above,
+    mark_freeze,
+    new_figure,
+    styled,
+)
+
+UNKNOWN = "slip not known"
+
+
+@styled
+def slip_figure(model: FrozenModel, recording: Recording, online: History | None = None) -> Figure:
+    """Draw force over slip angle, front and rear: truth, frozen model and linear tire.
+
+    The slip angle has the paper's sign, α = δ - atan2(v_y ± l r, v_x), the negative of ISO 8855, so
+    that the curves rise. Samples below the model's minimum speed are left out.
+
+    Parameters
+    ----------
+    model : the frozen model; its vehicle gives the axle positions and the linear tire.
+    recording : where the model is evaluated.
+    online : an online run over the recording, drawn where there is no truth.
+
+    Raises
+    ------
+    ValueError
+        Where the online run is of another recording, or the car never reaches the minimum speed.
+    """
+    if online is not None and online.axle_force.shape != (recording.t.size, 2):
+        raise ValueError(
+            f"the model is drawn on {recording.name}, the online run is of {online.recording.name}"
+        )
+    moving = recording.v_x >= model.min_speed
+    if not moving.any():
+        raise ValueError(f"{recording.name}: v_x never reaches {model.min_speed:g} m/s")
+    vehicle = model.vehicle
+    alpha = np.rad2deg(recording.alpha(vehicle.l_f, vehicle.l_r)[moving])
+    frozen = model.axle_force(recording)[moving]
+    known, color, label = recording.axle_force, BLACK, "truth"
+    if known is None and online is not None:
+        known, color, label = online.axle_force, BLUE, "online"
+    reference = frozen if known is None else known[moving]
+    unit = force_unit_of(reference)
+    frozen, reference = frozen / unit.newtons, reference / unit.newtons
+    limits = force_range(reference, frozen)
+    stiffness = vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear
+
+    figure = new_figure(PAGE, 3.2)
+    panels = figure.subplots(1, 2, sharey=True)
+    for axle, (axes, name) in enumerate(zip(panels, AXLES, strict=True)):
+        if known is not None:
+            axes.plot(
+                alpha[:, axle],
+                drawable(reference[:, axle], limits),
+                linestyle="",
+                marker=".",
+                markersize=3.0,
+                markeredgewidth=0.0,
+                color=color,
+                alpha=0.35,
+                label=label,
+            )
+        axes.plot(
+            alpha[:, axle],
+            drawable(frozen[:, axle], limits),
+            linestyle="",
+            marker=".",
+            markersize=2.2,
+            markeredgewidth=0.0,
+            color=ORANGE,
+            alpha=0.8,
+            label="frozen weights",
+        )
+        low, high = float(alpha[:, axle].min()), float(alpha[:, axle].max())
+        margin = 0.04 * (high - low) or 1.0
+        ends = np.array([low - margin, high + margin])
+        axes.plot(ends, stiffness[axle] / unit.newtons * np.deg2rad(ends), **LINEAR)
+        if model.known_slip is not None:
+            _draw_curve(axes, model, axle, ends, unit.newtons)
+            _shade_unknown(axes, float(np.rad2deg(model.known_slip[axle])), ends)
+        axes.set(
+            xlim=ends, ylim=limits, title=name, xlabel=rf"slip angle $\alpha_{'fr'[axle]}$ [deg]"
+        )
+        axes.xaxis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 5, 10]))
+    panels[0].set_ylabel(f"lateral force [{unit.name}]")
+    legend_above(figure, order=(UNKNOWN,))
+    return figure
+
+
+def _draw_curve(
+    axes: Axes, model: FrozenModel, axle: int, ends: NDArray[np.float64], newtons: float
+) -> None:
+    """Draw the steady curve of an axle."""
+    slip = np.linspace(np.deg2rad(ends[0]), np.deg2rad(ends[1]), 200)
+    axes.plot(
+        np.rad2deg(slip),
+        model.force(slip)[:, axle] / newtons,
+        color=BLUE,
+        linewidth=1.2,
+        label="frozen curve, steady",
+    )
+
+
+def _shade_unknown(axes: Axes, known: float, ends: NDArray[np.float64]) -> None:
+    """Shade the slip [deg] that the model does not know."""
+    for low, high in ((ends[0], -known), (known, ends[1])):
+        if low < high:
+            axes.axvspan(low, high, color="#EFE9DD", linewidth=0.0, zorder=0, label=UNKNOWN)
+
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TireCurve:
+    """Steady axle forces over slip, one curve an axle.
+
+    Parameters
+    ----------
+    label : what legends call it.
+    alpha : slip in the paper's sign [rad], (k,).
+    force : of front and rear axle [N], (k, 2).
+    """
+
+    label: str
+    alpha: Array
+    force: Array
+
+
+def axle_slip(drive: Drive) -> Array:
+    """Return the slip angles δ - atan2(v_y ± l r, v_x) in the paper's sign [rad], (n, 2).
+
+    Parameters
+    ----------
+    drive : its true motion is taken.
+    """
+    front = drive.delta - np.arctan2(drive.v_y + drive.vehicle.l_f * drive.r, drive.v_x)
+    rear = -np.arctan2(drive.v_y - drive.vehicle.l_r * drive.r, drive.v_x)
+    return np.column_stack([front, rear])
+
+
+REACH = 1.25  # curves go on this far beyond the slip of the drive
+
+
+@styled
+def drive_tires_figure(drive: Drive, curves: Sequence[TireCurve]) -> Figure:
+    """Draw the forces of a drive as a cloud, and the curves that trackers believed.
+
+    Parameters
+    ----------
+    drive : the drive.
+    curves : steady forces of the tires to compare.
+    """
+    unit = force_unit_of(drive.axle_force)
+    alpha, force = np.rad2deg(axle_slip(drive)), drive.axle_force / unit.newtons
+    reach = REACH * float(np.abs(alpha).max())
+    shown = [np.abs(np.rad2deg(curve.alpha)) <= reach for curve in curves]
+    within = [c.force[part] / unit.newtons for c, part in zip(curves, shown, strict=True)]
+    steep = [f for c, f in zip(curves, within, strict=True) if not c.label.startswith("linear")]
+    low, high = force_range(force, *steep)
+    figure = new_figure(PAGE, 3.3)
+    panels = figure.subplots(1, 2, sharey=True)
+    for axle, (axes, name) in enumerate(zip(panels, AXLES, strict=True)):
+        axes.plot(
+            alpha[:, axle],
+            force[:, axle],
+            linestyle="",
+            marker=".",
+            markersize=3.0,
+            markeredgewidth=0.0,
+            color=SKY,
+            alpha=0.6,
+            label="this drive, true forces",
+        )
+        for curve, part, values in zip(curves, shown, within, strict=True):
+            axes.plot(
+                np.rad2deg(curve.alpha[part]),
+                drawable(values[:, axle], (low, high)),
+                label=curve.label,
+                **tire_look(curve.label),
+            )
+        axes.set(
+            title=name,
+            xlabel=rf"slip angle $\alpha_{'fr'[axle]}$ [deg]",
+            xlim=(-reach, reach),
+            ylim=(low, high),
+        )
+        axes.xaxis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 5, 10]))
+    panels[0].set_ylabel(f"lateral force [{unit.name}]")
+    legend_above(figure, columns=1 + len(curves) if len(curves) < 5 else 3)
+    return figure
+
+
+@styled
+def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) -> Figure:
+    """Draw cornering stiffness, relaxation length and capacity of both axles over time.
+
+    Capacity is the force at which the learnt curve saturates, over the static load of the axle.
+
+    Parameters
+    ----------
+    history : a run of the axle identifier.
+    freeze_times : times at which weights were taken [s].
+
+    Raises
+    ------
+    TypeError
+        Where another method ran.
+    """
+    design, vehicle = history.design, history.vehicle
+    if not isinstance(design, AxleDesign):
+        raise TypeError(f"a run of the axle identifier is needed, not of {design}")
+    t, W = history.recording.t, history.carried["W"][:-1]
+    slope = (W / np.array(design.ladder)).sum(axis=2)
+    loads = np.array(vehicle.axle_loads)
+    stiff = float((slope * loads).max()) >= 1000.0
+    compliance = history.carried["own"][:-1, :, 0]
+    curves = {
+        f"cornering stiffness\n[{'kN' if stiff else 'N'}/rad]": slope
+        * loads
+        / (1000.0 if stiff else 1.0),
+        "relaxation length\n[m]": compliance * np.maximum(slope, 0.0)
+        + SHORTEST * vehicle.wheelbase,
+        "force at saturation\n[static load]": W.sum(axis=2),
+    }
+    figure = new_figure(PAGE, 4.4)
+    panels = figure.subplots(len(curves), 1, sharex=True)
+    for axes, (label, values) in zip(panels, curves.items(), strict=True):
+        for axle, color in enumerate((GREEN, PURPLE)):
+            axes.plot(t, values[:, axle], color=color, linewidth=1.0, label=AXLES[axle].lower())
+        axes.set(ylabel=label, xlim=(t[0], t[-1]))
+        axes.set_ylim(0.0, 1.1 * float(values.max()) or 1.0)
+        for at in freeze_times:
+            mark_freeze(axes, at, prediction=False)
+    panels[-1].set_xlabel(TIME)
+    legend_above(figure)
+    return figure
