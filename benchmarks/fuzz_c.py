@@ -11,6 +11,7 @@ is all of its code; a hundredth of the steps is taken with forty.
 """
 
 import argparse
+import random
 import re
 import shutil
 import subprocess
@@ -36,6 +37,7 @@ SHORT, LONG = 2, 40  # stages
 SHARE_LONG = 100  # of the steps, one in so many is taken with the long horizon
 LAWS = ("axle", "integral")
 LONGEST = 2048  # bytes of an input
+BEGINNINGS = 16  # random inputs that the search begins with
 SECONDS = 30  # of an input, before it counts as a hang
 SANITIZERS = "fuzzer,address,undefined,float-divide-by-zero,float-cast-overflow"
 # What AddressSanitizer sees too, and what takes five times as long to look at beside it.
@@ -171,6 +173,9 @@ def fuzz(program: Path, steps: int, seed: int) -> Outcome:
     """
     corpus = program.with_name("corpus")
     corpus.mkdir()
+    rng = random.Random(seed)
+    for k in range(BEGINNINGS):  # else what is hostile comes late, from an empty input on
+        (corpus / f"{k}").write_bytes(rng.randbytes(LONGEST))
     options = {"seed": seed, "max_len": LONGEST, "len_control": 0, "timeout": SECONDS}
     words = [str(program), str(corpus), *(f"-{name}={value}" for name, value in options.items())]
     start = time.perf_counter()

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from codegen import Scan
 from identifier.tire_model import TireModel
 from models.doors import Table
-from models.files import LARGEST_FORCE
 from models.recordings import Recording
+from models.rules import LARGEST_FORCE
 from models.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -170,7 +170,11 @@ def vehicle_from(data: Mapping[str, Any]) -> Vehicle:
 
 
 class SteadyTires(Protocol):
-    """What has steady axle forces at slip angles."""
+    """What has steady axle forces at slip angles, and knows the linear tires of its car."""
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """The car, with the cornering stiffnesses that it is told."""
 
     def force_at(self, alpha: Array) -> Array:
         """Return the steady axle forces at slip angles, (k, 2) [N].
@@ -192,7 +196,7 @@ def require_alive(refusal: type[ValueError], tires: SteadyTires) -> None:
     Raises
     ------
     ValueError
-        Of that class, with the forces.
+        Of that class, with the forces or the stiffness.
     """
     force = np.asarray(tires.force_at(np.array([-WIDE, -PROBE, PROBE, WIDE])))
     if not (np.abs(force) <= LARGEST_FORCE).all():
@@ -206,6 +210,13 @@ def require_alive(refusal: type[ValueError], tires: SteadyTires) -> None:
             f"{force[1].tolist()} and {force[2].tolist()} N: check units, the order of inputs, "
             "and the sign of slip (slip_sign)"
         )
+    slope = (force[2] - force[1]) / (2.0 * PROBE)
+    for axle, here, told in zip(("front", "rear"), slope, tires.vehicle.bicycle[4:], strict=True):
+        if not here >= DEAD * told:
+            raise refusal(
+                f"the {axle} axle does not push: it has {here:.4g} N/rad, its vehicle {told:.4g}; "
+                "check the units of force and slip"
+            )
 
 
 def require_min_speed(speed: float) -> None:

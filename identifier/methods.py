@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from identifier.axle import AxleDesign
+from identifier.axle.design import AxleDesign
 from identifier.axle.gate import Plausibility
 from identifier.axle.model import ARRAYS, AxleModel
 from identifier.axle.model import KIND as AXLE
@@ -28,11 +28,9 @@ from identifier.baselines import (
 )
 from identifier.baselines.curves import KIND as CURVE
 from identifier.baselines.curves import CurveModel
-from identifier.defaults import LAWS, default_design
+from identifier.defaults import LAWS, default_design, natural_operation
 from identifier.method import (
-    DEAD,
     FORMAT,
-    PROBE,
     FrozenModel,
     FrozenModelError,
     Method,
@@ -40,9 +38,13 @@ from identifier.method import (
 )
 from identifier.own_network import KIND as ONNX
 from identifier.own_network import OnnxModel
+from identifier.paper.design import Design, Driving
+from identifier.paper.laws import DRIVING_ERRORS
 from identifier.paper.network import KIND as NETWORK
 from identifier.paper.network import NetworkModel
 from identifier.regression import RegressionDesign
+from identifier.stability import Certificate
+from identifier.stability import certify as certify_gains
 from identifier.tire_model import TireModel
 from models.doors import Table, read_json, shown
 from models.vehicle import Vehicle
@@ -134,6 +136,25 @@ def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01) -> Method:
             raise ValueError(f"no method can go on learning from a {type(model).__name__}")
 
 
+def certify(method: Method, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
+    """Return what is proven of a method.
+
+    Parameters
+    ----------
+    method : any method.
+    vehicle : the car.
+    driving : how hard it is driven; None takes what is stored in a design, else `natural_driving`.
+    """
+    match method:
+        case Design():
+            operation = natural_operation(method, vehicle, driving)
+            return certify_gains(method.gains, DRIVING_ERRORS[method.law], operation)
+        case AxleDesign():
+            return Certificate(held=method.certificate["held_by_construction"])
+        case _:
+            return Certificate()
+
+
 LARGEST = 1e9  # of the numbers of an axle model, SI and static axle loads
 
 
@@ -163,21 +184,9 @@ def load_model(path: str | PathLike[str]) -> FrozenModel:
     model = READERS[kind](dict(table.data), str(path))
     try:
         require_alive(FrozenModelError, model)
-        _require_push(model)
     except FrozenModelError as error:
         raise FrozenModelError(f"{path}: {error}") from None
     return model
-
-
-def _require_push(model: FrozenModel) -> None:
-    """Refuse an axle that has next to nothing of the stiffness that the file's car is told."""
-    slope = np.diff(model.force_at(np.array([-PROBE, PROBE])), axis=0)[0] / (2.0 * PROBE)
-    told = np.array(model.vehicle.bicycle)[4:]
-    for axle, here, there in zip(("front", "rear"), slope, told, strict=True):
-        if not here >= DEAD * there:
-            raise FrozenModelError(
-                f"the {axle} axle has {here:.4g} N/rad, its vehicle {there:.4g}: it does not push"
-            )
 
 
 def _axle(data: dict[str, Any], source: str) -> AxleModel:

@@ -37,8 +37,8 @@ from identifier.paper.network import SIGNALS, network_signals
 from identifier.tire_model import TireModel, drift
 from models.bicycle import BicycleParameters
 from models.doors import Table, read_bytes
-from models.files import LARGEST_FORCE
 from models.recordings import Recording
+from models.rules import LARGEST_FORCE
 from models.vehicle import Vehicle
 
 FORCES = ("F_yf", "F_yr")

@@ -1,11 +1,7 @@
-"""Files that appear whole or not at all.
-
-Rules that numbers must keep wherever they come from.
-"""
+"""Files that appear whole or not at all."""
 
 import hashlib
 import json
-import math
 import tempfile
 from os import PathLike
 from pathlib import Path
@@ -42,43 +38,3 @@ def digest(content: Any) -> str:
     """
     text = json.dumps(content, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:12]
-
-
-LARGEST_FORCE = 1e7  # of an axle [N]: ten times that of the heaviest dump truck
-
-
-def require_positive(refusal: type[ValueError], /, **values: float) -> None:
-    """Refuse every value that is not a finite number above zero.
-
-    Parameters
-    ----------
-    refusal : class of the error to raise.
-    **values : what to check, by name.
-
-    Raises
-    ------
-    ValueError
-        Of that class, with the first name that breaks the rule and its value; NaN breaks it too.
-    """
-    for name, value in values.items():
-        if not (value > 0.0 and math.isfinite(value)):
-            raise refusal(f"{name} must be positive and finite, it is {value}")
-
-
-def require_within(refusal: type[ValueError], low: float, high: float, /, **values: float) -> None:
-    """Refuse every value outside the closed interval from `low` to `high`.
-
-    Parameters
-    ----------
-    refusal : class of the error to raise.
-    low, high : ends of the interval, in the unit of the values.
-    **values : what to check, by name.
-
-    Raises
-    ------
-    ValueError
-        Of that class, with the first name that breaks the rule and its value; NaN breaks it too.
-    """
-    for name, value in values.items():
-        if not low <= value <= high:
-            raise refusal(f"{name} must lie between {low:g} and {high:g}, it is {value:.10g}")

@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from models.files import require_positive
+from models.rules import require_positive
 
 Array = NDArray[np.float64]
 

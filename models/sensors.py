@@ -1,6 +1,9 @@
-"""Sensors as data: what noise, bias, delay and resolution do to an exact recording."""
+"""Sensors as data: what noise, bias, delay and resolution do to an exact recording, and what is
+no number of a sensor at all.
+"""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -9,6 +12,18 @@ from numpy.typing import NDArray
 from models.recordings import Recording
 
 Array = NDArray[np.float64]
+
+# What a sensor can show at all: beyond it, and NaN, is no number of a sensor.
+LARGEST_SHOWN: Mapping[str, float] = {
+    "X": 1e7,  # m: maps count up to the distance from the equator to a pole
+    "Y": 1e7,
+    "psi": 1e4,  # rad, turns counted
+    "v_x": 300.0,  # m/s
+    "v_y": 300.0,
+    "r": 10.0,  # rad/s
+    "delta": 2.0,  # rad
+    "a_y": 500.0,  # m/s²: a crash
+}
 
 
 class SensorError(ValueError):
@@ -95,3 +110,14 @@ class Sensors:
             delta_f=self.delta.measure(t, recording.delta_f, rng),
             delta_r=self.delta.measure(t, rear, rng) if np.any(rear != 0.0) else rear,
         )
+
+
+def is_shown(channel: str, value: float) -> bool:
+    """Return whether a channel shows a number.
+
+    Parameters
+    ----------
+    channel : one of `LARGEST_SHOWN`.
+    value : in its SI unit.
+    """
+    return abs(value) <= LARGEST_SHOWN[channel]

@@ -19,7 +19,8 @@ from typing import Any
 
 from models.bicycle import BicycleParameters
 from models.doors import Table, read_toml, require_name
-from models.files import require_positive, require_within, write_atomically
+from models.files import write_atomically
+from models.rules import require_positive, require_within
 
 
 class VehicleError(ValueError):

@@ -19,6 +19,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from models.rules import require_positive
+
 Array = NDArray[np.float64]
 
 # What costs ½ at weight 1; the order is that of y.
@@ -154,7 +156,14 @@ class Limits:
     soft_slip: float = 1e3
 
     def __post_init__(self) -> None:
-        _require_positive(self, ("steering", "steering_rate", "e_y", "soft_e_y", "soft_slip"))
+        require_positive(
+            ValueError,
+            steering=self.steering,
+            steering_rate=self.steering_rate,
+            e_y=self.e_y,
+            soft_e_y=self.soft_e_y,
+            soft_slip=self.soft_slip,
+        )
         if len(self.slip) != 2 or not all(0.0 < value < np.inf for value in self.slip):
             raise ValueError(f"slip must be two positive numbers, it is {self.slip}")
 
@@ -184,14 +193,7 @@ class Problem:
     def __post_init__(self) -> None:
         if not self.horizon >= 2:
             raise ValueError(f"horizon must be at least 2, it is {self.horizon}")
-        _require_positive(self, ("dt",))
-
-
-def _require_positive(owner: object, names: tuple[str, ...]) -> None:
-    for name in names:
-        value = getattr(owner, name)
-        if not 0.0 < value < np.inf:
-            raise ValueError(f"{name} must be positive and finite, it is {value}")
+        require_positive(ValueError, dt=self.dt)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

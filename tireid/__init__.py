@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from identifier.axle import AxleDesign as AxleIdentifier
-    from identifier.certification import certify
     from identifier.method import Method
-    from identifier.methods import make_method
+    from identifier.methods import certify, make_method
     from identifier.paper.design import Design as PaperIdentifier
     from identifier.reproducibility import Prediction
     from identifier.run import History
@@ -38,7 +37,7 @@ _HOMES = {
     "Recording": ("models.recordings", "Recording"),
     "TireModel": ("identifier.tire_model", "TireModel"),
     "Vehicle": ("models.vehicle", "Vehicle"),
-    "certify": ("identifier.certification", "certify"),
+    "certify": ("identifier.methods", "certify"),
     "drive": ("tireid.driving", "drive"),
     "export": ("tireid.exporting", "export"),
     "identify": ("tireid.learning", "identify"),

@@ -19,14 +19,11 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
-    os.environ.setdefault(name, "1")  # a fork has one thread, and a core is a worker's
-
-from benchmarks.fuzz.cases import draw  # noqa: E402
-from benchmarks.fuzz.doors import DOORS, Door  # noqa: E402
-from benchmarks.fuzz.judge import KINDS  # noqa: E402
-from benchmarks.fuzz.session import Outcome, Session, everything  # noqa: E402
-from benchmarks.targets import Targets, keeps  # noqa: E402
+from benchmarks.fuzz.cases import draw
+from benchmarks.fuzz.doors import DOORS, Door
+from benchmarks.fuzz.judge import KINDS
+from benchmarks.fuzz.session import Outcome, Session, everything
+from benchmarks.targets import Targets, keeps
 
 CASES, SEED = 20_000, 2026
 EVERY = 500  # cases between two lines of progress

@@ -36,7 +36,7 @@ class Outcome(NamedTuple):
     said: str
 
 
-class Broken(RuntimeError):  # noqa: N818
+class BrokenDoorError(RuntimeError):
     """A door fails where all of its input is right."""
 
 
@@ -67,7 +67,7 @@ class Session(NamedTuple):
 
         Raises
         ------
-        Broken
+        BrokenDoorError
             Where a door fails then: nothing can be said of what is mutated.
         """
         began = time.perf_counter()
@@ -86,7 +86,9 @@ class Session(NamedTuple):
             outcome = session.run(case)
             bad = [one for one in outcome.findings if one.kind != "not finite"]
             if (outcome.code not in (0, 1) and "--seeds" not in door.words) or bad:
-                raise Broken(f"{door.name}: exit code {outcome.code}: {outcome.said} {bad}")
+                raise BrokenDoorError(
+                    f"{door.name}: exit code {outcome.code}: {outcome.said} {bad}"
+                )
             allowed[door.name] = frozenset(one.place for one in outcome.findings)
         return session._replace(allowed=allowed)
 

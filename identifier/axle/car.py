@@ -16,7 +16,6 @@ The check that every record of design numbers makes.
 """
 
 import math
-from dataclasses import fields
 from typing import Any, NamedTuple, TypeVar
 
 import casadi as ca
@@ -145,21 +144,3 @@ def reciprocal(x: Any) -> Any:
     x : expression.
     """
     return 2 / (x + x)
-
-
-def require_positive(record: Any) -> None:
-    """Refuse numbers that are not positive and finite.
-
-    Parameters
-    ----------
-    record : a dataclass whose fields are all numbers.
-
-    Raises
-    ------
-    ValueError
-        With the name and the value.
-    """
-    for field in fields(record):
-        value = getattr(record, field.name)
-        if not 0.0 < value < float("inf"):
-            raise ValueError(f"{field.name} must be positive and finite, it is {value}")

@@ -12,7 +12,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.axle.car import larger, require_positive
+from identifier.axle.car import larger
+from models.rules import require_positive_fields
 
 Array = NDArray[np.float64]
 
@@ -64,7 +65,7 @@ class Plausibility:
     settle: float = 0.5
 
     def __post_init__(self) -> None:
-        require_positive(self)
+        require_positive_fields(self)
 
     def numbers(self) -> Array:
         """Return the fields in their order, (15,)."""

@@ -35,8 +35,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.axle.car import larger, reciprocal, require_positive, smaller, within
+from identifier.axle.car import larger, reciprocal, smaller, within
 from identifier.axle.covariance import Factors, Spread, Symmetric, excited, scaled, updated, width
+from models.rules import require_positive_fields
 
 Array = NDArray[np.float64]
 
@@ -72,7 +73,7 @@ class Regression:
     excitation_time: float = 1.0
 
     def __post_init__(self) -> None:
-        require_positive(self)
+        require_positive_fields(self)
 
     def numbers(self, dt: float) -> Array:
         """Return the numbers of `RegressionNumbers`, (9,).
@@ -212,7 +213,7 @@ class ChangeDetector:
     step_time: float = 0.3
 
     def __post_init__(self) -> None:
-        require_positive(self)
+        require_positive_fields(self)
 
     def numbers(self, dt: float) -> Array:
         """Return [1/threshold, dt/fast, dt/slow, inflation a sample], (4,).
@@ -302,7 +303,7 @@ class Bounds:
     v_y: float
 
     def __post_init__(self) -> None:
-        require_positive(self)
+        require_positive_fields(self)
         if not self.least_grip < self.most_grip:
             raise ValueError(
                 f"least_grip must be below most_grip, they are {self.least_grip}, {self.most_grip}"

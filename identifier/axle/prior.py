@@ -11,8 +11,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.axle.car import require_positive
 from identifier.axle.curve import unit_matrix
+from models.rules import require_positive_fields
 from models.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -55,7 +55,7 @@ class Prior:
     sd_v_y: float
 
     def __post_init__(self) -> None:
-        require_positive(self)
+        require_positive_fields(self)
 
     def means(self, vehicle: Vehicle, ladder: tuple[float, ...]) -> tuple[Array, Array]:
         """Return weights (2, n) and [compliance, sway share, offset] (2, 3).

@@ -21,9 +21,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.axle.car import Car, require_positive
+from identifier.axle.car import Car
 from identifier.axle.curve import Curve
 from identifier.axle.gate import Gate
+from models.rules import require_positive_fields
 from models.vehicle import GRAVITY, Vehicle
 
 SHORTEST = 1e-3  # wheelbases: the lag never vanishes
@@ -174,7 +175,7 @@ class Sway:
     damping: float = 0.3
 
     def __post_init__(self) -> None:
-        require_positive(self)
+        require_positive_fields(self)
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle) -> "Sway":

@@ -24,7 +24,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.axle.car import larger, require_positive, smaller
+from identifier.axle.car import larger, smaller
+from models.rules import require_positive_fields
 
 Array = NDArray[np.float64]
 
@@ -58,7 +59,7 @@ class Watch:
     give_up: float = 6.0
 
     def __post_init__(self) -> None:
-        require_positive(self)
+        require_positive_fields(self)
 
     def numbers(self, dt: float) -> Array:
         """Return the numbers of `WatchNumbers`, (6,).

@@ -26,18 +26,12 @@ from numpy.typing import NDArray
 from codegen import Scan
 from identifier.baselines.curves import CURVES, CurveModel
 from identifier.baselines.kalman import CARRY, NOISE, build_step
-from identifier.baselines.ports import (
-    OVER,
-    around,
-    axle_loads,
-    lowest_speed,
-    require_positive,
-    scales,
-)
+from identifier.baselines.ports import OVER, around, axle_loads, lowest_speed, scales
 from identifier.method import FrozenModel, Setup
 from identifier.tuning import Range
 from models.bicycle import BicycleParameters
 from models.recordings import Recording
+from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
 
 Array = NDArray[np.float64]
@@ -170,7 +164,7 @@ class CurveEkf:
         if self.curve not in PARAMETRIZATIONS:
             raise ValueError(f"curve must be one of {list(PARAMETRIZATIONS)}, not {self.curve!r}")
         names = ("walk", *NOISE, "friction", *SPREADS, "dt", "learning_speed", "min_speed")
-        require_positive(**{name: getattr(self, name) for name in names})
+        require_positive(ValueError, **{name: getattr(self, name) for name in names})
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, curve: str, dt: float = 0.01) -> Self:

@@ -21,7 +21,6 @@ from identifier.baselines.ports import (
     around,
     impulse,
     lowest_speed,
-    require_positive,
     sample_ports,
     scales,
     turning_force,
@@ -29,6 +28,7 @@ from identifier.baselines.ports import (
 from identifier.method import CannotFreezeError, FrozenModel, Setup
 from identifier.tuning import Range
 from models.recordings import Recording
+from models.rules import require_positive
 from models.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -95,7 +95,7 @@ class ExtendedStateObserver:
     min_speed: float = 1.0
 
     def __post_init__(self) -> None:
-        require_positive(bandwidth=self.bandwidth, dt=self.dt, min_speed=self.min_speed)
+        require_positive(ValueError, bandwidth=self.bandwidth, dt=self.dt, min_speed=self.min_speed)
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> Self:

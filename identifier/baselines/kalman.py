@@ -30,7 +30,6 @@ from identifier.baselines.ports import (
     axle_loads,
     lowest_speed,
     motion_rate,
-    require_positive,
     sample_ports,
     scales,
 )
@@ -38,6 +37,7 @@ from identifier.method import CannotFreezeError, FrozenModel, Setup
 from identifier.tuning import Range
 from models.bicycle import BicycleParameters
 from models.recordings import Recording
+from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
 
 CARRY = ("estimate", "P", "before", "running")
@@ -182,7 +182,8 @@ class ForceEkf:
 
     def __post_init__(self) -> None:
         require_positive(
-            **{name: getattr(self, name) for name in ("force_walk", *NOISE, "dt", "min_speed")}
+            ValueError,
+            **{name: getattr(self, name) for name in ("force_walk", *NOISE, "dt", "min_speed")},
         )
 
     @classmethod

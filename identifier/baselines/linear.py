@@ -26,7 +26,6 @@ from identifier.baselines.ports import (
     around,
     impulse,
     lowest_speed,
-    require_positive,
     sample_ports,
     scales,
     turning_force,
@@ -35,6 +34,7 @@ from identifier.method import FrozenModel, Setup
 from identifier.tuning import Range
 from models.bicycle import slip_angles
 from models.recordings import Recording
+from models.rules import require_positive
 from models.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -54,7 +54,7 @@ class LinearBaseline:
     min_speed: float = 1.0
 
     def __post_init__(self) -> None:
-        require_positive(dt=self.dt, min_speed=self.min_speed)
+        require_positive(ValueError, dt=self.dt, min_speed=self.min_speed)
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> Self:
@@ -194,7 +194,9 @@ class StiffnessRls:
     min_speed: float = 1.0
 
     def __post_init__(self) -> None:
-        require_positive(**{name: getattr(self, name) for name in (*NUMBERS, "dt", "min_speed")})
+        require_positive(
+            ValueError, **{name: getattr(self, name) for name in (*NUMBERS, "dt", "min_speed")}
+        )
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> Self:

@@ -146,20 +146,3 @@ def around(value: float, factor: float) -> Range:
     factor : above one.
     """
     return Range(value / factor, value * factor, log=True)
-
-
-def require_positive(**numbers: float) -> None:
-    """Check numbers.
-
-    Parameters
-    ----------
-    numbers : by name.
-
-    Raises
-    ------
-    ValueError
-        Where one is not positive and finite.
-    """
-    for name, value in numbers.items():
-        if not 0.0 < value < math.inf:
-            raise ValueError(f"{name} must be positive and finite, it is {value}")

@@ -27,8 +27,8 @@ from identifier.paper.network import Network, NetworkModel, Weights
 from identifier.paper.step import CARRY, GAINS, OVER, Structure, build_step
 from models.bicycle import BicycleParameters, bicycle
 from models.doors import Table, read_toml
-from models.files import require_within
 from models.recordings import Recording
+from models.rules import require_within
 from models.vehicle import GRAVITY, Vehicle
 
 SPEED_SPREAD = 0.05  # of the speed, give or take

@@ -31,7 +31,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from models.files import require_within
+from models.rules import require_within
 
 DrivingError = Callable[[Any, Any, Any], Any]
 Direction = Callable[[Any, Any], Any]

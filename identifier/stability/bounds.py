@@ -19,7 +19,6 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from identifier.stability.limits import require_positive
 from identifier.stability.loop import Law
 from identifier.stability.lyapunov import (
     Matrix,
@@ -28,6 +27,7 @@ from identifier.stability.lyapunov import (
     require_hurwitz,
     sampled_peak_gain,
 )
+from models.rules import require_positive
 
 
 def small_gain(
@@ -52,7 +52,7 @@ def small_gain(
     dt : step of explicit Euler [s]; None for continuous time.
     direction : (2, 2) D [s], None for -A_d⁻ᵀ.
     """
-    require_positive(forgetting=forgetting)
+    require_positive(ValueError, forgetting=forgetting)
     c_z, _ = law
     return c_z * _peak(A_d, dt) * eta_W * _size(A_d, direction) * n_h / forgetting**2
 
@@ -82,7 +82,7 @@ def steady_capacity(
     n_h : hidden units.
     direction : (2, 2) D [s], None for -A_d⁻ᵀ.
     """
-    require_positive(forgetting=forgetting, rho_W=rho_W)
+    require_positive(ValueError, forgetting=forgetting, rho_W=rho_W)
     c_z, c_xi = law
     return n_h * eta_W * _size(A_d, direction) * (c_z / forgetting + c_xi) / rho_W
 

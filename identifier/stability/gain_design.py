@@ -31,7 +31,6 @@ from scipy.optimize import brentq
 from identifier.paper.design import Design
 from identifier.paper.laws import DRIVING_ERRORS, Gains, diagonal
 from identifier.stability.bounds import small_gain
-from identifier.stability.limits import require_positive
 from identifier.stability.loop import Law, direction_matrix, linear_law
 from identifier.stability.operation import Operation, proven_bounds
 from identifier.stability.sampled_bound import (
@@ -42,6 +41,7 @@ from identifier.stability.sampled_bound import (
     error_gains,
     output_layer,
 )
+from models.rules import require_positive
 
 LAG_RULE = 1.0 / math.tan(math.radians(22.5))  # a/Ω for 45 degrees of lag through two equal poles
 FASTEST = 0.2  # largest a dt
@@ -90,7 +90,7 @@ def gain_for_phase_margin(
     DesignError
         If every gain has a larger phase margin.
     """
-    require_positive(a=a, lam=lam)
+    require_positive(ValueError, a=a, lam=lam)
     if not 0.0 < phase_margin < 90.0:
         raise DesignError(f"the phase margin must be in (0, 90) deg, it is {phase_margin}")
     c_z, c_xi = law
@@ -165,6 +165,7 @@ def design_gains(
         22 deg for the integral law).
     """
     require_positive(
+        ValueError,
         bandwidth=bandwidth,
         dt=dt,
         x_bar_max=x_bar_max,

@@ -24,7 +24,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from identifier.stability.limits import integral_euler_limit, integral_limit, require_positive
+from identifier.stability.limits import integral_euler_limit, integral_limit
+from models.rules import require_positive
 
 
 class NoLimitCycleError(ValueError):
@@ -156,6 +157,6 @@ def _sampled(
 
 def _require_beyond(g: float, limit: float, rho_W: float) -> None:
     """Check that there is a cycle to find."""
-    require_positive(g=g, rho_W=rho_W)
+    require_positive(ValueError, g=g, rho_W=rho_W)
     if not g > limit:
         raise NoLimitCycleError(f"g = {g:.6g} is within the limit {limit:.6g}: no limit cycle")

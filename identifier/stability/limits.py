@@ -6,17 +6,7 @@ Explicit Euler: the same with s = (w - 1)/T (Jury).   g = λ_max(G), l = leakage
 
 import math
 
-
-def require_positive(**values: float) -> None:
-    """Raise ValueError unless every value is a positive finite number.
-
-    Parameters
-    ----------
-    values : the named values.
-    """
-    for name, value in values.items():
-        if not (value > 0.0 and math.isfinite(value)):
-            raise ValueError(f"{name} must be positive and finite, it is {value}")
+from models.rules import require_positive
 
 
 def integral_limit(a: float, lam: float, leakage: float = 0.0) -> float:
@@ -28,7 +18,7 @@ def integral_limit(a: float, lam: float, leakage: float = 0.0) -> float:
     lam : forgetting factor λ [1/s].
     leakage : l [1/s].
     """
-    require_positive(a=a, lam=lam)
+    require_positive(ValueError, a=a, lam=lam)
     return a * (leakage + a) * (leakage + lam) * (a + lam)
 
 
@@ -41,7 +31,7 @@ def critical_frequency(a: float, lam: float, leakage: float = 0.0) -> float:
     lam : forgetting factor λ [1/s].
     leakage : l [1/s].
     """
-    require_positive(a=a, lam=lam)
+    require_positive(ValueError, a=a, lam=lam)
     return math.sqrt(leakage * a + leakage * lam + a * lam)
 
 
@@ -66,7 +56,7 @@ def integral_euler_limit(a: float, lam: float, dt: float, leakage: float = 0.0) 
     ValueError
         If a pole alone leaves the unit circle (a dt, λ dt or l dt not below 2).
     """
-    require_positive(a=a, lam=lam, dt=dt)
+    require_positive(ValueError, a=a, lam=lam, dt=dt)
     if not max(a, lam, leakage) * dt < 2.0:
         raise ValueError(f"a dt, lam dt and l dt must be below 2: {a * dt}, {lam * dt}")
     al, be, ga = 1.0 - a * dt, 1.0 - lam * dt, 1.0 - leakage * dt
@@ -87,7 +77,7 @@ def instantaneous_damping(a: float, g: float, leakage: float = 0.0) -> float:
     g : loop gain λ_max(G).
     leakage : l [1/s].
     """
-    require_positive(a=a, g=g)
+    require_positive(ValueError, a=a, g=g)
     return (a + leakage) / (2.0 * math.sqrt(a * leakage + g / a))
 
 
@@ -102,7 +92,7 @@ def instantaneous_euler_limit(a: float, dt: float, leakage: float = 0.0) -> floa
     dt : step T [s].
     leakage : l [1/s].
     """
-    require_positive(a=a, dt=dt)
+    require_positive(ValueError, a=a, dt=dt)
     if not max(a, leakage) * dt < 2.0:
         raise ValueError(f"a dt and l dt must be below 2: {a * dt}, {leakage * dt}")
     return a * (a + leakage - a * leakage * dt) / dt

@@ -24,7 +24,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq, minimize_scalar
 
-from identifier.stability.limits import require_positive
 from identifier.stability.loop import (
     Integrator,
     Law,
@@ -35,6 +34,7 @@ from identifier.stability.loop import (
     scaled_matrices,
 )
 from identifier.stability.lyapunov import Matrix, require_hurwitz
+from models.rules import require_positive
 
 if TYPE_CHECKING:
     import control
@@ -120,7 +120,7 @@ def scalar_loop(
     leakage : l [1/s].
     dt : step [s] of explicit Euler, None for continuous time.
     """
-    require_positive(a=a, lam=lam, g=g)
+    require_positive(ValueError, a=a, lam=lam, g=g)
     c_z, c_xi = law
     poles = [-a, -leakage] + ([-lam] if c_z > 0.0 else [])
     zeros = [-lam - c_z / c_xi] if c_z > 0.0 and c_xi > 0.0 else []
@@ -295,7 +295,7 @@ def shortage_formula(a: float, lam: float) -> float:
     a : decay rate of A_d = -a I [1/s].
     lam : forgetting factor λ [1/s].
     """
-    require_positive(a=a, lam=lam)
+    require_positive(ValueError, a=a, lam=lam)
     return 1.0 / (a * (a + lam) * (math.sqrt(a) + math.sqrt(lam)) ** 2)
 
 

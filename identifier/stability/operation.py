@@ -31,7 +31,6 @@ import numpy.typing as npt
 from identifier.paper.design import SPEED_SPREAD, YAW_OVERSHOOT, Design, Driving
 from identifier.paper.laws import Gains
 from identifier.paper.network import network_signals
-from identifier.stability.limits import require_positive
 from identifier.stability.loop import (
     INTEGRATORS,
     Integrator,
@@ -52,6 +51,7 @@ from identifier.stability.sampled_bound import (
     output_layer,
 )
 from models.bicycle import bicycle
+from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
 
 
@@ -93,6 +93,7 @@ class Operation:
 
     def __post_init__(self) -> None:
         require_positive(
+            ValueError,
             n_h=self.n_h,
             dt=self.dt,
             bandwidth=self.bandwidth,
@@ -265,7 +266,7 @@ def axle_coupling(*, m: float, I_z: float, l_f: float, l_r: float) -> Matrix:
     l_f : center of gravity to front axle [m].
     l_r : center of gravity to rear axle [m].
     """
-    require_positive(m=m, I_z=I_z, l_f=l_f, l_r=l_r)
+    require_positive(ValueError, m=m, I_z=I_z, l_f=l_f, l_r=l_r)
     K = np.array([[1.0 / m, 1.0 / m], [l_f / I_z, -l_r / I_z]])  # (6) prints a transpose
     slip = np.array([[1.0, l_f], [1.0, -l_r]])
     coupling: Matrix = slip @ K
@@ -292,7 +293,7 @@ def estimated_input_feedback(
     stiffness_lost : (2,) C - F' of front and rear axle [N/rad]; C itself at full saturation.
     v_x : speed [m/s].
     """
-    require_positive(v_x=v_x)
+    require_positive(ValueError, v_x=v_x)
     lost = np.asarray(stiffness_lost, dtype=np.float64)
     if lost.shape != (2,) or not np.all(np.isfinite(lost)):
         raise ValueError(f"stiffness_lost must be two numbers, it is {lost.tolist()}")
@@ -338,7 +339,7 @@ def largest_signals(
     slip : largest slip angle [rad].
     friction : μ [-].
     """
-    require_positive(v_x=v_x, slip=slip, friction=friction)
+    require_positive(ValueError, v_x=v_x, slip=slip, friction=friction)
     r = YAW_OVERSHOOT * friction * GRAVITY / v_x
     v_y = vehicle.l_r * r + v_x * slip
     return {
@@ -386,7 +387,7 @@ def residual_bound(vehicle: Vehicle, *, slip: float) -> float:
     vehicle : the car; its stiffness is at least half that of the tires.
     slip : largest slip angle [rad].
     """
-    require_positive(slip=slip)
+    require_positive(ValueError, slip=slip)
     return slip * math.hypot(vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear)
 
 
@@ -401,7 +402,7 @@ def expected_residual(vehicle: Vehicle, *, slip: float, friction: float) -> floa
     slip : largest slip angle [rad].
     friction : μ [-].
     """
-    require_positive(slip=slip, friction=friction)
+    require_positive(ValueError, slip=slip, friction=friction)
     peak = friction * np.array(vehicle.axle_loads)
     linear = slip * _stiffness(vehicle)
     carried = peak * np.sin(1.5 * np.arctan(linear / (1.5 * peak)))

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from identifier.stability.limits import require_positive
 from identifier.stability.loop import Law
 from identifier.stability.lyapunov import LyapunovPair, Matrix
+from models.rules import require_positive
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +52,7 @@ def pi_lead(tau: float) -> Law:
     ----------
     tau : lead time τ [s]; at least 1/a for a positive real loop.
     """
-    require_positive(tau=tau)
+    require_positive(ValueError, tau=tau)
     return Law(1.0, tau)
 
 
@@ -65,7 +65,7 @@ def scalar_storage(*, a: float, lam: float, tau: float) -> Storage:
     lam : forgetting factor λ [1/s].
     tau : lead time τ [s].
     """
-    require_positive(a=a, lam=lam, tau=tau)
+    require_positive(ValueError, a=a, lam=lam, tau=tau)
     P = np.array([[tau / a, 1.0 / a], [1.0 / a, (a + lam) / a]])
     Q = np.diag([2.0 * (tau - 1.0 / a), 2.0 * lam * (a + lam) / a])
     return Storage(M=P, N=Q)
@@ -80,7 +80,7 @@ def storage(pair: LyapunovPair, *, forgetting: float, tau: float) -> Storage:
     forgetting : λ [1/s].
     tau : lead time τ [s].
     """
-    require_positive(forgetting=forgetting, tau=tau)
+    require_positive(ValueError, forgetting=forgetting, tau=tau)
     A_d, P, Q = pair.A_d, pair.P, pair.Q
     R = forgetting * P + Q / 2.0
     S = P @ A_d + Q / 2.0  # skew: (P A_d - A_dᵀ P)/2
@@ -123,7 +123,7 @@ def lead_time(pair: LyapunovPair, *, forgetting: float) -> float:
     pair : A_d, P and Q of A_dᵀ P + P A_d = -Q.
     forgetting : λ [1/s].
     """
-    require_positive(forgetting=forgetting)
+    require_positive(ValueError, forgetting=forgetting)
     P, Q = pair.P, pair.Q
     S = P @ pair.A_d + Q / 2.0
     R = forgetting * P + Q / 2.0

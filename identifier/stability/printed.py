@@ -22,7 +22,6 @@ import numpy as np
 import numpy.typing as npt
 
 from identifier.paper.laws import Gains
-from identifier.stability.limits import require_positive
 from identifier.stability.loop import Law
 from identifier.stability.lyapunov import (
     LyapunovError,
@@ -34,6 +33,7 @@ from identifier.stability.lyapunov import (
 )
 from identifier.stability.operation import Operation
 from identifier.stability.property import Property, statement
+from models.rules import require_positive
 
 
 def printed_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: float) -> float:
@@ -47,7 +47,7 @@ def printed_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W
     eta_W : learning rate of (11).
     rho_W : leakage gain of (11) [1/(U s²)].
     """
-    require_positive(rho_W=rho_W)
+    require_positive(ValueError, rho_W=rho_W)
     inverse = float(np.linalg.norm(np.linalg.inv(pair.A_d), 2))
     coupling = float(np.linalg.norm(pair.P, 2)) + eta_W / rho_W * inverse
     return (W_M + math.sqrt(n_h) * coupling) / 2.0
@@ -66,7 +66,7 @@ def tight_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: 
     eta_W : learning rate of (11).
     rho_W : leakage gain of (11) [1/(U s²)].
     """
-    require_positive(rho_W=rho_W)
+    require_positive(ValueError, rho_W=rho_W)
     coupling = float(np.linalg.norm(pair.P + eta_W / rho_W * np.linalg.inv(pair.A_d), 2))
     return (W_M + math.sqrt(n_h) * coupling) / 2.0
 
@@ -85,7 +85,7 @@ def canceling_pair(A_d: npt.ArrayLike, *, eta_W: float, rho_W: float) -> Lyapuno
     LyapunovError
         If A_d is so far from symmetric that Q is not positive definite.
     """
-    require_positive(eta_W=eta_W, rho_W=rho_W)
+    require_positive(ValueError, eta_W=eta_W, rho_W=rho_W)
     matrix = require_hurwitz(A_d)
     inverse = np.linalg.inv(matrix)
     P = -eta_W / rho_W * (inverse + inverse.T) / 2.0
@@ -129,7 +129,7 @@ def k_b_with_V(
     ValueError
         If c l2² is not below 4: then this Lyapunov function proves nothing.
     """
-    require_positive(rho_V=rho_V, weight=weight)
+    require_positive(ValueError, rho_V=rho_V, weight=weight)
     inverse = float(np.linalg.norm(np.linalg.inv(np.asarray(A_d, dtype=np.float64)), 2))
     l2 = eta_V / rho_V * inverse * x_bar_max
     if not weight * l2**2 < 4.0:
@@ -192,7 +192,7 @@ def ultimate_bound(pair: LyapunovPair, *, w_bar: float, k_b: float, rho_W: float
     k_b : of `printed_k_b` or `tight_k_b` [U].
     rho_W : leakage gain of (11) [1/(U s²)].
     """
-    require_positive(rho_W=rho_W)
+    require_positive(ValueError, rho_W=rho_W)
     p = np.linalg.eigvalsh(pair.P)
     b, curve = bound_14(pair, w_bar=w_bar, k_b=k_b), 2.0 / np.linalg.eigvalsh(pair.Q)[0]
     w_b = k_b + math.sqrt(k_b**2 + p[1] * w_bar)

@@ -37,9 +37,9 @@ import numpy as np
 
 from identifier.paper.laws import Gains
 from identifier.stability.bounds import transient_peak
-from identifier.stability.limits import require_positive
 from identifier.stability.loop import Law
 from identifier.stability.lyapunov import Matrix, peak_gain, power_norms
+from models.rules import require_positive
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +61,7 @@ class Disturbance:
     known: float = 0.0
 
     def __post_init__(self) -> None:
-        require_positive(residual=self.residual)
+        require_positive(ValueError, residual=self.residual)
         for name in ("noise", "rate", "known"):
             value = getattr(self, name)
             if not 0.0 <= value < float("inf"):

@@ -27,8 +27,8 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from models.files import require_positive
 from models.friction import MAX_PLACES, place_change
+from models.rules import require_positive
 from models.tires import MagicFormula, Tire
 from models.vehicle import Vehicle
 

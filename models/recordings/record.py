@@ -23,7 +23,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from models.files import LARGEST_FORCE, write_atomically
+from models.files import write_atomically
+from models.rules import LARGEST_FORCE
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass, fields, replace
 from typing import Self
 
-from models.files import require_within
+from models.rules import require_within
 from models.tires.forces import Expression
 
 ESSENTIAL = ("FNOMIN", "PCX1", "PDX1", "PKX1", "PCY1", "PDY1", "PKY1", "PKY2")

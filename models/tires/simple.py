@@ -17,7 +17,7 @@ Source: Dugoff, Fancher and Segel, SAE 700377 (1970), constant friction coeffici
 
 from dataclasses import dataclass
 
-from models.files import require_positive
+from models.rules import require_positive
 from models.tires import forces as constant_stiffness
 from models.tires.forces import NO_FORCE, Expression, TireForces, positive, slips, smaller
 

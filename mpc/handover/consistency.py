@@ -14,8 +14,8 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
-from identifier.axle.car import require_positive
-from mpc.shown import LARGEST, is_shown
+from models.rules import require_positive_fields
+from models.sensors import LARGEST_SHOWN, is_shown
 
 
 class FullSample(Protocol):
@@ -90,7 +90,7 @@ class Tolerances:
     relapse: float = 10.0
 
     def __post_init__(self) -> None:
-        require_positive(self)
+        require_positive_fields(self)
 
 
 class Disagreement(NamedTuple):
@@ -157,7 +157,7 @@ class Consistency:
 
     def _judged(self, m: FullSample, asked: float | None) -> Disagreement:
         allowed, pull, dt = self._allowed, self._allowed.rate, self._dt
-        if not all(is_shown(channel, getattr(m, channel)) for channel in LARGEST):
+        if not all(is_shown(channel, getattr(m, channel)) for channel in LARGEST_SHOWN):
             self._begin()
             return NOT_A_NUMBER
         cos_psi, sin_psi = math.cos(m.psi), math.sin(m.psi)

@@ -22,7 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Scan
-from identifier.axle.car import car_numbers, require_positive
+from identifier.axle.car import car_numbers
+from models.rules import require_positive_fields
 from models.vehicle import GRAVITY
 from mpc.tires import TireModel
 from mpc.tires.tire import Car, Point
@@ -184,7 +185,7 @@ class ErrorModel:
     largest: float = 5.0
 
     def __post_init__(self) -> None:
-        require_positive(self)
+        require_positive_fields(self)
 
 
 class Misfit(NamedTuple):

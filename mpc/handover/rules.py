@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
-from identifier.axle.car import require_positive
+from models.rules import require_positive_fields
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +63,7 @@ class Rules:
     quick_blend: float = 0.08
 
     def __post_init__(self) -> None:
-        require_positive(self)
+        require_positive_fields(self)
 
 
 class Verdict(Enum):

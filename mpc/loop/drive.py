@@ -14,12 +14,12 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from models.sensors import is_shown
 from mpc.cars import Car, CarState
 from mpc.loop.record import Drive, Recorder
 from mpc.loop.sensing import CarSensors, Measured, Measures, SpeedProfile
 from mpc.path.path import Path, Projection
 from mpc.realtime.instance import Command, Measurement
-from mpc.shown import is_shown
 
 Array = NDArray[np.float64]
 

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from models.rules import require_positive
 from mpc.path.line import Array, PathError
 from mpc.path.path import Path
 
@@ -32,9 +33,9 @@ def grip_speed(
         Where a limit is not positive and finite.
     """
     for name, value in (("a_y_max", a_y_max), ("v_max", v_max)):
-        _require_positive(path, name, value)
+        require_positive(PathError, **{f"{path.name}: {name}": value})
     for name, value in (("a_accel", a_accel), ("a_brake", a_brake)):
-        _require_positive(path, name, value)
+        require_positive(PathError, **{f"{path.name}: {name}": value})
     kappa = np.abs(path.kappa)
     square = np.minimum(v_max**2, a_y_max / np.maximum(kappa, a_y_max / v_max**2))
     if path.closed:  # the slowest place limits itself; start both passes there
@@ -66,15 +67,10 @@ def steady_speed(path: Path, *, a_y_max: float, share: float = 1.0) -> float:
         Where a number is not positive and finite, or the path has no turn.
     """
     for name, value in (("a_y_max", a_y_max), ("share", share)):
-        _require_positive(path, name, value)
+        require_positive(PathError, **{f"{path.name}: {name}": value})
     if path.peak_curvature * path.length < 1e-6:
         raise PathError(f"{path.name}: has no turn that limits the speed, choose one")
     return math.sqrt(share * a_y_max / path.peak_curvature)
-
-
-def _require_positive(path: Path, name: str, value: float) -> None:
-    if not (value > 0.0 and math.isfinite(value)):
-        raise PathError(f"{path.name}: {name} must be positive and finite, it is {value}")
 
 
 def _pass(square: Array, bend: Array, gain: float) -> Array:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.certification import certify
+from identifier.methods import certify
 from identifier.paper.design import Design, Driving
 from identifier.paper.network import Weights
 from identifier.stability import Certificate, Property

@@ -137,8 +137,6 @@ def run(options: argparse.Namespace) -> None:
     others = [_read(log, None, vehicle, design, options) for log in options.replay]
     _require_distinct([recording, *others])
     network = network_model(options, vehicle, design.min_speed)
-    if network is not None:
-        _require_trusted(network, recording, str(options.network), "its unit of force and of slip")
     freeze_times = sorted(set(options.freeze or [float(recording.t[-1])]))
     _require_inside(freeze_times, recording)
     if network is None:
@@ -153,8 +151,7 @@ def run(options: argparse.Namespace) -> None:
         else:
             learnt = histories[0]
             for t in freeze_times:
-                words = f"{recording.name}: what {law} learnt until {freeze_key(t)} s"
-                _require_trusted(learnt.freeze(t), recording, words, "signs, units and sensors")
+                _require_trusted(learnt, t, law)
             frozen = {t: _replays(t, learnt, histories) for t in freeze_times}
             write_results(folder, law, learnt, histories[1:], frozen)
             closing = _closing_line(learnt, freeze_times[-1], vehicle, resumed=start is not None)
@@ -210,35 +207,22 @@ def _design(options: argparse.Namespace, vehicle: Vehicle) -> tuple[str, Method]
     return design.law, design
 
 
-def _require_trusted(model: FrozenModel, recording: Recording, words: str, doubtful: str) -> None:
-    """Refuse tires that do not push at the speed driven: they are not the car's.
-
-    Parameters
-    ----------
-    model : the tires.
-    recording : the drive.
-    words : what is refused.
-    doubtful : what a user should look at.
-    """
-    vehicle, where = model.vehicle, f"{words} is not to be trusted"
+def _require_trusted(learnt: History, t: float, law: str) -> None:
+    """Refuse tires that do not push at the speed driven: what was learnt then is not the car's."""
+    model, vehicle, v_x = learnt.freeze(t), learnt.vehicle, learnt.recording.v_x
+    where = f"{learnt.recording.name}: what {law} learnt until {freeze_key(t)} s"
     try:
         require_alive(NotTrustedError, model)
     except NotTrustedError as error:
-        raise NotTrustedError(f"{where}: {error}") from None
-    stiffness = steady_stiffness(model, _driven_speed(model, recording))
-    told = np.array([vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear])
+        raise NotTrustedError(f"{where} is not to be trusted: {error}") from None
+    stiffness = steady_stiffness(model, float(v_x[v_x >= model.min_speed].mean()))
+    told = np.array(vehicle.bicycle)[4:]
     for axle, learnt_one, told_one in zip(("front", "rear"), stiffness, told, strict=True):
         if not learnt_one >= DEAD * told_one:
             raise NotTrustedError(
-                f"{where}: the {axle} axle has {learnt_one:.4g} N/rad, the vehicle file says "
-                f"{told_one:.4g}; check {doubtful}"
+                f"{where} is not to be trusted: the {axle} axle has {learnt_one:.4g} N/rad, the "
+                f"vehicle file says {told_one:.4g}; check signs, units and sensors of the recording"
             )
-
-
-def _driven_speed(model: FrozenModel, recording: Recording) -> float:
-    """Return the mean speed of the samples at which a model tells forces [m/s]."""
-    moving = recording.v_x >= model.min_speed
-    return float(recording.v_x[moving].mean()) if moving.any() else model.min_speed
 
 
 def _learn(

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identifier.axle import AxleDesign
-from identifier.certification import certify
 from identifier.method import Method, vehicle_numbers
+from identifier.methods import certify
 from identifier.own_network import OnnxModel
 from identifier.paper.design import Design
 from identifier.reproducibility import (

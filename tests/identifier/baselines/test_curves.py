@@ -110,5 +110,5 @@ def test_a_model_whose_axle_does_not_push_is_not_read(car, tmp_path):
         if good:
             load_model(path)
         else:
-            with pytest.raises(FrozenModelError, match=r"the rear axle has .* it does not push"):
+            with pytest.raises(FrozenModelError, match="the rear axle does not push"):
                 load_model(path)

@@ -1,0 +1,59 @@
+"""Rules that numbers must keep wherever they come from: one wording for every record."""
+
+import math
+from dataclasses import fields
+from typing import Any
+
+LARGEST_FORCE = 1e7  # of an axle [N]: ten times that of the heaviest dump truck
+
+
+def require_positive(refusal: type[ValueError], /, **values: float) -> None:
+    """Refuse every value that is not a finite number above zero.
+
+    Parameters
+    ----------
+    refusal : class of the error to raise.
+    **values : what to check, by name.
+
+    Raises
+    ------
+    ValueError
+        Of that class, with the first name that breaks the rule and its value; NaN breaks it too.
+    """
+    for name, value in values.items():
+        if not (value > 0.0 and math.isfinite(value)):
+            raise refusal(f"{name} must be positive and finite, it is {value}")
+
+
+def require_positive_fields(record: Any) -> None:
+    """Refuse a record in which a number is not finite and above zero.
+
+    Parameters
+    ----------
+    record : a dataclass whose fields are all numbers.
+
+    Raises
+    ------
+    ValueError
+        With the first field that breaks the rule and its value.
+    """
+    require_positive(ValueError, **{one.name: getattr(record, one.name) for one in fields(record)})
+
+
+def require_within(refusal: type[ValueError], low: float, high: float, /, **values: float) -> None:
+    """Refuse every value outside the closed interval from `low` to `high`.
+
+    Parameters
+    ----------
+    refusal : class of the error to raise.
+    low, high : ends of the interval, in the unit of the values.
+    **values : what to check, by name.
+
+    Raises
+    ------
+    ValueError
+        Of that class, with the first name that breaks the rule and its value; NaN breaks it too.
+    """
+    for name, value in values.items():
+        if not low <= value <= high:
+            raise refusal(f"{name} must lie between {low:g} and {high:g}, it is {value:.10g}")
