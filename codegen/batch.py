@@ -4,11 +4,6 @@ The generated code is that of `Scan`, compiled with vectors in place of numbers,
 has the same bits as alone. Only what is asked for is recorded: writing every state of every run
 to memory would take longer than computing it. What is summed up over samples (a mean square, a
 peak) is best carried by the step itself.
-
-Arrays to blocks of lanes and back, and the compiled loop over blocks in several threads.
-
-A block holds as many runs as a register has lanes. Its arrays end in (size, lanes): the lanes of
-one number lie side by side. A last block that is not full repeats the last run.
 """
 
 import ctypes
@@ -29,6 +24,11 @@ from codegen.lanes import CPP_FLAGS, find_target, lanes_source, scratch_size
 from codegen.scan import Scan
 
 Array = NDArray[np.float64]
+# Arrays to blocks of lanes and back, and the compiled loop over blocks in several threads.
+#
+# A block holds as many runs as a register has lanes. Its arrays end in (size, lanes): the lanes of
+# one number lie side by side. A last block that is not full repeats the last run.
+
 ALIGNMENT = 64  # bytes, of the widest vector
 PARTS = 4  # of the work, for each thread
 

@@ -2,12 +2,6 @@
 
 Literals and functions go through macros of the prefix, `PREFIX_C(1.0)` and `PREFIX_SQRT(x)`, so
 that one text serves both precisions. Every compound operand is in parentheses.
-
-Finding again, in the scalars of a function, what a person would have written there.
-
-a·[c] + b·[not c] is a choice, and so is the derivative of fmax and fmin; the scalars of our own
-tanh, exp, atan and sin are one call each. Those of C libraries become calls of our own: they would
-differ from machine to machine.
 """
 
 import math
@@ -27,6 +21,12 @@ from codegen.graph import (
     graph_of,
     simplifying,
 )
+
+# Finding again, in the scalars of a function, what a person would have written there.
+#
+# a·[c] + b·[not c] is a choice, and so is the derivative of fmax and fmin; the scalars of our own
+# tanh, exp, atan and sin are one call each. Those of C libraries become calls of our own: they
+# would differ from machine to machine.
 
 OWN: Mapping[str, Callable[[Any], Any]] = {"tanh": tanh, "exp": exp, "atan": atan, "sin": sin}
 EXPANDED = {**BUILDERS, **OWN}

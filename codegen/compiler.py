@@ -2,11 +2,6 @@
 
 Messages go to the logger `tireid`: a build at level INFO, a missing compiler once at level WARNING
 (which Python prints even where no logging is set up).
-
-Where compiled code is kept between runs: what is found there, this user put there.
-
-What is loaded runs with all rights of who loads it. So the folder and the file must belong to this
-user and be writable by nobody else, and the file must have the hash that its name ends with.
 """
 
 import atexit
@@ -23,6 +18,11 @@ import time
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
+
+# Where compiled code is kept between runs: what is found there, this user put there.
+#
+# What is loaded runs with all rights of who loads it. So the folder and the file must belong to
+# this user and be writable by nobody else, and the file must have the hash that its name ends with.
 
 log = logging.getLogger("tireid.codegen")
 

@@ -5,13 +5,6 @@ exp(y) = ((Q + z P)/(Q - z P))^32 with z = y/64 and the Padé approximant of ord
 4e-15, in float 4e-6. atan(x) ≈ x P(x²)/Q(x²) on [-1, 1] and from 1/x beyond; error 7e-13.
 sin(x) ≈ x S(x²) on [-π, π], where whole turns are taken off before; error 8e-14, in float 6e-7,
 and what rounding leaves of the turns.
-
-Our own tanh, one rational expression that gives the same bits wherever it is computed.
-
-The tanh of C libraries differs in the last bit from machine to machine and takes most of the time
-of a small network. tanh(x) ≈ x P(x²)/Q(x²) for |x| <= LIMIT and constant beyond; coefficients by
-iteratively reweighted least squares on the largest error, which is 2.6e-13 below LIMIT, 1.9e-11
-above, and in float 5e-7. It is odd and lets NaN pass.
 """
 
 import math
@@ -19,6 +12,13 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+
+# Our own tanh, one rational expression that gives the same bits wherever it is computed.
+#
+# The tanh of C libraries differs in the last bit from machine to machine and takes most of the time
+# of a small network. tanh(x) ≈ x P(x²)/Q(x²) for |x| <= LIMIT and constant beyond; coefficients by
+# iteratively reweighted least squares on the largest error, which is 2.6e-13 below LIMIT, 1.9e-11
+# above, and in float 5e-7. It is odd and lets NaN pass.
 
 LIMIT = 12.7  # beyond it tanh differs from 1 by 1.9e-11
 P = (

@@ -1,7 +1,4 @@
-"""The scalars of an SX function as a graph in which equal expressions are one node.
-
-Two functions for one that decides: where a condition holds, and where it does not.
-"""
+"""The scalars of an SX function as a graph in which equal expressions are one node."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -191,6 +188,8 @@ def function_of(
     ]
     return ca.Function(like.name(), ports, results, like.name_in(), like.name_out())
 
+
+# Two functions for one that decides: where a condition holds, and where it does not.
 
 CONDITIONS = ("lt", "le", "eq", "ne", "and", "or", "not")
 

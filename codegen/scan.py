@@ -1,10 +1,6 @@
 """A step function folded over samples, in one compiled loop.
 
 Without a C compiler that works the CasADi virtual machine does the same, more slowly.
-
-A step function taken one sample at a time: the compiled loop of a `Scan`, with its memory kept.
-
-For what runs beside a car: nothing is laid out, checked or allocated anew at a sample.
 """
 
 import ctypes
@@ -299,6 +295,11 @@ def longs(numbers: list[int]) -> "ctypes.Array[ctypes.c_long]":
     numbers : the integers.
     """
     return (ctypes.c_long * max(len(numbers), 1))(*numbers)
+
+
+# A step function taken one sample at a time: the compiled loop of a `Scan`, with its memory kept.
+#
+# For what runs beside a car: nothing is laid out, checked or allocated anew at a sample.
 
 
 class Stepper:

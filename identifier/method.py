@@ -2,8 +2,6 @@
 
 The laws of the paper, the better laws and the baselines run, are recorded, frozen and compared by
 the same code; they differ in the `Method` that is handed over.
-
-The format of stored frozen models, and the error of a file that does not keep it.
 """
 
 from collections.abc import Mapping
@@ -118,6 +116,8 @@ class Method(Protocol):
             For a method that estimates a signal.
         """
 
+
+# The format of stored frozen models, and the error of a file that does not keep it.
 
 FORMAT = "tireid frozen model 1"
 

@@ -2,8 +2,6 @@
 
 A factory takes the vehicle and the seed of initial weights, where there are random ones, and
 returns a method whose numbers follow from the vehicle alone.
-
-Frozen models as JSON files: weights.json, whatever kind of model it holds.
 """
 
 from collections.abc import Callable, Mapping
@@ -154,6 +152,8 @@ def certify(method: Method, vehicle: Vehicle, driving: Driving | None = None) ->
         case _:
             return Certificate()
 
+
+# Frozen models as JSON files: weights.json, whatever kind of model it holds.
 
 LARGEST = 1e9  # of the numbers of an axle model, SI and static axle loads
 

@@ -1,12 +1,4 @@
-"""A user's own static tire network, an ONNX file, as a frozen model.
-
-A user's static tire network, an ONNX file, as a differentiable function that generates code.
-
-CasADi reads the graph node by node: dense layers and element-wise functions, in float32 or float64.
-Signals are those of `identifier.paper.network.SIGNALS`, SI; the two outputs are F_yf and F_yr [N].
-
-A network of one's own among the methods: it learns nothing, online and frozen are the same.
-"""
+"""A user's own static tire network, an ONNX file, as a frozen model."""
 
 import base64
 import re
@@ -40,6 +32,12 @@ from models.doors import Table, read_bytes
 from models.recordings import Recording
 from models.rules import LARGEST_FORCE
 from models.vehicle import Vehicle
+
+# A user's static tire network, an ONNX file, as a differentiable function that generates code.
+#
+# CasADi reads the graph node by node: dense layers and element-wise functions, in float32 or
+# float64. Signals are those of `identifier.paper.network.SIGNALS`, SI; the two outputs are F_yf and
+# F_yr [N].
 
 FORCES = ("F_yf", "F_yr")
 LARGEST = 1e9  # of a weight, SI: a stiffness in N/rad fits
@@ -409,6 +407,9 @@ def _scan(content: bytes, inputs: tuple[str, ...] | None, slip_sign: int) -> Sca
 
 
 Array = NDArray[np.float64]
+
+
+# A network of one's own among the methods: it learns nothing, online and frozen are the same.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

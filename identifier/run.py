@@ -1,12 +1,4 @@
-"""What a method did over a recording: forces, and everything that its step carries and tells.
-
-Running a method over a recording, in compiled code.
-
-A method beside a car that drives: sample in, axle forces out, and the model learnt so far.
-
-The compiled step is that of `identify`, so that a drive and its recording teach the same bits. What
-becomes of samples that are refused is in `identifier.refused`.
-"""
+"""What a method did over a recording: forces, and everything that its step carries and tells."""
 
 import math
 from collections.abc import Mapping
@@ -123,6 +115,9 @@ class History:
         return f"<{type(self.design).__name__} over {self.recording!r}{diverged}>"
 
 
+# Running a method over a recording, in compiled code.
+
+
 def check_sampling(recording: Recording, design: Method) -> None:
     """Refuse a recording that is not sampled at the design's interval.
 
@@ -170,6 +165,12 @@ def identify(
         carried={name: record[f"{name}_all"] for name in setup.scan.carry},
         told={name: record[name] for name in setup.scan.outputs if name != "axle_force"},
     )
+
+
+# A method beside a car that drives: sample in, axle forces out, and the model learnt so far.
+#
+# The compiled step is that of `identify`, so that a drive and its recording teach the same bits.
+# What becomes of samples that are refused is in `identifier.refused`.
 
 
 @dataclass(slots=True)

@@ -2,13 +2,6 @@
 
 SI units, ISO axes. The cornering stiffness is per axle (both tires), in the paper's sign
 F_y = +C alpha with alpha = delta - atan2(v_y +- l r, v_x), the negative of the ISO 8855 slip angle.
-
-What a car needs beyond the linear bicycle: roll, load transfer, tire lag and drive force.
-
-SI units, ISO axes (x forward, y left, z up). Numbers are checked when a `Chassis` is made, so a
-plant never starts from a value that is not physical.
-
-A dataclass of a vehicle as the text of a TOML file, with exact numbers.
 """
 
 import json
@@ -21,6 +14,11 @@ from models.bicycle import BicycleParameters
 from models.doors import Table, read_toml, require_name
 from models.files import write_atomically
 from models.rules import require_positive, require_within
+
+# What a car needs beyond the linear bicycle: roll, load transfer, tire lag and drive force.
+#
+# SI units, ISO axes (x forward, y left, z up). Numbers are checked when a `Chassis` is made, so a
+# plant never starts from a value that is not physical.
 
 
 class VehicleError(ValueError):
@@ -152,6 +150,9 @@ def toml_text(record: Any, *, folder: Path, table: str) -> str:
     if inner is not None:
         lines += ["", f"[{table}]", toml_text(inner, folder=folder, table="")]
     return "\n".join(lines).rstrip("\n") + "\n"
+
+
+# A dataclass of a vehicle as the text of a TOML file, with exact numbers.
 
 
 def _value(value: Any, folder: Path) -> str:

@@ -3,14 +3,6 @@
 State, input and parameters are those of `mpc.prediction`. The sensitivities of the Runge-Kutta step
 are chained by hand from the Jacobians of its four evaluations. Stage and end are tuned as exported
 functions are: our own tanh, atan and sin, nothing of a library.
-
-The car along a path as the tracker predicts it: ẋ and its Jacobian.
-
-x = [e_y, e_psi, v_y, r, δ] and, where the tire lags, [α_f', α_r']: deviation from the path [m],
-left positive; heading against the path's [rad]; lateral velocity [m/s]; yaw rate [rad/s];
-commanded angle of the front wheels [rad]; lagged slip [rad].   u: steering rate [rad/s].
-κ [1/m], > 0 where the path turns left, and v_x [m/s] are constant over a stage of dt [s].
-Force curves are those of the tire up to the slip that is of use, and rise slightly beyond.
 """
 
 from functools import cache
@@ -21,6 +13,14 @@ import casadi as ca
 from codegen.tuned import tuned
 from mpc.problem import N_ERRORS, gauss_newton, tracking_errors
 from mpc.tires.tire import Car, Point, PredictionTire, believed_force
+
+# The car along a path as the tracker predicts it: ẋ and its Jacobian.
+#
+# x = [e_y, e_psi, v_y, r, δ] and, where the tire lags, [α_f', α_r']: deviation from the path [m],
+# left positive; heading against the path's [rad]; lateral velocity [m/s]; yaw rate [rad/s];
+# commanded angle of the front wheels [rad]; lagged slip [rad].   u: steering rate [rad/s].
+# κ [1/m], > 0 where the path turns left, and v_x [m/s] are constant over a stage of dt [s].
+# Force curves are those of the tire up to the slip that is of use, and rise slightly beyond.
 
 N_CAR = 4
 # Least 1 - κ e_y that is believed: towards the center of a turn it vanishes, and ṡ has no bound.

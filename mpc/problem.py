@@ -4,12 +4,6 @@ Minimize Σ_k ½ y_k' Q y_k + ½ R u_k² + ½ y_N' Q_N y_N + ½ Σ Z s² over u_
 from one Runge-Kutta step of dt and x_0 given, so that
   |u_k| <= steering_rate,  |δ_k| <= steering                 hard, k = 1 … N
   |e_y,k| <= e_y + s,  |α_k| <= slip + s (front, rear)       soft, k = 1 … N
-
-What the tracker minimizes: Σ ½ q y² over the stages, Gauss-Newton, and ½ R u² of its input.
-
-y = [e_y, e_psi, course, v_y, yaw rate, δ, progress], see `tracking_errors`.
-
-What the tracker takes for possible, and what it does where it cannot plan.
 """
 
 from dataclasses import dataclass, field, fields
@@ -22,6 +16,10 @@ from numpy.typing import NDArray
 from models.rules import require_positive
 
 Array = NDArray[np.float64]
+
+# What the tracker minimizes: Σ ½ q y² over the stages, Gauss-Newton, and ½ R u² of its input.
+#
+# y = [e_y, e_psi, course, v_y, yaw rate, δ, progress], see `tracking_errors`.
 
 # What costs ½ at weight 1; the order is that of y.
 SCALES = {
@@ -194,6 +192,9 @@ class Problem:
         if not self.horizon >= 2:
             raise ValueError(f"horizon must be at least 2, it is {self.horizon}")
         require_positive(ValueError, dt=self.dt)
+
+
+# What the tracker takes for possible, and what it does where it cannot plan.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

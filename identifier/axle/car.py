@@ -3,16 +3,6 @@
 Rows are axles, front and rear.   F_z = m g l_o/L: static load [N], l_o distance to the other axle.
 φ = F_y/F_z [-].   ξ_i = v_y/g ± I_z r/(L F_z,i) [s], the axle impulse of (7) over F_z, obeys
 dξ_i/dt = φ_i cos δ_i - v_x r/g exactly: one axle, one equation, no stiffness in it.
-
-Ports of a compiled step whose numbers have names: a NamedTuple says what is in a vector.
-
-Numbers are computed once in Python and read by name in the equations, where they are symbols.
-
-Larger, smaller, within: as comparisons, since fmin and fmax of C are calls that cost more.
-
-And one division for many quotients: CasADi writes x (1/y) as x/y, once for each x.
-
-The check that every record of design numbers makes.
 """
 
 import math
@@ -75,6 +65,10 @@ def axle_impulse(car: Car, v_y: Any, r: Any) -> Any:
     return v_y / GRAVITY + car.inertia * r
 
 
+# Ports of a compiled step whose numbers have names: a NamedTuple says what is in a vector.
+#
+# Numbers are computed once in Python and read by name in the equations, where they are symbols.
+
 Record = TypeVar("Record", bound=tuple[Any, ...])
 
 
@@ -100,6 +94,11 @@ def axle_port(kind: type[Record], name: str) -> tuple[Any, Record]:
     """
     port = ca.SX.sym(name, 2, len(kind._fields))  # type: ignore[attr-defined]
     return port, kind(*ca.horzsplit(port))
+
+
+# Larger, smaller, within: as comparisons, since fmin and fmax of C are calls that cost more.
+#
+# And one division for many quotients: CasADi writes x (1/y) as x/y, once for each x.
 
 
 def larger(a: Any, b: Any) -> Any:

@@ -3,11 +3,6 @@
 φ(x) = Σ_j w_j tanh(x/α_j), in static axle loads.   α_j: slip scales [rad], each a power of two of
 the next: tanh(y) = 1 - 2/(1 + E) with E = exp(2y), and doubling y squares E, so that one tanh
 gives all units, with the same bits on every machine.   φ saturates at Σ w_j.
-
-Where the model has been: how long it learnt, by range of slip.
-
-Slip counts with the larger of its two sizes, without lag and sway and with them: the first is what
-a reader of the recording sees, the second is what made the force.
 """
 
 import math
@@ -119,6 +114,11 @@ def unit_matrix(alpha: Array, ladder: tuple[float, ...]) -> Array:
     units: Array = np.tanh(np.asarray(alpha)[:, None] / np.array(ladder))
     return units
 
+
+# Where the model has been: how long it learnt, by range of slip.
+#
+# Slip counts with the larger of its two sizes, without lag and sway and with them: the first is
+# what a reader of the recording sees, the second is what made the force.
 
 EDGES = (0.0, 0.0025, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16)  # rad
 

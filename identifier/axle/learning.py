@@ -4,27 +4,6 @@ dξ/dt = φ cos δ - v_x r/g, filtered by L(p) = 1/(p/κ + 1):
 y = κ ξ - L(κ ξ - v_x r/g) = L(φ cos δ) = Σ θ_j L(g_j),  so y is measured and h = L(g) known.
 The filter is trapezoidal: f⁺ = e f + (1 - e)/2 (u⁺ + u), e = exp(-κ dt), with the state
 v = e f + (1 - e)/2 u.
-
-Recursive least squares with directional forgetting (R. Kulhavy, Automatica 23, 1987).
-
-Only the direction that the regressor excites is forgotten: no wind-up while the rest is not
-excited, and none that would make the covariance wider than its limit.
-
-A change of the road's friction: noticed at both axles at once, followed along one direction.
-
-q = e²/S is one where the error model is right. Its fast mean over its slow mean rises at a change;
-then the covariance is inflated along d = M w, the change of weights that a change of friction
-makes (φ = μ φ₀(α/μ)), so that the weights move along it at once and the shape is kept. Both axles
-must alarm: a faulty steering disturbs only one.
-
-Bounds of what is learnt, kept after every sample, exactly: also in float, whatever was learnt.
-
-The saturated force W = Σ w_j and the slope S = Σ a_j w_j of an axle are kept in their ranges by the
-least move in the metric of the covariance, which finds both at once: moving one unit alone, or
-clipping each, would break what was learnt. Rounding, and the box on each weight, are the business
-of what comes last: a move on the straight line towards the center of the set, where all units are
-equal, by just so much that every bound holds. The numbers of that test lie inside the declared
-bounds by more than rounding in float can do, so that what is declared holds of the stored numbers.
 """
 
 import math
@@ -126,6 +105,12 @@ def filtered(numbers: RegressionNumbers, v: Any, u: Any, first: Any) -> tuple[An
     return f, numbers.e * f + numbers.half * u
 
 
+# Recursive least squares with directional forgetting (R. Kulhavy, Automatica 23, 1987).
+#
+# Only the direction that the regressor excites is forgotten: no wind-up while the rest is not
+# excited, and none that would make the covariance wider than its limit.
+
+
 class Learnt(NamedTuple):
     """Parameters (q entries) and factors of the covariance after an update.
 
@@ -184,6 +169,13 @@ def update(
     after = scaled(updated(P, seen, c), moves * wide)
     return Learnt(theta, after, a, spread.weights)
 
+
+# A change of the road's friction: noticed at both axles at once, followed along one direction.
+#
+# q = e²/S is one where the error model is right. Its fast mean over its slow mean rises at a
+# change; then the covariance is inflated along d = M w, the change of weights that a change of
+# friction makes (φ = μ φ₀(α/μ)), so that the weights move along it at once and the shape is kept.
+# Both axles must alarm: a faulty steering disturbs only one.
 
 LARGEST_Q = 25.0  # one outlier alone is no alarm
 SLOW_Q = 4.0  # and the slow mean shall not follow a change
@@ -272,6 +264,16 @@ def alarm(numbers: ChangeNumbers, fast: Any, slow: Any) -> Any:
     excess = smaller(ratio[0], ratio[1]) * numbers.per_threshold - 1
     return smaller(larger(excess, 0), 1)
 
+
+# Bounds of what is learnt, kept after every sample, exactly: also in float, whatever was learnt.
+#
+# The saturated force W = Σ w_j and the slope S = Σ a_j w_j of an axle are kept in their ranges by
+# the least move in the metric of the covariance, which finds both at once: moving one unit alone,
+# or clipping each, would break what was learnt. Rounding, and the box on each weight, are the
+# business of what comes last: a move on the straight line towards the center of the set, where all
+# units are equal, by just so much that every bound holds. The numbers of that test lie inside the
+# declared bounds by more than rounding in float can do, so that what is declared holds of the
+# stored numbers.
 
 FLOAT = float(np.finfo(np.float32).eps)
 TINY = 1e-12  # of a size that is divided by

@@ -5,12 +5,6 @@ front steering and the bias b of v_y.   x' = (v_x/σ)(α - x), σ = s C(x): s is
 load, C(x) the slope of the force curve, so that the lag shortens by itself where the tire slides.
 Solved exactly for α linear over the step (first-order hold): then the force still depends on s
 where σ is short against a step, and learning cannot get stuck at s = 0.
-
-The sway (roll) of the body, which moves the sensor of v_y sideways over the contact patches.
-
-ρ'' = ω² (a - ρ) - 2 ζ ω ρ', driven by a = (F_f + F_r)/m [m/s²] of the model itself. The contact
-patch sees α_i - k_i ρ'/(ω² v_x), k in [0, 1] (about m_s h²/(I_x + m_s h²)). Without it the roll
-rate is taken for a relaxation length of a meter and more, at one frequency only.
 """
 
 import math
@@ -154,6 +148,13 @@ def force_gradient(c: Curve, of_compliance: Any, of_share: Any, cos_delta: Any, 
 
 
 Array = NDArray[np.float64]
+
+
+# The sway (roll) of the body, which moves the sensor of v_y sideways over the contact patches.
+#
+# ρ'' = ω² (a - ρ) - 2 ζ ω ρ', driven by a = (F_f + F_r)/m [m/s²] of the model itself. The contact
+# patch sees α_i - k_i ρ'/(ω² v_x), k in [0, 1] (about m_s h²/(I_x + m_s h²)). Without it the roll
+# rate is taken for a relaxation length of a meter and more, at one frequency only.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

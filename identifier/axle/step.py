@@ -5,11 +5,6 @@ factors of its covariance P = U D U', D on the diagonal, q = n + 3; gate, sway, 
 `forward`; sensitivity (2, 3); filters (2, q + 1); errors (2, 3); excitation (2, 9); watch (6,) and
 kept (2, q), the weights that are gone back to after a fault. Sampled: x, u, v_x. Everything else is
 a number that stays an input. Forces are told with the weights before the sample.
-
-From a sample to the axle forces of given weights: what learning and the frozen model share.
-
-Carried: gate (9,), sway (3,), slip (2, 4).   W (2, n) [static axle loads].
-own (2, 3) = [compliance s [m], sway share k [-], offset: δ₀ [rad] in front, b [m/s] at the rear].
 """
 
 from typing import Any, NamedTuple
@@ -47,6 +42,11 @@ from identifier.axle.slip import (
 )
 from identifier.axle.watch import Watched, WatchNumbers, WatchState, watched
 from models.vehicle import GRAVITY
+
+# From a sample to the axle forces of given weights: what learning and the frozen model share.
+#
+# Carried: gate (9,), sway (3,), slip (2, 4).   W (2, n) [static axle loads].
+# own (2, 3) = [compliance s [m], sway share k [-], offset: δ₀ [rad] in front, b [m/s] at the rear].
 
 FROZEN_CARRY = ("gate", "sway", "slip")
 OVER = ("x", "u", "v_x")

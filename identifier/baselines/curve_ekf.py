@@ -1,16 +1,6 @@
 """The parameters of a tire curve by an extended Kalman filter; they freeze to that curve.
 
 Magic Formula: B, C, D per axle. Dugoff: stiffness per axle and the friction of the road.
-
-Numbers without limits for parameters that have some: what a filter may add noise to.
-
-θ = 0 is the prior: the stiffness told, a friction, a usual shape. Logarithms keep stiffness and
-friction positive; a logistic keeps the Magic Formula's shape C between 1 and 2, where the force
-has a peak and keeps its sign.
-
-Dugoff's tire, stiffness per axle and friction of the road by an extended Kalman filter.
-
-B, C and D of a Magic Formula per axle, learnt by an extended Kalman filter.
 """
 
 import math
@@ -35,6 +25,12 @@ from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
 
 Array = NDArray[np.float64]
+
+# Numbers without limits for parameters that have some: what a filter may add noise to.
+#
+# θ = 0 is the prior: the stiffness told, a friction, a usual shape. Logarithms keep stiffness and
+# friction positive; a logistic keeps the Magic Formula's shape C between 1 and 2, where the force
+# has a peak and keeps its sign.
 
 USUAL_SHAPE = 1.4  # C of a passenger tire, Pacejka, Tyre and Vehicle Dynamics, figure 4.9
 LOGIT = math.log((USUAL_SHAPE - 1.0) / (2.0 - USUAL_SHAPE))
@@ -270,6 +266,9 @@ class CurveEkf:
         )
 
 
+# Dugoff's tire, stiffness per axle and friction of the road by an extended Kalman filter.
+
+
 def dugoff_ekf(vehicle: Vehicle, *, dt: float = 0.01) -> CurveEkf:
     """Return the method for a car.
 
@@ -279,6 +278,9 @@ def dugoff_ekf(vehicle: Vehicle, *, dt: float = 0.01) -> CurveEkf:
     dt : sampling interval [s].
     """
     return CurveEkf.for_vehicle(vehicle, curve="dugoff", dt=dt)
+
+
+# B, C and D of a Magic Formula per axle, learnt by an extended Kalman filter.
 
 
 def magic_formula_ekf(vehicle: Vehicle, *, dt: float = 0.01) -> CurveEkf:

@@ -3,8 +3,6 @@
 α = δ - atan((v_y ± l r)/v_x) in the paper's sign, the negative of ISO 8855, so that F = +C α.
 Each curve gives both axle forces in the frame of the body, F cos δ; only the linear one is the
 paper's (3) as it stands, with neither atan nor cos.
-
-A frozen curve of axle force over slip angle: linear, Magic Formula or Dugoff.
 """
 
 from collections.abc import Callable, Mapping
@@ -120,6 +118,8 @@ CURVES: Mapping[str, Curve] = {
     "magic_formula": Curve(("B_1_rad", "C", "D_N"), magic_formula),
     "dugoff": Curve(("C_N_rad", "mu"), dugoff),
 }
+
+# A frozen curve of axle force over slip angle: linear, Magic Formula or Dugoff.
 
 KIND = "curve"
 

@@ -2,15 +2,6 @@
 
 minimize  Σ over recordings and axles of (RMSE/rms of the true force)²  over all parameters of the
 frozen model, by nonlinear least squares from several random starts.
-
-Levenberg-Marquardt within bounds, by normal equations: short and wide problems, many residuals.
-
-min |r(p)|²,   lower <= p <= upper;   (JᵀJ + μ D) d = -Jᵀ r over the parameters that are free to
-move, D = diag(JᵀJ), and the step is clipped to the bounds. A step is taken only downhill; μ follows
-Nielsen's rule. Source: Madsen, Nielsen and Tingleff, Methods for Non-Linear Least Squares Problems,
-2nd ed., 2004, section 3.2.
-
-What a method freezes to, as a function of parameters that may be fitted offline.
 """
 
 from collections.abc import Callable, Sequence
@@ -33,6 +24,13 @@ from models.recordings import Recording
 from models.vehicle import Vehicle
 
 Array = NDArray[np.float64]
+# Levenberg-Marquardt within bounds, by normal equations: short and wide problems, many residuals.
+#
+# min |r(p)|²,   lower <= p <= upper;   (JᵀJ + μ D) d = -Jᵀ r over the parameters that are free to
+# move, D = diag(JᵀJ), and the step is clipped to the bounds. A step is taken only downhill; μ
+# follows Nielsen's rule. Source: Madsen, Nielsen and Tingleff, Methods for Non-Linear Least Squares
+# Problems, 2nd ed., 2004, section 3.2.
+
 STEP = 1e-6  # of the one-sided differences, for parameters of order one
 FIRST_DAMPING = 1e-2
 LARGEST_DAMPING = 1e12
@@ -199,6 +197,8 @@ def _residual(
     errors = [_errors(model, recording).ravel() for recording in recordings]
     return np.concatenate([*errors, RIDGE * (parameters - start)])
 
+
+# What a method freezes to, as a function of parameters that may be fitted offline.
 
 SCATTER = 0.3  # of starts, in standard deviations of the method's own prior
 

@@ -6,11 +6,6 @@ unstable: x⁺ = x + T_s (I - T_s J/2)⁻¹ f, with f and J = ∂f/∂x at the m
 Its Jacobian is taken by automatic differentiation; the covariance is updated in Joseph's form. An
 innovation beyond `outlier` standard deviations moves θ no further than one at that distance, x
 follows it all the way. Source: Simon, Optimal State Estimation, 2006, sections 5.1 and 13.2.
-
-Extended Kalman filter with axle forces as random walks: a signal estimator.
-
-θ = [F_f, F_r]/F_z, in static axle loads.   Source of the idea: Ray, "Nonlinear state and tire force
-estimation for advanced vehicle control", IEEE Trans. Control Systems Technology 3(1), 1995.
 """
 
 import math
@@ -136,6 +131,11 @@ def correct(estimate: Any, P: Any, R: Any, x: Any, outlier: Any) -> tuple[Any, A
 
 
 Array = NDArray[np.float64]
+# Extended Kalman filter with axle forces as random walks: a signal estimator.
+#
+# θ = [F_f, F_r]/F_z, in static axle loads.   Source of the idea: Ray, "Nonlinear state and tire
+# force estimation for advanced vehicle control", IEEE Trans. Control Systems Technology 3(1), 1995.
+
 LIMIT = 5.0  # static axle loads: no tire reaches it
 
 

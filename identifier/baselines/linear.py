@@ -1,13 +1,4 @@
-"""The linear tire that the car was told of: no learning, the least that a method must beat.
-
-Cornering stiffness of each axle, online: recursive least squares with forgetting.
-
-ξ̇ = C α - n filtered by 1/(s/κ + 1), which needs no derivative and couples no axles:
-y = κ ξ - LP[κ ξ - n] = C LP[α].   Per axle J = Σ λ^(k-i) h_i² T_s [rad² s] and
-C ← C + h (y - h C) T_s/J: least squares in its information form.
-J never falls below what the prior is worth, so that straight driving forgets nothing for good.
-Source: Ljung, System Identification, 2nd ed., section 11.2.
-"""
+"""The linear tire that the car was told of: no learning, the least that a method must beat."""
 
 import math
 from collections.abc import Mapping
@@ -113,6 +104,14 @@ class LinearBaseline:
             min_speed=self.min_speed,
         )
 
+
+# Cornering stiffness of each axle, online: recursive least squares with forgetting.
+#
+# ξ̇ = C α - n filtered by 1/(s/κ + 1), which needs no derivative and couples no axles:
+# y = κ ξ - LP[κ ξ - n] = C LP[α].   Per axle J = Σ λ^(k-i) h_i² T_s [rad² s] and
+# C ← C + h (y - h C) T_s/J: least squares in its information form.
+# J never falls below what the prior is worth, so that straight driving forgets nothing for good.
+# Source: Ljung, System Identification, 2nd ed., section 11.2.
 
 CARRY = ("stiffness", "information", "filters", "inputs", "running")
 NUMBERS = ("cutoff", "memory", "prior_slip", "learning_speed")

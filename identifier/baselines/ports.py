@@ -3,11 +3,6 @@
 x = [v_y, r] [m/s, rad/s].   u = [δ_f, δ_r] [rad].   F: axle forces [N], frame of the body.
 ẋ = K F - [v_x r, 0]   and, with ξ = K⁻¹ x [N s],   ξ̇ = F - n,   n = m v_x r [l_r, l_f]/L:
 n is the force that holds a steady turn. Equation numbers: Hong and Choi.
-
-Scales of a car by Froude similarity, and ranges around numbers that follow from them.
-
-Lengths scale with the wheelbase L, times with sqrt(L/g), speeds with sqrt(g L): one rule serves a
-passenger car (2.7 m, 0.52 s, 5.1 m/s) and a 1:10 model (0.17 m, 0.13 s, 1.3 m/s).
 """
 
 import math
@@ -106,6 +101,12 @@ def motion_rate(p: BicycleParameters, v_x: Any, x: Any, F: Any) -> Any:
     F : axle forces (2,) [N].
     """
     return bicycle(p, 1.0).K @ F - ca.vertcat(v_x * x[1], 0)
+
+
+# Scales of a car by Froude similarity, and ranges around numbers that follow from them.
+#
+# Lengths scale with the wheelbase L, times with sqrt(L/g), speeds with sqrt(g L): one rule serves a
+# passenger car (2.7 m, 0.52 s, 5.1 m/s) and a 1:10 model (0.17 m, 0.13 s, 1.3 m/s).
 
 
 class Scales(NamedTuple):

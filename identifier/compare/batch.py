@@ -1,10 +1,6 @@
 """Many methods over one recording at once: those with the same compiled step share its lanes.
 
 A run has the bits of the same run by `identify`; its error is summed up while it runs.
-
-Many frozen models over one recording at once, as `identify_batch` runs many methods.
-
-`cross_replay` of many methods at once.
 """
 
 from collections import defaultdict
@@ -144,6 +140,9 @@ def _carried(
     return {port: scores.record[port][row, place] for port in ports}
 
 
+# Many frozen models over one recording at once, as `identify_batch` runs many methods.
+
+
 @runtime_checkable
 class Replayable(Protocol):
     """A frozen model that runs as a compiled step does."""
@@ -199,6 +198,9 @@ def replay_batch(
         )
         found |= dict(zip(setups, map(rmse, scores.squares), strict=True))
     return tuple(found[i] for i in range(len(models)))
+
+
+# `cross_replay` of many methods at once.
 
 
 def cross_replay_batch(

@@ -2,14 +2,6 @@
 
 All methods are judged on the same samples. Shares are RMSE over the rms of the true force, both
 axles together, in percent.
-
-A step that sums up its own errors, so that nothing else of a run need be recorded.
-
-Added are, sampled: truth (2,) [N] and counts, 1 where the sample counts; constant: impossible [N],
-a force that no tire makes; carried: squares (2,) [N²], the sum of squared errors over the samples
-that count, and sane_samples, the samples before the first impossible force, and sane, 1 till then.
-
-How long one step of a method takes, in compiled code.
 """
 
 import math
@@ -218,6 +210,13 @@ def _mean(values: Sequence[float]) -> float | None:
     return float(np.mean(values)) if values else None
 
 
+# A step that sums up its own errors, so that nothing else of a run need be recorded.
+#
+# Added are, sampled: truth (2,) [N] and counts, 1 where the sample counts; constant: impossible
+# [N], a force that no tire makes; carried: squares (2,) [N²], the sum of squared errors over the
+# samples that count, and sane_samples, the samples before the first impossible force, and sane, 1
+# till then.
+
 CARRY = ("squares", "sane_samples", "sane")
 OVER = ("truth", "counts")
 
@@ -331,6 +330,8 @@ def rmse(squares: Array) -> AxleRmse:
     front, rear = np.sqrt(squares)
     return AxleRmse(front=float(front), rear=float(rear))
 
+
+# How long one step of a method takes, in compiled code.
 
 LONG = 10_000  # samples, beside which the call of the loop does not count
 

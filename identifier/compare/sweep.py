@@ -2,8 +2,6 @@
 
 A method whose numbers were chosen well beats one whose were not, whatever their merit; so each may
 try the same number of designs from the ranges that it names itself.
-
-Which designs of a sweep are worth having: the Pareto front of frozen against online error.
 """
 
 import time
@@ -166,6 +164,9 @@ def _store(folder: Path, course: Course, seed: int) -> Store:
             for row in rows
         ),
     )
+
+
+# Which designs of a sweep are worth having: the Pareto front of frozen against online error.
 
 
 def pareto_front(candidates: Sequence[Candidate]) -> list[Candidate]:

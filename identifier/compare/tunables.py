@@ -2,11 +2,6 @@
 
 Ranges are wide and centered on the numbers that follow from the vehicle, since nobody knows better
 beforehand; those of the paper's laws come from their limit of stability.
-
-Random designs of the paper's laws, for a fair comparison: every law from the same ranges.
-
-The learning rate is drawn as a share of the rate at which the loop becomes unstable at the worst
-regressor (|σ|² = n_h), so that slow and fast observers get equally good chances.
 """
 
 import math
@@ -26,6 +21,11 @@ from identifier.stability.gain_design import gain_for_phase_margin
 from identifier.stability.loop import linear_law
 from identifier.tuning import Range
 from models.vehicle import GRAVITY, Vehicle
+
+# Random designs of the paper's laws, for a fair comparison: every law from the same ranges.
+#
+# The learning rate is drawn as a share of the rate at which the loop becomes unstable at the worst
+# regressor (|σ|² = n_h), so that slow and fast observers get equally good chances.
 
 SIZE = "size"
 TUNABLES: Mapping[str, Range] = {

@@ -3,8 +3,6 @@
 The name of a result is a hash of all that it follows from, this source text included, so that a
 result is never taken for that of other input or of another version. The files may be deleted at
 any time.
-
-Work spread over processes, in order; one worker stays in this process.
 """
 
 import hashlib
@@ -23,6 +21,8 @@ import numpy as np
 
 from models.doors import read_json
 from models.files import write_atomically
+
+# Work spread over processes, in order; one worker stays in this process.
 
 Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
 

@@ -1,21 +1,4 @@
-"""A folded step as an FMU for Co-Simulation: description, sources and binaries in one archive.
-
-Shared libraries of an FMU, for the machine at hand and, with MinGW, for Windows.
-
-C source of a folded step for the FMU: the files of the C package, and model.h, which names them.
-
-What is simulated is what is shipped: the same equations, guards and status codes, in double.
-
-The variables of the FMU, the same in FMI 2.0 and 3.0.
-
-Value references and states are those of sources/memory.h.
-
-XML as text: elements with attributes in the order in which they are given.
-
-modelDescription.xml of FMI 2.0 and 3.0, and the list of sources for whoever builds it again.
-
-FMUs for Co-Simulation: a folded step as a component of a simulation.
-"""
+"""A folded step as an FMU for Co-Simulation: description, sources and binaries in one archive."""
 
 import hashlib
 import io
@@ -37,6 +20,8 @@ from identifier.export.c_source import c_sources
 from identifier.export.fold import FoldedStep
 from identifier.export.package import ingredients, summary
 from models.files import write_atomically
+
+# Shared libraries of an FMU, for the machine at hand and, with MinGW, for Windows.
 
 log = logging.getLogger("tireid.export")
 
@@ -101,6 +86,10 @@ def build_binary(target: Target, name: str, sources: Mapping[str, bytes]) -> byt
         return (folder / library).read_bytes()
 
 
+# C source of a folded step for the FMU: the files of the C package, and model.h, which names them.
+#
+# What is simulated is what is shipped: the same equations, guards and status codes, in double.
+
 HEADER = """/* Generated: which component the FMU holds. */
 #ifndef MODEL_H
 #define MODEL_H
@@ -147,6 +136,10 @@ def model_files(folded: FoldedStep) -> dict[str, str]:
     sources = c_sources(folded, single=False, about=about)
     return {PurePosixPath(path).name: text for path, text in sources.items()}
 
+
+# The variables of the FMU, the same in FMI 2.0 and 3.0.
+#
+# Value references and states are those of sources/memory.h.
 
 # What a unit is made of in SI, as attributes of BaseUnit; a radian counts as one of its own.
 UNITS: Mapping[str, Mapping[str, int]] = {
@@ -233,6 +226,8 @@ def _constant(reference: int, name: str, unit: str, value: float, description: s
     )
 
 
+# XML as text: elements with attributes in the order in which they are given.
+
 DECLARATION = '<?xml version="1.0" encoding="UTF-8"?>\n'
 
 
@@ -260,6 +255,8 @@ def element(tag: str, attributes: dict[str, object], *children: str) -> str:
 def _text(value: object) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
+
+# modelDescription.xml of FMI 2.0 and 3.0, and the list of sources for whoever builds it again.
 
 TOOL = "tireid"
 
@@ -545,5 +542,7 @@ def _archive(members: Mapping[str, bytes]) -> bytes:
             archive.writestr(member, content)
     return buffer.getvalue()
 
+
+# FMUs for Co-Simulation: a folded step as a component of a simulation.
 
 __all__ = ["export_fmu"]

@@ -2,8 +2,6 @@
 
 Gains, T_s, vehicle and K⁻¹ become literals, so that only signals and carried values are left:
 (carried, x = [v_y, r], u = [δ_f, δ_r], v_x) -> (carried next, axle_force [N], other outputs), SI.
-
-What the ports of a step mean: a unit and a few words on every field of an exported structure.
 """
 
 from collections.abc import Mapping
@@ -22,6 +20,8 @@ from identifier.refused import GATE, Limits, judges_samples
 from identifier.regression import RegressionDesign
 from models.recordings import Recording
 from models.vehicle import Vehicle
+
+# What the ports of a step mean: a unit and a few words on every field of an exported structure.
 
 LOAD = "static axle loads"
 # Rules of weights that are taken over.

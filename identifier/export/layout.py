@@ -1,7 +1,4 @@
-"""How the ports of a step lie in the structures of the exported C.
-
-What weights must be to be taken over, in C: covariances and amounts that are not negative.
-"""
+"""How the ports of a step lie in the structures of the exported C."""
 
 from collections.abc import Iterator, Sequence
 from math import isqrt
@@ -155,6 +152,8 @@ def sum_terms(members: list[Member], prefix: str, base: str) -> list[str]:
             terms += [f"{place}{member.element(entry)}" for entry in range(size)]
     return terms
 
+
+# What weights must be to be taken over, in C: covariances and amounts that are not negative.
 
 # What a variance may miss to zero by rounding, as a share of its own: float keeps seven digits, and
 # both precisions accept what they have learnt themselves.

@@ -1,18 +1,4 @@
-"""A frozen model as an ONNX file, for whoever runs networks in a tool of their own.
-
-An ONNX graph, node by node: every value is a name, every operation returns that of its result.
-
-Tensors are (batch, columns) of one number type; the batch may have any size. Operators are those of
-opset 13, which every runtime of the last years knows, and of which CasADi reads back all.
-
-The paper's network, frozen, as ONNX: F_y = C α + U Ŵ tanh(V̂ x̄), zero below the minimum speed.
-
-Rows are samples, as ONNX has it, so that every product is transposed: x̄ᵀ V̂ᵀ, σᵀ Ŵᵀ.
-
-The axle model's static force curve as ONNX: F_i = load_i Σ_j w_ij tanh(α_i/α_j).
-
-What the whole model adds, the lag of slip and the sway of the body, has a state and stays out.
-"""
+"""A frozen model as an ONNX file, for whoever runs networks in a tool of their own."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -29,6 +15,11 @@ from identifier.method import FrozenModel
 from identifier.own_network import OnnxModel
 from identifier.paper.network import NetworkModel
 from models.files import write_atomically
+
+# An ONNX graph, node by node: every value is a name, every operation returns that of its result.
+#
+# Tensors are (batch, columns) of one number type; the batch may have any size. Operators are those
+# of opset 13, which every runtime of the last years knows, and of which CasADi reads back all.
 
 OPSET = 13
 IR_VERSION = 7  # of the file format that came with opset 13
@@ -145,6 +136,10 @@ class Graph:
         return content
 
 
+# The paper's network, frozen, as ONNX: F_y = C α + U Ŵ tanh(V̂ x̄), zero below the minimum speed.
+#
+# Rows are samples, as ONNX has it, so that every product is transposed: x̄ᵀ V̂ᵀ, σᵀ Ŵᵀ.
+
 SLIP_SIGN = "slip angle δ - atan(v/v_x), the negative of ISO 8855; force to the left is positive"
 OUTPUTS = (
     Signal("F_yf", "N", "lateral force of the front axle in the frame of the body, left positive"),
@@ -205,6 +200,10 @@ def network_graph(model: NetworkModel, *, single: bool = False) -> bytes:
         {"vehicle": name, "min_speed_m_s": repr(model.min_speed)},
     )
 
+
+# The axle model's static force curve as ONNX: F_i = load_i Σ_j w_ij tanh(α_i/α_j).
+#
+# What the whole model adds, the lag of slip and the sway of the body, has a state and stays out.
 
 FROZEN_INPUTS = (
     Signal("alpha_f", "rad", "slip angle of the front axle, paper's sign"),

@@ -1,9 +1,4 @@
-"""The package: C sources, example, self-test, build file, README and manifest, as texts by path.
-
-<name>.json: everything that went into a package, what is in it, and their hashes.
-
-Samples for the self-test of a package, and the forces that CasADi gives for them.
-"""
+"""The package: C sources, example, self-test, build file, README and manifest, as texts by path."""
 
 import hashlib
 import json
@@ -29,6 +24,8 @@ from identifier.method import FrozenModel, Method, vehicle_numbers
 from identifier.paper.design import Design
 from identifier.refused import NOWHERE, STALE_TIME, stale_samples
 from models.vehicle import Vehicle
+
+# <name>.json: everything that went into a package, what is in it, and their hashes.
 
 FORMAT = "tireid package 1"
 
@@ -192,6 +189,8 @@ def _described(signal: Signal) -> dict[str, Any]:
 
 
 Array = NDArray[np.float64]
+
+# Samples for the self-test of a package, and the forces that CasADi gives for them.
 
 SAMPLES = 240
 REST = 10  # samples at rest, and some as long in between

@@ -2,8 +2,6 @@
 
 A recording runs through the package; what comes back is a hash of every state and status on the way
 and, from QEMU, what a step costs. QEMU lets one instruction take 1 ns, and SysTick counts.
-
-Flash, RAM, stack and instructions of a package, measured where the tools for Arm are there.
 """
 
 import json
@@ -296,6 +294,9 @@ def _result(command: Sequence[str], folder: Path) -> Replay:
         raise ReplayError(f"{command[0]} ended with {answer.returncode}: {answer.stderr[:200]}")
     numbers = {key: int(found[key], 16) for key in Replay._fields if key != "hash"}
     return Replay(hash=found["hash"], **numbers)
+
+
+# Flash, RAM, stack and instructions of a package, measured where the tools for Arm are there.
 
 
 class Cost(NamedTuple):

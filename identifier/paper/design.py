@@ -1,12 +1,4 @@
-"""A design of the paper's identifier: everything that is chosen before the car drives.
-
-How hard a car is driven: the conditions that a design is made for, judged at, and stored with.
-
-A bound that is proven holds on every drive that keeps all of them; a drive that breaks one proves
-nothing. They stand in design.toml, so that the same file is judged alike wherever it is judged.
-
-A design as a TOML file: design.toml, read strictly and written with its units.
-"""
+"""A design of the paper's identifier: everything that is chosen before the car drives."""
 
 import json
 import math
@@ -30,6 +22,11 @@ from models.doors import Table, read_toml
 from models.recordings import Recording
 from models.rules import require_within
 from models.vehicle import GRAVITY, Vehicle
+
+# How hard a car is driven: the conditions that a design is made for, judged at, and stored with.
+#
+# A bound that is proven holds on every drive that keeps all of them; a drive that breaks one proves
+# nothing. They stand in design.toml, so that the same file is judged alike wherever it is judged.
 
 SPEED_SPREAD = 0.05  # of the speed, give or take
 RANGES = {  # SI, of what is driven on wheels
@@ -270,6 +267,8 @@ def natural_force_unit(mass: float) -> float:
     """
     return float(10.0 ** round(np.log10(mass * GRAVITY / 15)))
 
+
+# A design as a TOML file: design.toml, read strictly and written with its units.
 
 COMMENTS = {
     "law": "integral | instantaneous | pi_lead",

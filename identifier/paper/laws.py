@@ -11,16 +11,6 @@ ball; it is done after the step.
 
 ξ̃ = ξ - ξ̂ [U s], z = ∫ exp(-λ (t - τ)) ξ̃ dτ [U s²], σ = tanh(V̂ x̄), U the force unit.
 The paper never defines ξ̃. Only with ξ - ξ̂, so that dξ̃/dt = A_d ξ̃ + f - f̂, do (11)-(12) descend.
-
-The series-parallel observer (8), the error filter (10), and where the network reads the state.
-
-ξ, ξ̂ [U s]: axle impulse, measured and estimated.   u = [δ_f, δ_r] [rad].   f̂ [U]: network output.
-
-One step of an ordinary differential equation, with its inputs held over the step.
-
-Gains of the identifier, with their units.
-
-With the force unit U (kN for a car) the axle impulse ξ is in U s, the filtered error z in U s².
 """
 
 from collections.abc import Callable, Mapping
@@ -219,6 +209,11 @@ def weight_rates(
     return WeightRates(W_dot, V_dot)
 
 
+# The series-parallel observer (8), the error filter (10), and where the network reads the state.
+#
+# ξ, ξ̂ [U s]: axle impulse, measured and estimated.   u = [δ_f, δ_r] [rad].   f̂ [U]: network
+# output.
+
 InputSource = Callable[[Any, Any], Any]
 
 
@@ -277,6 +272,8 @@ def estimated(xi: Any, xi_hat: Any) -> Any:
 
 
 INPUT_SOURCES: Mapping[str, InputSource] = {"measured": measured, "estimated": estimated}
+
+# One step of an ordinary differential equation, with its inputs held over the step.
 
 Derivative = Callable[[list[Any]], list[Any]]
 Projection = Callable[[list[Any]], list[Any]]
@@ -337,6 +334,11 @@ def rk4(derivative: Derivative, state: list[Any], dt: Any, project: Projection =
 INTEGRATORS: Mapping[str, Integrator] = {"euler": euler, "rk4": rk4}
 
 LEAST, LARGEST = 1e-15, 1e12  # of a gain that is not 0, in its unit, whatever U is
+
+
+# Gains of the identifier, with their units.
+#
+# With the force unit U (kN for a car) the axle impulse ξ is in U s, the filtered error z in U s².
 
 
 class NotHurwitzError(ValueError):

@@ -2,8 +2,6 @@
 
 x̄ = (chosen signals) / (their scales), (n_in,).   Ŵ: (2, n_h) in the force unit.   V̂: (n_h, n_in).
 There is no bias: f̂ is odd in x̄, as the residual of a symmetric tire is, and f̂(0) = 0.
-
-The paper's network, frozen: weights at one instant and all that axle forces need.
 """
 
 from collections.abc import Mapping
@@ -146,6 +144,8 @@ def network_signals(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> 
         "alpha_r": alpha[1],
     }
 
+
+# The paper's network, frozen: weights at one instant and all that axle forces need.
 
 KIND = "network"
 LARGEST_SUM = 1e9  # of the units of an axle together [N]: what cancels may be large

@@ -1,61 +1,4 @@
-"""The laws by name: two kinds of statistics with two ways down, and least squares.
-
-How recursive least squares forgets: what becomes of P (n_h, n_h) [1/s] after each pair.
-
-keep = exp(-λ T) <= 1. P is the inverse of the information; forgetting makes it larger.
-
-Symmetric positive definite matrices in straight-line code, without pivots or branches.
-
-The filtered regression y = W s of dξ/dt = b + W σ: the residual force without a derivative.
-
-ξ (2,) [U s]: axle impulse.   b = A_ξ ξ + B_ξ u (2,) [U]: its rate without the network.
-σ (n_h,) [-]: hidden layer.   κ [1/s]: rate of the filters.   U: force unit.
-In the Laplace domain y = κ/(s + κ) (s ξ - b) and s = κ/(s + κ) σ, so that y = W s for a constant W;
-s ξ is never formed, since κ s/(s + κ) ξ = κ (ξ - ξ_f).
-
-Sampled at T, with e = exp(-κ T) and the mean of b and σ over a step by the trapezoidal rule,
-    s⁺ = e s + (1 - e) (σ + σ⁺)/2,     y⁺ = e y + (1 - e) [(ξ⁺ - ξ)/T - (b + b⁺)/2].
-The mean of dξ/dt over a step is (ξ⁺ - ξ)/T whatever it does in between: only the trapezoidal rule
-is approximate (T²), and where it holds, y = W s holds to round-off. `target_lag` and
-`regressor_lag` are what both recursions carry, chosen such that no difference of samples is taken.
-
-A memory of M pairs that excite the most: a new pair takes the place that gains the most.
-
-S (n_h, M) and Z (2, M) [U]: stored regressors and targets, zero where nothing is stored yet.
-Excitation is the determinant of G = ω S Sᵀ + δ I, ω [s] being what one pair counts for. s in the
-place of s_j multiplies it by (1 + a)(1 - b_j) + c_j², with a = ω sᵀ G⁻¹ s, b_j = ω s_jᵀ G⁻¹ s_j and
-c_j = ω s_jᵀ G⁻¹ s. For an empty place that is 1 + a, which no stored pair can exceed: the memory
-fills first.
-
-What a law is: where its statistics start, and how one pair moves them and the weights.
-
-W (2, n_h) [U]: weights.   s (n_h,), y (2,) [U]: the pair of `filtered`.   U: force unit.
-
-Recursive least squares on y = W s, with the way of forgetting as an argument.
-
-P (n_h, n_h) [1/s] is the inverse of the information Ω + δ I of `descent`, carried instead of solved
-for; without forgetting W is the ridge regression of all pairs so far, ridge δ about W_0.
-
-Two ways down the quadratic cost J(W) = tr[W Ω Wᵀ/2 - W Yᵀ] + δ |W - W_0|²/2.
-
-Ω (n_h, n_h) [s]: information.   Y (2, n_h) [U s].   δ [s]: ridge.   W_0: weights at the start.
-For Ω = Σ s sᵀ T and Y = Σ y sᵀ T this is the cost Σ |y - W s|² T/2, up to a constant. The ridge is
-the leakage: with no information left, W returns to W_0. `share` = 1 - exp(-η T) is in [0, 1) for
-every η, and neither step can overshoot.
-
-Kreisselmeier's statistics: with them the exact gradient of the paper's cost (9) is at hand.
-
-J = ∫ exp(-λ (t - τ)) |y(τ) - W s(τ)|²/2 dτ for the weights of *now*, not those of τ, has the
-gradient dJ/dW = W Ω - Y with dΩ/dt = -λ Ω + s sᵀ and dY/dt = -λ Y + y sᵀ. The integral law (11)
-takes the regressor out of the integral and so lags; this one does not.
-Sampled: Ω⁺ = exp(-λ T) Ω + T s sᵀ, exactly the gradient of Σ exp(-λ T (k - j)) |y_j - W s_j|² T/2.
-
-Concurrent learning: the present pair and a memory of exciting ones, learnt from together.
-
-Ω = ω (S Sᵀ + s sᵀ) and Y = ω (Z Sᵀ + y sᵀ), ω = 1/κ: a filtered pair stands for the time its filter
-looks back. Stored pairs fade, s_j and y_j alike, so that y_j = W s_j stays true while a newer pair
-takes the place of an old one more easily.
-"""
+"""The laws by name: two kinds of statistics with two ways down, and least squares."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -64,6 +7,10 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
+
+# How recursive least squares forgets: what becomes of P (n_h, n_h) [1/s] after each pair.
+#
+# keep = exp(-λ T) <= 1. P is the inverse of the information; forgetting makes it larger.
 
 Forgetting = Callable[[Any, Any, Any, Any], Any]
 
@@ -115,6 +62,9 @@ def directional(P: Any, s: Any, keep: Any, bound: Any) -> Any:
     return P + ca.fmin(1 / keep - 1, room) * (seen @ seen.T) / variance
 
 
+# Symmetric positive definite matrices in straight-line code, without pivots or branches.
+
+
 def symmetric(A: Any) -> Any:
     """Return the matrix that has the upper triangle of A on both sides, symmetric to the bit.
 
@@ -147,6 +97,21 @@ def solve_definite(A: Any, right: Any) -> Any:
     right : B (n, m).
     """
     return ca.solve(ca.chol(A), whiten(A, right))
+
+
+# The filtered regression y = W s of dξ/dt = b + W σ: the residual force without a derivative.
+#
+# ξ (2,) [U s]: axle impulse.   b = A_ξ ξ + B_ξ u (2,) [U]: its rate without the network. σ (n_h,)
+# [-]: hidden layer.   κ [1/s]: rate of the filters.   U: force unit. In the Laplace domain y = κ/(s
+# + κ) (s ξ - b) and s = κ/(s + κ) σ, so that y = W s for a constant W; s ξ is never formed, since κ
+# s/(s + κ) ξ = κ (ξ - ξ_f).
+#
+# Sampled at T, with e = exp(-κ T) and the mean of b and σ over a step by the trapezoidal rule,
+#     s⁺ = e s + (1 - e) (σ + σ⁺)/2,     y⁺ = e y + (1 - e) [(ξ⁺ - ξ)/T - (b + b⁺)/2].
+# The mean of dξ/dt over a step is (ξ⁺ - ξ)/T whatever it does in between: only the trapezoidal rule
+# is approximate (T²), and where it holds, y = W s holds to round-off. `target_lag` and
+# `regressor_lag` are what both recursions carry, chosen such that no difference of samples is
+# taken.
 
 
 class Pair(NamedTuple):
@@ -189,6 +154,14 @@ def filtered_pair(
     )
     return pair, carried
 
+
+# A memory of M pairs that excite the most: a new pair takes the place that gains the most.
+#
+# S (n_h, M) and Z (2, M) [U]: stored regressors and targets, zero where nothing is stored yet.
+# Excitation is the determinant of G = ω S Sᵀ + δ I, ω [s] being what one pair counts for. s in the
+# place of s_j multiplies it by (1 + a)(1 - b_j) + c_j², with a = ω sᵀ G⁻¹ s, b_j = ω s_jᵀ G⁻¹ s_j
+# and c_j = ω s_jᵀ G⁻¹ s. For an empty place that is 1 + a, which no stored pair can exceed: the
+# memory fills first.
 
 WORTH = 1.01  # a pair is stored where it multiplies the determinant by more than this
 
@@ -243,6 +216,10 @@ def remember(memory: Memory, pair: Pair, *, weight: Any, ridge: Any, allowed: An
 
 
 Array = NDArray[np.float64]
+# What a law is: where its statistics start, and how one pair moves them and the weights.
+#
+# W (2, n_h) [U]: weights.   s (n_h,), y (2,) [U]: the pair of `filtered`.   U: force unit.
+
 State = Mapping[str, Any]
 
 
@@ -278,6 +255,12 @@ class Law(NamedTuple):
 
     start: Callable[[int, int, float], dict[str, Array]]
     update: Callable[[State, Weights, Pair, Numbers, Any], tuple[dict[str, Any], Any]]
+
+
+# Recursive least squares on y = W s, with the way of forgetting as an argument.
+#
+# P (n_h, n_h) [1/s] is the inverse of the information Ω + δ I of `descent`, carried instead of
+# solved for; without forgetting W is the ridge regression of all pairs so far, ridge δ about W_0.
 
 
 def start_squares(n_h: int, memory: int, ridge: float) -> dict[str, Array]:
@@ -325,6 +308,13 @@ def least_squares(forget: Forgetting) -> Law:
     return Law(start=start_squares, update=partial(update_squares, forget=forget))
 
 
+# Two ways down the quadratic cost J(W) = tr[W Ω Wᵀ/2 - W Yᵀ] + δ |W - W_0|²/2.
+#
+# Ω (n_h, n_h) [s]: information.   Y (2, n_h) [U s].   δ [s]: ridge.   W_0: weights at the start.
+# For Ω = Σ s sᵀ T and Y = Σ y sᵀ T this is the cost Σ |y - W s|² T/2, up to a constant. The ridge
+# is the leakage: with no information left, W returns to W_0. `share` = 1 - exp(-η T) is in [0, 1)
+# for every η, and neither step can overshoot.
+
 Descent = Callable[[Weights, Any, Any, Any, Any], Any]
 
 
@@ -358,6 +348,14 @@ def newton(weights: Weights, Omega: Any, Y: Any, ridge: Any, share: Any) -> Any:
     W, W_0 = weights
     minimum = solve_definite(Omega + ridge * ca.SX.eye(Omega.shape[0]), (Y + ridge * W_0).T).T
     return W - share * (W - minimum)
+
+
+# Kreisselmeier's statistics: with them the exact gradient of the paper's cost (9) is at hand.
+#
+# J = ∫ exp(-λ (t - τ)) |y(τ) - W s(τ)|²/2 dτ for the weights of *now*, not those of τ, has the
+# gradient dJ/dW = W Ω - Y with dΩ/dt = -λ Ω + s sᵀ and dY/dt = -λ Y + y sᵀ. The integral law (11)
+# takes the regressor out of the integral and so lags; this one does not. Sampled: Ω⁺ = exp(-λ T) Ω
+# + T s sᵀ, exactly the gradient of Σ exp(-λ T (k - j)) |y_j - W s_j|² T/2.
 
 
 def start_averages(n_h: int, memory: int, ridge: float) -> dict[str, Array]:
@@ -401,6 +399,13 @@ def kreisselmeier(descent: Descent) -> Law:
     descent : the way down the cost, `gradient` or `newton`.
     """
     return Law(start=start_averages, update=partial(update_averages, descent=descent))
+
+
+# Concurrent learning: the present pair and a memory of exciting ones, learnt from together.
+#
+# Ω = ω (S Sᵀ + s sᵀ) and Y = ω (Z Sᵀ + y sᵀ), ω = 1/κ: a filtered pair stands for the time its
+# filter looks back. Stored pairs fade, s_j and y_j alike, so that y_j = W s_j stays true while a
+# newer pair takes the place of an old one more easily.
 
 
 def start_memory(n_h: int, memory: int, ridge: float) -> dict[str, Array]:

@@ -2,8 +2,6 @@
 
 Judged at the worst regressor (|s|² = n_h, no leakage), so that a pass holds on every road; the
 same loop at the regressors of a recorded run is `along_run`.
-
-The learning loop along a recorded run: how large its gain was, how close to the limit.
 """
 
 import math
@@ -108,6 +106,9 @@ def along_run(loop: Loop, gains_along: npt.ArrayLike, integrator: str, dt: float
 
 
 Array = NDArray[np.float64]
+
+
+# The learning loop along a recorded run: how large its gain was, how close to the limit.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,7 +1,4 @@
-"""Properties of the learning loop: poles, sampling, margins, damping, drift.
-
-Properties that bound error and weights, beside the bound of an identifier without a network.
-"""
+"""Properties of the learning loop: poles, sampling, margins, damping, drift."""
 
 import math
 
@@ -262,6 +259,8 @@ def _above_zero(name: str, title: str, value: float, advice: str) -> Property:
         advice="" if good else advice,
     )
 
+
+# Properties that bound error and weights, beside the bound of an identifier without a network.
 
 CONDITION = (
     "it holds while slip, friction, speed, steering, yaw rate and noise are as declared, no sample "

@@ -9,16 +9,6 @@
    |s|² = n_h (so that 4 leaves all of it at half-open units, s_i = 1/2).
 5. η_V = η_W/(x_bar_max W_max)², where V costs no margin, or less, where |V| would pass V_max;
    ρ_V keeps |V| <= V_max. W_max is the proven bound on |W|.
-
-What keeps the weights of the paper's network over hours of driving, by name.
-
-"leakage" is the paper's (11)-(12): it never rests, so that sensor noise, and every error that the
-network cannot learn, takes the weights to zero in hours of calm driving. "dead_zone" lets only that
-leak which lies beyond a ball; "projection" has no leakage, and keeps the weights in the same ball.
-
-The ball of W has twice the smallest weights that hold the force which the linear tire is expected
-to miss, every unit saturated: those of units that are half open. That of V has twice the norm that
-random first weights are expected to have. Neither reads anything but the car and its driving.
 """
 
 import math
@@ -236,6 +226,19 @@ def _leakage_of_V(layer: Learning, V_max: float, X: float) -> float:
     if excess(strongest) > 0.0:
         raise DesignError(f"no leakage keeps |V| below {V_max:.3g} at this sampling interval")
     return float(brentq(excess, weakest, strongest, xtol=1e-14 * weakest, rtol=1e-14))
+
+
+# What keeps the weights of the paper's network over hours of driving, by name.
+#
+# "leakage" is the paper's (11)-(12): it never rests, so that sensor noise, and every error that the
+# network cannot learn, takes the weights to zero in hours of calm driving. "dead_zone" lets only
+# that leak which lies beyond a ball; "projection" has no leakage, and keeps the weights in the same
+# ball.
+#
+# The ball of W has twice the smallest weights that hold the force which the linear tire is expected
+# to miss, every unit saturated: those of units that are half open. That of V has twice the norm
+# that random first weights are expected to have. Neither reads anything but the car and its
+# driving.
 
 
 def leakage(gains: Gains, known: Operation) -> Gains:

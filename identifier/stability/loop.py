@@ -11,13 +11,6 @@ law], l the leakage rate ρ |ξ̃| [1/s]. (c_z, c_ξ) is the law: (1, 0) the int
 instantaneous one, (1, τ) the PI-lead law. l = 0 is the worst case.
 A numerical integrator R acts on the eigenvalues μ of this matrix as R(μ dt), so that continuous
 time, Euler and Runge-Kutta 4 share one eigenvalue computation.
-
-How large the loop gain G is: at the worst regressor, and along a recorded run.
-
-G = η_W |s|² I + η_V |x_bar|² W (I - Λ)² Wᵀ, with s = tanh(V x_bar), Λ = diag(s²) of (13):
-what one unit of A_d⁻ᵀ z moves the network's output p per second through (11) and (12).
-Units: with the force unit U, z in U s² and A_d⁻¹ in s, p' in U/s asks for G and eta_W in 1/s⁴ for
-the integral law (1/s³ for the instantaneous one) and for eta_V in 1/(U² s⁴) (1/(U² s³)).
 """
 
 import math
@@ -249,6 +242,14 @@ def spectral_radius(matrices: npt.ArrayLike, integrator: Integrator, dt: float) 
     dt : step [s].
     """
     return np.exp(growth_rate(matrices, integrator, dt) * dt)
+
+
+# How large the loop gain G is: at the worst regressor, and along a recorded run.
+#
+# G = η_W |s|² I + η_V |x_bar|² W (I - Λ)² Wᵀ, with s = tanh(V x_bar), Λ = diag(s²) of (13):
+# what one unit of A_d⁻ᵀ z moves the network's output p per second through (11) and (12).
+# Units: with the force unit U, z in U s² and A_d⁻¹ in s, p' in U/s asks for G and eta_W in 1/s⁴ for
+# the integral law (1/s³ for the instantaneous one) and for eta_V in 1/(U² s⁴) (1/(U² s³)).
 
 
 def worst_gain(

@@ -3,15 +3,6 @@
 Gain margin: the factor on eta_W and eta_V at which the loop of `loop.py` turns unstable.
 Phase margin: the phase lag in the learning path that does the same, in degrees.
 For A_d = -a I both are those of the scalar loop (g/a) (c_ξ + c_z/(s + λ)) / ((s + a)(s + l)).
-
-Slow drift under a moving regressor: where the learning loop stops being positive real.
-
-With W_t = W - W_hat and W_t' = -η D H(s)[W_t s] sᵀ, the path from the force error W_t s to the
-signal that moves the weights is H(s) = D (c_ξ + c_z/(s + λ)) (s I - A_d)⁻¹, D = -A_d⁻ᵀ. Averaging
-over a regressor of frequency ω leaves -η He H(jω): a direction in which the Hermitian part is
-negative drifts away, at any η. For A_d = -a I the integral law has
-Re H ∝ (a λ - ω²): it drifts where the maneuver is faster than sqrt(a λ).
-A constant leakage s0 > η |s|² max(-λ_min He H) stops it for every s(t) (shortage of passivity).
 """
 
 import math
@@ -188,6 +179,16 @@ def _frequency(loop: Loop, integrator: Integrator, dt: float) -> float:
 def _rate(loop: Loop) -> float:
     """Return the size of the loop's rates [1/s], against which a growth rate counts as zero."""
     return float(np.linalg.norm(loop.A_d, 2)) + loop.forgetting
+
+
+# Slow drift under a moving regressor: where the learning loop stops being positive real.
+#
+# With W_t = W - W_hat and W_t' = -η D H(s)[W_t s] sᵀ, the path from the force error W_t s to the
+# signal that moves the weights is H(s) = D (c_ξ + c_z/(s + λ)) (s I - A_d)⁻¹, D = -A_d⁻ᵀ. Averaging
+# over a regressor of frequency ω leaves -η He H(jω): a direction in which the Hermitian part is
+# negative drifts away, at any η. For A_d = -a I the integral law has
+# Re H ∝ (a λ - ω²): it drifts where the maneuver is faster than sqrt(a λ).
+# A constant leakage s0 > η |s|² max(-λ_min He H) stops it for every s(t) (shortage of passivity).
 
 
 def passivity(

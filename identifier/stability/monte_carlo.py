@@ -4,12 +4,6 @@ Each drive has its own road, steering and initial weights; the identifier runs o
 once, one in each lane, and keeps nothing but the largest norms. Sensors err as much as is declared.
 Only drives that break a declared condition (slip, speed, steering, yaw rate) are left out: a bound
 that is passed is wrong.
-
-Random smooth drives of a bicycle on saturating tires, many at once in compiled code.
-
-The tire is F = μ F_z sin(1.5 atan(C α/(1.5 μ F_z))): the stiffness that the vehicle states, and the
-friction limit. The residual f that the identifier sees of a drive is known exactly:
-(ξ_{k+1} - ξ_k)/dt - A_ξ ξ_k - B_ξ u_k.
 """
 
 from collections.abc import Callable
@@ -29,6 +23,12 @@ from models.bicycle import BicycleParameters, bicycle, slip_angles
 from models.vehicle import GRAVITY, Vehicle
 
 Array = NDArray[np.float64]
+# Random smooth drives of a bicycle on saturating tires, many at once in compiled code.
+#
+# The tire is F = μ F_z sin(1.5 atan(C α/(1.5 μ F_z))): the stiffness that the vehicle states, and
+# the friction limit. The residual f that the identifier sees of a drive is known exactly: (ξ_{k+1}
+# - ξ_k)/dt - A_ξ ξ_k - B_ξ u_k.
+
 SUBSTEPS = 10  # of the plant in a sample
 HARD = (0.6, 1.3)  # lateral acceleration that is asked of the linear car, over friction x g
 UNDERSTEER = 0.05  # rad/g, up to which steering makes up for it

@@ -1,25 +1,4 @@
-"""What a certificate must know besides the gains, and the worst loop that follows from it.
-
-The loop that opens where the network reads the estimate x_hat instead of the measurement.
-
-With x_hat = x - K ξ̃, the network errs by J_f K ξ̃, J_f = ∂f/∂x, and the error dynamics become
-A_d + J_f K. For f = F(α) - C α and α = δ - (1/v_x) [1 l_f; 1 -l_r] x:
-J_f K = diag(C - F') N / v_x, N = [1 l_f; 1 -l_r] K, symmetric positive semidefinite but for the
-row scaling: even a perfect network needs a > λ_max(J_f K). Worst where the tire is saturated,
-F' = 0. (8)c prints x_hat; x is measured, so that reading x costs nothing and has no such limit.
-
-From a car and how hard it is driven to what a certificate must know: signals and disturbances.
-
-At the speed v_x, with slip angles up to `slip` and friction μ: |r| <= 1.5 μ g/v_x (a car that is
-steered fast overshoots), |v_y| <= l_r |r| + v_x slip, |δ_f| <= slip + (|v_y| + l_f |r|)/v_x, the
-same behind, and |δ'| <= 2 π bandwidth |δ|_max. A drive that breaks one of these is not judged.
-
-f = F - C α is the force that the linear tire misses. Wherever 0 <= F/(C α) <= 2, |f| <= C |α|: so
-|f| <= hypot(C_f, C_r) slip, however smooth the tire. (C slip - μ F_z is no bound: it is what is
-missed where the axle slides, and a smooth tire misses force long before.) The samples show f with
-ẋ as the mean over T_s and the rest held: |Cα - K⁻¹ [v_x r, 0]| moves by no more than its largest
-rate times T_s/2 from that.
-"""
+"""What a certificate must know besides the gains, and the worst loop that follows from it."""
 
 import math
 from dataclasses import dataclass, replace
@@ -256,6 +235,15 @@ def worst_loop(gains: Gains, law: Law, operation: Operation, direction: Matrix, 
     )
 
 
+# The loop that opens where the network reads the estimate x_hat instead of the measurement.
+#
+# With x_hat = x - K ξ̃, the network errs by J_f K ξ̃, J_f = ∂f/∂x, and the error dynamics become
+# A_d + J_f K. For f = F(α) - C α and α = δ - (1/v_x) [1 l_f; 1 -l_r] x:
+# J_f K = diag(C - F') N / v_x, N = [1 l_f; 1 -l_r] K, symmetric positive semidefinite but for the
+# row scaling: even a perfect network needs a > λ_max(J_f K). Worst where the tire is saturated,
+# F' = 0. (8)c prints x_hat; x is measured, so that reading x costs nothing and has no such limit.
+
+
 def axle_coupling(*, m: float, I_z: float, l_f: float, l_r: float) -> Matrix:
     """N = [1 l_f; 1 -l_r] K [1/kg], (2, 2), with K of (6).
 
@@ -325,6 +313,19 @@ def jacobian_feedback(
     W, V_x, s, K = np.asarray(W), np.asarray(V_x), np.asarray(s), np.asarray(K)
     feedback: Matrix = (W * (1.0 - s**2)) @ V_x @ K
     return feedback
+
+
+# From a car and how hard it is driven to what a certificate must know: signals and disturbances.
+#
+# At the speed v_x, with slip angles up to `slip` and friction μ: |r| <= 1.5 μ g/v_x (a car that is
+# steered fast overshoots), |v_y| <= l_r |r| + v_x slip, |δ_f| <= slip + (|v_y| + l_f |r|)/v_x, the
+# same behind, and |δ'| <= 2 π bandwidth |δ|_max. A drive that breaks one of these is not judged.
+#
+# f = F - C α is the force that the linear tire misses. Wherever 0 <= F/(C α) <= 2, |f| <= C |α|: so
+# |f| <= hypot(C_f, C_r) slip, however smooth the tire. (C slip - μ F_z is no bound: it is what is
+# missed where the axle slides, and a smooth tire misses force long before.) The samples show f with
+# ẋ as the mean over T_s and the rest held: |Cα - K⁻¹ [v_x r, 0]| moves by no more than its largest
+# rate times T_s/2 from that.
 
 
 def largest_signals(

@@ -6,13 +6,6 @@ w_bar bounds f - W tanh(V_hat x_bar): it includes W [tanh(V x_bar) - tanh(V_hat 
 |.| spectral, Frobenius for weights. Forces in U (kN), ξ̃ in U s. `residual_bound` is sup|f| [U].
 
 (14) is proved for the instantaneous law. The integral law can exceed it; see `sampled_bound.py`.
-
-Statements about (14): as printed, by the tight route, with the V layer; the true bound.
-
-They say how little (14) says: every one stands beside the bound of an identifier with no network.
-(14) needs ideal weights and a bound w_bar on what they leave. Nothing but W = 0, w_bar = sup|f| is
-known for sure before a drive, and that is what it is given: a smaller w_bar would be a claim.
-P is scaled as suits (14) best: b depends on the scale, the loop does not.
 """
 
 import math
@@ -207,6 +200,14 @@ def ultimate_bound(pair: LyapunovPair, *, w_bar: float, k_b: float, rho_W: float
     return UltimateBound(
         xi_tilde=math.sqrt(float(values[worst]) / p[0]), worst_y=float(candidates[worst])
     )
+
+
+# Statements about (14): as printed, by the tight route, with the V layer; the true bound.
+#
+# They say how little (14) says: every one stands beside the bound of an identifier with no network.
+# (14) needs ideal weights and a bound w_bar on what they leave. Nothing but W = 0, w_bar = sup|f|
+# is known for sure before a drive, and that is what it is given: a smaller w_bar would be a claim.
+# P is scaled as suits (14) best: b depends on the scale, the loop does not.
 
 
 def printed_bounds(gains: Gains, law: Law, operation: Operation, trivial: float) -> list[Property]:

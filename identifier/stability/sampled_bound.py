@@ -26,8 +26,6 @@ never grows faster than |W_hat|.
 
 The start: ξ_hat at the first measurement, z = 0, |W_hat(0)| within the bound on W_hat: so weights
 that were learnt within the declared conditions may be resumed.
-
-What acts on the error dynamics from outside: bounds that hold on every declared drive.
 """
 
 import math
@@ -40,6 +38,8 @@ from identifier.stability.bounds import transient_peak
 from identifier.stability.loop import Law
 from identifier.stability.lyapunov import Matrix, peak_gain, power_norms
 from models.rules import require_positive
+
+# What acts on the error dynamics from outside: bounds that hold on every declared drive.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,17 +8,6 @@ The wheel loads follow the forces through a lag of 10 ms, the vertical motion of
 it also breaks the algebraic loop between load and force.
 Assumed away: pitch, steer by the suspension, aligning moments of the tires, spin of the wheels
 (longitudinal slip follows from the wanted force at once), rolling and air resistance.
-
-Slip and force of the four wheels in the paper's sign: α = δ - atan2(v_y, v_x), F_y = +C α.
-
-The tires of the two sides mirror each other: what a tire does at zero slip (conicity, ply steer)
-pulls both inwards or both outwards and cancels straight ahead.
-
-Vertical load of each wheel from roll, axle side force and longitudinal acceleration.
-
-Order of wheels everywhere: front left, front right, rear left, rear right.
-
-The driver who holds the speed: proportional plus integral, with a limit and no wind-up.
 """
 
 import math
@@ -31,6 +20,11 @@ from models.friction import MAX_PLACES, place_change
 from models.rules import require_positive
 from models.tires import MagicFormula, Tire
 from models.vehicle import Vehicle
+
+# Slip and force of the four wheels in the paper's sign: α = δ - atan2(v_y, v_x), F_y = +C α.
+#
+# The tires of the two sides mirror each other: what a tire does at zero slip (conicity, ply steer)
+# pulls both inwards or both outwards and cancels straight ahead.
 
 LEAST_SPEED = 1.0  # below this wheel speed slip decays as if at it [m/s]
 LEAST_LOAD = 1.0  # a tire is asked at this load or more, and its force scaled down below it [N]
@@ -126,6 +120,11 @@ def tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: An
     return ca.vertcat(F_x, F_y) * (load / carried)
 
 
+# Vertical load of each wheel from roll, axle side force and longitudinal acceleration.
+#
+# Order of wheels everywhere: front left, front right, rear left, rear right.
+
+
 def wheel_loads(vehicle: Vehicle, roll: Any, roll_rate: Any, axle_force: Any, a_x: Any) -> Any:
     """Return the four wheel loads [N]; none is negative and their sum is m g exactly.
 
@@ -156,6 +155,9 @@ def wheel_loads(vehicle: Vehicle, roll: Any, roll_rate: Any, axle_force: Any, a_
         right = ca.fmin(ca.fmax(0.5 * axle + transfer, 0.0), axle)
         loads += [axle - right, right]
     return ca.vertcat(*loads)
+
+
+# The driver who holds the speed: proportional plus integral, with a limit and no wind-up.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

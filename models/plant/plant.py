@@ -1,11 +1,4 @@
-"""A plant ready to drive: the car, its tires and the compiled loop over time.
-
-What a plant recorded: the motion, and the forces behind it, which no car measures.
-
-The plant one control period at a time: for a driver or a controller that looks before it steers.
-
-The same compiled loop as `Plant.simulate`, so that the same commands give the same numbers.
-"""
+"""A plant ready to drive: the car, its tires and the compiled loop over time."""
 
 import os
 from collections.abc import Callable, Hashable, Mapping
@@ -26,6 +19,9 @@ from models.tires import MagicFormula, Tire
 from models.vehicle import Vehicle, VehicleError
 
 Array = NDArray[np.float64]
+
+
+# What a plant recorded: the motion, and the forces behind it, which no car measures.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -246,6 +242,11 @@ class Plant:
         name = name if name is not None else type(maneuver).__name__
         t = t[::every]
         return PlantRun.from_record(name, self.vehicle, t, maneuver.steering(t), record)
+
+
+# The plant one control period at a time: for a driver or a controller that looks before it steers.
+#
+# The same compiled loop as `Plant.simulate`, so that the same commands give the same numbers.
 
 
 class PlantState(NamedTuple):

@@ -5,8 +5,6 @@ excitation, so straight, short, slow and drifting runs pass. The bounds come fro
 from any log; a wrong unit changes a number by 57.3 (degrees), 3.6 (km/h), 9.81 (g) or 1000 (kN),
 and each bound lies inside that gap. One error nobody can see: a log whose lateral axis points to
 the right throughout (SAE, NED) obeys the same laws.
-
-The checks that need the axle positions: slip angles against accelerations and forces.
 """
 
 from typing import Protocol
@@ -252,6 +250,8 @@ def _larger_steering(recording: Recording) -> str:
     front, rear = np.mean(recording.delta_f**2), np.mean(recording.delta_r**2)
     return "delta_f" if front >= rear else "delta_r"
 
+
+# The checks that need the axle positions: slip angles against accelerations and forces.
 
 LARGEST_SLIP = 0.7  # [rad], 40 degrees in the median window: nobody drives a whole run like that
 

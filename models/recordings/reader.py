@@ -1,7 +1,4 @@
-"""From a log file to a Recording: one run, rising time, finite values, uniform grid, physics.
-
-Read the numeric columns of a log file: CSV, gzipped CSV or Parquet.
-"""
+"""From a log file to a Recording: one run, rising time, finite values, uniform grid, physics."""
 
 import csv
 import difflib
@@ -34,6 +31,8 @@ from models.recordings.record import (
     RecordingError,
     resample,
 )
+
+# Read the numeric columns of a log file: CSV, gzipped CSV or Parquet.
 
 NEEDED = ("t", "vx", "vy", "r", "delta_f")
 OPTIONAL = ("delta_r", "ay", "Fyf", "Fyr")

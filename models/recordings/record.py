@@ -2,14 +2,6 @@
 
 x = [v_y, r]: lateral velocity [m/s], yaw rate [rad/s].   u = [delta_f, delta_r]: steering [rad].
 ISO axes: x forward, y left, z up; r and delta turn left when positive, forces push left.
-
-Write a recording as a CSV that `read_recording` reads back bit for bit.
-
-Bring the columns of a log to a uniform grid.
-
-Linear interpolation when the log is slower than the grid. When it is faster, every value is the
-mean over one step about its instant: no phase, 1.6 % loss at a tenth of the sampling frequency,
-zeros at its multiples. The ends keep the logged values.
 """
 
 import csv
@@ -238,6 +230,9 @@ def _read_only(value: object) -> Array:
     return array
 
 
+# Write a recording as a CSV that `read_recording` reads back bit for bit.
+
+
 def write_recording(recording: Recording, path: str | Path) -> Path:
     """Write t [s], vx, vy [m/s], r [rad/s], delta_f, delta_r [rad], ay [m/s^2], Fyf, Fyr [N].
 
@@ -284,6 +279,12 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
     write_atomically(path, data)
     return path
 
+
+# Bring the columns of a log to a uniform grid.
+#
+# Linear interpolation when the log is slower than the grid. When it is faster, every value is the
+# mean over one step about its instant: no phase, 1.6 % loss at a tenth of the sampling frequency,
+# zeros at its multiples. The ends keep the logged values.
 
 ON_GRID = 0.01  # share of a step within which time stamps are those of the grid, with jitter
 SAME = 1e-6  # share of a step within which they already are the grid, but for rounding

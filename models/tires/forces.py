@@ -3,12 +3,6 @@
 Wheel frame: x forward along the wheel, y to the left, z up. α has the paper's sign, the negative
 of ISO 8855: F_y = +C α. κ = (ω R - V_x)/|V_x| > 0 when driving. γ > 0 turns about +x: the top of
 the wheel leans to the right.
-
-The slip of a tread element, common to the brush tires.
-
-σ = [κ, tan α]/(1 + κ): sliding over rolling speed (Pacejka, Tyre and Vehicle Dynamics, ch. 3).
-
-The two slopes of a tire whose stiffness is the same at every load: methods of such tires.
 """
 
 from typing import Any, NamedTuple, Protocol, TypeAlias
@@ -109,6 +103,10 @@ def folded(alpha: Expression) -> Expression:
     return ca.atan2(ca.sin(alpha), ca.fabs(ca.cos(alpha)))
 
 
+# The slip of a tread element, common to the brush tires.
+#
+# σ = [κ, tan α]/(1 + κ): sliding over rolling speed (Pacejka, Tyre and Vehicle Dynamics, ch. 3).
+
 ROLLING_FLOOR = 1e-3  # 1 + κ of a locked wheel: slides in the same direction, divides by no zero
 COSINE_FLOOR = 1e-3  # |cos α| of a wheel that moves sideways
 NO_FORCE = 1e-6  # N; rounds the root of a sum of squares at zero, so that its derivative exists
@@ -145,6 +143,9 @@ def slips(alpha: Expression, kappa: Expression, C_alpha: float, C_kappa: float) 
     p_y = C_alpha * tan_alpha
     size = ca.sqrt(p_x**2 + p_y**2 + NO_FORCE**2)
     return Slips(p_x, p_y, size, ca.fmax(1.0 + kappa, ROLLING_FLOOR))
+
+
+# The two slopes of a tire whose stiffness is the same at every load: methods of such tires.
 
 
 class ConstantStiffness(Protocol):

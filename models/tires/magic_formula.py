@@ -1,21 +1,4 @@
-"""The Magic Formula 5.2 (PAC2002) as a tire of this package, read from a `.tir` file.
-
-The two curves of the Magic Formula, and the guard all its divisions share.
-
-Pacejka, Tyre and Vehicle Dynamics, 2nd ed., (4.49)-(4.52), (4.72).
-
-Lateral force of the Magic Formula 5.2 (PAC2002), pure and combined slip.
-
-α, γ, κ, F_z, F_y in the axes of the tire file (ISO: α of the opposite sign to the paper's, so that
-K_y < 0); F_z >= 0. Numbers: Pacejka, Tyre and Vehicle Dynamics, 2nd ed., ch. 4.3.2. The 5.2 form
-takes α and γ where the book's later form takes tan α and sin γ, and knows no turn slip (ζ = 1).
-
-Longitudinal force of the Magic Formula 5.2 (PAC2002), pure and combined slip.
-
-α, γ, κ, F_z in the axes of the tire file (ISO: α of the opposite sign to the paper's); F_z >= 0.
-Numbers: Pacejka, Tyre and Vehicle Dynamics, 2nd ed., ch. 4.3.2. The 5.2 form takes α and γ where
-the book's later form takes tan α and sin γ, and knows no turn slip (ζ = 1).
-"""
+"""The Magic Formula 5.2 (PAC2002) as a tire of this package, read from a `.tir` file."""
 
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -26,6 +9,10 @@ import casadi as ca
 from models.tires.forces import Expression, TireForces, folded, positive
 from models.tires.magic_formula_coefficients import Coefficients
 from models.tires.tir import ValidRange, read_magic_formula
+
+# The two curves of the Magic Formula, and the guard all its divisions share.
+#
+# Pacejka, Tyre and Vehicle Dynamics, 2nd ed., (4.49)-(4.52), (4.72).
 
 EPSILON = 1e-9  # N; keeps B = K/(C D) finite in the air and on ice, changes no force by 1e-8 N
 
@@ -96,6 +83,14 @@ def weight(s: Expression, S_H: Expression, B: Expression, C: float, E: Expressio
     G = ca.cos(C * ca.atan(Bs - E * (Bs - ca.atan(Bs))))
     G_0 = ca.cos(C * ca.atan(B0 - E * (B0 - ca.atan(B0))))
     return positive(G / G_0)  # the standard asks for G > 0; with C > 1 the cosine alone is not
+
+
+# Lateral force of the Magic Formula 5.2 (PAC2002), pure and combined slip.
+#
+# α, γ, κ, F_z, F_y in the axes of the tire file (ISO: α of the opposite sign to the paper's, so
+# that K_y < 0); F_z >= 0. Numbers: Pacejka, Tyre and Vehicle Dynamics, 2nd ed., ch. 4.3.2. The 5.2
+# form takes α and γ where the book's later form takes tan α and sin γ, and knows no turn slip (ζ =
+# 1).
 
 
 def lateral_shape(c: Coefficients, gamma: Expression, F_z: Expression, mu: Expression) -> Shape:
@@ -203,6 +198,13 @@ def lateral_slope(c: Coefficients, F_z: Expression) -> Expression:
     B_y, C_y, D_y, S_Hy, _ = lateral_shape(c, 0.0, F_z, 1.0)
     E_y = lateral_curvature(c, S_Hy, 0.0, F_z)
     return magic_slope(S_Hy, B_y, C_y, D_y, E_y)
+
+
+# Longitudinal force of the Magic Formula 5.2 (PAC2002), pure and combined slip.
+#
+# α, γ, κ, F_z in the axes of the tire file (ISO: α of the opposite sign to the paper's); F_z >= 0.
+# Numbers: Pacejka, Tyre and Vehicle Dynamics, 2nd ed., ch. 4.3.2. The 5.2 form takes α and γ where
+# the book's later form takes tan α and sin γ, and knows no turn slip (ζ = 1).
 
 
 def longitudinal_shape(

@@ -1,19 +1,4 @@
-"""The tire of the linear bicycle: force proportional to slip, without limit.
-
-Fiala's brush tire in combined slip: parabolic pressure, one friction coefficient.
-
-A tread that never slides would give γ = |(C_κ σ_x, C_α σ_y)|, σ = [κ, tan α]/(1 + κ). Sliding
-starts at the rear edge of the contact and takes all of it at γ = 3 μ F_z:
-    F = γ - γ²/(3 μ F_z) + γ³/(27 μ² F_z²),   γ < 3 μ F_z;   F = μ F_z otherwise,
-along (C_κ σ_x, C_α σ_y).
-Source: Pacejka, Tyre and Vehicle Dynamics, ch. 3.2-3.3; Fiala, VDI-Z 96 (1954).
-
-Dugoff's tire: linear until half the friction is used, then a hyperbola; combined slip for free.
-
-F_x = C_κ κ f(λ)/(1 + κ),   F_y = C_α tan α f(λ)/(1 + κ),   f(λ) = λ (2 - λ), λ < 1;   1 otherwise,
-λ = μ F_z (1 + κ) / (2 |(C_κ κ, C_α tan α)|).
-Source: Dugoff, Fancher and Segel, SAE 700377 (1970), constant friction coefficient.
-"""
+"""The tire of the linear bicycle: force proportional to slip, without limit."""
 
 from dataclasses import dataclass
 
@@ -69,6 +54,15 @@ class LinearTire:
     cornering_stiffness = constant_stiffness.cornering_stiffness
 
 
+# Fiala's brush tire in combined slip: parabolic pressure, one friction coefficient.
+#
+# A tread that never slides would give γ = |(C_κ σ_x, C_α σ_y)|, σ = [κ, tan α]/(1 + κ). Sliding
+# starts at the rear edge of the contact and takes all of it at γ = 3 μ F_z:
+#     F = γ - γ²/(3 μ F_z) + γ³/(27 μ² F_z²),   γ < 3 μ F_z;   F = μ F_z otherwise,
+# along (C_κ σ_x, C_α σ_y).
+# Source: Pacejka, Tyre and Vehicle Dynamics, ch. 3.2-3.3; Fiala, VDI-Z 96 (1954).
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FialaTire:
     """Brush tire: |F| <= μ F_z exactly, smooth into full sliding; camber does nothing.
@@ -121,6 +115,13 @@ class FialaTire:
 
     slip_stiffness = constant_stiffness.slip_stiffness
     cornering_stiffness = constant_stiffness.cornering_stiffness
+
+
+# Dugoff's tire: linear until half the friction is used, then a hyperbola; combined slip for free.
+#
+# F_x = C_κ κ f(λ)/(1 + κ),   F_y = C_α tan α f(λ)/(1 + κ),   f(λ) = λ (2 - λ), λ < 1;   1
+# otherwise, λ = μ F_z (1 + κ) / (2 |(C_κ κ, C_α tan α)|). Source: Dugoff, Fancher and Segel, SAE
+# 700377 (1970), constant friction coefficient.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,13 +3,6 @@
 Both comment signs ($ and !), quoted strings, tables after a {header}, CRLF, tabs, any case of the
 keys, Fortran exponents (1.5D-3), UTF-8 or Latin-1, a byte order mark. A key means the same in every
 section, but units count in [UNITS] only. Unknown keys are kept and do nothing.
-
-Units of a tire property file: which keys have one, and what it is in SI.
-
-Only the keys of `DIMENSIONS` are converted. The coefficients of the Magic Formula (P.., R.., Q..,
-L..) are dimensionless or in radian whatever [UNITS] says: their equations are written in SI.
-
-From a tire property file to the Magic Formula 5.2: that model, complete, and possible.
 """
 
 import codecs
@@ -24,6 +17,11 @@ from typing import Literal, NamedTuple
 
 from models.doors import read_bytes, shown
 from models.tires.magic_formula_coefficients import ESSENTIAL, Coefficients
+
+# Units of a tire property file: which keys have one, and what it is in SI.
+#
+# Only the keys of `DIMENSIONS` are converted. The coefficients of the Magic Formula (P.., R.., Q..,
+# L..) are dimensionless or in radian whatever [UNITS] says: their equations are written in SI.
 
 DIMENSIONS: Mapping[str, Mapping[str, int]] = {
     "FNOMIN": {"FORCE": 1},
@@ -278,6 +276,8 @@ def _unquoted(value: str) -> str:
         return value[1:-1].strip()
     return value
 
+
+# From a tire property file to the Magic Formula 5.2: that model, complete, and possible.
 
 FITTYPS = (5, 6, 21, 51, 52)  # MF-Tyre up to 5.2 under its several numbers; 60 and above is 6.x
 FORMATS = ("PAC2002", "MF52", "MFTYRE", "MFTYRE52", "DELFTTYRE", "USER")

@@ -1,7 +1,4 @@
-"""What every car that can be driven has in common: a state, and a step of one control period.
-
-The double-track plant as a car to drive: roll, load transfer, relaxation, lagged steering.
-"""
+"""What every car that can be driven has in common: a state, and a step of one control period."""
 
 from typing import Any, NamedTuple, Protocol
 
@@ -93,6 +90,8 @@ class Car(Protocol):
             When the car left the range of its equations.
         """
 
+
+# The double-track plant as a car to drive: roll, load transfer, relaxation, lagged steering.
 
 HOLDING = Driver(gain=2.0, integral_gain=0.0, acceleration_limit=4.0)
 

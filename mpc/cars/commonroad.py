@@ -1,29 +1,4 @@
-"""A car of commonroad-vehicle-models to drive: their equations under our speed and steering.
-
-The package commonroad-vehicle-models, which not everybody has installed.
-
-The tire of commonroad-vehicle-models: a Magic Formula with every force proportional to load.
-
-Carried over on purpose: the sign of camber (their z axis points down), a camber shift that jumps
-with sign(γ), a vertical shift inside the sine, and no load sensitivity or relaxation.
-
-What driving their two cars has in common: an integration, friction, and forces from motion.
-
-The multi-body car of commonroad-vehicle-models: 29 states, as published or repaired.
-
-Repaired on request: their two centers of gravity (`bmw_parameters`), and their side slip, which
-adds the velocity of the sprung mass to the roll rate of the axle and so misses the sway of the axle
-under the rolling body.
-
-The single-track drift car of commonroad-vehicle-models (STD): combined slip, wheels that spin.
-
-Its states: X, Y, steering, speed, heading, yaw rate, side slip β of the center of gravity, speeds
-of the front and the rear wheel.
-
-The BMW 320i of commonroad-vehicle-models as a vehicle of ours, with its chassis.
-
-Cars of commonroad-vehicle-models, an independent program; the extra `commonroad` brings it.
-"""
+"""A car of commonroad-vehicle-models to drive: their equations under our speed and steering."""
 
 import copy
 import importlib
@@ -42,6 +17,8 @@ from models.plant import Driver
 from models.tires import TireForces
 from models.vehicle import GRAVITY, Chassis, Vehicle
 from mpc.cars.car import HOLDING, CarState
+
+# The package commonroad-vehicle-models, which not everybody has installed.
 
 
 class MissingCommonRoadError(ImportError):
@@ -115,6 +92,11 @@ def scale_friction(parameters: Any, tire: dict[str, float], scale: float) -> Non
     parameters.tire.p_dy1 = scale * tire["p_dy1"]
     parameters.tire.p_dx1 = scale * tire["p_dx1"]
 
+
+# The tire of commonroad-vehicle-models: a Magic Formula with every force proportional to load.
+#
+# Carried over on purpose: the sign of camber (their z axis points down), a camber shift that jumps
+# with sign(γ), a vertical shift inside the sine, and no load sensitivity or relaxation.
 
 SMOOTH_CAMBER = 1e-3  # |γ| below which our sign(γ) is a slope, so that it does not chatter [rad]
 
@@ -198,6 +180,9 @@ def _weight(slip: Any, shift: Any, B: Any, C: Any, E: Any) -> Any:
 Array = NDArray[np.float64]
 
 
+# What driving their two cars has in common: an integration, friction, and forces from motion.
+
+
 def runge_kutta_step(f: Callable[[Array], Array], x: Array, dt: float) -> Array:
     """Return the state after a classical fourth-order step.
 
@@ -245,6 +230,13 @@ def axle_force(vehicle: Vehicle, a_y: float, r_dot: float) -> Array:
 # Indices of their state: steering, v_x, heading, yaw rate, roll and its rate; lateral velocity of
 # the sprung mass, of the front and of the rear axle.
 STEERING, V_X, HEADING, YAW_RATE, ROLL, V_Y, V_Y_FRONT, V_Y_REAR = 2, 3, 4, 5, 6, 10, 15, 20
+
+
+# The multi-body car of commonroad-vehicle-models: 29 states, as published or repaired.
+#
+# Repaired on request: their two centers of gravity (`bmw_parameters`), and their side slip, which
+# adds the velocity of the sprung mass to the roll rate of the axle and so misses the sway of the
+# axle under the rolling body.
 
 
 @contextmanager
@@ -389,6 +381,12 @@ class MultiBody:
         )
 
 
+# The single-track drift car of commonroad-vehicle-models (STD): combined slip, wheels that spin.
+#
+# Its states: X, Y, steering, speed, heading, yaw rate, side slip β of the center of gravity, speeds
+# of the front and the rear wheel.
+
+
 class Drift:
     """Their equations, and what their state says.
 
@@ -464,6 +462,8 @@ class Drift:
             inner=inner,
         )
 
+
+# The BMW 320i of commonroad-vehicle-models as a vehicle of ours, with its chassis.
 
 INSTANT = 0.002  # what stands for "no lag": two steps of the integration [s]
 
@@ -716,6 +716,8 @@ def drift_car(
         equations, bmw_parameters(), friction=friction, driver=driver, period=period
     )
 
+
+# Cars of commonroad-vehicle-models, an independent program; the extra `commonroad` brings it.
 
 __all__ = [
     "CommonRoadCar",

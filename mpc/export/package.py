@@ -1,9 +1,4 @@
-"""The package of a tracker: C sources, self-test, build file, README and manifest, by path.
-
-The parameters of a tracker as C and as JSON, in the order of the structure.
-
-The self-test of a package: a closed-loop record, and what Python's tracker steered in it.
-"""
+"""The package of a tracker: C sources, self-test, build file, README and manifest, by path."""
 
 from collections import deque
 from collections.abc import Mapping
@@ -33,6 +28,8 @@ from mpc.realtime.c_source import c_sources
 from mpc.realtime.tracker import TOLERANCE as SOLVER_TOLERANCE
 from mpc.tires import TireModel
 from mpc.tires.tire import ALL
+
+# The parameters of a tracker as C and as JSON, in the order of the structure.
 
 Params = NDArray[np.void]
 MACROS = {"tolerance": "TOLERANCE"}  # members that are other in float
@@ -80,6 +77,8 @@ def _initializer(value: NDArray[Any]) -> str:
 
 
 Array = NDArray[np.float64]
+
+# The self-test of a package: a closed-loop record, and what Python's tracker steered in it.
 
 STEPS = 200
 SPEED = 20.0  # m/s

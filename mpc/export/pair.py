@@ -1,7 +1,4 @@
-"""Identifier and tracker together: both packages, what hands tires over, and a car to drive.
-
-C that turns what an identifier has learnt into the weights of the prediction.
-"""
+"""Identifier and tracker together: both packages, what hands tires over, and a car to drive."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,6 +14,8 @@ from models.vehicle import GRAVITY
 from mpc.export.package import MpcPackage, build_mpc_package
 from mpc.problem import Problem
 from mpc.tires import tire_model
+
+# C that turns what an identifier has learnt into the weights of the prediction.
 
 TEMPLATES = Path(__file__).parent / "pair"
 

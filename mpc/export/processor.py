@@ -1,7 +1,4 @@
-"""A package on a Cortex-M7 in QEMU, and on this machine: the same bits, and what a step costs.
-
-Flash, RAM, stack and instructions of a tracker on a Cortex-M7, and its time on this machine.
-"""
+"""A package on a Cortex-M7 in QEMU, and on this machine: the same bits, and what a step costs."""
 
 import json
 import platform
@@ -159,6 +156,9 @@ def _result(answer: subprocess.CompletedProcess[str], program: str) -> Replay:
         raise ReplayError(f"{program} ended with {answer.returncode}: {answer.stderr[:200]}")
     numbers = {key: int(found[key], 16) for key in Replay._fields if key != "hash"}
     return Replay(hash=found["hash"], **numbers)
+
+
+# Flash, RAM, stack and instructions of a tracker on a Cortex-M7, and its time on this machine.
 
 
 class MpcCost(NamedTuple):

@@ -6,10 +6,6 @@ dξ_i/dt = F_i/F_z,i - v_x r/g exactly. So the slope over a stretch of time of
 by least squares, is the mean error e of the force that a tire tells from the measured motion, in
 static axle loads: 0.1 at both axles are 1 m/s². (The slope has two thirds of the noise of a
 difference of two samples.) The misfit Σ (e/σ)² is -2 ln of the likelihood, up to a constant.
-
-The last seconds of a drive: what models are judged on.
-
-The axle forces that prediction tires tell from measured motion, sample by sample.
 """
 
 from collections.abc import Hashable, Sequence
@@ -29,6 +25,8 @@ from mpc.tires import TireModel
 from mpc.tires.tire import Car, Point
 
 Array = NDArray[np.float64]
+
+# The last seconds of a drive: what models are judged on.
 
 COLUMNS = ("v_x", "v_y", "r", "delta")  # m/s, m/s, rad/s, rad
 
@@ -94,6 +92,8 @@ class Window:
         """Forget everything."""
         self._kept = 0
 
+
+# The axle forces that prediction tires tell from measured motion, sample by sample.
 
 SHORTEST_LAG = 1e-3  # m
 

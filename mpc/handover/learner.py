@@ -1,9 +1,4 @@
-"""The whole of learning while driving, beside a tracker: observe, decide, move the weights.
-
-Moving weights to new ones so gently that the plan does not jump.
-
-What a tracker would plan with other weights, in the situation that it is in.
-"""
+"""The whole of learning while driving, beside a tracker: observe, decide, move the weights."""
 
 from collections import deque
 from collections.abc import Callable
@@ -18,6 +13,8 @@ from mpc.handover.supervisor import Supervisor
 from mpc.realtime import Tracker
 from mpc.tires import TireModel
 from mpc.tires.tire import reach_of
+
+# Moving weights to new ones so gently that the plan does not jump.
 
 HALVINGS = 6
 
@@ -75,6 +72,9 @@ def blended(
             return Step(tire, share, jump, whole)
         share *= 0.5
     return Step(now, 0.0, 0.0, False)
+
+
+# What a tracker would plan with other weights, in the situation that it is in.
 
 
 def previewed_rate(tracker: Tracker, tire: TireModel) -> float:

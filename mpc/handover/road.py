@@ -1,11 +1,4 @@
-"""The friction of the road against that a tire was learnt on: lost at once, regained with care.
-
-A tire on a road of another friction, and the friction that explains the last moments best.
-
-Similarity: φ(α) = μ φ₀(α/μ): the stiffness stays, force and the slip of the peak shrink. Ladders
-and networks of slip keep their structure under it, so that only weights change. One number is
-known after a third of a second, when a whole curve is not.
-"""
+"""The friction of the road against that a tire was learnt on: lost at once, regained with care."""
 
 import math
 from typing import NamedTuple
@@ -18,6 +11,12 @@ from mpc.handover.rules import Rules, Verdict
 from mpc.tires import TireModel
 from mpc.tires.ladder import N_AXLE, N_COMMON, LadderAxles
 from mpc.tires.network import NetworkAxles
+
+# A tire on a road of another friction, and the friction that explains the last moments best.
+#
+# Similarity: φ(α) = μ φ₀(α/μ): the stiffness stays, force and the slip of the peak shrink. Ladders
+# and networks of slip keep their structure under it, so that only weights change. One number is
+# known after a third of a second, when a whole curve is not.
 
 LEAST = 0.15  # of the friction that a tire was learnt on: ice, after a dry road
 GRID = 13

@@ -1,7 +1,4 @@
-"""Which tire should be steered with: the one in use, the one learnt, or one of another friction.
-
-Has the car been driven so that there was something to learn, and where was it learnt?
-"""
+"""Which tire should be steered with: the one in use, the one learnt, or one of another friction."""
 
 import math
 
@@ -19,6 +16,8 @@ from mpc.tires import TireModel, tire_model
 from mpc.tires.ladder import LadderAxles
 
 Array = NDArray[np.float64]
+
+# Has the car been driven so that there was something to learn, and where was it learnt?
 
 LEARNS = 0.005  # rad: below, a tire is a straight line in noise
 BEYOND = 1.2  # slip that is trusted over the largest one that was learnt from

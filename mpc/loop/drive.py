@@ -2,8 +2,6 @@
 
 At t_k the car is measured and the tracker decides; what it decides acts from t_{k+d} to t_{k+d+1},
 d periods later.
-
-What the loop asks of a tracker, whatever solves its problem.
 """
 
 import math
@@ -22,6 +20,9 @@ from mpc.path.path import Path, Projection
 from mpc.realtime.instance import Command, Measurement
 
 Array = NDArray[np.float64]
+
+
+# What the loop asks of a tracker, whatever solves its problem.
 
 
 class PathTracker(Protocol):

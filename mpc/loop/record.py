@@ -1,9 +1,4 @@
-"""What a drive was: all signals over time, what the tracker planned, and how it ended.
-
-Collecting a drive, period by period.
-
-What a drive is worth, in a few numbers.
-"""
+"""What a drive was: all signals over time, what the tracker planned, and how it ended."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -127,6 +122,8 @@ class Drive:
         )
 
 
+# Collecting a drive, period by period.
+
 OF_THE_CAR = ("t", "X", "Y", "psi", "v_x", "v_y", "r", "a_x", "a_y", "delta")
 
 
@@ -245,6 +242,9 @@ class Recorder:
             completed=completed,
             ending=ending,
         )
+
+
+# What a drive is worth, in a few numbers.
 
 
 class Scores(NamedTuple):

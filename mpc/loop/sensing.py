@@ -1,15 +1,4 @@
-"""What a driving car measures of itself, sample by sample.
-
-The wanted speed along a path, and what a tracker is told of the road ahead.
-
-v(s): wanted speed [m/s] at the samples of the path. The car's speed v_x runs to it with the time
-constant 1/k of the driver's gain, so that ahead it is v(s(t)) + (v_x - v(s)) exp(-k t).
-
-How hard a car can corner, found by driving it: steered more and more at constant speed.
-
-The driven axle also holds the speed against the drag of cornering, so that this limit lies a few
-per cent below the sum of what the tires could give to the side alone.
-"""
+"""What a driving car measures of itself, sample by sample."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -176,6 +165,12 @@ class FaultySensors:
 Array = NDArray[np.float64]
 
 
+# The wanted speed along a path, and what a tracker is told of the road ahead.
+#
+# v(s): wanted speed [m/s] at the samples of the path. The car's speed v_x runs to it with the time
+# constant 1/k of the driver's gain, so that ahead it is v(s(t)) + (v_x - v(s)) exp(-k t).
+
+
 class Preview(NamedTuple):
     """The road at some times ahead, each (k,)."""
 
@@ -269,6 +264,11 @@ class SpeedProfile:
         there = np.interp(t, self._t, self.path.s)
         return np.asarray(there + before * self.v[0] + after * self.v[-1])
 
+
+# How hard a car can corner, found by driving it: steered more and more at constant speed.
+#
+# The driven axle also holds the speed against the drag of cornering, so that this limit lies a few
+# per cent below the sum of what the tires could give to the side alone.
 
 RAMP_TIME = 20.0  # s
 LARGEST_ANGLE = 0.3  # rad at friction 1: beyond the peak of any tire for the road

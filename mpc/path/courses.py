@@ -1,12 +1,4 @@
-"""A circle for steady cornering, and a closed handling course of our own design.
-
-Paths of straights and turns, whose curvature rises and falls smoothly between them.
-
-Over the easing of a turn, κ goes from 0 to 1/R as 3 u² - 2 u³: dκ/ds is continuous. The turn of the
-heading over an easing is half that of the same length at 1/R.
-
-The built-in paths by the names that a command line knows them by.
-"""
+"""A circle for steady cornering, and a closed handling course of our own design."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -20,6 +12,11 @@ import numpy as np
 from mpc.path.gates import iso_3888_1, iso_3888_2, slalom
 from mpc.path.line import Array, Line, PathError, line_from_heading
 from mpc.path.path import Path
+
+# Paths of straights and turns, whose curvature rises and falls smoothly between them.
+#
+# Over the easing of a turn, κ goes from 0 to 1/R as 3 u² - 2 u³: dκ/ds is continuous. The turn of
+# the heading over an easing is half that of the same length at 1/R.
 
 SHORTEST_FREE = 1.0  # m, of a straight that closes a course
 
@@ -272,6 +269,8 @@ def pairs_beside(path: Path, *, gap: float = 8.0, half_width: float = 2.5) -> Ar
     middle = np.column_stack((X, Y))
     return np.vstack((middle + across, middle - across))
 
+
+# The built-in paths by the names that a command line knows them by.
 
 BUILT_IN: Mapping[str, Callable[[], Path]] = MappingProxyType(
     {

@@ -3,21 +3,6 @@
 y(x): lateral place [m] over the place along the lane [m], a spline whose fourth derivative is
 continuous. Minimizes the peak k of |κ| while |dκ/ds| <= k/easing: steering takes its time. A small
 cost on dκ/ds chooses among the lines with the same peak.
-
-The lane changes of ISO 3888: a double lane change (part 1) and obstacle avoidance (part 2).
-
-Lengths and widths of the lanes are those of ISO 3888-1:2018 and ISO 3888-2:2011 as public programs
-and papers give them, not checked against the text of the standards; b is the width of the car.
-x = 0 at the first cones, y = 0 in the middle of the first lane, the middle lane is to the left, and
-the right cones of the last lane are in line with those of the first.
-    part 1: lanes 15, 25, 30 m (two of 15) with 30 and 25 m between them, 1.1 b + 0.25,
-        1.2 b + 0.25, 1.3 b + 0.25 wide; the middle lane is offset by 3.5 m.
-    part 2: lanes 12, 11, 12 m with 13.5 and 12.5 m between them, 1.1 b + 0.25, b + 1 and
-        1.3 b + 0.25, at least 3 m, wide; the middle lane begins 1 m beside the first.
-The offset of part 1 is taken between right cones. The standard leaves the line to the driver; ours
-is the one of smallest peak curvature, see `mpc.path.gates`.
-
-A slalom: cones in a row at equal distances, passed left and right in turn.
 """
 
 import math
@@ -181,6 +166,19 @@ def _basis(t: Array, x: Array, order: int) -> Any:
     return ca.sparsify(ca.DM(np.where(np.abs(matrix) < 1e-12, 0.0, matrix)))
 
 
+# The lane changes of ISO 3888: a double lane change (part 1) and obstacle avoidance (part 2).
+#
+# Lengths and widths of the lanes are those of ISO 3888-1:2018 and ISO 3888-2:2011 as public
+# programs and papers give them, not checked against the text of the standards; b is the width of
+# the car. x = 0 at the first cones, y = 0 in the middle of the first lane, the middle lane is to
+# the left, and the right cones of the last lane are in line with those of the first.
+#     part 1: lanes 15, 25, 30 m (two of 15) with 30 and 25 m between them, 1.1 b + 0.25,
+#         1.2 b + 0.25, 1.3 b + 0.25 wide; the middle lane is offset by 3.5 m.
+#     part 2: lanes 12, 11, 12 m with 13.5 and 12.5 m between them, 1.1 b + 0.25, b + 1 and
+#         1.3 b + 0.25, at least 3 m, wide; the middle lane begins 1 m beside the first.
+# The offset of part 1 is taken between right cones. The standard leaves the line to the driver;
+# ours is the one of smallest peak curvature, see the gates above.
+
 CAR_WIDTH = 1.8  # m
 NARROWEST, WIDEST = 1.0, 2.6  # m, of a car
 
@@ -298,6 +296,8 @@ def _lane_change(
     )
     return Path.from_line(line, name=name, cones=cones_of(gates))
 
+
+# A slalom: cones in a row at equal distances, passed left and right in turn.
 
 EASING = 6.0  # m
 

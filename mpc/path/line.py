@@ -1,10 +1,6 @@
 """A plane curve, sampled: X, Y [m] and heading ψ [rad] over arc length s [m], dψ/ds = κ [1/m].
 
 ISO axes seen from above: ψ = 0 along X, κ > 0 turns left.
-
-Whether samples are one curve over its arc length.
-
-What lies between two samples of a line, from their values, slopes and second derivatives.
 """
 
 import math
@@ -86,6 +82,8 @@ def line_from_heading(
     return Line(s, place[0], place[1], psi[::4], kappa[::4])
 
 
+# Whether samples are one curve over its arc length.
+
 LARGEST_TURN = 0.3  # rad in one step; coarser samples would not carry the cubics between them
 DISAGREEMENT = 0.02  # of a step, or rad; beside what cubics leave out at that turn
 
@@ -144,6 +142,8 @@ def _check_ends(line: Line, name: str, h: float) -> None:
             f"{bend:.3g} rad and {kink:.3g} 1/m"
         )
 
+
+# What lies between two samples of a line, from their values, slopes and second derivatives.
 
 Pair: TypeAlias = tuple[Any, Any]  # at both ends of a step, numbers or arrays
 

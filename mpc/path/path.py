@@ -4,11 +4,6 @@ s: arc length [m], e_y > 0 left of the path, κ > 0 turns left. Between the samp
 quintics with the slopes cos ψ and sin ψ, ψ a cubic with the slope κ, and κ is linear: |dP/ds| = 1
 to 1e-6 and κ continuous.
 An open path goes on straight beyond both ends; a closed one counts laps, s may be any number.
-
-Where a car is along a path: the foot of the perpendicular, found by walking and never jumping.
-
-e_y > 0: the car is left of the path. At the foot the along-track residual g = (P - C(s)) · t(s) is
-zero; dg/ds = -(1 - κ e_y), so that s += g/(1 - κ e_y) is Newton's step.
 """
 
 import math
@@ -22,6 +17,11 @@ from numpy.typing import ArrayLike
 
 from mpc.path.line import Array, Ends, Line, PathError, check_line
 from mpc.path.waypoints import line_through, read_waypoints
+
+# Where a car is along a path: the foot of the perpendicular, found by walking and never jumping.
+#
+# e_y > 0: the car is left of the path. At the foot the along-track residual g = (P - C(s)) · t(s)
+# is zero; dg/ds = -(1 - κ e_y), so that s += g/(1 - κ e_y) is Newton's step.
 
 # s [m] -> X, Y [m], ψ [rad], κ [1/m]
 PointOf: TypeAlias = Callable[[float], tuple[float, float, float, float]]

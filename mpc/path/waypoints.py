@@ -2,13 +2,6 @@
 
 The spline runs over its own arc length, found by fitting again over the length of the last fit, so
 that way-points need no equal gaps. Open ends are natural: κ = 0, as on the straight beyond them.
-
-Way-points that were measured, moved a little so that a line through them bends gently.
-
-Minimizes Σ |p - q|² + λ Σ g |D³ p|², D³ the third divided difference over the chord length: what it
-leaves alone is a path of constant bending. λ is as large as the allowed distance permits.
-
-Read way-points from a CSV with a header: X_m, Y_m or x, y, in meters.
 """
 
 import csv
@@ -26,6 +19,11 @@ from models.doors import limits, read_text, require_few, shown
 from mpc.path.line import Array, Line, PathError, uniform_grid
 
 LEAST, MOST = -12.0, 18.0  # exponents of λ over the sixth power of the mean gap
+# Way-points that were measured, moved a little so that a line through them bends gently.
+#
+# Minimizes Σ |p - q|² + λ Σ g |D³ p|², D³ the third divided difference over the chord length: what
+# it leaves alone is a path of constant bending. λ is as large as the allowed distance permits.
+
 HALVINGS = 40
 
 
@@ -245,6 +243,8 @@ def _fit(points: Array, closed: bool) -> Any:
 
 
 X_NAMES, Y_NAMES = ("x_m", "x", "x [m]"), ("y_m", "y", "y [m]")
+# Read way-points from a CSV with a header: X_m, Y_m or x, y, in meters.
+
 ON_THE_GLOBE = {"lat", "latitude", "lon", "lng", "longitude"}
 
 

@@ -1,11 +1,4 @@
-"""One instance of the compiled C: its structures in memory, and its functions.
-
-What goes into a tracker and what comes out.
-
-The structures of the C tracker as NumPy types: Python writes and reads them in place.
-
-The text of a tracker in one file, kept between runs: a second start generates nothing.
-"""
+"""One instance of the compiled C: its structures in memory, and its functions."""
 
 import ctypes
 import hashlib
@@ -28,6 +21,9 @@ from mpc.realtime.fall_back import N_GAINS, N_SPEEDS
 from mpc.tires.tire import PredictionTire
 
 Array = NDArray[np.float64]
+
+
+# What goes into a tracker and what comes out.
 
 
 class Status(IntEnum):
@@ -73,6 +69,8 @@ class Command(NamedTuple):
     solve_time_s: float
     iterations: int
 
+
+# The structures of the C tracker as NumPy types: Python writes and reads them in place.
 
 N_COMMANDS = 32
 N_STATUSES = 9
@@ -168,6 +166,8 @@ def set_params(params: NDArray[Any], problem: Problem, guards: Guards) -> None:
 def _real(single: bool) -> type[np.floating]:
     return np.float32 if single else np.float64
 
+
+# The text of a tracker in one file, kept between runs: a second start generates nothing.
 
 NAME = "mpc"
 PACKAGES = ("codegen", "models", "identifier", "mpc")  # whose text makes the text

@@ -2,8 +2,6 @@
 
 Sources: Dugoff, Fancher and Segel, SAE 700377 (1970); Pacejka, Tyre and Vehicle Dynamics, ch. 3.2
 (Fiala's brush) and 2nd ed., (4.49). No longitudinal slip.
-
-The linear tire of the textbook: F = C α of the paper's (3), without a limit.
 """
 
 from dataclasses import dataclass
@@ -103,6 +101,9 @@ def _fiala(alpha: Any, C: Any, N: Any) -> Any:
     x = ca.fmin(ca.fabs(demand) / (3 * N), 1)
     gentle = demand * (1 - x + x * x / 3)
     return ca.if_else(x < 1, gentle, N * ca.sign(demand))
+
+
+# The linear tire of the textbook: F = C α of the paper's (3), without a limit.
 
 
 @dataclass(frozen=True, slots=True)

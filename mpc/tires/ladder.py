@@ -1,14 +1,6 @@
 """Axles as ladders of tanh, lagged or not: the frozen axle model, and any curve fitted by one.
 
 F = Σ_j w_j tanh(α'/α_j) cos δ per axle; lag σ = max(s Σ_j w_j/α_j (1 - tanh²) + σ_0, σ_least).
-
-A force curve, tabulated over slip, as a ladder of tanh: a linear least-squares fit.
-
-The true tire of a car as axle curves: what an MPC would use that knows what nobody can measure.
-
-Steady cornering: the side force of an axle and, through the yaw balance, the lateral acceleration
-a_y = F/(share of the mass) go together; a_y rolls the body and shifts load to the outer wheels,
-where tires make less of it. So F_i(α) is the solution of F = Σ tires(α; loads and camber at F).
 """
 
 from dataclasses import dataclass
@@ -158,6 +150,8 @@ def axle_tire(model: AxleModel) -> TireModel:
     return TireModel(LadderAxles(units=ladder.size), weights, model.vehicle)
 
 
+# A force curve, tabulated over slip, as a ladder of tanh: a linear least-squares fit.
+
 UNITS = 6
 NARROWEST = 0.25  # α_1 over the slip F_max/C at which the linear tire would reach the peak force
 WORST = 0.02  # largest error of a fit over the largest force
@@ -228,6 +222,12 @@ def fitted(alpha: Array, force: Array, ladder: Array) -> Fit:
     W = np.asarray(np.linalg.lstsq(T, force, rcond=None)[0], dtype=np.float64)
     return Fit(W, float(np.abs(T @ W - force).max() / np.abs(force).max()))
 
+
+# The true tire of a car as axle curves: what an MPC would use that knows what nobody can measure.
+#
+# Steady cornering: the side force of an axle and, through the yaw balance, the lateral acceleration
+# a_y = F/(share of the mass) go together; a_y rolls the body and shifts load to the outer wheels,
+# where tires make less of it. So F_i(α) is the solution of F = Σ tires(α; loads and camber at F).
 
 SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
 LARGEST_SLIP = 0.5  # rad, where the table ends; less where friction is low

@@ -1,10 +1,4 @@
-"""The paper's network as a prediction tire: F = C α + U Ŵ tanh(V̂ x̄), every number a weight.
-
-A user's network as a prediction tire; the numbers of its tensors become run-time weights.
-
-The structure is the network with symbols in place of numbers, so that networks of one architecture
-share their compiled code, and a retrained one is swapped in like any other weights.
-"""
+"""The paper's network as a prediction tire: F = C α + U Ŵ tanh(V̂ x̄), every number a weight."""
 
 from dataclasses import dataclass, field
 from functools import cache
@@ -80,6 +74,12 @@ def network_tire(model: NetworkModel) -> TireModel:
     )
     structure = NetworkAxles(hidden=network.hidden, inputs=network.inputs)
     return TireModel(structure, weights, model.vehicle)
+
+
+# A user's network as a prediction tire; the numbers of its tensors become run-time weights.
+#
+# The structure is the network with symbols in place of numbers, so that networks of one
+# architecture share their compiled code, and a retrained one is swapped in like any other weights.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,12 +3,6 @@
 v_y [m/s], r [rad/s] and δ of the front wheel [rad] make slip angles α = δ - (v_y ± l r)/v_x in the
 paper's sign, the negative of ISO 8855, and slip makes lateral axle forces F = +C α [N] in the frame
 of the body. Only the structure is compiled; the car and the weights are read while driving.
-
-How far slip is of use, and what the tracker believes beyond: a curve that goes on rising.
-
-Beyond the peak of its curve an axle gives less, and more slip is the wrong way out. A tracker that
-linearizes there and wants less force steers on, farther from where it has to go, and stays there.
-So it believes F(x) + rise (α - x) beyond the slip x that is of use: more slip never gives less.
 """
 
 from functools import cache
@@ -139,6 +133,13 @@ def no_lag(self: PredictionTire, slip: Pair, at: Point) -> Pair:
     del self, slip, at
     return 0.0, 0.0
 
+
+# How far slip is of use, and what the tracker believes beyond: a curve that goes on rising.
+#
+# Beyond the peak of its curve an axle gives less, and more slip is the wrong way out. A tracker
+# that linearizes there and wants less force steers on, farther from where it has to go, and stays
+# there. So it believes F(x) + rise (α - x) beyond the slip x that is of use: more slip never gives
+# less.
 
 FLAT = 0.05  # of the slope at zero: the peak is reached within a per cent or two of its force
 LEAST_RISE = 0.04  # of the slope at zero; a little less than where slip ends to be of use

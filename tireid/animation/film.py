@@ -1,7 +1,4 @@
-"""A drive as a film.
-
-Which instants of a drive are shown, how fast, and how they become a GIF or an MP4.
-"""
+"""A drive as a film."""
 
 import shutil
 import subprocess
@@ -20,6 +17,8 @@ from tireid.animation.scene import Scene
 from tireid.figures.style import AMBER, BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY
 from tireid.figures.tires import TireCurve
 from tireid.progress import say
+
+# Which instants of a drive are shown, how fast, and how they become a GIF or an MP4.
 
 Pixels = NDArray[np.uint8]
 

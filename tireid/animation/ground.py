@@ -1,7 +1,4 @@
-"""The ground as the camera sees it: grid, path, cones, cars, their plan and their forces.
-
-Where the picture looks: it goes along the path, and turns with it where the path winds.
-"""
+"""The ground as the camera sees it: grid, path, cones, cars, their plan and their forces."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -18,6 +15,8 @@ from tireid.figures.drive import CONES, PATH, car_shape, friction_label, tire_lo
 from tireid.figures.style import PURPLE
 
 Array = NDArray[np.float64]
+
+# Where the picture looks: it goes along the path, and turns with it where the path winds.
 
 WINDING = np.radians(75.0)  # a path that turns farther than this is shown turned to the right
 LOOK_BACK, LOOK_AHEAD = 8.0, 22.0  # stretch whose mean heading is the direction of view [m]

@@ -1,8 +1,6 @@
 """One picture of the film: the car on its path, its plan, its tire forces, and how far it is off.
 
 Everything that stays is drawn once; a frame copies it and draws only what moved.
-
-The small panels of the film: force over slip with the learnt curve, deviation, whole course.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,6 +21,8 @@ from tireid.animation.ground import Camera, Ground, Instant, sample_at
 from tireid.figures.drive import mark_drops, tire_look
 from tireid.figures.style import AXLES, GREEN, LOOK, PURPLE, drawable, force_range, force_unit_of
 from tireid.figures.tires import TireCurve, axle_slip
+
+# The small panels of the film: force over slip with the learnt curve, deviation, whole course.
 
 Moved = list[tuple[Axes, Artist]]
 

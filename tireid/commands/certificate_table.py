@@ -1,7 +1,4 @@
-"""A certificate as a person reads it: a table with a line of advice for what does not pass.
-
-`tireid check --monte-carlo`: the proven bounds beside what happened on random drives.
-"""
+"""A certificate as a person reads it: a table with a line of advice for what does not pass."""
 
 import math
 from collections.abc import Sequence
@@ -168,6 +165,8 @@ def _line(row: Sequence[str], width: Sequence[int]) -> str:
     cells += [cell.rjust(w) for cell, w in zip(others[:-1], width[1:-1], strict=True)]
     return "  ".join([*cells, others[-1]]).rstrip()
 
+
+# `tireid check --monte-carlo`: the proven bounds beside what happened on random drives.
 
 TOLERANCE = 1e-9  # of rounding, in parts of a bound
 BOUNDS = (  # name in the certificate, what it bounds, and how a table calls it

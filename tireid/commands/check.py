@@ -1,7 +1,4 @@
-"""`tireid check [design.toml]`: is a set of gains safe to drive with, and which would be better?
-
-The figures of `tireid check`: root locus with its margin, bounds against a real error.
-"""
+"""`tireid check [design.toml]`: is a set of gains safe to drive with, and which would be better?"""
 
 import argparse
 import json
@@ -51,6 +48,8 @@ from tireid.commands.options import read_log
 from tireid.figures import error_figure, locus_figure, save_figure
 from tireid.output import OutputError
 from tireid.progress import Stopwatch, say, tell
+
+# The figures of `tireid check`: root locus with its margin, bounds against a real error.
 
 FIGURES = ("locus.png", "bounds.png")
 BOUNDS = {

@@ -1,10 +1,4 @@
-"""`tireid compare LOG [LOG ...] --vehicle FILE --out DIR`: methods side by side, fairly tuned.
-
-Work spread over a Dask cluster: the same functions, on as many machines as have workers.
-
-Every worker must have this very version of tireid, which is checked. Results come in any order. A
-worker that is lost is made good for by the scheduler.
-"""
+"""`tireid compare LOG [LOG ...] --vehicle FILE --out DIR`: methods side by side, fairly tuned."""
 
 import argparse
 import importlib
@@ -33,6 +27,11 @@ from tireid.commands.demo_story import plant_recordings
 from tireid.commands.options import add_network_arguments, network_model, read_log
 from tireid.output import output_folder
 from tireid.progress import Stopwatch, say, tell
+
+# Work spread over a Dask cluster: the same functions, on as many machines as have workers.
+#
+# Every worker must have this very version of tireid, which is checked. Results come in any order. A
+# worker that is lost is made good for by the scheduler.
 
 PATIENCE = 30.0  # s that the scheduler and the first worker may take to answer
 _ONE_AT_A_TIME = threading.Lock()  # CasADi's graphs must not be built by two threads of a worker

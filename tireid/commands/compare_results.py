@@ -5,8 +5,6 @@ frozen_N by recording learnt on and recording replayed (null: a signal, no model
 recording, percent (means of both axles: online, in_sample, other), step_s and step_ratio; floors:
 by network frozen_N and percent; sweep: by method designs, diverged, default, best, front, trials.
 Errors are {"front", "rear"} in N; null stands for what diverged or is not there.
-
-The tables of `tireid compare` as text: percent of the rms force and newtons, front and rear.
 """
 
 import csv
@@ -25,6 +23,8 @@ from tireid import __version__
 from tireid.figures import matrix_figure, methods_figure, pareto_figure, save_figure
 from tireid.output import write_json
 from tireid.progress import say
+
+# The tables of `tireid compare` as text: percent of the rms force and newtons, front and rear.
 
 HINDSIGHT = (
     "The best design of a sweep is chosen with the recordings that it is judged on, for every "

@@ -1,7 +1,4 @@
-"""`tireid demo`: the whole story on the built-in car, in a minute, with a report.
-
-The demo's report: what was driven, learnt, frozen and predicted, in order.
-"""
+"""`tireid demo`: the whole story on the built-in car, in a minute, with a report."""
 
 import argparse
 from pathlib import Path
@@ -45,6 +42,8 @@ from tireid.figures import figure_png, side_by_side_figure
 from tireid.output import output_folder
 from tireid.progress import Stopwatch, say, tell
 from tireid.report import Paragraph, Picture, Section, Table, write_report
+
+# The demo's report: what was driven, learnt, frozen and predicted, in order.
 
 REFERENCE = (
     'Hong and Choi, "Integral Error-Based Adaptive Neural Identifier for Nonlinear Lateral Tire '

@@ -1,9 +1,4 @@
-"""What the demo learnt as a C package: written, compiled, self-tested, set beside Python.
-
-The car of the demo drives on what it learnt: a lane change, and a road that becomes slippery.
-
-The self-test of an exported package, compiled and run as an embedded engineer would.
-"""
+"""What the demo learnt as a C package: written, compiled, self-tested, set beside Python."""
 
 import subprocess
 import tempfile
@@ -44,6 +39,8 @@ from tireid.exporting import write_files
 from tireid.report import Block, Paragraph, Picture, Section, Table
 
 LANE_CHANGE, SLIPPERY = "drive", "drive_slippery"  # folders beside the report
+# The car of the demo drives on what it learnt: a lane change, and a road that becomes slippery.
+
 DELAY = 2  # periods of 10 ms
 SOURCE = "frozen ones learnt on the slalom"
 NOT_DRIVEN = "No C compiler (gcc) was found: the tracker cannot be built, the car did not drive."
@@ -172,6 +169,8 @@ def _table(driven: Driven) -> Table:
         rows=rows,
     )
 
+
+# The self-test of an exported package, compiled and run as an embedded engineer would.
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-Iinclude", "-Isrc")
 

@@ -1,7 +1,4 @@
-"""What the demo drives: the sedan learns on a slalom with sensor noise and is asked elsewhere.
-
-Drives of a plant that methods are compared on: the first to learn on, the others to predict.
-"""
+"""What the demo drives: the sedan learns on a slalom with sensor noise and is asked elsewhere."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -24,6 +21,8 @@ from tireid.commands.certificate_table import certificate_of
 
 SPEED = 20.0  # m/s
 FREEZE = 30.0  # s, the end of the first drive
+# Drives of a plant that methods are compared on: the first to learn on, the others to predict.
+
 RATE_LIMIT = np.radians(30.0)  # rad/s at the road wheels
 SENSORS = Sensors(v_y=Sensor(noise=0.02), r=Sensor(noise=0.002))  # m/s and rad/s, rms
 LEARN: Maneuver = Slalom(

@@ -1,9 +1,4 @@
-"""`tireid drive --out DIR`: steer a car along a path, told of the tires that were learnt.
-
-Words of `tireid drive` that are more than a name: how fast, and where the road is slippery.
-
-The words of `tireid drive` made into a case, and a case told in words and numbers.
-"""
+"""`tireid drive --out DIR`: steer a car along a path, told of the tires that were learnt."""
 
 import argparse
 import math
@@ -45,6 +40,8 @@ from tireid.output import output_folder
 from tireid.progress import say, tell
 
 PERCENT, METERS, KILOMETERS = "%", "m/s", "km/h"
+# Words of `tireid drive` that are more than a name: how fast, and where the road is slippery.
+
 PLAIN = 1.5  # a number without a unit up to here is a share of the grip
 
 
@@ -153,6 +150,8 @@ def require_friction(word: str, mu: float) -> float:
         raise ValueError(f"{word}: friction must be 0.05 to 1.5, it is {mu:g}")
     return mu
 
+
+# The words of `tireid drive` made into a case, and a case told in words and numbers.
 
 ALL = "all"
 LONGEST_DELAY = 100.0  # ms

@@ -1,9 +1,4 @@
-"""The files of `tireid drive`: numbers as JSON, every signal as CSV, figures as PNG, the film.
-
-What a tracker is told of the tires, as curves.
-
-What `tireid drive` prints: one line a drive.
-"""
+"""The files of `tireid drive`: numbers as JSON, every signal as CSV, figures as PNG, the film."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -148,6 +143,8 @@ def drive_columns(drive: Drive) -> dict[str, NDArray[np.float64]]:
     }
 
 
+# What a tracker is told of the tires, as curves.
+
 LARGEST = 0.35  # slip up to which curves are drawn [rad]
 POINTS = 281
 
@@ -194,6 +191,8 @@ def known_curves(runs: Sequence[Run], setup: Setup, learnt: FrozenModel | None) 
     v_x = float(setup.speeds().mean())
     return [steady_curve(label, model, v_x) for label, model in models.items()]
 
+
+# What `tireid drive` prints: one line a drive.
 
 COLUMNS = ("tires", "rms e_y", "peak e_y", "completed", "failures", "median", "p99", "max")
 

@@ -1,11 +1,4 @@
-"""One drive for each tire that a tracker is told: linear, frozen, true, or learnt on the way.
-
-What `tireid drive` drives: a path, a car on its road, and how fast.
-
-Grip is that of the true tire in steady cornering on the friction of the start.
-
-What may change the tire of a tracker on the way: learning, or being told the true friction.
-"""
+"""One drive for each tire that a tracker is told: linear, frozen, true, or learnt on the way."""
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
@@ -45,6 +38,10 @@ from mpc.problem import Problem
 from mpc.realtime import NoCompilerError, Tracker
 from mpc.tires import TireModel, oracle_tire, tire_model
 from tireid.progress import Ticker
+
+# What `tireid drive` drives: a path, a car on its road, and how fast.
+#
+# Grip is that of the true tire in steady cornering on the friction of the start.
 
 PLANTS = ("double-track", "multi-body", "drift")
 FASTEST = 30.0  # on a closed course [m/s]
@@ -236,6 +233,9 @@ def make_setup(
 
         car = bmw()
     return Setup(path=path, vehicle=car, plant=plant, mu=mu, drops=ordered, wish=wish)
+
+
+# What may change the tire of a tracker on the way: learning, or being told the true friction.
 
 
 class Informer:

@@ -1,7 +1,4 @@
-"""Where frozen tires come from: a file, a network of one's own, or a drive to learn on.
-
-The drive to learn on: the same car on an open field, steered at random and ever harder.
-"""
+"""Where frozen tires come from: a file, a network of one's own, or a drive to learn on."""
 
 import argparse
 from collections.abc import Callable, Sequence
@@ -19,6 +16,8 @@ from mpc.loop import CarSensors, Measured
 from tireid.commands.drive_runs import FROZEN, LEARNING, Conditions
 from tireid.commands.options import network_model
 from tireid.progress import Ticker, say
+
+# The drive to learn on: the same car on an open field, steered at random and ever harder.
 
 DURATION = 40.0  # s
 SPEED = 20.0  # m/s

@@ -1,7 +1,4 @@
-"""`tireid export DIR`: the identifier as clean C, and as FMU and ONNX.
-
-`tireid export DIR --mpc`: the tracker beside the identifier, and a car driven by both.
-"""
+"""`tireid export DIR`: the identifier as clean C, and as FMU and ONNX."""
 
 import argparse
 from collections.abc import Mapping
@@ -105,6 +102,8 @@ def _method(options: argparse.Namespace, vehicle: Vehicle, start: FrozenModel | 
         return make_method(law, vehicle)
     return make_method(DEFAULT, vehicle) if start is None else continuing(start, vehicle)
 
+
+# `tireid export DIR --mpc`: the tracker beside the identifier, and a car driven by both.
 
 TRACKER = "mpc"  # folder of the package; that of the identifier is `identifier`
 

@@ -1,12 +1,4 @@
-"""The files of `tireid identify`: numbers as JSON, every curve as CSV, figures as PNG.
-
-The machine-readable result of `tireid identify`: summary.json, whose keys are stable.
-
-What `tireid identify --network` finds: a network of one's own over recordings.
-
-summary.json has the keys of a learnt model; in place of a freeze time stands "network". What the
-identifier finds online over the same recordings stands beside it.
-"""
+"""The files of `tireid identify`: numbers as JSON, every curve as CSV, figures as PNG."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -47,6 +39,8 @@ from tireid.figures import (
 )
 from tireid.output import write_csv, write_json
 from tireid.progress import say
+
+# The machine-readable result of `tireid identify`: summary.json, whose keys are stable.
 
 
 def _axles(error: AxleRmse | None) -> dict[str, float] | None:
@@ -299,6 +293,11 @@ def _draw(folder: Path, learnt: History, others: Sequence[History], frozen: Froz
     for label, figure in figures.items():
         save_figure(figure, folder / f"{label}.png")
 
+
+# What `tireid identify --network` finds: a network of one's own over recordings.
+#
+# summary.json has the keys of a learnt model; in place of a freeze time stands "network". What the
+# identifier finds online over the same recordings stands beside it.
 
 NETWORK = "network"
 

@@ -1,7 +1,4 @@
-"""What commands read: recordings that are judged against physics and the vehicle.
-
-`--network FILE.onnx`: a tire network of one's own in place of one that was learnt.
-"""
+"""What commands read: recordings that are judged against physics and the vehicle."""
 
 import argparse
 from collections.abc import Sequence
@@ -76,6 +73,8 @@ def column_names(pairs: Sequence[str]) -> dict[str, str]:
         columns[name] = column
     return columns
 
+
+# `--network FILE.onnx`: a tire network of one's own in place of one that was learnt.
 
 CONVENTIONS = (
     "A network of --network is static: its outputs are the lateral forces F_yf, F_yr of both tires "

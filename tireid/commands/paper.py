@@ -1,17 +1,4 @@
-"""`tireid paper`: Tables I and II and Figs. 2-5 of the paper, beside ours, with a third column.
-
-What the paper prints in its Tables I and II: RMSE of the axle force [kN].
-
-Its gains, its car and its simulator are not public: these numbers stand beside ours, they are not
-reproduced.
-
-Tables I and II as text: both measures of frozen weights, and the paper's values beside ours.
-
-The paper's values of frozen weights stand beside the measure that its section IV-A defines, the
-past against the online output.
-
-The files of `tireid paper`: tables as JSON and text, seeds that diverged, Figs. 1-5 as PNG.
-"""
+"""`tireid paper`: Tables I and II and Figs. 2-5 of the paper, beside ours, with a third column."""
 
 import argparse
 from collections.abc import Mapping, Sequence
@@ -47,6 +34,11 @@ from tireid.figures import comparison_figure, force_figure, save_figure, scheme_
 from tireid.output import output_folder, write_json
 from tireid.progress import say, tell
 
+# What the paper prints in its Tables I and II: RMSE of the axle force [kN].
+#
+# Its gains, its car and its simulator are not public: these numbers stand beside ours, they are not
+# reproduced.
+
 PAPER: Mapping[str, Mapping[str, Mapping[str, float]]] = {
     "step_steer": {  # Table I
         "instantaneous": {"online": 0.2690, "32": 0.6506, "35": 0.6488},
@@ -57,6 +49,11 @@ PAPER: Mapping[str, Mapping[str, Mapping[str, float]]] = {
         "integral": {"online": 0.3386, "32": 0.4247, "40": 0.4300},
     },
 }
+
+# Tables I and II as text: both measures of frozen weights, and the paper's values beside ours.
+#
+# The paper's values of frozen weights stand beside the measure that its section IV-A defines, the
+# past against the online output.
 
 TITLES = {
     "step_steer": "Table I, step steer: RMSE of the axle force [kN]",
@@ -191,6 +188,8 @@ def settings(gains: Gains, network: Network) -> str:
         f"maneuver, both axles together.\n{MEASURES_MEAN}\n{MEANING}"
     )
 
+
+# The files of `tireid paper`: tables as JSON and text, seeds that diverged, Figs. 1-5 as PNG.
 
 SCHEME = "fig1_scheme.png"
 FIGURES = {  # number of the paper's figure, by maneuver and law

@@ -1,11 +1,4 @@
-"""Methods side by side: how far off online, frozen where learnt, and frozen elsewhere.
-
-Labels and scales that the figures of a comparison share.
-
-Learnt on one recording, replayed on another: a map of errors for each method.
-
-Every method at its best: Pareto fronts of frozen against online error over random designs.
-"""
+"""Methods side by side: how far off online, frozen where learnt, and frozen elsewhere."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -33,6 +26,8 @@ from tireid.figures.style import (
     note,
     styled,
 )
+
+# Labels and scales that the figures of a comparison share.
 
 TICKS = ((1, 1.5, 2, 2.5, 3, 4, 5, 6, 8), (1, 1.5, 2, 3, 5, 7), (1, 2, 5), (1, 3), (1,))
 MOST = 6  # ticks of an axis
@@ -188,6 +183,8 @@ def _draw_row(axes: Axes, position: int, errors: Mapping[str, list[float]]) -> N
 
 
 BEST, WORST = 1.0, 100.0  # [%], ends of the color scale
+# Learnt on one recording, replayed on another: a map of errors for each method.
+
 DARK = 0.55  # share of the color scale from which text is white
 LONGEST = 17  # letters of a recording's name beside a map
 
@@ -275,6 +272,8 @@ def _cut(label: str) -> str:
 
 DESIGN, FRONT, DEFAULT = "random design", "Pareto front", "default design"
 OTHERS, SIGNAL = "fronts of the other methods", "online error of a signal estimator"
+# Every method at its best: Pareto fronts of frozen against online error over random designs.
+
 Point = tuple[float, float]
 
 

@@ -1,18 +1,4 @@
-"""The path from above at one scale: cones, the driven tracks, and the car at every few meters.
-
-How long the tracker took for a step: a histogram with its percentiles, and where it failed.
-
-How the pictures of a drive tell paths, cones and the tires that a tracker was told of.
-
-How far the car was from its path, and how fast, over the arc length of the path.
-
-What the tracker asked of the steering, and what the wheels did.
-
-The car from above as polygons: a body and four wheels, the front ones steered.
-
-Pictures need a length, a width and wheels; a vehicle without a chassis gets those that are usual
-for its wheelbase.
-"""
+"""The path from above at one scale: cones, the driven tracks, and the car at every few meters."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -40,6 +26,8 @@ from tireid.figures.style import (
     new_figure,
     styled,
 )
+
+# How long the tracker took for a step: a histogram with its percentiles, and where it failed.
 
 BINS = 60
 WIDE = 10.0  # times slower than the median: from there on the axis is logarithmic
@@ -103,6 +91,8 @@ def drive_solve_figure(drive: Drive) -> Figure:
     return figure
 
 
+# How the pictures of a drive tell paths, cones and the tires that a tracker was told of.
+
 PATH: Mapping[str, Any] = {
     "color": "#9ADBC6",
     "linewidth": 3.5,
@@ -138,6 +128,8 @@ def tire_look(label: str) -> dict[str, Any]:
     look = dict(TIRES.get(label.split()[0], TIRES["frozen"]))
     return look | {"linestyle": LATER, "linewidth": 1.4} if label.endswith(AT_THE_END) else look
 
+
+# How far the car was from its path, and how fast, over the arc length of the path.
 
 TOLD = "told of another tire"
 ARC = "arc length of the path [m]"
@@ -240,6 +232,8 @@ def _roomy(axes: Axes, slowest: float) -> None:
     axes.set_ylim(min(low, slowest), high)
 
 
+# What the tracker asked of the steering, and what the wheels did.
+
 NEAR = 0.75  # a limit is drawn where a command comes this close to it
 
 
@@ -301,6 +295,11 @@ def _limits(axes: Axes, limit: float) -> None:
 Array = NDArray[np.float64]
 
 FRONT_OVERHANG, REAR_OVERHANG = 0.32, 0.36  # of the wheelbase, beyond the axles
+# The car from above as polygons: a body and four wheels, the front ones steered.
+#
+# Pictures need a length, a width and wheels; a vehicle without a chassis gets those that are usual
+# for its wheelbase.
+
 TRACK = 0.57  # of the wheelbase, where no chassis says
 BODY_BESIDE_TRACK = 0.1  # of the wheelbase: how much wider than the track the body is
 WHEEL_LENGTH, WHEEL_WIDTH = 0.24, 0.085  # of the wheelbase

@@ -1,11 +1,4 @@
-"""Axle forces over time as in the paper's Figs. 2-5: online above, frozen replays below.
-
-A frozen model on a recording that it did not learn from, and what it misses there.
-
-Frozen models side by side on a drive that none of them has learnt.
-
-What the identifier was given: speed, steering and motion of a recording over time.
-"""
+"""Axle forces over time as in the paper's Figs. 2-5: online above, frozen replays below."""
 
 from collections.abc import Mapping
 
@@ -125,6 +118,9 @@ def _errors(replay: Replay, unit: ForceUnit, axle: int) -> str:
     return f"{said}\npast to online {unit.format(sides.past_against_online, axle)}"
 
 
+# A frozen model on a recording that it did not learn from, and what it misses there.
+
+
 @styled
 def prediction_figure(
     replay: Replay, online: History | None = None, *, window: Window = None
@@ -192,6 +188,8 @@ def prediction_figure(
     return figure
 
 
+# Frozen models side by side on a drive that none of them has learnt.
+
 COLORS = (ORANGE, BLUE, GREEN, PURPLE)
 
 
@@ -234,6 +232,9 @@ def side_by_side_figure(replays: Mapping[str, Replay]) -> Figure:
     panels[1, 0].set_ylabel(f"missed [{unit.name}]")
     legend_above(figure)
     return figure
+
+
+# What the identifier was given: speed, steering and motion of a recording over time.
 
 
 @styled

@@ -1,11 +1,4 @@
-"""The norm of the identifier's error over time, beside the bounds that hold for it.
-
-The weights over time: what was learnt when, and whether it settled.
-
-A table as a picture: medians and quartiles by law and column, with the paper's values.
-
-How far the learning loop is from instability: its sampled poles at any gain.
-"""
+"""The norm of the identifier's error over time, beside the bounds that hold for it."""
 
 from collections.abc import Mapping, Sequence
 
@@ -43,6 +36,8 @@ from tireid.figures.style import (
     styled,
     time_window,
 )
+
+# A table as a picture: medians and quartiles by law and column, with the paper's values.
 
 WIDE = 20.0  # from this ratio between what is drawn on, the axis is logarithmic
 
@@ -111,6 +106,8 @@ def error_figure(
 
 
 Array = NDArray[np.float64]
+# The weights over time: what was learnt when, and whether it settled.
+
 SYMBOLS = {
     "v_y": "$v_y$",
     "r": "$r$",
@@ -259,6 +256,8 @@ def comparison_figure(
     legend_above(figure, columns=len(results), order=order)
     return figure
 
+
+# How far the learning loop is from instability: its sampled poles at any gain.
 
 FACTORS = np.geomspace(1e-3, 1e3, 1500)  # on the loop gain, along the locus
 

@@ -2,10 +2,6 @@
 
 Truth is black, what was identified online blue, frozen weights orange and dashed, the linear tire
 grey and dotted; the colors are those of Okabe and Ito, which color-blind readers tell apart.
-
-Parts that several figures share: time axes, freeze marks, legends, errors in titles.
-
-Units that suit the size of what is drawn: kN for cars, N for models, and the impulse of each.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -136,6 +132,8 @@ def save_figure(figure: Figure, path: Path) -> None:
 
 
 Array = NDArray[np.float64]
+# Parts that several figures share: time axes, freeze marks, legends, errors in titles.
+
 Window = tuple[float, float] | None
 
 TIME = "time [s]"
@@ -269,6 +267,8 @@ def _bolder(legend: Legend) -> None:
             line.set_markersize(7.0)
             line.set_alpha(1.0)
 
+
+# Units that suit the size of what is drawn: kN for cars, N for models, and the impulse of each.
 
 FARTHEST = 3.0  # an axis reaches at most this many times beyond the force it is compared with
 

@@ -1,11 +1,4 @@
-"""Axle force against slip angle: the shape of the tire, as measured and as learnt.
-
-What pictures of a drive say of tires: the slip of its axles, and curves of force over slip.
-
-Axle force over slip on the drive: what the tires did, what the tracker believed, the truth.
-
-What the axle identifier has learnt over time, in the numbers an engineer reads.
-"""
+"""Axle force against slip angle: the shape of the tire, as measured and as learnt."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -149,6 +142,9 @@ def _shade_unknown(axes: Axes, known: float, ends: NDArray[np.float64]) -> None:
 Array = NDArray[np.float64]
 
 
+# What pictures of a drive say of tires: the slip of its axles, and curves of force over slip.
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TireCurve:
     """Steady axle forces over slip, one curve an axle.
@@ -176,6 +172,8 @@ def axle_slip(drive: Drive) -> Array:
     rear = -np.arctan2(drive.v_y - drive.vehicle.l_r * drive.r, drive.v_x)
     return np.column_stack([front, rear])
 
+
+# Axle force over slip on the drive: what the tires did, what the tracker believed, the truth.
 
 REACH = 1.25  # curves go on this far beyond the slip of the drive
 
@@ -227,6 +225,9 @@ def drive_tires_figure(drive: Drive, curves: Sequence[TireCurve]) -> Figure:
     panels[0].set_ylabel(f"lateral force [{unit.name}]")
     legend_above(figure, columns=1 + len(curves) if len(curves) < 5 else 3)
     return figure
+
+
+# What the axle identifier has learnt over time, in the numbers an engineer reads.
 
 
 @styled
