@@ -123,13 +123,13 @@ def parse_fault(text: str) -> SensorFault:
         raise ValueError(
             f"--fault wants CHANNEL:KIND:START:DURATION[:SIZE], times in s, not {text!r}"
         ) from None
-    if kind in SIZED and not size:
-        raise ValueError(f"--fault {text}: {kind} needs a size")
     try:
         fault = SensorFault(channel=channel, kind=kind, start=start, duration=duration, size=most)
         FaultySensors(CarSensors(), [fault])  # refuses what is no channel
     except FaultError as error:
         raise ValueError(f"--fault {text}: {error}") from None
+    if kind in SIZED and not size:
+        raise ValueError(f"--fault {text}: {kind} needs a size")
     return fault
 
 

@@ -23,7 +23,7 @@ def network_file(rng, *, hidden=6, activation="Tanh", scale=0.1, unit=1000.0):
         "s": np.array([scale, scale]),
         "W": first,
         "b": np.concatenate([rng.normal(0.0, 0.1, hidden - 1), [0.0]]),
-        "U": second,
+        "U": second * (1000.0 / unit),  # so that U times k is newtons, whatever k is
         "k": np.array(unit),
     }
     nodes = [
