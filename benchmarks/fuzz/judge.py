@@ -16,6 +16,7 @@ PACKAGES = "codegen|models|identifier|mpc|tireid"
 FRAME = re.compile(rf'File ".*?((?:{PACKAGES})/[\w/]+\.py)", line (\d+)')
 NUMBER = re.compile(r"(?<![\w.:/-])[-+]?(?:nan|inf(?:inity)?)(?![\w.:/-])", re.IGNORECASE)
 NO_LIMIT = re.compile(r"\binf\b")  # as certificates say that there is none
+NAME = re.compile(r"""^\s*"?name"?\s*[=:]\s*"([^"\n]{2,})"\s*,?\s*$""", re.MULTILINE)
 CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 GOOD, BAD = (0, 1), 2
 CODES = (*GOOD, BAD, 74)
@@ -178,7 +179,7 @@ def _numbers(
         for place in ended.notes.get("not finite", [])[:3]
     ]
     said = ended.out
-    for word in sorted(words, key=len, reverse=True):
+    for word in sorted({*words, *_names(folder, before)}, key=len, reverse=True):
         said = said.replace(word, "") if len(word) > 1 else said
     if words[0] == "check":
         said = NO_LIMIT.sub("", said)
@@ -200,6 +201,16 @@ def _numbers(
                 Finding("dead axle", " ".join(words[:1]), f"{name}: {shares} of the linear tire")
             )
     return found
+
+
+def _names(folder: Path, before: Collection[str]) -> set[str]:
+    """Return the names that the user's files give to cars: one may be called "nan"."""
+    texts = [
+        (folder / name).read_text(encoding="utf-8", errors="replace")
+        for name in before
+        if name.endswith((".toml", ".json")) and (folder / name).is_file()
+    ]
+    return {name for text in texts for name in NAME.findall(text)}
 
 
 def _bad_column(path: Path) -> str:
