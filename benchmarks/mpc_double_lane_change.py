@@ -16,7 +16,7 @@ from models.vehicle import sedan
 from mpc.prediction import build_rk4
 from mpc.problem import Cost, Limits, Problem
 from mpc.tires.network import NetworkAxles
-from mpc.tires.tire import ALL, TireModel
+from mpc.tires.tire import ALL, PredictionTire
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ PULSES = ((2.0, 1.0), (4.6, -1.0), (8.5, 1.0), (11.1, -1.0))  # beginning [s], d
 PULSE = 1.8  # duration of a lane change [s]
 
 
-def network_fitted_to_curve(seed: int = 1) -> TireModel:
+def network_fitted_to_curve(seed: int = 1) -> PredictionTire:
     """Return the linear tire of the sedan plus a network fitted to what a tanh curve has less."""
     car, rng = sedan(), np.random.default_rng(seed)
     _, _, l_f, l_r, C_f, C_r = car.bicycle
@@ -50,10 +50,10 @@ def network_fitted_to_curve(seed: int = 1) -> TireModel:
     missing = limit * np.tanh(C[:, None] * alpha / limit) - C[:, None] * alpha
     W = np.linalg.solve(hidden @ hidden.T + 1e-3 * np.eye(HIDDEN), hidden @ missing.T).T
     weights = np.concatenate([C, W.ravel(order="F"), V.ravel(order="F")])
-    return TireModel(structure, weights, car)
+    return PredictionTire(structure, weights, car)
 
 
-def weaker(tire: TireModel) -> TireModel:
+def weaker(tire: PredictionTire) -> PredictionTire:
     """Return the tire of the plant."""
     weights = tire.weights.copy()
     weights[: 2 + 2 * HIDDEN] *= WEAKER
@@ -96,7 +96,7 @@ def road() -> Road:
 class Plant:
     """The car that is driven: x (5,) over a step with the steering rate u."""
 
-    def __init__(self, tire: TireModel, substeps: int = 10) -> None:
+    def __init__(self, tire: PredictionTire, substeps: int = 10) -> None:
         self.rk4 = build_rk4(tire.structure)
         self.weights, self.car, self.substeps = weaker(tire).weights, tire.car, substeps
 

@@ -19,7 +19,7 @@ from mpc.converged import build_errors
 from mpc.prediction import build_rk4
 from mpc.realtime import Status, Tracker
 from mpc.realtime.instance import FLAGS, tracker_source
-from mpc.tires.tire import ALL, TireModel
+from mpc.tires.tire import ALL, PredictionTire
 
 Array = NDArray[np.float64]
 N, N_X, WIDTH = PROBLEM.horizon, 5, 7  # a stage: x, u and the slack of the deviation behind it
@@ -52,7 +52,7 @@ class Stagewise(NamedTuple):
     bounds: dict[str, Array]
 
 
-def stagewise(tire: TireModel) -> Stagewise:
+def stagewise(tire: PredictionTire) -> Stagewise:
     """Return the problem in the order that structure-aware solvers read; p = x0, kappa, car, w."""
     limits, cost, k_last = PROBLEM.limits, PROBLEM.cost, N - 1
     rk4, errors = build_rk4(tire.structure), build_errors(tire.structure)
@@ -90,7 +90,9 @@ def stagewise(tire: TireModel) -> Stagewise:
 class Nlp:
     """A solver of CasADi, called without copies."""
 
-    def __init__(self, tire: TireModel, problem: Stagewise, solver: Any, *, warm: bool) -> None:
+    def __init__(
+        self, tire: PredictionTire, problem: Stagewise, solver: Any, *, warm: bool
+    ) -> None:
         self.numbers = np.concatenate([tire.car, tire.weights])
         self.solver, self.warm = solver, warm
         self.values: dict[str, Array] = {
@@ -125,7 +127,7 @@ class Nlp:
         return Answer(x, stages[:, N_X].copy(), elapsed, not np.isfinite(x).all())
 
 
-def hpipm(tire: TireModel) -> Nlp:
+def hpipm(tire: PredictionTire) -> Nlp:
     """Return CasADi's real-time iteration with HPIPM."""
     problem = stagewise(tire)
     nlp = problem.nlp
@@ -140,7 +142,7 @@ def hpipm(tire: TireModel) -> Nlp:
     return Nlp(tire, problem, ca.nlpsol("rti", "sqpmethod", nlp, options), warm=False)
 
 
-def ipopt(tire: TireModel) -> Nlp:
+def ipopt(tire: PredictionTire) -> Nlp:
     """Return IPOPT, to convergence."""
     problem = stagewise(tire)
     warm = {"warm_start_init_point": "yes", "mu_init": 1e-3, "tol": 1e-6}
@@ -151,7 +153,7 @@ def ipopt(tire: TireModel) -> Nlp:
 class Ours:
     """The tracker, one iteration a step."""
 
-    def __init__(self, tire: TireModel, *, converged: bool = False) -> None:
+    def __init__(self, tire: PredictionTire, *, converged: bool = False) -> None:
         self.tracker = Tracker(tire, PROBLEM, period=PROBLEM.dt, clock=time.thread_time)
         self.converged = converged
 
@@ -168,7 +170,7 @@ class Ours:
 class CondensedDaqp(Ours):
     """Our linearization, condensed, and DAQP."""
 
-    def __init__(self, tire: TireModel) -> None:
+    def __init__(self, tire: PredictionTire) -> None:
         super().__init__(tire)
         source = tracker_source(tire.structure, N, single=False)
         source = f"#include <string.h>\n{source}\n" + Path(__file__).with_name(

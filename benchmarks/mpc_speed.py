@@ -28,7 +28,7 @@ from benchmarks.mpc_double_lane_change import (
 from benchmarks.mpc_peers import CondensedDaqp, Ours, Peer, hpipm, ipopt
 from benchmarks.targets import Targets, keeps
 from mpc.converged import build_errors
-from mpc.tires.tire import TireModel
+from mpc.tires.tire import PredictionTire
 
 Array = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ class Loop(NamedTuple):
     cost: float
 
 
-def drive(solver: Peer, plant: Plant, tire: TireModel) -> Loop:
+def drive(solver: Peer, plant: Plant, tire: PredictionTire) -> Loop:
     """Drive the double lane change from the start."""
     errors, q = build_errors(tire.structure), PROBLEM.cost.numbers()
     ahead, now = road()

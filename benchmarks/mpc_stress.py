@@ -24,7 +24,7 @@ from models.vehicle import sedan
 from mpc.problem import Limits, Problem
 from mpc.realtime import Measurement, Status, Tracker
 from mpc.realtime.instance import tracker_source
-from mpc.tires import TireModel, tire_model
+from mpc.tires import PredictionTire, prediction_tire
 from mpc.tires.ladder import oracle_tire
 
 Array = NDArray[np.float64]
@@ -51,10 +51,10 @@ class Stress(NamedTuple):
     recorded: bytes
 
 
-def tires() -> dict[str, list[TireModel]]:
+def tires() -> dict[str, list[PredictionTire]]:
     """Return tires of each size of prediction, 2 weights, 82, and lagging, of different grip."""
     car, grips = sedan(), np.linspace(0.7, 1.2, 6)
-    linear, network = tire_model(car), network_fitted_to_curve()
+    linear, network = prediction_tire(car), network_fitted_to_curve()
     scaled = np.zeros(network.weights.size)
     scaled[: 2 + 2 * HIDDEN] = 1.0  # forces; what they depend on stays
     return {
@@ -72,7 +72,7 @@ def random_road(times: Array, rng: np.random.Generator) -> tuple[Array, Array]:
     return most * turns, v_x
 
 
-def stress(choice: list[TireModel], steps: int, rng: np.random.Generator) -> Stress:
+def stress(choice: list[PredictionTire], steps: int, rng: np.random.Generator) -> Stress:
     """Drive random episodes."""
     tracker = Tracker(choice[0], PROBLEM, period=PERIOD, delay=DELAY, clock=time.thread_time)
     limits, share = PROBLEM.limits, PERIOD / PROBLEM.dt
@@ -112,7 +112,7 @@ def stress(choice: list[TireModel], steps: int, rng: np.random.Generator) -> Str
     )
 
 
-def sanitized(tire: TireModel, recorded: bytes) -> tuple[int, int, float]:
+def sanitized(tire: PredictionTire, recorded: bytes) -> tuple[int, int, float]:
     """Return steps, failures and the largest difference of the steering [rad] of the replay."""
     compiler = find_compiler()
     assert compiler is not None, "this benchmark needs a C compiler"

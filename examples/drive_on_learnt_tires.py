@@ -17,7 +17,7 @@ from mpc.cars import DoubleTrackCar
 from mpc.loop import Drive, cornering_limit, drive, inertial_unit
 from mpc.path import iso_3888_2, steady_speed
 from mpc.realtime import Tracker
-from mpc.tires import TireModel, tire_model
+from mpc.tires import PredictionTire, prediction_tire
 from tireid.figures import drive_errors_figure, save_figure
 
 EXPECTED_BELOW = 0.5
@@ -25,7 +25,7 @@ SHARE = 0.9  # of the lateral acceleration that the tires can give
 DELAY = 2  # periods of 10 ms
 
 
-def steer(tires: TireModel) -> Drive:
+def steer(tires: PredictionTire) -> Drive:
     """Return the drive of a tracker that is told of some tires.
 
     Parameters
@@ -52,9 +52,9 @@ def main() -> float:
     slalom = Slalom(amplitude=0.07, frequency=0.5, onset=1.0, rate_limit=0.5, duration=20.0)
     recording = Plant(car).simulate(slalom, speed=20.0).recording()
     history = identify(recording, car, AxleDesign.for_vehicle(car))
-    learnt = tire_model(history.freeze(t=20.0))
+    learnt = prediction_tire(history.freeze(t=20.0))
 
-    drives = {"frozen": steer(learnt), "linear": steer(tire_model(car))}
+    drives = {"frozen": steer(learnt), "linear": steer(prediction_tire(car))}
     rms = {}
     for name, driven in drives.items():
         rms[name] = float(np.sqrt(np.mean(driven.e_y**2)))

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from codegen import Scan
 from identifier.tire_model import TireModel
-from models.doors import Table
 from models.recordings import Recording
 from models.rules import LARGEST_FORCE
+from models.schema import Table
 from models.vehicle import Vehicle
 
 Array = NDArray[np.float64]

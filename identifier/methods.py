@@ -44,7 +44,7 @@ from identifier.regression import RegressionDesign
 from identifier.stability import Certificate
 from identifier.stability import certify as certify_gains
 from identifier.tire_model import TireModel
-from models.doors import Table, read_json, shown
+from models.schema import Table, read_json, shown
 from models.vehicle import Vehicle
 
 Factory = Callable[[Vehicle, int], Method]

@@ -28,9 +28,9 @@ from identifier.method import (
 from identifier.paper.network import SIGNALS, network_signals
 from identifier.tire_model import TireModel, drift
 from models.bicycle import BicycleParameters
-from models.doors import Table, read_bytes
 from models.recordings import Recording
 from models.rules import LARGEST_FORCE
+from models.schema import Table, read_bytes
 from models.vehicle import Vehicle
 
 # A user's static tire network, an ONNX file, as a differentiable function that generates code.

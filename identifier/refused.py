@@ -1,6 +1,6 @@
 """Samples that are refused, and the gap in time that they leave: one rule for Python, C and FMU.
 
-A sample is refused where a number is not finite or beyond what any car reaches (`Limits`). It
+A sample is refused where a number is not finite or beyond what any car reaches (`SampleLimits`). It
 counts as time. A method that judges samples itself, whose step carries a gate, is shown a sample
 at `NOWHERE` in its place, which no gate believes: it holds its last one for a moment, then rests.
 The others rest at the first sample after the gap, once, before they take it: observers take the
@@ -23,7 +23,7 @@ NOWHERE = 1e6  # m/s, of a car that nobody has seen; its square is a number in f
 GATE = "gate"  # the carried port of a step that judges samples itself
 
 
-class Limits(NamedTuple):
+class SampleLimits(NamedTuple):
     """What no car reaches: speed [m/s], yaw rate [rad/s], steering [rad], axle force [N]."""
 
     speed: float
@@ -32,7 +32,7 @@ class Limits(NamedTuple):
     force: float
 
     @classmethod
-    def of(cls, vehicle: Vehicle) -> "Limits":
+    def of(cls, vehicle: Vehicle) -> "SampleLimits":
         """Return the limits of a car, by its size and weight.
 
         Parameters

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from codegen import Stepper
 from identifier.method import FrozenModel, Method, Setup
-from identifier.refused import NOWHERE, STALE_TIME, Limits, judges_samples, stale_samples
+from identifier.refused import NOWHERE, STALE_TIME, SampleLimits, judges_samples, stale_samples
 from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.recordings.record import MINIMUM_SAMPLES
@@ -220,7 +220,7 @@ class OnlineIdentifier:
         if not 0.0 < stale_time < math.inf:
             raise ValueError(f"stale_time must be positive and finite, it is {stale_time}")
         self.vehicle, self.method, self.counts = vehicle, method, Counts()
-        self.limits = Limits.of(vehicle)
+        self.limits = SampleLimits.of(vehicle)
         self.stale_time = stale_time
         self._most_missed = stale_samples(stale_time, method.dt)
         self._start = start

@@ -12,7 +12,7 @@ class LimitError(ValueError):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Limits:
+class InputLimits:
     """How much may be asked for. `TIREID_LIMITS="samples=1e7 megabytes=4000"` raises limits.
 
     Parameters
@@ -47,7 +47,7 @@ class Limits:
     processes: float = 256.0
 
 
-def limits() -> Limits:
+def limits() -> InputLimits:
     """Return the limits, as the environment raises or lowers them.
 
     Raises
@@ -55,7 +55,7 @@ def limits() -> Limits:
     LimitError
         Where the environment's words are not NAME=NUMBER.
     """
-    known = [field.name for field in fields(Limits)]
+    known = [field.name for field in fields(InputLimits)]
     asked: dict[str, float] = {}
     for word in os.environ.get(VARIABLE, "").replace(",", " ").split():
         name, _, number = word.partition("=")
@@ -64,12 +64,12 @@ def limits() -> Limits:
         except ValueError:
             asked[name] = math.nan
         if name not in known or not asked[name] > 0.0:
-            from models.doors import shown  # with all that reads files: help does not need it
+            from models.schema import shown  # with all that reads files: help does not need it
 
             raise LimitError(
                 f"{VARIABLE} must hold NAME=NUMBER of {', '.join(known)}, not {shown(word)}"
             )
-    return Limits(**asked)
+    return InputLimits(**asked)
 
 
 def limits_text() -> str:

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from models.bicycle import BicycleParameters
-from models.doors import Table, read_toml, require_name
 from models.files import write_atomically
 from models.rules import require_positive, require_within
+from models.schema import Table, read_toml, require_name
 
 # What a car needs beyond the linear bicycle: roll, load transfer, tire lag and drive force.
 #

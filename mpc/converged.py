@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mpc.prediction import N_CAR, build_rk4, motion, stage_ports, state_size
 from mpc.problem import N_ERRORS, Problem, tracking_errors
-from mpc.tires.tire import PredictionTire, TireModel, reach_of
+from mpc.tires.tire import PredictionTire, TireStructure, reach_of
 
 Array = NDArray[np.float64]
 N_SOFT = 3  # e_y, slip in front, slip at the rear
@@ -32,7 +32,7 @@ class Solution(NamedTuple):
 
 
 @cache
-def build_errors(structure: PredictionTire) -> ca.Function:
+def build_errors(structure: TireStructure) -> ca.Function:
     """Return what costs and what is bounded, of x, kappa, v_x, car, w: y (7,) and slip (2,) [rad].
 
     Parameters
@@ -48,7 +48,7 @@ def build_errors(structure: PredictionTire) -> ca.Function:
 
 
 @cache
-def build_nlp(structure: PredictionTire, horizon: int) -> dict[str, Any]:
+def build_nlp(structure: TireStructure, horizon: int) -> dict[str, Any]:
     """Return the nonlinear program with variables [X, U, S] by columns; every number is in `p`.
 
     Parameters
@@ -87,7 +87,7 @@ def build_nlp(structure: PredictionTire, horizon: int) -> dict[str, Any]:
     }
 
 
-def numbers(problem: Problem, tire: TireModel, kappa: ArrayLike, v_x: ArrayLike) -> Array:
+def numbers(problem: Problem, tire: PredictionTire, kappa: ArrayLike, v_x: ArrayLike) -> Array:
     """Return `p` of `build_nlp`.
 
     Parameters
@@ -131,14 +131,14 @@ def bounds(problem: Problem, x0: ArrayLike) -> dict[str, Array]:
 
 
 @cache
-def _solver(structure: PredictionTire, horizon: int, tolerance: float) -> ca.Function:
+def _solver(structure: TireStructure, horizon: int, tolerance: float) -> ca.Function:
     quiet: dict[str, Any] = {"print_level": 0, "sb": "yes", "tol": tolerance, "max_iter": 500}
     options: dict[str, Any] = {"print_time": False, "error_on_fail": False, "ipopt": quiet}
     return ca.nlpsol("converged", "ipopt", build_nlp(structure, horizon), options)
 
 
 def solve_converged(
-    tire: TireModel,
+    tire: PredictionTire,
     problem: Problem,
     x0: ArrayLike,
     kappa: ArrayLike,

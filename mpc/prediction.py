@@ -12,7 +12,7 @@ import casadi as ca
 
 from codegen.tuned import tuned
 from mpc.problem import N_ERRORS, gauss_newton, tracking_errors
-from mpc.tires.tire import Car, Point, PredictionTire, believed_force
+from mpc.tires.tire import Car, Point, TireStructure, believed_force
 
 # The car along a path as the tracker predicts it: ẋ and its Jacobian.
 #
@@ -52,7 +52,7 @@ class Motion(NamedTuple):
     slip_x: Any
 
 
-def state_size(structure: PredictionTire) -> int:
+def state_size(structure: TireStructure) -> int:
     """Return n_x, 5 or with lagged slip 7.
 
     Parameters
@@ -62,7 +62,7 @@ def state_size(structure: PredictionTire) -> int:
     return 7 if structure.lagged else 5
 
 
-def stage_ports(structure: PredictionTire) -> Ports:
+def stage_ports(structure: TireStructure) -> Ports:
     """Return fresh symbols.
 
     Parameters
@@ -74,7 +74,7 @@ def stage_ports(structure: PredictionTire) -> Ports:
     return Ports(*(ca.SX.sym(name, size) for name, size in pairs))
 
 
-def motion(structure: PredictionTire, p: Ports) -> Motion:
+def motion(structure: TireStructure, p: Ports) -> Motion:
     """Return the equations of motion and their derivatives, chained through the axle forces.
 
     Parameters
@@ -114,7 +114,7 @@ def motion(structure: PredictionTire, p: Ports) -> Motion:
 RESULTS = ("x_next", "A", "B", "H", "h", "slip", "slip_x")
 
 
-def build_dynamics(structure: PredictionTire) -> ca.Function:
+def build_dynamics(structure: TireStructure) -> ca.Function:
     """Return ẋ as a function of x, u, kappa, v_x, dt, car, w, max_slip, rise.
 
     dt only bounds the lag from below.
@@ -129,7 +129,7 @@ def build_dynamics(structure: PredictionTire) -> ca.Function:
     )
 
 
-def build_rk4(structure: PredictionTire) -> ca.Function:
+def build_rk4(structure: TireStructure) -> ca.Function:
     """Return the state after a stage by one classical Runge-Kutta step; ports as the dynamics.
 
     Parameters
@@ -146,7 +146,7 @@ def build_rk4(structure: PredictionTire) -> ca.Function:
 
 
 @cache
-def build_stage(structure: PredictionTire) -> ca.Function:
+def build_stage(structure: TireStructure) -> ca.Function:
     """Return the linearized stage as an SX function with dense ports.
 
     Ports: x (n_x,), u, kappa [1/m], v_x [m/s], dt [s], car (4,), w (n_w,), max_slip (2,) [rad],
@@ -168,7 +168,7 @@ def build_stage(structure: PredictionTire) -> ca.Function:
 
 
 @cache
-def build_end(structure: PredictionTire) -> ca.Function:
+def build_end(structure: TireStructure) -> ca.Function:
     """Return the cost and the slips at the end of the horizon: H, h, slip, slip_x of `build_stage`.
 
     Ports: those of `build_stage` without u and dt, with q of the end.

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from models.doors import read_json
+from models.schema import read_json
 from tireid.exchange import ClaimedError, claim, exchange
 from tireid.progress import say
 

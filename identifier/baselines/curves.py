@@ -26,8 +26,8 @@ from identifier.method import (
 )
 from identifier.tire_model import TireModel, drift
 from models.bicycle import BicycleParameters, linear_axle_force, slip_angles
-from models.doors import Table
 from models.recordings import Recording
+from models.schema import Table
 from models.vehicle import GRAVITY, Vehicle
 
 TINY = 1e-9  # rad: keeps Dugoff's λ finite at zero slip, where it does not matter

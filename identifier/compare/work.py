@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from models.doors import read_json
 from models.files import write_atomically
+from models.schema import read_json
 
 # Work spread over processes, in order; one worker stays in this process.
 

@@ -15,8 +15,8 @@ from codegen import load_library
 from codegen.template import filled
 from identifier.export.c_source import TEMPLATES
 from identifier.export.package import FORMAT, NAME, Package
-from models.doors import Table, read_json, read_text, shown
 from models.recordings import Recording
+from models.schema import Table, read_json, read_text, shown
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from identifier.axle import AxleDesign
 from identifier.baselines import StiffnessRls
 from identifier.method import FrozenModel, Method, Setup
 from identifier.paper.design import Design
-from identifier.refused import GATE, Limits, judges_samples
+from identifier.refused import GATE, SampleLimits, judges_samples
 from identifier.regression import RegressionDesign
 from models.recordings import Recording
 from models.vehicle import Vehicle
@@ -168,7 +168,7 @@ class FoldedStep(NamedTuple):
     min_speed: float
     rests_first: bool
     believed: str | None
-    limits: Limits
+    limits: SampleLimits
 
 
 def learnt_ports(method: Method, carry: Mapping[str, Array]) -> tuple[str, ...]:
@@ -232,7 +232,7 @@ def fold(
             not np.array_equal(setup.carry[port], moved.carry[port]) for port in setup.carry
         ),
         believed=GATE if judges_samples(setup.carry) else None,
-        limits=Limits.of(vehicle),
+        limits=SampleLimits.of(vehicle),
     )
 
 

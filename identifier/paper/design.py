@@ -18,9 +18,9 @@ from identifier.paper.laws import DRIVING_ERRORS, INPUT_SOURCES, INTEGRATORS, Ga
 from identifier.paper.network import Network, NetworkModel, Weights
 from identifier.paper.step import CARRY, GAINS, OVER, Structure, build_step
 from models.bicycle import BicycleParameters, bicycle
-from models.doors import Table, read_toml
 from models.recordings import Recording
 from models.rules import require_within
+from models.schema import Table, read_toml
 from models.vehicle import GRAVITY, Vehicle
 
 # How hard a car is driven: the conditions that a design is made for, judged at, and stored with.

@@ -25,9 +25,9 @@ from identifier.method import (
 )
 from identifier.tire_model import TireModel, drift
 from models.bicycle import BicycleParameters, linear_axle_force, slip_angles
-from models.doors import Table, require_few
 from models.recordings import Recording
 from models.rules import require_positive, require_within
+from models.schema import Table, require_few
 from models.vehicle import Vehicle
 
 # Signals that may enter the network, each with the value that counts as large for a passenger car.

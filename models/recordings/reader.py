@@ -13,15 +13,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from models.doors import (
-    LONGEST_NAME,
-    limits,
-    read_bytes,
-    require_few,
-    require_file,
-    shown,
-    unpack,
-)
 from models.recordings.checks import check_physics
 from models.recordings.record import (
     LARGEST,
@@ -30,6 +21,15 @@ from models.recordings.record import (
     Recording,
     RecordingError,
     resample,
+)
+from models.schema import (
+    LONGEST_NAME,
+    limits,
+    read_bytes,
+    require_few,
+    require_file,
+    shown,
+    unpack,
 )
 
 # Read the numeric columns of a log file: CSV, gzipped CSV or Parquet.

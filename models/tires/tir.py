@@ -15,7 +15,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from models.doors import read_bytes, shown
+from models.schema import read_bytes, shown
 from models.tires.magic_formula_coefficients import ESSENTIAL, Coefficients
 
 # Units of a tire property file: which keys have one, and what it is in SI.

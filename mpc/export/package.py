@@ -26,7 +26,7 @@ from mpc.problem import Problem
 from mpc.realtime import Measurement, Status, Tracker
 from mpc.realtime.c_source import c_sources
 from mpc.realtime.tracker import TOLERANCE as SOLVER_TOLERANCE
-from mpc.tires import TireModel
+from mpc.tires import PredictionTire
 from mpc.tires.tire import ALL
 
 # The parameters of a tracker as C and as JSON, in the order of the structure.
@@ -223,7 +223,7 @@ class MpcPackage(NamedTuple):
     """
 
     name: str
-    tire: TireModel
+    tire: PredictionTire
     problem: Problem
     params: NDArray[np.void]
     files: Mapping[str, str]
@@ -232,7 +232,7 @@ class MpcPackage(NamedTuple):
 
 
 def build_mpc_package(
-    tire: TireModel,
+    tire: PredictionTire,
     problem: Problem | None = None,
     *,
     period: float = 0.01,

@@ -13,7 +13,7 @@ from identifier.paper.network import NetworkModel
 from models.vehicle import GRAVITY
 from mpc.export.package import MpcPackage, build_mpc_package
 from mpc.problem import Problem
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 
 # C that turns what an identifier has learnt into the weights of the prediction.
 
@@ -149,7 +149,7 @@ def build_pair(
     """
     folded = identifier.folded
     tracker = build_mpc_package(
-        tire_model(frozen_start(identifier)),
+        prediction_tire(frozen_start(identifier)),
         problem,
         period=folded.dt,
         delay=delay,

@@ -15,7 +15,7 @@ from identifier.paper.design import Design
 from identifier.paper.laws import DRIVING_ERRORS
 from identifier.stability import certify
 from models.vehicle import GRAVITY, Vehicle
-from mpc.tires import TireModel
+from mpc.tires import PredictionTire
 from mpc.tires.tire import Car, Point
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ def law_complaint(method: Method, vehicle: Vehicle) -> str | None:
     return f"the certificate fails: {'; '.join(failed)}" if failed else None
 
 
-def tire_complaint(tire: TireModel, v_x: float, largest: float = LARGEST_SLIP) -> str | None:
+def tire_complaint(tire: PredictionTire, v_x: float, largest: float = LARGEST_SLIP) -> str | None:
     """Return why a tire must not be steered with at a speed, or None.
 
     Its forces are finite, push against the slip of their axle, rise from zero slip, and lie between
@@ -78,7 +78,7 @@ def tire_complaint(tire: TireModel, v_x: float, largest: float = LARGEST_SLIP) -
     return None
 
 
-def _forces(tire: TireModel, v_x: float, largest: float) -> tuple[Array, Array]:
+def _forces(tire: PredictionTire, v_x: float, largest: float) -> tuple[Array, Array]:
     """Return slips and forces (turns, axles, signs, slips) [rad, static axle loads]."""
     arm, load = car_numbers(tire.vehicle)[:, [0, 3]].T
     signs = np.array([1.0, -1.0])[:, None]

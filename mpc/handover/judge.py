@@ -21,7 +21,7 @@ from codegen import Scan
 from identifier.axle.car import car_numbers
 from models.rules import require_positive_fields
 from models.vehicle import GRAVITY
-from mpc.tires import TireModel
+from mpc.tires import PredictionTire
 from mpc.tires.tire import Car, Point
 
 Array = NDArray[np.float64]
@@ -98,7 +98,7 @@ class Window:
 SHORTEST_LAG = 1e-3  # m
 
 
-def axle_forces(tire: TireModel, weights: Array, samples: Array, dt: float) -> Array:
+def axle_forces(tire: PredictionTire, weights: Array, samples: Array, dt: float) -> Array:
     """Return the axle forces (k, n, 2) [N] of k tires, frame of the body; a lag begins settled.
 
     Parameters
@@ -238,7 +238,7 @@ class Judge:
         """
         return seconds + (self._settle + self._h + 1) * self.dt
 
-    def errors(self, tire: TireModel, samples: Array) -> tuple[Array, Array]:
+    def errors(self, tire: PredictionTire, samples: Array) -> tuple[Array, Array]:
         """Return e (m, 2) and the forces that it is the error of (m, 2) [static axle loads].
 
         Parameters
@@ -254,7 +254,7 @@ class Judge:
         e, force = self._errors(tire, tire.weights[None], samples)
         return e[0], force[0]
 
-    def misfit(self, tire: TireModel, samples: Array) -> Misfit:
+    def misfit(self, tire: PredictionTire, samples: Array) -> Misfit:
         """Return how badly a tire explains samples.
 
         Parameters
@@ -269,7 +269,7 @@ class Judge:
         """
         return self.misfits(tire, tire.weights[None], samples)[0]
 
-    def misfits(self, tire: TireModel, weights: Array, samples: Array) -> list[Misfit]:
+    def misfits(self, tire: PredictionTire, weights: Array, samples: Array) -> list[Misfit]:
         """Return how badly k tires explain samples.
 
         Parameters
@@ -298,7 +298,7 @@ class Judge:
             for one, error in zip(mean, rms, strict=True)
         ]
 
-    def _errors(self, tire: TireModel, weights: Array, samples: Array) -> tuple[Array, Array]:
+    def _errors(self, tire: PredictionTire, weights: Array, samples: Array) -> tuple[Array, Array]:
         """Return e and forces of k tires (k, m, 2) [static axle loads]."""
         n, least = len(samples), self._settle + self._h
         if n <= least:

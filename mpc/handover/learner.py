@@ -11,7 +11,7 @@ from mpc.handover.consistency import Consistency, FullSample
 from mpc.handover.rules import Decision, Verdict
 from mpc.handover.supervisor import Supervisor
 from mpc.realtime import Tracker
-from mpc.tires import TireModel
+from mpc.tires import PredictionTire
 from mpc.tires.tire import reach_of
 
 # Moving weights to new ones so gently that the plan does not jump.
@@ -26,18 +26,18 @@ class Step(NamedTuple):
     jump : of the steering rate that comes from it [rad/s].   arrived : whether nothing is left.
     """
 
-    tire: TireModel
+    tire: PredictionTire
     share: float
     jump: float
     arrived: bool
 
 
 def blended(
-    now: TireModel,
-    target: TireModel,
+    now: PredictionTire,
+    target: PredictionTire,
     share: float,
     *,
-    planned: Callable[[TireModel], float],
+    planned: Callable[[PredictionTire], float],
     most: float,
 ) -> Step:
     """Return the next weights on the way to a target, on which the plan does not jump.
@@ -77,7 +77,7 @@ def blended(
 # What a tracker would plan with other weights, in the situation that it is in.
 
 
-def previewed_rate(tracker: Tracker, tire: TireModel) -> float:
+def previewed_rate(tracker: Tracker, tire: PredictionTire) -> float:
     """Return the first steering rate of the plan after one more iteration with a tire [rad/s].
 
     From the plan and the road of the last step; the tracker is left as it was.

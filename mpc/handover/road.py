@@ -8,7 +8,7 @@ import numpy as np
 from mpc.handover.certificate import tire_complaint
 from mpc.handover.judge import Array, Judge, Misfit, Window
 from mpc.handover.rules import Rules, Verdict
-from mpc.tires import TireModel
+from mpc.tires import PredictionTire
 from mpc.tires.ladder import N_AXLE, N_COMMON, LadderAxles
 from mpc.tires.network import NetworkAxles
 
@@ -30,12 +30,12 @@ class FrictionFit(NamedTuple):
     """
 
     ratio: float
-    tire: TireModel
+    tire: PredictionTire
     misfit: Misfit
     gain: float
 
 
-def can_scale(tire: TireModel) -> bool:
+def can_scale(tire: PredictionTire) -> bool:
     """Return whether a tire can be told for another friction.
 
     Parameters
@@ -47,7 +47,7 @@ def can_scale(tire: TireModel) -> bool:
     return isinstance(tire.structure, LadderAxles)
 
 
-def at_friction(tire: TireModel, ratio: float) -> TireModel:
+def at_friction(tire: PredictionTire, ratio: float) -> PredictionTire:
     """Return a tire where the friction is another.
 
     Parameters
@@ -79,7 +79,7 @@ def at_friction(tire: TireModel, ratio: float) -> TireModel:
 
 def fit_friction(
     judge: Judge,
-    tire: TireModel,
+    tire: PredictionTire,
     samples: Array,
     *,
     known: float = 1.0,
@@ -129,12 +129,12 @@ class Road(NamedTuple):
     where another one was learnt since: that road may come back.
     """
 
-    base: TireModel
+    base: PredictionTire
     ratio: float = 1.0
     changed_at: float = -math.inf
-    before: TireModel | None = None
+    before: PredictionTire | None = None
 
-    def on(self, learnt: TireModel) -> "Road":
+    def on(self, learnt: PredictionTire) -> "Road":
         """Return the same road where another tire was learnt on it.
 
         Parameters
@@ -150,7 +150,7 @@ class Change(NamedTuple):
 
     verdict: Verdict
     road: Road
-    tire: TireModel
+    tire: PredictionTire
     before: float
     after: float
 
@@ -165,7 +165,7 @@ class Change(NamedTuple):
 
 def look_at_road(
     road: Road,
-    in_use: TireModel,
+    in_use: PredictionTire,
     window: Window,
     *,
     t: float,
@@ -236,7 +236,7 @@ def look_at_road(
 
 def _the_road_before(
     road: Road,
-    in_use: TireModel,
+    in_use: PredictionTire,
     window: Window,
     *,
     t: float,

@@ -12,7 +12,7 @@ from mpc.handover.certificate import LARGEST_SLIP, law_complaint, tire_complaint
 from mpc.handover.judge import Judge, Misfit, Window
 from mpc.handover.road import Road, look_at_road
 from mpc.handover.rules import Decision, Rules, Verdict
-from mpc.tires import TireModel, tire_model
+from mpc.tires import PredictionTire, prediction_tire
 from mpc.tires.ladder import LadderAxles
 
 Array = NDArray[np.float64]
@@ -74,7 +74,7 @@ class Excitation:
                     )
         return None
 
-    def trusted_slip(self, tire: TireModel) -> float:
+    def trusted_slip(self, tire: PredictionTire) -> float:
         """Return up to which slip [rad] a tire is to be judged.
 
         Ladders saturate whatever they have seen; any other tire only as far as the car slipped.
@@ -132,7 +132,7 @@ class Supervisor:
     def __init__(
         self,
         identifier: OnlineIdentifier,
-        in_use: TireModel,
+        in_use: PredictionTire,
         rules: Rules | None = None,
         judge: Judge | None = None,
         *,
@@ -159,11 +159,11 @@ class Supervisor:
         self.decisions: list[Decision] = []
         self.last = Decision(0.0, Verdict.KEEP, "nothing was driven yet", 0.0, 0.0)
 
-    def _require_fit_for_use(self, in_use: TireModel) -> None:
+    def _require_fit_for_use(self, in_use: PredictionTire) -> None:
         complaint = law_complaint(self.identifier.method, self.identifier.vehicle)
         if complaint is not None:
             raise ValueError(complaint)
-        learnt = tire_model(self.identifier.model()).structure
+        learnt = prediction_tire(self.identifier.model()).structure
         if learnt != in_use.structure:
             raise ValueError(
                 f"what is learnt ({learnt}) cannot replace what is steered with "
@@ -304,7 +304,7 @@ class Supervisor:
         except (DivergedError, CannotFreezeError, ValueError) as error:
             return self._keep(str(error), now.total)
         complaint = self._excitation.complaint(model, samples)
-        candidate = tire_model(model)
+        candidate = prediction_tire(model)
         trusted = self._excitation.trusted_slip(candidate)
         complaint = complaint or tire_complaint(candidate, v_x, trusted)
         if complaint is not None:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from models.doors import require_few
+from models.schema import require_few
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from scipy.sparse.linalg import splu
 
-from models.doors import limits, read_text, require_few, shown
+from models.schema import limits, read_text, require_few, shown
 from mpc.path.line import Array, Line, PathError, uniform_grid
 
 LEAST, MOST = -12.0, 18.0  # exponents of λ over the sixth power of the mean gap

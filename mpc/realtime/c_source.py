@@ -13,7 +13,7 @@ from codegen.tuned import tuned
 from mpc.prediction import build_end, build_rk4, build_stage, state_size
 from mpc.problem import N_ERRORS
 from mpc.realtime.fall_back import N_GAINS, N_SPEEDS
-from mpc.tires.tire import PredictionTire
+from mpc.tires.tire import TireStructure
 
 TEMPLATES = Path(__file__).parents[1] / "c"
 FILES: Mapping[str, str] = {  # template: path in a package
@@ -49,7 +49,7 @@ READ: Mapping[str, str] = {
 
 
 def c_sources(
-    structure: PredictionTire,
+    structure: TireStructure,
     *,
     horizon: int,
     name: str,
@@ -124,7 +124,7 @@ def _filled(template: str, values: Values) -> str:
     return filled(TEMPLATES / template, values)
 
 
-def _free_motion(structure: PredictionTire) -> ca.Function:
+def _free_motion(structure: TireStructure) -> ca.Function:
     """Return a step of the prediction without an input, tuned as the stage is."""
     rk4 = build_rk4(structure)
     names = [port for port in rk4.name_in() if port != "u"]

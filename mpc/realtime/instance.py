@@ -18,7 +18,7 @@ from mpc.prediction import state_size
 from mpc.problem import N_ERRORS, Guards, Problem
 from mpc.realtime.c_source import c_sources, one_file
 from mpc.realtime.fall_back import N_GAINS, N_SPEEDS
-from mpc.tires.tire import PredictionTire
+from mpc.tires.tire import TireStructure
 
 Array = NDArray[np.float64]
 
@@ -173,7 +173,7 @@ NAME = "mpc"
 PACKAGES = ("codegen", "models", "identifier", "mpc")  # whose text makes the text
 
 
-def tracker_source(structure: PredictionTire, horizon: int, *, single: bool) -> str:
+def tracker_source(structure: TireStructure, horizon: int, *, single: bool) -> str:
     """Return the C of a tracker, generated or found again by everything that it depends on.
 
     Parameters
@@ -196,7 +196,7 @@ def tracker_source(structure: PredictionTire, horizon: int, *, single: bool) -> 
     return text
 
 
-def _generated(structure: PredictionTire, horizon: int, single: bool) -> str:
+def _generated(structure: TireStructure, horizon: int, single: bool) -> str:
     about = {"title": "The tracker", "version": "", "version_text": NAME}
     files = c_sources(structure, horizon=horizon, name=NAME, about=about)
     return one_file(files, name=NAME, single=single)
@@ -248,7 +248,7 @@ class Instance:
         Where the compiler refuses the code.
     """
 
-    def __init__(self, structure: PredictionTire, horizon: int, *, single: bool) -> None:
+    def __init__(self, structure: TireStructure, horizon: int, *, single: bool) -> None:
         library = load_library(tracker_source(structure, horizon, single=single), "tracker", FLAGS)
         if library is None:
             raise NoCompilerError("no C compiler found: the tracker cannot be built")

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from mpc.problem import Guards, Problem
 from mpc.realtime.fall_back import fall_back
 from mpc.realtime.instance import N_COMMANDS, Command, Instance, Measurement, Status, set_params
-from mpc.tires.tire import TireModel, reach_of
+from mpc.tires.tire import PredictionTire, reach_of
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ class Tracker:
 
     def __init__(
         self,
-        tire: TireModel,
+        tire: PredictionTire,
         problem: Problem | None = None,
         *,
         period: float = 0.01,
@@ -125,7 +125,7 @@ class Tracker:
         """A copy of the numbers that the C reads, of `mpc.realtime.instance.params_type`."""
         return self.instance.params.copy()
 
-    def set_tire(self, tire: TireModel) -> None:
+    def set_tire(self, tire: PredictionTire) -> None:
         """Go on with other weights, the car that they are of and the slip that is of use to it.
 
         Parameters

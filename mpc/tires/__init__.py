@@ -1,7 +1,14 @@
 """Tires for the prediction: a compiled structure, and weights that are read at run time."""
 
-from mpc.tires.door import tire_model
+from mpc.tires.factory import prediction_tire
 from mpc.tires.ladder import CurveFitError, oracle_tire
-from mpc.tires.tire import Car, PredictionTire, TireModel
+from mpc.tires.tire import Car, PredictionTire, TireStructure
 
-__all__ = ["Car", "CurveFitError", "PredictionTire", "TireModel", "oracle_tire", "tire_model"]
+__all__ = [
+    "Car",
+    "CurveFitError",
+    "PredictionTire",
+    "TireStructure",
+    "oracle_tire",
+    "prediction_tire",
+]

@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from models.vehicle import Vehicle
-from mpc.tires.tire import Array, Pair, Point, TireModel, no_lag, small_slip, wheel_slip
+from mpc.tires.tire import Array, Pair, Point, PredictionTire, no_lag, small_slip, wheel_slip
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +128,7 @@ class LinearAxles:
         return w[0] * slip[0], w[1] * slip[1]
 
 
-def linear_tire(vehicle: Vehicle, stiffness: Array | None = None) -> TireModel:
+def linear_tire(vehicle: Vehicle, stiffness: Array | None = None) -> PredictionTire:
     """Return the tire of the linear bicycle.
 
     Parameters
@@ -137,4 +137,4 @@ def linear_tire(vehicle: Vehicle, stiffness: Array | None = None) -> TireModel:
     stiffness : C_f, C_r per axle [N/rad] (2,); None takes those that the vehicle states.
     """
     weights = vehicle.bicycle[4:] if stiffness is None else stiffness
-    return TireModel(LinearAxles(), np.array(weights, dtype=np.float64), vehicle)
+    return PredictionTire(LinearAxles(), np.array(weights, dtype=np.float64), vehicle)

@@ -14,7 +14,7 @@ from identifier.axle.slip import SHORTEST
 from models.plant.dynamics import wheel_loads
 from models.tires import MagicFormula, Tire
 from models.vehicle import GRAVITY, Vehicle, VehicleError
-from mpc.tires.tire import Array, Pair, Point, TireModel, wheel_slip
+from mpc.tires.tire import Array, Pair, Point, PredictionTire, wheel_slip
 
 N_COMMON = 3
 N_AXLE = 2  # beside the w_j
@@ -124,7 +124,7 @@ def ladder_weights(
     return np.concatenate([offset, [shortest], 1.0 / np.asarray(ladder), axles.ravel()])
 
 
-def axle_tire(model: AxleModel) -> TireModel:
+def axle_tire(model: AxleModel) -> PredictionTire:
     """Return the prediction tire of a frozen axle model.
 
     The sway of its body takes k ρ'/(ω² v_x) off the slip, ρ in steady cornering the force of the
@@ -147,7 +147,7 @@ def axle_tire(model: AxleModel) -> TireModel:
         shortest=shortest,
         offset=(model.own[0, 2], model.own[1, 2]),
     )
-    return TireModel(LadderAxles(units=ladder.size), weights, model.vehicle)
+    return PredictionTire(LadderAxles(units=ladder.size), weights, model.vehicle)
 
 
 # A force curve, tabulated over slip, as a ladder of tanh: a linear least-squares fit.
@@ -234,7 +234,7 @@ LARGEST_SLIP = 0.5  # rad, where the table ends; less where friction is low
 HALVINGS = 50
 
 
-def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> TireModel:
+def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> PredictionTire:
     """Return the axle curves of a car on its true tires, lagged by their relaxation lengths.
 
     Load transfer and camber are quasi-steady; drive forces are left out. The sedan's Magic
@@ -265,7 +265,7 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
     return _fitted_tire(vehicle, alpha, force, lengths)
 
 
-def mounted_tire(vehicle: Vehicle, tire: Tire) -> TireModel:
+def mounted_tire(vehicle: Vehicle, tire: Tire) -> PredictionTire:
     """Return two tires an axle at its static load, without lag.
 
     Parameters
@@ -321,9 +321,11 @@ def _both_sides(tire: Tire, alpha: Any, camber: Any, loads: Any, mu: float) -> A
     return sum(one.forces(alpha, 0.0, camber, load, mu).F_y for one, load in pairs)
 
 
-def _fitted_tire(vehicle: Vehicle, alpha: Array, force: Array, lengths: Array | None) -> TireModel:
+def _fitted_tire(
+    vehicle: Vehicle, alpha: Array, force: Array, lengths: Array | None
+) -> PredictionTire:
     ladder, W = fitted_ladder(alpha, force)
     least = np.zeros(2) if lengths is None else lengths
     weights = ladder_weights(ladder, W, compliance=np.zeros(2), least=least)
     structure = LadderAxles(units=ladder.size, lagged=lengths is not None)
-    return TireModel(structure, weights, vehicle)
+    return PredictionTire(structure, weights, vehicle)

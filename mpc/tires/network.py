@@ -10,7 +10,7 @@ import numpy as np
 from identifier.own_network import OnnxModel, read_network
 from identifier.paper.network import NetworkModel, network_signals
 from models.bicycle import BicycleParameters
-from mpc.tires.tire import Array, Pair, Point, TireModel, no_lag, small_slip
+from mpc.tires.tire import Array, Pair, Point, PredictionTire, no_lag, small_slip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +57,7 @@ class NetworkAxles:
         return w[0] * slip[0] + residual[0], w[1] * slip[1] + residual[1]
 
 
-def network_tire(model: NetworkModel) -> TireModel:
+def network_tire(model: NetworkModel) -> PredictionTire:
     """Return the prediction tire of a frozen network.
 
     Parameters
@@ -73,7 +73,7 @@ def network_tire(model: NetworkModel) -> TireModel:
         ]
     )
     structure = NetworkAxles(hidden=network.hidden, inputs=network.inputs)
-    return TireModel(structure, weights, model.vehicle)
+    return PredictionTire(structure, weights, model.vehicle)
 
 
 # A user's network as a prediction tire; the numbers of its tensors become run-time weights.
@@ -128,7 +128,7 @@ def _loaded(program: str) -> ca.Function:
     return ca.Function.deserialize(program)
 
 
-def onnx_tire(model: OnnxModel) -> TireModel:
+def onnx_tire(model: OnnxModel) -> PredictionTire:
     """Return the prediction tire of a user's network.
 
     Parameters
@@ -142,7 +142,7 @@ def onnx_tire(model: OnnxModel) -> TireModel:
         slip_sign=model.slip_sign,
         n_weights=weights.size,
     )
-    return TireModel(structure, weights, model.vehicle)
+    return PredictionTire(structure, weights, model.vehicle)
 
 
 @cache

@@ -38,7 +38,7 @@ class Point(NamedTuple):
     w: Any
 
 
-class PredictionTire(Protocol):
+class TireStructure(Protocol):
     """Formulas of the axle forces, hashable and equal where they compile to the same code.
 
     Written with `ca.tanh`, `ca.atan` and the like: the stage replaces them by our own, after it has
@@ -82,10 +82,10 @@ class PredictionTire(Protocol):
         """
 
 
-class TireModel(NamedTuple):
+class PredictionTire(NamedTuple):
     """A structure with its weights (n_weights,), and the car that they are of."""
 
-    structure: PredictionTire
+    structure: TireStructure
     weights: Array
     vehicle: Vehicle
 
@@ -95,7 +95,7 @@ class TireModel(NamedTuple):
         return np.array(self.vehicle.bicycle[:4])
 
 
-def wheel_slip(self: PredictionTire, at: Point) -> Pair:
+def wheel_slip(self: TireStructure, at: Point) -> Pair:
     """Return α = δ - atan((v_y ± l r)/v_x) [rad]; the rear wheels do not steer. A method `slip`.
 
     Parameters
@@ -109,7 +109,7 @@ def wheel_slip(self: PredictionTire, at: Point) -> Pair:
     return front, -ca.atan((v_y - car.l_r * r) * per_speed)
 
 
-def small_slip(self: PredictionTire, at: Point) -> Pair:
+def small_slip(self: TireStructure, at: Point) -> Pair:
     """Return α = δ - (v_y ± l r)/v_x [rad], as the paper's (3) has it. A method `slip`.
 
     Parameters
@@ -122,7 +122,7 @@ def small_slip(self: PredictionTire, at: Point) -> Pair:
     return delta - (v_y + car.l_f * r) * per_speed, -(v_y - car.l_r * r) * per_speed
 
 
-def no_lag(self: PredictionTire, slip: Pair, at: Point) -> Pair:
+def no_lag(self: TireStructure, slip: Pair, at: Point) -> Pair:
     """Return 0 m: force follows slip at once. A method `lag_length`.
 
     Parameters
@@ -157,7 +157,7 @@ class Reach(NamedTuple):
 ALL = Reach(np.full(2, np.inf), np.zeros(2))  # the curves as they are
 
 
-def reach_of(tire: TireModel, most: tuple[float, float]) -> Reach:
+def reach_of(tire: PredictionTire, most: tuple[float, float]) -> Reach:
     """Return how far the curves of a tire are believed, and how they go on.
 
     They go on straight, but never with less than 4 % of their slope at zero.
@@ -173,7 +173,7 @@ def reach_of(tire: TireModel, most: tuple[float, float]) -> Reach:
     return Reach(slip, np.maximum(np.maximum(there, LEAST_RISE * slopes[:, 0]), 0.0))
 
 
-def useful_slip(tire: TireModel) -> Array:
+def useful_slip(tire: PredictionTire) -> Array:
     """Return the slip [rad] where the slope of each axle's force falls below 5 % of its first.
 
     Infinite where it never does: a linear tire, and a network that reads other signals than slip.
@@ -185,7 +185,7 @@ def useful_slip(tire: TireModel) -> Array:
     return _useful(curve_slopes(tire))
 
 
-def curve_slopes(tire: TireModel) -> Array:
+def curve_slopes(tire: PredictionTire) -> Array:
     """Return dF/dα of the axles at `SLIPS` (2, k) [N/rad], straight ahead.
 
     Parameters
@@ -196,7 +196,7 @@ def curve_slopes(tire: TireModel) -> Array:
 
 
 def believed_force(
-    structure: PredictionTire, slip: Pair, at: Point, max_slip: Any, rise: Any
+    structure: TireStructure, slip: Pair, at: Point, max_slip: Any, rise: Any
 ) -> Any:
     """Return the axle forces that the tracker believes [N], (2,).
 
@@ -224,7 +224,7 @@ def _useful(slopes: Array) -> Array:
 
 
 @cache
-def _slopes(structure: PredictionTire) -> ca.Function:
+def _slopes(structure: TireStructure) -> ca.Function:
     """Return dF/dα (2, k) of slips (1, k), straight ahead."""
     slip, w, numbers = ca.SX.sym("slip"), ca.SX.sym("w", structure.n_weights), ca.SX.sym("car", 4)
     at = Point(0.0, 0.0, 0.0, SPEED, Car(*ca.vertsplit(numbers)), w)

@@ -10,7 +10,7 @@ from identifier.axle import AxleDesign
 from identifier.export.fold import fold
 from identifier.export.package import synthetic_samples
 from identifier.methods import METHODS, make_method
-from identifier.refused import Limits, stale_samples
+from identifier.refused import SampleLimits, stale_samples
 from identifier.run import OnlineIdentifier
 from models.maneuvers import Slalom
 from models.plant import Plant
@@ -184,7 +184,7 @@ def test_before_the_first_sample_nothing_begins(slalom):
 
 
 def test_the_limits_are_those_of_the_car_s_size():
-    limits = Limits.of(CAR)
+    limits = SampleLimits.of(CAR)
     good = (20.0, 0.5, 0.3, 0.05, 0.0)
     assert limits.accept(*good)
     for channel, most in enumerate((limits.speed, limits.speed, limits.yaw_rate, 1.5, 1.5)):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from models.doors import (
+from models.schema import (
     VARIABLE,
     LimitError,
     Limits,

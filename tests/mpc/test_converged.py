@@ -13,7 +13,7 @@ from mpc.converged import NotConvergedError, build_errors, numbers, solve_conver
 from mpc.prediction import build_rk4
 from mpc.problem import Cost, Limits, Problem
 from mpc.realtime import Status, Tracker
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 from mpc.tires.ladder import oracle_tire
 from mpc.tires.tire import reach_of
 
@@ -32,7 +32,7 @@ CASES = {
 
 @pytest.fixture(scope="module", params=["linear", "lagging curve"])
 def tire(request):
-    return tire_model(sedan()) if request.param == "linear" else oracle_tire(sedan())
+    return prediction_tire(sedan()) if request.param == "linear" else oracle_tire(sedan())
 
 
 @pytest.fixture(scope="module")
@@ -125,12 +125,12 @@ def test_another_tire_has_another_answer(tire):
 
 
 def test_ipopt_says_when_it_gives_up():
-    tire = tire_model(sedan())
+    tire = prediction_tire(sedan())
     with pytest.raises(NotConvergedError, match="IPOPT ended with"):
         solve_converged(tire, PROBLEM, [0.0, 0.0, 0.0, 0.0, 0.5], 0.0, 20.0)  # wheels beyond
 
 
 def test_a_number_serves_for_every_stage():
-    tire = tire_model(sedan())
+    tire = prediction_tire(sedan())
     whole = numbers(PROBLEM, tire, np.full(PROBLEM.horizon, 0.01), np.full(PROBLEM.horizon, 20.0))
     np.testing.assert_array_equal(numbers(PROBLEM, tire, 0.01, 20.0), whole)

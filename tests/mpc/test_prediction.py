@@ -11,7 +11,7 @@ from models.tires import DugoffTire, FialaTire
 from models.vehicle import sedan
 from mpc.prediction import build_dynamics, build_end, build_rk4, build_stage, state_size
 from mpc.problem import Cost, tracking_errors
-from mpc.tires import TireModel, oracle_tire, tire_model
+from mpc.tires import PredictionTire, oracle_tire, prediction_tire
 from mpc.tires.ladder import LadderAxles, ladder_weights
 from mpc.tires.tire import ALL, reach_of
 
@@ -39,20 +39,20 @@ def ladder():
         shortest=0.003,
         offset=(0.01, 0.1),
     )
-    return TireModel(LadderAxles(units=4), weights, CAR)
+    return PredictionTire(LadderAxles(units=4), weights, CAR)
 
 
 MAGIC = np.array([[11.0, 1.4, 7600.0], [12.0, 1.35, 6000.0]])
 WHEEL = {"C_alpha": 6e4, "C_kappa": 8e4, "friction": 0.9}
 TIRES = {
-    "linear": tire_model(CAR),
-    "network": tire_model(network()),
+    "linear": prediction_tire(CAR),
+    "network": prediction_tire(network()),
     "ladder": ladder(),
-    "magic": tire_model(
+    "magic": prediction_tire(
         CurveModel(vehicle=CAR, curve="magic_formula", parameters=MAGIC, min_speed=1.0)
     ),
-    "dugoff": tire_model(DugoffTire(**WHEEL), CAR),
-    "fiala": tire_model(FialaTire(**WHEEL), CAR),
+    "dugoff": prediction_tire(DugoffTire(**WHEEL), CAR),
+    "fiala": prediction_tire(FialaTire(**WHEEL), CAR),
     "oracle": oracle_tire(CAR),
 }
 
@@ -160,7 +160,7 @@ def test_a_straight_on_the_left_mirrors_one_on_the_right():
 
 
 def test_other_weights_need_no_other_function():
-    one, other = (tire_model(network(seed)) for seed in (0, 1))
+    one, other = (prediction_tire(network(seed)) for seed in (0, 1))
     stage = build_stage(one.structure)
     assert build_stage(other.structure) is stage
     given = next(situations(one))
@@ -171,7 +171,7 @@ def test_other_weights_need_no_other_function():
     assert not np.allclose(before, after)
     expected = differentiated(other.structure)(*given[:6], other.weights, *ALL)[1]
     np.testing.assert_allclose(after, np.array(expected), atol=1e-10)
-    assert build_stage(tire_model(network(hidden=8)).structure) is not stage
+    assert build_stage(prediction_tire(network(hidden=8)).structure) is not stage
 
 
 def test_a_lag_too_short_for_the_stage_is_half_of_it():
@@ -186,7 +186,7 @@ def test_the_shortest_lag_decays_within_a_stage():
     weights = ladder_weights(
         np.array([0.1]), np.zeros((2, 1)), compliance=np.zeros(2), least=np.array([0.1, 0.1])
     )
-    tire = TireModel(LadderAxles(units=1), weights, CAR)
+    tire = PredictionTire(LadderAxles(units=1), weights, CAR)
     given = [np.zeros(7), 0.0, 0.0, 40.0, 0.05, tire.car, tire.weights, *ALL, np.zeros(7)]
     A = np.array(build_stage(tire.structure)(*given)[1])
     z = -2.0  # a stage over half of it

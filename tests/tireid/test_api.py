@@ -15,7 +15,7 @@ from identifier.export.package import build_package
 from identifier.methods import make_method
 from models.recordings import RecordingError
 from mpc.prediction import build_dynamics
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 from tireid.cli import main
 from tireid.commands import COMMANDS
 
@@ -246,7 +246,7 @@ def test_stiffness_is_the_slope_at_zero(tires, name):
 def test_the_equations_of_motion_are_those_of_the_tracker(tires, name):
     """In the frame of a straight path at heading 0 the tracker's v̇_y, ṙ are the car's."""
     tire = tires[name]
-    theirs = tire_model(tire)
+    theirs = prediction_tire(tire)
     tracker, dynamics = build_dynamics(theirs.structure), tire.casadi_function().dynamics
     for v_y, r, delta in STATES:
         slips = [0.03, -0.02] if tire.lagged else []

@@ -14,7 +14,7 @@ from mpc.cars import DoubleTrackCar
 from mpc.loop import CarSensors
 from mpc.loop.sensing import cornering_limit
 from mpc.realtime import NoCompilerError
-from mpc.tires import oracle_tire, tire_model
+from mpc.tires import oracle_tire, prediction_tire
 from tireid.cli import main
 from tireid.commands import drive_results, drive_runs
 from tireid.commands import drive_source as drive_learn
@@ -164,7 +164,7 @@ def test_the_drive_to_learn_on_slides_but_neither_spins_nor_tips():
     slip = np.abs(recording.alpha(car.vehicle.l_f, car.vehicle.l_r)).max(axis=0)
     assert (slip > np.radians(3.5)).all()
     assert np.abs(recording.a_y).max() > 0.9 * grip
-    learnt = steady_curve("", tire_model(drive_learn.learn("axle", recording, sedan())), 20.0)
+    learnt = steady_curve("", prediction_tire(drive_learn.learn("axle", recording, sedan())), 20.0)
     true = steady_curve("", oracle_tire(car.vehicle, car.tire), 20.0)
     within = np.abs(true.alpha) < np.radians(4.0)
     np.testing.assert_allclose(learnt.force[within], true.force[within], atol=300.0)

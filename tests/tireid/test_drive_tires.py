@@ -9,7 +9,7 @@ import pytest
 from identifier.paper.network import Network, NetworkModel, Weights
 from models.vehicle import sedan
 from mpc.path import Path
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 from tireid.commands.drive_results import known_curves, steady_curve
 from tireid.commands.drive_runs import FROZEN, LEARNING, LINEAR, ORACLE, Setup, SpeedWish
 from tireid.figures.drive import AT_THE_END
@@ -32,7 +32,7 @@ def setup():
 
 
 def test_the_linear_tire_is_a_line_of_its_stiffness():
-    curve = steady_curve("linear", tire_model(CAR), 16.0)
+    curve = steady_curve("linear", prediction_tire(CAR), 16.0)
     slope = [CAR.cornering_stiffness_front, CAR.cornering_stiffness_rear]
     small = np.abs(curve.alpha) < 0.02
     np.testing.assert_allclose(curve.force[small], curve.alpha[small, None] * slope, rtol=1e-6)
@@ -47,9 +47,9 @@ def test_the_true_tire_is_shown_on_the_first_and_on_the_last_friction(setup):
 
 
 def test_what_a_tracker_was_told_later_is_shown_as_the_end(setup):
-    soft = tire_model(replace(CAR, cornering_stiffness_front=4e4))
+    soft = prediction_tire(replace(CAR, cornering_stiffness_front=4e4))
     same = SimpleNamespace(label=FROZEN, model=soft, final=soft)
-    changed = SimpleNamespace(label=LEARNING, model=tire_model(CAR), final=soft)
+    changed = SimpleNamespace(label=LEARNING, model=prediction_tire(CAR), final=soft)
     labels = [curve.label for curve in known_curves([same, changed], setup, None)]
     assert FROZEN in labels and FROZEN + AT_THE_END not in labels
     assert LEARNING + AT_THE_END in labels and LEARNING not in labels
@@ -66,7 +66,7 @@ def test_a_network_is_shown_sliding_sideways_as_fast_as_the_slip_says(v_x):
         force_unit=1500.0,
         min_speed=1.0,
     )
-    curve = steady_curve("network", tire_model(model), v_x)
+    curve = steady_curve("network", prediction_tire(model), v_x)
     v_y = -v_x * np.tan(curve.alpha)
     slope = np.array([CAR.cornering_stiffness_front, CAR.cornering_stiffness_rear])
     learnt = 1500.0 * W @ np.tanh(V * v_y / 4.0)

@@ -14,7 +14,7 @@ from identifier.run import identify
 from models.recordings import read_recording
 from models.vehicle import sedan
 from mpc.export import processor as figures
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 from tireid import exporting
 from tireid.cli import main
 
@@ -74,7 +74,7 @@ def test_the_tracker_begins_with_learnt_weights_and_another_car(tmp_path, logs):
     out = tmp_path / "package"
     assert main(["export", str(out), "--mpc", "--weights", str(tmp_path / "weights.json")]) == 0
     manifest = json.loads((out / "mpc" / "tireid_mpc.json").read_text())
-    np.testing.assert_array_equal(manifest["params"]["weights"], tire_model(model).weights)
+    np.testing.assert_array_equal(manifest["params"]["weights"], prediction_tire(model).weights)
     assert manifest["params"]["car"] == list(CAR.bicycle[:4])
 
 

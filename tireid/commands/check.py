@@ -31,9 +31,9 @@ from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS, with_kee
 from identifier.stability.loop import direction_matrix, linear_law
 from identifier.stability.monte_carlo import Beginning, Observed, monte_carlo
 from identifier.stability.operation import proven_bounds
-from models.doors import require_few
 from models.files import write_atomically
 from models.recordings import Recording
+from models.schema import require_few
 from models.vehicle import Vehicle, sedan
 from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import (

@@ -18,8 +18,8 @@ from identifier.defaults import default_design
 from identifier.method import Method
 from identifier.methods import METHODS
 from identifier.own_network import FrozenMethod
-from models.doors import require_few
 from models.recordings import Recording
+from models.schema import require_few
 from models.vehicle import Vehicle, sedan
 from tireid.commands import COMMANDS
 from tireid.commands.compare_results import comparison_text, pair_tables, write_comparison

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from identifier.method import FrozenModel, vehicle_numbers
-from models.doors import require_few
 from models.faults import KINDS, SIZED, FaultError, SensorFault
 from models.files import digest
+from models.schema import require_few
 from models.vehicle import Vehicle
 from mpc.loop import CarSensors, FaultySensors
 from mpc.path import BUILT_IN

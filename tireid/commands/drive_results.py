@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from identifier.method import FrozenModel
 from models.files import digest
 from mpc.loop import Drive
-from mpc.tires import Car, CurveFitError, TireModel, tire_model
+from mpc.tires import Car, CurveFitError, PredictionTire, prediction_tire
 from mpc.tires.tire import Point
 from tireid import __version__
 from tireid.animation import write_film
@@ -149,7 +149,7 @@ LARGEST = 0.35  # slip up to which curves are drawn [rad]
 POINTS = 281
 
 
-def steady_curve(label: str, model: TireModel, v_x: float) -> TireCurve:
+def steady_curve(label: str, model: PredictionTire, v_x: float) -> TireCurve:
     """Return the steady axle forces of a tire over slip, by sliding sideways without yawing.
 
     Parameters
@@ -176,9 +176,9 @@ def known_curves(runs: Sequence[Run], setup: Setup, learnt: FrozenModel | None) 
     setup : path, car and road.
     learnt : the frozen tires, if there are any.
     """
-    models = {LINEAR: tire_model(setup.vehicle)}
+    models = {LINEAR: prediction_tire(setup.vehicle)}
     if learnt is not None:
-        models[FROZEN] = tire_model(learnt, setup.vehicle)
+        models[FROZEN] = prediction_tire(learnt, setup.vehicle)
     for run in runs:
         if run.label != LEARNING:
             models[run.label] = run.model

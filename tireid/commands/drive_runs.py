@@ -36,7 +36,7 @@ from mpc.loop.sensing import cornering_limit
 from mpc.path import BUILT_IN, Path, grip_speed, steady_speed
 from mpc.problem import Problem
 from mpc.realtime import NoCompilerError, Tracker
-from mpc.tires import TireModel, oracle_tire, tire_model
+from mpc.tires import PredictionTire, oracle_tire, prediction_tire
 from tireid.progress import Ticker
 
 # What `tireid drive` drives: a path, a car on its road, and how fast.
@@ -94,7 +94,7 @@ class Setup:
         make: Callable[..., Car] = multi_body_car if self.plant == "multi-body" else drift_car
         return make(friction=friction, period=PERIOD)
 
-    def oracle(self, mu: float | None = None) -> TireModel:
+    def oracle(self, mu: float | None = None) -> PredictionTire:
         """Return the true tire on a road.
 
         Parameters
@@ -171,7 +171,7 @@ class Setup:
 
 
 @cache
-def _oracle(vehicle: Vehicle, tire: Hashable, mu: float) -> TireModel:
+def _oracle(vehicle: Vehicle, tire: Hashable, mu: float) -> PredictionTire:
     return oracle_tire(vehicle, cast(Tire, tire), mu)
 
 
@@ -299,7 +299,7 @@ def make_learner(learnt: FrozenModel, vehicle: Vehicle) -> Learner:
     except ValueError as error:
         raise ValueError(f"--tires learning: {error}") from None
     identifier = OnlineIdentifier(method, vehicle, PERIOD, learnt)
-    return Learner(Supervisor(identifier, tire_model(learnt, vehicle)))
+    return Learner(Supervisor(identifier, prediction_tire(learnt, vehicle)))
 
 
 LINEAR, FROZEN, ORACLE, LEARNING = TIRES = ("linear", "frozen", "oracle", "learning")
@@ -354,8 +354,8 @@ class Run:
     """
 
     label: str
-    model: TireModel
-    final: TireModel
+    model: PredictionTire
+    final: PredictionTire
     problem: Problem
     drive: Drive
     scores: Scores
@@ -369,7 +369,7 @@ class Run:
         )
 
 
-def told_tire(label: str, setup: Setup, learnt: FrozenModel | None) -> TireModel:
+def told_tire(label: str, setup: Setup, learnt: FrozenModel | None) -> PredictionTire:
     """Return the tire that a tracker is told at the start.
 
     Parameters
@@ -379,11 +379,11 @@ def told_tire(label: str, setup: Setup, learnt: FrozenModel | None) -> TireModel
     learnt : what was learnt before the drive, for `frozen` and, where there is any, `learning`.
     """
     if label == LINEAR:
-        return tire_model(setup.vehicle)
+        return prediction_tire(setup.vehicle)
     if label == ORACLE:
         return setup.oracle()
     assert learnt is not None
-    return tire_model(learnt, setup.vehicle)
+    return prediction_tire(learnt, setup.vehicle)
 
 
 def run_drive(

@@ -26,7 +26,7 @@ from identifier.paper_study import (
     run_study,
 )
 from identifier.reproducibility import freeze_key
-from models.doors import require_few
+from models.schema import require_few
 from models.vehicle import sedan
 from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import certificate_of, verdict_line

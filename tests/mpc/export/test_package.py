@@ -13,7 +13,7 @@ from models.vehicle import sedan
 from mpc.export.package import build_mpc_package, mpc_readme
 from mpc.problem import Cost, Problem
 from mpc.realtime import Tracker
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 from tests.mpc.export.conftest import LAWS, STRICT, c_files
 
 CAR = sedan()
@@ -34,7 +34,7 @@ def test_no_compiler_has_anything_to_say(law, single, compiler, packages, write,
 def test_symbols_begin_with_the_name_and_nothing_is_called_but_roots_and_copies(
     compiler, write, run
 ):
-    folder = write(build_mpc_package(tire_model(CAR), SHORT, name="left_mpc"))
+    folder = write(build_mpc_package(prediction_tire(CAR), SHORT, name="left_mpc"))
     flags = ["-std=c99", "-O2", "-fno-stack-protector", "-Iinclude", "-Isrc", "-c", "-o", "x.o"]
     for source in c_files(folder):
         assert run(compiler, *flags, source, cwd=folder).returncode == 0
@@ -58,13 +58,13 @@ def test_fast_math_is_refused(flag, compiler, packages, write, run):
 
 
 def test_the_same_input_gives_the_same_bytes():
-    one, two = (build_mpc_package(tire_model(CAR), SHORT) for _ in range(2))
+    one, two = (build_mpc_package(prediction_tire(CAR), SHORT) for _ in range(2))
     assert one.files == two.files
     assert mpc_readme(one, "") == mpc_readme(two, "")
 
 
 def test_everything_that_goes_in_changes_the_hash():
-    tire = tire_model(CAR)
+    tire = prediction_tire(CAR)
     packages = [
         build_mpc_package(tire, SHORT),
         build_mpc_package(tire, SHORT, single=True),
@@ -93,7 +93,7 @@ def test_the_manifest_tells_all_that_went_in(packages):
 @pytest.mark.parametrize("name", ["Upper_mpc", "1st_mpc", "with-dash", "", "a" * 32])
 def test_names_that_are_not_of_c_are_refused(name):
     with pytest.raises(PackageNameError, match="name must be"):
-        build_mpc_package(tire_model(CAR), SHORT, name=name)
+        build_mpc_package(prediction_tire(CAR), SHORT, name=name)
 
 
 def test_nothing_is_left_to_fill_in(pairs):

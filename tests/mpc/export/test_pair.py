@@ -15,7 +15,7 @@ from models.plant import Plant
 from models.vehicle import sedan
 from mpc.export.pair import DELAY, NoHandoverError, build_pair
 from mpc.realtime import Tracker
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 from tests.mpc.export.conftest import LAWS, STRICT, c_files, put
 
 CAR = sedan()
@@ -130,7 +130,7 @@ def test_c_hands_over_what_python_makes_of_the_same_weights(law, taught, pairs, 
     pair, weights = pairs[law], taught[law].weights
     folded = pair.identifier.folded
     carried = {**folded.carry, **weights}
-    wanted = tire_model(folded.method.frozen(folded.vehicle, carried))
+    wanted = prediction_tire(folded.method.frozen(folded.vehicle, carried))
     assert not np.allclose(wanted.weights, pair.tracker.tire.weights, rtol=0.01)
     taken, params = handed_over(libraries[law], pair, weights, 1.0)
     assert taken

@@ -8,7 +8,7 @@ import pytest
 from models.vehicle import sedan
 from mpc.export.package import build_mpc_package
 from mpc.problem import Problem
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 from tests.mpc.export.conftest import LAWS, c_files
 
 HOSTILE = (Path(__file__).parent / "hostile.c").read_text()
@@ -64,7 +64,7 @@ def test_float_keeps_the_same_limits(packages, write, run):
     ],
 )
 def test_without_a_guard_the_alarm_rings(file, pattern, replacement, complaint, write, run):
-    folder = write(build_mpc_package(tire_model(sedan()), Problem(horizon=8)))
+    folder = write(build_mpc_package(prediction_tire(sedan()), Problem(horizon=8)))
     text = (folder / file).read_text()
     changed = re.sub(pattern, replacement, text, count=1)
     assert changed != text
@@ -79,7 +79,7 @@ def test_without_a_guard_the_alarm_rings(file, pattern, replacement, complaint, 
 
 def test_without_all_that_keeps_numbers_finite_the_alarm_rings(write, run):
     """Limits of inputs, of the solver and of what is carried stand behind each other."""
-    folder = write(build_mpc_package(tire_model(sedan()), Problem(horizon=8)))
+    folder = write(build_mpc_package(prediction_tire(sedan()), Problem(horizon=8)))
     guards = {
         r"!known\b": "false",
         r"!tireid_mpc_finite\(seen\.product\)": "false",

@@ -10,7 +10,7 @@ from models.maneuvers import RandomSteer, Slalom
 from models.plant import Plant
 from models.sensors import Sensor, Sensors
 from models.vehicle import sedan
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 
 DROP = 6.0  # s
 SPEED = 20.0  # m/s
@@ -58,4 +58,4 @@ def learnt(car, dry):
 
 @pytest.fixture(scope="session")
 def tire(learnt):
-    return tire_model(learnt)
+    return prediction_tire(learnt)

@@ -5,7 +5,7 @@ import pytest
 
 from mpc.handover.learner import blended
 from mpc.handover.road import at_friction
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 
 
 def along(now, target, gain):
@@ -59,6 +59,6 @@ def test_a_plan_that_is_no_number_is_a_jump(tire):
 
 def test_there_is_no_way_to_another_structure_and_none_to_go_at_the_target(car, tire):
     with pytest.raises(ValueError, match="cannot move to"):
-        blended(tire, tire_model(car), 1.0, planned=lambda _: 0.0, most=0.1)
+        blended(tire, prediction_tire(car), 1.0, planned=lambda _: 0.0, most=0.1)
     copy = tire._replace(weights=tire.weights.copy())
     assert blended(tire, copy, 0.1, planned=lambda _: 0.0, most=0.1).arrived

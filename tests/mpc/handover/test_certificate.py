@@ -11,7 +11,7 @@ from identifier.methods import make_method
 from mpc.handover.certificate import law_complaint, tire_complaint
 from mpc.handover.road import at_friction
 from mpc.handover.supervisor import Excitation, slips
-from mpc.tires import TireModel, oracle_tire, tire_model
+from mpc.tires import PredictionTire, oracle_tire, prediction_tire
 from mpc.tires.tire import no_lag, wheel_slip
 
 
@@ -95,7 +95,7 @@ class Spoiled:
 def test_a_tire_that_is_none_at_one_sign_of_slip_or_bend_is_refused(
     car, axle, sign, turn, kind, complaint
 ):
-    spoiled = TireModel(Spoiled(axle, sign, turn, kind), np.ones(1), car)
+    spoiled = PredictionTire(Spoiled(axle, sign, turn, kind), np.ones(1), car)
     found = tire_complaint(spoiled, 20.0)
     assert found is not None
     assert re.search(complaint, found)
@@ -118,7 +118,7 @@ def test_a_learnt_tire_that_pushes_without_slip_is_refused_to_either_side(tire, 
 
 
 def test_a_tire_without_limit_passes_only_as_far_as_it_was_driven(car):
-    linear = tire_model(car)
+    linear = prediction_tire(car)
     assert tire_complaint(linear, 20.0, 0.05) is None
     assert "times its load" in tire_complaint(linear, 20.0)
 
@@ -159,10 +159,10 @@ def test_a_tire_must_be_known_where_the_car_is_driven(car, learnt, dry):
 def test_ladders_are_judged_far_others_as_far_as_the_car_slipped(car, tire):
     excitation = Excitation(0.01, car, 1.0)
     assert excitation.trusted_slip(tire) == 0.25
-    assert excitation.trusted_slip(tire_model(car)) == 0.01
+    assert excitation.trusted_slip(prediction_tire(car)) == 0.01
     right = Excitation(0.01, car, 1.0)
     for _ in range(100):
         excitation.add(20.0, -20.0 * np.tan(0.05), 0.0, 0.0)
         right.add(20.0, 20.0 * np.tan(0.05), 0.0, 0.0)
     for one in (excitation, right):
-        assert one.trusted_slip(tire_model(car)) == pytest.approx(0.06, rel=1e-3)
+        assert one.trusted_slip(prediction_tire(car)) == pytest.approx(0.06, rel=1e-3)

@@ -9,7 +9,7 @@ from identifier.methods import make_method
 from identifier.paper.network import Network
 from mpc.handover.judge import Judge, axle_forces
 from mpc.handover.road import at_friction, can_scale, fit_friction
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 from tests.mpc.handover.conftest import DROP, samples_of
 
 
@@ -40,7 +40,7 @@ def test_a_network_of_slip_is_stretched_exactly(car, rng):
     method = make_method("integral", car)
     method = replace(method, network=Network(inputs=("v_y", "r", "delta_f")))
     carried = dict(W=rng.normal(size=(2, 10)), V=rng.normal(size=(10, 3)))
-    tire, alpha = tire_model(method.frozen(car, carried)), np.linspace(-0.02, 0.02, 9)
+    tire, alpha = prediction_tire(method.frozen(car, carried)), np.linspace(-0.02, 0.02, 9)
     told = steady_force(at_friction(tire, 0.5), 0.5 * alpha)
     v_y = [-20.0 * np.tan(0.5 * a) for a in alpha], [-20.0 * np.tan(a) for a in alpha]
     np.testing.assert_allclose(v_y[0], 0.5 * np.array(v_y[1]), rtol=1e-3)  # nearly similar states
@@ -48,7 +48,7 @@ def test_a_network_of_slip_is_stretched_exactly(car, rng):
 
 
 def test_what_reads_the_speed_or_knows_no_limit_cannot_be_told_for_a_friction(car):
-    linear = tire_model(car)
+    linear = prediction_tire(car)
     assert not can_scale(linear)
     with pytest.raises(ValueError, match="LinearAxles cannot be told for another friction"):
         at_friction(linear, 0.5)

@@ -13,7 +13,7 @@ from mpc.handover.road import at_friction
 from mpc.loop import drive, inertial_unit
 from mpc.path import iso_3888_1
 from mpc.realtime import Measurement, Tracker
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 
 PLACE = 50.0  # m
 SPEED = 27.5  # m/s, 96 % of the limit at friction 0.5
@@ -24,9 +24,9 @@ def drives(car, learnt):
     """The lane change on the linear tire of the data sheet, and learning."""
     friction = Friction(changes=(FrictionChange(scale=0.5, at_place=PLACE),))
     identifier = OnlineIdentifier(AxleDesign.for_vehicle(car), car, 0.01, learnt)
-    learner = Learner(Supervisor(identifier, tire_model(learnt)))
+    learner = Learner(Supervisor(identifier, prediction_tire(learnt)))
     found = []
-    for tire, beside in ((tire_model(car), None), (tire_model(learnt), learner)):
+    for tire, beside in ((prediction_tire(car), None), (prediction_tire(learnt), learner)):
         tracker = Tracker(tire, period=0.01, delay=0.06)
         driven = drive(
             iso_3888_1(),
@@ -66,7 +66,7 @@ def test_no_handover_makes_the_plan_jump_more_than_noise_does(drives):
 
 def test_a_preview_changes_nothing_and_tells_the_plan(car, learnt):
     """Two trackers that drift off a bend, one of them asked at every step what it would do."""
-    tire = tire_model(learnt)
+    tire = prediction_tire(learnt)
     asked, left_alone = (Tracker(tire, period=0.01, delay=0.02) for _ in range(2))
     kappa, v_x = (np.full(asked.times.size, value) for value in (0.01, 20.0))
     for k in range(30):
@@ -79,10 +79,10 @@ def test_a_preview_changes_nothing_and_tells_the_plan(car, learnt):
     assert abs(other - same) > 0.02
     assert asked.tire is tire
     with pytest.raises(ValueError, match="the tracker is built for"):
-        previewed_rate(asked, tire_model(car))
+        previewed_rate(asked, prediction_tire(car))
 
 
 def test_jumps_must_be_positive(car, learnt):
     identifier = OnlineIdentifier(AxleDesign.for_vehicle(car), car, 0.01, learnt)
     with pytest.raises(ValueError, match="jumps must be positive"):
-        Learner(Supervisor(identifier, tire_model(learnt)), quick_jump=0.0)
+        Learner(Supervisor(identifier, prediction_tire(learnt)), quick_jump=0.0)

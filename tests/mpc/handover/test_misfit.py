@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mpc.handover.judge import ErrorModel, Judge, Window, axle_forces
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 from tests.mpc.handover.conftest import samples_of
 
 
@@ -83,7 +83,7 @@ def test_a_learnt_tire_fits_and_another_does_not(car, tire, dry):
     judge, samples = Judge(0.01), samples_of(dry[1])
     good = judge.misfit(tire, samples)
     assert good.mean < 1.0
-    assert judge.misfit(tire_model(car), samples).mean > 2.0 * good.mean  # the linear tire
+    assert judge.misfit(prediction_tire(car), samples).mean > 2.0 * good.mean  # the linear tire
     both = judge.misfits(tire, np.stack([tire.weights, tire.weights]), samples)
     assert both[0].total == both[1].total == pytest.approx(good.total)
     assert good.independent == pytest.approx(2 * (1 + (len(samples) - 22 - 1) / 12), rel=1e-12)

@@ -15,13 +15,13 @@ from mpc.handover import Rules, Supervisor, Verdict
 from mpc.handover import supervisor as supervisor_module
 from mpc.handover.judge import Judge, Misfit
 from mpc.handover.road import at_friction
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 from tests.mpc.handover.conftest import DROP, drive, samples_of
 
 
 def supervisor_of(car, start=None, *, in_use=None, rules=None):
     identifier = OnlineIdentifier(AxleDesign.for_vehicle(car), car, 0.01, start)
-    in_use = tire_model(identifier.model()) if in_use is None else in_use
+    in_use = prediction_tire(identifier.model()) if in_use is None else in_use
     return Supervisor(identifier, in_use, rules, proven=start is not None)
 
 
@@ -45,7 +45,9 @@ def test_after_a_drop_the_named_tire_explains_it_and_the_dry_one_does_not(car, l
     supervisor = watched(supervisor_of(car, learnt), dropped[1])
     late = samples_of(dropped[1])[-200:]
     judge = Judge(0.01)
-    named, dry = (judge.misfit(tire, late).mean for tire in (supervisor.target, tire_model(learnt)))
+    named, dry = (
+        judge.misfit(tire, late).mean for tire in (supervisor.target, prediction_tire(learnt))
+    )
     assert named < 1.5
     assert dry > 4.0 * named
 
@@ -96,7 +98,7 @@ def test_the_dry_tire_comes_back_after_another_was_learnt_in_between(car, learnt
     n = supervisor.target.structure.units
     grip = [
         tire.weights[3 + n :].reshape(2, -1)[:, 2:].sum()
-        for tire in (supervisor.target, tire_model(learnt))
+        for tire in (supervisor.target, prediction_tire(learnt))
     ]
     assert grip[0] > 0.8 * grip[1]
 
@@ -111,7 +113,7 @@ def test_what_is_not_better_is_not_handed_over(car, learnt, dry):
 def test_what_was_not_excited_is_not_handed_over(car, learnt):
     straight = np.tile([20.0, 0.0, 0.0, 0.0], (400, 1))
     straight[:, 1] += np.random.default_rng(0).normal(0.0, 0.03, 400)
-    supervisor = supervisor_of(car, learnt, in_use=tire_model(learnt))
+    supervisor = supervisor_of(car, learnt, in_use=prediction_tire(learnt))
     for row in straight:
         supervisor.observe(*row)
     assert supervisor.decisions == []
@@ -230,12 +232,12 @@ def test_friction_is_looked_for_only_on_a_tire_that_is_one_of_this_car(
 
 def test_another_structure_and_an_unproven_law_are_refused_at_the_start(car, learnt):
     with pytest.raises(ValueError, match="begin with a tire of the identifier"):
-        supervisor_of(car, in_use=tire_model(car))
+        supervisor_of(car, in_use=prediction_tire(car))
     design = make_method("integral", car)
     wild = replace(design, gains=replace(design.gains, eta_W=100.0 * design.gains.eta_W))
     identifier = OnlineIdentifier(wild, car, 0.01)
     with pytest.raises(ValueError, match="certificate fails"):
-        Supervisor(identifier, tire_model(identifier.model()))
+        Supervisor(identifier, prediction_tire(identifier.model()))
 
 
 def test_a_tire_that_cannot_be_told_for_a_friction_still_learns(car, dry):
@@ -244,7 +246,7 @@ def test_a_tire_that_cannot_be_told_for_a_friction_still_learns(car, dry):
     inputs = ("v_y", "r", "delta_f", "v_x")
     design = replace(design, network=Network(hidden=6, inputs=inputs, scale=(1.0, 0.5, 0.1, 20.0)))
     identifier = OnlineIdentifier(design, car, 0.01)
-    supervisor = watched(Supervisor(identifier, tire_model(identifier.model())), dry[1])
+    supervisor = watched(Supervisor(identifier, prediction_tire(identifier.model())), dry[1])
     assert all(d.verdict is Verdict.LEARNT for d in supervisor.decisions)
     with pytest.raises(ValueError, match="another friction"):
         at_friction(supervisor.target, 0.5)
@@ -265,7 +267,7 @@ def test_doubt_takes_back_what_was_handed_over_just_before_and_teaches_nothing(
     assert (decision.verdict, decision.reason) == (Verdict.DOUBT, "sensors disagree")
     assert supervisor.target is not wet
     if not before:
-        np.testing.assert_array_equal(supervisor.target.weights, tire_model(learnt).weights)
+        np.testing.assert_array_equal(supervisor.target.weights, prediction_tire(learnt).weights)
     for row in rows[k + 1 : k + 60]:
         assert supervisor.observe(*row, doubt="sensors disagree") is None
     assert supervisor.identifier.counts.samples == samples

@@ -6,7 +6,7 @@ import pytest
 from models.vehicle import sedan
 from mpc.problem import Limits, Problem
 from mpc.realtime import Measurement
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 from mpc.tires.ladder import oracle_tire
 
 PROBLEM = Problem(horizon=20, limits=Limits(steering=0.2, steering_rate=0.5, slip=(0.1, 0.1)))
@@ -14,7 +14,7 @@ PROBLEM = Problem(horizon=20, limits=Limits(steering=0.2, steering_rate=0.5, sli
 
 @pytest.fixture(scope="session")
 def linear():
-    return tire_model(sedan())
+    return prediction_tire(sedan())
 
 
 @pytest.fixture(scope="session")

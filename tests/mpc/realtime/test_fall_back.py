@@ -18,7 +18,7 @@ from mpc.problem import Problem
 from mpc.realtime import Guards, Measurement, Status, Tracker
 from mpc.realtime.fall_back import fall_back, feedback, motion, steady_turn
 from mpc.realtime.instance import input_type, params_type, state_type
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 
 CAR = sedan()
 PERIOD, PROBLEM = 0.01, Problem(horizon=4)
@@ -98,9 +98,11 @@ class Blind:
 
     def __init__(self, steps):
         self.steps, self.seen = steps, []
-        tracker = Tracker(tire_model(CAR), PROBLEM, period=PERIOD)
+        tracker = Tracker(prediction_tire(CAR), PROBLEM, period=PERIOD)
         self.period, self.times, self.plan_times = PERIOD, tracker.times, tracker.plan_times
-        self.tracker = Tracker(tire_model(CAR), PROBLEM, period=PERIOD, delay=PERIOD, guards=GUARDS)
+        self.tracker = Tracker(
+            prediction_tire(CAR), PROBLEM, period=PERIOD, delay=PERIOD, guards=GUARDS
+        )
 
     def reset(self):
         self.tracker.reset()
@@ -141,7 +143,7 @@ class Exported:
     """The C of a package, compiled alone, called with the same measurements."""
 
     def __init__(self, folder):
-        package = build_mpc_package(tire_model(CAR), PROBLEM, period=PERIOD, delay=PERIOD)
+        package = build_mpc_package(prediction_tire(CAR), PROBLEM, period=PERIOD, delay=PERIOD)
         for path, text in package.files.items():
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
             (folder / path).write_text(text)

@@ -5,7 +5,7 @@ import pytest
 
 from identifier.baselines.curves import CurveModel
 from models.tires import DugoffTire, FialaTire, LinearTire
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 
 CURVES = {
     "linear": np.array([[1.2e5], [1.0e5]]),
@@ -17,19 +17,19 @@ CURVES = {
 @pytest.mark.parametrize("curve", CURVES)
 def test_forces_are_those_of_the_frozen_curve(car, motions, forces, at, curve):
     model = CurveModel(vehicle=car, curve=curve, parameters=CURVES[curve], min_speed=1.0)
-    predicted, _ = forces(tire_model(model), *at(motions))
+    predicted, _ = forces(prediction_tire(model), *at(motions))
     expected = model.axle_force(motions)
     np.testing.assert_allclose(predicted, expected, rtol=1e-9, atol=1e-6)
     parameters = np.array(CURVES[curve])
     parameters[1, -1] *= 1.02
     other = CurveModel(vehicle=car, curve=curve, parameters=parameters, min_speed=1.0)
-    assert np.abs(forces(tire_model(other), *at(motions))[0] - expected)[:, 1].max() > 1.0
+    assert np.abs(forces(prediction_tire(other), *at(motions))[0] - expected)[:, 1].max() > 1.0
 
 
 @pytest.mark.parametrize("kind", [DugoffTire, FialaTire])
 def test_two_tires_an_axle_make_the_force(car, motions, forces, at, kind):
     tire = kind(C_alpha=6.0e4, C_kappa=8.0e4, friction=0.9)
-    predicted, slip = forces(tire_model(tire, car), *at(motions))
+    predicted, slip = forces(prediction_tire(tire, car), *at(motions))
     expected = np.array(
         [
             [2.0 * float(tire.forces(a, 0.0, 0.0, 0.5 * load).F_y) for a, load in pairs]
@@ -44,7 +44,7 @@ def test_two_tires_an_axle_make_the_force(car, motions, forces, at, kind):
 
 
 def test_slip_is_the_angle_between_wheel_and_travel(car, motions, forces, at):
-    tire = tire_model(DugoffTire(C_alpha=6.0e4, C_kappa=8.0e4, friction=0.9), car)
+    tire = prediction_tire(DugoffTire(C_alpha=6.0e4, C_kappa=8.0e4, friction=0.9), car)
     _, slip = forces(tire, *at(motions))
     v_x, v_y, r, delta = at(motions)
     np.testing.assert_allclose(slip[:, 0], delta - np.arctan2(v_y + car.l_f * r, v_x), atol=1e-12)
@@ -52,5 +52,7 @@ def test_slip_is_the_angle_between_wheel_and_travel(car, motions, forces, at):
 
 
 def test_the_linear_tire_is_twice_that_of_a_wheel(car, motions, forces, at):
-    force, slip = forces(tire_model(LinearTire(C_alpha=5.0e4, C_kappa=8.0e4), car), *at(motions))
+    force, slip = forces(
+        prediction_tire(LinearTire(C_alpha=5.0e4, C_kappa=8.0e4), car), *at(motions)
+    )
     np.testing.assert_allclose(force, 1.0e5 * slip, rtol=1e-12)

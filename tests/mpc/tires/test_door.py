@@ -7,12 +7,12 @@ import pytest
 
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
 from mpc.prediction import build_stage
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 from mpc.tires.tire import ALL
 
 
 def test_a_vehicle_stands_for_the_linear_tire_that_it_states(car):
-    model = tire_model(car)
+    model = prediction_tire(car)
     np.testing.assert_array_equal(model.weights, [127700.0, 106000.0])
     np.testing.assert_array_equal(model.car, [1500.0, 2500.0, 1.15, 1.55])
 
@@ -26,7 +26,7 @@ def test_every_tire_of_models_comes_in(car):
         MagicFormula.from_tir(car.chassis.tire),
     )
     for tire in tires:
-        model = tire_model(tire, car)
+        model = prediction_tire(tire, car)
         x = np.array([0.1, 0.02, 0.3, 0.2, 0.05])
         result = build_stage(model.structure)(
             x, 0.1, 0.0, 20.0, 0.05, model.car, model.weights, *ALL, np.ones(7)
@@ -37,17 +37,17 @@ def test_every_tire_of_models_comes_in(car):
 
 def test_a_model_may_be_driven_in_another_car(car):
     heavy = replace(car, mass=1800.0)
-    model = tire_model(tire_model(car), heavy)
+    model = prediction_tire(prediction_tire(car), heavy)
     assert model.car[0] == 1800.0
-    np.testing.assert_array_equal(model.weights, tire_model(car).weights)
-    np.testing.assert_array_equal(tire_model(car, heavy).car, model.car)
+    np.testing.assert_array_equal(model.weights, prediction_tire(car).weights)
+    np.testing.assert_array_equal(prediction_tire(car, heavy).car, model.car)
 
 
 def test_the_mounted_magic_formula_is_that_of_the_static_load(car, forces):
     tire, alpha = MagicFormula.from_tir(car.chassis.tire), np.linspace(0.01, 0.4, 20)
     none = np.zeros(20)
     given = np.column_stack([alpha, alpha])
-    force = forces(tire_model(tire, car), 20.0, none, none, none, lagged=given)[0]
+    force = forces(prediction_tire(tire, car), 20.0, none, none, none, lagged=given)[0]
     for i, load in enumerate(car.axle_loads):
         expected = [2.0 * float(tire.forces(a, 0.0, 0.0, 0.5 * load).F_y) for a in alpha]
         np.testing.assert_allclose(force[:, i], expected, rtol=0.005)
@@ -55,6 +55,6 @@ def test_the_mounted_magic_formula_is_that_of_the_static_load(car, forces):
 
 def test_the_door_says_what_it_cannot_use(car):
     with pytest.raises(ValueError, match="DugoffTire needs the vehicle"):
-        tire_model(DugoffTire(C_alpha=6e4, C_kappa=8e4, friction=1.0))
+        prediction_tire(DugoffTire(C_alpha=6e4, C_kappa=8e4, friction=1.0))
     with pytest.raises(TypeError, match="can be made of str"):
-        tire_model("weights.json", car)
+        prediction_tire("weights.json", car)

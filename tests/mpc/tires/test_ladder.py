@@ -7,7 +7,7 @@ import pytest
 from identifier.axle import AxleDesign, AxleModel
 from models.recordings import Recording
 from mpc.prediction import N_CAR, build_dynamics
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 from mpc.tires.tire import ALL, Car, Point
 
 W = np.array([[0.05, 0.5, 0.5, -0.15], [0.02, 0.6, 0.6, -0.2]])
@@ -57,7 +57,7 @@ def standing(v_y, r, delta, speed=20.0, n=400):
 @pytest.mark.parametrize("motion", [(0.4, 0.3, 0.05), (-1.0, -0.2, -0.1), (1.5, 0.5, 0.2)])
 def test_steady_forces_are_those_of_the_frozen_model(car, forces, motion):
     model = axle_model(car, offset=(0.01, 0.15))
-    predicted, _ = forces(tire_model(model), 20.0, *(np.array([value]) for value in motion))
+    predicted, _ = forces(prediction_tire(model), 20.0, *(np.array([value]) for value in motion))
     expected = model.axle_force(standing(*motion))[-1]
     np.testing.assert_allclose(predicted[0], expected, rtol=1e-9)
 
@@ -66,13 +66,13 @@ def test_curves_are_those_of_the_frozen_model(car, forces):
     alpha = np.linspace(-0.4, 0.4, 41)
     model, none = axle_model(car), np.zeros(41)
     predicted, _ = forces(
-        tire_model(model), 20.0, none, none, none, lagged=np.column_stack([alpha, alpha])
+        prediction_tire(model), 20.0, none, none, none, lagged=np.column_stack([alpha, alpha])
     )
     np.testing.assert_allclose(predicted, model.force_at(alpha), rtol=1e-9, atol=1e-6)
 
 
 def lengths(model, alpha):
-    tire = tire_model(model)
+    tire = prediction_tire(model)
     w = ca.SX.sym("w", tire.structure.n_weights)
     x = ca.SX.sym("x", 2)
     at = Point(0.0, 0.0, 0.0, 20.0, Car(*tire.car), w)
@@ -96,7 +96,7 @@ def test_the_lag_is_that_of_the_frozen_model_and_shortens_where_the_tire_slides(
 
 def test_lagged_slip_follows_as_in_the_frozen_model(car):
     model, drive = axle_model(car), slalom()
-    tire = tire_model(model)
+    tire = prediction_tire(model)
     rates = build_dynamics(tire.structure)
     behind, fine = np.zeros(2), 5
     slips = []
@@ -124,7 +124,7 @@ def test_a_body_that_sways_slowly_is_a_softer_carcass(car):
     sways, rests = (axle_model(car, sway=(k, k)) for k in (0.35, 0.0))
     t, v_x, turns = 0.01 * np.arange(1500), 25.0, 2.0 * np.pi * 0.4
     delta = 0.01 * np.sin(turns * t)
-    tire, rates = tire_model(sways), build_dynamics(tire_model(sways).structure)
+    tire, rates = prediction_tire(sways), build_dynamics(prediction_tire(sways).structure)
     x, rows, slips = np.zeros(7), [], []
     for angle in delta:  # a car on these tires: Euler at 2 ms
         x[4] = angle
@@ -152,7 +152,7 @@ def test_a_body_that_sways_slowly_is_a_softer_carcass(car):
 
 
 def test_a_model_learnt_anew_is_other_weights_only(car):
-    one, other = tire_model(axle_model(car)), tire_model(axle_model(car, weights=0.5 * W))
+    one, other = prediction_tire(axle_model(car)), prediction_tire(axle_model(car, weights=0.5 * W))
     assert one.structure == other.structure
     assert one.weights.size == one.structure.n_weights
     assert one.structure.lagged

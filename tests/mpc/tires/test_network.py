@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identifier.paper.network import Network, NetworkModel, Weights
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 
 
 def model_of(car, network, rng):
@@ -32,17 +32,17 @@ def model_of(car, network, rng):
 )
 def test_forces_are_those_of_the_frozen_model(network, car, motions, forces, at, rng):
     model = model_of(car, network, rng)
-    predicted, _ = forces(tire_model(model), *at(motions))
+    predicted, _ = forces(prediction_tire(model), *at(motions))
     expected = model.axle_force(motions)
     np.testing.assert_allclose(predicted, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
 def test_another_network_of_that_size_is_other_weights_only(car, motions, forces, at, rng):
-    one, other = (tire_model(model_of(car, Network(), rng)) for _ in range(2))
+    one, other = (prediction_tire(model_of(car, Network(), rng)) for _ in range(2))
     assert one.structure == other.structure
     assert hash(one.structure) == hash(other.structure)
     assert not np.allclose(forces(one, *at(motions))[0], forces(other, *at(motions))[0], rtol=0.1)
-    larger = tire_model(model_of(car, Network(hidden=11), rng))
+    larger = prediction_tire(model_of(car, Network(hidden=11), rng))
     assert larger.structure != one.structure
     assert larger.weights.size == larger.structure.n_weights == one.weights.size + 6
 
@@ -55,5 +55,5 @@ def test_scale_unit_and_stiffness_are_weights(car, rng):
         replace(model, vehicle=replace(car, cornering_stiffness_front=1.0e5)),
     )
     for other in others:
-        assert tire_model(other).structure == tire_model(model).structure
-        assert not np.array_equal(tire_model(other).weights, tire_model(model).weights)
+        assert prediction_tire(other).structure == prediction_tire(model).structure
+        assert not np.array_equal(prediction_tire(other).weights, prediction_tire(model).weights)

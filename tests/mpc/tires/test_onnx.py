@@ -6,7 +6,7 @@ import pytest
 
 from identifier.own_network import OnnxModel
 from mpc.prediction import build_stage
-from mpc.tires import tire_model
+from mpc.tires import prediction_tire
 from mpc.tires.tire import ALL
 
 onnx = pytest.importorskip("onnx", reason="needs the package onnx")
@@ -52,7 +52,7 @@ def own_forces(model, recording):
 @pytest.mark.parametrize("activation", ["Tanh", "Sigmoid", "Relu"])
 def test_forces_are_those_of_the_network(car, motions, forces, at, rng, activation):
     model = OnnxModel(vehicle=car, content=network_file(rng, activation=activation))
-    predicted, _ = forces(tire_model(model), *at(motions))
+    predicted, _ = forces(prediction_tire(model), *at(motions))
     expected = own_forces(model, motions)
     np.testing.assert_allclose(predicted, expected, rtol=1e-9, atol=1e-6)
 
@@ -60,27 +60,27 @@ def test_forces_are_those_of_the_network(car, motions, forces, at, rng, activati
 def test_a_network_in_the_sign_of_iso_is_turned_about(car, motions, forces, at, rng):
     content = network_file(rng, scale=-0.1)
     model = OnnxModel(vehicle=car, content=content, slip_sign=-1)
-    predicted, _ = forces(tire_model(model), *at(motions))
+    predicted, _ = forces(prediction_tire(model), *at(motions))
     np.testing.assert_allclose(predicted, own_forces(model, motions), rtol=1e-9, atol=1e-6)
 
 
 def test_a_retrained_network_is_other_weights_only(car, rng):
     one, other = (
-        tire_model(OnnxModel(vehicle=car, content=network_file(rng, scale=scale)))
+        prediction_tire(OnnxModel(vehicle=car, content=network_file(rng, scale=scale)))
         for scale in (0.1, 0.07)
     )
     assert one.structure == other.structure
     assert build_stage(one.structure) is build_stage(other.structure)
     assert one.weights.size == one.structure.n_weights
     assert np.flatnonzero(one.weights != other.weights).size >= 2 + 6 + 5 + 6
-    larger = tire_model(OnnxModel(vehicle=car, content=network_file(rng, hidden=8)))
+    larger = prediction_tire(OnnxModel(vehicle=car, content=network_file(rng, hidden=8)))
     assert larger.structure != one.structure
     assert len(repr(one.structure)) < 200
 
 
 def test_its_stage_has_the_derivatives_of_the_network(car, rng):
     model = OnnxModel(vehicle=car, content=network_file(rng))
-    tire = tire_model(model)
+    tire = prediction_tire(model)
     x, u, dt = np.array([0.2, 0.05, 0.5, 0.2, 0.05]), 0.1, 1e-4
     result = build_stage(tire.structure)(
         x, u, 0.01, 20.0, dt, tire.car, tire.weights, *ALL, np.ones(7)
@@ -99,5 +99,5 @@ def test_its_stage_has_the_derivatives_of_the_network(car, rng):
 def test_halves_and_small_whole_numbers_are_of_the_formula_others_are_weights(
     car, rng, unit, learnt
 ):
-    tire = tire_model(OnnxModel(vehicle=car, content=network_file(rng, unit=unit)))
+    tire = prediction_tire(OnnxModel(vehicle=car, content=network_file(rng, unit=unit)))
     assert np.count_nonzero(tire.weights == unit) == learnt

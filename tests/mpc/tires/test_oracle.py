@@ -10,7 +10,7 @@ from models.maneuvers import SlowlyIncreasingSteer
 from models.plant import Plant
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
 from models.vehicle import VehicleError
-from mpc.tires import CurveFitError, oracle_tire, tire_model
+from mpc.tires import CurveFitError, oracle_tire, prediction_tire
 from mpc.tires.ladder import cornering_force, fitted_ladder, slip_grid
 from mpc.tires.tire import Car, Point
 
@@ -44,7 +44,7 @@ def test_the_plant_in_steady_cornering_makes_these_forces(car, forces, mu):
     assert np.abs(run.a_y[late]).max() > 0.85 * mu * 9.81  # the drive reaches the limit
     error = np.abs(force - true).max(axis=0) / true.max(axis=0)
     assert (error < 0.02).all()
-    blind = forces(tire_model(MagicFormula.from_tir(car.chassis.tire), car), *motion)[0]
+    blind = forces(prediction_tire(MagicFormula.from_tir(car.chassis.tire), car), *motion)[0]
     assert np.abs(blind - true).max() / true.max() > 0.05  # without load transfer, nor friction
 
 

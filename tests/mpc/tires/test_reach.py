@@ -10,7 +10,7 @@ from models.vehicle import sedan
 from mpc.prediction import build_dynamics, build_rk4
 from mpc.problem import Limits, Problem
 from mpc.realtime import Tracker
-from mpc.tires import oracle_tire, tire_model
+from mpc.tires import oracle_tire, prediction_tire
 from mpc.tires.tire import ALL, LEAST_RISE, Car, Point, believed_force, reach_of, useful_slip
 
 CAR = sedan()
@@ -45,7 +45,7 @@ def test_half_the_friction_halves_the_useful_slip():
 
 
 def test_a_linear_tire_is_of_use_everywhere_and_goes_on_as_it_is():
-    linear = tire_model(CAR)
+    linear = prediction_tire(CAR)
     assert np.isinf(useful_slip(linear)).all()
     reach = reach_of(linear, MOST)
     np.testing.assert_allclose(reach.slip, MOST)
@@ -79,7 +79,7 @@ def test_a_curve_goes_on_without_a_kink(oracle):
 
 
 def test_a_tire_that_slides_fully_still_rises():
-    tire = tire_model(FialaTire(C_alpha=6e4, C_kappa=8e4, friction=0.5), CAR)
+    tire = prediction_tire(FialaTire(C_alpha=6e4, C_kappa=8e4, friction=0.5), CAR)
     kept = curves(tire, reach_of(tire, MOST))
     assert np.diff(curves(tire)).min() == pytest.approx(0.0, abs=1e-6)
     assert np.diff(kept).min() > 0.0
@@ -87,7 +87,7 @@ def test_a_tire_that_slides_fully_still_rises():
 
 def test_a_network_of_other_signals_is_left_as_it_is():
     rng = np.random.default_rng(0)
-    tire = tire_model(
+    tire = prediction_tire(
         NetworkModel(
             vehicle=CAR,
             network=Network(hidden=4),

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from codegen.escape import visible
 from models.limits import VARIABLE
+from models.limits import InputLimits as InputLimits
 from models.limits import LimitError as LimitError
-from models.limits import Limits as Limits
 from models.limits import limits as limits
 from models.limits import limits_text as limits_text
 

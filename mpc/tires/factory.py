@@ -14,10 +14,10 @@ from models.vehicle import Vehicle
 from mpc.tires.curves import DugoffAxles, FialaAxles, MagicAxles, linear_tire
 from mpc.tires.ladder import axle_tire, mounted_tire
 from mpc.tires.network import network_tire, onnx_tire
-from mpc.tires.tire import TireModel
+from mpc.tires.tire import PredictionTire
 
 
-def tire_model(source: Any, vehicle: Vehicle | None = None) -> TireModel:
+def prediction_tire(source: Any, vehicle: Vehicle | None = None) -> PredictionTire:
     """Return the prediction tire of a frozen model, of a tire of `models.tires`, or of a vehicle.
 
     Parameters
@@ -34,13 +34,13 @@ def tire_model(source: Any, vehicle: Vehicle | None = None) -> TireModel:
     TypeError
         Where the source is none of these.
     """
-    if isinstance(source, TireModel):
+    if isinstance(source, PredictionTire):
         return source if vehicle is None else source._replace(vehicle=vehicle)
     if isinstance(source, Vehicle):
         return linear_tire(source if vehicle is None else vehicle, np.array(source.bicycle[4:]))
     for kind, of_model in MODELS.items():
         if isinstance(source, kind):
-            return tire_model(of_model(source), vehicle)
+            return prediction_tire(of_model(source), vehicle)
     for kind, of_tire in TIRES.items():
         if isinstance(source, kind):
             if vehicle is None:
@@ -49,7 +49,7 @@ def tire_model(source: Any, vehicle: Vehicle | None = None) -> TireModel:
     raise TypeError(f"no prediction tire can be made of {type(source).__name__}")
 
 
-def curve_tire(model: CurveModel) -> TireModel:
+def curve_tire(model: CurveModel) -> PredictionTire:
     """Return the prediction tire of a frozen curve.
 
     Parameters
@@ -60,28 +60,28 @@ def curve_tire(model: CurveModel) -> TireModel:
     if model.curve == "linear":
         return linear_tire(model.vehicle, q[:, 0])
     if model.curve == "magic_formula":
-        return TireModel(MagicAxles(), q.ravel(), model.vehicle)
+        return PredictionTire(MagicAxles(), q.ravel(), model.vehicle)
     limit = q[:, 1] * np.array(model.vehicle.axle_loads)
-    return TireModel(DugoffAxles(), np.column_stack([q[:, 0], limit]).ravel(), model.vehicle)
+    return PredictionTire(DugoffAxles(), np.column_stack([q[:, 0], limit]).ravel(), model.vehicle)
 
 
-def _linear(vehicle: Vehicle, tire: LinearTire) -> TireModel:
+def _linear(vehicle: Vehicle, tire: LinearTire) -> PredictionTire:
     return linear_tire(vehicle, np.full(2, 2.0 * tire.C_alpha))
 
 
-def _limited(vehicle: Vehicle, tire: DugoffTire | FialaTire) -> TireModel:
+def _limited(vehicle: Vehicle, tire: DugoffTire | FialaTire) -> PredictionTire:
     structure = DugoffAxles() if isinstance(tire, DugoffTire) else FialaAxles()
     pairs = [[2.0 * tire.C_alpha, tire.friction * load] for load in vehicle.axle_loads]
-    return TireModel(structure, np.array(pairs).ravel(), vehicle)
+    return PredictionTire(structure, np.array(pairs).ravel(), vehicle)
 
 
-MODELS: Mapping[type, Callable[[Any], TireModel]] = {
+MODELS: Mapping[type, Callable[[Any], PredictionTire]] = {
     NetworkModel: network_tire,
     AxleModel: axle_tire,
     CurveModel: curve_tire,
     OnnxModel: onnx_tire,
 }
-TIRES: Mapping[type, Callable[[Vehicle, Any], TireModel]] = {
+TIRES: Mapping[type, Callable[[Vehicle, Any], PredictionTire]] = {
     LinearTire: _linear,
     DugoffTire: _limited,
     FialaTire: _limited,
