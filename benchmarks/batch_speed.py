@@ -20,9 +20,9 @@ from codegen import BatchScan
 from codegen.batch import processors
 from codegen.lanes import find_target
 from identifier.compare.batch import BatchRun, identify_batch
-from identifier.defaults import default_design
+from identifier.defaults import paper_identifier
 from identifier.methods import make_method
-from identifier.paper.design import Design
+from identifier.paper.design import PaperIdentifier
 from identifier.run import History, identify
 from models.maneuvers import Slalom
 from models.plant import Plant
@@ -76,9 +76,9 @@ def per_step(name: str, car: Vehicle, recording: Recording) -> tuple[float, floa
     return times["alone"] / n, times["lanes"] / n / runs
 
 
-def gain_sets(car: Vehicle, count: int) -> list[Design]:
+def gain_sets(car: Vehicle, count: int) -> list[PaperIdentifier]:
     """Return designs whose gains are drawn around those of the vehicle, each with its own seed."""
-    rng, base = np.random.default_rng(0), default_design(car)
+    rng, base = np.random.default_rng(0), paper_identifier(car)
     drawn = []
     for seed, (rate, leak, forgetting) in enumerate(np.exp(rng.uniform(-1, 1, (count, 3)))):
         gains = replace(
@@ -93,8 +93,8 @@ def gain_sets(car: Vehicle, count: int) -> list[Design]:
 
 def check(run: BatchRun, history: History) -> None:
     """Fail where a run in a lane is not that of the same design alone, in every bit."""
-    for port, value in run.carried[np.inf].items():
-        np.testing.assert_array_equal(value, history.carried[port][-1])
+    for port, value in run.state[np.inf].items():
+        np.testing.assert_array_equal(value, history.state[port][-1])
 
 
 def main(count: int = GAIN_SETS) -> int:

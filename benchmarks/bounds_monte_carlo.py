@@ -26,12 +26,12 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.random_drives import FORCE_UNIT, random_vehicle
 from benchmarks.targets import Targets, keeps
+from codegen.arrays import Array
 from identifier.defaults import natural_driving, natural_operation
-from identifier.paper.design import Design, Driving
+from identifier.paper.design import Driving, PaperIdentifier
 from identifier.paper.laws import DRIVING_ERRORS, Gains
 from identifier.paper.network import Network
 from identifier.stability import Certificate
@@ -41,7 +41,6 @@ from identifier.stability.monte_carlo import Beginning, Observed, monte_carlo
 from models.vehicle import Vehicle
 from tireid.commands.certificate_table import bound_rows, certificate_of
 
-Array = NDArray[np.float64]
 SEED, PROCESSES = 5, 2
 LAWS = ("integral", "integral", "instantaneous", "pi_lead")
 HIDDEN = (5, 20)
@@ -105,7 +104,7 @@ def random_error_dynamics(rng: np.random.Generator) -> Array:
 
 def random_design(
     rng: np.random.Generator, network: Network, driving: Driving, W_max: float = math.inf
-) -> Design:
+) -> PaperIdentifier:
     """Return a design that does not learn yet.
 
     Parameters
@@ -127,7 +126,7 @@ def random_design(
         W_max=W_max,
         V_max=20.0 if math.isfinite(W_max) else math.inf,
     )
-    return Design(
+    return PaperIdentifier(
         gains=gains,
         network=network,
         law=law,
@@ -140,7 +139,9 @@ def random_design(
     )
 
 
-def with_leakage(rng: np.random.Generator, vehicle: Vehicle, blank: Design) -> Design:
+def with_leakage(
+    rng: np.random.Generator, vehicle: Vehicle, blank: PaperIdentifier
+) -> PaperIdentifier:
     """Return the design with gains up to theta = 1 and a leakage that holds the force, or does not.
 
     Parameters
@@ -167,7 +168,7 @@ def with_leakage(rng: np.random.Generator, vehicle: Vehicle, blank: Design) -> D
     return replace(blank, gains=replace(gains, eta_W=eta_W, eta_V=eta_V, rho_W=rho, rho_V=rho))
 
 
-def with_projection(rng: np.random.Generator, blank: Design) -> Design:
+def with_projection(rng: np.random.Generator, blank: PaperIdentifier) -> PaperIdentifier:
     """Return the design with any gain and no leakage, kept by the projection alone.
 
     Parameters
@@ -180,7 +181,9 @@ def with_projection(rng: np.random.Generator, blank: Design) -> Design:
     return replace(blank, gains=replace(blank.gains, eta_W=eta_W, eta_V=eta_V))
 
 
-def with_dead_zone(rng: np.random.Generator, vehicle: Vehicle, leaking: Design) -> Design:
+def with_dead_zone(
+    rng: np.random.Generator, vehicle: Vehicle, leaking: PaperIdentifier
+) -> PaperIdentifier:
     """Return a design with leakage, up to a radius of which nothing leaks.
 
     Parameters
@@ -196,7 +199,7 @@ def with_dead_zone(rng: np.random.Generator, vehicle: Vehicle, leaking: Design) 
 
 def designs(
     rng: np.random.Generator, vehicle: Vehicle, driving: Driving, network: Network
-) -> Iterator[tuple[Design, Certificate]]:
+) -> Iterator[tuple[PaperIdentifier, Certificate]]:
     """Yield designs with leakage, with projection and with a dead zone, with their certificates.
 
     Parameters
@@ -232,7 +235,7 @@ def stated(certificate: Certificate) -> dict[str, float]:
 
 
 def driven(
-    design: Design,
+    design: PaperIdentifier,
     vehicle: Vehicle,
     certificate: Certificate,
     count: int,
@@ -255,7 +258,7 @@ def driven(
     return monte_carlo(design, vehicle, design.driving, count, beginning=beginning, rng=rng)
 
 
-def compared(design: Design, certificate: Certificate, observed: Observed) -> Found:
+def compared(design: PaperIdentifier, certificate: Certificate, observed: Observed) -> Found:
     """Return what the certificate states, over what was seen.
 
     Parameters

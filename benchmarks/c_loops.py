@@ -12,12 +12,11 @@ from pathlib import Path
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen import find_compiler
+from codegen.arrays import Array
 from identifier.export.package import Package
 
-Array = NDArray[np.float64]
 Loop = Callable[[Array], Array]
 HAND_WRITTEN = Path(__file__).with_name("hand_written_step.c")
 
@@ -69,7 +68,7 @@ def release_flags(package: Package) -> tuple[str, ...]:
 
 def package_loop(package: Package, *, single: bool, flags: Sequence[str]) -> Loop:
     """Return a package as a loop over samples (n, 5) that gives forces (n, 2) [N]."""
-    name = package.folded.name
+    name = package.specialized.name
     files = {p: t for p, t in package.files.items() if p.startswith(("include/", "src/"))}
     define = f"-D{name.upper()}_SINGLE={int(single)}"
     source = PACKAGE_LOOP.replace("@name@", name)

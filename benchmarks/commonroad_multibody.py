@@ -3,13 +3,11 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from models.maneuvers import Maneuver
 from models.plant import Driver
 from mpc.cars.commonroad import ROLL, V_X, YAW_RATE, MultiBody, runge_kutta_step
-
-Array = NDArray[np.float64]
 
 
 def drive(

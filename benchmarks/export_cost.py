@@ -17,7 +17,6 @@ import time
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.arm_cost import print_arm_costs, print_tracker_costs
 from benchmarks.c_loops import (
@@ -30,15 +29,15 @@ from benchmarks.c_loops import (
 from benchmarks.literal_step import Carried, NumpyStep, casadi_step, signals
 from benchmarks.targets import Targets, keeps
 from codegen import find_compiler
+from codegen.arrays import Array
 from identifier.export.compiled import samples_of
 from identifier.export.package import Package, build_package
 from identifier.methods import REFERENCE, make_method
-from identifier.paper.design import Design, axle_impulse
+from identifier.paper.design import PaperIdentifier, axle_impulse
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan
 
-Array = NDArray[np.float64]
 SLALOM = Slalom(amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=44.99)
 TURNS = 200
 FEW = 100  # samples of a turn of the NumPy step
@@ -64,10 +63,10 @@ def steps(package: Package) -> dict[str, Loop]:
     """Return every way to write the step, by name; each takes samples and gives forces."""
     car, flags = sedan(), release_flags(package)
     design = make_method(REFERENCE, car)
-    assert isinstance(design, Design)
+    assert isinstance(design, PaperIdentifier)
     gains, network = design.gains, design.network
     assert network.scale is not None
-    carry = package.folded.carry
+    carry = package.specialized.carry
     W, V = carry["W"], carry["V"]
     rates = [gains.eta_W, gains.eta_V, gains.rho_W, gains.rho_V]
     sampling = [design.dt, design.force_unit]

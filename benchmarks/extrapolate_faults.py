@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.targets import Targets, show
+from codegen.arrays import Array
 from identifier.compare.course import Course
 from identifier.method import CannotFreezeError
 from identifier.methods import DEFAULT, METHODS, make_method
@@ -15,7 +15,6 @@ from models.recordings import Recording
 from models.vehicle import sedan
 from tireid.commands.demo_story import plant_recordings
 
-Array = NDArray[np.float64]
 SIGNALS = ("v_x", "v_y", "r", "delta_f")
 EVERY, LASTS = 500, 40  # samples: a fault every 5 s, of 0.4 s
 
@@ -37,7 +36,7 @@ def faults(targets: Targets) -> None:
             history = identify(recording, car, make_method(name, car))
             finite = np.isfinite(history.axle_force).all()
             try:
-                force = history.design.frozen(car, history.carried_at(clean.t[-1]))
+                force = history.design.frozen(car, history.state_at(clean.t[-1]))
                 finite = finite and np.isfinite(force.axle_force(recording)).all()
             except CannotFreezeError:
                 pass

@@ -1,7 +1,6 @@
 """Learn on a noisy slalom of our plant, freeze, predict other maneuvers; and a drop of friction."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.targets import Targets, show
 from identifier.baselines import fit_floor, structure_of
@@ -17,7 +16,6 @@ from models.recordings import Recording
 from models.vehicle import sedan
 from tireid.commands.demo_story import DRIVES, RATE_LIMIT, SENSORS, SLALOM, plant_recordings
 
-Array = NDArray[np.float64]
 SEEDS = 5
 CHANGE, BACK, END = 20.0, 40.0, 60.0  # s
 SETTLED = 2.0  # s of excitation

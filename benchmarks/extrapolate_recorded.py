@@ -6,10 +6,10 @@ them this part is skipped.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.recorded_cars import CARMAKER, DART, DATA
 from benchmarks.targets import Targets, show
+from codegen.arrays import Array
 from identifier.axle import AxleModel
 from identifier.compare.course import Course, where_learnt_and_elsewhere
 from identifier.compare.study import Comparison, Frozen, run_comparison
@@ -20,7 +20,6 @@ from identifier.run import identify
 from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle
 
-Array = NDArray[np.float64]
 RUNS = {"hard": "slalom1_14_5ms", "mild": "experiment2_40kmh"}
 REAL_RUNS = ("ramp_steer02", "free_10_02_28", "free_10_12_05")
 SEEDS = 10

@@ -20,12 +20,12 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.targets import Targets, keeps
+from codegen.arrays import Array
 from identifier.defaults import design_for, natural_driving, natural_operation
 from identifier.methods import REFERENCE, make_method
-from identifier.paper.design import Design
+from identifier.paper.design import PaperIdentifier
 from identifier.paper.network import NetworkModel
 from identifier.run import identify
 from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS, with_keeping
@@ -36,7 +36,6 @@ from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
 from tireid.commands.demo_story import DRIVES, RATE_LIMIT, SENSORS
 
-Array = NDArray[np.float64]
 SEED, CARS, PROCESSES = 11, 6, 2
 MINUTES, PER_HOUR = 6, 10  # of a drive; drives of an hour
 CALM_SHARE = 0.75  # of the minutes of ordinary driving
@@ -156,7 +155,7 @@ def left_of(model: NetworkModel, asked: list[Recording]) -> After:
     return After(100.0 * (missed / force) ** 0.5, W, V)
 
 
-def designs(vehicle: Vehicle) -> dict[str, Design]:
+def designs(vehicle: Vehicle) -> dict[str, PaperIdentifier]:
     """Return the design of each keeping: that of --paper, and those of `tireid check --design`.
 
     Parameters
@@ -165,7 +164,7 @@ def designs(vehicle: Vehicle) -> dict[str, Design]:
     """
     paper = make_method(REFERENCE, vehicle)
     found = design_for(vehicle, natural_driving(vehicle))
-    assert isinstance(paper, Design)
+    assert isinstance(paper, PaperIdentifier)
     known = natural_operation(found, vehicle)
     return {"leakage": paper} | {
         name: with_keeping(found, known, name) for name in KEEPINGS if name != "leakage"

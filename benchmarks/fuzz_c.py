@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from benchmarks.targets import Targets, keeps
-from identifier.axle import AxleDesign
+from identifier.axle import AxleIdentifier
 from identifier.export.package import Package, build_package
 from identifier.methods import make_method
 from models.vehicle import sedan
@@ -86,7 +86,7 @@ def subjects(steps: int) -> Iterator[tuple[str, int, Subject]]:
         yield (
             f"identifier/{law}",
             steps,
-            Subject(package.files, package.folded.name, "identifier_fuzz.c", macros),
+            Subject(package.files, package.specialized.name, "identifier_fuzz.c", macros),
         )
         for stages, taken in ((SHORT, steps), (LONG, max(1, steps // SHARE_LONG))):
             tracker = build_pair(package, Problem(horizon=stages)).tracker
@@ -96,8 +96,8 @@ def subjects(steps: int) -> Iterator[tuple[str, int, Subject]]:
 
 def _boxes(package: Package) -> tuple[str, ...]:
     """Return the boxes of what the axle identifier learns as macros, none for another method."""
-    method = package.folded.method
-    if not isinstance(method, AxleDesign):
+    method = package.specialized.method
+    if not isinstance(method, AxleIdentifier):
         return ()
     b, rounding = method.bounds, 1.0 + 2e-7  # float has not all of these numbers
     rows = [

@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.random_drives import FORCE_UNIT
 from benchmarks.steady_cornering import Corner, loop_at, random_corner
 from benchmarks.targets import Targets, keeps
-from identifier.paper.design import Design
+from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import Gains
 from identifier.paper.network import Network, Weights
 from identifier.run import identify
@@ -49,7 +49,7 @@ class Case(NamedTuple):
         return self.found / self.predicted
 
 
-def scaled(design: Design, factor: float) -> Design:
+def scaled(design: PaperIdentifier, factor: float) -> PaperIdentifier:
     """Return the design with both learning rates multiplied."""
     gains = design.gains
     return replace(
@@ -57,12 +57,12 @@ def scaled(design: Design, factor: float) -> Design:
     )
 
 
-def grows(corner: Corner, design: Design, weights: Weights) -> bool:
+def grows(corner: Corner, design: PaperIdentifier, weights: Weights) -> bool:
     """Return whether a disturbance of a millionth grows, in the end or a hundredfold on the way."""
-    carried = {"W": weights.W * (1.0 + 1e-6), "V": weights.V}
-    start = design.frozen(corner.vehicle, carried)
+    state = {"W": weights.W * (1.0 + 1e-6), "V": weights.V}
+    start = design.frozen(corner.vehicle, state)
     history = identify(corner.recording, corner.vehicle, design, start)
-    error = np.linalg.norm(history.told["xi_tilde"], axis=1)
+    error = np.linalg.norm(history.outputs["xi_tilde"], axis=1)
     n, first_second = error.size, round(1.0 / design.dt)
     middle, end = error[n // 2 : 3 * n // 4].max(), error[3 * n // 4 :].max()
     return not end < middle or bool(error.max() > 100.0 * error[:first_second].max())
@@ -113,7 +113,7 @@ def random_case(rng: np.random.Generator, source: str, integrator: str, coupled:
         rho_W=0.02,
         rho_V=0.02,
     )
-    design = Design(
+    design = PaperIdentifier(
         gains=gains,
         network=Network(hidden=n_h),
         input_source=source,
@@ -121,8 +121,8 @@ def random_case(rng: np.random.Generator, source: str, integrator: str, coupled:
         force_unit=FORCE_UNIT,
         seed=int(rng.integers(1 << 30)),
     )
-    carried = identify(corner.recording, car, design).carried_at(SETTLE)
-    weights = Weights(W=carried["W"], V=carried["V"])
+    state = identify(corner.recording, car, design).state_at(SETTLE)
+    weights = Weights(W=state["W"], V=state["V"])
     G, feedback = loop_at(corner, design, weights)
     loop = Loop(
         A_d=gains.matrix,

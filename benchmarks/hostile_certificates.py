@@ -26,11 +26,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.hostile_designs import HIDDEN, INPUTS, INTEGRATORS, LAWS, UNIT, Case, random_cases
 from benchmarks.targets import Targets, keeps
-from identifier.paper.design import SPEED_SPREAD, Design, Driving
+from codegen.arrays import Array
+from identifier.paper.design import SPEED_SPREAD, Driving, PaperIdentifier
 from identifier.paper.laws import DRIVING_ERRORS, Gains
 from identifier.paper.network import Network
 from identifier.stability import Certificate, certify
@@ -53,7 +53,6 @@ from identifier.stability.operation import (
 )
 from models.vehicle import Vehicle
 
-Array = NDArray[np.float64]
 FROZEN = Path(__file__).parent / "hostile_verdicts.json"
 DRIVES, DURATION, GENES = 8, 8.0, 24
 SOFTER, TRIES = 0.7, 6  # steering of a drive that breaks a condition, and how often
@@ -81,14 +80,14 @@ class Attack(NamedTuple):
         return not np.isfinite(self.error)
 
 
-def design_of(case: Case) -> Design:
+def design_of(case: Case) -> PaperIdentifier:
     """Return the design of a case, with its declared conditions.
 
     Parameters
     ----------
     case : plain numbers.
     """
-    return Design(
+    return PaperIdentifier(
         gains=Gains(**case.gains),
         network=Network(hidden=HIDDEN),
         force_unit=UNIT,
@@ -97,7 +96,7 @@ def design_of(case: Case) -> Design:
     )
 
 
-def certificate_of(design: Design, vehicle: Vehicle) -> Certificate:
+def certificate_of(design: PaperIdentifier, vehicle: Vehicle) -> Certificate:
     """Return the certificate, as `tireid check` does.
 
     Parameters
@@ -110,7 +109,7 @@ def certificate_of(design: Design, vehicle: Vehicle) -> Certificate:
     return certify(design.gains, driving_error, operation(design, vehicle, design.driving))
 
 
-def may_pass(design: Design, vehicle: Vehicle) -> bool:
+def may_pass(design: PaperIdentifier, vehicle: Vehicle) -> bool:
     """Return whether the quick part of the certificate passes; it saves the rest where it does not.
 
     Parameters
@@ -188,7 +187,7 @@ def hostile_drives(vehicle: Vehicle, driving: Driving, genes: Array, dt: float) 
 
 
 def attack(
-    design: Design, vehicle: Vehicle, bounds: Array, genes: Array, rng: np.random.Generator
+    design: PaperIdentifier, vehicle: Vehicle, bounds: Array, genes: Array, rng: np.random.Generator
 ) -> Attack:
     """Drive a design hard; return what it did beside its bounds.
 
@@ -218,7 +217,7 @@ def attack(
 
 
 def climbed(
-    design: Design, vehicle: Vehicle, rounds: int, rng: np.random.Generator
+    design: PaperIdentifier, vehicle: Vehicle, rounds: int, rng: np.random.Generator
 ) -> tuple[float, bool, int]:
     """Climb on drives and gains while the certificate passes; worst ratio, diverged, attacks.
 
@@ -285,7 +284,7 @@ def searched(
     cases = random_cases(law, integrator, count)
     passes, exceeded, diverged, worst = 0, 0, 0, 0.0
     fine, kept, untrue, error_worst = 0, 0, 0, 0.0
-    front: list[tuple[float, Case, Design]] = []
+    front: list[tuple[float, Case, PaperIdentifier]] = []
     for i, case in enumerate(cases):
         design, before = design_of(case), str(i) in frozen
         if not (before or may_pass(design, case.vehicle)):

@@ -7,12 +7,10 @@ certificate can be asked about exactly the same ones.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.random_drives import random_vehicle
 from models.vehicle import GRAVITY, Vehicle
 
-Array = NDArray[np.float64]
 LAWS, INTEGRATORS = ("integral", "instantaneous", "pi_lead"), ("euler", "rk4")
 HIDDEN, INPUTS, UNIT = 6, 4, 1000.0
 STEPS = (0.005, 0.01, 0.02)  # s

@@ -11,19 +11,18 @@ import sys
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.random_drives import FORCE_UNIT, sampled_residual
 from benchmarks.steady_cornering import network_input, random_corner
 from benchmarks.targets import Targets, keeps
-from identifier.paper.design import Design
+from codegen.arrays import Array
+from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import Gains, diagonal
 from identifier.paper.network import Network
 from identifier.run import identify
 from identifier.stability.limit_cycle import LimitCycle, sampled_limit_cycle
 from identifier.stability.limits import integral_euler_limit
 
-Array = NDArray[np.float64]
 ALLOWED = 5.0  # %
 SLOW = (0.1, 0.4)  # lambda/a where the orbit is a circle
 DURATION, WATCH, DT = 200.0, 60.0, 0.01  # s
@@ -78,11 +77,13 @@ def random_case(rng: np.random.Generator, shares: tuple[float, float] | None = N
         lam = a * rng.uniform(*shares)
     network, seed = Network(hidden=10), int(rng.integers(1 << 30))
 
-    def design(eta_W: float, rho_W: float) -> Design:
+    def design(eta_W: float, rho_W: float) -> PaperIdentifier:
         gains = Gains(
             A_d=diagonal(a), forgetting=lam, eta_W=eta_W, eta_V=0.0, rho_W=rho_W, rho_V=0.0
         )
-        return Design(gains=gains, network=network, force_unit=FORCE_UNIT, dt=DT, seed=seed)
+        return PaperIdentifier(
+            gains=gains, network=network, force_unit=FORCE_UNIT, dt=DT, seed=seed
+        )
 
     g = beyond * integral_euler_limit(a, lam, DT)
     V = network.initial_weights(np.random.default_rng(seed)).V
@@ -97,7 +98,7 @@ def random_case(rng: np.random.Generator, shares: tuple[float, float] | None = N
     judged = design(g / float(s @ s), rho_W)
     start = judged.frozen(corner.vehicle, {"W": W, "V": V})
     history = identify(corner.recording, corner.vehicle, judged, start)
-    late = history.told["xi_tilde"][-round(WATCH / DT) :]
+    late = history.outputs["xi_tilde"][-round(WATCH / DT) :]
     return Case(
         a,
         lam,

@@ -10,14 +10,12 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from identifier.paper.laws import filter_rate, observer_rate, weight_rates
 from identifier.paper.network import Network, network_signals
 from models.bicycle import BicycleParameters, bicycle, linear_axle_force
 from models.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 
 def casadi_step(network: Network) -> ca.Function:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple
 
-from identifier.method import FrozenModel
+from identifier.tire_model import TireModel
 from tireid.cli import build_parser
 from tireid.commands.drive import conditions_of
 from tireid.commands.drive_runs import FROZEN, LINEAR, ORACLE, Conditions, Run, run_drive
@@ -65,7 +65,7 @@ def run(case: Case) -> Run:
 
 
 @cache
-def learnt_before(mu: float, seed: int, *, paper: bool = False) -> FrozenModel:
+def learnt_before(mu: float, seed: int, *, paper: bool = False) -> TireModel:
     """Return what the command learns before it drives: the same on every path.
 
     Parameters

@@ -10,15 +10,13 @@ straight road whose center line is the lane change: curvature over time, in both
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from models.vehicle import sedan
 from mpc.prediction import build_rk4
 from mpc.problem import Cost, Limits, Problem
 from mpc.tires.network import NetworkAxles
 from mpc.tires.tire import ALL, PredictionTire
-
-Array = NDArray[np.float64]
 
 SPEED = 20.0  # m/s
 STEPS = 300

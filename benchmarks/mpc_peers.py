@@ -11,17 +11,16 @@ from typing import Any, NamedTuple, Protocol
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.mpc_double_lane_change import PROBLEM, SPEED
 from codegen import load_library
+from codegen.arrays import Array
 from mpc.converged import build_errors
 from mpc.prediction import build_rk4
 from mpc.realtime import Status, Tracker
 from mpc.realtime.instance import FLAGS, tracker_source
 from mpc.tires.tire import ALL, PredictionTire
 
-Array = NDArray[np.float64]
 N, N_X, WIDTH = PROBLEM.horizon, 5, 7  # a stage: x, u and the slack of the deviation behind it
 JIT = {"jit": True, "compiler": "shell", "jit_options": {"flags": ["-O3"], "verbose": False}}
 QUIET = {"print_time": False, "error_on_fail": False}

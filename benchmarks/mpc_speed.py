@@ -15,7 +15,6 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.mpc_double_lane_change import (
     PROBLEM,
@@ -27,10 +26,9 @@ from benchmarks.mpc_double_lane_change import (
 )
 from benchmarks.mpc_peers import CondensedDaqp, Ours, Peer, hpipm, ipopt
 from benchmarks.targets import Targets, keeps
+from codegen.arrays import Array
 from mpc.converged import build_errors
 from mpc.tires.tire import PredictionTire
-
-Array = NDArray[np.float64]
 
 ROUNDS = 5
 FIRST_USE = """

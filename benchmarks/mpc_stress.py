@@ -20,14 +20,13 @@ from numpy.typing import NDArray
 from benchmarks.mpc_double_lane_change import HIDDEN, network_fitted_to_curve
 from benchmarks.targets import Targets, keeps
 from codegen import find_compiler
+from codegen.arrays import Array
 from models.vehicle import sedan
 from mpc.problem import Limits, Problem
 from mpc.realtime import Measurement, Status, Tracker
 from mpc.realtime.instance import tracker_source
 from mpc.tires import PredictionTire, prediction_tire
 from mpc.tires.ladder import oracle_tire
-
-Array = NDArray[np.float64]
 
 STEPS = 6000  # of each tire
 EPISODE = 20  # steps between two swaps

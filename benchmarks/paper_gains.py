@@ -16,9 +16,9 @@ from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.targets import Targets, keeps
+from codegen.arrays import Array
 from identifier.paper.laws import Gains, diagonal
 from identifier.paper.network import Network
 from identifier.paper_study import (
@@ -37,7 +37,6 @@ from models.recordings import Recording
 from models.vehicle import sedan
 from tireid.commands.certificate_table import certificate_of
 
-Array = NDArray[np.float64]
 DESIGNS = 1500
 SEED, OTHER_SEED = 8, 9  # of the designs; the other shows how far the counts are chance
 FEW, MANY = 6, 20  # seeds of the initial weights

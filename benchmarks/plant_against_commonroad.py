@@ -19,16 +19,14 @@ from typing import NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.commonroad_multibody import drive
 from benchmarks.targets import Targets, keeps
+from codegen.arrays import Array
 from models.friction import Friction
 from models.maneuvers import Maneuver, Slalom, StepSteer
 from models.plant import Driver, Plant
 from mpc.cars.commonroad import CommonRoadTire, MultiBody, bmw, bmw_320i, bmw_parameters
-
-Array = NDArray[np.float64]
 
 SPEED = 20.0  # [m/s]
 ONSET = 0.5  # [s]

@@ -1,13 +1,12 @@
 """Random cars, and the residual that the samples of a drive show."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from identifier.stability.monte_carlo import Drives, residuals
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 
-Array = NDArray[np.float64]
 FORCE_UNIT = 1000.0  # N
 
 

@@ -19,11 +19,11 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.random_drives import random_vehicle
 from benchmarks.targets import Targets, keeps, show
-from identifier.axle import AxleDesign
+from codegen.arrays import Array
+from identifier.axle import AxleIdentifier
 from identifier.axle.gate import GateState
 from identifier.methods import DEFAULT, make_method
 from identifier.paper.design import Driving
@@ -37,7 +37,6 @@ from models.recordings import Recording
 from models.sensors import Sensor, Sensors
 from models.vehicle import GRAVITY, Vehicle, sedan
 
-Array = NDArray[np.float64]
 FAULTS, DRIVES = 700, 24
 SENSORS = Sensors(
     v_x=Sensor(noise=0.03), v_y=Sensor(noise=0.03), r=Sensor(noise=0.003), delta=Sensor(noise=5e-4)
@@ -158,7 +157,7 @@ def signals(recording: Recording, fault: SensorFault | None, rng: np.random.Gene
 
 
 def drive(
-    design: AxleDesign, car: Vehicle, seen: Array, fault: SensorFault | None = None
+    design: AxleIdentifier, car: Vehicle, seen: Array, fault: SensorFault | None = None
 ) -> tuple[Array, float]:
     """Return the forces (n, 2) [N], and how long after its start a fault was noticed [s].
 
@@ -187,9 +186,9 @@ def is_noticed(online: OnlineIdentifier) -> bool:
     ----------
     online : the identifier.
     """
-    carried = online.carried()
-    believed = carried["gate"].ravel()
-    doubt, on, bad = carried["watch"].ravel()[0], believed[ON], believed[BAD]
+    state = online.state()
+    believed = state["gate"].ravel()
+    doubt, on, bad = state["watch"].ravel()[0], believed[ON], believed[BAD]
     return bool(online.counts.refused or doubt > 0.0 or bad > 0.0 or on == 0.0)
 
 
@@ -234,16 +233,16 @@ def run(count: int) -> tuple[dict[str, list[Result]], float]:
     return results, float(np.mean(doubt))
 
 
-def _design(car: Vehicle) -> AxleDesign:
+def _design(car: Vehicle) -> AxleIdentifier:
     design = make_method(DEFAULT, car)
-    assert isinstance(design, AxleDesign)
+    assert isinstance(design, AxleIdentifier)
     return design
 
 
 def _doubted(car: Vehicle, recording: Recording) -> float:
     """Return the share of time in which weights are in doubt although nothing fails."""
     history = identify(recording, car, _design(car))
-    return float((history.carried["watch"].reshape(len(recording) + 1, -1)[:, 0] > 0.0).mean())
+    return float((history.state["watch"].reshape(len(recording) + 1, -1)[:, 0] > 0.0).mean())
 
 
 def _result(drive_: Drive, rng: np.random.Generator) -> Result:

@@ -4,17 +4,15 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.random_drives import FORCE_UNIT, random_vehicle
-from identifier.paper.design import Design
+from codegen.arrays import Array
+from identifier.paper.design import PaperIdentifier
 from identifier.paper.network import Weights
 from identifier.stability.loop import regressor_gains
 from identifier.stability.operation import jacobian_feedback
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
-
-Array = NDArray[np.float64]
 
 
 class Corner(NamedTuple):
@@ -55,7 +53,7 @@ def random_corner(rng: np.random.Generator, *, duration: float, dt: float = 0.01
     return Corner(vehicle, recording)
 
 
-def network_input(corner: Corner, design: Design) -> Array:
+def network_input(corner: Corner, design: PaperIdentifier) -> Array:
     """Return x_bar of the network [v_y, r, delta_f, delta_r], (4,).
 
     Parameters
@@ -68,7 +66,7 @@ def network_input(corner: Corner, design: Design) -> Array:
     return scaled
 
 
-def loop_at(corner: Corner, design: Design, weights: Weights) -> tuple[Array, Array]:
+def loop_at(corner: Corner, design: PaperIdentifier, weights: Weights) -> tuple[Array, Array]:
     """Return G (2, 2) of the design at these weights, and J_f K (2, 2) [1/s].
 
     Parameters

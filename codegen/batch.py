@@ -19,11 +19,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from codegen.compiler import CompilationError, load_library
 from codegen.lanes import CPP_FLAGS, find_target, lanes_source, scratch_size
 from codegen.scan import Scan
 
-Array = NDArray[np.float64]
 # Arrays to blocks of lanes and back, and the compiled loop over blocks in several threads.
 #
 # A block holds as many runs as a register has lanes. Its arrays end in (size, lanes): the lanes of

@@ -10,11 +10,9 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from codegen.compiler import CompilationError, load_library
-
-Array = NDArray[np.float64]
 
 log = logging.getLogger("tireid.codegen")
 
@@ -249,7 +247,7 @@ class Scan:
         self, n: int, packed: dict[str, Array], every: int
     ) -> dict[str, Array]:
         step = self.step
-        folded = step.mapaccum(
+        specialized = step.mapaccum(
             f"{step.name()}_{n}",
             n,
             [step.index_in(p) for p in self.carry],
@@ -265,7 +263,7 @@ class Scan:
                 start = value.reshape(columns, rows).T
                 arguments.append(start if port in self.carry else np.tile(start, (1, n)))
         results = dict(
-            zip(step.name_out(), folded.call([ca.DM(a) for a in arguments]), strict=True)
+            zip(step.name_out(), specialized.call([ca.DM(a) for a in arguments]), strict=True)
         )
         record = {}
         for port in self.carry:

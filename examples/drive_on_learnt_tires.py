@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from identifier.axle import AxleDesign
+from identifier.axle import AxleIdentifier
 from identifier.run import identify
 from models.maneuvers import Slalom
 from models.plant import Plant
@@ -51,7 +51,7 @@ def main() -> float:
     car = sedan()
     slalom = Slalom(amplitude=0.07, frequency=0.5, onset=1.0, rate_limit=0.5, duration=20.0)
     recording = Plant(car).simulate(slalom, speed=20.0).recording()
-    history = identify(recording, car, AxleDesign.for_vehicle(car))
+    history = identify(recording, car, AxleIdentifier.for_vehicle(car))
     learnt = prediction_tire(history.freeze(t=20.0))
 
     drives = {"frozen": steer(learnt), "linear": steer(prediction_tire(car))}

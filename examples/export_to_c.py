@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from identifier.axle import AxleDesign
+from identifier.axle import AxleIdentifier
 from identifier.export.compiled import CompiledPackage
 from identifier.export.package import build_package
 from identifier.run import identify
@@ -47,7 +47,7 @@ def drives(car: Vehicle) -> tuple[Recording, Recording]:
 def main() -> float:
     """Return how far the C in float is from Python in double, at most over the lane change [N]."""
     car = sedan()
-    design = AxleDesign.for_vehicle(car)
+    design = AxleIdentifier.for_vehicle(car)
     slalom, change = drives(car)
     learnt = identify(slalom, car, design).freeze(t=20.0)
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identifier.paper.design import Design, Driving, natural_force_unit
+from identifier.paper.design import Driving, PaperIdentifier, natural_force_unit
 from identifier.paper.laws import DRIVING_ERRORS, Gains, diagonal
 from identifier.paper.network import SIGNALS, Network
 from identifier.stability.gain_design import decay_rate, design_gains
@@ -55,7 +55,7 @@ def natural_driving(vehicle: Vehicle, *, bandwidth: float = BANDWIDTH) -> Drivin
 
 
 def natural_operation(
-    design: Design, vehicle: Vehicle, driving: Driving | None = None
+    design: PaperIdentifier, vehicle: Vehicle, driving: Driving | None = None
 ) -> Operation:
     """Return what a certificate of the design must know.
 
@@ -97,7 +97,7 @@ def design_for(
     integrator: str = "euler",
     dt: float = 0.01,
     seed: int = 0,
-) -> Design:
+) -> PaperIdentifier:
     """Return a design whose learning loop has the wanted phase margin at the worst regressor.
 
     Parameters
@@ -118,7 +118,7 @@ def design_for(
         Where the bandwidth is too high for the sampling, or the margin cannot be had.
     """
     network = network or natural_network(vehicle)
-    frame = Design(
+    frame = PaperIdentifier(
         gains=_placeholder(),
         network=network,
         law=law,
@@ -150,14 +150,14 @@ def design_for(
     return replace(frame, gains=replace(designed.gains, lead=lead))
 
 
-def default_design(
+def paper_identifier(
     vehicle: Vehicle,
     *,
     law: str = "integral",
     network: Network | None = None,
     seed: int = 0,
     dt: float = 0.01,
-) -> Design:
+) -> PaperIdentifier:
     """Return a design for a vehicle.
 
     The two instantaneous laws have the gains of the integral law, one as they are and one with
@@ -189,7 +189,7 @@ def default_design(
     return with_law(design, law)
 
 
-def with_law(design: Design, law: str) -> Design:
+def with_law(design: PaperIdentifier, law: str) -> PaperIdentifier:
     """Return a design run by another law, to compare the two: its gains as they are, or with η/λ.
 
     Parameters

@@ -8,16 +8,14 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen import Scan
+from codegen.arrays import Array
 from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.rules import LARGEST_FORCE
 from models.schema import Table
 from models.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 SLIP = 0.02  # rad, below the peak of every tire
 SLIDE = 300  # samples of 10 ms: after them a lag of the force is over
@@ -27,10 +25,7 @@ class CannotFreezeError(ValueError):
     """The method estimates a signal: there is no model of the tire to freeze."""
 
 
-FrozenModel = TireModel
-
-
-def steady_stiffness(model: FrozenModel, v_x: float) -> Array:
+def steady_stiffness(model: TireModel, v_x: float) -> Array:
     """Return the slope of both axle forces over slip between two steady slides, (2,) [N/rad].
 
     Parameters
@@ -91,7 +86,7 @@ class Method(Protocol):
         """Below this speed [m/s] learning rests and forces read zero."""
 
     def setup(
-        self, vehicle: Vehicle, recording: Recording, start: FrozenModel | None = None
+        self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
     ) -> Setup:
         """Return what a run needs.
 
@@ -102,13 +97,13 @@ class Method(Protocol):
         start : model whose weights the run begins with; None begins with those of the method.
         """
 
-    def frozen(self, vehicle: Vehicle, carried: Mapping[str, Array]) -> FrozenModel:
+    def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> TireModel:
         """Return the model that carried values make.
 
         Parameters
         ----------
         vehicle : the car.
-        carried : values of the carried ports at one instant.
+        state : values of the carried ports at one instant.
 
         Raises
         ------

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from identifier.axle.design import AxleDesign
+from identifier.axle.design import AxleIdentifier
 from identifier.axle.gate import Plausibility
 from identifier.axle.model import ARRAYS, AxleModel
 from identifier.axle.model import KIND as AXLE
@@ -26,21 +26,15 @@ from identifier.baselines import (
 )
 from identifier.baselines.curves import KIND as CURVE
 from identifier.baselines.curves import CurveModel
-from identifier.defaults import LAWS, default_design, natural_operation
-from identifier.method import (
-    FORMAT,
-    FrozenModel,
-    FrozenModelError,
-    Method,
-    require_alive,
-)
+from identifier.defaults import LAWS, natural_operation, paper_identifier
+from identifier.method import FORMAT, FrozenModelError, Method, require_alive
 from identifier.own_network import KIND as ONNX
 from identifier.own_network import OnnxModel
-from identifier.paper.design import Design, Driving
+from identifier.paper.design import Driving, PaperIdentifier
 from identifier.paper.laws import DRIVING_ERRORS
 from identifier.paper.network import KIND as NETWORK
 from identifier.paper.network import NetworkModel
-from identifier.regression import RegressionDesign
+from identifier.regression import RegressionIdentifier
 from identifier.stability import Certificate
 from identifier.stability import certify as certify_gains
 from identifier.tire_model import TireModel
@@ -54,11 +48,11 @@ REFERENCE = "integral"  # the paper's law, which times are compared with
 
 
 def _paper(law: str) -> Factory:
-    return lambda vehicle, seed: default_design(vehicle, law=law, seed=seed)
+    return lambda vehicle, seed: paper_identifier(vehicle, law=law, seed=seed)
 
 
 def _regression(law: str) -> Factory:
-    return lambda vehicle, seed: RegressionDesign.for_vehicle(vehicle, law=law, seed=seed)
+    return lambda vehicle, seed: RegressionIdentifier.for_vehicle(vehicle, law=law, seed=seed)
 
 
 def _seedless(factory: Callable[[Vehicle], Method]) -> Factory:
@@ -70,7 +64,7 @@ def _seedless(factory: Callable[[Vehicle], Method]) -> Factory:
 
 
 METHODS: Mapping[str, Factory] = {
-    DEFAULT: _seedless(AxleDesign.for_vehicle),
+    DEFAULT: _seedless(AxleIdentifier.for_vehicle),
     **{law: _regression(law) for law in REGRESSIONS},
     **{law: _paper(law) for law in LAWS},
     "linear": _seedless(LinearBaseline.for_vehicle),
@@ -127,9 +121,9 @@ def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01) -> Method:
     """
     match model:
         case AxleModel():
-            return AxleDesign.for_vehicle(vehicle, dt=dt)
+            return AxleIdentifier.for_vehicle(vehicle, dt=dt)
         case NetworkModel():
-            return default_design(vehicle, network=model.network, dt=dt)
+            return paper_identifier(vehicle, network=model.network, dt=dt)
         case _:
             raise ValueError(f"no method can go on learning from a {type(model).__name__}")
 
@@ -144,10 +138,10 @@ def certify(method: Method, vehicle: Vehicle, driving: Driving | None = None) ->
     driving : how hard it is driven; None takes what is stored in a design, else `natural_driving`.
     """
     match method:
-        case Design():
+        case PaperIdentifier():
             operation = natural_operation(method, vehicle, driving)
             return certify_gains(method.gains, DRIVING_ERRORS[method.law], operation)
-        case AxleDesign():
+        case AxleIdentifier():
             return Certificate(held=method.certificate["held_by_construction"])
         case _:
             return Certificate()
@@ -158,7 +152,7 @@ def certify(method: Method, vehicle: Vehicle, driving: Driving | None = None) ->
 LARGEST = 1e9  # of the numbers of an axle model, SI and static axle loads
 
 
-def load_model(path: str | PathLike[str]) -> FrozenModel:
+def load_model(path: str | PathLike[str]) -> TireModel:
     """Read a frozen model of any kind.
 
     Parameters
@@ -201,7 +195,7 @@ def _axle(data: dict[str, Any], source: str) -> AxleModel:
     return AxleModel.from_dict(data, source)
 
 
-READERS: Mapping[str, Callable[[dict[str, Any], str], FrozenModel]] = {
+READERS: Mapping[str, Callable[[dict[str, Any], str], TireModel]] = {
     NETWORK: NetworkModel.from_dict,
     AXLE: _axle,
     CURVE: CurveModel.from_dict,

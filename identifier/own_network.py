@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Scan
+from codegen.arrays import Array
 from identifier.method import (
     FORMAT,
-    FrozenModel,
     FrozenModelError,
     Setup,
     require_alive,
@@ -406,9 +406,6 @@ def _scan(content: bytes, inputs: tuple[str, ...] | None, slip_sign: int) -> Sca
     return Scan(replay, carry=(), over=OVER)
 
 
-Array = NDArray[np.float64]
-
-
 # A network of one's own among the methods: it learns nothing, online and frozen are the same.
 
 
@@ -440,7 +437,7 @@ class FrozenMethod:
         return self.model.min_speed
 
     def setup(
-        self, vehicle: Vehicle, recording: Recording, start: FrozenModel | None = None
+        self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
     ) -> Setup:
         """Return what a run needs.
 
@@ -460,13 +457,13 @@ class FrozenMethod:
             raise ValueError("a frozen model learns nothing, it cannot begin with a stored one")
         return self.model.setup(recording)
 
-    def frozen(self, vehicle: Vehicle, carried: Mapping[str, Array]) -> OnnxModel:
+    def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> OnnxModel:
         """Return the model itself.
 
         Parameters
         ----------
         vehicle : the car; the model keeps its own.
-        carried : nothing is carried.
+        state : nothing is carried.
         """
-        del vehicle, carried
+        del vehicle, state
         return self.model

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identifier.defaults import with_law
-from identifier.paper.design import Design
+from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import Gains, diagonal
 from identifier.paper.network import Network
 from identifier.reproducibility import AxleRmse, Replay, freeze_key, online_error, reproduce
@@ -62,7 +62,7 @@ GAINS = Gains(
 
 def paper_design(
     law: str, seed: int, *, gains: Gains = GAINS, network: Network = NETWORK
-) -> Design:
+) -> PaperIdentifier:
     """Return the design of the study.
 
     Parameters
@@ -72,7 +72,7 @@ def paper_design(
     gains : those of the study, or others.
     network : that of the study, or another.
     """
-    return with_law(Design(gains=gains, network=network, seed=seed), law)
+    return with_law(PaperIdentifier(gains=gains, network=network, seed=seed), law)
 
 
 ONLINE = "online"  # the column of what was identified online, against truth, over all
@@ -131,7 +131,7 @@ def drive_maneuvers() -> dict[str, Recording]:
     }
 
 
-def run_trial(recording: Recording, maneuver: str, design: Design) -> Trial:
+def run_trial(recording: Recording, maneuver: str, design: PaperIdentifier) -> Trial:
     """Run one design.
 
     Parameters

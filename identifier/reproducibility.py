@@ -14,11 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.method import FrozenModel
+from codegen.arrays import Array
 from identifier.run import History
+from identifier.tire_model import TireModel
 from models.recordings import Recording
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -162,7 +161,7 @@ def counted_samples(
     return counted
 
 
-def predict(model: FrozenModel, recording: Recording, *, since: float | None = None) -> Prediction:
+def predict(model: TireModel, recording: Recording, *, since: float | None = None) -> Prediction:
     """Replay a recording with frozen weights and compare with its true forces, where it has any.
 
     Parameters
@@ -187,7 +186,7 @@ def predict(model: FrozenModel, recording: Recording, *, since: float | None = N
     )
 
 
-def replay(model: FrozenModel, online: History, *, since: float | None = None) -> Replay:
+def replay(model: TireModel, online: History, *, since: float | None = None) -> Replay:
     """Replay a recording with frozen weights and compare over all of it.
 
     Parameters

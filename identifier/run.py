@@ -5,17 +5,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen import Stepper
-from identifier.method import FrozenModel, Method, Setup
+from codegen.arrays import Array
+from identifier.method import Method, Setup
 from identifier.refused import NOWHERE, STALE_TIME, SampleLimits, judges_samples, stale_samples
 from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.recordings.record import MINIMUM_SAMPLES
 from models.vehicle import Vehicle
 
-Array = NDArray[np.float64]
 IMPOSSIBLE_FORCE = 100.0  # times the car's weight: no tire reaches it, so the law has diverged
 
 
@@ -23,7 +22,7 @@ class DivergedError(ArithmeticError):
     """The law diverged before the instant that was asked for."""
 
 
-def carried_index(recording: Recording, t: float) -> int:
+def state_index(recording: Recording, t: float) -> int:
     """Return which carried values are in effect at a time: those before that sample; n at the end.
 
     Parameters
@@ -54,16 +53,16 @@ class History:
     design : the method that ran.
     recording : what it ran over.
     axle_force : forces that were identified online (n, 2) [N].
-    carried : by port, the carried values in effect at each sample and after the last (n + 1, ...).
-    told : by port, the other outputs of the step at each sample (n, ...).
+    state : by port, the carried values in effect at each sample and after the last (n + 1, ...).
+    outputs : by port, the other outputs of the step at each sample (n, ...).
     """
 
     vehicle: Vehicle
     design: Method
     recording: Recording
     axle_force: Array
-    carried: Mapping[str, Array]
-    told: Mapping[str, Array]
+    state: Mapping[str, Array]
+    outputs: Mapping[str, Array]
 
     @property
     def diverged_at(self) -> float | None:
@@ -72,7 +71,7 @@ class History:
         sane = possible.all(axis=1)
         return None if sane.all() else float(self.recording.t[np.argmin(sane)])
 
-    def carried_at(self, t: float) -> dict[str, Array]:
+    def state_at(self, t: float) -> dict[str, Array]:
         """Return the carried values in effect at a time; from the end on, those after the last.
 
         Parameters
@@ -84,8 +83,8 @@ class History:
         ValueError
             Where the recording begins after that time.
         """
-        index = carried_index(self.recording, t)
-        return {name: values[index] for name, values in self.carried.items()}
+        index = state_index(self.recording, t)
+        return {name: values[index] for name, values in self.state.items()}
 
     def freeze(self, t: float | None = None) -> TireModel:
         """Return the model with the weights in effect at a time.
@@ -104,11 +103,11 @@ class History:
             Where the recording begins after that time.
         """
         t = float(self.recording.t[-1]) if t is None else t
-        carried = self.carried_at(t)
+        state = self.state_at(t)
         diverged_at = self.diverged_at
         if diverged_at is not None and diverged_at <= t:
             raise DivergedError(f"the law diverged at {diverged_at:g} s, before {t:g} s")
-        return self.design.frozen(self.vehicle, carried)
+        return self.design.frozen(self.vehicle, state)
 
     def __repr__(self) -> str:
         diverged = "" if self.diverged_at is None else f", diverged at {self.diverged_at:g} s"
@@ -138,7 +137,7 @@ def check_sampling(recording: Recording, design: Method) -> None:
 
 
 def identify(
-    recording: Recording, vehicle: Vehicle, design: Method, start: FrozenModel | None = None
+    recording: Recording, vehicle: Vehicle, design: Method, start: TireModel | None = None
 ) -> History:
     """Run a method over a recording, sample by sample.
 
@@ -146,7 +145,7 @@ def identify(
     ----------
     recording : signals, sampled at the design's interval; its forces are not looked at.
     vehicle : the car as the method is told of it.
-    design : the method: a `Design` of the paper's identifier, or any other.
+    design : the method: a `PaperIdentifier` of the paper's identifier, or any other.
     start : stored weights to begin with; None begins afresh.
 
     Raises
@@ -162,8 +161,8 @@ def identify(
         design=design,
         recording=recording,
         axle_force=record["axle_force"],
-        carried={name: record[f"{name}_all"] for name in setup.scan.carry},
-        told={name: record[name] for name in setup.scan.outputs if name != "axle_force"},
+        state={name: record[f"{name}_all"] for name in setup.scan.carry},
+        outputs={name: record[name] for name in setup.scan.outputs if name != "axle_force"},
     )
 
 
@@ -211,7 +210,7 @@ class OnlineIdentifier:
         method: Method,
         vehicle: Vehicle,
         dt: float,
-        start: FrozenModel | None = None,
+        start: TireModel | None = None,
         *,
         stale_time: float = STALE_TIME,
     ) -> None:
@@ -309,11 +308,11 @@ class OnlineIdentifier:
             self._stepper = None
 
     @property
-    def start(self) -> FrozenModel | None:
+    def start(self) -> TireModel | None:
         """Stored weights that the run began with, None where it began afresh."""
         return self._start
 
-    def restart(self, start: FrozenModel | None) -> None:
+    def restart(self, start: TireModel | None) -> None:
         """Begin again at the next sample; the counts go on.
 
         Parameters
@@ -328,7 +327,7 @@ class OnlineIdentifier:
         return self._diverged
 
     @property
-    def told(self) -> dict[str, Array]:
+    def outputs(self) -> dict[str, Array]:
         """What the step told about the last sample, by port, matrices by columns; copies.
 
         Zero while it is `stale`.
@@ -338,7 +337,7 @@ class OnlineIdentifier:
         told = {name: array.copy() for name, array in self._stepper.outputs.items()}
         return {name: np.zeros_like(array) for name, array in told.items()} if self.stale else told
 
-    def carried(self) -> dict[str, Array]:
+    def state(self) -> dict[str, Array]:
         """Return the values that the next sample will meet, by port; copies.
 
         Before the first sample those of a car that rolls straight ahead.
@@ -348,7 +347,7 @@ class OnlineIdentifier:
             return {name: np.array(value) for name, value in carry.items()}
         return self._stepper.carried()
 
-    def model(self) -> FrozenModel:
+    def model(self) -> TireModel:
         """Return the model with the weights in effect now.
 
         Raises
@@ -364,4 +363,4 @@ class OnlineIdentifier:
             raise DivergedError(f"the law diverged within {self.counts.samples} samples")
         if self._stepper is None and self._start is not None:
             return self._start
-        return self.method.frozen(self.vehicle, self.carried())
+        return self.method.frozen(self.vehicle, self.state())

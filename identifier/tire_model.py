@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from codegen.arrays import Array
 from models.files import write_atomically
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 
-Array = NDArray[np.float64]
 Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
 

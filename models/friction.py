@@ -12,11 +12,9 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from models.rules import require_positive
-
-Array = NDArray[np.float64]
 
 MAX_PLACES = 4  # changes over the place that a compiled plant has room for
 

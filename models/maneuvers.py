@@ -12,9 +12,8 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from codegen.arrays import Array
 
 
 class ManeuverError(ValueError):

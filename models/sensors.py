@@ -7,11 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from models.recordings import Recording
-
-Array = NDArray[np.float64]
 
 # What a sensor can show at all: beyond it, and NaN, is no number of a sensor.
 LARGEST_SHOWN: Mapping[str, float] = {

@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from codegen.arrays import Array
 from mpc.prediction import N_CAR, build_rk4, motion, stage_ports, state_size
 from mpc.problem import N_ERRORS, Problem, tracking_errors
 from mpc.tires.tire import PredictionTire, TireStructure, reach_of
 
-Array = NDArray[np.float64]
 N_SOFT = 3  # e_y, slip in front, slip at the rear
 
 

@@ -1,6 +1,7 @@
 """The optimal control problem of the tracker: horizon, cost, limits. Numbers, but for the horizon.
 
 Minimize Σ_k ½ y_k' Q y_k + ½ R u_k² + ½ y_N' Q_N y_N + ½ Σ Z s² over u_0 … u_{N-1}, with x_{k+1}
+from codegen.arrays import Array
 from one Runge-Kutta step of dt and x_0 given, so that
   |u_k| <= steering_rate,  |δ_k| <= steering                 hard, k = 1 … N
   |e_y,k| <= e_y + s,  |α_k| <= slip + s (front, rear)       soft, k = 1 … N
@@ -11,11 +12,9 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from models.rules import require_positive
-
-Array = NDArray[np.float64]
 
 # What the tracker minimizes: Σ ½ q y² over the stages, Gauss-Newton, and ½ R u² of its input.
 #

@@ -12,10 +12,10 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from identifier.axle import AxleDesign as AxleIdentifier
+    from identifier.axle import AxleIdentifier
     from identifier.method import Method
     from identifier.methods import certify, make_method
-    from identifier.paper.design import Design as PaperIdentifier
+    from identifier.paper.design import PaperIdentifier
     from identifier.reproducibility import Prediction
     from identifier.run import History
     from identifier.tire_model import TireModel
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     __version__: str
 
 _HOMES = {
-    "AxleIdentifier": ("identifier.axle", "AxleDesign"),
+    "AxleIdentifier": ("identifier.axle", "AxleIdentifier"),
     "History": ("identifier.run", "History"),
     "Method": ("identifier.method", "Method"),
-    "PaperIdentifier": ("identifier.paper.design", "Design"),
+    "PaperIdentifier": ("identifier.paper.design", "PaperIdentifier"),
     "Prediction": ("identifier.reproducibility", "Prediction"),
     "Recording": ("models.recordings", "Recording"),
     "TireModel": ("identifier.tire_model", "TireModel"),

@@ -46,7 +46,7 @@ class Exported:
         return "\n".join([*lines, *self.told, wrote])
 
     def __repr__(self) -> str:
-        return f"<Exported {self.package.folded.name} in {self.folder}>"
+        return f"<Exported {self.package.specialized.name} in {self.folder}>"
 
 
 def export(
@@ -160,7 +160,9 @@ def export_method(
 
             for version in (2, 3):
                 export_fmu(
-                    package.folded, scratch / f"{package.folded.name}_fmi{version}.fmu", version
+                    package.specialized,
+                    scratch / f"{package.specialized.name}_fmi{version}.fmu",
+                    version,
                 )
         if onnx:
             _write_onnx(scratch, method, vehicle, package, start)
@@ -177,7 +179,7 @@ def write_files(folder: Path, package: Package, figures: str, costs: Sequence[Co
     figures : what it costs, as Markdown.
     costs : what it costs, for the JSON file.
     """
-    manifest = f"{package.folded.name}.json"
+    manifest = f"{package.specialized.name}.json"
     texts = {**package.files, "README.md": readme(package, figures)}
     for path, text in {**texts, manifest: with_figures(texts[manifest], costs)}.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
@@ -196,7 +198,7 @@ def _write_onnx(
     from identifier.export.onnx import export_onnx
 
     try:
-        model = start or method.frozen(vehicle, package.folded.carry)
+        model = start or method.frozen(vehicle, package.specialized.carry)
     except CannotFreezeError as error:
         raise ValueError(f"--onnx: {error}") from error
-    export_onnx(model, folder / f"{package.folded.name}.onnx")
+    export_onnx(model, folder / f"{package.specialized.name}.onnx")

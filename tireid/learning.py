@@ -1,6 +1,6 @@
 """Learning from a recording and asking what was learnt about another, as commands and users do."""
 
-from identifier.axle import AxleDesign
+from identifier.axle import AxleIdentifier
 from identifier.method import Method
 from identifier.reproducibility import Prediction, counted_samples, freeze_key, predict
 from identifier.run import DivergedError, History
@@ -37,7 +37,7 @@ def identify(
     ValueError
         Where the car never drives, or recording and method differ in their sampling interval.
     """
-    design = AxleDesign.for_vehicle(vehicle, dt=recording.dt) if method is None else method
+    design = AxleIdentifier.for_vehicle(vehicle, dt=recording.dt) if method is None else method
     if check:
         check_against_vehicle(recording, vehicle)
     counted_samples(recording, design.min_speed)  # refuses a car that never drives

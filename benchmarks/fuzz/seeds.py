@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from identifier.defaults import default_design
+from identifier.defaults import paper_identifier
 from identifier.export.onnx import export_onnx
-from identifier.method import FrozenModel
 from identifier.methods import make_method
 from identifier.own_network import OnnxModel
 from identifier.paper.design import design_text
 from identifier.run import identify
+from identifier.tire_model import TireModel
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.recordings import Recording, write_recording
@@ -49,7 +49,7 @@ def write_seeds(folder: Path, needed: Collection[str]) -> Mapping[str, bytes]:
         (folder / name).write_bytes((DATA / name).read_bytes())
     (folder / "car.toml").write_text(_plain_car(car))
     for name, law in DESIGNS.items():
-        (folder / name).write_text(design_text(default_design(car, law=law)), encoding="utf-8")
+        (folder / name).write_text(design_text(paper_identifier(car, law=law)), encoding="utf-8")
     _write_path(folder / "path.csv")
     if "log.parquet" in needed:
         _write_parquet(recording, folder / "log.parquet")
@@ -83,7 +83,7 @@ def short_drive(car: Vehicle) -> Recording:
     return drive.recording(sensors, np.random.default_rng(1))
 
 
-def _learnt(law: str, recording: Recording, car: Vehicle) -> FrozenModel:
+def _learnt(law: str, recording: Recording, car: Vehicle) -> TireModel:
     history = identify(recording, car, make_method(law, car))
     return history.freeze(float(recording.t[-1]))
 

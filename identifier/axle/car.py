@@ -10,11 +10,9 @@ from typing import Any, NamedTuple, TypeVar
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from models.vehicle import GRAVITY, Vehicle
-
-Array = NDArray[np.float64]
 
 
 class Car(NamedTuple):

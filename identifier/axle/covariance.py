@@ -10,11 +10,10 @@ from itertools import combinations_with_replacement
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from identifier.axle.car import larger, reciprocal
 
-Array = NDArray[np.float64]
 Symmetric = dict[tuple[int, int], Any]
 
 LEAST_VARIANCE = 1e-14  # of stored weights: of a parameter given those after it, in its unit

@@ -11,12 +11,10 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from codegen.elementary import tanh
 from identifier.axle.car import larger, smaller
-
-Array = NDArray[np.float64]
 
 LADDER = (0.016, 0.064, 0.128, 0.256)  # rad: from where a tire bends to where it slides
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen import Scan
+from codegen.arrays import Array
 from identifier.axle.car import car_numbers, froude_speed
 from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
@@ -21,18 +21,17 @@ from identifier.axle.prior import Prior, friction_direction
 from identifier.axle.slip import SensitivityState, Sway, SwayState
 from identifier.axle.step import CARRY, OVER, build_step
 from identifier.axle.watch import BEGIN, Watch
-from identifier.method import FrozenModel, Setup
+from identifier.method import Setup
+from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
-
-Array = NDArray[np.float64]
 
 NOT_CERTIFIED = "not certified"
 STEERING, V_Y = (BoundNumbers._fields.index(name) for name in ("steering", "v_y"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AxleDesign:
+class AxleIdentifier:
     """Axle units, lag, sway, and recursive least squares with directional forgetting.
 
     Parameters
@@ -76,7 +75,7 @@ class AxleDesign:
             raise ValueError(f"rising_until must not be negative, it is {self.rising_until}")
 
     @classmethod
-    def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> "AxleDesign":
+    def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> "AxleIdentifier":
         """Return the design for a car: lengths scale with L, speeds with U = sqrt(g L) (Froude).
 
         Parameters
@@ -128,7 +127,7 @@ class AxleDesign:
         }
 
     def setup(
-        self, vehicle: Vehicle, recording: Recording, start: FrozenModel | None = None
+        self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
     ) -> Setup:
         """Return what a run needs.
 
@@ -211,24 +210,24 @@ class AxleDesign:
         slopes = 1.0 / (scales * np.cosh(self.rising_until / scales) ** 2)
         return {"rising": slopes / slopes.sum()}
 
-    def frozen(self, vehicle: Vehicle, carried: Mapping[str, Array]) -> AxleModel:
+    def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> AxleModel:
         """Return the model with the carried weights.
 
         Parameters
         ----------
         vehicle : the car.
-        carried : W (2, n), own (2, 3), UD (2, q (q + 1)/2) and excitation (2, 9).
+        state : W (2, n), own (2, 3), UD (2, q (q + 1)/2) and excitation (2, 9).
         """
         return AxleModel(
             vehicle=vehicle,
             ladder=self.ladder,
             sway=self.sway,
             plausibility=self.plausibility,
-            W=carried["W"].copy(),
-            own=carried["own"].copy(),
-            covariance=unpacked(carried["UD"], len(self.ladder) + 3),
+            W=state["W"].copy(),
+            own=state["own"].copy(),
+            covariance=unpacked(state["UD"], len(self.ladder) + 3),
             prior_covariance=self.prior.covariance(vehicle, self.ladder),
-            excitation=carried["excitation"].copy(),
+            excitation=state["excitation"].copy(),
         )
 
 

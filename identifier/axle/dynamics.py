@@ -9,14 +9,12 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from identifier.axle.car import Car
 from identifier.axle.curve import Curve, curve, doublings
 from identifier.axle.slip import SHORTEST
 from models.vehicle import GRAVITY
-
-Array = NDArray[np.float64]
 
 
 def static_curve(slip: Any, W: Array, ladder: tuple[float, ...]) -> Curve:

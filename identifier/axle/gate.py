@@ -10,12 +10,10 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from identifier.axle.car import larger
 from models.rules import require_positive_fields
-
-Array = NDArray[np.float64]
 
 BAD_IN_A_ROW = 3
 

@@ -12,13 +12,11 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from identifier.axle.car import larger, reciprocal, smaller, within
 from identifier.axle.covariance import Factors, Spread, Symmetric, excited, scaled, updated, width
 from models.rules import require_positive_fields
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Scan
+from codegen.arrays import Array
 from identifier.axle.car import Car, car_numbers
 from identifier.axle.curve import EDGES, doublings, unit_matrix
 from identifier.axle.dynamics import lagged_force, series_compliance, static_curve
@@ -19,8 +20,6 @@ from identifier.method import FORMAT, FrozenModelError, Setup, vehicle_from, veh
 from identifier.tire_model import Fact, TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 KIND = "axle"
 ARRAYS = ("W", "own", "covariance", "prior_covariance", "excitation")

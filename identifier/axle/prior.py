@@ -9,13 +9,11 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from identifier.axle.curve import unit_matrix
 from models.rules import require_positive_fields
 from models.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 SLIPS = np.linspace(0.002, 0.6, 300)  # rad, where a curve and its projection must agree
 RIDGE = 0.3  # keeps projected weights small where units are alike

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from identifier.axle.car import Car
 from identifier.axle.curve import Curve
 from identifier.axle.gate import Gate
@@ -145,9 +145,6 @@ def force_gradient(c: Curve, of_compliance: Any, of_share: Any, cos_delta: Any, 
     of_offset = ca.vertcat(1, 1 / v_x)
     units = c.units * ca.repmat(cos_delta, 1, c.units.shape[1])
     return ca.horzcat(units, slope * of_compliance, slope * of_share, slope * of_offset)
-
-
-Array = NDArray[np.float64]
 
 
 # The sway (roll) of the body, which moves the sensor of v_y sideways over the contact patches.

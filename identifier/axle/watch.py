@@ -22,12 +22,10 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from identifier.axle.car import larger, smaller
 from models.rules import require_positive_fields
-
-Array = NDArray[np.float64]
 
 LARGEST_Q = 25.0  # one outlier alone is no fault
 

@@ -11,20 +11,19 @@ from typing import Any, NamedTuple, Self
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen import Scan
+from codegen.arrays import Array
 from identifier.baselines.curves import CURVES, CurveModel
 from identifier.baselines.kalman import CARRY, NOISE, build_step
 from identifier.baselines.ports import OVER, around, axle_loads, lowest_speed, scales
-from identifier.method import FrozenModel, Setup
+from identifier.method import Setup
+from identifier.tire_model import TireModel
 from identifier.tuning import Range
 from models.bicycle import BicycleParameters
 from models.recordings import Recording
 from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
-
-Array = NDArray[np.float64]
 
 # Numbers without limits for parameters that have some: what a filter may add noise to.
 #
@@ -199,7 +198,7 @@ class CurveEkf:
         return {name: around(getattr(self, name), factor) for name, factor in factors.items()}
 
     def setup(
-        self, vehicle: Vehicle, recording: Recording, start: FrozenModel | None = None
+        self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
     ) -> Setup:
         """Return what a run needs.
 
@@ -247,17 +246,17 @@ class CurveEkf:
             },
         )
 
-    def frozen(self, vehicle: Vehicle, carried: Mapping[str, Array]) -> CurveModel:
+    def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
         """Return the curve with the carried parameters.
 
         Parameters
         ----------
         vehicle : the car.
-        carried : estimate (2 + n,).
+        state : estimate (2 + n,).
         """
         decode = PARAMETRIZATIONS[self.curve].decode
         loads = ca.DM(vehicle.axle_loads)
-        theta = ca.DM(carried["estimate"][2:])
+        theta = ca.DM(state["estimate"][2:])
         return CurveModel(
             vehicle=vehicle,
             curve=self.curve,

@@ -13,9 +13,9 @@ from typing import Self
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen import Scan
+from codegen.arrays import Array
 from identifier.baselines.ports import (
     OVER,
     around,
@@ -25,13 +25,13 @@ from identifier.baselines.ports import (
     scales,
     turning_force,
 )
-from identifier.method import CannotFreezeError, FrozenModel, Setup
+from identifier.method import CannotFreezeError, Setup
+from identifier.tire_model import TireModel
 from identifier.tuning import Range
 from models.recordings import Recording
 from models.rules import require_positive
 from models.vehicle import Vehicle
 
-Array = NDArray[np.float64]
 CARRY = ("xi_hat", "F_hat", "turning", "running")
 
 
@@ -116,7 +116,7 @@ class ExtendedStateObserver:
         return {"bandwidth": around(self.bandwidth, 4.0)}
 
     def setup(
-        self, vehicle: Vehicle, recording: Recording, start: FrozenModel | None = None
+        self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
     ) -> Setup:
         """Return what a run needs.
 
@@ -149,18 +149,18 @@ class ExtendedStateObserver:
             },
         )
 
-    def frozen(self, vehicle: Vehicle, carried: Mapping[str, Array]) -> FrozenModel:
+    def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> TireModel:
         """Refuse: there is no model.
 
         Parameters
         ----------
         vehicle : the car.
-        carried : of the run.
+        state : of the run.
 
         Raises
         ------
         CannotFreezeError
             Always.
         """
-        del vehicle, carried
+        del vehicle, state
         raise CannotFreezeError("an extended state observer estimates forces, not a tire")

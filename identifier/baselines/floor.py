@@ -10,20 +10,20 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from identifier.axle import AxleDesign, AxleModel
+from codegen.arrays import Array
+from identifier.axle import AxleIdentifier, AxleModel
 from identifier.baselines.curve_ekf import LIMITS, PARAMETRIZATIONS, SPREADS, CurveEkf
 from identifier.baselines.curves import CurveModel
 from identifier.baselines.linear import LinearBaseline, StiffnessRls
-from identifier.method import CannotFreezeError, FrozenModel
-from identifier.paper.design import Design
+from identifier.method import CannotFreezeError
+from identifier.paper.design import PaperIdentifier
 from identifier.paper.network import NetworkModel, Weights
 from identifier.reproducibility import axle_rms, counted_samples
+from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
-Array = NDArray[np.float64]
 # Levenberg-Marquardt within bounds, by normal equations: short and wide problems, many residuals.
 #
 # min |r(p)|²,   lower <= p <= upper;   (JᵀJ + μ D) d = -Jᵀ r over the parameters that are free to
@@ -118,7 +118,7 @@ class Structure(NamedTuple):
     """
 
     start: Callable[[np.random.Generator], Array]
-    model: Callable[[Array], FrozenModel]
+    model: Callable[[Array], TireModel]
     lower: Array
     upper: Array
 
@@ -130,7 +130,7 @@ def fit_floor(
     rng: np.random.Generator,
     starts: int = 3,
     steps: int = 60,
-) -> FrozenModel:
+) -> TireModel:
     """Return the frozen model of a structure nearest to the true forces.
 
     Parameters
@@ -161,7 +161,7 @@ def fit_floor(
     return structure.model(min(fits, key=lambda fit: fit.cost).parameters)
 
 
-def share_of_force(model: FrozenModel, recording: Recording) -> Array:
+def share_of_force(model: TireModel, recording: Recording) -> Array:
     """Return the error of a frozen model as a share of the rms true force, per axle (2,) [-].
 
     Parameters
@@ -178,7 +178,7 @@ def share_of_force(model: FrozenModel, recording: Recording) -> Array:
     return share
 
 
-def _errors(model: FrozenModel, recording: Recording) -> Array:
+def _errors(model: TireModel, recording: Recording) -> Array:
     """Errors whose sum of squares over samples is the squared share, (n, 2)."""
     truth = recording.axle_force
     if truth is None:
@@ -222,7 +222,7 @@ def structure_of(method: object, vehicle: Vehicle) -> Structure:
 
 
 @structure_of.register
-def _network(method: Design, vehicle: Vehicle) -> Structure:
+def _network(method: PaperIdentifier, vehicle: Vehicle) -> Structure:
     """All weights of the paper's network: W in the force unit, then V, by rows."""
     n_h, n_in = method.network.hidden, len(method.network.inputs)
     free = np.full(n_h * (2 + n_in), np.inf)
@@ -245,7 +245,7 @@ def _network(method: Design, vehicle: Vehicle) -> Structure:
 
 
 @structure_of.register
-def _axle(method: AxleDesign, vehicle: Vehicle) -> Structure:
+def _axle(method: AxleIdentifier, vehicle: Vehicle) -> Structure:
     """Weights of the units, and compliance, sway and offsets over their bounds, by rows."""
     n, limits = len(method.ladder), method.bounds
     W, own = method.prior.means(vehicle, method.ladder)

@@ -16,9 +16,9 @@ from typing import Any, Self
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen import Scan
+from codegen.arrays import Array
 from identifier.baselines.ports import (
     OVER,
     around,
@@ -28,7 +28,8 @@ from identifier.baselines.ports import (
     sample_ports,
     scales,
 )
-from identifier.method import CannotFreezeError, FrozenModel, Setup
+from identifier.method import CannotFreezeError, Setup
+from identifier.tire_model import TireModel
 from identifier.tuning import Range
 from models.bicycle import BicycleParameters
 from models.recordings import Recording
@@ -130,7 +131,6 @@ def correct(estimate: Any, P: Any, R: Any, x: Any, outlier: Any) -> tuple[Any, A
     return estimate + move, (after + after.T) / 2
 
 
-Array = NDArray[np.float64]
 # Extended Kalman filter with axle forces as random walks: a signal estimator.
 #
 # θ = [F_f, F_r]/F_z, in static axle loads.   Source of the idea: Ray, "Nonlinear state and tire
@@ -219,7 +219,7 @@ class ForceEkf:
         }
 
     def setup(
-        self, vehicle: Vehicle, recording: Recording, start: FrozenModel | None = None
+        self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
     ) -> Setup:
         """Return what a run needs.
 
@@ -257,18 +257,18 @@ class ForceEkf:
             },
         )
 
-    def frozen(self, vehicle: Vehicle, carried: Mapping[str, Array]) -> FrozenModel:
+    def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> TireModel:
         """Refuse: there is no model.
 
         Parameters
         ----------
         vehicle : the car.
-        carried : of the run.
+        state : of the run.
 
         Raises
         ------
         CannotFreezeError
             Always.
         """
-        del vehicle, carried
+        del vehicle, state
         raise CannotFreezeError("a filter of forces estimates forces, not a tire")

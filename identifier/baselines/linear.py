@@ -8,9 +8,9 @@ from typing import Self
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen import Scan
+from codegen.arrays import Array
 from identifier.baselines.curves import CurveModel, curve_scan
 from identifier.baselines.ports import (
     OVER,
@@ -21,14 +21,13 @@ from identifier.baselines.ports import (
     scales,
     turning_force,
 )
-from identifier.method import FrozenModel, Setup
+from identifier.method import Setup
+from identifier.tire_model import TireModel
 from identifier.tuning import Range
 from models.bicycle import slip_angles
 from models.recordings import Recording
 from models.rules import require_positive
 from models.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +58,7 @@ class LinearBaseline:
         return cls(dt=dt, min_speed=lowest_speed(vehicle))
 
     def setup(
-        self, vehicle: Vehicle, recording: Recording, start: FrozenModel | None = None
+        self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
     ) -> Setup:
         """Return what a run needs.
 
@@ -87,15 +86,15 @@ class LinearBaseline:
             },
         )
 
-    def frozen(self, vehicle: Vehicle, carried: Mapping[str, Array]) -> CurveModel:
+    def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
         """Return the linear tire itself.
 
         Parameters
         ----------
         vehicle : the car.
-        carried : nothing is carried.
+        state : nothing is carried.
         """
-        del carried
+        del state
         stiffness = [[vehicle.cornering_stiffness_front], [vehicle.cornering_stiffness_rear]]
         return CurveModel(
             vehicle=vehicle,
@@ -225,7 +224,7 @@ class StiffnessRls:
         }
 
     def setup(
-        self, vehicle: Vehicle, recording: Recording, start: FrozenModel | None = None
+        self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
     ) -> Setup:
         """Return what a run needs.
 
@@ -262,17 +261,17 @@ class StiffnessRls:
             },
         )
 
-    def frozen(self, vehicle: Vehicle, carried: Mapping[str, Array]) -> CurveModel:
+    def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
         """Return the linear tire with the carried stiffness.
 
         Parameters
         ----------
         vehicle : the car.
-        carried : stiffness (2,) [N/rad].
+        state : stiffness (2,) [N/rad].
         """
         return CurveModel(
             vehicle=vehicle,
             curve="linear",
-            parameters=carried["stiffness"].reshape(2, 1).copy(),
+            parameters=state["stiffness"].reshape(2, 1).copy(),
             min_speed=self.min_speed,
         )

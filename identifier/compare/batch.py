@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Scan
+from codegen.arrays import Array
 from identifier.compare.course import INFINITE, Course, Scores, Trial, rmse, run_scored
-from identifier.method import CannotFreezeError, FrozenModel, Method, Setup
+from identifier.method import CannotFreezeError, Method, Setup
 from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
-from identifier.run import IMPOSSIBLE_FORCE, DivergedError, carried_index, check_sampling
+from identifier.run import IMPOSSIBLE_FORCE, DivergedError, check_sampling, state_index
+from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,16 +33,16 @@ class BatchRun:
     online : error of the forces that were identified online [N], not a number where the law
         diverged to none; None without true forces.
     diverged_at : time [s] from which a force is not finite or a hundred times the weight, or None.
-    carried : by freeze time, and at the end as infinity, the carried values in effect.
+    state : by freeze time, and at the end as infinity, the carried values in effect.
     """
 
     vehicle: Vehicle
     design: Method
     online: AxleRmse | None
     diverged_at: float | None
-    carried: Mapping[float, Mapping[str, Array]]
+    state: Mapping[float, Mapping[str, Array]]
 
-    def freeze(self, t: float = np.inf) -> FrozenModel:
+    def freeze(self, t: float = np.inf) -> TireModel:
         """Return the model with the weights in effect at a freeze time, or at the end.
 
         Parameters
@@ -58,11 +58,11 @@ class BatchRun:
         ValueError
             Where the weights were not kept at that time, or are not finite.
         """
-        if t not in self.carried:
-            raise ValueError(f"weights were kept at {sorted(self.carried)} s, not at {t:g} s")
+        if t not in self.state:
+            raise ValueError(f"weights were kept at {sorted(self.state)} s, not at {t:g} s")
         if self.diverged_at is not None and self.diverged_at <= t:
             raise DivergedError(f"the law diverged at {self.diverged_at:g} s, before {t:g} s")
-        return self.design.frozen(self.vehicle, self.carried[t])
+        return self.design.frozen(self.vehicle, self.state[t])
 
 
 def identify_batch(
@@ -99,7 +99,7 @@ def identify_batch(
         check_sampling(recording, design)
     slowest = max((design.min_speed for design in designs), default=0.0)
     counts = counted_samples(recording, slowest if min_speed is None else min_speed)
-    instants = {np.inf: len(recording)} | {t: carried_index(recording, t) for t in freeze_times}
+    instants = {np.inf: len(recording)} | {t: state_index(recording, t) for t in freeze_times}
     kept = sorted(set(instants.values()) - {len(recording)})
     setups = [design.setup(car, recording) for design, car in zip(designs, cars, strict=True)]
     groups: dict[Scan, list[int]] = defaultdict(list)
@@ -123,7 +123,7 @@ def identify_batch(
                 design=designs[i],
                 online=None if recording.axle_force is None else rmse(scores.squares[row]),
                 diverged_at=None if sane == len(recording) else float(recording.t[sane]),
-                carried={
+                state={
                     t: _carried(scores, scan.carry, row, kept.index(k) if k in kept else None)
                     for t, k in instants.items()
                 },
@@ -158,7 +158,7 @@ class Replayable(Protocol):
 
 def replay_batch(
     recording: Recording,
-    models: Sequence[FrozenModel],
+    models: Sequence[TireModel],
     *,
     counts: NDArray[np.bool_],
     workers: int | None = None,
@@ -217,7 +217,7 @@ def cross_replay_batch(
     online: list[dict[str, AxleRmse]] = [{} for _ in methods]
     diverged_at: list[dict[str, float]] = [{} for _ in methods]
     freezes = [True] * len(methods)
-    models: dict[tuple[int, str], FrozenModel] = {}
+    models: dict[tuple[int, str], TireModel] = {}
     for learnt in course.recordings:
         runs = identify_batch(
             learnt, course.vehicle, methods, min_speed=course.min_speed, workers=workers

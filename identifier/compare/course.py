@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import BatchScan, Scan
-from identifier.method import CannotFreezeError, FrozenModel, Method
+from codegen.arrays import Array
+from identifier.method import CannotFreezeError, Method
 from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
 from identifier.run import identify
+from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
-Array = NDArray[np.float64]
 INFINITE = AxleRmse(front=np.inf, rear=np.inf)
 
 
@@ -80,7 +81,7 @@ class Course:
         found = axle_rms(force - recording.axle_force, counted_samples(recording, self.min_speed))
         return found if np.isfinite([found.front, found.rear]).all() else INFINITE
 
-    def replays(self, model: FrozenModel) -> dict[str, AxleRmse]:
+    def replays(self, model: TireModel) -> dict[str, AxleRmse]:
         """Return by recording the error of a frozen model.
 
         Parameters

@@ -10,13 +10,13 @@ from dataclasses import replace
 from functools import reduce
 from typing import Any
 
-from identifier.axle import AxleDesign
+from identifier.axle import AxleIdentifier
 from identifier.defaults import LAWS, natural_network
 from identifier.method import Method
 from identifier.methods import make_method
-from identifier.paper.design import Design, natural_force_unit
+from identifier.paper.design import PaperIdentifier, natural_force_unit
 from identifier.paper.laws import DRIVING_ERRORS, Gains, diagonal
-from identifier.regression import RegressionDesign
+from identifier.regression import RegressionIdentifier
 from identifier.stability.gain_design import gain_for_phase_margin
 from identifier.stability.loop import linear_law
 from identifier.tuning import Range
@@ -43,7 +43,7 @@ MARGIN_OF_LIMIT = 1e-3  # deg: at no phase margin the loop is at its limit
 
 def tuned_design(
     vehicle: Vehicle, law: str, values: Mapping[str, float], *, seed: int = 0, dt: float = 0.01
-) -> Design:
+) -> PaperIdentifier:
     """Return the design with values of `TUNABLES`.
 
     "instantaneous_scaled" has the gains that the integral law gets, with η/λ.
@@ -81,7 +81,7 @@ def tuned_design(
         rho_V=values["rho"],
         lead=lead,
     )
-    design = Design(
+    design = PaperIdentifier(
         gains=gains,
         network=natural_network(vehicle, hidden=n_h),
         law="instantaneous" if scaled else law,
@@ -158,9 +158,9 @@ def tunables(name: str, vehicle: Vehicle) -> Mapping[str, Range]:
     if name in LAWS:
         return TUNABLES
     method = make_method(name, vehicle)
-    if isinstance(method, RegressionDesign):
+    if isinstance(method, RegressionIdentifier):
         return {SIZE: TUNABLES[SIZE], **_around(method, REGRESSION_FACTORS)}
-    if isinstance(method, AxleDesign):
+    if isinstance(method, AxleIdentifier):
         return _around(method, AXLE_FACTORS)
     found: Mapping[str, Range] = getattr(method, "tunables", {})
     return found
@@ -179,7 +179,7 @@ def tuned_method(name: str, vehicle: Vehicle, values: Mapping[str, float], seed:
     if name in LAWS and values:
         return tuned_design(vehicle, name, values, seed=seed)
     method = make_method(name, vehicle, seed)
-    if isinstance(method, RegressionDesign) and SIZE in values:
+    if isinstance(method, RegressionIdentifier) and SIZE in values:
         method = replace(method, network=natural_network(vehicle, hidden=hidden_units(values)))
     numbers = {path: value for path, value in values.items() if path != SIZE}
     return reduce(lambda record, path: _set(record, path, numbers[path]), numbers, method)

@@ -11,7 +11,6 @@ import numpy as np
 from codegen.clean_c import OWN, Statements, literal, recognized
 from codegen.graph import graph_of
 from codegen.template import Values, Words, filled
-from identifier.export.fold import FoldedStep
 from identifier.export.layout import (
     Member,
     carried_members,
@@ -25,6 +24,7 @@ from identifier.export.layout import (
     sum_terms,
     write_expression,
 )
+from identifier.export.specialize import SpecializedStep
 from identifier.refused import NOWHERE, STALE_TIME
 
 TEMPLATES = Path(__file__).parent / "c"
@@ -41,12 +41,12 @@ MACROS: Mapping[str, tuple[str, str]] = {  # in float and in double
 }
 
 
-def c_sources(folded: FoldedStep, *, single: bool, about: Values) -> dict[str, str]:
+def c_sources(specialized: SpecializedStep, *, single: bool, about: Values) -> dict[str, str]:
     """Return the C files by their path in the package.
 
     Parameters
     ----------
-    folded : the step.
+    specialized : the step.
     single : whether float is the default precision.
     about : title, method, version and hash.
 
@@ -57,15 +57,15 @@ def c_sources(folded: FoldedStep, *, single: bool, about: Values) -> dict[str, s
     ValueError
         Where nothing is carried from step to step, or a carried value is not finite.
     """
-    if not folded.carry:
-        kind = type(folded.method).__name__
+    if not specialized.carry:
+        kind = type(specialized.method).__name__
         raise ValueError(f"{kind} is a formula without state: nothing to export")
-    for number in (number for value in folded.carry.values() for number in value.ravel()):
+    for number in (number for value in specialized.carry.values() for number in value.ravel()):
         if not math.isfinite(number):
             raise ValueError(f"a carried value must be finite to be exported, it is {number}")
-    name = folded.name
-    values: dict[str, str | Words] = {**about, **_pieces(folded, single=single)}
-    values |= _parts(folded, values)
+    name = specialized.name
+    values: dict[str, str | Words] = {**about, **_pieces(specialized, single=single)}
+    values |= _parts(specialized, values)
     equations, shell = _filled("equations.c", values), _filled("name.c", values)
     values |= _macros(name, equations + shell)
     return {
@@ -76,27 +76,27 @@ def c_sources(folded: FoldedStep, *, single: bool, about: Values) -> dict[str, s
     }
 
 
-def _pieces(folded: FoldedStep, *, single: bool) -> dict[str, str]:
-    name, real = folded.name, f"{folded.name}_real"
-    carried, told = carried_members(folded), output_members(folded)
-    learnt = [member for member in carried if member.learnt]
-    others = [member for member in carried if not member.learnt]
-    driving, called = _body(folded, folded.parts.where_true)
-    decided, called_elsewhere = _decided(folded)
-    limits = folded.limits
-    terms = (*sum_terms(carried, name, "values->"), *sum_terms(told, name, "out->"))
+def _pieces(specialized: SpecializedStep, *, single: bool) -> dict[str, str]:
+    name, real = specialized.name, f"{specialized.name}_real"
+    state, told = carried_members(specialized), output_members(specialized)
+    learnt = [member for member in state if member.learnt]
+    others = [member for member in state if not member.learnt]
+    driving, called = _body(specialized, specialized.parts.where_true)
+    decided, called_elsewhere = _decided(specialized)
+    limits = specialized.limits
+    terms = (*sum_terms(state, name, "values->"), *sum_terms(told, name, "out->"))
     total = _sum(terms, " " * 8)
     return {
         "single": str(int(single)),
-        "dt": _number(folded.dt),
-        "min_speed": _number(folded.min_speed),
+        "dt": _number(specialized.dt),
+        "min_speed": _number(specialized.min_speed),
         "max_speed": _number(limits.speed),
         "max_yaw_rate": _number(limits.yaw_rate),
         "max_steering": _number(limits.steering),
         "max_force": _number(limits.force),
         "input_members": "".join(
             f"    {real} {port.name}; /* {port.description} [{port.unit}] */\n"
-            for port in folded.inputs
+            for port in specialized.inputs
         ),
         "output_members": _declarations(told, real),
         "weights_type": (
@@ -111,7 +111,7 @@ def _pieces(folded: FoldedStep, *, single: bool) -> dict[str, str]:
         "driving": driving,
         "at_rest": "driving",
         **decided,
-        "start": _start(folded, learnt, others),
+        "start": _start(specialized, learnt, others),
         "zeros": _zeros(told, name),
         "sum": total,
         "weights_sum": _sum(
@@ -125,29 +125,29 @@ def _pieces(folded: FoldedStep, *, single: bool) -> dict[str, str]:
             if learnt
             else ""
         ),
-        "believed": folded.believed or "",
+        "believed": specialized.believed or "",
         "first": (
             ""
-            if folded.believed
-            else f"            if ({_BEGINS[folded.rests_first]}) {{\n"
+            if specialized.believed
+            else f"            if ({_BEGINS[specialized.rests_first]}) {{\n"
             f"                {name}_begin(state, params, input);\n"
             "            }\n"
         ),
         "stale_time": _number(STALE_TIME),
         "nowhere": literal(NOWHERE, name),
-        "missed_params": f", const {name}_params *params" if folded.believed else "",
-        "missed_arguments": ", params" if folded.believed else "",
+        "missed_params": f", const {name}_params *params" if specialized.believed else "",
+        "missed_arguments": ", params" if specialized.believed else "",
     }
 
 
-def _parts(folded: FoldedStep, values: Values) -> dict[str, str]:
+def _parts(specialized: SpecializedStep, values: Values) -> dict[str, str]:
     """Return the pieces that have a template of their own, filled; empty where not needed."""
-    decides = folded.parts.where_false is not None
-    learns, judges = bool(folded.learnt), bool(folded.believed)
+    decides = specialized.parts.where_false is not None
+    learns, judges = bool(specialized.learnt), bool(specialized.believed)
     wanted = {
         "weights_prototypes": ("weights.h", learns),
         "weights_functions": ("weights.c", learns),
-        "sum_function": ("sum.c", f"{folded.name}_sum(" in str(values["sum"])),
+        "sum_function": ("sum.c", f"{specialized.name}_sum(" in str(values["sum"])),
         "believed_function": ("believed.c", judges),
         "judge": ("judge.c", judges),
         "begin": ("begin.c", not judges),
@@ -155,7 +155,7 @@ def _parts(folded: FoldedStep, values: Values) -> dict[str, str]:
         "decided_prototypes": ("decided.h", decides),
         "decided_functions": ("decided.c", decides),
     }
-    weights = [member for member in carried_members(folded) if member.learnt]
+    weights = [member for member in carried_members(specialized) if member.learnt]
     covariance, factors = covariance_values(weights), factor_values(weights)
     inner = {
         "covariance_function": _filled("covariance.c", {**values, **covariance})
@@ -210,25 +210,25 @@ def _declarations(members: list[Member], real: str) -> str:
     return "".join(member.declaration(real) for member in members)
 
 
-def _body(folded: FoldedStep, function: ca.Function) -> tuple[str, set[str]]:
+def _body(specialized: SpecializedStep, function: ca.Function) -> tuple[str, set[str]]:
     statements = Statements(
         recognized(graph_of(function)),
-        prefix=folded.name,
-        read=lambda port, entry: read_expression(folded, port, entry),
-        write=lambda port, entry: write_expression(folded, port, entry),
+        prefix=specialized.name,
+        read=lambda port, entry: read_expression(specialized, port, entry),
+        write=lambda port, entry: write_expression(specialized, port, entry),
     )
     return statements.block(), statements.called
 
 
-def _decided(folded: FoldedStep) -> tuple[dict[str, str], set[str]]:
+def _decided(specialized: SpecializedStep) -> tuple[dict[str, str], set[str]]:
     """Return the pieces that decide between driving and rest, where the method does."""
-    if folded.parts.where_false is None:
+    if specialized.parts.where_false is None:
         return {}, set()
-    elsewhere, called = _body(folded, folded.parts.where_false)
+    elsewhere, called = _body(specialized, specialized.parts.where_false)
     condition = Statements(
-        recognized(graph_of(folded.parts.condition)),
-        prefix=folded.name,
-        read=lambda port, entry: read_expression(folded, port, entry),
+        recognized(graph_of(specialized.parts.condition)),
+        prefix=specialized.name,
+        read=lambda port, entry: read_expression(specialized, port, entry),
         write=lambda _port, _entry: "",
         returns=True,
     )
@@ -250,10 +250,11 @@ def _functions(name: str, called: set[str]) -> str:
     return "".join(texts)
 
 
-def _start(folded: FoldedStep, learnt: list[Member], others: list[Member]) -> str:
+def _start(specialized: SpecializedStep, learnt: list[Member], others: list[Member]) -> str:
     def lines(members: list[Member], indent: str) -> str:
         texts = (
-            initializer(folded.carry[m.signal.name], m.dimensions, folded.name) for m in members
+            initializer(specialized.carry[m.signal.name], m.dimensions, specialized.name)
+            for m in members
         )
         return ",\n".join(_by_rows(text, indent) for text in texts)
 

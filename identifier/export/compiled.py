@@ -12,13 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import load_library
+from codegen.arrays import Array
 from codegen.template import filled
 from identifier.export.c_source import TEMPLATES
 from identifier.export.package import FORMAT, NAME, Package
 from models.recordings import Recording
 from models.schema import Table, read_json, read_text, shown
-
-Array = NDArray[np.float64]
 
 
 class Status(IntEnum):
@@ -103,7 +102,7 @@ class CompiledPackage:
         package : the package.
         single : whether to compute in float; None takes the package's default.
         """
-        manifest = json.loads(package.files[f"{package.folded.name}.json"])
+        manifest = json.loads(package.files[f"{package.specialized.name}.json"])
         return cls(manifest, package.files, single=single)
 
     @classmethod

@@ -17,8 +17,8 @@ from codegen import CompilationError, find_compiler
 from codegen.compiler import KEEP_GUARDS
 from codegen.escape import xml_attribute
 from identifier.export.c_source import c_sources
-from identifier.export.fold import FoldedStep
 from identifier.export.package import ingredients, summary
+from identifier.export.specialize import SpecializedStep
 from models.files import write_atomically
 
 # Shared libraries of an FMU, for the machine at hand and, with MinGW, for Windows.
@@ -118,12 +118,12 @@ def model_header(name: str, token: str) -> str:
     return HEADER.format(name=name, NAME=name.upper(), token=token)
 
 
-def model_files(folded: FoldedStep) -> dict[str, str]:
+def model_files(specialized: SpecializedStep) -> dict[str, str]:
     """Return header and sources of the C package by file name.
 
     Parameters
     ----------
-    folded : the step.
+    specialized : the step.
 
     Raises
     ------
@@ -132,8 +132,8 @@ def model_files(folded: FoldedStep) -> dict[str, str]:
     ValueError
         Where nothing is carried from step to step, or a carried value is not finite.
     """
-    about = summary(folded, ingredients(folded, single=False))
-    sources = c_sources(folded, single=False, about=about)
+    about = summary(specialized, ingredients(specialized, single=False))
+    sources = c_sources(specialized, single=False, about=about)
     return {PurePosixPath(path).name: text for path, text in sources.items()}
 
 
@@ -171,19 +171,19 @@ class Variable(NamedTuple):
     description: str
 
 
-def variables(folded: FoldedStep) -> tuple[Variable, ...]:
+def variables(specialized: SpecializedStep) -> tuple[Variable, ...]:
     """Return the variables of a step.
 
     Parameters
     ----------
-    folded : the step.
+    specialized : the step.
     """
     inputs = (
         Variable(1 + i, port.name, "real", "input", "continuous", "0", port.unit, port.description)
-        for i, port in enumerate(folded.inputs)
+        for i, port in enumerate(specialized.inputs)
     )
     side = "left positive, frame of the body"
-    learnt = ", ".join(folded.learnt) or "nothing: this method has no memory of the tire"
+    learnt = ", ".join(specialized.learnt) or "nothing: this method has no memory of the tire"
     return (
         *inputs,
         _output(6, "F_yf", "real", "N", f"lateral force of the front axle, {side}"),
@@ -209,9 +209,13 @@ def variables(folded: FoldedStep) -> tuple[Variable, ...]:
             "",
             f"whether it learns; false holds {learnt}",
         ),
-        _constant(11, "sample_time", "s", folded.dt, "sampling interval, inside and fixed"),
+        _constant(11, "sample_time", "s", specialized.dt, "sampling interval, inside and fixed"),
         _constant(
-            12, "min_speed", "m/s", folded.min_speed, "below it forces are zero, learning rests"
+            12,
+            "min_speed",
+            "m/s",
+            specialized.min_speed,
+            "below it forces are zero, learning rests",
         ),
     )
 
@@ -261,16 +265,16 @@ def _text(value: object) -> str:
 TOOL = "tireid"
 
 
-def description_2(folded: FoldedStep, token: str, sources: Sequence[str]) -> str:
+def description_2(specialized: SpecializedStep, token: str, sources: Sequence[str]) -> str:
     """Return modelDescription.xml of FMI 2.0.
 
     Parameters
     ----------
-    folded : the step.
+    specialized : the step.
     token : the GUID.
     sources : names of the C files.
     """
-    table = variables(folded)
+    table = variables(specialized)
     unknowns = [
         element("Unknown", {"index": i})
         for i, variable in enumerate(table, start=1)
@@ -280,16 +284,16 @@ def description_2(folded: FoldedStep, token: str, sources: Sequence[str]) -> str
         "fmiModelDescription",
         {
             "fmiVersion": "2.0",
-            "modelName": folded.name,
+            "modelName": specialized.name,
             "guid": token,
-            "description": _sentence(folded),
+            "description": _sentence(specialized),
             "generationTool": TOOL,
             "variableNamingConvention": "flat",
         },
         element(
             "CoSimulation",
             {
-                "modelIdentifier": folded.name,
+                "modelIdentifier": specialized.name,
                 "canHandleVariableCommunicationStepSize": True,
                 "canNotUseMemoryManagementFunctions": True,
                 "canGetAndSetFMUstate": True,
@@ -298,7 +302,7 @@ def description_2(folded: FoldedStep, token: str, sources: Sequence[str]) -> str
             element("SourceFiles", {}, *(element("File", {"name": name}) for name in sources)),
         ),
         _units(),
-        _experiment(folded),
+        _experiment(specialized),
         element("ModelVariables", {}, *(_variable_2(variable) for variable in table)),
         element(
             "ModelStructure",
@@ -310,15 +314,15 @@ def description_2(folded: FoldedStep, token: str, sources: Sequence[str]) -> str
     return f"{DECLARATION}{model}\n"
 
 
-def description_3(folded: FoldedStep, token: str) -> str:
+def description_3(specialized: SpecializedStep, token: str) -> str:
     """Return modelDescription.xml of FMI 3.0.
 
     Parameters
     ----------
-    folded : the step.
+    specialized : the step.
     token : the instantiation token.
     """
-    table = variables(folded)
+    table = variables(specialized)
     outputs = [variable for variable in table if variable.causality == "output"]
     time = element(
         "Float64",
@@ -329,23 +333,23 @@ def description_3(folded: FoldedStep, token: str) -> str:
         "fmiModelDescription",
         {
             "fmiVersion": "3.0",
-            "modelName": folded.name,
+            "modelName": specialized.name,
             "instantiationToken": token,
-            "description": _sentence(folded),
+            "description": _sentence(specialized),
             "generationTool": TOOL,
             "variableNamingConvention": "flat",
         },
         element(
             "CoSimulation",
             {
-                "modelIdentifier": folded.name,
+                "modelIdentifier": specialized.name,
                 "canGetAndSetFMUState": True,
                 "canSerializeFMUState": True,
                 "canHandleVariableCommunicationStepSize": True,
             },
         ),
         _units(),
-        _experiment(folded),
+        _experiment(specialized),
         element("ModelVariables", {}, time, *(_variable_3(variable) for variable in table)),
         element(
             "ModelStructure",
@@ -360,12 +364,12 @@ def description_3(folded: FoldedStep, token: str) -> str:
     return f"{DECLARATION}{model}\n"
 
 
-def build_description(folded: FoldedStep, sources: Sequence[str]) -> str:
+def build_description(specialized: SpecializedStep, sources: Sequence[str]) -> str:
     """Return sources/buildDescription.xml of FMI 3.0.
 
     Parameters
     ----------
-    folded : the step.
+    specialized : the step.
     sources : names of the C files.
     """
     files = (element("SourceFile", {"name": name}) for name in sources)
@@ -374,17 +378,17 @@ def build_description(folded: FoldedStep, sources: Sequence[str]) -> str:
         {"fmiVersion": "3.0"},
         element(
             "BuildConfiguration",
-            {"modelIdentifier": folded.name},
+            {"modelIdentifier": specialized.name},
             element("SourceFileSet", {"language": "C99"}, *files),
         ),
     )
     return f"{DECLARATION}{text}\n"
 
 
-def _sentence(folded: FoldedStep) -> str:
+def _sentence(specialized: SpecializedStep) -> str:
     return (
-        f"Lateral tire forces of a car, identified while it drives, every {folded.dt:g} s. Outputs "
-        "are those of the last sample; slip angles inside have the sign in which F_y = +C alpha."
+        f"Lateral tire forces of a car, identified while it drives, every {specialized.dt:g} s. "
+        "Outputs are those of the last sample; slip angles inside have the sign in which F_y = +C alpha."
     )
 
 
@@ -400,8 +404,10 @@ def _units() -> str:
     return element("UnitDefinitions", {}, *units)
 
 
-def _experiment(folded: FoldedStep) -> str:
-    return element("DefaultExperiment", {"startTime": 0.0, "stopTime": 10.0, "stepSize": folded.dt})
+def _experiment(specialized: SpecializedStep) -> str:
+    return element(
+        "DefaultExperiment", {"startTime": 0.0, "stopTime": 10.0, "stepSize": specialized.dt}
+    )
 
 
 def _variable_2(variable: Variable) -> str:
@@ -452,7 +458,7 @@ OF_VERSION: Mapping[Version, tuple[str, ...]] = {
 }
 
 
-def export_fmu(folded: FoldedStep, path: Path, version: Version = 2) -> None:
+def export_fmu(specialized: SpecializedStep, path: Path, version: Version = 2) -> None:
     """Write an FMU for Co-Simulation; the same step gives the same bytes.
 
     Inputs v_x, v_y, r, delta_f, delta_r and outputs F_yf, F_yr, SI; see
@@ -461,7 +467,7 @@ def export_fmu(folded: FoldedStep, path: Path, version: Version = 2) -> None:
 
     Parameters
     ----------
-    folded : the step; its name is the model identifier.
+    specialized : the step; its name is the model identifier.
     path : the file, usually ending in .fmu.
     version : of FMI, 2 or 3.
 
@@ -479,7 +485,7 @@ def export_fmu(folded: FoldedStep, path: Path, version: Version = 2) -> None:
     built = targets()
     if not built:
         log.warning("no C compiler found: %s holds sources only", path)
-    members = {name: text.encode("utf-8") for name, text in fmu_text(folded, version).items()}
+    members = {name: text.encode("utf-8") for name, text in fmu_text(specialized, version).items()}
     sources = {
         name.removeprefix("sources/"): content
         for name, content in members.items()
@@ -487,41 +493,41 @@ def export_fmu(folded: FoldedStep, path: Path, version: Version = 2) -> None:
     }
     for target in built:
         folder = target.folder_2 if version == 2 else target.folder_3
-        library = f"binaries/{folder}/{folded.name}{target.ending}"
-        members[library] = build_binary(target, folded.name, sources)
+        library = f"binaries/{folder}/{specialized.name}{target.ending}"
+        members[library] = build_binary(target, specialized.name, sources)
     write_atomically(path, _archive(members))
 
 
-def fmu_text(folded: FoldedStep, version: Version) -> dict[str, str]:
+def fmu_text(specialized: SpecializedStep, version: Version) -> dict[str, str]:
     """Return the text files of an FMU by their path inside it.
 
     Parameters
     ----------
-    folded : the step.
+    specialized : the step.
     version : of FMI, 2 or 3.
     """
-    shared = model_files(folded)
-    blank = _text_with(folded, shared, version, "")
+    shared = model_files(specialized)
+    blank = _text_with(specialized, shared, version, "")
     content = "\0".join(f"{name}\0{text}" for name, text in sorted(blank.items()))
-    return _text_with(folded, shared, version, _token(content))
+    return _text_with(specialized, shared, version, _token(content))
 
 
 def _text_with(
-    folded: FoldedStep, shared: Mapping[str, str], version: Version, token: str
+    specialized: SpecializedStep, shared: Mapping[str, str], version: Version, token: str
 ) -> dict[str, str]:
     templates = files("identifier.export") / "c_fmu"
     text = {
         name: (templates / name).read_text(encoding="utf-8")
         for name in (*SHARED, *OF_VERSION[version])
     }
-    text |= {**shared, "model.h": model_header(folded.name, token)}
+    text |= {**shared, "model.h": model_header(specialized.name, token)}
     c_files = sorted(name for name in text if name.endswith(".c"))
     members = {f"sources/{name}": content for name, content in text.items()}
     if version == 2:
-        members["modelDescription.xml"] = description_2(folded, token, c_files)
+        members["modelDescription.xml"] = description_2(specialized, token, c_files)
     else:
-        members["modelDescription.xml"] = description_3(folded, token)
-        members["sources/buildDescription.xml"] = build_description(folded, c_files)
+        members["modelDescription.xml"] = description_3(specialized, token)
+        members["sources/buildDescription.xml"] = build_description(specialized, c_files)
     return members
 
 

@@ -4,13 +4,17 @@ from collections.abc import Iterator, Sequence
 from math import isqrt
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from codegen.arrays import Array
 from codegen.clean_c import literal
-from identifier.export.fold import COVARIANCE, FACTORS, NOT_NEGATIVE, SAMPLED, FoldedStep, Signal
+from identifier.export.specialize import (
+    COVARIANCE,
+    FACTORS,
+    NOT_NEGATIVE,
+    SAMPLED,
+    Signal,
+    SpecializedStep,
+)
 
-Array = NDArray[np.float64]
 FEW = 8  # entries that are summed one by one
 READS = {"x": ("v_y", "r"), "u": ("delta_f", "delta_r"), "v_x": ("v_x",)}
 
@@ -62,60 +66,61 @@ class Member(NamedTuple):
         return "[0]" * len(self.dimensions)
 
 
-def carried_members(folded: FoldedStep) -> list[Member]:
+def carried_members(specialized: SpecializedStep) -> list[Member]:
     """Return the carried ports in their order.
 
     Parameters
     ----------
-    folded : the step.
+    specialized : the step.
     """
     return [
-        Member(signal, folded.function.size_in(signal.name), signal.name in folded.learnt)
-        for signal in folded.carried
+        Member(signal, specialized.function.size_in(signal.name), signal.name in specialized.learnt)
+        for signal in specialized.state
     ]
 
 
-def output_members(folded: FoldedStep) -> list[Member]:
+def output_members(specialized: SpecializedStep) -> list[Member]:
     """Return the outputs in their order.
 
     Parameters
     ----------
-    folded : the step.
+    specialized : the step.
     """
     return [
-        Member(signal, folded.function.size_out(signal.name), False) for signal in folded.outputs
+        Member(signal, specialized.function.size_out(signal.name), False)
+        for signal in specialized.outputs
     ]
 
 
-def read_expression(folded: FoldedStep, port: int, entry: int) -> str:
+def read_expression(specialized: SpecializedStep, port: int, entry: int) -> str:
     """Return the C expression of an entry of an input of the step.
 
     Parameters
     ----------
-    folded : the step.
+    specialized : the step.
     port : number of the input.
     entry : counted by columns.
     """
-    name = folded.function.name_in(port)
+    name = specialized.function.name_in(port)
     if name in SAMPLED:
         return f"in->{READS[name][entry]}"
-    member = carried_members(folded)[port]
+    member = carried_members(specialized)[port]
     return f"now->{member.path}{member.element(entry)}"
 
 
-def write_expression(folded: FoldedStep, port: int, entry: int) -> str:
+def write_expression(specialized: SpecializedStep, port: int, entry: int) -> str:
     """Return the C lvalue of an entry of an output of the step.
 
     Parameters
     ----------
-    folded : the step.
+    specialized : the step.
     port : number of the output.
     entry : counted by columns.
     """
-    carried = carried_members(folded)
-    if port < len(carried):
-        return f"next->{carried[port].path}{carried[port].element(entry)}"
-    told = output_members(folded)[port - len(carried)]
+    state = carried_members(specialized)
+    if port < len(state):
+        return f"next->{state[port].path}{state[port].element(entry)}"
+    told = output_members(specialized)[port - len(state)]
     return f"out->{told.signal.name}{told.element(entry)}"
 
 

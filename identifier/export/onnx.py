@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 
 from codegen.escape import visible
 from identifier.axle.model import AxleModel
-from identifier.export.fold import INPUTS, Signal
-from identifier.method import FrozenModel
+from identifier.export.specialize import INPUTS, Signal
 from identifier.own_network import OnnxModel
 from identifier.paper.network import NetworkModel
+from identifier.tire_model import TireModel
 from models.files import write_atomically
 
 # An ONNX graph, node by node: every value is a name, every operation returns that of its result.
@@ -241,7 +241,7 @@ class NoOnnxError(ValueError):
     """A frozen model of a kind that has no ONNX form."""
 
 
-def onnx_bytes(model: FrozenModel, *, single: bool = False) -> bytes:
+def onnx_bytes(model: TireModel, *, single: bool = False) -> bytes:
     """Return a frozen model as the content of an ONNX file; the same model gives the same bytes.
 
     Parameters
@@ -270,7 +270,7 @@ def onnx_bytes(model: FrozenModel, *, single: bool = False) -> bytes:
             )
 
 
-def export_onnx(model: FrozenModel, path: Path, *, single: bool = False) -> None:
+def export_onnx(model: TireModel, path: Path, *, single: bool = False) -> None:
     """Write a frozen model as an ONNX file.
 
     Parameters

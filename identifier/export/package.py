@@ -11,18 +11,19 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from codegen.escape import c_string
 from codegen.template import Values, Words, filled
-from identifier.axle import AxleDesign
+from identifier.axle import AxleIdentifier
 from identifier.axle.design import NOT_CERTIFIED
 from identifier.export.c_source import TEMPLATES, c_sources
-from identifier.export.fold import FoldedStep, Signal, fold
 from identifier.export.layout import Member, carried_members, output_members, ruled
-from identifier.method import FrozenModel, Method, vehicle_numbers
-from identifier.paper.design import Design
+from identifier.export.specialize import Signal, SpecializedStep, specialize
+from identifier.method import Method, vehicle_numbers
+from identifier.paper.design import PaperIdentifier
 from identifier.refused import NOWHERE, STALE_TIME, stale_samples
+from identifier.tire_model import TireModel
 from models.vehicle import Vehicle
 
 # <name>.json: everything that went into a package, what is in it, and their hashes.
@@ -30,44 +31,44 @@ from models.vehicle import Vehicle
 FORMAT = "tireid package 1"
 
 
-def ingredients(folded: FoldedStep, *, single: bool) -> dict[str, Any]:
+def ingredients(specialized: SpecializedStep, *, single: bool) -> dict[str, Any]:
     """Return everything that a package is made of, ready for JSON.
 
     Parameters
     ----------
-    folded : the step.
+    specialized : the step.
     single : whether float is the default precision.
     """
-    method = folded.method
+    method = specialized.method
     numbers: dict[str, Any] = (
         asdict(method) if is_dataclass(method) and not isinstance(method, type) else {}
     )
     return {
         "format": FORMAT,
-        "name": folded.name,
+        "name": specialized.name,
         "tireid": tireid_version(),
         "precision": "float" if single else "double",
         "method": {"kind": type(method).__name__, **plain(numbers)},
         "certificate": certificate(method),
-        "vehicle": plain(vehicle_numbers(folded.vehicle)),
-        "sample_time_s": folded.dt,
-        "min_speed_m_s": folded.min_speed,
+        "vehicle": plain(vehicle_numbers(specialized.vehicle)),
+        "sample_time_s": specialized.dt,
+        "min_speed_m_s": specialized.min_speed,
         "limits": {
-            "speed_m_s": folded.limits.speed,
-            "yaw_rate_rad_s": folded.limits.yaw_rate,
-            "steering_rad": folded.limits.steering,
-            "force_N": folded.limits.force,
+            "speed_m_s": specialized.limits.speed,
+            "yaw_rate_rad_s": specialized.limits.yaw_rate,
+            "steering_rad": specialized.limits.steering,
+            "force_N": specialized.limits.force,
         },
-        "inputs": [_described(signal) for signal in folded.inputs],
-        "outputs": [_described(signal) for signal in folded.outputs],
+        "inputs": [_described(signal) for signal in specialized.inputs],
+        "outputs": [_described(signal) for signal in specialized.outputs],
         "carried": [
             {
                 **_described(signal),
-                "learnt": signal.name in folded.learnt,
-                "shape": list(folded.carry[signal.name].shape),
-                "start": plain(folded.carry[signal.name].tolist()),
+                "learnt": signal.name in specialized.learnt,
+                "shape": list(specialized.carry[signal.name].shape),
+                "start": plain(specialized.carry[signal.name].tolist()),
             }
-            for signal in folded.carried
+            for signal in specialized.state
         ],
     }
 
@@ -79,39 +80,39 @@ def certificate(method: Method) -> dict[str, Any]:
     ----------
     method : what was exported.
     """
-    if isinstance(method, AxleDesign):
+    if isinstance(method, AxleIdentifier):
         return method.certificate
-    verdict = "judged by tireid check" if isinstance(method, Design) else NOT_CERTIFIED
+    verdict = "judged by tireid check" if isinstance(method, PaperIdentifier) else NOT_CERTIFIED
     return {"verdict": verdict, "held_by_construction": {}}
 
 
-def summary(folded: FoldedStep, content: Mapping[str, Any]) -> dict[str, str | Words]:
+def summary(specialized: SpecializedStep, content: Mapping[str, Any]) -> dict[str, str | Words]:
     """Return what texts say about a package: title, method, versions, hash, names and numbers.
 
     Parameters
     ----------
-    folded : the step.
+    specialized : the step.
     content : what `ingredients` returned.
     """
     short, version = digest(content)[:12], tireid_version()
     return {
-        "title": Words(f"Tire forces of the car {folded.vehicle.name}"),
-        "method": type(folded.method).__name__,
+        "title": Words(f"Tire forces of the car {specialized.vehicle.name}"),
+        "method": type(specialized.method).__name__,
         "version": version,
         "hash": short,
-        "certificate": _certificate_text(folded.method),
-        "version_text": c_string(f"{folded.name} {short}, tireid {version}"),
+        "certificate": _certificate_text(specialized.method),
+        "version_text": c_string(f"{specialized.name} {short}, tireid {version}"),
         "single": str(int(content["precision"] == "float")),
-        "dt": f"{folded.dt:g}",
-        "min_speed": f"{folded.min_speed:.3g}",
-        "name": folded.name,
-        "NAME": folded.name.upper(),
+        "dt": f"{specialized.dt:g}",
+        "min_speed": f"{specialized.min_speed:.3g}",
+        "name": specialized.name,
+        "NAME": specialized.name.upper(),
     }
 
 
 def _certificate_text(method: Method) -> str:
     proven = certificate(method)
-    if isinstance(method, Design):
+    if isinstance(method, PaperIdentifier):
         return (
             "Stability and error bounds of this law depend on its gains: `tireid check` on its\n"
             "design file gives the certificate. None is part of this package."
@@ -188,8 +189,6 @@ def _described(signal: Signal) -> dict[str, Any]:
     }
 
 
-Array = NDArray[np.float64]
-
 # Samples for the self-test of a package, and the forces that CasADi gives for them.
 
 SAMPLES = 240
@@ -203,20 +202,20 @@ class Vectors(NamedTuple):
     force: Array
 
 
-def synthetic_samples(folded: FoldedStep, n: int = SAMPLES) -> Array:
+def synthetic_samples(specialized: SpecializedStep, n: int = SAMPLES) -> Array:
     """Return a start from rest and turns to both sides, (n, 5); arithmetic only, no noise.
 
     Parameters
     ----------
-    folded : its lowest speed sets the scale.
+    specialized : its lowest speed sets the scale.
     n : number of samples.
     """
     k = np.arange(n, dtype=np.float64)
     wave, slow = _triangle(k / 60.0), _triangle(k / 97.0 + 0.2)
-    v_x = folded.min_speed * np.minimum(0.0973 * np.maximum(k - REST, 0.0), 15.0)
-    v_x = np.where((k >= n // 2) & (k < n // 2 + REST), 0.5 * folded.min_speed, v_x)
+    v_x = specialized.min_speed * np.minimum(0.0973 * np.maximum(k - REST, 0.0), 15.0)
+    v_x = np.where((k >= n // 2) & (k < n // 2 + REST), 0.5 * specialized.min_speed, v_x)
     v_y = 0.03 * v_x * slow
-    r = 0.4 * folded.min_speed * wave * np.minimum(k / n, 0.5)
+    r = 0.4 * specialized.min_speed * wave * np.minimum(k / n, 0.5)
     delta_f, delta_r = 0.05 * wave, 0.005 * slow
     return np.column_stack([v_x, v_y, r, delta_f, delta_r])
 
@@ -226,52 +225,56 @@ def _triangle(phase: Array) -> Array:
     return wave
 
 
-def run_in_virtual_machine(folded: FoldedStep, samples: Array) -> tuple[Array, dict[str, Array]]:
+def run_in_virtual_machine(
+    specialized: SpecializedStep, samples: Array
+) -> tuple[Array, dict[str, Array]]:
     """Return the outputs (n, k) of a folded step, one beside the other, and what it carries then.
 
     Samples that are refused count as time, as `identifier.refused` says.
 
     Parameters
     ----------
-    folded : the step.
+    specialized : the step.
     samples : (n, 5) in the order of the inputs.
     """
-    carry = [ca.DM(value) for value in folded.carry.values()]
-    n, size = len(carry), sum(port.size for port in folded.outputs)
+    carry = [ca.DM(value) for value in specialized.carry.values()]
+    n, size = len(carry), sum(port.size for port in specialized.outputs)
     told, now, missed, started = [], np.zeros(size), 0, False
 
     def step(sample: Array) -> tuple[list[ca.DM], Array]:
         v_x, v_y, r, delta_f, delta_r = sample
-        results = list(folded.function(*carry, ca.DM([v_y, r]), ca.DM([delta_f, delta_r]), v_x))
+        results = list(
+            specialized.function(*carry, ca.DM([v_y, r]), ca.DM([delta_f, delta_r]), v_x)
+        )
         flat = [np.array(value).ravel(order="F") for value in results[n:]]
         return results[:n], np.concatenate(flat)
 
     for sample in samples:
-        if folded.limits.accept(*sample):
-            anew = folded.believed is None and missed > 0
-            if anew if started else folded.rests_first:
+        if specialized.limits.accept(*sample):
+            anew = specialized.believed is None and missed > 0
+            if anew if started else specialized.rests_first:
                 carry, _ = step(np.array([0.0, *sample[1:]]))
             carry, now = step(sample)
             missed, started = 0, True
         else:
             missed += 1
-            if folded.believed is not None and started:
+            if specialized.believed is not None and started:
                 carry, now = step(np.array([NOWHERE, 0.0, 0.0, 0.0, 0.0]))
-            if missed >= stale_samples(STALE_TIME, folded.dt):
+            if missed >= stale_samples(STALE_TIME, specialized.dt):
                 now = np.zeros(size)
         told.append(now)
-    return np.array(told), dict(zip(folded.carry, map(np.array, carry), strict=True))
+    return np.array(told), dict(zip(specialized.carry, map(np.array, carry), strict=True))
 
 
-def vectors(folded: FoldedStep) -> Vectors:
+def vectors(specialized: SpecializedStep) -> Vectors:
     """Return the self-test of a package.
 
     Parameters
     ----------
-    folded : the step.
+    specialized : the step.
     """
-    samples = synthetic_samples(folded)
-    outputs, _ = run_in_virtual_machine(folded, samples)
+    samples = synthetic_samples(specialized)
+    outputs, _ = run_in_virtual_machine(specialized, samples)
     return Vectors(samples, outputs[:, :2])
 
 
@@ -306,7 +309,7 @@ class PackageNameError(ValueError):
 class Package(NamedTuple):
     """A package before it is written: its step, its files by path, title, version and hash."""
 
-    folded: FoldedStep
+    specialized: SpecializedStep
     files: Mapping[str, str]
     about: Values
 
@@ -314,7 +317,7 @@ class Package(NamedTuple):
 def build_package(
     method: Method,
     vehicle: Vehicle,
-    start: FrozenModel | None = None,
+    start: TireModel | None = None,
     *,
     name: str = "tireid",
     single: bool = False,
@@ -342,17 +345,17 @@ def build_package(
         raise PackageNameError(
             f"name must be lower-case letters, digits and _, at most 31, not {name!r}"
         )
-    folded = fold(method, vehicle, start, name)
-    content = ingredients(folded, single=single)
-    about = summary(folded, content)
-    files = c_sources(folded, single=single, about=about)
-    files |= _other_files(folded, about, single=single)
-    return Package(folded, files | {f"{name}.json": manifest_text(content, files)}, about)
+    specialized = specialize(method, vehicle, start, name)
+    content = ingredients(specialized, single=single)
+    about = summary(specialized, content)
+    files = c_sources(specialized, single=single, about=about)
+    files |= _other_files(specialized, about, single=single)
+    return Package(specialized, files | {f"{name}.json": manifest_text(content, files)}, about)
 
 
-def _other_files(folded: FoldedStep, about: Values, *, single: bool) -> dict[str, str]:
-    name, learnt = folded.name, bool(folded.learnt)
-    members = carried_members(folded)
+def _other_files(specialized: SpecializedStep, about: Values, *, single: bool) -> dict[str, str]:
+    name, learnt = specialized.name, bool(specialized.learnt)
+    members = carried_members(specialized)
     first = next((m.signal.name + m.first for m in members if m.learnt), "")
     rules = ruled([member for member in members if member.learnt])
     negative = {"first_rule": rules[0].signal.name + rules[0].first, **about} if rules else {}
@@ -365,8 +368,8 @@ def _other_files(folded: FoldedStep, about: Values, *, single: bool) -> dict[str
         "weights_test": filled(TEMPLATES / "weights_test.c", about_weights) if learnt else "",
         "weights_held": filled(TEMPLATES / "held_test.c", about) if learnt else "",
         "weights_call": "    test_modes(&state, &params);\n" if learnt else "",
-        "tolerance_double": f"{TOLERANCE_DOUBLE * folded.limits.force:.2g}",
-        "tolerance_single": f"{TOLERANCE_SINGLE * folded.limits.force:.2g}",
+        "tolerance_double": f"{TOLERANCE_DOUBLE * specialized.limits.force:.2g}",
+        "tolerance_single": f"{TOLERANCE_SINGLE * specialized.limits.force:.2g}",
         "single_option": "ON" if single else "OFF",
         **about,
     }
@@ -374,7 +377,7 @@ def _other_files(folded: FoldedStep, about: Values, *, single: bool) -> dict[str
         "CMakeLists.txt": filled(TEMPLATES / "CMakeLists.txt", values),
         "examples/main.c": filled(TEMPLATES / "main.c", values),
         f"tests/test_{name}.c": filled(TEMPLATES / "test.c", values),
-        "tests/vectors.h": vectors_header(vectors(folded)),
+        "tests/vectors.h": vectors_header(vectors(specialized)),
     }
 
 
@@ -386,26 +389,28 @@ def readme(package: Package, about_figures: str) -> str:
     package : what it describes.
     about_figures : flash, RAM, stack and instructions, as Markdown.
     """
-    folded = package.folded
-    carried = carried_members(folded)
+    specialized = package.specialized
+    state = carried_members(specialized)
     carry_table = "".join(
-        f"| `{m.path}` | {_shape(m)} | {m.signal.unit} | {m.signal.description} |\n"
-        for m in carried
+        f"| `{m.path}` | {_shape(m)} | {m.signal.unit} | {m.signal.description} |\n" for m in state
     )
-    modes = _modes(folded)
-    tolerance = TOLERANCE_DOUBLE * folded.limits.force, TOLERANCE_SINGLE * folded.limits.force
-    equations = package.files[f"src/{folded.name}_equations.h"]
+    modes = _modes(specialized)
+    tolerance = (
+        TOLERANCE_DOUBLE * specialized.limits.force,
+        TOLERANCE_SINGLE * specialized.limits.force,
+    )
+    equations = package.files[f"src/{specialized.name}_equations.h"]
     called = [f"`{word}`" for word in ("sqrt", "fabs", "floor") if f" {word}(x)" in equations]
     return filled(
         TEMPLATES / "README.md",
         {
-            "input_table": _table([Member(s, (1, 1), False) for s in folded.inputs]),
-            "output_table": _table(output_members(folded)),
+            "input_table": _table([Member(s, (1, 1), False) for s in specialized.inputs]),
+            "output_table": _table(output_members(specialized)),
             "carry_table": carry_table,
             "modes": modes,
-            "implausible_row": _implausible_row(folded),
+            "implausible_row": _implausible_row(specialized),
             "stale_time": f"{STALE_TIME:g}",
-            **_about_gaps(folded),
+            **_about_gaps(specialized),
             "libraries": f"{', '.join(called) or 'nothing'} of `<math.h>`, copies of structures",
             "samples": str(SAMPLES),
             "tolerance_double": f"{tolerance[0]:.2g}",
@@ -416,11 +421,11 @@ def readme(package: Package, about_figures: str) -> str:
     )
 
 
-def _modes(folded: FoldedStep) -> str:
-    if not folded.learnt:
+def _modes(specialized: SpecializedStep) -> str:
+    if not specialized.learnt:
         return "This method estimates a signal: there are no weights to read, set or freeze."
-    name = folded.name
-    learnt = ", ".join(folded.learnt)
+    name = specialized.name
+    learnt = ", ".join(specialized.learnt)
     return (
         f"`{name}_set_adaptation(&state, false)` freezes what is learnt ({learnt});\n"
         "observers and filters go on, so that it may be switched on again at any time. "
@@ -429,21 +434,21 @@ def _modes(folded: FoldedStep) -> str:
     )
 
 
-def _implausible_row(folded: FoldedStep) -> str:
+def _implausible_row(specialized: SpecializedStep) -> str:
     """Return what is done with a sample that no car can be in, where the method judges that."""
-    if folded.believed is not None:
+    if specialized.believed is not None:
         return (
             "| 2 `IMPLAUSIBLE` | no car can be there, or get there within a sample | of the last "
             "sample that was believed, zero where that lasts | hold | yes |\n"
         )
-    if folded.parts.where_false is not None:
+    if specialized.parts.where_false is not None:
         return "| 2 `IMPLAUSIBLE` | no car can be there | zero | hold | yes |\n"
     return ""
 
 
-def _about_gaps(folded: FoldedStep) -> dict[str, str]:
+def _about_gaps(specialized: SpecializedStep) -> dict[str, str]:
     """Return what becomes of forces while samples are refused, and of the state after it."""
-    if folded.believed is not None:
+    if specialized.believed is not None:
         return {
             "refused_forces": "of the last sample that was believed, zero where that lasts",
             "after_gap": "After a moment the step rests, and restarts with the next good sample.",

@@ -14,13 +14,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen import CompilationError
+from codegen.arrays import Array
 from codegen.template import filled
 from identifier.export.package import Package, synthetic_samples
-
-Array = NDArray[np.float64]
 
 TARGET = Path(__file__).parent / "target"
 CROSS_COMPILER, SIZE, EMULATOR = "arm-none-eabi-gcc", "arm-none-eabi-size", "qemu-system-arm"
@@ -327,7 +325,7 @@ def measure(package: Package) -> list[Cost]:
     """
     if missing_tools():
         return []
-    name, samples = package.folded.name, synthetic_samples(package.folded)
+    name, samples = package.specialized.name, synthetic_samples(package.specialized)
     costs = []
     for processor in PROCESSORS:
         for single in (True, False):

@@ -10,13 +10,14 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen import Scan
-from identifier.method import FrozenModel, Setup
+from codegen.arrays import Array
+from identifier.method import Setup
 from identifier.paper.laws import DRIVING_ERRORS, INPUT_SOURCES, INTEGRATORS, Gains
 from identifier.paper.network import Network, NetworkModel, Weights
 from identifier.paper.step import CARRY, GAINS, OVER, Structure, build_step
+from identifier.tire_model import TireModel
 from models.bicycle import BicycleParameters, bicycle
 from models.recordings import Recording
 from models.rules import require_within
@@ -88,13 +89,11 @@ class Driving:
             raise ValueError(f"noise_v_x must be below half the speed, it is {self.noise_v_x}")
 
 
-Array = NDArray[np.float64]
-
 SHORTEST_STEP, LONGEST_STEP = 1e-4, 0.1  # [s]: finer is only work, coarser is blind
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Design:
+class PaperIdentifier:
     """Network, law, gains and sampling of one identifier.
 
     Parameters
@@ -159,7 +158,7 @@ class Design:
     @classmethod
     def for_vehicle(
         cls, vehicle: Vehicle, *, law: str = "integral", dt: float = 0.01, seed: int = 0
-    ) -> "Design":
+    ) -> "PaperIdentifier":
         """Return the identifier of the paper with gains that follow from the car.
 
         Parameters
@@ -174,12 +173,12 @@ class Design:
         ValueError
             Where the law is unknown.
         """
-        from identifier.defaults import default_design  # it finds gains for designs like this one
+        from identifier.defaults import paper_identifier  # it finds gains for designs like this one
 
-        return default_design(vehicle, law=law, dt=dt, seed=seed)
+        return paper_identifier(vehicle, law=law, dt=dt, seed=seed)
 
     def setup(
-        self, vehicle: Vehicle, recording: Recording, start: FrozenModel | None = None
+        self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
     ) -> Setup:
         """Return what a run needs; the observer starts at the first measurement.
 
@@ -209,25 +208,25 @@ class Design:
             },
         )
 
-    def _first_weights(self, start: FrozenModel | None) -> Weights:
+    def _first_weights(self, start: TireModel | None) -> Weights:
         if start is None:
             return self.network.initial_weights(np.random.default_rng(self.seed))
         if not isinstance(start, NetworkModel) or start.network != self.network:
             raise ValueError("the stored weights are of another structure than the design's")
         return Weights(W=start.weights.W * (start.force_unit / self.force_unit), V=start.weights.V)
 
-    def frozen(self, vehicle: Vehicle, carried: Mapping[str, Array]) -> NetworkModel:
+    def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> NetworkModel:
         """Return the model with the carried weights.
 
         Parameters
         ----------
         vehicle : the car.
-        carried : W (2, n_h) and V (n_h, n_in).
+        state : W (2, n_h) and V (n_h, n_in).
         """
         return NetworkModel(
             vehicle=vehicle,
             network=self.network,
-            weights=Weights(W=carried["W"].copy(), V=carried["V"].copy()),
+            weights=Weights(W=state["W"].copy(), V=state["V"].copy()),
             force_unit=self.force_unit,
             min_speed=self.min_speed,
         )
@@ -307,13 +306,13 @@ class DesignFileError(ValueError):
     """A file does not hold a design; the message names file, key and rule."""
 
 
-def read_design(path: Path) -> Design:
+def read_design(path: Path) -> PaperIdentifier:
     """Read a design.
 
     Parameters
     ----------
-    path : TOML with the keys of `Design`, and tables [gains], [network] and, where the conditions
-        of driving are declared, [driving].
+    path : TOML with the keys of `PaperIdentifier`, and tables [gains], [network] and, where the
+        conditions of driving are declared, [driving].
 
     Raises
     ------
@@ -329,11 +328,11 @@ def read_design(path: Path) -> Design:
         None if part is None else Table(part, f"{path}: ", DesignFileError, f"{name}.").record(cls)
         for (name, part), cls in zip(inner.items(), (Gains, Network, Driving), strict=True)
     )
-    values = Table(data, f"{path}: ", DesignFileError).record(Design, skip=TABLES)
+    values = Table(data, f"{path}: ", DesignFileError).record(PaperIdentifier, skip=TABLES)
     if gains is None:
         raise DesignFileError(f"{path}: the table [gains] is missing")
     try:
-        return Design(
+        return PaperIdentifier(
             gains=Gains(**gains),
             network=Network(**(network or {})),
             driving=None if driving is None else Driving(**driving),
@@ -343,14 +342,16 @@ def read_design(path: Path) -> Design:
         raise DesignFileError(f"{path}: {error}") from None
 
 
-def design_text(design: Design) -> str:
+def design_text(design: PaperIdentifier) -> str:
     """Return a design as TOML that `read_design` reads back exactly.
 
     Parameters
     ----------
     design : the design.
     """
-    lines = [_line(design, field.name) for field in fields(Design) if field.name not in TABLES]
+    lines = [
+        _line(design, field.name) for field in fields(PaperIdentifier) if field.name not in TABLES
+    ]
     for name in TABLES:
         record = getattr(design, name)
         if record is None:

@@ -6,23 +6,22 @@ from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen import Scan
+from codegen.arrays import Array
 from identifier.defaults import natural_network
-from identifier.method import FrozenModel, Setup
+from identifier.method import Setup
 from identifier.paper.design import natural_force_unit
 from identifier.paper.network import Network, NetworkModel, Weights
 from identifier.regression.laws import LAWS, Numbers
 from identifier.regression.step import OVER, Structure, build_step
+from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RegressionDesign:
+class RegressionIdentifier:
     """Law, network, numbers and sampling; the hidden layer is random and stays as it is.
 
     Parameters
@@ -85,7 +84,7 @@ class RegressionDesign:
         memory: int = 20,
         dt: float = 0.01,
         seed: int = 0,
-    ) -> "RegressionDesign":
+    ) -> "RegressionIdentifier":
         """Return a design for a car of any size: times scale with sqrt(L/g), forces with weight.
 
         Parameters
@@ -116,7 +115,7 @@ class RegressionDesign:
         )
 
     def setup(
-        self, vehicle: Vehicle, recording: Recording, start: FrozenModel | None = None
+        self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
     ) -> Setup:
         """Return what a run needs.
 
@@ -152,25 +151,25 @@ class RegressionDesign:
             },
         )
 
-    def _first_weights(self, start: FrozenModel | None) -> Weights:
+    def _first_weights(self, start: TireModel | None) -> Weights:
         if start is None:
             return self.network.initial_weights(np.random.default_rng(self.seed))
         if not isinstance(start, NetworkModel) or start.network != self.network:
             raise ValueError("the stored weights are of another structure than the design's")
         return Weights(W=start.weights.W * (start.force_unit / self.force_unit), V=start.weights.V)
 
-    def frozen(self, vehicle: Vehicle, carried: Mapping[str, Array]) -> NetworkModel:
+    def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> NetworkModel:
         """Return the model with the carried weights.
 
         Parameters
         ----------
         vehicle : the car.
-        carried : W (2, n_h) and V (n_h, n_in).
+        state : W (2, n_h) and V (n_h, n_in).
         """
         return NetworkModel(
             vehicle=vehicle,
             network=self.network,
-            weights=Weights(W=carried["W"].copy(), V=carried["V"].copy()),
+            weights=Weights(W=state["W"].copy(), V=state["V"].copy()),
             force_unit=self.force_unit,
             min_speed=self.min_speed,
         )

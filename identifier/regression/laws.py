@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
+
+from codegen.arrays import Array
 
 # How recursive least squares forgets: what becomes of P (n_h, n_h) [1/s] after each pair.
 #
@@ -215,7 +216,6 @@ def remember(memory: Memory, pair: Pair, *, weight: Any, ridge: Any, allowed: An
     )
 
 
-Array = NDArray[np.float64]
 # What a law is: where its statistics start, and how one pair moves them and the weights.
 #
 # W (2, n_h) [U]: weights.   s (n_h,), y (2,) [U]: the pair of `filtered`.   U: force unit.

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
-from numpy.typing import NDArray
 
-from identifier.paper.design import Design
+from codegen.arrays import Array
+from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import DRIVING_ERRORS, DrivingError, Gains
 from identifier.paper.network import network_signals
 from identifier.run import History
@@ -105,9 +105,6 @@ def along_run(loop: Loop, gains_along: npt.ArrayLike, integrator: str, dt: float
     return spectral_radius(stack, INTEGRATORS[integrator], dt)
 
 
-Array = NDArray[np.float64]
-
-
 # The learning loop along a recorded run: how large its gain was, how close to the limit.
 
 
@@ -132,7 +129,7 @@ class LoopAlongRun:
     margin: float
 
 
-def loop_along(history: History, design: Design) -> LoopAlongRun:
+def loop_along(history: History, design: PaperIdentifier) -> LoopAlongRun:
     """Evaluate the loop at the regressors and weights of a run.
 
     The network's input is taken from the measured state, which the estimate follows closely.
@@ -145,7 +142,7 @@ def loop_along(history: History, design: Design) -> LoopAlongRun:
     recording = history.recording
     moving = recording.v_x >= design.min_speed
     x_bar = network_inputs(history, design)[moving]
-    W, V = history.carried["W"][:-1][moving], history.carried["V"][:-1][moving]
+    W, V = history.state["W"][:-1][moving], history.state["V"][:-1][moving]
     s = np.tanh(np.einsum("nij,nj->ni", V, x_bar))
     gains = regressor_gains(
         eta_W=design.gains.eta_W, eta_V=design.gains.eta_V, s=s, x_bar=x_bar, W=W
@@ -167,7 +164,7 @@ def loop_along(history: History, design: Design) -> LoopAlongRun:
     )
 
 
-def network_inputs(history: History, design: Design) -> Array:
+def network_inputs(history: History, design: PaperIdentifier) -> Array:
     """Return x̄ at every sample, (n, n_in).
 
     Parameters

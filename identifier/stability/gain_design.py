@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import brentq
 
-from identifier.paper.design import Design
+from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import DRIVING_ERRORS, Gains, diagonal
 from identifier.stability.bounds import small_gain
 from identifier.stability.loop import Law, direction_matrix, linear_law
@@ -283,7 +283,7 @@ KEEPINGS: Mapping[str, Callable[[Gains, Operation], Gains]] = {
 DEFAULT_KEEPING = "projection"  # of designs that are found; measured by benchmarks/forgetting.py
 
 
-def with_keeping(design: Design, known: Operation, keeping: str) -> Design:
+def with_keeping(design: PaperIdentifier, known: Operation, keeping: str) -> PaperIdentifier:
     """Return the design with its weights kept otherwise, η_V lowered where V would cost margin.
 
     Parameters

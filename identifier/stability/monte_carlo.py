@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import BatchScan
-from identifier.paper.design import SPEED_SPREAD, Design, Driving
+from codegen.arrays import Array
+from identifier.paper.design import SPEED_SPREAD, Driving, PaperIdentifier
 from identifier.paper.network import Weights
 from identifier.paper.step import CARRY, GAINS, OVER, Structure, build_step
 from identifier.stability.operation import declared_signals, largest_steering_rate
 from models.bicycle import BicycleParameters, bicycle, slip_angles
 from models.vehicle import GRAVITY, Vehicle
 
-Array = NDArray[np.float64]
 # Random smooth drives of a bicycle on saturating tires, many at once in compiled code.
 #
 # The tire is F = μ F_z sin(1.5 atan(C α/(1.5 μ F_z))): the stiffness that the vehicle states, and
@@ -291,7 +291,7 @@ class Beginning(NamedTuple):
 
 
 def monte_carlo(
-    design: Design,
+    design: PaperIdentifier,
     vehicle: Vehicle,
     driving: Driving,
     count: int,
@@ -345,7 +345,7 @@ def monte_carlo(
 
 
 def first_weights(
-    design: Design, count: int, beginning: Beginning, rng: np.random.Generator
+    design: PaperIdentifier, count: int, beginning: Beginning, rng: np.random.Generator
 ) -> Weights:
     """Return first weights of N drives: W (N, 2, n_h), zero on every second, and V (N, n_h, n_in).
 
@@ -365,7 +365,7 @@ def first_weights(
 
 
 def largest_norms(
-    design: Design, vehicle: Vehicle, drives: Drives, weights: Weights
+    design: PaperIdentifier, vehicle: Vehicle, drives: Drives, weights: Weights
 ) -> tuple[Array, Array, Array]:
     """Return the largest norms of ξ̃, W and V on each drive, (N,) each.
 

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from identifier.paper.design import SPEED_SPREAD, YAW_OVERSHOOT, Design, Driving
+from identifier.paper.design import SPEED_SPREAD, YAW_OVERSHOOT, Driving, PaperIdentifier
 from identifier.paper.laws import Gains
 from identifier.paper.network import network_signals
 from identifier.stability.loop import (
@@ -406,8 +406,8 @@ def expected_residual(vehicle: Vehicle, *, slip: float, friction: float) -> floa
     require_positive(ValueError, slip=slip, friction=friction)
     peak = friction * np.array(vehicle.axle_loads)
     linear = slip * _stiffness(vehicle)
-    carried = peak * np.sin(1.5 * np.arctan(linear / (1.5 * peak)))
-    return float(np.linalg.norm(linear - carried))
+    state = peak * np.sin(1.5 * np.arctan(linear / (1.5 * peak)))
+    return float(np.linalg.norm(linear - state))
 
 
 def disturbance(vehicle: Vehicle, driving: Driving, *, dt: float, unit: float) -> Disturbance:
@@ -451,7 +451,7 @@ def disturbance(vehicle: Vehicle, driving: Driving, *, dt: float, unit: float) -
     )
 
 
-def largest_input(design: Design, vehicle: Vehicle, driving: Driving) -> float:
+def largest_input(design: PaperIdentifier, vehicle: Vehicle, driving: Driving) -> float:
     """Bound on |x_bar| [-], noise of the sensors in it.
 
     Parameters
@@ -478,7 +478,7 @@ def largest_input(design: Design, vehicle: Vehicle, driving: Driving) -> float:
     return float(np.linalg.norm([(signals[name] + noise[name]) / scale for name, scale in named]))
 
 
-def input_per_error(design: Design, vehicle: Vehicle, driving: Driving) -> float:
+def input_per_error(design: PaperIdentifier, vehicle: Vehicle, driving: Driving) -> float:
     """What |ξ̃| adds to |x_bar| where the network reads x_hat = x - K ξ̃ [1/(U s)].
 
     Parameters
@@ -496,7 +496,7 @@ def input_per_error(design: Design, vehicle: Vehicle, driving: Driving) -> float
     return float(np.linalg.norm(np.array(ca.evalf(ca.densify(per_error))), 2))
 
 
-def operation(design: Design, vehicle: Vehicle, driving: Driving) -> Operation:
+def operation(design: PaperIdentifier, vehicle: Vehicle, driving: Driving) -> Operation:
     """Return what the certificate of a design needs.
 
     (14) is given what holds for sure: the ideal weights W = 0, that leave all of f as w_bar. The V

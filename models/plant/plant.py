@@ -7,9 +7,9 @@ from functools import cache
 from typing import NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen import Scan
+from codegen.arrays import Array
 from models.friction import Friction
 from models.maneuvers import Maneuver
 from models.plant.dynamics import N_STATES, Driver, dynamics, runge_kutta
@@ -17,9 +17,6 @@ from models.recordings import Recording
 from models.sensors import Sensors
 from models.tires import MagicFormula, Tire
 from models.vehicle import Vehicle, VehicleError
-
-Array = NDArray[np.float64]
-
 
 # What a plant recorded: the motion, and the forces behind it, which no car measures.
 

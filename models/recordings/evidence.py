@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from models.recordings.record import Array, Recording
+from codegen.arrays import Array
+from models.recordings.record import Recording
 
 WINDOW = 0.2  # [s]: keeps maneuvers up to 2 Hz, averages 20 samples of noise at 100 Hz
 STRIDE = 0.05  # [s]

@@ -13,15 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from models.recordings.checks import check_physics
-from models.recordings.record import (
-    LARGEST,
-    MINIMUM_SAMPLES,
-    Array,
-    Recording,
-    RecordingError,
-    resample,
-)
+from models.recordings.record import LARGEST, MINIMUM_SAMPLES, Recording, RecordingError, resample
 from models.schema import (
     LONGEST_NAME,
     limits,

@@ -13,12 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from models.files import write_atomically
 from models.rules import LARGEST_FORCE
-
-Array = NDArray[np.float64]
 
 MINIMUM_SAMPLES = 10
 JITTER = 0.02  # largest departure of a sample from the uniform grid, as a share of one step

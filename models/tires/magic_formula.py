@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple, Self
 
 import casadi as ca
 
-from models.tires.forces import Expression, TireForces, folded, positive
+from models.tires.forces import Expression, TireForces, positive, specialized
 from models.tires.magic_formula_coefficients import Coefficients
 from models.tires.tir import ValidRange, read_magic_formula
 
@@ -370,7 +370,7 @@ class MagicFormula:
         mu : friction of the road over that of the measurement [-]; multiplies LMUX and LMUY.
         """
         c, load = self.coefficients, positive(F_z)
-        alpha_iso = -folded(alpha)  # the file and its equations have the ISO sign
+        alpha_iso = -specialized(alpha)  # the file and its equations have the ISO sign
         return TireForces(
             combined_longitudinal(c, alpha_iso, kappa, gamma, load, mu),
             combined_lateral(c, alpha_iso, kappa, gamma, load, mu),

@@ -3,14 +3,12 @@
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from models.friction import Friction
 from models.plant import Driver, Plant, PlantState, StepwisePlant
 from models.tires import Tire
 from models.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 
 class CarState(NamedTuple):

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple, Protocol
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from models.friction import Friction, place_change
 from models.plant import Driver
 from models.tires import TireForces
@@ -175,9 +175,6 @@ def _weight(slip: Any, shift: Any, B: Any, C: Any, E: Any) -> Any:
         return ca.cos(C * ca.atan(B * s - E * (B * s - ca.atan(B * s))))
 
     return cosine(slip + shift) / cosine(shift)
-
-
-Array = NDArray[np.float64]
 
 
 # What driving their two cars has in common: an integration, friction, and forces from motion.

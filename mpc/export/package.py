@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from codegen.escape import c_string
 from codegen.template import Values, Words, filled
 from identifier.export.package import (
@@ -75,8 +76,6 @@ def _initializer(value: NDArray[Any]) -> str:
         return f"{int(value)}U"
     return f"R({float(value)!r})"
 
-
-Array = NDArray[np.float64]
 
 # The self-test of a package: a closed-loop record, and what Python's tracker steered in it.
 

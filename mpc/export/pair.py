@@ -36,9 +36,9 @@ def frozen_start(package: Package) -> NetworkModel | AxleModel:
     NoHandoverError
         Where the method learns neither a network nor axle curves.
     """
-    folded = package.folded
+    specialized = package.specialized
     try:
-        model = folded.method.frozen(folded.vehicle, folded.carry)
+        model = specialized.method.frozen(specialized.vehicle, specialized.carry)
     except CannotFreezeError as error:
         raise NoHandoverError(f"no tire to hand over: {error}") from error
     if not isinstance(model, NetworkModel | AxleModel):
@@ -60,12 +60,12 @@ def handover_sources(identifier: Package, tracker: MpcPackage) -> dict[str, str]
     NoHandoverError
         Where the method learns neither a network nor axle curves.
     """
-    name, model = identifier.folded.name, frozen_start(identifier)
+    name, model = identifier.specialized.name, frozen_start(identifier)
     about = {
         "name": name,
         "NAME": name.upper(),
         "version": identifier.about["version"],
-        "max_force": repr(round(identifier.folded.limits.force, 1)),
+        "max_force": repr(round(identifier.specialized.limits.force, 1)),
     }
     if isinstance(model, AxleModel):
         values: Mapping[str, Any] = {
@@ -147,20 +147,20 @@ def build_pair(
     NoCompilerError
         Where there is no C compiler.
     """
-    folded = identifier.folded
+    specialized = identifier.specialized
     tracker = build_mpc_package(
         prediction_tire(frozen_start(identifier)),
         problem,
-        period=folded.dt,
+        period=specialized.dt,
         delay=delay,
-        name=f"{folded.name}_mpc",
+        name=f"{specialized.name}_mpc",
         single=single,
     )
     values: dict[str, str | Words] = {
-        "name": folded.name,
-        "NAME": folded.name.upper(),
+        "name": specialized.name,
+        "NAME": specialized.name.upper(),
         "version": identifier.about["version"],
-        "vehicle": Words(folded.vehicle.name),
+        "vehicle": Words(specialized.vehicle.name),
         "identifier_hash": identifier.about["hash"],
         "mpc_hash": tracker.about["hash"],
         "learnt_peak": LEARNT_PEAK,

@@ -6,19 +6,17 @@ from typing import Any, cast
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from identifier.axle.car import car_numbers
 from identifier.defaults import natural_operation
 from identifier.method import Method
-from identifier.paper.design import Design
+from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import DRIVING_ERRORS
 from identifier.stability import certify
 from models.vehicle import GRAVITY, Vehicle
 from mpc.tires import PredictionTire
 from mpc.tires.tire import Car, Point
-
-Array = NDArray[np.float64]
 
 LARGEST_SLIP = 0.25  # rad: an axle slides long before
 SHARES = (0.02, 0.04, 0.08, 0.16, 0.28, 0.44, 0.64, 1.0)  # of the largest slip that is judged
@@ -39,7 +37,7 @@ def law_complaint(method: Method, vehicle: Vehicle) -> str | None:
     method : the method.
     vehicle : the car.
     """
-    if not isinstance(method, Design):
+    if not isinstance(method, PaperIdentifier):
         return None
     driving_error = DRIVING_ERRORS[method.law]
     certificate = certify(method.gains, driving_error, natural_operation(method, vehicle))

@@ -15,16 +15,14 @@ from typing import Any, NamedTuple, cast
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen import Scan
+from codegen.arrays import Array
 from identifier.axle.car import car_numbers
 from models.rules import require_positive_fields
 from models.vehicle import GRAVITY
 from mpc.tires import PredictionTire
 from mpc.tires.tire import Car, Point
-
-Array = NDArray[np.float64]
 
 # The last seconds of a drive: what models are judged on.
 

@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from codegen.arrays import Array
 from mpc.handover.certificate import tire_complaint
-from mpc.handover.judge import Array, Judge, Misfit, Window
+from mpc.handover.judge import Judge, Misfit, Window
 from mpc.handover.rules import Rules, Verdict
 from mpc.tires import PredictionTire
 from mpc.tires.ladder import N_AXLE, N_COMMON, LadderAxles

@@ -3,10 +3,11 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from identifier.method import CannotFreezeError, FrozenModel
+from codegen.arrays import Array
+from identifier.method import CannotFreezeError
 from identifier.run import DivergedError, OnlineIdentifier
+from identifier.tire_model import TireModel
 from models.vehicle import Vehicle
 from mpc.handover.certificate import LARGEST_SLIP, law_complaint, tire_complaint
 from mpc.handover.judge import Judge, Misfit, Window
@@ -14,8 +15,6 @@ from mpc.handover.road import Road, look_at_road
 from mpc.handover.rules import Decision, Rules, Verdict
 from mpc.tires import PredictionTire, prediction_tire
 from mpc.tires.ladder import LadderAxles
-
-Array = NDArray[np.float64]
 
 # Has the car been driven so that there was something to learn, and where was it learnt?
 
@@ -52,7 +51,7 @@ class Excitation:
         self._time += self._dt * (size >= LEARNS)
         self._largest += 0.1 * np.maximum(size - self._largest, 0.0)  # not of one noisy sample
 
-    def complaint(self, model: FrozenModel, samples: Array) -> str | None:
+    def complaint(self, model: TireModel, samples: Array) -> str | None:
         """Return why a model is not known well enough where the car is driven, or None.
 
         Parameters
@@ -154,7 +153,7 @@ class Supervisor:
         self._road = Road(in_use)
         # What was steered with and what was learnt, and since when [s], to go back to.
         self._steered = [(-math.inf, in_use, self._road)]
-        self._models: list[tuple[float, FrozenModel | None]] = [(-math.inf, identifier.start)]
+        self._models: list[tuple[float, TireModel | None]] = [(-math.inf, identifier.start)]
         self._agreed, self._believed_since = True, -math.inf
         self.decisions: list[Decision] = []
         self.last = Decision(0.0, Verdict.KEEP, "nothing was driven yet", 0.0, 0.0)

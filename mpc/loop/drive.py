@@ -10,17 +10,14 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from models.sensors import is_shown
 from mpc.cars import Car, CarState
 from mpc.loop.record import Drive, Recorder
 from mpc.loop.sensing import CarSensors, Measured, Measures, SpeedProfile
 from mpc.path.path import Path, Projection
 from mpc.realtime.instance import Command, Measurement
-
-Array = NDArray[np.float64]
-
 
 # What the loop asks of a tracker, whatever solves its problem.
 

@@ -7,14 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from mpc.cars import CarState
 from mpc.loop.sensing import Measured
 from mpc.path.path import Path, Projection
 from mpc.realtime.instance import Command, Status
-
-Array = NDArray[np.float64]
 
 
 class Plan(NamedTuple):

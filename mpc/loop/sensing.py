@@ -5,8 +5,9 @@ from dataclasses import dataclass, fields
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from codegen.arrays import Array
 from models.faults import FaultError, SensorFault
 from models.friction import Friction
 from models.maneuvers import SlowlyIncreasingSteer
@@ -160,9 +161,6 @@ class FaultySensors:
                 good = good._replace(**{name: getattr(held, name)})
         self._good = good
         return shown
-
-
-Array = NDArray[np.float64]
 
 
 # The wanted speed along a path, and what a tracker is told of the road ahead.

@@ -9,8 +9,9 @@ from typing import TypeAlias
 
 import numpy as np
 
+from codegen.arrays import Array
 from mpc.path.gates import iso_3888_1, iso_3888_2, slalom
-from mpc.path.line import Array, Line, PathError, line_from_heading
+from mpc.path.line import Line, PathError, line_from_heading
 from mpc.path.path import Path
 
 # Paths of straights and turns, whose curvature rises and falls smoothly between them.

@@ -15,7 +15,8 @@ import casadi as ca
 import numpy as np
 from scipy.interpolate import BSpline
 
-from mpc.path.line import Array, Line, PathError
+from codegen.arrays import Array
+from mpc.path.line import Line, PathError
 from mpc.path.path import Path
 from mpc.path.waypoints import sample
 

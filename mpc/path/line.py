@@ -8,11 +8,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from models.schema import require_few
-
-Array = NDArray[np.float64]
 
 
 class PathError(ValueError):

@@ -15,7 +15,8 @@ from typing import NamedTuple, Self, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mpc.path.line import Array, Ends, Line, PathError, check_line
+from codegen.arrays import Array
+from mpc.path.line import Ends, Line, PathError, check_line
 from mpc.path.waypoints import line_through, read_waypoints
 
 # Where a car is along a path: the foot of the perpendicular, found by walking and never jumping.

@@ -7,8 +7,9 @@ import math
 
 import numpy as np
 
+from codegen.arrays import Array
 from models.rules import require_positive
-from mpc.path.line import Array, PathError
+from mpc.path.line import PathError
 from mpc.path.path import Path
 
 

@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from scipy.sparse.linalg import splu
 
+from codegen.arrays import Array
 from models.schema import limits, read_text, require_few, shown
-from mpc.path.line import Array, Line, PathError, uniform_grid
+from mpc.path.line import Line, PathError, uniform_grid
 
 LEAST, MOST = -12.0, 18.0  # exponents of λ over the sixth power of the mean gap
 # Way-points that were measured, moved a little so that a line through them bends gently.

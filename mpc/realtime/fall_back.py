@@ -9,11 +9,9 @@ may be what the solver failed at, reaches it. The delay is a lag of its length.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from models.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 N_STATES = 5
 N_GAINS = N_STATES + 2  # of x, and what the steady turn asks for

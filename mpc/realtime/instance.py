@@ -13,15 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from codegen import load_library
+from codegen.arrays import Array
 from codegen.compiler import keep, kept
 from mpc.prediction import state_size
 from mpc.problem import N_ERRORS, Guards, Problem
 from mpc.realtime.c_source import c_sources, one_file
 from mpc.realtime.fall_back import N_GAINS, N_SPEEDS
 from mpc.tires.tire import TireStructure
-
-Array = NDArray[np.float64]
-
 
 # What goes into a tracker and what comes out.
 

@@ -6,12 +6,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from codegen.arrays import Array
 from mpc.problem import Guards, Problem
 from mpc.realtime.fall_back import fall_back
 from mpc.realtime.instance import N_COMMANDS, Command, Instance, Measurement, Status, set_params
 from mpc.tires.tire import PredictionTire, reach_of
-
-Array = NDArray[np.float64]
 
 TOLERANCE = {False: 1e-8, True: 1e-5}  # of the solver, by `single`
 STAYS = 1e-9  # change of the steering rate [rad/s] below which a plan has converged

@@ -10,8 +10,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from codegen.arrays import Array
 from models.vehicle import Vehicle
-from mpc.tires.tire import Array, Pair, Point, PredictionTire, no_lag, small_slip, wheel_slip
+from mpc.tires.tire import Pair, Point, PredictionTire, no_lag, small_slip, wheel_slip
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,12 +9,13 @@ from typing import Any, Literal, NamedTuple
 import casadi as ca
 import numpy as np
 
+from codegen.arrays import Array
 from identifier.axle.model import AxleModel
 from identifier.axle.slip import SHORTEST
 from models.plant.dynamics import wheel_loads
 from models.tires import MagicFormula, Tire
 from models.vehicle import GRAVITY, Vehicle, VehicleError
-from mpc.tires.tire import Array, Pair, Point, PredictionTire, wheel_slip
+from mpc.tires.tire import Pair, Point, PredictionTire, wheel_slip
 
 N_COMMON = 3
 N_AXLE = 2  # beside the w_j

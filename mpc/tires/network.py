@@ -7,10 +7,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from codegen.arrays import Array
 from identifier.own_network import OnnxModel, read_network
 from identifier.paper.network import NetworkModel, network_signals
 from models.bicycle import BicycleParameters
-from mpc.tires.tire import Array, Pair, Point, PredictionTire, no_lag, small_slip
+from mpc.tires.tire import Pair, Point, PredictionTire, no_lag, small_slip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,11 +10,10 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from models.vehicle import Vehicle
 
-Array = NDArray[np.float64]
 Pair: TypeAlias = tuple[Any, Any]  # front, rear: SX expressions or numbers
 
 

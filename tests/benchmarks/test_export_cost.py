@@ -7,7 +7,7 @@ from benchmarks import c_loops
 from benchmarks.export_cost import LOOP, NUMPY, PACKAGE, check, steps
 from benchmarks.targets import Targets
 from codegen import find_compiler
-from identifier.defaults import default_design
+from identifier.defaults import paper_identifier
 from identifier.export.package import build_package
 from models.vehicle import sedan
 
@@ -18,7 +18,7 @@ CAR = sedan()
 def package():
     if find_compiler() is None:
         pytest.skip("needs a C compiler")
-    return build_package(default_design(CAR), CAR)
+    return build_package(paper_identifier(CAR), CAR)
 
 
 @pytest.fixture

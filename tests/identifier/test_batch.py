@@ -8,7 +8,7 @@ import pytest
 import codegen.batch
 from identifier.compare.batch import cross_replay_batch, identify_batch, replay_batch
 from identifier.compare.course import Course, cross_replay, shares
-from identifier.defaults import default_design
+from identifier.defaults import paper_identifier
 from identifier.method import CannotFreezeError
 from identifier.methods import METHODS, make_method
 from identifier.paper.network import NetworkModel
@@ -22,7 +22,7 @@ QUICK = [name for name in METHODS if name != "concurrent"]  # which takes long t
 
 def gain_sets(car, count):
     """Designs of one structure that differ in gains and seed."""
-    base = default_design(car)
+    base = paper_identifier(car)
     return [
         replace(base, seed=k, gains=replace(base.gains, eta_W=base.gains.eta_W * (0.5 + 0.1 * k)))
         for k in range(count)
@@ -32,11 +32,11 @@ def gain_sets(car, count):
 def require_the_same(run, history):
     """Bits of every carried value that was kept; the error to rounding, its sum has an order."""
     assert run.diverged_at == history.diverged_at
-    for t, carried in run.carried.items():
-        expected = history.carried_at(min(t, history.recording.t[-1]))
-        assert set(carried) == set(expected)
+    for t, state in run.state.items():
+        expected = history.state_at(min(t, history.recording.t[-1]))
+        assert set(state) == set(expected)
         for port, value in expected.items():
-            np.testing.assert_array_equal(carried[port], value, err_msg=f"{port} at {t}")
+            np.testing.assert_array_equal(state[port], value, err_msg=f"{port} at {t}")
     truth = history.recording.axle_force
     counts = counted_samples(history.recording, history.design.min_speed)
     error = axle_rms(history.axle_force - truth, counts)
@@ -50,7 +50,7 @@ def test_many_gain_sets_have_the_bits_of_each_alone(car, drive):
     runs = identify_batch(recording, car, designs, freeze_times=FREEZE)
     for design, run in zip(designs, runs, strict=True):
         assert run.design is design
-        assert set(run.carried) == {*FREEZE, np.inf}
+        assert set(run.state) == {*FREEZE, np.inf}
         require_the_same(run, identify(recording, car, design))
 
 
@@ -72,7 +72,7 @@ def test_every_method_has_the_bits_of_its_run_alone(car, drive):
 def test_each_method_may_have_its_own_car(car, drive):
     recording = drive(n=400)
     cars = [replace(car, mass=car.mass * (1.0 + 0.05 * k)) for k in range(9)]
-    designs = [default_design(one) for one in cars]
+    designs = [paper_identifier(one) for one in cars]
     runs = identify_batch(recording, cars, designs)
     for one, design, run in zip(cars, designs, runs, strict=True):
         assert run.vehicle is one
@@ -113,7 +113,7 @@ def at_rest_for_a_while(recording):
 
 def test_samples_at_rest_do_not_count(car, drive):
     recording = at_rest_for_a_while(drive(n=400))
-    design = default_design(car)
+    design = paper_identifier(car)
     (run,) = identify_batch(recording, car, [design])
     history = identify(recording, car, design)
     require_the_same(run, history)
@@ -125,14 +125,14 @@ def test_samples_at_rest_do_not_count(car, drive):
 
 def test_a_recording_without_truth_has_no_error(car, drive):
     recording = replace(drive(n=100), axle_force=None)
-    (run,) = identify_batch(recording, car, [default_design(car)])
+    (run,) = identify_batch(recording, car, [paper_identifier(car)])
     assert run.online is None
     with pytest.raises(ValueError, match="has no true forces"):
         replay_batch(recording, [run.freeze()], counts=np.ones(100, dtype=bool))
 
 
 def test_what_was_not_kept_cannot_be_frozen(car, drive):
-    recording, design = drive(n=300), default_design(car)
+    recording, design = drive(n=300), paper_identifier(car)
     (run,) = identify_batch(recording, car, [design], freeze_times=(1.0,))
     with pytest.raises(ValueError, match=r"weights were kept at \[1.0, inf\] s, not at 2 s"):
         run.freeze(2.0)
@@ -173,7 +173,7 @@ def test_models_of_every_kind_replay_as_they_do_alone(car, drive):
 def test_many_methods_are_judged_as_each_alone(car, drive):
     slow, quick = drive(n=400), replace(drive(n=400, amplitude=0.09), name="quick")
     course = Course(vehicle=car, recordings=(slow, quick), min_speed=1.0)
-    wild = replace(default_design(car), gains=replace(default_design(car).gains, eta_W=1e6))
+    wild = replace(paper_identifier(car), gains=replace(paper_identifier(car).gains, eta_W=1e6))
     methods = [*(make_method(name, car, seed) for name in QUICK for seed in (1, 2)), wild]
     for method, trial in zip(methods, cross_replay_batch(methods, course), strict=True):
         alone = cross_replay(method, course)

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import pytest
 
-from identifier.defaults import default_design
+from identifier.defaults import paper_identifier
 from identifier.paper.design import DesignFileError, design_text, read_design
 
 
 def test_a_design_comes_back_from_its_file(car, tmp_path):
-    design = default_design(car)
+    design = paper_identifier(car)
     odd = replace(
         design,
         law="pi_lead",
@@ -42,7 +42,7 @@ def test_a_design_comes_back_from_its_file(car, tmp_path):
     ],
 )
 def test_a_wrong_file_is_refused_by_its_key(car, tmp_path, old, new, said):
-    text = design_text(default_design(car))
+    text = design_text(paper_identifier(car))
     assert old in text
     path = tmp_path / "design.toml"
     path.write_text(text.replace(old, new))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_lyapunov
 
-from identifier.defaults import default_design
-from identifier.paper.design import Design
+from identifier.defaults import paper_identifier
+from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import Gains, NotHurwitzError
 from identifier.paper.network import Network
 from identifier.run import DivergedError, identify
@@ -65,13 +65,13 @@ def by_hand(recording, design, car):
 @pytest.mark.parametrize("radius", [np.inf, 0.5])
 def test_step_repeats_the_equations_by_hand(law, source, radius, car, drive):
     gains = replace(GAINS, W_max=radius, V_max=4 * radius, lead=0.2)
-    design = Design(gains=gains, law=law, input_source=source, network=Network(hidden=6))
+    design = PaperIdentifier(gains=gains, law=law, input_source=source, network=Network(hidden=6))
     recording = drive(n=400)
     history = identify(recording, car, design)
     forces, W, V = by_hand(recording, design, car)
     np.testing.assert_allclose(history.axle_force, forces, rtol=1e-9, atol=1e-6)
-    np.testing.assert_allclose(history.carried["W"][-1], W, rtol=1e-9, atol=1e-10)
-    np.testing.assert_allclose(history.carried["V"][-1], V, rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(history.state["W"][-1], W, rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(history.state["V"][-1], V, rtol=1e-9, atol=1e-10)
 
 
 @pytest.mark.parametrize(("W_free", "V_free"), [(0.4, 3.0), (0.4, 0.0), (0.0, 3.0)])
@@ -79,12 +79,12 @@ def test_a_dead_zone_leaks_what_lies_beyond_it(W_free, V_free, car, drive):
     gains = replace(GAINS, rho_W=8.0, rho_V=8.0, W_free=W_free, V_free=V_free)
     recording, ends = drive(n=400), []
     for one in (gains, replace(gains, W_free=0.0, V_free=0.0)):
-        design = Design(gains=one, network=Network(hidden=6))
+        design = PaperIdentifier(gains=one, network=Network(hidden=6))
         history = identify(recording, car, design)
         forces, W, V = by_hand(recording, design, car)
         np.testing.assert_allclose(history.axle_force, forces, rtol=1e-9, atol=1e-6)
-        np.testing.assert_allclose(history.carried["W"][-1], W, rtol=1e-9, atol=1e-10)
-        np.testing.assert_allclose(history.carried["V"][-1], V, rtol=1e-9, atol=1e-10)
+        np.testing.assert_allclose(history.state["W"][-1], W, rtol=1e-9, atol=1e-10)
+        np.testing.assert_allclose(history.state["V"][-1], V, rtol=1e-9, atol=1e-10)
         ends.append((np.linalg.norm(W), np.linalg.norm(V)))
     kept, leaked = ends
     assert W_free == 0.0 or kept[0] > 1.1 * leaked[0]
@@ -94,9 +94,9 @@ def test_a_dead_zone_leaks_what_lies_beyond_it(W_free, V_free, car, drive):
 def test_without_error_of_the_model_a_dead_zone_that_is_never_left_is_no_leakage_at_all(car, drive):
     wide = replace(GAINS, W_free=1e9, V_free=1e9)
     none = replace(GAINS, rho_W=0.0, rho_V=0.0)
-    found = [identify(drive(n=400), car, Design(gains=gains)) for gains in (wide, none)]
+    found = [identify(drive(n=400), car, PaperIdentifier(gains=gains)) for gains in (wide, none)]
     for name in ("W", "V"):
-        np.testing.assert_array_equal(*(history.carried[name] for history in found))
+        np.testing.assert_array_equal(*(history.state[name] for history in found))
 
 
 def test_finer_steps_of_both_integrators_meet(car, drive):
@@ -106,7 +106,7 @@ def test_finer_steps_of_both_integrators_meet(car, drive):
         recording = drive(n=300 * fine, dt=0.01 / fine)
         forces = [
             identify(
-                recording, car, Design(gains=GAINS, dt=0.01 / fine, integrator=name)
+                recording, car, PaperIdentifier(gains=GAINS, dt=0.01 / fine, integrator=name)
             ).axle_force
             for name in ("euler", "rk4")
         ]
@@ -116,7 +116,7 @@ def test_finer_steps_of_both_integrators_meet(car, drive):
 
 def test_learnt_forces_approach_the_truth(car, drive):
     recording = drive()
-    history = identify(recording, car, default_design(car))
+    history = identify(recording, car, paper_identifier(car))
     p = car.bicycle
     alpha_f = recording.delta_f - (recording.v_y + p.l_f * recording.r) / recording.v_x
     linear = np.sqrt(np.mean((p.C_f * alpha_f - recording.axle_force[:, 0])[-500:] ** 2))
@@ -125,8 +125,8 @@ def test_learnt_forces_approach_the_truth(car, drive):
 
 
 def test_true_forces_are_not_looked_at(car, drive):
-    one = identify(drive(n=200), car, default_design(car))
-    other = identify(drive(n=200, scale=-3.0), car, default_design(car))
+    one = identify(drive(n=200), car, paper_identifier(car))
+    other = identify(drive(n=200, scale=-3.0), car, paper_identifier(car))
     np.testing.assert_array_equal(one.axle_force, other.axle_force)
 
 
@@ -134,21 +134,21 @@ def test_speed_may_vary_and_learning_rests_at_standstill(car, drive):
     moving = drive(n=300)
     v_x = np.where(np.arange(300) < 150, 20.0, 0.0)
     stopped = replace(moving, v_x=v_x)
-    history = identify(stopped, car, default_design(car))
+    history = identify(stopped, car, paper_identifier(car))
     assert np.isfinite(history.axle_force).all()
     np.testing.assert_array_equal(history.axle_force[150:], 0.0)
-    np.testing.assert_array_equal(history.told["xi_tilde"][150:], 0.0)
-    np.testing.assert_array_equal(history.carried["W"][150], history.carried["W"][-1])
-    assert np.abs(history.carried["W"][149] - history.carried["W"][100]).max() > 0.0
+    np.testing.assert_array_equal(history.outputs["xi_tilde"][150:], 0.0)
+    np.testing.assert_array_equal(history.state["W"][150], history.state["W"][-1])
+    assert np.abs(history.state["W"][149] - history.state["W"][100]).max() > 0.0
 
 
 def test_at_rest_the_filter_empties_and_the_observer_follows_the_measurement(car, drive):
     """Learning goes on from a clean start: no error of before the halt is left to learn from."""
     moving = drive(n=300)
     v_x = np.where((np.arange(300) < 150) | (np.arange(300) >= 200), 20.0, 0.0)
-    design = default_design(car)
+    design = paper_identifier(car)
     history = identify(replace(moving, v_x=v_x), car, design)
-    z, xi_hat = history.carried["z"], history.carried["xi_hat"]
+    z, xi_hat = history.state["z"], history.state["xi_hat"]
     p, (v_y, r) = car.bicycle, moving.x.T
     xi = np.column_stack([p.m * p.l_r * v_y + p.I_z * r, p.m * p.l_f * v_y - p.I_z * r])
     xi /= (p.l_f + p.l_r) * design.force_unit
@@ -162,7 +162,7 @@ def test_at_rest_the_filter_empties_and_the_observer_follows_the_measurement(car
 
 def test_gains_that_diverge_are_reported_not_hidden(car, drive):
     wild = replace(GAINS, eta_W=1e7, eta_V=1e7, rho_W=0.0, rho_V=0.0)
-    history = identify(drive(), car, Design(gains=wild))
+    history = identify(drive(), car, PaperIdentifier(gains=wild))
     assert history.diverged_at is not None
     with pytest.raises(DivergedError, match="diverged at"):
         history.freeze(14.0)
@@ -170,7 +170,7 @@ def test_gains_that_diverge_are_reported_not_hidden(car, drive):
 
 def test_a_recording_of_another_rate_is_refused(car, drive):
     with pytest.raises(ValueError, match=r"sampled at 0.02 s, the design at 0.01 s"):
-        identify(drive(n=50, dt=0.02), car, Design(gains=GAINS))
+        identify(drive(n=50, dt=0.02), car, PaperIdentifier(gains=GAINS))
 
 
 def test_impossible_gains_are_refused():
@@ -181,7 +181,7 @@ def test_impossible_gains_are_refused():
     with pytest.raises(ValueError, match="eta_W must not be negative"):
         replace(GAINS, eta_W=-1.0)
     with pytest.raises(ValueError, match="law must be one of"):
-        Design(gains=GAINS, law="magic")
+        PaperIdentifier(gains=GAINS, law="magic")
 
 
 def test_default_design_is_similar_for_a_model_car(car):
@@ -195,7 +195,7 @@ def test_default_design_is_similar_for_a_model_car(car):
         cornering_stiffness_front=140.0,
         cornering_stiffness_rear=120.0,
     )
-    full, small = default_design(car), default_design(model)
+    full, small = paper_identifier(car), paper_identifier(model)
     ratio = np.array(full.network.scale) / np.array(small.network.scale)
     np.testing.assert_allclose(ratio, [np.sqrt(10), 1 / np.sqrt(10), 1.0, 1.0])
     assert full.force_unit == 1000.0
@@ -210,7 +210,7 @@ def test_a_spike_is_not_learnt_from(car, drive, law, signal, size):
     recording = drive(n=400)
     spoilt = getattr(recording, signal).copy()
     spoilt[200] += size
-    design = default_design(car, law=law)
+    design = paper_identifier(car, law=law)
     clean = identify(recording, car, design)
     history = identify(replace(recording, **{signal: spoilt}), car, design)
     assert np.isfinite(history.axle_force).all()
@@ -227,7 +227,7 @@ def test_spikes_of_all_signals_at_once_are_not_believed(car, drive, law, rng):
         values = getattr(recording, signal).copy()
         values[100:500:40] += 1000.0 * rng.choice([-1.0, 1.0], size=10)
         spoilt[signal] = values
-    history = identify(replace(recording, **spoilt), car, default_design(car, law=law))
+    history = identify(replace(recording, **spoilt), car, paper_identifier(car, law=law))
     assert np.isfinite(history.axle_force).all()
     assert history.diverged_at is None
     assert np.abs(history.axle_force).max() < 3.0 * np.abs(recording.axle_force).max()
@@ -235,7 +235,7 @@ def test_spikes_of_all_signals_at_once_are_not_believed(car, drive, law, rng):
 
 def test_weights_keep_their_forces_in_a_design_of_another_force_unit(car, drive):
     recording = drive(n=600)
-    design = default_design(car)
+    design = paper_identifier(car)
     model = identify(recording, car, design).freeze(5.0)
     other = replace(design, force_unit=4.0 * design.force_unit)
     start = identify(recording, car, other, start=model).freeze(float(recording.t[0]))

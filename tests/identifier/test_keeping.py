@@ -5,7 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.defaults import LAWS, default_design, design_for, natural_driving, natural_operation
+from identifier.defaults import (
+    LAWS,
+    design_for,
+    natural_driving,
+    natural_operation,
+    paper_identifier,
+)
 from identifier.methods import make_method
 from identifier.run import identify
 from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS, with_keeping
@@ -74,7 +80,7 @@ def test_the_paper_keeps_its_leakage():
         gains = make_method(law, CAR).gains
         assert gains.W_free == gains.V_free == 0.0 < gains.rho_W
         assert gains.W_max == gains.V_max == np.inf
-    design = default_design(CAR)
+    design = paper_identifier(CAR)
     assert kept("leakage", design) is design
     assert KEEPINGS[DEFAULT_KEEPING] is not KEEPINGS["leakage"]
 
@@ -102,7 +108,7 @@ def test_what_cannot_be_kept_otherwise_is_refused():
 
 
 def test_a_dead_zone_without_a_leakage_is_refused():
-    gains = default_design(CAR).gains
+    gains = paper_identifier(CAR).gains
     for free, rho in (("W_free", "rho_W"), ("V_free", "rho_V")):
         with pytest.raises(ValueError, match=f"{free} is the dead zone of a leakage"):
             replace(gains, **{free: 1.0, rho: 0.0})

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.axle import AxleDesign
+from identifier.axle import AxleIdentifier
 from identifier.method import CannotFreezeError
 from identifier.methods import METHODS, make_method
 from identifier.run import DivergedError, OnlineIdentifier, identify
@@ -23,10 +23,10 @@ def test_every_method_learns_the_same_bits_as_over_the_recording(name, car, driv
     history = identify(recording, car, method)
     online = OnlineIdentifier(method, car, recording.dt)
     np.testing.assert_array_equal(driven(online, recording), history.axle_force)
-    for port, value in online.carried().items():
-        np.testing.assert_array_equal(value, history.carried[port][-1])
-    for port, value in history.told.items():
-        np.testing.assert_array_equal(online.told[port], value[-1].ravel(order="F"))
+    for port, value in online.state().items():
+        np.testing.assert_array_equal(value, history.state[port][-1])
+    for port, value in history.outputs.items():
+        np.testing.assert_array_equal(online.outputs[port], value[-1].ravel(order="F"))
     try:
         frozen = history.freeze(recording.t[-1])
     except CannotFreezeError:
@@ -47,7 +47,7 @@ def test_a_run_goes_on_from_stored_weights(name, car, drive):
 
 
 def test_a_sample_that_is_no_number_is_refused_and_counted(car, drive):
-    recording, method = drive(n=200), AxleDesign.for_vehicle(car)
+    recording, method = drive(n=200), AxleIdentifier.for_vehicle(car)
     online, clean = (OnlineIdentifier(method, car, 0.01) for _ in range(2))
     for k, (x, u, v_x) in enumerate(zip(recording.x, recording.u, recording.v_x, strict=True)):
         clean.update(x, u, v_x)
@@ -80,7 +80,7 @@ def test_a_law_that_diverges_is_noticed_and_freezes_to_nothing(car, drive):
 
 
 def test_another_interval_and_samples_of_another_shape_are_refused(car):
-    method = AxleDesign.for_vehicle(car)
+    method = AxleIdentifier.for_vehicle(car)
     with pytest.raises(ValueError, match=r"every 0\.02 s, the method wants 0\.01 s"):
         OnlineIdentifier(method, car, 0.02)
     with pytest.raises(ValueError, match="unpack"):
@@ -89,7 +89,7 @@ def test_another_interval_and_samples_of_another_shape_are_refused(car):
 
 def test_an_update_takes_far_less_than_a_sample(car, drive):
     recording = drive(n=500)
-    online = OnlineIdentifier(AxleDesign.for_vehicle(car), car, recording.dt)
+    online = OnlineIdentifier(AxleIdentifier.for_vehicle(car), car, recording.dt)
     online.prepare()
     times = []
     for sample in zip(recording.x, recording.u, recording.v_x, strict=True):

@@ -6,9 +6,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.axle import AxleDesign
-from identifier.export.fold import fold
+from identifier.axle import AxleIdentifier
 from identifier.export.package import synthetic_samples
+from identifier.export.specialize import specialize
 from identifier.methods import METHODS, make_method
 from identifier.refused import SampleLimits, stale_samples
 from identifier.run import OnlineIdentifier
@@ -79,7 +79,7 @@ def test_forces_are_right_again_three_seconds_after_a_speed_that_is_lost(name, s
 def test_a_gap_that_does_not_count_as_time_costs_more(slalom):
     """What the rule is for: the same samples left out, so that two far ones follow each other."""
     rows, truth = rows_of(slalom), slalom.axle_force
-    method = AxleDesign.for_vehicle(CAR)
+    method = AxleIdentifier.for_vehicle(CAR)
     clean, worst = driven(method, rows)[0], 0.0
     for begin in range(BEGIN, BEGIN + 200, 25):
         left_out = driven(method, np.delete(rows, slice(begin, begin + 50), axis=0))[0]
@@ -94,28 +94,28 @@ def test_a_gap_that_does_not_count_as_time_costs_more(slalom):
 def test_no_channel_without_a_number_changes_what_was_learnt(channel, broken, slalom):
     rows = rows_of(slalom)[:700]
     rows[500:600, channel] = broken
-    method = AxleDesign.for_vehicle(CAR)
+    method = AxleIdentifier.for_vehicle(CAR)
     online = OnlineIdentifier(method, CAR, method.dt)
     for k, row in enumerate(rows):
         if k == 500:
-            before = online.carried()
+            before = online.state()
         force = update(online, row)
         assert np.isfinite(force).all()
         if 500 <= k < 600:
             for port in ("W", "own", "UD", "errors", "excitation"):
-                np.testing.assert_array_equal(online.carried()[port], before[port])
+                np.testing.assert_array_equal(online.state()[port], before[port])
     assert (online.counts.samples, online.counts.refused) == (600, 100)
     assert np.abs(force).max() > 100.0
 
 
 def test_no_input_brings_a_number_into_the_axle_identifier_that_is_none():
     """The step alone, without the door before it: every channel and all of them, in any state."""
-    folded, rng = fold(AxleDesign.for_vehicle(CAR), CAR), np.random.default_rng(3)
-    n, gate = len(folded.carry), list(folded.carry).index("gate")
-    carry = [ca.DM(value) for value in folded.carry.values()]
+    specialized, rng = specialize(AxleIdentifier.for_vehicle(CAR), CAR), np.random.default_rng(3)
+    n, gate = len(specialized.carry), list(specialized.carry).index("gate")
+    carry = [ca.DM(value) for value in specialized.carry.values()]
     states = [carry]
-    for v_x, v_y, r, delta_f, delta_r in synthetic_samples(folded, 400):
-        carry = list(folded.function(*carry, [v_y, r], [delta_f, delta_r], v_x))[:n]
+    for v_x, v_y, r, delta_f, delta_r in synthetic_samples(specialized, 400):
+        carry = list(specialized.function(*carry, [v_y, r], [delta_f, delta_r], v_x))[:n]
         if rng.random() < 0.1:
             states += [carry, [*carry[:gate], np.array(carry[gate]), *carry[gate + 1 :]]]
             states[-1][gate][5] = 0.0  # just switched off: whatever comes first is near
@@ -123,8 +123,8 @@ def test_no_input_brings_a_number_into_the_axle_identifier_that_is_none():
     for state, which, broken in itertools.product(states, channels, BROKEN):
         sample = np.array([20.0, 0.1, 0.1, 0.01, 0.0])
         sample[list(which)] = broken
-        told = folded.function(*state, sample[1:3], sample[3:], sample[0])
-        for port, value in zip([*folded.carry, "axle_force"], told, strict=False):
+        told = specialized.function(*state, sample[1:3], sample[3:], sample[0])
+        for port, value in zip([*specialized.carry, "axle_force"], told, strict=False):
             assert np.abs(np.array(value)).max() < 1e9, (port, which, broken)  # NaN is not
 
 
@@ -138,7 +138,7 @@ def test_forces_are_zero_and_stale_after_half_a_second_without_a_sample(name, sl
         assert online.stale == (449 <= k < 500)
         if online.stale:
             np.testing.assert_array_equal(force, 0.0)
-            assert all((value == 0.0).all() for value in online.told.values())
+            assert all((value == 0.0).all() for value in online.outputs.values())
     assert np.abs(force).max() > 100.0
     assert online.counts.missed == 0
 
@@ -161,7 +161,7 @@ def test_a_time_that_is_none_is_refused(time):
 
 
 def test_a_run_that_is_begun_anew_stays_stale_until_a_sample_comes(slalom):
-    rows, method = rows_of(slalom)[:200], AxleDesign.for_vehicle(CAR)
+    rows, method = rows_of(slalom)[:200], AxleIdentifier.for_vehicle(CAR)
     online = OnlineIdentifier(method, CAR, method.dt)
     for row in rows:
         update(online, row)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.defaults import default_design
+from identifier.defaults import paper_identifier
 from identifier.method import FrozenModelError
 from identifier.methods import load_model
 from identifier.reproducibility import (
@@ -24,7 +24,7 @@ from identifier.run import identify
 
 @pytest.fixture(name="history")
 def a_history(car, drive):
-    return identify(drive(n=600), car, default_design(car))
+    return identify(drive(n=600), car, paper_identifier(car))
 
 
 def test_frozen_and_online_force_agree_at_the_instant_of_freezing(history):
@@ -46,8 +46,8 @@ def test_frozen_force_is_the_network_by_hand(history, car):
 
 
 def test_freezing_at_the_end_takes_the_weights_after_the_last_sample(history):
-    np.testing.assert_array_equal(history.freeze(5.99).weights.W, history.carried["W"][-1])
-    np.testing.assert_array_equal(history.freeze(99.0).weights.W, history.carried["W"][-1])
+    np.testing.assert_array_equal(history.freeze(5.99).weights.W, history.state["W"][-1])
+    np.testing.assert_array_equal(history.freeze(99.0).weights.W, history.state["W"][-1])
     with pytest.raises(ValueError, match="begins at 0 s"):
         history.freeze(-1.0)
 

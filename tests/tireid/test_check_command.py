@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.defaults import default_design, design_for, natural_driving, natural_operation
+from identifier.defaults import design_for, natural_driving, natural_operation, paper_identifier
 from identifier.paper.design import design_text, read_design
 from identifier.paper_study import paper_design
 from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS, with_keeping
@@ -33,7 +33,7 @@ def checked(capsys, *words):
 
 @pytest.fixture
 def unstable(tmp_path):
-    design = default_design(sedan())
+    design = paper_identifier(sedan())
     gains = replace(design.gains, eta_W=30.0 * design.gains.eta_W)
     path = tmp_path / "unstable.toml"
     path.write_text(design_text(replace(design, gains=gains)))
@@ -115,7 +115,7 @@ def test_figures_and_a_recorded_run(capsys, logs, tmp_path):
     code, said = checked(capsys, "--log", logs / "slalom.csv", "--figures", folder)
     assert code == 0
     margin = float(re.search(r"gain margin there ([\d.]+)", said.out).group(1))
-    worst = certificate_of(default_design(sedan()), sedan())["gain_sampled"].margin
+    worst = certificate_of(paper_identifier(sedan()), sedan())["gain_sampled"].margin
     assert margin > worst  # no recorded regressor is worse than the worst
     for name in ("locus.png", "bounds.png"):
         assert (folder / name).read_bytes().startswith(b"\x89PNG")

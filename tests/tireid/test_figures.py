@@ -16,8 +16,8 @@ from matplotlib.patches import FancyBboxPatch
 from matplotlib.ticker import FixedLocator
 from matplotlib.transforms import Bbox
 
-from identifier.axle import AxleDesign, AxleModel
-from identifier.paper.design import Design
+from identifier.axle import AxleIdentifier, AxleModel
+from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import Gains, diagonal
 from identifier.paper.network import Network
 from identifier.reproducibility import AxleRmse, Replay, Reproduction
@@ -73,11 +73,11 @@ def made_up(scale: float = 5000.0, *, truth: bool = True, rear: float = 0.0) -> 
     unit = 1000.0 if scale > 100.0 else 1.0
     return History(
         vehicle=CAR,
-        design=Design(gains=GAINS, network=Network(hidden=3), force_unit=unit),
+        design=PaperIdentifier(gains=GAINS, network=Network(hidden=3), force_unit=unit),
         recording=recording,
         axle_force=1.1 * force,
         told={"f_hat": 0.1 * force / unit, "xi_tilde": 0.01 * rng.standard_normal((N, 2))},
-        carried={
+        state={
             "z": np.zeros((N + 1, 2)),
             "W": np.cumsum(rng.standard_normal((N + 1, 2, 3)), axis=0),
             "V": np.cumsum(rng.standard_normal((N + 1, 3, 4)), axis=0),
@@ -307,7 +307,7 @@ def test_slip_angles_have_the_sign_of_the_paper() -> None:
 
 def unlike_axles() -> AxleModel:
     """A ladder whose axles differ in stiffness, grip and in how far they are known."""
-    design = AxleDesign.for_vehicle(CAR)
+    design = AxleIdentifier.for_vehicle(CAR)
     new = design.frozen(CAR, design.setup(CAR, made_up().recording).carry)
     return replace(
         new,
@@ -357,11 +357,11 @@ def test_every_axle_has_its_own_curves_in_the_slip_figure() -> None:
 
 def test_the_learnt_axles_are_drawn_each_in_its_own_numbers() -> None:
     """Stiffness, relaxation length and saturation by hand, with the weights before each sample."""
-    design, n = AxleDesign.for_vehicle(CAR), N + 1
+    design, n = AxleIdentifier.for_vehicle(CAR), N + 1
     growth = np.linspace(0.5, 1.0, n)[:, None, None]
     W = growth * np.array([[0.2, 0.3, 0.2, 0.1], [0.1, 0.4, 0.1, 0.3]])
     own = growth * np.array([[0.03, 0.5, 0.0], [0.05, 0.2, 0.0]])
-    history = replace(made_up(), design=design, carried={"W": W, "own": own})
+    history = replace(made_up(), design=design, state={"W": W, "own": own})
     stiffness, lag, grip = learnt_axles_figure(history).axes
     for axle, load in enumerate(1500.0 * 9.81 / 2.7 * np.array([1.5, 1.2])):
         slope = (W[:-1, axle] / np.array(design.ladder)).sum(axis=1)
@@ -387,7 +387,7 @@ def test_the_error_norm_is_the_euclidean_norm_and_bounds_far_above_make_its_axis
 ):
     history = made_up()
     axes = FIGURES["error"]().axes[0]
-    expected = np.sqrt(np.sum(history.told["xi_tilde"] ** 2, axis=1))
+    expected = np.sqrt(np.sum(history.outputs["xi_tilde"] ** 2, axis=1))
     assert np.asarray(axes.lines[0].get_ydata()) == pytest.approx(expected)
     assert axes.get_yscale() == "linear"
     assert FIGURES["error under bounds"]().axes[0].get_yscale() == "log"
@@ -395,18 +395,18 @@ def test_the_error_norm_is_the_euclidean_norm_and_bounds_far_above_make_its_axis
 
 def test_a_law_that_diverges_leaves_the_panel_instead_of_flattening_it() -> None:
     history = made_up()
-    force, xi_tilde = history.axle_force.copy(), history.told["xi_tilde"].copy()
+    force, xi_tilde = history.axle_force.copy(), history.outputs["xi_tilde"].copy()
     growth = np.exp(np.minimum(10.0 * np.arange(100), 700.0))[:, None]
     force[150:250] *= growth
     xi_tilde[150:250] *= growth
     force[250:], xi_tilde[250:] = np.nan, np.inf
-    W = history.carried["W"].copy()
+    W = history.state["W"].copy()
     W[150:], W[250:] = 1e200, np.nan
     wild = replace(
         history,
         axle_force=force,
-        told={**history.told, "xi_tilde": xi_tilde},
-        carried={**history.carried, "W": W},
+        told={**history.outputs, "xi_tilde": xi_tilde},
+        state={**history.state, "W": W},
     )
     figure = force_figure(wild)
     assert figure.axes[0].get_ylim()[1] < 20.0
@@ -467,7 +467,7 @@ def test_a_comparison_draws_medians_with_quartiles_on_their_own_sides() -> None:
 
 def test_what_the_axles_learnt_is_drawn_in_the_units_of_its_axes() -> None:
     car = replace(CAR, cornering_stiffness_front=9e4)
-    design = AxleDesign.for_vehicle(car)
+    design = AxleIdentifier.for_vehicle(car)
     history = identify(made_up().recording, car, design)
     figure = learnt_axles_figure(history)
     model = history.freeze(float(history.recording.t[-1]))
@@ -486,22 +486,24 @@ def test_what_the_axles_learnt_is_drawn_in_the_units_of_its_axes() -> None:
         cornering_stiffness_front=60.0,
         cornering_stiffness_rear=70.0,
     )
-    small = learnt_axles_figure(identify(made_up(5.0).recording, toy, AxleDesign.for_vehicle(toy)))
+    small = learnt_axles_figure(
+        identify(made_up(5.0).recording, toy, AxleIdentifier.for_vehicle(toy))
+    )
     assert "[N/rad]" in small.axes[0].get_ylabel()
     cart = replace(toy, mass=15.0, yaw_inertia=0.1)
     cart = replace(cart, cornering_stiffness_front=2000.0, cornering_stiffness_rear=2000.0)
-    light = identify(made_up(50.0).recording, cart, AxleDesign.for_vehicle(cart))
+    light = identify(made_up(50.0).recording, cart, AxleIdentifier.for_vehicle(cart))
     assert "[kN/rad]" in learnt_axles_figure(light).axes[0].get_ylabel(), "light, but stiff"
 
 
 def test_weights_that_run_away_downward_do_not_flatten_the_panel_either() -> None:
     history = made_up()
-    W = history.carried["W"].copy()
+    W = history.state["W"].copy()
     W[150:250] = -1e6
     W[250:] = np.nan
     force = history.axle_force.copy()
     force[250:] = np.nan
-    wild = replace(history, axle_force=force, carried={**history.carried, "W": W})
+    wild = replace(history, axle_force=force, state={**history.state, "W": W})
     assert weights_figure(wild).axes[0].get_ylim()[0] > -1e3
 
 

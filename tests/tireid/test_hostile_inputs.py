@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from codegen import compiler
-from identifier.axle import AxleDesign
-from identifier.defaults import default_design
+from identifier.axle import AxleIdentifier
+from identifier.defaults import paper_identifier
 from identifier.paper.design import design_text
 from identifier.paper.network import Network
 from models.recordings import RecordingError, read_recording
@@ -76,7 +76,7 @@ def changed(text, key, value):
 )
 def test_a_hostile_design_is_refused_by_its_key(capsys, tmp_path, key, value, said):
     path = tmp_path / "design.toml"
-    path.write_text(changed(design_text(default_design(sedan())), key, value))
+    path.write_text(changed(design_text(paper_identifier(sedan())), key, value))
     refused(capsys, ["check", path], said)
     assert list(tmp_path.iterdir()) == [path]
 
@@ -106,7 +106,7 @@ def test_a_hostile_vehicle_is_refused_by_its_key(capsys, tmp_path, key, value, s
 def weights():
     """The axle model of the sedan before it has learnt, as it is stored."""
     car = sedan()
-    design = AxleDesign.for_vehicle(car)
+    design = AxleIdentifier.for_vehicle(car)
     recording = read_recording_of(np.zeros(50))
     return design.frozen(car, design.setup(car, recording).carry).to_dict()
 
@@ -306,7 +306,7 @@ def test_limits_that_are_none_are_said_by_the_command(capsys, monkeypatch):
 
 
 def test_a_limit_that_is_raised_lets_the_file_in(tmp_path, monkeypatch):
-    text = design_text(replace(default_design(sedan()), network=Network(hidden=128)))
+    text = design_text(replace(paper_identifier(sedan()), network=Network(hidden=128)))
     path = tmp_path / "design.toml"
     path.write_text(changed(text, "hidden", "129"))
     assert main(["check", str(path)]) == 2

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from identifier.axle import AxleModel
-from identifier.defaults import default_design
+from identifier.defaults import paper_identifier
 from identifier.method import SLIP, steady_stiffness
 from identifier.methods import METHODS, draws_weights, load_model, make_method
 from identifier.paper.design import design_text
@@ -256,7 +256,7 @@ def test_a_car_that_never_drives_is_refused(logs, tmp_path, capsys):
 
 
 def written_design(path, **changes):
-    design = default_design(sedan())
+    design = paper_identifier(sedan())
     names = changes.keys() & {"eta_W", "eta_V", "rho_W", "rho_V"}
     gains = {name: changes.pop(name) for name in names}
     path.write_text(design_text(replace(design, gains=replace(design.gains, **gains), **changes)))
@@ -369,15 +369,13 @@ def test_resumed_weights_beyond_what_is_proven_are_told(logs, tmp_path, capsys, 
     bound = json.loads(capsys.readouterr().out)["properties"][name]["value"]
     design = make_method("integral", sedan(), 0)
     drawn = design.network.initial_weights(np.random.default_rng(0))
-    carried = {"W": np.ones_like(drawn.W), "V": drawn.V}
+    state = {"W": np.ones_like(drawn.W), "V": drawn.V}
     words = ["identify", logs / "quick.csv", "--vehicle", logs / "car.toml", "--paper"]
     told = {}
     for share in (0.99, 1.01):
-        size = np.linalg.norm(carried[layer])
+        size = np.linalg.norm(state[layer])
         weights = tmp_path / f"{share}.json"
-        design.frozen(sedan(), {**carried, layer: share * bound / size * carried[layer]}).save(
-            weights
-        )
+        design.frozen(sedan(), {**state, layer: share * bound / size * state[layer]}).save(weights)
         more = ["--weights", weights, "--out", tmp_path / f"out{share}"]
         assert main([str(word) for word in [*words, *more]]) == 0
         lines = capsys.readouterr().out.splitlines()

@@ -7,14 +7,12 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from mpc.loop import Drive
 from mpc.path import Path
 from tireid.figures.drive import CONES, PATH, car_shape, friction_label, tire_look
 from tireid.figures.style import PURPLE
-
-Array = NDArray[np.float64]
 
 # Where the picture looks: it goes along the path, and turns with it where the path winds.
 

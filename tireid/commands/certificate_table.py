@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identifier.methods import certify
-from identifier.paper.design import Design, Driving
+from identifier.paper.design import Driving, PaperIdentifier
 from identifier.paper.network import Weights
 from identifier.stability import Certificate, Property
 from identifier.stability.monte_carlo import Observed
@@ -19,7 +19,9 @@ ROUNDING = 1e-9  # of weights that lie on their projection, in parts of its radi
 HEADER = ("property", "value", "limit", "margin", "")
 
 
-def certificate_of(design: Design, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
+def certificate_of(
+    design: PaperIdentifier, vehicle: Vehicle, driving: Driving | None = None
+) -> Certificate:
     """Return the certificate of a design.
 
     Parameters
@@ -108,7 +110,7 @@ def verdict_line(certificate: Certificate) -> str:
     )
 
 
-def resumed_line(certificate: Certificate, design: Design, first: Weights) -> str:
+def resumed_line(certificate: Certificate, design: PaperIdentifier, first: Weights) -> str:
     """Return what the certificate says of resumed weights: nothing where it covers them.
 
     Its bounds hold from first weights that keep them.

@@ -16,13 +16,13 @@ from identifier.defaults import (
     BANDWIDTH,
     LAWS,
     PHASE_MARGIN,
-    default_design,
     design_for,
     natural_driving,
     natural_operation,
+    paper_identifier,
 )
 from identifier.methods import DEFAULT
-from identifier.paper.design import Design, Driving, design_text, read_design
+from identifier.paper.design import Driving, PaperIdentifier, design_text, read_design
 from identifier.paper.laws import DRIVING_ERRORS, Gains
 from identifier.run import identify
 from identifier.stability import Certificate, DesignError, Operation
@@ -64,7 +64,7 @@ def draw_check(
     folder: Path,
     recording: Recording,
     vehicle: Vehicle,
-    design: Design,
+    design: PaperIdentifier,
     operation: Operation,
     certificate: Certificate,
 ) -> list[Path]:
@@ -224,7 +224,7 @@ def _finish(
     options: argparse.Namespace,
     vehicle: Vehicle,
     driving: Driving,
-    design: Design,
+    design: PaperIdentifier,
     certificate: Certificate,
     drive: Recording | None,
 ) -> int:
@@ -271,7 +271,9 @@ def _require_sense(options: argparse.Namespace) -> None:
         raise ValueError(f"--slip must be in rad and below 1, it is {options.slip:g}")
 
 
-def _driving(options: argparse.Namespace, design: Design | None, vehicle: Vehicle) -> Driving:
+def _driving(
+    options: argparse.Namespace, design: PaperIdentifier | None, vehicle: Vehicle
+) -> Driving:
     """Return what the design declares, or what is natural for the car, with the options over it."""
     declared = None if design is None else design.driving
     return replace(declared or natural_driving(vehicle), **_overrides(options))
@@ -282,7 +284,7 @@ def _overrides(options: argparse.Namespace) -> dict[str, float]:
     return {field: value for field, value in given.items() if value is not None}
 
 
-def _said(options: argparse.Namespace, design: Design, driving: Driving) -> str:
+def _said(options: argparse.Namespace, design: PaperIdentifier, driving: Driving) -> str:
     """Return where the conditions come from."""
     changed = ", ".join(f"--{CONDITIONS[field].replace('_', '-')}" for field in _overrides(options))
     if options.file is None:
@@ -295,7 +297,7 @@ def _said(options: argparse.Namespace, design: Design, driving: Driving) -> str:
     return f"conditions: as stored in the design, but for {changed}: not the file's own verdict"
 
 
-def _design(options: argparse.Namespace, vehicle: Vehicle, driving: Driving) -> Design:
+def _design(options: argparse.Namespace, vehicle: Vehicle, driving: Driving) -> PaperIdentifier:
     law = options.law or "integral"
     if options.design:
         if law == "instantaneous_scaled":
@@ -304,14 +306,14 @@ def _design(options: argparse.Namespace, vehicle: Vehicle, driving: Driving) -> 
         found = design_for(vehicle, driving, law=law, phase_margin=margin)
         known = natural_operation(found, vehicle, driving)
         return with_keeping(found, known, options.keep or DEFAULT_KEEPING)
-    return replace(default_design(vehicle, law=law), driving=driving)
+    return replace(paper_identifier(vehicle, law=law), driving=driving)
 
 
 def _drive(
     options: argparse.Namespace,
     vehicle: Vehicle,
     driving: Driving,
-    design: Design,
+    design: PaperIdentifier,
     certificate: Certificate,
 ) -> Observed | None:
     """Run the random drives of --monte-carlo; None where there are none."""
@@ -334,7 +336,7 @@ def _drive(
     )
 
 
-def _conditions(design: Design, vehicle: Vehicle, driving: Driving, said: str) -> str:
+def _conditions(design: PaperIdentifier, vehicle: Vehicle, driving: Driving, said: str) -> str:
     gains = design.gains
     unit = unit_text("U", design.force_unit)
     rows = "; ".join(" ".join(f"{value:.4g}" for value in row) for row in gains.A_d)
@@ -356,11 +358,11 @@ def _radii(gains: Gains) -> str:
     return "".join(f", {name} {r:.4g}" for name, r in radii.items() if 0.0 < r < math.inf)
 
 
-def _read(log: str | None, vehicle: Vehicle, design: Design) -> Recording | None:
+def _read(log: str | None, vehicle: Vehicle, design: PaperIdentifier) -> Recording | None:
     return None if log is None else read_log(log, vehicle, dt=design.dt)
 
 
-def _along(recording: Recording, vehicle: Vehicle, design: Design) -> str:
+def _along(recording: Recording, vehicle: Vehicle, design: PaperIdentifier) -> str:
     from identifier.stability.certificate import loop_along
 
     history = identify(recording, vehicle, design)
@@ -375,7 +377,7 @@ def _along(recording: Recording, vehicle: Vehicle, design: Design) -> str:
 
 
 def _proposal(
-    options: argparse.Namespace, design: Design, vehicle: Vehicle, driving: Driving
+    options: argparse.Namespace, design: PaperIdentifier, vehicle: Vehicle, driving: Driving
 ) -> str:
     try:
         better = design_for(
@@ -413,7 +415,7 @@ def _draw(
     folder: Path,
     vehicle: Vehicle,
     driving: Driving,
-    design: Design,
+    design: PaperIdentifier,
     certificate: Certificate,
     drive: Recording | None,
 ) -> None:
@@ -437,7 +439,7 @@ def _target(options: argparse.Namespace) -> Path:
     return options.out or Path("design.toml")
 
 
-def _write(options: argparse.Namespace, design: Design) -> None:
+def _write(options: argparse.Namespace, design: PaperIdentifier) -> None:
     target = _target(options)
     write_atomically(target, design_text(design))
     say(f"wrote {target}")

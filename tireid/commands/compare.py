@@ -14,7 +14,7 @@ import numpy as np
 
 from identifier.compare.study import run_comparison
 from identifier.compare.work import Map, source_digest
-from identifier.defaults import default_design
+from identifier.defaults import paper_identifier
 from identifier.method import Method
 from identifier.methods import METHODS
 from identifier.own_network import FrozenMethod
@@ -221,7 +221,7 @@ def run(options: argparse.Namespace) -> None:
 
 def _network(options: argparse.Namespace, vehicle: Vehicle) -> dict[str, Method]:
     """Return the network of --network as a method by the name of its file."""
-    model = network_model(options, vehicle, default_design(vehicle).min_speed)
+    model = network_model(options, vehicle, paper_identifier(vehicle).min_speed)
     return {} if model is None else {options.network.name: FrozenMethod(model=model)}
 
 

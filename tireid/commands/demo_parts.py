@@ -269,7 +269,7 @@ def ship(story: Story, folder: Path) -> Shipped:
     if find_compiler() is not None:
         expected = identify(learnt.recording, story.car, learnt.design, model).axle_force
         for single in (False, True):
-            verdict = self_test(folder, package.folded.name, single=single)
+            verdict = self_test(folder, package.specialized.name, single=single)
             assert verdict is not None
             run = CompiledPackage.from_folder(folder, single=single).run(learnt.recording)
             difference = float(np.abs(run.axle_force - expected).max())
@@ -308,7 +308,7 @@ def package_section(shipped: Shipped) -> Section:
     ----------
     shipped : the package.
     """
-    name, about = shipped.package.folded.name, shipped.package.about
+    name, about = shipped.package.specialized.name, shipped.package.about
     blocks: list[Paragraph | Table] = [
         Paragraph(
             text="The default method, beginning with what it has just learnt, is written as a C99 "

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identifier.defaults import default_design
+from identifier.defaults import paper_identifier
 from identifier.method import Method
 from identifier.methods import DEFAULT, REFERENCE, make_method
-from identifier.paper.design import Design
+from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import Replay, force_rms, online_error, replay, reproduce
 from identifier.run import History, identify
 from identifier.stability import Certificate
@@ -86,7 +86,7 @@ class Story:
     """
 
     car: Vehicle
-    design: Design
+    design: PaperIdentifier
     default: Learning
     paper: Learning
 
@@ -157,7 +157,7 @@ def run_story() -> Story:
     """Drive, learn, freeze and predict, with both methods."""
     car = sedan()
     recordings = drives({"slalom": LEARN, **PREDICT})
-    design = default_design(car)
+    design = paper_identifier(car)
     return Story(
         car=car,
         design=design,

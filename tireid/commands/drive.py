@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from identifier.method import FrozenModel, vehicle_numbers
+from identifier.method import vehicle_numbers
+from identifier.tire_model import TireModel
 from models.faults import KINDS, SIZED, FaultError, SensorFault
 from models.files import digest
 from models.schema import require_few
@@ -247,7 +248,7 @@ def headline(conditions: Conditions) -> str:
 
 
 def inputs_of(
-    conditions: Conditions, labels: Sequence[str], source: str, learnt: FrozenModel | None
+    conditions: Conditions, labels: Sequence[str], source: str, learnt: TireModel | None
 ) -> dict[str, Any]:
     """Return all that goes into drives, ready for JSON.
 

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.method import FrozenModel
+from identifier.tire_model import TireModel
 from models.files import digest
 from mpc.loop import Drive
 from mpc.tires import Car, CurveFitError, PredictionTire, prediction_tire
@@ -167,7 +167,7 @@ def steady_curve(label: str, model: PredictionTire, v_x: float) -> TireCurve:
     return TireCurve(label=label, alpha=alpha, force=np.array(evaluate(alpha[None])).T)
 
 
-def known_curves(runs: Sequence[Run], setup: Setup, learnt: FrozenModel | None) -> list[TireCurve]:
+def known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) -> list[TireCurve]:
     """Return what the trackers were told, and the linear and the true tire beside it.
 
     Parameters

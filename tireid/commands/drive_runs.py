@@ -7,11 +7,11 @@ from pathlib import Path as FilePath
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
-from identifier.method import FrozenModel
+from codegen.arrays import Array
 from identifier.methods import continuing
 from identifier.run import OnlineIdentifier
+from identifier.tire_model import TireModel
 from models.faults import SensorFault
 from models.friction import Friction, FrictionChange
 from models.tires import Tire
@@ -47,8 +47,6 @@ PLANTS = ("double-track", "multi-body", "drift")
 FASTEST = 30.0  # on a closed course [m/s]
 ACCELERATION, BRAKING = 2.0, 3.0  # on a closed course at friction 1 [m/s²]
 PERIOD = 0.01  # control period [s]
-
-Array = NDArray[np.float64]
 
 
 class SpeedWish(NamedTuple):
@@ -281,7 +279,7 @@ def friction_now(friction: Friction, measured: Measured) -> float:
     return mu
 
 
-def make_learner(learnt: FrozenModel, vehicle: Vehicle) -> Learner:
+def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
     """Return what goes on learning while the tracker drives, and hands over what is fit.
 
     Parameters
@@ -369,7 +367,7 @@ class Run:
         )
 
 
-def told_tire(label: str, setup: Setup, learnt: FrozenModel | None) -> PredictionTire:
+def told_tire(label: str, setup: Setup, learnt: TireModel | None) -> PredictionTire:
     """Return the tire that a tracker is told at the start.
 
     Parameters
@@ -389,7 +387,7 @@ def told_tire(label: str, setup: Setup, learnt: FrozenModel | None) -> Predictio
 def run_drive(
     label: str,
     conditions: Conditions,
-    learnt: FrozenModel | None,
+    learnt: TireModel | None,
     *,
     linearizations: int = 1,
 ) -> Run:
@@ -447,7 +445,7 @@ def run_drive(
     )
 
 
-def _learner(label: str, setup: Setup, learnt: FrozenModel | None) -> LearningTires | None:
+def _learner(label: str, setup: Setup, learnt: TireModel | None) -> LearningTires | None:
     if label == ORACLE and setup.drops:
         return Informer(setup)
     if label == LEARNING:

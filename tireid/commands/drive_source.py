@@ -5,9 +5,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from identifier.method import FrozenModel, vehicle_numbers
+from identifier.method import vehicle_numbers
 from identifier.methods import DEFAULT, REFERENCE, load_model, make_method
 from identifier.run import DivergedError, identify
+from identifier.tire_model import TireModel
 from models.maneuvers import RandomSteer
 from models.recordings import Recording
 from models.vehicle import Vehicle
@@ -83,7 +84,7 @@ def learning_drive(
     )
 
 
-def learn(law: str, recording: Recording, vehicle: Vehicle) -> FrozenModel:
+def learn(law: str, recording: Recording, vehicle: Vehicle) -> TireModel:
     """Return what a method has learnt at the end of a drive.
 
     Parameters
@@ -105,7 +106,7 @@ def learn(law: str, recording: Recording, vehicle: Vehicle) -> FrozenModel:
 
 def frozen_tires(
     options: argparse.Namespace, labels: Sequence[str], conditions: Conditions
-) -> tuple[str, FrozenModel | None]:
+) -> tuple[str, TireModel | None]:
     """Return where frozen tires come from, and the model where one is needed.
 
     Parameters

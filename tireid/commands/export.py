@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from identifier.export.package import Package
-from identifier.method import FrozenModel, Method
+from identifier.method import Method
 from identifier.methods import DEFAULT, METHODS, REFERENCE, continuing, load_model, make_method
 from identifier.paper.design import read_design
+from identifier.tire_model import TireModel
 from models.vehicle import Vehicle, sedan
 from mpc.export.package import mpc_readme
 from mpc.export.pair import build_pair
@@ -84,13 +85,13 @@ def run(options: argparse.Namespace) -> None:
         say(line)
 
 
-def _vehicle(path: Path | None, start: FrozenModel | None) -> Vehicle:
+def _vehicle(path: Path | None, start: TireModel | None) -> Vehicle:
     if path is not None:
         return Vehicle.from_toml(path)
     return sedan() if start is None else start.vehicle
 
 
-def _method(options: argparse.Namespace, vehicle: Vehicle, start: FrozenModel | None) -> Method:
+def _method(options: argparse.Namespace, vehicle: Vehicle, start: TireModel | None) -> Method:
     law = REFERENCE if options.paper else options.law
     if options.paper and (options.law or options.design):
         raise ValueError("--paper names the law already: give no --law or --design with it")

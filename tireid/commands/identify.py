@@ -10,16 +10,9 @@ import numpy as np
 from codegen.escape import visible
 from identifier.axle import AxleModel
 from identifier.axle.design import NOT_CERTIFIED
-from identifier.method import (
-    DEAD,
-    CannotFreezeError,
-    FrozenModel,
-    Method,
-    require_alive,
-    steady_stiffness,
-)
+from identifier.method import DEAD, CannotFreezeError, Method, require_alive, steady_stiffness
 from identifier.methods import DEFAULT, METHODS, REFERENCE, draws_weights, load_model, make_method
-from identifier.paper.design import Design, read_design
+from identifier.paper.design import PaperIdentifier, read_design
 from identifier.paper.network import Weights
 from identifier.reproducibility import (
     Replay,
@@ -30,6 +23,7 @@ from identifier.reproducibility import (
     reproduce,
 )
 from identifier.run import History
+from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
@@ -171,9 +165,9 @@ def _require_model(law: str, design: Method, recording: Recording, vehicle: Vehi
 def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool) -> str:
     """Return the certificate of the paper's identifier, or what the axle identifier knows."""
     model, design = learnt.freeze(t), learnt.design
-    if isinstance(design, Design):
+    if isinstance(design, PaperIdentifier):
         certificate = certificate_of(design, vehicle)
-        first = Weights(W=learnt.carried["W"][0], V=learnt.carried["V"][0])
+        first = Weights(W=learnt.state["W"][0], V=learnt.state["V"][0])
         beyond = resumed_line(certificate, design, first) if resumed else ""
         return "\n".join(line for line in (verdict_line(certificate), beyond) if line)
     if not isinstance(model, AxleModel):
@@ -230,7 +224,7 @@ def _learn(
     vehicle: Vehicle,
     law: str,
     design: Method,
-    start: FrozenModel | None,
+    start: TireModel | None,
 ) -> History:
     history = identify(recording, vehicle, design, start=start, check=False)  # it was when read
     say(f"learnt {law} over {recording.name}")

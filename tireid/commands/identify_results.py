@@ -9,11 +9,11 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.axle import AxleDesign
+from identifier.axle import AxleIdentifier
 from identifier.method import Method, vehicle_numbers
 from identifier.methods import certify
 from identifier.own_network import OnnxModel
-from identifier.paper.design import Design
+from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import (
     AxleRmse,
     Replay,
@@ -64,7 +64,7 @@ def method_numbers(design: Method) -> dict[str, Any]:
     ----------
     design : any method.
     """
-    if isinstance(design, Design):
+    if isinstance(design, PaperIdentifier):
         return {
             "gains": asdict(design.gains),
             "network": asdict(design.network),
@@ -224,20 +224,20 @@ def _write_curves(folder: Path, learnt: History, others: Sequence[History], froz
         name = "forces.csv" if history is learnt else f"forces_{file_name(history.recording)}.csv"
         write_csv(folder / name, force_columns(history, replays))
     t, n = learnt.recording.t, learnt.recording.t.size
-    if isinstance(learnt.design, Design):
+    if isinstance(learnt.design, PaperIdentifier):
         write_csv(
             folder / "errors.csv",
             {
                 "t_s": t,
-                "xi_tilde_f_Us": learnt.told["xi_tilde"][:, 0],
-                "xi_tilde_r_Us": learnt.told["xi_tilde"][:, 1],
-                "z_f_Us2": learnt.carried["z"][:-1, 0],
-                "z_r_Us2": learnt.carried["z"][:-1, 1],
+                "xi_tilde_f_Us": learnt.outputs["xi_tilde"][:, 0],
+                "xi_tilde_r_Us": learnt.outputs["xi_tilde"][:, 1],
+                "z_f_Us2": learnt.state["z"][:-1, 0],
+                "z_r_Us2": learnt.state["z"][:-1, 1],
             },
         )
     weights = {"t_s": t}
-    for matrix in [name for name in WEIGHTS if name in learnt.carried]:
-        values = learnt.carried[matrix]
+    for matrix in [name for name in WEIGHTS if name in learnt.state]:
+        values = learnt.state[matrix]
         for i, j in np.ndindex(values.shape[1:]):
             weights[f"{matrix}_{i + 1}_{j + 1}"] = values[:n, i, j]
     write_csv(folder / "weights.csv", weights)
@@ -282,10 +282,10 @@ def _draw(folder: Path, learnt: History, others: Sequence[History], frozen: Froz
         "slip": slip_figure(learnt.freeze(last), learnt.recording, learnt),
         "inputs": inputs_figure(learnt.recording),
     }
-    if isinstance(learnt.design, Design):
+    if isinstance(learnt.design, PaperIdentifier):
         figures["error"] = error_figure(learnt, freeze_times=list(frozen))
         figures["weights"] = weights_figure(learnt, list(frozen))
-    elif isinstance(learnt.design, AxleDesign):
+    elif isinstance(learnt.design, AxleIdentifier):
         figures["learnt"] = learnt_axles_figure(learnt, list(frozen))
     for other in others:
         replay = frozen[last][other.recording.name]

@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from models.vehicle import Vehicle
 from mpc.loop import Drive
 from mpc.path import Path
@@ -291,8 +291,6 @@ def _limits(axes: Axes, limit: float) -> None:
         for side in (-limit, limit):
             axes.axhline(side, color="#AA4499", linewidth=0.8, linestyle=(0, (4, 2)), label="limit")
 
-
-Array = NDArray[np.float64]
 
 FRONT_OVERHANG, REAR_OVERHANG = 0.32, 0.36  # of the wheelbase, beyond the axles
 # The car from above as polygons: a body and four wheels, the front ones steered.

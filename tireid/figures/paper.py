@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from identifier.defaults import LAWS
 from identifier.run import History
 from identifier.stability.loop import INTEGRATORS, Loop, eigenvalues, scaled_matrices
@@ -70,7 +70,7 @@ def error_figure(
     ends = time_window(recording.t, window)
     part = shown(recording.t, ends)
     # A root of squares would overflow where a law diverges; hypot does not.
-    norm = np.hypot(history.told["xi_tilde"][part, 0], history.told["xi_tilde"][part, 1])
+    norm = np.hypot(history.outputs["xi_tilde"][part, 0], history.outputs["xi_tilde"][part, 1])
     known = {name: bound for name, bound in (bounds or {}).items() if np.isfinite(bound)}
     drawn = norm[np.isfinite(norm) & (norm > 0.0) & (norm < 1e12)]
     typical, peak = (float(np.median(drawn)), float(drawn.max())) if drawn.size else (1.0, 1.0)
@@ -105,7 +105,6 @@ def error_figure(
     return figure
 
 
-Array = NDArray[np.float64]
 # The weights over time: what was learnt when, and whether it settled.
 
 SYMBOLS = {
@@ -139,7 +138,7 @@ def weights_figure(
     recording, design = history.recording, paper_design(history)
     ends = time_window(recording.t, window)
     part = shown(recording.t, ends)
-    t, W, V = recording.t[part], history.carried["W"][:-1][part], history.carried["V"][:-1][part]
+    t, W, V = recording.t[part], history.state["W"][:-1][part], history.state["V"][:-1][part]
 
     figure = new_figure(PAGE, 4.2)
     upper, lower = figure.subplots(2, 1, sharex=True)

@@ -18,7 +18,8 @@ from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from numpy.typing import NDArray
 
-from identifier.paper.design import Design
+from codegen.arrays import Array
+from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import AxleRmse
 from identifier.run import History
 
@@ -131,7 +132,6 @@ def save_figure(figure: Figure, path: Path) -> None:
     path.write_bytes(figure_png(figure))
 
 
-Array = NDArray[np.float64]
 # Parts that several figures share: time axes, freeze marks, legends, errors in titles.
 
 Window = tuple[float, float] | None
@@ -315,7 +315,7 @@ def impulse_unit(force_unit: float) -> str:
     return f"{force_unit_name(force_unit)} s"
 
 
-def paper_design(history: History) -> Design:
+def paper_design(history: History) -> PaperIdentifier:
     """Return the design of a run of the paper's identifier, whose weights and error have units.
 
     Parameters
@@ -327,7 +327,7 @@ def paper_design(history: History) -> Design:
     TypeError
         Where another method ran.
     """
-    if not isinstance(history.design, Design):
+    if not isinstance(history.design, PaperIdentifier):
         raise TypeError(f"a run of the paper's identifier is needed, not of {history.design}")
     return history.design
 

@@ -9,10 +9,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from identifier.axle import AxleDesign
+from codegen.arrays import Array
+from identifier.axle import AxleIdentifier
 from identifier.axle.slip import SHORTEST
-from identifier.method import FrozenModel
 from identifier.run import History
+from identifier.tire_model import TireModel
 from models.recordings import Recording
 from mpc.loop import Drive
 from tireid.figures.drive import tire_look
@@ -40,7 +41,7 @@ UNKNOWN = "slip not known"
 
 
 @styled
-def slip_figure(model: FrozenModel, recording: Recording, online: History | None = None) -> Figure:
+def slip_figure(model: TireModel, recording: Recording, online: History | None = None) -> Figure:
     """Draw force over slip angle, front and rear: truth, frozen model and linear tire.
 
     The slip angle has the paper's sign, α = δ - atan2(v_y ± l r, v_x), the negative of ISO 8855, so
@@ -119,7 +120,7 @@ def slip_figure(model: FrozenModel, recording: Recording, online: History | None
 
 
 def _draw_curve(
-    axes: Axes, model: FrozenModel, axle: int, ends: NDArray[np.float64], newtons: float
+    axes: Axes, model: TireModel, axle: int, ends: NDArray[np.float64], newtons: float
 ) -> None:
     """Draw the steady curve of an axle."""
     slip = np.linspace(np.deg2rad(ends[0]), np.deg2rad(ends[1]), 200)
@@ -137,9 +138,6 @@ def _shade_unknown(axes: Axes, known: float, ends: NDArray[np.float64]) -> None:
     for low, high in ((ends[0], -known), (known, ends[1])):
         if low < high:
             axes.axvspan(low, high, color="#EFE9DD", linewidth=0.0, zorder=0, label=UNKNOWN)
-
-
-Array = NDArray[np.float64]
 
 
 # What pictures of a drive say of tires: the slip of its axles, and curves of force over slip.
@@ -247,13 +245,13 @@ def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) ->
         Where another method ran.
     """
     design, vehicle = history.design, history.vehicle
-    if not isinstance(design, AxleDesign):
+    if not isinstance(design, AxleIdentifier):
         raise TypeError(f"a run of the axle identifier is needed, not of {design}")
-    t, W = history.recording.t, history.carried["W"][:-1]
+    t, W = history.recording.t, history.state["W"][:-1]
     slope = (W / np.array(design.ladder)).sum(axis=2)
     loads = np.array(vehicle.axle_loads)
     stiff = float((slope * loads).max()) >= 1000.0
-    compliance = history.carried["own"][:-1, :, 0]
+    compliance = history.state["own"][:-1, :, 0]
     curves = {
         f"cornering stiffness\n[{'kN' if stiff else 'N'}/rad]": slope
         * loads

@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.axle import AxleDesign, AxleModel
+from identifier.axle import AxleIdentifier, AxleModel
 from identifier.method import FrozenModelError
 from identifier.methods import load_model
 from identifier.run import identify
 
 
 def learnt(recording, car, start=None):
-    return identify(recording, car, AxleDesign.for_vehicle(car), start=start)
+    return identify(recording, car, AxleIdentifier.for_vehicle(car), start=start)
 
 
 def error(force, recording):
@@ -45,7 +45,7 @@ def test_frozen_weights_repeat_the_drive_and_another(car, drive):
 
 
 def test_frozen_and_online_forces_are_one_where_nothing_is_learnt(car, drive):
-    design = AxleDesign.for_vehicle(car)
+    design = AxleIdentifier.for_vehicle(car)
     never = replace(design, plausibility=replace(design.plausibility, learning_speed=100.0))
     recording = drive(n=400)
     history = identify(recording, car, never)
@@ -65,7 +65,7 @@ def test_it_knows_where_it_has_been(car, drive):
     doubt = model.doubt(np.array([0.01, 0.1]))
     assert (doubt[0] < 0.15).all()
     assert (doubt[1] > 2 * doubt[0]).all()
-    new = AxleDesign.for_vehicle(car).frozen(car, learnt(gentle, car).carried_at(0.0))
+    new = AxleIdentifier.for_vehicle(car).frozen(car, learnt(gentle, car).state_at(0.0))
     np.testing.assert_allclose(new.doubt(np.array([0.01, 0.1])), 1.0)
     np.testing.assert_array_equal(new.known_slip_range, 0.0)
     assert new.outside(gentle)[100:].any(axis=1).mean() > 0.9
@@ -74,10 +74,10 @@ def test_it_knows_where_it_has_been(car, drive):
 
 def test_slip_is_known_up_to_where_a_quarter_of_the_doubt_is_left(car):
     """Weights of one unit: doubt is that of the unit at every slip. Of two: where they balance."""
-    design = AxleDesign.for_vehicle(car)
+    design = AxleIdentifier.for_vehicle(car)
     n = len(design.ladder)
-    carried = dict(design.setup(car, None).carry)
-    new = design.frozen(car, carried)
+    state = dict(design.setup(car, None).carry)
+    new = design.frozen(car, state)
     seen = np.array([[0.2], [0.1]]) * np.eye(1, 9)
     for share, known in ((0.24, [0.2, 0.1]), (0.26, [0.0, 0.0]), (0.35, [0.0, 0.0])):
         model = replace(new, excitation=seen, covariance=share**2 * new.prior_covariance)
@@ -121,7 +121,7 @@ def test_learning_goes_on_from_stored_weights(car, drive, tmp_path):
     stored = load_model(tmp_path / "weights.json")
     assert isinstance(stored, AxleModel)
     again, afresh = learnt(second, car, start=stored), learnt(second, car)
-    np.testing.assert_array_equal(again.carried["W"][0], model.W)
+    np.testing.assert_array_equal(again.state["W"][0], model.W)
     assert (error(again.axle_force, second) < 0.5 * error(afresh.axle_force, second)).all()
     np.testing.assert_allclose(
         again.freeze(15.0).force_at(np.array([0.05])),
@@ -133,7 +133,7 @@ def test_learning_goes_on_from_stored_weights(car, drive, tmp_path):
 def test_weights_of_another_structure_are_refused(car, drive):
     recording = drive(n=100)
     model = learnt(recording, car).freeze(0.5)
-    other = replace(AxleDesign.for_vehicle(car), ladder=(0.016, 0.064, 0.256))
+    other = replace(AxleIdentifier.for_vehicle(car), ladder=(0.016, 0.064, 0.256))
     assert np.isfinite(identify(recording, car, other).axle_force).all()
     with pytest.raises(ValueError, match="another structure"):
         identify(recording, car, other, start=model)
@@ -174,7 +174,7 @@ def test_a_file_that_is_no_model_is_refused(key, value, rule, car, drive, tmp_pa
 
 
 def test_impossible_numbers_are_refused(car):
-    design = AxleDesign.for_vehicle(car)
+    design = AxleIdentifier.for_vehicle(car)
     with pytest.raises(ValueError, match="dt must be positive"):
         replace(design, dt=0.0)
     with pytest.raises(ValueError, match="memory must be positive"):
@@ -194,7 +194,7 @@ def test_designs_are_similar_for_a_model_car(car):
         cornering_stiffness_front=140.0,
         cornering_stiffness_rear=120.0,
     )
-    full, small = AxleDesign.for_vehicle(car), AxleDesign.for_vehicle(small_car)
+    full, small = AxleIdentifier.for_vehicle(car), AxleIdentifier.for_vehicle(small_car)
     assert full.prior.compliance / small.prior.compliance == pytest.approx(10.0)
     assert full.min_speed / small.min_speed == pytest.approx(np.sqrt(10.0))
     assert small.sway.frequency / full.sway.frequency == pytest.approx(np.sqrt(10.0))
@@ -204,13 +204,13 @@ def test_designs_are_similar_for_a_model_car(car):
 def test_curves_may_be_kept_from_falling_before_a_slip(car, drive):
     """Left free, the learnt curve falls at some time; held, it never does from the start on."""
     recording, until = drive(amplitude=0.08), 0.2
-    free = replace(AxleDesign.for_vehicle(car), rising_until=None)
+    free = replace(AxleIdentifier.for_vehicle(car), rising_until=None)
     held = replace(free, rising_until=until)
     lowest = []
     for design in (free, held):
         history = identify(recording, car, design)
         scales = np.array(design.ladder)
-        W = history.carried["W"][1:]
+        W = history.state["W"][1:]
         slope = (W / (scales * np.cosh(until / scales) ** 2)).sum(axis=2)
         lowest.append(slope.min())
         assert (error(history.freeze(15.0).axle_force(recording), recording) < 0.05).all()

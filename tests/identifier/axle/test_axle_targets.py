@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.axle import AxleDesign
+from identifier.axle import AxleIdentifier
 from identifier.run import identify
 from models.friction import Friction, FrictionChange
 from models.maneuvers import DoubleLaneChange, Slalom, StepSteer
@@ -23,7 +23,7 @@ def rms(force):
 
 
 def learnt(recording, car, start=None):
-    design = AxleDesign.for_vehicle(car)
+    design = AxleIdentifier.for_vehicle(car)
     return identify(recording, car, design, start=start).freeze(recording.t[-1])
 
 
@@ -136,7 +136,7 @@ def test_a_change_of_friction_is_followed_within_two_seconds_both_ways():
     )
     run = Plant(sedan()).simulate(replace(WEAVE, duration=42.0), speed=20.0, friction=road)
     recording = run.recording(NOISE, np.random.default_rng(5))
-    history = identify(recording, sedan(), AxleDesign.for_vehicle(sedan()))
+    history = identify(recording, sedan(), AxleIdentifier.for_vehicle(sedan()))
     t, error, size = recording.t, history.axle_force - recording.axle_force, recording.axle_force
     for start in (14.0, 28.0):
         just, later = (t >= start) & (t < start + 1), (t >= start + 2) & (t < start + 14)

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.axle import AxleDesign
+from identifier.axle import AxleIdentifier
 from identifier.axle import learning as bounds
 from identifier.axle.covariance import LEAST_VARIANCE, narrowed, packed, per_variance, unpacked
 from identifier.axle.curve import LADDER
@@ -95,11 +95,11 @@ def spoilt(recording, fault, seed=0):
     return replace(recording, **signals)
 
 
-def broken(design, car, carried):
+def broken(design, car, state):
     """What is declared and does not hold of some sample; sums of weights are exact."""
     b, found, n = design.bounds, set(), len(design.ladder)
     prior = design.prior.covariance(car, design.ladder)
-    for W, own, UD in zip(carried["W"], carried["own"], carried["UD"], strict=True):
+    for W, own, UD in zip(state["W"], state["own"], state["UD"], strict=True):
         for i, w in enumerate(W):
             grip = sum(map(Fraction, w))
             slope = sum(Fraction(x) / Fraction(a) for x, a in zip(w, design.ladder, strict=True))
@@ -126,30 +126,30 @@ def broken(design, car, carried):
 @pytest.mark.parametrize("speed", [8.0, 20.0, 35.0])
 @pytest.mark.parametrize("fault", HOSTILE, ids=lambda fault: fault.__name__)
 def test_what_is_declared_holds_after_every_sample(fault, speed, car, drive):
-    design = AxleDesign.for_vehicle(car)
+    design = AxleIdentifier.for_vehicle(car)
     history = identify(spoilt(drive(speed=speed, amplitude=0.07), fault), car, design)
     assert history.diverged_at is None
-    assert broken(design, car, history.carried) == set()
+    assert broken(design, car, history.state) == set()
     assert history.freeze(1e9).cornering_stiffness.min() >= 0.0
 
 
 def test_a_dead_yaw_rate_sensor_leads_to_the_bounds_and_not_beyond(car, drive):
     """The bounds are at work: the drive ends at them, and a check of narrower ones rings."""
-    design = AxleDesign.for_vehicle(car)
+    design = AxleIdentifier.for_vehicle(car)
     history = identify(spoilt(drive(n=4000, amplitude=0.07), dead_yaw_rate), car, design)
-    grip = history.carried["W"].sum(axis=2)
-    assert broken(design, car, history.carried) == set()
+    grip = history.state["W"].sum(axis=2)
+    assert broken(design, car, history.state) == set()
     assert min(grip.min() - 0.1, 1.5 - grip.max()) < 1e-4
     narrower = replace(
         design,
         bounds=replace(design.bounds, least_grip=0.3, most_grip=0.7, weight=0.5),
         regression=replace(design.regression, widest=0.5),
     )
-    assert {"grip", "weight", "variance"} <= broken(narrower, car, history.carried)
+    assert {"grip", "weight", "variance"} <= broken(narrower, car, history.state)
 
 
 def test_left_free_the_same_drive_leaves_the_box(car, drive):
-    design = AxleDesign.for_vehicle(car)
+    design = AxleIdentifier.for_vehicle(car)
     wide = replace(design.bounds, least_grip=1e-3, most_grip=30.0, weight=60.0)
     free = replace(
         design, bounds=wide, rising_until=None, regression=replace(design.regression, widest=1e6)
@@ -157,7 +157,7 @@ def test_left_free_the_same_drive_leaves_the_box(car, drive):
     found = set()
     for fault in (dead_yaw_rate, flipped_yaw_rate, flipped_v_y):
         recording = spoilt(drive(n=4000, amplitude=0.07), fault)
-        found |= broken(design, car, identify(recording, car, free).carried)
+        found |= broken(design, car, identify(recording, car, free).state)
     assert {"grip", "stiffness", "weight", "variance"} <= found
 
 
@@ -238,7 +238,7 @@ def test_factors_are_those_of_the_covariance(rng):
 
 def test_a_stored_covariance_that_is_too_wide_is_narrowed(car, drive):
     """Weights may come from a file of another design: its boxes hold from the first sample on."""
-    design, recording = AxleDesign.for_vehicle(car), drive(n=300)
+    design, recording = AxleIdentifier.for_vehicle(car), drive(n=300)
     model = identify(recording, car, design).freeze(1e9)
     wide = replace(
         model,
@@ -246,7 +246,7 @@ def test_a_stored_covariance_that_is_too_wide_is_narrowed(car, drive):
         own=model.own + np.array([0.5, 2.0, 1.0]),
         covariance=300.0 * model.prior_covariance,
     )
-    carried = identify(recording, car, design, start=wide).carried
-    assert broken(design, car, carried) == set()
+    state = identify(recording, car, design, start=wide).state
+    assert broken(design, car, state) == set()
     limits = per_variance(model.prior_covariance, 4, 2.0)
     np.testing.assert_array_equal(narrowed(model.covariance, limits), model.covariance)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.axle import AxleDesign
+from identifier.axle import AxleIdentifier
 from identifier.run import identify
 
 
@@ -59,13 +59,13 @@ def faulty(recording, fault, rng):
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.__name__)
 def test_everything_stays_finite_and_bounded(fault, car, drive, rng):
     recording = faulty(drive(amplitude=0.08), fault, rng)
-    design = AxleDesign.for_vehicle(car)
+    design = AxleIdentifier.for_vehicle(car)
     history = identify(recording, car, design)
     assert history.diverged_at is None
-    for name, values in history.carried.items():
+    for name, values in history.state.items():
         assert np.isfinite(values).all(), name
     assert (np.abs(history.axle_force) < 6 * np.array(car.axle_loads)).all()
-    assert np.abs(history.carried["W"]).max() <= design.bounds.weight
+    assert np.abs(history.state["W"]).max() <= design.bounds.weight
     model = history.freeze(1e9)
     for P in model.covariance:
         assert np.linalg.eigvalsh(P).min() > 0.0
@@ -78,14 +78,14 @@ def test_everything_stays_finite_and_bounded(fault, car, drive, rng):
 def test_what_was_learnt_survives_faults(fault, car, drive, rng):
     """The frozen model of the faulty drive, on a faultless one, is nearly as good as without."""
     clean = drive(amplitude=0.08)
-    model = identify(faulty(clean, fault, rng), car, AxleDesign.for_vehicle(car)).freeze(1e9)
+    model = identify(faulty(clean, fault, rng), car, AxleIdentifier.for_vehicle(car)).freeze(1e9)
     miss = model.axle_force(clean) - clean.axle_force
     assert np.sqrt(np.mean(miss**2)) < 0.05 * np.sqrt(np.mean(clean.axle_force**2))
 
 
 def test_faults_that_are_believed_would_spoil_it(car, drive, rng):
     """With the gate wide open the same spikes do harm: the gate is what protects."""
-    clean, design = drive(amplitude=0.08), AxleDesign.for_vehicle(car)
+    clean, design = drive(amplitude=0.08), AxleIdentifier.for_vehicle(car)
     wide = {"jump": 1e6, "yaw_jump": 1e6, "steering_jump": 1e6, "max_steering": 1e6}
     wide |= {"max_yaw_rate": 1e6, "max_sideslip": 1e6}
     credulous = replace(design, plausibility=replace(design.plausibility, **wide))
@@ -111,17 +111,17 @@ def test_learning_rests_at_rest_slowly_straight_and_stuck(car, drive):
         quiet,
         {name: np.full(n, getattr(recording, name)[200]) for name in still},
     ):
-        history = identify(replace(recording, **signals), car, AxleDesign.for_vehicle(car))
-        W = history.carried["W"]
+        history = identify(replace(recording, **signals), car, AxleIdentifier.for_vehicle(car))
+        W = history.state["W"]
         assert np.abs(W - W[0]).max() == 0.0
     assert (
-        np.abs(identify(recording, car, AxleDesign.for_vehicle(car)).carried["W"] - W[0]).max()
+        np.abs(identify(recording, car, AxleIdentifier.for_vehicle(car)).state["W"] - W[0]).max()
         > 0.05
     )
 
 
 def test_forces_read_zero_below_the_least_speed_only(car, drive):
-    recording, design = drive(n=600), AxleDesign.for_vehicle(car)
+    recording, design = drive(n=600), AxleIdentifier.for_vehicle(car)
     v_x = np.where(np.arange(600) < 300, 20.0, 0.9 * design.min_speed)
     force = identify(replace(recording, v_x=v_x), car, design).axle_force
     np.testing.assert_array_equal(force[326:], 0.0)
@@ -134,11 +134,11 @@ def test_a_slow_sensor_in_a_fast_log_is_learnt_from(hold, car, drive):
     recording = drive()
     held = np.arange(recording.t.size) // hold * hold
     slow = replace(recording, v_y=recording.v_y[held], r=recording.r[held])
-    design = AxleDesign.for_vehicle(car)
+    design = AxleIdentifier.for_vehicle(car)
     errors = []
     for one in (recording, slow):
         history = identify(one, car, design)
-        assert history.carried["excitation"][-1, :, 1].min() > 2.0  # seconds of learning
+        assert history.state["excitation"][-1, :, 1].min() > 2.0  # seconds of learning
         force = history.freeze(15.0).axle_force(recording)
         errors.append(np.sqrt(np.mean((force - recording.axle_force) ** 2)))
     assert errors[1] < errors[0] + 0.06 * np.sqrt(np.mean(recording.axle_force**2))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.axle import AxleDesign
+from identifier.axle import AxleIdentifier
 from identifier.run import identify
 
 G = 9.81
@@ -231,7 +231,7 @@ def disturbed(recording):
 def test_step_repeats_the_equations_by_hand(damage, car, drive):
     recording = drive(n=1200, amplitude=0.08)
     recording = disturbed(recording) if damage else recording
-    design = AxleDesign.for_vehicle(car)
+    design = AxleIdentifier.for_vehicle(car)
     hand = assert_by_hand(design, car, recording)
     moved = np.abs(hand.theta - np.hstack(design.prior.means(car, design.ladder)))
     assert moved[:, :4].max() > 0.05
@@ -250,7 +250,7 @@ def assert_by_hand(design, car, recording):
     np.testing.assert_allclose(model.covariance, hand.P, rtol=1e-4, atol=1e-7)
     np.testing.assert_allclose(model.excitation[:, 0], hand.longest, rtol=1e-5)
     np.testing.assert_allclose(model.excitation[:, 1], hand.time, atol=0.5 * design.dt)
-    last = history.carried_at(1e9)
+    last = history.state_at(1e9)
     np.testing.assert_allclose(last["kept"], hand.kept, rtol=1e-4, atol=1e-6)
     means = [hand.doubt, hand.again, *hand.q_learnt, *hand.q_kept]
     np.testing.assert_allclose(last["watch"], means, rtol=1e-3, atol=1e-6)
@@ -272,7 +272,7 @@ def with_a_rest(recording):
 
 @pytest.mark.parametrize("dt", [0.004, 0.02, 0.05, 0.09])
 def test_step_repeats_the_equations_at_every_rate_above_ten_hertz(dt, car, drive):
-    design = AxleDesign.for_vehicle(car, dt=dt)
+    design = AxleIdentifier.for_vehicle(car, dt=dt)
     recording = with_a_rest(drive(n=round(12.0 / dt), dt=dt, amplitude=0.08))
     hand = assert_by_hand(design, car, recording)
     assert hand.time.max() < 10.0  # it rested
@@ -285,8 +285,8 @@ def test_what_is_learnt_does_not_depend_on_the_rate(car, drive):
     slow = drive(n=750, dt=0.02, amplitude=0.08)
     fast = drive(n=3750, dt=0.004, amplitude=0.08)
     designs = {
-        0.02: AxleDesign.for_vehicle(car, dt=0.02),
-        0.004: AxleDesign.for_vehicle(car, dt=0.004),
+        0.02: AxleIdentifier.for_vehicle(car, dt=0.02),
+        0.004: AxleIdentifier.for_vehicle(car, dt=0.004),
     }
     models = [identify(one, car, designs[one.dt]).freeze(15.0) for one in (slow, fast)]
     slips = np.array([0.01, 0.03, 0.05])
@@ -312,7 +312,7 @@ def test_step_repeats_the_equations_where_limits_act(rare, dt, car, drive):
     recording = disturbed(drive(n=1200, dt=dt, amplitude=0.08))
     learnt = []
     for regression, change in (RARE[rare], NEVER):
-        design = AxleDesign.for_vehicle(car, dt=dt)
+        design = AxleIdentifier.for_vehicle(car, dt=dt)
         design = replace(design, regression=replace(design.regression, **regression))
         design = replace(design, change=replace(design.change, **change))
         learnt.append(assert_by_hand(design, car, recording))
@@ -329,7 +329,7 @@ def test_step_repeats_the_equations_through_doubt(broken, ends, car, drive):
     recording = drive(n=2400, amplitude=0.06)
     wrong = (recording.t >= broken[0]) & (recording.t < broken[1])
     recording = replace(recording, r=np.where(wrong, 1.25 * recording.r, recording.r))
-    hand = assert_by_hand(AxleDesign.for_vehicle(car), car, recording)
+    hand = assert_by_hand(AxleIdentifier.for_vehicle(car), car, recording)
     assert hand.ends[: len(ends)] == ends
 
 
@@ -337,7 +337,7 @@ def test_covariance_grows_again_only_while_it_is_no_wider_than_told(car, drive):
     """A memory of a moment, and no alarm: forgetting alone can widen it, and without limit does."""
     recording, beyond = drive(n=1500, amplitude=0.02), {}
     for widest in (0.3, 0.58, 1e6):
-        design = AxleDesign.for_vehicle(car)
+        design = AxleIdentifier.for_vehicle(car)
         design = replace(
             design,
             regression=replace(design.regression, memory=0.1, widest=widest),
@@ -346,7 +346,7 @@ def test_covariance_grows_again_only_while_it_is_no_wider_than_told(car, drive):
         n = len(design.ladder)
         history = identify(recording, car, design)
         times = np.append(recording.t, np.inf)  # before each sample and after the last
-        P = np.stack([design.frozen(car, history.carried_at(t)).covariance for t in times])
+        P = np.stack([design.frozen(car, history.state_at(t)).covariance for t in times])
         told = design.prior.covariance(car, design.ladder)
         trace, limit = (np.trace(M[..., :n, :n], axis1=-2, axis2=-1) for M in (P, told))
         grew = np.diff(trace, axis=0) > 1e-9 * limit
@@ -357,14 +357,14 @@ def test_covariance_grows_again_only_while_it_is_no_wider_than_told(car, drive):
 
 
 def test_true_forces_are_not_looked_at(car, drive):
-    design = AxleDesign.for_vehicle(car)
+    design = AxleIdentifier.for_vehicle(car)
     one = identify(drive(n=200), car, design)
     other = identify(drive(n=200, scale=-3.0), car, design)
     np.testing.assert_array_equal(one.axle_force, other.axle_force)
 
 
 def test_a_mirrored_drive_gives_mirrored_forces(car, drive):
-    design = AxleDesign.for_vehicle(car)
+    design = AxleIdentifier.for_vehicle(car)
     left = drive(n=800)
     right = replace(left, v_y=-left.v_y, r=-left.r, delta_f=-left.delta_f)
     forces = [identify(recording, car, design).axle_force for recording in (left, right)]
@@ -376,7 +376,7 @@ def test_a_change_of_friction_too_large_for_the_limit_teaches_as_if_none_were_se
     recording, P = disturbed(drive(n=900, amplitude=0.08)), {}
     alarms = {"none": {"threshold": 1e6}, "too large": {"step": 1e6}, "fits": {"step": 0.05}}
     for name, change in alarms.items():
-        design = AxleDesign.for_vehicle(car)
+        design = AxleIdentifier.for_vehicle(car)
         rung = replace(design.change, **({"threshold": 0.3, "fast": 0.1, "slow": 5.0} | change))
         history = identify(recording, car, replace(design, change=rung))
         P[name] = history.freeze(1e9).covariance

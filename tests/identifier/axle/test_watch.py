@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.axle import AxleDesign
+from identifier.axle import AxleIdentifier
 from identifier.axle.watch import BEGIN, Watch, WatchNumbers, WatchState, watched
 from identifier.run import identify
 from models.faults import SensorFault
@@ -115,7 +115,7 @@ def drive():
 
 @cache
 def without_fault():
-    return identify(drive(), sedan(), AxleDesign.for_vehicle(sedan())).axle_force
+    return identify(drive(), sedan(), AxleIdentifier.for_vehicle(sedan())).axle_force
 
 
 def broken(channel, kind, size=0.0):
@@ -132,7 +132,7 @@ def off_afterwards(recording, design):
     later = recording.t >= STARTS + LASTS + AGAIN
     off = np.sqrt(np.mean((history.axle_force - without_fault())[later] ** 2, axis=0))
     size = np.sqrt(np.mean(without_fault() ** 2, axis=0))
-    doubts = history.carried["watch"].reshape(recording.t.size + 1, 6)[:, 0] > 0.0
+    doubts = history.state["watch"].reshape(recording.t.size + 1, 6)[:, 0] > 0.0
     return (off / size).max(), recording.t[np.flatnonzero(doubts[1:])]
 
 
@@ -150,7 +150,7 @@ HARMFUL = [
 
 @pytest.mark.parametrize("fault", HARMFUL, ids=str)
 def test_what_a_broken_sensor_taught_is_gone_three_seconds_after_it_is_good(fault):
-    design, recording = AxleDesign.for_vehicle(sedan()), broken(*fault)
+    design, recording = AxleIdentifier.for_vehicle(sedan()), broken(*fault)
     off, doubted = off_afterwards(recording, design)
     assert off < 0.05
     assert STARTS < doubted[0] < STARTS + 0.5
@@ -167,13 +167,13 @@ def test_what_a_broken_sensor_taught_is_gone_three_seconds_after_it_is_good(faul
     ids=str,
 )
 def test_a_broken_watch_is_caught(watch):
-    design = AxleDesign.for_vehicle(sedan())
+    design = AxleIdentifier.for_vehicle(sedan())
     design = replace(design, watch=replace(design.watch, **watch))
     assert max(off_afterwards(broken(*fault), design)[0] for fault in HARMFUL) > 0.05
 
 
 def test_nothing_is_in_doubt_where_nothing_fails():
-    _, doubted = off_afterwards(drive(), AxleDesign.for_vehicle(sedan()))
+    _, doubted = off_afterwards(drive(), AxleIdentifier.for_vehicle(sedan()))
     assert doubted.size == 0
 
 
@@ -182,7 +182,7 @@ def test_nothing_is_in_doubt_where_nothing_fails():
 def test_samples_that_are_no_number_are_as_impossible_ones(channel, at):
     """Bit for bit, wherever they come, in every carried number; and none of them is kept."""
     car, clean, carried = sedan(), drive(), []
-    setup = AxleDesign.for_vehicle(car).setup(car, clean)
+    setup = AxleIdentifier.for_vehicle(car).setup(car, clean)
     names = ("v_x", "v_y", "r", "delta_f", "delta_r")
     for wrong in (np.nan, 1e6):
         seen = {name: getattr(clean, name).copy() for name in names}

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.axle import AxleDesign
+from identifier.axle import AxleIdentifier
 from identifier.baselines import (
     ForceEkf,
     StiffnessRls,
@@ -15,7 +15,7 @@ from identifier.baselines import (
     share_of_force,
     structure_of,
 )
-from identifier.defaults import default_design, natural_network
+from identifier.defaults import natural_network, paper_identifier
 from identifier.method import CannotFreezeError
 from identifier.run import identify
 from models.recordings import read_recording
@@ -34,7 +34,7 @@ def cost(model, recordings):
 
 
 def small_network(car):
-    return default_design(car, network=natural_network(car, hidden=4))
+    return paper_identifier(car, network=natural_network(car, hidden=4))
 
 
 def test_planted_parameters_are_found_exactly(car, curve_drive, rng):
@@ -50,7 +50,7 @@ def test_planted_parameters_are_found_exactly(car, curve_drive, rng):
         StiffnessRls.for_vehicle,
         magic_formula_ekf,
         dugoff_ekf,
-        AxleDesign.for_vehicle,
+        AxleIdentifier.for_vehicle,
         small_network,
     ],
 )

@@ -86,10 +86,10 @@ def test_magic_formula_filter_is_the_textbook(dt, car, drive, rng):
         np.diag(spread) ** 2,
         [method.walk] * 6,
     )
-    np.testing.assert_allclose(history.carried["estimate"][1:], rows, rtol=1e-4, atol=1e-6)
-    np.testing.assert_allclose(history.carried["P"][-1], P, rtol=1e-3, atol=1e-8)
+    np.testing.assert_allclose(history.state["estimate"][1:], rows, rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(history.state["P"][-1], P, rtol=1e-3, atol=1e-8)
     other = replace(method, v_y_disturbance=1.1 * method.v_y_disturbance)
-    estimate = identify(recording, car, other).carried["estimate"][1:]
+    estimate = identify(recording, car, other).state["estimate"][1:]
     assert not np.allclose(estimate, rows, rtol=1e-4, atol=1e-6), "a wrong number shows"
 
 
@@ -111,7 +111,7 @@ def test_force_filter_is_the_textbook_and_tells_the_corrected_force(car, drive):
 
 @pytest.mark.parametrize("make", [magic_formula_ekf, dugoff_ekf, ForceEkf.for_vehicle])
 def test_covariance_stays_symmetric_and_positive(make, car, drive):
-    P = identify(drive(n=3000), car, make(car)).carried["P"][1:]
+    P = identify(drive(n=3000), car, make(car)).state["P"][1:]
     np.testing.assert_array_equal(P, P.swapaxes(1, 2))
     assert np.linalg.eigvalsh(P).min() > 0.0
 
@@ -127,8 +127,8 @@ def test_a_spike_teaches_little_and_all_forces_stay_finite(size, make, car, driv
     def moved(method):
         history = identify(spiked, car, method)
         assert np.isfinite(history.axle_force).all()
-        theta = history.carried["estimate"][:, 2:]
-        deviation = np.sqrt(np.diag(history.carried["P"][500]))[2:]
+        theta = history.state["estimate"][:, 2:]
+        deviation = np.sqrt(np.diag(history.state["P"][500]))[2:]
         return np.max(np.abs(theta[502] - theta[500]) / deviation)
 
     assert moved(method) < 1.0
@@ -157,6 +157,6 @@ def test_at_rest_the_force_is_zero_and_learning_rests(make, car, halted_drive):
     recording, rest = halted_drive
     history = identify(recording, car, make(car))
     assert (history.axle_force[rest] == 0.0).all()
-    theta = history.carried["estimate"][:, 2:]
+    theta = history.state["estimate"][:, 2:]
     assert (np.diff(theta, axis=0)[rest] == 0.0).all()
     assert np.abs(np.diff(theta, axis=0)[~rest]).max() > 0.0

@@ -44,9 +44,9 @@ def test_recursion_gives_the_weighted_batch_solution(dt, car, curve_drive):
     )
     method = replace(METHOD, dt=dt)
     history = identify(recording, car, method)
-    online = history.carried["stiffness"][-1]
+    online = history.state["stiffness"][-1]
     floor = METHOD.prior_slip**2 * METHOD.memory
-    learning = history.carried["information"][round(0.52 / dt) + 1 :]  # after half a second
+    learning = history.state["information"][round(0.52 / dt) + 1 :]  # after half a second
     assert (learning > floor).all(), "else it is not plain weighting"
     np.testing.assert_allclose(online, batch(recording, car, method), rtol=1e-9)
     other = replace(method, memory=1.0)
@@ -60,21 +60,21 @@ def test_the_stiffness_of_a_linear_car_is_found_and_frozen(car, curve_drive, rng
     assert isinstance(model, CurveModel)
     np.testing.assert_allclose(model.parameters[:, 0], true, rtol=0.03)
     again = identify(recording, car, METHOD, start=model)
-    np.testing.assert_array_equal(again.carried["stiffness"][0], model.parameters[:, 0])
+    np.testing.assert_array_equal(again.state["stiffness"][0], model.parameters[:, 0])
 
 
 def test_straight_driving_forgets_nothing(car, curve_drive):
     recording = curve_drive(car, lambda i, a: 8e4 * a, n=800, amplitude=0.0)
     history = identify(recording, car, METHOD)
-    np.testing.assert_array_equal(history.carried["stiffness"][-1], np.array(car.bicycle)[4:])
-    assert history.carried["information"].min() >= METHOD.prior_slip**2 * METHOD.memory
+    np.testing.assert_array_equal(history.state["stiffness"][-1], np.array(car.bicycle)[4:])
+    assert history.state["information"].min() >= METHOD.prior_slip**2 * METHOD.memory
 
 
 def test_learning_rests_at_low_speed_and_force_at_rest(car, halted_drive):
     recording, rest = halted_drive
     history = identify(recording, car, METHOD)
     assert (history.axle_force[rest] == 0.0).all()
-    stiffness = history.carried["stiffness"]
+    stiffness = history.state["stiffness"]
     assert (np.diff(stiffness, axis=0)[rest] == 0.0).all()
     assert np.ptp(stiffness[:, 0]) > 0.0
 

@@ -88,13 +88,13 @@ def test_c_computes_the_bits_of_casadi_in_double(law, gaps, packages, slalom):
     if gaps:
         rows[:5, 0], rows[1000:1020, 1], rows[2000:2200, 2] = np.inf, np.nan, 1e308
     run = CompiledPackage.of(packages[law], single=False)
-    told, carried = run_in_virtual_machine(packages[law].folded, rows)
+    told, state = run_in_virtual_machine(packages[law].specialized, rows)
     shipped = run.run_samples(rows)
     assert ((shipped.status >= Status.BAD_INPUT).sum() == 225) == gaps
     np.testing.assert_array_equal(shipped.axle_force, told[:, :2])
     np.testing.assert_array_equal(np.column_stack(list(shipped.outputs.values())), told)
     for name, value in run.weights.items():
-        np.testing.assert_array_equal(value, carried[name].reshape(value.shape))
+        np.testing.assert_array_equal(value, state[name].reshape(value.shape))
 
 
 @pytest.mark.parametrize("law", LAWS)

@@ -280,7 +280,7 @@ def test_the_shipped_c_keeps_the_weights_as_the_method_does(keeping, slalom):
     history = identify(slalom, CAR, method)
     run = CompiledPackage.of(build_package(method, CAR))
     assert np.abs(run.run(slalom).axle_force - history.axle_force).max() < 1e-6
-    kept = {name: np.linalg.norm(history.carried[name][-1]) for name in ("W", "V")}
+    kept = {name: np.linalg.norm(history.state[name][-1]) for name in ("W", "V")}
     assert kept["W"] > 0.39 and kept["V"] > 2.9
     plain = replace(gains, W_free=0.0, V_free=0.0, W_max=np.inf, V_max=np.inf)
     other = identify(slalom, CAR, replace(method, gains=plain)).axle_force

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from identifier.axle import AxleDesign
+from identifier.axle import AxleIdentifier
 
 HOSTILE = (Path(__file__).parent / "hostile.c").read_text()
 SANITIZED = (
@@ -18,11 +18,11 @@ SOURCES = ["src/tireid.c", "src/tireid_equations.c", "hostile.c"]
 
 def declared(package, **changed):
     """The bounds of the axle identifier as macros, none for another method."""
-    method, n = package.folded.method, 4
-    if not isinstance(method, AxleDesign):
+    method, n = package.specialized.method, 4
+    if not isinstance(method, AxleIdentifier):
         return []
     bounds = replace(method.bounds, **changed)
-    prior = method.prior.covariance(package.folded.vehicle, method.ladder)
+    prior = method.prior.covariance(package.specialized.vehicle, method.ladder)
     trace = np.trace(prior[:, :n, :n], axis1=1, axis2=2)
     widest = method.regression.widest * np.column_stack([trace, prior[:, [4, 5, 6], [4, 5, 6]]])
     rows = ",".join("{" + ",".join(f"{one!r}L" for one in row) + "}" for row in widest.tolist())

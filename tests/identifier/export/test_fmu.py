@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from codegen import Scan
-from identifier.defaults import default_design
+from identifier.defaults import paper_identifier
 from identifier.export import fmu as binaries
 from identifier.export.fmu import export_fmu
-from identifier.export.fold import fold
+from identifier.export.specialize import specialize
 from identifier.run import OnlineIdentifier, identify
 from models.recordings import Recording
 from models.vehicle import sedan
@@ -23,7 +23,7 @@ CAR = sedan()
 
 
 def design(dt=0.01):
-    return replace(default_design(CAR), dt=dt)
+    return replace(paper_identifier(CAR), dt=dt)
 
 
 def swaying(n, dt=0.01):
@@ -107,7 +107,7 @@ def exported(tmp_path_factory):
             written[key] = folder / f"v{version}_{dt}.fmu"
             with pytest.MonkeyPatch.context() as patch:
                 patch.setattr(binaries, "MINGW", "no-such-compiler")
-                export_fmu(fold(design(dt), CAR), written[key], version)
+                export_fmu(specialize(design(dt), CAR), written[key], version)
         return written[key]
 
     return path
@@ -129,12 +129,12 @@ def a_master(exported, tmp_path):
 
 def in_python(drive, start=None):
     """The folded step over a drive, after one sample at rest; exact, no tolerance."""
-    folded = fold(design(drive.dt), CAR)
-    scan = Scan(folded.function, carry=tuple(folded.carry), over=("x", "u", "v_x"))
+    specialized = specialize(design(drive.dt), CAR)
+    scan = Scan(specialized.function, carry=tuple(specialized.carry), over=("x", "u", "v_x"))
     if start is None:
         first = {"x": drive.x[:1], "u": drive.u[:1], "v_x": np.zeros(1)}
-        rest = scan(1, {**folded.carry, **first})
-        start = {port: rest[f"{port}_final"] for port in folded.carry}
+        rest = scan(1, {**specialized.carry, **first})
+        start = {port: rest[f"{port}_final"] for port in specialized.carry}
     return scan(drive.t.size, {**start, "x": drive.x, "u": drive.u, "v_x": drive.v_x})
 
 

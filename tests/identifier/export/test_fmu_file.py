@@ -8,19 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.defaults import default_design
+from identifier.defaults import paper_identifier
 from identifier.export import fmu as binaries
 from identifier.export import fmu as package
 from identifier.export.fmu import export_fmu, fmu_text
-from identifier.export.fold import fold
 from identifier.export.package import build_package
+from identifier.export.specialize import specialize
 from models.vehicle import sedan
 
 fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")
 validation = pytest.importorskip("fmpy.validation")
 CAR = sedan()
 PARTS = ("include", "src")
-DESIGN = default_design(CAR)
+DESIGN = paper_identifier(CAR)
 needs_compiler = pytest.mark.skipif(
     not binaries.targets(), reason="needs a C compiler on Linux x86-64"
 )
@@ -32,7 +32,7 @@ def sources_only(tmp_path, monkeypatch):
     monkeypatch.setattr(package, "targets", lambda: ())
     paths = {version: tmp_path / f"{version}.fmu" for version in (2, 3)}
     for version, path in paths.items():
-        export_fmu(fold(DESIGN, CAR), path, version)
+        export_fmu(specialize(DESIGN, CAR), path, version)
     return paths
 
 
@@ -45,7 +45,7 @@ def test_fmpy_finds_nothing_to_complain_about(exported, version):
 def test_the_same_step_gives_the_same_bytes_on_every_platform(tmp_path):
     paths = [tmp_path / name for name in ("a.fmu", "b.fmu")]
     for path in paths:
-        export_fmu(fold(DESIGN, CAR), path)
+        export_fmu(specialize(DESIGN, CAR), path)
     assert paths[0].read_bytes() == paths[1].read_bytes()
     with zipfile.ZipFile(paths[0]) as archive:
         libraries = {
@@ -61,12 +61,12 @@ def test_every_number_changes_the_token():
     def token(step):
         return re.search(r'guid="([^"]+)"', fmu_text(step, 2)["modelDescription.xml"])[1]
 
-    same, again = fold(DESIGN, CAR), fold(DESIGN, CAR)
+    same, again = specialize(DESIGN, CAR), specialize(DESIGN, CAR)
     assert token(same) == token(again)
     others = [
-        fold(replace(DESIGN, seed=1), CAR),
-        fold(replace(DESIGN, dt=0.02), CAR),
-        fold(DESIGN, replace(CAR, mass=CAR.mass + 1)),
+        specialize(replace(DESIGN, seed=1), CAR),
+        specialize(replace(DESIGN, dt=0.02), CAR),
+        specialize(DESIGN, replace(CAR, mass=CAR.mass + 1)),
     ]
     assert len({token(step) for step in (same, *others)}) == 4
 
@@ -74,7 +74,7 @@ def test_every_number_changes_the_token():
 def test_its_component_is_the_c_package():
     shipped = build_package(DESIGN, CAR).files
     shared = {path: text for path, text in shipped.items() if path.split("/")[0] in PARTS}
-    inside = fmu_text(fold(DESIGN, CAR), 3)
+    inside = fmu_text(specialize(DESIGN, CAR), 3)
     assert len(shared) == 4
     for path, text in shared.items():
         assert inside[f"sources/{path.split('/')[1]}"] == text
@@ -82,7 +82,7 @@ def test_its_component_is_the_c_package():
 
 def test_another_version_is_refused(tmp_path):
     with pytest.raises(ValueError, match="version must be 2 or 3, it is 1"):
-        export_fmu(fold(DESIGN, CAR), tmp_path / "one.fmu", 1)
+        export_fmu(specialize(DESIGN, CAR), tmp_path / "one.fmu", 1)
 
 
 @pytest.mark.parametrize("version", [2, 3])
@@ -94,7 +94,7 @@ def test_units_are_told(exported, version):
 
 def test_without_a_compiler_it_holds_sources_only_and_says_so(exported, caplog, tmp_path):
     with caplog.at_level(logging.WARNING, "tireid.export"):
-        export_fmu(fold(DESIGN, CAR), tmp_path / "again.fmu")
+        export_fmu(specialize(DESIGN, CAR), tmp_path / "again.fmu")
     assert "no C compiler found" in caplog.text
     with zipfile.ZipFile(exported[2]) as archive:
         names = archive.namelist()
@@ -103,10 +103,10 @@ def test_without_a_compiler_it_holds_sources_only_and_says_so(exported, caplog, 
 
 
 def test_a_start_that_is_not_finite_is_refused(tmp_path):
-    folded = fold(DESIGN, CAR)
-    carry = {port: np.full_like(value, np.nan) for port, value in folded.carry.items()}
+    specialized = specialize(DESIGN, CAR)
+    carry = {port: np.full_like(value, np.nan) for port, value in specialized.carry.items()}
     with pytest.raises(ValueError, match="must be finite to be exported, it is nan"):
-        export_fmu(folded._replace(carry=carry), tmp_path / "nan.fmu")
+        export_fmu(specialized._replace(carry=carry), tmp_path / "nan.fmu")
 
 
 @pytest.mark.parametrize("version", [2, 3])
@@ -116,7 +116,7 @@ def test_the_switch_of_learning_says_what_it_holds(exported, version, tmp_path):
         (switch,) = (v for v in about.modelVariables if v.name == "adaptation")
         return switch.description
 
-    step = fold(DESIGN, CAR)
+    step = specialize(DESIGN, CAR)
     held = said(exported[version]).removeprefix("whether it learns; false holds ")
     assert step.learnt and held.split(", ") == list(step.learnt)
     export_fmu(step._replace(learnt=()), tmp_path / "none.fmu", version)

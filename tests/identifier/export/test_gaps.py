@@ -58,7 +58,7 @@ def test_gaps_are_met_as_beside_a_car_in_python(law, shipped, rows):
     np.testing.assert_array_equal(np.isin(run.status, [Status.BAD_INPUT, Status.STALE]), refused)
     assert shipped[law].faults >= refused.sum() == online.counts.refused
     for name, value in shipped[law].weights.items():
-        kept = online.carried()[name]
+        kept = online.state()[name]
         if name == "UD" or kept.shape != value.shape:
             kept = kept.reshape(value.shape)
         np.testing.assert_allclose(value, kept, rtol=1e-9, atol=1e-9)

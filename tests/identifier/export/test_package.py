@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.export.fold import Signal
 from identifier.export.layout import Member, sum_terms
 from identifier.export.package import PackageNameError, build_package, readme
+from identifier.export.specialize import Signal
 from identifier.methods import METHODS, make_method
 from identifier.paper.network import Network
 from models.recordings import write_recording
@@ -119,7 +119,7 @@ def test_a_package_says_what_is_proven_of_it(packages):
     """The default method is not certified; its boxes are those of its design."""
     axle, integral = packages["axle"], packages["integral"]
     held = json.loads(axle.files["tireid.json"])["certificate"]["held_by_construction"]
-    bounds = axle.folded.method.bounds
+    bounds = axle.specialized.method.bounds
     assert held["grip_static_axle_loads"] == [bounds.least_grip, bounds.most_grip]
     text = readme(axle, "")
     assert "This method is **not certified**" in text

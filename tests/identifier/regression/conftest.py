@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identifier.paper.network import Network
-from identifier.regression import RegressionDesign
+from identifier.regression import RegressionIdentifier
 
 
 def known_rate(recording, car, unit):
@@ -57,6 +57,6 @@ def a_design(car):
             "memory": 5,
             "network": Network(hidden=6),
         }
-        return RegressionDesign(law=law, **{**chosen, **numbers})
+        return RegressionIdentifier(law=law, **{**chosen, **numbers})
 
     return make

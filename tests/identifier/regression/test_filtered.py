@@ -23,9 +23,9 @@ def run_filters(xi, b, sigma, filter_rate=4.0, dt=DT):
     lags = Lags(p["target_lag"], p["regressor_lag"])
     pair, following = filtered_pair(lags, p["fresh"], **signals, filter_rate=filter_rate, dt=dt)
     function = ca.Function("pair", [*p.values()], [pair.s, pair.y, *following])
-    carried, fresh, rows = (np.zeros(2), np.zeros(3)), 1.0, []
+    state, fresh, rows = (np.zeros(2), np.zeros(3)), 1.0, []
     for sample in zip(xi, b, sigma, strict=True):
-        s, y, *carried = (np.array(v).ravel() for v in function(*carried, fresh, *sample))
+        s, y, *state = (np.array(v).ravel() for v in function(*state, fresh, *sample))
         fresh = 0.0
         rows.append((s, y))
     return (np.array(column) for column in zip(*rows, strict=True))
@@ -99,8 +99,8 @@ def test_after_a_rest_the_filters_begin_as_at_the_first_sample(car, drive, desig
     rest = replace(whole, axle_force=None, **{name: getattr(whole, name)[160:] for name in signals})
     anew = identify(rest, car, design())
     for name in ("target_lag", "regressor_lag"):
-        np.testing.assert_array_equal(paused.carried[name][161:], anew.carried[name][1:])
-    unpaused = identify(whole, car, design()).carried["target_lag"]
-    assert np.abs(unpaused[161:200] - anew.carried["target_lag"][1:40]).max() > 0.01
-    np.testing.assert_allclose(paused.told["residual"][120:161], 0.0, atol=1e-12)
-    np.testing.assert_array_equal(paused.carried["P"][120], paused.carried["P"][161])
+        np.testing.assert_array_equal(paused.state[name][161:], anew.state[name][1:])
+    unpaused = identify(whole, car, design()).state["target_lag"]
+    assert np.abs(unpaused[161:200] - anew.state["target_lag"][1:40]).max() > 0.01
+    np.testing.assert_allclose(paused.outputs["residual"][120:161], 0.0, atol=1e-12)
+    np.testing.assert_array_equal(paused.state["P"][120], paused.state["P"][161])

@@ -23,8 +23,8 @@ def test_statistics_are_the_gradient_of_the_weighted_cost(car, drive, design, pa
     chosen, recording = design("kreisselmeier"), drive(n=250)
     history = identify(recording, car, chosen)
     s, y = pairs(recording, chosen, car)
-    Omega, Y = history.carried["Omega"][-1], history.carried["Y"][-1]
-    for W in (history.carried["W"][-1], rng.standard_normal((2, 6))):
+    Omega, Y = history.state["Omega"][-1], history.state["Y"][-1]
+    for W in (history.state["W"][-1], rng.standard_normal((2, 6))):
         exact = cost_gradient(W, s, y, chosen.forgetting, chosen.dt)
         np.testing.assert_allclose(W @ Omega - Y, exact, rtol=1e-9, atol=1e-10)
     wrong = cost_gradient(W, s, y, 1.1 * chosen.forgetting, chosen.dt)  # another λ is seen
@@ -34,7 +34,7 @@ def test_statistics_are_the_gradient_of_the_weighted_cost(car, drive, design, pa
 def test_the_step_goes_against_the_gradient_by_finite_differences(car, drive, design, pairs):
     """The move of W at the last sample, against differences of cost and ridge at the W of then."""
     chosen, recording = design("kreisselmeier"), drive(n=200)
-    W = identify(recording, car, chosen).carried["W"]
+    W = identify(recording, car, chosen).state["W"]
     s, y = pairs(recording, chosen, car)
 
     def cost(W):
@@ -55,7 +55,7 @@ def test_the_step_goes_against_the_gradient_by_finite_differences(car, drive, de
 def test_newton_rests_at_the_weighted_least_squares_solution(car, drive, design, pairs):
     """At an infinitely fast rate W is that solution at every sample; numpy's lstsq knows it."""
     chosen, recording = design("kreisselmeier_newton", learning_rate=1e9), drive(n=300)
-    W = identify(recording, car, chosen).carried["W"][-1]
+    W = identify(recording, car, chosen).state["W"][-1]
     s, y = pairs(recording, chosen, car)
     root = np.sqrt(chosen.dt * np.exp(-chosen.forgetting * chosen.dt * np.arange(300)[::-1]))
     ridge = np.sqrt(chosen.ridge) * np.eye(6)
@@ -73,4 +73,4 @@ def test_no_rate_is_too_high_for_either_way_down(car, drive, design):
         for rate in (1e-3, 1e9):
             history = identify(drive(n=600), car, design(law, learning_rate=rate))
             assert history.diverged_at is None
-            assert np.abs(history.carried["W"]).max() < 100.0
+            assert np.abs(history.state["W"]).max() < 100.0

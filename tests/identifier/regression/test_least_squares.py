@@ -15,11 +15,11 @@ def test_without_forgetting_it_is_batch_ridge_regression(car, drive, design, pai
     s, y = pairs(recording, design(), car)
     for law in ("rls", "rls_bounded_trace", "rls_exponential"):
         chosen = design(law, forgetting=0.0)
-        W = identify(recording, car, chosen).carried["W"][-1]
+        W = identify(recording, car, chosen).state["W"][-1]
         information = chosen.dt * s.T @ s + chosen.ridge * np.eye(6)
         batch = np.linalg.solve(information, chosen.dt * s.T @ y).T
         np.testing.assert_allclose(W, batch, rtol=1e-6, atol=1e-8)
-        forgetful = identify(recording, car, design(law, forgetting=0.5)).carried["W"][-1]
+        forgetful = identify(recording, car, design(law, forgetting=0.5)).state["W"][-1]
         assert np.abs(forgetful - batch).max() > 1e-3
 
 
@@ -32,7 +32,7 @@ def test_exponential_forgetting_is_newton_with_a_fading_ridge(car, drive, design
     ridge = chosen.ridge * np.exp(-chosen.forgetting * chosen.dt * 298)
     information = chosen.dt * (s.T * weight) @ s + ridge * np.eye(6)
     batch = np.linalg.solve(information, chosen.dt * (s.T * weight) @ y).T
-    np.testing.assert_allclose(history.carried["W"][-1], batch, rtol=1e-6, atol=1e-8)
+    np.testing.assert_allclose(history.state["W"][-1], batch, rtol=1e-6, atol=1e-8)
 
 
 def straight_after_slalom(drive, straight=6000):
@@ -49,7 +49,7 @@ def straight_after_slalom(drive, straight=6000):
 def test_only_exponential_forgetting_blows_up_without_excitation(car, drive, design):
     recording = straight_after_slalom(drive)
     traces = {
-        law: np.trace(identify(recording, car, design(law)).carried["P"], axis1=1, axis2=2)
+        law: np.trace(identify(recording, car, design(law)).state["P"], axis1=1, axis2=2)
         for law in ("rls", "rls_bounded_trace", "rls_exponential")
     }
     bound = 6 / design().ridge

@@ -69,7 +69,7 @@ def test_nothing_is_stored_where_it_is_not_allowed(store, rng):
 
 def test_over_a_drive_every_kept_pair_was_seen_and_excitation_only_grows(car, drive, design, pairs):
     chosen, recording = design("concurrent", forgetting=0.0), drive(n=500)
-    S, Z = (identify(recording, car, chosen).carried[name] for name in "SZ")
+    S, Z = (identify(recording, car, chosen).state[name] for name in "SZ")
     s, y = pairs(recording, chosen, car)
     assert S.shape == (501, 6, chosen.memory)
     for place in range(chosen.memory):
@@ -85,7 +85,7 @@ def test_over_a_drive_every_kept_pair_was_seen_and_excitation_only_grows(car, dr
 def test_stored_pairs_fade_alike(car, drive, design):
     """Target over regressor stays what it was: a faded pair still says y = W s."""
     fading = identify(drive(n=300), car, design("concurrent", forgetting=2.0, memory=2))
-    S, Z, fade = fading.carried["S"], fading.carried["Z"], np.exp(-2.0 * 0.01 / 2)
+    S, Z, fade = fading.state["S"], fading.state["Z"], np.exp(-2.0 * 0.01 / 2)
     full = [k for k in range(50, 300) if S[k, :, 0].any()]
     faded = [k for k in full if np.allclose(S[k + 1, :, 0], fade * S[k, :, 0], rtol=1e-12)]
     assert 20 < len(faded) < len(full)  # and now and then a new pair takes the place

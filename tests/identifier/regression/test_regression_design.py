@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.defaults import default_design, natural_network
+from identifier.defaults import natural_network, paper_identifier
 from identifier.paper.network import Network
-from identifier.regression import LAWS, RegressionDesign
+from identifier.regression import LAWS, RegressionIdentifier
 from identifier.regression.laws import WORTH
 from identifier.reproducibility import online_error, replay
 from identifier.run import identify
@@ -16,7 +16,7 @@ from identifier.run import identify
 def small_design(vehicle, law, dt=0.01):
     """The design for a vehicle, small so that it compiles fast."""
     network = natural_network(vehicle, hidden=6)
-    return RegressionDesign.for_vehicle(vehicle, law=law, network=network, memory=8, dt=dt)
+    return RegressionIdentifier.for_vehicle(vehicle, law=law, network=network, memory=8, dt=dt)
 
 
 def forget_by_hand(law, P, s, keep, bound):
@@ -85,7 +85,7 @@ def test_the_compiled_step_repeats_the_equations_by_hand(law, dt, car, drive, de
     chosen, recording = design(law, quiet=0.1, W_max=2.5, dt=dt), drive(n=300, dt=dt)
     history = identify(recording, car, chosen)
     expected = learn_by_hand(*pairs(recording, chosen, car), chosen)
-    np.testing.assert_allclose(history.carried["W"], expected, rtol=1e-6, atol=1e-7)
+    np.testing.assert_allclose(history.state["W"], expected, rtol=1e-6, atol=1e-7)
     assert np.linalg.norm(expected[-1]) > 0.5
     wrong = learn_by_hand(*pairs(recording, chosen, car), replace(chosen, ridge=2e-3))
     assert np.abs(wrong[-1] - expected[-1]).max() > 1e-5  # a wrong number does not pass
@@ -95,7 +95,7 @@ def test_the_compiled_step_repeats_the_equations_by_hand(law, dt, car, drive, de
 def test_better_than_the_integral_law_online_and_frozen(law, car, drive):
     """With networks of the same size, though the integral law learns the hidden layer too."""
     recording, errors = drive(n=2000), []
-    for chosen in (RegressionDesign.for_vehicle(car, law=law), default_design(car)):
+    for chosen in (RegressionIdentifier.for_vehicle(car, law=law), paper_identifier(car)):
         history = identify(recording, car, chosen)
         frozen = replay(history.freeze(recording.t[-1]), history).against_truth
         errors.append(np.array([online_error(history).both, frozen.both]))
@@ -111,11 +111,11 @@ def test_at_rest_and_straight_ahead_nothing_is_learnt(law, car, drive):
         name: np.where(k < 100, getattr(moving, name), 0.0) for name in ("v_y", "r", "delta_f")
     }
     quiet = identify(replace(moving, **straight), car, chosen)
-    for name in stopped.carried:
+    for name in stopped.state:
         if name not in ("target_lag", "regressor_lag", "fresh"):
-            np.testing.assert_array_equal(stopped.carried[name][200], stopped.carried[name][-1])
-            np.testing.assert_array_equal(quiet.carried[name][300], quiet.carried[name][-1])
-    assert np.abs(stopped.carried["W"][200] - stopped.carried["W"][100]).max() > 0.0
+            np.testing.assert_array_equal(stopped.state[name][200], stopped.state[name][-1])
+            np.testing.assert_array_equal(quiet.state[name][300], quiet.state[name][-1])
+    assert np.abs(stopped.state["W"][200] - stopped.state["W"][100]).max() > 0.0
     np.testing.assert_array_equal(stopped.axle_force[200:], 0.0)
 
 
@@ -128,7 +128,7 @@ def test_wild_samples_leave_forces_finite_and_weights_in_their_ball(law, car, dr
     chosen = small_design(car, law)
     history = identify(replace(recording, v_y=v_y, r=r, v_x=v_x), car, chosen)
     assert np.isfinite(history.axle_force).all()
-    norms = np.linalg.norm(history.carried["W"], axis=(1, 2))
+    norms = np.linalg.norm(history.state["W"], axis=(1, 2))
     assert norms.max() <= chosen.W_max * (1 + 1e-12)
 
 
@@ -151,10 +151,10 @@ def test_learning_goes_on_from_stored_weights_and_falls_back_to_them(law, car, d
     stored = identify(drive(n=800), car, design(seed=4)).freeze(7.99)
     chosen = design(law, ridge=1e6)
     history = identify(drive(n=200), car, chosen, start=stored)
-    np.testing.assert_allclose(history.carried["W"][-1], stored.weights.W, rtol=1e-3)
-    np.testing.assert_array_equal(history.carried["V"][-1], stored.weights.V)
+    np.testing.assert_allclose(history.state["W"][-1], stored.weights.W, rtol=1e-3)
+    np.testing.assert_array_equal(history.state["V"][-1], stored.weights.V)
     other = replace(stored, force_unit=stored.force_unit / 2)
-    begun = identify(drive(n=200), car, chosen, start=other).carried["W"][0]
+    begun = identify(drive(n=200), car, chosen, start=other).state["W"][0]
     np.testing.assert_allclose(begun, stored.weights.W / 2)
 
 
@@ -171,7 +171,7 @@ def test_slip_angles_as_input_carry_over_to_another_speed_better_than_the_state(
     for inputs in (("alpha_f", "alpha_r"), Network().inputs):
         network, errors = Network(hidden=8, inputs=inputs), []
         for seed in range(3):
-            chosen = RegressionDesign.for_vehicle(car, network=network, seed=seed)
+            chosen = RegressionIdentifier.for_vehicle(car, network=network, seed=seed)
             model = identify(slow, car, chosen).freeze(slow.t[-1])
             errors.append(np.sqrt(np.mean((model.axle_force(fast) - fast.axle_force) ** 2)))
         middle.append(np.median(errors))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from identifier.defaults import default_design, natural_operation
+from identifier.defaults import natural_operation, paper_identifier
 from identifier.paper.laws import DRIVING_ERRORS
 from identifier.run import identify
 from identifier.stability.certificate import loop_along, network_inputs
@@ -11,13 +11,13 @@ from identifier.stability.operation import proven_bounds, worst_loop
 
 
 def test_gain_along_a_run_is_the_formula_at_one_sample(car, drive):
-    design = default_design(car)
+    design = paper_identifier(car)
     history = identify(drive(n=600), car, design)
     along, k = loop_along(history, design), 345
     x_bar = np.concatenate([history.recording.x[k], history.recording.u[k]])
     x_bar = x_bar / np.array(design.network.scale)
     np.testing.assert_allclose(network_inputs(history, design)[k], x_bar)
-    W, V = history.carried["W"][k], history.carried["V"][k]
+    W, V = history.state["W"][k], history.state["V"][k]
     s = np.tanh(V @ x_bar)
     through_V = (W * (1 - s**2)) @ (W * (1 - s**2)).T * (x_bar @ x_bar)
     G = design.gains.eta_W * (s @ s) * np.eye(2) + design.gains.eta_V * through_V
@@ -26,7 +26,7 @@ def test_gain_along_a_run_is_the_formula_at_one_sample(car, drive):
 
 
 def test_no_recorded_regressor_is_worse_than_the_worst(car, drive):
-    design = default_design(car)
+    design = paper_identifier(car)
     history = identify(drive(n=600), car, design)
     integral, task = DRIVING_ERRORS[design.law], natural_operation(design, car)
     law, D = linear_law(integral), direction_matrix(integral, design.gains.matrix)

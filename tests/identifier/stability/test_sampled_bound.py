@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.defaults import default_design, design_for, natural_driving, natural_operation
-from identifier.paper.design import Design
+from identifier.defaults import design_for, natural_driving, natural_operation, paper_identifier
+from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import DRIVING_ERRORS, Gains, diagonal, rk4
 from identifier.paper.network import Network
 from identifier.paper.step import GAINS, build_step
@@ -87,7 +87,7 @@ def test_rk4_with_held_inputs_errs_by_what_the_car_moves_on():
     """No residual at all: A_ξ ξ + B_ξ u is ξ' exactly, and yet the estimate is late."""
     a, dt, slope = 20.0, 0.01, 3.0  # kN
     gains = Gains(A_d=diagonal(a), forgetting=5.0, eta_W=0.0, eta_V=0.0, rho_W=0.0, rho_V=0.0)
-    design = Design(gains=gains, network=Network(hidden=2), integrator="rk4", dt=dt)
+    design = PaperIdentifier(gains=gains, network=Network(hidden=2), integrator="rk4", dt=dt)
     step = build_step(design.structure)
     numbers = np.array([getattr(gains, name) for name in GAINS])
     K = np.array([[1 / CAR.mass] * 2, [CAR.l_f / CAR.yaw_inertia, -CAR.l_r / CAR.yaw_inertia]])
@@ -149,7 +149,7 @@ def test_no_drive_passes_a_bound_with_noise_resumed_weights_and_a_high_gain(law,
 
 
 def test_a_V_layer_that_leaks_more_than_itself_in_a_sample_fails_and_diverges():
-    design = default_design(CAR)
+    design = paper_identifier(CAR)
     planted = replace(design, gains=replace(design.gains, rho_V=3000.0))
     certificate = judged(planted)
     assert certificate["leakage_step_V"].status == "fail"
@@ -184,22 +184,22 @@ def test_a_smooth_tire_short_of_sliding_keeps_the_bound_and_passes_that_of_a_sli
 
 
 def test_a_filter_that_forgets_more_than_itself_in_a_sample_fails():
-    design = default_design(CAR)
+    design = paper_identifier(CAR)
     certificate = judged(replace(design, gains=replace(design.gains, forgetting=199.0)))
     assert certificate["filter_step"].status == "fail"
 
 
 def test_nothing_that_is_unbounded_passes():
-    gains = default_design(CAR).gains
+    gains = paper_identifier(CAR).gains
     for changed in ({"rho_W": 0.0, "eta_V": 0.0}, {"rho_V": 0.0}, {"rho_W": 0.0, "rho_V": 0.0}):
-        design = replace(default_design(CAR), gains=replace(gains, **changed))
+        design = replace(paper_identifier(CAR), gains=replace(gains, **changed))
         assert judged(design).verdict != "pass"
 
 
 def test_sensors_that_err_more_than_declared_pass_the_bound_and_those_as_declared_do_not():
     exact = replace(DRIVING, slip=0.01, noise_v_x=0.0, noise_v_y=0.0, noise_r=0.0, noise_delta=0.0)
     poor = replace(exact, noise_v_y=1.0, noise_r=0.1)
-    design = default_design(CAR)
+    design = paper_identifier(CAR)
     gains = replace(design.gains, eta_W=0.0, eta_V=0.0, rho_W=0.0, rho_V=0.0, W_max=1e-3)
     quiet = replace(design, gains=gains)
     rng = np.random.default_rng(3)
@@ -224,7 +224,7 @@ def test_the_projection_of_rk4_needs_no_gain_to_be_small():
 
 def test_the_tight_route_claims_no_less_than_an_identifier_without_a_network():
     for law in ("integral", "instantaneous"):
-        certificate = judged(default_design(CAR, law=law))
+        certificate = judged(paper_identifier(CAR, law=law))
         for name in ("printed_bound", "tight_bound", "ultimate_bound"):
             assert certificate[name].value >= certificate["trivial_bound"].value * (1 - 1e-9)
 
@@ -236,14 +236,14 @@ def test_the_sedan_in_its_own_slalom_keeps_the_bound_of_the_slip_that_it_reaches
     slalom = Slalom(amplitude=0.06, frequency=0.5, onset=1.0, rate_limit=0.5, duration=20.0)
     recording = Plant(CAR).simulate(slalom, speed=20.0).recording()
     assert np.abs(recording.alpha(CAR.l_f, CAR.l_r)).max() < gentle.slip
-    told = identify(recording, CAR, design).told["xi_tilde"]
+    told = identify(recording, CAR, design).outputs["xi_tilde"]
     largest = np.linalg.norm(told.reshape(len(recording), 2), axis=1).max()
     assert 0.039 < largest <= bounds_of(design, gentle).xi_tilde
 
 
 def test_a_projection_far_beyond_what_the_leakage_keeps_changes_no_bound_on_v():
     """Inner stages of RK4 go beyond the W of samples, with such a projection as without."""
-    free = replace(default_design(CAR), integrator="rk4")
+    free = replace(paper_identifier(CAR), integrator="rk4")
     bound = bounds_of(free)
     far = replace(free, gains=replace(free.gains, W_max=2.0 * bound.W))
     assert pytest.approx(bound.V, rel=1e-12) == bounds_of(far).V

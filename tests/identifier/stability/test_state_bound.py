@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from identifier.paper.design import Design
+from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import Gains, diagonal
 from identifier.paper.network import Network
 from identifier.run import identify
@@ -213,7 +213,9 @@ def a_run(drive, car):
 
     def run(**gains):
         settings = {"forgetting": 6.0, "eta_V": 5.0, "rho_W": 5.0, "rho_V": 5.0, **gains}
-        design = Design(gains=Gains(A_d=diagonal(6.0), **settings), network=Network(hidden=8))
+        design = PaperIdentifier(
+            gains=Gains(A_d=diagonal(6.0), **settings), network=Network(hidden=8)
+        )
         history = identify(drive(n=1000), car, design)
         p, K_inv = car.bicycle, np.array([[1500.0 * 1.55, 2500.0], [1500.0 * 1.15, -2500.0]]) / 2.7
         record = history.recording
@@ -235,7 +237,7 @@ def test_the_identifier_itself_keeps_the_bounds_of_leakage_and_of_projection(run
     history, residual = run(eta_W=100.0)
     f_max = np.linalg.norm(residual, axis=1).max()
     assert 1.0 < f_max < 20.0
-    V_start = float(np.linalg.norm(history.carried["V"][0]))
+    V_start = float(np.linalg.norm(history.state["V"][0]))
     signals = np.hstack([history.recording.x, history.recording.u])
     x_bar_max = np.linalg.norm(signals / np.array(history.design.network.scale), axis=1).max()
     operation = Operation(
@@ -254,13 +256,13 @@ def test_the_identifier_itself_keeps_the_bounds_of_leakage_and_of_projection(run
     inverse = np.eye(2) / 6.0
     proven = proven_bounds(history.design.gains, INTEGRAL, operation, inverse)
     bounds = proven.leakage
-    error = np.linalg.norm(history.told["xi_tilde"], axis=1).max()
+    error = np.linalg.norm(history.outputs["xi_tilde"], axis=1).max()
     assert 0.02 * bounds.xi_tilde < error <= bounds.xi_tilde
-    assert np.linalg.norm(history.carried["W"], axis=(1, 2)).max() <= bounds.W
-    assert np.linalg.norm(history.carried["V"], axis=(1, 2)).max() <= proven.V
+    assert np.linalg.norm(history.state["W"], axis=(1, 2)).max() <= bounds.W
+    assert np.linalg.norm(history.state["V"], axis=(1, 2)).max() <= proven.V
     wild, residual = run(eta_W=1e5, rho_W=0.0, rho_V=0.0, W_max=3.0, V_max=9.0)
     bound = proven_bounds(wild.design.gains, INTEGRAL, operation, inverse).projection.xi_tilde
-    assert 0.1 * bound < np.linalg.norm(wild.told["xi_tilde"], axis=1).max() <= bound
+    assert 0.1 * bound < np.linalg.norm(wild.outputs["xi_tilde"], axis=1).max() <= bound
 
 
 def test_the_integral_law_passes_bound_14_many_times_over():

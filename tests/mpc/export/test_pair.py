@@ -128,9 +128,9 @@ def handed_over(library, pair, weights, share):
 @pytest.mark.parametrize("law", LAWS)
 def test_c_hands_over_what_python_makes_of_the_same_weights(law, taught, pairs, libraries):
     pair, weights = pairs[law], taught[law].weights
-    folded = pair.identifier.folded
-    carried = {**folded.carry, **weights}
-    wanted = prediction_tire(folded.method.frozen(folded.vehicle, carried))
+    specialized = pair.identifier.specialized
+    state = {**specialized.carry, **weights}
+    wanted = prediction_tire(specialized.method.frozen(specialized.vehicle, state))
     assert not np.allclose(wanted.weights, pair.tracker.tire.weights, rtol=0.01)
     taken, params = handed_over(libraries[law], pair, weights, 1.0)
     assert taken
@@ -175,5 +175,5 @@ def test_what_cannot_be_handed_over_is_said(law, complaint):
 
 def test_a_pair_holds_each_package_under_its_own_name(pairs):
     for pair in pairs.values():
-        assert pair.identifier.folded.name + "_mpc" == pair.tracker.name
+        assert pair.identifier.specialized.name + "_mpc" == pair.tracker.name
         assert pair.tracker.params["delay"] == DELAY

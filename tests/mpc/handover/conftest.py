@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identifier.axle import AxleDesign
+from identifier.axle import AxleIdentifier
 from identifier.run import identify
 from models.friction import Friction, FrictionChange
 from models.maneuvers import RandomSteer, Slalom
@@ -53,7 +53,7 @@ def dropped():
 @pytest.fixture(scope="session")
 def learnt(car, dry):
     """The model that the axle identifier learnt on the dry road."""
-    return identify(dry[1], car, AxleDesign.for_vehicle(car)).freeze(11.9)
+    return identify(dry[1], car, AxleIdentifier.for_vehicle(car)).freeze(11.9)
 
 
 @pytest.fixture(scope="session")

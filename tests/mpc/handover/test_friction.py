@@ -39,8 +39,8 @@ def test_a_ladder_is_stretched_exactly(tire, ratio):
 def test_a_network_of_slip_is_stretched_exactly(car, rng):
     method = make_method("integral", car)
     method = replace(method, network=Network(inputs=("v_y", "r", "delta_f")))
-    carried = dict(W=rng.normal(size=(2, 10)), V=rng.normal(size=(10, 3)))
-    tire, alpha = prediction_tire(method.frozen(car, carried)), np.linspace(-0.02, 0.02, 9)
+    state = dict(W=rng.normal(size=(2, 10)), V=rng.normal(size=(10, 3)))
+    tire, alpha = prediction_tire(method.frozen(car, state)), np.linspace(-0.02, 0.02, 9)
     told = steady_force(at_friction(tire, 0.5), 0.5 * alpha)
     v_y = [-20.0 * np.tan(0.5 * a) for a in alpha], [-20.0 * np.tan(a) for a in alpha]
     np.testing.assert_allclose(v_y[0], 0.5 * np.array(v_y[1]), rtol=1e-3)  # nearly similar states

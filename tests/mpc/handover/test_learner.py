@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identifier.axle import AxleDesign
+from identifier.axle import AxleIdentifier
 from identifier.run import OnlineIdentifier
 from models.friction import Friction, FrictionChange
 from mpc.cars import DoubleTrackCar
@@ -23,7 +23,7 @@ SPEED = 27.5  # m/s, 96 % of the limit at friction 0.5
 def drives(car, learnt):
     """The lane change on the linear tire of the data sheet, and learning."""
     friction = Friction(changes=(FrictionChange(scale=0.5, at_place=PLACE),))
-    identifier = OnlineIdentifier(AxleDesign.for_vehicle(car), car, 0.01, learnt)
+    identifier = OnlineIdentifier(AxleIdentifier.for_vehicle(car), car, 0.01, learnt)
     learner = Learner(Supervisor(identifier, prediction_tire(learnt)))
     found = []
     for tire, beside in ((prediction_tire(car), None), (prediction_tire(learnt), learner)):
@@ -83,6 +83,6 @@ def test_a_preview_changes_nothing_and_tells_the_plan(car, learnt):
 
 
 def test_jumps_must_be_positive(car, learnt):
-    identifier = OnlineIdentifier(AxleDesign.for_vehicle(car), car, 0.01, learnt)
+    identifier = OnlineIdentifier(AxleIdentifier.for_vehicle(car), car, 0.01, learnt)
     with pytest.raises(ValueError, match="jumps must be positive"):
         Learner(Supervisor(identifier, prediction_tire(learnt)), quick_jump=0.0)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.axle import AxleDesign
+from identifier.axle import AxleIdentifier
 from identifier.methods import make_method
 from identifier.paper.network import Network
 from identifier.run import OnlineIdentifier
@@ -20,7 +20,7 @@ from tests.mpc.handover.conftest import DROP, drive, samples_of
 
 
 def supervisor_of(car, start=None, *, in_use=None, rules=None):
-    identifier = OnlineIdentifier(AxleDesign.for_vehicle(car), car, 0.01, start)
+    identifier = OnlineIdentifier(AxleIdentifier.for_vehicle(car), car, 0.01, start)
     in_use = prediction_tire(identifier.model()) if in_use is None else in_use
     return Supervisor(identifier, in_use, rules, proven=start is not None)
 

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.axle import AxleDesign, AxleModel
+from identifier.axle import AxleIdentifier, AxleModel
 from models.recordings import Recording
 from mpc.prediction import N_CAR, build_dynamics
 from mpc.tires import prediction_tire
@@ -14,7 +14,7 @@ W = np.array([[0.05, 0.5, 0.5, -0.15], [0.02, 0.6, 0.6, -0.2]])
 
 
 def axle_model(car, *, compliance=(0.05, 0.06), sway=(0.0, 0.0), offset=(0.0, 0.0), weights=W):
-    design, n = AxleDesign.for_vehicle(car), weights.shape[1]
+    design, n = AxleIdentifier.for_vehicle(car), weights.shape[1]
     return AxleModel(
         vehicle=car,
         ladder=design.ladder,

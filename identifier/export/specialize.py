@@ -9,15 +9,16 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from codegen.tuned import Tuned, tuned
-from identifier.axle import AxleDesign
+from identifier.axle import AxleIdentifier
 from identifier.baselines import StiffnessRls
-from identifier.method import FrozenModel, Method, Setup
-from identifier.paper.design import Design
+from identifier.method import Method, Setup
+from identifier.paper.design import PaperIdentifier
 from identifier.refused import GATE, SampleLimits, judges_samples
-from identifier.regression import RegressionDesign
+from identifier.regression import RegressionIdentifier
+from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
@@ -121,19 +122,17 @@ def describe(method: Method, port: str, size: int) -> Signal:
     port : name of an output or of a carried port.
     size : number of entries.
     """
-    curves = isinstance(method, AxleDesign)
+    curves = isinstance(method, AxleIdentifier)
     known = {**PORTS, **AXLE_PORTS} if curves else PORTS
     unit, description = known.get(port, ("-", "state of the method"))
     rule = (AXLE_RULES if curves else RULES).get(port, "")
     return Signal(port, unit.replace("U", force_unit_text(method)), description, size, rule)
 
 
-Array = NDArray[np.float64]
-
 SAMPLED = ("x", "u", "v_x")
 
 
-class FoldedStep(NamedTuple):
+class SpecializedStep(NamedTuple):
     """A step without constants, where it starts, and what its ports mean.
 
     name : C identifier, prefix of everything that is exported.
@@ -145,7 +144,7 @@ class FoldedStep(NamedTuple):
     learnt : carried ports that hold their values while adaptation is off; empty: it cannot be.
     inputs : the five scalars v_x, v_y, r, delta_f, delta_r.
     outputs : axle_force and what else the step tells.
-    carried : units of the carried ports.
+    state : units of the carried ports.
     dt : sampling interval [s].   min_speed : [m/s], below it forces read zero.
     rests_first : whether a run begins with one step at v_x = 0 of its first sample, in which the
         observer takes the measurement.
@@ -163,7 +162,7 @@ class FoldedStep(NamedTuple):
     learnt: tuple[str, ...]
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
-    carried: tuple[Signal, ...]
+    state: tuple[Signal, ...]
     dt: float
     min_speed: float
     rests_first: bool
@@ -180,11 +179,11 @@ def learnt_ports(method: Method, carry: Mapping[str, Array]) -> tuple[str, ...]:
     carry : its carried ports.
     """
     match method:
-        case Design():
+        case PaperIdentifier():
             moving = {"W", "V"}
-        case AxleDesign():
+        case AxleIdentifier():
             moving = {"W", "own", "UD", "errors", "excitation", "watch", "kept"}
-        case RegressionDesign():
+        case RegressionIdentifier():
             moving = set(carry) - {"target_lag", "regressor_lag", "fresh"}
         case StiffnessRls():
             moving = {"stiffness", "information"}
@@ -193,9 +192,9 @@ def learnt_ports(method: Method, carry: Mapping[str, Array]) -> tuple[str, ...]:
     return tuple(port for port in carry if port in moving)
 
 
-def fold(
-    method: Method, vehicle: Vehicle, start: FrozenModel | None = None, name: str = "tireid"
-) -> FoldedStep:
+def specialize(
+    method: Method, vehicle: Vehicle, start: TireModel | None = None, name: str = "tireid"
+) -> SpecializedStep:
     """Return the step of a method for a car, ready to be exported.
 
     Parameters
@@ -213,9 +212,9 @@ def fold(
     setup = method.setup(vehicle, _standing(method.dt), start)
     moved = method.setup(vehicle, _standing(method.dt, x=1.0), start)
     step = setup.scan.step
-    parts = _folded(setup, name)
+    parts = _specialized(setup, name)
     told = sorted(setup.scan.outputs, key=lambda port: port != "axle_force")
-    return FoldedStep(
+    return SpecializedStep(
         name=name,
         method=method,
         vehicle=vehicle,
@@ -225,7 +224,7 @@ def fold(
         learnt=learnt_ports(method, setup.carry),
         inputs=INPUTS,
         outputs=tuple(describe(method, port, step.numel_out(port)) for port in told),
-        carried=tuple(describe(method, port, value.size) for port, value in setup.carry.items()),
+        state=tuple(describe(method, port, value.size) for port, value in setup.carry.items()),
         dt=method.dt,
         min_speed=method.min_speed,
         rests_first=any(
@@ -236,7 +235,7 @@ def fold(
     )
 
 
-def _folded(setup: Setup, name: str) -> Tuned:
+def _specialized(setup: Setup, name: str) -> Tuned:
     step, carry = setup.scan.step, list(setup.carry)
     ports = {port: ca.SX.sym(port, *step.size_in(port)) for port in carry}
     ports |= {"x": ca.SX.sym("x", 2), "u": ca.SX.sym("u", 2), "v_x": ca.SX.sym("v_x")}

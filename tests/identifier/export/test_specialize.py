@@ -5,8 +5,8 @@ import pytest
 
 from codegen import Scan
 from identifier.export.compiled import samples_of
-from identifier.export.fold import FoldedStep, fold
 from identifier.export.package import run_in_virtual_machine, synthetic_samples
+from identifier.export.specialize import SpecializedStep, specialize
 from identifier.methods import METHODS, make_method
 from identifier.run import identify
 from models.vehicle import sedan
@@ -14,12 +14,12 @@ from models.vehicle import sedan
 CAR = sedan()
 
 
-def run_folded(folded: FoldedStep, recording):
-    scan = Scan(folded.function, carry=tuple(folded.carry), over=("x", "u", "v_x"))
-    carry = dict(folded.carry)
-    if folded.rests_first:
+def run_folded(specialized: SpecializedStep, recording):
+    scan = Scan(specialized.function, carry=tuple(specialized.carry), over=("x", "u", "v_x"))
+    carry = dict(specialized.carry)
+    if specialized.rests_first:
         names = list(carry)
-        rested = folded.function(*carry.values(), recording.x[0], recording.u[0], 0.0)
+        rested = specialized.function(*carry.values(), recording.x[0], recording.u[0], 0.0)
         carry = dict(zip(names, map(np.array, rested[: len(names)]), strict=True))
     signals = {"x": recording.x, "u": recording.u, "v_x": recording.v_x}
     return scan(recording.t.size, {**carry, **signals})["axle_force"]
@@ -28,76 +28,76 @@ def run_folded(folded: FoldedStep, recording):
 @pytest.mark.parametrize("law", [law for law in METHODS if law != "concurrent"])
 def test_the_folded_step_is_the_method_up_to_rounding(law, slalom):
     method = make_method(law, CAR)
-    folded = fold(method, CAR)
+    specialized = specialize(method, CAR)
     expected = identify(slalom, CAR, method).axle_force
-    error = np.abs(run_folded(folded, slalom) - expected).max()
+    error = np.abs(run_folded(specialized, slalom) - expected).max()
     assert error <= 1e-6  # N, of 5000; the tires' own sin, cos and exp are far from exact
 
 
 def test_a_forgotten_constant_would_be_noticed(slalom):
     other = make_method("integral", CAR, seed=1)
     expected = identify(slalom, CAR, make_method("integral", CAR)).axle_force
-    assert np.abs(run_folded(fold(other, CAR), slalom) - expected).max() > 1.0
+    assert np.abs(run_folded(specialize(other, CAR), slalom) - expected).max() > 1.0
 
 
 def test_a_run_starts_with_weights_that_were_learnt(slalom):
     method = make_method("integral", CAR)
     model = identify(slalom, CAR, method).freeze(40.0)
-    np.testing.assert_array_equal(fold(method, CAR, model).carry["W"], model.weights.W)
+    np.testing.assert_array_equal(specialize(method, CAR, model).carry["W"], model.weights.W)
 
 
 def test_the_paper_s_step_takes_fewer_operations_than_it_was_written_in():
-    folded = fold(make_method("integral", CAR), CAR)
-    assert folded.parts.where_true.n_instructions() < 1300
-    assert folded.parts.where_false.n_instructions() < 200
+    specialized = specialize(make_method("integral", CAR), CAR)
+    assert specialized.parts.where_true.n_instructions() < 1300
+    assert specialized.parts.where_false.n_instructions() < 200
 
 
 def test_observers_begin_with_the_first_measurement_filters_do_not():
-    assert fold(make_method("integral", CAR), CAR).rests_first
-    assert not fold(make_method("axle", CAR), CAR).rests_first
-    assert not fold(make_method("rls", CAR), CAR).rests_first
+    assert specialize(make_method("integral", CAR), CAR).rests_first
+    assert not specialize(make_method("axle", CAR), CAR).rests_first
+    assert not specialize(make_method("rls", CAR), CAR).rests_first
 
 
 def test_what_is_learnt_is_told_apart_from_filters():
-    assert fold(make_method("integral", CAR), CAR).learnt == ("W", "V")
-    assert "filters" not in fold(make_method("axle", CAR), CAR).learnt
-    assert {"W", "P"} <= set(fold(make_method("rls", CAR), CAR).learnt)
-    assert fold(make_method("eso", CAR), CAR).learnt == ()
+    assert specialize(make_method("integral", CAR), CAR).learnt == ("W", "V")
+    assert "filters" not in specialize(make_method("axle", CAR), CAR).learnt
+    assert {"W", "P"} <= set(specialize(make_method("rls", CAR), CAR).learnt)
+    assert specialize(make_method("eso", CAR), CAR).learnt == ()
 
 
 @pytest.mark.parametrize("law", ["integral", "axle", "rls", "eso", "ekf_force"])
 def test_every_port_has_a_unit_and_words(law):
-    folded = fold(make_method(law, CAR), CAR)
-    assert [signal.name for signal in folded.carried] == list(folded.carry)
-    for signal in (*folded.inputs, *folded.outputs, *folded.carried):
+    specialized = specialize(make_method(law, CAR), CAR)
+    assert [signal.name for signal in specialized.state] == list(specialized.carry)
+    for signal in (*specialized.inputs, *specialized.outputs, *specialized.state):
         assert signal.unit
         assert signal.description
-    assert folded.outputs[0].name == "axle_force"
+    assert specialized.outputs[0].name == "axle_force"
 
 
 def test_synthetic_samples_rest_drive_and_rest_again():
-    folded = fold(make_method("integral", CAR), CAR)
-    samples = synthetic_samples(folded)
-    resting = samples[:, 0] < folded.min_speed
+    specialized = specialize(make_method("integral", CAR), CAR)
+    samples = synthetic_samples(specialized)
+    resting = samples[:, 0] < specialized.min_speed
     assert resting[0]
     assert resting[len(samples) // 2]
     assert (~resting).sum() > 150
-    outputs, _ = run_in_virtual_machine(folded, samples)
+    outputs, _ = run_in_virtual_machine(specialized, samples)
     assert (outputs[resting, :2] == 0.0).all()
     assert np.abs(outputs[~resting, :2]).max() > 500.0
 
 
 def test_samples_are_in_the_order_of_the_inputs(slalom):
     rows = samples_of(slalom)
-    folded = fold(make_method("integral", CAR), CAR)
-    for column, signal in zip(rows.T, folded.inputs, strict=True):
+    specialized = specialize(make_method("integral", CAR), CAR)
+    for column, signal in zip(rows.T, specialized.inputs, strict=True):
         np.testing.assert_array_equal(column, getattr(slalom, signal.name))
 
 
 def test_the_self_test_starts_at_rest_and_turns_to_both_sides_at_many_speeds():
-    folded = fold(make_method("integral", CAR), CAR)
-    v_x, *signals = synthetic_samples(folded).T
-    n, lowest = v_x.size, folded.min_speed
+    specialized = specialize(make_method("integral", CAR), CAR)
+    v_x, *signals = synthetic_samples(specialized).T
+    n, lowest = v_x.size, specialized.min_speed
     assert v_x[0] == 0.0 and v_x[n // 2] < lowest, "it rests at the start, and once more"
     assert v_x.max() == pytest.approx(15.0 * lowest)
     fast = v_x > lowest
@@ -108,7 +108,7 @@ def test_the_self_test_starts_at_rest_and_turns_to_both_sides_at_many_speeds():
 
 
 def test_the_self_test_begins_gently_and_grows():
-    r = synthetic_samples(fold(make_method("integral", CAR), CAR))[:, 2]
+    r = synthetic_samples(specialize(make_method("integral", CAR), CAR))[:, 2]
     first, middle, last = (np.abs(part).max() for part in np.array_split(r, 3))
     assert first < 0.8 * middle and middle < 1.3 * last
     assert np.abs(r[: r.size // 20]).max() < 0.2 * last
