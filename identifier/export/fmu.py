@@ -388,7 +388,8 @@ def build_description(specialized: SpecializedStep, sources: Sequence[str]) -> s
 def _sentence(specialized: SpecializedStep) -> str:
     return (
         f"Lateral tire forces of a car, identified while it drives, every {specialized.dt:g} s. "
-        "Outputs are those of the last sample; slip angles inside have the sign in which F_y = +C alpha."
+        "Outputs are those of the last sample; slip angles inside have the sign in which "
+        "F_y = +C alpha."
     )
 
 
