@@ -58,7 +58,8 @@ def onnx_mutated(rng: random.Random, data: bytes) -> bytes:
             if part:
                 del part[rng.randrange(len(part))]
         case _:
-            _change_shape(rng, rng.choice((graph.input, graph.output))[0])
+            ports = [*graph.input[:1], *graph.output[:1]]  # one may be gone by now
+            _change_shape(rng, rng.choice(ports))
     content: bytes = model.SerializeToString()
     return content
 

@@ -86,8 +86,19 @@ class AxleModel(TireModel):
                 f"W must be static axle loads below {LARGEST_WEIGHT:g}, it reaches "
                 f"{np.abs(self.W).max():g}"
             )
-        if (self.own[:, 0] < 0.0).any():
-            raise ValueError(f"compliance must not be negative, it is {self.own[:, 0]}")
+        self._require_possible()
+
+    def _require_possible(self) -> None:
+        """Refuse a lag, a share or an offset that no car has."""
+        car, at_most = self.vehicle, self.plausibility
+        for name, value, low, high in (
+            ("compliance [m]", self.own[:, 0], 0.0, car.wheelbase),
+            ("sway share", self.own[:, 1], 0.0, 1.0),
+            ("steering offset [rad]", self.own[0, 2], -at_most.max_steering, at_most.max_steering),
+            ("bias of v_y [m/s]", self.own[1, 2], -at_most.slow, at_most.slow),
+        ):
+            if not (np.less_equal(low, value).all() and np.less_equal(value, high).all()):
+                raise ValueError(f"{name} must be within {low:g} and {high:g}, it is {value}")
 
     @property
     def min_speed(self) -> float:

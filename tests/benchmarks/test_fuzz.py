@@ -126,6 +126,19 @@ def test_what_is_planted_behind_a_door_is_found(session, monkeypatch, fault):
     assert kinds(session) == [PLANTED[fault]]
 
 
+def test_a_car_may_be_called_nan(session, monkeypatch):
+    def names(options):
+        print("of the car nan")
+
+    monkeypatch.setattr(tireid.commands.check, "run", names)
+    assert kinds(session) == ["not finite"]
+    text = session.seeds["car.toml"].decode()
+    renamed = text.replace('name = "sedan"', 'name = "nan"')
+    assert renamed != text
+    session.seeds["car.toml"] = renamed.encode()
+    assert kinds(session) == []
+
+
 def test_a_command_that_tells_how_far_it_came_does_not_hang(session, monkeypatch):
     def works(options):
         while True:

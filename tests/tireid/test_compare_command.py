@@ -6,10 +6,12 @@ import json
 import numpy as np
 import pytest
 
+from identifier.compare.course import INFINITE, Shares
 from identifier.methods import METHODS
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tireid.cli import main
+from tireid.commands import compare_results
 from tireid.commands.compare_results import ERROR_COLUMNS, SWEEP_COLUMNS
 from tireid.figures.compare import short_names
 
@@ -230,3 +232,10 @@ def test_the_registry_has_every_name_that_is_promised():
 def test_runs_of_one_file_are_named_by_the_run_alone():
     assert short_names(["log:a", "log:b"]) == {"log:a": "a", "log:b": "b"}
     assert short_names(["log:a", "other:a"]) == {"log:a": "log:a", "other:a": "other:a"}
+
+
+def test_what_diverged_is_null_in_the_file_and_not_infinite():
+    diverged = compare_results._percent(Shares(np.inf, np.inf, None))
+    assert diverged == {"online": None, "in_sample": None, "other": None}
+    assert compare_results._axles(INFINITE) == {"front": None, "rear": None}
+    assert compare_results._percent(Shares(5.0, 6.0, None))["in_sample"] == 6.0

@@ -8,6 +8,7 @@ Errors are {"front", "rear"} in N; null stands for what diverged or is not there
 """
 
 import csv
+import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -274,14 +275,19 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
 
 
 def _percent(found: Shares) -> dict[str, float | None]:
-    return found._asdict()
+    return {name: _finite(share) for name, share in found._asdict().items()}
 
 
-def _axles(error: AxleRmse) -> dict[str, float]:
-    return {"front": error.front, "rear": error.rear}
+def _axles(error: AxleRmse) -> dict[str, float | None]:
+    return {"front": _finite(error.front), "rear": _finite(error.rear)}
 
 
-def _pairs(frozen: Frozen) -> dict[str, dict[str, dict[str, float]]]:
+def _finite(error: float | None) -> float | None:
+    """Return an error; None where a law that diverged has an infinite one."""
+    return error if error is not None and math.isfinite(error) else None
+
+
+def _pairs(frozen: Frozen) -> dict[str, dict[str, dict[str, float | None]]]:
     return {
         learnt: {name: _axles(error) for name, error in replays.items()}
         for learnt, replays in frozen.items()
