@@ -8,7 +8,6 @@ that no name breaks a line, rings a bell or hides what follows it.
 
 import html as standard_html
 import unicodedata
-from xml.sax.saxutils import quoteattr
 
 MARKDOWN = frozenset("\\`*_{}[]<>#|~!&$@")  # what means something inside a paragraph or a table
 
@@ -76,16 +75,6 @@ def markdown(text: str) -> str:
     """
     shown = visible(text)
     return "".join(f"&#{ord(one)};" if one in MARKDOWN else one for one in shown)
-
-
-def xml_attribute(text: str) -> str:
-    """Return text as the value of an XML attribute, with its quotes.
-
-    Parameters
-    ----------
-    text : any.
-    """
-    return quoteattr(visible(text))
 
 
 def html(text: str) -> str:

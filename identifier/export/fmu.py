@@ -12,10 +12,11 @@ from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path, PurePosixPath
 from typing import Literal, NamedTuple
+from xml.etree.ElementTree import Element, indent, tostring
 
 from codegen import CompilationError, find_compiler
 from codegen.compiler import KEEP_GUARDS
-from codegen.escape import xml_attribute
+from codegen.escape import visible
 from identifier.export.c_source import c_sources
 from identifier.export.package import ingredients, summary
 from identifier.export.specialize import SpecializedStep
@@ -230,34 +231,39 @@ def _constant(reference: int, name: str, unit: str, value: float, description: s
     )
 
 
-# XML as text: elements with attributes in the order in which they are given.
+# XML: elements with attributes in the order in which they are given.
 
 DECLARATION = '<?xml version="1.0" encoding="UTF-8"?>\n'
 
 
-def element(tag: str, attributes: dict[str, object], *children: str) -> str:
-    """Return an element; attributes that are empty strings or None are left out.
+def element(tag: str, attributes: Mapping[str, object], *children: Element) -> Element:
+    """Return an element; attributes that are empty strings are left out.
 
     Parameters
     ----------
     tag : its name.
     attributes : by name; True and False become true and false.
-    children : elements inside, one a line.
+    children : elements inside.
     """
-    words = [
-        f"{name}={xml_attribute(_text(value))}"
-        for name, value in attributes.items()
-        if value is not None and value != ""
-    ]
-    head = " ".join([tag, *words])
-    if not children:
-        return f"<{head}/>"
-    inside = "\n".join(f"  {line}" for child in children for line in child.splitlines())
-    return f"<{head}>\n{inside}\n</{tag}>"
+    words = {name: _text(value) for name, value in attributes.items() if value != ""}
+    made = Element(tag, words)
+    made.extend(children)
+    return made
+
+
+def document(root: Element) -> str:
+    """Return a whole XML file, indented.
+
+    Parameters
+    ----------
+    root : the outermost element.
+    """
+    indent(root)
+    return f"{DECLARATION}{tostring(root, encoding='unicode')}\n"
 
 
 def _text(value: object) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)
+    return str(value).lower() if isinstance(value, bool) else visible(str(value))
 
 
 # modelDescription.xml of FMI 2.0 and 3.0, and the list of sources for whoever builds it again.
@@ -311,7 +317,7 @@ def description_2(specialized: SpecializedStep, token: str, sources: Sequence[st
             element("InitialUnknowns", {}, *unknowns),
         ),
     )
-    return f"{DECLARATION}{model}\n"
+    return document(model)
 
 
 def description_3(specialized: SpecializedStep, token: str) -> str:
@@ -361,7 +367,7 @@ def description_3(specialized: SpecializedStep, token: str) -> str:
             ),
         ),
     )
-    return f"{DECLARATION}{model}\n"
+    return document(model)
 
 
 def build_description(specialized: SpecializedStep, sources: Sequence[str]) -> str:
@@ -373,7 +379,7 @@ def build_description(specialized: SpecializedStep, sources: Sequence[str]) -> s
     sources : names of the C files.
     """
     files = (element("SourceFile", {"name": name}) for name in sources)
-    text = element(
+    build = element(
         "fmiBuildDescription",
         {"fmiVersion": "3.0"},
         element(
@@ -382,7 +388,7 @@ def build_description(specialized: SpecializedStep, sources: Sequence[str]) -> s
             element("SourceFileSet", {"language": "C99"}, *files),
         ),
     )
-    return f"{DECLARATION}{text}\n"
+    return document(build)
 
 
 def _sentence(specialized: SpecializedStep) -> str:
@@ -393,7 +399,7 @@ def _sentence(specialized: SpecializedStep) -> str:
     )
 
 
-def _units() -> str:
+def _units() -> Element:
     angle = {"rad": ("deg", DEGREES), "rad/s": ("deg/s", DEGREES)}
     units = []
     for name, base in UNITS.items():
@@ -405,13 +411,13 @@ def _units() -> str:
     return element("UnitDefinitions", {}, *units)
 
 
-def _experiment(specialized: SpecializedStep) -> str:
+def _experiment(specialized: SpecializedStep) -> Element:
     return element(
         "DefaultExperiment", {"startTime": 0.0, "stopTime": 10.0, "stepSize": specialized.dt}
     )
 
 
-def _variable_2(variable: Variable) -> str:
+def _variable_2(variable: Variable) -> Element:
     tag = {"real": "Real", "integer": "Integer", "boolean": "Boolean"}[variable.kind]
     return element(
         "ScalarVariable",
@@ -427,7 +433,7 @@ def _variable_2(variable: Variable) -> str:
     )
 
 
-def _variable_3(variable: Variable) -> str:
+def _variable_3(variable: Variable) -> Element:
     tag = {"real": "Float64", "integer": "Int32", "boolean": "Boolean"}[variable.kind]
     return element(
         tag,

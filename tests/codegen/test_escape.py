@@ -2,7 +2,6 @@
 
 import html
 import subprocess
-import xml.etree.ElementTree as ElementTree
 from html.parser import HTMLParser
 from shutil import which
 
@@ -29,7 +28,7 @@ CONTROLS = {chr(code) for code in (*range(0x20), 0x7F, *range(0x80, 0xA0))}
 FUNCTIONS = [
     getattr(escape, name)
     for name in (
-        *("visible", "c_comment", "c_string", "cmake_comment", "markdown", "xml_attribute"),
+        *("visible", "c_comment", "c_string", "cmake_comment", "markdown"),
         *("html", "mathtext", "terminal"),
     )
 ]
@@ -39,7 +38,6 @@ def test_a_name_of_letters_is_left_alone():
     for text in ("sedan", "Audi A3, 2.0 (2019)", "Škoda", "two words"):
         assert {f(text) for f in (escape.visible, escape.c_comment, escape.cmake_comment)} == {text}
         assert {f(text) for f in (escape.markdown, escape.html, escape.terminal)} == {text}
-        assert escape.xml_attribute(text) == f'"{text}"'
 
 
 @pytest.mark.parametrize("function", FUNCTIONS, ids=lambda f: f.__name__)
@@ -125,12 +123,6 @@ def test_markdown_shows_the_words_and_means_nothing():
         got = escape.markdown(text)
         assert html.unescape(got) == escape.visible(text)
         assert not escape.MARKDOWN & set(got.replace("&#", "")), text
-
-
-def test_xml_gives_the_words_back():
-    for text in HOSTILE:
-        node = ElementTree.fromstring(f"<a b={escape.xml_attribute(text)}/>")
-        assert node.attrib == {"b": escape.visible(text)}
 
 
 class Reader(HTMLParser):
