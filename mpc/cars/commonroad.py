@@ -247,11 +247,11 @@ def slip_at_the_axles(parameters: Any) -> Iterator[Callable[[Array], None]]:
     ----------
     parameters : theirs, with the axle distances a and b.
     """
-    from vehiclemodels.utils import prediction_tire
+    from vehiclemodels.utils import tire_model
 
     lacking = [0.0, 0.0]
     names = {"formula_lateral": 0, "formula_longitudinal_comb": 1, "formula_lateral_comb": 1}
-    originals = {name: getattr(prediction_tire, name) for name in names}
+    originals = {name: getattr(tire_model, name) for name in names}
     calls = dict.fromkeys(names, 0)
 
     def wrapped(name: str) -> Callable[..., Any]:
@@ -271,11 +271,11 @@ def slip_at_the_axles(parameters: Any) -> Iterator[Callable[[Array], None]]:
 
     try:
         for name in names:
-            setattr(prediction_tire, name, wrapped(name))
+            setattr(tire_model, name, wrapped(name))
         yield prepare
     finally:
         for name, original in originals.items():
-            setattr(prediction_tire, name, original)
+            setattr(tire_model, name, original)
 
 
 @contextmanager

@@ -29,7 +29,7 @@ def random_coefficients(rng):
 @needs_package
 @pytest.mark.parametrize("case", range(8))
 def test_the_tire_is_that_of_the_package_for_any_coefficients(case):
-    from vehiclemodels.utils import prediction_tire
+    from vehiclemodels.utils import tire_model
 
     from mpc.cars.commonroad import CommonRoadTire
 
@@ -40,11 +40,11 @@ def test_the_tire_is_that_of_the_package_for_any_coefficients(case):
         alpha, kappa = rng.uniform(-0.4, 0.4), rng.uniform(-0.4, 0.4)
         gamma, F_z = rng.choice([-1.0, 1.0]) * rng.uniform(0.02, 0.1), rng.uniform(1e3, 7e3)
         a, s, g = -alpha, -kappa, -gamma
-        F0_x = prediction_tire.formula_longitudinal(s, g, F_z, p)
-        F0_y, mu_y = prediction_tire.formula_lateral(a, g, F_z, p)
+        F0_x = tire_model.formula_longitudinal(s, g, F_z, p)
+        F0_y, mu_y = tire_model.formula_lateral(a, g, F_z, p)
         expected = (
-            prediction_tire.formula_longitudinal_comb(s, a, F0_x, p),
-            prediction_tire.formula_lateral_comb(s, a, g, mu_y, F_z, F0_y, p),
+            tire_model.formula_longitudinal_comb(s, a, F0_x, p),
+            tire_model.formula_lateral_comb(s, a, g, mu_y, F_z, F0_y, p),
         )
         ours = tire.forces(alpha, kappa, gamma, F_z)
         np.testing.assert_allclose((float(ours.F_x), float(ours.F_y)), expected, rtol=2e-3)
@@ -102,18 +102,18 @@ def test_the_friction_under_a_car_is_that_of_its_time_or_place():
 @needs_package
 def test_a_tire_slips_by_the_velocity_of_its_axle(monkeypatch):
     """Front pair, then rear pair: each is told what its axle moves sideways beside the body."""
-    from vehiclemodels.utils import prediction_tire
+    from vehiclemodels.utils import tire_model
 
     from mpc.cars.commonroad import V_X, V_Y, V_Y_FRONT, V_Y_REAR, YAW_RATE
     from mpc.cars.commonroad import slip_at_the_axles as at_the_axles
 
     seen = []
-    monkeypatch.setattr(prediction_tire, "formula_lateral", lambda alpha, *_: seen.append(alpha))
+    monkeypatch.setattr(tire_model, "formula_lateral", lambda alpha, *_: seen.append(alpha))
     x, car = np.zeros(29), SimpleNamespace(a=1.2, b=1.6)
     x[[V_X, V_Y, YAW_RATE]] = 20.0, 0.5, 0.3
     x[V_Y_FRONT], x[V_Y_REAR] = 0.5 + 1.2 * 0.3 + 0.04, 0.5 - 1.6 * 0.3 - 0.06
     with at_the_axles(car) as prepare:
         prepare(x)
         for _ in range(4):
-            prediction_tire.formula_lateral(0.1)
+            tire_model.formula_lateral(0.1)
     assert seen == pytest.approx([0.1 + 0.002] * 2 + [0.1 - 0.003] * 2)
