@@ -7,7 +7,8 @@ import numpy as np
 from codegen.arrays import Array
 from models.maneuvers import Maneuver
 from models.plant import Driver
-from mpc.cars.commonroad import ROLL, V_X, YAW_RATE, MultiBody, runge_kutta_step
+from mpc.cars.bmw_equations import ROLL, V_X, YAW_RATE, MultiBody
+from mpc.cars.commonroad import runge_kutta_step
 
 
 def drive(

@@ -6,7 +6,7 @@ drives step steers and a slalom with both at 20 m/s on dry and on slippery road,
 and writes the figure OUT/plant_against_commonroad.png. The multi-body car has 29 states and its own
 authors; both get the same parameters (its BMW 320i), tires, steering and speed controller.
 The first table is against the program as published, the second with its two contradictions removed
-(see `mpc.cars.commonroad`): what remains is the difference of the models.
+(see `mpc.cars.bmw_equations`): what remains is the difference of the models.
 The lateral velocity passes through zero near this speed, so that its error in percent of its own
 rms says little; the table gives it as an angle of side slip too. It does not decide about passing.
 Targets: steady values against either, transients against the repaired program.
@@ -26,7 +26,8 @@ from codegen.arrays import Array
 from models.friction import Friction
 from models.maneuvers import Maneuver, Slalom, StepSteer
 from models.plant import Driver, Plant
-from mpc.cars.commonroad import CommonRoadTire, MultiBody, bmw, bmw_320i, bmw_parameters
+from mpc.cars.bmw import CommonRoadTire, bmw, bmw_320i, bmw_parameters
+from mpc.cars.bmw_equations import MultiBody
 
 SPEED = 20.0  # [m/s]
 ONSET = 0.5  # [s]

@@ -227,7 +227,7 @@ def make_setup(
     else:
         if vehicle is not None:
             raise ValueError(f"--plant {plant} brings a car of its own: give no --vehicle with it")
-        from mpc.cars.commonroad import bmw
+        from mpc.cars.bmw import bmw
 
         car = bmw()
     return Setup(path=path, vehicle=car, plant=plant, mu=mu, drops=ordered, wish=wish)

@@ -8,7 +8,8 @@ import pytest
 
 from models.friction import Friction, FrictionChange
 from models.plant import Driver
-from mpc.cars.commonroad import CommonRoadError, MissingCommonRoadError, drift_car, multi_body_car
+from mpc.cars.bmw import MissingCommonRoadError
+from mpc.cars.commonroad import CommonRoadError, drift_car, multi_body_car
 
 needs_package = pytest.mark.skipif(
     importlib.util.find_spec("vehiclemodels") is None,

@@ -8,7 +8,8 @@ import pytest
 
 from models.friction import Friction, FrictionChange
 from models.vehicle import sedan
-from mpc.cars.commonroad import axle_force, friction_at
+from mpc.cars.bmw_equations import axle_force
+from mpc.cars.commonroad import friction_at
 
 needs_package = pytest.mark.skipif(
     importlib.util.find_spec("vehiclemodels") is None,
@@ -18,7 +19,7 @@ needs_package = pytest.mark.skipif(
 
 def random_coefficients(rng):
     """The tire of the package with every coefficient awake."""
-    from mpc.cars.commonroad import bmw_tire
+    from mpc.cars.bmw import bmw_tire
 
     return {
         name: value * rng.uniform(0.8, 1.2) + (0.02 * rng.normal() if abs(value) < 0.05 else 0.0)
@@ -31,7 +32,7 @@ def random_coefficients(rng):
 def test_the_tire_is_that_of_the_package_for_any_coefficients(case):
     from vehiclemodels.utils import tire_model
 
-    from mpc.cars.commonroad import CommonRoadTire
+    from mpc.cars.bmw import CommonRoadTire
 
     rng = np.random.default_rng(case)
     coefficients = random_coefficients(rng)
@@ -52,7 +53,7 @@ def test_the_tire_is_that_of_the_package_for_any_coefficients(case):
 
 @needs_package
 def test_its_stiffnesses_are_its_slopes_at_zero():
-    from mpc.cars.commonroad import CommonRoadTire
+    from mpc.cars.bmw import CommonRoadTire
 
     tire, h = CommonRoadTire.read(), 1e-5
     for F_z in (2000.0, 5000.0):
@@ -64,7 +65,7 @@ def test_its_stiffnesses_are_its_slopes_at_zero():
 
 @needs_package
 def test_the_repair_moves_unsprung_mass_until_both_axles_balance():
-    from mpc.cars.commonroad import bmw_parameters
+    from mpc.cars.bmw import bmw_parameters
 
     plain, repaired = bmw_parameters(), bmw_parameters(repaired=True)
     assert repaired.m_uf + repaired.m_ur == pytest.approx(plain.m_uf + plain.m_ur)
@@ -74,7 +75,7 @@ def test_the_repair_moves_unsprung_mass_until_both_axles_balance():
 
 @needs_package
 def test_friction_scales_both_directions_of_a_parameter_set():
-    from mpc.cars.commonroad import bmw_parameters, bmw_tire
+    from mpc.cars.bmw import bmw_parameters, bmw_tire
 
     slippery, tire = bmw_parameters(0.4).tire, bmw_tire()
     assert slippery.p_dx1 == pytest.approx(0.4 * tire["p_dx1"])
@@ -104,8 +105,8 @@ def test_a_tire_slips_by_the_velocity_of_its_axle(monkeypatch):
     """Front pair, then rear pair: each is told what its axle moves sideways beside the body."""
     from vehiclemodels.utils import tire_model
 
-    from mpc.cars.commonroad import V_X, V_Y, V_Y_FRONT, V_Y_REAR, YAW_RATE
-    from mpc.cars.commonroad import slip_at_the_axles as at_the_axles
+    from mpc.cars.bmw_equations import V_X, V_Y, V_Y_FRONT, V_Y_REAR, YAW_RATE
+    from mpc.cars.bmw_equations import slip_at_the_axles as at_the_axles
 
     seen = []
     monkeypatch.setattr(tire_model, "formula_lateral", lambda alpha, *_: seen.append(alpha))
