@@ -1,4 +1,4 @@
-"""Public docstrings document the parameters that there are, no more and no less."""
+"""Public docstrings document parameters that there are, and say what arrays hold."""
 
 import ast
 import re
@@ -10,19 +10,22 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("codegen", "models", "identifier", "mpc", "tireid")
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 Documented = ast.FunctionDef | ast.ClassDef
+# (n, 2), [rad]; or the words that send to where it is said: "as `errors` takes them".
+SHAPE_OR_UNIT = r"\(.*\)|\[.+\]|`\w[\w.]*`"
 
 
-def documented_parameters(docstring: str) -> list[str] | None:
-    """Names under "Parameters" of a numpy-style docstring, None where there is no such section."""
+def documented_parameters(docstring: str) -> dict[str, str]:
+    """What is said under "Parameters" of a numpy-style docstring, by name in order."""
     found = re.search(r"^Parameters\n-+\n(.*?)(?=^\w[^\n]*\n-+\n|\Z)", docstring, re.M | re.S)
-    if not found:
-        return None
-    names = []
-    for line in found.group(1).splitlines():
-        head = re.match(r"^([\w*]+(?:, [\w*]+)*) : ", line)
+    said: dict[str, str] = {}
+    names: list[str] = []
+    for line in found.group(1).splitlines() if found else []:
+        head = re.match(r"^([\w*]+(?:, [\w*]+)*) : (.*)", line)
         if head:
-            names += [name.lstrip("*") for name in head.group(1).split(", ")]
-    return names
+            names = [name.lstrip("*") for name in head.group(1).split(", ")]
+        for name in names:
+            said[name] = said.get(name, "") + (head.group(2) if head else line)
+    return said
 
 
 def fields(node: ast.ClassDef) -> list[ast.AnnAssign]:
@@ -39,31 +42,29 @@ def is_method(node: ast.FunctionDef) -> bool:
     return bool(arguments) and (arguments[0].arg == "self" or bool(bound))
 
 
-def optional_fields(node: Documented) -> set[str]:
-    """Fields of a record that have a default: a long record may leave them undocumented."""
-    if not isinstance(node, ast.ClassDef):
-        return set()
-    return {item.target.id for item in fields(node) if item.value is not None}
-
-
-def actual_parameters(node: Documented) -> list[str]:
-    """Arguments of a function, or fields (else arguments of __init__) of a class."""
+def actual_parameters(node: Documented) -> dict[str, str]:
+    """Annotations of arguments of a function, or fields (else arguments of __init__) of a class."""
     if isinstance(node, ast.ClassDef):
         for item in node.body:
             if isinstance(item, ast.FunctionDef) and item.name == "__init__":
                 return actual_parameters(item)
-        return [item.target.id for item in fields(node)]
+        return {item.target.id: ast.unparse(item.annotation) for item in fields(node)}
     arguments = node.args
     listed = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
     extra = [a for a in (arguments.vararg, arguments.kwarg) if a]
-    return [a.arg for a in (*listed, *extra)][is_method(node) :]
+    shown = [*listed, *extra][is_method(node) :]
+    return {a.arg: ast.unparse(a.annotation) if a.annotation else "" for a in shown}
 
 
-def needs_parameters(node: Documented) -> bool:
-    """Whether a section "Parameters" is due: a tuple with names may describe them in prose."""
-    if isinstance(node, ast.FunctionDef):
-        return True
-    return any("dataclass" in ast.unparse(decorator) for decorator in node.decorator_list)
+def describes_itself(node: Documented) -> bool:
+    """Whether a class is a tuple with names, or a protocol: prose describes its fields."""
+    return isinstance(node, ast.ClassDef) and bool(
+        {ast.unparse(base) for base in node.bases} & {"NamedTuple", "Protocol"}
+    )
+
+
+def is_array(annotation: str) -> bool:
+    return bool({"Array", "ArrayLike"} & set(annotation.split(" | ")))
 
 
 def is_overload(node: Documented) -> bool:
@@ -87,6 +88,10 @@ def public_definitions(source: str) -> list[Documented]:
 
 
 def complaints(source: str) -> list[str]:
+    """Drift between docstrings and signatures, and arrays of which no shape or unit is said.
+
+    A parameter whose name and type say what it is needs no entry.
+    """
     wrong = []
     for node in public_definitions(source):
         docstring = ast.get_docstring(node)
@@ -94,14 +99,16 @@ def complaints(source: str) -> list[str]:
             wrong.append(f"{node.name} has no docstring")
             continue
         documented, actual = documented_parameters(docstring), actual_parameters(node)
-        if documented is None:
-            if actual and needs_parameters(node):
-                wrong.append(f"{node.name} documents none of its parameters {actual}")
-        elif documented != actual:
-            optional = optional_fields(node)
-            if documented == [name for name in actual if name not in optional]:
-                continue
-            wrong.append(f"{node.name} documents {documented}, its parameters are {actual}")
+        if list(documented) != [name for name in actual if name in documented]:
+            wrong.append(
+                f"{node.name} documents {list(documented)}, its parameters are {list(actual)}"
+            )
+        wrong += [
+            f"{node.name} says neither the shape nor the unit of {name}"
+            for name, annotation in actual.items()
+            if is_array(annotation) and not describes_itself(node)
+            if not re.search(SHAPE_OR_UNIT, documented.get(name, ""))
+        ]
     return wrong
 
 
@@ -126,17 +133,35 @@ def area(width, height):
     depth : of the thing [m].
     """
 
+def ratio(above: float, below: float):
+    """Return the ratio.
+
+    Parameters
+    ----------
+    below : not zero [-].
+    above : of any sign [-].
+    """
+
 def silent():
     pass
 
-def volume(width):
-    """Return the volume."""
+def volume(width: float, samples: Array, weights: ArrayLike | None):
+    """Return the volume.
+
+    Parameters
+    ----------
+    samples : what was
+        measured.
+    weights : of the samples
+        (n,) [kg].
+    """
 
 @dataclass(frozen=True)
 class Box:
     """A box."""
 
     width: float
+    corners: Array
 
     def scaled(self, factor):
         """Return a larger box."""
@@ -145,14 +170,14 @@ class Corner(NamedTuple):
     """A corner, x and y [m]."""
 
     x: float
-    y: float
+    y: Array
 '''
     assert complaints(source) == [
         "area documents ['width', 'depth'], its parameters are ['width', 'height']",
+        "ratio documents ['below', 'above'], its parameters are ['above', 'below']",
         "silent has no docstring",
-        "volume documents none of its parameters ['width']",
-        "Box documents none of its parameters ['width']",
-        "scaled documents none of its parameters ['factor']",
+        "volume says neither the shape nor the unit of samples",
+        "Box says neither the shape nor the unit of corners",
     ]
 
 

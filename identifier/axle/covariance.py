@@ -73,7 +73,7 @@ def unpacked(packed: Array, q: int) -> Array:
 
     Parameters
     ----------
-    packed : D on the diagonal, U above it, by rows.
+    packed : D on the diagonal, U above it, by rows, (2, q (q + 1)/2).
     q : size of the matrices.
     """
     F = np.zeros((2, q, q))

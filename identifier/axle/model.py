@@ -43,7 +43,7 @@ class AxleModel(TireModel):
     W : weights [static axle loads], (2, n).
     own : [compliance [m per load], sway share [-], offset ([rad] front, [m/s] rear)], (2, 3).
     covariance : of [W, own], (2, n + 3, n + 3).
-    prior_covariance : the same before the first sample.
+    prior_covariance : `covariance` before the first sample.
     excitation : largest slip [rad], then time of learning above each of `EDGES` [s], (2, 9).
 
     Raises

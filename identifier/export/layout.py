@@ -129,7 +129,7 @@ def initializer(value: Array, dimensions: tuple[int, ...], prefix: str) -> str:
 
     Parameters
     ----------
-    value : the numbers.
+    value : the numbers (of any shape).
     dimensions : of the C array.
     prefix : of the macro of literals.
     """

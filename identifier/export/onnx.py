@@ -65,7 +65,7 @@ class Graph:
         Parameters
         ----------
         name : name of the constant.
-        value : its numbers.
+        value : its numbers (of any shape).
         """
         number = np.float32 if self.single else np.float64
         array = np.ascontiguousarray(np.asarray(value), dtype=number)

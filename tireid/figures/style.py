@@ -350,8 +350,8 @@ def force_range(reference: Array, *others: Array) -> tuple[float, float]:
 
     Parameters
     ----------
-    reference : curves that are seen in full as long as they are finite.
-    others : curves that may be cut.
+    reference : curves that are seen in full as long as they are finite (of any shape).
+    others : curves that may be cut (of any shape).
     """
     largest = _finite(reference)
     bound = FARTHEST * float(np.abs(largest).max(initial=0.0)) or np.inf
@@ -368,7 +368,7 @@ def drawable(curve: Array, limits: tuple[float, float]) -> Array:
 
     Parameters
     ----------
-    curve : any shape, in the unit of the axis.
+    curve : in the unit of the axis (of any shape).
     limits : ends of the axis.
     """
     low, high = limits
