@@ -95,7 +95,7 @@ class Outcome(NamedTuple):
 
     kept: bool
     peak: float
-    doubts: tuple[float, ...]
+    faults: tuple[float, ...]
     lasted: float
 
 
@@ -136,7 +136,7 @@ class Row(NamedTuple):
         """From the beginning of the fault to that of the doubt, where there was one [s]."""
         found = []
         for begins, one in zip(self.begins, self.outcomes[LEARNING], strict=True):
-            found += [t - begins for t in one.doubts if t >= begins][:1]
+            found += [t - begins for t in one.faults if t >= begins][:1]
         return found
 
 
@@ -161,9 +161,9 @@ def score(case: Case) -> Outcome:
     """
     words = [*case.words, "--tires", case.tires, "--seed", str(case.seed)]
     driven = drive_with(conditions_of(options_of(words)), case.tires).drive
-    doubts = tuple(t for t, note in driven.notes if note.startswith(Verdict.DOUBT.value))
+    faults = tuple(t for t, note in driven.notes if note.startswith(Verdict.FAULT.value))
     peak = float(np.abs(driven.e_y).max())
-    return Outcome(driven.completed, peak, doubts, float(driven.t[-1]))
+    return Outcome(driven.completed, peak, faults, float(driven.t[-1]))
 
 
 def cases_of(fault: tuple[str, str, float, float], tires: str) -> list[Case]:
@@ -232,9 +232,9 @@ def judge(rows: list[Row], quiet: list[Outcome], targets: Targets) -> None:
         t < begins
         for row in rows
         for begins, one in zip(row.begins, row.outcomes[LEARNING], strict=True)
-        for t in one.doubts
+        for t in one.faults
     ]
-    false = sum(len(one.doubts) for one in quiet)
+    false = sum(len(one.faults) for one in quiet)
     targets.at_most("alarms without a fault", false + sum(early), 0, "", key="quiet/alarms")
     left = sum(not one.kept for one in quiet)
     targets.at_most("drives without a fault that left the path", left, 0, "", key="quiet/left")

@@ -83,9 +83,9 @@ def run_lanes(
             step.numel_in(port) * (lanes if differs else 1) if port in scan.over else 0
         )
         shared.append(int(not differs))
-    carried = {p: _aligned(n_blocks, kept.size, step.numel_in(p), lanes) for p in scan.carry}
+    states = {p: _aligned(n_blocks, kept.size, step.numel_in(p), lanes) for p in scan.carry}
     final = {p: _aligned(n_blocks, step.numel_in(p), lanes) for p in scan.carry}
-    told = {p: _aligned(n_blocks, kept.size, step.numel_out(p), lanes) for p in scan.outputs}
+    outputs = {p: _aligned(n_blocks, kept.size, step.numel_out(p), lanes) for p in scan.outputs}
     before = (
         _pointers(arrays),
         _longs(block_step),
@@ -93,9 +93,9 @@ def run_lanes(
         _longs(shared),
         ctypes.c_long(kept.size),
         _longs(kept.tolist()),
-        _pointers([carried.get(p) for p in names_in]),
+        _pointers([states.get(p) for p in names_in]),
         _pointers([final.get(p) for p in names_in]),
-        _pointers([told.get(p) for p in names_out]),
+        _pointers([outputs.get(p) for p in names_out]),
     )
 
     def run(first: int, last: int) -> None:
@@ -105,9 +105,9 @@ def run_lanes(
             raise RuntimeError(f"{step.name()} reported a failure")
 
     in_threads(run, n_blocks, workers)
-    record = {p: _from_blocks(a, runs) for p, a in carried.items()}
+    record = {p: _from_blocks(a, runs) for p, a in states.items()}
     record |= {f"{p}_final": _from_blocks(a, runs) for p, a in final.items()}
-    return record | {p: _from_blocks(a, runs) for p, a in told.items()}
+    return record | {p: _from_blocks(a, runs) for p, a in outputs.items()}
 
 
 def in_threads(work: Callable[[int, int], None], n: int, workers: int) -> None:

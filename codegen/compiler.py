@@ -40,12 +40,12 @@ def cache_folder() -> Path:
         if not folder.is_dir():
             folder.parent.mkdir(parents=True, exist_ok=True)
             folder.mkdir(mode=0o700, exist_ok=True)
-        doubt = distrust(folder.resolve())
+        reason = distrust(folder.resolve())
     except (OSError, RuntimeError) as error:  # RuntimeError: this user has no home
         return _temporary_folder(str(error))
     if not os.access(folder, os.W_OK | os.X_OK):
         return _temporary_folder(f"{folder} cannot be written")
-    return folder if doubt is None else _temporary_folder(doubt)
+    return folder if reason is None else _temporary_folder(reason)
 
 
 def distrust(path: Path) -> str | None:
@@ -108,15 +108,15 @@ def kept(stem: str, ending: str) -> Path | None:
     """
     for file in sorted(cache_folder().glob(f"{stem}.*{ending}")):
         try:
-            doubt = distrust(file)
-            if doubt is None and file.name == f"{stem}.{_digest(file.read_bytes())}{ending}":
+            reason = distrust(file)
+            if reason is None and file.name == f"{stem}.{_digest(file.read_bytes())}{ending}":
                 return file
         except OSError as error:
-            doubt = str(error)
-        if doubt is None:
+            reason = str(error)
+        if reason is None:
             log.info("%s is damaged: building it anew", file)
         else:
-            log.warning("%s: it is not loaded, but built anew", doubt)
+            log.warning("%s: it is not loaded, but built anew", reason)
         with suppress(OSError):
             file.unlink()
     return None

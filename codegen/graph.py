@@ -123,11 +123,11 @@ def graph_of(function: ca.Function) -> Graph:
         elif op == "input":
             work[written[0]] = graph.add(Node("input", port=read[0], entry=read[1]))
         else:
-            work[written[0]] = graph.add(_usual(graph, op, tuple(work[i] for i in read)))
+            work[written[0]] = graph.add(_canonical(graph, op, tuple(work[i] for i in read)))
     return graph
 
 
-def _usual(graph: Graph, op: str, args: tuple[int, ...]) -> Node:
+def _canonical(graph: Graph, op: str, args: tuple[int, ...]) -> Node:
     """Return the one form of operations that CasADi writes in two."""
     if op == "mul" and args[0] == args[1]:
         return Node("sq", args[:1])
@@ -202,17 +202,17 @@ def decision(graph: Graph, ports: set[int]) -> int | None:
     graph : the scalars.
     ports : numbers of the inputs that the condition may read.
     """
-    own: set[int] = set()
+    of_ports: set[int] = set()
     count: dict[int, int] = {}
     for place in graph.reached():
         node = graph.nodes[place]
         if node.op == "const" or (
-            all(a in own for a in node.args) if node.args else node.port in ports
+            all(a in of_ports for a in node.args) if node.args else node.port in ports
         ):
-            own.add(place)
-        if node.op in ("select", "if_else_zero") and node.args[0] in own:
+            of_ports.add(place)
+        if node.op in ("select", "if_else_zero") and node.args[0] in of_ports:
             condition = graph.nodes[node.args[0]]
-            if condition.op in CONDITIONS and condition.op != "not" and node.args[0] in own:
+            if condition.op in CONDITIONS and condition.op != "not" and node.args[0] in of_ports:
                 count[node.args[0]] = count.get(node.args[0], 0) + 1
     return max(count, key=lambda place: (count[place], -place)) if count else None
 

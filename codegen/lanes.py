@@ -107,7 +107,7 @@ LOOP = """
 enum {{ N_IN = {n_in}, N_OUT = {n_out}, ALL_IN = {all_in}, ALL_OUT = {all_out} }};
 const long SIZE_IN[] = {{{size_in}}}, SIZE_OUT[] = {{{size_out}}};
 const long NEXT[] = {{{next}}};  /* output that the input is carried on from, or -1 */
-const int TOLD[] = {{{told}}};  /* whether an output is told, not carried */
+const int IS_OUTPUT[] = {{{outputs}}};  /* whether an output is told, not carried */
 inline void load(Lanes* to, const double* from, long size, long shared) {{
   for (long j = 0; j < size; ++j) {{
     if (shared) to[j] = Lanes(from[j]);
@@ -141,14 +141,14 @@ extern "C" int {name}_lanes(
         arg[i] = now[i];
         res[NEXT[i]] = following[i];
         if (keep)
-          memcpy(carried[i] + (b * n_kept + row) * SIZE_IN[i] * N_LANES, now[i],
+          memcpy(states[i] + (b * n_kept + row) * SIZE_IN[i] * N_LANES, now[i],
                  SIZE_IN[i] * sizeof(Lanes));
       }}
       if ({name}(arg, res, 0, work, 0)) return 1;
       if (keep) {{
         for (long i = 0; i < N_OUT; ++i)
-          if (TOLD[i])
-            memcpy(told[i] + (b * n_kept + row) * SIZE_OUT[i] * N_LANES, res[i],
+          if (IS_OUTPUT[i])
+            memcpy(outputs[i] + (b * n_kept + row) * SIZE_OUT[i] * N_LANES, res[i],
                    SIZE_OUT[i] * sizeof(Lanes));
         ++row;
       }}
@@ -237,7 +237,7 @@ def _loop(step: ca.Function, carry: tuple[str, ...]) -> str:
         size_in=_listed(size_in),
         size_out=_listed(size_out),
         next=_listed(after),
-        told=_listed([int(i not in after) for i in range(len(names_out))]),
+        outputs=_listed([int(i not in after) for i in range(len(names_out))]),
         sz_arg=max(step.sz_arg(), len(names_in)),
         sz_res=max(step.sz_res(), len(names_out)),
     )

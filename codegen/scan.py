@@ -163,12 +163,18 @@ class Scan:
         for port, value in values.items():
             rows, columns = self.step.size_in(port)
             array = np.asarray(value, dtype=np.float64)
-            wanted = (n, rows * columns) if port in self.over else (rows, columns)
-            if array.ndim < 2 and 1 in wanted and array.size == wanted[0] * wanted[1]:
-                array = array.reshape(wanted)  # a column given flat, a scalar given bare
-            if array.shape != wanted:
+            expected_shape = (n, rows * columns) if port in self.over else (rows, columns)
+            if (
+                array.ndim < 2
+                and 1 in expected_shape
+                and array.size == expected_shape[0] * expected_shape[1]
+            ):
+                array = array.reshape(expected_shape)  # a column given flat, a scalar given bare
+            if array.shape != expected_shape:
                 name = self.step.name()
-                raise ValueError(f"{name}: {port} must have shape {wanted}, not {array.shape}")
+                raise ValueError(
+                    f"{name}: {port} must have shape {expected_shape}, not {array.shape}"
+                )
             by_columns = array if port in self.over else array.ravel(order="F")
             packed[port] = np.ascontiguousarray(by_columns)
         return packed
@@ -205,7 +211,7 @@ class Scan:
         size = {p: step.numel_in(p) for p in self.carry}
         now = [packed[p].copy() for p in self.carry]
         following = [np.empty_like(a) for a in now]
-        carried = [np.empty((n_rows + 1, size[p])) for p in self.carry]
+        state = [np.empty((n_rows + 1, size[p])) for p in self.carry]
         outputs = [np.empty((n_rows, step.numel_out(p))) for p in self.outputs]
         scratch = [np.empty(step.numel_out(p)) for p in self.outputs]
         arrays = [packed[p] for p in names_in]
@@ -224,7 +230,7 @@ class Scan:
             longs([size[p] for p in self.carry]),
             now_pointers,
             next_pointers,
-            pointers(carried),
+            pointers(state),
             ctypes.c_long(len(self.outputs)),
             longs([names_out.index(p) for p in self.outputs]),
             longs([step.numel_out(p) for p in self.outputs]),
@@ -237,9 +243,9 @@ class Scan:
         )
         if failed:
             raise RuntimeError(f"{step.name()} reported a failure")
-        for rows, last in zip(carried, following if n % 2 else now, strict=True):
+        for rows, last in zip(state, following if n % 2 else now, strict=True):
             rows[-1] = last
-        record = dict(zip(self.carry, carried, strict=True))
+        record = dict(zip(self.carry, state, strict=True))
         record |= dict(zip(self.outputs, outputs, strict=True))
         return self._shape_all(record)
 
@@ -342,7 +348,7 @@ class Stepper:
             work := np.empty(max(step.sz_w(), 1)),
         ]
         self._integer_work = np.empty(max(step.sz_iw(), 1), dtype=np.int64)
-        told = pointers(list(self.outputs.values()))
+        outputs = pointers(list(self.outputs.values()))
         return [
             ctypes.c_long(1),
             ctypes.c_long(1),
@@ -358,8 +364,8 @@ class Stepper:
             ctypes.c_long(len(scan.outputs)),
             longs([names_out.index(port) for port in scan.outputs]),
             longs([step.numel_out(port) for port in scan.outputs]),
-            told,
-            told,
+            outputs,
+            outputs,
             (ctypes.c_void_p * max(step.sz_arg(), len(names_in)))(),
             (ctypes.c_void_p * max(step.sz_res(), len(names_out)))(),
             self._integer_work.ctypes.data_as(ctypes.c_void_p),
@@ -382,13 +388,13 @@ class Stepper:
         self._now, self._following = self._following, self._now
 
     def _advance_slowly(self) -> None:
-        record = self._scan(1, {**self.carried(), **self._samples, **self._constants})
+        record = self._scan(1, {**self.state(), **self._samples, **self._constants})
         for port, array in self.outputs.items():
             array[:] = record[port].ravel(order="F")
         for port, array in self._now.items():
             array[:] = record[f"{port}_final"].ravel(order="F")
 
-    def carried(self) -> dict[str, Array]:
+    def state(self) -> dict[str, Array]:
         """Return the carried values in effect, by port, in their shapes; copies."""
         return {port: self.value(port) for port in self._now}
 

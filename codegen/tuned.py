@@ -58,8 +58,8 @@ def _part(graph: Graph, place: int | None, holds: bool) -> Graph:
 
 
 def _condition(graph: Graph, place: int, function: ca.Function) -> ca.Function:
-    wanted = Graph()
-    wanted.nodes, wanted.outputs = graph.nodes, [[place]]
+    single = Graph()
+    single.nodes, single.outputs = graph.nodes, [[place]]
     ports = [ca.SX.sym(port, *function.size_in(port)) for port in function.name_in()]
     like = ca.Function(function.name(), ports, [ca.SX(0)], function.name_in(), ["holds"])
-    return function_of(wanted, like, EXPANDED)
+    return function_of(single, like, EXPANDED)

@@ -345,7 +345,7 @@ class OnlineIdentifier:
         if self._stepper is None:
             carry = self._setup(np.zeros(2), np.zeros(2), self.method.min_speed).carry
             return {name: np.array(value) for name, value in carry.items()}
-        return self._stepper.carried()
+        return self._stepper.state()
 
     def model(self) -> TireModel:
         """Return the model with the weights in effect now.

@@ -72,20 +72,20 @@ class SensorFault:
         """
         return (t >= self.start) & (t < self.start + self.duration)
 
-    def shown(self, t: Any, value: Any, held: float, noise: Any) -> Any:
+    def shown(self, t: Any, value: Any, stuck_at: float, noise: Any) -> Any:
         """Return what the broken channel shows.
 
         Parameters
         ----------
         t : time [s], a number or (n,).
         value : what a good sensor would show, like t.
-        held : what it showed when the fault began.
+        stuck_at : what it showed when the fault began.
         noise : standard normal numbers, like t.
         """
         since = t - self.start
         match self.kind:
             case "stuck":
-                return held + 0.0 * since
+                return stuck_at + 0.0 * since
             case "zero":
                 return 0.0 * since
             case "lost":

@@ -423,8 +423,8 @@ class Table:
                 self.refuse(key, f"must be a text, it is {shown(value)}")
             return value
         if isinstance(value, bool) or not isinstance(value, int | float):
-            wanted = "a whole number" if kind is int else "a number"
-            self.refuse(key, f"must be {wanted}, it is {shown(value)}")
+            expected = "a whole number" if kind is int else "a number"
+            self.refuse(key, f"must be {expected}, it is {shown(value)}")
         if kind is int and not (isinstance(value, int) and abs(value) < 2**63):
             self.refuse(key, f"must be a whole number of 64 bits, it is {shown(value)}")
         try:

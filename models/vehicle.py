@@ -225,10 +225,10 @@ class Vehicle:
         """Refuse values that no car of any size has: a wrong unit, or a digit too many."""
         require_within(VehicleError, 1e-2, 1e6, mass=self.mass)  # a toy; a dump truck has 6e5
         require_within(VehicleError, 1e-3, 30.0, l_f=self.l_f, l_r=self.l_r)
-        usual = self.mass * self.l_f * self.l_r  # about that; 0.4 times it in models
-        if not 0.05 < self.yaw_inertia / usual < 20.0:
+        typical = self.mass * self.l_f * self.l_r  # about that; 0.4 times it in models
+        if not 0.05 < self.yaw_inertia / typical < 20.0:
             raise VehicleError(
-                f"yaw_inertia in kg m^2 must be 0.05 to 20 times mass * l_f * l_r = {usual:.4g}, "
+                f"yaw_inertia in kg m^2 must be 0.05 to 20 times mass * l_f * l_r = {typical:.4g}, "
                 f"it is {self.yaw_inertia:g}: check the units"
             )
         for name, load in zip(("front", "rear"), self.axle_loads, strict=True):

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from codegen.arrays import Array
 from mpc.prediction import N_CAR, build_rk4, motion, stage_ports, state_size
 from mpc.problem import N_ERRORS, Problem, tracking_errors
-from mpc.tires.tire import PredictionTire, TireStructure, reach_of
+from mpc.tires.tire import PredictionTire, TireStructure, valid_slip
 
 N_SOFT = 3  # e_y, slip in front, slip at the rear
 
@@ -98,12 +98,12 @@ def numbers(problem: Problem, tire: PredictionTire, kappa: ArrayLike, v_x: Array
     v_x : speed of each stage [m/s], (N,).
     """
     cost, limits, N = problem.cost, problem.limits, problem.horizon
-    reach = reach_of(tire, limits.slip)
+    valid = valid_slip(tire, limits.slip)
     road = np.column_stack([np.broadcast_to(kappa, N), np.broadcast_to(v_x, N)]).ravel()
-    bounds = [limits.e_y, *reach.slip]
+    bounds = [limits.e_y, *valid.slip]
     Z = [limits.soft_e_y, limits.soft_slip, limits.soft_slip]
     parts = [road, [problem.dt, cost.R], tire.car, tire.weights]
-    return np.concatenate([*parts, cost.numbers(), cost.terminal_numbers(), bounds, reach.rise, Z])
+    return np.concatenate([*parts, cost.numbers(), cost.terminal_numbers(), bounds, valid.rise, Z])
 
 
 def bounds(problem: Problem, x0: ArrayLike) -> dict[str, Array]:

@@ -12,7 +12,7 @@ import casadi as ca
 
 from codegen.tuned import tuned
 from mpc.problem import N_ERRORS, gauss_newton, tracking_errors
-from mpc.tires.tire import Car, Point, TireStructure, believed_force
+from mpc.tires.tire import Car, Point, TireStructure, extrapolated_force
 
 # The car along a path as the tracker predicts it: ẋ and its Jacobian.
 #
@@ -28,7 +28,7 @@ NEAREST = 0.1
 
 
 class Ports(NamedTuple):
-    """Symbols of a stage, SX: state, input, parameters; the last two are those of `Reach`."""
+    """Symbols of a stage, SX: state, input, parameters; the last two are those of `ValidSlip`."""
 
     x: Any
     u: Any
@@ -87,7 +87,7 @@ def motion(structure: TireStructure, p: Ports) -> Motion:
     at = Point(v_y, r, delta, p.v_x, car, p.w)
     kinematic = structure.slip(at)
     slip = (lagged[0], lagged[1]) if structure.lagged else kinematic
-    force = believed_force(structure, slip, at, p.max_slip, p.rise)
+    force = extrapolated_force(structure, slip, at, p.max_slip, p.rise)
 
     F = ca.SX.sym("F", 2)
     c, s = ca.cos(e_psi), ca.sin(e_psi)

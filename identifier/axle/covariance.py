@@ -233,7 +233,7 @@ def excited(factors: Factors, h: list[Any], least: Any) -> Excited:
     return Excited(f, g, v, sum(a * b for a, b in zip(f, g, strict=True)) + least)
 
 
-def updated(factors: Factors, seen: Excited, c: Any) -> Factors:
+def updated(factors: Factors, direction: Excited, c: Any) -> Factors:
     """Return the factors of P - c P h h'P/(1 + c a) (Bierman).
 
     D_j is multiplied by β_(j-1)/β_j, β_j = 1 + c Σ_(i<=j) f_i g_i, which is positive whatever
@@ -242,13 +242,13 @@ def updated(factors: Factors, seen: Excited, c: Any) -> Factors:
     Parameters
     ----------
     factors : U and D.
-    seen : the regressor.
+    direction : the regressor.
     c : more than -1/a by more than rounding.
     """
     U, D = dict(factors.U), list(factors.D)
     before, per_before, excitation = 1.0, 1.0, 0.0
     v: list[Any] = []
-    for j, (f, g) in enumerate(zip(seen.f, seen.g, strict=True)):
+    for j, (f, g) in enumerate(zip(direction.f, direction.g, strict=True)):
         excitation = excitation + f * g
         move = -(c * f) * per_before
         for i in range(j):

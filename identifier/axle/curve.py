@@ -91,13 +91,13 @@ def curve(x: Any, W: Any, scales: Any, steps: tuple[int, ...]) -> Curve:
     slopes = W * (1 - T * T) * inverse
     slope, bend = ca.sum2(slopes), -2 * ca.sum2(T * slopes * inverse)
     least = 0.02 * larger(ca.sum2(W * inverse), 0.1)
-    held = slope < least
+    floored = slope < least
     return Curve(
         units=T,
         force=ca.sum2(W * T),
         slope=slope,
         carcass_slope=larger(slope, least),
-        bend=ca.if_else(held, 0, bend),
+        bend=ca.if_else(floored, 0, bend),
     )
 
 

@@ -1,4 +1,4 @@
-"""Which samples are believed, and when learning may run.
+"""Which samples are used, and when learning may run.
 
 A sample that no car could have made is replaced by the last good one; after `hold` seconds of
 that the run restarts with the next good one. Learning waits `settle` seconds after a restart,
@@ -133,11 +133,11 @@ def gate(limits: Any, dt: Any, last: GateState, x: Any, u: Any, v_x: Any) -> Gat
         ca.fabs(delta_r) < at["max_steering"],
     )
     since = dt * (1 + last.bad)
-    reach = at["max_rate"] * since + at["jump"]
+    largest_change = at["max_rate"] * since + at["jump"]
     turn = at["max_steering_rate"] * since + at["steering_jump"]
     near = _all(
-        ca.fabs(v_x - last.v_x) < reach,
-        ca.fabs(v_y - last.v_y) < reach,
+        ca.fabs(v_x - last.v_x) < largest_change,
+        ca.fabs(v_y - last.v_y) < largest_change,
         ca.fabs(r - last.r) < at["max_yaw_acceleration"] * since + at["yaw_jump"],
         ca.fabs(delta_f - last.delta_f) < turn,
         ca.fabs(delta_r - last.delta_r) < turn,
@@ -149,8 +149,8 @@ def gate(limits: Any, dt: Any, last: GateState, x: Any, u: Any, v_x: Any) -> Gat
 
     sample = (v_x, v_y, r, delta_f, delta_r)
     used = [ca.if_else(good, new, old) for new, old in zip(sample, last[:5], strict=True)]
-    held = ca.logic_and(last.on, bad * dt <= at["hold"])
-    on = ca.logic_and(used[0] >= at["min_speed"], ca.logic_or(good, held))
+    holds = ca.logic_and(last.on, bad * dt <= at["hold"])
+    on = ca.logic_and(used[0] >= at["min_speed"], ca.logic_or(good, holds))
     # A slow sensor in a fast log holds its value for some samples; one that is stuck, for longer.
     alive = stuck * dt <= at["hold"]
     steady = _all(used[0] > at["learning_speed"], bad < BAD_IN_A_ROW, alive, on)

@@ -126,7 +126,7 @@ def update(
     P: Factors,
     h: list[Any],
     *,
-    error: Any,
+    innovation: Any,
     R: Any,
     forgetting: Any,
     spread: Spread,
@@ -143,15 +143,15 @@ def update(
     theta : parameters, q entries.
     P : factors of their covariance.
     h : regressor, q entries.
-    error : e = y - h'θ, clipped.
-    R : variance of the error.
+    innovation : e = y - h'θ, clipped.
+    R : its variance.
     forgetting : (1 - λ)/λ.
     spread : of P, and of what is added to it otherwise in this step.
     limits : as in `width`; where P would grow beyond them it stays as it is.
     learns : whether to update at all.
     """
-    seen = excited(P, h, 1e-12 * R)
-    v, a = seen.v, seen.a
+    direction = excited(P, h, 1e-12 * R)
+    v, a = direction.v, direction.a
     kappa = a - forgetting * R
     share = reciprocal((R + a) * a)
     growth = -kappa * share  # of P along v v'
@@ -162,9 +162,9 @@ def update(
     moves = ca.logic_and(learns, ca.logic_or(kappa >= 0, wide <= 1))
     # β_q = 1 + c a = (R + a)/(R + R (1 - λ)/λ), so that c/β_q = κ/((R + a) a)
     c = ca.if_else(moves, kappa / (a * R * (1 + forgetting)), 0)
-    gain = learns * error * a * share
+    gain = learns * innovation * a * share
     theta = [one + along * gain for one, along in zip(theta, v, strict=True)]
-    after = scaled(updated(P, seen, c), moves * wide)
+    after = scaled(updated(P, direction, c), moves * wide)
     return Learnt(theta, after, a, spread.weights)
 
 

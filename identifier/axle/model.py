@@ -25,7 +25,7 @@ KIND = "axle"
 ARRAYS = ("W", "own", "covariance", "prior_covariance", "excitation")
 LARGEST_WEIGHT = 100.0  # static axle loads: no unit of a tire carries more
 ROUNDING = 1e-6  # of correlations, as learning in float leaves them
-DOUBT = 0.25  # standard deviation over the prior's, above which a slip is not known
+LARGEST_SD = 0.25  # standard deviation over the prior's, above which a slip is not known
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -131,7 +131,7 @@ class AxleModel(TireModel):
         force: Array = unit_matrix(alpha, self.ladder) @ self.W.T * self._loads
         return force
 
-    def doubt(self, alpha: Array) -> Array:
+    def relative_sd(self, alpha: Array) -> Array:
         """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning.
 
         Standard deviation of the force over that of the prior.
@@ -146,8 +146,8 @@ class AxleModel(TireModel):
             / np.einsum("ki,ij,kj->k", T, before[:n, :n], T)
             for now, before in zip(self.covariance, self.prior_covariance, strict=True)
         ]
-        doubt: Array = np.sqrt(np.maximum(np.stack(ratio, axis=1), 0.0))
-        return doubt
+        relative_sd: Array = np.sqrt(np.maximum(np.stack(ratio, axis=1), 0.0))
+        return relative_sd
 
     @property
     def known_slip_range(self) -> Array:
@@ -156,7 +156,7 @@ class AxleModel(TireModel):
         known = np.zeros(2)
         for i, largest in enumerate(self.excitation[:, 0]):
             if largest > 0.0:
-                sure = self.doubt(largest * grid)[:, i] <= DOUBT
+                sure = self.relative_sd(largest * grid)[:, i] <= LARGEST_SD
                 count = sure.size if sure.all() else int(np.argmin(sure))
                 known[i] = largest * count / grid.size
         return known
@@ -175,7 +175,7 @@ class AxleModel(TireModel):
             Fact("known up to a slip of", np.degrees(known), "deg"),
         ]
         if (known > 0.0).all():
-            unsure = 100.0 * np.diag(self.doubt(known))
+            unsure = 100.0 * np.diag(self.relative_sd(known))
             lines.append(Fact("standard deviation there over the prior's", unsure, "%"))
         lines.append(Fact("time of learning", self.learning_time.sum(axis=1), "s"))
         return tuple(lines)

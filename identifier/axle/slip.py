@@ -50,18 +50,18 @@ class Hold(NamedTuple):
     phi: Any
 
 
-def kinematic_slip(car: Car, seen: Gate, offset: Any) -> Any:
+def kinematic_slip(car: Car, gated: Gate, offset: Any) -> Any:
     """Return α without sway [rad], (2,).
 
     Parameters
     ----------
     car : the car.
-    seen : what the gate lets through.
+    gated : what the gate lets through.
     offset : δ₀ [rad] and b [m/s], (2,).
     """
-    sideways = seen.v_y - offset[1] + car.arm * seen.r
+    sideways = gated.v_y - offset[1] + car.arm * gated.r
     zero = ca.vertcat(offset[0], 0)
-    return seen.delta - ca.atan(sideways * (1 / seen.v_x)) + zero  # v_x > 0: atan2 is atan
+    return gated.delta - ca.atan(sideways * (1 / gated.v_x)) + zero  # v_x > 0: atan2 is atan
 
 
 def hold(car: Car, v_x: Any, dt: Any, compliance: Any, slope: Any) -> Hold:

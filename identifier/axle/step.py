@@ -58,16 +58,16 @@ class Forward(NamedTuple):
     """Symbols of the forward part and what it computes.
 
     ports : every input by name.   car, dt, scales : constants.   last_sway, last_slip : states.
-    seen : the gate.   sway, hold, curve and the slip angles alpha and x [rad] : at this sample.
+    gated : the gate.   sway, hold, curve and the slip angles alpha and x [rad] : at this sample.
     size : of slip, the larger of with and without lag and sway [rad], (2,).
-    axle_force : (2,) [N].   carried : next states by name.
+    axle_force : (2,) [N].   next_state : by name.
     """
 
     ports: dict[str, Any]
     car: Car
     last_sway: SwayState
     last_slip: SlipState
-    seen: Gate
+    gated: Gate
     sway: SwayState
     hold: Hold
     alpha: Any
@@ -76,7 +76,7 @@ class Forward(NamedTuple):
     curve: Curve
     cos_delta: Any
     axle_force: Any
-    carried: dict[str, Any]
+    next_state: dict[str, Any]
 
 
 def forward(steps: tuple[int, ...]) -> Forward:
@@ -97,25 +97,25 @@ def forward(steps: tuple[int, ...]) -> Forward:
     roll_port, roll = named_port(SwayNumbers, "roll")
     compliance, share, offset = ca.horzsplit(own)
 
-    seen = gate(plausibility, dt, last_gate, x, u, v_x)
+    gated = gate(plausibility, dt, last_gate, x, u, v_x)
     body = sway(
         roll,
         car,
         dt,
         last_sway,
-        first=seen.first,
-        v_x=seen.v_x,
-        r=seen.r,
+        first=gated.first,
+        v_x=gated.v_x,
+        r=gated.r,
         force=last_slip.force,
         slope=last_slip.slope,
         share=share,
     )
-    kinematic = kinematic_slip(car, seen, offset)
+    kinematic = kinematic_slip(car, gated, offset)
     alpha = kinematic + share * body.slip
-    step = hold(car, seen.v_x, dt, compliance, last_slip.slope)
-    lagged = lagged_slip(step, last_slip, alpha, seen.first)
+    step = hold(car, gated.v_x, dt, compliance, last_slip.slope)
+    lagged = lagged_slip(step, last_slip, alpha, gated.first)
     at_x = curve(lagged, W, scales, steps)
-    cos_delta = 1 - seen.delta**2 / 2 + seen.delta**4 / 24  # 2e-5 off at 0.5 rad, no call
+    cos_delta = 1 - gated.delta**2 / 2 + gated.delta**4 / 24  # 2e-5 off at 0.5 rad, no call
     ports = {
         "gate": gate_port,
         "sway": sway_port,
@@ -136,7 +136,7 @@ def forward(steps: tuple[int, ...]) -> Forward:
         car=car,
         last_sway=last_sway,
         last_slip=last_slip,
-        seen=seen,
+        gated=gated,
         sway=body,
         hold=step,
         alpha=alpha,
@@ -144,9 +144,9 @@ def forward(steps: tuple[int, ...]) -> Forward:
         size=larger(ca.fabs(kinematic), ca.fabs(lagged)),
         curve=at_x,
         cos_delta=cos_delta,
-        axle_force=ca.if_else(seen.on, at_x.force * cos_delta * car.load, 0),
-        carried={
-            "gate": seen.state,
+        axle_force=ca.if_else(gated.on, at_x.force * cos_delta * car.load, 0),
+        next_state={
+            "gate": gated.state,
             "sway": ca.vertcat(*body),
             "slip": ca.horzcat(lagged, alpha, at_x.carcass_slope, at_x.force),
         },
@@ -164,9 +164,9 @@ def build_frozen(steps: tuple[int, ...]) -> ca.Function:
     return ca.Function(
         "_".join(["axle_frozen", *map(str, steps)]),
         list(f.ports.values()),
-        [*f.carried.values(), f.axle_force, f.x, f.size],
+        [*f.next_state.values(), f.axle_force, f.x, f.size],
         list(f.ports),
-        [*(f"{name}_next" for name in f.carried), "axle_force", "lagged_slip", "slip_size"],
+        [*(f"{name}_next" for name in f.next_state), "axle_force", "lagged_slip", "slip_size"],
         {"cse": True},
     )
 
@@ -177,15 +177,15 @@ BESIDE = ("errors", "excitation", "watch", "kept")
 CARRY = (*LEARNT, "gate", "sway", "slip", "sensitivity", "filters", *BESIDE)
 
 
-class Lesson(NamedTuple):
-    """What a sample teaches, rows front and rear.
+class RegressionSample(NamedTuple):
+    """A sample of the regression, rows front and rear.
 
-    h : regressor (2, q).   error : y - h'w, clipped (2,).   R : its variance (2,).
+    h : regressor (2, q).   innovation : y - h'w, clipped (2,).   R : its variance (2,).
     inflation : variance to add along a change of friction.   learns : 1 or 0, (2,).
     """
 
     h: Any
-    error: Any
+    innovation: Any
     R: Any
     inflation: Any
     learns: Any
@@ -205,24 +205,24 @@ def build_step(steps: tuple[int, ...], *, rises: bool = False) -> ca.Function:
     ports["UD"] = ca.SX.sym("UD", 2, len(triangle(n + 3)))
     ports["friction_direction"] = ca.SX.sym("friction_direction", n, n)
     ports["per_variance"] = ca.SX.sym("per_variance", 2, 4)
-    h, y, carried = _regression(f, ports)
-    lesson, means = _lesson(f, ports, h, y)
+    h, y, next_state = _regression(f, ports)
+    sample, means = _sample_of(f, ports, h, y)
     ports["bounds"], limits = named_port(BoundNumbers, "bounds")
     if rises:
         ports["rising"] = ca.SX.sym("rising", n)
-    axles = [_learn(ports, lesson, i) for i in (0, 1)]
-    watch = _watch(f, ports, lesson, y, ca.vertcat(*(axle.uncertainty for axle in axles)))
+    axles = [_learn(ports, sample, i) for i in (0, 1)]
+    watch = _watch(f, ports, sample, y, ca.vertcat(*(axle.uncertainty for axle in axles)))
     theta = ca.vertcat(*(_kept(ports, limits, axles[i], watch, i) for i in (0, 1)))
-    carried |= f.carried
-    carried["W"], carried["own"] = theta[:, :n], theta[:, n:]
-    carried["UD"] = ca.vertcat(*(ca.horzcat(*row_of(axle.P)) for axle in axles))
-    carried |= _kept_books(f, ports, lesson, means, watch)
-    carried["watch"] = watch.state
-    carried["kept"] = ports["kept"] + watch.follow * (theta - ports["kept"])
+    next_state |= f.next_state
+    next_state["W"], next_state["own"] = theta[:, :n], theta[:, n:]
+    next_state["UD"] = ca.vertcat(*(ca.horzcat(*row_of(axle.P)) for axle in axles))
+    next_state |= _kept_books(f, ports, sample, means, watch)
+    next_state["watch"] = watch.state
+    next_state["kept"] = ports["kept"] + watch.follow * (theta - ports["kept"])
     return ca.Function(
         "_".join(["axle_step", *map(str, steps), *["rising"] * rises]),
         list(ports.values()),
-        [*(carried[name] for name in CARRY), f.axle_force],
+        [*(next_state[name] for name in CARRY), f.axle_force],
         list(ports),
         [*(f"{name}_next" for name in CARRY), "axle_force"],
         {"cse": True},
@@ -235,51 +235,55 @@ def _regression(f: Forward, ports: dict[str, Any]) -> tuple[Any, Any, dict[str, 
     ports["sensitivity"], lasting = axle_port(SensitivityState, "sensitivity")
     ports["filters"] = ca.SX.sym("filters", 2, q + 1)
     ports["regression"], numbers = named_port(RegressionNumbers, "regression")
-    seen = f.seen
+    gated = f.gated
     p_s, p_k = sensitivity(
         f.hold,
         f.last_slip,
         lasting,
         compliance=ports["own"][:, 0],
         alpha=f.alpha,
-        first=seen.first,
+        first=gated.first,
         sway_before=f.last_sway.slip,
         sway_now=f.sway.slip,
     )
-    g = force_gradient(f.curve, p_s, p_k, f.cos_delta, seen.v_x)
-    xi = numbers.bandwidth * axle_impulse(f.car, seen.v_y, seen.r)
-    inputs = ca.horzcat(g, xi - seen.v_x * seen.r / GRAVITY)
-    low, filters = filtered(numbers, ports["filters"], inputs, seen.first)
-    carried = {"sensitivity": ca.horzcat(p_s, p_k, f.curve.bend), "filters": filters}
-    return low[:, :q], xi - low[:, q], carried
+    g = force_gradient(f.curve, p_s, p_k, f.cos_delta, gated.v_x)
+    xi = numbers.bandwidth * axle_impulse(f.car, gated.v_y, gated.r)
+    inputs = ca.horzcat(g, xi - gated.v_x * gated.r / GRAVITY)
+    low, filters = filtered(numbers, ports["filters"], inputs, gated.first)
+    next_state = {"sensitivity": ca.horzcat(p_s, p_k, f.curve.bend), "filters": filters}
+    return low[:, :q], xi - low[:, q], next_state
 
 
-def _lesson(f: Forward, ports: dict[str, Any], h: Any, y: Any) -> tuple[Lesson, ErrorState]:
-    """Return what the sample teaches, and means of its errors; adds its ports."""
+def _sample_of(
+    f: Forward, ports: dict[str, Any], h: Any, y: Any
+) -> tuple[RegressionSample, ErrorState]:
+    """Return the sample of the regression, and means of its errors; adds its ports."""
     ports["errors"], errors = axle_port(ErrorState, "errors")
     ports["excitation"] = ca.SX.sym("excitation", 2, 1 + len(EDGES))
     ports["change"], change = named_port(ChangeNumbers, "change")
     numbers = RegressionNumbers(*ca.vertsplit(ports["regression"]))
-    learns, W = f.seen.learns, ports["W"]
+    learns, W = f.gated.learns, ports["W"]
     y_hat = ca.sum2(W * h[:, : W.shape[1]])
-    error = y - y_hat
+    innovation = y - y_hat
     sigma = numbers.error + numbers.relative_error * ca.fabs(y_hat)
-    fast, slow = error_means(change, errors, (error / sigma) ** 2, learns)
+    fast, slow = error_means(change, errors, (innovation / sigma) ** 2, learns)
     peak = larger(ca.fabs(y_hat), errors.peak * numbers.decay)
     peak = ca.if_else(learns, peak, errors.peak)
-    reach = numbers.clip * sigma * slow
-    lesson = Lesson(
+    bound = numbers.clip * sigma * slow
+    sample = RegressionSample(
         h=h,
-        error=within(error, -reach, reach),
+        innovation=within(innovation, -bound, bound),
         R=sigma**2 * slow * numbers.samples,
         inflation=learns * change.inflation * alarm(change, fast, slow),
         learns=ca.logic_and(learns, peak >= numbers.error),
     )
-    return lesson, ErrorState(fast, slow, peak)
+    return sample, ErrorState(fast, slow, peak)
 
 
-def _watch(f: Forward, ports: dict[str, Any], lesson: Lesson, y: Any, uncertainty: Any) -> Watched:
-    """Return whether weights are in doubt; adds its ports."""
+def _watch(
+    f: Forward, ports: dict[str, Any], sample: RegressionSample, y: Any, uncertainty: Any
+) -> Watched:
+    """Return whether there is an alarm on the weights; adds its ports."""
     n = f.curve.units.shape[1]
     ports["watch"], state = named_port(WatchState, "watch")
     ports["watching"], numbers = named_port(WatchNumbers, "watching")
@@ -288,7 +292,7 @@ def _watch(f: Forward, ports: dict[str, Any], lesson: Lesson, y: Any, uncertaint
     slow = ports["errors"][:, 1]
 
     def normalized(W: Any) -> Any:
-        y_hat = ca.sum2(W * lesson.h[:, :n])
+        y_hat = ca.sum2(W * sample.h[:, :n])
         sigma = expected.error + expected.relative_error * ca.fabs(y_hat)
         return (y - y_hat) ** 2 / (sigma**2 * slow + uncertainty)
 
@@ -299,27 +303,27 @@ def _watch(f: Forward, ports: dict[str, Any], lesson: Lesson, y: Any, uncertaint
         normalized(ports["W"]),
         normalized(ports["kept"][:, :n]),
         dt=ports["dt"],
-        learns=f.seen.learns,
+        learns=f.gated.learns,
         moving=larger(size[0], size[1]) > MOVING * expected.error,
     )
 
 
 def _kept_books(
-    f: Forward, ports: dict[str, Any], lesson: Lesson, means: ErrorState, watch: Watched
+    f: Forward, ports: dict[str, Any], sample: RegressionSample, means: ErrorState, watch: Watched
 ) -> dict[str, Any]:
-    """Return means of errors and excitation; in doubt the usual error and what is known rest."""
+    """Return means of errors and excitation; in an alarm the mean error and what is known rest."""
     slow = ca.if_else(watch.rests, ports["errors"][:, 1], means.slow)
     times = excited(
         ports["excitation"],
         f.size,
         dt=ports["dt"],
         samples=RegressionNumbers(*ca.vertsplit(ports["regression"])).samples,
-        learns=ca.logic_and(lesson.learns, ca.logic_not(watch.rests)),
+        learns=ca.logic_and(sample.learns, ca.logic_not(watch.rests)),
     )
     return {"errors": ca.horzcat(means.fast, slow, means.peak), "excitation": times}
 
 
-def _learn(ports: dict[str, Any], lesson: Lesson, i: int) -> Learnt:
+def _learn(ports: dict[str, Any], sample: RegressionSample, i: int) -> Learnt:
     """Return parameters, before they are bounded, and covariance of axle i after the sample."""
     w = ca.horzsplit(ports["W"][i, :])
     theta = [*w, *ca.horzsplit(ports["own"][i, :])]
@@ -327,21 +331,21 @@ def _learn(ports: dict[str, Any], lesson: Lesson, i: int) -> Learnt:
     forgetting = RegressionNumbers(*ca.vertsplit(ports["regression"])).forgetting
     widest = ca.horzsplit(ports["per_variance"][i, :])
     P = factors_of(ca.horzsplit(ports["UD"][i, :]), q)
-    seen = spread(P, n)
+    before = spread(P, n)
     direction = ca.vertsplit(ports["friction_direction"] @ ca.vertcat(*w))
-    trace = seen.trace + sum(lesson.inflation * d * d for d in direction)
+    trace = before.trace + sum(sample.inflation * d * d for d in direction)
     fits = trace * widest[0] <= 1
-    P = inflated(P, direction, ca.if_else(fits, lesson.inflation, 0))
+    P = inflated(P, direction, ca.if_else(fits, sample.inflation, 0))
     return update(
         theta,
         P,
-        ca.horzsplit(lesson.h[i, :]),
-        error=lesson.error[i],
-        R=lesson.R[i],
+        ca.horzsplit(sample.h[i, :]),
+        innovation=sample.innovation[i],
+        R=sample.R[i],
         forgetting=forgetting,
-        spread=seen._replace(trace=ca.if_else(fits, trace, seen.trace)),
+        spread=before._replace(trace=ca.if_else(fits, trace, before.trace)),
         limits=widest,
-        learns=lesson.learns[i],
+        learns=sample.learns[i],
     )
 
 

@@ -4,10 +4,10 @@ q = e²/(σ² s + h'Ph), e = y - h'w, is about one where car, road and sensors a
 while the weights are not known yet: σ² is the variance of the error that is told, s the slow mean
 of e²/σ² over what was told, h'Ph the variance that the weights still have. Its mean over a moment,
 m⁺ = m + T_s/τ (min(q, 25) - m), rises with a broken sensor and with another road alike, and at
-first both look the same. Where it passes `noticed` at an axle there is doubt, and two sets of
+first both look the same. Where it passes `noticed` at an axle there is an alarm, and two sets of
 weights are compared on every sample: those that were followed about a second behind the learnt
-ones, kept⁺ = kept + T_s/τ_k (θ - kept), and stay as they are in doubt; and those that go on
-learning, whose lag and offsets rest as do the usual error s and what counts as known. Three ways
+ones, kept⁺ = kept + T_s/τ_k (θ - kept), and stay as they are in an alarm; and those that go on
+learning, whose lag and offsets rest as do the mean error s and what counts as known. Three ways
 lead out:
   the kept weights explain forces that are there     the sensor is good again: go back to them
   after `give_up` only the new ones explain them     the road is another: go on with them
@@ -32,16 +32,16 @@ LARGEST_Q = 25.0  # one outlier alone is no fault
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Watch:
-    """When weights are in doubt, and how long.
+    """When there is an alarm on the weights, and how long.
 
     Parameters
     ----------
     moment : time constant of the means of q [s].
-    noticed : mean of q at either axle from which on there is doubt [-].
+    noticed : mean of q at either axle from which on there is an alarm [-].
     calm : mean of q below which weights explain what is measured [-].
     behind : time by which the old weights follow the learnt ones [s].
     again : time for which the old weights must explain forces that are there [s].
-    give_up : time of doubt after which another road is believed [s].
+    give_up : time of alarm after which it is taken for another road [s].
 
     Raises
     ------
@@ -90,11 +90,11 @@ class WatchNumbers(NamedTuple):
 
 
 class WatchState(NamedTuple):
-    """Time in doubt, 0 outside of it, and time in which the kept weights explained again [s]; means
+    """Time of alarm, 0 outside of it, and time in which the kept weights explained again [s]; means
     of q of the learnt and of the kept weights, front and rear.
     """
 
-    doubt: Any
+    alarm: Any
     again: Any
     learnt_front: Any
     learnt_rear: Any
@@ -149,13 +149,13 @@ def watched(
     learnt = [mean(a, b) for a, b in zip(state[2:4], ca.vertsplit(q), strict=True)]
     kept = [mean(a, b) for a, b in zip(state[4:6], ca.vertsplit(q_kept), strict=True)]
     worst, worst_kept = larger(*learnt), larger(*kept)
-    rests = ca.logic_or(state.doubt > 0, worst > numbers.noticed)
-    doubt = ca.if_else(rests, state.doubt + time, 0)
+    rests = ca.logic_or(state.alarm > 0, worst > numbers.noticed)
+    alarm = ca.if_else(rests, state.alarm + time, 0)
     explained = ca.logic_and(rests, worst_kept < numbers.calm)
     again = ca.if_else(explained, state.again + time * moving, 0)
-    late = doubt > 2 * numbers.give_up
+    late = alarm > 2 * numbers.give_up
     returns = ca.logic_and(explained, ca.logic_or(again > numbers.again, late))
-    waited = ca.logic_and(doubt > numbers.give_up, worst < numbers.calm)
+    waited = ca.logic_and(alarm > numbers.give_up, worst < numbers.calm)
     goes_on = ca.logic_and(ca.logic_or(waited, late), ca.logic_not(explained))
     over = ca.logic_or(returns, goes_on)
     calm = ca.logic_and(worst < numbers.calm, ca.logic_not(rests))
@@ -168,5 +168,5 @@ def watched(
         rests=rests,
         returns=returns,
         follow=ca.if_else(goes_on, 1, calm * learns * numbers.follow),
-        state=ca.vertcat(ca.if_else(over, 0, doubt), ca.if_else(over, 0, again), *learnt, *kept),
+        state=ca.vertcat(ca.if_else(over, 0, alarm), ca.if_else(over, 0, again), *learnt, *kept),
     )

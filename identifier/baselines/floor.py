@@ -303,7 +303,7 @@ def _curve(method: CurveEkf, vehicle: Vehicle) -> Structure:
 @structure_of.register(StiffnessRls)
 def _linear(method: LinearBaseline | StiffnessRls, vehicle: Vehicle) -> Structure:
     """Logarithms of both stiffnesses over those that the car states."""
-    told = np.array([vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear])
+    stated = np.array([vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear])
     limit = np.full(2, 4.0)
 
     def start(rng: np.random.Generator) -> Array:
@@ -313,7 +313,7 @@ def _linear(method: LinearBaseline | StiffnessRls, vehicle: Vehicle) -> Structur
         return CurveModel(
             vehicle=vehicle,
             curve="linear",
-            parameters=(told * np.exp(parameters)).reshape(2, 1),
+            parameters=(stated * np.exp(parameters)).reshape(2, 1),
             min_speed=method.min_speed,
         )
 

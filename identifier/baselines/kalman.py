@@ -86,8 +86,8 @@ def build_step(name: str, force: Force, *, unknowns: int, prior: int, follows: b
     P_afresh = ca.diagcat(R, P[2:, 2:])
     following = ca.if_else(going, corrected, afresh)
     theta_next = ca.fmin(ca.fmax(following[2:], -limit), limit)
-    told = theta_next if follows else theta
-    axle_force = force(p, known, told, s.speed, s.x, s.u)
+    output_theta = theta_next if follows else theta
+    axle_force = force(p, known, output_theta, s.speed, s.x, s.u)
     return ca.Function(
         name,
         [

@@ -139,8 +139,8 @@ def build_step() -> ca.Function:
     y, h = kappa * xi - filtered[:2], filtered[2:]
     warm = running * dt * kappa > 2  # the filters have forgotten their start
     J_next = ca.fmax(ca.exp(-dt / memory) * J + h**2 * dt, prior_slip**2 * memory)
-    told = ca.vertcat(p.C_f, p.C_r)
-    C_next = ca.fmax(stiffness + h * (y - h * stiffness) * dt / J_next, SMALLEST * told)
+    stated = ca.vertcat(p.C_f, p.C_r)
+    C_next = ca.fmax(stiffness + h * (y - h * stiffness) * dt / J_next, SMALLEST * stated)
     fast = s.v_x >= learning_speed
     learning = ca.logic_and(fast, warm)
     return ca.Function(

@@ -124,16 +124,14 @@ def identify_batch(
                 online=None if recording.axle_force is None else rmse(scores.squares[row]),
                 diverged_at=None if sane == len(recording) else float(recording.t[sane]),
                 state={
-                    t: _carried(scores, scan.carry, row, kept.index(k) if k in kept else None)
+                    t: _state(scores, scan.carry, row, kept.index(k) if k in kept else None)
                     for t, k in instants.items()
                 },
             )
     return tuple(runs[i] for i in range(len(designs)))
 
 
-def _carried(
-    scores: Scores, ports: tuple[str, ...], row: int, place: int | None
-) -> dict[str, Array]:
+def _state(scores: Scores, ports: tuple[str, ...], row: int, place: int | None) -> dict[str, Array]:
     """Carried values of one run at one of the kept samples; None: after the last."""
     if place is None:
         return {port: scores.record[f"{port}_final"][row] for port in ports}

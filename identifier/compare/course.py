@@ -183,9 +183,9 @@ def frozen_shares(
     frozen : by recording learnt on and recording replayed [N].
     course : car and recordings.
     """
-    own, other = where_learnt_and_elsewhere(frozen)
+    learnt_on, other = where_learnt_and_elsewhere(frozen)
     return (
-        _mean([course.share(name, error) for name, error in own]),
+        _mean([course.share(name, error) for name, error in learnt_on]),
         _mean([course.share(name, error) for name, error in other]),
     )
 
@@ -199,12 +199,12 @@ def where_learnt_and_elsewhere(
     ----------
     frozen : by recording learnt on and recording replayed [N].
     """
-    own: list[tuple[str, AxleRmse]] = []
+    learnt_on: list[tuple[str, AxleRmse]] = []
     other: list[tuple[str, AxleRmse]] = []
     for learnt, replays in frozen.items():
         for name, error in replays.items():
-            (own if name == learnt else other).append((name, error))
-    return own, other
+            (learnt_on if name == learnt else other).append((name, error))
+    return learnt_on, other
 
 
 def _mean(values: Sequence[float]) -> float | None:

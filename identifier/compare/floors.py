@@ -70,8 +70,8 @@ def fit_floors(
     workers : processes; 1 stays in this one.
     progress : told what is being done.
     """
-    wanted = {FLOOR_OF[name] for name in methods if name in FLOOR_OF}
-    tasks = [(s, i) for s in STRUCTURES if s in wanted for i in range(len(course.recordings))]
+    needed = {FLOOR_OF[name] for name in methods if name in FLOOR_OF}
+    tasks = [(s, i) for s in STRUCTURES if s in needed for i in range(len(course.recordings))]
     floors: dict[str, dict[str, dict[str, AxleRmse]]] = {}
     with spread(workers) as spread_map:
         results = spread_map(partial(fit, course, starts, seed), tasks)

@@ -127,12 +127,12 @@ def _counter(
     name: str, designs: int, progress: Callable[[str], None]
 ) -> Callable[[int, int], None]:
     """Return who is told of chunks and says so now and then."""
-    last, told_of_earlier = time.monotonic(), False
+    last, reported_earlier = time.monotonic(), False
 
     def count(earlier: int, ready: int) -> None:
-        nonlocal last, told_of_earlier
-        if earlier and not told_of_earlier:
-            told_of_earlier = True
+        nonlocal last, reported_earlier
+        if earlier and not reported_earlier:
+            reported_earlier = True
             found = min(earlier * CHUNK, designs)
             progress(f"{name}: {found} of {designs} designs were judged by an earlier run")
         elif time.monotonic() - last > QUIET and ready * CHUNK < designs:

@@ -57,10 +57,10 @@ def directional(P: Any, s: Any, keep: Any, bound: Any) -> Any:
     keep : exp(-λ T).
     bound : largest trace [1/s].
     """
-    seen = P @ s
-    variance = ca.fmax(s.T @ seen, 1e-300)  # s = 0: nothing is seen, nothing grows
-    room = ca.fmax(0, bound - ca.trace(P)) * variance / ca.fmax(ca.sumsqr(seen), 1e-300)
-    return P + ca.fmin(1 / keep - 1, room) * (seen @ seen.T) / variance
+    Ps = P @ s
+    variance = ca.fmax(s.T @ Ps, 1e-300)  # s = 0: nothing is seen, nothing grows
+    room = ca.fmax(0, bound - ca.trace(P)) * variance / ca.fmax(ca.sumsqr(Ps), 1e-300)
+    return P + ca.fmin(1 / keep - 1, room) * (Ps @ Ps.T) / variance
 
 
 # Symmetric positive definite matrices in straight-line code, without pivots or branches.
@@ -149,11 +149,11 @@ def filtered_pair(
     p = ca.if_else(fresh, c * xi - half * b, lags.target_lag)
     q = ca.if_else(fresh, -half * sigma, lags.regressor_lag)
     pair = Pair(s=q + half * sigma, y=c * xi - p - half * b)
-    carried = Lags(
+    next_lags = Lags(
         target_lag=e * p + c * (1 - e) * xi + (1 + e) * half * b,
         regressor_lag=e * q + (1 + e) * half * sigma,
     )
-    return pair, carried
+    return pair, next_lags
 
 
 # A memory of M pairs that excite the most: a new pair takes the place that gains the most.

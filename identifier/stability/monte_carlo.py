@@ -334,9 +334,9 @@ def monte_carlo(
         if chosen.size:
             kept = Drives(*(values[chosen] for values in drawn))
             residual = np.linalg.norm(residuals(vehicle, kept, design.dt), axis=2).max(axis=1)
-            seen = measured(kept, driving, rng)
+            log = measured(kept, driving, rng)
             peaks = largest_norms(
-                design, vehicle, seen, first_weights(design, chosen.size, beginning, rng)
+                design, vehicle, log, first_weights(design, chosen.size, beginning, rng)
             )
             found.append((*peaks, residual / design.force_unit))
             progress(done)

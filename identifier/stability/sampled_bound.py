@@ -301,12 +301,14 @@ def _error(
     e = error.start * acting.noise + error.force * (acting.residual + _norm(A_d) * acting.noise)
     e += error.rate * acting.rate
     e += sum(gamma * force for gamma, force in zip(error.weights, forces, strict=True))
-    seen = e + acting.noise
+    measured = e + acting.noise
     stages = [
-        grown * seen + held * acting.known + sum(c * f for c, f in zip(cs, forces, strict=False))
+        grown * measured
+        + held * acting.known
+        + sum(c * f for c, f in zip(cs, forces, strict=False))
         for grown, held, cs in error.inner
     ]
-    return seen, max([seen, *stages])
+    return measured, max([measured, *stages])
 
 
 def _norm(matrix: Matrix) -> float:

@@ -111,13 +111,13 @@ def tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: An
     load : vertical load [N].
     mu : friction over the tire's own [-].
     """
-    carried = ca.fmax(load, LEAST_LOAD)
+    floored = ca.fmax(load, LEAST_LOAD)
     # A tire may push at zero slip (its shifts); a free wheel then slips to where it does not.
-    at_rest = tire.forces(0.0, 0.0, 0.0, carried, mu)[0]
-    kappa = (drive - at_rest) / tire.slip_stiffness(carried)
+    at_rest = tire.forces(0.0, 0.0, 0.0, floored, mu)[0]
+    kappa = (drive - at_rest) / tire.slip_stiffness(floored)
     kappa = ca.fmin(ca.fmax(kappa, -LARGEST_KAPPA), LARGEST_KAPPA)
-    F_x, F_y = tire.forces(ca.atan(slip), kappa, camber, carried, mu)
-    return ca.vertcat(F_x, F_y) * (load / carried)
+    F_x, F_y = tire.forces(ca.atan(slip), kappa, camber, floored, mu)
+    return ca.vertcat(F_x, F_y) * (load / floored)
 
 
 # Vertical load of each wheel from roll, axle side force and longitudinal acceleration.
@@ -193,10 +193,10 @@ class Driver:
         error : wanted minus actual speed [m/s].
         integral : of the error [m].
         """
-        wanted = self.gain * error + self.integral_gain * integral
+        unlimited = self.gain * error + self.integral_gain * integral
         limit = self.acceleration_limit
-        demand = ca.fmin(ca.fmax(wanted, -limit), limit)
-        return demand, error + (demand - wanted) / self.gain  # the integral stops at the limit
+        demand = ca.fmin(ca.fmax(unlimited, -limit), limit)
+        return demand, error + (demand - unlimited) / self.gain  # the integral stops at the limit
 
 
 N_STATES = 18

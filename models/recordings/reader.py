@@ -210,9 +210,9 @@ def _read_parquet(path: Path, only_runs: bool, columns_named: Mapping[str, str])
             found = list(file.schema_arrow.names)
             header = _standard_names(path, found, columns_named)
             names = _choose(path, header, only_runs)
-            wanted = names + [RUN] * (RUN in header)
-            data: Any = file.read(columns=[found[header.index(name)] for name in wanted])
-            data = data.rename_columns(wanted)
+            known = names + [RUN] * (RUN in header)
+            data: Any = file.read(columns=[found[header.index(name)] for name in known])
+            data = data.rename_columns(known)
     except (pyarrow.ArrowException, OSError, UnicodeDecodeError) as error:
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise RecordingError(f"{path}: is not a Parquet file ({reason})") from None
@@ -260,8 +260,8 @@ def _standard_names(path: str | Path, header: list[str], columns: Mapping[str, s
 
 def _choose(path: str | Path, header: list[str], only_runs: bool) -> list[str]:
     """Check the header and return the numeric columns to read."""
-    wanted = (*NEEDED, *OPTIONAL, RUN)
-    doubled = [name for name in wanted if header.count(name) > 1]
+    known = (*NEEDED, *OPTIONAL, RUN)
+    doubled = [name for name in known if header.count(name) > 1]
     if doubled:
         raise RecordingError(f"{path}: column {', '.join(doubled)} appears more than once")
     if only_runs:
@@ -272,11 +272,11 @@ def _choose(path: str | Path, header: list[str], only_runs: bool) -> list[str]:
         if ";" in only or "\t" in only:
             raise RecordingError(f"{path}: cells must be separated by commas, found {only[:40]!r}")
         hints = [f"{found!r} for {name}" for name in missing if (found := _similar(name, header))]
-        seen = ", ".join(header[:12]) + (", ..." if len(header) > 12 else "")
+        listing = ", ".join(header[:12]) + (", ..." if len(header) > 12 else "")
         raise RecordingError(
             f"{path}: column {', '.join(missing)} is missing; "
             + (f"did you mean {', '.join(hints)}? rename it; " if hints else "")
-            + f"columns found: {seen[:200]!r}"
+            + f"columns found: {listing[:200]!r}"
         )
     if ("Fyf" in header) != ("Fyr" in header):
         lonely = "Fyf" if "Fyf" in header else "Fyr"

@@ -93,7 +93,7 @@ class Tolerances:
         require_positive_fields(self)
 
 
-class Disagreement(NamedTuple):
+class Residual(NamedTuple):
     """The worst relation: its name, what is left of it, and that over what is tolerated."""
 
     relation: str
@@ -106,8 +106,8 @@ class Disagreement(NamedTuple):
         return f"{self.relation} disagree by {self.value:.2g} {self.unit}"
 
 
-NONE = Disagreement("", 0.0, "", 0.0)
-NOT_A_NUMBER = Disagreement("a sensor shows no number: sensors", math.inf, "", math.inf)
+NONE = Residual("", 0.0, "", 0.0)
+NOT_A_NUMBER = Residual("a sensor shows no number: sensors", math.inf, "", math.inf)
 
 
 class Consistency:
@@ -128,7 +128,7 @@ class Consistency:
         self.agrees, self.worst = True, NONE
 
     def _begin(self) -> None:
-        self._told: tuple[float, ...] | None = None  # X, Y, ψ, v_y as predicted
+        self._predicted: tuple[float, ...] | None = None  # X, Y, ψ, v_y as predicted
         self._rates: tuple[float, ...] = ()
         self._means: tuple[float, ...] = (0.0,) * 6
         self._last_asked = 0.0
@@ -155,7 +155,7 @@ class Consistency:
         self.agrees = self._calm >= self._calm_asked
         return self.agrees
 
-    def _judged(self, m: FullSample, asked: float | None) -> Disagreement:
+    def _judged(self, m: FullSample, asked: float | None) -> Residual:
         allowed, pull, dt = self._allowed, self._allowed.rate, self._dt
         if not all(is_shown(channel, getattr(m, channel)) for channel in LARGEST_SHOWN):
             self._begin()
@@ -168,26 +168,28 @@ class Consistency:
             m.a_y - m.v_x * m.r,
         )
         shown = (m.X, m.Y, m.psi, m.v_y)
-        if self._told is None:
-            self._told, self._rates = shown, rates
+        if self._predicted is None:
+            self._predicted, self._rates = shown, rates
             self._last_asked = m.delta if asked is None else asked
         # Trapezoidal: half a sample of a turning car is 0.1 m/s across.
         moved = [0.5 * dt * (a + b) for a, b in zip(self._rates, rates, strict=True)]
-        told = [a + b for a, b in zip(self._told, moved, strict=True)]
-        left = [a - b for a, b in zip(shown, told, strict=True)]
-        left[2] = math.remainder(left[2], math.tau)
-        self._told = tuple(x + pull * dt * e for x, e in zip(told, left, strict=True))
+        predicted = [a + b for a, b in zip(self._predicted, moved, strict=True)]
+        residuals = [a - b for a, b in zip(shown, predicted, strict=True)]
+        residuals[2] = math.remainder(residuals[2], math.tau)
+        self._predicted = tuple(
+            x + pull * dt * e for x, e in zip(predicted, residuals, strict=True)
+        )
         self._rates = rates
         along, across = (
-            left[0] * cos_psi + left[1] * sin_psi,
-            left[1] * cos_psi - left[0] * sin_psi,
+            residuals[0] * cos_psi + residuals[1] * sin_psi,
+            residuals[1] * cos_psi - residuals[0] * sin_psi,
         )
         steering, turning = self._means[4:]
         if asked is not None:
             steering, turning = m.delta - asked, abs(asked - self._last_asked) / dt
             self._last_asked = asked
-        rates_left = [pull * one for one in (along, across, left[2], left[3])]
-        now = (*rates_left, steering, turning)
+        pulled = [pull * one for one in (along, across, residuals[2], residuals[3])]
+        now = (*pulled, steering, turning)
         self._means = tuple(a + pull * dt * (b - a) for a, b in zip(self._means, now, strict=True))
         along, across, heading, lateral, steering, turning = self._means
         steers = allowed.steering + allowed.steering_time * turning
@@ -199,7 +201,7 @@ class Consistency:
             ("steering and what was asked of it", steering, "rad", steers),
         )
         found = [
-            Disagreement(relation, value, unit, abs(value) / most)
+            Residual(relation, value, unit, abs(value) / most)
             for relation, value, unit, most in relations
         ]
         return max(found, key=lambda one: one.share)

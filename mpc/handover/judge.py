@@ -5,7 +5,7 @@ dξ_i/dt = F_i/F_z,i - v_x r/g exactly. So the slope over a stretch of time of
     ξ - ∫ (F/F_z - v_x r/g) dt,
 by least squares, is the mean error e of the force that a tire tells from the measured motion, in
 static axle loads: 0.1 at both axles are 1 m/s². (The slope has two thirds of the noise of a
-difference of two samples.) The misfit Σ (e/σ)² is -2 ln of the likelihood, up to a constant.
+difference of two samples.) The chi-square Σ (e/σ)² is -2 ln of the likelihood, up to a constant.
 """
 
 from collections.abc import Hashable, Sequence
@@ -186,7 +186,7 @@ class ErrorModel:
         require_positive_fields(self)
 
 
-class Misfit(NamedTuple):
+class ChiSquare(NamedTuple):
     """Σ (e/σ)² over independent stretches and both axles [-], the number of those, rms of e (2,).
 
     The rms is in static axle loads, front and rear.
@@ -203,7 +203,7 @@ class Misfit(NamedTuple):
 
 
 class Judge:
-    """Misfits of tires over samples that come at one interval.
+    """Chi-squares of tires over samples that come at one interval.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ class Judge:
         self._slope = centered / (dt * np.sum(centered**2))
         self._mean = np.full(self._h + 1, 1.0 / (self._h + 1))
 
-    def reach(self, seconds: float) -> float:
+    def lookback(self, seconds: float) -> float:
         """Return how far back samples must go to judge the last seconds [s].
 
         Parameters
@@ -252,7 +252,7 @@ class Judge:
         e, force = self._errors(tire, tire.weights[None], samples)
         return e[0], force[0]
 
-    def misfit(self, tire: PredictionTire, samples: Array) -> Misfit:
+    def chi_square(self, tire: PredictionTire, samples: Array) -> ChiSquare:
         """Return how badly a tire explains samples.
 
         Parameters
@@ -265,9 +265,9 @@ class Judge:
         ValueError
             Where there are too few samples.
         """
-        return self.misfits(tire, tire.weights[None], samples)[0]
+        return self.chi_squares(tire, tire.weights[None], samples)[0]
 
-    def misfits(self, tire: PredictionTire, weights: Array, samples: Array) -> list[Misfit]:
+    def chi_squares(self, tire: PredictionTire, weights: Array, samples: Array) -> list[ChiSquare]:
         """Return how badly k tires explain samples.
 
         Parameters
@@ -292,7 +292,7 @@ class Judge:
         rms = np.sqrt(np.mean(e**2, axis=1))
         independent = 2.0 * (1.0 + (e.shape[1] - 1) / self._h)
         return [
-            Misfit(float(one) * independent, independent, error)
+            ChiSquare(float(one) * independent, independent, error)
             for one, error in zip(mean, rms, strict=True)
         ]
 
@@ -306,8 +306,8 @@ class Judge:
         v_x, v_y, r = samples[self._settle :, :3].T
         xi = v_y[:, None] / GRAVITY + inertia * r[:, None]
         rate = phi - (v_x * r / GRAVITY)[:, None]
-        told = np.cumsum(0.5 * (rate[:, 1:] + rate[:, :-1]), axis=1) * self.dt  # trapezoidal
-        gap = xi - xi[0] - np.concatenate([np.zeros((len(phi), 1, 2)), told], axis=1)
+        integral = np.cumsum(0.5 * (rate[:, 1:] + rate[:, :-1]), axis=1) * self.dt  # trapezoidal
+        gap = xi - xi[0] - np.concatenate([np.zeros((len(phi), 1, 2)), integral], axis=1)
         return _along(gap, self._slope), _along(phi, self._mean)
 
 

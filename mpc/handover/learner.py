@@ -12,7 +12,7 @@ from mpc.handover.rules import Decision, Verdict
 from mpc.handover.supervisor import Supervisor
 from mpc.realtime import Tracker
 from mpc.tires import PredictionTire
-from mpc.tires.tire import reach_of
+from mpc.tires.tire import valid_slip
 
 # Moving weights to new ones so gently that the plan does not jump.
 
@@ -99,8 +99,8 @@ def previewed_rate(tracker: Tracker, tire: PredictionTire) -> float:
     instance.start[:] = state["x"][0]
     params_now = instance.params
     params_now["weights"], params_now["car"] = tire.weights, tire.car
-    reach = reach_of(tire, tracker.problem.limits.slip)
-    params_now["max_slip"], params_now["rise"] = reach
+    valid = valid_slip(tire, tracker.problem.limits.slip)
+    params_now["max_slip"], params_now["rise"] = valid
     instance.solve()
     rate = float(instance.state["u"][0])
     instance.state[...], instance.params[...] = state, params
@@ -162,7 +162,7 @@ class Learner:
             measured.v_y,
             measured.r,
             measured.delta,
-            doubt=None if agree else str(self._sensors.worst),
+            fault=None if agree else str(self._sensors.worst),
         )
         changed = decision is not None and decision.verdict is not Verdict.KEEP
         if decision is not None and changed:

@@ -7,7 +7,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from mpc.handover.certificate import tire_complaint
-from mpc.handover.judge import Judge, Misfit, Window
+from mpc.handover.judge import ChiSquare, Judge, Window
 from mpc.handover.rules import Rules, Verdict
 from mpc.tires import PredictionTire
 from mpc.tires.ladder import N_AXLE, N_COMMON, LadderAxles
@@ -21,18 +21,18 @@ from mpc.tires.network import NetworkAxles
 
 LEAST = 0.15  # of the friction that a tire was learnt on: ice, after a dry road
 GRID = 13
-DOUBT = 0.7  # standard deviation of ln μ where nothing is seen
+PRIOR_SD = 0.7  # standard deviation of ln μ where nothing is seen
 
 
 class FrictionFit(NamedTuple):
     """Friction over that of the tire it began with [-], the tire, and how it explains the samples.
 
-    `gain` is by how much the misfit, with what is known of roads, is better than without a change.
+    `gain` is by how much the chi-square, with what is known of roads, falls by the change.
     """
 
     ratio: float
     tire: PredictionTire
-    misfit: Misfit
+    chi_square: ChiSquare
     gain: float
 
 
@@ -91,12 +91,12 @@ def fit_friction(
 
     Parameters
     ----------
-    judge : of misfits.
+    judge : of chi-squares.
     tire : as `at_friction` takes it.
     samples : as `Judge.errors` takes them.
     known : friction over that of the tire that was taken so far [-].
     between : least and largest friction over that of the tire that is looked for [-].
-    scale : of misfits: they are that many times as large as expected even of a good tire [-].
+    scale : of chi-squares: they are that many times as large as expected even of a good tire [-].
 
     Raises
     ------
@@ -105,25 +105,25 @@ def fit_friction(
     """
     center, (least, most) = math.log(known), np.log(between)
 
-    def costs(log_ratios: Array) -> tuple[Array, list[Misfit]]:
+    def costs(log_ratios: Array) -> tuple[Array, list[ChiSquare]]:
         weights = np.stack([at_friction(tire, math.exp(at)).weights for at in log_ratios])
-        misfits = judge.misfits(tire, weights, samples)
-        total = np.array([misfit.total for misfit in misfits])
-        return total / scale + ((log_ratios - center) / DOUBT) ** 2, misfits
+        chi_squares = judge.chi_squares(tire, weights, samples)
+        total = np.array([chi_square.total for chi_square in chi_squares])
+        return total / scale + ((log_ratios - center) / PRIOR_SD) ** 2, chi_squares
 
     grid = np.linspace(least, most, GRID)
     cost, _ = costs(grid)
     around = grid[int(np.argmin(cost))] + (grid[1] - grid[0]) * np.linspace(-1.0, 1.0, GRID)
     fine = np.append(np.clip(around, least, most)[:-1], center)  # what is known, too
-    cost, misfits = costs(fine)
+    cost, chi_squares = costs(fine)
     best = int(np.argmin(cost))
     ratio = math.exp(fine[best])
     gain = float(cost[-1] - cost[best])
-    return FrictionFit(ratio, at_friction(tire, ratio), misfits[best], gain)
+    return FrictionFit(ratio, at_friction(tire, ratio), chi_squares[best], gain)
 
 
 class Road(NamedTuple):
-    """What is believed of the road.
+    """The estimate of the road's friction.
 
     base : the tire as it was learnt.   ratio : friction over that of the base, at most 1 [-].
     changed_at : when it last changed for good [s].   before : the base before friction was lost,
@@ -147,7 +147,7 @@ class Road(NamedTuple):
 
 
 class Change(NamedTuple):
-    """Another belief, how it was found, and misfits before and after [-]."""
+    """Another estimate, how it was found, and chi-squares before and after [-]."""
 
     verdict: Verdict
     road: Road
@@ -159,7 +159,7 @@ class Change(NamedTuple):
     def reason(self) -> str:
         """In words."""
         return (
-            f"{self.road.ratio:.2f} of the friction learnt on: misfit {self.before:.0f} -> "
+            f"{self.road.ratio:.2f} of the friction learnt on: chi-square {self.before:.0f} -> "
             f"{self.after:.0f}"
         )
 
@@ -170,7 +170,7 @@ def look_at_road(
     window: Window,
     *,
     t: float,
-    usual: float,
+    baseline: float,
     trusted: float,
     judge: Judge,
     rules: Rules,
@@ -184,13 +184,13 @@ def look_at_road(
 
     Parameters
     ----------
-    road : what is believed so far.
+    road : the estimate so far.
     in_use : the tire in use, the base at that friction.
     window : the last samples.
     t : time [s].
-    usual : size of mean misfits [-].
+    baseline : mean chi-square of the tire in use where the road does not change [-].
     trusted : slip up to which a tire must be one [rad].
-    judge : of misfits.
+    judge : of chi-squares.
     rules : times and evidence.
     """
     if not can_scale(road.base):
@@ -198,28 +198,28 @@ def look_at_road(
 
     def fit(
         seconds: float, least: float, most: float, *, wrong: float = 1.0
-    ) -> tuple[FrictionFit, Misfit] | None:
+    ) -> tuple[FrictionFit, ChiSquare] | None:
         if not least < most:
             return None
-        samples = window.last(judge.reach(seconds))
-        now = judge.misfit(in_use, samples)
-        if now.mean <= wrong * usual:
+        samples = window.last(judge.lookback(seconds))
+        now = judge.chi_square(in_use, samples)
+        if now.mean <= wrong * baseline:
             return None
         between = (least, most)
         found = fit_friction(
-            judge, road.base, samples, known=road.ratio, between=between, scale=usual
+            judge, road.base, samples, known=road.ratio, between=between, scale=baseline
         )
         complaint = tire_complaint(found.tire, float(samples[-1, 0]), trusted)
         return None if complaint is not None else (found, now)
 
-    def change(verdict: Verdict, found: FrictionFit, now: Misfit, since: float) -> Change:
-        belief = road._replace(ratio=found.ratio, changed_at=since)
-        return Change(verdict, belief, found.tire, now.total, found.misfit.total)
+    def change(verdict: Verdict, found: FrictionFit, now: ChiSquare, since: float) -> Change:
+        estimate = road._replace(ratio=found.ratio, changed_at=since)
+        return Change(verdict, estimate, found.tire, now.total, found.chi_square.total)
 
     drop = fit(rules.last_moments, LEAST, road.ratio, wrong=rules.wrong)
     if drop is not None:
         found, now = drop
-        good = found.misfit.mean < min(rules.wrong * usual, 0.5 * now.mean)
+        good = found.chi_square.mean < min(rules.wrong * baseline, 0.5 * now.mean)
         if good and found.gain >= rules.friction_evidence:
             return change(Verdict.FRICTION, found, now, t)
     since = t - road.changed_at
@@ -227,11 +227,13 @@ def look_at_road(
         better = fit(rules.last_moments + since, LEAST, 1.0)
         if better is not None and better[0].gain >= rules.correction:
             return change(Verdict.CORRECTION, *better, road.changed_at)
-    elif window.duration >= judge.reach(rules.recovery_seconds):
+    elif window.duration >= judge.lookback(rules.recovery_seconds):
         back = fit(rules.recovery_seconds, road.ratio, 1.0)
         if back is not None and back[0].gain >= rules.recovery_evidence:
             return change(Verdict.RECOVERY, *back, t)
-        return _the_road_before(road, in_use, window, t=t, usual=usual, judge=judge, rules=rules)
+        return _the_road_before(
+            road, in_use, window, t=t, baseline=baseline, judge=judge, rules=rules
+        )
     return None
 
 
@@ -241,7 +243,7 @@ def _the_road_before(
     window: Window,
     *,
     t: float,
-    usual: float,
+    baseline: float,
     judge: Judge,
     rules: Rules,
 ) -> Change | None:
@@ -249,9 +251,9 @@ def _the_road_before(
     if road.before is None:
         return None
     weights = np.stack([in_use.weights, road.before.weights])
-    samples = window.last(judge.reach(rules.recovery_seconds))
-    now, then = judge.misfits(in_use, weights, samples)
-    if now.mean <= usual or now.total - then.total < rules.recovery_evidence * usual:
+    samples = window.last(judge.lookback(rules.recovery_seconds))
+    now, then = judge.chi_squares(in_use, weights, samples)
+    if now.mean <= baseline or now.total - then.total < rules.recovery_evidence * baseline:
         return None
-    belief = Road(road.before, changed_at=t)
-    return Change(Verdict.RECOVERY, belief, road.before, now.total, then.total)
+    estimate = Road(road.before, changed_at=t)
+    return Change(Verdict.RECOVERY, estimate, road.before, now.total, then.total)

@@ -11,7 +11,7 @@ from models.rules import require_positive_fields
 class Rules:
     """Times and evidence of handing over.
 
-    Evidence is a difference of misfits, -2 ln of a ratio of likelihoods: 8 is one in 50.
+    Evidence is a difference of chi-squares, -2 ln of a ratio of likelihoods: 8 is one in 50.
 
     Parameters
     ----------
@@ -22,14 +22,14 @@ class Rules:
     least_seconds : of these seconds there must be at least [s]; after a change of friction too.
     learning_time : with slip at both axles before anything is handed over [s].
     last_moments : what tells that the friction has changed [s].
-    wrong : mean misfit of the last moments, over its usual size, from which on a friction is
+    wrong : mean chi-square of the last moments, over its baseline, from which on a friction is
         looked for [-].
     friction_evidence : by which a lower friction must explain the last moments better [-].
     recovery_seconds, recovery_evidence : the same for a higher one, which can wait: a car that
         believes in too little grip is only slow to turn.
     follow : time for which a new friction is corrected as more is seen of it [s].
     correction : evidence that is enough for that [-].
-    usual_time : over which the usual size of misfits is averaged [s].
+    baseline_time : over which the baseline of chi-squares is averaged [s].
     revoke : what was handed over this long before the sensors were found to disagree is taken back
         [s].
     relapse : what was learnt or handed over since they were believed again is taken back too, where
@@ -56,7 +56,7 @@ class Rules:
     recovery_evidence: float = 16.0
     follow: float = 2.0
     correction: float = 2.0
-    usual_time: float = 10.0
+    baseline_time: float = 10.0
     revoke: float = 1.0
     relapse: float = 10.0
     blend: float = 0.4
@@ -74,11 +74,11 @@ class Verdict(Enum):
     FRICTION = "friction lost"
     CORRECTION = "friction corrected"
     RECOVERY = "friction regained"
-    DOUBT = "sensors in doubt"
+    FAULT = "sensor fault"
 
 
 class Decision(NamedTuple):
-    """What was decided at a time [s] and why; misfits of the tire in use and of the candidate [-].
+    """What was decided at a time [s] and why; chi-squares in use and of the candidate [-].
 
     friction : of the candidate over that of the tire that it was scaled from [-]; 1 for others.
     """

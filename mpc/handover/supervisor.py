@@ -10,7 +10,7 @@ from identifier.run import DivergedError, OnlineIdentifier
 from identifier.tire_model import TireModel
 from models.vehicle import Vehicle
 from mpc.handover.certificate import LARGEST_SLIP, law_complaint, tire_complaint
-from mpc.handover.judge import Judge, Misfit, Window
+from mpc.handover.judge import ChiSquare, Judge, Window
 from mpc.handover.road import Road, look_at_road
 from mpc.handover.rules import Decision, Rules, Verdict
 from mpc.tires import PredictionTire, prediction_tire
@@ -118,7 +118,7 @@ class Supervisor:
     identifier : which is told every sample here.
     in_use : the tire that is steered with at the start.
     rules : times and evidence.
-    judge : of misfits; None expects the usual errors.
+    judge : of chi-squares; None expects the usual errors.
     proven : whether that tire is one of this car, so that what it does not explain is the road;
         else a friction is looked for only after a learnt tire took over.
 
@@ -142,19 +142,19 @@ class Supervisor:
         self.rules, self.judge = rules or Rules(), judge or Judge(dt)
         self._require_fit_for_use(in_use)
         longest = max(self.rules.seconds, self.rules.follow)
-        self._window = Window(self.judge.reach(longest), dt)
+        self._window = Window(self.judge.lookback(longest), dt)
         self._excitation = Excitation(dt, identifier.vehicle, self.rules.learning_time)
         self._every = max(1, round(self.rules.every / dt))
         self._learnt_every = max(1, round(self.rules.learnt_every / dt))
         self._samples, self._dt = 0, dt
         self._sample, self._lost = (0.0, 0.0, 0.0, 0.0), 0
-        self._usual = 1.0  # mean misfit of the tire in use
+        self._baseline = 1.0  # mean chi-square of the tire in use
         self._proven = proven
         self._road = Road(in_use)
         # What was steered with and what was learnt, and since when [s], to go back to.
         self._steered = [(-math.inf, in_use, self._road)]
         self._models: list[tuple[float, TireModel | None]] = [(-math.inf, identifier.start)]
-        self._agreed, self._believed_since = True, -math.inf
+        self._agreed, self._trusted_since = True, -math.inf
         self.decisions: list[Decision] = []
         self.last = Decision(0.0, Verdict.KEEP, "nothing was driven yet", 0.0, 0.0)
 
@@ -175,13 +175,13 @@ class Supervisor:
         return self._samples * self._dt
 
     def observe(
-        self, v_x: float, v_y: float, r: float, delta: float, *, doubt: str | None = None
+        self, v_x: float, v_y: float, r: float, delta: float, *, fault: str | None = None
     ) -> Decision | None:
         """Take a sample; return a decision where one was due.
 
-        A sample in doubt teaches nothing. Where doubt begins, what is steered with and what was
-        learnt go back to what they were before its cause can have been at work. An identifier that
-        is stale is in doubt by itself.
+        A sample with a sensor fault teaches nothing. Where a fault begins, what is steered with and
+        what was learnt go back to what they were before its cause can have been at work. An
+        identifier that is stale is a fault by itself.
 
         Parameters
         ----------
@@ -189,17 +189,17 @@ class Supervisor:
         v_y : lateral velocity [m/s].
         r : yaw rate [rad/s].
         delta : angle of the front road wheels [rad].
-        doubt : why the sensors are not to be believed, in words; None where they are.
+        fault : why the sensors are not to be believed, in words; None where they are.
         """
         self._samples += 1
-        if doubt is None:
+        if fault is None:
             self.identifier.update(np.array([v_y, r]), np.array([delta, 0.0]), v_x)
             if self.identifier.stale:
-                doubt = f"no sample could be taken for {self.identifier.stale_time:g} s"
-        if doubt is not None:
-            return self._doubted(doubt)
+                fault = f"no sample could be taken for {self.identifier.stale_time:g} s"
+        if fault is not None:
+            return self._faulted(fault)
         if not self._agreed:
-            self._agreed, self._believed_since = True, self.t
+            self._agreed, self._trusted_since = True, self.t
         if self.identifier.limits.accept(v_x, v_y, r, delta, 0.0):
             self._lost = 0
             sample = (v_x, v_y, r, delta)
@@ -229,47 +229,47 @@ class Supervisor:
         except (DivergedError, CannotFreezeError, ValueError):
             return
         self._models.append((self.t, model))
-        old = [one for one in self._models if one[0] <= self._beyond_doubt]
+        old = [one for one in self._models if one[0] <= self._trusted_until]
         self._models = self._models[max(len(old) - 1, 0) :]
 
-    def _doubted(self, doubt: str) -> Decision | None:
-        """Take a sample that is not believed; return the decision where doubt begins."""
+    def _faulted(self, fault: str) -> Decision | None:
+        """Take a sample with a fault; return the decision where the fault begins."""
         self._window.clear()
         if not self._agreed:
             return None
         self._agreed = False
-        before = self._beyond_doubt
+        before = self._trusted_until
         self._steered = [one for one in self._steered if one[0] <= before]
         self._models = [one for one in self._models if one[0] <= before] or self._models[:1]
         _, self.target, self._road = self._steered[-1]
         self.identifier.restart(self._models[-1][1])
-        self.last = Decision(self.t, Verdict.DOUBT, doubt, 0.0, 0.0)
+        self.last = Decision(self.t, Verdict.FAULT, fault, 0.0, 0.0)
         self.decisions.append(self.last)
         return self.last
 
     @property
-    def _beyond_doubt(self) -> float:
+    def _trusted_until(self) -> float:
         """Time until which nothing was spoilt by a fault that would be noticed now [s]."""
         before = self.t - self.rules.revoke
-        relapsed = self.t - self._believed_since < self.rules.relapse
-        return min(before, self._believed_since) if relapsed else before
+        relapsed = self.t - self._trusted_since < self.rules.relapse
+        return min(before, self._trusted_since) if relapsed else before
 
     def _keep(self, reason: str, in_use: float = 0.0, candidate: float = 0.0) -> Decision:
         return Decision(self.t, Verdict.KEEP, reason, in_use, candidate)
 
     def _decide(self, v_x: float) -> Decision:
         rules, judge = self.rules, self.judge
-        if self._window.duration < judge.reach(rules.last_moments):
+        if self._window.duration < judge.lookback(rules.last_moments):
             return self._keep("too few samples")
-        moments = self._window.last(judge.reach(rules.last_moments))
-        now = judge.misfit(self.target, moments)
+        moments = self._window.last(judge.lookback(rules.last_moments))
+        now = judge.chi_square(self.target, moments)
         if self._proven:
             change = look_at_road(
                 self._road,
                 self.target,
                 self._window,
                 t=self.t,
-                usual=self._usual,
+                baseline=self._baseline,
                 trusted=self._excitation.trusted_slip(self.target),
                 judge=judge,
                 rules=rules,
@@ -284,18 +284,18 @@ class Supervisor:
                     change.after,
                     change.road.ratio,
                 )
-        share = rules.every / rules.usual_time
-        rise = min(now.mean, 4.0 * self._usual) - self._usual  # shall not follow a change
-        self._usual = max(1.0, self._usual + share * rise)
+        share = rules.every / rules.baseline_time
+        rise = min(now.mean, 4.0 * self._baseline) - self._baseline  # shall not follow a change
+        self._baseline = max(1.0, self._baseline + share * rise)
         if self._samples % self._learnt_every:
             return self._keep(self.last.reason, now.total)
         return self._learnt(moments, now, v_x)
 
-    def _learnt(self, moments: Array, now: Misfit, v_x: float) -> Decision:
+    def _learnt(self, moments: Array, now: ChiSquare, v_x: float) -> Decision:
         """Return a decision on what the identifier has learnt."""
         rules, judge = self.rules, self.judge
         seconds = min(rules.seconds, self.t - self._road.changed_at)
-        samples = self._window.last(judge.reach(seconds))
+        samples = self._window.last(judge.lookback(seconds))
         if seconds < rules.least_seconds or len(samples) * self._dt < rules.least_seconds:
             return self._keep("too few seconds to judge what was learnt", now.total)
         try:
@@ -309,12 +309,12 @@ class Supervisor:
         if complaint is not None:
             return self._keep(complaint, now.total)
         weights = np.stack([self.target.weights, candidate.weights])
-        before, after = judge.misfits(candidate, weights, samples)
-        reason = f"misfit of {seconds:.1f} s {before.total:.0f} -> {after.total:.0f}"
-        if before.total - after.total < rules.evidence * self._usual:
+        before, after = judge.chi_squares(candidate, weights, samples)
+        reason = f"chi-square of {seconds:.1f} s {before.total:.0f} -> {after.total:.0f}"
+        if before.total - after.total < rules.evidence * self._baseline:
             return self._keep(f"not better: {reason}", before.total, after.total)
-        latest = judge.misfit(candidate, moments)
-        if latest.total > now.total + rules.correction * self._usual:
+        latest = judge.chi_square(candidate, moments)
+        if latest.total > now.total + rules.correction * self._baseline:
             return self._keep("worse in the last moments", before.total, after.total)
         self.target, self._proven = candidate, True
         self._road = self._road.on(candidate)

@@ -130,7 +130,7 @@ def drive(
     state = _at_the_start(path, car, profile)
     waiting = deque([0.0] * delay)
     record = Recorder(plan_every)
-    here, believed = path.project(state.X, state.Y, 0.0), 0.0
+    here, last_s = path.project(state.X, state.Y, 0.0), 0.0
     place = Place(state.X, state.Y, state.psi, state.v_x, 0.0, 0.0, (0.0,) * len(GUIDES))
     ending = ""
     while not ending:
@@ -138,15 +138,15 @@ def drive(
         place = _located(measured, place, car.period)
         for channel in place.just_lost(car.period):
             record.note(state.t, f"{channel} shows no number: dead reckoning")
-        seen = path.project(place.X, place.Y, believed)
-        believed = seen.s
+        projected = path.project(place.X, place.Y, last_s)
+        last_s = projected.s
         if learner is not None:
             record.note(state.t, learner.observe(measured, tracker))
-        ahead = profile.ahead(seen.s, place.v_x, tracker.times, car.speed_gain)
+        ahead = profile.ahead(projected.s, place.v_x, tracker.times, car.speed_gain)
         command = tracker.step(
             Measurement(
-                e_y=seen.e_y,
-                e_psi=seen.heading_error(place.psi),
+                e_y=projected.e_y,
+                e_psi=projected.heading_error(place.psi),
                 v_y=measured.v_y if is_shown("v_y", measured.v_y) else math.nan,
                 r=measured.r if is_shown("r", measured.r) else math.nan,
                 kappa=ahead.kappa,
@@ -155,7 +155,7 @@ def drive(
         )
         v_ref = profile.reference(here.s, car.speed_gain)
         if record.plan_is_due:
-            there = profile.ahead(seen.s, place.v_x, tracker.plan_times, car.speed_gain)
+            there = profile.ahead(projected.s, place.v_x, tracker.plan_times, car.speed_gain)
             record.plan(command, there.s)
         record.add(state, here, measured, v_ref, command)
         waiting.append(command.steering)

@@ -150,15 +150,15 @@ class FaultySensors:
         rng : source of the noise; of a fault's own noise too, so that it changes no other draw.
         """
         shown = self._sensors.measure(state, rng)
-        held = self._good if self._good is not None else shown
+        last_good = self._good if self._good is not None else shown
         good = shown
         for fault in self._faults:
             name = fault.channel
             if fault.active(state.t):
-                own = np.random.default_rng(round(1e6 * state.t)).standard_normal()
-                value = fault.shown(state.t, getattr(shown, name), getattr(held, name), own)
+                noise = np.random.default_rng(round(1e6 * state.t)).standard_normal()
+                value = fault.shown(state.t, getattr(shown, name), getattr(last_good, name), noise)
                 shown = shown._replace(**{name: float(value)})
-                good = good._replace(**{name: getattr(held, name)})
+                good = good._replace(**{name: getattr(last_good, name)})
         self._good = good
         return shown
 

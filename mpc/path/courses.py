@@ -102,9 +102,9 @@ class Turn:
         peak = math.copysign(1.0 / self.radius, self.angle)
         into = np.clip(s / self.easing, 0.0, 1.0)
         out = np.clip((self.length - s) / self.easing, 0.0, 1.0)
-        held = np.clip(s - self.easing, 0.0, self.length - 2.0 * self.easing)
+        plateau = np.clip(s - self.easing, 0.0, self.length - 2.0 * self.easing)
         rise, fall = into**3 - 0.5 * into**4, 0.5 - (out**3 - 0.5 * out**4)  # ∫ 3 u² - 2 u³
-        psi = peak * (self.easing * (rise + fall) + held)
+        psi = peak * (self.easing * (rise + fall) + plateau)
         smaller = np.minimum(into, out)
         return psi, peak * smaller**2 * (3.0 - 2.0 * smaller)
 

@@ -55,7 +55,9 @@ class Projection(NamedTuple):
         return math.remainder(psi - self.psi, 2.0 * math.pi)
 
 
-def walk_to_foot(point_of: PointOf, X: float, Y: float, near: float, reach: float) -> Projection:
+def walk_to_foot(
+    point_of: PointOf, X: float, Y: float, near: float, search_distance: float
+) -> Projection:
     """Walk from `near` towards the car until the path passes square beside it.
 
     The walk follows the path, so that another leg that passes close by cannot catch it.
@@ -66,8 +68,8 @@ def walk_to_foot(point_of: PointOf, X: float, Y: float, near: float, reach: floa
     X : of the car [m].
     Y : of the car [m].
     near : s where the walk starts [m].
-    reach : how far from `near` the walk may go [m]; where it must stop short, e_y is the deviation
-        there.
+    search_distance : how far from `near` the walk may go [m]; where it must stop short, e_y is the
+        deviation there.
     """
     s = near
     for _ in range(STEPS):
@@ -77,7 +79,7 @@ def walk_to_foot(point_of: PointOf, X: float, Y: float, near: float, reach: floa
         e_y = (Y - Y_s) * cos_psi - (X - X_s) * sin_psi
         step = along / max(1.0 - kappa * e_y, SMALLEST_SLOPE)
         step = min(max(step, -LONGEST_STEP), LONGEST_STEP)
-        goal = min(max(s + step, near - reach), near + reach)
+        goal = min(max(s + step, near - search_distance), near + search_distance)
         if abs(goal - s) < TOLERANCE:
             break
         s = goal
@@ -304,7 +306,7 @@ class Path:
         return np.asarray(np.interp(at, self.s, np.asarray(values, dtype=np.float64)))
 
     def project(
-        self, X: float, Y: float, near: float | None = None, *, reach: float = 10.0
+        self, X: float, Y: float, near: float | None = None, *, search_distance: float = 10.0
     ) -> Projection:
         """Return the point of the path that a car is at.
 
@@ -314,7 +316,7 @@ class Path:
         Y : of the car [m].
         near : s of the last projection [m], laps included: the search follows the path from there
             and does not jump to another leg. None: the nearest point of the whole path.
-        reach : how far from `near` to look [m].
+        search_distance : how far from `near` to look [m].
 
         Raises
         ------
@@ -324,7 +326,7 @@ class Path:
         if not (math.isfinite(X) and math.isfinite(Y) and math.isfinite(near or 0.0)):
             raise PathError(f"{self.name}: cannot project X = {X}, Y = {Y}, near = {near}")
         if near is not None:
-            return walk_to_foot(self._point, X, Y, near, reach)
+            return walk_to_foot(self._point, X, Y, near, search_distance)
         nearest = int(np.argmin((self.X - X) ** 2 + (self.Y - Y) ** 2))
         start = float(self.s[nearest])
         if nearest in (0, self.s.size - 1) and not self.closed:  # perhaps far beyond an end

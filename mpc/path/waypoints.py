@@ -302,11 +302,11 @@ def _find(file: Path, axis: str, names: tuple[str, ...], header: list[str]) -> i
     found = [k for k, name in enumerate(header) if name.lower() in names]
     if len(found) == 1:
         return found[0]
-    seen = ", ".join(header)[:120]
+    listing = ", ".join(header)[:120]
     if found:
-        raise PathError(f"{file}: column {axis} must be there once, found {seen!r}")
-    if len(header) == 1 and (";" in seen or "\t" in seen):
-        raise PathError(f"{file}: cells must be separated by commas, found {seen!r}")
+        raise PathError(f"{file}: column {axis} must be there once, found {listing!r}")
+    if len(header) == 1 and (";" in listing or "\t" in listing):
+        raise PathError(f"{file}: cells must be separated by commas, found {listing!r}")
     lower = {name.lower() for name in header}
     hint = ""
     if lower & ON_THE_GLOBE:
@@ -315,7 +315,9 @@ def _find(file: Path, axis: str, names: tuple[str, ...], header: list[str]) -> i
         hint = f"; {unit[0]} is not in meters, convert and rename it"
     elif all(_is_number(name) for name in header):
         hint = "; the first line must name the columns"
-    raise PathError(f"{file}: column {axis}_m (or {axis.lower()}) is missing, found {seen!r}{hint}")
+    raise PathError(
+        f"{file}: column {axis}_m (or {axis.lower()}) is missing, found {listing!r}{hint}"
+    )
 
 
 def _is_number(cell: str) -> bool:

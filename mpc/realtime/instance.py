@@ -258,8 +258,8 @@ class Instance:
         self.state = np.zeros((), state_type(horizon, n_x, single=single))
         self.input = np.zeros((), input_type(horizon, single=single))
         sizes = [library.mpc_sizes(i) for i in range(4)]
-        own = [array.nbytes for array in (self.params, self.state, self.input)]
-        assert sizes[:3] == own, f"structures of {own} bytes are {sizes[:3]} in C"
+        expected = [array.nbytes for array in (self.params, self.state, self.input)]
+        assert sizes[:3] == expected, f"structures of {expected} bytes are {sizes[:3]} in C"
         self._work = np.zeros(sizes[3], np.uint8)
         self.steering = np.zeros((), self.state["u"].dtype)
         arrays = (self.state, self.params, self._work, self.input, self.steering)

@@ -10,7 +10,7 @@ from codegen.arrays import Array
 from mpc.problem import Guards, Problem
 from mpc.realtime.fall_back import fall_back
 from mpc.realtime.instance import N_COMMANDS, Command, Instance, Measurement, Status, set_params
-from mpc.tires.tire import PredictionTire, reach_of
+from mpc.tires.tire import PredictionTire, valid_slip
 
 TOLERANCE = {False: 1e-8, True: 1e-5}  # of the solver, by `single`
 STAYS = 1e-9  # change of the steering rate [rad/s] below which a plan has converged
@@ -146,7 +146,7 @@ class Tracker:
         if not (np.isfinite(weights).all() and np.isfinite(car).all()):
             raise ValueError("weights and car must be finite")
         params["weights"], params["car"] = weights, car
-        params["max_slip"], params["rise"] = reach_of(tire, self.problem.limits.slip)
+        params["max_slip"], params["rise"] = valid_slip(tire, self.problem.limits.slip)
         self.tire = tire
 
     def reset(self, steering: float = 0.0) -> None:
@@ -171,9 +171,9 @@ class Tracker:
         ----------
         measurement : the car against the path, and the road ahead.
         """
-        instance, told = self.instance, self.instance.input
-        told["e_y"], told["e_psi"], told["v_y"], told["r"] = measurement[:4]
-        told["kappa"], told["v_x"] = measurement[4:6]
+        instance, ports = self.instance, self.instance.input
+        ports["e_y"], ports["e_psi"], ports["v_y"], ports["r"] = measurement[:4]
+        ports["kappa"], ports["v_x"] = measurement[4:6]
         instead = self._planned_steering() if self._budget is not None else 0.0
         start = self._clock()
         status = instance.step()

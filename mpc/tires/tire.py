@@ -146,17 +146,17 @@ SLIPS = np.linspace(0.0, 0.5, 251)  # rad
 SPEED = 15.0  # m/s; curves of slip do not depend on it
 
 
-class Reach(NamedTuple):
+class ValidSlip(NamedTuple):
     """Slip up to which curves are believed [rad], and their slope beyond [N/rad]; (2,) each."""
 
     slip: Array
     rise: Array
 
 
-ALL = Reach(np.full(2, np.inf), np.zeros(2))  # the curves as they are
+ALL = ValidSlip(np.full(2, np.inf), np.zeros(2))  # the curves as they are
 
 
-def reach_of(tire: PredictionTire, most: tuple[float, float]) -> Reach:
+def valid_slip(tire: PredictionTire, most: tuple[float, float]) -> ValidSlip:
     """Return how far the curves of a tire are believed, and how they go on.
 
     They go on straight, but never with less than 4 % of their slope at zero.
@@ -169,7 +169,7 @@ def reach_of(tire: PredictionTire, most: tuple[float, float]) -> Reach:
     slopes = curve_slopes(tire)
     slip = np.minimum(most, _useful(slopes))
     there = [np.interp(x, SLIPS, axle) for x, axle in zip(slip, slopes, strict=True)]
-    return Reach(slip, np.maximum(np.maximum(there, LEAST_RISE * slopes[:, 0]), 0.0))
+    return ValidSlip(slip, np.maximum(np.maximum(there, LEAST_RISE * slopes[:, 0]), 0.0))
 
 
 def useful_slip(tire: PredictionTire) -> Array:
@@ -194,7 +194,7 @@ def curve_slopes(tire: PredictionTire) -> Array:
     return np.array(_slopes(tire.structure)(SLIPS[None], tire.car, tire.weights))
 
 
-def believed_force(
+def extrapolated_force(
     structure: TireStructure, slip: Pair, at: Point, max_slip: Any, rise: Any
 ) -> Any:
     """Return the axle forces that the tracker believes [N], (2,).
@@ -212,8 +212,8 @@ def believed_force(
     alpha = ca.vertcat(*slip)
     if ca.is_linear(curves, x):  # goes on as it is
         return ca.substitute(curves, x, alpha)
-    held = ca.fmin(ca.fmax(alpha, -max_slip), max_slip)
-    return ca.substitute(curves, x, held) + rise * (alpha - held)
+    inside = ca.fmin(ca.fmax(alpha, -max_slip), max_slip)
+    return ca.substitute(curves, x, inside) + rise * (alpha - inside)
 
 
 def _useful(slopes: Array) -> Array:

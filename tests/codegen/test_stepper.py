@@ -32,13 +32,13 @@ def test_steps_are_bit_equal_to_the_loop(scan, rng, n):
     stepper = Stepper(scan, start)
     for k in range(n):
         for port in ("M", "s"):
-            np.testing.assert_array_equal(stepper.carried()[port], whole[port][k])
+            np.testing.assert_array_equal(stepper.state()[port], whole[port][k])
         stepper.inputs["u"][:] = u[k]
         stepper.advance()
         np.testing.assert_array_equal(stepper.outputs["y"], whole["y"][k])
         np.testing.assert_array_equal(stepper.outputs["twice"].reshape(3, 2).T, whole["twice"][k])
-    np.testing.assert_array_equal(stepper.carried()["M"], whole["M_final"])
-    np.testing.assert_array_equal(stepper.carried()["s"], whole["s_final"])
+    np.testing.assert_array_equal(stepper.state()["M"], whole["M_final"])
+    np.testing.assert_array_equal(stepper.state()["s"], whole["s_final"])
 
 
 def test_the_values_at_the_start_stay_the_callers(scan, rng):
@@ -46,11 +46,11 @@ def test_the_values_at_the_start_stay_the_callers(scan, rng):
     kept = {port: value.copy() for port, value in start.items()}
     stepper = Stepper(scan, {**start, "c": np.array(0.1)})
     stepper.inputs["u"][:] = 1.0
-    carried = stepper.carried()
+    state = stepper.state()
     stepper.advance()
     for port, value in kept.items():
         np.testing.assert_array_equal(start[port], value)
-        np.testing.assert_array_equal(carried[port], value)  # a copy, not a view
+        np.testing.assert_array_equal(state[port], value)  # a copy, not a view
 
 
 def test_a_wrong_shape_is_refused_at_the_start(scan):

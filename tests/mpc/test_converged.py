@@ -15,7 +15,7 @@ from mpc.problem import Cost, Limits, Problem
 from mpc.realtime import Status, Tracker
 from mpc.tires import prediction_tire
 from mpc.tires.ladder import oracle_tire
-from mpc.tires.tire import reach_of
+from mpc.tires.tire import valid_slip
 
 PROBLEM = Problem(
     horizon=25,
@@ -97,7 +97,7 @@ def test_the_plan_obeys_motion_and_hard_limits(tire, tracker, case):
             PROBLEM.dt,
             tire.car,
             tire.weights,
-            *reach_of(tire, PROBLEM.limits.slip),
+            *valid_slip(tire, PROBLEM.limits.slip),
         )
         np.testing.assert_allclose(plan.plan_x[k + 1], np.asarray(there).ravel(), atol=1e-7)
     assert np.abs(plan.plan_x[:, 4]).max() <= PROBLEM.limits.steering

@@ -13,7 +13,7 @@ from mpc.prediction import build_dynamics, build_end, build_rk4, build_stage, st
 from mpc.problem import Cost, tracking_errors
 from mpc.tires import PredictionTire, oracle_tire, prediction_tire
 from mpc.tires.ladder import LadderAxles, ladder_weights
-from mpc.tires.tire import ALL, reach_of
+from mpc.tires.tire import ALL, valid_slip
 
 CAR, DT, MOST = sedan(), 0.05, (0.06, 0.05)  # situations lie on both sides of these slips
 
@@ -72,7 +72,7 @@ def situations(tire, count=60, seed=1):
             DT,
             tire.car,
             tire.weights,
-            *reach_of(tire, MOST),
+            *valid_slip(tire, MOST),
         ]
 
 

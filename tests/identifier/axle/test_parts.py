@@ -170,7 +170,7 @@ def learnt(h, y, R, forgetting, P0, learns=1.0, widest=1e9):
         ca.vertsplit(theta),
         factors,
         ca.vertsplit(regressor),
-        error=e,
+        innovation=e,
         R=R,
         forgetting=forgetting,
         spread=covariance.spread(factors, 1),

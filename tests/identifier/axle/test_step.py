@@ -39,7 +39,7 @@ class ByHand:
         self.fast, self.slow, self.peak = np.zeros(2), np.ones(2), np.zeros(2)
         self.longest, self.time = np.zeros(2), np.zeros(2)
         self.kept = self.theta.copy()
-        self.doubt = self.again = 0.0
+        self.alarm = self.again = 0.0
         self.q_learnt, self.q_kept = np.ones(2), np.ones(2)
         self.ends = []  # of doubts
 
@@ -181,22 +181,22 @@ class ByHand:
             S = (m.error + m.relative_error * np.abs(y_hat)) ** 2 * slow + excited
             q += min(dt / w.moment, 1.0) * (np.minimum((y - y_hat) ** 2 / S, 25) - q)
         end = ""
-        rests = self.doubt > 0 or self.q_learnt.max() > w.noticed
+        rests = self.alarm > 0 or self.q_learnt.max() > w.noticed
         if rests:
-            self.doubt += dt
+            self.alarm += dt
             self.theta[:, n:] = before[:, n:]
             moving = np.abs(y).max() > 2 * m.error
             explained, calm = self.q_kept.max() < w.calm, self.q_learnt.max() < w.calm
             self.again = self.again + dt * moving if explained else 0.0
-            late = self.doubt > 2 * w.give_up
+            late = self.alarm > 2 * w.give_up
             if explained and (late or self.again > w.again):
                 end, self.theta, self.q_learnt = "returns", self.kept.copy(), self.q_kept.copy()
-            elif not explained and (late or (self.doubt > w.give_up and calm)):
+            elif not explained and (late or (self.alarm > w.give_up and calm)):
                 end, self.q_learnt = "goes on", np.minimum(self.q_learnt, 1.0)
         self.bound(metric)
         if end:
             self.ends.append(end)
-            self.doubt = self.again = 0.0
+            self.alarm = self.again = 0.0
         if end == "goes on":
             self.kept = self.theta.copy()
         elif not rests and self.q_learnt.max() < w.calm:
@@ -252,7 +252,7 @@ def assert_by_hand(design, car, recording):
     np.testing.assert_allclose(model.excitation[:, 1], hand.time, atol=0.5 * design.dt)
     last = history.state_at(1e9)
     np.testing.assert_allclose(last["kept"], hand.kept, rtol=1e-4, atol=1e-6)
-    means = [hand.doubt, hand.again, *hand.q_learnt, *hand.q_kept]
+    means = [hand.alarm, hand.again, *hand.q_learnt, *hand.q_kept]
     np.testing.assert_allclose(last["watch"], means, rtol=1e-3, atol=1e-6)
     return hand
 
@@ -290,8 +290,8 @@ def test_what_is_learnt_does_not_depend_on_the_rate(car, drive):
     }
     models = [identify(one, car, designs[one.dt]).freeze(15.0) for one in (slow, fast)]
     slips = np.array([0.01, 0.03, 0.05])
-    doubts = [model.doubt(slips) for model in models]
-    np.testing.assert_allclose(doubts[0], doubts[1], rtol=0.15)
+    sds = [model.relative_sd(slips) for model in models]
+    np.testing.assert_allclose(sds[0], sds[1], rtol=0.15)
     curves = [model.force_at(slips) for model in models]
     np.testing.assert_allclose(curves[0], curves[1], rtol=0.03)
     np.testing.assert_allclose(models[0].excitation, models[1].excitation, rtol=0.1, atol=0.1)

@@ -65,7 +65,7 @@ def test_doubt_begins_soon_after_errors_are_large_at_an_axle_and_one_outlier_is_
     assert not told[:, :2].any()
     told, state = judged([GOOD] * 50 + [BAD] * 10, axle=axle)
     assert told[-1, 0] == 1.0 and not told[:50, 0].any()
-    assert 0.0 < state.doubt <= 0.1
+    assert 0.0 < state.alarm <= 0.1
     np.testing.assert_array_equal(told[told[:, 0] > 0, 2], 0.0)  # kept weights stay
 
 
@@ -75,7 +75,7 @@ def test_kept_weights_that_explain_forces_again_are_gone_back_to(axle):
     (back,) = np.flatnonzero(told[:, 1])
     calm_after = 0.2 * np.log((20.0 - 1.0) / (Watch().calm - 1.0))  # of a mean from 20 to 1
     assert (back - 200) * DT == pytest.approx(calm_after + Watch().again, abs=3 * DT)
-    assert state.doubt > 0.0  # what learns goes on to be wrong, so that there is doubt again
+    assert state.alarm > 0.0  # what learns goes on to be wrong, so that there is doubt again
     told, state = judged([BAD] * 200 + [(20.0, 1.0, 1, 0)] * 200)
     assert not told[:, 1].any(), "without forces every weight explains what is measured"
 

@@ -63,7 +63,7 @@ def test_a_drop_is_found_from_the_last_moments(tire, dropped):
     fit = fit_friction(judge, tire, samples[k - 42 : k])
     assert 0.42 < fit.ratio < 0.62
     assert fit.gain > 8.0
-    assert fit.misfit.total < 0.3 * judge.misfit(tire, samples[k - 42 : k]).total
+    assert fit.chi_square.total < 0.3 * judge.chi_square(tire, samples[k - 42 : k]).total
 
 
 def test_without_a_drop_no_other_friction_is_worth_it(tire, dry):

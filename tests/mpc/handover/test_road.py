@@ -1,4 +1,4 @@
-"""What is believed of the road, on misfits that are told by a formula of the friction."""
+"""What is believed of the road, on chi-squares that are told by a formula of the friction."""
 
 import math
 from itertools import product
@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from mpc.handover.judge import Misfit, Window
+from mpc.handover.judge import ChiSquare, Window
 from mpc.handover.road import Road, at_friction, look_at_road
 from mpc.handover.rules import Rules, Verdict
 
@@ -14,23 +14,23 @@ COUNT = 10.0  # independent errors, whatever the samples
 
 
 class Formula:
-    """A judge: mean misfit = size (least + slope (ln μ - ln μ_true)²) of a tire of friction μ."""
+    """Mean chi-square = size (least + slope (ln μ - ln μ_true)²) of a tire of friction μ."""
 
     def __init__(self, tire, *, true, least, slope, size=1.0, count=COUNT):
         self._grip, self._count = grip(tire.weights, tire), count
         self._true, self._least, self._slope, self._size = true, least, slope, size
 
-    def reach(self, seconds):
+    def lookback(self, seconds):
         return seconds
 
-    def misfit(self, tire, samples):
-        return self.misfits(tire, tire.weights[None], samples)[0]
+    def chi_square(self, tire, samples):
+        return self.chi_squares(tire, tire.weights[None], samples)[0]
 
-    def misfits(self, tire, weights, samples):
+    def chi_squares(self, tire, weights, samples):
         del samples
         away = [np.log(grip(w, tire) / self._grip / self._true) for w in weights]
         means = [self._size * (self._least + self._slope * a**2) for a in away]
-        return [Misfit(self._count * mean, self._count, np.zeros(2)) for mean in means]
+        return [ChiSquare(self._count * mean, self._count, np.zeros(2)) for mean in means]
 
 
 def grip(weights, tire):
@@ -46,13 +46,13 @@ def seen(seconds=4.0):
     return window
 
 
-def look(road, in_use, judge, *, usual, t=10.0, window=None):
+def look(road, in_use, judge, *, baseline, t=10.0, window=None):
     return look_at_road(
         road,
         in_use,
         window or seen(),
         t=t,
-        usual=usual,
+        baseline=baseline,
         trusted=0.2,
         judge=judge,
         rules=Rules(),
@@ -74,15 +74,15 @@ CASES = [
 ]
 
 
-def test_a_road_on_which_all_tires_misfit_more_is_judged_as_any_other(tire):
-    """Misfits and their usual size thrice as large: the same beliefs, to the last digit."""
+def test_a_road_on_which_all_tires_fit_worse_is_judged_as_any_other(tire):
+    """Chi-squares and their baseline thrice as large: the same estimates, to the last digit."""
     found = {}
     for case in CASES:
         told = {name: case[name] for name in ("true", "least", "slope")}
         road = Road(tire, case["known"], 10.0 - case["since"])
         in_use = at_friction(tire, case["known"])
         one, three = (
-            believed(look(road, in_use, Formula(tire, **told, size=size), usual=size))
+            believed(look(road, in_use, Formula(tire, **told, size=size), baseline=size))
             for size in (1.0, 3.0)
         )
         assert one[0] is three[0], case
@@ -92,15 +92,15 @@ def test_a_road_on_which_all_tires_misfit_more_is_judged_as_any_other(tire):
     assert min(map(len, found.values())) >= 3
 
 
-def test_misfits_that_are_usual_are_no_drop_and_the_same_without_that_are(tire):
+def test_chi_squares_at_their_baseline_are_no_drop_and_the_same_without_that_are(tire):
     judge = Formula(tire, true=0.4, least=1.0, slope=6.0)
-    assert look(Road(tire), tire, judge, usual=1.0).verdict is Verdict.FRICTION
-    assert look(Road(tire), tire, judge, usual=8.0) is None
+    assert look(Road(tire), tire, judge, baseline=1.0).verdict is Verdict.FRICTION
+    assert look(Road(tire), tire, judge, baseline=8.0) is None
 
 
 def test_a_lower_friction_must_explain_well_and_not_only_better(tire):
     """As badly as before at every friction, or well at one: the usual size says what well is."""
-    change = look(Road(tire), tire, Formula(tire, true=0.4, least=1.4, slope=9.0), usual=1.0)
+    change = look(Road(tire), tire, Formula(tire, true=0.4, least=1.4, slope=9.0), baseline=1.0)
     assert change.verdict is Verdict.FRICTION
     # ln μ that is least: total/usual + (ln μ/0.7)², its minimum by hand
     steep = COUNT * 9.0
@@ -109,8 +109,8 @@ def test_a_lower_friction_must_explain_well_and_not_only_better(tire):
     )
     assert change.tire.weights == pytest.approx(at_friction(tire, change.road.ratio).weights)
     badly = Formula(tire, true=0.4, least=1.6, slope=9.0)
-    assert look(Road(tire), tire, badly, usual=1.0) is None
-    assert look(Road(tire), tire, badly, usual=1.2).verdict is Verdict.FRICTION
+    assert look(Road(tire), tire, badly, baseline=1.0) is None
+    assert look(Road(tire), tire, badly, baseline=1.2).verdict is Verdict.FRICTION
 
 
 def test_a_new_friction_is_corrected_by_little_evidence_and_only_for_a_while(tire):
@@ -118,14 +118,16 @@ def test_a_new_friction_is_corrected_by_little_evidence_and_only_for_a_while(tir
     wet, road = at_friction(tire, 0.5), Road(tire, 0.5, changed_at=9.0)
     slope = 5.0 / COUNT / math.log(0.7 / 0.5) ** 2
     judge = Formula(tire, true=0.7, least=1.1, slope=slope)
-    change = look(road, wet, judge, usual=1.0)
+    change = look(road, wet, judge, baseline=1.0)
     assert change.verdict is Verdict.CORRECTION
     assert (change.road.base, change.road.changed_at) == (tire, 9.0)
     assert 0.6 < change.road.ratio < 0.75
-    assert look(road, wet, judge, usual=1.0, t=9.0 + 2.1) is None
-    assert look(road, wet, Formula(tire, true=0.7, least=1.1, slope=0.3 * slope), usual=1.0) is None
+    assert look(road, wet, judge, baseline=1.0, t=9.0 + 2.1) is None
+    assert (
+        look(road, wet, Formula(tire, true=0.7, least=1.1, slope=0.3 * slope), baseline=1.0) is None
+    )
     clear = Formula(tire, true=0.7, least=1.1, slope=4.0 * slope)
-    back = look(road, wet, clear, usual=1.0, t=9.0 + 2.1)
+    back = look(road, wet, clear, baseline=1.0, t=9.0 + 2.1)
     assert (back.verdict, back.road.changed_at) == (Verdict.RECOVERY, 9.0 + 2.1)
 
 
@@ -146,41 +148,41 @@ def test_the_road_before_comes_back_where_it_explains_enough_more(tire, size):
     for evidence, comes_back in ((15.0, False), (17.0, True)):
         slope = evidence / COUNT / math.log(0.5) ** 2
         judge = Formula(tire, true=1.0, least=1.0, slope=slope, size=size)
-        change = look(Road(wet, before=tire), wet, judge, usual=size)
+        change = look(Road(wet, before=tire), wet, judge, baseline=size)
         assert (change is not None) == comes_back
-        assert look(Road(wet), wet, judge, usual=size) is None  # there was no road before
+        assert look(Road(wet), wet, judge, baseline=size) is None  # there was no road before
     assert change.verdict is Verdict.RECOVERY
     assert change.tire is tire
     assert change.road == Road(tire, changed_at=10.0)
     assert change.before - change.after == pytest.approx(17.0 * size)
 
 
-def test_the_road_before_does_not_come_back_where_the_misfit_is_usual(tire):
+def test_the_road_before_does_not_come_back_where_chi_square_is_at_its_baseline(tire):
     wet = at_friction(tire, 0.5)
     judge = Formula(tire, true=1.0, least=0.1, slope=10.0, count=40.0)  # mean in use 4.9
-    assert look(Road(wet, before=tire), wet, judge, usual=2.0).verdict is Verdict.RECOVERY
-    assert look(Road(wet, before=tire), wet, judge, usual=5.0) is None
+    assert look(Road(wet, before=tire), wet, judge, baseline=2.0).verdict is Verdict.RECOVERY
+    assert look(Road(wet, before=tire), wet, judge, baseline=5.0) is None
 
 
 def test_a_change_waits_until_enough_was_seen_for_it(tire):
     wet = at_friction(tire, 0.5)
     judge = Formula(tire, true=1.0, least=0.5, slope=20.0)
     half = Road(tire, 0.5)
-    assert look(half, wet, judge, usual=1.0, window=seen(0.4)) is None
-    assert look(half, wet, judge, usual=1.0, window=seen(0.7)).verdict is Verdict.RECOVERY
+    assert look(half, wet, judge, baseline=1.0, window=seen(0.4)) is None
+    assert look(half, wet, judge, baseline=1.0, window=seen(0.7)).verdict is Verdict.RECOVERY
     fresh = half._replace(changed_at=9.5)
-    assert look(fresh, wet, judge, usual=1.0, window=seen(0.4)).verdict is Verdict.CORRECTION
+    assert look(fresh, wet, judge, baseline=1.0, window=seen(0.4)).verdict is Verdict.CORRECTION
 
 
 def test_a_drop_is_sought_down_to_ice_and_in_the_last_moments_alone(tire):
     lengths = []
 
     class Watching(Formula):
-        def misfit(self, tire, samples):
+        def chi_square(self, tire, samples):
             lengths.append(len(samples))
-            return super().misfit(tire, samples)
+            return super().chi_square(tire, samples)
 
-    change = look(Road(tire), tire, Watching(tire, true=0.16, least=1.0, slope=90.0), usual=1.0)
+    change = look(Road(tire), tire, Watching(tire, true=0.16, least=1.0, slope=90.0), baseline=1.0)
     assert change.verdict is Verdict.FRICTION
     assert 0.15 <= change.road.ratio < 0.18
     assert lengths[0] == pytest.approx(Rules().last_moments / 0.01, abs=1)
@@ -189,5 +191,5 @@ def test_a_drop_is_sought_down_to_ice_and_in_the_last_moments_alone(tire):
 @pytest.mark.parametrize("true", [0.237, 0.411, 0.683])
 def test_a_friction_is_found_finer_than_the_grid_of_the_first_look(tire, true):
     judge = Formula(tire, true=true, least=1.0, slope=900.0)
-    change = look(Road(tire), tire, judge, usual=1.0)
+    change = look(Road(tire), tire, judge, baseline=1.0)
     assert change.road.ratio == pytest.approx(true, rel=0.02)

@@ -13,7 +13,7 @@ from models.friction import Friction, FrictionChange
 from models.maneuvers import RandomSteer, Slalom
 from mpc.handover import Rules, Supervisor, Verdict
 from mpc.handover import supervisor as supervisor_module
-from mpc.handover.judge import Judge, Misfit
+from mpc.handover.judge import ChiSquare, Judge
 from mpc.handover.road import at_friction
 from mpc.tires import prediction_tire
 from tests.mpc.handover.conftest import DROP, drive, samples_of
@@ -46,7 +46,7 @@ def test_after_a_drop_the_named_tire_explains_it_and_the_dry_one_does_not(car, l
     late = samples_of(dropped[1])[-200:]
     judge = Judge(0.01)
     named, dry = (
-        judge.misfit(tire, late).mean for tire in (supervisor.target, prediction_tire(learnt))
+        judge.chi_square(tire, late).mean for tire in (supervisor.target, prediction_tire(learnt))
     )
     assert named < 1.5
     assert dry > 4.0 * named
@@ -65,7 +65,7 @@ def test_from_nothing_the_learnt_tire_takes_over_and_is_better(car, dry):
     assert first.verdict is Verdict.LEARNT
     assert 0.5 < first.t < 6.0
     judge, late = Judge(0.01), samples_of(dry[1])[-300:]
-    assert judge.misfit(supervisor.target, late).total < judge.misfit(begun, late).total
+    assert judge.chi_square(supervisor.target, late).total < judge.chi_square(begun, late).total
 
 
 def test_a_friction_that_comes_back_is_regained_up_to_what_was_learnt(car, learnt, tire):
@@ -139,7 +139,7 @@ def test_many_lost_samples_and_standing_still_decide_nothing(car, learnt, droppe
 
 
 @pytest.mark.parametrize("broken", [np.nan, np.inf, 1e308])
-def test_a_stale_identifier_is_in_doubt_and_the_last_good_tire_stays(car, learnt, dropped, broken):
+def test_a_stale_identifier_is_a_fault_and_the_last_good_tire_stays(car, learnt, dropped, broken):
     supervisor = supervisor_of(car, learnt)
     first = supervisor.target
     rows = samples_of(dropped[1])
@@ -147,47 +147,47 @@ def test_a_stale_identifier_is_in_doubt_and_the_last_good_tire_stays(car, learnt
         supervisor.observe(*(np.full(4, broken) if 100 <= k < 300 else row))
         if k == 140:
             assert supervisor.decisions == []  # 0.4 s: not yet
-    doubts = [one for one in supervisor.decisions if one.verdict is Verdict.DOUBT]
-    assert len(doubts) == 1
-    assert doubts[0].t == pytest.approx(1.5)
-    assert doubts[0].reason == "no sample could be taken for 0.5 s"
+    faults = [one for one in supervisor.decisions if one.verdict is Verdict.FAULT]
+    assert len(faults) == 1
+    assert faults[0].t == pytest.approx(1.5)
+    assert faults[0].reason == "no sample could be taken for 0.5 s"
     assert supervisor.target is first
     assert not supervisor.identifier.stale
 
 
 class Told:
-    """A judge whose mean misfits are given: of the tire in use, and of any other."""
+    """A judge whose mean chi-squares are given: of the tire in use, and of any other."""
 
     def __init__(self, in_use, mean, *, better=0.0, worse_lately=0.0):
         self.in_use, self._mean = in_use, mean
         self._better, self._worse_lately = better, worse_lately
 
-    def reach(self, seconds):
+    def lookback(self, seconds):
         return seconds
 
-    def misfit(self, tire, samples):
-        return self.misfits(tire, tire.weights[None], samples)[0]
+    def chi_square(self, tire, samples):
+        return self.chi_squares(tire, tire.weights[None], samples)[0]
 
-    def misfits(self, tire, weights, samples):
+    def chi_squares(self, tire, weights, samples):
         total = 20.0 * self._mean
         other = total - self._better if len(samples) > 50 else total + self._worse_lately
         totals = [total if np.array_equal(w, self.in_use.weights) else other for w in weights]
-        return [Misfit(total, 20.0, np.zeros(2)) for total in totals]
+        return [ChiSquare(total, 20.0, np.zeros(2)) for total in totals]
 
 
 @pytest.mark.parametrize("mean", [0.3, 1.0, 3.0, 100.0])
-def test_the_usual_misfit_follows_what_is_seen_slowly_and_not_a_change(
+def test_the_baseline_follows_what_is_seen_slowly_and_not_a_change(
     car, learnt, dry, monkeypatch, mean
 ):
-    """A low-pass over `usual_time` from 1 on, of no more than four times itself, never below 1."""
-    usual = []
+    """A low-pass over `baseline_time` from 1 on, of at most four times itself, never below 1."""
+    baseline = []
     monkeypatch.setattr(
-        supervisor_module, "look_at_road", lambda *_, **given: usual.append(given["usual"])
+        supervisor_module, "look_at_road", lambda *_, **given: baseline.append(given["baseline"])
     )
     supervisor = supervisor_of(car, learnt, rules=Rules(learning_time=1e3))
     supervisor.judge = Told(supervisor.target, mean)
     watched(supervisor, dry[1].between(0.0, 4.0))
-    n, share = np.arange(len(usual)), 0.05 / 10.0
+    n, share = np.arange(len(baseline)), 0.05 / 10.0
     assert n.size > 70
     wanted = {
         0.3: np.ones(n.size),
@@ -195,22 +195,22 @@ def test_the_usual_misfit_follows_what_is_seen_slowly_and_not_a_change(
         3.0: 3.0 - 2.0 * (1.0 - share) ** n,
         100.0: (1.0 + 3.0 * share) ** n,
     }
-    np.testing.assert_allclose(usual, wanted[mean], rtol=1e-9)
+    np.testing.assert_allclose(baseline, wanted[mean], rtol=1e-9)
 
 
-@pytest.mark.parametrize("usual", [1.0, 3.0])
+@pytest.mark.parametrize("baseline", [1.0, 3.0])
 @pytest.mark.parametrize(
     ("better", "worse_lately", "taken"),
     [(4.4, 0.0, True), (3.6, 0.0, False), (40.0, 1.8, True), (40.0, 2.2, False)],
 )
-def test_a_learnt_tire_is_taken_by_evidence_in_parts_of_what_is_usual(
-    car, learnt, dry, usual, better, worse_lately, taken
+def test_a_learnt_tire_is_taken_by_evidence_in_parts_of_the_baseline(
+    car, learnt, dry, baseline, better, worse_lately, taken
 ):
     """4 better over seconds, no more than 2 worse in the last moments; on a bad road thrice it."""
-    supervisor = supervisor_of(car, learnt, rules=Rules(usual_time=0.05))
+    supervisor = supervisor_of(car, learnt, rules=Rules(baseline_time=0.05))
     supervisor._proven = False  # friction is not looked for
     supervisor.judge = Told(
-        supervisor.target, usual, better=usual * better, worse_lately=usual * worse_lately
+        supervisor.target, baseline, better=baseline * better, worse_lately=baseline * worse_lately
     )
     watched(supervisor, dry[1].between(0.0, 6.0))
     assert [d.verdict for d in supervisor.decisions[:1]] == [Verdict.LEARNT] * taken
@@ -252,7 +252,7 @@ def test_a_tire_that_cannot_be_told_for_a_friction_still_learns(car, dry):
         at_friction(supervisor.target, 0.5)
 
 
-def test_doubt_takes_back_what_was_handed_over_just_before_and_teaches_nothing(
+def test_a_fault_takes_back_what_was_handed_over_just_before_and_teaches_nothing(
     car, learnt, dropped
 ):
     """A friction that was believed a moment before the sensors disagree may be their fault."""
@@ -263,25 +263,25 @@ def test_doubt_takes_back_what_was_handed_over_just_before_and_teaches_nothing(
         k += 1
     before = [d for d in supervisor.decisions if d.t <= supervisor.t - supervisor.rules.revoke]
     samples, wet = supervisor.identifier.counts.samples, supervisor.target
-    decision = supervisor.observe(*rows[k], doubt="sensors disagree")
-    assert (decision.verdict, decision.reason) == (Verdict.DOUBT, "sensors disagree")
+    decision = supervisor.observe(*rows[k], fault="sensors disagree")
+    assert (decision.verdict, decision.reason) == (Verdict.FAULT, "sensors disagree")
     assert supervisor.target is not wet
     if not before:
         np.testing.assert_array_equal(supervisor.target.weights, prediction_tire(learnt).weights)
     for row in rows[k + 1 : k + 60]:
-        assert supervisor.observe(*row, doubt="sensors disagree") is None
+        assert supervisor.observe(*row, fault="sensors disagree") is None
     assert supervisor.identifier.counts.samples == samples
     assert supervisor.t == pytest.approx(0.01 * (k + 60))
 
 
-def test_after_doubt_learning_goes_on_from_what_was_known_before_it(car, learnt, dry):
+def test_after_a_fault_learning_goes_on_from_what_was_known_before_it(car, learnt, dry):
     supervisor, rows = supervisor_of(car, learnt), samples_of(dry[1])
     for row in rows[:600]:
         supervisor.observe(*row)
     known = next(
         model for t, model in reversed(supervisor._models) if t <= 6.0 - supervisor.rules.revoke
     )
-    supervisor.observe(*rows[600], doubt="sensors disagree")
+    supervisor.observe(*rows[600], fault="sensors disagree")
     assert supervisor.identifier.model().to_dict() == known.to_dict()
     for row in rows[700:900]:
         supervisor.observe(*row)
@@ -289,17 +289,17 @@ def test_after_doubt_learning_goes_on_from_what_was_known_before_it(car, learnt,
 
 
 @pytest.mark.parametrize("relapse", [6.0, 2.0])
-def test_a_doubt_that_comes_back_soon_takes_back_what_was_learnt_between(car, learnt, dry, relapse):
+def test_a_fault_that_comes_back_soon_takes_back_what_was_learnt_between(car, learnt, dry, relapse):
     rules, calm = Rules(relapse=relapse), 4.0
     supervisor, rows = supervisor_of(car, learnt, rules=rules), samples_of(dry[1])
     for row in rows[:300]:
         supervisor.observe(*row)
-    supervisor.observe(*rows[300], doubt="sensors disagree")
+    supervisor.observe(*rows[300], fault="sensors disagree")
     known = supervisor.identifier.model().to_dict()
     for row in rows[301 : 301 + round(100 * calm)]:
         supervisor.observe(*row)
     assert supervisor.identifier.model().to_dict() != known
-    supervisor.observe(*rows[-1], doubt="sensors disagree")
+    supervisor.observe(*rows[-1], fault="sensors disagree")
     assert (supervisor.identifier.model().to_dict() == known) is (calm < relapse)
     most = relapse / rules.learnt_every + 3
     assert len(supervisor._models) <= most

@@ -98,7 +98,7 @@ def test_beyond_the_ends_s_goes_on():
 def test_the_search_stops_at_its_reach():
     path = Path.from_waypoints([0.0, 100.0], [0.0, 0.0])
     assert path.project(90.0, 1.0, near=20.0).s == pytest.approx(30.0)
-    assert path.project(90.0, 1.0, near=20.0, reach=80.0).s == pytest.approx(90.0)
+    assert path.project(90.0, 1.0, near=20.0, search_distance=80.0).s == pytest.approx(90.0)
 
 
 def test_a_car_in_the_center_of_a_turn_gets_an_answer():

@@ -5,7 +5,7 @@ import pytest
 
 from mpc.prediction import build_stage
 from mpc.realtime import Status, Tracker
-from mpc.tires.tire import reach_of
+from mpc.tires.tire import valid_slip
 
 PERIOD = 0.02
 HUGE = [1e308, -1e308, 1e30, np.inf, np.nan]
@@ -78,12 +78,12 @@ def test_where_the_center_comes_later_the_equations_stay_finite(tracker, measure
 def test_the_stage_is_finite_beyond_the_center_and_as_before_on_this_side(tire, problem):
     stage = build_stage(tire.structure)
     n_x = 7 if tire.structure.lagged else 5
-    reach = reach_of(tire, problem.limits.slip)
+    valid = valid_slip(tire, problem.limits.slip)
 
     def s_dot_acts(e_y, kappa):
         x = np.zeros(n_x)
         x[0] = e_y
-        rest = (0.0, kappa, 10.0, 1e-3, tire.car, tire.weights, *reach)
+        rest = (0.0, kappa, 10.0, 1e-3, tire.car, tire.weights, *valid)
         found = [np.array(value) for value in stage(x, *rest, problem.cost.numbers())]
         assert all(np.isfinite(value).all() for value in found)
         return found[0][1, 0] / (-kappa * 1e-3)  # e_psi falls by kappa s_dot

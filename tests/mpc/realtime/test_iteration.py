@@ -6,7 +6,7 @@ import pytest
 
 from mpc.prediction import build_end, build_stage
 from mpc.realtime import Status, Tracker
-from mpc.tires.tire import reach_of
+from mpc.tires.tire import valid_slip
 
 SOFT = 3  # e_y, slip in front, slip at the rear
 
@@ -16,14 +16,14 @@ def dense_solution(tire, problem, plan_x, plan_u, kappa, v_x):
     N, n_x = problem.horizon, plan_x.shape[1]
     stage, end = build_stage(tire.structure), build_end(tire.structure)
     cost, limits = problem.cost, problem.limits
-    reach = reach_of(tire, limits.slip)
+    valid = valid_slip(tire, limits.slip)
     plan_x = plan_x.copy()
     at = []
     for k in range(N):
-        ports = (plan_x[k], plan_u[k], kappa[k], v_x[k], problem.dt, tire.car, tire.weights, *reach)
+        ports = (plan_x[k], plan_u[k], kappa[k], v_x[k], problem.dt, tire.car, tire.weights, *valid)
         at.append([np.array(value) for value in stage(*ports, cost.numbers())])
     plan_x[N] = at[-1][0].ravel()  # the end is where the last stage leads
-    last = (plan_x[N], kappa[-1], v_x[-1], tire.car, tire.weights, *reach, cost.terminal_numbers())
+    last = (plan_x[N], kappa[-1], v_x[-1], tire.car, tire.weights, *valid, cost.terminal_numbers())
     at.append([None, None, None, *(np.array(value) for value in end(*last))])
 
     # variables: dx_1 … dx_N, du_0 … du_{N-1}, s of every soft row

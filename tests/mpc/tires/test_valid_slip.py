@@ -11,18 +11,18 @@ from mpc.prediction import build_dynamics, build_rk4
 from mpc.problem import Limits, Problem
 from mpc.realtime import Tracker
 from mpc.tires import oracle_tire, prediction_tire
-from mpc.tires.tire import ALL, LEAST_RISE, Car, Point, believed_force, reach_of, useful_slip
+from mpc.tires.tire import ALL, LEAST_RISE, Car, Point, extrapolated_force, useful_slip, valid_slip
 
 CAR = sedan()
 SLIPS = np.linspace(-0.4, 0.4, 161)
 MOST = (0.2, 0.2)
 
 
-def curves(tire, reach=ALL, delta=0.0):
+def curves(tire, valid=ALL, delta=0.0):
     """Axle forces [N] over slip as they are believed, (2, k)."""
     x = ca.SX.sym("x")
     at = Point(0.0, 0.0, delta, 20.0, Car(*map(float, tire.car)), ca.SX(tire.weights))
-    force = believed_force(tire.structure, (x, x), at, *map(ca.DM, reach))
+    force = extrapolated_force(tire.structure, (x, x), at, *map(ca.DM, valid))
     return np.array(ca.Function("force", [x], [force])(SLIPS[None]))
 
 
@@ -47,15 +47,15 @@ def test_half_the_friction_halves_the_useful_slip():
 def test_a_linear_tire_is_of_use_everywhere_and_goes_on_as_it_is():
     linear = prediction_tire(CAR)
     assert np.isinf(useful_slip(linear)).all()
-    reach = reach_of(linear, MOST)
-    np.testing.assert_allclose(reach.slip, MOST)
-    np.testing.assert_allclose(reach.rise, linear.weights)
-    np.testing.assert_allclose(curves(linear, reach), curves(linear), atol=1e-8)
+    valid = valid_slip(linear, MOST)
+    np.testing.assert_allclose(valid.slip, MOST)
+    np.testing.assert_allclose(valid.rise, linear.weights)
+    np.testing.assert_allclose(curves(linear, valid), curves(linear), atol=1e-8)
 
 
 def test_a_curve_is_the_tires_up_to_there_and_rises_beyond(oracle):
-    useful, reach = useful_slip(oracle), reach_of(oracle, MOST)
-    free, kept = curves(oracle, delta=0.1), curves(oracle, reach, delta=0.1)
+    useful, valid = useful_slip(oracle), valid_slip(oracle, MOST)
+    free, kept = curves(oracle, delta=0.1), curves(oracle, valid, delta=0.1)
     first = np.gradient(curves(oracle), SLIPS, axis=1)[:, SLIPS.size // 2]
     for axle in (0, 1):
         inside = np.abs(SLIPS) <= useful[axle]
@@ -69,18 +69,18 @@ def test_a_curve_is_the_tires_up_to_there_and_rises_beyond(oracle):
 
 
 def test_a_curve_goes_on_without_a_kink(oracle):
-    reach, step = reach_of(oracle, MOST), 1e-6
+    valid, step = valid_slip(oracle, MOST), 1e-6
     x = ca.SX.sym("x", 2)
     at = Point(0.0, 0.0, 0.0, 20.0, Car(*map(float, oracle.car)), ca.SX(oracle.weights))
-    force = believed_force(oracle.structure, (x[0], x[1]), at, *map(ca.DM, reach))
+    force = extrapolated_force(oracle.structure, (x[0], x[1]), at, *map(ca.DM, valid))
     slope = ca.Function("slope", [x], [ca.diag(ca.jacobian(force, x))])
-    below, above = (np.array(slope(reach.slip + d)).ravel() for d in (-step, step))
+    below, above = (np.array(slope(valid.slip + d)).ravel() for d in (-step, step))
     np.testing.assert_allclose(above, below, rtol=1e-3)
 
 
 def test_a_tire_that_slides_fully_still_rises():
     tire = prediction_tire(FialaTire(C_alpha=6e4, C_kappa=8e4, friction=0.5), CAR)
-    kept = curves(tire, reach_of(tire, MOST))
+    kept = curves(tire, valid_slip(tire, MOST))
     assert np.diff(curves(tire)).min() == pytest.approx(0.0, abs=1e-6)
     assert np.diff(kept).min() > 0.0
 
@@ -96,11 +96,11 @@ def test_a_network_of_other_signals_is_left_as_it_is():
             min_speed=1.0,
         )
     )
-    reach = reach_of(tire, MOST)
+    valid = valid_slip(tire, MOST)
     x = np.array([0.0, 0.0, 3.0, 0.5, 0.4])
     given = (x, 0.1, 0.0, 12.0, 0.05, tire.car, tire.weights)
     rates = build_dynamics(tire.structure)
-    np.testing.assert_array_equal(np.array(rates(*given, *reach)), np.array(rates(*given, *ALL)))
+    np.testing.assert_array_equal(np.array(rates(*given, *valid)), np.array(rates(*given, *ALL)))
 
 
 def test_the_tracker_believes_what_is_of_use_of_the_tire_that_it_is_told():
@@ -108,7 +108,7 @@ def test_the_tracker_believes_what_is_of_use_of_the_tire_that_it_is_told():
     tracker = Tracker(dry, Problem(limits=Limits(slip=(0.1, 0.2))))
     for tire in (dry, wet):
         tracker.set_tire(tire)
-        slip, rise = reach_of(tire, (0.1, 0.2))
+        slip, rise = valid_slip(tire, (0.1, 0.2))
         np.testing.assert_allclose(tracker.params["max_slip"], slip, rtol=1e-14)
         np.testing.assert_allclose(tracker.params["rise"], rise, rtol=1e-14)
     assert (tracker.params["max_slip"] < 0.1).all()
@@ -120,8 +120,8 @@ def test_the_c_predicts_with_curves_that_rise(oracle):
     plan = tracker.solve_converged(x0, np.zeros(n), np.full(n, 15.0))
     step = build_rk4(oracle.structure)
     misses = []
-    for reach in (reach_of(oracle, tracker.problem.limits.slip), ALL):
-        told = (0.0, 15.0, 0.02, oracle.car, oracle.weights, *reach)
+    for valid in (valid_slip(oracle, tracker.problem.limits.slip), ALL):
+        told = (0.0, 15.0, 0.02, oracle.car, oracle.weights, *valid)
         there = [
             np.asarray(step(x, u, *told)).ravel()
             for x, u in zip(plan.plan_x[:-1], plan.plan_u, strict=True)

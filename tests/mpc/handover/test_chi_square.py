@@ -81,10 +81,10 @@ def test_errors_are_those_of_the_forces(car, tire):
 
 def test_a_learnt_tire_fits_and_another_does_not(car, tire, dry):
     judge, samples = Judge(0.01), samples_of(dry[1])
-    good = judge.misfit(tire, samples)
+    good = judge.chi_square(tire, samples)
     assert good.mean < 1.0
-    assert judge.misfit(prediction_tire(car), samples).mean > 2.0 * good.mean  # the linear tire
-    both = judge.misfits(tire, np.stack([tire.weights, tire.weights]), samples)
+    assert judge.chi_square(prediction_tire(car), samples).mean > 2.0 * good.mean  # the linear tire
+    both = judge.chi_squares(tire, np.stack([tire.weights, tire.weights]), samples)
     assert both[0].total == both[1].total == pytest.approx(good.total)
     assert good.independent == pytest.approx(2 * (1 + (len(samples) - 22 - 1) / 12), rel=1e-12)
 
@@ -92,15 +92,15 @@ def test_a_learnt_tire_fits_and_another_does_not(car, tire, dry):
 def test_one_fault_counts_as_one(tire, dry):
     samples = samples_of(dry[1])[:200]
     judge = Judge(0.01)
-    before = judge.misfit(tire, samples)
+    before = judge.chi_square(tire, samples)
     samples[100, 1] += 50.0  # v_y of a broken sensor, for one sample
-    after = judge.misfit(tire, samples)
+    after = judge.chi_square(tire, samples)
     assert before.total < after.total < before.total + 2.5 * 2 * 25.0
 
 
 def test_a_judge_wants_samples_and_a_stretch(tire):
     with pytest.raises(ValueError, match="takes more than 22 samples, there are 22"):
-        Judge(0.01).misfit(tire, np.ones((22, 6)))
+        Judge(0.01).chi_square(tire, np.ones((22, 6)))
     with pytest.raises(ValueError, match="three samples"):
         Judge(0.1)
     with pytest.raises(ValueError, match="error must be positive"):
