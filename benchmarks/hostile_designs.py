@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks.random_drives import random_vehicle
-from models.vehicle import GRAVITY, Vehicle
+from models.vehicle import Vehicle
 
 LAWS, INTEGRATORS = ("integral", "instantaneous", "pi_lead"), ("euler", "rk4")
 HIDDEN, INPUTS, UNIT = 6, 4, 1000.0
@@ -51,7 +51,7 @@ def random_case(rng: np.random.Generator, law: str, integrator: str) -> Case:
     load = np.array(car.axle_loads)
     friction = rng.uniform(0.4, 1.0)
     slip = friction * float((load / C).max()) * log_uniform(rng, 0.7, 2.5)
-    v_x = 4.0 * np.sqrt(GRAVITY * car.wheelbase) * rng.uniform(0.7, 1.4)
+    v_x = 4.0 * car.froude_speed * rng.uniform(0.7, 1.4)
     bandwidth = log_uniform(rng, 0.3, 1.0)
     noise = rng.choice([0.0, rng.uniform(0.0, 1.5)])
     driving = {"v_x": v_x, "slip": slip, "friction": friction, "bandwidth": bandwidth}

@@ -16,7 +16,7 @@ from identifier.paper.network import SIGNALS, Network
 from identifier.stability.gain_design import decay_rate, design_gains
 from identifier.stability.loop import linear_law
 from identifier.stability.operation import Operation, minimal_decay, operation
-from models.vehicle import GRAVITY, Vehicle
+from models.vehicle import Vehicle
 
 REFERENCE_WHEELBASE = 2.7  # m: the car for which the scales of SIGNALS are meant
 BANDWIDTH = 0.7  # Hz: a brisk slalom; the steering of a normal driver stays below 0.5 Hz
@@ -43,7 +43,7 @@ def natural_driving(vehicle: Vehicle, *, bandwidth: float = BANDWIDTH) -> Drivin
     sliding = max(load / c for load, c in zip(vehicle.axle_loads, stiffness, strict=True))
     ratio = math.sqrt(vehicle.wheelbase / REFERENCE_WHEELBASE)
     return Driving(
-        v_x=4.0 * math.sqrt(GRAVITY * vehicle.wheelbase),
+        v_x=4.0 * vehicle.froude_speed,
         slip=2.0 * sliding,
         friction=1.0,
         bandwidth=bandwidth,
@@ -126,7 +126,7 @@ def design_for(
         integrator=integrator,
         dt=dt,
         force_unit=natural_force_unit(vehicle.mass),
-        min_speed=0.2 * math.sqrt(GRAVITY * vehicle.wheelbase),
+        min_speed=vehicle.lowest_speed,
         seed=seed,
         driving=driving,
     )

@@ -40,7 +40,7 @@ class SampleLimits(NamedTuple):
         vehicle : the car.
         """
         return cls(
-            speed=FROUDE * math.sqrt(GRAVITY * vehicle.wheelbase),
+            speed=FROUDE * vehicle.froude_speed,
             yaw_rate=TURN * math.sqrt(GRAVITY / vehicle.wheelbase),
             steering=STEERING,
             force=WEIGHTS * vehicle.weight,

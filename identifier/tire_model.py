@@ -5,7 +5,6 @@ F = +C α. Axle forces are lateral, in the frame of the body, left positive.
 """
 
 import json
-import math
 from abc import ABC, abstractmethod
 from os import PathLike
 from pathlib import Path
@@ -18,7 +17,7 @@ from numpy.typing import ArrayLike
 from codegen.arrays import Array
 from models.files import write_atomically
 from models.recordings import Recording
-from models.vehicle import GRAVITY, Vehicle
+from models.vehicle import Vehicle
 
 Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
@@ -107,7 +106,7 @@ class TireModel(ABC):
     @property
     def reference_speed(self) -> float:
         """Speed [m/s] at which a force that depends on it is told, 4 sqrt(g L): brisk driving."""
-        return max(4.0 * math.sqrt(GRAVITY * self.vehicle.wheelbase), self.min_speed)
+        return max(4.0 * self.vehicle.froude_speed, self.min_speed)
 
     def predict(self, recording: Recording) -> Array:
         """Return the axle forces that the model predicts of a drive, (n, 2) [N].

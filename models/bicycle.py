@@ -12,6 +12,10 @@ The parameters and v_x may be numbers or CasADi expressions.
 from typing import Any, NamedTuple
 
 import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from codegen.arrays import Array
 
 
 class BicycleParameters(NamedTuple):
@@ -78,6 +82,36 @@ def slip_angles(l_f: Any, l_r: Any, v_x: Any, x: Any, u: Any) -> Any:
     u : [δ_f, δ_r], steering [rad].
     """
     return ca.vertcat(u[0] - (x[0] + l_f * x[1]) / v_x, u[1] - (x[0] - l_r * x[1]) / v_x)
+
+
+def measured_slip(
+    l_f: float,
+    l_r: float,
+    *,
+    v_x: ArrayLike,
+    v_y: ArrayLike,
+    r: ArrayLike,
+    delta_f: ArrayLike,
+    delta_r: ArrayLike = 0.0,
+) -> Array:
+    """Return [α_f, α_r] = δ - atan2(v_y ± l r, v_x) [rad] of samples, (n, 2), the paper's sign.
+
+    Without small angles; meaningless at standstill.
+
+    Parameters
+    ----------
+    l_f : distance from the center of gravity to the front axle [m].
+    l_r : distance from the center of gravity to the rear axle [m].
+    v_x : longitudinal speed [m/s], (n,).
+    v_y : lateral velocity [m/s], (n,).
+    r : yaw rate [rad/s], (n,).
+    delta_f : steering in front [rad], (n,).
+    delta_r : at the rear [rad], (n,).
+    """
+    v_y, r = np.asarray(v_y), np.asarray(r)
+    front = np.asarray(delta_f) - np.arctan2(v_y + l_f * r, v_x)
+    rear = np.asarray(delta_r) - np.arctan2(v_y - l_r * r, v_x)
+    return np.column_stack([front, rear])
 
 
 def linear_axle_force(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:

@@ -5,6 +5,7 @@ F_y = +C alpha with alpha = delta - atan2(v_y +- l r, v_x), the negative of the 
 """
 
 import json
+import math
 import os
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -256,6 +257,21 @@ class Vehicle:
             self.weight * self.l_r / self.wheelbase,
             self.weight * self.l_f / self.wheelbase,
         )
+
+    @property
+    def froude_speed(self) -> float:
+        """Speed that scales with the size of a car, sqrt(g L) [m/s]: 5 for a sedan."""
+        return math.sqrt(GRAVITY * self.wheelbase)
+
+    @property
+    def froude_time(self) -> float:
+        """Time that scales with the size of a car, sqrt(L/g) [s]: 0.5 for a sedan."""
+        return math.sqrt(self.wheelbase / GRAVITY)
+
+    @property
+    def lowest_speed(self) -> float:
+        """Speed below which slip angles mean little, 0.2 sqrt(g L) [m/s]: 1 for a sedan."""
+        return 0.2 * self.froude_speed
 
     @property
     def roll_arm(self) -> float:

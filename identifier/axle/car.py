@@ -5,7 +5,6 @@ Rows are axles, front and rear.   F_z = m g l_o/L: static load [N], l_o distance
 dξ_i/dt = φ_i cos δ_i - v_x r/g exactly: one axle, one equation, no stiffness in it.
 """
 
-import math
 from typing import Any, NamedTuple, TypeVar
 
 import casadi as ca
@@ -39,16 +38,6 @@ def car_numbers(vehicle: Vehicle) -> Array:
     yaw = np.array([1.0, -1.0]) * vehicle.yaw_inertia / (vehicle.wheelbase * load)
     arm = np.array([vehicle.l_f, -vehicle.l_r])
     return np.column_stack([arm, load / vehicle.weight, yaw, load])
-
-
-def froude_speed(vehicle: Vehicle) -> float:
-    """Return U = sqrt(g L) [m/s], the speed that scales with the size of the car.
-
-    Parameters
-    ----------
-    vehicle : the car; 5 m/s for a sedan, 1.3 m/s for a 1:10 model.
-    """
-    return math.sqrt(GRAVITY * vehicle.wheelbase)
 
 
 def axle_impulse(car: Car, v_y: Any, r: Any) -> Any:

@@ -11,7 +11,7 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
-from identifier.axle.car import car_numbers, froude_speed
+from identifier.axle.car import car_numbers
 from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
 from identifier.axle.gate import GateState, Plausibility
@@ -83,7 +83,7 @@ class AxleIdentifier:
         vehicle : only its wheelbase is used here; its cornering stiffness enters the prior.
         dt : sampling interval [s].
         """
-        L, U = vehicle.wheelbase, froude_speed(vehicle)
+        L, U = vehicle.wheelbase, vehicle.froude_speed
         return cls(
             prior=Prior(compliance=0.01 * L, sd_compliance=0.01 * L, sd_v_y=0.005 * U),
             sway=Sway.for_vehicle(vehicle),

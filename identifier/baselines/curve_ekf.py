@@ -16,7 +16,7 @@ from codegen import Scan
 from codegen.arrays import Array
 from identifier.baselines.curves import CURVES, CurveModel
 from identifier.baselines.kalman import CARRY, NOISE, build_step
-from identifier.baselines.ports import OVER, around, axle_loads, lowest_speed, scales
+from identifier.baselines.ports import OVER, around, axle_loads
 from identifier.method import Setup
 from identifier.tire_model import TireModel
 from identifier.tuning import Range
@@ -174,7 +174,7 @@ class CurveEkf:
         curve : "magic_formula" or "dugoff".
         dt : sampling interval [s].
         """
-        time, speed = scales(vehicle).time, scales(vehicle).speed
+        time, speed = vehicle.froude_time, vehicle.froude_speed
         return cls(
             curve=curve,
             walk=0.0075 / math.sqrt(time),
@@ -184,7 +184,7 @@ class CurveEkf:
             r_disturbance=0.12 / time**1.5,
             dt=dt,
             learning_speed=0.6 * speed,
-            min_speed=lowest_speed(vehicle),
+            min_speed=vehicle.lowest_speed,
         )
 
     @property

@@ -20,9 +20,7 @@ from identifier.baselines.ports import (
     OVER,
     around,
     impulse,
-    lowest_speed,
     sample_ports,
-    scales,
     turning_force,
 )
 from identifier.method import CannotFreezeError, Setup
@@ -108,7 +106,7 @@ class ExtendedStateObserver:
         vehicle : the car.
         dt : sampling interval [s].
         """
-        return cls(bandwidth=25.0 / scales(vehicle).time, dt=dt, min_speed=lowest_speed(vehicle))
+        return cls(bandwidth=25.0 / vehicle.froude_time, dt=dt, min_speed=vehicle.lowest_speed)
 
     @property
     def tunables(self) -> Mapping[str, Range]:

@@ -23,10 +23,8 @@ from identifier.baselines.ports import (
     OVER,
     around,
     axle_loads,
-    lowest_speed,
     motion_rate,
     sample_ports,
-    scales,
 )
 from identifier.method import CannotFreezeError, Setup
 from identifier.tire_model import TireModel
@@ -198,7 +196,7 @@ class ForceEkf:
         vehicle : the car.
         dt : sampling interval [s].
         """
-        time, speed = scales(vehicle).time, scales(vehicle).speed
+        time, speed = vehicle.froude_time, vehicle.froude_speed
         return cls(
             force_walk=0.36 / math.sqrt(time),
             v_y_noise=0.004 * speed,
@@ -206,7 +204,7 @@ class ForceEkf:
             v_y_disturbance=0.001 * speed / math.sqrt(time),
             r_disturbance=0.001 / time**1.5,
             dt=dt,
-            min_speed=lowest_speed(vehicle),
+            min_speed=vehicle.lowest_speed,
         )
 
     @property

@@ -16,9 +16,7 @@ from identifier.baselines.ports import (
     OVER,
     around,
     impulse,
-    lowest_speed,
     sample_ports,
-    scales,
     turning_force,
 )
 from identifier.method import Setup
@@ -55,7 +53,7 @@ class LinearBaseline:
         vehicle : the car.
         dt : sampling interval [s].
         """
-        return cls(dt=dt, min_speed=lowest_speed(vehicle))
+        return cls(dt=dt, min_speed=vehicle.lowest_speed)
 
     def setup(
         self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
@@ -205,13 +203,13 @@ class StiffnessRls:
         vehicle : the car.
         dt : sampling interval [s].
         """
-        time, speed = scales(vehicle).time, scales(vehicle).speed
+        time, speed = vehicle.froude_time, vehicle.froude_speed
         return cls(
             cutoff=3.0 / time,
             memory=20.0 * time,
             dt=dt,
             learning_speed=0.6 * speed,
-            min_speed=lowest_speed(vehicle),
+            min_speed=vehicle.lowest_speed,
         )
 
     @property

@@ -5,14 +5,12 @@ x = [v_y, r] [m/s, rad/s].   u = [δ_f, δ_r] [rad].   F: axle forces [N], frame
 n is the force that holds a steady turn. Equation numbers: Hong and Choi.
 """
 
-import math
 from typing import Any, NamedTuple
 
 import casadi as ca
 
 from identifier.tuning import Range
 from models.bicycle import BicycleParameters, bicycle
-from models.vehicle import GRAVITY, Vehicle
 
 OVER = ("x", "u", "v_x")
 SAMPLING = ("dt", "min_speed")
@@ -103,39 +101,7 @@ def motion_rate(p: BicycleParameters, v_x: Any, x: Any, F: Any) -> Any:
     return bicycle(p, 1.0).K @ F - ca.vertcat(v_x * x[1], 0)
 
 
-# Scales of a car by Froude similarity, and ranges around numbers that follow from them.
-#
-# Lengths scale with the wheelbase L, times with sqrt(L/g), speeds with sqrt(g L): one rule serves a
-# passenger car (2.7 m, 0.52 s, 5.1 m/s) and a 1:10 model (0.17 m, 0.13 s, 1.3 m/s).
-
-
-class Scales(NamedTuple):
-    """Natural units of a car: length [m], time [s], speed [m/s]."""
-
-    length: float
-    time: float
-    speed: float
-
-
-def scales(vehicle: Vehicle) -> Scales:
-    """Return the natural units of a car.
-
-    Parameters
-    ----------
-    vehicle : its wheelbase is the length.
-    """
-    L = vehicle.wheelbase
-    return Scales(length=L, time=math.sqrt(L / GRAVITY), speed=math.sqrt(GRAVITY * L))
-
-
-def lowest_speed(vehicle: Vehicle) -> float:
-    """Return the speed below which slip angles mean little, 0.2 sqrt(g L) [m/s].
-
-    Parameters
-    ----------
-    vehicle : 1 m/s for a sedan.
-    """
-    return 0.2 * scales(vehicle).speed
+# Ranges around numbers that follow from the size of a car.
 
 
 def around(value: float, factor: float) -> Range:

@@ -20,7 +20,7 @@ from identifier.regression import RegressionIdentifier
 from identifier.stability.gain_design import gain_for_phase_margin
 from identifier.stability.loop import linear_law
 from identifier.tuning import Range
-from models.vehicle import GRAVITY, Vehicle
+from models.vehicle import Vehicle
 
 # Random designs of the paper's laws, for a fair comparison: every law from the same ranges.
 #
@@ -87,7 +87,7 @@ def tuned_design(
         law="instantaneous" if scaled else law,
         dt=dt,
         force_unit=natural_force_unit(vehicle.mass),
-        min_speed=0.2 * math.sqrt(GRAVITY * vehicle.wheelbase),
+        min_speed=vehicle.lowest_speed,
         seed=seed,
     )
     return replace(design, gains=gains.scaled_by_forgetting()) if scaled else design

@@ -1,6 +1,5 @@
 """A design that learns the last layer by a filtered regression: law, network and numbers."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -17,7 +16,7 @@ from identifier.regression.laws import LAWS, Numbers
 from identifier.regression.step import OVER, Structure, build_step
 from identifier.tire_model import TireModel
 from models.recordings import Recording
-from models.vehicle import GRAVITY, Vehicle
+from models.vehicle import Vehicle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,7 +95,7 @@ class RegressionIdentifier:
         dt : sampling interval [s].
         seed : seed of the hidden layer.
         """
-        time = math.sqrt(vehicle.wheelbase / GRAVITY)  # 0.5 s for a passenger car
+        time = vehicle.froude_time
         unit = natural_force_unit(vehicle.mass)
         return cls(
             filter_rate=2.0 / time,
@@ -110,7 +109,7 @@ class RegressionIdentifier:
             network=network or natural_network(vehicle),
             dt=dt,
             force_unit=unit,
-            min_speed=0.2 * math.sqrt(GRAVITY * vehicle.wheelbase),
+            min_speed=vehicle.lowest_speed,
             seed=seed,
         )
 

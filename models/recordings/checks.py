@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from codegen.arrays import Array
+from models.bicycle import measured_slip
 from models.recordings.evidence import (
     STRIDE,
     Steering,
@@ -298,8 +299,9 @@ def check_against_vehicle(recording: Recording, vehicle: Axles) -> None:
     if w.r.size * STRIDE < 2.0 or np.sqrt(np.mean(a**2)) < 0.3:
         return
     l_f, l_r = vehicle.l_f, vehicle.l_r
-    alpha_f = w.delta_f - np.arctan2(w.v_y + l_f * w.r, w.v_x)
-    alpha_r = w.delta_r - np.arctan2(w.v_y - l_r * w.r, w.v_x)
+    motion = {"v_x": w.v_x, "v_y": w.v_y, "r": w.r}
+    slip = measured_slip(l_f, l_r, **motion, delta_f=w.delta_f, delta_r=w.delta_r)
+    alpha_f, alpha_r = slip.T
     typical = float(np.median(np.abs(alpha_r)))
     if typical > LARGEST_SLIP:
         raise RecordingError(

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from codegen.arrays import Array
+from models.bicycle import measured_slip
 from models.files import write_atomically
 from models.rules import LARGEST_FORCE
 
@@ -181,9 +182,9 @@ class Recording:
         Array
             [alpha_f, alpha_r] [rad], shape (n, 2).
         """
-        alpha_f = self.delta_f - np.arctan2(self.v_y + l_f * self.r, self.v_x)
-        alpha_r = self.delta_r - np.arctan2(self.v_y - l_r * self.r, self.v_x)
-        return _read_only(np.column_stack([alpha_f, alpha_r]))
+        motion = {"v_x": self.v_x, "v_y": self.v_y, "r": self.r}
+        steering = {"delta_f": self.delta_f, "delta_r": self.delta_r}
+        return _read_only(measured_slip(l_f, l_r, **motion, **steering))
 
     def between(self, t0: float, t1: float) -> "Recording":
         """Return the part with t0 <= t <= t1.

@@ -8,6 +8,7 @@ from codegen.arrays import Array
 from identifier.method import CannotFreezeError
 from identifier.run import DivergedError, OnlineIdentifier
 from identifier.tire_model import TireModel
+from models.bicycle import measured_slip
 from models.vehicle import Vehicle
 from mpc.handover.certificate import LARGEST_SLIP, law_complaint, tire_complaint
 from mpc.handover.judge import ChiSquare, Judge, Window
@@ -96,8 +97,7 @@ def slips(samples: Array, vehicle: Vehicle) -> Array:
     vehicle : the car.
     """
     v_x, v_y, r, delta = samples[:, :4].T
-    front = delta - np.arctan2(v_y + vehicle.l_f * r, v_x)
-    return np.column_stack([front, -np.arctan2(v_y - vehicle.l_r * r, v_x)])
+    return measured_slip(vehicle.l_f, vehicle.l_r, v_x=v_x, v_y=v_y, r=r, delta_f=delta)
 
 
 LOST = 5  # samples in a row after which a window is none

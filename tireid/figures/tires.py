@@ -14,6 +14,7 @@ from identifier.axle import AxleIdentifier
 from identifier.axle.slip import SHORTEST
 from identifier.run import History
 from identifier.tire_model import TireModel
+from models.bicycle import measured_slip
 from models.recordings import Recording
 from mpc.loop import Drive
 from tireid.figures.drive import tire_look
@@ -166,9 +167,9 @@ def axle_slip(drive: Drive) -> Array:
     ----------
     drive : its true motion is taken.
     """
-    front = drive.delta - np.arctan2(drive.v_y + drive.vehicle.l_f * drive.r, drive.v_x)
-    rear = -np.arctan2(drive.v_y - drive.vehicle.l_r * drive.r, drive.v_x)
-    return np.column_stack([front, rear])
+    car = drive.vehicle
+    motion = {"v_x": drive.v_x, "v_y": drive.v_y, "r": drive.r}
+    return measured_slip(car.l_f, car.l_r, **motion, delta_f=drive.delta)
 
 
 # Axle force over slip on the drive: what the tires did, what the tracker believed, the truth.
