@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
+from scipy.optimize import OptimizeResult, least_squares
 
 from codegen.arrays import Array
 from identifier.axle import AxleIdentifier, AxleModel
@@ -24,89 +25,8 @@ from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
-# Levenberg-Marquardt within bounds, by normal equations: short and wide problems, many residuals.
-#
-# min |r(p)|²,   lower <= p <= upper;   (JᵀJ + μ D) d = -Jᵀ r over the parameters that are free to
-# move, D = diag(JᵀJ), and the step is clipped to the bounds. A step is taken only downhill; μ
-# follows Nielsen's rule. Source: Madsen, Nielsen and Tingleff, Methods for Non-Linear Least Squares
-# Problems, 2nd ed., 2004, section 3.2.
-
 STEP = 1e-6  # of the one-sided differences, for parameters of order one
-FIRST_DAMPING = 1e-2
-LARGEST_DAMPING = 1e12
 GAIN = 1e-7  # a step that lowers the cost by a smaller share is the last
-TINY = 1e-12  # keeps the normal equations solvable where a parameter does nothing
-
-
-class Fit(NamedTuple):
-    """Parameters (k,), and the sum of squares that they leave."""
-
-    parameters: Array
-    cost: float
-
-
-def least_squares(
-    residual: Callable[[Array], Array], start: Array, lower: Array, upper: Array, *, steps: int
-) -> Fit:
-    """Return a local minimum of the sum of squares.
-
-    Parameters
-    ----------
-    residual : r(p), any length.
-    start : first parameters (k,), each of order one; moved into the bounds.
-    lower : bounds (k,).
-    upper : bounds (k,).
-    steps : largest number of steps downhill.
-    """
-    p = np.clip(start, lower, upper)
-    r = residual(p)
-    cost, damping = float(r @ r), FIRST_DAMPING
-    for _ in range(steps):
-        J = _jacobian(residual, p, r, upper)
-        slope, normal = J.T @ r, J.T @ J
-        growth = 2.0
-        while damping < LARGEST_DAMPING:
-            trial = np.clip(p + _step(normal, slope, damping, p, lower, upper), lower, upper)
-            r_trial = residual(trial)
-            now = float(r_trial @ r_trial)
-            if now < cost:
-                break
-            damping, growth = damping * growth, 2.0 * growth
-        else:
-            return Fit(p, cost)
-        d = trial - p
-        expected = -float(d @ (2.0 * slope + normal @ d))
-        quality = (cost - now) / expected if expected > 0.0 else 0.0
-        damping = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * quality - 1.0) ** 3), 1e-12)
-        small = cost - now < GAIN * cost
-        p, r, cost = trial, r_trial, now
-        if small:
-            break
-    return Fit(p, cost)
-
-
-def _step(
-    normal: Array, slope: Array, damping: float, p: Array, lower: Array, upper: Array
-) -> Array:
-    """Solve the damped normal equations for what does not press against its bound."""
-    free = ~(((p <= lower) & (slope > 0.0)) | ((p >= upper) & (slope < 0.0)))
-    d = np.zeros_like(p)
-    A = normal[np.ix_(free, free)]
-    scale = np.diag(A) + TINY * max(float(np.trace(A)), TINY)
-    d[free] = np.linalg.solve(A + damping * np.diag(scale), -slope[free])
-    return d
-
-
-def _jacobian(residual: Callable[[Array], Array], p: Array, r: Array, upper: Array) -> Array:
-    columns = []
-    for i in range(p.size):
-        ahead = p.copy()
-        step = STEP * max(1.0, abs(float(p[i])))
-        ahead[i] += step if p[i] + step <= upper[i] else -step
-        columns.append((residual(ahead) - r) / (ahead[i] - p[i]))
-    return np.column_stack(columns)
-
-
 RIDGE = 1e-4  # of a parameter's distance to its start: 1 % of error for a hundred units of it
 
 
@@ -157,8 +77,28 @@ def fit_floor(
     for _ in range(starts):
         start = structure.start(rng)
         residual = partial(_residual, structure=structure, recordings=recordings, start=start)
-        fits.append(least_squares(residual, start, structure.lower, structure.upper, steps=steps))
-    return structure.model(min(fits, key=lambda fit: fit.cost).parameters)
+        fits.append(_fitted(residual, start, structure, steps))
+    return structure.model(min(fits, key=lambda fit: fit.cost).x)
+
+
+def _fitted(
+    residual: Callable[[Array], Array], start: Array, structure: Structure, steps: int
+) -> OptimizeResult:
+    """Return SciPy's solution, from a start that is moved into the bounds."""
+    lower, upper = structure.lower, structure.upper
+    bounded = np.isfinite([lower, upper]).any()
+    # MINPACK, which knows no bounds, counts the evaluations of differences too.
+    most = steps if bounded else steps * (start.size + 1)
+    return least_squares(
+        residual,
+        np.clip(start, lower, upper),
+        bounds=(lower, upper),
+        method="trf" if bounded else "lm",
+        x_scale="jac",
+        diff_step=STEP,
+        ftol=GAIN,
+        max_nfev=most,
+    )
 
 
 def share_of_force(model: TireModel, recording: Recording) -> Array:
