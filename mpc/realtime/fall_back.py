@@ -9,6 +9,7 @@ may be what the solver failed at, reaches it. The delay is a lag of its length.
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.linalg import expm
 
 from codegen.arrays import Array
 from models.vehicle import Vehicle
@@ -95,7 +96,8 @@ def steady_turn(vehicle: Vehicle, v_x: float) -> tuple[float, float]:
 def feedback(A: Array, B: Array, Q: Array, R: Array) -> Array:
     """Return K (1, n) of u = -K x that minimizes Σ x'Q x + u'R u, x⁺ = A x + B u.
 
-    By structure-preserving doubling (Chu, Fan, Lin and Wang 2004), which converges quadratically.
+    By structure-preserving doubling (Chu, Fan, Lin and Wang 2004), which converges quadratically
+    and also for cars of which SciPy's Schur form is too ill-conditioned to be ordered.
 
     Parameters
     ----------
@@ -126,18 +128,10 @@ def _riccati(A: Array, G: Array, Q: Array) -> Array:
 
 
 def _sampled(A: Array, B: Array, period: float) -> tuple[Array, Array]:
-    """Return A and B of samples with u held: the series of the exponential, halved and squared."""
+    """Return A and B of samples with u held."""
     n, m = B.shape
-    M = period * np.vstack([np.hstack([A, B]), np.zeros((m, n + m))])
-    halvings = max(0, int(np.ceil(np.log2(max(np.abs(M).sum(axis=1).max(), 1e-300)))) + 3)
-    term = total = np.eye(n + m)
-    M = M / 2.0**halvings
-    for k in range(1, 13):
-        term = term @ M / k
-        total = total + term
-    for _ in range(halvings):
-        total = total @ total
-    return total[:n, :n], total[:n, n:]
+    M = expm(period * np.vstack([np.hstack([A, B]), np.zeros((m, n + m))]))
+    return M[:n, :n], M[:n, n:]
 
 
 def _rounded(x: Any) -> float:
