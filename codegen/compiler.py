@@ -189,22 +189,7 @@ def load_library(
 ) -> ctypes.CDLL | None:
     """Build C source as `build_library` does and load it; where that fails build anew, once.
 
-    Parameters
-    ----------
-    source : the whole text of one C99 file; it may include <math.h> and <string.h> only.
-    name : beginning of the file's name and of the messages.
-    flags : of the compiler; None takes `FLAGS`.
-
-    Returns
-    -------
-    The library, or None where there is no compiler.
-
-    Raises
-    ------
-    CompilationError
-        Where the compiler refuses the source.
-    OSError
-        Where the library can be neither written nor loaded.
+    Returns None where there is no compiler; an OSError is also that it cannot be loaded.
     """
     library = build_library(source, name, flags)
     if library is None:

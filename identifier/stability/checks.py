@@ -22,6 +22,9 @@ ENOUGH_GAIN, ENOUGH_PHASE, ENOUGH_DAMPING = 2.0, 30.0, 0.2
 LARGEST_STEP = 0.2  # fastest pole times dt that Euler resolves well
 
 
+CALMER = {"phase_margin": "lower eta_W", "damping": "raise A_d and forgetting, or lower eta_W"}
+
+
 def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
     """A_d and λ: stable as they are sampled, resolved by the step, faster than the x_hat loop.
 
@@ -93,33 +96,28 @@ def margin_checks(loop: Loop, operation: Operation) -> list[Property]:
     """
     phase = phase_margin(loop, operation.step, operation.dt)
     damping = worst_damping(loop)
-    advice = ("lower eta_W", "raise A_d and forgetting, or lower eta_W")
     return [
         _gain_check(
             "gain_continuous", "loop gain, continuous time", loop, operation, sampled=False
         ),
         _gain_check("gain_sampled", "loop gain, sampled", loop, operation, sampled=True),
-        Property(
-            name="phase_margin",
-            title="phase margin of the sampled loop",
-            value=phase,
-            limit=ENOUGH_PHASE,
-            margin=phase / ENOUGH_PHASE,
-            status=at_least(phase, good=ENOUGH_PHASE, bad=1e-9),
-            unit="deg",
-            advice="" if phase >= ENOUGH_PHASE else advice[0],
-        ),
-        Property(
-            name="damping",
-            title="damping ratio of the learning loop",
-            value=damping,
-            limit=ENOUGH_DAMPING,
-            margin=damping / ENOUGH_DAMPING,
-            status=at_least(damping, good=ENOUGH_DAMPING, bad=1e-9),
-            unit="-",
-            advice="" if damping >= ENOUGH_DAMPING else advice[1],
-        ),
+        _enough("phase_margin", "phase margin of the sampled loop", phase, ENOUGH_PHASE, "deg"),
+        _enough("damping", "damping ratio of the learning loop", damping, ENOUGH_DAMPING, "-"),
     ]
+
+
+def _enough(name: str, title: str, value: float, least: float, unit: str) -> Property:
+    """Return a margin of the loop that is to be above zero, and better above a least one."""
+    return Property(
+        name=name,
+        title=title,
+        value=value,
+        limit=least,
+        margin=value / least,
+        status=at_least(value, good=least, bad=1e-9),
+        unit=unit,
+        advice="" if value >= least else CALMER[name],
+    )
 
 
 def weight_check(gains: Gains, operation: Operation, kept: float, judged: float) -> Property:

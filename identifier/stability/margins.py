@@ -262,14 +262,12 @@ def passivity_shortage(
 ) -> float:
     """Max over ω of -λ_min He H(jω), zero where H is positive real.
 
-    For A_d = -a I and the integral law: 1/(a (a + λ) (√a + √λ)²), `shortage_formula`.
+    For A_d = -a I and the integral law: 1/(a (a + λ) (√a + √λ)²), `shortage_formula`. The other
+    arguments are those of `drift_frequency`.
 
     Parameters
     ----------
     A_d : (2, 2) Hurwitz error dynamics [1/s].
-    forgetting : λ [1/s].
-    law : coefficients of z and ξ̃ in the driving error.
-    direction : (2, 2) D, None for -A_d⁻ᵀ.
     """
 
     def lowest(log_frequency: npt.ArrayLike) -> Matrix:

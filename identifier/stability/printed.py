@@ -49,15 +49,8 @@ def printed_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W
 def tight_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: float) -> float:
     """k_b = [W_M + √n_h |P + (η/ρ) A_d⁻¹|]/2: the two couplings cancel before the norm is taken.
 
-    W_M/2 for a symmetric A_d and P = -(η/ρ) A_d⁻¹, the pair of `canceling_pair`.
-
-    Parameters
-    ----------
-    pair : A_d, P and Q of A_dᵀ P + P A_d = -Q.
-    W_M : bound on the ideal weights (Frobenius) [U].
-    n_h : hidden units; |s| <= √n_h.
-    eta_W : learning rate of (11).
-    rho_W : leakage gain of (11) [1/(U s²)].
+    W_M/2 for a symmetric A_d and P = -(η/ρ) A_d⁻¹, the pair of `canceling_pair`. Arguments are
+    those of `printed_k_b`.
     """
     require_positive(ValueError, rho_W=rho_W)
     coupling = float(np.linalg.norm(pair.P + eta_W / rho_W * np.linalg.inv(pair.A_d), 2))

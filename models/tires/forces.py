@@ -90,7 +90,7 @@ def smaller(a: Expression, b: Expression) -> Expression:
     return a * (a <= b) + b * (b < a)
 
 
-def specialized(alpha: Expression) -> Expression:
+def folded(alpha: Expression) -> Expression:
     """The slip angle against the line of travel, in [-π/2, π/2] [rad].
 
     tan α is the sideways over the absolute forward speed, so a wheel that rolls backwards, with

@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple, Self
 
 import casadi as ca
 
-from models.tires.forces import Expression, TireForces, positive, specialized
+from models.tires.forces import Expression, TireForces, folded, positive
 from models.tires.magic_formula_coefficients import Coefficients
 from models.tires.tir import ValidRange, read_magic_formula
 
@@ -273,17 +273,7 @@ def combined_longitudinal(
     F_z: Expression,
     mu: Expression,
 ) -> Expression:
-    """F_x [N] at any slip, (4.E50).
-
-    Parameters
-    ----------
-    c : coefficients of the tire file.
-    alpha : slip angle, ISO sign [rad].
-    kappa : longitudinal slip [-].
-    gamma : camber [rad].
-    F_z : wheel load, not negative [N].
-    mu : friction of the road over that of the measurement [-].
-    """
+    """F_x [N] at any slip, (4.E50); arguments are those of `combined_lateral`."""
     df_z = c.load_increment(F_z)
     B_xa = c.RBX1 * ca.cos(ca.atan(c.RBX2 * kappa)) * c.LXAL  # (4.E54)
     C_xa = c.RCX1  # (4.E55)
@@ -370,7 +360,7 @@ class MagicFormula:
         mu : friction of the road over that of the measurement [-]; multiplies LMUX and LMUY.
         """
         c, load = self.coefficients, positive(F_z)
-        alpha_iso = -specialized(alpha)  # the file and its equations have the ISO sign
+        alpha_iso = -folded(alpha)  # the file and its equations have the ISO sign
         return TireForces(
             combined_longitudinal(c, alpha_iso, kappa, gamma, load, mu),
             combined_lateral(c, alpha_iso, kappa, gamma, load, mu),

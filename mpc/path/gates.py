@@ -228,18 +228,7 @@ def iso_3888_2(
 ) -> Path:
     """Return the obstacle avoidance of ISO 3888-2, 61 m between the first and the last cones.
 
-    Parameters
-    ----------
-    car_width : width of the car without mirrors [m]; the lanes grow with it.
-    margin : room between the side of the car and the cones, on top of half its width [m].
-    run_in : lane before the first cones [m].
-    run_out : lane after the last cones [m].
-    spacing : longest step of the samples [m].
-
-    Raises
-    ------
-    PathError
-        Where a number is out of range.
+    Arguments are those of `iso_3888_1`.
 
     Examples
     --------

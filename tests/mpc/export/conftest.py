@@ -9,18 +9,9 @@ from identifier.export.package import build_package
 from identifier.methods import make_method
 from models.vehicle import sedan
 from mpc.export.pair import build_pair
+from tests.identifier.export.conftest import STRICT as STRICT  # the same flags for both
 
 LAWS = ("integral", "axle")
-STRICT = [
-    "-std=c99",
-    "-Wall",
-    "-Wextra",
-    "-Wpedantic",
-    "-Wconversion",
-    "-Wshadow",
-    "-Wdouble-promotion",
-    "-Werror",
-]
 
 
 @pytest.fixture(scope="session")
