@@ -1,8 +1,13 @@
 """A small car and a drive whose axle forces are known exactly."""
 
+import json
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from identifier.method import FrozenModelError
+from identifier.methods import load_model
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
@@ -50,6 +55,35 @@ def drive(n=1500, dt=0.01, speed=20.0, amplitude=0.06, scale=1.0):
 @pytest.fixture(name="car")
 def the_car():
     return CAR
+
+
+@pytest.fixture
+def model_car():
+    """A car of 1:10."""
+    return replace(
+        CAR,
+        mass=1.5,
+        yaw_inertia=0.025,
+        l_f=0.115,
+        l_r=0.155,
+        cornering_stiffness_front=140.0,
+        cornering_stiffness_rear=120.0,
+    )
+
+
+@pytest.fixture
+def refused_in_one_line(tmp_path):
+    """A function that checks that a file of these numbers is refused with its name and a rule."""
+
+    def check(data, said):
+        path = tmp_path / "weights.json"
+        path.write_text(json.dumps(data))
+        with pytest.raises(FrozenModelError, match=said) as error:
+            load_model(path)
+        assert str(error.value).startswith(str(path))
+        assert "\n" not in str(error.value)
+
+    return check
 
 
 @pytest.fixture(name="drive")

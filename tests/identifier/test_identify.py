@@ -184,18 +184,9 @@ def test_impossible_gains_are_refused():
         PaperIdentifier(gains=GAINS, law="magic")
 
 
-def test_default_design_is_similar_for_a_model_car(car):
+def test_default_design_is_similar_for_a_model_car(car, model_car):
     """By Froude a 1:10 model sees the same scaled inputs: lengths over 10, times over sqrt(10)."""
-    model = replace(
-        car,
-        mass=1.5,
-        yaw_inertia=0.025,
-        l_f=0.115,
-        l_r=0.155,
-        cornering_stiffness_front=140.0,
-        cornering_stiffness_rear=120.0,
-    )
-    full, small = paper_identifier(car), paper_identifier(model)
+    full, small = paper_identifier(car), paper_identifier(model_car)
     ratio = np.array(full.network.scale) / np.array(small.network.scale)
     np.testing.assert_allclose(ratio, [np.sqrt(10), 1 / np.sqrt(10), 1.0, 1.0])
     assert full.force_unit == 1000.0

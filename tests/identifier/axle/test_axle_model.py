@@ -186,18 +186,9 @@ def test_impossible_numbers_are_refused(car):
         replace(design.prior, friction=-1.0)
 
 
-def test_designs_are_similar_for_a_model_car(car):
+def test_designs_are_similar_for_a_model_car(car, model_car):
     """By Froude lengths over 10 and speeds over sqrt(10); times of drivers and sensors stay."""
-    small_car = replace(
-        car,
-        mass=1.5,
-        yaw_inertia=0.025,
-        l_f=0.115,
-        l_r=0.155,
-        cornering_stiffness_front=140.0,
-        cornering_stiffness_rear=120.0,
-    )
-    full, small = AxleIdentifier.for_vehicle(car), AxleIdentifier.for_vehicle(small_car)
+    full, small = AxleIdentifier.for_vehicle(car), AxleIdentifier.for_vehicle(model_car)
     assert full.prior.compliance / small.prior.compliance == pytest.approx(10.0)
     assert full.min_speed / small.min_speed == pytest.approx(np.sqrt(10.0))
     assert small.sway.frequency / full.sway.frequency == pytest.approx(np.sqrt(10.0))

@@ -50,17 +50,17 @@ def samples(slalom):
     return rows
 
 
+def put(folder, files):
+    for path, text in files.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text)
+    return folder
+
+
 @pytest.fixture
 def write(tmp_path):
     """A function that writes a package and returns its folder."""
-
-    def written(package):
-        for path, text in package.files.items():
-            (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
-            (tmp_path / path).write_text(text)
-        return tmp_path
-
-    return written
+    return lambda package: put(tmp_path, package.files)
 
 
 @pytest.fixture

@@ -10,23 +10,13 @@ from models.friction import Friction, FrictionChange
 from models.plant import Driver
 from mpc.cars.bmw import MissingCommonRoadError
 from mpc.cars.commonroad import CommonRoadError, drift_car, multi_body_car
+from tests.mpc.cars.conftest import column, driven
 
 needs_package = pytest.mark.skipif(
     importlib.util.find_spec("vehiclemodels") is None,
     reason="needs commonroad-vehicle-models: pip install tireid[commonroad]",
 )
 CARS = {"multi-body": multi_body_car, "drift": drift_car}
-
-
-def driven(car, periods, command, v_x=20.0):
-    states = [car.start(v_x)]
-    for k in range(periods):
-        states.append(car.step(states[-1], command(k), v_x))
-    return states
-
-
-def column(states, name):
-    return np.array([getattr(state, name) for state in states])
 
 
 @pytest.fixture(scope="module", params=list(CARS))

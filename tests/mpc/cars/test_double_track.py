@@ -6,17 +6,7 @@ import pytest
 from models.friction import Friction, FrictionChange
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
-
-
-def driven(car, periods, command, v_x=20.0):
-    states = [car.start(v_x)]
-    for k in range(periods):
-        states.append(car.step(states[-1], command(k), v_x))
-    return states
-
-
-def column(states, name):
-    return np.array([getattr(state, name) for state in states])
+from tests.mpc.cars.conftest import column, driven
 
 
 @pytest.fixture(scope="module")

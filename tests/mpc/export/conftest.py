@@ -1,7 +1,6 @@
 """Packages of both kinds of tires that can be handed over, alone and with their identifiers."""
 
 import shutil
-import subprocess
 
 import pytest
 
@@ -9,7 +8,10 @@ from identifier.export.package import build_package
 from identifier.methods import make_method
 from models.vehicle import sedan
 from mpc.export.pair import build_pair
-from tests.identifier.export.conftest import STRICT as STRICT  # the same flags for both
+from tests.identifier.export.conftest import STRICT as STRICT
+from tests.identifier.export.conftest import compiler as compiler
+from tests.identifier.export.conftest import put
+from tests.identifier.export.conftest import run as run
 
 LAWS = ("integral", "axle")
 
@@ -27,13 +29,6 @@ def pairs():
 def packages(pairs):
     """By law, the tracker alone."""
     return {law: pair.tracker for law, pair in pairs.items()}
-
-
-def put(folder, files):
-    for path, text in files.items():
-        (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_text(text)
-    return folder
 
 
 @pytest.fixture
@@ -54,24 +49,5 @@ def write_pair(tmp_path):
     return written
 
 
-@pytest.fixture
-def run():
-    """A function that runs a command and returns its answer, whatever its exit code."""
-
-    def ran(*command, cwd=None):
-        if shutil.which(command[0]) is None:
-            pytest.skip(f"needs {command[0]}")
-        return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
-
-    return ran
-
-
 def c_files(folder, under="src"):
     return sorted(path.relative_to(folder).as_posix() for path in (folder / under).glob("*.c"))
-
-
-@pytest.fixture(params=["gcc", "clang"])
-def compiler(request):
-    if shutil.which(request.param) is None:
-        pytest.skip(f"needs {request.param}")
-    return request.param
