@@ -8,7 +8,7 @@ tires and on those that go on learning. Each time has a seed of its own, of nois
 to learn on. The tolerances of the sensors' agreement were chosen on ISO 3888-2 and the slalom.
 Drives without a fault, at 90 % and 97 % and on half the friction too, count alarms that are false.
 
-A fault is noticed where learning says that its sensors are in doubt. One that shows nothing wrong
+A fault is noticed where learning says that there is a sensor fault. One that shows nothing wrong
 meanwhile (a steering that is scaled on a straight) cannot be: it is noticed where it shows.
 Prints a table, writes OUT/mpc_sensor_faults.json.
 """
@@ -91,7 +91,7 @@ class Case(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Whether the path was kept, peak deviation [m], when doubt began [s], and how long it took."""
+    """Whether the path was kept, peak deviation [m], when the alarm began [s], and how long."""
 
     kept: bool
     peak: float
@@ -133,7 +133,7 @@ class Row(NamedTuple):
 
     @property
     def times(self) -> list[float]:
-        """From the beginning of the fault to that of the doubt, where there was one [s]."""
+        """From the beginning of the fault to that of the alarm, where there was one [s]."""
         found = []
         for begins, one in zip(self.begins, self.outcomes[LEARNING], strict=True):
             found += [t - begins for t in one.faults if t >= begins][:1]

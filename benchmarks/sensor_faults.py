@@ -7,7 +7,7 @@ and of random cars, taken sample by sample as a car would. Forces are right wher
 3 s after the sensor is good again, they differ from those told without the fault by at most 5 % of
 the rms force. The same faults are told to a method that never doubts: those that it does not get
 over are harmful, and of these the time is told until the first sample is not believed or the
-weights are in doubt; a drift is small at first and is told apart. No number of the method was
+there is an alarm; a drift is small at first and is told apart. No number of the method was
 chosen on these drives.
 """
 
@@ -180,16 +180,16 @@ def drive(
 
 
 def is_noticed(online: OnlineIdentifier) -> bool:
-    """Return whether a sample was refused, the last one not believed, or weights are in doubt.
+    """Return whether a sample was refused, the last one not believed, or there is an alarm.
 
     Parameters
     ----------
     online : the identifier.
     """
     state = online.state()
-    believed = state["gate"].ravel()
-    doubt, on, bad = state["watch"].ravel()[0], believed[ON], believed[BAD]
-    return bool(online.counts.refused or doubt > 0.0 or bad > 0.0 or on == 0.0)
+    gate_state = state["gate"].ravel()
+    alarm, on, bad = state["watch"].ravel()[0], gate_state[ON], gate_state[BAD]
+    return bool(online.counts.refused or alarm > 0.0 or bad > 0.0 or on == 0.0)
 
 
 def after_fault(drive_: Drive, fault: SensorFault, forces: Array) -> float:
@@ -209,13 +209,13 @@ def after_fault(drive_: Drive, fault: SensorFault, forces: Array) -> float:
 
 
 def run(count: int) -> tuple[dict[str, list[Result]], float]:
-    """Return the results for sedan and random cars, and the share of time in doubt without faults.
+    """Return the results for sedan and random cars, and the share of time with a false alarm.
 
     Parameters
     ----------
     count : number of faults, half on each.
     """
-    results, doubt = {}, []
+    results, alarm = {}, []
     for stream, (name, make) in enumerate(
         {"sedan": sedan_drive, "random cars": random_car_drive}.items()
     ):
@@ -225,12 +225,12 @@ def run(count: int) -> tuple[dict[str, list[Result]], float]:
             car, recording = make(rng)
             forces, _ = drive(_design(car), car, signals(recording, None, rng))
             drives.append(Drive(car, recording, forces))
-            doubt.append(_doubted(car, recording))
+            alarm.append(_alarm_share(car, recording))
         results[name] = [
             _result(drives[k % len(drives)], np.random.default_rng([21, stream, k]))
             for k in range(count // 2)
         ]
-    return results, float(np.mean(doubt))
+    return results, float(np.mean(alarm))
 
 
 def _design(car: Vehicle) -> AxleIdentifier:
@@ -239,8 +239,8 @@ def _design(car: Vehicle) -> AxleIdentifier:
     return design
 
 
-def _doubted(car: Vehicle, recording: Recording) -> float:
-    """Return the share of time in which weights are in doubt although nothing fails."""
+def _alarm_share(car: Vehicle, recording: Recording) -> float:
+    """Return the share of time with an alarm although nothing fails."""
     history = identify(recording, car, _design(car))
     return float((history.state["watch"].reshape(len(recording) + 1, -1)[:, 0] > 0.0).mean())
 
@@ -259,13 +259,13 @@ def _result(drive_: Drive, rng: np.random.Generator) -> Result:
     return Result(fault, error, without, noticed)
 
 
-def report(results: dict[str, list[Result]], doubt: float, targets: Targets) -> None:
+def report(results: dict[str, list[Result]], alarm: float, targets: Targets) -> None:
     """Print tables, record their numbers and judge them.
 
     Parameters
     ----------
     results : by cars.
-    doubt : share of time in doubt where nothing fails.
+    alarm : share of time with an alarm where nothing fails.
     targets : collects what is missed.
     """
     everything = [one for some in results.values() for one in some]
@@ -290,7 +290,7 @@ def report(results: dict[str, list[Result]], doubt: float, targets: Targets) -> 
     soon = float(100.0 * np.mean(np.array(at_once) <= SOON))
     label = f"harmful faults that do not grow, noticed within {SOON:g} s"
     targets.at_least(label, soon, 90.0, "%", key="soon")
-    targets.at_most("time in doubt although nothing fails", 100.0 * doubt, 1.0, key="doubt")
+    targets.at_most("time in doubt although nothing fails", 100.0 * alarm, 1.0, key="doubt")
     for one in sorted(everything, key=lambda one: -one.error)[:10]:
         show(
             str(one.fault), f"{one.error:.1f} %, {one.unwatched:.1f} % without, {one.noticed:.2f} s"
@@ -323,8 +323,8 @@ def main() -> int:
     parser.add_argument("--faults", type=int, default=FAULTS)
     count = parser.parse_args().faults
     targets = Targets("sensor_faults")
-    results, doubt = run(count)
-    report(results, doubt, targets)
+    results, alarm = run(count)
+    report(results, alarm, targets)
     return targets.finish(keep=keep and count == FAULTS)
 
 

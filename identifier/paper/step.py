@@ -81,9 +81,9 @@ def plausible(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     x : [v_y, r] (2,).
     u : [δ_f, δ_r] (2,).
     """
-    reach = 2 * v_x  # tan 63°
+    most = 2 * v_x  # tan 63°
     front, rear = x[0] + parameters.l_f * x[1], x[0] - parameters.l_r * x[1]
-    inside = ca.logic_and(ca.fabs(front) <= reach, ca.fabs(rear) <= reach)
+    inside = ca.logic_and(ca.fabs(front) <= most, ca.fabs(rear) <= most)
     steering = ca.logic_and(ca.fabs(u[0]) <= LARGEST_ANGLE, ca.fabs(u[1]) <= LARGEST_ANGLE)
     return ca.logic_and(inside, steering)
 
@@ -146,8 +146,8 @@ def build_step(structure: Structure) -> ca.Function:
         return [state[0], state[1], bounded(state[2], W_max), bounded(state[3], V_max)]
 
     moving = v_x >= min_speed
-    believed = ca.logic_and(plausible(parameters, speed, x, u), v_x <= LARGEST_SPEED)
-    used = ca.logic_and(moving, believed)
+    plausible_sample = ca.logic_and(plausible(parameters, speed, x, u), v_x <= LARGEST_SPEED)
+    used = ca.logic_and(moving, plausible_sample)
     f_hat = ca.if_else(used, W @ layers(xi_hat, V)[1], 0)
     linear = ca.if_else(used, linear_axle_force(parameters, speed, x, u), 0)
     ahead = ca.if_else(used, dt, 0)  # else nothing moves on: weights keep their values
@@ -159,7 +159,7 @@ def build_step(structure: Structure) -> ca.Function:
         [xi_hat, z, W, V, x, u, v_x, vehicle, A_d, gains, sampling],
         [
             # at rest the observer follows the measurement, as far as it can be believed
-            ca.if_else(ca.logic_or(moving, ca.logic_not(believed)), xi_hat_next, xi),
+            ca.if_else(ca.logic_or(moving, ca.logic_not(plausible_sample)), xi_hat_next, xi),
             ca.if_else(moving, z_next, 0),
             bounded(W_next, W_max),
             bounded(V_next, V_max),

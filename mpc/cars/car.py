@@ -134,7 +134,7 @@ class DoubleTrackCar:
         X, Y : position of the center of gravity [m].
         psi : heading [rad].
         """
-        return self._seen(self._plant.start(v_x, X=X, Y=Y, psi=psi))
+        return self._state(self._plant.start(v_x, X=X, Y=Y, psi=psi))
 
     def step(self, state: CarState, command: float, v_ref: float) -> CarState:
         """Return the car one period later.
@@ -150,9 +150,9 @@ class DoubleTrackCar:
         PlantError
             When a state stops being a finite number.
         """
-        return self._seen(self._plant.step(state.inner, np.array([command, 0.0]), v_ref))
+        return self._state(self._plant.step(state.inner, np.array([command, 0.0]), v_ref))
 
-    def _seen(self, plant: PlantState) -> CarState:
+    def _state(self, plant: PlantState) -> CarState:
         v_x, v_y, r, _, _, X, Y, psi = (float(value) for value in plant.x[:8])
         a_x, a_y = (float(value) for value in plant.acceleration)
         return CarState(
