@@ -55,7 +55,6 @@ def run_lanes(
 
     Parameters
     ----------
-    loop : the compiled loop.
     scan : the step and what its ports are.
     n : number of samples.
     values : of every input: (size,), (n, size) for one that is sampled, with a first axis of runs

@@ -17,7 +17,6 @@ def visible(text: str, *, keep: str = "") -> str:
 
     Parameters
     ----------
-    text : any.
     keep : characters that stay as they are.
     """
     return "".join(
@@ -88,20 +87,10 @@ def html(text: str) -> str:
 
 
 def mathtext(text: str) -> str:
-    """Return text for a label of a figure, where a dollar begins no formula.
-
-    Parameters
-    ----------
-    text : any.
-    """
+    """Return text for a label of a figure, where a dollar begins no formula."""
     return visible(text).replace("$", r"\$")
 
 
 def terminal(text: str) -> str:
-    """Return text for a person's terminal, which it cannot command; ends of lines stay.
-
-    Parameters
-    ----------
-    text : any.
-    """
+    """Return text for a person's terminal, which it cannot command; ends of lines stay."""
     return visible(text, keep="\n")

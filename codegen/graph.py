@@ -160,7 +160,6 @@ def function_of(
 
     Parameters
     ----------
-    graph : the graph.
     like : function with the wanted name and ports.
     builders : expression of each operation.
 
@@ -199,7 +198,6 @@ def decision(graph: Graph, ports: set[int]) -> int | None:
 
     Parameters
     ----------
-    graph : the scalars.
     ports : numbers of the inputs that the condition may read.
     """
     of_ports: set[int] = set()
@@ -222,7 +220,6 @@ def assumed(graph: Graph, condition: int, holds: bool) -> Graph:
 
     Parameters
     ----------
-    graph : the scalars.
     condition : place of the condition.
     holds : whether it holds.
     """

@@ -447,7 +447,6 @@ def require_name(refusal: type[ValueError], key: str, name: Any) -> None:
     ----------
     refusal : class of the error to raise.
     key : what the name is of.
-    name : any.
 
     Raises
     ------

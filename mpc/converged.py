@@ -53,7 +53,6 @@ def build_nlp(structure: TireStructure, horizon: int) -> dict[str, Any]:
 
     Parameters
     ----------
-    structure : of the tire.
     horizon : number of stages N.
     """
     n_x, N = state_size(structure), horizon
@@ -92,7 +91,6 @@ def numbers(problem: Problem, tire: PredictionTire, kappa: ArrayLike, v_x: Array
 
     Parameters
     ----------
-    problem : cost and limits.
     tire : weights and car.
     kappa : curvature of each stage [1/m], (N,).
     v_x : speed of each stage [m/s], (N,).
@@ -152,7 +150,6 @@ def solve_converged(
     Parameters
     ----------
     tire : of the prediction, with its car.
-    problem : horizon, cost and limits.
     x0 : state at the beginning (n_x,).
     kappa : curvature of each stage [1/m], (N,) or a number.
     v_x : speed of each stage [m/s], (N,) or a number.

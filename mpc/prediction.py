@@ -53,22 +53,12 @@ class Motion(NamedTuple):
 
 
 def state_size(structure: TireStructure) -> int:
-    """Return n_x, 5 or with lagged slip 7.
-
-    Parameters
-    ----------
-    structure : of the tire.
-    """
+    """Return n_x, 5 or with lagged slip 7."""
     return 7 if structure.lagged else 5
 
 
 def stage_ports(structure: TireStructure) -> Ports:
-    """Return fresh symbols.
-
-    Parameters
-    ----------
-    structure : of the tire.
-    """
+    """Return fresh symbols."""
     sizes = (state_size(structure), 1, 1, 1, 1, N_CAR, structure.n_weights, 2, 2)
     pairs = zip(Ports._fields, sizes, strict=True)
     return Ports(*(ca.SX.sym(name, size) for name, size in pairs))
@@ -79,7 +69,6 @@ def motion(structure: TireStructure, p: Ports) -> Motion:
 
     Parameters
     ----------
-    structure : of the tire.
     p : symbols.
     """
     e_y, e_psi, v_y, r, delta, *lagged = ca.vertsplit(p.x)
@@ -118,10 +107,6 @@ def build_dynamics(structure: TireStructure) -> ca.Function:
     """Return ẋ as a function of x, u, kappa, v_x, dt, car, w, max_slip, rise.
 
     dt only bounds the lag from below.
-
-    Parameters
-    ----------
-    structure : of the tire.
     """
     p = stage_ports(structure)
     return ca.Function(
@@ -130,12 +115,7 @@ def build_dynamics(structure: TireStructure) -> ca.Function:
 
 
 def build_rk4(structure: TireStructure) -> ca.Function:
-    """Return the state after a stage by one classical Runge-Kutta step; ports as the dynamics.
-
-    Parameters
-    ----------
-    structure : of the tire.
-    """
+    """Return the state after a stage by one classical Runge-Kutta step; ports as the dynamics."""
     p, f = stage_ports(structure), build_dynamics(structure)
     k1 = f(*p)
     k2 = f(p.x + 0.5 * p.dt * k1, *p[1:])
@@ -152,10 +132,6 @@ def build_stage(structure: TireStructure) -> ca.Function:
     Ports: x (n_x,), u, kappa [1/m], v_x [m/s], dt [s], car (4,), w (n_w,), max_slip (2,) [rad],
     rise (2,) [N/rad], q (7,). Results: x_next; A = ∂x_next/∂x, B = ∂x_next/∂u; H (n_x, n_x) and
     h (n_x,) of the cost at x; slip (2,) [rad], the kinematic one, and slip_x (2, n_x).
-
-    Parameters
-    ----------
-    structure : of the tire.
     """
     p = stage_ports(structure)
     q = ca.SX.sym("q", N_ERRORS)
@@ -172,10 +148,6 @@ def build_end(structure: TireStructure) -> ca.Function:
     """Return the cost and the slips at the end of the horizon: H, h, slip, slip_x of `build_stage`.
 
     Ports: those of `build_stage` without u and dt, with q of the end.
-
-    Parameters
-    ----------
-    structure : of the tire.
     """
     p = stage_ports(structure)
     q = ca.SX.sym("q", N_ERRORS)

@@ -126,12 +126,7 @@ def factors_of(packed: list[Any], q: int) -> Factors:
 
 
 def row_of(factors: Factors) -> list[Any]:
-    """Return the row that holds factors.
-
-    Parameters
-    ----------
-    factors : U and D.
-    """
+    """Return the row that holds factors."""
     U, D = factors
     return [D[i] if i == j else U[i, j] for i, j in triangle(len(D))]
 
@@ -141,7 +136,6 @@ def spread(factors: Factors, n: int) -> Spread:
 
     Parameters
     ----------
-    factors : U and D.
     n : number of weights, which stand first.
     """
     U, D = factors
@@ -177,7 +171,6 @@ def scaled(factors: Factors, wide: Any) -> Factors:
 
     Parameters
     ----------
-    factors : U and D.
     wide : from `width`.
     """
     scale = reciprocal(larger(wide, 1))
@@ -189,7 +182,6 @@ def inflated(factors: Factors, direction: list[Any], amount: Any) -> Factors:
 
     Parameters
     ----------
-    factors : U and D.
     direction : d, n entries.
     amount : variance to add, not negative.
     """
@@ -219,7 +211,6 @@ def excited(factors: Factors, h: list[Any], least: Any) -> Excited:
 
     Parameters
     ----------
-    factors : U and D.
     h : regressor, q entries.
     least : added to a, so that it may be divided by.
     """
@@ -241,7 +232,6 @@ def updated(factors: Factors, direction: Excited, c: Any) -> Factors:
 
     Parameters
     ----------
-    factors : U and D.
     direction : the regressor.
     c : more than -1/a by more than rounding.
     """

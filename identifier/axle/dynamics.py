@@ -57,7 +57,6 @@ def lagged_force(
 
     Parameters
     ----------
-    car : the car.
     at : force curve at the lagged slip.
     compliance : of `series_compliance`.
     offset : zero of the front steering [rad] and bias of v_y [m/s], (2,).

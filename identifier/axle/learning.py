@@ -384,7 +384,6 @@ def bounded(
 
     Parameters
     ----------
-    numbers : the bounds.
     theta : parameters, n + 3 entries.
     P : covariance of the weights, the metric: upper triangle by place.
     offset : bound of the last one.

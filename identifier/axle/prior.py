@@ -73,7 +73,6 @@ class Prior:
 
         Parameters
         ----------
-        vehicle : the car.
         ladder : slip scales of the units [rad].
         """
         n, mu = len(ladder), self.friction

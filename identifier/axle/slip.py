@@ -55,7 +55,6 @@ def kinematic_slip(car: Car, gated: Gate, offset: Any) -> Any:
 
     Parameters
     ----------
-    car : the car.
     gated : what the gate lets through.
     offset : δ₀ [rad] and b [m/s], (2,).
     """
@@ -69,7 +68,6 @@ def hold(car: Car, v_x: Any, dt: Any, compliance: Any, slope: Any) -> Hold:
 
     Parameters
     ----------
-    car : the car.
     v_x : longitudinal speed [m/s].
     dt : sampling interval [s].
     compliance : s [m], (2,).
@@ -225,7 +223,6 @@ def sway(
     Parameters
     ----------
     numbers : of the second-order system.
-    car : the car.
     dt : sampling interval [s].
     state : before the step.
     first : 1 at a restart, which begins in steady cornering, else 0.

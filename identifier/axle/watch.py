@@ -133,7 +133,6 @@ def watched(
 
     Parameters
     ----------
-    numbers : of the watch.
     state : before the sample.
     q : of the learnt weights, front and rear (2,).
     q_kept : of the kept ones (2,).

@@ -170,7 +170,6 @@ class CurveEkf:
 
         Parameters
         ----------
-        vehicle : the car.
         curve : "magic_formula" or "dugoff".
         dt : sampling interval [s].
         """
@@ -251,7 +250,6 @@ class CurveEkf:
 
         Parameters
         ----------
-        vehicle : the car.
         state : estimate (2 + n,).
         """
         decode = PARAMETRIZATIONS[self.curve].decode

@@ -48,7 +48,6 @@ def wheel_slip(p: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
 
     Parameters
     ----------
-    p : of the bicycle.
     v_x : longitudinal speed [m/s], not zero.
     x : [v_y, r] (2,).
     u : [δ_f, δ_r] (2,).
@@ -79,7 +78,6 @@ def magic_formula(p: BicycleParameters, q: Any, loads: Any, v_x: Any, x: Any, u:
 
     Parameters
     ----------
-    p : of the bicycle.
     q : B [1/rad], C [-], D [N] (2, 3).
     loads : not looked at.
     v_x : longitudinal speed [m/s], not zero.
@@ -100,7 +98,6 @@ def dugoff(p: BicycleParameters, q: Any, loads: Any, v_x: Any, x: Any, u: Any) -
 
     Parameters
     ----------
-    p : of the bicycle.
     q : C [N/rad], μ [-] (2, 2).
     loads : F_z (2,) [N].
     v_x : longitudinal speed [m/s], not zero.
@@ -161,7 +158,6 @@ class CurveModel(TireModel):
 
     Parameters
     ----------
-    vehicle : the car.
     curve : one of `CURVES`.
     parameters : of the curve, front and rear (2, n), SI.
     min_speed : below this speed [m/s] the forces read zero.

@@ -103,7 +103,6 @@ class ExtendedStateObserver:
 
         Parameters
         ----------
-        vehicle : the car.
         dt : sampling interval [s].
         """
         return cls(bandwidth=25.0 / vehicle.froude_time, dt=dt, min_speed=vehicle.lowest_speed)
@@ -152,7 +151,6 @@ class ExtendedStateObserver:
 
         Parameters
         ----------
-        vehicle : the car.
         state : of the run.
 
         Raises

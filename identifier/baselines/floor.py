@@ -150,7 +150,6 @@ def structure_of(method: object, vehicle: Vehicle) -> Structure:
     Parameters
     ----------
     method : a design of the paper's, an axle design, or a baseline that has a model.
-    vehicle : the car.
 
     Raises
     ------

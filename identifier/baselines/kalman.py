@@ -193,7 +193,6 @@ class ForceEkf:
 
         Parameters
         ----------
-        vehicle : the car.
         dt : sampling interval [s].
         """
         time, speed = vehicle.froude_time, vehicle.froude_speed
@@ -260,7 +259,6 @@ class ForceEkf:
 
         Parameters
         ----------
-        vehicle : the car.
         state : of the run.
 
         Raises

@@ -50,7 +50,6 @@ class LinearBaseline:
 
         Parameters
         ----------
-        vehicle : the car.
         dt : sampling interval [s].
         """
         return cls(dt=dt, min_speed=vehicle.lowest_speed)
@@ -89,7 +88,6 @@ class LinearBaseline:
 
         Parameters
         ----------
-        vehicle : the car.
         state : nothing is carried.
         """
         del state
@@ -200,7 +198,6 @@ class StiffnessRls:
 
         Parameters
         ----------
-        vehicle : the car.
         dt : sampling interval [s].
         """
         time, speed = vehicle.froude_time, vehicle.froude_speed
@@ -264,7 +261,6 @@ class StiffnessRls:
 
         Parameters
         ----------
-        vehicle : the car.
         state : stiffness (2,) [N/rad].
         """
         return CurveModel(

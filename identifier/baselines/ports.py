@@ -59,7 +59,6 @@ def axle_loads(p: BicycleParameters, gravity: float) -> Any:
 
     Parameters
     ----------
-    p : of the bicycle.
     gravity : g [m/s²].
     """
     return p.m * gravity / (p.l_f + p.l_r) * ca.vertcat(p.l_r, p.l_f)
@@ -70,7 +69,6 @@ def impulse(p: BicycleParameters, x: Any) -> Any:
 
     Parameters
     ----------
-    p : of the bicycle.
     x : [v_y, r] (2,).
     """
     return bicycle(p, 1.0).K_inv @ x  # K does not depend on v_x
@@ -81,7 +79,6 @@ def turning_force(p: BicycleParameters, v_x: Any, x: Any) -> Any:
 
     Parameters
     ----------
-    p : of the bicycle.
     v_x : longitudinal speed [m/s].
     x : [v_y, r] (2,).
     """
@@ -93,7 +90,6 @@ def motion_rate(p: BicycleParameters, v_x: Any, x: Any, F: Any) -> Any:
 
     Parameters
     ----------
-    p : of the bicycle.
     v_x : longitudinal speed [m/s].
     x : [v_y, r] (2,).
     F : axle forces (2,) [N].

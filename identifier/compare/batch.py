@@ -209,7 +209,6 @@ def cross_replay_batch(
     Parameters
     ----------
     methods : in any order; those of one structure share the lanes of one compiled loop.
-    course : car and recordings.
     workers : threads; None takes one for each processor.
     """
     online: list[dict[str, AxleRmse]] = [{} for _ in methods]

@@ -82,12 +82,7 @@ class Course:
         return found if np.isfinite([found.front, found.rear]).all() else INFINITE
 
     def replays(self, model: TireModel) -> dict[str, AxleRmse]:
-        """Return by recording the error of a frozen model.
-
-        Parameters
-        ----------
-        model : the model.
-        """
+        """Return by recording the error of a frozen model."""
         return {rec.name: self.error(rec, model.axle_force(rec)) for rec in self.recordings}
 
     def share(self, name: str, error: AxleRmse) -> float:
@@ -131,13 +126,7 @@ class Shares(NamedTuple):
 
 
 def cross_replay(method: Method, course: Course) -> Trial:
-    """Learn on each recording afresh, freeze at its end and replay on all.
-
-    Parameters
-    ----------
-    method : the method.
-    course : car and recordings.
-    """
+    """Learn on each recording afresh, freeze at its end and replay on all."""
     online, frozen, diverged_at, freezes = {}, {}, {}, True
     for recording in course.recordings:
         history = identify(recording, course.vehicle, method)
@@ -161,7 +150,6 @@ def shares(trial: Trial, course: Course) -> Shares:
     Parameters
     ----------
     trial : one method on the course.
-    course : car and recordings.
     """
     names = [recording.name for recording in course.recordings]
     if trial.diverged_at:
@@ -181,7 +169,6 @@ def frozen_shares(
     Parameters
     ----------
     frozen : by recording learnt on and recording replayed [N].
-    course : car and recordings.
     """
     learnt_on, other = where_learnt_and_elsewhere(frozen)
     return (
@@ -349,7 +336,6 @@ def step_times(
     Parameters
     ----------
     methods : by name.
-    vehicle : the car.
     recording : what is run over.
     repeats : turns; the shortest counts.
     """

@@ -38,7 +38,6 @@ def fit(course: Course, starts: int, seed: int, task: tuple[str, int]) -> dict[s
 
     Parameters
     ----------
-    course : car and recordings.
     starts : of the fit.
     seed : of the starts.
     task : name of the structure, number of the recording.
@@ -64,11 +63,9 @@ def fit_floors(
     Parameters
     ----------
     methods : whose structures are fitted.
-    course : car and recordings.
     starts : of each fit.
     seed : of the starts.
     workers : processes; 1 stays in this one.
-    progress : told what is being done.
     """
     needed = {FLOOR_OF[name] for name in methods if name in FLOOR_OF}
     tasks = [(s, i) for s in STRUCTURES if s in needed for i in range(len(course.recordings))]

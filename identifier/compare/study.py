@@ -23,7 +23,6 @@ class Comparison:
 
     Parameters
     ----------
-    course : car and recordings.
     seed : of initial weights and draws.
     trials : by method, its errors with the numbers that follow from the vehicle.
     floors : by structure of the network, errors of its offline fit to the true forces of one
@@ -81,13 +80,11 @@ def run_comparison(
     Parameters
     ----------
     names : of methods.
-    vehicle : the car.
     recordings : with true forces.
     seed : of initial weights and of the sweep.
     designs : random designs of each method; 0 leaves the sweep out.
     starts : of each offline fit to the true forces; 0 leaves the floors out.
     workers : processes of fits and sweep.
-    progress : told what is being done.
     elsewhere : does the sweep in place of processes of this machine, as a cluster's map does.
     others : further methods by name, which have neither sweep nor floor.
 

@@ -48,7 +48,6 @@ def random_values(
     ----------
     ranges : by name.
     designs : how many.
-    rng : source of randomness.
     """
     return [
         {
@@ -66,7 +65,6 @@ def judge(
 
     Parameters
     ----------
-    course : car and recordings.
     seed : seed of the initial weights.
     task : name of the method, and for each design the values of its tunables.
     """
@@ -94,11 +92,9 @@ def sweep(
     Parameters
     ----------
     names : of methods.
-    course : car and recordings.
     designs : of each method; a method without tunables runs once.
     seed : of the initial weights, and of the draws, which are the same numbers for each method.
     workers : processes; 1 stays in this one.
-    progress : told what is being done.
     elsewhere : does the work in place of processes of this machine, as a cluster's map does; its
         results may come in any order.
     folder : where results are kept, so that a sweep that was stopped goes on; None keeps none.

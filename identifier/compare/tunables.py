@@ -50,7 +50,6 @@ def tuned_design(
 
     Parameters
     ----------
-    vehicle : the car.
     law : as in `identifier.defaults.LAWS`.
     values : by name, within the ranges of `TUNABLES`.
     seed : seed of the initial weights.
@@ -153,7 +152,6 @@ def tunables(name: str, vehicle: Vehicle) -> Mapping[str, Range]:
     Parameters
     ----------
     name : of the method.
-    vehicle : the car.
     """
     if name in LAWS:
         return TUNABLES
@@ -172,7 +170,6 @@ def tuned_method(name: str, vehicle: Vehicle, values: Mapping[str, float], seed:
     Parameters
     ----------
     name : of the method.
-    vehicle : the car.
     values : by name; "part.number" is a number of a part. Empty leaves the method as it is.
     seed : seed of the initial weights.
     """

@@ -47,7 +47,6 @@ def certify(gains: Gains, driving_error: DrivingError, operation: Operation) -> 
     ----------
     gains : of (8) to (12).
     driving_error : of `identifier.paper.laws`; the PI-lead law takes its τ from the gains.
-    operation : where it runs.
     """
     law, D = linear_law(driving_error, gains.lead), direction_matrix(driving_error, gains.matrix)
     proven = proven_bounds(gains, law, operation, D)
@@ -74,7 +73,6 @@ def judged_loop(
     ----------
     gains : of (8) to (12).
     law : coefficients of z and ξ̃ in the driving error.
-    operation : where it runs.
     direction : (2, 2) D [s].
     kept : |W_hat| that is proven [U].
     """

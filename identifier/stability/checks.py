@@ -31,7 +31,6 @@ def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
     Parameters
     ----------
     gains : of (8) to (12).
-    operation : where it runs.
     """
     A_d = gains.matrix
     poles = state_space_poles(A_d)
@@ -92,7 +91,6 @@ def margin_checks(loop: Loop, operation: Operation) -> list[Property]:
     Parameters
     ----------
     loop : the loop at the worst regressor.
-    operation : where it runs.
     """
     phase = phase_margin(loop, operation.step, operation.dt)
     damping = worst_damping(loop)
@@ -129,7 +127,6 @@ def weight_check(gains: Gains, operation: Operation, kept: float, judged: float)
     Parameters
     ----------
     gains : of (8) to (12).
-    operation : where it runs.
     kept : |W_hat| that is proven [U].
     judged : |W_hat| at which the margins were judged [U].
     """
@@ -174,7 +171,6 @@ def drift_check(gains: Gains, law: Law, operation: Operation, direction: Matrix)
     ----------
     gains : of (8) to (12).
     law : coefficients of z and ξ̃ in the driving error.
-    operation : where it runs.
     direction : (2, 2) D [s].
     """
     found = drift_frequency(
@@ -208,10 +204,6 @@ def worst_damping(loop: Loop) -> float:
     """Smallest -Re/|.| of the oscillating eigenvalues of the loop, 1 if none oscillates.
 
     sqrt(a³/g)/2 for the instantaneous law with A_d = -a I; negative where the loop is unstable.
-
-    Parameters
-    ----------
-    loop : the loop.
     """
     mu = eigenvalues(loop.matrix())
     turning = mu[np.abs(mu.imag) > 1e-9 * np.abs(mu).max()]
@@ -275,7 +267,6 @@ def bound_checks(
     ----------
     gains : of (8) to (12).
     law : coefficients of z and ξ̃ in the driving error.
-    operation : where it runs.
     direction : (2, 2) D [s].
     proven : of `proven_bounds`.
     """

@@ -81,7 +81,6 @@ def phase_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) ->
 
     Parameters
     ----------
-    loop : the loop.
     integrator : `exact` for continuous time, or the integrator of the step.
     dt : step [s]; irrelevant for `exact`.
     """

@@ -47,7 +47,6 @@ def smooth_steering(rng: np.random.Generator, t: Array, *, highest: float, peak:
 
     Parameters
     ----------
-    rng : source of randomness.
     t : times [s].
     highest : largest frequency [Hz].
     peak : largest angle of the front axle [rad].
@@ -73,8 +72,6 @@ def random_drives(
 
     Parameters
     ----------
-    vehicle : the car.
-    rng : source of randomness.
     count : number of drives N.
     driving : how hard; each drive has a friction from 0.3 times the declared one on.
     duration : of a drive [s].
@@ -102,7 +99,6 @@ def driven(vehicle: Vehicle, u: Array, speed: Array, road: Array, dt: float) -> 
 
     Parameters
     ----------
-    vehicle : the car.
     u : steering (N, n, 2) [rad].
     speed : v_x (N, n) [m/s].
     road : friction (N,).
@@ -129,7 +125,6 @@ def within(vehicle: Vehicle, drives: Drives, driving: Driving, dt: float) -> NDA
 
     Parameters
     ----------
-    vehicle : the car.
     drives : what it drove.
     driving : what was declared.
     dt : sampling interval [s].
@@ -157,7 +152,6 @@ def measured(drives: Drives, driving: Driving, rng: np.random.Generator) -> Driv
     ----------
     drives : the true signals.
     driving : what was declared.
-    rng : source of randomness.
     """
     count, n = drives.v_x.shape
     kind = np.asarray(rng.integers(0, 4, count))[:, None, None]
@@ -180,7 +174,6 @@ def residuals(vehicle: Vehicle, drives: Drives, dt: float) -> Array:
     Parameters
     ----------
     vehicle : the car, whose linear tire is taken off.
-    drives : its drives.
     dt : sampling interval [s].
     """
     model = bicycle(vehicle.bicycle, 1.0)
@@ -195,13 +188,7 @@ def residuals(vehicle: Vehicle, drives: Drives, dt: float) -> Array:
 
 
 def slips(vehicle: Vehicle, drives: Drives) -> Array:
-    """Return [α_f, α_r] of (3), small angles, (N, n, 2) [rad].
-
-    Parameters
-    ----------
-    vehicle : the car.
-    drives : its drives.
-    """
+    """Return [α_f, α_r] of (3), small angles, (N, n, 2) [rad]."""
     lever = np.array([vehicle.l_f, -vehicle.l_r])
     v_y, r = drives.x[..., :1], drives.x[..., 1:]
     angles: Array = drives.u - (v_y + lever * r) / drives.v_x[..., None]
@@ -304,7 +291,6 @@ def monte_carlo(
 
     Parameters
     ----------
-    design : the design.
     vehicle : the car as the identifier is told of it, and as it drives.
     driving : the declared conditions.
     count : number of drives N.
@@ -351,10 +337,8 @@ def first_weights(
 
     Parameters
     ----------
-    design : the design.
     count : number of drives N.
     beginning : largest weights.
-    rng : source of randomness.
     """
     V = np.stack([design.network.initial_weights(rng).V for _ in range(count)])
     W = rng.standard_normal((count, 2, design.network.hidden))
@@ -371,8 +355,6 @@ def largest_norms(
 
     Parameters
     ----------
-    design : the design.
-    vehicle : the car.
     drives : as measured; the observer begins at the first sample.
     weights : of each drive to begin with.
     """

@@ -154,7 +154,6 @@ def proven_bounds(gains: Gains, law: Law, operation: Operation, direction: Matri
     ----------
     gains : of (8) to (12).
     law : coefficients of z and ξ̃ in the driving error.
-    operation : where it runs.
     direction : (2, 2) D [s], of `direction_matrix`.
     """
     A_d, dt, n_h = gains.matrix, operation.dt, operation.n_h
@@ -214,7 +213,6 @@ def worst_loop(gains: Gains, law: Law, operation: Operation, direction: Matrix, 
     ----------
     gains : of (8) to (12).
     law : coefficients of z and ξ̃ in the driving error.
-    operation : where it runs.
     direction : (2, 2) D [s], of `direction_matrix`.
     W : largest |W_hat| that is counted [U].
     """
@@ -335,7 +333,6 @@ def largest_signals(
 
     Parameters
     ----------
-    vehicle : the car.
     v_x : speed [m/s].
     slip : largest slip angle [rad].
     friction : μ [-].
@@ -359,7 +356,6 @@ def declared_signals(vehicle: Vehicle, driving: Driving) -> dict[str, float]:
 
     Parameters
     ----------
-    vehicle : the car.
     driving : how hard it is driven.
     """
     at = {"slip": driving.slip, "friction": driving.friction}
@@ -373,7 +369,6 @@ def largest_steering_rate(vehicle: Vehicle, driving: Driving) -> tuple[float, fl
 
     Parameters
     ----------
-    vehicle : the car.
     driving : how hard it is driven.
     """
     signals, omega = declared_signals(vehicle, driving), 2.0 * math.pi * driving.bandwidth
@@ -399,7 +394,6 @@ def expected_residual(vehicle: Vehicle, *, slip: float, friction: float) -> floa
 
     Parameters
     ----------
-    vehicle : the car.
     slip : largest slip angle [rad].
     friction : μ [-].
     """
@@ -415,7 +409,6 @@ def disturbance(vehicle: Vehicle, driving: Driving, *, dt: float, unit: float) -
 
     Parameters
     ----------
-    vehicle : the car.
     driving : how hard it is driven.
     dt : sampling interval [s].
     unit : force unit U [N].
@@ -457,7 +450,6 @@ def largest_input(design: PaperIdentifier, vehicle: Vehicle, driving: Driving) -
     Parameters
     ----------
     design : its network.
-    vehicle : the car.
     driving : how hard it is driven.
     """
     signals, slow = declared_signals(vehicle, driving), (1.0 - SPEED_SPREAD) * driving.v_x
@@ -484,7 +476,6 @@ def input_per_error(design: PaperIdentifier, vehicle: Vehicle, driving: Driving)
     Parameters
     ----------
     design : its network.
-    vehicle : the car.
     driving : how hard it is driven; the slowest speed counts.
     """
     slowest = (1.0 - SPEED_SPREAD) * driving.v_x - driving.noise_v_x
@@ -506,7 +497,6 @@ def operation(design: PaperIdentifier, vehicle: Vehicle, driving: Driving) -> Op
     Parameters
     ----------
     design : network, step and input source.
-    vehicle : the car.
     driving : how hard it is driven.
     """
     found = disturbance(vehicle, driving, dt=design.dt, unit=design.force_unit)

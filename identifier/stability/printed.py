@@ -210,7 +210,6 @@ def printed_bounds(gains: Gains, law: Law, operation: Operation, trivial: float)
     ----------
     gains : of (8) to (12), with leakage.
     law : coefficients of z and ξ̃ in the driving error.
-    operation : where it runs.
     trivial : bound of an identifier without a network [U s].
     """
     pair, tight_pair = best_pair(gains, operation), _tight_pair(gains, operation)
@@ -247,7 +246,6 @@ def best_pair(gains: Gains, operation: Operation) -> LyapunovPair:
     Parameters
     ----------
     gains : of (8) to (12), with leakage.
-    operation : where it runs.
     """
     unit = lyapunov(gains.matrix, np.eye(2))
     inverse = float(np.linalg.norm(np.linalg.inv(gains.matrix), 2))

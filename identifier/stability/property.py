@@ -127,7 +127,6 @@ def statement(name: str, title: str, value: float, unit: str, advice: str = "") 
     ----------
     name : key.
     title : what it means.
-    value : the value.
     unit : of the value.
     advice : remark.
     """

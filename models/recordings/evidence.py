@@ -62,10 +62,6 @@ def windows(recording: Recording) -> Windows:
     """Average a recording over windows of 0.2 s in which the car moves forward all the time.
 
     Moving: v_x above 0.5 m/s and above 30 % of its 95th percentile.
-
-    Parameters
-    ----------
-    recording : the recording.
     """
     n, dt = len(recording), recording.dt
     width = max(round(WINDOW / dt), 1)

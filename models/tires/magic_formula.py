@@ -354,9 +354,7 @@ class MagicFormula:
         Parameters
         ----------
         alpha : slip angle, paper's sign [rad]; beyond ±π/2 the wheel rolls backwards.
-        kappa : longitudinal slip [-].
         gamma : camber [rad], > 0 leans the top to the right.
-        F_z : wheel load [N]; no force at F_z <= 0.
         mu : friction of the road over that of the measurement [-]; multiplies LMUX and LMUY.
         """
         c, load = self.coefficients, positive(F_z)
@@ -367,21 +365,11 @@ class MagicFormula:
         )
 
     def slip_stiffness(self, F_z: Expression) -> Expression:
-        """∂F_x/∂κ at zero slip and camber [N]; 0 in the air.
-
-        Parameters
-        ----------
-        F_z : wheel load [N].
-        """
+        """∂F_x/∂κ at zero slip and camber [N]; 0 in the air."""
         return longitudinal_slope(self.coefficients, positive(F_z))
 
     def cornering_stiffness(self, F_z: Expression) -> Expression:
-        """∂F_y/∂α at zero slip and camber, paper's sign: positive [N/rad]; 0 in the air.
-
-        Parameters
-        ----------
-        F_z : wheel load [N].
-        """
+        """∂F_y/∂α at zero slip and camber, paper's sign: positive [N/rad]; 0 in the air."""
         return -lateral_slope(self.coefficients, positive(F_z))
 
     def mirrored(self) -> Self:

@@ -42,10 +42,7 @@ class LinearTire:
 
         Parameters
         ----------
-        alpha : slip angle, paper's sign [rad].
-        kappa : longitudinal slip [-].
         gamma : camber [rad]; without effect.
-        F_z : wheel load [N]; no force at F_z <= 0.
         mu : friction of the road over that of the measurement [-]; without effect.
         """
         return TireForces(self.slip_stiffness(F_z) * kappa, self.cornering_stiffness(F_z) * alpha)
@@ -100,11 +97,8 @@ class FialaTire:
 
         Parameters
         ----------
-        alpha : slip angle, paper's sign [rad].
         kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
         gamma : camber [rad]; without effect.
-        F_z : wheel load [N]; no force at F_z <= 0.
-        mu : friction of the road over that of the measurement [-].
         """
         s = slips(alpha, kappa, self.C_alpha, self.C_kappa)
         sliding = 3.0 * mu * self.friction * positive(F_z)  # demand at which all contact slides
@@ -161,11 +155,8 @@ class DugoffTire:
 
         Parameters
         ----------
-        alpha : slip angle, paper's sign [rad].
         kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
         gamma : camber [rad]; without effect.
-        F_z : wheel load [N]; no force at F_z <= 0.
-        mu : friction of the road over that of the measurement [-].
         """
         s = slips(alpha, kappa, self.C_alpha, self.C_kappa)
         half = mu * self.friction * positive(F_z) / (2.0 * s.size)  # λ/(1 + κ)

@@ -62,7 +62,6 @@ def axle_force(vehicle: Vehicle, a_y: float, r_dot: float) -> Array:
 
     Parameters
     ----------
-    vehicle : the car.
     a_y : acceleration of the center of gravity to the left [m/s^2].
     r_dot : yaw acceleration [rad/s^2].
     """

@@ -78,7 +78,6 @@ class Car(Protocol):
 
         Parameters
         ----------
-        state : now.
         command : angle asked of the front road wheels [rad].
         v_ref : wanted speed [m/s].
 
@@ -126,24 +125,11 @@ class DoubleTrackCar:
         self.speed_gain = driver.gain
 
     def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> CarState:
-        """Return the car rolling straight ahead.
-
-        Parameters
-        ----------
-        v_x : speed [m/s].
-        X, Y : position of the center of gravity [m].
-        psi : heading [rad].
-        """
+        """Return the car rolling straight ahead."""
         return self._state(self._plant.start(v_x, X=X, Y=Y, psi=psi))
 
     def step(self, state: CarState, command: float, v_ref: float) -> CarState:
         """Return the car one period later.
-
-        Parameters
-        ----------
-        state : now.
-        command : angle asked of the front road wheels [rad].
-        v_ref : wanted speed [m/s].
 
         Raises
         ------

@@ -104,12 +104,6 @@ class CommonRoadCar:
     def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> CarState:
         """Return the car rolling straight ahead.
 
-        Parameters
-        ----------
-        v_x : speed [m/s].
-        X, Y : position of the center of gravity [m].
-        psi : heading [rad].
-
         Raises
         ------
         ValueError
@@ -122,12 +116,6 @@ class CommonRoadCar:
 
     def step(self, state: CarState, command: float, v_ref: float) -> CarState:
         """Return the car one period later.
-
-        Parameters
-        ----------
-        state : now.
-        command : angle asked of the front road wheels [rad].
-        v_ref : wanted speed [m/s].
 
         Raises
         ------

@@ -31,11 +31,6 @@ def law_complaint(method: Method, vehicle: Vehicle) -> str | None:
     The paper's laws need the certificate of their gains. Least squares with bounded parameters
     is not certified: its boxes hold by construction, and what it teaches is judged by
     `tire_complaint`.
-
-    Parameters
-    ----------
-    method : the method.
-    vehicle : the car.
     """
     if not isinstance(method, PaperIdentifier):
         return None

@@ -37,12 +37,7 @@ class FrictionFit(NamedTuple):
 
 
 def can_scale(tire: PredictionTire) -> bool:
-    """Return whether a tire can be told for another friction.
-
-    Parameters
-    ----------
-    tire : the tire.
-    """
+    """Return whether a tire can be told for another friction."""
     if isinstance(tire.structure, NetworkAxles):
         return "v_x" not in tire.structure.inputs
     return isinstance(tire.structure, LadderAxles)
@@ -91,7 +86,6 @@ def fit_friction(
 
     Parameters
     ----------
-    judge : of chi-squares.
     tire : as `at_friction` takes it.
     samples : as `Judge.errors` takes them.
     known : friction over that of the tire that was taken so far [-].
@@ -136,12 +130,7 @@ class Road(NamedTuple):
     before: PredictionTire | None = None
 
     def on(self, learnt: PredictionTire) -> "Road":
-        """Return the same road where another tire was learnt on it.
-
-        Parameters
-        ----------
-        learnt : the tire.
-        """
+        """Return the same road where another tire was learnt on it."""
         before = self.base if self.before is None and self.ratio < 1.0 else self.before
         return Road(learnt, 1.0, self.changed_at, before)
 
@@ -190,8 +179,6 @@ def look_at_road(
     t : time [s].
     baseline : mean chi-square of the tire in use where the road does not change [-].
     trusted : slip up to which a tire must be one [rad].
-    judge : of chi-squares.
-    rules : times and evidence.
     """
     if not can_scale(road.base):
         return None

@@ -29,7 +29,6 @@ class Excitation:
     Parameters
     ----------
     dt : sampling interval [s].
-    vehicle : the car.
     least_time : with slip at both axles before anything may be handed over [s].
     """
 
@@ -94,7 +93,6 @@ def slips(samples: Array, vehicle: Vehicle) -> Array:
     Parameters
     ----------
     samples : rows of v_x (positive), v_y [m/s], r [rad/s], δ_f [rad], (n, 4 or more).
-    vehicle : the car.
     """
     v_x, v_y, r, delta = samples[:, :4].T
     return measured_slip(vehicle.l_f, vehicle.l_r, v_x=v_x, v_y=v_y, r=r, delta_f=delta)
@@ -117,7 +115,6 @@ class Supervisor:
     ----------
     identifier : which is told every sample here.
     in_use : the tire that is steered with at the start.
-    rules : times and evidence.
     judge : of chi-squares; None expects the usual errors.
     proven : whether that tire is one of this car, so that what it does not explain is the road;
         else a friction is looked for only after a learnt tire took over.

@@ -181,7 +181,6 @@ class Recorder:
 
         Parameters
         ----------
-        state : the truth.
         here : where it is along the path.
         measured : what the sensors said.
         v_ref : wanted speed [m/s].
@@ -266,12 +265,7 @@ class Scores(NamedTuple):
 
 
 def scores(drive: Drive) -> Scores:
-    """Return the scores of a drive.
-
-    Parameters
-    ----------
-    drive : the drive.
-    """
+    """Return the scores of a drive."""
     values, counts = np.unique(drive.status, return_counts=True)
     failures = {
         Status(int(value)).name: int(count)

@@ -43,7 +43,6 @@ class Measures(Protocol):
 
         Parameters
         ----------
-        state : the truth.
         rng : source of the noise.
         """
 
@@ -87,7 +86,6 @@ class CarSensors:
 
         Parameters
         ----------
-        state : the truth.
         rng : source of the noise; drawn from even without noise, so that channels stay in step.
         """
         noise = rng.standard_normal(len(fields(self)))
@@ -146,7 +144,6 @@ class FaultySensors:
 
         Parameters
         ----------
-        state : the truth.
         rng : source of the noise; of a fault's own noise too, so that it changes no other draw.
         """
         shown = self._sensors.measure(state, rng)
@@ -185,7 +182,6 @@ class SpeedProfile:
 
     Parameters
     ----------
-    path : the path.
     v : wanted speed [m/s], a number or one for each sample of the path, (n,).
 
     Raises

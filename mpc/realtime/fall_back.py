@@ -41,7 +41,6 @@ def fall_back(
 
     Parameters
     ----------
-    vehicle : the car.
     period : between two steps [s].
     delay : from a measurement until its command acts [s].
     e_y : deviation [m] that is worth as much as `acceleration`.
@@ -65,7 +64,6 @@ def motion(vehicle: Vehicle, v_x: float, lag: float) -> tuple[Array, Array]:
 
     Parameters
     ----------
-    vehicle : the car.
     v_x : longitudinal speed [m/s].
     lag : of the wheels behind what is told [s].
     """
@@ -84,7 +82,6 @@ def steady_turn(vehicle: Vehicle, v_x: float) -> tuple[float, float]:
 
     Parameters
     ----------
-    vehicle : the car.
     v_x : longitudinal speed [m/s].
     """
     m, _, l_f, l_r, C_f, C_r = vehicle.bicycle

@@ -146,7 +146,6 @@ def set_params(params: NDArray[Any], problem: Problem, guards: Guards) -> None:
     Parameters
     ----------
     params : of `params_type`, written in place.
-    problem : cost and limits.
     guards : bounds and fall-back.
     """
     cost, limits = problem.cost, problem.limits

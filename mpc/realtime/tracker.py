@@ -165,12 +165,7 @@ class Tracker:
             raise ValueError(f"steering must be finite and at most 3.2 rad, it is {steering}")
 
     def step(self, measurement: Measurement) -> Command:
-        """Return what to steer from `delay` after the measurement on.
-
-        Parameters
-        ----------
-        measurement : the car against the path, and the road ahead.
-        """
+        """Return what to steer from `delay` after the measurement on."""
         instance, ports = self.instance, self.instance.input
         ports["e_y"], ports["e_psi"], ports["v_y"], ports["r"] = measurement[:4]
         ports["kappa"], ports["v_x"] = measurement[4:6]

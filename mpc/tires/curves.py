@@ -34,7 +34,6 @@ class DugoffAxles:
         Parameters
         ----------
         slip : what makes the force [rad].
-        at : motion, car and weights.
         """
         delta, w = at.delta, at.w
         return _dugoff(slip[0], w[0], w[1]) * ca.cos(delta), _dugoff(slip[1], w[2], w[3])
@@ -56,7 +55,6 @@ class FialaAxles:
         Parameters
         ----------
         slip : what makes the force [rad].
-        at : motion, car and weights.
         """
         delta, w = at.delta, at.w
         return _fiala(slip[0], w[0], w[1]) * ca.cos(delta), _fiala(slip[1], w[2], w[3])
@@ -78,7 +76,6 @@ class MagicAxles:
         Parameters
         ----------
         slip : what makes the force [rad].
-        at : motion, car and weights.
         """
         delta, w = at.delta, at.w
         front, rear = (
@@ -123,7 +120,6 @@ class LinearAxles:
         Parameters
         ----------
         slip : what makes the force [rad].
-        at : motion, car and weights.
         """
         w = at.w
         return w[0] * slip[0], w[1] * slip[1]
@@ -134,7 +130,6 @@ def linear_tire(vehicle: Vehicle, stiffness: Array | None = None) -> PredictionT
 
     Parameters
     ----------
-    vehicle : the car.
     stiffness : C_f, C_r per axle [N/rad] (2,); None takes those that the vehicle states.
     """
     weights = vehicle.bicycle[4:] if stiffness is None else stiffness

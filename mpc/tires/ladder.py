@@ -51,12 +51,7 @@ class LadderAxles:
         return N_COMMON + self.units + 2 * (N_AXLE + self.units)
 
     def slip(self, at: Point) -> Pair:
-        """Return the slip angles, offsets of the sensors taken off [rad].
-
-        Parameters
-        ----------
-        at : motion, car and weights.
-        """
+        """Return the slip angles, offsets of the sensors taken off [rad]."""
         front, rear = wheel_slip(self, at._replace(v_y=at.v_y - at.w[1]))
         return front + at.w[0], rear
 
@@ -66,7 +61,6 @@ class LadderAxles:
         Parameters
         ----------
         slip : what makes the force [rad].
-        at : motion, car and weights.
         """
         per_scale, axles = self._weights(at.w)
         front, rear = (
@@ -76,13 +70,7 @@ class LadderAxles:
         return front * cos_delta, rear
 
     def lag_length(self, slip: Pair, at: Point) -> Pair:
-        """Return the relaxation lengths [m], which shorten with the slope of the curve.
-
-        Parameters
-        ----------
-        slip : lagged slip [rad].
-        at : motion, car and weights.
-        """
+        """Return the relaxation lengths [m], which shorten with the slope of the curve."""
         per_scale, axles = self._weights(at.w)
         lengths = []
         for axle, x in zip(axles, slip, strict=True):

@@ -45,7 +45,6 @@ class NetworkAxles:
         Parameters
         ----------
         slip : what makes the force [rad].
-        at : motion, car and weights.
         """
         v_y, r, delta, v_x, car, w = at
         n_h, end = self.hidden, 2 + 2 * self.hidden
@@ -111,7 +110,6 @@ class OnnxAxles:
         Parameters
         ----------
         slip : what makes the force [rad].
-        at : motion, car and weights.
         """
         del slip
         bicycle = BicycleParameters(*at.car, C_f=0.0, C_r=0.0)

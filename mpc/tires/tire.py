@@ -55,12 +55,7 @@ class TireStructure(Protocol):
         """Whether force follows a lagged slip, two more states [rad]."""
 
     def slip(self, at: Point) -> Pair:
-        """Return the kinematic slip angles [rad], paper's sign.
-
-        Parameters
-        ----------
-        at : motion, car and weights.
-        """
+        """Return the kinematic slip angles [rad], paper's sign."""
 
     def force(self, slip: Pair, at: Point) -> Pair:
         """Return the axle forces [N], frame of the body.
@@ -68,7 +63,6 @@ class TireStructure(Protocol):
         Parameters
         ----------
         slip : what makes the force [rad]: lagged slip where `lagged`, else the kinematic one.
-        at : motion, car and weights.
         """
 
     def lag_length(self, slip: Pair, at: Point) -> Pair:
@@ -77,7 +71,6 @@ class TireStructure(Protocol):
         Parameters
         ----------
         slip : lagged slip [rad].
-        at : motion, car and weights.
         """
 
 
@@ -95,12 +88,7 @@ class PredictionTire(NamedTuple):
 
 
 def wheel_slip(self: TireStructure, at: Point) -> Pair:
-    """Return α = δ - atan((v_y ± l r)/v_x) [rad]; the rear wheels do not steer. A method `slip`.
-
-    Parameters
-    ----------
-    at : motion and car.
-    """
+    """Return α = δ - atan((v_y ± l r)/v_x) [rad]; the rear wheels do not steer. A method `slip`."""
     del self
     v_y, r, delta, v_x, car, _ = at
     per_speed = 1 / v_x
@@ -109,12 +97,7 @@ def wheel_slip(self: TireStructure, at: Point) -> Pair:
 
 
 def small_slip(self: TireStructure, at: Point) -> Pair:
-    """Return α = δ - (v_y ± l r)/v_x [rad], as the paper's (3) has it. A method `slip`.
-
-    Parameters
-    ----------
-    at : motion and car.
-    """
+    """Return α = δ - (v_y ± l r)/v_x [rad], as the paper's (3) has it. A method `slip`."""
     del self
     v_y, r, delta, v_x, car, _ = at
     per_speed = 1 / v_x
@@ -163,7 +146,6 @@ def valid_slip(tire: PredictionTire, most: tuple[float, float]) -> ValidSlip:
 
     Parameters
     ----------
-    tire : structure and weights.
     most : slip beyond which no curve is believed [rad], front and rear.
     """
     slopes = curve_slopes(tire)
@@ -176,21 +158,12 @@ def useful_slip(tire: PredictionTire) -> Array:
     """Return the slip [rad] where the slope of each axle's force falls below 5 % of its first.
 
     Infinite where it never does: a linear tire, and a network that reads other signals than slip.
-
-    Parameters
-    ----------
-    tire : structure and weights.
     """
     return _useful(curve_slopes(tire))
 
 
 def curve_slopes(tire: PredictionTire) -> Array:
-    """Return dF/dα of the axles at `SLIPS` (2, k) [N/rad], straight ahead.
-
-    Parameters
-    ----------
-    tire : structure and weights.
-    """
+    """Return dF/dα of the axles at `SLIPS` (2, k) [N/rad], straight ahead."""
     return np.array(_slopes(tire.structure)(SLIPS[None], tire.car, tire.weights))
 
 
@@ -201,9 +174,7 @@ def extrapolated_force(
 
     Parameters
     ----------
-    structure : of the tire.
     slip : what makes the force [rad].
-    at : motion, car and weights.
     max_slip : slip up to which its curves are believed [rad], (2,).
     rise : slope beyond [N/rad], (2,).
     """
