@@ -87,12 +87,7 @@ class StepSteer:
         _check(self, steepest=0.0)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2).
-
-        Parameters
-        ----------
-        t : times [s], (n,).
-        """
+        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         angle = np.clip(self._rate * (t - self.onset), 0.0, abs(self.amplitude))
         return _both(np.copysign(angle, self.amplitude), self.rear_ratio)
 
@@ -149,12 +144,7 @@ class TwoStepSteer:
         )
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2).
-
-        Parameters
-        ----------
-        t : times [s], (n,).
-        """
+        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         change = (self.second_share - 1.0) * self.amplitude
         second = replace(self._first, amplitude=change, onset=self.second_onset)
         return self._first.steering(t) + second.steering(t)
@@ -185,12 +175,7 @@ class Slalom:
         _check_sine(self)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2).
-
-        Parameters
-        ----------
-        t : times [s], (n,).
-        """
+        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         phase = 2.0 * math.pi * self.frequency * np.maximum(t - self.onset, 0.0)
         return _both(self.amplitude * np.sin(phase), self.rear_ratio)
 
@@ -222,12 +207,7 @@ class DoubleLaneChange:
         _check_sine(self)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2).
-
-        Parameters
-        ----------
-        t : times [s], (n,).
-        """
+        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         there = np.clip((t - self.onset) * self.frequency, 0.0, 1.0) % 1.0
         second = self.onset + 1.0 / self.frequency + self.pause
         back = np.clip((t - second) * self.frequency, 0.0, 1.0) % 1.0
@@ -262,12 +242,7 @@ class SineWithDwell:
         _check_sine(self)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2).
-
-        Parameters
-        ----------
-        t : times [s], (n,).
-        """
+        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         since = t - self.onset
         peak = 0.75 / self.frequency
         moving = np.minimum(since, peak) + np.maximum(since - peak - self.dwell, 0.0)
@@ -300,12 +275,7 @@ class SlowlyIncreasingSteer:
         _check(self, steepest=self.rate)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2).
-
-        Parameters
-        ----------
-        t : times [s], (n,).
-        """
+        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         angle = np.clip(self.rate * (t - self.onset), 0.0, abs(self.amplitude))
         return _both(np.copysign(angle, self.amplitude), self.rear_ratio)
 
@@ -341,12 +311,7 @@ class RandomSteer:
         _check_sine(self)
 
     def steering(self, t: Array) -> Array:
-        """Commanded [δ_f, δ_r] [rad], (n, 2).
-
-        Parameters
-        ----------
-        t : times [s], (n,).
-        """
+        """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
         rng = np.random.default_rng(self.seed)
         swings = 2 + math.ceil(2.0 * self.frequency * self.duration)
         angles = np.append(0.0, self.amplitude * rng.uniform(-1.0, 1.0, swings))

@@ -203,20 +203,7 @@ def read_json(path: Path, refusal: type[ValueError]) -> Any:
 
 
 def read_toml(path: Path, refusal: type[ValueError]) -> dict[str, Any]:
-    """Read a TOML file.
-
-    Parameters
-    ----------
-    path : a regular file.
-    refusal : class of the error to raise.
-
-    Raises
-    ------
-    ValueError
-        Of that class, where it is not TOML or beyond the limits.
-    OSError
-        Where it cannot be read.
-    """
+    """Read a TOML file, as `read_json` a JSON file."""
     text = read_text(path, refusal, limit="toml")
     longest = max(map(len, text.splitlines()), default=0)  # its parser takes the square of it
     require_few(refusal, str(path), longest, "line", "characters of a line")

@@ -108,6 +108,7 @@ def complaints(source: str) -> list[str]:
             for name, annotation in actual.items()
             if is_array(annotation) and not describes_itself(node)
             if not re.search(SHAPE_OR_UNIT, documented.get(name, ""))
+            and not re.search(rf"`{name}` (?:{SHAPE_OR_UNIT})", docstring)
         ]
     return wrong
 

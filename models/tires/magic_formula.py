@@ -52,15 +52,7 @@ def magic_curve(
 def magic_slope(
     x: Expression, B: Expression, C: Expression, D: Expression, E: Expression
 ) -> Expression:
-    """Derivative of `magic_curve` with respect to x; B C D at x = 0.
-
-    Parameters
-    ----------
-    x : slip, shifted.
-    B, C : stiffness and shape factor.
-    D : peak value [N].
-    E : curvature factor.
-    """
+    """Derivative of `magic_curve` with respect to x, of its arguments; B C D at x = 0."""
     Bx = B * x
     inner = Bx - E * (Bx - ca.atan(Bx))
     inner_slope = B * (1.0 - E * Bx**2 / (1.0 + Bx**2))

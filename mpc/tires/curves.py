@@ -4,6 +4,7 @@ Sources: Dugoff, Fancher and Segel, SAE 700377 (1970); Pacejka, Tyre and Vehicle
 (Fiala's brush) and 2nd ed., (4.49). No longitudinal slip.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,79 +13,15 @@ import numpy as np
 
 from codegen.arrays import Array
 from models.vehicle import Vehicle
-from mpc.tires.tire import Pair, Point, PredictionTire, no_lag, small_slip, wheel_slip
-
-
-@dataclass(frozen=True, slots=True)
-class DugoffAxles:
-    """C tan α f(λ), f = λ (2 - λ), λ = N/(2 C |tan α|) <= 1; w = [C_f, N_f, C_r, N_r].
-
-    C [N/rad] and N = μ F_z [N] are of an axle.
-    """
-
-    n_weights = 4
-    lagged = False
-
-    slip = wheel_slip
-    lag_length = no_lag
-
-    def force(self, slip: Pair, at: Point) -> Pair:
-        """Return the axle forces [N], frame of the body.
-
-        Parameters
-        ----------
-        slip : what makes the force [rad].
-        """
-        delta, w = at.delta, at.w
-        return _dugoff(slip[0], w[0], w[1]) * ca.cos(delta), _dugoff(slip[1], w[2], w[3])
-
-
-@dataclass(frozen=True, slots=True)
-class FialaAxles:
-    """Brush tire, full sliding from C |tan α| = 3 N on; w = [C_f, N_f, C_r, N_r] as Dugoff's."""
-
-    n_weights = 4
-    lagged = False
-
-    slip = wheel_slip
-    lag_length = no_lag
-
-    def force(self, slip: Pair, at: Point) -> Pair:
-        """Return the axle forces [N], frame of the body.
-
-        Parameters
-        ----------
-        slip : what makes the force [rad].
-        """
-        delta, w = at.delta, at.w
-        return _fiala(slip[0], w[0], w[1]) * ca.cos(delta), _fiala(slip[1], w[2], w[3])
-
-
-@dataclass(frozen=True, slots=True)
-class MagicAxles:
-    """D sin(C atan(B α)); w = [B, C, D] of the front, then of the rear axle, [1/rad, -, N]."""
-
-    n_weights = 6
-    lagged = False
-
-    slip = wheel_slip
-    lag_length = no_lag
-
-    def force(self, slip: Pair, at: Point) -> Pair:
-        """Return the axle forces [N], frame of the body.
-
-        Parameters
-        ----------
-        slip : what makes the force [rad].
-        """
-        delta, w = at.delta, at.w
-        front, rear = (
-            D * ca.sin(C * ca.atan(B * alpha))
-            for alpha, (B, C, D) in zip(
-                slip, (ca.vertsplit(w[:3]), ca.vertsplit(w[3:])), strict=True
-            )
-        )
-        return front * ca.cos(delta), rear
+from mpc.tires.tire import (
+    Pair,
+    Point,
+    PredictionTire,
+    TireStructure,
+    no_lag,
+    small_slip,
+    wheel_slip,
+)
 
 
 def _dugoff(alpha: Any, C: Any, N: Any) -> Any:
@@ -101,6 +38,71 @@ def _fiala(alpha: Any, C: Any, N: Any) -> Any:
     return ca.if_else(x < 1, gentle, N * ca.sign(demand))
 
 
+def limited(curve: Callable[[Any, Any, Any], Any]) -> Callable[[Any, Pair, Point], Pair]:
+    """Return a method `force`: a curve of slip, stiffness and largest force at both axles, cos δ.
+
+    Parameters
+    ----------
+    curve : α [rad], C [N/rad], N [N] to force [N].
+    """
+
+    def force(self: TireStructure, slip: Pair, at: Point) -> Pair:
+        del self
+        w, cos_delta = at.w, ca.cos(at.delta)
+        return curve(slip[0], w[0], w[1]) * cos_delta, curve(slip[1], w[2], w[3])
+
+    return force
+
+
+@dataclass(frozen=True, slots=True)
+class DugoffAxles:
+    """C tan α f(λ), f = λ (2 - λ), λ = N/(2 C |tan α|) <= 1; w = [C_f, N_f, C_r, N_r].
+
+    C [N/rad] and N = μ F_z [N] are of an axle.
+    """
+
+    n_weights = 4
+    lagged = False
+
+    slip = wheel_slip
+    lag_length = no_lag
+    force = limited(_dugoff)
+
+
+@dataclass(frozen=True, slots=True)
+class FialaAxles:
+    """Brush tire, full sliding from C |tan α| = 3 N on; w = [C_f, N_f, C_r, N_r] as Dugoff's."""
+
+    n_weights = 4
+    lagged = False
+
+    slip = wheel_slip
+    lag_length = no_lag
+    force = limited(_fiala)
+
+
+@dataclass(frozen=True, slots=True)
+class MagicAxles:
+    """D sin(C atan(B α)); w = [B, C, D] of the front, then of the rear axle, [1/rad, -, N]."""
+
+    n_weights = 6
+    lagged = False
+
+    slip = wheel_slip
+    lag_length = no_lag
+
+    def force(self, slip: Pair, at: Point) -> Pair:
+        """Return the axle forces [N], frame of the body."""
+        delta, w = at.delta, at.w
+        front, rear = (
+            D * ca.sin(C * ca.atan(B * alpha))
+            for alpha, (B, C, D) in zip(
+                slip, (ca.vertsplit(w[:3]), ca.vertsplit(w[3:])), strict=True
+            )
+        )
+        return front * ca.cos(delta), rear
+
+
 # The linear tire of the textbook: F = C α of the paper's (3), without a limit.
 
 
@@ -115,12 +117,7 @@ class LinearAxles:
     lag_length = no_lag
 
     def force(self, slip: Pair, at: Point) -> Pair:
-        """Return the axle forces [N], frame of the body.
-
-        Parameters
-        ----------
-        slip : what makes the force [rad].
-        """
+        """Return the axle forces [N], frame of the body."""
         w = at.w
         return w[0] * slip[0], w[1] * slip[1]
 

@@ -56,12 +56,7 @@ class LadderAxles:
         return front + at.w[0], rear
 
     def force(self, slip: Pair, at: Point) -> Pair:
-        """Return the axle forces [N], frame of the body.
-
-        Parameters
-        ----------
-        slip : what makes the force [rad].
-        """
+        """Return the axle forces [N], frame of the body."""
         per_scale, axles = self._weights(at.w)
         front, rear = (
             ca.dot(axle.W, ca.tanh(per_scale * x)) for axle, x in zip(axles, slip, strict=True)

@@ -40,12 +40,7 @@ class NetworkAxles:
     lag_length = no_lag
 
     def force(self, slip: Pair, at: Point) -> Pair:
-        """Return the axle forces [N], frame of the body.
-
-        Parameters
-        ----------
-        slip : what makes the force [rad].
-        """
+        """Return the axle forces [N], frame of the body."""
         v_y, r, delta, v_x, car, w = at
         n_h, end = self.hidden, 2 + 2 * self.hidden
         W = ca.reshape(w[2:end], 2, n_h)
@@ -105,12 +100,7 @@ class OnnxAxles:
     lag_length = no_lag
 
     def force(self, slip: Pair, at: Point) -> Pair:
-        """Return the axle forces [N], frame of the body.
-
-        Parameters
-        ----------
-        slip : what makes the force [rad].
-        """
+        """Return the axle forces [N], frame of the body."""
         del slip
         bicycle = BicycleParameters(*at.car, C_f=0.0, C_r=0.0)
         signals = network_signals(
