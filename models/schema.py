@@ -41,7 +41,7 @@ def require_few(refusal: type[ValueError], where: str, count: float, limit: str,
     refusal : class of the error to raise.
     where : file or option, begins the message.
     count : what is asked for.
-    limit : field of `Limits`.
+    limit : field of `InputLimits`.
     what : is counted, in the plural.
 
     Raises
@@ -79,7 +79,7 @@ def require_file(path: Path, refusal: type[ValueError], *, limit: str) -> None:
     ----------
     path : to be read.
     refusal : class of the error to raise.
-    limit : field of `Limits` that says how many megabytes it may hold.
+    limit : field of `InputLimits` that says how many megabytes it may hold.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def read_bytes(path: Path, refusal: type[ValueError], *, limit: str = "document"
     ----------
     path : a regular file: no device, pipe or folder, which may have no end.
     refusal : class of the error to raise.
-    limit : field of `Limits` that says how many megabytes it may hold.
+    limit : field of `InputLimits` that says how many megabytes it may hold.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def unpack(path: Path, data: bytes, refusal: type[ValueError], *, limit: str) ->
     path : for messages.
     data : of one or several gzip members.
     refusal : class of the error to raise.
-    limit : field of `Limits` that says how many megabytes they may become.
+    limit : field of `InputLimits` that says how many megabytes they may become.
 
     Raises
     ------
@@ -159,7 +159,7 @@ def read_text(
     ----------
     path : a regular file.
     refusal : class of the error to raise.
-    limit : field of `Limits` that says how many megabytes it may hold.
+    limit : field of `InputLimits` that says how many megabytes it may hold.
     encoding : utf-8, or utf-8-sig where a byte order mark may begin it.
 
     Raises

@@ -9,8 +9,8 @@ import pytest
 
 from models.schema import (
     VARIABLE,
+    InputLimits,
     LimitError,
-    Limits,
     Table,
     limits,
     limits_text,
@@ -62,7 +62,7 @@ def test_a_large_file_is_refused_unread_and_the_limit_can_be_raised(tmp_path, mo
     assert f"{VARIABLE}=toml=NUMBER" in said
     monkeypatch.setenv(VARIABLE, "toml=1, samples=5")
     assert read_toml(path, RefusedError)["name"].startswith("a\n")
-    assert limits() == Limits(toml=1.0, samples=5.0)
+    assert limits() == InputLimits(toml=1.0, samples=5.0)
 
 
 @pytest.mark.parametrize("words", ["tom=1", "toml", "toml=", "toml=-1", "toml=nan", "toml=1 =2"])
