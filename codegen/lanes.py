@@ -118,7 +118,7 @@ inline void load(Lanes* to, const double* from, long size, long shared) {{
 extern "C" int {name}_lanes(
     long n, long first, long last, const double* const* in, const long* in_block,
     const long* in_step, const long* shared, long n_kept, const long* kept,
-    double* const* carried, double* const* final, double* const* told, double* scratch) {{
+    double* const* states, double* const* final, double* const* outputs, double* scratch) {{
   Lanes* const wide = (Lanes*)scratch;
   Lanes *const other = wide + ALL_IN, *const out = other + ALL_IN, *const work = out + ALL_OUT;
   Lanes *now[N_IN], *following[N_IN], *res[{sz_res}];
