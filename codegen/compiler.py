@@ -238,7 +238,7 @@ def build_library(source: str, name: str, flags: tuple[str, ...] | None = None) 
     start = time.perf_counter()
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
         c_file, built = Path(scratch) / f"{name}.c", Path(scratch) / name
-        c_file.write_text(source)
+        c_file.write_text(source, encoding="utf-8")
         command = [*words, str(c_file), "-o", str(built), "-lm"]
         answer = subprocess.run(command, capture_output=True, text=True, check=False)
         if answer.returncode != 0:

@@ -141,11 +141,14 @@ VEHICLE_KEYS = (
 def vehicle_numbers(vehicle: Vehicle) -> dict[str, Any]:
     """Return the name and the six numbers of the bicycle by the words of a vehicle file, SI.
 
+    Where some of them are estimated, `estimated` lists which.
+
     Parameters
     ----------
     vehicle : the car.
     """
-    return {key: getattr(vehicle, key) for key in VEHICLE_KEYS}
+    numbers = {key: getattr(vehicle, key) for key in VEHICLE_KEYS}
+    return numbers | ({"estimated": list(vehicle.estimated)} if vehicle.estimated else {})
 
 
 def vehicle_from(data: Mapping[str, Any]) -> Vehicle:

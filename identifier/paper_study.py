@@ -217,24 +217,26 @@ def _quartiles(seeds: tuple[Mapping[str, float], ...]) -> dict[str, dict[str, fl
     return spread
 
 
+STEPS = 1 + 2 * len(LAWS)  # of `run_study`: the drives, and each law on both maneuvers
+
+
 def run_study(seeds: int, progress: Callable[[str], None]) -> Study:
     """Run every law with every seed on both maneuvers.
 
     Parameters
     ----------
     seeds : number of seeds, counted from 0.
-    progress : told what is being done.
+    progress : told what is being done, `STEPS` times.
     """
     progress("driving step steer and slalom with the sedan at 20 m/s")
     recordings = drive_maneuvers()
     errors: dict[str, dict[str, tuple[Mapping[str, float], ...]]] = {}
     for maneuver, recording in recordings.items():
-        progress(f"{maneuver}: {len(LAWS)} laws, {seeds} seeds of the initial weights")
-        errors[maneuver] = {
-            law: tuple(
+        errors[maneuver] = {}
+        for law in LAWS:
+            progress(f"{maneuver}: the {law} law, {seeds} seeds of the initial weights")
+            errors[maneuver][law] = tuple(
                 run_trial(recording, maneuver, paper_design(law, seed)).errors
                 for seed in range(seeds)
             )
-            for law in LAWS
-        }
     return Study(recordings=recordings, errors=errors)

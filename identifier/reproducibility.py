@@ -18,6 +18,7 @@ from codegen.arrays import Array
 from identifier.run import History
 from identifier.tire_model import TireModel
 from models.recordings import Recording
+from models.vehicle import Vehicle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,6 +74,85 @@ class Reproduction:
     after_against_truth: AxleRmse | None
 
 
+# What forces explain of the motion: the question where no true force is known.
+#
+# Newton over a window of T seconds, no derivative of a noisy signal in it: the mean of
+# (F_f + F_r)/m is [v_y(t + T) - v_y(t)]/T + the mean of v_x r, which is the lateral acceleration;
+# the mean of (l_f F_f - l_r F_r)/I_z is [r(t + T) - r(t)]/T, the yaw acceleration.
+
+WINDOW = 0.2  # T [s]: shorter ones show the noise of the sensors, longer ones no transient
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionError:
+    """What forces miss of the measured motion, root mean square of means over `WINDOW`.
+
+    The noise of the sensors, another mass or inertia and a banked road are in it too: where it is
+    small the forces are right, where it is large they need not be wrong.
+
+    Parameters
+    ----------
+    lateral, yaw : missed of the lateral [m/s²] and the yaw acceleration [rad/s²].
+    lateral_rms, yaw_rms : of these accelerations themselves.
+    """
+
+    lateral: float
+    yaw: float
+    lateral_rms: float
+    yaw_rms: float
+
+    @property
+    def explained(self) -> tuple[float | None, float | None]:
+        """Share of the mean square of both that the forces explain; None where it stands still."""
+        pairs = (self.lateral, self.lateral_rms), (self.yaw, self.yaw_rms)
+        lateral, yaw = (1.0 - (e / size) ** 2 if size > 0.0 else None for e, size in pairs)
+        return lateral, yaw
+
+
+def motion_error(
+    force: Array, recording: Recording, vehicle: Vehicle, counted: NDArray[np.bool_]
+) -> MotionError | None:
+    """Return what axle forces miss of the measured motion; None where no window counts.
+
+    Parameters
+    ----------
+    force : lateral axle forces (n, 2) [N], frame of the body.
+    recording : the motion.
+    vehicle : mass, inertia and geometry.
+    counted : samples that count (n,); a window counts where all of its samples do.
+    """
+    n = round(WINDOW / recording.dt)
+    if recording.t.size <= n:
+        return None
+    m, I_z, l_f, l_r = vehicle.bicycle[:4]
+    T = n * recording.dt
+    lateral = (force[:, 0] + force[:, 1]) / m
+    yaw = (l_f * force[:, 0] - l_r * force[:, 1]) / I_z
+
+    def mean(signal: Array) -> Array:
+        """Mean over each window, by the trapezoidal rule."""
+        steps = 0.5 * (signal[1:] + signal[:-1])
+        windows: Array = np.lib.stride_tricks.sliding_window_view(steps, n).mean(axis=1)
+        return windows
+
+    whole = np.lib.stride_tricks.sliding_window_view(counted, n + 1).all(axis=1)
+    if not whole.any():
+        return None
+    a_y = (recording.v_y[n:] - recording.v_y[:-n]) / T + mean(recording.v_x * recording.r)
+    r_dot = (recording.r[n:] - recording.r[:-n]) / T
+
+    def rms(signal: Array) -> float:
+        with np.errstate(over="ignore", invalid="ignore"):
+            return float(np.sqrt(np.mean(signal[whole] ** 2)))
+
+    return MotionError(
+        lateral=rms(a_y - mean(lateral)),
+        yaw=rms(r_dot - mean(yaw)),
+        lateral_rms=rms(a_y),
+        yaw_rms=rms(r_dot),
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Prediction:
     """One recording as a frozen model predicts it.
@@ -83,22 +163,33 @@ class Prediction:
     axle_force : forces of the frozen model (n, 2) [N].
     against_truth : error over the samples that count, against the true force; None without truth.
     true_force : root mean square of the true force over the same samples, None without truth.
+    motion : what the forces miss of the measured motion; None where the recording is too short.
     """
 
     recording: Recording
     axle_force: Array
     against_truth: AxleRmse | None
     true_force: AxleRmse | None
+    motion: MotionError | None
 
     def __repr__(self) -> str:
         name, error, size = self.recording.name, self.against_truth, self.true_force
         if error is None or size is None:
-            return f"<Prediction of {name!r}: no true forces to compare with>"
+            told = "" if self.motion is None else f"; {self.motion_text()}"
+            return f"<Prediction of {name!r}: no true forces to compare with{told}>"
         front, rear = 100.0 * error.front / size.front, 100.0 * error.rear / size.rear
         return (
             f"<Prediction of {name!r}: {error.front:.0f} / {error.rear:.0f} N rms missed, "
             f"{front:.1f} / {rear:.1f} % of the force, front / rear>"
         )
+
+    def motion_text(self) -> str:
+        """Return what the forces explain of the motion, in a line; empty where nobody knows."""
+        if self.motion is None:
+            return ""
+        parts = zip(("lateral", "yaw"), self.motion.explained, strict=True)
+        shares = [f"{100.0 * share:.1f} % of the {name}" for name, share in parts if share]
+        return f"explained are {' and '.join(shares)} acceleration" if shares else ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -183,6 +274,7 @@ def predict(model: TireModel, recording: Recording, *, since: float | None = Non
         axle_force=force,
         against_truth=None if truth is None else axle_rms(force - truth, counted),
         true_force=None if truth is None else axle_rms(truth, counted),
+        motion=motion_error(force, recording, model.vehicle, counted),
     )
 
 

@@ -197,6 +197,8 @@ class TireModel(ABC):
                 for title, (front, rear), unit in facts
             ),
         ]
+        if self.vehicle.estimates:
+            lines.append(self.vehicle.estimates)
         return "\n".join(lines)
 
     def casadi_function(self) -> TireFunctions:

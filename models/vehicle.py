@@ -7,14 +7,15 @@ F_y = +C alpha with alpha = delta - atan2(v_y +- l r, v_x), the negative of the 
 import json
 import math
 import os
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 from models.bicycle import BicycleParameters
 from models.files import write_atomically
 from models.rules import require_positive, require_within
-from models.schema import Table, read_toml, require_name
+from models.schema import Table, read_toml, require_name, shown
 
 # What a car needs beyond the linear bicycle: roll, load transfer, tire lag and drive force.
 #
@@ -133,7 +134,7 @@ class Chassis:
         )
 
 
-def toml_text(record: Any, *, folder: Path, table: str) -> str:
+def toml_text(record: Any, *, folder: Path, table: str, leave_out: Sequence[str] = ()) -> str:
     """Return the TOML text of a dataclass and of the one dataclass inside it.
 
     Parameters
@@ -141,11 +142,12 @@ def toml_text(record: Any, *, folder: Path, table: str) -> str:
     record : the dataclass to write; fields that are None are left out.
     folder : paths are written relative to it.
     table : name of the field that becomes a table of its own, last in the file.
+    leave_out : names of fields that are not written.
     """
     lines = [
-        f"{field.name} = {_value(getattr(record, field.name), folder)}"
-        for field in fields(record)
-        if field.name != table and getattr(record, field.name) is not None
+        f"{one.name} = {_value(getattr(record, one.name), folder)}"
+        for one in fields(record)
+        if one.name not in (table, *leave_out) and getattr(record, one.name) is not None
     ]
     inner = getattr(record, table, None)
     if inner is not None:
@@ -169,7 +171,60 @@ def _value(value: Any, folder: Path) -> str:
 
 GRAVITY = 9.81  # standard acceleration of free fall, rounded as usual [m/s^2]
 
-__all__ = ["GRAVITY", "BicycleParameters", "Chassis", "Vehicle", "VehicleError", "sedan"]
+# What a vehicle file may leave out, and what is believed of a road car then.
+#
+# Inertia: a car that swings about one axle leaves the other at rest where I_z = m l_f l_r. The cars
+# of CommonRoad (Ford Escort, BMW 320i, VW Vanagon, measured by the NHTSA) have 0.94, 1.00 and 1.10
+# of it, that of CarMaker 0.99. A scale model has less: 0.4 for one of 1:10.
+# Stiffness: Gillespie, Fundamentals of Vehicle Dynamics (1992), ch. 10: a radial tire makes 0.15
+# of its load a degree, one of low section (0.60 and less) 0.25 to 0.30; 14 /rad is 0.25.
+
+STIFFNESS_SHARE = 14.0  # of the static load of the axle [1/rad]
+RULES = {
+    "yaw_inertia": "mass l_f l_r",
+    "cornering_stiffness_front": f"{STIFFNESS_SHARE:g} static axle loads per rad",
+    "cornering_stiffness_rear": f"{STIFFNESS_SHARE:g} static axle loads per rad",
+}
+UNITS = ("kg m2", "N/rad", "N/rad")  # of the same
+
+__all__ = [
+    "GRAVITY",
+    "BicycleParameters",
+    "Chassis",
+    "Vehicle",
+    "VehicleError",
+    "estimate",
+    "sedan",
+    "vehicle_template",
+]
+
+
+def estimate(mass: float, l_f: float, l_r: float) -> dict[str, float]:
+    """Return yaw inertia and cornering stiffnesses of a road car of that size, by `RULES`.
+
+    Parameters
+    ----------
+    mass : total mass [kg].
+    l_f, l_r : distance from the center of gravity to the front and rear axle [m].
+
+    Raises
+    ------
+    VehicleError
+        For a value that no car has.
+    """
+    _require_size(mass, l_f, l_r)
+    weight, wheelbase = mass * GRAVITY, l_f + l_r
+    return {
+        "yaw_inertia": mass * l_f * l_r,
+        "cornering_stiffness_front": STIFFNESS_SHARE * weight * l_r / wheelbase,
+        "cornering_stiffness_rear": STIFFNESS_SHARE * weight * l_f / wheelbase,
+    }
+
+
+def _require_size(mass: float, l_f: float, l_r: float) -> None:
+    require_positive(VehicleError, mass=mass, l_f=l_f, l_r=l_r)
+    require_within(VehicleError, 1e-2, 1e6, mass=mass)  # a toy; a dump truck has 6e5
+    require_within(VehicleError, 1e-3, 30.0, l_f=l_f, l_r=l_r)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -185,6 +240,8 @@ class Vehicle:
     cornering_stiffness_front, cornering_stiffness_rear : slope of the lateral force of the axle
         (both tires) over its slip angle at zero [N/rad].
     chassis : what the double-track plant needs, or None.
+    estimated : names of the values that nobody measured, but that follow from the others by a
+        rule; two cars that differ in it alone are equal.
 
     Raises
     ------
@@ -201,9 +258,13 @@ class Vehicle:
     cornering_stiffness_front: float
     cornering_stiffness_rear: float
     chassis: Chassis | None = None
+    estimated: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         require_name(VehicleError, "name", self.name)
+        for name in self.estimated:
+            if name not in RULES:
+                raise VehicleError(f"estimated must be of {', '.join(RULES)}, not {shown(name)}")
         require_positive(
             VehicleError,
             mass=self.mass,
@@ -224,8 +285,7 @@ class Vehicle:
 
     def _require_plausible(self) -> None:
         """Refuse values that no car of any size has: a wrong unit, or a digit too many."""
-        require_within(VehicleError, 1e-2, 1e6, mass=self.mass)  # a toy; a dump truck has 6e5
-        require_within(VehicleError, 1e-3, 30.0, l_f=self.l_f, l_r=self.l_r)
+        _require_size(self.mass, self.l_f, self.l_r)
         typical = self.mass * self.l_f * self.l_r  # about that; 0.4 times it in models
         if not 0.05 < self.yaw_inertia / typical < 20.0:
             raise VehicleError(
@@ -307,12 +367,30 @@ class Vehicle:
             When the vehicle has none.
         """
         if self.chassis is None:
-            raise VehicleError(f"vehicle '{self.name}' has no [chassis] table: a plant needs one")
+            raise VehicleError(
+                f"vehicle '{self.name}' has no [chassis] table, which a simulated car needs: "
+                "`tireid init car.toml` writes one to fill in, docs/driving.md (The car that is "
+                "driven) says what it holds"
+            )
         return self.chassis
+
+    @property
+    def estimates(self) -> str:
+        """What of the car is estimated, with values and rules, in one line; empty if nothing is."""
+        units = dict(zip(RULES, UNITS, strict=True))
+        found = [
+            f"{name} = {getattr(self, name):.4g} {units[name]} ({rule})"
+            for name, rule in RULES.items()
+            if name in self.estimated
+        ]
+        return f"estimated, as the vehicle file leaves it out: {'; '.join(found)}" if found else ""
 
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> "Vehicle":
-        """Read a vehicle from a TOML file: six flat keys, optional name and table [chassis].
+        """Read a vehicle from a TOML file: mass, l_f, l_r and what else is known of it.
+
+        Name, yaw inertia, cornering stiffnesses and the table [chassis] may be left out; inertia
+        and stiffnesses are estimated then, see `estimated`.
 
         Parameters
         ----------
@@ -328,7 +406,14 @@ class Vehicle:
         file = Path(path)
         data = read_toml(file, VehicleError)
         inner = data.pop("chassis", None)
-        values = Table(data, f"{file}: ", VehicleError).record(cls, skip=("chassis",))
+        table = Table(data, f"{file}: ", VehicleError)
+        size = [table.number(key) for key in ("mass", "l_f", "l_r")]
+        missing = tuple(key for key in RULES if key not in data)
+        try:
+            data |= {key: value for key, value in estimate(*size).items() if key in missing}
+        except VehicleError as error:
+            raise VehicleError(f"{file}: {error}") from None
+        values = table.record(cls, skip=("chassis", "estimated")) | {"estimated": missing}
         if inner is not None:
             parts = Table(inner, f"{file}: ", VehicleError, "chassis.").record(Chassis)
         try:
@@ -343,6 +428,8 @@ class Vehicle:
     def to_toml(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
         """Write the vehicle so that `from_toml` gives back an equal one, bit for bit.
 
+        What is estimated is left out, as it was in the file.
+
         Parameters
         ----------
         path : the file to write; a tire file is named relative to its folder.
@@ -354,7 +441,8 @@ class Vehicle:
             When the file is there and `overwrite` is False.
         """
         file = Path(path)
-        content = toml_text(self, folder=file.parent, table="chassis")
+        out = ("estimated", *self.estimated)
+        content = toml_text(self, folder=file.parent, table="chassis", leave_out=out)
         if not overwrite and file.exists():
             raise FileExistsError(f"{file} exists; overwrite=True replaces it")
         write_atomically(file, content)
@@ -363,3 +451,11 @@ class Vehicle:
 def sedan() -> Vehicle:
     """Return the documented mid-size sedan; its file says where each value comes from."""
     return Vehicle.from_toml(Path(__file__).parent / "data" / "sedan.toml")
+
+
+def vehicle_template() -> str:
+    """Return the text of a vehicle file to fill in: units, where each number comes from, [chassis].
+
+    It can be read as it is; its numbers are those of `sedan`.
+    """
+    return (Path(__file__).parent / "data" / "template.toml").read_text(encoding="utf-8")

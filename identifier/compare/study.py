@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from codegen import cache_folder
 from identifier.compare.course import Course, Shares, Trial, cross_replay, shares, step_times
-from identifier.compare.floors import fit_floors
+from identifier.compare.floors import FLOOR_OF, STRUCTURES, fit_floors
 from identifier.compare.sweep import Candidate, frozen_share, sweep
 from identifier.compare.work import Map
 from identifier.method import Method
@@ -62,6 +62,36 @@ class Comparison:
         return self.step_times[method] / self.step_times[REFERENCE]
 
 
+# About how long the steps of a comparison take, beside learning and replaying with one method on
+# one recording: what is left of it is told by these.
+
+FIT, NETWORK_FIT, DESIGN = 2.0, 60.0, 1.0  # each start of a fit, of the network's; each design
+
+
+def step_lengths(
+    names: Sequence[str], recordings: int, *, designs: int, starts: int, others: int = 0
+) -> list[float]:
+    """Return how long each step that `run_comparison` tells of takes beside the others.
+
+    Parameters
+    ----------
+    names : of methods.
+    recordings : how many.
+    designs, starts : as for `run_comparison`.
+    others : further methods.
+    """
+    lengths = [float(recordings)] * (len(names) + others)
+    if starts:
+        wanted = {FLOOR_OF[name] for name in names if name in FLOOR_OF}
+        for structure in (one for one in STRUCTURES if one in wanted):
+            lengths += [
+                starts * (NETWORK_FIT if structure == FLOOR_OF[REFERENCE] else FIT)
+            ] * recordings
+    if designs:
+        lengths += [0.0, *[DESIGN * designs * recordings] * len(names)]
+    return lengths
+
+
 def run_comparison(
     names: Sequence[str],
     vehicle: Vehicle,
@@ -72,6 +102,7 @@ def run_comparison(
     starts: int,
     workers: int,
     progress: Callable[[str], None],
+    note: Callable[[str], None] | None = None,
     elsewhere: Map | None = None,
     others: Mapping[str, Method] | None = None,
 ) -> Comparison:
@@ -85,6 +116,8 @@ def run_comparison(
     designs : random designs of each method; 0 leaves the sweep out.
     starts : of each offline fit to the true forces; 0 leaves the floors out.
     workers : processes of fits and sweep.
+    progress : told of each step that is done, of `step_lengths` many.
+    note : told how far a sweep has come, now and then; None tells it to `progress`.
     elsewhere : does the sweep in place of processes of this machine, as a cluster's map does.
     others : further methods by name, which have neither sweep nor floor.
 
@@ -120,6 +153,7 @@ def run_comparison(
             seed=seed,
             workers=workers,
             progress=progress,
+            note=note,
             elsewhere=elsewhere,
             folder=cache_folder() / "sweeps",
         )

@@ -84,6 +84,7 @@ def sweep(
     seed: int,
     workers: int = 2,
     progress: Callable[[str], None] | None = None,
+    note: Callable[[str], None] | None = None,
     elsewhere: Map | None = None,
     folder: Path | None = None,
 ) -> dict[str, tuple[Candidate, ...]]:
@@ -95,11 +96,14 @@ def sweep(
     designs : of each method; a method without tunables runs once.
     seed : of the initial weights, and of the draws, which are the same numbers for each method.
     workers : processes; 1 stays in this one.
+    progress : told of each method that is done.
+    note : told how far one has come, now and then; None tells it to `progress`.
     elsewhere : does the work in place of processes of this machine, as a cluster's map does; its
         results may come in any order.
     folder : where results are kept, so that a sweep that was stopped goes on; None keeps none.
     """
     found: dict[str, tuple[Candidate, ...]] = {}
+    noted = note or progress
     with nullcontext(elsewhere) if elsewhere else spread(workers) as spread_map:
         for name in names:
             ranges = tunables(name, course.vehicle)
@@ -110,7 +114,7 @@ def sweep(
                 [(name, draws[i : i + CHUNK]) for i in range(0, len(draws), CHUNK)],
                 spread_map,
                 store=None if folder is None else _store(folder, course, seed),
-                done=progress and _counter(name, len(draws), progress),
+                done=noted and _counter(name, len(draws), noted),
             )
             found[name] = tuple(candidate for chunk in chunks for candidate in chunk)
             lost = sum(bool(candidate.diverged_on) for candidate in found[name])

@@ -8,7 +8,7 @@ import json
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -240,7 +240,7 @@ def _write(folder: Path, files: Mapping[str, str]) -> list[str]:
     }
     for path, text in wanted.items():
         (folder / path).parent.mkdir(exist_ok=True)
-        (folder / path).write_text(text)
+        (folder / path).write_text(text, encoding="utf-8")
     return sorted(path for path in wanted if path.endswith(".c"))
 
 
@@ -256,7 +256,7 @@ def _build(
     sources = _write(folder, files)
     for path in TARGET.iterdir():
         text = filled(path, {"name": name, "NAME": name.upper()})
-        (folder / path.name).write_text(text)
+        (folder / path.name).write_text(text, encoding="utf-8")
     (folder / "samples.bin").write_bytes(np.ascontiguousarray(samples, dtype="<f8").tobytes())
     own = [f"-D{name.upper()}_SINGLE={int(single)}", "-Iinclude", "-Isrc", "-I."]
     compiler, *words = command
@@ -316,12 +316,13 @@ class Cost(NamedTuple):
         return self.static_ram + self.replay.state + self.replay.params
 
 
-def measure(package: Package) -> list[Cost]:
+def measure(package: Package, progress: Callable[[float], None] | None = None) -> list[Cost]:
     """Return what a package costs on every processor, float and double; empty without the tools.
 
     Parameters
     ----------
     package : the package.
+    progress : called with the share that is done.
     """
     if missing_tools():
         return []
@@ -332,6 +333,8 @@ def measure(package: Package) -> list[Cost]:
             size = size_on(processor, name, package.files, single=single)
             replay = replay_on(processor, name, package.files, samples, single=single)
             costs.append(Cost(processor.name, single, size.flash, replay, size.static_ram))
+            if progress is not None:
+                progress(len(costs) / (2 * len(PROCESSORS)))
     return costs
 
 

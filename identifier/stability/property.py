@@ -89,6 +89,7 @@ class Certificate:
                 }
                 for entry in self.properties
             },
+            "held_by_construction": dict(self.held),
         }
 
 

@@ -120,9 +120,11 @@ def _replayed(
             (folder / path).parent.mkdir(exist_ok=True)
             (folder / path).write_text(text, encoding="utf-8")
         for board in ("board.c", "host.c", "machine.h", "mps2.ld"):
-            (folder / board).write_text((BOARD / board).read_text(encoding="utf-8"))
+            (folder / board).write_text(
+                (BOARD / board).read_text(encoding="utf-8"), encoding="utf-8"
+            )
         values = {"name": name, "NAME": name.upper(), "steps": str(steps)}
-        (folder / "replay.c").write_text(filled(TARGET / "replay.c", values))
+        (folder / "replay.c").write_text(filled(TARGET / "replay.c", values), encoding="utf-8")
         sources = sorted(path for path in package.files if path.startswith("src/"))
         own = [f"-D{name.upper()}_SINGLE={int(single)}", "-Iinclude", "-Isrc", "-Itests", "-I."]
         files = [path for path in sources if path.endswith(".c")]

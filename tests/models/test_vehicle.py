@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from identifier.method import vehicle_from, vehicle_numbers
 from models.bicycle import BicycleParameters
 from models.tires import MagicFormula
 from models.vehicle import GRAVITY, Chassis, Vehicle, VehicleError, sedan
@@ -174,3 +175,50 @@ def test_a_model_car_and_a_truck_are_plausible():
     Vehicle(**kwargs, cornering_stiffness_front=20.0, cornering_stiffness_rear=300.0)
     kwargs = {"mass": 18000.0, "yaw_inertia": 130000.0, "l_f": 3.5, "l_r": 2.0}
     Vehicle(**kwargs, cornering_stiffness_front=4e5, cornering_stiffness_rear=8e5)
+
+
+def test_what_a_file_leaves_out_is_estimated_and_said(tmp_path):
+    text = "\n".join(line for line in SIX.splitlines() if "rear" not in line and "yaw" not in line)
+    car = Vehicle.from_toml(written(tmp_path, text))
+    assert car.estimated == ("yaw_inertia", "cornering_stiffness_rear")
+    assert car.cornering_stiffness_front == 1.2e5
+    assert car.yaw_inertia == 1500.0 * (1.1 * 1.6)
+    assert car.cornering_stiffness_rear == pytest.approx(14.0 * 1500.0 * GRAVITY * 1.1 / 2.7)
+    assert "yaw_inertia = 2640 kg m2" in car.estimates
+    assert "rear = 8.393e+04 N/rad (14 static axle loads per rad)" in car.estimates
+    assert "stiffness_front" not in car.estimates
+    assert Vehicle.from_toml(written(tmp_path, SIX)).estimates == ""
+
+
+def test_estimates_stay_estimates_in_files_and_models(tmp_path):
+    plain = "mass = 1500\nl_f = 1.1\nl_r = 1.6\n"
+    car = Vehicle.from_toml(written(tmp_path, plain))
+    car.to_toml(tmp_path / "again.toml")
+    again = Vehicle.from_toml(tmp_path / "again.toml")
+    assert again == car
+    assert again.estimated == car.estimated == vehicle_from(vehicle_numbers(car)).estimated
+    told = replace(car, estimated=())
+    assert told == car
+    assert "estimated" not in vehicle_numbers(told)
+
+
+@pytest.mark.parametrize(
+    ("size", "said"),
+    [
+        ("mass = -1\nl_f = 1\nl_r = 1\n", "mass must be positive"),
+        ("mass = 1e308\nl_f = 1\nl_r = 1\n", "mass must lie between"),
+        ("mass = 1500\nl_f = nan\nl_r = 1\n", "l_f must be positive"),
+        ("mass = 1500\nl_f = 1\n", "l_r is missing"),
+        ("mass = 1500\nl_f = 1\nl_r = 1\nestimated = []\n", "estimated is unknown"),
+    ],
+)
+def test_nothing_is_estimated_of_a_car_that_cannot_be(tmp_path, size, said):
+    path = written(tmp_path, size)
+    with pytest.raises(VehicleError, match=said) as caught:
+        Vehicle.from_toml(path)
+    assert str(caught.value).startswith(f"{path}: ")
+
+
+def test_only_what_has_a_rule_can_be_estimated():
+    with pytest.raises(VehicleError, match="estimated must be of yaw_inertia"):
+        replace(sedan(), estimated=("mass",))
