@@ -4,7 +4,7 @@
 
 Every hour is ten drives of six minutes on the built-in plant, with sensor noise; each is identified
 as `tireid identify --weights` does it, beginning with the weights that the drive before left. The
-weights are kept by the paper's leakage (`tireid identify --paper`), or as `tireid check --design
+weights are kept by the paper's leakage (`tireid identify --paper`), or as `tireid check --tune
 --keep` writes it: by a leakage with a dead zone, or by a projection in its place. After 0.1, 1, 3
 and 10 hours the frozen network is asked about a lane change and a slalom that it never drove.
 Ordinary: of the minutes three in four are calm and one is brisk, nothing is known at first. Calm:
@@ -156,7 +156,7 @@ def left_of(model: NetworkModel, asked: list[Recording]) -> After:
 
 
 def designs(vehicle: Vehicle) -> dict[str, PaperIdentifier]:
-    """Return the design of each keeping: that of --paper, and those of `tireid check --design`.
+    """Return the design of each keeping: that of --paper, and those of `tireid check --tune`.
 
     Parameters
     ----------

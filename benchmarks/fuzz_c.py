@@ -156,7 +156,8 @@ def has_fuzzer(compiler: str = "clang") -> bool:
         empty.write_text(
             "int LLVMFuzzerTestOneInput(const char *d, unsigned long n);\n"
             "int LLVMFuzzerTestOneInput(const char *d, unsigned long n)\n"
-            "{ return (d == 0) && (n > 0); }\n"
+            "{ return (d == 0) && (n > 0); }\n",
+            encoding="utf-8",
         )
         words = [compiler, f"-fsanitize={SANITIZERS}", str(empty), "-o", str(empty.with_suffix(""))]
         return subprocess.run(words, capture_output=True, check=False).returncode == 0

@@ -1,6 +1,6 @@
 """Runs that are killed, that find the disk full, and that write one folder at once: what is lost?
 
-`tireid export DIR --force` is run again and again, each time in a process of its own that starts
+`tireid export --force` is run again and again, each time in a process of its own that starts
 warm: killed at a random moment of its time, or before a random one of the system calls by which it
 writes, or by which it renames and tidies up, which no load of the machine can hide; with a limit on
 the size of files, and on a disk that is too small; twenty times at once. After each the folder must
@@ -142,11 +142,11 @@ class Bench:
         self.place, self.out = place, place / "out"
         for name, text in NOTES.items():
             (place / name).parent.mkdir(parents=True, exist_ok=True)
-            (place / name).write_text(text)
+            (place / name).write_text(text, encoding="utf-8")
 
     def words(self, name: str) -> list[str]:
         """Return the command, whose package has another name each time."""
-        return ["export", str(self.out), "--paper", "--force", "--name", name]
+        return ["export", "--out", str(self.out), "--paper", "--force", "--name", name]
 
     def clear(self) -> None:
         """Delete the folder."""
@@ -160,7 +160,10 @@ class Bench:
         nothing_there : whether there may be no folder.
         """
         for name, text in NOTES.items():
-            if not (self.place / name).is_file() or (self.place / name).read_text() != text:
+            if (
+                not (self.place / name).is_file()
+                or (self.place / name).read_text(encoding="utf-8") != text
+            ):
                 return name
         if nothing_there and not self.out.exists():
             return ""
@@ -201,7 +204,7 @@ def partial(folder: Path) -> str:
     folder : any.
     """
     try:
-        listed = json.loads((folder / MARKER).read_text())["files"]
+        listed = json.loads((folder / MARKER).read_text(encoding="utf-8"))["files"]
     except (OSError, ValueError):
         return str(folder / MARKER)
     there = {

@@ -12,9 +12,8 @@ from typing import NamedTuple
 
 from identifier.tire_model import TireModel
 from tireid.cli import build_parser
-from tireid.commands.drive import conditions_of
-from tireid.commands.drive_runs import FROZEN, LINEAR, ORACLE, Conditions, Run, run_drive
-from tireid.commands.drive_source import frozen_tires
+from tireid.commands.drive_case import conditions_of, frozen_tires
+from tireid.driving.runs import FROZEN, LINEAR, ORACLE, Conditions, Run, run_drive
 
 LABELS = {"linear": LINEAR, "paper": FROZEN, "axle": FROZEN, "oracle": ORACLE}
 TIRES = tuple(LABELS)
@@ -87,7 +86,7 @@ def drive_with(conditions: Conditions, label: str) -> Run:
     Parameters
     ----------
     conditions : path, car, road and seed.
-    label : of `tireid.commands.drive_runs.TIRES`.
+    label : of `tireid.driving.runs.TIRES`.
     """
     learnt = (
         None if label in (LINEAR, ORACLE) else learnt_before(conditions.setup.mu, conditions.seed)

@@ -34,8 +34,8 @@ from models.vehicle import sedan
 from mpc.handover import Learner
 from mpc.loop.sensing import cornering_limit
 from mpc.path import Path, iso_3888_1, slalom, steady_speed
-from tireid.commands.drive import conditions_of
-from tireid.commands.drive_runs import Conditions, Run, SpeedWish, make_setup
+from tireid.commands.drive_case import conditions_of, make_setup
+from tireid.driving import Conditions, Run, SpeedWish
 
 TIRES = ("linear", "frozen", "learning", "oracle")
 GAPS = {"slalom 24 m": 24.0, "slalom 30 m": 30.0, "slalom 36 m": 36.0}  # of the cones [m]
@@ -275,7 +275,7 @@ def main(out: File, seeds: int = SEEDS, *, keep: bool = False) -> int:
     found, targets = drive_all(seeds), Targets("mpc_friction_drop")
     report(found, seeds, targets)
     rows = [{**case._asdict(), "place": case.place, **r._asdict()} for case, r in found.items()]
-    (out / "mpc_friction_drop.json").write_text(json.dumps(rows, indent=1))
+    (out / "mpc_friction_drop.json").write_text(json.dumps(rows, indent=1), encoding="utf-8")
     print(f"wrote {out / 'mpc_friction_drop.json'}")
     status = targets.finish(keep=keep)
     draw(seeds, out / "mpc_friction_drop.png")

@@ -17,8 +17,8 @@ from benchmarks.targets import Targets, keeps
 from mpc.loop import Drive
 from mpc.path import BUILT_IN
 from mpc.problem import Problem, tracking_errors
-from tireid.commands.drive import conditions_of
-from tireid.commands.drive_runs import ORACLE, run_drive
+from tireid.commands.drive_case import conditions_of
+from tireid.driving.runs import ORACLE, run_drive
 
 TRIED, CONVERGED = (1, 3), 20  # linearizations a step
 SHARE, TIRES, SEEDS = 0.9, "oracle", 3

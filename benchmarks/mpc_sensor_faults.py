@@ -27,8 +27,8 @@ from benchmarks.mpc_cases import drive_with, options_of
 from benchmarks.targets import Targets, keeps
 from identifier.compare.work import spread
 from mpc.handover.rules import Verdict
-from tireid.commands.drive import conditions_of, parse_fault
-from tireid.commands.drive_runs import FROZEN, LEARNING
+from tireid.commands.drive_case import conditions_of, parse_fault
+from tireid.driving.runs import FROZEN, LEARNING
 
 TIRES = (FROZEN, LEARNING)
 FAULTS = (  # channel, kind, how long [s], size: `tireid drive --fault` with a time
@@ -276,7 +276,7 @@ def main(out: Path, *, keep: bool = False) -> int:
     print_table(rows)
     judge(rows, quiet, targets)
     content = {"faults": [row._asdict() for row in rows], "quiet": quiet}
-    (out / "mpc_sensor_faults.json").write_text(json.dumps(content, indent=1))
+    (out / "mpc_sensor_faults.json").write_text(json.dumps(content, indent=1), encoding="utf-8")
     print(f"wrote {out / 'mpc_sensor_faults.json'}")
     return targets.finish(keep=keep)
 

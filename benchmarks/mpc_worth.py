@@ -232,7 +232,9 @@ def main(out: Path, seeds: int = SEEDS, *, keep: bool = False) -> int:
     print_table(rows)
     judge(rows, targets)
     summarize(rows, targets)
-    (out / "mpc_worth.json").write_text(json.dumps([row._asdict() for row in rows], indent=1))
+    (out / "mpc_worth.json").write_text(
+        json.dumps([row._asdict() for row in rows], indent=1), encoding="utf-8"
+    )
     draw(rows, out / "mpc_worth.png")
     print(f"wrote {out / 'mpc_worth.json'}, {out / 'mpc_worth.png'}")
     return targets.finish(keep=keep)

@@ -116,7 +116,7 @@ def run(script: str, words: Sequence[str], out: Path) -> Outcome:
     start = time.perf_counter()
     answer = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     seconds = time.perf_counter() - start
-    (out / f"{script}.txt").write_text(answer.stdout + answer.stderr)
+    (out / f"{script}.txt").write_text(answer.stdout + answer.stderr, encoding="utf-8")
     print(answer.stdout, end="", flush=True)
     found = outcome(script, answer.returncode, answer.stdout, seconds)
     if not found.good and not found.missed:
@@ -144,7 +144,7 @@ def main(argv: list[str] | None = None) -> int:
         words = [word.format(out=out) for word in BENCHMARKS[script]]
         outcomes.append(run(script, [*words, *["--record"] * options.record], out))
     table = summary(outcomes)
-    (out / "summary.txt").write_text(table + "\n")
+    (out / "summary.txt").write_text(table + "\n", encoding="utf-8")
     print(table)
     return 0 if all(one.good for one in outcomes) else 1
 

@@ -18,8 +18,7 @@ from models.plant import Plant
 from models.recordings import Recording
 from models.sensors import Sensor, Sensors
 from models.vehicle import Vehicle, sedan
-from tireid.commands.demo_parts import self_test
-from tireid.exporting import write_files
+from tireid.exporting import self_test, write_files
 
 EXPECTED_BELOW = 1.0  # N, of forces of 8 kN
 SENSORS = Sensors(v_y=Sensor(noise=0.02), r=Sensor(noise=0.002))  # m/s and rad/s, rms

@@ -40,6 +40,36 @@ def test_the_rule_catches_a_planted_import():
     assert wrong_imports("tireid", "import matplotlib, identifier, models") == set()
 
 
+def commands_imported(source: str) -> set[str]:
+    """The modules of commands that a file imports."""
+    modules = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            modules |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            modules |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return {name for name in modules if name.split(".")[:2] == ["tireid", "commands"]}
+
+
+def test_commands_call_the_interface_and_nothing_calls_the_commands():
+    files = [path for package in (*ORDER, "examples") for path in (ROOT / package).rglob("*.py")]
+    free = [path for path in files if path != ROOT / "tireid/cli.py"]
+    for path in free:
+        if path.parent != ROOT / "tireid/commands":
+            assert not commands_imported(path.read_text(encoding="utf-8")), path
+
+
+def test_the_rule_catches_an_interface_that_calls_a_command():
+    for planted in (
+        "from tireid.commands.drive import run",
+        "from tireid.commands import drive",
+        "from tireid import commands",
+        "def late():\n    import tireid.commands.drive as d",
+    ):
+        assert commands_imported(planted), planted
+    assert not commands_imported("from tireid import driving\nimport tireid.commandments")
+
+
 def test_every_package_is_in_the_wheel():
     import tomllib
 

@@ -31,8 +31,17 @@ class Parser(argparse.ArgumentParser):
         ----------
         message : what is wrong with the words.
         """
-        complain(f"{self.prog}: error: {one_line(message)} (see {self.prog} --help)")
+        complain(f"{self.prog}: error: {one_line(message)} ({_hint(message, self.prog)})")
         sys.exit(BAD_INPUT)
+
+
+def _hint(message: str, program: str) -> str:
+    """Return what to do about wrong words: the word of today for one of yesterday, or the help."""
+    from tireid.commands.options import RENAMED
+
+    words = set(message.split()) if message.startswith("unrecognized") else set()
+    renamed = [f"{old} is {new} now" for old, new in RENAMED.items() if old in words]
+    return "; ".join(renamed) or f"see {program} --help"
 
 
 def build_parser(words: Sequence[str]) -> Parser:
@@ -103,7 +112,7 @@ def _expected_errors() -> tuple[type[Exception], ...]:
     from identifier.export import compiled, processor
     from mpc.converged import NotConvergedError
     from mpc.realtime import instance
-    from tireid.commands.demo_parts import SelfTestError
+    from tireid.exporting import SelfTestError
 
     return (
         *(ValueError, ArithmeticError, OSError, ImportError, MemoryError),

@@ -1,10 +1,14 @@
 """An identifier as clean C, and beside it as FMU, as ONNX and with a tracker: into one folder."""
 
-from collections.abc import Sequence
+import subprocess
+import tempfile
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import NamedTuple
 
+from codegen import find_compiler
 from identifier.export.package import Package, build_package, readme
 from identifier.export.processor import Cost, figures_text, measure, with_figures
 from identifier.method import CannotFreezeError, Method
@@ -12,9 +16,22 @@ from identifier.methods import continuing
 from identifier.run import History
 from identifier.tire_model import TireModel
 from models.vehicle import Vehicle, sedan
+from mpc.export.package import mpc_readme
+from mpc.export.pair import build_pair
+from mpc.export.processor import measure_mpc, mpc_figures_text, time_here, with_mpc_figures
+from mpc.realtime import NoCompilerError
 from tireid.output import output_folder
+from tireid.progress import Progress
 
 IDENTIFIER = "identifier"  # folder of the package where a tracker lies beside it
+COSTS, TRACKING, UNITS, NETWORK = "costs on Arm processors", "the tracker", "FMUs", "ONNX"
+PARTS = (  # of an export: about how long each takes, and the option that asks for it
+    ("the identifier", 1.0, ""),
+    (COSTS, 17.0, ""),
+    (TRACKING, 17.0, "mpc"),
+    (UNITS, 8.0, "fmu"),
+    (NETWORK, 1.0, "onnx"),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -43,7 +60,8 @@ class Exported:
                 f"{cost.flash} B flash, {cost.ram} B RAM, {cost.replay.stack} B stack"
             )
         wrote = f"wrote {self.folder}/, hash {self.package.about['hash']}"
-        return "\n".join([*lines, *self.told, wrote])
+        estimates = self.package.specialized.vehicle.estimates
+        return "\n".join([*lines, *self.told, *([estimates] if estimates else []), wrote])
 
     def __repr__(self) -> str:
         return f"<Exported {self.package.specialized.name} in {self.folder}>"
@@ -149,13 +167,22 @@ def export_method(
     OSError
         Where the folder cannot be written.
     """
-    package = build_package(method, vehicle, start, name=name, single=single)
-    with output_folder(folder, force=overwrite) as scratch:
-        costs = measure(package)
+    parts = [word for word, on in (("mpc", mpc), ("fmu", fmu), ("onnx", onnx)) if on]
+    lasts = {title: seconds for title, seconds, wanted in PARTS if wanted in ("", *parts)}
+    with (
+        Progress("export", lasts, long=True) as progress,
+        output_folder(folder, force=overwrite) as scratch,
+    ):
+        package = build_package(method, vehicle, start, name=name, single=single)
+        costs = measure(package, progress.begin(COSTS))
         place = scratch / IDENTIFIER if mpc else scratch
         write_files(place, package, figures_text(costs), costs)
-        told = _write_tracker(scratch, package, single) if mpc else []
+        told = []
+        if mpc:
+            progress.begin(TRACKING)
+            told = write_tracker(scratch, package, single=single)
         if fmu:
+            progress.begin(UNITS)
             from identifier.export.fmu import export_fmu
 
             for version in (2, 3):
@@ -164,7 +191,9 @@ def export_method(
                     scratch / f"{package.specialized.name}_fmi{version}.fmu",
                     version,
                 )
+                progress.step(2)
         if onnx:
+            progress.begin(NETWORK)
             _write_onnx(scratch, method, vehicle, package, start)
     return Exported(folder=folder, package=package, costs=tuple(costs), told=tuple(told))
 
@@ -181,15 +210,13 @@ def write_files(folder: Path, package: Package, figures: str, costs: Sequence[Co
     """
     manifest = f"{package.specialized.name}.json"
     texts = {**package.files, "README.md": readme(package, figures)}
-    for path, text in {**texts, manifest: with_figures(texts[manifest], costs)}.items():
+    _write_texts(folder, {**texts, manifest: with_figures(texts[manifest], costs)})
+
+
+def _write_texts(folder: Path, texts: Mapping[str, str]) -> None:
+    for path, text in texts.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, encoding="utf-8")
-
-
-def _write_tracker(folder: Path, package: Package, single: bool) -> list[str]:
-    from tireid.commands.export import write_tracker
-
-    return write_tracker(folder, package, single=single)
 
 
 def _write_onnx(
@@ -202,3 +229,95 @@ def _write_onnx(
     except CannotFreezeError as error:
         raise ValueError(f"--onnx: {error}") from error
     export_onnx(model, folder / f"{package.specialized.name}.onnx")
+
+
+# With `mpc`: the tracker beside the identifier, and a car driven by both.
+
+TRACKER = "mpc"  # folder of the package; that of the identifier is `identifier`
+
+
+def write_tracker(folder: Path, package: Package, *, single: bool) -> list[str]:
+    """Write the tracker and what joins it with the identifier; return what to say about it.
+
+    Parameters
+    ----------
+    folder : where the identifier lies in a folder of that name.
+    package : of the identifier.
+    single : whether float is the default precision.
+
+    Raises
+    ------
+    ValueError
+        Where what the method learns cannot be handed over, or there is no C compiler.
+    """
+    try:
+        pair = build_pair(package, single=single)
+    except NoCompilerError as error:
+        raise ValueError(f"--mpc: {error}") from error
+    tracker = pair.tracker
+    costs, times = measure_mpc(tracker), time_here(tracker)
+    manifest = f"{tracker.name}.json"
+    texts = {**tracker.files, "README.md": mpc_readme(tracker, mpc_figures_text(costs, times))}
+    texts[manifest] = with_mpc_figures(texts[manifest], costs)
+    _write_texts(folder, pair.files)
+    _write_texts(folder / TRACKER, texts)
+    return [
+        *(
+            f"{cost.processor}, {'float' if cost.single else 'double'}: {tracker.name} takes "
+            f"{cost.replay.instructions} instructions a step, {cost.flash} B flash, "
+            f"{cost.replay.state + cost.replay.params + cost.replay.work} B RAM, "
+            f"{cost.replay.stack} B stack"
+            for cost in costs
+        ),
+        f"this machine: {tracker.name} takes {times.median:.0f} us a step, hash "
+        f"{tracker.about['hash']}",
+    ]
+
+
+# The self-test of an exported package, compiled and run as an embedded engineer would.
+
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-Iinclude", "-Isrc")
+
+
+class SelfTestError(RuntimeError):
+    """A package does not compile or fails its own test; the message holds what was printed."""
+
+
+class Verdict(NamedTuple):
+    """What a self-test printed: version and precision, the largest difference, "passed"."""
+
+    version: str
+    difference: str
+    verdict: str
+
+
+def self_test(folder: Path, name: str, *, single: bool) -> Verdict | None:
+    """Compile and run the self-test of a package; None where there is no C compiler.
+
+    Parameters
+    ----------
+    folder : with the package.
+    name : prefix of its symbols.
+    single : whether to compute in float.
+
+    Raises
+    ------
+    SelfTestError
+        Where it does not compile or does not pass.
+    """
+    compiler = find_compiler()
+    if compiler is None:
+        return None
+    sources = [str(p.relative_to(folder)) for p in sorted((folder / "src").glob("*.c"))]
+    with tempfile.TemporaryDirectory(prefix="tireid-") as scratch:
+        program = Path(scratch) / "self_test"
+        own = [f"-D{name.upper()}_SINGLE={int(single)}", *sources, f"tests/test_{name}.c"]
+        build = [*compiler, *FLAGS, *own, "-o", str(program), "-lm"]
+        for command in (build, [str(program)]):
+            answer = subprocess.run(
+                command, cwd=folder, capture_output=True, text=True, check=False
+            )
+            if answer.returncode != 0:
+                lines = (answer.stdout + answer.stderr).splitlines()
+                raise SelfTestError(f"the package {folder} fails its self-test: {lines[:5]}")
+    return Verdict(*answer.stdout.splitlines()[-3:])

@@ -11,7 +11,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -274,7 +274,7 @@ def write_json(path: Path, data: Any) -> None:
     path : the file.
     data : dictionaries, lists, numbers, strings and None.
     """
-    path.write_text(json.dumps(_finite(data), indent=2, allow_nan=False) + "\n")
+    path.write_text(json.dumps(_finite(data), indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def _finite(data: Any) -> Any:
@@ -298,3 +298,22 @@ def write_csv(path: Path, columns: dict[str, NDArray[np.float64]]) -> None:
     table = np.column_stack(list(columns.values()))
     digits = ["%.15g" if name == "t_s" else "%.9g" for name in columns]  # t_s may be a Unix time
     np.savetxt(path, table, fmt=digits, delimiter=",", header=",".join(columns), comments="")
+
+
+def text_table(rows: Sequence[Sequence[str]], align: str = "", *, indent: str = "") -> str:
+    """Return rows of cells as lines of text, each column as wide as its widest cell.
+
+    Parameters
+    ----------
+    rows : cells; a row may be shorter than others.
+    align : of each column, `<` left or `>` right; columns without are left.
+    indent : before each line.
+    """
+    count = max((len(row) for row in rows), default=0)
+    sides = align.ljust(count, "<")
+    widths = [max(len(row[i]) for row in rows if i < len(row)) for i in range(count)]
+    lines = []
+    for row in rows:
+        cells = [f"{cell:{sides[i]}{widths[i]}}" if widths[i] else "" for i, cell in enumerate(row)]
+        lines.append(f"{indent}{'  '.join(cells)}".rstrip())
+    return "\n".join(lines)

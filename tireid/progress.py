@@ -6,10 +6,13 @@ working.
 """
 
 import logging
+import math
 import os
 import sys
 import time
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from itertools import accumulate
 from typing import TextIO
 
 
@@ -44,8 +47,16 @@ def complain(text: str) -> None:
     ----------
     text : one or several lines.
     """
+    _print(f"{_wiped()}{_escaped(text)}\n")
+
+
+def _print(text: str) -> None:
+    """Write on standard error, which may be closed."""
+    if sys.stderr is None:
+        return
     try:
-        print(_escaped(text), file=sys.stderr, flush=True)
+        sys.stderr.write(text)
+        sys.stderr.flush()
     except OSError:
         _muffle(sys.stderr)
 
@@ -79,6 +90,8 @@ def _write_out(text: str) -> None:
     global _lost
     if sys.stdout is None:  # closed before we began
         return
+    if _live:
+        _print(_wiped())
     try:
         sys.stdout.write(text)
         sys.stdout.flush()
@@ -99,7 +112,9 @@ def _muffle(stream: TextIO) -> None:
 
 
 def listen_to_library() -> None:
-    """Show what the library has to say, such as that it compiles."""
+    """Show what the library has to say, such as that it compiles, and how far work has come."""
+    global _listening
+    _listening = True
     log = logging.getLogger("tireid")
     log.setLevel(logging.INFO)
     log.propagate = False
@@ -119,27 +134,145 @@ class Stopwatch:
         return time.perf_counter() - self._start
 
 
-class Ticker:
-    """Tells every few seconds how far something has come, so that short work says nothing.
+# How far work has come. On a terminal one line that changes and goes away, elsewhere a line now and
+# then; in a program that only uses the library nothing at all.
+
+QUIET, PLAIN, LIVE = 2.0, 5.0, 0.2  # s: before the first word, between lines, between changes
+TELLING = 0.02  # share from which the time left is told
+_listening = False
+_live = False  # whether such a line stands on the terminal
+
+
+def _wiped() -> str:
+    """Return what takes the changing line away, if there is one."""
+    global _live
+    was, _live = _live, False
+    return "\r\x1b[K" if was else ""
+
+
+def _on_terminal() -> bool:
+    stream = sys.stderr
+    return stream is not None and stream.isatty() and os.environ.get("TERM", "dumb") != "dumb"
+
+
+class Progress:
+    """Tells how far something has come and how much time is left; short work says nothing.
+
+    Use it as a context: the changing line goes away at its end.
 
     Parameters
     ----------
     what : that goes on.
-    every : time between two lines [s].
+    parts : names of its parts in order, and about how long each takes beside the others; None has
+        one.
+    long : whether it is known to last, so that the beginning of each part is told at once.
     """
 
-    def __init__(self, what: str, every: float = 3.0) -> None:
-        self._what, self._every = what, every
-        self._last = time.perf_counter()
+    def __init__(
+        self, what: str, parts: Mapping[str, float] | None = None, *, long: bool = False
+    ) -> None:
+        self._what, self._parts, self._long = what, dict(parts or {"": 1.0}), long
+        self._whole = sum(self._parts.values())
+        self._begun = time.perf_counter()
+        self._told = self._begun + QUIET - (LIVE if _on_terminal() else PLAIN)
+        self._before, self._weight, self._name = 0.0, 0.0, ""
+        self._done = 0
+        self.begin(next(iter(self._parts)))
 
-    def __call__(self, share: float) -> None:
-        """Say it where it is time.
+    def __enter__(self) -> "Progress":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if _listening:
+            _print(_wiped())
+
+    def begin(self, part: str) -> "Progress":
+        """Go on with a part; return what takes its share.
 
         Parameters
         ----------
-        share : done, 0 to 1.
+        part : one of the parts; what comes before it is done.
+        """
+        names = list(self._parts)
+        self._before = sum(self._parts[name] for name in names[: names.index(part)]) / self._whole
+        self._weight, self._name = self._parts[part] / self._whole, part
+        self._done = 0
+        if self._long:
+            self._told = -math.inf
+        self(0.0)
+        return self
+
+    def step(self, of: int, text: str = "") -> None:
+        """Count one of several equal steps of the part.
+
+        Parameters
+        ----------
+        of : steps of the part.
+        text : what was done, in place of the part's name.
+        """
+        self._done += 1
+        self(min(self._done / max(of, 1), 1.0), text)
+
+    def along(self, lengths: Sequence[float]) -> Callable[[str], None]:
+        """Return who is told in words of each of several steps of the part, when it is done.
+
+        Parameters
+        ----------
+        lengths : about how long each takes beside the others.
+        """
+        ends, whole = iter(accumulate(lengths)), sum(lengths)
+
+        def told(text: str) -> None:
+            self(next(ends, whole) / whole if whole > 0.0 else 1.0, text)
+
+        return told
+
+    def __call__(self, share: float, text: str = "") -> None:
+        """Tell it where it is time.
+
+        Parameters
+        ----------
+        share : done of the part, 0 to 1.
+        text : what is being done, in place of the part's name.
         """
         now = time.perf_counter()
-        if now - self._last >= self._every:
-            self._last = now
-            say(f"{self._what}: {100.0 * share:.0f} %")
+        live = _on_terminal()
+        if not _listening or now - self._told < (LIVE if live else PLAIN):
+            return
+        self._told = now
+        done = min(self._before + self._weight * share, 1.0)
+        told = [text or self._name, f"{100.0 * done:.0f} %"]
+        if done > TELLING:
+            told.append(f"{_time_text((now - self._begun) * (1.0 - done) / done)} left")
+        line = f"{self._what}: {', '.join(one for one in told if one)}"
+        if live:
+            _show(line)
+        else:
+            say(line)
+
+
+def _time_text(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
+
+
+def _columns() -> int:
+    """Return how wide the terminal is."""
+    told = os.environ.get("COLUMNS", "")
+    if told.isdecimal() and int(told) > 0:
+        return int(told)
+    try:
+        found = os.get_terminal_size(sys.stderr.fileno()).columns
+    except (OSError, ValueError):
+        found = 0
+    return found or 80
+
+
+def _show(line: str) -> None:
+    """Put a line in the place of the changing one; one that is too long is cut."""
+    global _live
+    from codegen.escape import visible
+
+    width = _columns() - 1
+    wiped = _wiped()
+    _live = True
+    _print(f"{wiped}{_escaped(visible(f'  {line}'))[:width]}")

@@ -106,19 +106,19 @@ def _surround(folder: Path, kind: str) -> None:
     out = folder / "out"
     if kind.startswith("ours"):
         with output_folder(out, force=False) as new:
-            (new / "summary.json").write_text("{}\n")
+            (new / "summary.json").write_text("{}\n", encoding="utf-8")
             (new / "deep").mkdir()
-            (new / "deep" / "old.csv").write_text("1\n")
+            (new / "deep" / "old.csv").write_text("1\n", encoding="utf-8")
         if kind.endswith("theirs"):
-            (out / "deep" / "mine.txt").write_text("of the user\n")
+            (out / "deep" / "mine.txt").write_text("of the user\n", encoding="utf-8")
     elif kind == "file":
-        out.write_text("of the user\n")
+        out.write_text("of the user\n", encoding="utf-8")
     elif kind == "link":
         out.symlink_to("data")
     else:
         out.mkdir()
         if kind == "theirs":
-            (out / "mine.txt").write_text("of the user\n")
+            (out / "mine.txt").write_text("of the user\n", encoding="utf-8")
 
 
 def clear(folder: Path) -> Path:

@@ -43,7 +43,9 @@ def _door(name: str, share: float, words: str, mutated: str = "") -> Door:
 
 
 IDENTIFY = "identify log.csv --vehicle car.toml --out out"
-COMPARE = "compare log.csv --vehicle car.toml --floor 0 --workers 1 --out out --methods"
+COMPARE = "compare log.csv --vehicle car.toml --floor 0 --jobs 1 --out out --method"
+PREDICT = "predict --out out"
+FILTER = "--method magic_formula_ekf"
 DRIVE = "drive --path path.csv --speed 12m/s --film none --out out"
 DOORS = (
     # recordings
@@ -52,42 +54,50 @@ DOORS = (
     _door("identify csv.gz", 4, IDENTIFY.replace(".csv", ".csv.gz"), "log.csv.gz"),
     _door("identify parquet", 4, IDENTIFY.replace(".csv", ".parquet"), "log.parquet"),
     _door("identify csv, paper", 4, f"{IDENTIFY} --paper --no-check", "log.csv"),
-    _door("identify csv, rls", 2, f"{IDENTIFY} --law rls --no-check", "log.csv"),
-    _door("identify csv, filter", 2, f"{IDENTIFY} --law magic_formula_ekf --no-check", "log.csv"),
+    _door("identify csv, rls", 2, f"{IDENTIFY} --method rls --no-check", "log.csv"),
+    _door("identify csv, filter", 2, f"{IDENTIFY} {FILTER} --no-check", "log.csv"),
     _door("identify replay", 3, f"{IDENTIFY} --replay other.csv", "other.csv"),
     _door("compare csv", 4, f"{COMPARE} axle linear", "log.csv"),
     _door(
-        "check log", 3, "check integral.toml --vehicle car.toml --log log.csv", "log.csv car.toml"
+        "check log",
+        3,
+        "check --design integral.toml --vehicle car.toml --log log.csv",
+        "log.csv car.toml",
     ),
     # cars
     _door("identify car", 8, IDENTIFY.replace("car.toml", "sedan.toml"), "sedan.toml"),
-    _door("check car", 6, "check --vehicle sedan.toml", "sedan.toml"),
-    _door("check car, design", 3, "check --design --vehicle car.toml --out out.toml", "car.toml"),
-    _door("export car", 5, "export out --vehicle sedan.toml", "sedan.toml"),
-    _door("export car, FMU", 0.5, "export out --vehicle car.toml --fmu --onnx", "car.toml"),
-    _door("export tracker", 0.2, "export out --mpc --vehicle car.toml", "car.toml"),
+    _door("check car", 6, "check --paper --vehicle sedan.toml", "sedan.toml"),
+    _door("check default", 2, "check --vehicle sedan.toml --out out", "sedan.toml"),
+    _door("check car, tuned", 3, "check --vehicle car.toml --tune out.toml", "car.toml"),
+    _door("export car", 5, "export --out out --vehicle sedan.toml", "sedan.toml"),
+    _door("export car, FMU", 0.5, "export --out out --vehicle car.toml --fmu --onnx", "car.toml"),
+    _door("export tracker", 0.2, "export --out out --mpc --vehicle car.toml", "car.toml"),
     _door("drive car", 4, f"{DRIVE} --weights axle.json --vehicle sedan.toml", "sedan.toml"),
     _door("drive tire", 4, f"{DRIVE} --tires linear --vehicle sedan.toml", "sedan.tir"),
     _door(
         "drive oracle", 1, f"{DRIVE} --tires oracle --vehicle sedan.toml", "sedan.tir sedan.toml"
     ),
     # designs
-    _door("check design", 9, "check integral.toml --vehicle car.toml", "integral.toml"),
-    _door("check design, lead", 3, "check lead.toml", "lead.toml"),
+    _door("check design", 9, "check --design integral.toml --vehicle car.toml", "integral.toml"),
+    _door("check design, lead", 3, "check --design lead.toml", "lead.toml"),
     _door("identify design", 5, f"{IDENTIFY} --design integral.toml", "integral.toml"),
-    _door("export design", 3, "export out --design lead.toml", "lead.toml"),
+    _door("export design", 3, "export --out out --design lead.toml", "lead.toml"),
     # frozen models
-    _door("export axle", 6, "export out --weights axle.json", "axle.json"),
-    _door("export network", 4, "export out --weights network.json", "network.json"),
+    _door("export axle", 6, "export --out out --weights axle.json", "axle.json"),
+    _door("export network", 4, "export --out out --weights network.json", "network.json"),
     _door("identify axle", 6, f"{IDENTIFY} --weights axle.json", "axle.json"),
     _door("identify network", 4, f"{IDENTIFY} --paper --weights network.json", "network.json"),
-    _door("identify regression", 2, f"{IDENTIFY} --law rls --weights regression.json", RLS),
-    _door("identify curve", 2, f"{IDENTIFY} --law magic_formula_ekf --weights curve.json", CURVE),
+    _door("identify regression", 2, f"{IDENTIFY} --method rls --weights regression.json", RLS),
+    _door("identify curve", 2, f"{IDENTIFY} {FILTER} --weights curve.json", CURVE),
     _door("drive axle", 4, f"{DRIVE} --weights axle.json", "axle.json"),
     _door("drive network", 3, f"{DRIVE} --weights network.json", "network.json"),
     _door("drive curve", 2, f"{DRIVE} --weights curve.json", "curve.json"),
     _door("drive own", 2, f"{DRIVE} --weights own.json", "own.json"),
     _door("drive learning", 1, f"{DRIVE} --tires learning --weights axle.json", "axle.json"),
+    _door("predict axle", 4, f"{PREDICT} axle.json log.csv", "axle.json"),
+    _door("predict network", 2, f"{PREDICT} network.json log.csv", "network.json"),
+    _door("predict log", 4, f"{PREDICT} axle.json log.csv --no-check", "log.csv"),
+    _door("predict car", 3, f"{PREDICT} axle.json log.csv --vehicle sedan.toml", "sedan.toml"),
     # networks of the user's own
     _door("identify onnx", 8, f"{IDENTIFY} --network slip.onnx", "slip.onnx"),
     _door("identify onnx, exported", 3, f"{IDENTIFY} --network exported.onnx", "exported.onnx"),
@@ -96,24 +106,26 @@ DOORS = (
     # paths
     _door("drive path", 10, f"{DRIVE} --tires linear", "path.csv"),
     # words
-    _door("words of identify", 6, f"{IDENTIFY} --freeze 4 5 --columns r=r --seed 1 --law rls"),
+    _door("words of identify", 6, f"{IDENTIFY} --freeze 4 5 --columns r=r --seed 1 --method rls"),
     _door(
         "words of check",
         6,
-        "check --vehicle car.toml --law integral --bandwidth 0.7 --speed 20 --slip 0.1 "
+        "check --vehicle car.toml --method integral --bandwidth 0.7 --speed 20 --slip 0.1 "
         "--friction 1 --noise-r 0.01",
     ),
     _door(
-        "words of check, design",
+        "words of check, tuned",
         3,
-        "check --design --vehicle car.toml --phase-margin 60 --noise-v-x 0.1 --out out.toml",
+        "check --vehicle car.toml --phase-margin 60 --noise-v-x 0.1 --tune out.toml",
     ),
-    _door("words of export", 3, "export out --name mine --law integral --single"),
+    _door("words of export", 3, "export --out out --name mine --method integral --single"),
     _door("words of compare", 3, f"{COMPARE} axle linear --sweep 0 --seed 0"),
     _door(
         "words of drive",
         6,
         f"{DRIVE} --mu 0.9 --mu-drop 20:0.5 --tires linear --delay 20 --fault r:stuck:1:1 --seed 3",
     ),
+    _door("words of predict", 3, f"{PREDICT} axle.json log.csv --columns r=r --vehicle car.toml"),
+    _door("words of init", 2, "init out.toml"),
     _door("words of paper", 0.5, "paper --seeds 0 --out out"),
 )

@@ -47,7 +47,7 @@ def write_seeds(folder: Path, needed: Collection[str]) -> Mapping[str, bytes]:
         write_recording(recording, folder / name)
     for name in ("sedan.toml", "sedan.tir"):
         (folder / name).write_bytes((DATA / name).read_bytes())
-    (folder / "car.toml").write_text(_plain_car(car))
+    (folder / "car.toml").write_text(_plain_car(car), encoding="utf-8")
     for name, law in DESIGNS.items():
         (folder / name).write_text(design_text(paper_identifier(car, law=law)), encoding="utf-8")
     _write_path(folder / "path.csv")
@@ -144,4 +144,4 @@ def _write_path(path: Path) -> None:
     x = np.linspace(0.0, 40.0, 21)
     y = 1.0 - np.cos(np.pi * np.clip((x - 10.0) / 20.0, 0.0, 1.0))
     rows = [f"{a:.3f},{b:.3f}" for a, b in zip(x, y, strict=True)]
-    path.write_text("\n".join(["X_m,Y_m", *rows]) + "\n")
+    path.write_text("\n".join(["X_m,Y_m", *rows]) + "\n", encoding="utf-8")

@@ -114,7 +114,7 @@ def _notes(path: Path) -> dict[str, Any]:
     if not path.exists():
         return {}
     told: dict[str, Any] = {}
-    for line in path.read_text().splitlines():
+    for line in path.read_text(encoding="utf-8").splitlines():
         with contextlib.suppress(ValueError):  # cut off where it was killed
             told.update(json.loads(line))
     return told
@@ -130,11 +130,11 @@ def _child(words: list[str], folder: Path, aside: Path, drawn: bool) -> NoReturn
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
         sys.stdout, sys.stderr = (os.fdopen(number, "w", closefd=False) for number in (1, 2))
         os.chdir(folder)
-        trace = (aside / "trace").open("w")
+        trace = (aside / "trace").open("w", encoding="utf-8")
         faulthandler.enable(trace)
         faulthandler.register(signal.SIGXCPU, trace, chain=True)
         faulthandler.dump_traceback_later(patience() - 2.0, file=trace)
-        notes = (aside / "notes").open("w")
+        notes = (aside / "notes").open("w", encoding="utf-8")
         warnings.resetwarnings()  # as a process of its own has them
         _limit()
         _listen(lambda key, value: print(json.dumps({key: value}), file=notes, flush=True))
@@ -177,7 +177,7 @@ def _entered(words: list[str]) -> int:
 
 
 def _limit() -> None:
-    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    pages = int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[0])
     memory = pages * resource.getpagesize() + MEMORY
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     resource.setrlimit(resource.RLIMIT_CPU, (CPU, CPU + 5))

@@ -161,7 +161,9 @@ class Session(NamedTuple):
                 f"cd here/case; tireid {shlex.join(again.words)}",
                 again.said,
             )
-            (folder / "README").write_text("\n".join(lines) + "\n", errors="backslashreplace")
+            (folder / "README").write_text(
+                "\n".join(lines) + "\n", errors="backslashreplace", encoding="utf-8"
+            )
             kept[key] = folder
         return kept
 

@@ -4,7 +4,7 @@ import random
 
 from benchmarks.fuzz.hostile import NUMBERS, text
 
-COUNTS = ("--workers", "--sweep", "--floor", "--monte-carlo", "--seeds", "--laps")
+COUNTS = ("--jobs", "--sweep", "--floor", "--monte-carlo", "--seeds", "--laps")
 FEW = (
     "-1",
     "0",
@@ -17,7 +17,7 @@ FEW = (
     "2e0",
     "٢",
 )  # more of them is more work, as asked
-PLACES = ("--out", "--figures", "export")  # what follows is written
+PLACES = ("--out", "--tune", "init", "sample")  # what follows is written
 OUTS = (
     *(
         "out",
@@ -69,8 +69,8 @@ MORE = (
     *(
         "--columns r=vy vy=r",
         "--columns t=vx",
-        "--law linear",
-        "--law none",
+        "--method linear",
+        "--method none",
         "--seed -1",
         "--network slip.onnx",
     ),

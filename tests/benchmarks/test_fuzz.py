@@ -43,7 +43,7 @@ def kinds(session, case=None):
 
 
 def key_error(options):
-    return {}[options.file]
+    return {}[options.design]
 
 
 def hangs(options):
@@ -167,7 +167,7 @@ def test_a_door_without_a_check_is_found_by_mutations(session, monkeypatch):
     import tomllib
 
     def unchecked(options):
-        return min(0, int(tomllib.loads(options.file.read_text())["network"]["hidden"]))
+        return min(0, int(tomllib.loads(options.design.read_text())["network"]["hidden"]))
 
     monkeypatch.setattr(tireid.commands.check, "run", unchecked)
     found = set()

@@ -7,8 +7,8 @@ from benchmarks.mpc_sensor_faults import FAULTS, TIRES, Outcome, Row, cases_of, 
 from benchmarks.targets import Targets
 from models.faults import KINDS
 from mpc.loop import Measured
-from tireid.commands.drive import conditions_of, parse_fault
-from tireid.commands.drive_runs import FROZEN, LEARNING
+from tireid.commands.drive_case import conditions_of, parse_fault
+from tireid.driving.runs import FROZEN, LEARNING
 
 
 def row(learning, frozen, begins=(3.0, 9.0)):

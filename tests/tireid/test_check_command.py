@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identifier.axle import AxleIdentifier
 from identifier.defaults import design_for, natural_driving, natural_operation, paper_identifier
 from identifier.paper.design import design_text, read_design
 from identifier.paper_study import paper_design
@@ -40,21 +41,21 @@ def unstable(tmp_path):
     return path
 
 
-def test_the_default_design_passes_for_any_size_of_car(capsys, tmp_path):
-    assert checked(capsys)[0] == 0
+def test_the_gains_of_the_paper_s_law_pass_for_any_size_of_car(capsys, tmp_path):
+    assert checked(capsys, "--paper")[0] == 0
     model = tmp_path / "model.toml"
     model.write_text(
         "mass = 1.58\nyaw_inertia = 0.00481\nl_f = 0.0805\nl_r = 0.093\n"
         "cornering_stiffness_front = 40.0\ncornering_stiffness_rear = 40.0\n"
     )
-    code, said = checked(capsys, "--vehicle", model)
+    code, said = checked(capsys, "--paper", "--vehicle", model)
     assert code == 0
     assert "verdict: pass" in said.out
     assert "[N s]" in said.out
 
 
 def test_gains_beyond_the_limit_fail_with_advice_and_a_proposal_that_passes(capsys, unstable):
-    code, said = checked(capsys, unstable)
+    code, said = checked(capsys, "--design", unstable)
     assert code == 1
     assert "verdict: fail" in said.out
     assert "fail: loop gain, sampled: multiply eta_W and eta_V by" in said.out
@@ -62,7 +63,7 @@ def test_gains_beyond_the_limit_fail_with_advice_and_a_proposal_that_passes(caps
 
 
 def test_json_has_the_documented_keys_and_only_finite_numbers(capsys, unstable):
-    code, said = checked(capsys, unstable, "--json")
+    code, said = checked(capsys, "--design", unstable, "--json")
     data = json.loads(said.out)
     assert code == 1
     assert data["verdict"] == "fail"
@@ -76,7 +77,7 @@ def test_json_has_the_documented_keys_and_only_finite_numbers(capsys, unstable):
 
 def test_a_design_is_found_written_and_keeps_the_wanted_margin(capsys, tmp_path):
     path = tmp_path / "design.toml"
-    words = ("--design", "--bandwidth", "0.5", "--phase-margin", "50", "--out", path)
+    words = ("--tune", path, "--bandwidth", "0.5", "--phase-margin", "50")
     code, said = checked(capsys, *words)
     assert code == 0
     assert f"wrote {path}" in said.err
@@ -85,19 +86,24 @@ def test_a_design_is_found_written_and_keeps_the_wanted_margin(capsys, tmp_path)
     assert phase == pytest.approx(50.0, abs=0.5)
     assert checked(capsys, *words)[0] == 2  # nothing is overwritten unasked
     assert checked(capsys, *words, "--force")[0] == 0
-    assert checked(capsys, path, "--bandwidth", "0.5")[0] == 0
+    assert checked(capsys, "--design", path, "--bandwidth", "0.5")[0] == 0
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["nowhere.toml"], "nowhere.toml"),
-        (["--design", "--bandwidth", "9"], "sample every"),
+        (["--design", "nowhere.toml"], "nowhere.toml"),
+        (["--tune", "d.toml", "--bandwidth", "9"], "sample every"),
         (["--bandwidth", "-1"], "--bandwidth must be positive"),
         (["--slip", "12"], "--slip must be in rad"),
-        (["--phase-margin", "30"], "go with --design"),
-        (["--design", "--phase-margin", "120"], "phase margin must be in"),
+        (["--phase-margin", "30"], "go with --tune"),
+        (["--tune", "d.toml", "--phase-margin", "120"], "phase margin must be in"),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),
+        (["--bandwidth", "0.5"], "which axle has not: add --paper, --method integral"),
+        (["--method", "rls", "--monte-carlo", "3"], "--monte-carlo asks about the gains"),
+        (["--tune", "d.toml", "--method", "rls"], "rls has none"),
+        (["--tune", "d.toml", "--design", "d.toml"], "give no --design FILE"),
+        (["--paper", "--method", "axle"], "give only one of --method, --paper"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(capsys, monkeypatch, tmp_path, words, said):
@@ -111,14 +117,18 @@ def test_bad_input_is_one_line_and_exit_code_2(capsys, monkeypatch, tmp_path, wo
 
 
 def test_figures_and_a_recorded_run(capsys, logs, tmp_path):
-    folder = tmp_path / "figures"
-    code, said = checked(capsys, "--log", logs / "slalom.csv", "--figures", folder)
+    folder = tmp_path / "judged"
+    code, said = checked(capsys, "--paper", "--log", logs / "slalom.csv", "--out", folder)
     assert code == 0
     margin = float(re.search(r"gain margin there ([\d.]+)", said.out).group(1))
     worst = certificate_of(paper_identifier(sedan()), sedan())["gain_sampled"].margin
     assert margin > worst  # no recorded regressor is worse than the worst
     for name in ("locus.png", "bounds.png"):
         assert (folder / name).read_bytes().startswith(b"\x89PNG")
+    assert (folder / "certificate.txt").read_text(encoding="utf-8") == said.out
+    numbers = json.loads((folder / "certificate.json").read_text(encoding="utf-8"))
+    assert (numbers["method"], numbers["verdict"]) == ("integral", "pass")
+    assert checked(capsys, "--paper", "--out", folder)[0] == 2  # nothing is replaced unasked
 
 
 def test_the_gains_of_the_paper_study_are_judged():
@@ -144,10 +154,21 @@ def test_numbers_and_units_read_well():
     assert unit_text("U s", 1.0) == "N s"
 
 
-def test_without_a_file_it_says_which_law_it_judges(capsys, unstable):
-    said = checked(capsys)[1].out
-    assert "judged is the paper's law; axle, the default of tireid identify: not certified" in said
-    assert "not certified" not in checked(capsys, unstable)[1].out
+def test_without_options_it_says_what_is_certified_of_what_identify_uses(capsys, tmp_path):
+    """The boxes are those of the identifier itself, and no margin is claimed of it."""
+    code, said = checked(capsys, "--out", tmp_path / "judged")
+    assert code == 0
+    assert said.out.startswith("sedan: axle, the default of tireid identify\n")
+    assert "verdict: not certified; no margin and no bound of its error is proven" in said.out
+    held = AxleIdentifier.for_vehicle(sedan()).certificate["held_by_construction"]
+    least, most = held["grip_static_axle_loads"]
+    assert re.search(rf"grip_static_axle_loads +{number(least)} to {number(most)}\n", said.out)
+    assert set(held) <= set(said.out.split())
+    numbers = json.loads((tmp_path / "judged" / "certificate.json").read_text(encoding="utf-8"))
+    assert numbers["held_by_construction"] == held
+    code, said = checked(capsys, "--json")
+    assert (code, json.loads(said.out)) == (0, numbers)
+    assert "nothing is held by construction" in checked(capsys, "--method", "linear")[1].out
 
 
 def test_advice_is_given_for_what_does_not_pass_and_says_what_to_do():
@@ -176,15 +197,15 @@ def test_advice_is_given_for_what_does_not_pass_and_says_what_to_do():
 @pytest.mark.parametrize("keeping", KEEPINGS)
 def test_weights_of_a_found_design_are_kept_as_asked(capsys, tmp_path, keeping):
     path = tmp_path / "design.toml"
-    code, said = checked(capsys, "--design", "--keep", keeping, "--out", path)
+    code, said = checked(capsys, "--tune", path, "--keep", keeping)
     gains = read_design(path).gains
     radii = {"dead_zone": gains.W_free * gains.V_free, "projection": gains.W_max * gains.V_max}
     found = [name for name, radius in radii.items() if 0.0 < radius < np.inf]
     assert (code, found) == (0, [keeping] * (keeping != "leakage"))
     assert (gains.rho_W > 0.0) == (keeping != "projection")
     assert ("W_free" in said.out, "W_max" in said.out) == tuple(name in found for name in radii)
-    assert checked(capsys, path)[0] == 0
-    code, said = checked(capsys, path, "--monte-carlo", "16")
+    assert checked(capsys, "--design", path)[0] == 0
+    code, said = checked(capsys, "--design", path, "--monte-carlo", "16")
     assert code == 0
     assert ("by the projection" in said.out) == (keeping == "projection")
     assert checked(capsys, "--keep", keeping)[0] == 2
@@ -192,7 +213,7 @@ def test_weights_of_a_found_design_are_kept_as_asked(capsys, tmp_path, keeping):
 
 def test_the_default_of_keep_is_not_the_leakage_that_forgets(capsys, tmp_path):
     path = tmp_path / "design.toml"
-    assert checked(capsys, "--design", "--out", path)[0] == 0
+    assert checked(capsys, "--tune", path)[0] == 0
     assert DEFAULT_KEEPING != "leakage"
     design = design_for(sedan(), natural_driving(sedan()))
     kept = with_keeping(design, natural_operation(design, sedan()), DEFAULT_KEEPING)

@@ -1,8 +1,12 @@
 """The command line itself: one-line errors, exit codes, help."""
 
+from pathlib import Path
+
 import pytest
 
-from tireid.cli import main, one_line
+from identifier.methods import METHODS
+from tireid.cli import build_parser, main, one_line
+from tireid.commands import COMMANDS
 
 
 @pytest.mark.parametrize(
@@ -25,6 +29,66 @@ def test_help_lists_the_commands(capsys):
     said = capsys.readouterr().out
     for command in ("demo", "paper", "identify", "check", "drive"):
         assert command in said
+
+
+def test_without_a_word_it_tells_what_there_is(capsys):
+    assert main([]) == 0
+    alone = capsys.readouterr().out
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert alone == capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        (["identify", "log.csv", "--vehicle", "car.toml", "--law", "rls"], "--law is --method now"),
+        (["compare", "--workers", "2"], "--workers is --jobs now"),
+        (["check", "--figures", "out"], "--figures is --out now"),
+        (["drive", "--nonsense"], "see tireid --help"),
+    ],
+)
+def test_an_option_that_was_renamed_leads_to_its_new_name(words, hint, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(words)
+    assert stop.value.code == 2
+    assert hint in capsys.readouterr().err
+
+
+def options_of():
+    """Every option of every command, by its word."""
+    found = {}
+    for name in COMMANDS:
+        parser = build_parser([name])
+        choices = next(a for a in parser._actions if a.choices and name in a.choices).choices
+        for action in choices[name]._actions:
+            for word in action.option_strings:
+                found.setdefault(word, {})[name] = action
+    return found
+
+
+def test_an_option_takes_the_same_in_every_command():
+    for word, actions in options_of().items():
+        kinds = {(type(a).__name__, a.type) for a in actions.values() if word != "--method"}
+        kinds -= {("_StoreAction", None)}  # words that the command reads itself
+        assert len(kinds) <= 1, (word, actions)
+
+
+def test_folders_are_named_by_out_and_nothing_is_replaced_without_force():
+    options = options_of()
+    for name, action in options["--out"].items():
+        assert action.default == (None if name == "check" else Path(f"tireid-{name}"))
+        assert not action.required
+        assert name in options["--force"]
+    assert set(COMMANDS) - set(options["--out"]) == {"init", "sample"}  # their argument is a file
+
+
+def test_what_learns_is_named_alike_wherever_one_method_learns():
+    options = options_of()
+    for name in ("identify", "check", "export", "drive"):
+        assert {name} <= set(options["--paper"]) & set(options["--design"])
+        assert options["--method"][name].choices == METHODS
+    assert set(options["--method"]) == {"identify", "check", "export", "drive", "compare"}
 
 
 def test_an_error_of_the_system_names_the_file():

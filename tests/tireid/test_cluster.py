@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-import tireid.commands.compare
+import tireid.cluster
 from identifier.compare.course import Course
 from identifier.compare.sweep import CHUNK, sweep
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tireid.cli import main
-from tireid.commands.compare import ClusterError, cluster
+from tireid.cluster import ClusterError, cluster
 
 pytest.importorskip("distributed", reason="needs Dask: pip install 'tireid[cluster]'")
 pytestmark = pytest.mark.filterwarnings("default")  # Dask's own
@@ -69,7 +69,13 @@ def test_two_workers_find_what_this_machine_finds(address, course):
     designs, said = CHUNK + 5, []
     with cluster(address) as elsewhere:
         spread = sweep(
-            NAMES, course, designs=designs, seed=3, elsewhere=elsewhere, progress=said.append
+            NAMES,
+            course,
+            designs=designs,
+            seed=3,
+            elsewhere=elsewhere,
+            progress=said.append,
+            note=lambda _: None,  # how far it has come, on a machine that is slow
         )
     assert spread == sweep(NAMES, course, designs=designs, seed=3, workers=1)
     assert said[0].startswith(f"integral: {designs} designs")
@@ -99,7 +105,7 @@ def test_an_error_of_a_worker_arrives_here(address):
 
 
 def test_a_worker_of_another_version_is_refused(address, monkeypatch):
-    monkeypatch.setattr(tireid.commands.compare, "source_digest", another_version)
+    monkeypatch.setattr(tireid.cluster, "source_digest", another_version)
     with pytest.raises(ClusterError, match="has another version of tireid"), cluster(address):
         pass
 
@@ -109,7 +115,7 @@ def another_version():
 
 
 def test_a_scheduler_without_workers_is_told_of(monkeypatch, tmp_path):
-    monkeypatch.setattr(tireid.commands.compare, "PATIENCE", 2.0)
+    monkeypatch.setattr(tireid.cluster, "PATIENCE", 2.0)
     port = free_port()
     lonely = f"tcp://127.0.0.1:{port}"
     process = start("scheduler", ["--host", "127.0.0.1", "--port", str(port)], tmp_path)
@@ -135,12 +141,12 @@ def wait_until_open(port, patience=20.0):
 @pytest.fixture
 def words(logs):
     return ["compare", str(logs / "slalom.csv"), str(logs / "quick.csv"), "--vehicle",
-            str(logs / "car.toml"), "--methods", *NAMES, "--floor", "0"]  # fmt: skip
+            str(logs / "car.toml"), "--method", *NAMES, "--floor", "0"]  # fmt: skip
 
 
 def test_the_command_writes_the_same_sweep_from_a_cluster(words, address, tmp_path, monkeypatch):
     sweeps = {}
-    for name, extra in (("here", ["--workers", "1"]), ("there", ["--scheduler", address])):
+    for name, extra in (("here", ["--jobs", "1"]), ("there", ["--scheduler", address])):
         monkeypatch.setenv("TIREID_CACHE", str(tmp_path / f"cache {name}"))
         out = tmp_path / name
         assert main([*words, "--sweep", "4", "--out", str(out), *extra]) == 0
@@ -152,7 +158,7 @@ def test_the_command_writes_the_same_sweep_from_a_cluster(words, address, tmp_pa
 
 
 def test_the_command_names_what_is_wrong_with_the_cluster(words, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(tireid.commands.compare, "PATIENCE", 1.0)
+    monkeypatch.setattr(tireid.cluster, "PATIENCE", 1.0)
     nobody = f"tcp://127.0.0.1:{free_port()}"
     out = ["--out", str(tmp_path / "out")]
     assert main([*words, *out, "--sweep", "4", "--scheduler", nobody]) == 2

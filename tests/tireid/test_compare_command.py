@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from identifier.compare.course import INFINITE, Shares
+from identifier.compare.study import run_comparison, step_lengths
 from identifier.methods import METHODS
 from models.recordings import read_recording
 from models.vehicle import sedan
@@ -21,13 +22,13 @@ METHODS_TRIED = ("integral", "linear", "eso")
 @pytest.fixture(scope="module")
 def words(logs):
     return ["compare", f"{logs / 'slalom.csv'}", f"{logs / 'quick.csv'}", "--vehicle",
-            f"{logs / 'car.toml'}", "--workers", "1"]  # fmt: skip
+            f"{logs / 'car.toml'}", "--jobs", "1"]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def result(words, tmp_path_factory):
     out = tmp_path_factory.mktemp("compare") / "out"
-    words = [*words, "--methods", *METHODS_TRIED, "--sweep", "5", "--floor", "0"]
+    words = [*words, "--method", *METHODS_TRIED, "--sweep", "5", "--floor", "0"]
     assert main([*words, "--out", str(out)]) == 0
     return out
 
@@ -71,7 +72,7 @@ def test_the_linear_tire_has_the_error_of_stiffness_times_slip(numbers, logs):
 
 def test_the_floor_of_the_linear_tire_is_least_squares(words, logs, tmp_path):
     out = tmp_path / "out"
-    words = [*words, "--methods", "linear", "--floor", "2", "--out", str(out)]
+    words = [*words, "--method", "linear", "--floor", "2", "--out", str(out)]
     assert main(words) == 0
     data = json.loads((out / "compare.json").read_text())
     found = data["floors"]["linear tire"]["frozen_N"]
@@ -169,7 +170,7 @@ def test_figures_are_written(result):
 
 def test_the_same_seed_finds_the_same(words, numbers, tmp_path):
     out = tmp_path / "out"
-    words = [*words, "--methods", *METHODS_TRIED, "--sweep", "5", "--floor", "0"]
+    words = [*words, "--method", *METHODS_TRIED, "--sweep", "5", "--floor", "0"]
     assert main([*words, "--out", str(out)]) == 0
     again = json.loads((out / "compare.json").read_text())
     assert again["sweep"] == numbers["sweep"]
@@ -180,9 +181,9 @@ def test_the_same_seed_finds_the_same(words, numbers, tmp_path):
 @pytest.mark.parametrize(
     ("extra", "said"),
     [
-        (["--methods", "magic"], "--methods magic is none of axle, "),
+        (["--method", "magic"], "--method magic is none of axle, "),
         (["--sweep", "-1"], "--sweep must be at least 0, it is -1"),
-        (["--workers", "0"], "--workers must be at least 1"),
+        (["--jobs", "0"], "--jobs must be at least 1"),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),
         (["slalom"], "slalom is given twice"),
         (["blind"], "blind: a comparison needs the true forces Fyf, Fyr"),
@@ -216,7 +217,7 @@ def test_a_log_needs_its_vehicle(logs, tmp_path, capsys):
 
 def test_without_a_log_the_plant_drives(tmp_path):
     out = tmp_path / "out"
-    words = ["compare", "--methods", "linear", "--floor", "0", "--workers", "1"]
+    words = ["compare", "--method", "linear", "--floor", "0", "--jobs", "1"]
     assert main([*words, "--out", str(out)]) == 0
     data = json.loads((out / "compare.json").read_text())
     assert set(data["recordings"]) == {"slalom_20", "step_steer", "lane_change", "slalom_25"}
@@ -239,3 +240,25 @@ def test_what_diverged_is_null_in_the_file_and_not_infinite():
     assert diverged == {"online": None, "in_sample": None, "other": None}
     assert compare_results._axles(INFINITE) == {"front": None, "rear": None}
     assert compare_results._percent(Shares(5.0, 6.0, None))["in_sample"] == 6.0
+
+
+@pytest.mark.parametrize(("designs", "starts"), [(0, 0), (3, 1)])
+def test_as_many_steps_are_told_of_as_are_announced(logs, designs, starts, monkeypatch, tmp_path):
+    monkeypatch.setenv("TIREID_CACHE", str(tmp_path))
+    names, told = ("linear", "stiffness_rls", "dugoff_ekf"), []
+    recordings = [read_recording(logs / f"{name}.csv") for name in ("slalom", "quick")]
+    run_comparison(
+        names,
+        sedan(),
+        recordings,
+        seed=0,
+        designs=designs,
+        starts=starts,
+        workers=1,
+        progress=told.append,
+        note=lambda _: None,
+    )
+    lengths = step_lengths(names, len(recordings), designs=designs, starts=starts)
+    assert len(told) == len(lengths)
+    swept = [length for length, text in zip(lengths, told, strict=True) if "sweep" in text]
+    assert swept == [0.0] * (designs > 0)

@@ -3,10 +3,11 @@
 import pytest
 
 from codegen import find_compiler
+from tireid import exporting as self_test
 from tireid.commands import demo_parts as demo_package
-from tireid.commands import demo_parts as self_test
-from tireid.commands.demo_parts import NOT_BUILT, SelfTestError, package_section, ship, shipped_text
+from tireid.commands.demo_parts import NOT_BUILT, package_section, ship, shipped_text
 from tireid.commands.demo_story import run_story
+from tireid.exporting import SelfTestError
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +18,7 @@ def story():
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
     """Costs on Arm have tests of their own."""
-    monkeypatch.setattr(demo_package, "measure", lambda _: [])
+    monkeypatch.setattr(demo_package, "measure", lambda *_: [])
 
 
 def test_it_compiles_passes_and_computes_what_python_computes(story, tmp_path):

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import tireid as ti
 from identifier.methods import load_model
 from models.files import digest
 from models.friction import Friction
@@ -16,9 +17,11 @@ from mpc.loop.sensing import cornering_limit
 from mpc.realtime import NoCompilerError
 from mpc.tires import oracle_tire, prediction_tire
 from tireid.cli import main
-from tireid.commands import drive_results, drive_runs
-from tireid.commands import drive_source as drive_learn
+from tireid.commands import drive_results
 from tireid.commands.drive_results import steady_curve
+from tireid.driving import learn as drive_learn
+from tireid.driving import runs as drive_runs
+from tireid.learning import identify
 
 SIDE = 3.0 * (1.0 - np.cos(np.linspace(0.0, 2.0 * np.pi, 9)))
 BEND = np.column_stack([np.linspace(0.0, 70.0, 9), SIDE])
@@ -164,7 +167,7 @@ def test_the_drive_to_learn_on_slides_but_neither_spins_nor_tips():
     slip = np.abs(recording.alpha(car.vehicle.l_f, car.vehicle.l_r)).max(axis=0)
     assert (slip > np.radians(3.5)).all()
     assert np.abs(recording.a_y).max() > 0.9 * grip
-    learnt = steady_curve("", prediction_tire(drive_learn.learn("axle", recording, sedan())), 20.0)
+    learnt = steady_curve("", prediction_tire(identify(recording, sedan()).freeze()), 20.0)
     true = steady_curve("", oracle_tire(car.vehicle, car.tire), 20.0)
     within = np.abs(true.alpha) < np.radians(4.0)
     np.testing.assert_allclose(learnt.force[within], true.force[within], atol=300.0)
@@ -227,3 +230,37 @@ def test_without_a_compiler_it_says_what_is_missing(bend, tmp_path, capsys, monk
     words = ["--path", bend, "--tires", "linear", "--out", tmp_path / "out"]
     assert "no C compiler found" in refusal(capsys, words)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_without_a_compiler_it_says_so_before_it_learns(bend, tmp_path, capsys, monkeypatch):
+    def learns(*_, **__):
+        raise AssertionError("it has begun to learn")
+
+    monkeypatch.setattr(drive_runs, "find_compiler", lambda: None)
+    monkeypatch.setattr("tireid.commands.drive_case.learning_drive", learns)
+    words = ["--path", bend, "--out", tmp_path / "out"]
+    assert "no C compiler found: the tracker cannot be built" in refusal(capsys, words)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_tires_of_another_car_lead_somewhere(bend, tmp_path, capsys):
+    """The name of a car is no difference, its mass is."""
+    car, log = sedan(), ti.sample_recording()
+    tire = ti.identify(log, car).freeze()
+    heavy = replace(tire, vehicle=replace(car, mass=1.1 * car.mass, name="heavy"))
+    heavy.save(tmp_path / "heavy.json")
+    words = ["--path", bend, "--weights", tmp_path / "heavy.json", "--out", tmp_path / "out"]
+    said = refusal(capsys, words)
+    assert "was learnt on the car 'heavy', driven is 'sedan': give that car by --vehicle" in said
+    assert "tireid init" in said and "docs/driving.md" in said
+    replace(tire, vehicle=replace(car, name="mine")).save(tmp_path / "mine.json")
+    words = ["drive", "--path", bend, "--weights", tmp_path / "mine.json", "--film", "none"]
+    assert main([str(word) for word in [*words, "--out", tmp_path / "out"]]) == 0
+
+
+def test_a_car_without_chassis_leads_to_the_table(bend, tmp_path, capsys):
+    assert main(["init", str(tmp_path / "car.toml")]) == 0
+    words = ["--path", bend, "--vehicle", tmp_path / "car.toml", "--out", tmp_path / "out"]
+    said = refusal(capsys, words)
+    assert "`tireid init car.toml` writes one" in said
+    assert "docs/driving.md (The car that is driven)" in said

@@ -7,7 +7,7 @@ import pytest
 
 from models.vehicle import sedan
 from mpc.loop import Measured
-from tireid.commands.drive_source import learning_drive
+from tireid.driving import learning_drive
 
 CAR, PERIOD, GRIP = sedan(), 0.01, 9.0
 

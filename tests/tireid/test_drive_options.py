@@ -5,8 +5,8 @@ import math
 import pytest
 
 from models.faults import SensorFault
-from tireid.commands.drive import parse_drop, parse_fault, parse_speed, require_friction
-from tireid.commands.drive_runs import SpeedWish
+from tireid.commands.drive_case import parse_drop, parse_fault, parse_speed
+from tireid.driving.setup import SpeedWish, require_friction
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,8 @@ from models.vehicle import sedan
 from mpc.path import Path
 from mpc.tires import prediction_tire
 from tireid.commands.drive_results import known_curves, steady_curve
-from tireid.commands.drive_runs import FROZEN, LEARNING, LINEAR, ORACLE, Setup, SpeedWish
+from tireid.driving import Setup, SpeedWish
+from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE
 from tireid.figures.drive import AT_THE_END
 
 CAR = sedan()

@@ -22,12 +22,12 @@ CAR = sedan()
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
     """Costs on Arm have tests of their own."""
-    monkeypatch.setattr(exporting, "measure", lambda _: [])
+    monkeypatch.setattr(exporting, "measure", lambda *_: [])
 
 
 def test_a_package_is_complete(tmp_path):
     out = tmp_path / "package"
-    assert main(["export", str(out), "--paper", "--name", "car"]) == 0
+    assert main(["export", "--out", str(out), "--paper", "--name", "car"]) == 0
     for path in (
         "include/car.h",
         "src/car.c",
@@ -48,26 +48,26 @@ def test_learnt_weights_are_shipped(tmp_path, logs):
     model = identify(recording, CAR, make_method("integral", CAR)).freeze(7.0)
     model.save(tmp_path / "weights.json")
     out = tmp_path / "package"
-    assert main(["export", str(out), "--weights", str(tmp_path / "weights.json")]) == 0
+    assert main(["export", "--out", str(out), "--weights", str(tmp_path / "weights.json")]) == 0
     weights = CompiledPackage.from_folder(out).weights
     np.testing.assert_array_equal(weights["W"], model.weights.W)
 
 
 def test_single_precision_is_the_default_of_the_build(tmp_path):
-    assert main(["export", str(tmp_path / "a"), "--single"]) == 0
+    assert main(["export", "--out", str(tmp_path / "a"), "--single"]) == 0
     assert "#define TIREID_SINGLE 1" in (tmp_path / "a" / "include" / "tireid.h").read_text()
     assert json.loads((tmp_path / "a" / "tireid.json").read_text())["precision"] == "float"
 
 
 def test_fmus_lie_beside_the_c(tmp_path):
-    assert main(["export", str(tmp_path / "a"), "--paper", "--fmu"]) == 0
+    assert main(["export", "--out", str(tmp_path / "a"), "--paper", "--fmu"]) == 0
     assert (tmp_path / "a" / "tireid_fmi2.fmu").stat().st_size > 10_000
     assert (tmp_path / "a" / "tireid_fmi3.fmu").stat().st_size > 10_000
 
 
 def test_the_frozen_network_lies_beside_the_c(tmp_path):
     pytest.importorskip("onnx", reason="needs the package onnx")
-    assert main(["export", str(tmp_path / "a"), "--paper", "--onnx"]) == 0
+    assert main(["export", "--out", str(tmp_path / "a"), "--paper", "--onnx"]) == 0
     assert (tmp_path / "a" / "tireid.onnx").stat().st_size > 500
 
 
@@ -75,15 +75,15 @@ def test_the_frozen_network_lies_beside_the_c(tmp_path):
     ("words", "complaint"),
     [
         (["--name", "No"], "name must be lower-case"),
-        (["--law", "linear"], "formula without state"),
-        (["--paper", "--law", "axle"], "--paper names the law already"),
+        (["--method", "linear"], "formula without state"),
+        (["--paper", "--method", "axle"], "give only one of --method, --paper"),
         (["--weights", "missing.json"], "missing.json"),
-        (["--law", "eso", "--onnx"], "--onnx"),
+        (["--method", "eso", "--onnx"], "--onnx"),
     ],
 )
 def test_bad_words_are_one_line_and_leave_nothing(words, complaint, tmp_path, capsys):
     out = tmp_path / "package"
-    assert main(["export", str(out), *words]) == 2
+    assert main(["export", "--out", str(out), *words]) == 2
     error = [line for line in capsys.readouterr().err.splitlines() if "error" in line]
     assert len(error) == 1
     assert complaint in error[0]
@@ -92,17 +92,17 @@ def test_bad_words_are_one_line_and_leave_nothing(words, complaint, tmp_path, ca
 
 def test_a_folder_is_replaced_only_when_told(tmp_path, capsys):
     out = tmp_path / "package"
-    assert main(["export", str(out), "--paper"]) == 0
+    assert main(["export", "--out", str(out), "--paper"]) == 0
     first = (out / "tireid.json").read_text()
-    assert main(["export", str(out), "--paper"]) == 2
+    assert main(["export", "--out", str(out), "--paper"]) == 2
     assert "add --force" in capsys.readouterr().err
-    assert main(["export", str(out), "--paper", "--force"]) == 0
+    assert main(["export", "--out", str(out), "--paper", "--force"]) == 0
     assert (out / "tireid.json").read_text() == first
 
 
 def test_missing_tools_are_said_in_the_readme(monkeypatch, tmp_path):
     monkeypatch.setattr(figures, "missing_tools", lambda: ("arm-none-eabi-gcc",))
-    assert main(["export", str(tmp_path / "a"), "--paper"]) == 0
+    assert main(["export", "--out", str(tmp_path / "a"), "--paper"]) == 0
     assert "Not measured: arm-none-eabi-gcc" in (tmp_path / "a" / "README.md").read_text()
 
 
@@ -111,10 +111,10 @@ def test_beside_a_tracker_the_identifier_lies_in_a_folder_of_its_own(monkeypatch
         return [str(path.relative_to(folder)) for path in sorted(folder.iterdir())]
 
     said = []
-    monkeypatch.setattr(exporting, "_write_tracker", seen)
+    monkeypatch.setattr(exporting, "write_tracker", seen)
     monkeypatch.setattr(export_command, "say", said.append)
     out = tmp_path / "package"
-    assert main(["export", str(out), "--paper", "--mpc"]) == 0
+    assert main(["export", "--out", str(out), "--paper", "--mpc"]) == 0
     assert said[0] == "identifier", "and nothing else, when the tracker is to be written"
     assert (out / "identifier" / "include" / "tireid.h").is_file()
     assert not (out / "include").exists()

@@ -77,7 +77,7 @@ def changed(text, key, value):
 def test_a_hostile_design_is_refused_by_its_key(capsys, tmp_path, key, value, said):
     path = tmp_path / "design.toml"
     path.write_text(changed(design_text(paper_identifier(sedan())), key, value))
-    refused(capsys, ["check", path], said)
+    refused(capsys, ["check", "--design", path], said)
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -156,7 +156,7 @@ def test_hostile_weights_are_refused_by_their_key(capsys, tmp_path, weights, key
     place[keys[-1]] = value
     path = tmp_path / "weights.json"
     path.write_text(json.dumps(data))
-    refused(capsys, ["export", tmp_path / "out", "--weights", path], said)
+    refused(capsys, ["export", "--out", tmp_path / "out", "--weights", path], said)
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -164,7 +164,7 @@ def test_hostile_weights_are_refused_by_their_key(capsys, tmp_path, weights, key
 def test_weights_that_are_no_model_are_refused(capsys, tmp_path, text):
     path = tmp_path / "weights.json"
     path.write_text(text)
-    refused(capsys, ["export", tmp_path / "out", "--weights", path], f"{path}: ")
+    refused(capsys, ["export", "--out", tmp_path / "out", "--weights", path], f"{path}: ")
 
 
 def log(path, column, value, *, rows=300):
@@ -231,7 +231,7 @@ def test_a_log_without_end_is_refused(capsys, tmp_path):
     (tmp_path / "log.csv").symlink_to("/dev/zero")
     words = ["identify", tmp_path / "log.csv", "--vehicle", tmp_path / "car.toml"]
     refused(capsys, [*words, "--out", tmp_path / "out"], "a device, pipe or socket")
-    refused(capsys, ["check", "/dev/zero"], "a device, pipe or socket")
+    refused(capsys, ["check", "--design", "/dev/zero"], "a device, pipe or socket")
 
 
 @pytest.mark.parametrize(
@@ -282,16 +282,19 @@ def test_a_network_of_impossible_weights_is_refused(capsys, tmp_path, bad, layer
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["check", "--speed", "1e300"], "v_x must lie between"),
-        (["check", "--bandwidth", "1e300"], "bandwidth must lie between"),
-        (["check", "--bandwidth", "1e-300"], "bandwidth must lie between"),
-        (["check", "--friction", "nan"], "--friction must be positive"),
-        (["check", "--noise-r", "1e308"], "noise_r must lie between"),
-        (["check", "--monte-carlo", "10000000000"], "--monte-carlo: runs must be at most 100000"),
+        (["check", "--paper", "--speed", "1e300"], "v_x must lie between"),
+        (["check", "--paper", "--bandwidth", "1e300"], "bandwidth must lie between"),
+        (["check", "--paper", "--bandwidth", "1e-300"], "bandwidth must lie between"),
+        (["check", "--paper", "--friction", "nan"], "--friction must be positive"),
+        (["check", "--paper", "--noise-r", "1e308"], "noise_r must lie between"),
+        (
+            ["check", "--paper", "--monte-carlo", "10000000000"],
+            "--monte-carlo: runs must be at most 100000",
+        ),
         (["paper", "--seeds", "10000000000"], "--seeds: runs must be at most 100000"),
         (["compare", "--sweep", "10000000000"], "--sweep: runs must be at most 100000"),
         (["compare", "--floor", "10000000000"], "--floor: runs must be at most 100000"),
-        (["compare", "--workers", "10000000"], "--workers: processes must be at most 256"),
+        (["compare", "--jobs", "10000000"], "--jobs: processes must be at most 256"),
     ],
 )
 def test_numbers_of_the_command_line_are_bounded(capsys, tmp_path, words, said):
@@ -309,9 +312,9 @@ def test_a_limit_that_is_raised_lets_the_file_in(tmp_path, monkeypatch):
     text = design_text(replace(paper_identifier(sedan()), network=Network(hidden=128)))
     path = tmp_path / "design.toml"
     path.write_text(changed(text, "hidden", "129"))
-    assert main(["check", str(path)]) == 2
+    assert main(["check", "--design", str(path)]) == 2
     monkeypatch.setenv("TIREID_LIMITS", "hidden=129")
-    assert main(["check", str(path)]) in (0, 1)
+    assert main(["check", "--design", str(path)]) in (0, 1)
 
 
 def test_a_compiler_that_refuses_is_one_line(capsys, tmp_path, monkeypatch):
@@ -326,7 +329,7 @@ def test_a_compiler_that_refuses_is_one_line(capsys, tmp_path, monkeypatch):
     monkeypatch.setattr("tireid.exporting.build_package", compiles)
     compiler.find_compiler.cache_clear()
     try:
-        assert main(["export", str(tmp_path / "out")]) == 2
+        assert main(["export", "--out", str(tmp_path / "out")]) == 2
     finally:
         compiler.find_compiler.cache_clear()
     said = capsys.readouterr().err.splitlines()[-1]
@@ -341,8 +344,7 @@ def test_figures_are_not_left_where_the_design_cannot_be_written(capsys, tmp_pat
     monkeypatch.setattr("tireid.commands.check.write_atomically", full)
     monkeypatch.setattr("tireid.commands.check.draw_check", _drawn, raising=False)
     monkeypatch.setattr("tireid.commands.check.draw_check", _drawn)
-    figures = tmp_path / "figures"
-    words = ["check", "--design", "--out", tmp_path / "d.toml", "--figures", figures]
+    words = ["check", "--tune", tmp_path / "d.toml", "--out", tmp_path / "judged"]
     refused(capsys, words, "no space left on device")
     assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == []
 

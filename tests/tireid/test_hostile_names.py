@@ -35,8 +35,8 @@ NAMES = {
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    monkeypatch.setattr(exporting, "measure", lambda _: [])
-    monkeypatch.setattr(figures, "measure", lambda _: [])
+    monkeypatch.setattr(exporting, "measure", lambda *_: [])
+    monkeypatch.setattr(figures, "measure", lambda *_: [])
 
 
 def car_called(name, folder):
@@ -70,7 +70,7 @@ def built(folder):
 def test_a_package_is_built_and_nothing_else_is_run(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     out = tmp_path / "out"
-    assert main(["export", str(out), "--vehicle", str(car_called(name, tmp_path))]) == 0
+    assert main(["export", "--out", str(out), "--vehicle", str(car_called(name, tmp_path))]) == 0
     built(out)
     assert not list(tmp_path.rglob("ran"))
     assert json.loads((out / "tireid.json").read_text())["vehicle"]["name"] == name
@@ -85,10 +85,10 @@ def test_identifier_and_tracker_are_built_and_nothing_else_is_run(tmp_path, monk
     if find_compiler() is None:
         pytest.skip("needs a C compiler")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("tireid.commands.export.measure_mpc", lambda _: [])
+    monkeypatch.setattr("tireid.exporting.measure_mpc", lambda _: [])
     out = tmp_path / "out"
     car = car_called(CONSTRUCTOR + ORDER + "@title@", tmp_path)
-    assert main(["export", str(out), "--mpc", "--paper", "--vehicle", str(car)]) == 0
+    assert main(["export", "--out", str(out), "--mpc", "--paper", "--vehicle", str(car)]) == 0
     for part in (out, out / "mpc", out / "identifier"):
         words = ["cmake", "-S", str(part), "-B", str(tmp_path / f"build-{part.name}")]
         answer = subprocess.run(words, capture_output=True, text=True, check=False)
@@ -104,7 +104,7 @@ def test_an_fmu_is_loaded_and_nothing_in_it_is_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     out = tmp_path / "out"
     car = car_called(CONSTRUCTOR, tmp_path)
-    assert main(["export", str(out), "--fmu", "--vehicle", str(car)]) == 0
+    assert main(["export", "--out", str(out), "--fmu", "--vehicle", str(car)]) == 0
     for version in (2, 3):
         fmu = out / f"tireid_fmi{version}.fmu"
         assert fmpy.simulate_fmu(str(fmu), stop_time=0.1) is not None
@@ -121,7 +121,7 @@ def test_no_name_and_no_word_commands_the_terminal(tmp_path, capsys, monkeypatch
     log = tmp_path / f"log{bell}.csv"
     log.write_text(f"t,vx{bell}\n0,1\n")
     assert main(["check", "--vehicle", str(car)]) in (0, 1)
-    assert main(["check", str(tmp_path / f"no{bell}.toml")]) == 2
+    assert main(["check", "--design", str(tmp_path / f"no{bell}.toml")]) == 2
     assert main(["identify", str(log), "--vehicle", str(car), "--out", "out"]) == 2
     assert main(["--debug", "identify", str(log), "--vehicle", str(car), "--out", "out"]) == 2
     with pytest.raises(SystemExit):

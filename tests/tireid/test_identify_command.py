@@ -273,17 +273,18 @@ def test_a_design_from_a_file_is_the_one_that_runs(logs, tmp_path, capsys):
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert (summary["law"], summary["seed"]) == ("instantaneous", 3)
     assert summary["gains"]["eta_W"] == 12.5
-    for extra in (["--law", "integral"], ["--seed", "0"]):
-        assert f"{extra[0]} is for the default design" in refusal(
-            capsys, [*words[:-1], tmp_path / "other", *extra]
-        )
+    for extra, said in (
+        (["--method", "integral"], "give only one of --method, --design"),
+        (["--seed", "0"], f"--seed goes with a method: that of {design} stands in it"),
+    ):
+        assert said in refusal(capsys, [*words[:-1], tmp_path / "other", *extra])
 
 
 def test_a_seed_that_would_change_nothing_is_refused(logs, tmp_path, capsys):
     words = ["identify", logs / "slalom.csv", "--vehicle", logs / "car.toml", "--seed", "3"]
     words += ["--out", tmp_path / "out"]
     assert "axle begins with none" in refusal(capsys, words)
-    assert "linear begins with none" in refusal(capsys, [*words, "--law", "linear"])
+    assert "linear begins with none" in refusal(capsys, [*words, "--method", "linear"])
     for name, factory in METHODS.items():  # what is told is what is so
         drawn = factory(sedan(), 0) != factory(sedan(), 1)
         assert draws_weights(name) == drawn, name
@@ -351,7 +352,7 @@ def test_a_log_in_degrees_is_refused_by_its_column(logs, tmp_path, capsys):
 def test_learning_goes_on_from_stored_weights(result, law, logs, tmp_path):
     """What was learnt on the slalom serves from the first sample of the next drive."""
     words = ["identify", str(logs / "quick.csv"), "--vehicle", str(logs / "car.toml")]
-    words += ["--law", law]
+    words += ["--method", law]
     errors = {}
     for name, more in (("afresh", []), ("stored", ["--weights", str(result / "weights.json")])):
         assert main([*words, *more, "--out", str(tmp_path / name)]) == 0
@@ -363,7 +364,7 @@ def test_learning_goes_on_from_stored_weights(result, law, logs, tmp_path):
 @pytest.mark.parametrize("layer", ["W", "V"])
 def test_resumed_weights_beyond_what_is_proven_are_told(logs, tmp_path, capsys, layer):
     """On either side of the bound that `tireid check` states of the same gains."""
-    check = ["check", "--vehicle", str(logs / "car.toml"), "--json"]
+    check = ["check", "--paper", "--vehicle", str(logs / "car.toml"), "--json"]
     assert main(check) == 0
     name = {"W": "weight_bound", "V": "V_bound"}[layer]
     bound = json.loads(capsys.readouterr().out)["properties"][name]["value"]
@@ -396,13 +397,20 @@ def test_weights_of_another_structure_are_refused(logs, tmp_path, capsys, result
     words = ["identify", logs / "quick.csv", "--vehicle", logs / "car.toml"]
     words += ["--out", tmp_path / "out"]
     other = "integral" if law == "axle" else "axle"
-    said = refusal(capsys, [*words, "--law", other, "--weights", result / "weights.json"])
+    said = refusal(capsys, [*words, "--method", other, "--weights", result / "weights.json"])
     assert "the stored weights are of another structure" in said
     assert not (tmp_path / "out").exists()
 
 
 def test_a_filter_of_forces_has_nothing_to_freeze(logs, tmp_path, capsys):
-    words = ["identify", logs / "quick.csv", "--vehicle", logs / "car.toml", "--law", "ekf_force"]
+    words = [
+        "identify",
+        logs / "quick.csv",
+        "--vehicle",
+        logs / "car.toml",
+        "--method",
+        "ekf_force",
+    ]
     assert "not a tire" in refusal(capsys, [*words, "--out", tmp_path / "out"])
     assert list(tmp_path.iterdir()) == []
 
@@ -416,7 +424,16 @@ def test_a_recorded_car_is_identified_by_every_law(shared_data, tmp_path, name):
         "cornering_stiffness_front = 110e3\ncornering_stiffness_rear = 130e3\n"
     )
     log = shared_data / "carmaker.csv.gz"
-    words = ["identify", str(log), "--run", "slalom1_14_5ms", "--vehicle", str(car), "--law", name]
+    words = [
+        "identify",
+        str(log),
+        "--run",
+        "slalom1_14_5ms",
+        "--vehicle",
+        str(car),
+        "--method",
+        name,
+    ]
     words += ["--replay", f"{log}:experiment2_40kmh", "--out", str(tmp_path / "out")]
     assert main(words) == 0
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())

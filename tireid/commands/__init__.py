@@ -13,8 +13,10 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
     {
         "demo": "the whole story on the built-in car, with a report",
         "sample": "a log to learn from, driven by the built-in car, where there is none",
+        "init": "a commented vehicle file to fill in",
         "paper": "Tables I and II of the paper, beside ours, over many seeds",
         "identify": "learn tire forces from a recording, freeze the weights and test them",
+        "predict": "axle forces of a drive by a stored model, and what they miss",
         "compare": "learn, freeze and replay with every method, side by side",
         "check": "certificate of a design: margins, bounds, advice; or a design from a bandwidth",
         "export": "the identifier as clean C for a microcontroller, as FMU and ONNX for simulators",

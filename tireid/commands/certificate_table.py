@@ -1,19 +1,19 @@
 """A certificate as a person reads it: a table with a line of advice for what does not pass."""
 
 import math
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.methods import certify
+from identifier.methods import DEFAULT, certify
 from identifier.paper.design import Driving, PaperIdentifier
 from identifier.paper.network import Weights
 from identifier.stability import Certificate, Property
 from identifier.stability.monte_carlo import Observed
 from models.vehicle import Vehicle
 from tireid.figures.style import force_unit_name
+from tireid.output import text_table
 
 ROUNDING = 1e-9  # of weights that lie on their projection, in parts of its radius
 HEADER = ("property", "value", "limit", "margin", "")
@@ -62,11 +62,39 @@ def certificate_text(certificate: Certificate, force_unit: float) -> str:
     force_unit : the unit U of the design [N].
     """
     rows = [list(HEADER), *certificate_rows(certificate, force_unit)]
-    width = [max(len(row[i]) for row in rows) for i in range(len(HEADER))]
-    lines = [_line(row, width) for row in rows]
+    lines = [text_table(rows, "<>>><")]
     lines += [f"{e.status}: {e.title}: {e.advice}" for e in advised(certificate)]
     lines += [f"note: {note}" for note in notes(certificate)]
     return "\n".join([*lines, f"verdict: {certificate.verdict}"])
+
+
+def held_text(name: str, certificate: Certificate, vehicle: Vehicle) -> str:
+    """Return what is certified of a method without gains: its boxes, and what is not proven.
+
+    Parameters
+    ----------
+    name : of the method.
+    certificate : what is proven of it.
+    vehicle : the car.
+    """
+    default = ", the default of tireid identify" if name == DEFAULT else ""
+    rows = [
+        [f"  {title}", " to ".join(number(one) for one in np.atleast_1d(value))]
+        for title, value in certificate.held.items()
+    ]
+    lines = [f"{vehicle.name}: {name}{default}"]
+    if rows:
+        lines += ["held after every sample, by construction, whatever is measured:"]
+        lines += [text_table(rows)]
+    else:
+        lines += ["nothing is held by construction"]
+    return "\n".join(
+        [
+            *lines,
+            f"verdict: {certificate.verdict}; no margin and no bound of its error is proven, of "
+            "the paper's laws there are: tireid check --paper",
+        ]
+    )
 
 
 def advised(certificate: Certificate) -> list[Property]:
@@ -161,13 +189,6 @@ def number(value: float | None) -> str:
     return "inf" if math.isinf(value) else f"{value:.4g}"
 
 
-def _line(row: Sequence[str], width: Sequence[int]) -> str:
-    first, *others = row
-    cells = [first.ljust(width[0])]
-    cells += [cell.rjust(w) for cell, w in zip(others[:-1], width[1:-1], strict=True)]
-    return "  ".join([*cells, others[-1]]).rstrip()
-
-
 # `tireid check --monte-carlo`: the proven bounds beside what happened on random drives.
 
 TOLERANCE = 1e-9  # of rounding, in parts of a bound
@@ -236,18 +257,12 @@ def monte_carlo_text(rows: list[Row], observed: Observed, seed: int, force_unit:
     ]
     if not rows:
         return "\n".join([*lines, "nothing is proven of these gains that a drive could contradict"])
-    lines.append(
-        f"{'proven bound':42} {'value':>9} {'largest':>9} {'passed':>7}   over seen: "
-        f"{'least':>7} {'median':>7} {'90 %':>7}"
-    )
+    table = [["proven bound", "value", "largest", "passed", "over seen: least", "median", "90 %"]]
     for row in rows:
         title = f"{row.title} [{unit_text(row.unit, force_unit)}]"
-        ratios = " ".join(f"{number(value):>7}" for value in row.tightness)
-        lines.append(
-            f"{title:42} {number(row.bound):>9} {number(row.largest):>9} {row.passed:>7}   "
-            f"{'':10} {ratios}"
-        )
-    return "\n".join(lines)
+        cells = [number(row.bound), number(row.largest), str(row.passed)]
+        table.append([title, *cells, *(number(value) for value in row.tightness)])
+    return "\n".join([*lines, text_table(table, "<>>>>>>")])
 
 
 def monte_carlo_numbers(rows: list[Row], observed: Observed, seed: int) -> dict[str, Any]:

@@ -1,13 +1,13 @@
-"""`tireid check [design.toml]`: is a set of gains safe to drive with, and which would be better?"""
+"""`tireid check`: what is certified of an identifier, and which gains would be better?"""
 
 import argparse
 import json
 import math
 import shlex
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import asdict, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -19,10 +19,10 @@ from identifier.defaults import (
     design_for,
     natural_driving,
     natural_operation,
-    paper_identifier,
 )
-from identifier.methods import DEFAULT
-from identifier.paper.design import Driving, PaperIdentifier, design_text, read_design
+from identifier.method import vehicle_numbers
+from identifier.methods import REFERENCE, certify
+from identifier.paper.design import Driving, PaperIdentifier, design_text
 from identifier.paper.laws import DRIVING_ERRORS, Gains
 from identifier.run import identify
 from identifier.stability import Certificate, DesignError, Operation
@@ -34,20 +34,32 @@ from identifier.stability.operation import proven_bounds
 from models.files import write_atomically
 from models.recordings import Recording
 from models.schema import require_few
-from models.vehicle import Vehicle, sedan
+from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import (
     bound_rows,
     certificate_of,
     certificate_text,
+    held_text,
     monte_carlo_numbers,
     monte_carlo_text,
     unit_text,
 )
-from tireid.commands.options import read_log
+from tireid.commands.options import (
+    Chosen,
+    add_method,
+    add_output,
+    add_seed,
+    add_vehicle,
+    chosen_method,
+    method_is_given,
+    read_log,
+    read_vehicle,
+    seed_of,
+)
 from tireid.figures import error_figure, locus_figure, save_figure
-from tireid.output import OutputError
-from tireid.progress import Stopwatch, say, tell
+from tireid.output import OutputError, output_folder, write_json
+from tireid.progress import Progress, say, tell
 
 # The figures of `tireid check`: root locus with its margin, bounds against a real error.
 
@@ -118,6 +130,8 @@ CONDITIONS = {  # field of the declared driving, and the option that says otherw
     "noise_r": "noise_r",
     "noise_delta": "noise_delta",
 }
+OF_GAINS = (*CONDITIONS.values(), "log", "monte_carlo")  # options that ask about the paper's gains
+TEXT, NUMBERS = "certificate.txt", "certificate.json"
 
 
 def add_parser(commands: Any) -> None:
@@ -130,15 +144,14 @@ def add_parser(commands: Any) -> None:
     parser = commands.add_parser(
         "check",
         help=COMMANDS["check"],
-        description="Judge the gains of DESIGN at the worst regressor: poles, sampling, gain and "
-        "phase margin, damping, drift, proven bounds. Exit code 0: pass or warn, 1: fails, 2: bad "
-        "input. With --design, find gains instead and write them.",
+        description="Say what is certified of an identifier; without options, of the default of "
+        "tireid identify. Gains of the paper's laws (--paper, --method NAME, --design FILE) are "
+        "judged at the worst regressor: poles, sampling, gain and phase margin, damping, drift, "
+        "proven bounds. Exit code 0: nothing fails, 1: something does, 2: bad input. With --tune, "
+        "find gains and write them.",
     )
-    parser.add_argument(
-        "file", nargs="?", type=Path, metavar="DESIGN", help="design.toml (the default design)"
-    )
-    parser.add_argument("--vehicle", type=Path, metavar="FILE", help="car as TOML (the sedan)")
-    parser.add_argument("--law", choices=LAWS, help="law of the default design or of --design")
+    add_vehicle(parser)
+    add_method(parser)
     parser.add_argument(
         "--bandwidth", type=float, metavar="HZ", help=f"of the steering ({BANDWIDTH:g} Hz)"
     )
@@ -156,24 +169,22 @@ def add_parser(commands: Any) -> None:
         metavar="N",
         help="run N random drives within what is judged: is a proven bound ever passed?",
     )
-    parser.add_argument("--seed", type=int, metavar="N", help="of --monte-carlo (0)")
+    add_seed(parser, "--monte-carlo")
     parser.add_argument("--json", action="store_true", help="print the certificate as JSON")
-    parser.add_argument("--figures", type=Path, metavar="DIR", help="draw root locus and bounds")
-    parser.add_argument("--design", action="store_true", help="find gains and write them")
     parser.add_argument(
-        "--phase-margin", type=float, metavar="DEG", help=f"for --design ({PHASE_MARGIN:g} deg)"
+        "--tune", type=Path, metavar="FILE", help="find gains and write them, for --design FILE"
+    )
+    parser.add_argument(
+        "--phase-margin", type=float, metavar="DEG", help=f"for --tune ({PHASE_MARGIN:g} deg)"
     )
     parser.add_argument(
         "--keep",
         choices=KEEPINGS,
-        help="for --design: what keeps the weights over hours, the paper's leakage (which forgets "
+        help="for --tune: what keeps the weights over hours, the paper's leakage (which forgets "
         "them), a leakage with a dead zone, or a projection in its place "
         f"({DEFAULT_KEEPING})",
     )
-    parser.add_argument(
-        "--out", type=Path, metavar="FILE", help="for --design: file to write (design.toml)"
-    )
-    parser.add_argument("--force", action="store_true", help="replace the files if they exist")
+    add_output(parser, None)
     parser.set_defaults(run=run)
 
 
@@ -185,75 +196,111 @@ def run(options: argparse.Namespace) -> int:
     options : parsed arguments.
     """
     _require_sense(options)
-    vehicle = sedan() if options.vehicle is None else Vehicle.from_toml(options.vehicle)
-    stored = None if options.file is None else read_design(options.file)
-    driving = _driving(options, stored, vehicle)
-    design = _design(options, vehicle, driving) if stored is None else stored
+    vehicle = read_vehicle(options)
+    name, method = _method(options, vehicle)
+    if isinstance(method, PaperIdentifier):
+        return _judge_gains(options, vehicle, method)
+    _refuse_gains(options, name)
+    certificate = certify(method, vehicle)
+    text = _with_estimates(held_text(name, certificate, vehicle), vehicle)
+    numbers = {"method": name, **certificate.to_dict(), "vehicle": vehicle_numbers(vehicle)}
+    if options.out is not None:
+        with output_folder(options.out, force=options.force) as folder:
+            _write_certificate(folder, text, numbers)
+    tell(json.dumps(numbers, indent=2) if options.json else text)
+    _say_written(options)
+    return 0
+
+
+def _method(options: argparse.Namespace, vehicle: Vehicle) -> Chosen:
+    """Return what is judged; gains that are to be found are those of a law of the paper."""
+    if options.tune is None:
+        return chosen_method(options, vehicle)
+    if options.design is not None:
+        raise ValueError("--tune finds gains: give no --design FILE to judge with it")
+    law = options.method or REFERENCE
+    if law not in LAWS:
+        raise ValueError(f"--tune finds gains of {', '.join(LAWS)}, {law} has none")
+    if law == "instantaneous_scaled":
+        raise ValueError("--method instantaneous_scaled is a control, tune one of the others")
+    driving = replace(natural_driving(vehicle), **_overrides(options))
+    margin = options.phase_margin or PHASE_MARGIN
+    found = design_for(vehicle, driving, law=law, phase_margin=margin)
+    known = natural_operation(found, vehicle, driving)
+    return Chosen(law, with_keeping(found, known, options.keep or DEFAULT_KEEPING))
+
+
+def _refuse_gains(options: argparse.Namespace, name: str) -> None:
+    for option in OF_GAINS:
+        if getattr(options, option) is not None:
+            raise ValueError(
+                f"--{option.replace('_', '-')} asks about the gains of the paper's laws, which "
+                f"{name} has not: add --paper, --method {'|'.join(LAWS)} or --design FILE"
+            )
+
+
+def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIdentifier) -> int:
+    """Judge the gains of a law of the paper, tell and write what is asked for."""
+    driving = _driving(options, design, vehicle)
+    if options.design is None:
+        design = replace(design, driving=driving)
     certificate = certificate_of(design, vehicle, driving)
-    drive = _read(options.log, vehicle, design)
+    drive = None if options.log is None else read_log(options.log, vehicle, dt=design.dt)
     _require_free(options)
     observed = _drive(options, vehicle, driving, design, certificate)
     rows = [] if observed is None else bound_rows(certificate, observed)
     passed = any(row.passed for row in rows) or (observed is not None and observed.diverged > 0)
-    seed = options.seed or 0
-    if options.json:
-        numbers = {"conditions": asdict(driving), **certificate.to_dict()}
-        if observed is not None:
-            numbers["monte_carlo"] = monte_carlo_numbers(rows, observed, seed)
-        told = [json.dumps(numbers, indent=2)]
-    else:
-        told = []
-        if options.file is None:
-            law = f"{DEFAULT}, the default of tireid identify: not certified"
-            told.append(f"judged is the paper's law; {law}")
-        told.append(_conditions(design, vehicle, driving, _said(options, design, driving)))
-        told.append(certificate_text(certificate, design.force_unit))
-        if drive is not None:
-            told.append(_along(drive, vehicle, design))
-        if observed is not None:
-            told.append(monte_carlo_text(rows, observed, seed, design.force_unit))
-        if certificate.verdict != "pass" and not options.design:
-            told.append(_proposal(options, design, vehicle, driving))
-    status = _finish(options, vehicle, driving, design, certificate, drive)
-    for text in told:  # once nothing can fail any more
-        tell(text)
-    return status or FAILS * passed
+    numbers = {
+        "method": design.law,
+        "conditions": asdict(driving),
+        **certificate.to_dict(),
+        "vehicle": vehicle_numbers(vehicle),
+    }
+    texts = [
+        _conditions(design, vehicle, driving, _said(options, design, driving)),
+        certificate_text(certificate, design.force_unit),
+    ]
+    if drive is not None:
+        texts.append(_along(drive, vehicle, design))
+    if observed is not None:
+        numbers["monte_carlo"] = monte_carlo_numbers(rows, observed, seed_of(options))
+        texts.append(monte_carlo_text(rows, observed, seed_of(options), design.force_unit))
+    if certificate.verdict != "pass" and options.tune is None and not options.json:
+        texts.append(_proposal(options, design, vehicle, driving))
+    text = _with_estimates("\n".join(texts), vehicle)
+    with ExitStack() as stack:  # where a part fails, none is there
+        if options.out is not None:
+            folder = stack.enter_context(output_folder(options.out, force=options.force))
+            _write_certificate(folder, text, numbers)
+            _draw(folder, vehicle, driving, design, certificate, drive)
+        if options.tune is not None:
+            write_atomically(options.tune, design_text(design))
+    tell(json.dumps(numbers, indent=2) if options.json else text)
+    _say_written(options)
+    return FAILS if certificate.verdict == "fail" or passed else 0
 
 
-def _finish(
-    options: argparse.Namespace,
-    vehicle: Vehicle,
-    driving: Driving,
-    design: PaperIdentifier,
-    certificate: Certificate,
-    drive: Recording | None,
-) -> int:
-    """Write what was asked for; return the exit code. Where a part fails, none is there."""
-    with ExitStack() as stack:
-        drawn = None
-        if options.figures:
-            options.figures.mkdir(parents=True, exist_ok=True)
-            scratch = TemporaryDirectory(prefix=".tireid-", dir=options.figures)
-            drawn = Path(stack.enter_context(scratch))
-            _draw(drawn, vehicle, driving, design, certificate, drive)
-        if options.design:
-            _write(options, design)
-        if drawn is not None:
-            for name in FIGURES:
-                (drawn / name).replace(options.figures / name)
-                say(f"wrote {options.figures / name}")
-    return FAILS if certificate.verdict == "fail" else 0
+def _with_estimates(text: str, vehicle: Vehicle) -> str:
+    return "\n".join(part for part in (text, vehicle.estimates) if part)
+
+
+def _write_certificate(folder: Path, text: str, numbers: Mapping[str, Any]) -> None:
+    write_json(folder / NUMBERS, numbers)
+    (folder / TEXT).write_text(f"{text}\n", encoding="utf-8")
+
+
+def _say_written(options: argparse.Namespace) -> None:
+    for what in (options.tune, None if options.out is None else f"{options.out}/"):
+        if what is not None:
+            say(f"wrote {what}")
 
 
 def _require_sense(options: argparse.Namespace) -> None:
-    if options.design and options.file is not None:
-        raise ValueError("--design finds gains: give no DESIGN file to judge with it")
-    if options.file is not None and options.law is not None:
-        raise ValueError("--law is for the default design: the law stands in the DESIGN file")
-    if not options.design:
-        for name in ("phase_margin", "keep", "out"):
+    method_is_given(options)
+    if options.tune is None:
+        for name in ("phase_margin", "keep"):
             if getattr(options, name) is not None:
-                raise ValueError("--phase-margin, --keep and --out go with --design")
+                raise ValueError("--phase-margin and --keep go with --tune FILE")
     for name in ("bandwidth", "speed", "slip", "friction", "phase_margin"):
         value = getattr(options, name)
         if value is not None and not 0.0 < value < float("inf"):
@@ -262,8 +309,9 @@ def _require_sense(options: argparse.Namespace) -> None:
         value = getattr(options, name)
         if value is not None and not 0.0 <= value < float("inf"):
             raise ValueError(f"--{name.replace('_', '-')} must not be negative, it is {value:g}")
-    if options.seed is not None and (options.monte_carlo is None or options.seed < 0):
-        raise ValueError("--seed, not negative, goes with --monte-carlo")
+    if options.seed is not None and options.monte_carlo is None:
+        raise ValueError("--seed goes with --monte-carlo")
+    seed_of(options)
     if options.monte_carlo is not None and options.monte_carlo < 1:
         raise ValueError(f"--monte-carlo must be at least 1, it is {options.monte_carlo}")
     require_few(ValueError, "--monte-carlo", options.monte_carlo or 0, "runs", "runs")
@@ -271,12 +319,9 @@ def _require_sense(options: argparse.Namespace) -> None:
         raise ValueError(f"--slip must be in rad and below 1, it is {options.slip:g}")
 
 
-def _driving(
-    options: argparse.Namespace, design: PaperIdentifier | None, vehicle: Vehicle
-) -> Driving:
+def _driving(options: argparse.Namespace, design: PaperIdentifier, vehicle: Vehicle) -> Driving:
     """Return what the design declares, or what is natural for the car, with the options over it."""
-    declared = None if design is None else design.driving
-    return replace(declared or natural_driving(vehicle), **_overrides(options))
+    return replace(design.driving or natural_driving(vehicle), **_overrides(options))
 
 
 def _overrides(options: argparse.Namespace) -> dict[str, float]:
@@ -287,7 +332,7 @@ def _overrides(options: argparse.Namespace) -> dict[str, float]:
 def _said(options: argparse.Namespace, design: PaperIdentifier, driving: Driving) -> str:
     """Return where the conditions come from."""
     changed = ", ".join(f"--{CONDITIONS[field].replace('_', '-')}" for field in _overrides(options))
-    if options.file is None:
+    if options.design is None:
         return "conditions: of the car" + (f", but for {changed}" if changed else "")
     if design.driving is None:
         told = "conditions: none stored in the design, those of the car"
@@ -295,18 +340,6 @@ def _said(options: argparse.Namespace, design: PaperIdentifier, driving: Driving
     if driving == design.driving:
         return "conditions: as stored in the design"
     return f"conditions: as stored in the design, but for {changed}: not the file's own verdict"
-
-
-def _design(options: argparse.Namespace, vehicle: Vehicle, driving: Driving) -> PaperIdentifier:
-    law = options.law or "integral"
-    if options.design:
-        if law == "instantaneous_scaled":
-            raise ValueError("--law instantaneous_scaled is a control, design one of the others")
-        margin = options.phase_margin or PHASE_MARGIN
-        found = design_for(vehicle, driving, law=law, phase_margin=margin)
-        known = natural_operation(found, vehicle, driving)
-        return with_keeping(found, known, options.keep or DEFAULT_KEEPING)
-    return replace(paper_identifier(vehicle, law=law), driving=driving)
 
 
 def _drive(
@@ -319,21 +352,22 @@ def _drive(
     """Run the random drives of --monte-carlo; None where there are none."""
     if options.monte_carlo is None:
         return None
-    watch, count = Stopwatch(), options.monte_carlo
+    count = options.monte_carlo
     known = {entry.name: entry.value for entry in certificate.properties}
     kept = min(known.get("weight_bound", math.inf), design.gains.W_max)
-    return monte_carlo(
-        design,
-        vehicle,
-        driving,
-        count,
-        beginning=Beginning(
-            W=kept if math.isfinite(kept) else 0.0,
-            V=min(natural_operation(design, vehicle, driving).V_start, design.gains.V_max),
-        ),
-        rng=np.random.default_rng(options.seed or 0),
-        progress=lambda done: say(f"{done} of {count} random drives, {watch.seconds:.1f} s"),
-    )
+    with Progress(f"{count} random drives") as progress:
+        return monte_carlo(
+            design,
+            vehicle,
+            driving,
+            count,
+            beginning=Beginning(
+                W=kept if math.isfinite(kept) else 0.0,
+                V=min(natural_operation(design, vehicle, driving).V_start, design.gains.V_max),
+            ),
+            rng=np.random.default_rng(seed_of(options)),
+            progress=lambda done: progress(done / count),
+        )
 
 
 def _conditions(design: PaperIdentifier, vehicle: Vehicle, driving: Driving, said: str) -> str:
@@ -356,10 +390,6 @@ def _radii(gains: Gains) -> str:
     """Return the balls that the weights are kept in, as far as there are any."""
     radii = {name: getattr(gains, name) for name in ("W_free", "V_free", "W_max", "V_max")}
     return "".join(f", {name} {r:.4g}" for name, r in radii.items() if 0.0 < r < math.inf)
-
-
-def _read(log: str | None, vehicle: Vehicle, design: PaperIdentifier) -> Recording | None:
-    return None if log is None else read_log(log, vehicle, dt=design.dt)
 
 
 def _along(recording: Recording, vehicle: Vehicle, design: PaperIdentifier) -> str:
@@ -398,7 +428,7 @@ def _proposal(
         f"proposal ({verdict}): A_d = -{-gains.A_d[0][0]:.4g} I, lambda {gains.forgetting:.4g}, "
         f"eta_W {gains.eta_W:.4g}, eta_V {gains.eta_V:.4g}, rho_W {gains.rho_W:.4g}, rho_V "
         f"{gains.rho_V:.4g}{_radii(gains)}{f', lead {gains.lead:.4g}' if gains.lead else ''}\n"
-        f"write it with: tireid check --design --law {design.law}{_given(options)}"
+        f"write it with: tireid check --tune design.toml --method {design.law}{_given(options)}"
     )
 
 
@@ -427,19 +457,5 @@ def _draw(
 
 
 def _require_free(options: argparse.Namespace) -> None:
-    targets = [options.figures / name for name in FIGURES] if options.figures else []
-    if options.design:
-        targets.append(_target(options))
-    for target in targets:
-        if target.exists() and not options.force:
-            raise OutputError(f"{target} exists: choose another, or add --force to replace it")
-
-
-def _target(options: argparse.Namespace) -> Path:
-    return options.out or Path("design.toml")
-
-
-def _write(options: argparse.Namespace, design: PaperIdentifier) -> None:
-    target = _target(options)
-    write_atomically(target, design_text(design))
-    say(f"wrote {target}")
+    if options.tune is not None and options.tune.exists() and not options.force:
+        raise OutputError(f"{options.tune} exists: choose another, or add --force to replace it")

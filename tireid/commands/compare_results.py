@@ -22,7 +22,7 @@ from identifier.method import vehicle_numbers
 from identifier.reproducibility import AxleRmse
 from tireid import __version__
 from tireid.figures import matrix_figure, methods_figure, pareto_figure, save_figure
-from tireid.output import write_json
+from tireid.output import text_table, write_json
 from tireid.progress import say
 
 # The tables of `tireid compare` as text: percent of the rms force and newtons, front and rear.
@@ -162,9 +162,7 @@ def _mean(comparison: Comparison, pairs: list[tuple[str, AxleRmse]]) -> str:
 
 
 def _text(title: str, lines: list[list[str]]) -> str:
-    widths = [max(len(row[i]) for row in lines) for i in range(len(lines[0]))]
-    rows = ["  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)) for row in lines]
-    return "\n".join([title, *(f"  {row.rstrip()}" for row in rows), ""])
+    return "\n".join([title, text_table(lines, indent="  "), ""])
 
 
 Row = tuple[str | float | int, ...]
@@ -179,7 +177,9 @@ def write_comparison(folder: Path, comparison: Comparison) -> None:
     comparison : the methods.
     """
     write_json(folder / "compare.json", comparison_numbers(comparison))
-    (folder / "tables.txt").write_text(comparison_text(comparison) + pair_tables(comparison))
+    (folder / "tables.txt").write_text(
+        comparison_text(comparison) + pair_tables(comparison), encoding="utf-8"
+    )
     _write_rows(folder / "compare.csv", ERROR_COLUMNS, _error_rows(comparison))
     if comparison.sweeps:
         _write_rows(folder / "sweep.csv", SWEEP_COLUMNS, _sweep_rows(comparison))
@@ -350,7 +350,7 @@ def _words(values: Mapping[str, float]) -> str:
 
 
 def _write_rows(path: Path, columns: tuple[str, ...], rows: Iterator[Row]) -> None:
-    with path.open("w", newline="") as file:
+    with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         for row in rows:

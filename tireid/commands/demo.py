@@ -1,11 +1,12 @@
 """`tireid demo`: the whole story on the built-in car, in a minute, with a report."""
 
 import argparse
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from identifier.defaults import natural_operation
-from identifier.paper_study import GAINS, NETWORK, Study, run_study
+from identifier.paper_study import GAINS, NETWORK, STEPS, Study, run_study
 from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import (
     HEADER,
@@ -26,8 +27,9 @@ from tireid.commands.demo_parts import (
     ship,
     shipped_text,
 )
-from tireid.commands.demo_story import FREEZE, SPEED, Story, run_story
+from tireid.commands.demo_story import FREEZE, PREDICT, SPEED, Story, run_story
 from tireid.commands.identify_results import write_results
+from tireid.commands.options import add_output
 from tireid.commands.paper import (
     MEANING,
     MEASURES_MEAN,
@@ -40,7 +42,7 @@ from tireid.commands.paper import (
 )
 from tireid.figures import figure_png, side_by_side_figure
 from tireid.output import output_folder
-from tireid.progress import Stopwatch, say, tell
+from tireid.progress import Progress, Stopwatch, tell
 from tireid.report import Paragraph, Picture, Section, Table, write_report
 
 # The demo's report: what was driven, learnt, frozen and predicted, in order.
@@ -282,6 +284,10 @@ SUMMARY = (
     "steers."
 )
 SEEDS = 20
+LEARNING, EXPORTING = "driving the sedan, learning, predicting", "as C, compiled and tested"
+TESTING, DRIVING = "the frozen-weight test of the paper", "driving on what was learnt"
+REPORTING = "writing the report"
+PARTS = {LEARNING: 15.0, EXPORTING: 20.0, TESTING: 20.0, DRIVING: 40.0, REPORTING: 2.0}  # about s
 
 
 def add_parser(commands: Any) -> None:
@@ -298,10 +304,7 @@ def add_parser(commands: Any) -> None:
         "maneuver, export them as a C package that is compiled and tested, repeat the paper's "
         "tables, and steer the car along a path on what it learnt; leaves one report.html to read.",
     )
-    parser.add_argument(
-        "--out", type=Path, default=Path("tireid-demo"), metavar="DIR", help="default: %(default)s"
-    )
-    parser.add_argument("--force", action="store_true", help="replace the folder if it exists")
+    add_output(parser, "demo")
     parser.set_defaults(run=run)
 
 
@@ -313,9 +316,11 @@ def run(options: argparse.Namespace) -> None:
     options : parsed arguments.
     """
     watch = Stopwatch()
-    with output_folder(options.out, force=options.force) as folder:
-        say("1/5 driving the sedan, learning, freezing, predicting")
-        story = run_story()
+    with (
+        output_folder(options.out, force=options.force) as folder,
+        Progress("demo", PARTS, long=True) as work,
+    ):
+        story = run_story(partial(work.begin(LEARNING).step, 2 * (1 + len(PREDICT))))
         folders = {name: folder / name for name in ("identify", "paper_network", "paper")}
         for one in folders.values():
             one.mkdir()
@@ -325,14 +330,13 @@ def run(options: argparse.Namespace) -> None:
         draw_check(
             folders["paper_network"], drive, story.car, story.design, operation, story.certificate
         )
-        say("2/5 exporting what was learnt as C, compiling and testing it")
+        work.begin(EXPORTING)
         shipped = ship(story, folder / FOLDER)
-        say("3/5 the frozen-weight test of the paper")
-        study = run_study(SEEDS, say)
+        study = run_study(SEEDS, partial(work.begin(TESTING).step, STEPS))
         write_study(folders["paper"], study)
-        say("4/5 driving on what was learnt")
+        work.begin(DRIVING)
         driven = drive_story(story, folder)
-        say("5/5 writing the report")
+        work.begin(REPORTING)
         sections = demo_sections(story, shipped, study, folder)
         sections.append(drive_section(driven, folder))
         write_report(folder / "report.html", TITLE, sections, summary=SUMMARY)

@@ -1,7 +1,5 @@
 """What the demo learnt as a C package: written, compiled, self-tested, set beside Python."""
 
-import subprocess
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -24,18 +22,9 @@ from mpc.path import BUILT_IN
 from tireid.commands.demo_story import FREEZE, Story
 from tireid.commands.drive import headline, inputs_of
 from tireid.commands.drive_results import drive_table, known_curves, write_drives
-from tireid.commands.drive_runs import (
-    FROZEN,
-    LEARNING,
-    LINEAR,
-    ORACLE,
-    Conditions,
-    Run,
-    Setup,
-    SpeedWish,
-    run_drive,
-)
-from tireid.exporting import write_files
+from tireid.driving import Conditions, Run, Setup, SpeedWish, run_drive
+from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE
+from tireid.exporting import Verdict, self_test, write_files
 from tireid.report import Block, Paragraph, Picture, Section, Table
 
 LANE_CHANGE, SLIPPERY = "drive", "drive_slippery"  # folders beside the report
@@ -170,54 +159,7 @@ def _table(driven: Driven) -> Table:
     )
 
 
-# The self-test of an exported package, compiled and run as an embedded engineer would.
-
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-Iinclude", "-Isrc")
-
-
-class SelfTestError(RuntimeError):
-    """A package does not compile or fails its own test; the message holds what was printed."""
-
-
-class Verdict(NamedTuple):
-    """What a self-test printed: version and precision, the largest difference, "passed"."""
-
-    version: str
-    difference: str
-    verdict: str
-
-
-def self_test(folder: Path, name: str, *, single: bool) -> Verdict | None:
-    """Compile and run the self-test of a package; None where there is no C compiler.
-
-    Parameters
-    ----------
-    folder : with the package.
-    name : prefix of its symbols.
-    single : whether to compute in float.
-
-    Raises
-    ------
-    SelfTestError
-        Where it does not compile or does not pass.
-    """
-    compiler = find_compiler()
-    if compiler is None:
-        return None
-    sources = [str(p.relative_to(folder)) for p in sorted((folder / "src").glob("*.c"))]
-    with tempfile.TemporaryDirectory(prefix="tireid-") as scratch:
-        program = Path(scratch) / "self_test"
-        own = [f"-D{name.upper()}_SINGLE={int(single)}", *sources, f"tests/test_{name}.c"]
-        build = [*compiler, *FLAGS, *own, "-o", str(program), "-lm"]
-        for command in (build, [str(program)]):
-            answer = subprocess.run(
-                command, cwd=folder, capture_output=True, text=True, check=False
-            )
-            if answer.returncode != 0:
-                lines = (answer.stdout + answer.stderr).splitlines()
-                raise SelfTestError(f"the package {folder} fails its self-test: {lines[:5]}")
-    return Verdict(*answer.stdout.splitlines()[-3:])
-
+# What was exported, beside Python.
 
 FOLDER = "package"
 NOT_BUILT = (

@@ -1,6 +1,6 @@
 """What the demo drives: the sedan learns on a slalom with sensor noise and is asked elsewhere."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from models.recordings import Recording
 from models.sensors import Sensor, Sensors
 from models.vehicle import Vehicle, sedan
 from tireid.commands.certificate_table import certificate_of
+from tireid.output import text_table
 
 SPEED = 20.0  # m/s
 FREEZE = 30.0  # s, the end of the first drive
@@ -121,17 +122,15 @@ class Story:
 
     def text(self) -> str:
         """Return the rows as lines of text."""
-        lines = [
-            "Frozen after the slalom, asked about drives that were not learnt: RMSE [kN]",
-            f"  {'':20} {'default (axle)':>26}   {'paper (network, integral)':>26}",
-            f"  {'drive':20} {'online':>8} {'frozen':>8} {'of rms':>8}"
-            f"   {'online':>8} {'frozen':>8} {'of rms':>8}",
-        ]
-        for name, *cells in self.rows():
-            first, second = cells[:3], cells[3:]
-            numbers = "   ".join(" ".join(f"{c:>8}" for c in part) for part in (first, second))
-            lines.append(f"  {name:20} {numbers}")
-        return "\n".join(lines)
+        told = ["online", "frozen", "of rms"]
+        rows = [["drive", *(f"{who} {what}" for who in ("axle,", "paper,") for what in told)]]
+        return "\n".join(
+            [
+                "Frozen after the slalom, asked about drives that were not learnt: RMSE [kN]; the "
+                "default (axle) and the paper's (network, integral law)",
+                text_table([*rows, *self.rows()], "<>>>>>>", indent="  "),
+            ]
+        )
 
 
 def drives(maneuvers: Mapping[str, Maneuver]) -> dict[str, Recording]:
@@ -153,23 +152,35 @@ def drive_to_learn() -> Recording:
     return drives({"slalom": LEARN})["slalom"]
 
 
-def run_story() -> Story:
-    """Drive, learn, freeze and predict, with both methods."""
+def run_story(progress: Callable[[], None] = lambda: None) -> Story:
+    """Drive, learn, freeze and predict, with both methods.
+
+    Parameters
+    ----------
+    progress : called after each method has learnt on a drive, six times.
+    """
     car = sedan()
     recordings = drives({"slalom": LEARN, **PREDICT})
     design = paper_identifier(car)
     return Story(
         car=car,
         design=design,
-        default=_learning(DEFAULT, make_method(DEFAULT, car), car, recordings),
-        paper=_learning(REFERENCE, design, car, recordings),
+        default=_learning(DEFAULT, make_method(DEFAULT, car), car, recordings, progress),
+        paper=_learning(REFERENCE, design, car, recordings, progress),
     )
 
 
 def _learning(
-    law: str, method: Method, car: Vehicle, recordings: Mapping[str, Recording]
+    law: str,
+    method: Method,
+    car: Vehicle,
+    recordings: Mapping[str, Recording],
+    progress: Callable[[], None],
 ) -> Learning:
-    histories = {name: identify(rec, car, method) for name, rec in recordings.items()}
+    histories = {}
+    for name, recording in recordings.items():
+        histories[name] = identify(recording, car, method)
+        progress()
     model = histories["slalom"].freeze(FREEZE)
     return Learning(
         law=law,

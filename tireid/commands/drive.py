@@ -1,8 +1,7 @@
-"""`tireid drive --out DIR`: steer a car along a path, told of the tires that were learnt."""
+"""`tireid drive`: steer a car along a path, told of the tires that were learnt."""
 
 import argparse
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -12,217 +11,27 @@ import numpy as np
 
 from identifier.method import vehicle_numbers
 from identifier.tire_model import TireModel
-from models.faults import KINDS, SIZED, FaultError, SensorFault
+from models.faults import KINDS
 from models.files import digest
-from models.schema import require_few
 from models.vehicle import Vehicle
-from mpc.loop import CarSensors, FaultySensors
 from mpc.path import BUILT_IN
 from tireid.animation import FORMATS, require_ffmpeg
 from tireid.commands import COMMANDS
+from tireid.commands.drive_case import ALL, conditions_of, frozen_tires, labels_of
 from tireid.commands.drive_results import NO_FILM, drive_table, known_curves, write_drives
-from tireid.commands.drive_runs import (
-    FROZEN,
-    LEARNING,
-    LINEAR,
-    ORACLE,
-    PERIOD,
-    PLANTS,
-    TIRES,
-    Conditions,
-    SpeedWish,
-    make_setup,
-    named_path,
-    run_drive,
+from tireid.commands.options import (
+    add_method,
+    add_network_arguments,
+    add_output,
+    add_seed,
+    add_vehicle,
+    add_weights,
 )
-from tireid.commands.drive_source import DURATION, frozen_tires
-from tireid.commands.options import add_network_arguments
+from tireid.driving.learn import DURATION
+from tireid.driving.runs import FROZEN, ORACLE, TIRES, Conditions, require_compiler, run_drive
+from tireid.driving.setup import PERIOD, PLANTS
 from tireid.output import output_folder
 from tireid.progress import say, tell
-
-PERCENT, METERS, KILOMETERS = "%", "m/s", "km/h"
-# Words of `tireid drive` that are more than a name: how fast, and where the road is slippery.
-
-PLAIN = 1.5  # a number without a unit up to here is a share of the grip
-
-
-def parse_speed(text: str) -> SpeedWish:
-    """Return what --speed says.
-
-    Parameters
-    ----------
-    text : 90% or 0.9 of the grip, 17m/s or 60km/h.
-
-    Raises
-    ------
-    ValueError
-        Where it is none of these, or not a speed for a car.
-    """
-    found = re.fullmatch(r"\s*([-+.\deE]+?)\s*(%|m/s|km/h)?\s*", text)
-    try:
-        value = float(found[1]) if found else math.nan
-    except ValueError:
-        value = math.nan
-    unit = found[2] if found else None
-    if not (math.isfinite(value) and value > 0.0):
-        raise ValueError(f"--speed wants a share of the grip or a speed (90%, 17m/s), not {text!r}")
-    if unit is None and value > PLAIN:
-        raise ValueError(f"--speed {text} has no unit: write {text}%, {text}m/s or {text}km/h")
-    if unit in (METERS, KILOMETERS):
-        speed = value / (3.6 if unit == KILOMETERS else 1.0)
-        if not 3.0 <= speed <= 100.0:
-            raise ValueError(f"--speed must be 3 to 100 m/s, it is {speed:.3g} m/s")
-        return SpeedWish(None, speed)
-    share = value / (100.0 if unit == PERCENT else 1.0)
-    if not 0.05 <= share <= PLAIN:
-        raise ValueError(f"--speed must be 5 to 150 % of the grip, it is {100.0 * share:.3g} %")
-    return SpeedWish(share, None)
-
-
-def parse_drop(text: str) -> tuple[float, float]:
-    """Return the place [m] and the friction from there on [-] of --mu-drop S:MU.
-
-    Parameters
-    ----------
-    text : such as 60:0.5.
-
-    Raises
-    ------
-    ValueError
-        Where it is not such a pair, or the numbers are not those of a road.
-    """
-    place, colon, friction = text.partition(":")
-    try:
-        s, mu = float(place), float(friction)
-    except ValueError:
-        s = mu = math.nan
-    if not colon or math.isnan(s) or math.isnan(mu):
-        raise ValueError(f"--mu-drop wants S:MU, arc length [m] and friction, not {text!r}")
-    if not (math.isfinite(s) and s >= 0.0):
-        raise ValueError(f"--mu-drop: the place must not be negative, it is {s:g} m")
-    return s, require_friction("--mu-drop", mu)
-
-
-def parse_fault(text: str) -> SensorFault:
-    """Return what --fault says of a sensor.
-
-    Parameters
-    ----------
-    text : CHANNEL:KIND:START:DURATION[:SIZE], such as v_y:biased:3:inf:0.5.
-
-    Raises
-    ------
-    ValueError
-        Where it is not of that form, or not a fault that a sensor of the loop can have.
-    """
-    words = text.split(":")
-    try:
-        channel, kind, *numbers = words
-        start, duration, *size = map(float, numbers)
-        (most,) = size or [0.0]
-    except ValueError:
-        raise ValueError(
-            f"--fault wants CHANNEL:KIND:START:DURATION[:SIZE], times in s, not {text!r}"
-        ) from None
-    try:
-        fault = SensorFault(channel=channel, kind=kind, start=start, duration=duration, size=most)
-        FaultySensors(CarSensors(), [fault])  # refuses what is no channel
-    except FaultError as error:
-        raise ValueError(f"--fault {text}: {error}") from None
-    if kind in SIZED and not size:
-        raise ValueError(f"--fault {text}: {kind} needs a size")
-    return fault
-
-
-def require_friction(word: str, mu: float) -> float:
-    """Return a friction over that of the tire's measurement, if a road can have it.
-
-    Parameters
-    ----------
-    word : that it was given by.
-    mu : the friction [-].
-
-    Raises
-    ------
-    ValueError
-        Where no road has it.
-    """
-    if not 0.05 <= mu <= 1.5:
-        raise ValueError(f"{word}: friction must be 0.05 to 1.5, it is {mu:g}")
-    return mu
-
-
-# The words of `tireid drive` made into a case, and a case told in words and numbers.
-
-ALL = "all"
-LONGEST_DELAY = 100.0  # ms
-
-
-def labels_of(words: Sequence[str]) -> list[str]:
-    """Return the tires in order, each once; all begins with the frozen ones.
-
-    Parameters
-    ----------
-    words : names of tires, or all.
-    """
-    wanted = [FROZEN, LINEAR, ORACLE, LEARNING] if ALL in words else list(words)
-    return list(dict.fromkeys(wanted))
-
-
-def conditions_of(options: argparse.Namespace) -> Conditions:
-    """Return what is to be driven.
-
-    Parameters
-    ----------
-    options : parsed arguments.
-
-    Raises
-    ------
-    ValueError
-        Where a word or a file is not right.
-    """
-    if options.seed < 0:
-        raise ValueError(f"--seed must not be negative, it is {options.seed}")
-    if not 0.0 < options.laps <= 100.0:
-        raise ValueError(f"--laps must be positive and at most 100, it is {options.laps:g}")
-    path = named_path(options.path)
-    if options.laps != 1.0 and not path.closed:
-        raise ValueError(f"--laps is for a closed path, {path.name} is not")
-    _require_one_source(options)
-    setup = make_setup(
-        path,
-        vehicle=options.vehicle,
-        plant=options.plant,
-        mu=require_friction("--mu", options.mu),
-        drops=[parse_drop(text) for text in options.mu_drop],
-        wish=parse_speed(options.speed),
-    )
-    hours = options.laps * setup.time_at(setup.path.s[-2]) / 3600.0
-    require_few(ValueError, f"--path {path.name}", hours, "hours", "hours of driving")
-    return Conditions(
-        setup=setup,
-        delay=_periods(options.delay),
-        noise=options.noise,
-        seed=options.seed,
-        laps=options.laps,
-        faults=tuple(parse_fault(text) for text in options.fault),
-    )
-
-
-def _periods(delay: float) -> int:
-    periods = delay / (1e3 * PERIOD)
-    if not (0.0 <= delay <= LONGEST_DELAY and abs(periods - round(periods)) < 1e-9):
-        raise ValueError(
-            f"--delay must be 0 to {LONGEST_DELAY:g} ms in steps of {1e3 * PERIOD:g} ms, it is "
-            f"{delay:g}"
-        )
-    return round(periods)
-
-
-def _require_one_source(options: argparse.Namespace) -> None:
-    given = [name for name in ("weights", "network", "paper") if getattr(options, name)]
-    if len(given) > 1:
-        raise ValueError(f"give only one of {', '.join('--' + name for name in given)}")
 
 
 def headline(conditions: Conditions) -> str:
@@ -294,7 +103,11 @@ def _finite(numbers: dict[str, Any]) -> dict[str, Any]:
 def _chassis(vehicle: Vehicle) -> dict[str, Any]:
     """Return the chassis, with a hash in place of the file of its tire."""
     chassis = vehicle.require_chassis()
-    tire = None if chassis.tire is None else digest(Path(chassis.tire).read_text(errors="replace"))
+    tire = (
+        None
+        if chassis.tire is None
+        else digest(Path(chassis.tire).read_text(errors="replace", encoding="utf-8"))
+    )
     return {**asdict(chassis), "tire": tire}
 
 
@@ -353,11 +166,9 @@ def add_parser(commands: Any) -> None:
         metavar="NAME",
         help=f"what the tracker is told: {', '.join(TIRES)}, or {ALL}; the first leads ({FROZEN})",
     )
-    parser.add_argument("--weights", type=Path, metavar="FILE", help="frozen model, as identified")
-    parser.add_argument(
-        "--paper", action="store_true", help="learn with the paper's network and law instead"
-    )
-    parser.add_argument("--vehicle", type=Path, metavar="FILE", help="car as TOML (the sedan)")
+    add_weights(parser, "the frozen tires, as identified")
+    add_method(parser)
+    add_vehicle(parser)
     parser.add_argument(
         "--plant",
         choices=PLANTS,
@@ -387,7 +198,7 @@ def add_parser(commands: Any) -> None:
         help=f"a sensor that breaks on the path, times in s (v_y:biased:3:inf:0.5); kinds: "
         f"{', '.join(KINDS)}; may be repeated",
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of noise and learning")
+    add_seed(parser, "noise and learning")
     parser.add_argument(
         "--laps", type=float, default=1.0, metavar="N", help="of a closed path (%(default)g)"
     )
@@ -399,8 +210,7 @@ def add_parser(commands: Any) -> None:
         help=f"{', '.join(FORMATS)} (by ffmpeg) or {NO_FILM} (%(default)s)",
     )
     add_network_arguments(parser, "steer on this frozen network")
-    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder to write")
-    parser.add_argument("--force", action="store_true", help="replace the folder if it exists")
+    add_output(parser, "drive")
     parser.set_defaults(run=run)
 
 
@@ -416,6 +226,7 @@ def run(options: argparse.Namespace) -> int:
     setup = conditions.setup
     if options.film == "mp4":
         require_ffmpeg()
+    require_compiler()
     with output_folder(options.out, force=options.force) as folder:
         say(headline(conditions))
         if ORACLE in labels:
@@ -434,6 +245,7 @@ def run(options: argparse.Namespace) -> int:
             film=options.film,
         )
         told = f"{headline(conditions)}\ntires: {source}\n{drive_table(runs)}"
+        told = "\n".join(part for part in (told, setup.vehicle.estimates) if part)
     tell(told)
     say(f"wrote {options.out}/")
     return 0 if runs[0].scores.completed else NOT_COMPLETED

@@ -16,7 +16,8 @@ from mpc.tires import Car, CurveFitError, PredictionTire, prediction_tire
 from mpc.tires.tire import Point
 from tireid import __version__
 from tireid.animation import write_film
-from tireid.commands.drive_runs import FROZEN, LEARNING, LINEAR, ORACLE, WIDEST, Run, Setup
+from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, WIDEST, Run
+from tireid.driving.setup import Setup
 from tireid.figures import (
     axle_slip,
     drive_errors_figure,
@@ -28,7 +29,7 @@ from tireid.figures import (
 )
 from tireid.figures.drive import AT_THE_END
 from tireid.figures.tires import TireCurve
-from tireid.output import write_csv, write_json
+from tireid.output import text_table, write_csv, write_json
 from tireid.progress import say
 
 NO_FILM = "none"
@@ -194,7 +195,8 @@ def known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) ->
 
 # What `tireid drive` prints: one line a drive.
 
-COLUMNS = ("tires", "rms e_y", "peak e_y", "completed", "failures", "median", "p99", "max")
+TIMES = "wall time: median / p99 / max"
+COLUMNS = ("tires", "rms e_y", "peak e_y", "completed", "failures", TIMES)
 
 
 def drive_table(runs: Sequence[Run]) -> str:
@@ -204,17 +206,14 @@ def drive_table(runs: Sequence[Run]) -> str:
     ----------
     runs : the drives.
     """
-    wide = max(9, *(len(_completed(run)) for run in runs))
-    head = f"{'tires':10} {'rms e_y':>9} {'peak e_y':>9}  {'completed':{wide}} {'failures':>9}"
-    lines = [f"{head}   {'wall time: median / p99 / max':>32}"]
+    rows = [list(COLUMNS)]
     for run in runs:
         score = run.scores
         failures = ", ".join(f"{n} {name}" for name, n in score.failures.items()) or "0"
         times = " / ".join(f"{score.solve_ms[key]:.3f}" for key in ("median", "p99", "max"))
-        lines.append(
-            f"{run.label:10} {score.rms_e_y_m:7.3f} m {score.peak_e_y_m:7.3f} m  "
-            f"{_completed(run):{wide}} {failures:>9}   {times:>29} ms"
-        )
+        off = [f"{score.rms_e_y_m:.3f} m", f"{score.peak_e_y_m:.3f} m"]
+        rows.append([run.label, *off, _completed(run), failures, f"{times} ms"])
+    lines = [text_table(rows, "<>><>>")]
     for run in runs:
         lines += [f"{run.label} at {t:.2f} s: {note}" for t, note in run.drive.notes]
     return "\n".join(lines)

@@ -2,7 +2,6 @@
 
 import argparse
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,8 +10,8 @@ from codegen.escape import visible
 from identifier.axle import AxleModel
 from identifier.axle.design import NOT_CERTIFIED
 from identifier.method import DEAD, CannotFreezeError, Method, require_alive, steady_stiffness
-from identifier.methods import DEFAULT, METHODS, REFERENCE, draws_weights, load_model, make_method
-from identifier.paper.design import PaperIdentifier, read_design
+from identifier.methods import load_model
+from identifier.paper.design import PaperIdentifier
 from identifier.paper.network import Weights
 from identifier.reproducibility import (
     Replay,
@@ -35,11 +34,25 @@ from tireid.commands.identify_results import (
     write_network_results,
     write_results,
 )
-from tireid.commands.options import add_network_arguments, network_model, read_log
+from tireid.commands.options import (
+    add_log_reading,
+    add_method,
+    add_network_arguments,
+    add_output,
+    add_seed,
+    add_vehicle,
+    add_weights,
+    chosen_method,
+    network_model,
+    read_log,
+    read_vehicle,
+    seed_of,
+)
 from tireid.learning import identify
-from tireid.output import output_folder
-from tireid.progress import say, tell
+from tireid.output import output_folder, text_table
+from tireid.progress import Progress, say, tell
 
+LEARNING, DRAWING = "learning", "replays and figures"
 OWN_PAST = "  its past, against online"
 
 
@@ -65,17 +78,9 @@ def add_parser(commands: Any) -> None:
         "x forward, y left, delta and r positive to the left.",
     )
     parser.add_argument("log", metavar="LOG", help="recording; LOG:RUN names one of its runs")
-    parser.add_argument("--vehicle", required=True, type=Path, metavar="FILE", help="car as TOML")
+    add_vehicle(parser, required=True)
     parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
-    parser.add_argument(
-        "--law", choices=METHODS, metavar="NAME", help=f"{', '.join(METHODS)} (default: {DEFAULT})"
-    )
-    parser.add_argument(
-        "--paper", action="store_true", help=f"the paper's network and law: --law {REFERENCE}"
-    )
-    parser.add_argument(
-        "--design", type=Path, metavar="FILE", help="design.toml, in place of the default design"
-    )
+    add_method(parser)
     parser.add_argument(
         "--freeze",
         nargs="+",
@@ -92,26 +97,11 @@ def add_parser(commands: Any) -> None:
         metavar="LOG[:RUN]",
         help="recordings to predict",
     )
-    parser.add_argument(
-        "--columns",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="NAME=COLUMN",
-        help="read column COLUMN of the logs as NAME, for example r=yaw_rate",
-    )
-    parser.add_argument(
-        "--no-check", action="store_true", help="accept a log that contradicts physics"
-    )
-    parser.add_argument(
-        "--weights", type=Path, metavar="FILE", help="weights.json to begin learning with"
-    )
-    parser.add_argument(
-        "--seed", type=int, metavar="N", help="of the initial weights of the paper's network (0)"
-    )
+    add_log_reading(parser)
+    add_weights(parser, "begin learning with it")
+    add_seed(parser, "the initial weights of the paper's network")
     add_network_arguments(parser, "freeze nothing, judge this network instead")
-    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder to write")
-    parser.add_argument("--force", action="store_true", help="replace the folder if it exists")
+    add_output(parser, "identify")
     parser.set_defaults(run=run)
 
 
@@ -122,8 +112,9 @@ def run(options: argparse.Namespace) -> None:
     ----------
     options : parsed arguments.
     """
-    vehicle = Vehicle.from_toml(options.vehicle)
-    law, design = _design(options, vehicle)
+    vehicle = read_vehicle(options)
+    seed = None if options.seed is None else seed_of(options)
+    law, design = chosen_method(options, vehicle, seed)
     if options.network is not None and options.freeze is not None:
         raise ValueError("--freeze is for what is learnt: the network of --network is frozen")
     start = None if options.weights is None else load_model(options.weights)
@@ -137,8 +128,16 @@ def run(options: argparse.Namespace) -> None:
         _require_model(law, design, recording, vehicle)
     if isinstance(start, AxleModel) and start.vehicle != vehicle:
         say(f"{options.weights} is of the car {start.vehicle.name!r}: scaled by the axle loads")
-    with output_folder(options.out, force=options.force) as folder:
-        histories = [_learn(one, vehicle, law, design, start) for one in (recording, *others)]
+    parts = {LEARNING: 2.0 + len(others), DRAWING: 3.0 + len(others)}
+    with (
+        output_folder(options.out, force=options.force) as folder,
+        Progress("identify", parts) as progress,
+    ):
+        histories = []
+        for one in (recording, *others):
+            histories.append(_learn(one, vehicle, law, design, start))
+            progress.step(1 + len(others))
+        progress.begin(DRAWING)
         if network is not None:
             replays = write_network_results(folder, options.network, law, network, histories)
             told = network_table(law, histories, replays)
@@ -150,6 +149,7 @@ def run(options: argparse.Namespace) -> None:
             write_results(folder, law, learnt, histories[1:], frozen)
             closing = _closing_line(learnt, freeze_times[-1], vehicle, resumed=start is not None)
             told = f"{error_table(histories, frozen)}\n{closing}"
+        told = "\n".join(part for part in (told, vehicle.estimates) if part)
     tell(told)
     say(f"wrote {options.out}/")
 
@@ -159,7 +159,7 @@ def _require_model(law: str, design: Method, recording: Recording, vehicle: Vehi
     try:
         design.frozen(vehicle, design.setup(vehicle, recording).carry)
     except CannotFreezeError as error:
-        raise CannotFreezeError(f"--law {law}: {error}; tireid compare shows it") from None
+        raise CannotFreezeError(f"--method {law}: {error}; tireid compare shows it") from None
 
 
 def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool) -> str:
@@ -181,24 +181,6 @@ def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool)
         f"certificate: {NOT_CERTIFIED}; grip, cornering stiffness, weights, offsets and covariance "
         "stay in their boxes by construction (summary.json lists them)"
     )
-
-
-def _design(options: argparse.Namespace, vehicle: Vehicle) -> tuple[str, Method]:
-    """Return the name of the law and the method."""
-    if options.seed is not None and options.seed < 0:
-        raise ValueError(f"--seed must not be negative, it is {options.seed}")
-    if options.paper and (options.law or options.design):
-        raise ValueError("--paper names the law already: give no --law or --design with it")
-    if options.design is None:
-        law = options.law or (REFERENCE if options.paper else DEFAULT)
-        if options.seed is not None and not draws_weights(law):
-            raise ValueError(f"--seed is of random initial weights, and {law} begins with none")
-        return law, make_method(law, vehicle, options.seed or 0)
-    for name in ("law", "seed"):
-        if getattr(options, name) is not None:
-            raise ValueError(f"--{name} is for the default design: it stands in {options.design}")
-    design = read_design(options.design)
-    return design.law, design
 
 
 def _require_trusted(learnt: History, t: float, law: str) -> None:
@@ -286,15 +268,14 @@ def error_table(histories: list[History], frozen: dict[float, dict[str, Replay]]
     frozen : freeze time [s] to recording name to replay.
     """
     sizes = {history.recording.name: force_rms(history) for history in histories}
-    lines = [f"{'frozen at':>10}  {'replayed on':40} {'front':>16} {'rear':>16}"]
+    rows = [["frozen at", "replayed on", "front", "rear"]]
     for t, replays in frozen.items():
         for name, result in replays.items():
             error = result.against_truth or result.against_online
-            note = "" if sizes[name] is not None else "  (against online, no truth)"
-            front, rear = error_cells(error, sizes[name])
-            lines.append(f"{freeze_key(t):>8} s  {visible(name):40} {front:>16} {rear:>16}{note}")
+            note = "" if sizes[name] is not None else "(against online, no truth)"
+            cells = error_cells(error, sizes[name])
+            rows.append([f"{freeze_key(t)} s", visible(name), *cells, note])
             sides = result.reproduction
             if sides is not None and sides.past_against_online is not None:
-                front, rear = error_cells(sides.past_against_online, sizes[name])
-                lines.append(f"{'':10}  {OWN_PAST:40} {front:>16} {rear:>16}")
-    return "\n".join(lines)
+                rows.append(["", OWN_PAST, *error_cells(sides.past_against_online, sizes[name])])
+    return text_table(rows, "><>>")

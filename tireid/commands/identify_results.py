@@ -37,7 +37,7 @@ from tireid.figures import (
     slip_figure,
     weights_figure,
 )
-from tireid.output import write_csv, write_json
+from tireid.output import text_table, write_csv, write_json
 from tireid.progress import say
 
 # The machine-readable result of `tireid identify`: summary.json, whose keys are stable.
@@ -345,14 +345,12 @@ def network_table(law: str, histories: Sequence[History], replays: Mapping[str, 
     histories : what was identified online over each recording.
     replays : of the network, by recording.
     """
-    lines = [f"{'':24} {'replayed on':40} {'front':>16} {'rear':>16}"]
+    table = [["", "replayed on", "front", "rear"]]
     for history in histories:
         name, size, online = history.recording.name, force_rms(history), online_error(history)
         own = replays[name]
         rows = [(NETWORK, own.against_truth or own.against_online)]
         rows += [] if online is None else [(f"{law}, learning online", online)]
-        note = "  (against online, no truth)" if size is None else ""
-        for title, error in rows:
-            front, rear = error_cells(error, size)
-            lines.append(f"{title:24} {name:40} {front:>16} {rear:>16}{note}")
-    return "\n".join(lines)
+        note = "" if size is not None else "(against online, no truth)"
+        table += [[title, name, *error_cells(error, size), note] for title, error in rows]
+    return text_table(table, "<<>>")

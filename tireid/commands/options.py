@@ -1,10 +1,20 @@
-"""What commands read: recordings that are judged against physics and the vehicle."""
+"""Options that commands share, each declared once; what they read: methods, logs, networks.
+
+One word means one thing in every command: `--vehicle` the car, `--method`, `--paper` and `--design`
+what learns, `--weights` what was learnt before, `--out` the folder that is written, `--force` that
+what is there is replaced, `--seed` chance, `--jobs` processes.
+"""
 
 import argparse
+import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
+from identifier.method import Method
+from identifier.methods import DEFAULT, METHODS, REFERENCE, draws_weights, make_method
 from identifier.own_network import OnnxModel
+from identifier.paper.design import read_design
 from identifier.paper.network import SIGNALS
 from models.recordings import (
     Recording,
@@ -12,8 +22,240 @@ from models.recordings import (
     read_recording,
     split_log_argument,
 )
-from models.vehicle import Vehicle
+from models.schema import require_few
+from models.vehicle import Vehicle, sedan
 from tireid.progress import say
+
+RENAMED = {  # options that had another word in some command
+    "--law": "--method",
+    "--methods": "--method",
+    "--workers": "--jobs",
+    "--figures": "--out",
+}
+
+
+def add_vehicle(
+    parser: argparse.ArgumentParser, *, required: bool = False, default: str = "the sedan"
+) -> None:
+    """Add --vehicle.
+
+    Parameters
+    ----------
+    parser : of a command.
+    required : whether it cannot be left out.
+    default : what it is where it is left out.
+    """
+    text = f"car as TOML, tireid init writes one ({'needed' if required else default})"
+    parser.add_argument("--vehicle", required=required, type=Path, metavar="FILE", help=text)
+
+
+def read_vehicle(options: argparse.Namespace) -> Vehicle:
+    """Return the car of --vehicle, the sedan without, and say what of it is estimated.
+
+    Parameters
+    ----------
+    options : parsed arguments.
+    """
+    if options.vehicle is None:
+        return sedan()
+    vehicle = Vehicle.from_toml(options.vehicle)
+    if vehicle.estimates:
+        say(f"{options.vehicle}: {vehicle.estimates}")
+    return vehicle
+
+
+def add_output(parser: argparse.ArgumentParser, command: str | None) -> None:
+    """Add --out and --force: the folder of results.
+
+    Parameters
+    ----------
+    parser : of the command.
+    command : its name, which the folder bears by default; None writes a folder only where asked.
+    """
+    folder = None if command is None else Path(f"tireid-{command}")
+    told = f"folder to write ({folder or 'only where asked'})"
+    parser.add_argument("--out", type=Path, default=folder, metavar="DIR", help=told)
+    add_force(parser)
+
+
+def add_force(parser: argparse.ArgumentParser) -> None:
+    """Add --force.
+
+    Parameters
+    ----------
+    parser : of a command.
+    """
+    parser.add_argument("--force", action="store_true", help="replace what is there")
+
+
+def add_weights(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add --weights.
+
+    Parameters
+    ----------
+    parser : of a command.
+    what : what the command does with the model.
+    """
+    parser.add_argument("--weights", type=Path, metavar="FILE", help=f"stored model: {what}")
+
+
+def add_seed(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add --seed; None where it is not given.
+
+    Parameters
+    ----------
+    parser : of a command.
+    what : is drawn with it.
+    """
+    parser.add_argument("--seed", type=int, metavar="N", help=f"of {what} (0)")
+
+
+def seed_of(options: argparse.Namespace) -> int:
+    """Return --seed, 0 where it is not given.
+
+    Parameters
+    ----------
+    options : parsed arguments.
+
+    Raises
+    ------
+    ValueError
+        Where it is negative.
+    """
+    seed = int(options.seed or 0)
+    if seed < 0:
+        raise ValueError(f"--seed must not be negative, it is {seed}")
+    return seed
+
+
+def add_jobs(parser: argparse.ArgumentParser) -> None:
+    """Add --jobs.
+
+    Parameters
+    ----------
+    parser : of a command.
+    """
+    count = os.cpu_count() or 1
+    parser.add_argument(
+        "--jobs", type=int, default=count, metavar="N", help="processes (%(default)s)"
+    )
+
+
+def jobs_of(options: argparse.Namespace) -> int:
+    """Return --jobs.
+
+    Parameters
+    ----------
+    options : parsed arguments.
+
+    Raises
+    ------
+    ValueError
+        Where there are none, or more than `Limits` allows.
+    """
+    jobs = int(options.jobs)
+    if jobs < 1:
+        raise ValueError(f"--jobs must be at least 1, it is {jobs}")
+    require_few(ValueError, "--jobs", jobs, "processes", "processes")
+    return jobs
+
+
+# What learns: a method by its name, the paper's, or the design in a file.
+
+
+def add_method(parser: argparse.ArgumentParser) -> None:
+    """Add --method, --paper and --design, of which one is given or none.
+
+    Parameters
+    ----------
+    parser : of a command.
+    """
+    parser.add_argument(
+        "--method",
+        choices=METHODS,
+        metavar="NAME",
+        help=f"what learns: {', '.join(METHODS)} (default: {DEFAULT})",
+    )
+    parser.add_argument(
+        "--paper", action="store_true", help=f"the paper's network and law: --method {REFERENCE}"
+    )
+    parser.add_argument(
+        "--design", type=Path, metavar="FILE", help="design.toml, in place of --method"
+    )
+
+
+class Chosen(NamedTuple):
+    """A method by the name that results are told under."""
+
+    name: str
+    method: Method
+
+
+def method_is_given(options: argparse.Namespace) -> bool:
+    """Return whether a command is told what learns.
+
+    Parameters
+    ----------
+    options : parsed arguments.
+
+    Raises
+    ------
+    ValueError
+        Where it is told so twice.
+    """
+    given = [word for word in ("method", "paper", "design") if getattr(options, word)]
+    if len(given) > 1:
+        raise ValueError(f"give only one of {', '.join('--' + word for word in given)}")
+    return bool(given)
+
+
+def chosen_method(options: argparse.Namespace, vehicle: Vehicle, seed: int | None = None) -> Chosen:
+    """Return what --method, --paper or --design say, the default where none is given.
+
+    Parameters
+    ----------
+    options : parsed arguments.
+    vehicle : the car.
+    seed : of initial weights; None where nobody asks for one.
+
+    Raises
+    ------
+    ValueError
+        Where there are several, a seed would change nothing, or the file is no design.
+    """
+    method_is_given(options)
+    if options.design is not None:
+        if seed is not None:
+            raise ValueError(f"--seed goes with a method: that of {options.design} stands in it")
+        design = read_design(options.design)
+        return Chosen(design.law, design)
+    name = options.method or (REFERENCE if options.paper else DEFAULT)
+    if seed is not None and not draws_weights(name):
+        raise ValueError(f"--seed is of random initial weights, and {name} begins with none")
+    return Chosen(name, make_method(name, vehicle, seed or 0))
+
+
+# Logs: recordings that are judged against physics and the vehicle.
+
+
+def add_log_reading(parser: argparse.ArgumentParser) -> None:
+    """Add --columns and --no-check.
+
+    Parameters
+    ----------
+    parser : of a command that reads logs.
+    """
+    parser.add_argument(
+        "--columns",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME=COLUMN",
+        help="read column COLUMN of the logs as NAME, for example r=yaw_rate",
+    )
+    parser.add_argument(
+        "--no-check", action="store_true", help="accept a log that contradicts physics"
+    )
 
 
 def read_log(

@@ -1,7 +1,8 @@
 """`tireid paper`: Tables I and II and Figs. 2-5 of the paper, beside ours, with a third column."""
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from identifier.paper_study import (
     ONSETS,
     PAST,
     PAST_ONLINE,
+    STEPS,
     Study,
     columns,
     frozen_column,
@@ -30,9 +32,10 @@ from models.schema import require_few
 from models.vehicle import sedan
 from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import certificate_of, verdict_line
+from tireid.commands.options import add_output
 from tireid.figures import comparison_figure, force_figure, save_figure, scheme_figure
-from tireid.output import output_folder, write_json
-from tireid.progress import say, tell
+from tireid.output import output_folder, text_table, write_json
+from tireid.progress import Progress, say, tell
 
 # What the paper prints in its Tables I and II: RMSE of the axle force [kN].
 #
@@ -158,15 +161,9 @@ def table_text(maneuver: str, study: Study) -> str:
     study : its errors over all seeds.
     """
     lines = [header(), *rows(maneuver, study)]
-    width = [max(len(row[i]) for row in lines) for i in range(len(lines[0]))]
     seeds = len(study.errors[maneuver]["integral"])
     title = f"{TITLES[maneuver]}, median (quartiles) of {seeds} seeds"
-    return "\n".join([title, *(_line(row, width) for row in lines), ""])
-
-
-def _line(row: Sequence[str], width: Sequence[int]) -> str:
-    cells = [cell.ljust(w) for cell, w in zip(row, width, strict=True)]
-    return "  " + "  ".join(cells).rstrip()
+    return "\n".join([title, text_table(lines, indent="  "), ""])
 
 
 def settings(gains: Gains, network: Network) -> str:
@@ -229,7 +226,7 @@ def write_study(folder: Path, study: Study) -> None:
     """
     write_json(folder / "tables.json", study.tables())
     write_json(folder / "diverged.json", study.diverged())
-    (folder / "tables.txt").write_text(study_text(study) + "\n")
+    (folder / "tables.txt").write_text(study_text(study) + "\n", encoding="utf-8")
     say("drawing figures")
     save_figure(scheme_figure(), folder / SCHEME)
     for maneuver in study.errors:
@@ -271,6 +268,9 @@ def _compared(maneuver: str) -> dict[str, str]:
     return labels
 
 
+STUDY, DRAWING = "the study", "figures"
+
+
 def add_parser(commands: Any) -> None:
     """Add the command to the parser.
 
@@ -285,8 +285,7 @@ def add_parser(commands: Any) -> None:
         "and the control 'instantaneous at eta/lambda'; write tables and figures.",
     )
     parser.add_argument("--seeds", type=int, default=20, help="seeds of the weights (%(default)s)")
-    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder to write")
-    parser.add_argument("--force", action="store_true", help="replace the folder if it exists")
+    add_output(parser, "paper")
     parser.set_defaults(run=run)
 
 
@@ -300,8 +299,13 @@ def run(options: argparse.Namespace) -> None:
     if options.seeds < 1:
         raise ValueError(f"--seeds must be at least 1, it is {options.seeds}")
     require_few(ValueError, "--seeds", options.seeds, "runs", "runs")
-    with output_folder(options.out, force=options.force) as folder:
-        study = run_study(options.seeds, say)
+    parts = {STUDY: float(options.seeds), DRAWING: 10.0}
+    with (
+        output_folder(options.out, force=options.force) as folder,
+        Progress("paper", parts, long=True) as progress,
+    ):
+        study = run_study(options.seeds, partial(progress.begin(STUDY).step, STEPS))
+        progress.begin(DRAWING)
         write_study(folder, study)
         told = study_text(study)
     tell(told)

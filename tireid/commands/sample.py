@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from models.recordings import write_recording
-from models.vehicle import Vehicle, sedan
 from tireid.commands import COMMANDS
+from tireid.commands.options import add_force, add_seed, add_vehicle, read_vehicle, seed_of
 from tireid.driving import sample_recording
 from tireid.output import OutputError
 from tireid.progress import say
@@ -27,16 +27,12 @@ def add_parser(commands: Any) -> None:
         "identify.",
     )
     parser.add_argument("log", type=Path, metavar="LOG", help="file to write, .csv or .csv.gz")
-    parser.add_argument(
-        "--vehicle", type=Path, metavar="FILE", help="car as TOML with [chassis] (the sedan)"
-    )
+    add_vehicle(parser)
     parser.add_argument(
         "--car", type=Path, metavar="FILE", help="also write the car as TOML, for --vehicle"
     )
-    parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="of steering and noise (0)"
-    )
-    parser.add_argument("--force", action="store_true", help="replace the files if they exist")
+    add_seed(parser, "steering and noise")
+    add_force(parser)
     parser.set_defaults(run=run)
 
 
@@ -47,15 +43,14 @@ def run(options: argparse.Namespace) -> None:
     ----------
     options : parsed arguments.
     """
-    if options.seed < 0:
-        raise ValueError(f"--seed must not be negative, it is {options.seed}")
+    seed = seed_of(options)
     if not options.log.name.lower().endswith((".csv", ".csv.gz")):
         raise ValueError(f"{options.log}: the name must end in .csv or .csv.gz")
     for path in filter(None, (options.log, options.car)):
         if path.exists() and not options.force:
             raise OutputError(f"{path} exists: --force replaces it")
-    vehicle = sedan() if options.vehicle is None else Vehicle.from_toml(options.vehicle)
-    recording = sample_recording(vehicle, seed=options.seed)
+    vehicle = read_vehicle(options)
+    recording = sample_recording(vehicle, seed=seed)
     write_recording(recording, options.log)
     say(f"wrote {options.log}: {len(recording)} samples, {recording.duration:.1f} s")
     if options.car is not None:

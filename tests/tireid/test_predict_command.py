@@ -1,0 +1,129 @@
+"""`tireid predict`: what a stored model says of a log, with truth and without, on another car."""
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tireid as ti
+from identifier.methods import make_method
+from models.recordings import read_recording, write_recording
+from tireid.cli import main
+
+
+@pytest.fixture(scope="module")
+def model(logs, tmp_path_factory):
+    tire = ti.identify(read_recording(logs / "slalom.csv"), ti.sedan()).freeze()
+    path = tmp_path_factory.mktemp("model") / "tire.json"
+    tire.save(path)
+    return path
+
+
+def predicted(out, *words):
+    assert main(["predict", *(str(word) for word in words), "--out", str(out)]) == 0
+    with (out / "forces.csv").open(encoding="utf-8") as file:
+        rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
+    columns = {key: np.array([row[key] for row in rows]) for key in rows[0]}
+    return json.loads((out / "summary.json").read_text(encoding="utf-8")), columns
+
+
+def test_it_says_what_the_interface_says(model, logs, tmp_path, capsys):
+    summary, columns = predicted(tmp_path / "out", model, logs / "quick.csv")
+    tire, log = ti.TireModel.load(model), read_recording(logs / "quick.csv")
+    force = tire.predict(log)
+    np.testing.assert_allclose(columns["Fyf_predicted_N"], force[:, 0], rtol=1e-8, atol=1e-6)
+    np.testing.assert_allclose(columns["Fyr_true_N"], log.axle_force[:, 1], rtol=1e-8, atol=1e-6)
+    missed = force - log.axle_force
+    for axle, error in zip(("front", "rear"), missed.T, strict=True):
+        assert summary["rmse_N"][axle] == pytest.approx(np.sqrt(np.mean(error**2)))
+    said = capsys.readouterr()
+    assert f"{summary['rmse_N']['front']:.4g} N" in said.out
+    assert "wrote" in said.err
+
+
+def test_without_truth_it_says_what_of_the_motion_is_explained(model, logs, tmp_path, capsys):
+    log = replace(read_recording(logs / "quick.csv"), axle_force=None)
+    write_recording(log, tmp_path / "blind.csv")
+    summary, columns = predicted(tmp_path / "out", model, tmp_path / "blind.csv")
+    assert (summary["rmse_N"], summary["rms_force_N"]) == (None, None)
+    assert not [name for name in columns if "true" in name]
+    assert 0.9 < summary["motion"]["explained_lateral"] <= 1.0
+    said = capsys.readouterr().out
+    assert "cannot be said in newtons" in said
+    share = 100.0 * summary["motion"]["explained_lateral"]
+    assert f"explained are {share:.1f} % of the lateral" in said
+
+
+def test_a_model_of_half_the_force_explains_less(model, logs, tmp_path):
+    """(1/2)² of the mean square stays: three quarters are explained, by the lateral balance."""
+    data = json.loads(model.read_text(encoding="utf-8"))
+    weak = {**data, "W": (0.5 * np.array(data["W"])).tolist()}
+    path = tmp_path / "weak.json"
+    path.write_text(json.dumps(weak), encoding="utf-8")
+    whole, _ = predicted(tmp_path / "whole", model, logs / "quick.csv")
+    half, _ = predicted(tmp_path / "half", path, logs / "quick.csv")
+    assert whole["motion"]["explained_lateral"] > 0.98
+    assert half["motion"]["explained_lateral"] == pytest.approx(0.75, abs=0.05)
+
+
+def test_slip_beyond_what_is_known_is_told(logs, tmp_path, capsys):
+    log = read_recording(logs / "slalom.csv")
+    tire = ti.identify(log, ti.sedan()).freeze(t=2.0)  # the slalom has just begun
+    tire.save(tmp_path / "young.json")
+    summary, columns = predicted(tmp_path / "out", tmp_path / "young.json", logs / "quick.csv")
+    beyond = np.mean(np.abs(columns["alpha_f_rad"]) > tire.known_slip[0])
+    assert summary["beyond_known_slip"][0] == pytest.approx(beyond, abs=1e-3)
+    assert beyond > 0.2
+    assert f"which {100.0 * beyond:.0f} /" in capsys.readouterr().out
+
+
+def test_an_axle_model_is_mounted_on_the_car_that_drove(model, logs, tmp_path, capsys):
+    """A car with more load in the back: forces scale by the loads of the axles."""
+    car = ti.sedan()
+    laden = replace(car, mass=1.2 * car.mass, name="laden")
+    laden.to_toml(tmp_path / "laden.toml")
+    words = (logs / "quick.csv", "--vehicle", tmp_path / "laden.toml", "--no-check")
+    summary, columns = predicted(tmp_path / "laden", model, *words)
+    _, own = predicted(tmp_path / "own", model, logs / "quick.csv")
+    assert summary["vehicle"]["mass"] == pytest.approx(1.2 * car.mass)
+    np.testing.assert_allclose(columns["Fyf_predicted_N"], 1.2 * own["Fyf_predicted_N"], rtol=1e-6)
+    assert "scaled by the axle loads" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["missing.json", "log.csv"], "missing.json: cannot be read"),
+        (["MODEL", "missing.csv"], "missing.csv"),
+        (["NETWORK", "LOG", "--vehicle", "CAR"], "cannot be mounted on 'other'"),
+    ],
+)
+def test_what_cannot_be_asked_is_one_line_and_leaves_nothing(
+    words, told, model, logs, tmp_path, capsys
+):
+    car = ti.sedan()
+    replace(car, name="other", mass=1.1 * car.mass).to_toml(tmp_path / "other.toml")
+    log = read_recording(logs / "slalom.csv")
+    ti.identify(log, car, make_method("integral", car)).freeze().save(tmp_path / "network.json")
+    names = {
+        "MODEL": model,
+        "LOG": logs / "slalom.csv",
+        "NETWORK": tmp_path / "network.json",
+        "CAR": tmp_path / "other.toml",
+    }
+    out = tmp_path / "out"
+    line = ["predict", *(str(names.get(word, word)) for word in words), "--out", str(out)]
+    assert main(line) == 2
+    errors = [text for text in capsys.readouterr().err.splitlines() if "error:" in text]
+    assert len(errors) == 1
+    assert told in errors[0]
+    assert not out.exists()
+
+
+def test_a_folder_is_replaced_only_when_told(model, logs, tmp_path, capsys):
+    out = tmp_path / "out"
+    line = ["predict", str(model), str(logs / "quick.csv"), "--out", str(out)]
+    assert [main(line), main(line), main([*line, "--force"])] == [0, 2, 0]
+    assert "add --force" in capsys.readouterr().err

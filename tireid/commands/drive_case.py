@@ -1,0 +1,317 @@
+"""The words of `tireid drive` made into a case: path, car, road, and where its tires are from."""
+
+import argparse
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from identifier.methods import load_model
+from identifier.tire_model import TireModel
+from models.faults import SIZED, FaultError, SensorFault
+from models.schema import require_few
+from models.vehicle import Vehicle, sedan
+from mpc.loop import CarSensors, FaultySensors
+from mpc.path import BUILT_IN, Path
+from tireid.commands.options import chosen_method, network_model, read_vehicle, seed_of
+from tireid.driving.learn import learning_drive
+from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, Conditions
+from tireid.driving.setup import PERIOD, Setup, SpeedWish, require_friction
+from tireid.learning import identify
+from tireid.progress import Progress
+
+PERCENT, METERS, KILOMETERS = "%", "m/s", "km/h"
+# Words of `tireid drive` that are more than a name: how fast, and where the road is slippery.
+
+PLAIN = 1.5  # a number without a unit up to here is a share of the grip
+
+
+def parse_speed(text: str) -> SpeedWish:
+    """Return what --speed says.
+
+    Parameters
+    ----------
+    text : 90% or 0.9 of the grip, 17m/s or 60km/h.
+
+    Raises
+    ------
+    ValueError
+        Where it is none of these, or not a speed for a car.
+    """
+    found = re.fullmatch(r"\s*([-+.\deE]+?)\s*(%|m/s|km/h)?\s*", text)
+    try:
+        value = float(found[1]) if found else math.nan
+    except ValueError:
+        value = math.nan
+    unit = found[2] if found else None
+    if not (math.isfinite(value) and value > 0.0):
+        raise ValueError(f"--speed wants a share of the grip or a speed (90%, 17m/s), not {text!r}")
+    if unit is None and value > PLAIN:
+        raise ValueError(f"--speed {text} has no unit: write {text}%, {text}m/s or {text}km/h")
+    if unit in (METERS, KILOMETERS):
+        speed = value / (3.6 if unit == KILOMETERS else 1.0)
+        if not 3.0 <= speed <= 100.0:
+            raise ValueError(f"--speed must be 3 to 100 m/s, it is {speed:.3g} m/s")
+        return SpeedWish(None, speed)
+    share = value / (100.0 if unit == PERCENT else 1.0)
+    if not 0.05 <= share <= PLAIN:
+        raise ValueError(f"--speed must be 5 to 150 % of the grip, it is {100.0 * share:.3g} %")
+    return SpeedWish(share, None)
+
+
+def parse_drop(text: str) -> tuple[float, float]:
+    """Return the place [m] and the friction from there on [-] of --mu-drop S:MU.
+
+    Parameters
+    ----------
+    text : such as 60:0.5.
+
+    Raises
+    ------
+    ValueError
+        Where it is not such a pair, or the numbers are not those of a road.
+    """
+    place, colon, friction = text.partition(":")
+    try:
+        s, mu = float(place), float(friction)
+    except ValueError:
+        s = mu = math.nan
+    if not colon or math.isnan(s) or math.isnan(mu):
+        raise ValueError(f"--mu-drop wants S:MU, arc length [m] and friction, not {text!r}")
+    if not (math.isfinite(s) and s >= 0.0):
+        raise ValueError(f"--mu-drop: the place must not be negative, it is {s:g} m")
+    return s, require_friction("--mu-drop", mu)
+
+
+def parse_fault(text: str) -> SensorFault:
+    """Return what --fault says of a sensor.
+
+    Parameters
+    ----------
+    text : CHANNEL:KIND:START:DURATION[:SIZE], such as v_y:biased:3:inf:0.5.
+
+    Raises
+    ------
+    ValueError
+        Where it is not of that form, or not a fault that a sensor of the loop can have.
+    """
+    words = text.split(":")
+    try:
+        channel, kind, *numbers = words
+        start, duration, *size = map(float, numbers)
+        (most,) = size or [0.0]
+    except ValueError:
+        raise ValueError(
+            f"--fault wants CHANNEL:KIND:START:DURATION[:SIZE], times in s, not {text!r}"
+        ) from None
+    try:
+        fault = SensorFault(channel=channel, kind=kind, start=start, duration=duration, size=most)
+        FaultySensors(CarSensors(), [fault])  # refuses what is no channel
+    except FaultError as error:
+        raise ValueError(f"--fault {text}: {error}") from None
+    if kind in SIZED and not size:
+        raise ValueError(f"--fault {text}: {kind} needs a size")
+    return fault
+
+
+# The words of `tireid drive` made into a case, and a case told in words and numbers.
+
+ALL = "all"
+LONGEST_DELAY = 100.0  # ms
+
+
+def labels_of(words: Sequence[str]) -> list[str]:
+    """Return the tires in order, each once; all begins with the frozen ones.
+
+    Parameters
+    ----------
+    words : names of tires, or all.
+    """
+    wanted = [FROZEN, LINEAR, ORACLE, LEARNING] if ALL in words else list(words)
+    return list(dict.fromkeys(wanted))
+
+
+def conditions_of(options: argparse.Namespace) -> Conditions:
+    """Return what is to be driven.
+
+    Parameters
+    ----------
+    options : parsed arguments.
+
+    Raises
+    ------
+    ValueError
+        Where a word or a file is not right.
+    """
+    if not 0.0 < options.laps <= 100.0:
+        raise ValueError(f"--laps must be positive and at most 100, it is {options.laps:g}")
+    path = named_path(options.path)
+    if options.laps != 1.0 and not path.closed:
+        raise ValueError(f"--laps is for a closed path, {path.name} is not")
+    _require_one_source(options)
+    _require_its_own(options.plant, options.vehicle)
+    setup = make_setup(
+        path,
+        vehicle=None if options.vehicle is None else read_vehicle(options),
+        plant=options.plant,
+        mu=require_friction("--mu", options.mu),
+        drops=[parse_drop(text) for text in options.mu_drop],
+        wish=parse_speed(options.speed),
+    )
+    hours = options.laps * setup.time_at(setup.path.s[-2]) / 3600.0
+    require_few(ValueError, f"--path {path.name}", hours, "hours", "hours of driving")
+    return Conditions(
+        setup=setup,
+        delay=_periods(options.delay),
+        noise=options.noise,
+        seed=seed_of(options),
+        laps=options.laps,
+        faults=tuple(parse_fault(text) for text in options.fault),
+    )
+
+
+def _periods(delay: float) -> int:
+    periods = delay / (1e3 * PERIOD)
+    if not (0.0 <= delay <= LONGEST_DELAY and abs(periods - round(periods)) < 1e-9):
+        raise ValueError(
+            f"--delay must be 0 to {LONGEST_DELAY:g} ms in steps of {1e3 * PERIOD:g} ms, it is "
+            f"{delay:g}"
+        )
+    return round(periods)
+
+
+def _require_one_source(options: argparse.Namespace) -> None:
+    given = [
+        name
+        for name in ("weights", "network", "method", "paper", "design")
+        if getattr(options, name)
+    ]
+    if len(given) > 1:
+        raise ValueError(f"give only one of {', '.join('--' + name for name in given)}")
+
+
+def named_path(name: str) -> Path:
+    """Return a built-in path, or one from way-points in a file.
+
+    Parameters
+    ----------
+    name : one of the built-in paths, or the name of a CSV file.
+
+    Raises
+    ------
+    ValueError
+        Where it is neither, or the file is no path.
+    """
+    if name in BUILT_IN:
+        return BUILT_IN[name]()
+    if not FilePath(name).suffix:
+        raise ValueError(f"--path: there is no path {name!r}; {', '.join(BUILT_IN)}, or FILE.csv")
+    return Path.from_csv(FilePath(name))
+
+
+def make_setup(
+    path: Path,
+    *,
+    vehicle: Vehicle | None,
+    plant: str,
+    mu: float,
+    drops: Sequence[tuple[float, float]],
+    wish: SpeedWish,
+) -> Setup:
+    """Return a car at the start of a path.
+
+    Parameters
+    ----------
+    path : to follow.
+    vehicle : the car; None takes the built-in sedan, or the car of the plant.
+    plant : of `PLANTS`.
+    mu : friction before the first drop [-].
+    drops : arc length [m] and friction from there on.
+    wish : how fast.
+
+    Raises
+    ------
+    ValueError
+        Where the plant brings its own car, or a drop is beyond the path.
+    """
+    ordered = tuple(sorted(drops))
+    for s, _ in ordered:
+        if not path.closed and s >= path.length:
+            raise ValueError(f"--mu-drop {s:g} is beyond the path, which is {path.length:.0f} m")
+    if plant == "double-track":
+        car = vehicle or sedan()
+        car.require_chassis()
+    else:
+        _require_its_own(plant, vehicle)
+        from mpc.cars.bmw import bmw
+
+        car = bmw()
+    return Setup(path=path, vehicle=car, plant=plant, mu=mu, drops=ordered, wish=wish)
+
+
+def _require_its_own(plant: str, vehicle: object | None) -> None:
+    if plant != "double-track" and vehicle is not None:
+        raise ValueError(f"--plant {plant} brings a car of its own: give no --vehicle with it")
+
+
+def frozen_tires(
+    options: argparse.Namespace, labels: Sequence[str], conditions: Conditions
+) -> tuple[str, TireModel | None]:
+    """Return where frozen tires come from, and the model where one is needed.
+
+    Parameters
+    ----------
+    options : parsed arguments.
+    labels : what the trackers are told.
+    conditions : of the drives.
+
+    Raises
+    ------
+    ValueError
+        Where a file cannot be used, or a law runs away.
+    """
+    setup = conditions.setup
+    if not {FROZEN, LEARNING} & set(labels):
+        return "nothing was learnt", None
+    if options.weights is not None:
+        model = load_model(options.weights)
+        _require_its_car(options, model.vehicle, setup)
+        return f"frozen ones from {options.weights}", model
+    network = network_model(options, setup.vehicle, 1.0)
+    if network is not None:
+        return f"frozen ones from {options.network}", network
+    law, method = chosen_method(options, setup.vehicle)
+    with Progress("the drive to learn on") as progress:
+        recording = learning_drive(
+            setup.car(open_field=True),
+            conditions.sensors,
+            np.random.default_rng([conditions.seed, 1]),
+            grip=setup.grip,
+            seed=conditions.seed,
+            progress=progress,
+        )
+    model = identify(recording, setup.vehicle, method, check=False).freeze()
+    assert recording.a_y is not None
+    return (
+        f"frozen ones learnt by {law} on {recording.duration:.0f} s of random steering on an open "
+        f"field, up to {np.abs(recording.a_y).max():.1f} m/s² sidewards"
+    ), model
+
+
+def _require_its_car(options: argparse.Namespace, learnt: Vehicle, setup: Setup) -> None:
+    """Refuse tires that were learnt on another car than is driven, whatever either is called."""
+    if learnt.bicycle == setup.vehicle.bicycle:
+        return
+    mine = f"{options.weights} was learnt on the car {learnt.name!r}, driven is "
+    if setup.plant != "double-track":
+        raise ValueError(
+            f"{mine}the {setup.vehicle.name!r} that --plant {setup.plant} brings: leave --weights "
+            "out to learn on it first"
+        )
+    raise ValueError(
+        f"{mine}{setup.vehicle.name!r}: give that car by --vehicle FILE, with its table [chassis] "
+        "(tireid init writes one, docs/driving.md says what it holds), or leave --weights out to "
+        "learn on the car that is driven"
+    )

@@ -1,0 +1,46 @@
+"""`tireid init car.toml`: a vehicle file to fill in, with units and where to find each number."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from models.files import write_atomically
+from models.vehicle import vehicle_template
+from tireid.commands import COMMANDS
+from tireid.commands.options import add_force
+from tireid.output import OutputError
+from tireid.progress import say
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : subparsers of `tireid`.
+    """
+    parser = commands.add_parser(
+        "init",
+        help=COMMANDS["init"],
+        description="Write a commented vehicle file: what is needed, its unit and where to find "
+        "it; yaw inertia and cornering stiffnesses may be left out and are estimated then; "
+        "[chassis], which only a simulated car needs, is there behind comment signs.",
+    )
+    parser.add_argument("file", type=Path, metavar="FILE", help="file to write, .toml")
+    add_force(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run the command.
+
+    Parameters
+    ----------
+    options : parsed arguments.
+    """
+    if options.file.suffix.lower() != ".toml":
+        raise ValueError(f"{options.file}: the name must end in .toml")
+    if options.file.exists() and not options.force:
+        raise OutputError(f"{options.file} exists: --force replaces it")
+    write_atomically(options.file, vehicle_template())
+    say(f"wrote {options.file}: replace its numbers by those of your car")

@@ -1,0 +1,199 @@
+"""`tireid predict MODEL LOG`: the axle forces of a drive by a stored model, and what they miss."""
+
+import argparse
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.escape import visible
+from identifier.axle import AxleModel
+from identifier.method import vehicle_numbers
+from identifier.methods import load_model
+from identifier.reproducibility import Prediction, counted_samples
+from identifier.tire_model import TireModel
+from models.recordings import Recording
+from tireid import __version__
+from tireid.commands import COMMANDS
+from tireid.commands.identify_results import error_cells
+from tireid.commands.options import (
+    add_log_reading,
+    add_output,
+    add_vehicle,
+    read_log,
+    read_vehicle,
+)
+from tireid.learning import replay
+from tireid.output import output_folder, text_table, write_csv, write_json
+from tireid.progress import say, tell
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : subparsers of `tireid`.
+    """
+    parser = commands.add_parser(
+        "predict",
+        help=COMMANDS["predict"],
+        description="Predict the axle forces of LOG with a stored model, which learns nothing from "
+        "it; write forces.csv and summary.json. Where LOG has true forces, say how much is missed; "
+        "else how much of the measured lateral and yaw acceleration the forces explain, in means "
+        "over 0.2 s.",
+    )
+    parser.add_argument("model", type=Path, metavar="MODEL", help="weights.json, as identified")
+    parser.add_argument("log", metavar="LOG", help="recording; LOG:RUN names one of its runs")
+    add_vehicle(parser, default="that of the model")
+    parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
+    add_log_reading(parser)
+    add_output(parser, "predict")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run the command.
+
+    Parameters
+    ----------
+    options : parsed arguments.
+    """
+    model = _model(options)
+    recording = read_log(
+        options.log,
+        model.vehicle,
+        run_name=options.run_name,
+        columns=options.columns,
+        check=not options.no_check,
+    )
+    prediction = replay(model, recording)
+    with output_folder(options.out, force=options.force) as folder:
+        write_csv(folder / "forces.csv", force_columns(model, prediction))
+        write_json(folder / "summary.json", summary(model, prediction))
+        told = prediction_text(model, prediction)
+    tell(told)
+    say(f"wrote {options.out}/")
+
+
+def _model(options: argparse.Namespace) -> TireModel:
+    """Return the model, on the car that drove."""
+    model = load_model(options.model)
+    if options.vehicle is None:
+        return model
+    vehicle = read_vehicle(options)
+    if vehicle == model.vehicle:
+        return model
+    if not isinstance(model, AxleModel):
+        raise ValueError(
+            f"{options.model} is of the car {model.vehicle.name!r} and cannot be mounted on "
+            f"{vehicle.name!r}, as models of the axle identifier can: leave --vehicle out to ask "
+            "it of its own car"
+        )
+    say(f"{options.model} is of the car {model.vehicle.name!r}: scaled by the axle loads")
+    return replace(model, vehicle=vehicle)
+
+
+def force_columns(model: TireModel, prediction: Prediction) -> dict[str, NDArray[np.float64]]:
+    """Return the columns of forces.csv: time, slip angles, predicted and true forces.
+
+    Parameters
+    ----------
+    model : that predicted.
+    prediction : of a recording.
+    """
+    recording, car = prediction.recording, model.vehicle
+    alpha = recording.alpha(car.l_f, car.l_r)
+    columns = {"t_s": recording.t, "alpha_f_rad": alpha[:, 0], "alpha_r_rad": alpha[:, 1]}
+    forces = {"predicted": prediction.axle_force, "true": recording.axle_force}
+    for name, force in forces.items():
+        if force is not None:
+            columns |= {f"Fyf_{name}_N": force[:, 0], f"Fyr_{name}_N": force[:, 1]}
+    return columns
+
+
+def beyond_known(model: TireModel, recording: Recording) -> tuple[float, float] | None:
+    """Return the share of the samples with more slip than the model knows; None if it cannot tell.
+
+    Parameters
+    ----------
+    model : that predicts.
+    recording : the drive; samples below the model's minimum speed do not count.
+    """
+    known = model.known_slip
+    if known is None:
+        return None
+    counted = counted_samples(recording, model.min_speed)
+    alpha = np.abs(recording.alpha(model.vehicle.l_f, model.vehicle.l_r)[counted])
+    front, rear = np.mean(alpha > known, axis=0)
+    return float(front), float(rear)
+
+
+def summary(model: TireModel, prediction: Prediction) -> dict[str, Any]:
+    """Return what summary.json holds; null stands for what cannot be known.
+
+    Parameters
+    ----------
+    model : that predicted.
+    prediction : of a recording.
+    """
+    error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
+    beyond, known = beyond_known(model, prediction.recording), model.known_slip
+    shares = (None, None) if motion is None else motion.explained
+    return {
+        "recording": prediction.recording.name,
+        "samples": len(prediction.recording),
+        "rmse_N": None if error is None else asdict(error),
+        "rms_force_N": None if size is None else asdict(size),
+        "motion": None
+        if motion is None
+        else {
+            "missed_lateral_m_s2": motion.lateral,
+            "missed_yaw_rad_s2": motion.yaw,
+            "rms_lateral_m_s2": motion.lateral_rms,
+            "rms_yaw_rad_s2": motion.yaw_rms,
+            "explained_lateral": shares[0],
+            "explained_yaw": shares[1],
+        },
+        "known_slip_rad": None if known is None else known.tolist(),
+        "beyond_known_slip": beyond,
+        "model": type(model).__name__,
+        "vehicle": vehicle_numbers(model.vehicle),
+        "version": __version__,
+    }
+
+
+def prediction_text(model: TireModel, prediction: Prediction) -> str:
+    """Return what is to be said of a prediction, as lines of text.
+
+    Parameters
+    ----------
+    model : that predicted.
+    prediction : of a recording.
+    """
+    error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
+    lines = []
+    if error is not None:
+        rows = [["predicted", "front", "rear"]]
+        rows.append([visible(prediction.recording.name), *error_cells(error, size)])
+        lines.append(text_table(rows, "<>>"))
+    else:
+        lines.append("no true forces in the log: what the forces miss cannot be said in newtons")
+    if motion is not None:
+        lines.append(
+            f"of the measured motion they miss {motion.lateral:.3g} of {motion.lateral_rms:.3g} "
+            f"m/s² lateral and {motion.yaw:.3g} of {motion.yaw_rms:.3g} rad/s² yaw acceleration, "
+            f"rms, sensor noise included; {prediction.motion_text()}"
+        )
+    beyond, known = beyond_known(model, prediction.recording), model.known_slip
+    if beyond is not None and known is not None:
+        front, rear = np.degrees(known)
+        lines.append(
+            f"known to {front:.1f} / {rear:.1f} deg of slip, which {100.0 * beyond[0]:.0f} / "
+            f"{100.0 * beyond[1]:.0f} % of the samples exceed (front / rear)"
+        )
+    if model.vehicle.estimates:
+        lines.append(model.vehicle.estimates)
+    return "\n".join(lines)

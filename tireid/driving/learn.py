@@ -1,0 +1,102 @@
+"""A drive to learn tires on, of a simulated car, and what a method learns on it."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from models.maneuvers import RandomSteer
+from models.recordings import Recording
+from models.vehicle import Vehicle, sedan
+from mpc.cars import Car, DoubleTrackCar
+from mpc.loop import CarSensors, Measured, cornering_limit, inertial_unit
+from tireid.driving.setup import PERIOD
+from tireid.progress import Progress
+
+# The drive to learn on: the same car on an open field, steered at random and ever harder.
+
+DURATION = 40.0  # s
+SPEED = 20.0  # m/s
+FREQUENCY = 0.6  # Hz, of the fastest swings
+SLIP = np.radians(3.5)  # of the front axle, at the limit of grip
+GENTLE, GROWS = 0.3, 30.0  # share of the angles at the start, and time to all of them [s]
+SPUN = np.tan(np.radians(15.0))  # of the side slip
+TIPS = 1.2  # times the grip: a car that is said to have more is falling over
+FORGOTTEN = 0.5  # s before a car spins or tips that are not learnt from
+RATE_LIMIT = 1.0  # rad/s at the road wheels
+
+
+def learning_drive(
+    car: Car,
+    sensors: CarSensors,
+    rng: np.random.Generator,
+    *,
+    grip: float,
+    seed: int,
+    progress: Callable[[float], None] | None = None,
+) -> Recording:
+    """Drive a car without a path and return what its sensors saw; a car that spins or tips ends it.
+
+    Parameters
+    ----------
+    car : to drive.
+    sensors : of the car.
+    rng : of their noise.
+    grip : largest lateral acceleration [m/s²], which sizes the steering.
+    seed : of the steering.
+    progress : called with the share of the time.
+    """
+    # Angle of a bend at that acceleration, and the slip that the front axle needs beyond it.
+    amplitude = car.vehicle.wheelbase * grip / SPEED**2 + SLIP
+    maneuver = RandomSteer(
+        amplitude=amplitude,
+        frequency=min(FREQUENCY, 0.9 * RATE_LIMIT / (2.0 * np.pi * amplitude)),
+        seed=seed,
+        onset=1.0,
+        rate_limit=RATE_LIMIT,
+        duration=DURATION,
+    )
+    t = car.period * np.arange(round(DURATION / car.period), dtype=np.float64)
+    steering = maneuver.steering(t)[:, 0] * np.minimum(GENTLE + t / GROWS, 1.0)
+    state, samples, forces = car.start(SPEED), [], []
+    for k, angle in enumerate(steering):
+        samples.append(sensors.measure(state, rng))
+        forces.append(state.axle_force)
+        state = car.step(state, float(angle), SPEED)
+        if abs(state.v_y) > SPUN * state.v_x or abs(state.a_y) > TIPS * grip:
+            kept = max(len(samples) - round(FORGOTTEN / car.period), 10)
+            samples, forces = samples[:kept], forces[:kept]
+            break
+        if progress is not None:
+            progress((k + 1) / t.size)
+    signals = dict(zip(Measured._fields, np.array(samples).T, strict=True))
+    return Recording(
+        name="learning drive",
+        delta_f=signals["delta"],
+        delta_r=np.zeros(len(samples)),
+        axle_force=np.array(forces),
+        **{name: signals[name] for name in ("t", "v_x", "v_y", "r", "a_y")},
+    )
+
+
+def sample_recording(vehicle: Vehicle | None = None, *, seed: int = 0) -> Recording:
+    """Return what the sensors of a simulated car saw on an open field, with the true axle forces.
+
+    It is steered at random and ever harder until it slides, 40 s: a drive to learn from.
+
+    Parameters
+    ----------
+    vehicle : the car, with a chassis; None takes the sedan.
+    seed : of steering and sensor noise.
+
+    Raises
+    ------
+    VehicleError
+        Where the vehicle has no chassis.
+    """
+    car = DoubleTrackCar(sedan() if vehicle is None else vehicle, period=PERIOD)
+    grip = cornering_limit(car.vehicle, car.tire)
+    rng = np.random.default_rng([seed, 1])
+    with Progress("the drive to learn on") as progress:
+        driven = learning_drive(car, inertial_unit(), rng, grip=grip, seed=seed, progress=progress)
+    return replace(driven, name=f"sample {seed}")

@@ -1,0 +1,338 @@
+"""One drive for each tire that a tracker is told: linear, frozen, true, or learnt on the way."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from codegen import find_compiler
+from identifier.methods import continuing
+from identifier.run import OnlineIdentifier
+from identifier.tire_model import TireModel
+from models.faults import SensorFault
+from models.friction import Friction
+from models.vehicle import Vehicle
+from mpc.handover.learner import Learner
+from mpc.handover.supervisor import Supervisor
+from mpc.loop import (
+    CarSensors,
+    Drive,
+    FaultySensors,
+    LearningTires,
+    Measured,
+    Measures,
+    Scores,
+    inertial_unit,
+    scores,
+)
+from mpc.loop import drive as drive_tracker
+from mpc.path import Path
+from mpc.problem import Problem
+from mpc.realtime import NoCompilerError, Tracker
+from mpc.tires import PredictionTire, prediction_tire
+from tireid.driving.setup import PERIOD, Setup, SpeedWish, require_friction
+from tireid.progress import Progress
+
+# What may change the tire of a tracker on the way: learning, or being told the true friction.
+
+
+class Informer:
+    """Tells the tracker of an oracle the true tire of the road that the car is on.
+
+    Parameters
+    ----------
+    setup : path, car and road.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self._setup, self._friction, self._mu = setup, setup.friction(), setup.mu
+
+    def observe(self, measured: Measured, tracker: Any) -> str | None:
+        """Change the tire where the friction has changed; return that it was done.
+
+        Parameters
+        ----------
+        measured : by the sensors.
+        tracker : which steers.
+        """
+        mu = friction_now(self._friction, measured)
+        if mu == self._mu:
+            return None
+        self._mu = mu
+        tracker.set_tire(self._setup.oracle(mu))
+        return f"told of friction {mu:g}"
+
+
+def friction_now(friction: Friction, measured: Measured) -> float:
+    """Return the friction where the car is, of a road whose changes are steps [-].
+
+    Parameters
+    ----------
+    friction : of the road.
+    measured : time and place of the car.
+    """
+    mu = friction.scale
+    for change in friction.changes:
+        here = measured.t if change.at_time is not None else measured.X
+        if here >= change.start:
+            mu = change.scale
+    return mu
+
+
+def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
+    """Return what goes on learning while the tracker drives, and hands over what is fit.
+
+    Parameters
+    ----------
+    learnt : what the tracker is told at the start.
+    vehicle : the car.
+
+    Raises
+    ------
+    ValueError
+        Where no method can go on from there, or its law has no certificate.
+    """
+    try:
+        method = continuing(learnt, vehicle, PERIOD)
+    except ValueError as error:
+        raise ValueError(f"--tires learning: {error}") from None
+    identifier = OnlineIdentifier(method, vehicle, PERIOD, learnt)
+    return Learner(Supervisor(identifier, prediction_tire(learnt, vehicle)))
+
+
+LINEAR, FROZEN, ORACLE, LEARNING = TIRES = ("linear", "frozen", "oracle", "learning")
+WIDEST = 2.0  # deviation at which a car is off the path [m]
+PLAN_EVERY = 4  # periods between two plans that are kept: half a frame of the film
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Conditions:
+    """What is alike for every tire.
+
+    Parameters
+    ----------
+    setup : path, car and road.
+    delay : periods from a measurement until what follows from it acts.
+    noise : whether sensors are noisy.
+    seed : of the noise.
+    laps : of a closed path.
+    faults : of the sensors, while the path is driven.
+    """
+
+    setup: Setup
+    delay: int
+    noise: bool
+    seed: int
+    laps: float
+    faults: tuple[SensorFault, ...] = ()
+
+    @property
+    def sensors(self) -> CarSensors:
+        """The sensors of the car, in order."""
+        return inertial_unit() if self.noise else CarSensors()
+
+    @property
+    def driving_sensors(self) -> Measures:
+        """The sensors on the path, new ones for each drive: broken ones remember."""
+        return FaultySensors(self.sensors, self.faults) if self.faults else self.sensors
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Run:
+    """A drive and what is known of it.
+
+    Parameters
+    ----------
+    label : the tire that the tracker was told.
+    model, final : that tire, at the start and at the end.
+    problem : of the tracker.
+    drive : what happened.
+    scores : what it is worth.
+    learner : what changed the tire on the way, if anything could.
+    """
+
+    label: str
+    model: PredictionTire
+    final: PredictionTire
+    problem: Problem
+    drive: Drive
+    scores: Scores
+    learner: LearningTires | None
+
+    def __repr__(self) -> str:
+        rms, peak = self.scores.rms_e_y_m, self.scores.peak_e_y_m
+        return (
+            f"<Run on {self.label} tires along {self.drive.path.name}: {self.drive.ending}; "
+            f"{rms:.3f} m rms off the path, {peak:.3f} m at most>"
+        )
+
+
+def require_compiler() -> None:
+    """Say that there is no C compiler for the tracker before anything is learnt or driven.
+
+    Raises
+    ------
+    ValueError
+        Where there is none.
+    """
+    if find_compiler() is None:
+        raise ValueError(
+            "no C compiler found: the tracker cannot be built; install gcc or clang, or name one "
+            "in the environment as CC"
+        )
+
+
+def told_tire(label: str, setup: Setup, learnt: TireModel | None) -> PredictionTire:
+    """Return the tire that a tracker is told at the start.
+
+    Parameters
+    ----------
+    label : of `TIRES`.
+    setup : path, car and road.
+    learnt : what was learnt before the drive, for `frozen` and, where there is any, `learning`.
+    """
+    if label == LINEAR:
+        return prediction_tire(setup.vehicle)
+    if label == ORACLE:
+        return setup.oracle()
+    assert learnt is not None
+    return prediction_tire(learnt, setup.vehicle)
+
+
+def run_drive(
+    label: str,
+    conditions: Conditions,
+    learnt: TireModel | None,
+    *,
+    linearizations: int = 1,
+) -> Run:
+    """Drive the path once with the tracker told of a tire.
+
+    Parameters
+    ----------
+    label : of `TIRES`.
+    conditions : what is alike for every tire.
+    learnt : what was learnt before the drive.
+    linearizations : a step of the tracker.
+
+    Raises
+    ------
+    ValueError
+        Where there is no C compiler for the tracker.
+    """
+    setup, problem = conditions.setup, Problem()
+    model = told_tire(label, setup, learnt)
+    lag = setup.vehicle.require_chassis().steering_lag
+    try:
+        tracker = Tracker(
+            model,
+            problem,
+            period=PERIOD,
+            delay=conditions.delay * PERIOD + lag,
+            linearizations=linearizations,
+        )
+    except NoCompilerError as error:
+        raise ValueError(str(error)) from None
+    learner = _learner(label, setup, learnt)
+    with Progress(f"driving on {label} tires") as progress:
+        driven = drive_tracker(
+            setup.path,
+            setup.car(),
+            tracker,
+            speed=setup.profile(),
+            sensors=conditions.driving_sensors,
+            delay=conditions.delay,
+            rng=np.random.default_rng([conditions.seed, 2]),
+            learner=learner,
+            laps=conditions.laps,
+            widest=WIDEST,
+            plan_every=PLAN_EVERY,
+            name=f"{setup.path.name}, {label}",
+            progress=progress,
+        )
+    return Run(
+        label=label,
+        model=model,
+        final=tracker.tire,
+        problem=problem,
+        drive=driven,
+        scores=scores(driven),
+        learner=learner,
+    )
+
+
+def _learner(label: str, setup: Setup, learnt: TireModel | None) -> LearningTires | None:
+    if label == ORACLE and setup.drops:
+        return Informer(setup)
+    if label == LEARNING:
+        assert learnt is not None
+        return make_learner(learnt, setup.vehicle)
+    return None
+
+
+def drive(
+    path: Path,
+    vehicle: Vehicle,
+    tire: TireModel | None = None,
+    *,
+    speed: float | None = None,
+    share: float = 0.9,
+    friction: float = 1.0,
+    delay: float = 0.02,
+    learning: bool = False,
+    noise: bool = True,
+    laps: float = 1.0,
+    seed: int = 0,
+) -> Run:
+    """Drive a double-track car along a path; the tracker steers by the tires that it is told of.
+
+    Parameters
+    ----------
+    path : to follow, of `tireid.paths`, or `tireid.paths.Path.from_csv`.
+    vehicle : the car, with a chassis.
+    tire : what was learnt; None tells the tracker of the linear tire of the vehicle.
+    speed : constant speed [m/s]; None drives at a share of the grip.
+    share : of the lateral acceleration that the tightest bend takes, over what the tires can give;
+        a closed path brakes for bends.
+    friction : of the road over that of the tire's measurement [-].
+    delay : from a measurement until its command acts, a multiple of 0.01 s [s].
+    learning : go on learning from the tire while driving, and hand over what is fit.
+    noise : whether sensors are noisy.
+    laps : of a closed path.
+    seed : of the noise.
+
+    Returns
+    -------
+    Run
+        `drive` holds every signal, `scores` what it is worth.
+
+    Raises
+    ------
+    VehicleError
+        Where the vehicle has no chassis.
+    ValueError
+        Where a number is not that of a drive, there is no tire to go on learning from, or no C
+        compiler for the tracker.
+    """
+    periods = delay / PERIOD
+    if not (0.0 <= delay <= 0.1 and abs(periods - round(periods)) < 1e-9):
+        raise ValueError(f"delay must be 0 to 0.1 s in steps of {PERIOD:g} s, it is {delay:g}")
+    for name, value in (("share", share), ("laps", laps), ("speed", speed)):
+        if value is not None and not value > 0.0:
+            raise ValueError(f"{name} must be positive, it is {value:g}")
+    if laps != 1.0 and not path.closed:
+        raise ValueError(f"laps are of a closed path, {path.name} is not")
+    if learning and tire is None:
+        raise ValueError("learning goes on from a tire: none is given")
+    vehicle.require_chassis()
+    setup = Setup(
+        path=path,
+        vehicle=vehicle,
+        plant="double-track",
+        mu=require_friction("friction", friction),
+        drops=(),
+        wish=SpeedWish(share if speed is None else None, speed),
+    )
+    conditions = Conditions(setup=setup, delay=round(periods), noise=noise, seed=seed, laps=laps)
+    label = LINEAR if tire is None else LEARNING if learning else FROZEN
+    return run_drive(label, conditions, tire)

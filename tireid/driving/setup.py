@@ -1,0 +1,168 @@
+"""What is driven: a path, a car on its road, and how fast.
+
+Grip is that of the true tire in steady cornering on the friction of the start.
+"""
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from functools import cache
+from typing import NamedTuple, cast
+
+import numpy as np
+
+from codegen.arrays import Array
+from models.friction import Friction, FrictionChange
+from models.tires import Tire
+from models.vehicle import Vehicle
+from mpc.cars import Car, DoubleTrackCar
+from mpc.loop import SpeedProfile
+from mpc.loop.sensing import cornering_limit
+from mpc.path import Path, grip_speed, steady_speed
+from mpc.tires import PredictionTire, oracle_tire
+
+PLANTS = ("double-track", "multi-body", "drift")
+FASTEST = 30.0  # on a closed course [m/s]
+ACCELERATION, BRAKING = 2.0, 3.0  # on a closed course at friction 1 [m/s²]
+PERIOD = 0.01  # control period [s]
+
+
+class SpeedWish(NamedTuple):
+    """How fast to drive: a share of the grip, or a speed [m/s]; one of them is None."""
+
+    share: float | None
+    speed: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setup:
+    """A car at the start of a path.
+
+    Parameters
+    ----------
+    path : to follow.
+    vehicle : the car as its tracker is told of it.
+    plant : which equations drive, of `PLANTS`.
+    mu : friction of the road over that of the tire's measurement, before the first drop [-].
+    drops : arc length [m] and friction from there on.
+    wish : how fast.
+    """
+
+    path: Path
+    vehicle: Vehicle
+    plant: str
+    mu: float
+    drops: tuple[tuple[float, float], ...]
+    wish: SpeedWish
+
+    def car(self, *, open_field: bool = False) -> Car:
+        """Return a car on the road, or on a field that has the friction of the start everywhere.
+
+        Parameters
+        ----------
+        open_field : leave the drops out.
+        """
+        friction = Friction(scale=self.mu) if open_field else self.friction()
+        if self.plant == "double-track":
+            return DoubleTrackCar(self.vehicle, friction=friction, period=PERIOD)
+        from mpc.cars.commonroad import drift_car, multi_body_car
+
+        make: Callable[..., Car] = multi_body_car if self.plant == "multi-body" else drift_car
+        return make(friction=friction, period=PERIOD)
+
+    def oracle(self, mu: float | None = None) -> PredictionTire:
+        """Return the true tire on a road.
+
+        Parameters
+        ----------
+        mu : its friction; None is that of the start.
+        """
+        tire = cast(Hashable, self._tire())
+        return _oracle(self.vehicle, tire, self.mu if mu is None else mu)
+
+    def _tire(self) -> Tire:
+        return self.car(open_field=True).tire
+
+    @property
+    def grip(self) -> float:
+        """Largest lateral acceleration on the road of the start [m/s²]."""
+        return cornering_limit(self.vehicle, self._tire(), self.mu)
+
+    def speeds(self) -> Array:
+        """Return the wanted speed at the samples of the path, (n,) [m/s].
+
+        On an open path it is constant; on a closed one it brakes for the bends and accelerates.
+        """
+        if self.wish.share is None:
+            assert self.wish.speed is not None
+            return np.full(self.path.s.size, self.wish.speed)
+        a_y = self.wish.share * self.grip
+        if not self.path.closed:
+            return np.full(self.path.s.size, steady_speed(self.path, a_y_max=a_y))
+        return grip_speed(
+            self.path,
+            a_y_max=a_y,
+            v_max=FASTEST,
+            a_accel=self.mu * ACCELERATION,
+            a_brake=self.mu * BRAKING,
+        )
+
+    def profile(self) -> SpeedProfile:
+        """Return the wanted speed along the path."""
+        return SpeedProfile(self.path, self.speeds())
+
+    def friction(self) -> Friction:
+        """Return the road with its drops.
+
+        On a path along X each wheel meets a drop at its place. Elsewhere all wheels meet it at the
+        time at which the car is expected there.
+        """
+        if not self.drops:
+            return Friction(scale=self.mu)
+        if self._runs_along_x:
+            changes = [
+                FrictionChange(scale=mu, at_place=float(self.path.pose(s)[0]))
+                for s, mu in self.drops
+            ]
+        else:
+            changes = [FrictionChange(scale=mu, at_time=self.time_at(s)) for s, mu in self.drops]
+        return Friction(scale=self.mu, changes=tuple(changes))
+
+    def time_at(self, s: float) -> float:
+        """Return when the car is expected at a place, at the wanted speed [s].
+
+        Parameters
+        ----------
+        s : arc length [m]; a closed course counts laps.
+        """
+        v = self.speeds()
+        pace = 0.5 * (1.0 / v[1:] + 1.0 / v[:-1]) * np.diff(self.path.s)
+        t = np.concatenate([[0.0], np.cumsum(pace)])
+        laps, within = divmod(s, self.path.length) if self.path.closed else (0.0, s)
+        return float(laps * t[-1] + np.interp(within, self.path.s, t))
+
+    @property
+    def _runs_along_x(self) -> bool:
+        return not self.path.closed and bool(np.all(np.cos(self.path.psi) > 0.2))
+
+
+@cache
+def _oracle(vehicle: Vehicle, tire: Hashable, mu: float) -> PredictionTire:
+    return oracle_tire(vehicle, cast(Tire, tire), mu)
+
+
+def require_friction(word: str, mu: float) -> float:
+    """Return a friction over that of the tire's measurement, if a road can have it.
+
+    Parameters
+    ----------
+    word : that it was given by.
+    mu : the friction [-].
+
+    Raises
+    ------
+    ValueError
+        Where no road has it.
+    """
+    if not 0.05 <= mu <= 1.5:
+        raise ValueError(f"{word}: friction must be 0.05 to 1.5, it is {mu:g}")
+    return mu
