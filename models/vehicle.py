@@ -174,10 +174,10 @@ GRAVITY = 9.81  # standard acceleration of free fall, rounded as usual [m/s^2]
 # What a vehicle file may leave out, and what is believed of a road car then.
 #
 # Inertia: a car that swings about one axle leaves the other at rest where I_z = m l_f l_r. The cars
-# of CommonRoad (Ford Escort, BMW 320i, VW Vanagon, measured by the NHTSA) have 0.94, 1.00 and 1.10
-# of it, that of CarMaker 0.99. A scale model has less: 0.4 for one of 1:10.
-# Stiffness: Gillespie, Fundamentals of Vehicle Dynamics (1992), ch. 10: a radial tire makes 0.15
-# of its load a degree, one of low section (0.60 and less) 0.25 to 0.30; 14 /rad is 0.25.
+# of CommonRoad (Ford Escort, BMW 320i, VW Vanagon) have 0.94, 1.00 and 1.10 of it, a sedan of
+# CarMaker 0.99. A scale model has less: 0.4 for one of 1:10.
+# Stiffness: the middle of the 12 to 20 static loads per rad that passenger cars have, on the soft
+# side, as on a road that is not of the best; 0.25 of the load a degree.
 
 STIFFNESS_SHARE = 14.0  # of the static load of the axle [1/rad]
 RULES = {
