@@ -6,7 +6,8 @@ number above it, in their order:
     <!-- numbers learn_and_extrapolate: input=5 plant/over_floor/{least,most} target=1.3 -->
 
     script:          whose recorded values, benchmarks/results/<script>.json, the next keys are of;
-                     tireid_paper has those of the tables that a test computes again
+                     tireid_paper has those of the tables that a test computes again, house
+                     what docs/house.py counts of the code
     key              measured: the number is the recorded value, rounded as it is printed
     key*1e3          times a factor, where the document has another unit
     key~3            rounded to three significant digits, as in 60 800
@@ -34,7 +35,10 @@ from typing import Any, NamedTuple
 from benchmarks.targets import RESULTS
 
 ROOT = Path(__file__).resolve().parents[1]
-COMMITTED = {"tireid_paper": ROOT / "tests" / "tireid" / "expected_tables.json"}
+COMMITTED = {
+    "tireid_paper": ROOT / "tests" / "tireid" / "expected_tables.json",
+    "house": ROOT / "docs" / "house.json",
+}
 REASONS = ("input", "target", "definition", "formula", "paper", "standard", "version", "name")
 Values = Mapping[str, Mapping[str, float | int | str]]  # by script, by key
 
