@@ -1,5 +1,6 @@
 """How the documents become a site: `make docs`."""
 
+import json
 import re
 from importlib.metadata import version as installed
 from typing import Any
@@ -9,6 +10,7 @@ author = "The tireid developers"
 release = version = installed("tireid")
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 myst_heading_anchors = 3
+source_suffix = {".md": "markdown", ".ipynb": "notebook"}
 html_theme = "furo"
 html_title = "tireid"
 html_copy_source = False
@@ -44,7 +46,27 @@ def shorten(*event: Any) -> tuple[str | None, ...]:
     return tuple(text.replace(ARRAY, "Array") if text else None for text in event[-2:])
 
 
+def markdown_of(notebook: str) -> str:
+    """Return a notebook, without outputs, as Markdown."""
+    texts = []
+    for cell in json.loads(notebook)["cells"]:
+        text = "".join(cell["source"])
+        texts.append(text if cell["cell_type"] == "markdown" else f"```python\n{text}\n```")
+    return "\n\n".join(texts) + "\n"
+
+
 def setup(app: Any) -> None:
-    """Rewrite docstrings before napoleon reads them, and signatures."""
+    """Rewrite docstrings before napoleon reads them, and signatures; read notebooks."""
+    from myst_parser.sphinx_ import MystParser
+
+    class NotebookParser(MystParser):
+        """Reads a notebook as the Markdown that it holds."""
+
+        supported = ("notebook",)
+
+        def parse(self, inputstring: str, document: Any) -> None:
+            super().parse(markdown_of(inputstring), document)
+
+    app.add_source_parser(NotebookParser)
     app.connect("autodoc-process-signature", shorten)
     app.connect("autodoc-process-docstring", describe, priority=400)

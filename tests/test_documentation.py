@@ -229,5 +229,6 @@ def test_python_in_documents_is_python_and_names_what_there_is():
 def test_every_page_is_in_the_table_of_contents():
     index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
     listed = set(re.findall(r"^[\w/]+$", index, re.M))
-    pages = {p.relative_to(ROOT / "docs").with_suffix("").as_posix() for p in DOCUMENTS[2:]}
+    files = [*DOCUMENTS[2:], *(ROOT / "docs").rglob("*.ipynb")]
+    pages = {p.relative_to(ROOT / "docs").with_suffix("").as_posix() for p in files}
     assert listed == pages - {"index"}

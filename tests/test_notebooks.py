@@ -1,0 +1,90 @@
+"""Notebooks run from the first cell to the last, keep no outputs, and hold what they promise."""
+
+import ast
+import importlib.util
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
+
+
+def cells(path: Path, kind: str) -> list[str]:
+    """The sources of the cells of a kind, markdown or code."""
+    notebook = json.loads(path.read_text(encoding="utf-8"))
+    return ["".join(c["source"]) for c in notebook["cells"] if c["cell_type"] == kind]
+
+
+def run(sources: list[str]) -> dict:
+    """Run cells one after the other as Jupyter does; return the names that they leave."""
+    names = {"__name__": "__main__"}
+    for k, source in enumerate(sources):
+        exec(compile(source, f"cell {k}", "exec"), names)
+    return names
+
+
+@pytest.fixture
+def executed(request, tmp_path, monkeypatch):
+    import matplotlib
+    import matplotlib.pyplot as plt
+
+    matplotlib.use("Agg")
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    path = ROOT / "docs" / "notebooks" / f"{request.param}.ipynb"
+    yield run(cells(path, "code"))
+    plt.close("all")
+
+
+@pytest.mark.parametrize("executed", ["learn_from_a_log"], indirect=True)
+def test_what_was_learnt_from_a_log_predicts_another_drive(executed):
+    prediction, before = executed["prediction"], executed["before"]
+    assert prediction.against_truth.both < 0.06 * prediction.true_force.both
+    assert prediction.against_truth.both < 0.1 * before.against_truth.both
+    assert executed["again"].to_dict() == executed["tire"].to_dict()
+
+
+@pytest.mark.parametrize("executed", ["from_a_tire_to_a_controller"], indirect=True)
+def test_controllers_on_a_learnt_tire_steer_and_its_c_passes_its_own_test(executed):
+    assert 0.0 < executed["furthest"]["learnt"] < 0.25 * executed["LANE"]
+    assert abs(executed["Y"][-1]) < 0.01
+    assert executed["rms"]["learnt"] < 0.5 * executed["rms"]["linear"]
+    assert (executed["exported"].folder / "include").is_dir()
+    if "told" in executed:
+        assert executed["told"].returncode == 0 and "100% tests passed" in executed["told"].stdout
+    assert np.isfinite(executed["gains"]["learnt"]).all()
+
+
+def test_every_notebook_is_run_and_leads_through_one_import():
+    assert {path.stem for path in NOTEBOOKS} == {"learn_from_a_log", "from_a_tire_to_a_controller"}
+    own = {"codegen", "models", "identifier", "mpc"}
+    for path in NOTEBOOKS:
+        nodes = [n for source in cells(path, "code") for n in ast.walk(ast.parse(source))]
+        modules = {a.name for n in nodes if isinstance(n, ast.Import) for a in n.names}
+        modules |= {n.module for n in nodes if isinstance(n, ast.ImportFrom)}
+        assert "tireid" in modules and not {m.split(".")[0] for m in modules} & own, path
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_keeps_no_output_and_has_the_form_that_jupyter_reads(path):
+    notebook = json.loads(path.read_text(encoding="utf-8"))
+    assert (notebook["nbformat"], notebook["nbformat_minor"]) == (4, 5)
+    ids = [cell["id"] for cell in notebook["cells"]]
+    assert len(set(ids)) == len(ids) and all(re.fullmatch(r"[\w-]{1,64}", name) for name in ids)
+    for cell in notebook["cells"]:
+        code = {"outputs", "execution_count"} if cell["cell_type"] == "code" else set()
+        assert set(cell) == {"id", "cell_type", "metadata", "source"} | code
+        assert not cell.get("outputs") and cell.get("execution_count") is None
+
+
+def test_the_site_shows_a_notebook_as_its_text_with_code_in_blocks():
+    spec = importlib.util.spec_from_file_location("conf", ROOT / "docs" / "conf.py")
+    conf = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(conf)
+    shown = conf.markdown_of(NOTEBOOKS[0].read_text(encoding="utf-8"))
+    blocks = re.findall(r"^```python\n(.*?)\n```$", shown, re.M | re.S)
+    assert blocks == cells(NOTEBOOKS[0], "code")
+    assert all(text in shown for text in cells(NOTEBOOKS[0], "markdown"))
