@@ -11,13 +11,17 @@ SMOKE := tests/test_imports.py tests/codegen tests/models/test_vehicle.py \
 	tests/mpc/path/test_waypoints.py tests/mpc/path/test_gates.py tests/tireid/test_cli.py
 SMOKE_ONNX := tests/identifier/export/test_onnx.py tests/identifier/export/test_onnx_model.py
 
-.PHONY: demo test lint docs bench mutants fuzz fuzz-c numbers newest lowest lock wheel clean
+.PHONY: demo test heavy lint docs bench mutants fuzz fuzz-c numbers newest lowest lock wheel clean
 
 demo: $(VENV)/.demo
 	$(VENV)/bin/tireid demo --out out/demo --force
 
 test: $(VENV)/.test lint
-	$(PY) -m pytest -n auto --dist worksteal
+	$(PY) -m pytest -n auto --dist worksteal -m "not heavy"
+
+# The sweeps that tests/heavy.toml lists.
+heavy: $(VENV)/.test
+	$(PY) -m pytest -n auto --dist worksteal -m heavy
 
 lint: $(VENV)/.test
 	$(VENV)/bin/ruff check .

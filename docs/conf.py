@@ -57,7 +57,7 @@ def markdown_of(notebook: str) -> str:
 
 def setup(app: Any) -> None:
     """Rewrite docstrings before napoleon reads them, and signatures; read notebooks."""
-    from myst_parser.sphinx_ import MystParser
+    from myst_parser.parsers.sphinx_ import MystParser
 
     class NotebookParser(MystParser):
         """Reads a notebook as the Markdown that it holds."""

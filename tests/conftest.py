@@ -1,11 +1,42 @@
-"""What several tests need: the recordings beside the checkout, and a seeded generator."""
+"""What several tests need: recordings beside the checkout, a seeded generator; what is heavy."""
 
+import tomllib
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+HEAVY = tomllib.loads(Path(__file__).with_name("heavy.toml").read_text(encoding="utf-8"))["heavy"]
+
+
+def kept(case: str, entry: dict) -> str | None:
+    """The pattern by which a case of a heavy test stays quick, if one does."""
+    return next((pattern for pattern in entry.get("keep", ()) if fnmatchcase(case, pattern)), None)
+
+
+def sort_out(items, entries) -> list[str]:
+    """Mark what is heavy; return the entries, and patterns of them, that no item meets."""
+    by_name = {entry["test"]: entry for entry in entries}
+    unmet = {
+        (name, pattern) for name, e in by_name.items() for pattern in (None, *e.get("keep", ()))
+    }
+    for item in items:
+        name, _, case = item.nodeid.partition("[")
+        if name in by_name:
+            pattern = kept(case.removesuffix("]"), by_name[name])
+            unmet.discard((name, pattern))
+            if pattern is None:
+                item.add_marker(pytest.mark.heavy)
+    return sorted(name if pattern is None else f"{name}: {pattern}" for name, pattern in unmet)
+
+
+@pytest.hookimpl(tryfirst=True)  # before -m chooses
+def pytest_collection_modifyitems(config, items):
+    unmet = sort_out(items, HEAVY)
+    if unmet and config.args == config.getini("testpaths") and not config.option.keyword:
+        raise pytest.UsageError("tests/heavy.toml names what is not there: " + ", ".join(unmet))
 
 
 @pytest.fixture(scope="session")
