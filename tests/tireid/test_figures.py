@@ -76,7 +76,7 @@ def made_up(scale: float = 5000.0, *, truth: bool = True, rear: float = 0.0) -> 
         design=PaperIdentifier(gains=GAINS, network=Network(hidden=3), force_unit=unit),
         recording=recording,
         axle_force=1.1 * force,
-        told={"f_hat": 0.1 * force / unit, "xi_tilde": 0.01 * rng.standard_normal((N, 2))},
+        outputs={"f_hat": 0.1 * force / unit, "xi_tilde": 0.01 * rng.standard_normal((N, 2))},
         state={
             "z": np.zeros((N + 1, 2)),
             "W": np.cumsum(rng.standard_normal((N + 1, 2, 3)), axis=0),
@@ -405,7 +405,7 @@ def test_a_law_that_diverges_leaves_the_panel_instead_of_flattening_it() -> None
     wild = replace(
         history,
         axle_force=force,
-        told={**history.outputs, "xi_tilde": xi_tilde},
+        outputs={**history.outputs, "xi_tilde": xi_tilde},
         state={**history.state, "W": W},
     )
     figure = force_figure(wild)
