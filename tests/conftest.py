@@ -17,10 +17,17 @@ def kept(case: str, entry: dict) -> str | None:
 
 
 def sort_out(items, entries) -> list[str]:
-    """Mark what is heavy; return the entries, and patterns of them, that no item meets."""
+    """Mark what is heavy; return the entries, and patterns of them, that nothing in a file meets.
+
+    Files without a test are left out: they are skipped where a package is missing.
+    """
     by_name = {entry["test"]: entry for entry in entries}
+    files = {item.nodeid.partition("::")[0] for item in items}
     unmet = {
-        (name, pattern) for name, e in by_name.items() for pattern in (None, *e.get("keep", ()))
+        (name, pattern)
+        for name, entry in by_name.items()
+        for pattern in (None, *entry.get("keep", ()))
+        if name.partition("::")[0] in files
     }
     for item in items:
         name, _, case = item.nodeid.partition("[")

@@ -33,6 +33,7 @@ def test_cases_that_are_kept_and_other_tests_are_not_heavy():
 def test_an_entry_that_nothing_meets_is_told():
     assert sorted_out("sweep[a]", "sweep[c]")[1] == ["t.py::long", "t.py::sweep: b-*"]
     assert sorted_out("sweep[a]", "sweep[b-1]", "long")[1] == ["t.py::sweep"]  # none is heavy
+    assert sort_out([Item("u.py::long")], ENTRIES) == []  # t.py is skipped
 
 
 @pytest.mark.parametrize("entry", HEAVY, ids=lambda entry: entry["test"].partition("::")[2][:60])
