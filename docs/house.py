@@ -216,8 +216,8 @@ def starts(root: Path) -> Counts:
     help_words = "import sys; from tireid.cli import main; sys.exit(main(['--help']))"
     empty = _quickest_ms("pass", root)
     return {
-        "import_ms": _quickest_ms("import tireid", root) - empty,
-        "help_ms": _quickest_ms(help_words, root) - empty,
+        "import_ms": max(0.0, _quickest_ms("import tireid", root) - empty),
+        "help_ms": max(0.0, _quickest_ms(help_words, root) - empty),
     }
 
 
