@@ -20,7 +20,6 @@ from codegen import BatchScan
 from codegen.batch import processors
 from codegen.lanes import find_target
 from identifier.compare.batch import BatchRun, identify_batch
-from identifier.defaults import paper_identifier
 from identifier.methods import make_method
 from identifier.paper.design import PaperIdentifier
 from identifier.run import History, identify
@@ -52,7 +51,7 @@ def shortest(
 
 def per_step(name: str, car: Vehicle, recording: Recording) -> tuple[float, float]:
     """Return the time of a step of one run [s]: alone, and in lanes on one core."""
-    setup, n = make_method(name, car).setup(car, recording), len(recording)
+    setup, n = make_method(name, car).setup(car).begin(recording.x[0]), len(recording)
     signals = {"x": recording.x, "u": recording.u, "v_x": recording.v_x}
     sampled = {port: signals[port] for port in setup.scan.over}
     numbers = {**setup.carry, **setup.constants}
@@ -78,7 +77,7 @@ def per_step(name: str, car: Vehicle, recording: Recording) -> tuple[float, floa
 
 def gain_sets(car: Vehicle, count: int) -> list[PaperIdentifier]:
     """Return designs whose gains are drawn around those of the vehicle, each with its own seed."""
-    rng, base = np.random.default_rng(0), paper_identifier(car)
+    rng, base = np.random.default_rng(0), PaperIdentifier.for_vehicle(car)
     drawn = []
     for seed, (rate, leak, forgetting) in enumerate(np.exp(rng.uniform(-1, 1, (count, 3)))):
         gains = replace(

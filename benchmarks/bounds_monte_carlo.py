@@ -30,19 +30,19 @@ import numpy as np
 from benchmarks.random_drives import FORCE_UNIT, random_vehicle
 from benchmarks.targets import Targets, keeps
 from codegen.arrays import Array
-from identifier.defaults import natural_driving, natural_operation
-from identifier.paper.design import Driving, PaperIdentifier
-from identifier.paper.laws import DRIVING_ERRORS, Gains
+from identifier.driving import Driving, natural_driving
+from identifier.paper.design import PaperIdentifier
+from identifier.paper.laws import LAWS, Gains
 from identifier.paper.network import Network
 from identifier.stability import Certificate
 from identifier.stability.bounds import small_gain, steady_capacity
-from identifier.stability.loop import direction_matrix, linear_law
+from identifier.stability.loop import direction_matrix
 from identifier.stability.monte_carlo import Beginning, Observed, monte_carlo
 from models.vehicle import Vehicle
 from tireid.commands.certificate_table import bound_rows, certificate_of
 
 SEED, PROCESSES = 5, 2
-LAWS = ("integral", "integral", "instantaneous", "pi_lead")
+DRAWN = ("integral", "integral", "instantaneous", "pi_lead")
 HIDDEN = (5, 20)
 STEPS = (0.005, 0.01, 0.02)  # s
 KEYS = {  # what is recorded: the bound in the certificate, and what it bounds
@@ -114,7 +114,7 @@ def random_design(
     driving : the declared conditions.
     W_max : radius of a projection [U]; then V has one too.
     """
-    A_d, law = random_error_dynamics(rng), str(rng.choice(LAWS))
+    A_d, law = random_error_dynamics(rng), str(rng.choice(DRAWN))
     gains = Gains(
         A_d=((A_d[0, 0], A_d[0, 1]), (A_d[1, 0], A_d[1, 1])),
         forgetting=rng.uniform(2.0, 15.0),
@@ -151,15 +151,15 @@ def with_leakage(
     blank : of `random_design`.
     """
     gains, n_h = blank.gains, blank.network.hidden
-    driving_error = DRIVING_ERRORS[blank.law]
-    law, D = linear_law(driving_error, gains.lead), direction_matrix(driving_error, gains.matrix)
+    chosen = LAWS[blank.law]
+    law, D = chosen.error(gains.lead), direction_matrix(chosen, gains.matrix)
     A_d, forgetting = gains.matrix, gains.forgetting
-    integral = linear_law(DRIVING_ERRORS["integral"])
+    integral = LAWS["integral"].error()
     unit = small_gain(A_d, law=integral, forgetting=forgetting, eta_W=1.0, n_h=n_h, direction=D)
     eta_W = rng.uniform(0.02, 0.98) / unit
     if blank.law == "instantaneous":
         eta_W /= forgetting  # theta is 0 at any gain: as fast as the integral law
-    needed = natural_operation(blank, vehicle).needed_force
+    needed = blank.operation(vehicle).needed_force
     capacity = needed * np.exp(rng.uniform(np.log(0.3), np.log(10.0)))
     rho = steady_capacity(
         A_d, law=law, forgetting=forgetting, eta_W=eta_W, rho_W=capacity, n_h=n_h, direction=D
@@ -192,7 +192,7 @@ def with_dead_zone(
     vehicle : the car.
     leaking : of `with_leakage`.
     """
-    known = natural_operation(leaking, vehicle)
+    known = leaking.operation(vehicle)
     W, V = np.exp(rng.uniform(np.log(0.1), np.log(3.0), 2)) * (known.W_large, known.V_start)
     return replace(leaking, gains=replace(leaking.gains, W_free=W, V_free=V))
 
@@ -253,7 +253,7 @@ def driven(
     """
     assert design.driving is not None
     W = min(stated(certificate).get("weight_bound", math.inf), design.gains.W_max)
-    V = min(natural_operation(design, vehicle).V_start, design.gains.V_max)
+    V = min(design.operation(vehicle).V_start, design.gains.V_max)
     beginning = Beginning(W=W if math.isfinite(W) else 0.0, V=V)
     return monte_carlo(design, vehicle, design.driving, count, beginning=beginning, rng=rng)
 

@@ -23,9 +23,9 @@ import numpy as np
 
 from benchmarks.targets import Targets, keeps
 from codegen.arrays import Array
-from identifier.defaults import design_for, natural_driving, natural_operation
+from identifier.driving import natural_driving
 from identifier.methods import REFERENCE, make_method
-from identifier.paper.design import PaperIdentifier
+from identifier.paper.design import PaperIdentifier, design_for
 from identifier.paper.network import NetworkModel
 from identifier.run import identify
 from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS, with_keeping
@@ -165,7 +165,7 @@ def designs(vehicle: Vehicle) -> dict[str, PaperIdentifier]:
     paper = make_method(REFERENCE, vehicle)
     found = design_for(vehicle, natural_driving(vehicle))
     assert isinstance(paper, PaperIdentifier)
-    known = natural_operation(found, vehicle)
+    known = found.operation(vehicle)
     return {"leakage": paper} | {
         name: with_keeping(found, known, name) for name in KEEPINGS if name != "leakage"
     }

@@ -30,12 +30,14 @@ import numpy as np
 from benchmarks.hostile_designs import HIDDEN, INPUTS, INTEGRATORS, LAWS, UNIT, Case, random_cases
 from benchmarks.targets import Targets, keeps
 from codegen.arrays import Array
-from identifier.paper.design import SPEED_SPREAD, Driving, PaperIdentifier
-from identifier.paper.laws import DRIVING_ERRORS, Gains
+from identifier.driving import SPEED_SPREAD, Driving
+from identifier.paper.design import PaperIdentifier
+from identifier.paper.laws import LAWS as KNOWN
+from identifier.paper.laws import Gains
 from identifier.paper.network import Network
 from identifier.stability import Certificate, certify
 from identifier.stability.checks import bound_checks, drift_check, dynamics_checks
-from identifier.stability.loop import direction_matrix, linear_law
+from identifier.stability.loop import direction_matrix
 from identifier.stability.monte_carlo import (
     Beginning,
     Drives,
@@ -105,8 +107,8 @@ def certificate_of(design: PaperIdentifier, vehicle: Vehicle) -> Certificate:
     vehicle : the car.
     """
     assert design.driving is not None
-    driving_error = DRIVING_ERRORS[design.law]
-    return certify(design.gains, driving_error, operation(design, vehicle, design.driving))
+    chosen = KNOWN[design.law]
+    return certify(design.gains, chosen, operation(design, vehicle, design.driving))
 
 
 def may_pass(design: PaperIdentifier, vehicle: Vehicle) -> bool:
@@ -118,8 +120,8 @@ def may_pass(design: PaperIdentifier, vehicle: Vehicle) -> bool:
     vehicle : the car.
     """
     assert design.driving is not None
-    driving_error, gains = DRIVING_ERRORS[design.law], design.gains
-    law, D = linear_law(driving_error, gains.lead), direction_matrix(driving_error, gains.matrix)
+    chosen, gains = KNOWN[design.law], design.gains
+    law, D = chosen.error(gains.lead), direction_matrix(chosen, gains.matrix)
     task = operation(design, vehicle, design.driving)
     found = proven_bounds(gains, law, task, D)
     entries = [

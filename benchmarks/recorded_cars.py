@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.targets import Targets, keeps
-from identifier.defaults import LAWS
 from identifier.methods import make_method
+from identifier.paper.design import VARIANTS
 from identifier.reproducibility import AxleRmse, force_rms, online_error, replay
 from identifier.run import identify
 from models.recordings import read_recording
@@ -66,7 +66,7 @@ def measure(targets: Targets) -> None:
     for task, (car, log, learn, other) in TASKS.items():
         learnt, unseen = (read_recording(DATA / log, run=run) for run in (learn, other))
         print(f"{car.name}: learnt on {learn}, frozen, replayed on {other} [% of rms force]")
-        for law in LAWS:
+        for law in VARIANTS:
             rows = []
             for seed in range(SEEDS):
                 design = make_method(law, car, seed)

@@ -25,8 +25,8 @@ from benchmarks.targets import Targets, keeps, show
 from codegen.arrays import Array
 from identifier.axle import AxleIdentifier
 from identifier.axle.gate import GateState
+from identifier.driving import Driving
 from identifier.methods import DEFAULT, make_method
-from identifier.paper.design import Driving
 from identifier.run import OnlineIdentifier, identify
 from identifier.stability.monte_carlo import random_drives, within
 from models.faults import KINDS, SIZED, SensorFault

@@ -13,13 +13,14 @@ import numpy as np
 from scipy.linalg import eigvals
 
 from benchmarks.targets import Targets, keeps
+from identifier.paper.laws import DrivingError
 from identifier.stability.limits import (
     critical_frequency,
     instantaneous_euler_limit,
     integral_euler_limit,
     integral_limit,
 )
-from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Law, Loop, euler, growth_rate
+from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, euler, growth_rate
 from identifier.stability.margins import gain_margin
 
 DT, CASES = 0.01, 200
@@ -32,7 +33,7 @@ TOLERANCES = {
 }
 
 
-def scalar_loop(a: float, lam: float, leakage: float, law: Law) -> Loop:
+def scalar_loop(a: float, lam: float, leakage: float, law: DrivingError) -> Loop:
     """Return the loop of A_d = -a I at unit gain."""
     return Loop(A_d=-a * np.eye(2), forgetting=lam, law=law, G=np.eye(2), leakage=leakage)
 

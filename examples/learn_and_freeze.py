@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from identifier.defaults import paper_identifier
+from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import replay
 from identifier.run import identify
 from models.maneuvers import DoubleLaneChange, Slalom
@@ -37,7 +37,7 @@ def main() -> float:
     learnt = plant.simulate(slalom, speed=20.0).recording()
     unseen = plant.simulate(change, speed=20.0).recording()
 
-    design = paper_identifier(car)
+    design = PaperIdentifier.for_vehicle(car)
     history = identify(learnt, car, design)  # learns sample by sample, in compiled code
     model = history.freeze(25.0)
     result = replay(model, identify(unseen, car, design))

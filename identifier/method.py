@@ -4,14 +4,19 @@ The laws of the paper, the better laws and the baselines run, are recorded, froz
 the same code; they differ in the `Method` that is handed over.
 """
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple, Protocol
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, is_dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeVar, cast
 
 import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
+from identifier.certificate import Certificate
+from identifier.driving import Driving
 from identifier.tire_model import TireModel
+from identifier.tuning import Range, with_numbers
 from models.recordings import Recording
 from models.rules import LARGEST_FORCE
 from models.schema import Table
@@ -51,16 +56,57 @@ def steady_stiffness(model: TireModel, v_x: float) -> Array:
     return np.asarray((left - right) / (2.0 * SLIP))
 
 
+Model = TypeVar("Model", bound=TireModel)
+
+
+def resumed(start: TireModel, kind: type[Model], refusal: str, **structure: Any) -> Model:
+    """Return a stored model to begin with, of the kind and structure that a method learns.
+
+    Parameters
+    ----------
+    start : the stored model.
+    kind : of model that the method learns.
+    refusal : what to say of another.
+    structure : what the method and the model must agree on, by attribute of the model.
+
+    Raises
+    ------
+    ValueError
+        Where the model is of another kind or structure.
+    """
+    if not isinstance(start, kind) or any(
+        getattr(start, name) != value for name, value in structure.items()
+    ):
+        raise ValueError(refusal)
+    return start
+
+
+OTHER_STRUCTURE = "the stored weights are of another structure than the design's"
+
+
 class Setup(NamedTuple):
     """A run, ready to go: the compiled step, the values it carries at the start, its constants.
 
     The step reads x = [v_y, r] (2,), u = [δ_f, δ_r] (2,) and v_x sample by sample, SI, and has an
-    output axle_force (2,) [N].
+    output axle_force (2,) [N]. An observer that starts at the first measurement carries zero until
+    that is known: `observe` takes its x and returns the carried values that begin with it, by port.
     """
 
     scan: Scan
     carry: Mapping[str, Array]
     constants: Mapping[str, Array]
+    observe: Callable[[Array], Mapping[str, Array]] | None = None
+
+    def begin(self, x: Array) -> "Setup":
+        """Return the setup whose observers begin at a measurement.
+
+        Parameters
+        ----------
+        x : [v_y, r] of the first sample (2,) [m/s, rad/s].
+        """
+        if self.observe is None:
+            return self
+        return self._replace(carry={**self.carry, **self.observe(x)})
 
     def run(self, recording: Recording) -> dict[str, Array]:
         """Return what the compiled step records over a recording, by port.
@@ -71,32 +117,169 @@ class Setup(NamedTuple):
         """
         signals = {"x": recording.x, "u": recording.u, "v_x": recording.v_x}
         sampled = {name: signals[name] for name in self.scan.over}
-        return self.scan(len(recording), {**self.carry, **sampled, **self.constants})
+        carry = self.begin(recording.x[0]).carry
+        return self.scan(len(recording), {**carry, **sampled, **self.constants})
 
 
-class Method(Protocol):
+# Rules of numbers that are taken over from elsewhere: a file, another controller.
+COVARIANCE, FACTORS, NOT_NEGATIVE = "covariance", "factors of a covariance", "not negative"
+
+
+class Port(NamedTuple):
+    """An output or a carried value of a step: what stands in it.
+
+    name : of the port, in C, FMU and JSON.   unit : of its numbers, "U" the force unit.
+    words : what it is.   learnt : whether it holds its value while adaptation is off.
+    rule : what its numbers must be to be taken over; empty: finite.
+    """
+
+    name: str
+    unit: str
+    words: str
+    learnt: bool = False
+    rule: str = ""
+
+
+AXLE_FORCE = Port(
+    "axle_force", "N", "lateral axle forces, front and rear, left positive, frame of the body"
+)
+
+
+def force_unit_name(force_unit: float) -> str:
+    """Return the name of a unit of force.
+
+    Parameters
+    ----------
+    force_unit : U [N].
+    """
+    return {1.0: "N", 1000.0: "kN"}.get(force_unit, f"{force_unit:g} N")
+
+
+def in_force_unit(ports: Iterable[Port], force_unit: float) -> tuple[Port, ...]:
+    """Return ports with the name of the force unit in place of U.
+
+    Parameters
+    ----------
+    ports : with units in which U stands for it.
+    force_unit : U [N].
+    """
+    name = force_unit_name(force_unit)
+    return tuple(port._replace(unit=port.unit.replace("U", name)) for port in ports)
+
+
+class Track(NamedTuple):
+    """What was learnt of both axles, instant by instant: what, its unit, its values (n, 2)."""
+
+    title: str
+    unit: str
+    values: Array
+
+
+class Method(ABC):
     """A way to identify axle forces: everything that is chosen before the car drives."""
 
-    @property
-    def dt(self) -> float:
-        """Sampling interval [s]."""
+    __slots__ = ()
+
+    if TYPE_CHECKING:  # at run time they would be taken for the defaults of a dataclass's fields
+
+        @property
+        def dt(self) -> float:
+            """Sampling interval [s]."""
+
+        @property
+        def min_speed(self) -> float:
+            """Below this speed [m/s] learning rests and forces read zero."""
+
+    judged_by = ""  # what gives the certificate, where a package cannot hold it
 
     @property
-    def min_speed(self) -> float:
-        """Below this speed [m/s] learning rests and forces read zero."""
+    def ports(self) -> tuple[Port, ...]:
+        """Outputs and state of its step, axle_force first."""
+        return (AXLE_FORCE,)
 
-    def setup(
-        self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
-    ) -> Setup:
-        """Return what a run needs.
+    def certify(self, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
+        """Return what is proven of it: nothing, where a method does not say more.
 
         Parameters
         ----------
         vehicle : the car.
-        recording : what it drove; the run begins at its first sample.
+        driving : how hard it is driven; None takes what the method was designed for.
+        """
+        del vehicle, driving
+        return Certificate()
+
+    @property
+    def tunables(self) -> Mapping[str, Range]:
+        """What a search may vary, around the numbers that it has; empty: nothing."""
+        return {}
+
+    def tuned(self, values: Mapping[str, float]) -> Self:
+        """Return the method with other numbers.
+
+        Parameters
+        ----------
+        values : by name of its `tunables`; empty leaves it as it is.
+        """
+        return with_numbers(self, values)
+
+    def numbers(self) -> dict[str, Any]:
+        """Return all that was chosen, as plain data: gains, network, the rest and the seed.
+
+        Without a network and random weights those two are None; numbers that are no parts of a
+        design of the paper's stand under gains.
+        """
+        everything: dict[str, Any] = asdict(cast(Any, self)) if is_dataclass(self) else {}
+        return {
+            "gains": everything,
+            "network": everything.get("network"),
+            "design": {"dt_s": self.dt, "min_speed_m_s": self.min_speed},
+            "seed": everything.get("seed"),
+        }
+
+    def tracks(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Track, ...]:
+        """Return what was learnt of the axles over a run, to be drawn over time.
+
+        Parameters
+        ----------
+        vehicle : the car.
+        state : carried values by port, at each of n instants (n, ...).
+        """
+        del vehicle, state
+        return ()
+
+    def port(self, name: str) -> Port:
+        """Return what stands in an output or a carried value.
+
+        Parameters
+        ----------
+        name : of the port.
+
+        Raises
+        ------
+        KeyError
+            Where the method does not describe it.
+        """
+        for port in self.ports:
+            if port.name == name:
+                return port
+        raise KeyError(f"{type(self).__name__} has no port {name!r}")
+
+    @abstractmethod
+    def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
+        """Return what a run needs.
+
+        Parameters
+        ----------
+        vehicle : the car, as far as the method knows it.
         start : model whose weights the run begins with; None begins with those of the method.
+
+        Raises
+        ------
+        ValueError
+            Where no run can begin with that model.
         """
 
+    @abstractmethod
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> TireModel:
         """Return the model that carried values make.
 
@@ -121,7 +304,7 @@ class FrozenModelError(ValueError):
     """A file does not hold a frozen model; the message names the file and what is wrong."""
 
 
-DEAD = 0.02  # of the stiffness told, below which an axle does not push
+DEAD = 0.02  # of the stated stiffness, below which an axle does not push
 PROBE = 0.02  # rad, a slip at which every tire pushes back
 WIDE = 0.3  # rad, beyond the slip of every tire's peak
 PROBE_SPEED = 10.0  # m/s
@@ -172,7 +355,7 @@ class SteadyTires(Protocol):
 
     @property
     def vehicle(self) -> Vehicle:
-        """The car, with the cornering stiffnesses that it is told."""
+        """The car, with the cornering stiffnesses that are stated of it."""
 
     def force_at(self, alpha: Array) -> Array:
         """Return the steady axle forces at slip angles, (k, 2) [N].
@@ -209,10 +392,10 @@ def require_alive(refusal: type[ValueError], tires: SteadyTires) -> None:
             "and the sign of slip (slip_sign)"
         )
     slope = (force[2] - force[1]) / (2.0 * PROBE)
-    for axle, here, told in zip(("front", "rear"), slope, tires.vehicle.bicycle[4:], strict=True):
-        if not here >= DEAD * told:
+    for axle, here, said in zip(("front", "rear"), slope, tires.vehicle.bicycle[4:], strict=True):
+        if not here >= DEAD * said:
             raise refusal(
-                f"the {axle} axle does not push: it has {here:.4g} N/rad, its vehicle {told:.4g}; "
+                f"the {axle} axle does not push: it has {here:.4g} N/rad, its vehicle {said:.4g}; "
                 "check the units of force and slip"
             )
 

@@ -12,13 +12,13 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.method import (
     FORMAT,
     FrozenModelError,
+    Method,
     Setup,
     require_alive,
     require_min_speed,
@@ -28,7 +28,6 @@ from identifier.method import (
 from identifier.paper.network import SIGNALS, network_signals
 from identifier.tire_model import TireModel, drift
 from models.bicycle import BicycleParameters
-from models.recordings import Recording
 from models.rules import LARGEST_FORCE
 from models.schema import Table, read_bytes
 from models.vehicle import Vehicle
@@ -172,7 +171,6 @@ def _reason(error: Exception) -> Any:
     return lines[1] if len(lines) > 1 and "Assertion" in first else first
 
 
-KIND = "onnx"
 STATES = ((1.0, 10.0, 60.0), *([(-most, 0.0, most) for most in (5.0, 2.0, 0.6, 0.6)]))  # SI
 OVER = ("x", "u", "v_x")
 
@@ -197,6 +195,8 @@ class OnnxModel(TireModel):
     ValueError
         Where a number is impossible, the network cannot be read, or its forces do not push back.
     """
+
+    kind = "onnx"
 
     vehicle: Vehicle
     content: bytes
@@ -279,14 +279,14 @@ class OnnxModel(TireModel):
         """The signals that the network reads, column by column."""
         return tuple(read_network(self.content, self.inputs).name_in())
 
-    def setup(self, recording: Recording) -> Setup:
+    def setup(self, dt: float) -> Setup:
         """Return what a replay needs.
 
         Parameters
         ----------
-        recording : what is replayed; it is not looked at.
+        dt : sampling interval of what is replayed [s]; it is not looked at.
         """
-        del recording
+        del dt
         return Setup(
             scan=_scan(self.content, self.inputs, self.slip_sign),
             carry={},
@@ -295,15 +295,6 @@ class OnnxModel(TireModel):
                 "min_speed": np.array(self.min_speed),
             },
         )
-
-    def axle_force(self, recording: Recording) -> NDArray[np.float64]:
-        """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
-
-        Parameters
-        ----------
-        recording : its signals are the input; its forces are not looked at.
-        """
-        return self.setup(recording).run(recording)["axle_force"]
 
     def curve_expression(self, alpha: Any, v_x: Any) -> Any:
         """Return the steady axle forces (2,) [N] as a CasADi expression.
@@ -338,7 +329,7 @@ class OnnxModel(TireModel):
         """Return the model as plain numbers and words, ready for JSON; the network in base64."""
         return {
             "format": FORMAT,
-            "kind": KIND,
+            "kind": self.kind,
             "units": {"inputs": "SI", "outputs": "N"},
             "vehicle": vehicle_numbers(self.vehicle),
             "min_speed_m_s": self.min_speed,
@@ -410,7 +401,7 @@ def _scan(content: bytes, inputs: tuple[str, ...] | None, slip_sign: int) -> Sca
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FrozenMethod:
+class FrozenMethod(Method):
     """A frozen model that takes part in a comparison of methods.
 
     Parameters
@@ -436,15 +427,12 @@ class FrozenMethod:
         """Below this speed [m/s] forces read zero."""
         return self.model.min_speed
 
-    def setup(
-        self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
-    ) -> Setup:
+    def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs.
 
         Parameters
         ----------
         vehicle : the car; the model keeps its own.
-        recording : what it will run over; not looked at.
         start : None; there is nothing that a stored model could begin.
 
         Raises
@@ -455,7 +443,7 @@ class FrozenMethod:
         del vehicle
         if start is not None:
             raise ValueError("a frozen model learns nothing, it cannot begin with a stored one")
-        return self.model.setup(recording)
+        return self.model.setup(self.dt)
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> OnnxModel:
         """Return the model itself.

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identifier.defaults import with_law
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import Gains, diagonal
 from identifier.paper.network import Network
@@ -72,7 +71,7 @@ def paper_design(
     gains : those of the study, or others.
     network : that of the study, or another.
     """
-    return with_law(PaperIdentifier(gains=gains, network=network, seed=seed), law)
+    return PaperIdentifier(gains=gains, network=network, seed=seed).with_law(law)
 
 
 ONLINE = "online"  # the column of what was identified online, against truth, over all

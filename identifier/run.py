@@ -1,4 +1,4 @@
-"""What a method did over a recording: forces, and everything that its step carries and tells."""
+"""What a method did over a recording: forces, and every output and state of its step."""
 
 import math
 from collections.abc import Mapping
@@ -8,11 +8,10 @@ import numpy as np
 
 from codegen import Stepper
 from codegen.arrays import Array
-from identifier.method import Method, Setup
+from identifier.method import Method, Setup, Track
 from identifier.refused import NOWHERE, STALE_TIME, SampleLimits, judges_samples, stale_samples
 from identifier.tire_model import TireModel
 from models.recordings import Recording
-from models.recordings.record import MINIMUM_SAMPLES
 from models.vehicle import Vehicle
 
 IMPOSSIBLE_FORCE = 100.0  # times the car's weight: no tire reaches it, so the law has diverged
@@ -49,7 +48,7 @@ class History:
 
     Parameters
     ----------
-    vehicle : the car the method was told of.
+    vehicle : the car, as far as the method knew it.
     design : the method that ran.
     recording : what it ran over.
     axle_force : forces that were identified online (n, 2) [N].
@@ -70,6 +69,12 @@ class History:
         possible = np.abs(self.axle_force) < IMPOSSIBLE_FORCE * self.vehicle.weight
         sane = possible.all(axis=1)
         return None if sane.all() else float(self.recording.t[np.argmin(sane)])
+
+    @property
+    def tracks(self) -> tuple[Track, ...]:
+        """What the method says it had learnt of the axles at each sample."""
+        before = {name: values[:-1] for name, values in self.state.items()}
+        return self.design.tracks(self.vehicle, before)
 
     def state_at(self, t: float) -> dict[str, Array]:
         """Return the carried values in effect at a time; from the end on, those after the last.
@@ -144,7 +149,7 @@ def identify(
     Parameters
     ----------
     recording : signals, sampled at the design's interval; its forces are not looked at.
-    vehicle : the car as the method is told of it.
+    vehicle : the car, as far as the method knows it.
     design : the method: a `PaperIdentifier` of the paper's identifier, or any other.
     start : stored weights to begin with; None begins afresh.
 
@@ -154,7 +159,7 @@ def identify(
         Where recording and design differ in their sampling interval.
     """
     check_sampling(recording, design)
-    setup = design.setup(vehicle, recording, start)
+    setup = design.setup(vehicle, start)
     record = setup.run(recording)
     return History(
         vehicle=vehicle,
@@ -189,15 +194,15 @@ class Counts:
 
 
 class OnlineIdentifier:
-    """A method that is told sample by sample; attributes vehicle, method, counts, limits.
+    """A method that takes sample by sample; attributes vehicle, method, counts, limits.
 
     Parameters
     ----------
     method : the method.
-    vehicle : the car as the method is told of it.
+    vehicle : the car, as far as the method knows it.
     dt : interval at which `update` is called [s].
     start : stored weights to begin with; None begins afresh.
-    stale_time : time of refused samples after which no force is told any more [s].
+    stale_time : time of refused samples after which forces read zero [s].
 
     Raises
     ------
@@ -229,9 +234,9 @@ class OnlineIdentifier:
         self._diverged = False
 
     def update(self, x: Array, u: Array, v_x: float) -> Array:
-        """Take a sample; return the axle forces (2,) [N], told with the weights before it.
+        """Take a sample; return the axle forces (2,) [N], with the weights before it.
 
-        Where the sample is refused, those of the last one it believed, and zero once it is `stale`.
+        Where the sample is refused, those of the last one it took, and zero once it is `stale`.
 
         Parameters
         ----------
@@ -248,7 +253,7 @@ class OnlineIdentifier:
         if not self.limits.accept(v_x, v_y, r, delta_f, delta_r):
             return self._refused()
         if self._stepper is None:
-            self._begun(x, u, v_x)
+            self._begun(x)
         elif self.counts.missed and not self._judges:
             self._take((v_y, r), (delta_f, delta_r), 0.0)  # a rest, so that the step begins anew
         self._take((v_y, r), (delta_f, delta_r), v_x)
@@ -279,32 +284,22 @@ class OnlineIdentifier:
 
     @property
     def stale(self) -> bool:
-        """Whether samples have been refused for so long that no force is told: do not trust it."""
+        """Whether samples have been refused for so long that forces read zero."""
         return self.counts.missed >= self._most_missed
 
-    def _begun(self, x: Array, u: Array, v_x: float) -> None:
+    def _begun(self, x: Array) -> None:
         """Set the step up where `identify` would: at the first sample."""
-        setup = self._setup(x, u, v_x)
+        setup = self._setup().begin(x)
         self._stepper = Stepper(setup.scan, {**setup.carry, **setup.constants})
         self._judges = judges_samples(setup.carry)
 
-    def _setup(self, x: Array, u: Array, v_x: float) -> Setup:
-        n = MINIMUM_SAMPLES  # all alike: a setup looks at the first one
-        first = Recording(
-            name="first sample",
-            t=self.method.dt * np.arange(n, dtype=np.float64),
-            v_x=np.full(n, v_x),
-            v_y=np.full(n, x[0]),
-            r=np.full(n, x[1]),
-            delta_f=np.full(n, u[0]),
-            delta_r=np.full(n, u[1]),
-        )
-        return self.method.setup(self.vehicle, first, self._start)
+    def _setup(self) -> Setup:
+        return self.method.setup(self.vehicle, self._start)
 
     def prepare(self) -> None:
         """Compile the step before the first sample comes, where that takes a while."""
         if self._stepper is None:
-            self._begun(np.zeros(2), np.zeros(2), self.method.min_speed)
+            self._begun(np.zeros(2))
             self._stepper = None
 
     @property
@@ -328,14 +323,16 @@ class OnlineIdentifier:
 
     @property
     def outputs(self) -> dict[str, Array]:
-        """What the step told about the last sample, by port, matrices by columns; copies.
+        """Outputs of the step at the last sample, by port, matrices by columns; copies.
 
         Zero while it is `stale`.
         """
         if self._stepper is None:
             return {}
-        told = {name: array.copy() for name, array in self._stepper.outputs.items()}
-        return {name: np.zeros_like(array) for name, array in told.items()} if self.stale else told
+        found = {name: array.copy() for name, array in self._stepper.outputs.items()}
+        return (
+            {name: np.zeros_like(array) for name, array in found.items()} if self.stale else found
+        )
 
     def state(self) -> dict[str, Array]:
         """Return the values that the next sample will meet, by port; copies.
@@ -343,7 +340,7 @@ class OnlineIdentifier:
         Before the first sample those of a car that rolls straight ahead.
         """
         if self._stepper is None:
-            carry = self._setup(np.zeros(2), np.zeros(2), self.method.min_speed).carry
+            carry = self._setup().carry
             return {name: np.array(value) for name, value in carry.items()}
         return self._stepper.state()
 

@@ -19,6 +19,9 @@ from models.files import write_atomically
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
+if TYPE_CHECKING:
+    from identifier.method import Setup  # whose methods make such models
+
 Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
 
@@ -50,6 +53,8 @@ class TireModel(ABC):
 
     __slots__ = ()
 
+    kind = ""  # of model, in files and wherever something is to be had for some kinds only
+
     if TYPE_CHECKING:  # at run time they would be taken for the defaults of a dataclass's fields
 
         @property
@@ -61,6 +66,14 @@ class TireModel(ABC):
             """Below this speed [m/s] the forces read zero."""
 
     @abstractmethod
+    def setup(self, dt: float) -> "Setup":
+        """Return what a replay needs.
+
+        Parameters
+        ----------
+        dt : sampling interval of what is replayed [s].
+        """
+
     def axle_force(self, recording: Recording) -> Array:
         """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
 
@@ -68,10 +81,27 @@ class TireModel(ABC):
         ----------
         recording : its signals are the input; its forces are not looked at.
         """
+        return self.setup(recording.dt).run(recording)["axle_force"]
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
         """Return the model as plain numbers and words, ready for JSON."""
+
+    @classmethod
+    @abstractmethod
+    def from_dict(cls, data: dict[str, Any], source: str) -> "TireModel":
+        """Return the model that `to_dict` describes.
+
+        Parameters
+        ----------
+        data : as from `to_dict`.
+        source : name of the file, for errors.
+
+        Raises
+        ------
+        FrozenModelError
+            Where a key is missing or a value impossible.
+        """
 
     @abstractmethod
     def curve_expression(self, alpha: Any, v_x: Any) -> Any:
@@ -104,8 +134,13 @@ class TireModel(ABC):
         return False
 
     @property
+    def scales_with_load(self) -> bool:
+        """Whether forces are in static axle loads, so that another car's model scales to a car."""
+        return False
+
+    @property
     def reference_speed(self) -> float:
-        """Speed [m/s] at which a force that depends on it is told, 4 sqrt(g L): brisk driving."""
+        """Speed [m/s] at which a force that depends on it is given, 4 sqrt(g L): brisk driving."""
         return max(4.0 * self.vehicle.froude_speed, self.min_speed)
 
     def predict(self, recording: Recording) -> Array:
@@ -147,8 +182,8 @@ class TireModel(ABC):
         slip = np.asarray(alpha, dtype=np.float64)
         pairs = np.tile(slip.ravel(), (2, 1))
         speed = self.reference_speed if v_x is None else v_x
-        told = self._force_curve()(pairs, speed) if slip.size else pairs
-        both: Array = np.array(told, dtype=np.float64).T.reshape(*slip.shape, 2)
+        found = self._force_curve()(pairs, speed) if slip.size else pairs
+        both: Array = np.array(found, dtype=np.float64).T.reshape(*slip.shape, 2)
         if axle is None:
             return both
         one: Array = both[..., AXLES.index(axle)]

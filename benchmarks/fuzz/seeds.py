@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from identifier.defaults import paper_identifier
 from identifier.export.onnx import export_onnx
 from identifier.methods import make_method
 from identifier.own_network import OnnxModel
-from identifier.paper.design import design_text
+from identifier.paper.design import PaperIdentifier, design_text
 from identifier.run import identify
 from identifier.tire_model import TireModel
 from models.maneuvers import Slalom
@@ -49,7 +48,9 @@ def write_seeds(folder: Path, needed: Collection[str]) -> Mapping[str, bytes]:
         (folder / name).write_bytes((DATA / name).read_bytes())
     (folder / "car.toml").write_text(_plain_car(car), encoding="utf-8")
     for name, law in DESIGNS.items():
-        (folder / name).write_text(design_text(paper_identifier(car, law=law)), encoding="utf-8")
+        (folder / name).write_text(
+            design_text(PaperIdentifier.for_vehicle(car, law=law)), encoding="utf-8"
+        )
     _write_path(folder / "path.csv")
     if "log.parquet" in needed:
         _write_parquet(recording, folder / "log.parquet")

@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -18,20 +17,39 @@ from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.learning import BoundNumbers, Bounds, ChangeDetector, Regression, bounded
 from identifier.axle.model import AxleModel
 from identifier.axle.prior import Prior, friction_direction
-from identifier.axle.slip import SensitivityState, Sway, SwayState
-from identifier.axle.step import CARRY, OVER, build_step
+from identifier.axle.slip import SHORTEST, SensitivityState, Sway, SwayState
+from identifier.axle.step import CARRY, OVER, PORTS, build_step
 from identifier.axle.watch import BEGIN, Watch
-from identifier.method import Setup
+from identifier.certificate import Certificate
+from identifier.driving import Driving
+from identifier.method import OTHER_STRUCTURE, Method, Port, Setup, Track, resumed
 from identifier.tire_model import TireModel
-from models.recordings import Recording
+from identifier.tuning import Range, ranges_around
 from models.vehicle import GRAVITY, Vehicle
 
-NOT_CERTIFIED = "not certified"
 STEERING, V_Y = (BoundNumbers._fields.index(name) for name in ("steering", "v_y"))
 
 
+# What a search may vary of it, and what the number is multiplied and divided by.
+TUNED: Mapping[str, float] = {
+    "regression.bandwidth": 2.0,
+    "regression.memory": 4.0,
+    "regression.error": 3.0,
+    "regression.relative_error": 3.0,
+    "regression.correlation_time": 3.0,
+    "prior.sd_shape": 2.0,
+    "prior.sd_stiffness": 2.0,
+    "prior.compliance": 3.0,
+    "prior.sd_compliance": 3.0,
+    "prior.sway_share": 3.0,
+    "prior.sd_sway_share": 3.0,
+    "sway.frequency": 1.5,
+    "change.threshold": 2.0,
+}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AxleIdentifier:
+class AxleIdentifier(Method):
     """Axle units, lag, sway, and recursive least squares with directional forgetting.
 
     Parameters
@@ -107,14 +125,18 @@ class AxleIdentifier:
         """Below this speed [m/s] forces read zero; learning rests below `learning_speed`."""
         return self.plausibility.min_speed
 
-    @property
-    def certificate(self) -> dict[str, Any]:
-        """What is proven of it: no margins or error bounds; the boxes hold after every sample."""
-        b, last = self.bounds, self.regression.widest
-        rising = self.rising_until
-        return {
-            "verdict": NOT_CERTIFIED,
-            "held_by_construction": {
+    def certify(self, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
+        """Return what is proven of it: no margins or error bounds; boxes hold after every sample.
+
+        Parameters
+        ----------
+        vehicle : not looked at: the boxes are in static axle loads.
+        driving : not looked at: the boxes hold whatever is measured.
+        """
+        del vehicle, driving
+        b, rising = self.bounds, self.rising_until
+        return Certificate(
+            held={
                 "grip_static_axle_loads": [b.least_grip, b.most_grip],
                 "weight_static_axle_loads": [-b.weight, b.weight],
                 **({} if rising is None else {"force_curves_rise_at_slip_rad": rising}),
@@ -122,19 +144,26 @@ class AxleIdentifier:
                 "sway_share": [0.0, 1.0],
                 "steering_offset_rad": [-b.steering, b.steering],
                 "v_y_offset_m_s": [-b.v_y, b.v_y],
-                "covariance_over_prior": [0.0, last],
-            },
-        }
+                "covariance_over_prior": [0.0, self.regression.widest],
+            }
+        )
 
-    def setup(
-        self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
-    ) -> Setup:
+    @property
+    def tunables(self) -> Mapping[str, Range]:
+        """What a search may vary, around the numbers that it has."""
+        return ranges_around(self, TUNED)
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """Outputs and state of its step, axle_force first."""
+        return PORTS
+
+    def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs.
 
         Parameters
         ----------
-        vehicle : the car as the identifier is told of it.
-        recording : not read: the run starts with its first plausible sample.
+        vehicle : the car, as far as the identifier knows it.
         start : stored weights to begin with, which know how sure they are; None takes the prior.
 
         Raises
@@ -142,15 +171,13 @@ class AxleIdentifier:
         ValueError
             Where stored weights are those of another structure.
         """
-        del recording
         n = len(self.ladder)
         W, own = self.prior.means(vehicle, self.ladder)
         P = prior_P = self.prior.covariance(vehicle, self.ladder)
         excitation = np.zeros((2, 1 + len(EDGES)))
         if start is not None:
-            if not isinstance(start, AxleModel) or start.ladder != self.ladder:
-                raise ValueError("the stored weights are of another structure than the design's")
-            W, own, P, excitation = start.W, start.own, start.covariance, start.excitation
+            stored = resumed(start, AxleModel, OTHER_STRUCTURE, ladder=self.ladder)
+            W, own, P, excitation = stored.W, stored.own, stored.covariance, stored.excitation
         widest = per_variance(prior_P, n, self.regression.widest)
         W, own = self._within_bounds(W, own, P)
         return Setup(
@@ -209,6 +236,23 @@ class AxleIdentifier:
         scales = np.array(self.ladder)
         slopes = 1.0 / (scales * np.cosh(self.rising_until / scales) ** 2)
         return {"rising": slopes / slopes.sum()}
+
+    def tracks(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Track, ...]:
+        """Return cornering stiffness, relaxation length, and the force that curves saturate at.
+
+        Parameters
+        ----------
+        vehicle : the car.
+        state : W (k, 2, n) and own (k, 2, 3) at each of k instants.
+        """
+        W, compliance = state["W"], state["own"][:, :, 0]
+        slope = (W / np.array(self.ladder)).sum(axis=2)
+        lag = compliance * np.maximum(slope, 0.0) + SHORTEST * vehicle.wheelbase
+        return (
+            Track("cornering stiffness", "N/rad", slope * np.array(vehicle.axle_loads)),
+            Track("relaxation length", "m", lag),
+            Track("force at saturation", "static load", W.sum(axis=2)),
+        )
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> AxleModel:
         """Return the model with the carried weights.

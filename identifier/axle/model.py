@@ -19,10 +19,11 @@ from identifier.axle.step import FROZEN_CARRY, OVER, build_frozen
 from identifier.method import FORMAT, FrozenModelError, Setup, vehicle_from, vehicle_numbers
 from identifier.tire_model import Fact, TireModel
 from models.recordings import Recording
+from models.schema import Table
 from models.vehicle import Vehicle
 
-KIND = "axle"
 ARRAYS = ("W", "own", "covariance", "prior_covariance", "excitation")
+LARGEST = 1e9  # of the numbers in a file, SI and static axle loads
 LARGEST_WEIGHT = 100.0  # static axle loads: no unit of a tire carries more
 ROUNDING = 1e-6  # of correlations, as learning in float leaves them
 LARGEST_SD = 0.25  # standard deviation over the prior's, above which a slip is not known
@@ -51,6 +52,8 @@ class AxleModel(TireModel):
     ValueError
         Where a number has the wrong shape or is not finite.
     """
+
+    kind = "axle"
 
     vehicle: Vehicle
     ladder: tuple[float, ...]
@@ -181,6 +184,11 @@ class AxleModel(TireModel):
         return tuple(lines)
 
     @property
+    def scales_with_load(self) -> bool:
+        """Whether forces are in static axle loads, so that another car's model scales to a car."""
+        return True
+
+    @property
     def lagged(self) -> bool:
         """Whether the force follows a lagged slip, two more states."""
         return True
@@ -246,21 +254,12 @@ class AxleModel(TireModel):
         """
         return self._run(recording)["lagged_slip"]
 
-    def axle_force(self, recording: Recording) -> Array:
-        """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
-
-        Parameters
-        ----------
-        recording : its signals are the input; its forces are not looked at.
-        """
-        return self._run(recording)["axle_force"]
-
-    def setup(self, recording: Recording) -> Setup:
+    def setup(self, dt: float) -> Setup:
         """Return what a replay needs.
 
         Parameters
         ----------
-        recording : what is replayed; only its sampling interval is looked at.
+        dt : sampling interval of what is replayed [s].
         """
         return Setup(
             scan=_frozen_scan(doublings(self.ladder)),
@@ -272,7 +271,7 @@ class AxleModel(TireModel):
             constants={
                 "W": self.W,
                 "own": self.own,
-                "dt": np.array(recording.dt),
+                "dt": np.array(dt),
                 "car": car_numbers(self.vehicle),
                 "scales": 1.0 / np.array(self.ladder)[None],
                 "plausibility": self.plausibility.numbers(),
@@ -281,13 +280,13 @@ class AxleModel(TireModel):
         )
 
     def _run(self, recording: Recording) -> dict[str, Array]:
-        return self.setup(recording).run(recording)
+        return self.setup(recording.dt).run(recording)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the model as plain numbers and words, ready for JSON."""
         return {
             "format": FORMAT,
-            "kind": KIND,
+            "kind": self.kind,
             "units": {
                 "ladder": "rad",
                 "W": "static axle loads",
@@ -320,6 +319,7 @@ class AxleModel(TireModel):
         FrozenModelError
             Where a key is missing or a value impossible.
         """
+        _require_plausible(data, source)
         try:
             if list(data["edges"]) != list(EDGES):
                 raise ValueError(f"edges must be {list(EDGES)}, they are {data['edges']}")
@@ -334,6 +334,17 @@ class AxleModel(TireModel):
             raise FrozenModelError(f"{source}: key {error} is missing") from error
         except (TypeError, ValueError) as error:
             raise FrozenModelError(f"{source}: {error}") from error
+
+
+def _require_plausible(data: dict[str, Any], source: str) -> None:
+    """Judge types and sizes of values before they become a model."""
+    table = Table(data, f"{source}: ", FrozenModelError)
+    for name, record in (("sway", Sway), ("plausibility", Plausibility)):
+        table.table(name).record(record)
+    for name in ("ladder", "edges", *ARRAYS):
+        largest = float(np.abs(table.array(name)).max(initial=0.0))
+        if largest > LARGEST:
+            table.refuse(name, f"must hold numbers below {LARGEST:g}, it reaches {largest:g}")
 
 
 def _is_covariance(P: Array) -> bool:

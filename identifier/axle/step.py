@@ -41,6 +41,7 @@ from identifier.axle.slip import (
     sway,
 )
 from identifier.axle.watch import Watched, WatchNumbers, WatchState, watched
+from identifier.method import AXLE_FORCE, FACTORS, NOT_NEGATIVE, Port
 from models.vehicle import GRAVITY
 
 # From a sample to the axle forces of given weights: what learning and the frozen model share.
@@ -175,6 +176,70 @@ MOVING = 2.0  # errors of y that a force must have to tell weights apart
 LEARNT = ("W", "own", "UD")
 BESIDE = ("errors", "excitation", "watch", "kept")
 CARRY = (*LEARNT, "gate", "sway", "slip", "sensitivity", "filters", *BESIDE)
+LOAD = "static axle loads"
+PORTS = (
+    AXLE_FORCE,
+    Port("W", LOAD, "weights of the units, rows front and rear", learnt=True),
+    Port(
+        "own",
+        "m per load; -; rad and m/s",
+        "compliance, sway share, offset of steering (front) and of v_y (rear)",
+        learnt=True,
+    ),
+    Port(
+        "UD",
+        "of W and own",
+        "covariance U D U' of W and own: D, and U above it, by rows; front and rear",
+        learnt=True,
+        rule=FACTORS,
+    ),
+    Port(
+        "gate",
+        "SI",
+        "last good v_x, v_y, r, delta_f, delta_r; on; time of steady learning; bad and stuck "
+        "samples in a row",
+    ),
+    Port("sway", "m/s^2; m/s^3; rad", "roll: state, its rate, slip of the contact patch"),
+    Port(
+        "slip",
+        "rad; rad; 1/rad; -",
+        "lagged slip, slip, slope and force of the curve, per axle",
+    ),
+    Port(
+        "sensitivity",
+        "rad; rad; 1/rad^2",
+        "of slip to compliance and sway share, bend, per axle",
+    ),
+    Port("filters", LOAD, "filters of the regressors and of the target, per axle"),
+    Port(
+        "errors",
+        f"-; -; {LOAD}",
+        "fast and slow mean squared error, peak force, per axle",
+        learnt=True,
+        rule=NOT_NEGATIVE,
+    ),
+    Port(
+        "excitation",
+        "rad; s",
+        "largest slip, then time of learning above each edge, per axle",
+        learnt=True,
+        rule=NOT_NEGATIVE,
+    ),
+    Port(
+        "watch",
+        "s; s; -",
+        "time in doubt, and in which kept explained again; mean squared error of W and of kept, "
+        "front and rear",
+        learnt=True,
+        rule=NOT_NEGATIVE,
+    ),
+    Port(
+        "kept",
+        "of W and own",
+        "W and own that are gone back to after a fault, front and rear",
+        learnt=True,
+    ),
+)
 
 
 class RegressionSample(NamedTuple):

@@ -15,13 +15,12 @@ import numpy as np
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.baselines.curves import CURVES, CurveModel
-from identifier.baselines.kalman import CARRY, NOISE, build_step
-from identifier.baselines.ports import OVER, around, axle_loads
-from identifier.method import Setup
+from identifier.baselines.kalman import CARRY, NOISE, PORTS, build_step
+from identifier.baselines.ports import OVER, axle_loads
+from identifier.method import Method, Port, Setup, resumed
 from identifier.tire_model import TireModel
-from identifier.tuning import Range
+from identifier.tuning import Range, around
 from models.bicycle import BicycleParameters
-from models.recordings import Recording
 from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
 
@@ -114,7 +113,7 @@ def _scan(curve: str) -> Scan:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CurveEkf:
+class CurveEkf(Method):
     """Tire parameters that walk at random, slowly, in the coordinates of `parametrizations`.
 
     Parameters
@@ -196,15 +195,17 @@ class CurveEkf:
             factors |= {"shape_spread": 3.0}
         return {name: around(getattr(self, name), factor) for name, factor in factors.items()}
 
-    def setup(
-        self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
-    ) -> Setup:
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """Outputs and state of its step, axle_force first."""
+        return PORTS
+
+    def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs.
 
         Parameters
         ----------
         vehicle : the car; its stiffness is the prior.
-        recording : what it will run over.
         start : a frozen curve of the same kind to begin with; None begins with the prior.
 
         Raises
@@ -212,18 +213,17 @@ class CurveEkf:
         ValueError
             Where the stored model is of another kind.
         """
-        del recording
         kinds, _, encode = PARAMETRIZATIONS[self.curve]
         theta = np.zeros(len(kinds))
         if start is not None:
-            if not isinstance(start, CurveModel) or start.curve != self.curve:
-                raise ValueError(f"the stored model is not a curve {self.curve!r}")
+            refusal = f"the stored model is not a curve {self.curve!r}"
+            stored = resumed(start, CurveModel, refusal, curve=self.curve)
             with np.errstate(invalid="ignore", divide="ignore"):  # judged below
-                theta = encode(vehicle, self.friction, start.parameters)
+                theta = encode(vehicle, self.friction, stored.parameters)
             if not np.isfinite(theta).all():
                 raise ValueError(
                     "a curve to begin with must have positive stiffness and friction and a shape "
-                    f"between 1 and 2, its parameters are {start.parameters.tolist()}"
+                    f"between 1 and 2, its parameters are {stored.parameters.tolist()}"
                 )
         spread = [getattr(self, SPREADS[kind]) for kind in kinds]
         return Setup(

@@ -26,7 +26,6 @@ from identifier.method import (
 )
 from identifier.tire_model import TireModel, drift
 from models.bicycle import BicycleParameters, linear_axle_force, slip_angles
-from models.recordings import Recording
 from models.schema import Table
 from models.vehicle import GRAVITY, Vehicle
 
@@ -118,8 +117,6 @@ CURVES: Mapping[str, Curve] = {
 
 # A frozen curve of axle force over slip angle: linear, Magic Formula or Dugoff.
 
-KIND = "curve"
-
 
 def build_curve(name: str) -> ca.Function:
     """Return a curve as a function with one result, axle_force (2,) [N]; at rest 0.
@@ -168,6 +165,8 @@ class CurveModel(TireModel):
         Where the curve is unknown, a parameter not positive and finite, or their shape wrong.
     """
 
+    kind = "curve"
+
     vehicle: Vehicle
     curve: str
     parameters: NDArray[np.float64]
@@ -185,12 +184,12 @@ class CurveModel(TireModel):
         if not (np.isfinite(self.parameters) & (self.parameters > 0.0)).all():
             raise ValueError(f"parameters must be positive, they are {self.parameters.tolist()}")
 
-    def setup(self, recording: Recording) -> Setup:
+    def setup(self, dt: float) -> Setup:
         """Return what a replay needs.
 
         Parameters
         ----------
-        recording : what is replayed; only its sampling interval is looked at.
+        dt : sampling interval of what is replayed [s].
         """
         return Setup(
             scan=curve_scan(self.curve),
@@ -198,18 +197,9 @@ class CurveModel(TireModel):
             constants={
                 "parameters": self.parameters,
                 "vehicle": np.array(self.vehicle.bicycle),
-                "sampling": np.array([recording.dt, self.min_speed]),
+                "sampling": np.array([dt, self.min_speed]),
             },
         )
-
-    def axle_force(self, recording: Recording) -> NDArray[np.float64]:
-        """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
-
-        Parameters
-        ----------
-        recording : its signals are the input; its forces are not looked at.
-        """
-        return self.setup(recording).run(recording)["axle_force"]
 
     def curve_expression(self, alpha: Any, v_x: Any) -> Any:
         """Return the steady axle forces (2,) [N] as a CasADi expression.
@@ -248,7 +238,7 @@ class CurveModel(TireModel):
         names = CURVES[self.curve].parameters
         return {
             "format": FORMAT,
-            "kind": KIND,
+            "kind": self.kind,
             "vehicle": vehicle_numbers(self.vehicle),
             "curve": self.curve,
             "min_speed_m_s": self.min_speed,

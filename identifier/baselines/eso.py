@@ -18,19 +18,24 @@ from codegen import Scan
 from codegen.arrays import Array
 from identifier.baselines.ports import (
     OVER,
-    around,
     impulse,
     sample_ports,
     turning_force,
 )
-from identifier.method import CannotFreezeError, Setup
+from identifier.method import AXLE_FORCE, CannotFreezeError, Method, Port, Setup
 from identifier.tire_model import TireModel
-from identifier.tuning import Range
-from models.recordings import Recording
+from identifier.tuning import Range, around
 from models.rules import require_positive
 from models.vehicle import Vehicle
 
 CARRY = ("xi_hat", "F_hat", "turning", "running")
+PORTS = (
+    AXLE_FORCE,
+    Port("xi_hat", "N s", "observed axle impulse, front and rear"),
+    Port("F_hat", "N", "observed axle forces, front and rear"),
+    Port("turning", "N", "axle forces that hold a steady turn, at the last sample"),
+    Port("running", "-", "1 after a sample in motion"),
+)
 
 
 def build_step() -> ca.Function:
@@ -73,7 +78,7 @@ def _scan() -> Scan:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ExtendedStateObserver:
+class ExtendedStateObserver(Method):
     """A signal estimator: it follows any force with a lag of 2/ω_o, and knows no tire.
 
     Parameters
@@ -112,15 +117,17 @@ class ExtendedStateObserver:
         """What a search may vary, around the numbers that it has."""
         return {"bandwidth": around(self.bandwidth, 4.0)}
 
-    def setup(
-        self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
-    ) -> Setup:
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """Outputs and state of its step, axle_force first."""
+        return PORTS
+
+    def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs.
 
         Parameters
         ----------
         vehicle : the car; its stiffness is not looked at.
-        recording : what it will run over.
         start : None; a signal estimator cannot begin with a model.
 
         Raises
@@ -128,7 +135,6 @@ class ExtendedStateObserver:
         ValueError
             Where a stored model is given.
         """
-        del recording
         if start is not None:
             raise ValueError("an extended state observer cannot begin with a stored model")
         return Setup(

@@ -21,21 +21,26 @@ from codegen import Scan
 from codegen.arrays import Array
 from identifier.baselines.ports import (
     OVER,
-    around,
     axle_loads,
     motion_rate,
     sample_ports,
 )
-from identifier.method import CannotFreezeError, Setup
+from identifier.method import AXLE_FORCE, COVARIANCE, CannotFreezeError, Method, Port, Setup
 from identifier.tire_model import TireModel
-from identifier.tuning import Range
+from identifier.tuning import Range, around
 from models.bicycle import BicycleParameters
-from models.recordings import Recording
 from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
 
 CARRY = ("estimate", "P", "before", "running")
 CONSTANTS = ("noise", "walk", "limit", "prior", "learning_speed")
+PORTS = (
+    AXLE_FORCE,
+    Port("estimate", "m/s; rad/s; -", "v_y, r and the unknowns of the force"),
+    Port("P", "of estimate", "covariance of estimate", rule=COVARIANCE),
+    Port("before", "rad; rad; m/s", "delta_f, delta_r and v_x of the last sample"),
+    Port("running", "-", "1 after a sample in motion"),
+)
 NOISE = ("v_y_noise", "r_noise", "v_y_disturbance", "r_disturbance", "outlier")
 
 # (bicycle parameters, prior, θ, v_x, x, u) -> axle forces (2,) [N]
@@ -149,7 +154,7 @@ def _scan() -> Scan:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ForceEkf:
+class ForceEkf(Method):
     """Forces that walk at random: no tire, only how fast a force may change.
 
     Parameters
@@ -215,15 +220,17 @@ class ForceEkf:
             "r_noise": around(self.r_noise, 4.0),
         }
 
-    def setup(
-        self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
-    ) -> Setup:
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """Outputs and state of its step, axle_force first."""
+        return PORTS
+
+    def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs.
 
         Parameters
         ----------
         vehicle : the car; its stiffness is not looked at.
-        recording : what it will run over.
         start : None; a signal estimator cannot begin with a model.
 
         Raises
@@ -231,7 +238,6 @@ class ForceEkf:
         ValueError
             Where a stored model is given.
         """
-        del recording
         if start is not None:
             raise ValueError("a filter of forces cannot begin with a stored model")
         R = np.array([self.v_y_noise, self.r_noise]) ** 2

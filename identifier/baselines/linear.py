@@ -14,22 +14,20 @@ from codegen.arrays import Array
 from identifier.baselines.curves import CurveModel, curve_scan
 from identifier.baselines.ports import (
     OVER,
-    around,
     impulse,
     sample_ports,
     turning_force,
 )
-from identifier.method import Setup
+from identifier.method import AXLE_FORCE, NOT_NEGATIVE, Method, Port, Setup, resumed
 from identifier.tire_model import TireModel
-from identifier.tuning import Range
+from identifier.tuning import Range, around
 from models.bicycle import slip_angles
-from models.recordings import Recording
 from models.rules import require_positive
 from models.vehicle import Vehicle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LinearBaseline:
+class LinearBaseline(Method):
     """F = C α of (3) with the stiffness that the vehicle states.
 
     Parameters
@@ -54,15 +52,12 @@ class LinearBaseline:
         """
         return cls(dt=dt, min_speed=vehicle.lowest_speed)
 
-    def setup(
-        self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
-    ) -> Setup:
+    def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs.
 
         Parameters
         ----------
         vehicle : the car, whose stiffness is used.
-        recording : what it will run over; not looked at.
         start : None; there is nothing that a stored model could begin.
 
         Raises
@@ -70,7 +65,6 @@ class LinearBaseline:
         ValueError
             Where a stored model is given.
         """
-        del recording
         if start is not None:
             raise ValueError("the linear tire learns nothing, it cannot begin with a stored model")
         return Setup(
@@ -109,6 +103,20 @@ class LinearBaseline:
 # Source: Ljung, System Identification, 2nd ed., section 11.2.
 
 CARRY = ("stiffness", "information", "filters", "inputs", "running")
+PORTS = (
+    AXLE_FORCE,
+    Port("stiffness", "N/rad", "cornering stiffness, front and rear", learnt=True),
+    Port(
+        "information",
+        "rad^2 s",
+        "of the stiffness, front and rear",
+        learnt=True,
+        rule=NOT_NEGATIVE,
+    ),
+    Port("filters", "N; rad", "filtered target, then slip, front and rear each"),
+    Port("inputs", "N; rad", "what the filters read at the last sample"),
+    Port("running", "-", "samples since the start"),
+)
 NUMBERS = ("cutoff", "memory", "prior_slip", "learning_speed")
 SMALLEST = 0.02  # of the stiffness told: a tire pushes, whatever the noise says
 
@@ -161,7 +169,7 @@ def _scan() -> Scan:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StiffnessRls:
+class StiffnessRls(Method):
     """The best linear tire of the recent past; it freezes to a linear tire.
 
     Parameters
@@ -218,15 +226,17 @@ class StiffnessRls:
             "prior_slip": around(self.prior_slip, math.sqrt(10.0)),
         }
 
-    def setup(
-        self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
-    ) -> Setup:
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """Outputs and state of its step, axle_force first."""
+        return PORTS
+
+    def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs.
 
         Parameters
         ----------
         vehicle : the car; its stiffness is the prior.
-        recording : what it will run over.
         start : a linear tire to begin with; None takes the vehicle's.
 
         Raises
@@ -234,12 +244,10 @@ class StiffnessRls:
         ValueError
             Where the stored model is of another kind.
         """
-        del recording
         first = np.array([vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear])
         if start is not None:
-            if not isinstance(start, CurveModel) or start.curve != "linear":
-                raise ValueError("the stored model is not a linear tire")
-            first = start.parameters[:, 0]
+            refusal = "the stored model is not a linear tire"
+            first = resumed(start, CurveModel, refusal, curve="linear").parameters[:, 0]
         return Setup(
             scan=_scan(),
             carry={

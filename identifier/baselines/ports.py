@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from identifier.tuning import Range
 from models.bicycle import BicycleParameters, bicycle
 
 OVER = ("x", "u", "v_x")
@@ -95,17 +94,3 @@ def motion_rate(p: BicycleParameters, v_x: Any, x: Any, F: Any) -> Any:
     F : axle forces (2,) [N].
     """
     return bicycle(p, 1.0).K @ F - ca.vertcat(v_x * x[1], 0)
-
-
-# Ranges around numbers that follow from the size of a car.
-
-
-def around(value: float, factor: float) -> Range:
-    """Return the range from a number divided by a factor to the number times it.
-
-    Parameters
-    ----------
-    value : the number, positive.
-    factor : above one.
-    """
-    return Range(value / factor, value * factor, log=True)

@@ -6,7 +6,6 @@ A run has the bits of the same run by `identify`; its error is summed up while i
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,7 @@ from codegen import Scan
 from codegen.arrays import Array
 from identifier.compare.course import INFINITE, Course, Scores, Trial, rmse, run_scored
 from identifier.method import CannotFreezeError, Method, Setup
-from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
+from identifier.reproducibility import AxleRmse, counted_samples
 from identifier.run import IMPOSSIBLE_FORCE, DivergedError, check_sampling, state_index
 from identifier.tire_model import TireModel
 from models.recordings import Recording
@@ -101,7 +100,9 @@ def identify_batch(
     counts = counted_samples(recording, slowest if min_speed is None else min_speed)
     instants = {np.inf: len(recording)} | {t: state_index(recording, t) for t in freeze_times}
     kept = sorted(set(instants.values()) - {len(recording)})
-    setups = [design.setup(car, recording) for design, car in zip(designs, cars, strict=True)]
+    setups = [
+        design.setup(car).begin(recording.x[0]) for design, car in zip(designs, cars, strict=True)
+    ]
     groups: dict[Scan, list[int]] = defaultdict(list)
     for i, setup in enumerate(setups):
         groups[setup.scan].append(i)
@@ -141,19 +142,6 @@ def _state(scores: Scores, ports: tuple[str, ...], row: int, place: int | None) 
 # Many frozen models over one recording at once, as `identify_batch` runs many methods.
 
 
-@runtime_checkable
-class Replayable(Protocol):
-    """A frozen model that runs as a compiled step does."""
-
-    def setup(self, recording: Recording) -> Setup:
-        """Return what a replay needs.
-
-        Parameters
-        ----------
-        recording : what is replayed.
-        """
-
-
 def replay_batch(
     recording: Recording,
     models: Sequence[TireModel],
@@ -166,7 +154,7 @@ def replay_batch(
     Parameters
     ----------
     recording : with true forces.
-    models : in any order; those that are not `Replayable` run one at a time.
+    models : in any order.
     counts : samples that count (n,).
     workers : threads; None takes one for each processor.
 
@@ -180,11 +168,8 @@ def replay_batch(
     found: dict[int, AxleRmse] = {}
     groups: dict[Scan, dict[int, Setup]] = defaultdict(dict)
     for i, model in enumerate(models):
-        if isinstance(model, Replayable):
-            setup = model.setup(recording)
-            groups[setup.scan][i] = setup
-        else:
-            found[i] = axle_rms(model.axle_force(recording) - recording.axle_force, counts)
+        setup = model.setup(recording.dt)
+        groups[setup.scan][i] = setup
     for scan, setups in groups.items():
         scores = run_scored(
             scan,

@@ -344,7 +344,7 @@ def step_times(
     n = len(signals["v_x"])
     runs = {}
     for name, method in methods.items():
-        setup = method.setup(vehicle, recording)
+        setup = method.setup(vehicle).begin(recording.x[0])
         sampled = {port: signals[port] for port in setup.scan.over}
         runs[name] = setup.scan, {**setup.carry, **sampled, **setup.constants}
         setup.scan(n, runs[name][1])  # compiled and warm

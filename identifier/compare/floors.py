@@ -12,8 +12,8 @@ import numpy as np
 from identifier.baselines import fit_floor, structure_of
 from identifier.compare.course import Course
 from identifier.compare.work import spread
-from identifier.defaults import LAWS
 from identifier.methods import DEFAULT, REFERENCE, REGRESSIONS, make_method
+from identifier.paper.design import VARIANTS
 from identifier.reproducibility import AxleRmse
 
 STRUCTURES: Mapping[str, str] = {  # name of the structure to a method that has it
@@ -25,7 +25,7 @@ STRUCTURES: Mapping[str, str] = {  # name of the structure to a method that has 
 }
 FLOOR_OF: Mapping[str, str] = {
     DEFAULT: "axle units",
-    **dict.fromkeys((*LAWS, *REGRESSIONS), "network"),
+    **dict.fromkeys((*VARIANTS, *REGRESSIONS), "network"),
     "magic_formula_ekf": "Magic Formula",
     "dugoff_ekf": "Dugoff",
     "linear": "linear tire",

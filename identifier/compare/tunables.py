@@ -4,22 +4,15 @@ Ranges are wide and centered on the numbers that follow from the vehicle, since 
 beforehand; those of the paper's laws come from their limit of stability.
 """
 
-import math
 from collections.abc import Mapping
-from dataclasses import replace
-from functools import reduce
-from typing import Any
 
-from identifier.axle import AxleIdentifier
-from identifier.defaults import LAWS, natural_network
 from identifier.method import Method
 from identifier.methods import make_method
-from identifier.paper.design import PaperIdentifier, natural_force_unit
-from identifier.paper.laws import DRIVING_ERRORS, Gains, diagonal
-from identifier.regression import RegressionIdentifier
+from identifier.paper.design import VARIANTS, PaperIdentifier, natural_force_unit
+from identifier.paper.laws import LAWS, Gains, diagonal
+from identifier.paper.network import natural_network
 from identifier.stability.gain_design import gain_for_phase_margin
-from identifier.stability.loop import linear_law
-from identifier.tuning import Range
+from identifier.tuning import SIZE, SIZE_RANGE, Range, hidden_units
 from models.vehicle import Vehicle
 
 # Random designs of the paper's laws, for a fair comparison: every law from the same ranges.
@@ -27,7 +20,6 @@ from models.vehicle import Vehicle
 # The learning rate is drawn as a share of the rate at which the loop becomes unstable at the worst
 # regressor (|σ|² = n_h), so that slow and fast observers get equally good chances.
 
-SIZE = "size"
 TUNABLES: Mapping[str, Range] = {
     "a": Range(2.0, 20.0, True),  # 1/s, A_d = -a I; a dt <= 0.2
     "forgetting": Range(2.0, 40.0, True),  # 1/s, λ
@@ -35,9 +27,8 @@ TUNABLES: Mapping[str, Range] = {
     "V_to_W": Range(1e-5, 0.1, True),  # η_V/η_W [1/U²]
     "rho": Range(0.003, 1.0, True),  # ρ1 = ρ2 [1/(U s²)]
     "lead": Range(1.0, 4.0, False),  # τ a of the PI-lead law [-]
-    SIZE: Range(0.0, 3.0, False),  # which of SIZES
+    SIZE: SIZE_RANGE,
 }
-SIZES = (5, 10, 20)  # hidden units: each is one compilation
 MARGIN_OF_LIMIT = 1e-3  # deg: at no phase margin the loop is at its limit
 
 
@@ -46,11 +37,11 @@ def tuned_design(
 ) -> PaperIdentifier:
     """Return the design with values of `TUNABLES`.
 
-    "instantaneous_scaled" has the gains that the integral law gets, with η/λ.
+    The variant at η/λ has the gains that the integral law gets.
 
     Parameters
     ----------
-    law : as in `identifier.defaults.LAWS`.
+    law : one of `VARIANTS`.
     values : by name, within the ranges of `TUNABLES`.
     seed : seed of the initial weights.
     dt : sampling interval [s].
@@ -60,17 +51,13 @@ def tuned_design(
     ValueError
         Where the law is unknown.
     """
-    if law not in LAWS:
-        raise ValueError(f"law must be one of {list(LAWS)}, not {law!r}")
-    scaled = law == "instantaneous_scaled"
+    if law not in VARIANTS:
+        raise ValueError(f"law must be one of {list(VARIANTS)}, not {law!r}")
+    variant = VARIANTS[law]
     a, lam = values["a"], values["forgetting"]
-    lead = values["lead"] / a if law == "pi_lead" else 0.0
-    n_h = hidden_units(values)
-    eta_W = (
-        values["share_of_limit"]
-        * largest_loop_gain("integral" if scaled else law, a=a, lam=lam, lead=lead, dt=dt)
-        / n_h
-    )
+    lead = LAWS[variant.law].lead * values["lead"] / a
+    n_h, of = hidden_units(values), variant.gains_of if variant.scaled else variant.law
+    eta_W = values["share_of_limit"] * largest_loop_gain(of, a=a, lam=lam, lead=lead, dt=dt) / n_h
     gains = Gains(
         A_d=diagonal(a),
         forgetting=lam,
@@ -80,26 +67,15 @@ def tuned_design(
         rho_V=values["rho"],
         lead=lead,
     )
-    design = PaperIdentifier(
-        gains=gains,
+    return PaperIdentifier(
+        gains=variant.gains(gains),
         network=natural_network(vehicle, hidden=n_h),
-        law="instantaneous" if scaled else law,
+        law=variant.law,
         dt=dt,
         force_unit=natural_force_unit(vehicle.mass),
         min_speed=vehicle.lowest_speed,
         seed=seed,
     )
-    return replace(design, gains=gains.scaled_by_forgetting()) if scaled else design
-
-
-def hidden_units(values: Mapping[str, float]) -> int:
-    """Return the number of hidden units.
-
-    Parameters
-    ----------
-    values : of `TUNABLES`.
-    """
-    return SIZES[min(math.floor(values[SIZE]), len(SIZES) - 1)]
 
 
 def largest_loop_gain(law: str, *, a: float, lam: float, lead: float, dt: float) -> float:
@@ -116,34 +92,10 @@ def largest_loop_gain(law: str, *, a: float, lam: float, lead: float, dt: float)
     return gain_for_phase_margin(
         a=a,
         lam=lam,
-        law=linear_law(DRIVING_ERRORS[law], lead),
+        law=LAWS[law].error(lead),
         phase_margin=MARGIN_OF_LIMIT,
         dt=dt,
     )
-
-
-REGRESSION_FACTORS: Mapping[str, float] = {  # times and divided by
-    "filter_rate": 4.0,
-    "forgetting": 10.0,
-    "learning_rate": 10.0,
-    "ridge": 10.0,
-    "quiet": 3.0,
-}
-AXLE_FACTORS: Mapping[str, float] = {
-    "regression.bandwidth": 2.0,
-    "regression.memory": 4.0,
-    "regression.error": 3.0,
-    "regression.relative_error": 3.0,
-    "regression.correlation_time": 3.0,
-    "prior.sd_shape": 2.0,
-    "prior.sd_stiffness": 2.0,
-    "prior.compliance": 3.0,
-    "prior.sd_compliance": 3.0,
-    "prior.sway_share": 3.0,
-    "prior.sd_sway_share": 3.0,
-    "sway.frequency": 1.5,
-    "change.threshold": 2.0,
-}
 
 
 def tunables(name: str, vehicle: Vehicle) -> Mapping[str, Range]:
@@ -153,15 +105,9 @@ def tunables(name: str, vehicle: Vehicle) -> Mapping[str, Range]:
     ----------
     name : of the method.
     """
-    if name in LAWS:
+    if name in VARIANTS:
         return TUNABLES
-    method = make_method(name, vehicle)
-    if isinstance(method, RegressionIdentifier):
-        return {SIZE: TUNABLES[SIZE], **_around(method, REGRESSION_FACTORS)}
-    if isinstance(method, AxleIdentifier):
-        return _around(method, AXLE_FACTORS)
-    found: Mapping[str, Range] = getattr(method, "tunables", {})
-    return found
+    return make_method(name, vehicle).tunables
 
 
 def tuned_method(name: str, vehicle: Vehicle, values: Mapping[str, float], seed: int = 0) -> Method:
@@ -173,24 +119,6 @@ def tuned_method(name: str, vehicle: Vehicle, values: Mapping[str, float], seed:
     values : by name; "part.number" is a number of a part. Empty leaves the method as it is.
     seed : seed of the initial weights.
     """
-    if name in LAWS and values:
+    if name in VARIANTS and values:
         return tuned_design(vehicle, name, values, seed=seed)
-    method = make_method(name, vehicle, seed)
-    if isinstance(method, RegressionIdentifier) and SIZE in values:
-        method = replace(method, network=natural_network(vehicle, hidden=hidden_units(values)))
-    numbers = {path: value for path, value in values.items() if path != SIZE}
-    return reduce(lambda record, path: _set(record, path, numbers[path]), numbers, method)
-
-
-def _around(method: Any, factors: Mapping[str, float]) -> dict[str, Range]:
-    found = {}
-    for path, factor in factors.items():
-        value = reduce(getattr, path.split("."), method)
-        found[path] = Range(value / factor, value * factor, log=True)
-    return found
-
-
-def _set(record: Any, path: str, value: float) -> Any:
-    """Return the record with one number of it, or of a part of it, replaced."""
-    head, _, rest = path.partition(".")
-    return replace(record, **{head: _set(getattr(record, head), rest, value) if rest else value})
+    return make_method(name, vehicle, seed).tuned(values)

@@ -6,14 +6,8 @@ from typing import NamedTuple
 
 from codegen.arrays import Array
 from codegen.clean_c import literal
-from identifier.export.specialize import (
-    COVARIANCE,
-    FACTORS,
-    NOT_NEGATIVE,
-    SAMPLED,
-    Signal,
-    SpecializedStep,
-)
+from identifier.export.specialize import SAMPLED, Signal, SpecializedStep
+from identifier.method import COVARIANCE, FACTORS, NOT_NEGATIVE
 
 FEW = 8  # entries that are summed one by one
 READS = {"x": ("v_y", "r"), "u": ("delta_f", "delta_r"), "v_x": ("v_x",)}

@@ -1,6 +1,6 @@
 """A frozen model as an ONNX file, for whoever runs networks in a tool of their own."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -237,6 +237,14 @@ def axle_graph(model: AxleModel, *, single: bool = False) -> bytes:
     )
 
 
+# By kind of model: the content of its file, from the model and whether numbers are float32.
+GRAPHS: Mapping[str, Callable[[Any, bool], bytes]] = {
+    NetworkModel.kind: lambda model, single: network_graph(model, single=single),
+    AxleModel.kind: lambda model, single: axle_graph(model, single=single),
+    OnnxModel.kind: lambda model, _: model.content,
+}
+
+
 class NoOnnxError(ValueError):
     """A frozen model of a kind that has no ONNX form."""
 
@@ -257,17 +265,11 @@ def onnx_bytes(model: TireModel, *, single: bool = False) -> bytes:
     MissingOnnxError
         Where the package onnx is not installed.
     """
-    match model:
-        case NetworkModel():
-            return network_graph(model, single=single)
-        case AxleModel():
-            return axle_graph(model, single=single)
-        case OnnxModel():
-            return model.content
-        case _:
-            raise NoOnnxError(
-                f"{type(model).__name__} has no ONNX form, only networks and axle curves have"
-            )
+    if model.kind not in GRAPHS:
+        raise NoOnnxError(
+            f"{type(model).__name__} has no ONNX form, only networks and axle curves have"
+        )
+    return GRAPHS[model.kind](model, single)
 
 
 def export_onnx(model: TireModel, path: Path, *, single: bool = False) -> None:

@@ -15,13 +15,10 @@ import numpy as np
 from codegen.arrays import Array
 from codegen.escape import c_string
 from codegen.template import Values, Words, filled
-from identifier.axle import AxleIdentifier
-from identifier.axle.design import NOT_CERTIFIED
 from identifier.export.c_source import TEMPLATES, c_sources
 from identifier.export.layout import Member, carried_members, output_members, ruled
 from identifier.export.specialize import Signal, SpecializedStep, specialize
 from identifier.method import Method, vehicle_numbers
-from identifier.paper.design import PaperIdentifier
 from identifier.refused import NOWHERE, STALE_TIME, stale_samples
 from identifier.tire_model import TireModel
 from models.vehicle import Vehicle
@@ -49,7 +46,7 @@ def ingredients(specialized: SpecializedStep, *, single: bool) -> dict[str, Any]
         "tireid": tireid_version(),
         "precision": "float" if single else "double",
         "method": {"kind": type(method).__name__, **plain(numbers)},
-        "certificate": certificate(method),
+        "certificate": certificate(method, specialized.vehicle),
         "vehicle": plain(vehicle_numbers(specialized.vehicle)),
         "sample_time_s": specialized.dt,
         "min_speed_m_s": specialized.min_speed,
@@ -73,17 +70,18 @@ def ingredients(specialized: SpecializedStep, *, single: bool) -> dict[str, Any]
     }
 
 
-def certificate(method: Method) -> dict[str, Any]:
+def certificate(method: Method, vehicle: Vehicle) -> dict[str, Any]:
     """Return what is proven of a method, as the manifest says it.
 
     Parameters
     ----------
     method : what was exported.
+    vehicle : the car.
     """
-    if isinstance(method, AxleIdentifier):
-        return method.certificate
-    verdict = "judged by tireid check" if isinstance(method, PaperIdentifier) else NOT_CERTIFIED
-    return {"verdict": verdict, "held_by_construction": {}}
+    if method.judged_by:
+        return {"verdict": f"judged by {method.judged_by}", "held_by_construction": {}}
+    found = method.certify(vehicle)
+    return {"verdict": found.verdict, "held_by_construction": dict(found.held)}
 
 
 def summary(specialized: SpecializedStep, content: Mapping[str, Any]) -> dict[str, str | Words]:
@@ -100,7 +98,7 @@ def summary(specialized: SpecializedStep, content: Mapping[str, Any]) -> dict[st
         "method": type(specialized.method).__name__,
         "version": version,
         "hash": short,
-        "certificate": _certificate_text(specialized.method),
+        "certificate": _certificate_text(specialized.method, specialized.vehicle),
         "version_text": c_string(f"{specialized.name} {short}, tireid {version}"),
         "single": str(int(content["precision"] == "float")),
         "dt": f"{specialized.dt:g}",
@@ -110,11 +108,12 @@ def summary(specialized: SpecializedStep, content: Mapping[str, Any]) -> dict[st
     }
 
 
-def _certificate_text(method: Method) -> str:
-    proven = certificate(method)
-    if isinstance(method, PaperIdentifier):
+def _certificate_text(method: Method, vehicle: Vehicle) -> str:
+    proven = certificate(method, vehicle)
+    if method.judged_by:
         return (
-            "Stability and error bounds of this law depend on its gains: `tireid check` on its\n"
+            "Stability and error bounds of this law depend on its gains: "
+            f"`{method.judged_by}` on its\n"
             "design file gives the certificate. None is part of this package."
         )
     verdict, held = proven["verdict"], proven["held_by_construction"]

@@ -12,28 +12,10 @@ import numpy as np
 
 from codegen.arrays import Array
 from codegen.tuned import Tuned, tuned
-from identifier.axle import AxleIdentifier
-from identifier.baselines import StiffnessRls
-from identifier.method import Method, Setup
-from identifier.paper.design import PaperIdentifier
+from identifier.method import Method, Port, Setup
 from identifier.refused import GATE, SampleLimits, judges_samples
-from identifier.regression import RegressionIdentifier
 from identifier.tire_model import TireModel
-from models.recordings import Recording
 from models.vehicle import Vehicle
-
-# What the ports of a step mean: a unit and a few words on every field of an exported structure.
-
-LOAD = "static axle loads"
-# Rules of weights that are taken over.
-COVARIANCE, FACTORS, NOT_NEGATIVE = "covariance", "factors of a covariance", "not negative"
-RULES: Mapping[str, str] = {"P": COVARIANCE, "Omega": COVARIANCE, "information": NOT_NEGATIVE}
-AXLE_RULES: Mapping[str, str] = {
-    "UD": FACTORS,
-    "errors": NOT_NEGATIVE,
-    "excitation": NOT_NEGATIVE,
-    "watch": NOT_NEGATIVE,
-}
 
 
 class Signal(NamedTuple):
@@ -53,82 +35,6 @@ INPUTS = (
     Signal("delta_f", "rad", "road-wheel steering angle in front, left positive"),
     Signal("delta_r", "rad", "road-wheel steering angle at the rear, left positive"),
 )
-# U stands for the unit of forces inside the identifier.
-PORTS: Mapping[str, tuple[str, str]] = {
-    "axle_force": ("N", "lateral axle forces, front and rear, left positive, frame of the body"),
-    "f_hat": ("U", "force of the network alone, front and rear"),
-    "xi_tilde": ("U s", "error of the observed axle impulse, front and rear"),
-    "residual": ("U", "error of the filtered regression, front and rear"),
-    "W": ("U", "output weights, rows front and rear"),
-    "V": ("-", "hidden weights, rows units, columns scaled inputs"),
-    "xi_hat": ("U s", "observed axle impulse, front and rear"),
-    "z": ("U s^2", "filtered error, front and rear"),
-    "target_lag": ("U", "filter of the target, front and rear"),
-    "regressor_lag": ("-", "filter of the hidden layer"),
-    "fresh": ("-", "1 where the filters begin anew"),
-    "P": ("1/s", "inverse of the information"),
-    "Omega": ("s", "information"),
-    "Y": ("U s", "information times target"),
-    "S": ("-", "stored regressors"),
-    "Z": ("U", "stored targets"),
-}
-AXLE_PORTS: Mapping[str, tuple[str, str]] = {
-    "W": (LOAD, "weights of the units, rows front and rear"),
-    "own": (
-        "m per load; -; rad and m/s",
-        "compliance, sway share, offset of steering (front) and of v_y (rear)",
-    ),
-    "UD": (
-        "of W and own",
-        "covariance U D U' of W and own: D, and U above it, by rows; front and rear",
-    ),
-    "gate": (
-        "SI",
-        "last good v_x, v_y, r, delta_f, delta_r; on; time of steady learning; bad and stuck "
-        "samples in a row",
-    ),
-    "sway": ("m/s^2; m/s^3; rad", "roll: state, its rate, slip of the contact patch"),
-    "slip": ("rad; rad; 1/rad; -", "lagged slip, slip, slope and force of the curve, per axle"),
-    "sensitivity": ("rad; rad; 1/rad^2", "of slip to compliance and sway share, bend, per axle"),
-    "filters": (LOAD, "filters of the regressors and of the target, per axle"),
-    "errors": (f"-; -; {LOAD}", "fast and slow mean squared error, peak force, per axle"),
-    "excitation": ("rad; s", "largest slip, then time of learning above each edge, per axle"),
-    "watch": (
-        "s; s; -",
-        "time in doubt, and in which kept explained again; mean squared error of W and of kept, "
-        "front and rear",
-    ),
-    "kept": ("of W and own", "W and own that are gone back to after a fault, front and rear"),
-}
-
-
-def force_unit_text(method: Method) -> str:
-    """Return the name of the unit of forces inside a method.
-
-    Parameters
-    ----------
-    method : the method.
-    """
-    unit = getattr(method, "force_unit", 1.0)
-    return {1.0: "N", 1000.0: "kN"}.get(unit, f"{unit:g} N")
-
-
-def describe(method: Method, port: str, size: int) -> Signal:
-    """Return what a port of the step of a method means.
-
-    Parameters
-    ----------
-    method : the method.
-    port : name of an output or of a carried port.
-    size : number of entries.
-    """
-    curves = isinstance(method, AxleIdentifier)
-    known = {**PORTS, **AXLE_PORTS} if curves else PORTS
-    unit, description = known.get(port, ("-", "state of the method"))
-    rule = (AXLE_RULES if curves else RULES).get(port, "")
-    return Signal(port, unit.replace("U", force_unit_text(method)), description, size, rule)
-
-
 SAMPLED = ("x", "u", "v_x")
 
 
@@ -170,26 +76,8 @@ class SpecializedStep(NamedTuple):
     limits: SampleLimits
 
 
-def learnt_ports(method: Method, carry: Mapping[str, Array]) -> tuple[str, ...]:
-    """Return the carried ports that adaptation moves; filters and observers are not among them.
-
-    Parameters
-    ----------
-    method : the method.
-    carry : its carried ports.
-    """
-    match method:
-        case PaperIdentifier():
-            moving = {"W", "V"}
-        case AxleIdentifier():
-            moving = {"W", "own", "UD", "errors", "excitation", "watch", "kept"}
-        case RegressionIdentifier():
-            moving = set(carry) - {"target_lag", "regressor_lag", "fresh"}
-        case StiffnessRls():
-            moving = {"stiffness", "information"}
-        case _:
-            moving = set()
-    return tuple(port for port in carry if port in moving)
+def _described(port: Port, size: int) -> Signal:
+    return Signal(port.name, port.unit, port.words, size, port.rule)
 
 
 def specialize(
@@ -209,8 +97,7 @@ def specialize(
     ValueError
         Where stored weights are those of another structure.
     """
-    setup = method.setup(vehicle, _standing(method.dt), start)
-    moved = method.setup(vehicle, _standing(method.dt, x=1.0), start)
+    setup = method.setup(vehicle, start)
     step = setup.scan.step
     parts = _specialized(setup, name)
     told = sorted(setup.scan.outputs, key=lambda port: port != "axle_force")
@@ -221,15 +108,15 @@ def specialize(
         function=parts.function,
         parts=parts,
         carry={port: _matrix(value, step.size_in(port)) for port, value in setup.carry.items()},
-        learnt=learnt_ports(method, setup.carry),
+        learnt=tuple(port for port in setup.carry if method.port(port).learnt),
         inputs=INPUTS,
-        outputs=tuple(describe(method, port, step.numel_out(port)) for port in told),
-        state=tuple(describe(method, port, value.size) for port, value in setup.carry.items()),
+        outputs=tuple(_described(method.port(port), step.numel_out(port)) for port in told),
+        state=tuple(
+            _described(method.port(port), value.size) for port, value in setup.carry.items()
+        ),
         dt=method.dt,
         min_speed=method.min_speed,
-        rests_first=any(
-            not np.array_equal(setup.carry[port], moved.carry[port]) for port in setup.carry
-        ),
+        rests_first=setup.observe is not None,
         believed=GATE if judges_samples(setup.carry) else None,
         limits=SampleLimits.of(vehicle),
     )
@@ -260,17 +147,3 @@ def _specialized(setup: Setup, name: str) -> Tuned:
 def _matrix(value: Array, size: tuple[int, int]) -> Array:
     array = np.asarray(value, dtype=np.float64)
     return array if array.shape == tuple(size) else array.reshape(size)
-
-
-def _standing(dt: float, x: float = 0.0) -> Recording:
-    """Return ten samples of a car that stands, or is said to slide sideways by x."""
-    zero = np.zeros(10)
-    return Recording(
-        name="standing",
-        t=dt * np.arange(10.0),
-        v_x=zero,
-        v_y=zero + x,
-        r=zero + x,
-        delta_f=zero,
-        delta_r=zero,
-    )

@@ -1,99 +1,74 @@
-"""A design of the paper's identifier: everything that is chosen before the car drives."""
+"""A design of the paper's identifier: everything that is chosen before the car drives.
+
+Its numbers may follow from the vehicle alone: lengths scale with the wheelbase L and times with
+sqrt(L/g) (Froude), so that one rule serves a passenger car and a 1:10 model.
+"""
 
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
-from identifier.method import Setup
-from identifier.paper.laws import DRIVING_ERRORS, INPUT_SOURCES, INTEGRATORS, Gains
-from identifier.paper.network import Network, NetworkModel, Weights
-from identifier.paper.step import CARRY, GAINS, OVER, Structure, build_step
+from identifier.certificate import Certificate
+from identifier.driving import Driving, natural_driving
+from identifier.method import Method, Port, Setup, in_force_unit
+from identifier.paper.laws import INPUT_SOURCES, INTEGRATORS, LAWS, Gains, diagonal
+from identifier.paper.network import Network, NetworkModel, Weights, first_weights, natural_network
+from identifier.paper.step import CARRY, GAINS, OVER, PORTS, Structure, build_step
+from identifier.stability.certificate import certify
+from identifier.stability.gain_design import decay_rate, design_gains
+from identifier.stability.operation import Operation, minimal_decay, operation
 from identifier.tire_model import TireModel
 from models.bicycle import BicycleParameters, bicycle
-from models.recordings import Recording
 from models.rules import require_within
 from models.schema import Table, read_toml
 from models.vehicle import GRAVITY, Vehicle
 
-# How hard a car is driven: the conditions that a design is made for, judged at, and stored with.
-#
-# A bound that is proven holds on every drive that keeps all of them; a drive that breaks one proves
-# nothing. They stand in design.toml, so that the same file is judged alike wherever it is judged.
 
-SPEED_SPREAD = 0.05  # of the speed, give or take
-RANGES = {  # SI, of what is driven on wheels
-    "v_x": (0.01, 150.0),
-    "slip": (1e-4, 1.5),
-    "friction": (1e-3, 10.0),
-    "bandwidth": (1e-3, 1e3),
-    "noise_v_y": (0.0, 150.0),
-    "noise_r": (0.0, 100.0),
-    "noise_delta": (0.0, 1.5),
-}
-YAW_OVERSHOOT = 1.5  # largest yaw rate, of the steady one at the friction limit
+class Variant(NamedTuple):
+    """A law of the paper as it is compared: its law, and where its gains come from.
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Driving:
-    """Conditions of driving, SI.
-
-    The sensors may err by as much as the noise at every sample, in any direction: it is a largest
-    error, not a standard deviation.
-
-    Parameters
-    ----------
-    v_x : speed [m/s], give or take `SPEED_SPREAD`.
-    slip : largest slip angle of an axle [rad].
-    friction : largest μ of the road [-]; an axle pushes with at most μ times its load.
-    bandwidth : highest frequency of the steering [Hz].
-    noise_v_x : largest error of the speed [m/s].
-    noise_v_y : largest error of the lateral velocity [m/s].
-    noise_r : largest error of the yaw rate [rad/s].
-    noise_delta : largest error of a steering angle [rad].
-
-    Raises
-    ------
-    ValueError
-        Where a condition is not positive or outside `RANGES`, or a noise negative, not a number or
-        beyond the speed.
+    title : what a reader is told.   law : one of `LAWS`.
+    gains_of : the law that they are found for.   scaled : whether η/λ stands in place of η.
     """
 
-    v_x: float
-    slip: float
-    friction: float
-    bandwidth: float
-    noise_v_x: float = 0.0
-    noise_v_y: float = 0.0
-    noise_r: float = 0.0
-    noise_delta: float = 0.0
+    title: str
+    law: str
+    gains_of: str
+    scaled: bool = False
 
-    def __post_init__(self) -> None:
-        for one in fields(self):
-            value = getattr(self, one.name)
-            lowest = value >= 0.0 if one.name.startswith("noise") else value > 0.0
-            if not (lowest and math.isfinite(value)):
-                rule = "not be negative" if one.name.startswith("noise") else "be positive"
-                raise ValueError(f"{one.name} must {rule} and finite, it is {value}")
-        for name, (least, most) in RANGES.items():
-            require_within(ValueError, least, most, **{name: getattr(self, name)})
-        if not self.noise_v_x < 0.5 * self.v_x:
-            raise ValueError(f"noise_v_x must be below half the speed, it is {self.noise_v_x}")
+    def gains(self, found: Gains) -> Gains:
+        """Return the gains.
 
+        Parameters
+        ----------
+        found : for the law `gains_of`.
+        """
+        return found.scaled_by_forgetting() if self.scaled else found
+
+
+VARIANTS: Mapping[str, Variant] = {
+    "integral": Variant("integral", "integral", "integral"),
+    "instantaneous": Variant("instantaneous", "instantaneous", "integral"),
+    "instantaneous_scaled": Variant(
+        "instantaneous at eta/lambda", "instantaneous", "integral", scaled=True
+    ),
+    "pi_lead": Variant("PI-lead", "pi_lead", "pi_lead"),
+}
 
 SHORTEST_STEP, LONGEST_STEP = 1e-4, 0.1  # [s]: finer is only work, coarser is blind
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PaperIdentifier:
+class PaperIdentifier(Method):
     """Network, law, gains and sampling of one identifier.
 
     Parameters
@@ -109,7 +84,7 @@ class PaperIdentifier:
     min_speed : below this speed [m/s] learning rests and forces read zero.
     seed : seed of the initial weights.
     driving : the conditions that it was designed for and is judged at; None takes those of the
-        car, `identifier.defaults.natural_driving`.
+        car, `identifier.driving.natural_driving`.
 
     Raises
     ------
@@ -128,9 +103,11 @@ class PaperIdentifier:
     seed: int = 0
     driving: Driving | None = None
 
+    judged_by = "tireid check"  # on the file of the design
+
     def __post_init__(self) -> None:
         for name, known in (
-            ("law", DRIVING_ERRORS),
+            ("law", LAWS),
             ("input_source", INPUT_SOURCES),
             ("integrator", INTEGRATORS),
         ):
@@ -157,14 +134,24 @@ class PaperIdentifier:
 
     @classmethod
     def for_vehicle(
-        cls, vehicle: Vehicle, *, law: str = "integral", dt: float = 0.01, seed: int = 0
+        cls,
+        vehicle: Vehicle,
+        *,
+        law: str = "integral",
+        network: Network | None = None,
+        dt: float = 0.01,
+        seed: int = 0,
     ) -> "PaperIdentifier":
         """Return the identifier of the paper with gains that follow from the car.
+
+        The two instantaneous laws have the gains of the integral law, one as they are and one with
+        η/λ, since they are there to be compared with it.
 
         Parameters
         ----------
         vehicle : the car.
-        law : "integral", "instantaneous", "instantaneous_scaled" (at η/λ) or "pi_lead".
+        law : one of `VARIANTS`.
+        network : structure; None takes `natural_network`.
         dt : sampling interval [s].
         seed : seed of the initial weights.
 
@@ -173,19 +160,61 @@ class PaperIdentifier:
         ValueError
             Where the law is unknown.
         """
-        from identifier.defaults import paper_identifier  # it finds gains for designs like this one
+        if law not in VARIANTS:
+            raise ValueError(f"law must be one of {list(VARIANTS)}, not {law!r}")
+        found = design_for(
+            vehicle,
+            natural_driving(vehicle),
+            law=VARIANTS[law].gains_of,
+            network=network,
+            seed=seed,
+            dt=dt,
+        )
+        return found.with_law(law)
 
-        return paper_identifier(vehicle, law=law, dt=dt, seed=seed)
+    def with_law(self, name: str) -> "PaperIdentifier":
+        """Return it run by another law, to compare the two.
 
-    def setup(
-        self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
-    ) -> Setup:
+        Parameters
+        ----------
+        name : one of `VARIANTS`.
+        """
+        variant = VARIANTS[name]
+        return replace(self, law=variant.law, gains=variant.gains(self.gains))
+
+    def operation(self, vehicle: Vehicle, driving: Driving | None = None) -> Operation:
+        """Return what its certificate must know.
+
+        Parameters
+        ----------
+        vehicle : the car.
+        driving : how hard it is driven; None takes what it was designed for, else
+            `natural_driving`.
+        """
+        return operation(self, vehicle, driving or self.driving or natural_driving(vehicle))
+
+    def certify(self, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
+        """Return what is proven of its gains.
+
+        Parameters
+        ----------
+        vehicle : the car.
+        driving : how hard it is driven; None takes what it was designed for, else
+            `natural_driving`.
+        """
+        return certify(self.gains, LAWS[self.law], self.operation(vehicle, driving))
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """Outputs and state of its step, axle_force first."""
+        return in_force_unit(PORTS, self.force_unit)
+
+    def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs; the observer starts at the first measurement.
 
         Parameters
         ----------
-        vehicle : the car as the identifier is told of it.
-        recording : what it will run over.
+        vehicle : the car, as far as the identifier knows it.
         start : weights to begin with; None draws them from the seed.
 
         Raises
@@ -196,9 +225,11 @@ class PaperIdentifier:
         return Setup(
             scan=_scan(self.structure),
             carry={
-                "xi_hat": axle_impulse(recording.x[0], vehicle) / self.force_unit,
+                "xi_hat": np.zeros(2),
                 "z": np.zeros(2),
-                **self._first_weights(start)._asdict(),
+                **first_weights(
+                    self.network, start, seed=self.seed, force_unit=self.force_unit
+                )._asdict(),
             },
             constants={
                 "vehicle": np.array(vehicle.bicycle),
@@ -206,14 +237,23 @@ class PaperIdentifier:
                 "gains": np.array([getattr(self.gains, name) for name in GAINS]),
                 "sampling": np.array([self.dt, self.force_unit, self.min_speed]),
             },
+            observe=lambda x: {"xi_hat": axle_impulse(x, vehicle) / self.force_unit},
         )
 
-    def _first_weights(self, start: TireModel | None) -> Weights:
-        if start is None:
-            return self.network.initial_weights(np.random.default_rng(self.seed))
-        if not isinstance(start, NetworkModel) or start.network != self.network:
-            raise ValueError("the stored weights are of another structure than the design's")
-        return Weights(W=start.weights.W * (start.force_unit / self.force_unit), V=start.weights.V)
+    def numbers(self) -> dict[str, Any]:
+        """Return all that was chosen, as plain data: gains, network, the rest and the seed."""
+        return {
+            "gains": asdict(self.gains),
+            "network": asdict(self.network),
+            "design": {
+                "input_source": self.input_source,
+                "integrator": self.integrator,
+                "dt_s": self.dt,
+                "force_unit_N": self.force_unit,
+                "min_speed_m_s": self.min_speed,
+            },
+            "seed": self.seed,
+        }
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> NetworkModel:
         """Return the model with the carried weights.
@@ -265,6 +305,80 @@ def natural_force_unit(mass: float) -> float:
     mass : mass of the car [kg].
     """
     return float(10.0 ** round(np.log10(mass * GRAVITY / 15)))
+
+
+# Gains by the margin of the learning loop: sizes follow from the car by similarity.
+
+PHASE_MARGIN = 60.0  # deg
+
+
+def design_for(
+    vehicle: Vehicle,
+    driving: Driving,
+    *,
+    law: str = "integral",
+    network: Network | None = None,
+    phase_margin: float = PHASE_MARGIN,
+    input_source: str = "measured",
+    integrator: str = "euler",
+    dt: float = 0.01,
+    seed: int = 0,
+) -> PaperIdentifier:
+    """Return a design whose learning loop has the wanted phase margin at the worst regressor.
+
+    Parameters
+    ----------
+    vehicle : the car.
+    driving : how hard it is driven; it is stored with the design.
+    law : "integral", "instantaneous" or "pi_lead", which gets the lead τ = 1/a.
+    network : structure; None takes `natural_network`.
+    phase_margin : of the sampled loop [deg].
+    input_source : "measured" or "estimated".
+    integrator : "euler" or "rk4".
+    dt : sampling interval [s].
+    seed : seed of the initial weights.
+
+    Raises
+    ------
+    DesignError
+        Where the bandwidth is too high for the sampling, or the margin cannot be had.
+    """
+    network = network or natural_network(vehicle)
+    frame = PaperIdentifier(
+        gains=_placeholder(),
+        network=network,
+        law=law,
+        input_source=input_source,
+        integrator=integrator,
+        dt=dt,
+        force_unit=natural_force_unit(vehicle.mass),
+        min_speed=vehicle.lowest_speed,
+        seed=seed,
+        driving=driving,
+    )
+    known = frame.operation(vehicle, driving)
+    feedback = known.input_feedback
+    slowest = 0.0 if feedback is None else minimal_decay(feedback)
+    lead = LAWS[law].lead / decay_rate(driving.bandwidth, slowest)
+    designed = design_gains(
+        law=LAWS[law].error(lead),
+        bandwidth=driving.bandwidth,
+        dt=dt,
+        n_h=network.hidden,
+        x_bar_max=known.x_bar_max,
+        disturbance=known.disturbance,
+        needed_force=known.needed_force,
+        V_max=known.V_start,
+        phase_margin=phase_margin,
+        integrator=integrator,
+        minimal_decay=slowest,
+    )
+    return replace(frame, gains=replace(designed.gains, lead=lead))
+
+
+def _placeholder() -> Gains:
+    """Gains that are replaced once the design around them is known."""
+    return Gains(A_d=diagonal(1.0), forgetting=1.0, eta_W=0.0, eta_V=0.0, rho_W=0.0, rho_V=0.0)
 
 
 # A design as a TOML file: design.toml, read strictly and written with its units.

@@ -23,56 +23,7 @@ from numpy.typing import NDArray
 
 from models.rules import require_within
 
-DrivingError = Callable[[Any, Any, Any], Any]
 Direction = Callable[[Any, Any], Any]
-
-
-def integral(z: Any, xi_tilde: Any, lead: Any) -> Any:
-    """Drive the laws by the exponentially filtered error z, as (11)-(12) do; (2,).
-
-    Parameters
-    ----------
-    z : filtered error (2,).
-    xi_tilde : error (2,).
-    lead : not read.
-    """
-    del xi_tilde, lead
-    return z
-
-
-def instantaneous(z: Any, xi_tilde: Any, lead: Any) -> Any:
-    """Drive the laws by the error itself, the conventional scheme; (2,).
-
-    Parameters
-    ----------
-    z : filtered error (2,).
-    xi_tilde : error (2,).
-    lead : not read.
-    """
-    del z, lead
-    return xi_tilde
-
-
-def pi_lead(z: Any, xi_tilde: Any, lead: Any) -> Any:
-    """Drive the laws by z + τ ξ̃: with τ long enough the loop is positive real.
-
-    Together with `lyapunov_direction` no gain is then too high, whatever the Hurwitz A_d; for
-    A_d = -a I long enough is 1/a, else `identifier.stability.pi_lead.lead_time`.
-
-    Parameters
-    ----------
-    z : filtered error (2,).
-    xi_tilde : error (2,).
-    lead : lead time τ [s].
-    """
-    return z + lead * xi_tilde
-
-
-DRIVING_ERRORS: Mapping[str, DrivingError] = {
-    "integral": integral,
-    "instantaneous": instantaneous,
-    "pi_lead": pi_lead,
-}
 
 
 def static_direction(A_d: Any, drive: Any) -> Any:
@@ -103,10 +54,76 @@ def lyapunov_direction(A_d: Any, drive: Any) -> Any:
     return (determinant * drive + S.T @ (S @ drive)) / (trace * determinant)
 
 
-DIRECTIONS: Mapping[DrivingError, Direction] = {
-    integral: static_direction,
-    instantaneous: static_direction,
-    pi_lead: lyapunov_direction,  # only with P is the lead passive where A_d is not symmetric
+class DrivingError(NamedTuple):
+    """Coefficients of z and ξ̃ in the error that drives (11) and (12), numbers or symbols.
+
+    `z` has no unit and `xi_tilde` is a time [s]; for a law without z, `xi_tilde` has no unit.
+    """
+
+    z: Any
+    xi_tilde: Any
+
+    def drive(self, z: Any, xi_tilde: Any) -> Any:
+        """Return the driving error.
+
+        Parameters
+        ----------
+        z : filtered error.
+        xi_tilde : error.
+        """
+        return self.z * z + self.xi_tilde * xi_tilde
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Law:
+    """A law: the error z z + (xi + lead τ) ξ̃ drives (11)-(12) along a direction.
+
+    Parameters
+    ----------
+    name : in files and commands.
+    z : share of the filtered error.
+    xi : share of the error.
+    lead : share of the lead time τ of the gains in what multiplies the error.
+    direction : of the descent, from A_d and the driving error.
+
+    Raises
+    ------
+    ValueError
+        Where a share is negative, or all of them are zero.
+    """
+
+    name: str
+    z: float = 0.0
+    xi: float = 0.0
+    lead: float = 0.0
+    direction: Direction = static_direction
+
+    def __post_init__(self) -> None:
+        shares = (self.z, self.xi, self.lead)
+        if not (min(shares) >= 0.0 and 0.0 < sum(shares) < np.inf):
+            raise ValueError(f"a law must weigh z and xi_tilde positively, it has {shares}")
+
+    def error(self, lead: Any = 0.0) -> DrivingError:
+        """Return the coefficients of the driving error.
+
+        Parameters
+        ----------
+        lead : lead time τ of the gains [s], a number or a symbol.
+        """
+        return DrivingError(self.z, self.xi + self.lead * lead)
+
+
+# The integral law is that of (11)-(12); the instantaneous one the conventional scheme. z + τ ξ̃:
+# with τ long enough the loop is positive real, and along `lyapunov_direction` no gain is then too
+# high, whatever the Hurwitz A_d; for A_d = -a I long enough is 1/a, else `lead_time` of
+# `identifier.stability.pi_lead`.
+LAWS: Mapping[str, Law] = {
+    law.name: law
+    for law in (
+        Law(name="integral", z=1.0),
+        Law(name="instantaneous", xi=1.0),
+        Law(name="pi_lead", z=1.0, lead=1.0, direction=lyapunov_direction),
+    )
 }
 
 
@@ -196,7 +213,7 @@ def weight_rates(
     eta_V : learning rate η2.
     rho_W : leakage ρ1.
     rho_V : leakage ρ2.
-    direction : of the descent, from A_d and the driving error; one of `DIRECTIONS`.
+    direction : of the descent, from A_d and the driving error.
     leaking : what of the weights leaks, from them and the radius: `whole` or `beyond_ball`.
     W_free : radius of the dead zone of W, which `whole` does not read [U].
     V_free : radius of the dead zone of V, which `whole` does not read [-].

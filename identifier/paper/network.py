@@ -15,17 +15,19 @@ from numpy.typing import NDArray
 
 from codegen import Scan
 from codegen.elementary import tanh
+from identifier.driving import REFERENCE_WHEELBASE
 from identifier.method import (
     FORMAT,
+    OTHER_STRUCTURE,
     FrozenModelError,
     Setup,
     require_min_speed,
+    resumed,
     vehicle_from,
     vehicle_numbers,
 )
 from identifier.tire_model import TireModel, drift
 from models.bicycle import BicycleParameters, linear_axle_force, slip_angles
-from models.recordings import Recording
 from models.rules import require_positive, require_within
 from models.schema import Table, require_few
 from models.vehicle import Vehicle
@@ -112,6 +114,23 @@ class Network:
         return ca.vertcat(*(signals[name] * (1 / scale) for name, scale in pairs))
 
 
+def natural_network(
+    vehicle: Vehicle, *, hidden: int = 10, inputs: tuple[str, ...] = Network().inputs
+) -> Network:
+    """Return a network whose input scales fit the size of the car.
+
+    Parameters
+    ----------
+    vehicle : its wheelbase sets the scales of speeds and yaw rate.
+    hidden : number of hidden units.
+    inputs : signals that the network reads.
+    """
+    ratio = np.sqrt(vehicle.wheelbase / REFERENCE_WHEELBASE)
+    froude = {"v_y": ratio, "v_x": ratio, "r": 1 / ratio}
+    scale = tuple(float(SIGNALS[name] * froude.get(name, 1.0)) for name in inputs)
+    return Network(hidden=hidden, inputs=inputs, scale=scale)
+
+
 def hidden_layer(V: Any, x_bar: Any) -> Any:
     """Return σ = tanh(V x̄), (n_h,), by the rational tanh that every machine computes alike.
 
@@ -147,7 +166,6 @@ def network_signals(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> 
 
 # The paper's network, frozen: weights at one instant and all that axle forces need.
 
-KIND = "network"
 LARGEST_SUM = 1e9  # of the units of an axle together [N]: what cancels may be large
 LARGEST_V = 1e9  # [-], beyond which tanh is a sign at the slip of a resting car
 
@@ -228,6 +246,8 @@ class NetworkModel(TireModel):
         Where a weight has the wrong shape or is not finite.
     """
 
+    kind = "network"
+
     vehicle: Vehicle
     network: Network
     weights: Weights
@@ -251,14 +271,14 @@ class NetworkModel(TireModel):
         require_within(ValueError, 0.0, LARGEST_SUM, **{"force_unit times |W|": largest})
         require_within(ValueError, 0.0, LARGEST_V, **{"|V|": np.abs(self.weights.V).max()})
 
-    def setup(self, recording: Recording) -> Setup:
+    def setup(self, dt: float) -> Setup:
         """Return what a replay needs.
 
         Parameters
         ----------
-        recording : what is replayed; it is not looked at.
+        dt : sampling interval of what is replayed [s]; it is not looked at.
         """
-        del recording
+        del dt
         return Setup(
             scan=_replay_scan(self.network),
             carry={},
@@ -270,15 +290,6 @@ class NetworkModel(TireModel):
                 "min_speed": np.array(self.min_speed),
             },
         )
-
-    def axle_force(self, recording: Recording) -> NDArray[np.float64]:
-        """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
-
-        Parameters
-        ----------
-        recording : its signals are the input; its forces are not looked at.
-        """
-        return self.setup(recording).run(recording)["axle_force"]
 
     def curve_expression(self, alpha: Any, v_x: Any) -> Any:
         """Return the steady axle forces (2,) [N] as a CasADi expression.
@@ -316,7 +327,7 @@ class NetworkModel(TireModel):
         """Return the model as plain numbers and words, ready for JSON."""
         return {
             "format": FORMAT,
-            "kind": KIND,
+            "kind": self.kind,
             "units": {"W": "force_unit_N newtons", "V": "-", "scale": "SI, by input"},
             "vehicle": vehicle_numbers(self.vehicle),
             "network": asdict(self.network),
@@ -351,3 +362,26 @@ class NetworkModel(TireModel):
             )
         except ValueError as error:
             raise FrozenModelError(f"{source}: {error}") from error
+
+
+def first_weights(
+    network: Network, start: TireModel | None, *, seed: int, force_unit: float
+) -> Weights:
+    """Return the weights that learning begins with.
+
+    Parameters
+    ----------
+    network : structure of the network.
+    start : stored weights to begin with; None draws them.
+    seed : of the weights that are drawn.
+    force_unit : U of what learns [N].
+
+    Raises
+    ------
+    ValueError
+        Where stored weights are those of another structure.
+    """
+    if start is None:
+        return network.initial_weights(np.random.default_rng(seed))
+    stored = resumed(start, NetworkModel, OTHER_STRUCTURE, network=network)
+    return Weights(W=stored.weights.W * (stored.force_unit / force_unit), V=stored.weights.V)

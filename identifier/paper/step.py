@@ -13,11 +13,11 @@ from typing import Any
 
 import casadi as ca
 
+from identifier.method import AXLE_FORCE, Port
 from identifier.paper.laws import (
-    DIRECTIONS,
-    DRIVING_ERRORS,
     INPUT_SOURCES,
     INTEGRATORS,
+    LAWS,
     ball,
     beyond_ball,
     filter_rate,
@@ -30,6 +30,18 @@ from identifier.paper.network import Network, hidden_layer, network_signals
 from models.bicycle import BicycleParameters, bicycle, linear_axle_force
 
 CARRY = ("xi_hat", "z", "W", "V")
+NETWORK_PORTS = (
+    AXLE_FORCE,
+    Port("f_hat", "U", "force of the network alone, front and rear"),
+    Port("W", "U", "output weights, rows front and rear", learnt=True),
+    Port("V", "-", "hidden weights, rows units, columns scaled inputs", learnt=True),
+)
+PORTS = (
+    *NETWORK_PORTS,
+    Port("xi_tilde", "U s", "error of the observed axle impulse, front and rear"),
+    Port("xi_hat", "U s", "observed axle impulse, front and rear"),
+    Port("z", "U s^2", "filtered error, front and rear"),
+)
 OVER = ("x", "u", "v_x")
 LARGEST_SPEED, LARGEST_ANGLE = 300.0, 1.5  # m/s and rad: no car is faster, no wheel turns more
 GAINS = (
@@ -53,7 +65,7 @@ class Structure:
     Parameters
     ----------
     network : structure of the network.
-    law : name of the driving error.
+    law : name of the law.
     input_source : where the network reads the state.
     integrator : name of the integrator.
     projects : whether a projection bounds the weights.
@@ -109,7 +121,8 @@ def build_step(structure: Structure) -> ca.Function:
     speed = ca.fmax(v_x, min_speed)
     model = bicycle(parameters, speed)
     xi = model.K_inv @ x / unit
-    drive, source = DRIVING_ERRORS[structure.law], INPUT_SOURCES[structure.input_source]
+    law, source = LAWS[structure.law], INPUT_SOURCES[structure.input_source]
+    error = law.error(lead)
     bounded = ball if structure.projects else unbounded
 
     def layers(xi_hat: Any, V: Any) -> tuple[Any, Any]:
@@ -122,7 +135,7 @@ def build_step(structure: Structure) -> ca.Function:
         x_bar, sigma = layers(xi_hat, V)
         xi_tilde = xi - xi_hat
         rates = weight_rates(
-            drive=drive(z, xi_tilde, lead),
+            drive=error.drive(z, xi_tilde),
             xi_tilde=xi_tilde,
             W=W,
             V=V,
@@ -133,7 +146,7 @@ def build_step(structure: Structure) -> ca.Function:
             eta_V=eta_V,
             rho_W=rho_W,
             rho_V=rho_V,
-            direction=DIRECTIONS[drive],
+            direction=law.direction,
             leaking=beyond_ball if structure.rests else whole,
             W_free=W_free,
             V_free=V_free,

@@ -1,26 +1,34 @@
 """A design that learns the last layer by a filtered regression: law, network and numbers."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
-from identifier.defaults import natural_network
-from identifier.method import Setup
+from identifier.method import Method, Port, Setup, in_force_unit
 from identifier.paper.design import natural_force_unit
-from identifier.paper.network import Network, NetworkModel, Weights
+from identifier.paper.network import Network, NetworkModel, Weights, first_weights, natural_network
 from identifier.regression.laws import LAWS, Numbers
-from identifier.regression.step import OVER, Structure, build_step
+from identifier.regression.step import OVER, PORTS, Structure, build_step
 from identifier.tire_model import TireModel
-from models.recordings import Recording
+from identifier.tuning import SIZE, SIZE_RANGE, Range, hidden_units, ranges_around, with_numbers
 from models.vehicle import Vehicle
+
+# What a search may vary of it, and what the number is multiplied and divided by.
+TUNED: Mapping[str, float] = {
+    "filter_rate": 4.0,
+    "forgetting": 10.0,
+    "learning_rate": 10.0,
+    "ridge": 10.0,
+    "quiet": 3.0,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RegressionIdentifier:
+class RegressionIdentifier(Method):
     """Law, network, numbers and sampling; the hidden layer is random and stays as it is.
 
     Parameters
@@ -113,15 +121,35 @@ class RegressionIdentifier:
             seed=seed,
         )
 
-    def setup(
-        self, vehicle: Vehicle, recording: Recording, start: TireModel | None = None
-    ) -> Setup:
+    @property
+    def tunables(self) -> Mapping[str, Range]:
+        """What a search may vary, around the numbers that it has."""
+        return {SIZE: SIZE_RANGE, **ranges_around(self, TUNED)}
+
+    def tuned(self, values: Mapping[str, float]) -> "RegressionIdentifier":
+        """Return the method with other numbers, a network of another size among them.
+
+        Parameters
+        ----------
+        values : by name of its `tunables`; empty leaves it as it is.
+        """
+        numbers = {name: value for name, value in values.items() if name != SIZE}
+        changed = with_numbers(self, numbers)
+        if SIZE not in values:
+            return changed
+        return replace(changed, network=replace(self.network, hidden=hidden_units(values)))
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """Outputs and state of its step, axle_force first."""
+        return in_force_unit(PORTS, self.force_unit)
+
+    def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs.
 
         Parameters
         ----------
-        vehicle : the car as the identifier is told of it.
-        recording : not looked at before the car drives.
+        vehicle : the car, as far as the identifier knows it.
         start : weights to begin with, hidden layer and all; None begins at the linear tire.
 
         Raises
@@ -129,9 +157,11 @@ class RegressionIdentifier:
         ValueError
             Where stored weights are those of another structure.
         """
-        del recording
         structure = Structure(network=self.network, law=self.law, memory=self.memory)
-        weights, n_h = self._first_weights(start), self.network.hidden
+        weights, n_h = (
+            first_weights(self.network, start, seed=self.seed, force_unit=self.force_unit),
+            self.network.hidden,
+        )
         return Setup(
             scan=_scan(structure),
             carry={
@@ -149,13 +179,6 @@ class RegressionIdentifier:
                 "sampling": np.array([self.dt, self.force_unit, self.min_speed]),
             },
         )
-
-    def _first_weights(self, start: TireModel | None) -> Weights:
-        if start is None:
-            return self.network.initial_weights(np.random.default_rng(self.seed))
-        if not isinstance(start, NetworkModel) or start.network != self.network:
-            raise ValueError("the stored weights are of another structure than the design's")
-        return Weights(W=start.weights.W * (start.force_unit / self.force_unit), V=start.weights.V)
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> NetworkModel:
         """Return the model with the carried weights.

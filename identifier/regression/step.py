@@ -14,13 +14,27 @@ from typing import Any
 
 import casadi as ca
 
+from identifier.method import COVARIANCE, Port
 from identifier.paper.laws import ball
 from identifier.paper.network import Network, hidden_layer, network_signals
+from identifier.paper.step import NETWORK_PORTS
 from identifier.regression.laws import LAWS, Lags, Numbers, Weights, filtered_pair
 from models.bicycle import BicycleParameters, bicycle, linear_axle_force
 
 CARRY = ("W", "V", "target_lag", "regressor_lag", "fresh")
 OVER = ("x", "u", "v_x")
+PORTS = (
+    *NETWORK_PORTS,
+    Port("residual", "U", "error of the filtered regression, front and rear"),
+    Port("target_lag", "U", "filter of the target, front and rear"),
+    Port("regressor_lag", "-", "filter of the hidden layer"),
+    Port("fresh", "-", "1 where the filters begin anew"),
+    Port("P", "1/s", "inverse of the information", learnt=True, rule=COVARIANCE),
+    Port("Omega", "s", "information", learnt=True, rule=COVARIANCE),
+    Port("Y", "U s", "information times target", learnt=True),
+    Port("S", "-", "stored regressors", learnt=True),
+    Port("Z", "U", "stored targets", learnt=True),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

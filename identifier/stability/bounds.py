@@ -19,7 +19,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from identifier.stability.loop import Law
+from identifier.paper.laws import DrivingError
 from identifier.stability.lyapunov import (
     Matrix,
     lyapunov,
@@ -33,7 +33,7 @@ from models.rules import require_positive
 def small_gain(
     A_d: npt.ArrayLike,
     *,
-    law: Law,
+    law: DrivingError,
     forgetting: float,
     eta_W: float,
     n_h: int,
@@ -54,13 +54,14 @@ def small_gain(
     """
     require_positive(ValueError, forgetting=forgetting)
     c_z, _ = law
-    return c_z * _peak(A_d, dt) * eta_W * _size(A_d, direction) * n_h / forgetting**2
+    gain: float = c_z * _peak(A_d, dt) * eta_W * _size(A_d, direction) * n_h / forgetting**2
+    return gain
 
 
 def steady_capacity(
     A_d: npt.ArrayLike,
     *,
-    law: Law,
+    law: DrivingError,
     forgetting: float,
     eta_W: float,
     rho_W: float,
@@ -84,7 +85,8 @@ def steady_capacity(
     """
     require_positive(ValueError, forgetting=forgetting, rho_W=rho_W)
     c_z, c_xi = law
-    return n_h * eta_W * _size(A_d, direction) * (c_z / forgetting + c_xi) / rho_W
+    weight: float = n_h * eta_W * _size(A_d, direction) * (c_z / forgetting + c_xi) / rho_W
+    return weight
 
 
 def transient_peak(A_d: npt.ArrayLike) -> float:

@@ -6,14 +6,15 @@ same loop at the regressors of a recorded run is `along_run`.
 
 import math
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
 from codegen.arrays import Array
-from identifier.paper.design import PaperIdentifier
-from identifier.paper.laws import DRIVING_ERRORS, DrivingError, Gains
+from identifier.certificate import Certificate, Property
+from identifier.paper.laws import LAWS, DrivingError, Gains, Law
 from identifier.paper.network import network_signals
 from identifier.run import History
 from identifier.stability.checks import (
@@ -25,10 +26,8 @@ from identifier.stability.checks import (
 )
 from identifier.stability.loop import (
     INTEGRATORS,
-    Law,
     Loop,
     direction_matrix,
-    linear_law,
     regressor_gains,
     spectral_radius,
     strongest,
@@ -36,34 +35,36 @@ from identifier.stability.loop import (
 from identifier.stability.lyapunov import Matrix
 from identifier.stability.margins import gain_margin
 from identifier.stability.operation import Operation, proven_bounds, worst_loop
-from identifier.stability.property import Certificate, Property
 from models.bicycle import BicycleParameters
 
+if TYPE_CHECKING:
+    from identifier.paper.design import PaperIdentifier  # which asks for this
 
-def certify(gains: Gains, driving_error: DrivingError, operation: Operation) -> Certificate:
+
+def certify(gains: Gains, law: Law, operation: Operation) -> Certificate:
     """Return every property of the design.
 
     Parameters
     ----------
     gains : of (8) to (12).
-    driving_error : of `identifier.paper.laws`; the PI-lead law takes its τ from the gains.
+    law : of `identifier.paper.laws.LAWS`; the PI-lead law takes its τ from the gains.
     """
-    law, D = linear_law(driving_error, gains.lead), direction_matrix(driving_error, gains.matrix)
-    proven = proven_bounds(gains, law, operation, D)
-    W, _, margins = judged_loop(gains, law, operation, D, proven.W)
+    error, D = law.error(gains.lead), direction_matrix(law, gains.matrix)
+    proven = proven_bounds(gains, error, operation, D)
+    W, _, margins = judged_loop(gains, error, operation, D, proven.W)
     return Certificate(
         properties=(
             *dynamics_checks(gains, operation),
             *margins,
             weight_check(gains, operation, proven.W, W),
-            drift_check(gains, law, operation, D),
-            *bound_checks(gains, law, operation, D, proven),
+            drift_check(gains, error, operation, D),
+            *bound_checks(gains, error, operation, D, proven),
         )
     )
 
 
 def judged_loop(
-    gains: Gains, law: Law, operation: Operation, direction: Matrix, kept: float
+    gains: Gains, law: DrivingError, operation: Operation, direction: Matrix, kept: float
 ) -> tuple[float, Loop, list[Property]]:
     """Return the |W_hat| that margins are judged at, the worst loop there, and its margins.
 
@@ -127,7 +128,7 @@ class LoopAlongRun:
     margin: float
 
 
-def loop_along(history: History, design: PaperIdentifier) -> LoopAlongRun:
+def loop_along(history: History, design: "PaperIdentifier") -> LoopAlongRun:
     """Evaluate the loop at the regressors and weights of a run.
 
     The network's input is taken from the measured state, which the estimate follows closely.
@@ -149,9 +150,9 @@ def loop_along(history: History, design: PaperIdentifier) -> LoopAlongRun:
     loop = Loop(
         A_d=design.gains.matrix,
         forgetting=design.gains.forgetting,
-        law=linear_law(DRIVING_ERRORS[design.law], design.gains.lead),
+        law=LAWS[design.law].error(design.gains.lead),
         G=gains[worst],
-        direction=direction_matrix(DRIVING_ERRORS[design.law], design.gains.matrix),
+        direction=direction_matrix(LAWS[design.law], design.gains.matrix),
     )
     return LoopAlongRun(
         t=recording.t[moving],
@@ -162,7 +163,7 @@ def loop_along(history: History, design: PaperIdentifier) -> LoopAlongRun:
     )
 
 
-def network_inputs(history: History, design: PaperIdentifier) -> Array:
+def network_inputs(history: History, design: "PaperIdentifier") -> Array:
     """Return x̄ at every sample, (n, n_in).
 
     Parameters

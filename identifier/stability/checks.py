@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 
-from identifier.paper.laws import Gains
+from identifier.certificate import Property, Status, at_least, at_most, statement
+from identifier.paper.laws import DrivingError, Gains
 from identifier.stability.bounds import small_gain, steady_capacity
-from identifier.stability.loop import ComplexArray, Law, Loop, eigenvalues, exact
+from identifier.stability.loop import ComplexArray, Loop, eigenvalues, exact
 from identifier.stability.lyapunov import Matrix, lyapunov
 from identifier.stability.margins import (
     drift_frequency,
@@ -16,7 +17,6 @@ from identifier.stability.margins import (
 )
 from identifier.stability.operation import Operation, Proven
 from identifier.stability.printed import printed_bounds, trivial_bound
-from identifier.stability.property import Property, Status, at_least, at_most, statement
 
 ENOUGH_GAIN, ENOUGH_PHASE, ENOUGH_DAMPING = 2.0, 30.0, 0.2
 LARGEST_STEP = 0.2  # fastest pole times dt that Euler resolves well
@@ -164,7 +164,9 @@ def state_space_poles(A_d: Matrix) -> ComplexArray:
     return np.asarray(control.poles(error_dynamics), dtype=np.complex128)
 
 
-def drift_check(gains: Gains, law: Law, operation: Operation, direction: Matrix) -> Property:
+def drift_check(
+    gains: Gains, law: DrivingError, operation: Operation, direction: Matrix
+) -> Property:
     """Whether a regressor that moves at the maneuver's bandwidth makes the weights drift.
 
     Parameters
@@ -259,7 +261,7 @@ CONDITION = (
 
 
 def bound_checks(
-    gains: Gains, law: Law, operation: Operation, direction: Matrix, proven: Proven
+    gains: Gains, law: DrivingError, operation: Operation, direction: Matrix, proven: Proven
 ) -> list[Property]:
     """Small gain, bounds of |ξ̃|, |W_hat| and |V_hat|, leakage, capacity, (14).
 
@@ -382,7 +384,7 @@ def _leakage(name: str, layer: str, step: float, rho: float) -> Property:
     )
 
 
-def _capacity(gains: Gains, law: Law, operation: Operation, direction: Matrix) -> Property:
+def _capacity(gains: Gains, law: DrivingError, operation: Operation, direction: Matrix) -> Property:
     """Judge the force that leakage lets W hold: beyond the dead zone it holds what it did."""
     resting = math.sqrt(operation.n_h) * gains.W_free
     capacity = resting + steady_capacity(

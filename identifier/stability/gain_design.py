@@ -14,14 +14,14 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import brentq
 
-from identifier.paper.design import PaperIdentifier
-from identifier.paper.laws import DRIVING_ERRORS, Gains, diagonal
+from identifier.paper.laws import LAWS, DrivingError, Gains, diagonal
 from identifier.stability.bounds import small_gain
-from identifier.stability.loop import Law, direction_matrix, linear_law
+from identifier.stability.loop import direction_matrix
 from identifier.stability.operation import Operation, proven_bounds
 from identifier.stability.sampled_bound import (
     Disturbance,
@@ -32,6 +32,9 @@ from identifier.stability.sampled_bound import (
     output_layer,
 )
 from models.rules import require_positive
+
+if TYPE_CHECKING:
+    from identifier.paper.design import PaperIdentifier  # which asks for this
 
 LAG_RULE = 1.0 / math.tan(math.radians(22.5))  # a/Ω for 45 degrees of lag through two equal poles
 FASTEST = 0.2  # largest a dt
@@ -60,7 +63,7 @@ class GainDesign:
 
 
 def gain_for_phase_margin(
-    *, a: float, lam: float, law: Law, phase_margin: float, dt: float | None = None
+    *, a: float, lam: float, law: DrivingError, phase_margin: float, dt: float | None = None
 ) -> float:
     """Loop gain g that gives the scalar loop (A_d = -a I, no leakage) its phase margin, exactly.
 
@@ -118,7 +121,7 @@ def decay_rate(bandwidth: float, minimal_decay: float = 0.0) -> float:
 
 def design_gains(
     *,
-    law: Law,
+    law: DrivingError,
     bandwidth: float,
     dt: float,
     n_h: int,
@@ -283,13 +286,13 @@ KEEPINGS: Mapping[str, Callable[[Gains, Operation], Gains]] = {
 DEFAULT_KEEPING = "projection"  # of designs that are found; measured by benchmarks/forgetting.py
 
 
-def with_keeping(design: PaperIdentifier, known: Operation, keeping: str) -> PaperIdentifier:
+def with_keeping(design: "PaperIdentifier", known: Operation, keeping: str) -> "PaperIdentifier":
     """Return the design with its weights kept otherwise, η_V lowered where V would cost margin.
 
     Parameters
     ----------
     design : of the paper's leakage, as `design_for` finds it.
-    known : where it runs, `identifier.defaults.natural_operation`.
+    known : where it runs, `PaperIdentifier.operation`.
     keeping : one of `KEEPINGS`.
 
     Raises
@@ -305,8 +308,8 @@ def with_keeping(design: PaperIdentifier, known: Operation, keeping: str) -> Pap
     gains = KEEPINGS[keeping](first, known)
     if gains == first:
         return design
-    driving_error = DRIVING_ERRORS[design.law]
-    law, D = linear_law(driving_error, gains.lead), direction_matrix(driving_error, gains.matrix)
+    chosen = LAWS[design.law]
+    law, D = chosen.error(gains.lead), direction_matrix(chosen, gains.matrix)
     W = proven_bounds(gains, law, known, D).W
     free_of_cost = gains.eta_W / (known.x_bar_max * W) ** 2  # rule 5 of `gain_design`
     return replace(design, gains=replace(gains, eta_V=min(gains.eta_V, free_of_cost)))

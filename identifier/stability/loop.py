@@ -16,13 +16,12 @@ time, Euler and Runge-Kutta 4 share one eigenvalue computation.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from identifier.paper.laws import DIRECTIONS, DrivingError, static_direction
+from identifier.paper.laws import DrivingError, Law
 from identifier.stability.lyapunov import Matrix, require_square
 
 ComplexArray = npt.NDArray[np.complex128]
@@ -62,63 +61,19 @@ def rk4(mu: ComplexArray) -> ComplexArray:
 INTEGRATORS: dict[str, Integrator] = {"exact": exact, "euler": euler, "rk4": rk4}
 
 
-class Law(NamedTuple):
-    """Coefficients of z and ξ̃ in the error that drives (11) and (12).
-
-    `z` has no unit and `xi_tilde` is a time [s]; for a law without z, `xi_tilde` has no unit.
-    """
-
-    z: float
-    xi_tilde: float
-
-    def drive(self, z: Any, xi_tilde: Any) -> Any:
-        """Return the driving error.
-
-        Parameters
-        ----------
-        z : filtered error.
-        xi_tilde : error.
-        """
-        return self.z * z + self.xi_tilde * xi_tilde
+INTEGRAL = DrivingError(1.0, 0.0)
+INSTANTANEOUS = DrivingError(0.0, 1.0)
 
 
-INTEGRAL = Law(1.0, 0.0)
-INSTANTANEOUS = Law(0.0, 1.0)
-
-
-def linear_law(driving_error: DrivingError, lead: float = 0.0) -> Law:
-    """Read the coefficients of a law off with unit arguments.
-
-    Parameters
-    ----------
-    driving_error : of `identifier.paper.laws`.
-    lead : τ of the PI-lead law [s].
-
-    Raises
-    ------
-    ValueError
-        If the law is not linear, or has no positive part.
-    """
-    c_z = float(driving_error(1.0, 0.0, lead))
-    c_xi = float(driving_error(0.0, 1.0, lead))
-    both = float(driving_error(2.0, -3.0, lead))
-    if not np.isclose(both, 2.0 * c_z - 3.0 * c_xi, rtol=1e-12, atol=1e-12):
-        raise ValueError("the law must be linear in z and xi_tilde")
-    if not (c_z >= 0.0 and c_xi >= 0.0 and c_z + c_xi > 0.0):
-        raise ValueError(f"the law must weigh z and xi_tilde positively, it is ({c_z}, {c_xi})")
-    return Law(c_z, c_xi)
-
-
-def direction_matrix(driving_error: DrivingError, A_d: npt.ArrayLike) -> Matrix:
+def direction_matrix(law: Law, A_d: npt.ArrayLike) -> Matrix:
     """Return D of the law, (2, 2) [s]: -A_d⁻ᵀ as printed, P for the PI-lead law.
 
     Parameters
     ----------
-    driving_error : of `identifier.paper.laws`.
+    law : of `identifier.paper.laws.LAWS`.
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     """
-    direction = DIRECTIONS.get(driving_error, static_direction)
-    found: Matrix = -np.array(ca.DM(direction(ca.DM(require_square(A_d)), ca.DM.eye(2))))
+    found: Matrix = -np.array(ca.DM(law.direction(ca.DM(require_square(A_d)), ca.DM.eye(2))))
     return found
 
 
@@ -139,7 +94,7 @@ class Loop:
 
     A_d: Matrix
     forgetting: float
-    law: Law
+    law: DrivingError
     G: Matrix
     leakage: float = 0.0
     input_feedback: Matrix | None = None

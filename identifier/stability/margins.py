@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq, minimize_scalar
 
+from identifier.paper.laws import DrivingError
 from identifier.stability.loop import (
     Integrator,
-    Law,
     Loop,
     eigenvalues,
     exact,
@@ -94,7 +94,13 @@ def phase_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) ->
 
 
 def scalar_loop(
-    *, a: float, lam: float, g: float, law: Law, leakage: float = 0.0, dt: float | None = None
+    *,
+    a: float,
+    lam: float,
+    g: float,
+    law: DrivingError,
+    leakage: float = 0.0,
+    dt: float | None = None,
 ) -> "control.TransferFunction":
     """Return the loop transfer function for A_d = -a I, in s, or in w = 1 + s dt (Euler).
 
@@ -195,7 +201,7 @@ def passivity(
     *,
     A_d: npt.ArrayLike,
     forgetting: float,
-    law: Law,
+    law: DrivingError,
     direction: Matrix | None = None,
 ) -> Matrix:
     """λ_min of the Hermitian part of H(jω), (n,): negative where a regressor drifts.
@@ -220,7 +226,7 @@ def passivity(
 
 
 def drift_frequency(
-    *, A_d: npt.ArrayLike, forgetting: float, law: Law, direction: Matrix | None = None
+    *, A_d: npt.ArrayLike, forgetting: float, law: DrivingError, direction: Matrix | None = None
 ) -> float:
     """Lowest frequency from which a regressor drifts [rad/s]; inf where H is positive real.
 
@@ -257,7 +263,7 @@ def drift_frequency(
 
 
 def passivity_shortage(
-    *, A_d: npt.ArrayLike, forgetting: float, law: Law, direction: Matrix | None = None
+    *, A_d: npt.ArrayLike, forgetting: float, law: DrivingError, direction: Matrix | None = None
 ) -> float:
     """Max over ω of -λ_min He H(jω), zero where H is positive real.
 
@@ -301,7 +307,7 @@ def sufficient_leakage(
     *,
     A_d: npt.ArrayLike,
     forgetting: float,
-    law: Law,
+    law: DrivingError,
     eta_W: float,
     n_h: int,
     direction: Matrix | None = None,

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from codegen import BatchScan
 from codegen.arrays import Array
-from identifier.paper.design import SPEED_SPREAD, Driving, PaperIdentifier
+from identifier.driving import SPEED_SPREAD, Driving
+from identifier.paper.design import PaperIdentifier
 from identifier.paper.network import Weights
 from identifier.paper.step import CARRY, GAINS, OVER, Structure, build_step
 from identifier.stability.operation import declared_signals, largest_steering_rate

@@ -2,22 +2,16 @@
 
 import math
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from identifier.paper.design import SPEED_SPREAD, YAW_OVERSHOOT, Driving, PaperIdentifier
-from identifier.paper.laws import Gains
+from identifier.driving import SPEED_SPREAD, YAW_OVERSHOOT, Driving
+from identifier.paper.laws import DrivingError, Gains
 from identifier.paper.network import network_signals
-from identifier.stability.loop import (
-    INTEGRATORS,
-    Integrator,
-    Law,
-    Loop,
-    spectral_radius,
-    worst_gain,
-)
+from identifier.stability.loop import INTEGRATORS, Integrator, Loop, spectral_radius, worst_gain
 from identifier.stability.lyapunov import Matrix
 from identifier.stability.sampled_bound import (
     Disturbance,
@@ -32,6 +26,9 @@ from identifier.stability.sampled_bound import (
 from models.bicycle import bicycle
 from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
+
+if TYPE_CHECKING:
+    from identifier.paper.design import PaperIdentifier  # which asks for this
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,7 +144,9 @@ class Proven:
 NOTHING = Proven(leakage=None, projection=None, V=math.inf, leakage_step=0.0, leakage_step_V=0.0)
 
 
-def proven_bounds(gains: Gains, law: Law, operation: Operation, direction: Matrix) -> Proven:
+def proven_bounds(
+    gains: Gains, law: DrivingError, operation: Operation, direction: Matrix
+) -> Proven:
     """Return all bounds that are proven, for the start of `sampled_bound.py`.
 
     Parameters
@@ -204,7 +203,9 @@ def _kept_V(
     return min(max(operation.V_start, kept), gains.V_max)
 
 
-def worst_loop(gains: Gains, law: Law, operation: Operation, direction: Matrix, W: float) -> Loop:
+def worst_loop(
+    gains: Gains, law: DrivingError, operation: Operation, direction: Matrix, W: float
+) -> Loop:
     """Return the loop at the worst regressor, and |W_hat| up to W.
 
     Where W is infinite, the V layer cannot be counted and is left out.
@@ -444,7 +445,7 @@ def disturbance(vehicle: Vehicle, driving: Driving, *, dt: float, unit: float) -
     )
 
 
-def largest_input(design: PaperIdentifier, vehicle: Vehicle, driving: Driving) -> float:
+def largest_input(design: "PaperIdentifier", vehicle: Vehicle, driving: Driving) -> float:
     """Bound on |x_bar| [-], noise of the sensors in it.
 
     Parameters
@@ -470,7 +471,7 @@ def largest_input(design: PaperIdentifier, vehicle: Vehicle, driving: Driving) -
     return float(np.linalg.norm([(signals[name] + noise[name]) / scale for name, scale in named]))
 
 
-def input_per_error(design: PaperIdentifier, vehicle: Vehicle, driving: Driving) -> float:
+def input_per_error(design: "PaperIdentifier", vehicle: Vehicle, driving: Driving) -> float:
     """What |ξ̃| adds to |x_bar| where the network reads x_hat = x - K ξ̃ [1/(U s)].
 
     Parameters
@@ -487,7 +488,7 @@ def input_per_error(design: PaperIdentifier, vehicle: Vehicle, driving: Driving)
     return float(np.linalg.norm(np.array(ca.evalf(ca.densify(per_error))), 2))
 
 
-def operation(design: PaperIdentifier, vehicle: Vehicle, driving: Driving) -> Operation:
+def operation(design: "PaperIdentifier", vehicle: Vehicle, driving: Driving) -> Operation:
     """Return what the certificate of a design needs.
 
     (14) is given what holds for sure: the ideal weights W = 0, that leave all of f as w_bar. The V

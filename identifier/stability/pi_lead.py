@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from identifier.stability.loop import Law
+from identifier.paper.laws import DrivingError
 from identifier.stability.lyapunov import LyapunovPair, Matrix
 from models.rules import require_positive
 
@@ -45,7 +45,7 @@ class Storage:
         )
 
 
-def pi_lead(tau: float) -> Law:
+def pi_lead(tau: float) -> DrivingError:
     """Return the law z + τ ξ̃.
 
     Parameters
@@ -53,7 +53,7 @@ def pi_lead(tau: float) -> Law:
     tau : lead time τ [s]; at least 1/a for a positive real loop.
     """
     require_positive(ValueError, tau=tau)
-    return Law(1.0, tau)
+    return DrivingError(1.0, tau)
 
 
 def scalar_storage(*, a: float, lam: float, tau: float) -> Storage:

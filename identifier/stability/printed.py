@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from identifier.paper.laws import Gains
-from identifier.stability.loop import Law
+from identifier.certificate import Property, statement
+from identifier.paper.laws import DrivingError, Gains
 from identifier.stability.lyapunov import (
     LyapunovError,
     LyapunovPair,
@@ -25,7 +25,6 @@ from identifier.stability.lyapunov import (
     require_hurwitz,
 )
 from identifier.stability.operation import Operation
-from identifier.stability.property import Property, statement
 from models.rules import require_positive
 
 
@@ -203,7 +202,9 @@ def ultimate_bound(pair: LyapunovPair, *, w_bar: float, k_b: float, rho_W: float
 # P is scaled as suits (14) best: b depends on the scale, the loop does not.
 
 
-def printed_bounds(gains: Gains, law: Law, operation: Operation, trivial: float) -> list[Property]:
+def printed_bounds(
+    gains: Gains, law: DrivingError, operation: Operation, trivial: float
+) -> list[Property]:
     """State b of (14) by the printed and the tight route, with the V layer, and b_UUB [U s].
 
     Parameters
@@ -279,7 +280,7 @@ def _with_V(gains: Gains, operation: Operation, pair: LyapunovPair, k_b: float) 
     return bound_14(pair, w_bar=operation.w_bar, k_b=larger)
 
 
-def _remark(law: Law, value: float, trivial: float) -> str:
+def _remark(law: DrivingError, value: float, trivial: float) -> str:
     remarks = []
     if law.z > 0.0:
         remarks.append("its proof does not cover a law that reads z")

@@ -33,9 +33,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identifier.paper.laws import Gains
+from identifier.paper.laws import DrivingError, Gains
 from identifier.stability.bounds import transient_peak
-from identifier.stability.loop import Law
 from identifier.stability.lyapunov import Matrix, peak_gain, power_norms
 from models.rules import require_positive
 
@@ -167,7 +166,7 @@ class Learning:
     free : radius of the dead zone of the leakage, in the unit of the weights.
     """
 
-    law: Law
+    law: DrivingError
     forgetting: float
     leakage: float
     drive: float
@@ -190,7 +189,8 @@ class Learning:
             return math.inf
         late, weak = (mu**2, q) if self.staged else (0.0, 0.0)
         balance = self.drive * (c_z * (1.0 + late) / lam + c_xi) / (self.leakage * (1.0 - weak))
-        return self.free + balance + c_z * self.drive * X / lam**2
+        reached: float = self.free + balance + c_z * self.drive * X / lam**2
+        return reached
 
     def beyond(self, X: float) -> tuple[float, ...]:
         """What inner stages may lie beyond the weights of the sample, one for each stage.
@@ -210,7 +210,7 @@ class Learning:
 
 
 def output_layer(
-    gains: Gains, law: Law, direction: Matrix, *, n_h: int, integrator: str, dt: float
+    gains: Gains, law: DrivingError, direction: Matrix, *, n_h: int, integrator: str, dt: float
 ) -> Learning:
     """Return how W is driven: g' = η_W |D| √n_h.
 

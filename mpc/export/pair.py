@@ -1,6 +1,6 @@
 """Identifier and tracker together: both packages, what hands tires over, and a car to drive."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,6 +10,7 @@ from identifier.axle.slip import SHORTEST
 from identifier.export.package import Package
 from identifier.method import CannotFreezeError
 from identifier.paper.network import NetworkModel
+from identifier.tire_model import TireModel
 from models.vehicle import GRAVITY
 from mpc.export.package import MpcPackage, build_mpc_package
 from mpc.problem import Problem
@@ -24,7 +25,7 @@ class NoHandoverError(ValueError):
     """What a method learns cannot be handed over in C."""
 
 
-def frozen_start(package: Package) -> NetworkModel | AxleModel:
+def frozen_start(package: Package) -> TireModel:
     """Return the model that an exported identifier begins with.
 
     Parameters
@@ -41,10 +42,59 @@ def frozen_start(package: Package) -> NetworkModel | AxleModel:
         model = specialized.method.frozen(specialized.vehicle, specialized.carry)
     except CannotFreezeError as error:
         raise NoHandoverError(f"no tire to hand over: {error}") from error
-    if not isinstance(model, NetworkModel | AxleModel):
+    if model.kind not in HANDOVERS:
         kind = type(model).__name__
         raise NoHandoverError(f"only networks and axle curves are handed over in C, not {kind}")
     return model
+
+
+class Handover(NamedTuple):
+    """C that turns one kind of model into weights of the prediction.
+
+    values : of its template.   conversion : the template.   slope_rule : what else is refused.
+    adapt : C that goes before it.
+    """
+
+    values: Mapping[str, Any]
+    conversion: str
+    slope_rule: str = ""
+    adapt: str = ""
+
+
+def _axle_handover(model: AxleModel, tracker: MpcPackage) -> Handover:
+    return Handover(
+        {
+            "units": len(model.ladder),
+            "sway": repr(GRAVITY / model.sway.frequency**2),
+            "shortest": repr(SHORTEST * model.vehicle.wheelbase),
+            "load": _numbers(model.vehicle.axle_loads),
+            "ladder": _numbers(model.ladder),
+            "max_slip": _numbers(tracker.problem.limits.slip),
+        },
+        "axle.c",
+        ",\n * or force that does not rise with slip",
+        (TEMPLATES / "adapt_axle.c").read_text(encoding="utf-8"),
+    )
+
+
+def _network_handover(model: NetworkModel, tracker: MpcPackage) -> Handover:
+    del tracker
+    return Handover(
+        {
+            "units": model.network.hidden,
+            "inputs": len(model.network.inputs),
+            "force_unit": repr(float(model.force_unit)),
+            "stiffness": _numbers(model.vehicle.bicycle[4:]),
+            "scale": _numbers(model.network.scale),
+        },
+        "network.c",
+    )
+
+
+HANDOVERS: Mapping[str, Callable[[Any, MpcPackage], Handover]] = {
+    AxleModel.kind: _axle_handover,
+    NetworkModel.kind: _network_handover,
+}
 
 
 def handover_sources(identifier: Package, tracker: MpcPackage) -> dict[str, str]:
@@ -67,26 +117,7 @@ def handover_sources(identifier: Package, tracker: MpcPackage) -> dict[str, str]
         "version": identifier.about["version"],
         "max_force": repr(round(identifier.specialized.limits.force, 1)),
     }
-    if isinstance(model, AxleModel):
-        values: Mapping[str, Any] = {
-            "units": len(model.ladder),
-            "sway": repr(GRAVITY / model.sway.frequency**2),
-            "shortest": repr(SHORTEST * model.vehicle.wheelbase),
-            "load": _numbers(model.vehicle.axle_loads),
-            "ladder": _numbers(model.ladder),
-            "max_slip": _numbers(tracker.problem.limits.slip),
-        }
-        adapt = (TEMPLATES / "adapt_axle.c").read_text(encoding="utf-8")
-        conversion, slope_rule = "axle.c", ",\n * or force that does not rise with slip"
-    else:
-        values = {
-            "units": model.network.hidden,
-            "inputs": len(model.network.inputs),
-            "force_unit": repr(float(model.force_unit)),
-            "stiffness": _numbers(model.vehicle.bicycle[4:]),
-            "scale": _numbers(model.network.scale),
-        }
-        conversion, slope_rule, adapt = "network.c", "", ""
+    values, conversion, slope_rule, adapt = HANDOVERS[model.kind](model, tracker)
     text = filled(TEMPLATES / conversion, {**about, **{k: str(v) for k, v in values.items()}})
     body = {
         **about,

@@ -9,11 +9,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.axle.car import car_numbers
-from identifier.defaults import natural_operation
 from identifier.method import Method
-from identifier.paper.design import PaperIdentifier
-from identifier.paper.laws import DRIVING_ERRORS
-from identifier.stability import certify
 from models.vehicle import GRAVITY, Vehicle
 from mpc.tires import PredictionTire
 from mpc.tires.tire import Car, Point
@@ -32,11 +28,8 @@ def law_complaint(method: Method, vehicle: Vehicle) -> str | None:
     is not certified: its boxes hold by construction, and what it teaches is judged by
     `tire_complaint`.
     """
-    if not isinstance(method, PaperIdentifier):
-        return None
-    driving_error = DRIVING_ERRORS[method.law]
-    certificate = certify(method.gains, driving_error, natural_operation(method, vehicle))
-    failed = [entry.title for entry in certificate.properties if entry.status == "fail"]
+    proven = method.certify(vehicle)
+    failed = [entry.title for entry in proven.properties if entry.status == "fail"]
     return f"the certificate fails: {'; '.join(failed)}" if failed else None
 
 

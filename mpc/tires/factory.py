@@ -9,6 +9,7 @@ from identifier.axle.model import AxleModel
 from identifier.baselines.curves import CurveModel
 from identifier.own_network import OnnxModel
 from identifier.paper.network import NetworkModel
+from identifier.tire_model import TireModel
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
 from models.vehicle import Vehicle
 from mpc.tires.curves import DugoffAxles, FialaAxles, MagicAxles, linear_tire
@@ -38,9 +39,8 @@ def prediction_tire(source: Any, vehicle: Vehicle | None = None) -> PredictionTi
         return source if vehicle is None else source._replace(vehicle=vehicle)
     if isinstance(source, Vehicle):
         return linear_tire(source if vehicle is None else vehicle, np.array(source.bicycle[4:]))
-    for kind, of_model in MODELS.items():
-        if isinstance(source, kind):
-            return prediction_tire(of_model(source), vehicle)
+    if isinstance(source, TireModel) and source.kind in MODELS:
+        return prediction_tire(MODELS[source.kind](source), vehicle)
     for kind, of_tire in TIRES.items():
         if isinstance(source, kind):
             if vehicle is None:
@@ -75,11 +75,11 @@ def _limited(vehicle: Vehicle, tire: DugoffTire | FialaTire) -> PredictionTire:
     return PredictionTire(structure, np.array(pairs).ravel(), vehicle)
 
 
-MODELS: Mapping[type, Callable[[Any], PredictionTire]] = {
-    NetworkModel: network_tire,
-    AxleModel: axle_tire,
-    CurveModel: curve_tire,
-    OnnxModel: onnx_tire,
+MODELS: Mapping[str, Callable[[Any], PredictionTire]] = {
+    NetworkModel.kind: network_tire,
+    AxleModel.kind: axle_tire,
+    CurveModel.kind: curve_tire,
+    OnnxModel.kind: onnx_tire,
 }
 TIRES: Mapping[type, Callable[[Vehicle, Any], PredictionTire]] = {
     LinearTire: _linear,

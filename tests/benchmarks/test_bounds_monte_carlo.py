@@ -9,8 +9,8 @@ from benchmarks import bounds_monte_carlo
 from benchmarks.bounds_monte_carlo import designs, driven, random_driving, record, run
 from benchmarks.random_drives import random_vehicle
 from benchmarks.targets import Targets
+from identifier.certificate import Certificate
 from identifier.paper.network import Network
-from identifier.stability.property import Certificate
 from tireid.commands.certificate_table import certificate_of
 
 

@@ -7,8 +7,8 @@ from benchmarks import c_loops
 from benchmarks.export_cost import LOOP, NUMPY, PACKAGE, check, steps
 from benchmarks.targets import Targets
 from codegen import find_compiler
-from identifier.defaults import paper_identifier
 from identifier.export.package import build_package
+from identifier.paper.design import PaperIdentifier
 from models.vehicle import sedan
 
 CAR = sedan()
@@ -18,7 +18,7 @@ CAR = sedan()
 def package():
     if find_compiler() is None:
         pytest.skip("needs a C compiler")
-    return build_package(paper_identifier(CAR), CAR)
+    return build_package(PaperIdentifier.for_vehicle(CAR), CAR)
 
 
 @pytest.fixture

@@ -76,7 +76,7 @@ def test_an_hour_is_driven_again_with_other_noise(monkeypatch):
 
 def test_the_error_is_the_share_of_the_force_that_is_missed(slalom):
     design = make_method("integral", CAR)
-    model = design.frozen(CAR, design.setup(CAR, slalom).carry)  # W = 0: the linear tire
+    model = design.frozen(CAR, design.setup(CAR).carry)  # W = 0: the linear tire
     C = [CAR.cornering_stiffness_front, CAR.cornering_stiffness_rear]
     speeds = np.column_stack([slalom.v_y + 1.15 * slalom.r, slalom.v_y - 1.55 * slalom.r])
     missed = (slalom.u - speeds / slalom.v_x[:, None]) * C - slalom.axle_force

@@ -15,8 +15,7 @@ from benchmarks.fuzz.__main__ import main
 from benchmarks.fuzz.cases import MUTATORS, Case, draw, lay_out
 from benchmarks.fuzz.doors import DOORS
 from benchmarks.fuzz.session import Session
-from identifier.defaults import paper_identifier
-from identifier.paper.design import design_text
+from identifier.paper.design import PaperIdentifier, design_text
 from models.vehicle import sedan
 
 pytestmark = pytest.mark.skipif(
@@ -30,7 +29,7 @@ def session(tmp_path, monkeypatch):
     """A session whose seeds are those of one door."""
     monkeypatch.setattr(server, "CPU", 2)
     monkeypatch.setattr(server, "SILENCE", 1.0)
-    car, design = sedan(), design_text(paper_identifier(sedan()))
+    car, design = sedan(), design_text(PaperIdentifier.for_vehicle(sedan()))
     car.to_toml(tmp_path / "whole.toml")
     car = (tmp_path / "whole.toml").read_text().partition("[chassis]")[0]
     seeds = {"car.toml": car.encode(), "integral.toml": design.encode()}

@@ -8,13 +8,12 @@ import pytest
 import codegen.batch
 from identifier.compare.batch import cross_replay_batch, identify_batch, replay_batch
 from identifier.compare.course import Course, cross_replay, shares
-from identifier.defaults import paper_identifier
 from identifier.method import CannotFreezeError
 from identifier.methods import METHODS, make_method
+from identifier.paper.design import PaperIdentifier
 from identifier.paper.network import NetworkModel
 from identifier.reproducibility import axle_rms, counted_samples
 from identifier.run import DivergedError, identify
-from models.recordings import Recording
 
 FREEZE = (4.0, 12.345)
 QUICK = [name for name in METHODS if name != "concurrent"]  # which takes long to compile
@@ -22,7 +21,7 @@ QUICK = [name for name in METHODS if name != "concurrent"]  # which takes long t
 
 def gain_sets(car, count):
     """Designs of one structure that differ in gains and seed."""
-    base = paper_identifier(car)
+    base = PaperIdentifier.for_vehicle(car)
     return [
         replace(base, seed=k, gains=replace(base.gains, eta_W=base.gains.eta_W * (0.5 + 0.1 * k)))
         for k in range(count)
@@ -72,7 +71,7 @@ def test_every_method_has_the_bits_of_its_run_alone(car, drive):
 def test_each_method_may_have_its_own_car(car, drive):
     recording = drive(n=400)
     cars = [replace(car, mass=car.mass * (1.0 + 0.05 * k)) for k in range(9)]
-    designs = [paper_identifier(one) for one in cars]
+    designs = [PaperIdentifier.for_vehicle(one) for one in cars]
     runs = identify_batch(recording, cars, designs)
     for one, design, run in zip(cars, designs, runs, strict=True):
         assert run.vehicle is one
@@ -113,7 +112,7 @@ def at_rest_for_a_while(recording):
 
 def test_samples_at_rest_do_not_count(car, drive):
     recording = at_rest_for_a_while(drive(n=400))
-    design = paper_identifier(car)
+    design = PaperIdentifier.for_vehicle(car)
     (run,) = identify_batch(recording, car, [design])
     history = identify(recording, car, design)
     require_the_same(run, history)
@@ -125,14 +124,14 @@ def test_samples_at_rest_do_not_count(car, drive):
 
 def test_a_recording_without_truth_has_no_error(car, drive):
     recording = replace(drive(n=100), axle_force=None)
-    (run,) = identify_batch(recording, car, [paper_identifier(car)])
+    (run,) = identify_batch(recording, car, [PaperIdentifier.for_vehicle(car)])
     assert run.online is None
     with pytest.raises(ValueError, match="has no true forces"):
         replay_batch(recording, [run.freeze()], counts=np.ones(100, dtype=bool))
 
 
 def test_what_was_not_kept_cannot_be_frozen(car, drive):
-    recording, design = drive(n=300), paper_identifier(car)
+    recording, design = drive(n=300), PaperIdentifier.for_vehicle(car)
     (run,) = identify_batch(recording, car, [design], freeze_times=(1.0,))
     with pytest.raises(ValueError, match=r"weights were kept at \[1.0, inf\] s, not at 2 s"):
         run.freeze(2.0)
@@ -142,19 +141,9 @@ def test_what_was_not_kept_cannot_be_frozen(car, drive):
         identify_batch(recording, car, [replace(design, dt=0.02)])
 
 
-class Straight:
-    """A frozen model that is no compiled step."""
-
-    def __init__(self, car):
-        self.vehicle, self.min_speed = car, 1.0
-
-    def axle_force(self, recording: Recording):
-        return np.zeros((len(recording), 2))
-
-
 def test_models_of_every_kind_replay_as_they_do_alone(car, drive):
     learnt, other = drive(n=400), at_rest_for_a_while(drive(n=400, amplitude=0.04))
-    models = [Straight(car)]
+    models = []
     methods = [make_method(name, car, seed) for seed in (1, 2) for name in QUICK]
     for run in identify_batch(learnt, car, methods):
         try:
@@ -173,7 +162,10 @@ def test_models_of_every_kind_replay_as_they_do_alone(car, drive):
 def test_many_methods_are_judged_as_each_alone(car, drive):
     slow, quick = drive(n=400), replace(drive(n=400, amplitude=0.09), name="quick")
     course = Course(vehicle=car, recordings=(slow, quick), min_speed=1.0)
-    wild = replace(paper_identifier(car), gains=replace(paper_identifier(car).gains, eta_W=1e6))
+    wild = replace(
+        PaperIdentifier.for_vehicle(car),
+        gains=replace(PaperIdentifier.for_vehicle(car).gains, eta_W=1e6),
+    )
     methods = [*(make_method(name, car, seed) for name in QUICK for seed in (1, 2)), wild]
     for method, trial in zip(methods, cross_replay_batch(methods, course), strict=True):
         alone = cross_replay(method, course)

@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from identifier.defaults import paper_identifier
-from identifier.paper.design import DesignFileError, design_text, read_design
+from identifier.paper.design import DesignFileError, PaperIdentifier, design_text, read_design
 
 
 def test_a_design_comes_back_from_its_file(car, tmp_path):
-    design = paper_identifier(car)
+    design = PaperIdentifier.for_vehicle(car)
     odd = replace(
         design,
         law="pi_lead",
@@ -42,7 +41,7 @@ def test_a_design_comes_back_from_its_file(car, tmp_path):
     ],
 )
 def test_a_wrong_file_is_refused_by_its_key(car, tmp_path, old, new, said):
-    text = design_text(paper_identifier(car))
+    text = design_text(PaperIdentifier.for_vehicle(car))
     assert old in text
     path = tmp_path / "design.toml"
     path.write_text(text.replace(old, new))

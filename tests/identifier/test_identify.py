@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_lyapunov
 
-from identifier.defaults import paper_identifier
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import Gains, NotHurwitzError
 from identifier.paper.network import Network
@@ -116,7 +115,7 @@ def test_finer_steps_of_both_integrators_meet(car, drive):
 
 def test_learnt_forces_approach_the_truth(car, drive):
     recording = drive()
-    history = identify(recording, car, paper_identifier(car))
+    history = identify(recording, car, PaperIdentifier.for_vehicle(car))
     p = car.bicycle
     alpha_f = recording.delta_f - (recording.v_y + p.l_f * recording.r) / recording.v_x
     linear = np.sqrt(np.mean((p.C_f * alpha_f - recording.axle_force[:, 0])[-500:] ** 2))
@@ -125,8 +124,8 @@ def test_learnt_forces_approach_the_truth(car, drive):
 
 
 def test_true_forces_are_not_looked_at(car, drive):
-    one = identify(drive(n=200), car, paper_identifier(car))
-    other = identify(drive(n=200, scale=-3.0), car, paper_identifier(car))
+    one = identify(drive(n=200), car, PaperIdentifier.for_vehicle(car))
+    other = identify(drive(n=200, scale=-3.0), car, PaperIdentifier.for_vehicle(car))
     np.testing.assert_array_equal(one.axle_force, other.axle_force)
 
 
@@ -134,7 +133,7 @@ def test_speed_may_vary_and_learning_rests_at_standstill(car, drive):
     moving = drive(n=300)
     v_x = np.where(np.arange(300) < 150, 20.0, 0.0)
     stopped = replace(moving, v_x=v_x)
-    history = identify(stopped, car, paper_identifier(car))
+    history = identify(stopped, car, PaperIdentifier.for_vehicle(car))
     assert np.isfinite(history.axle_force).all()
     np.testing.assert_array_equal(history.axle_force[150:], 0.0)
     np.testing.assert_array_equal(history.outputs["xi_tilde"][150:], 0.0)
@@ -146,7 +145,7 @@ def test_at_rest_the_filter_empties_and_the_observer_follows_the_measurement(car
     """Learning goes on from a clean start: no error of before the halt is left to learn from."""
     moving = drive(n=300)
     v_x = np.where((np.arange(300) < 150) | (np.arange(300) >= 200), 20.0, 0.0)
-    design = paper_identifier(car)
+    design = PaperIdentifier.for_vehicle(car)
     history = identify(replace(moving, v_x=v_x), car, design)
     z, xi_hat = history.state["z"], history.state["xi_hat"]
     p, (v_y, r) = car.bicycle, moving.x.T
@@ -186,7 +185,7 @@ def test_impossible_gains_are_refused():
 
 def test_default_design_is_similar_for_a_model_car(car, model_car):
     """By Froude a 1:10 model sees the same scaled inputs: lengths over 10, times over sqrt(10)."""
-    full, small = paper_identifier(car), paper_identifier(model_car)
+    full, small = PaperIdentifier.for_vehicle(car), PaperIdentifier.for_vehicle(model_car)
     ratio = np.array(full.network.scale) / np.array(small.network.scale)
     np.testing.assert_allclose(ratio, [np.sqrt(10), 1 / np.sqrt(10), 1.0, 1.0])
     assert full.force_unit == 1000.0
@@ -201,7 +200,7 @@ def test_a_spike_is_not_learnt_from(car, drive, law, signal, size):
     recording = drive(n=400)
     spoilt = getattr(recording, signal).copy()
     spoilt[200] += size
-    design = paper_identifier(car, law=law)
+    design = PaperIdentifier.for_vehicle(car, law=law)
     clean = identify(recording, car, design)
     history = identify(replace(recording, **{signal: spoilt}), car, design)
     assert np.isfinite(history.axle_force).all()
@@ -218,7 +217,7 @@ def test_spikes_of_all_signals_at_once_are_not_believed(car, drive, law, rng):
         values = getattr(recording, signal).copy()
         values[100:500:40] += 1000.0 * rng.choice([-1.0, 1.0], size=10)
         spoilt[signal] = values
-    history = identify(replace(recording, **spoilt), car, paper_identifier(car, law=law))
+    history = identify(replace(recording, **spoilt), car, PaperIdentifier.for_vehicle(car, law=law))
     assert np.isfinite(history.axle_force).all()
     assert history.diverged_at is None
     assert np.abs(history.axle_force).max() < 3.0 * np.abs(recording.axle_force).max()
@@ -226,7 +225,7 @@ def test_spikes_of_all_signals_at_once_are_not_believed(car, drive, law, rng):
 
 def test_weights_keep_their_forces_in_a_design_of_another_force_unit(car, drive):
     recording = drive(n=600)
-    design = paper_identifier(car)
+    design = PaperIdentifier.for_vehicle(car)
     model = identify(recording, car, design).freeze(5.0)
     other = replace(design, force_unit=4.0 * design.force_unit)
     start = identify(recording, car, other, start=model).freeze(float(recording.t[0]))

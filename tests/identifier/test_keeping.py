@@ -5,14 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.defaults import (
-    LAWS,
-    design_for,
-    natural_driving,
-    natural_operation,
-    paper_identifier,
-)
+from identifier.driving import natural_driving
 from identifier.methods import make_method
+from identifier.paper.design import VARIANTS, PaperIdentifier, design_for
 from identifier.run import identify
 from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS, with_keeping
 from models.maneuvers import RandomSteer, Slalom
@@ -26,7 +21,7 @@ CAR = sedan()
 
 def kept(keeping, design=None):
     design = design or design_for(CAR, natural_driving(CAR))
-    return with_keeping(design, natural_operation(design, CAR), keeping)
+    return with_keeping(design, design.operation(CAR), keeping)
 
 
 @pytest.fixture(name="drives", scope="module")
@@ -76,11 +71,11 @@ def test_every_keeping_of_a_found_design_passes_its_certificate(law, integrator)
 
 
 def test_the_paper_keeps_its_leakage():
-    for law in LAWS:
+    for law in VARIANTS:
         gains = make_method(law, CAR).gains
         assert gains.W_free == gains.V_free == 0.0 < gains.rho_W
         assert gains.W_max == gains.V_max == np.inf
-    design = paper_identifier(CAR)
+    design = PaperIdentifier.for_vehicle(CAR)
     assert kept("leakage", design) is design
     assert KEEPINGS[DEFAULT_KEEPING] is not KEEPINGS["leakage"]
 
@@ -88,7 +83,7 @@ def test_the_paper_keeps_its_leakage():
 def test_the_balls_are_those_of_half_open_units_and_of_the_first_weights():
     """W: its force at s = 1/2 is the expected residual. V: twice a normal draw of its size."""
     design = design_for(CAR, natural_driving(CAR))
-    known = natural_operation(design, CAR)
+    known = design.operation(CAR)
     dead, projected = kept("dead_zone").gains, kept("projection").gains
     assert dead.W_free == projected.W_max
     assert dead.V_free == projected.V_max
@@ -108,7 +103,7 @@ def test_what_cannot_be_kept_otherwise_is_refused():
 
 
 def test_a_dead_zone_without_a_leakage_is_refused():
-    gains = paper_identifier(CAR).gains
+    gains = PaperIdentifier.for_vehicle(CAR).gains
     for free, rho in (("W_free", "rho_W"), ("V_free", "rho_V")):
         with pytest.raises(ValueError, match=f"{free} is the dead zone of a leakage"):
             replace(gains, **{free: 1.0, rho: 0.0})

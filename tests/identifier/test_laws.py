@@ -5,14 +5,11 @@ import numpy as np
 import pytest
 
 from identifier.paper.laws import (
-    DRIVING_ERRORS,
+    LAWS,
     ball,
     beyond_ball,
     filter_rate,
-    instantaneous,
-    integral,
     observer_rate,
-    pi_lead,
     weight_rates,
     whole,
 )
@@ -207,14 +204,20 @@ def test_filtered_error_is_the_gradient_for_a_constant_offset():
         assert (J(e) - J(-e)) / 2e-4 == pytest.approx(z[i], rel=1e-9)
 
 
-def test_driving_errors_differ_in_their_argument_only(case):
-    assert DRIVING_ERRORS["integral"] is integral
-    assert DRIVING_ERRORS["instantaneous"] is instantaneous
-    assert DRIVING_ERRORS["pi_lead"] is pi_lead
+def test_laws_differ_in_their_numbers_only(case):
     z, xi_tilde = case["z"], case["xi"]
-    np.testing.assert_array_equal(integral(z, xi_tilde, 0.3), z)
-    np.testing.assert_array_equal(instantaneous(z, xi_tilde, 0.3), xi_tilde)
-    np.testing.assert_array_equal(pi_lead(z, xi_tilde, 0.3), z + 0.3 * xi_tilde)
+    expected = {"integral": z, "instantaneous": xi_tilde, "pi_lead": z + 0.3 * xi_tilde}
+    assert set(LAWS) == set(expected)
+    for name, law in LAWS.items():
+        np.testing.assert_array_equal(law.error(0.3).drive(z, xi_tilde), expected[name])
+
+
+def test_a_law_without_a_share_of_an_error_costs_no_operation_for_it():
+    """0 ξ̃ and 1 z leave no trace in the compiled step."""
+    z, xi_tilde, lead = (ca.SX.sym(name) for name in ("z", "xi_tilde", "lead"))
+    expected = {"integral": z, "instantaneous": xi_tilde, "pi_lead": z + lead * xi_tilde}
+    for name, law in LAWS.items():
+        assert ca.is_equal(law.error(lead).drive(z, xi_tilde), expected[name], 2), name
 
 
 def test_projection_keeps_the_ball_and_leaves_its_inside_alone(rng):

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.defaults import paper_identifier
 from identifier.method import FrozenModelError
 from identifier.methods import load_model
+from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import (
     AxleRmse,
     axle_rms,
@@ -23,7 +23,7 @@ from identifier.run import identify
 
 @pytest.fixture(name="history")
 def a_history(car, drive):
-    return identify(drive(n=600), car, paper_identifier(car))
+    return identify(drive(n=600), car, PaperIdentifier.for_vehicle(car))
 
 
 def test_frozen_and_online_force_agree_at_the_instant_of_freezing(history):

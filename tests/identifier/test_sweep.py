@@ -6,7 +6,6 @@ import pytest
 from identifier.compare.course import Course, Shares, cross_replay, shares
 from identifier.compare.sweep import Candidate, best_candidate, pareto_front, random_values, sweep
 from identifier.compare.tunables import (
-    SIZES,
     TUNABLES,
     largest_loop_gain,
     tunables,
@@ -15,6 +14,7 @@ from identifier.compare.tunables import (
 )
 from identifier.methods import METHODS, make_method
 from identifier.stability.limits import instantaneous_euler_limit, integral_euler_limit
+from identifier.tuning import SIZES
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from identifier.axle import AxleIdentifier
-from identifier.defaults import design_for, natural_driving, natural_operation, paper_identifier
-from identifier.paper.design import design_text, read_design
+from identifier.certificate import Certificate, Property
+from identifier.driving import natural_driving
+from identifier.paper.design import PaperIdentifier, design_for, design_text, read_design
 from identifier.paper_study import paper_design
 from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS, with_keeping
-from identifier.stability.property import Certificate, Property
 from models.vehicle import sedan
 from tireid.cli import main
 from tireid.commands.certificate_table import (
@@ -34,7 +34,7 @@ def checked(capsys, *words):
 
 @pytest.fixture
 def unstable(tmp_path):
-    design = paper_identifier(sedan())
+    design = PaperIdentifier.for_vehicle(sedan())
     gains = replace(design.gains, eta_W=30.0 * design.gains.eta_W)
     path = tmp_path / "unstable.toml"
     path.write_text(design_text(replace(design, gains=gains)))
@@ -121,7 +121,7 @@ def test_figures_and_a_recorded_run(capsys, logs, tmp_path):
     code, said = checked(capsys, "--paper", "--log", logs / "slalom.csv", "--out", folder)
     assert code == 0
     margin = float(re.search(r"gain margin there ([\d.]+)", said.out).group(1))
-    worst = certificate_of(paper_identifier(sedan()), sedan())["gain_sampled"].margin
+    worst = certificate_of(PaperIdentifier.for_vehicle(sedan()), sedan())["gain_sampled"].margin
     assert margin > worst  # no recorded regressor is worse than the worst
     for name in ("locus.png", "bounds.png"):
         assert (folder / name).read_bytes().startswith(b"\x89PNG")
@@ -216,5 +216,5 @@ def test_the_default_of_keep_is_not_the_leakage_that_forgets(capsys, tmp_path):
     assert checked(capsys, "--tune", path)[0] == 0
     assert DEFAULT_KEEPING != "leakage"
     design = design_for(sedan(), natural_driving(sedan()))
-    kept = with_keeping(design, natural_operation(design, sedan()), DEFAULT_KEEPING)
+    kept = with_keeping(design, design.operation(sedan()), DEFAULT_KEEPING)
     assert read_design(path) == kept

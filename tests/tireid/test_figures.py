@@ -308,7 +308,7 @@ def test_slip_angles_have_the_sign_of_the_paper() -> None:
 def unlike_axles() -> AxleModel:
     """A ladder whose axles differ in stiffness, grip and in how far they are known."""
     design = AxleIdentifier.for_vehicle(CAR)
-    new = design.frozen(CAR, design.setup(CAR, made_up().recording).carry)
+    new = design.frozen(CAR, design.setup(CAR).carry)
     return replace(
         new,
         W=np.array([0.2, 0.3, 0.2, 0.1]) * np.array([[1.0], [0.4]]),

@@ -12,8 +12,7 @@ import pytest
 
 from codegen import compiler
 from identifier.axle import AxleIdentifier
-from identifier.defaults import paper_identifier
-from identifier.paper.design import design_text
+from identifier.paper.design import PaperIdentifier, design_text
 from identifier.paper.network import Network
 from models.recordings import RecordingError, read_recording
 from models.vehicle import sedan
@@ -76,7 +75,7 @@ def changed(text, key, value):
 )
 def test_a_hostile_design_is_refused_by_its_key(capsys, tmp_path, key, value, said):
     path = tmp_path / "design.toml"
-    path.write_text(changed(design_text(paper_identifier(sedan())), key, value))
+    path.write_text(changed(design_text(PaperIdentifier.for_vehicle(sedan())), key, value))
     refused(capsys, ["check", "--design", path], said)
     assert list(tmp_path.iterdir()) == [path]
 
@@ -107,8 +106,7 @@ def weights():
     """The axle model of the sedan before it has learnt, as it is stored."""
     car = sedan()
     design = AxleIdentifier.for_vehicle(car)
-    recording = read_recording_of(np.zeros(50))
-    return design.frozen(car, design.setup(car, recording).carry).to_dict()
+    return design.frozen(car, design.setup(car).carry).to_dict()
 
 
 def read_recording_of(r):
@@ -309,7 +307,7 @@ def test_limits_that_are_none_are_said_by_the_command(capsys, monkeypatch):
 
 
 def test_a_limit_that_is_raised_lets_the_file_in(tmp_path, monkeypatch):
-    text = design_text(replace(paper_identifier(sedan()), network=Network(hidden=128)))
+    text = design_text(replace(PaperIdentifier.for_vehicle(sedan()), network=Network(hidden=128)))
     path = tmp_path / "design.toml"
     path.write_text(changed(text, "hidden", "129"))
     assert main(["check", "--design", str(path)]) == 2

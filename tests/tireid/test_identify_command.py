@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from identifier.axle import AxleModel
-from identifier.defaults import paper_identifier
 from identifier.method import SLIP, steady_stiffness
 from identifier.methods import METHODS, draws_weights, load_model, make_method
-from identifier.paper.design import design_text
-from models.recordings import Recording, read_recording
+from identifier.paper.design import PaperIdentifier, design_text
+from models.recordings import read_recording
 from models.vehicle import sedan
 from tireid.cli import main
 
@@ -256,7 +255,7 @@ def test_a_car_that_never_drives_is_refused(logs, tmp_path, capsys):
 
 
 def written_design(path, **changes):
-    design = paper_identifier(sedan())
+    design = PaperIdentifier.for_vehicle(sedan())
     names = changes.keys() & {"eta_W", "eta_V", "rho_W", "rho_V"}
     gains = {name: changes.pop(name) for name in names}
     path.write_text(design_text(replace(design, gains=replace(design.gains, **gains), **changes)))
@@ -466,17 +465,7 @@ def test_an_axle_that_does_not_push_is_not_handed_on(logs, tmp_path, capsys, mon
 def test_the_stiffness_of_a_slide_is_the_slope_of_the_steady_curve(law):
     car = sedan()
     method = make_method(law, car)
-    rest = np.zeros(20)
-    still = Recording(
-        name="still",
-        t=0.01 * np.arange(20),
-        v_x=rest + 10.0,
-        v_y=rest,
-        r=rest,
-        delta_f=rest,
-        delta_r=rest,
-    )
-    model = method.frozen(car, method.setup(car, still).carry)
+    model = method.frozen(car, method.setup(car).carry)
     force = model.force_at(np.array([-SLIP, SLIP]))
     slope = (force[1] - force[0]) / (2.0 * SLIP)
     assert steady_stiffness(model, 10.0) == pytest.approx(slope, rel=0.02)

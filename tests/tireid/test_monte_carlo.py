@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.defaults import natural_driving, paper_identifier
-from identifier.paper.design import Driving, design_text, read_design
+from identifier.certificate import statement
+from identifier.driving import Driving, natural_driving
+from identifier.paper.design import PaperIdentifier, design_text, read_design
 from identifier.stability import Certificate
 from identifier.stability.monte_carlo import Beginning, Observed, monte_carlo
-from identifier.stability.property import statement
 from models.vehicle import sedan
 from tireid.cli import main
 from tireid.commands import check as check_command
@@ -95,7 +95,7 @@ def test_bad_words_are_one_line(words, complaint, capsys):
 
 
 def test_gains_of_which_nothing_is_proven_say_so(tmp_path, capsys):
-    design = paper_identifier(sedan())
+    design = PaperIdentifier.for_vehicle(sedan())
     unproven = replace(design, gains=replace(design.gains, eta_W=6.0 * design.gains.eta_W))
     path = tmp_path / "design.toml"
     path.write_text(design_text(unproven))
@@ -104,7 +104,7 @@ def test_gains_of_which_nothing_is_proven_say_so(tmp_path, capsys):
 
 
 def test_a_drive_that_diverges_fails_the_check_where_nothing_is_proven(tmp_path, capsys):
-    design = paper_identifier(sedan())
+    design = PaperIdentifier.for_vehicle(sedan())
     gains = replace(design.gains, eta_W=1e9, rho_W=0.0, rho_V=0.0)
     path = tmp_path / "design.toml"
     path.write_text(design_text(replace(design, gains=gains)))
@@ -126,7 +126,7 @@ def test_divergence_alone_is_an_exit_code_of_one(monkeypatch, capsys):
 
 def test_every_row_is_passed_by_a_law_that_breaks_what_it_bounds():
     """The certificate of a sound design, beside drives of one whose layers leak wrongly."""
-    vehicle, design = sedan(), paper_identifier(sedan())
+    vehicle, design = sedan(), PaperIdentifier.for_vehicle(sedan())
     driving = natural_driving(vehicle)
     passed = {}
     for name, changed in {
@@ -165,7 +165,7 @@ def test_drives_resume_with_the_smaller_of_proven_and_projected_weights(
     monkeypatch, tmp_path, share
 ):
     """A projection beyond what the leakage keeps, or none, lets no drive begin beyond the bound."""
-    seen, design = [], paper_identifier(sedan())
+    seen, design = [], PaperIdentifier.for_vehicle(sedan())
     bound = certificate_of(design, sedan())["weight_bound"].value
     path = tmp_path / "design.toml"
     gains = replace(design.gains, W_max=share * bound)

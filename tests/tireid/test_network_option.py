@@ -162,7 +162,7 @@ def test_a_network_cannot_be_learnt_on_from_a_model():
     with pytest.raises(ValueError, match="dt must be positive"):
         FrozenMethod(model=method, dt=0.0)
     with pytest.raises(ValueError, match="learns nothing"):
-        FrozenMethod(model=method).setup(CAR, None, start=object())
+        FrozenMethod(model=method).setup(CAR, start=object())
 
 
 @pytest.mark.parametrize(

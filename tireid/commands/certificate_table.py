@@ -6,8 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from identifier.driving import Driving
 from identifier.methods import DEFAULT, certify
-from identifier.paper.design import Driving, PaperIdentifier
+from identifier.paper.design import PaperIdentifier
 from identifier.paper.network import Weights
 from identifier.stability import Certificate, Property
 from identifier.stability.monte_carlo import Observed

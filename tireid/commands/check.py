@@ -12,23 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from identifier.defaults import (
-    BANDWIDTH,
-    LAWS,
-    PHASE_MARGIN,
-    design_for,
-    natural_driving,
-    natural_operation,
-)
+from identifier.driving import BANDWIDTH, Driving, natural_driving
 from identifier.method import vehicle_numbers
 from identifier.methods import REFERENCE, certify
-from identifier.paper.design import Driving, PaperIdentifier, design_text
-from identifier.paper.laws import DRIVING_ERRORS, Gains
+from identifier.paper.design import PHASE_MARGIN, VARIANTS, PaperIdentifier, design_for, design_text
+from identifier.paper.laws import LAWS, Gains
 from identifier.run import identify
 from identifier.stability import Certificate, DesignError, Operation
 from identifier.stability.certificate import judged_loop
 from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS, with_keeping
-from identifier.stability.loop import direction_matrix, linear_law
+from identifier.stability.loop import direction_matrix
 from identifier.stability.monte_carlo import Beginning, Observed, monte_carlo
 from identifier.stability.operation import proven_bounds
 from models.files import write_atomically
@@ -92,9 +85,9 @@ def draw_check(
     certificate : its certificate.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    driving_error = DRIVING_ERRORS[design.law]
-    law = linear_law(driving_error, design.gains.lead)
-    D = direction_matrix(driving_error, design.gains.matrix)
+    chosen = LAWS[design.law]
+    law = chosen.error(design.gains.lead)
+    D = direction_matrix(chosen, design.gains.matrix)
     kept = proven_bounds(design.gains, law, operation, D).W
     _, loop, _ = judged_loop(design.gains, law, operation, D, kept)
     history = identify(recording, vehicle, design)
@@ -219,14 +212,14 @@ def _method(options: argparse.Namespace, vehicle: Vehicle) -> Chosen:
     if options.design is not None:
         raise ValueError("--tune finds gains: give no --design FILE to judge with it")
     law = options.method or REFERENCE
-    if law not in LAWS:
-        raise ValueError(f"--tune finds gains of {', '.join(LAWS)}, {law} has none")
-    if law == "instantaneous_scaled":
+    if law not in VARIANTS:
+        raise ValueError(f"--tune finds gains of {', '.join(VARIANTS)}, {law} has none")
+    if VARIANTS[law].scaled:
         raise ValueError("--method instantaneous_scaled is a control, tune one of the others")
     driving = replace(natural_driving(vehicle), **_overrides(options))
     margin = options.phase_margin or PHASE_MARGIN
     found = design_for(vehicle, driving, law=law, phase_margin=margin)
-    known = natural_operation(found, vehicle, driving)
+    known = found.operation(vehicle, driving)
     return Chosen(law, with_keeping(found, known, options.keep or DEFAULT_KEEPING))
 
 
@@ -235,7 +228,7 @@ def _refuse_gains(options: argparse.Namespace, name: str) -> None:
         if getattr(options, option) is not None:
             raise ValueError(
                 f"--{option.replace('_', '-')} asks about the gains of the paper's laws, which "
-                f"{name} has not: add --paper, --method {'|'.join(LAWS)} or --design FILE"
+                f"{name} has not: add --paper, --method {'|'.join(VARIANTS)} or --design FILE"
             )
 
 
@@ -363,7 +356,7 @@ def _drive(
             count,
             beginning=Beginning(
                 W=kept if math.isfinite(kept) else 0.0,
-                V=min(natural_operation(design, vehicle, driving).V_start, design.gains.V_max),
+                V=min(design.operation(vehicle, driving).V_start, design.gains.V_max),
             ),
             rng=np.random.default_rng(seed_of(options)),
             progress=lambda done: progress(done / count),
@@ -419,7 +412,7 @@ def _proposal(
             integrator=design.integrator,
             dt=design.dt,
         )
-        known = natural_operation(better, vehicle, driving)
+        known = better.operation(vehicle, driving)
         better = with_keeping(better, known, DEFAULT_KEEPING)
     except DesignError as error:
         return f"no better gains at this bandwidth: {error}"
@@ -452,7 +445,7 @@ def _draw(
     from tireid.commands.demo_story import drive_to_learn
 
     recording = drive_to_learn() if drive is None else drive
-    operation = natural_operation(design, vehicle, driving)
+    operation = design.operation(vehicle, driving)
     draw_check(folder, recording, vehicle, design, operation, certificate)
 
 

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from identifier.compare.study import run_comparison, step_lengths
-from identifier.defaults import paper_identifier
 from identifier.method import Method
 from identifier.methods import METHODS
 from identifier.own_network import FrozenMethod
+from identifier.paper.design import PaperIdentifier
 from models.recordings import Recording
 from models.schema import require_few
 from models.vehicle import Vehicle
@@ -146,7 +146,7 @@ def run(options: argparse.Namespace) -> None:
 
 def _network(options: argparse.Namespace, vehicle: Vehicle) -> dict[str, Method]:
     """Return the network of --network as a method by the name of its file."""
-    model = network_model(options, vehicle, paper_identifier(vehicle).min_speed)
+    model = network_model(options, vehicle, PaperIdentifier.for_vehicle(vehicle).min_speed)
     return {} if model is None else {options.network.name: FrozenMethod(model=model)}
 
 

@@ -5,7 +5,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from identifier.defaults import natural_operation
 from identifier.paper_study import GAINS, NETWORK, STEPS, Study, run_study
 from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import (
@@ -326,7 +325,7 @@ def run(options: argparse.Namespace) -> None:
             one.mkdir()
         for name, part in (("identify", story.default), ("paper_network", story.paper)):
             write_results(folders[name], part.law, part.learnt, part.others, part.frozen)
-        operation, drive = natural_operation(story.design, story.car), story.paper.learnt.recording
+        operation, drive = story.design.operation(story.car), story.paper.learnt.recording
         draw_check(
             folders["paper_network"], drive, story.car, story.design, operation, story.certificate
         )

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identifier.defaults import paper_identifier
 from identifier.method import Method
 from identifier.methods import DEFAULT, REFERENCE, make_method
 from identifier.paper.design import PaperIdentifier
@@ -161,7 +160,7 @@ def run_story(progress: Callable[[], None] = lambda: None) -> Story:
     """
     car = sedan()
     recordings = drives({"slalom": LEARN, **PREDICT})
-    design = paper_identifier(car)
+    design = PaperIdentifier.for_vehicle(car)
     return Story(
         car=car,
         design=design,

@@ -7,11 +7,8 @@ from typing import Any
 import numpy as np
 
 from codegen.escape import visible
-from identifier.axle import AxleModel
-from identifier.axle.design import NOT_CERTIFIED
 from identifier.method import DEAD, CannotFreezeError, Method, require_alive, steady_stiffness
 from identifier.methods import load_model
-from identifier.paper.design import PaperIdentifier
 from identifier.paper.network import Weights
 from identifier.reproducibility import (
     Replay,
@@ -26,7 +23,7 @@ from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
-from tireid.commands.certificate_table import certificate_of, resumed_line, verdict_line
+from tireid.commands.certificate_table import resumed_line, verdict_line
 from tireid.commands.identify_results import (
     error_cells,
     file_name,
@@ -48,6 +45,7 @@ from tireid.commands.options import (
     read_vehicle,
     seed_of,
 )
+from tireid.figures.style import paper_design
 from tireid.learning import identify
 from tireid.output import output_folder, text_table
 from tireid.progress import Progress, say, tell
@@ -125,8 +123,8 @@ def run(options: argparse.Namespace) -> None:
     freeze_times = sorted(set(options.freeze or [float(recording.t[-1])]))
     _require_inside(freeze_times, recording)
     if network is None:
-        _require_model(law, design, recording, vehicle)
-    if isinstance(start, AxleModel) and start.vehicle != vehicle:
+        _require_model(law, design, vehicle)
+    if start is not None and start.scales_with_load and start.vehicle != vehicle:
         say(f"{options.weights} is of the car {start.vehicle.name!r}: scaled by the axle loads")
     parts = {LEARNING: 2.0 + len(others), DRAWING: 3.0 + len(others)}
     with (
@@ -154,32 +152,32 @@ def run(options: argparse.Namespace) -> None:
     say(f"wrote {options.out}/")
 
 
-def _require_model(law: str, design: Method, recording: Recording, vehicle: Vehicle) -> None:
+def _require_model(law: str, design: Method, vehicle: Vehicle) -> None:
     """Refuse a filter of forces before it runs: there would be nothing to freeze."""
     try:
-        design.frozen(vehicle, design.setup(vehicle, recording).carry)
+        design.frozen(vehicle, design.setup(vehicle).carry)
     except CannotFreezeError as error:
         raise CannotFreezeError(f"--method {law}: {error}; tireid compare shows it") from None
 
 
 def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool) -> str:
     """Return the certificate of the paper's identifier, or what the axle identifier knows."""
-    model, design = learnt.freeze(t), learnt.design
-    if isinstance(design, PaperIdentifier):
-        certificate = certificate_of(design, vehicle)
+    model, certificate = learnt.freeze(t), learnt.design.certify(vehicle)
+    if certificate.properties:
         first = Weights(W=learnt.state["W"][0], V=learnt.state["V"][0])
-        beyond = resumed_line(certificate, design, first) if resumed else ""
+        beyond = resumed_line(certificate, paper_design(learnt), first) if resumed else ""
         return "\n".join(line for line in (verdict_line(certificate), beyond) if line)
-    if not isinstance(model, AxleModel):
+    if model.known_slip is None:
         return "frozen; `tireid compare` sets it beside the other methods"
-    stiffness, length = model.cornering_stiffness, model.relaxation_length
-    known = np.degrees(model.known_slip_range)
+    facts = {fact.title: fact.values for fact in model.facts()}
+    stiffness, length = facts["cornering stiffness"], facts["relaxation length"]
+    known = np.degrees(model.known_slip)
     return (
         f"learnt: cornering stiffness {stiffness[0]:.4g} / {stiffness[1]:.4g} N/rad, relaxation "
         f"length {length[0]:.2g} / {length[1]:.2g} m, known to {known[0]:.1f} / {known[1]:.1f} deg "
         "of slip (front / rear)\n"
-        f"certificate: {NOT_CERTIFIED}; grip, cornering stiffness, weights, offsets and covariance "
-        "stay in their boxes by construction (summary.json lists them)"
+        f"certificate: {certificate.verdict}; grip, cornering stiffness, weights, offsets and "
+        "covariance stay in their boxes by construction (summary.json lists them)"
     )
 
 

@@ -2,18 +2,15 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, is_dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identifier.axle import AxleIdentifier
 from identifier.method import Method, vehicle_numbers
 from identifier.methods import certify
 from identifier.own_network import OnnxModel
-from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import (
     AxleRmse,
     Replay,
@@ -52,37 +49,6 @@ def _sides(sides: Reproduction) -> dict[str, dict[str, float] | None]:
         "past_against_online": _axles(sides.past_against_online),
         "past_against_truth": _axles(sides.past_against_truth),
         "after_against_truth": _axles(sides.after_against_truth),
-    }
-
-
-def method_numbers(design: Method) -> dict[str, Any]:
-    """Return gains, network, the rest of the design, and the seed (None without random weights).
-
-    A method that is not the paper's has all its numbers under "gains" and no network.
-
-    Parameters
-    ----------
-    design : any method.
-    """
-    if isinstance(design, PaperIdentifier):
-        return {
-            "gains": asdict(design.gains),
-            "network": asdict(design.network),
-            "design": {
-                "input_source": design.input_source,
-                "integrator": design.integrator,
-                "dt_s": design.dt,
-                "force_unit_N": design.force_unit,
-                "min_speed_m_s": design.min_speed,
-            },
-            "seed": design.seed,
-        }
-    numbers: dict[str, Any] = asdict(cast(Any, design)) if is_dataclass(design) else {}
-    return {
-        "gains": numbers,
-        "network": numbers.get("network"),
-        "design": {"dt_s": design.dt, "min_speed_m_s": design.min_speed},
-        "seed": numbers.get("seed"),
     }
 
 
@@ -153,7 +119,7 @@ def summarize_replays(
             },
         },
         "law": law,
-        **method_numbers(learnt.design),
+        **learnt.design.numbers(),
         "certificate": certificate_numbers(learnt.design, learnt.vehicle),
         "vehicle": vehicle_numbers(learnt.vehicle),
         "diverged_at_s": learnt.diverged_at,
@@ -162,6 +128,7 @@ def summarize_replays(
 
 
 Frozen = Mapping[float, Mapping[str, Replay]]
+OBSERVED = "xi_tilde"  # the output of a method that learns from the error of an observer
 WEIGHTS = ("W", "V", "own")  # carried matrices that are the learnt model, by whatever method
 
 
@@ -224,13 +191,13 @@ def _write_curves(folder: Path, learnt: History, others: Sequence[History], froz
         name = "forces.csv" if history is learnt else f"forces_{file_name(history.recording)}.csv"
         write_csv(folder / name, force_columns(history, replays))
     t, n = learnt.recording.t, learnt.recording.t.size
-    if isinstance(learnt.design, PaperIdentifier):
+    if OBSERVED in learnt.outputs:
         write_csv(
             folder / "errors.csv",
             {
                 "t_s": t,
-                "xi_tilde_f_Us": learnt.outputs["xi_tilde"][:, 0],
-                "xi_tilde_r_Us": learnt.outputs["xi_tilde"][:, 1],
+                "xi_tilde_f_Us": learnt.outputs[OBSERVED][:, 0],
+                "xi_tilde_r_Us": learnt.outputs[OBSERVED][:, 1],
                 "z_f_Us2": learnt.state["z"][:-1, 0],
                 "z_r_Us2": learnt.state["z"][:-1, 1],
             },
@@ -282,10 +249,10 @@ def _draw(folder: Path, learnt: History, others: Sequence[History], frozen: Froz
         "slip": slip_figure(learnt.freeze(last), learnt.recording, learnt),
         "inputs": inputs_figure(learnt.recording),
     }
-    if isinstance(learnt.design, PaperIdentifier):
+    if OBSERVED in learnt.outputs:
         figures["error"] = error_figure(learnt, freeze_times=list(frozen))
         figures["weights"] = weights_figure(learnt, list(frozen))
-    elif isinstance(learnt.design, AxleIdentifier):
+    if learnt.tracks:
         figures["learnt"] = learnt_axles_figure(learnt, list(frozen))
     for other in others:
         replay = frozen[last][other.recording.name]

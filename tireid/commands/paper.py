@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from identifier.defaults import LAWS as LAW_TITLES
+from identifier.paper.design import VARIANTS
 from identifier.paper.laws import Gains
 from identifier.paper.network import Network
 from identifier.paper_study import (
@@ -148,7 +148,7 @@ def header() -> list[str]:
     """Return the head of the table's columns."""
     names = ["condition"]
     for law in LAWS:
-        names += [LAW_TITLES[law], "paper" if law != "instantaneous_scaled" else ""]
+        names += [VARIANTS[law].title, "" if VARIANTS[law].scaled else "paper"]
     return names
 
 
@@ -211,7 +211,7 @@ def study_text(study: Study) -> str:
 def verdicts() -> list[str]:
     """Return for each law one line with the verdict on the gains of the study."""
     return [
-        f"{LAW_TITLES[law]}: {verdict_line(certificate_of(paper_design(law, seed=0), sedan()))}"
+        f"{VARIANTS[law].title}: {verdict_line(certificate_of(paper_design(law, seed=0), sedan()))}"
         for law in LAWS
     ]
 

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from codegen.arrays import Array
-from identifier.defaults import LAWS
+from identifier.paper.design import VARIANTS
 from identifier.run import History
 from identifier.stability.loop import INTEGRATORS, Loop, eigenvalues, scaled_matrices
 from identifier.stability.margins import gain_margin, phase_margin
@@ -209,7 +209,7 @@ def comparison_figure(
     for number, (law, row) in enumerate(results.items()):
         if not row:
             continue
-        label = LAWS.get(law, law).replace("eta/lambda", "η/λ")
+        label = VARIANTS[law].title.replace("eta/lambda", "η/λ")
         color, marker = MARKS.get(law, FURTHER[number % len(FURTHER)])
         order += [label, f"{label} (paper)"]
         shift = OFFSET * (number - (len(results) - 1) / 2)

@@ -10,8 +10,6 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.axle import AxleIdentifier
-from identifier.axle.slip import SHORTEST
 from identifier.run import History
 from identifier.tire_model import TireModel
 from models.bicycle import measured_slip
@@ -231,39 +229,31 @@ def drive_tires_figure(drive: Drive, curves: Sequence[TireCurve]) -> Figure:
 
 @styled
 def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) -> Figure:
-    """Draw cornering stiffness, relaxation length and capacity of both axles over time.
+    """Draw what was learnt of both axles over time.
 
-    Capacity is the force at which the learnt curve saturates, over the static load of the axle.
+    Of the axle identifier cornering stiffness, relaxation length and capacity, the force at which
+    the learnt curve saturates, over the static load of the axle.
 
     Parameters
     ----------
-    history : a run of the axle identifier.
+    history : a run of a method that has `tracks`.
     freeze_times : times at which weights were taken [s].
 
     Raises
     ------
     TypeError
-        Where another method ran.
+        Where the method has none.
     """
-    design, vehicle = history.design, history.vehicle
-    if not isinstance(design, AxleIdentifier):
-        raise TypeError(f"a run of the axle identifier is needed, not of {design}")
-    t, W = history.recording.t, history.state["W"][:-1]
-    slope = (W / np.array(design.ladder)).sum(axis=2)
-    loads = np.array(vehicle.axle_loads)
-    stiff = float((slope * loads).max()) >= 1000.0
-    compliance = history.state["own"][:-1, :, 0]
-    curves = {
-        f"cornering stiffness\n[{'kN' if stiff else 'N'}/rad]": slope
-        * loads
-        / (1000.0 if stiff else 1.0),
-        "relaxation length\n[m]": compliance * np.maximum(slope, 0.0)
-        + SHORTEST * vehicle.wheelbase,
-        "force at saturation\n[static load]": W.sum(axis=2),
-    }
+    tracks = history.tracks
+    if not tracks:
+        raise TypeError(f"{history.design} does not say what it learns of the axles")
+    t = history.recording.t
     figure = new_figure(PAGE, 4.4)
-    panels = figure.subplots(len(curves), 1, sharex=True)
-    for axes, (label, values) in zip(panels, curves.items(), strict=True):
+    panels = figure.subplots(len(tracks), 1, sharex=True)
+    for axes, (title, unit, values) in zip(panels, tracks, strict=True):
+        label = f"{title}\n[{unit}]"
+        if unit == "N/rad" and float(values.max()) >= 1000.0:
+            label, values = f"{title}\n[kN/rad]", values / 1000.0
         for axle, color in enumerate((GREEN, PURPLE)):
             axes.plot(t, values[:, axle], color=color, linewidth=1.0, label=AXLES[axle].lower())
         axes.set(ylabel=label, xlim=(t[0], t[-1]))

@@ -76,7 +76,7 @@ def test_slip_is_known_up_to_where_a_quarter_of_the_doubt_is_left(car):
     """Weights of one unit: doubt is that of the unit at every slip. Of two: where they balance."""
     design = AxleIdentifier.for_vehicle(car)
     n = len(design.ladder)
-    state = dict(design.setup(car, None).carry)
+    state = dict(design.setup(car).carry)
     new = design.frozen(car, state)
     seen = np.array([[0.2], [0.1]]) * np.eye(1, 9)
     for share, known in ((0.24, [0.2, 0.1]), (0.26, [0.0, 0.0]), (0.35, [0.0, 0.0])):

@@ -182,7 +182,7 @@ def test_nothing_is_in_doubt_where_nothing_fails():
 def test_samples_that_are_no_number_are_as_impossible_ones(channel, at):
     """Bit for bit, wherever they come, in every carried number; and none of them is kept."""
     car, clean, carried = sedan(), drive(), []
-    setup = AxleIdentifier.for_vehicle(car).setup(car, clean)
+    setup = AxleIdentifier.for_vehicle(car).setup(car)
     names = ("v_x", "v_y", "r", "delta_f", "delta_r")
     for wrong in (np.nan, 1e6):
         seen = {name: getattr(clean, name).copy() for name in names}

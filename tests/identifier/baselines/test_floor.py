@@ -15,8 +15,9 @@ from identifier.baselines import (
     share_of_force,
     structure_of,
 )
-from identifier.defaults import natural_network, paper_identifier
 from identifier.method import CannotFreezeError
+from identifier.paper.design import PaperIdentifier
+from identifier.paper.network import natural_network
 from identifier.run import identify
 from models.recordings import read_recording
 from models.vehicle import Vehicle
@@ -34,7 +35,7 @@ def cost(model, recordings):
 
 
 def small_network(car):
-    return paper_identifier(car, network=natural_network(car, hidden=4))
+    return PaperIdentifier.for_vehicle(car, network=natural_network(car, hidden=4))
 
 
 def test_planted_parameters_are_found_exactly(car, curve_drive, rng):

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from codegen import find_compiler
-from identifier.defaults import natural_operation
 from identifier.export.compiled import (
     CompiledPackage,
     PackageFileError,
@@ -268,7 +267,7 @@ def test_an_input_on_its_limit_is_taken_and_one_beyond_is_not(packages):
 def test_the_shipped_c_keeps_the_weights_as_the_method_does(keeping, slalom):
     """With balls so small that the slalom leaves them; without, the forces are others."""
     paper = make_method("integral", CAR)
-    method = with_keeping(paper, natural_operation(paper, CAR), keeping)
+    method = with_keeping(paper, paper.operation(CAR), keeping)
     small = {
         "dead_zone": {"W_free": 0.4, "V_free": 3.0},
         "projection": {"W_max": 0.4, "V_max": 3.0},

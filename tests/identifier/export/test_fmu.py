@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from codegen import Scan
-from identifier.defaults import paper_identifier
 from identifier.export import fmu as binaries
 from identifier.export.fmu import export_fmu
 from identifier.export.specialize import specialize
+from identifier.paper.design import PaperIdentifier
 from identifier.run import OnlineIdentifier, identify
 from models.recordings import Recording
 from models.vehicle import sedan
@@ -23,7 +23,7 @@ CAR = sedan()
 
 
 def design(dt=0.01):
-    return replace(paper_identifier(CAR), dt=dt)
+    return replace(PaperIdentifier.for_vehicle(CAR), dt=dt)
 
 
 def swaying(n, dt=0.01):

@@ -8,19 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.defaults import paper_identifier
 from identifier.export import fmu as binaries
 from identifier.export import fmu as package
 from identifier.export.fmu import export_fmu, fmu_text
 from identifier.export.package import build_package
 from identifier.export.specialize import specialize
+from identifier.paper.design import PaperIdentifier
 from models.vehicle import sedan
 
 fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")
 validation = pytest.importorskip("fmpy.validation")
 CAR = sedan()
 PARTS = ("include", "src")
-DESIGN = paper_identifier(CAR)
+DESIGN = PaperIdentifier.for_vehicle(CAR)
 needs_compiler = pytest.mark.skipif(
     not binaries.targets(), reason="needs a C compiler on Linux x86-64"
 )

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from codegen import find_compiler
-from identifier.defaults import paper_identifier
 from identifier.export import fmu as binaries
 from identifier.export.fmu import OF_VERSION, SHARED, export_fmu, fmu_text
 from identifier.export.specialize import specialize
+from identifier.paper.design import PaperIdentifier
 from models.vehicle import sedan
 
 CAR = sedan()
@@ -61,7 +61,7 @@ int main(void) {
 
 
 def write_sources(folder, version):
-    text = fmu_text(specialize(paper_identifier(CAR), CAR), version)
+    text = fmu_text(specialize(PaperIdentifier.for_vehicle(CAR), CAR), version)
     for name, content in text.items():
         if name.startswith("sources/"):
             (folder / Path(name).name).write_text(content)
@@ -161,7 +161,7 @@ def test_built_anew_from_its_own_sources_it_gives_the_same_bits(tmp_path, versio
         pytest.skip("needs cmake, and a compiler on Linux x86-64")
     monkeypatch.setattr(binaries, "MINGW", "no-such-compiler")
     path = tmp_path / "one.fmu"
-    export_fmu(specialize(paper_identifier(CAR), CAR), path, version)
+    export_fmu(specialize(PaperIdentifier.for_vehicle(CAR), CAR), path, version)
     folder = Path(fmpy.extract(str(path), str(tmp_path / "unzipped")))
     (library,) = (folder / "binaries").rglob("*.so")
     shipped = library.read_bytes()

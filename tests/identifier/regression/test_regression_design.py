@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.defaults import natural_network, paper_identifier
-from identifier.paper.network import Network
+from identifier.paper.design import PaperIdentifier
+from identifier.paper.network import Network, natural_network
 from identifier.regression import LAWS, RegressionIdentifier
 from identifier.regression.laws import WORTH
 from identifier.reproducibility import online_error, replay
@@ -95,7 +95,10 @@ def test_the_compiled_step_repeats_the_equations_by_hand(law, dt, car, drive, de
 def test_better_than_the_integral_law_online_and_frozen(law, car, drive):
     """With networks of the same size, though the integral law learns the hidden layer too."""
     recording, errors = drive(n=2000), []
-    for chosen in (RegressionIdentifier.for_vehicle(car, law=law), paper_identifier(car)):
+    for chosen in (
+        RegressionIdentifier.for_vehicle(car, law=law),
+        PaperIdentifier.for_vehicle(car),
+    ):
         history = identify(recording, car, chosen)
         frozen = replay(history.freeze(recording.t[-1]), history).against_truth
         errors.append(np.array([online_error(history).both, frozen.both]))

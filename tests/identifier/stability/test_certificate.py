@@ -5,21 +5,23 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_lyapunov
 
-from identifier.paper.laws import Gains, diagonal, instantaneous, integral
-from identifier.paper.laws import pi_lead as lead_law
+from identifier.certificate import Property, at_least, at_most
+from identifier.paper.laws import LAWS, Gains, diagonal
 from identifier.stability import (
     Certificate,
     Operation,
     along_run,
     certify,
     design_gains,
-    linear_law,
 )
 from identifier.stability.limits import instantaneous_damping, integral_euler_limit, integral_limit
 from identifier.stability.loop import direction_matrix
 from identifier.stability.operation import worst_loop
-from identifier.stability.property import Property, at_least, at_most
 from identifier.stability.sampled_bound import Disturbance
+
+integral, instantaneous, lead_law = (
+    LAWS[name] for name in ("integral", "instantaneous", "pi_lead")
+)
 
 CITY = Operation(
     n_h=10,
@@ -37,7 +39,7 @@ CITY = Operation(
 
 def designed(law):
     return design_gains(
-        law=linear_law(law),
+        law=law.error(),
         bandwidth=0.7,
         dt=0.01,
         n_h=10,
@@ -190,7 +192,7 @@ def test_the_worst_status_is_the_verdict_and_nan_never_passes():
 def test_along_a_run_the_loop_is_unstable_only_where_the_regressor_is_large():
     design = gains(eta_W=1.0)
     loop = worst_loop(
-        design, linear_law(integral), CITY, direction_matrix(integral, -8 * np.eye(2)), np.inf
+        design, integral.error(), CITY, direction_matrix(integral, -8 * np.eye(2)), np.inf
     )
     limit = integral_euler_limit(8.0, 8.0, 0.01)
     G = np.array([0.5, 0.99, 1.01])[:, None, None] * limit * np.eye(2)

@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.defaults import natural_driving, natural_operation, paper_identifier
+from identifier.driving import natural_driving
+from identifier.paper.design import PaperIdentifier
+from identifier.paper.laws import DrivingError
 from identifier.stability.gain_design import with_keeping
-from identifier.stability.loop import INTEGRAL, Law
+from identifier.stability.loop import INTEGRAL
 from identifier.stability.monte_carlo import Beginning, monte_carlo
 from identifier.stability.sampled_bound import Learning
 from models.vehicle import sedan
@@ -74,7 +76,7 @@ def test_an_error_that_is_held_and_then_small_fills_the_bound(staged):
 
 
 @pytest.mark.parametrize("staged", [False, True])
-@pytest.mark.parametrize("law", [INTEGRAL, Law(0.0, 1.0), Law(1.0, 0.2)])
+@pytest.mark.parametrize("law", [INTEGRAL, DrivingError(0.0, 1.0), DrivingError(1.0, 0.2)])
 def test_no_error_drives_the_weights_beyond_their_bound(staged, law, rng):
     """Errors of every size up to X, that turn and flip, with up to 0.9 of W leaking in a sample."""
     for free in (0.5, 5.0, 50.0):
@@ -104,8 +106,10 @@ def test_more_than_one_whole_sample_of_leakage_is_not_covered():
 @pytest.mark.parametrize("keeping", ["dead_zone", "projection"])
 @pytest.mark.parametrize("integrator", ["euler", "rk4"])
 def test_drives_keep_the_bounds_of_the_certificate(keeping, integrator):
-    design = replace(paper_identifier(CAR), integrator=integrator, driving=natural_driving(CAR))
-    design = with_keeping(design, natural_operation(design, CAR), keeping)
+    design = replace(
+        PaperIdentifier.for_vehicle(CAR), integrator=integrator, driving=natural_driving(CAR)
+    )
+    design = with_keeping(design, design.operation(CAR), keeping)
     certificate = certificate_of(design, CAR)
     known = {entry.name: entry.value for entry in certificate.properties}
     W = min(known.get("weight_bound", np.inf), design.gains.W_max)
@@ -123,8 +127,8 @@ def test_drives_keep_the_bounds_of_the_certificate(keeping, integrator):
 
 
 def test_a_certificate_of_a_smaller_dead_zone_than_the_one_that_runs_is_found_out():
-    design = replace(paper_identifier(CAR), driving=natural_driving(CAR))
-    design = with_keeping(design, natural_operation(design, CAR), "dead_zone")
+    design = replace(PaperIdentifier.for_vehicle(CAR), driving=natural_driving(CAR))
+    design = with_keeping(design, design.operation(CAR), "dead_zone")
     certificate = certificate_of(design, CAR)
     gains = replace(design.gains, V_free=1e3, W_free=1e3, eta_W=3e5)
     seen = monte_carlo(
@@ -140,7 +144,7 @@ def test_a_certificate_of_a_smaller_dead_zone_than_the_one_that_runs_is_found_ou
 
 def test_the_force_that_a_dead_zone_lets_w_hold_is_the_one_at_which_learning_rests():
     """All units saturated, a residual above the capacity: the force settles at the capacity."""
-    design, n_h = paper_identifier(CAR), 10
+    design, n_h = PaperIdentifier.for_vehicle(CAR), 10
     resting = replace(design, gains=replace(design.gains, W_free=3.0))
     capacity = certificate_of(resting, CAR)["capacity"].value
     assert capacity == pytest.approx(
@@ -158,7 +162,7 @@ def test_the_force_that_a_dead_zone_lets_w_hold_is_the_one_at_which_learning_res
 
 
 def test_too_small_a_capacity_advises_the_leakage_that_is_just_enough():
-    design = paper_identifier(CAR)
+    design = PaperIdentifier.for_vehicle(CAR)
     strong = replace(design, gains=replace(design.gains, rho_W=10.0, W_free=1.0))
     advice = certificate_of(strong, CAR)["capacity"].advice
     rho = float(advice.removeprefix("rho_W below "))
@@ -170,7 +174,7 @@ def test_too_small_a_capacity_advises_the_leakage_that_is_just_enough():
 
 @pytest.mark.parametrize("integrator", ["euler", "rk4"])
 def test_the_dead_zone_of_each_layer_widens_its_own_bound(integrator):
-    design = replace(paper_identifier(CAR), integrator=integrator)
+    design = replace(PaperIdentifier.for_vehicle(CAR), integrator=integrator)
     wide = replace(design, gains=replace(design.gains, V_free=20.0))
     before, after = (certificate_of(one, CAR) for one in (design, wide))
     assert after["V_bound"].value == pytest.approx(before["V_bound"].value + 20.0, rel=0.03)
@@ -183,7 +187,7 @@ def test_bound_14_is_not_stated_of_a_leakage_that_rests():
     def names(design):
         return {entry.name for entry in certificate_of(design, CAR).properties}
 
-    design = paper_identifier(CAR)
+    design = PaperIdentifier.for_vehicle(CAR)
     for layer in ("W_free", "V_free"):
         resting = replace(design, gains=replace(design.gains, **{layer: 1.0}))
         assert {"printed_bound", "tight_bound", "ultimate_bound"} <= names(design) - names(resting)

@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.defaults import paper_identifier
-from identifier.paper.design import Driving
-from identifier.paper.laws import DRIVING_ERRORS
+from identifier.driving import Driving
+from identifier.paper.design import PaperIdentifier
+from identifier.paper.laws import LAWS
 from identifier.paper.network import Network
 from identifier.stability import certify
 from identifier.stability.monte_carlo import Drives, measured, random_drives, within
@@ -115,9 +115,9 @@ def test_what_each_sensor_adds_is_the_force_of_the_slip_and_of_the_turn_that_it_
 
 def test_the_operation_of_a_design_is_enough_for_its_certificate(car):
     for law in ("integral", "instantaneous_scaled"):
-        design = paper_identifier(car, law=law)
+        design = PaperIdentifier.for_vehicle(car, law=law)
         task = operation(design, car, DRIVING)
-        certificate = certify(design.gains, DRIVING_ERRORS[design.law], task)
+        certificate = certify(design.gains, LAWS[design.law], task)
         assert certificate["gain_sampled"].margin > 1.0
         a = -design.gains.A_d[0][0]
         decay = -np.log(1.0 - 0.01 * a) / 0.01  # of Euler at 10 ms
@@ -125,7 +125,7 @@ def test_the_operation_of_a_design_is_enough_for_its_certificate(car):
 
 
 def test_a_network_that_reads_the_estimate_brings_its_feedback_along(car):
-    design = replace(paper_identifier(car), input_source="estimated")
+    design = replace(PaperIdentifier.for_vehicle(car), input_source="estimated")
     task = operation(design, car, DRIVING)
     assert task.input_feedback is not None
     assert 5.0 < minimal_decay(task.input_feedback) < 12.0
@@ -144,7 +144,7 @@ def test_an_error_of_the_estimate_adds_most_to_the_input_at_the_slowest_speed_th
     """Slip angles that the network reads, by hand, where the sensor shows its least."""
     names = ("alpha_f", "alpha_r")
     network = Network(hidden=4, inputs=names, scale=(0.1, 0.2))
-    design = replace(paper_identifier(car), network=network, input_source="estimated")
+    design = replace(PaperIdentifier.for_vehicle(car), network=network, input_source="estimated")
     noisy = replace(DRIVING, noise_v_x=4.0)
     K_inv = np.array(
         [[car.mass * car.l_r, car.yaw_inertia], [car.mass * car.l_f, -car.yaw_inertia]]

@@ -3,9 +3,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from identifier.paper import laws
+from identifier.paper.laws import LAWS, Law, filter_rate, weight_rates
 from identifier.paper.laws import euler as euler_step
-from identifier.paper.laws import filter_rate, weight_rates
 from identifier.paper.laws import rk4 as rk4_step
 from identifier.paper.network import hidden_layer
 from identifier.stability.loop import (
@@ -15,7 +14,6 @@ from identifier.stability.loop import (
     euler,
     exact,
     growth_rate,
-    linear_law,
     regressor_gains,
     rk4,
     root_locus,
@@ -39,7 +37,7 @@ def frozen_identifier(law, leakage_rate, feedback):
     W_now, V_now = ca.SX.sym("W", 2, n_h), ca.SX.sym("V", n_h, n_in)
     sigma = hidden_layer(V_now, x_bar)
     rates = weight_rates(
-        drive=law(z, xi_tilde, 0.3),
+        drive=law.error(0.3).drive(z, xi_tilde),
         xi_tilde=xi_tilde,
         W=W_now,
         V=V_now,
@@ -67,18 +65,18 @@ def frozen_identifier(law, leakage_rate, feedback):
     return np.vstack([top, middle, bottom]), G
 
 
-@pytest.mark.parametrize("law", [laws.integral, laws.instantaneous, laws.pi_lead])
+@pytest.mark.parametrize("law", LAWS.values())
 def test_the_loop_matrix_is_the_jacobian_of_the_laws_of_the_identifier(law):
     feedback = np.array([[0.3, -0.1], [0.2, 0.5]])
     jacobian, G = frozen_identifier(law, 0.4, feedback)
     loop = Loop(
-        A_d=A_D, forgetting=3.0, law=linear_law(law, 0.3), G=G, leakage=0.4, input_feedback=feedback
+        A_d=A_D, forgetting=3.0, law=law.error(0.3), G=G, leakage=0.4, input_feedback=feedback
     )
     np.testing.assert_allclose(loop.matrix(), jacobian, rtol=1e-9, atol=1e-9)
 
 
 def test_a_transpose_forgotten_in_the_gradient_would_be_seen():
-    jacobian, G = frozen_identifier(laws.integral, 0.4, np.zeros((2, 2)))
+    jacobian, G = frozen_identifier(LAWS["integral"], 0.4, np.zeros((2, 2)))
     loop = Loop(A_d=A_D, forgetting=3.0, law=INTEGRAL, G=G, leakage=0.4)
     wrong = loop.matrix()
     wrong[4:, 2:4] = -G @ np.linalg.inv(A_D)
@@ -102,14 +100,16 @@ def test_the_exact_integrator_is_the_matrix_exponential():
     assert growth_rate(M) == pytest.approx(np.log(radius) / 0.02, rel=1e-8)
 
 
-def test_the_coefficients_of_a_law_are_read_off_and_a_nonlinear_law_is_refused():
-    assert linear_law(laws.integral, 0.2) == INTEGRAL
-    assert linear_law(laws.instantaneous, 0.2) == INSTANTANEOUS
-    assert linear_law(laws.pi_lead, 0.2) == pi_lead(0.2) == (1.0, 0.2)
-    with pytest.raises(ValueError, match="linear"):
-        linear_law(lambda z, xi_tilde, lead: z * abs(z))
+def test_a_law_gives_the_coefficients_of_its_driving_error_and_one_that_drives_away_is_refused():
+    assert LAWS["integral"].error(0.2) == INTEGRAL == (1.0, 0.0)
+    assert LAWS["instantaneous"].error(0.2) == INSTANTANEOUS == (0.0, 1.0)
+    assert LAWS["pi_lead"].error(0.2) == pi_lead(0.2) == (1.0, 0.2)
     with pytest.raises(ValueError, match="positively"):
-        linear_law(lambda z, xi_tilde, lead: xi_tilde - z)
+        Law(name="away", z=-1.0, xi=1.0)
+    with pytest.raises(ValueError, match="positively"):
+        Law(name="nothing")
+    with pytest.raises(ValueError, match="positively"):
+        Law(name="unknown", z=float("nan"))
     with pytest.raises(ValueError, match="leakage"):
         Loop(A_d=A_D, forgetting=3.0, law=INTEGRAL, G=np.eye(2), leakage=-0.1)
 

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.defaults import natural_driving, natural_operation, paper_identifier
+from identifier.driving import natural_driving
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.network import NetworkModel, Weights
 from identifier.run import History, identify
@@ -70,7 +70,7 @@ def learnt_alone(design: PaperIdentifier, drives: Drives, weights: Weights, i: i
 
 @pytest.mark.parametrize("law", ["integral", "instantaneous", "pi_lead"])
 def test_the_largest_norms_are_those_of_the_same_run_alone(drives, law):
-    design = paper_identifier(CAR, law=law)
+    design = PaperIdentifier.for_vehicle(CAR, law=law)
     begun = first_weights(design, COUNT, Beginning(W=3.0, V=12.0), np.random.default_rng(8))
     found = largest_norms(design, CAR, drives, begun)
     for i in range(COUNT):
@@ -85,7 +85,7 @@ def test_the_largest_norms_are_those_of_the_same_run_alone(drives, law):
 
 
 def test_what_is_not_a_number_shows_in_the_end():
-    design = paper_identifier(CAR)
+    design = PaperIdentifier.for_vehicle(CAR)
     wild = replace(design, gains=replace(design.gains, eta_W=1e9, rho_W=0.0, rho_V=0.0))
     found = monte_carlo(wild, CAR, DRIVING, 20, beginning=FRESH, rng=np.random.default_rng(0))
     assert found.diverged > 0
@@ -117,8 +117,8 @@ def test_the_plant_is_a_magic_formula_that_saturates_at_the_friction():
 
 
 def test_drives_stay_within_what_is_judged():
-    design = paper_identifier(CAR)
-    operation = natural_operation(design, CAR)
+    design = PaperIdentifier.for_vehicle(CAR)
+    operation = design.operation(CAR)
     found = monte_carlo(design, CAR, DRIVING, 300, beginning=FRESH, rng=np.random.default_rng(1))
     assert found.xi_tilde.shape == found.W.shape == found.residual.shape == (300,)
     assert found.residual.max() <= operation.disturbance.residual
@@ -127,7 +127,7 @@ def test_drives_stay_within_what_is_judged():
 
 
 def test_the_same_seed_gives_the_same_drives_and_progress_reaches_the_end():
-    design = paper_identifier(CAR)
+    design = PaperIdentifier.for_vehicle(CAR)
     told = []
     first, again = (
         monte_carlo(
@@ -147,7 +147,7 @@ def test_the_same_seed_gives_the_same_drives_and_progress_reaches_the_end():
 
 def test_driving_that_hardly_a_drive_keeps_to_is_refused(monkeypatch):
     monkeypatch.setattr(module, "TRIES", 1)
-    design = paper_identifier(CAR)
+    design = PaperIdentifier.for_vehicle(CAR)
     with pytest.raises(ValueError, match="judge harder driving"):
         monte_carlo(
             design,
@@ -168,7 +168,7 @@ def test_slips_are_those_of_the_paper(drives):
 
 def test_first_weights_of_V_are_shrunk_to_the_largest_that_a_drive_may_begin_with():
     """Drawn larger they keep their direction, drawn smaller they stay as they were drawn."""
-    design, norms = paper_identifier(CAR), {}
+    design, norms = PaperIdentifier.for_vehicle(CAR), {}
     for largest in (2.0, 100.0):
         begun = first_weights(design, COUNT, Beginning(W=0.0, V=largest), np.random.default_rng(8))
         norms[largest] = begun.V, np.linalg.norm(begun.V, axis=(1, 2))

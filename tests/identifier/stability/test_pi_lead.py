@@ -4,8 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.paper import laws
-from identifier.paper.laws import Gains
+from identifier.paper.laws import LAWS, Gains
 from identifier.stability import Operation, certify
 from identifier.stability.loop import INTEGRAL, Loop, direction_matrix
 from identifier.stability.lyapunov import lyapunov
@@ -107,9 +106,9 @@ def test_the_law_that_runs_goes_along_p_of_the_lyapunov_equation():
         A_d = -rng.uniform(1.0, 8.0) * np.eye(2) + 2.0 * rng.standard_normal((2, 2))
         if np.linalg.eigvals(A_d).real.max() > -0.1:
             continue
-        P = direction_matrix(laws.pi_lead, A_d)
+        P = direction_matrix(LAWS["pi_lead"], A_d)
         np.testing.assert_allclose(A_d.T @ P + P @ A_d, -2.0 * np.eye(2), atol=1e-10)
-        printed = direction_matrix(laws.integral, A_d)
+        printed = direction_matrix(LAWS["integral"], A_d)
         np.testing.assert_allclose(A_d.T @ printed, -np.eye(2), atol=1e-10)
 
 
@@ -136,8 +135,8 @@ def test_the_certificate_finds_no_gain_limit_of_the_lead_even_for_skewed_error_d
         rho_V=0.1,
         lead=tau,
     )
-    certificate = certify(gains, laws.pi_lead, task)
+    certificate = certify(gains, LAWS["pi_lead"], task)
     assert certificate["gain_continuous"].margin == np.inf
     assert certificate["drift"].limit == np.inf
-    short = certify(replace(gains, lead=0.2 * tau), laws.pi_lead, task)
+    short = certify(replace(gains, lead=0.2 * tau), LAWS["pi_lead"], task)
     assert short["drift"].limit < np.inf

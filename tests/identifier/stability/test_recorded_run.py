@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from identifier.defaults import natural_operation, paper_identifier
-from identifier.paper.laws import DRIVING_ERRORS
+from identifier.paper.design import PaperIdentifier
+from identifier.paper.laws import LAWS
 from identifier.run import identify
 from identifier.stability.certificate import loop_along, network_inputs
-from identifier.stability.loop import direction_matrix, linear_law
+from identifier.stability.loop import direction_matrix
 from identifier.stability.operation import proven_bounds, worst_loop
 
 
 def test_gain_along_a_run_is_the_formula_at_one_sample(car, drive):
-    design = paper_identifier(car)
+    design = PaperIdentifier.for_vehicle(car)
     history = identify(drive(n=600), car, design)
     along, k = loop_along(history, design), 345
     x_bar = np.concatenate([history.recording.x[k], history.recording.u[k]])
@@ -26,10 +26,10 @@ def test_gain_along_a_run_is_the_formula_at_one_sample(car, drive):
 
 
 def test_no_recorded_regressor_is_worse_than_the_worst(car, drive):
-    design = paper_identifier(car)
+    design = PaperIdentifier.for_vehicle(car)
     history = identify(drive(n=600), car, design)
-    integral, task = DRIVING_ERRORS[design.law], natural_operation(design, car)
-    law, D = linear_law(integral), direction_matrix(integral, design.gains.matrix)
+    integral, task = LAWS[design.law], design.operation(car)
+    law, D = integral.error(), direction_matrix(integral, design.gains.matrix)
     kept = proven_bounds(design.gains, law, task, D).W
     worst = worst_loop(design.gains, law, task, D, kept)
     along = loop_along(history, design)

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.defaults import design_for, natural_driving, natural_operation, paper_identifier
-from identifier.paper.design import PaperIdentifier
-from identifier.paper.laws import DRIVING_ERRORS, Gains, diagonal, rk4
+from identifier.driving import natural_driving
+from identifier.paper.design import PaperIdentifier, design_for
+from identifier.paper.laws import LAWS, DrivingError, Gains, diagonal, rk4
 from identifier.paper.network import Network
 from identifier.paper.step import GAINS, build_step
 from identifier.run import identify
 from identifier.stability import certify
-from identifier.stability.loop import INTEGRAL, Law, direction_matrix, linear_law
+from identifier.stability.loop import INTEGRAL, direction_matrix
 from identifier.stability.monte_carlo import (
     Beginning,
     largest_norms,
@@ -39,18 +39,18 @@ SKEWED = np.array([[-6.0, 4.0], [-1.0, -9.0]])
 
 
 def judged(design):
-    return certify(design.gains, DRIVING_ERRORS[design.law], natural_operation(design, CAR))
+    return certify(design.gains, LAWS[design.law], design.operation(CAR))
 
 
 def bounds_of(design, driving=None):
-    law = DRIVING_ERRORS[design.law]
+    law = LAWS[design.law]
     D = direction_matrix(law, design.gains.matrix)
-    task = natural_operation(design, CAR, driving)
-    return proven_bounds(design.gains, linear_law(law, design.gains.lead), task, D)
+    task = design.operation(CAR, driving)
+    return proven_bounds(design.gains, law.error(design.gains.lead), task, D)
 
 
 @pytest.mark.parametrize("A_d", [-6.0 * np.eye(2), SKEWED])
-@pytest.mark.parametrize("law", [INTEGRAL, Law(0.0, 1.0), Law(1.0, 0.2)])
+@pytest.mark.parametrize("law", [INTEGRAL, DrivingError(0.0, 1.0), DrivingError(1.0, 0.2)])
 def test_without_noise_euler_has_the_bounds_of_the_closed_form(A_d, law):
     gains = Gains(
         A_d=tuple(map(tuple, A_d)), forgetting=5.0, eta_W=40.0, eta_V=0.0, rho_W=2.0, rho_V=0.0
@@ -149,7 +149,7 @@ def test_no_drive_passes_a_bound_with_noise_resumed_weights_and_a_high_gain(law,
 
 
 def test_a_V_layer_that_leaks_more_than_itself_in_a_sample_fails_and_diverges():
-    design = paper_identifier(CAR)
+    design = PaperIdentifier.for_vehicle(CAR)
     planted = replace(design, gains=replace(design.gains, rho_V=3000.0))
     certificate = judged(planted)
     assert certificate["leakage_step_V"].status == "fail"
@@ -184,22 +184,22 @@ def test_a_smooth_tire_short_of_sliding_keeps_the_bound_and_passes_that_of_a_sli
 
 
 def test_a_filter_that_forgets_more_than_itself_in_a_sample_fails():
-    design = paper_identifier(CAR)
+    design = PaperIdentifier.for_vehicle(CAR)
     certificate = judged(replace(design, gains=replace(design.gains, forgetting=199.0)))
     assert certificate["filter_step"].status == "fail"
 
 
 def test_nothing_that_is_unbounded_passes():
-    gains = paper_identifier(CAR).gains
+    gains = PaperIdentifier.for_vehicle(CAR).gains
     for changed in ({"rho_W": 0.0, "eta_V": 0.0}, {"rho_V": 0.0}, {"rho_W": 0.0, "rho_V": 0.0}):
-        design = replace(paper_identifier(CAR), gains=replace(gains, **changed))
+        design = replace(PaperIdentifier.for_vehicle(CAR), gains=replace(gains, **changed))
         assert judged(design).verdict != "pass"
 
 
 def test_sensors_that_err_more_than_declared_pass_the_bound_and_those_as_declared_do_not():
     exact = replace(DRIVING, slip=0.01, noise_v_x=0.0, noise_v_y=0.0, noise_r=0.0, noise_delta=0.0)
     poor = replace(exact, noise_v_y=1.0, noise_r=0.1)
-    design = paper_identifier(CAR)
+    design = PaperIdentifier.for_vehicle(CAR)
     gains = replace(design.gains, eta_W=0.0, eta_V=0.0, rho_W=0.0, rho_V=0.0, W_max=1e-3)
     quiet = replace(design, gains=gains)
     rng = np.random.default_rng(3)
@@ -224,7 +224,7 @@ def test_the_projection_of_rk4_needs_no_gain_to_be_small():
 
 def test_the_tight_route_claims_no_less_than_an_identifier_without_a_network():
     for law in ("integral", "instantaneous"):
-        certificate = judged(paper_identifier(CAR, law=law))
+        certificate = judged(PaperIdentifier.for_vehicle(CAR, law=law))
         for name in ("printed_bound", "tight_bound", "ultimate_bound"):
             assert certificate[name].value >= certificate["trivial_bound"].value * (1 - 1e-9)
 
@@ -243,7 +243,7 @@ def test_the_sedan_in_its_own_slalom_keeps_the_bound_of_the_slip_that_it_reaches
 
 def test_a_projection_far_beyond_what_the_leakage_keeps_changes_no_bound_on_v():
     """Inner stages of RK4 go beyond the W of samples, with such a projection as without."""
-    free = replace(paper_identifier(CAR), integrator="rk4")
+    free = replace(PaperIdentifier.for_vehicle(CAR), integrator="rk4")
     bound = bounds_of(free)
     far = replace(free, gains=replace(free.gains, W_max=2.0 * bound.W))
     assert pytest.approx(bound.V, rel=1e-12) == bounds_of(far).V
