@@ -160,7 +160,7 @@ def test_without_options_it_says_what_is_certified_of_what_identify_uses(capsys,
     assert code == 0
     assert said.out.startswith("sedan: axle, the default of tireid identify\n")
     assert "verdict: not certified; no margin and no bound of its error is proven" in said.out
-    held = AxleIdentifier.for_vehicle(sedan()).certificate["held_by_construction"]
+    held = AxleIdentifier.for_vehicle(sedan()).certify(sedan()).held
     least, most = held["grip_static_axle_loads"]
     assert re.search(rf"grip_static_axle_loads +{number(least)} to {number(most)}\n", said.out)
     assert set(held) <= set(said.out.split())
