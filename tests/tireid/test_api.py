@@ -335,7 +335,7 @@ def test_only_the_paper_s_identifier_is_certified(car):
 
 
 def test_a_run_a_model_and_a_method_are_exported(run, car, tmp_path, monkeypatch):
-    monkeypatch.setattr("tireid.exporting.measure", lambda _: [])  # has tests of its own
+    monkeypatch.setattr("tireid.exporting.measure", lambda *_: [])  # has tests of its own
     written = ti.export(run, tmp_path / "run", name="axle")
     assert (tmp_path / "run" / "include" / "axle.h").is_file()
     expected = build_package(run.design, car, run.freeze(), name="axle", single=False)
