@@ -1,4 +1,8 @@
-"""The C files of a folded step: header, equations, state and guards."""
+"""The C files of a specialized step: the real C of `c/` under its name, and what is generated.
+
+Generated are `<name>_config.h` (switches, numbers, structures), `<name>_tables.h` (where the state
+starts, what weights must keep) and `<name>_equations.c`.
+"""
 
 import math
 import textwrap
@@ -8,41 +12,42 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
-from codegen.clean_c import OWN, Statements, literal, recognized
+from codegen.clean_c import Statements, literal, own_functions, recognized, used_macros
+from codegen.escape import c_comment
 from codegen.graph import graph_of
-from codegen.template import Values, Words, filled
+from codegen.package import c_files, defines, header, precision
+from codegen.template import Values, Words
 from identifier.export.layout import (
+    SLACK,
     Member,
     carried_members,
-    conditions,
-    covariance_values,
-    factor_values,
-    has_amounts,
+    covariance_order,
     initializer,
     output_members,
     read_expression,
-    sum_terms,
+    rules,
     write_expression,
 )
 from identifier.export.specialize import SpecializedStep
-from identifier.refused import NOWHERE, STALE_TIME
+from identifier.refused import GATE, NOWHERE, STALE_TIME
 
-TEMPLATES = Path(__file__).parent / "c"
-# Where a step begins anew, by whether it does so at the first sample of all.
-_BEGINS: Mapping[bool, str] = {
-    True: "(state->started == 0U) || (state->missed > 0U)",
-    False: "(state->started != 0U) && (state->missed > 0U)",
+C = Path(__file__).parent / "c"
+PREFIX = "tireid"  # of the C as it lies there
+LIBRARY: Mapping[str, str] = {
+    "tireid.h": "include",
+    "tireid_equations.h": "src",
+    "tireid.c": "src",
 }
-MACROS: Mapping[str, tuple[str, str]] = {  # in float and in double
-    "PICK": ("PICK(x, y) x##F", "PICK(x, y) y"),
-    "SQRT": ("SQRT(x) sqrtf(x)", "SQRT(x) sqrt(x)"),
-    "FABS": ("FABS(x) fabsf(x)", "FABS(x) fabs(x)"),
-    "FLOOR": ("FLOOR(x) floorf(x)", "FLOOR(x) floor(x)"),
-}
+PROGRAMS: Mapping[str, str] = {"main.c": "examples", "test_tireid.c": "tests"}
+# Of the library as one file, headers first.
+ORDER = (
+    *("include/{}_config.h", "include/{}.h", "src/{}_equations.h", "src/{}_tables.h"),
+    *("src/{}_equations.c", "src/{}.c"),
+)
 
 
 def c_sources(specialized: SpecializedStep, *, single: bool, about: Values) -> dict[str, str]:
-    """Return the C files by their path in the package.
+    """Return the C files of the library by their path in the package.
 
     Parameters
     ----------
@@ -64,190 +69,150 @@ def c_sources(specialized: SpecializedStep, *, single: bool, about: Values) -> d
         if not math.isfinite(number):
             raise ValueError(f"a carried value must be finite to be exported, it is {number}")
     name = specialized.name
-    values: dict[str, str | Words] = {**about, **_pieces(specialized, single=single)}
-    values |= _parts(specialized, values)
-    equations, shell = _filled("equations.c", values), _filled("name.c", values)
-    values |= _macros(name, equations + shell)
     return {
-        f"include/{name}.h": _filled("name.h", values),
-        f"src/{name}_equations.h": _filled("equations.h", values),
-        f"src/{name}_equations.c": equations,
-        f"src/{name}.c": shell,
+        **c_files(C, LIBRARY, {PREFIX: name}),
+        f"include/{name}_config.h": _config(specialized, single=single, about=about),
+        f"src/{name}_tables.h": _tables(specialized, about),
+        f"src/{name}_equations.c": _equations(specialized, about),
     }
 
 
-def _pieces(specialized: SpecializedStep, *, single: bool) -> dict[str, str]:
-    name, real = specialized.name, f"{specialized.name}_real"
-    state, told = carried_members(specialized), output_members(specialized)
-    learnt = [member for member in state if member.learnt]
-    others = [member for member in state if not member.learnt]
-    driving, called = _body(specialized, specialized.parts.where_true)
-    decided, called_elsewhere = _decided(specialized)
-    limits = specialized.limits
-    terms = (*sum_terms(state, name, "values->"), *sum_terms(told, name, "out->"))
-    total = _sum(terms, " " * 8)
-    return {
-        "single": str(int(single)),
-        "dt": _number(specialized.dt),
-        "min_speed": _number(specialized.min_speed),
-        "max_speed": _number(limits.speed),
-        "max_yaw_rate": _number(limits.yaw_rate),
-        "max_steering": _number(limits.steering),
-        "max_force": _number(limits.force),
-        "input_members": "".join(
-            f"    {real} {port.name}; /* {port.description} [{port.unit}] */\n"
-            for port in specialized.inputs
-        ),
-        "output_members": _declarations(told, real),
-        "weights_type": (
-            "/* What is learnt. */\ntypedef struct {\n"
-            f"{_declarations(learnt, real)}}} {name}_weights;\n\n"
-            if learnt
-            else ""
-        ),
-        "carry_members": (f"    {name}_weights weights;\n" if learnt else "")
-        + _declarations(others, real),
-        "functions": _functions(name, called | called_elsewhere),
-        "driving": driving,
-        "at_rest": "driving",
-        **decided,
-        "start": _start(specialized, learnt, others),
-        "zeros": _zeros(told, name),
-        "sum": total,
-        "weights_sum": _sum(
-            sum_terms([member._replace(learnt=False) for member in learnt], name, "weights->"),
-            " " * 12,
-        ),
-        "weights_rules": conditions(learnt, name),
-        "keep": _keep(name, bool(learnt)),
-        "hold": (
-            "    if (state->adapts == 0U) {\n        next.weights = state->values.weights;\n    }\n"
-            if learnt
-            else ""
-        ),
-        "believed": specialized.believed or "",
-        "first": (
-            ""
-            if specialized.believed
-            else f"            if ({_BEGINS[specialized.rests_first]}) {{\n"
-            f"                {name}_begin(state, params, input);\n"
-            "            }\n"
-        ),
-        "stale_time": _number(STALE_TIME),
-        "nowhere": literal(NOWHERE, name),
-        "missed_params": f", const {name}_params *params" if specialized.believed else "",
-        "missed_arguments": ", params" if specialized.believed else "",
-    }
+def _words(about: Values, key: str) -> str:
+    given = about[key]
+    return c_comment(given.text) if isinstance(given, Words) else given
 
 
-def _parts(specialized: SpecializedStep, values: Values) -> dict[str, str]:
-    """Return the pieces that have a template of their own, filled; empty where not needed."""
-    decides = specialized.parts.where_false is not None
-    learns, judges = bool(specialized.learnt), bool(specialized.believed)
-    wanted = {
-        "weights_prototypes": ("weights.h", learns),
-        "weights_functions": ("weights.c", learns),
-        "sum_function": ("sum.c", f"{specialized.name}_sum(" in str(values["sum"])),
-        "believed_function": ("believed.c", judges),
-        "judge": ("judge.c", judges),
-        "begin": ("begin.c", not judges),
-        "pass": ("pass.c", judges),
-        "decided_prototypes": ("decided.h", decides),
-        "decided_functions": ("decided.c", decides),
-    }
-    weights = [member for member in carried_members(specialized) if member.learnt]
-    covariance, factors = covariance_values(weights), factor_values(weights)
-    inner = {
-        "covariance_function": _filled("covariance.c", {**values, **covariance})
-        if covariance
-        else "",
-        "factors_function": _filled("factors.c", {**values, **factors}) if factors else "",
-        "amounts_function": _filled("not_negative.c", values) if has_amounts(weights) else "",
-    }
-    values = {**values, **inner}
-    parts = {key: _filled(file, values) if there else "" for key, (file, there) in wanted.items()}
-    step = "decided_step.c" if decides else "undecided_step.c"
-    parts["compute"] = _filled(step, {**values, **parts})
-    for part in ("advance", "missed"):
-        parts[f"{part}_function"] = _filled(f"{part}.c", {**values, **parts})
-    return parts
-
-
-def _macros(name: str, text: str) -> dict[str, str]:
-    """Return the definitions of the macros that a text uses, in float and in double."""
-    used = [key for key in MACROS if f"{name.upper()}_{key}(" in text]
-    return {
-        f"macros_{kind}": "".join(f"#define {name.upper()}_{MACROS[key][i]}\n" for key in used)
-        for i, kind in enumerate(("single", "double"))
-    }
-
-
-def _wrapped(text: str, indent: str, width: int = 100) -> str:
-    return textwrap.fill(
-        text,
-        width,
-        initial_indent=indent,
-        subsequent_indent=indent + "  " * text.startswith("{"),
-        break_long_words=False,
-        break_on_hyphens=False,
+def _generated(about: Values) -> str:
+    return (
+        f"Generated by tireid {about['version']} from {about['hash']}: do not edit, export again."
     )
 
 
-def _sum(terms: Sequence[str], indent: str) -> str:
-    solid = " + ".join(term.replace(" ", "\xa0") for term in terms)
-    return _wrapped(solid, indent).replace("\xa0", " ")
+# Switches, numbers and structures.
 
 
-def _filled(template: str, values: Values) -> str:
-    return filled(TEMPLATES / template, values)
+def _config(specialized: SpecializedStep, *, single: bool, about: Values) -> str:
+    name, learnt, others = specialized.name, *_weights_and_others(specialized)
+    title = f"{_words(about, 'title')} ({about['method']}): switches, numbers, structures."
+    stale = f"{name.upper()}_STALE_TIME"
+    return header(
+        f"{name}_config.h",
+        f"{title}\n\n{_generated(about)}",
+        [
+            precision(name, single=single),
+            defines(name, _switches(specialized)),
+            defines(name, _numbers(specialized, about)),
+            "/* Time [s] without a sample that could be taken after which no force is told any\n"
+            f" * more; may be set by who compiles the library. */\n#ifndef {stale}\n"
+            f"#define {stale} ({_number(STALE_TIME)})\n#endif\n",
+            _structure(f"{name}_input", _inputs(specialized)),
+            _structure(f"{name}_output", _declarations(output_members(specialized), name)),
+            _structure(f"{name}_weights", _declarations(learnt, name), "What is learnt."),
+            _structure(
+                f"{name}_values",
+                (f"    {name}_weights weights;\n" if learnt else "") + _declarations(others, name),
+                "What is carried from step to step.",
+            ),
+        ],
+    )
+
+
+def _switches(specialized: SpecializedStep) -> dict[str, tuple[object, str]]:
+    learnt, _ = _weights_and_others(specialized)
+    if specialized.believed not in (None, GATE):
+        raise ValueError(f"the C looks for what was believed in {GATE}, not {specialized.believed}")
+    count, order = len(rules(learnt)), covariance_order(learnt)
+    ruled: dict[str, tuple[object, str]] = {
+        "COVARIANCE": (f"{order}U", "rows of a covariance among the weights"),
+        "SLACK": (SLACK, "of a variance, in parts, to zero"),
+    }
+    return {
+        "LEARNS": (int(bool(learnt)), "there are weights, which adaptation moves"),
+        "JUDGES": (int(specialized.believed is not None), "the step has a gate of its own"),
+        "DECIDES": (
+            int(specialized.parts.where_false is not None),
+            "equations at rest are others than those of driving",
+        ),
+        "RESTS_FIRST": (
+            int(specialized.rests_first),
+            "the first sample of all is one to rest at before it is taken",
+        ),
+        "RULES": (f"{count}U", "of weights that are taken over"),
+        **(ruled if order else {"COVARIANCE": ruled["COVARIANCE"]} if count else {}),
+    }
+
+
+def _numbers(specialized: SpecializedStep, about: Values) -> dict[str, tuple[object, str]]:
+    limits = specialized.limits
+    numbers = {
+        "SAMPLE_TIME": (specialized.dt, "from one sample to the next [s]"),
+        "MIN_SPEED": (specialized.min_speed, "below it forces read zero and learning rests [m/s]"),
+        "MAX_SPEED": (limits.speed, "default of what is accepted [m/s]"),
+        "MAX_YAW_RATE": (limits.yaw_rate, "likewise [rad/s]"),
+        "MAX_STEERING": (limits.steering, "likewise [rad]"),
+        "MAX_FORCE": (limits.force, "likewise [N]"),
+        **({"NOWHERE": (NOWHERE, "speed of no car [m/s]")} if specialized.believed else {}),
+    }
+    said: dict[str, tuple[object, str]] = {
+        key: (f"({_number(value)})", words) for key, (value, words) in numbers.items()
+    }
+    return said | {"VERSION": (f'"{about["version_text"]}"', "name, hash, version of tireid")}
 
 
 def _number(value: float) -> str:
     return literal(value, "x").removeprefix("X_C(").removesuffix(")")
 
 
-def _declarations(members: list[Member], real: str) -> str:
-    return "".join(member.declaration(real) for member in members)
+def _weights_and_others(specialized: SpecializedStep) -> tuple[list[Member], list[Member]]:
+    members = carried_members(specialized)
+    return [m for m in members if m.learnt], [m for m in members if not m.learnt]
 
 
-def _body(specialized: SpecializedStep, function: ca.Function) -> tuple[str, set[str]]:
-    statements = Statements(
-        recognized(graph_of(function)),
-        prefix=specialized.name,
-        read=lambda port, entry: read_expression(specialized, port, entry),
-        write=lambda port, entry: write_expression(specialized, port, entry),
+def _inputs(specialized: SpecializedStep) -> str:
+    real = f"{specialized.name}_real"
+    return "".join(
+        f"    {real} {port.name}; /* {port.description} [{port.unit}] */\n"
+        for port in specialized.inputs
     )
-    return statements.block(), statements.called
 
 
-def _decided(specialized: SpecializedStep) -> tuple[dict[str, str], set[str]]:
-    """Return the pieces that decide between driving and rest, where the method does."""
-    if specialized.parts.where_false is None:
-        return {}, set()
-    elsewhere, called = _body(specialized, specialized.parts.where_false)
-    condition = Statements(
-        recognized(graph_of(specialized.parts.condition)),
-        prefix=specialized.name,
-        read=lambda port, entry: read_expression(specialized, port, entry),
-        write=lambda _port, _entry: "",
-        returns=True,
+def _declarations(members: Sequence[Member], name: str) -> str:
+    return "".join(member.declaration(f"{name}_real") for member in members)
+
+
+def _structure(name: str, members: str, about: str = "") -> str:
+    words = f"/* {about} */\n" if about else ""
+    return f"{words}typedef struct {{\n{members}}} {name};\n" if members else ""
+
+
+# Where the state starts, and rules of weights, as data.
+
+
+def _tables(specialized: SpecializedStep, about: Values) -> str:
+    name, learnt, others = specialized.name, *_weights_and_others(specialized)
+    outputs = output_members(specialized)
+    zeros = ", ".join(initializer(np.zeros(m.shape), m.dimensions, name) for m in outputs)
+    capital = name.upper()
+    kept = "".join(
+        f"    {{ {capital}_{rule.kind}, {rule.first}U, {rule.order}U }},\n"
+        for rule in rules(learnt)
     )
-    pieces = {"drives": condition.block(), "elsewhere": elsewhere, "at_rest": "elsewhere"}
-    return pieces, called | condition.called
-
-
-def _functions(name: str, called: set[str]) -> str:
-    """Return those of our own that are called, each over an array, written from one expression."""
-    texts = []
-    for own in sorted(called):
-        x = ca.SX.sym("x")
-        graph = recognized(graph_of(ca.Function(own, [x], [OWN[own](x)])), whole=False)
-        statements = Statements(graph, prefix=name, read=lambda *_: "x[i]", write=lambda *_: "x[i]")
-        texts.append(
-            f"static void {name}_{own}({name}_real *x, uint32_t n)\n{{\n    uint32_t i;\n"
-            f"    for (i = 0U; i < n; i++) {{\n{statements.block(indent=8)}    }}\n}}\n\n"
-        )
-    return "".join(texts)
+    body = (
+        f"static const {name}_values {name}_start = {{\n"
+        f"{_start(specialized, learnt, others)}\n}};\n\n"
+        f"static const {name}_output {name}_no_output = {{ {zeros} }};\n"
+    )
+    table = f"static const {name}_rule {name}_rules[{capital}_RULES] = {{\n{kept}}};\n"
+    return header(
+        f"{name}_tables.h",
+        f"Where the state starts, and what weights must keep.\n\n{_generated(about)}",
+        [
+            f'#include "{name}_equations.h"\n',
+            used_macros(name, body).removesuffix("\n"),
+            body,
+            table if kept else "",
+        ],
+    )
 
 
 def _start(specialized: SpecializedStep, learnt: list[Member], others: list[Member]) -> str:
@@ -266,20 +231,56 @@ def _by_rows(text: str, indent: str) -> str:
     """Return the initializer of a matrix with its rows below one another."""
     if not text.startswith("{ {"):
         return _wrapped(text, indent)
-    rows = [f"{{ {row} }}" for row in text[4:-4].split(" }, { ")]
-    return f"{indent}{{\n" + ",\n".join(_wrapped(row, f"{indent}    ") for row in rows) + " }"
+    lines = [f"{{ {row} }}" for row in text[4:-4].split(" }, { ")]
+    return f"{indent}{{\n" + ",\n".join(_wrapped(line, f"{indent}    ") for line in lines) + " }"
 
 
-def _zeros(members: list[Member], name: str) -> str:
-    return ", ".join(initializer(np.zeros(m.shape), m.dimensions, name) for m in members)
+def _wrapped(text: str, indent: str, width: int = 100) -> str:
+    return textwrap.fill(
+        text,
+        width,
+        initial_indent=indent,
+        subsequent_indent=indent + "  " * text.startswith("{"),
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
-def _keep(name: str, learns: bool) -> str:
-    if not learns:
-        return f"        state->values = {name}_start;\n"
+# The equations.
+
+
+def _equations(specialized: SpecializedStep, about: Values) -> str:
+    name, parts = specialized.name, specialized.parts
+    moves = f"(const {name}_values *now, const {name}_input *in, {name}_values *next,"
+    moves += f"\n    {name}_output *out)\n"
+    functions = {f"void {name}_driving{moves}": _statements(specialized, parts.where_true)}
+    if parts.where_false is not None:
+        condition = _statements(specialized, parts.condition, returns=True)
+        elsewhere = _statements(specialized, parts.where_false)
+        functions[f"bool {name}_drives(const {name}_input *in)\n"] = condition
+        functions[f"void {name}_elsewhere{moves}"] = elsewhere
+    called = {own for statements in functions.values() for own in statements.called}
+    body = own_functions(name, called) + "\n".join(
+        f"{signature}{{\n{statements.block()}}}\n" for signature, statements in functions.items()
+    )
+    macros = used_macros(name, body)
+    library = "#include <math.h>\n\n" if macros else ""
     return (
-        f"        {name}_weights weights;\n"
-        "        weights = state->values.weights;\n"
-        f"        state->values = {name}_start;\n"
-        "        state->values.weights = weights;\n"
+        f"/* The equations. {_generated(about)} */\n"
+        f'{library}#include "{name}_equations.h"\n\n'
+        "/* -ffp-contract=off gives the same bits on every machine; ISO modes of gcc have it by "
+        "themselves. */\n#if defined(__clang__)\n#pragma STDC FP_CONTRACT OFF\n#endif\n\n"
+        f"{macros}{body}"
+    )
+
+
+def _statements(
+    specialized: SpecializedStep, function: ca.Function, *, returns: bool = False
+) -> Statements:
+    return Statements(
+        recognized(graph_of(function)),
+        prefix=specialized.name,
+        read=lambda port, entry: read_expression(specialized, port, entry),
+        write=lambda port, entry: "" if returns else write_expression(specialized, port, entry),
+        returns=returns,
     )

@@ -2,7 +2,6 @@
 
 import ctypes
 import json
-import re
 from collections.abc import Mapping
 from enum import IntEnum
 from pathlib import Path
@@ -13,9 +12,9 @@ from numpy.typing import NDArray
 
 from codegen import load_library
 from codegen.arrays import Array
-from codegen.template import filled
-from identifier.export.c_source import TEMPLATES
-from identifier.export.package import FORMAT, NAME, Package
+from codegen.package import NAME, c_files, one_file
+from identifier.export.c_source import ORDER, PREFIX, C
+from identifier.export.package import FORMAT, Package
 from models.recordings import Recording
 from models.schema import Table, read_json, read_text, shown
 
@@ -131,19 +130,10 @@ class CompiledPackage:
         raise PackageFileError(f"{folder}: no package, a JSON file of format {FORMAT!r} is missing")
 
     def _source(self, files: Mapping[str, str]) -> str:
-        """Return the package as one file."""
-        name = self.name
-        order = ("src/{}_equations.h", "src/{}_equations.c", "src/{}.c")
-        paths = [f"include/{name}.h", *(path.format(name) for path in order)]
-        text = "".join(files[path] for path in paths)
-        glue = filled(TEMPLATES / "glue.c", {"name": name})
-        if self._weights:
-            glue += filled(TEMPLATES / "glue_weights.c", {"name": name})
-        return (
-            f"#define {name.upper()}_SINGLE {int(self.single)}\n"
-            + re.sub(r'^#include "[^"]*"$', "", text, flags=re.M)
-            + glue
-        )
+        """Return the package as one file, with what Python asks of it."""
+        texts = [files[path.format(self.name)] for path in ORDER]
+        (glue,) = c_files(C, {"glue.c": "."}, {PREFIX: self.name}).values()
+        return one_file([*texts, glue], defines={f"{self.name.upper()}_SINGLE": int(self.single)})
 
     def _call(self, function: str) -> Any:
         return getattr(self._library, f"{self.name}_{function}")  # which keeps it

@@ -9,7 +9,6 @@ import subprocess
 import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 from pathlib import Path, PurePosixPath
 from typing import Literal, NamedTuple
 from xml.etree.ElementTree import Element, indent, tostring
@@ -17,7 +16,8 @@ from xml.etree.ElementTree import Element, indent, tostring
 from codegen import CompilationError, find_compiler
 from codegen.compiler import KEEP_GUARDS
 from codegen.escape import visible
-from identifier.export.c_source import c_sources
+from codegen.package import c_files, header
+from identifier.export.c_source import PREFIX, c_sources
 from identifier.export.package import ingredients, summary
 from identifier.export.specialize import SpecializedStep
 from models.files import write_atomically
@@ -87,36 +87,19 @@ def build_binary(target: Target, name: str, sources: Mapping[str, bytes]) -> byt
         return (folder / library).read_bytes()
 
 
-# C source of a folded step for the FMU: the files of the C package, and model.h, which names them.
+# C source of a step for the FMU: the files of the C package, and those of c_fmu/ around them.
 #
 # What is simulated is what is shipped: the same equations, guards and status codes, in double.
 
-HEADER = """/* Generated: which component the FMU holds. */
-#ifndef MODEL_H
-#define MODEL_H
 
-#include "{name}.h"
-
-/* All names begin with that of the component, for programs that hold several. */
-#define MODEL(name) {name}_##name
-
-#define MODEL_TOKEN "{token}"
-#define MODEL_DT {NAME}_SAMPLE_TIME
-#define MODEL_MIN_SPEED {NAME}_MIN_SPEED
-
-#endif
-"""
-
-
-def model_header(name: str, token: str) -> str:
-    """Return model.h.
+def token_header(token: str) -> str:
+    """Return token.h, which tells this FMU from every other one.
 
     Parameters
     ----------
-    name : of the step.
     token : GUID of FMI 2.0, instantiation token of FMI 3.0.
     """
-    return HEADER.format(name=name, NAME=name.upper(), token=token)
+    return header("token.h", "Generated.", [f'#define MODEL_TOKEN "{token}"\n'])
 
 
 def model_files(specialized: SpecializedStep) -> dict[str, str]:
@@ -458,7 +441,8 @@ def _initial(variable: Variable) -> str:
 
 
 Version = Literal[2, 3]
-SHARED = ("memory.h", "memory.c")
+FMU = Path(__file__).parent / "c_fmu"
+SHARED = ("model.h", "memory.h", "memory.c")
 OF_VERSION: Mapping[Version, tuple[str, ...]] = {
     2: ("fmi2Functions.h", "fmi2.c"),
     3: ("fmi3Functions.h", "fmi3.c", "fmi3_stubs.c"),
@@ -522,19 +506,16 @@ def fmu_text(specialized: SpecializedStep, version: Version) -> dict[str, str]:
 def _text_with(
     specialized: SpecializedStep, shared: Mapping[str, str], version: Version, token: str
 ) -> dict[str, str]:
-    templates = files("identifier.export") / "c_fmu"
-    text = {
-        name: (templates / name).read_text(encoding="utf-8")
-        for name in (*SHARED, *OF_VERSION[version])
-    }
-    text |= {**shared, "model.h": model_header(specialized.name, token)}
-    c_files = sorted(name for name in text if name.endswith(".c"))
+    places = dict.fromkeys((*SHARED, *OF_VERSION[version]), ".")
+    text = c_files(FMU, places, {PREFIX: specialized.name})
+    text |= {**shared, "token.h": token_header(token)}
+    sources = sorted(name for name in text if name.endswith(".c"))
     members = {f"sources/{name}": content for name, content in text.items()}
     if version == 2:
-        members["modelDescription.xml"] = description_2(specialized, token, c_files)
+        members["modelDescription.xml"] = description_2(specialized, token, sources)
     else:
         members["modelDescription.xml"] = description_3(specialized, token)
-        members["sources/buildDescription.xml"] = build_description(specialized, c_files)
+        members["sources/buildDescription.xml"] = build_description(specialized, sources)
     return members
 
 

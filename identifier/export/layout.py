@@ -9,7 +9,6 @@ from codegen.clean_c import literal
 from identifier.export.specialize import SAMPLED, Signal, SpecializedStep
 from identifier.method import COVARIANCE, FACTORS, NOT_NEGATIVE
 
-FEW = 8  # entries that are summed one by one
 READS = {"x": ("v_y", "r"), "u": ("delta_f", "delta_r"), "v_x": ("v_x",)}
 
 
@@ -24,6 +23,11 @@ class Member(NamedTuple):
     def dimensions(self) -> tuple[int, ...]:
         """Sizes of the C array: none for a scalar, one for a row or column."""
         return tuple(size for size in self.shape if size > 1)
+
+    @property
+    def size(self) -> int:
+        """How many numbers."""
+        return self.shape[0] * self.shape[1]
 
     @property
     def path(self) -> str:
@@ -53,11 +57,6 @@ class Member(NamedTuple):
         row, column = entry % self.shape[0], entry // self.shape[0]
         pair = zip((row, column), self.shape, strict=True)
         return "".join(f"[{index}]" for index, size in pair if size > 1)
-
-    @property
-    def first(self) -> str:
-        """C index of the first number, in memory."""
-        return "[0]" * len(self.dimensions)
 
 
 def carried_members(specialized: SpecializedStep) -> list[Member]:
@@ -133,106 +132,64 @@ def initializer(value: Array, dimensions: tuple[int, ...], prefix: str) -> str:
     return "{ " + ", ".join(initializer(row, dimensions[1:], prefix) for row in rows) + " }"
 
 
-def sum_terms(members: list[Member], prefix: str, base: str) -> list[str]:
-    """Return terms whose sum is that of all numbers of members, and finite where they are.
-
-    Parameters
-    ----------
-    members : of one structure.
-    prefix : of the functions.
-    base : expression of the structure with its dot or arrow.
-    """
-    terms = []
-    for member in members:
-        place, size = f"{base}{member.path}", member.shape[0] * member.shape[1]
-        if size > FEW:
-            terms.append(f"{prefix}_sum(&{place}{member.first}, {size}U)")
-        else:
-            terms += [f"{place}{member.element(entry)}" for entry in range(size)]
-    return terms
-
-
 # What weights must be to be taken over, in C: covariances and amounts that are not negative.
 
 # What a variance may miss to zero by rounding, as a share of its own: float keeps seven digits, and
 # both precisions accept what they have learnt themselves.
-SLACK = "1e-3"
+SLACK = 1e-3
 
 
-def ruled(members: Sequence[Member]) -> list[Member]:
-    """Return the members that have a rule.
+class Rule(NamedTuple):
+    """A row of the table of rules: its kind in C, first number of the weights, rows of a matrix."""
+
+    kind: str
+    first: int
+    order: int
+
+
+def rules(members: Sequence[Member]) -> list[Rule]:
+    """Return what numbers of the weights must keep to be taken over.
+
+    Parameters
+    ----------
+    members : of the weights, in the order in which they lie in memory.
+    """
+    found, first = list[Rule](), 0
+    for member in members:
+        found += _rules_of(member, first)
+        first += member.size
+    return found
+
+
+def covariance_order(members: Sequence[Member]) -> int:
+    """Return the rows of the covariances among weights, 0 where there is none.
 
     Parameters
     ----------
     members : of the weights.
     """
-    return [member for member in members if member.signal.rule]
+    orders = {rule.order for rule in rules(members) if rule.kind in ("MATRIX", "TRIANGLE")}
+    return max(orders, default=0)
 
 
-def conditions(members: Sequence[Member], prefix: str) -> str:
-    """Return C expressions, each behind `&&`, that hold where weights keep their rules.
-
-    Parameters
-    ----------
-    members : of the weights.
-    prefix : of the functions.
-    """
-    calls = []
-    for member in ruled(members):
-        place, (rows, columns) = f"weights->{member.signal.name}", member.shape
-        if member.signal.rule == NOT_NEGATIVE:
-            size = f"{rows * columns}U"
-            calls.append(f"{prefix}_are_not_negative(&{place}{member.first}, {size})")
-        elif member.signal.rule == FACTORS:
-            calls += [f"{prefix}_are_factors({place}[{row}])" for row in range(rows)]
-        elif rows == columns:
-            calls.append(f"{prefix}_is_covariance(&{place}{member.first})")
-        else:
-            calls += [f"{prefix}_is_covariance({place}[{row}])" for row in range(rows)]
-    return "".join(f"\n            && {call}" for call in calls)
-
-
-def covariance_values(members: Sequence[Member]) -> dict[str, str] | None:
-    """Return order and layout of the covariances of a method for the template; None for none.
-
-    Parameters
-    ----------
-    members : of the weights.
-    """
-    shapes = {member.shape for member in members if member.signal.rule == COVARIANCE}
-    if not shapes:
-        return None
-    ((rows, columns),) = shapes
-    square = rows == columns
-    return {
-        "order": str(rows if square else _order(columns)),
-        "skip": "i" if square else "0U",
-        "layout": "It lies in the whole matrix." if square else "It lies alone.",
-        "slack": SLACK,
-    }
-
-
-def factor_values(members: Sequence[Member]) -> dict[str, str] | None:
-    """Return the order of the factored covariances of a method for the template; None for none.
-
-    Parameters
-    ----------
-    members : of the weights.
-    """
-    orders = {_order(member.shape[1]) for member in members if member.signal.rule == FACTORS}
-    return {"order": str(*orders)} if orders else None
+def _rules_of(member: Member, first: int) -> list[Rule]:
+    rows, columns = member.shape
+    starts = [first + row * columns for row in range(rows)]
+    match member.signal.rule:
+        case "":
+            return []
+        case rule if rule == NOT_NEGATIVE:
+            return [Rule("NOT_NEGATIVE", first, member.size)]
+        case rule if rule == FACTORS:
+            return [Rule("FACTORS", start, _order(columns)) for start in starts]
+        case rule if rule == COVARIANCE and rows == columns:
+            return [Rule("MATRIX", first, rows)]
+        case rule if rule == COVARIANCE:
+            return [Rule("TRIANGLE", start, _order(columns)) for start in starts]
+        case unknown:
+            raise ValueError(f"there is no C for the rule {unknown!r}")
 
 
 def _order(size: int) -> int:
     """Return the rows of a matrix whose upper triangle has so many numbers."""
     return (isqrt(8 * size + 1) - 1) // 2
-
-
-def has_amounts(members: Sequence[Member]) -> bool:
-    """Tell whether numbers of a method must not be negative.
-
-    Parameters
-    ----------
-    members : of the weights.
-    """
-    return any(member.signal.rule == NOT_NEGATIVE for member in members)

@@ -1,12 +1,7 @@
 """The package: C sources, example, self-test, build file, README and manifest, as texts by path."""
 
-import hashlib
-import json
-import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -14,9 +9,19 @@ import numpy as np
 
 from codegen.arrays import Array
 from codegen.escape import c_string
+from codegen.package import (
+    c_files,
+    check_name,
+    digest,
+    header,
+    manifest_text,
+    plain,
+    rows,
+    tireid_version,
+)
 from codegen.template import Values, Words, filled
-from identifier.export.c_source import TEMPLATES, c_sources
-from identifier.export.layout import Member, carried_members, output_members, ruled
+from identifier.export.c_source import PREFIX, PROGRAMS, C, c_sources
+from identifier.export.layout import Member, carried_members, output_members, rules
 from identifier.export.specialize import Signal, SpecializedStep, specialize
 from identifier.method import Method, vehicle_numbers
 from identifier.refused import NOWHERE, STALE_TIME, stale_samples
@@ -125,60 +130,6 @@ def _certificate_text(method: Method, vehicle: Vehicle) -> str:
     return "\n".join(lines)
 
 
-def digest(content: Any) -> str:
-    """Return the SHA-256 of data as JSON, 64 hexadecimal digits.
-
-    Parameters
-    ----------
-    content : ready for JSON.
-    """
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def manifest_text(content: Mapping[str, Any], files: Mapping[str, str]) -> str:
-    """Return <name>.json.
-
-    Parameters
-    ----------
-    content : what `ingredients` returned.
-    files : text of the other files by path.
-    """
-    hashes = {path: hashlib.sha256(text.encode()).hexdigest() for path, text in files.items()}
-    data = {**content, "hash": digest(content), "files_sha256": dict(sorted(hashes.items()))}
-    return json.dumps(data, indent=2) + "\n"
-
-
-def plain(value: Any) -> Any:
-    """Return data with plain numbers, lists and texts; infinity becomes a text.
-
-    Parameters
-    ----------
-    value : any of what dataclasses of methods hold.
-    """
-    match value:
-        case Mapping():
-            return {str(key): plain(item) for key, item in value.items()}
-        case np.ndarray():
-            return plain(value.tolist())
-        case list() | tuple():
-            return [plain(item) for item in value]
-        case float() | np.floating():
-            return float(value) if math.isfinite(value) else str(float(value))
-        case None | bool() | int() | str():
-            return value
-        case _:
-            return str(value)
-
-
-def tireid_version() -> str:
-    """Return the version of tireid."""
-    try:
-        return version("tireid")
-    except PackageNotFoundError:  # run from a checkout that is not installed
-        return "unknown"
-
-
 def _described(signal: Signal) -> dict[str, Any]:
     return {
         "name": signal.name,
@@ -277,32 +228,32 @@ def vectors(specialized: SpecializedStep) -> Vectors:
     return Vectors(samples, outputs[:, :2])
 
 
-def vectors_header(found: Vectors) -> str:
+def vectors_header(specialized: SpecializedStep, found: Vectors) -> str:
     """Return the vectors as a C header.
 
     Parameters
     ----------
+    specialized : the step.
     found : the vectors.
     """
-    return (
-        "/* Generated. Samples v_x, v_y, r, delta_f, delta_r [SI] and forces front, rear [N]. */\n"
-        f"#define VECTORS {len(found.samples)}\n\n"
-        f"static const double vector_input[VECTORS][5] = {{\n{_rows(found.samples)}}};\n\n"
-        f"static const double vector_force[VECTORS][2] = {{\n{_rows(found.force)}}};\n"
+    double, single = tolerances(specialized)
+    kept = rules([member for member in carried_members(specialized) if member.learnt])
+    negative = [f"#define VECTOR_NOT_NEGATIVE {rule.first}U /* a weight */\n" for rule in kept]
+    return header(
+        "vectors.h",
+        "Generated. Samples v_x, v_y, r, delta_f, delta_r [SI] and forces front, rear [N].",
+        [
+            f"#define VECTORS {len(found.samples)}\n"
+            f"#define VECTOR_TOLERANCE_DOUBLE {double} /* N */\n"
+            f"#define VECTOR_TOLERANCE_SINGLE {single} /* N */\n" + "".join(negative[:1]),
+            f"static const double vector_input[VECTORS][5] = {{\n{rows(found.samples)}}};\n",
+            f"static const double vector_force[VECTORS][2] = {{\n{rows(found.force)}}};\n",
+        ],
     )
 
 
-def _rows(table: Array) -> str:
-    return "".join(f"    {{ {', '.join(repr(float(v)) for v in row)} }},\n" for row in table)
-
-
-NAME = re.compile(r"[a-z][a-z0-9_]{0,30}")
 # Largest differences of a force that the self-test allows, in parts of the limit of forces.
 TOLERANCE_DOUBLE, TOLERANCE_SINGLE = 1e-8, 2e-5
-
-
-class PackageNameError(ValueError):
-    """A name that cannot begin the symbols of a C library."""
 
 
 class Package(NamedTuple):
@@ -340,10 +291,7 @@ def build_package(
     ValueError
         Where stored weights are those of another structure.
     """
-    if not NAME.fullmatch(name):
-        raise PackageNameError(
-            f"name must be lower-case letters, digits and _, at most 31, not {name!r}"
-        )
+    check_name(name)
     specialized = specialize(method, vehicle, start, name)
     content = ingredients(specialized, single=single)
     about = summary(specialized, content)
@@ -353,31 +301,23 @@ def build_package(
 
 
 def _other_files(specialized: SpecializedStep, about: Values, *, single: bool) -> dict[str, str]:
-    name, learnt = specialized.name, bool(specialized.learnt)
-    members = carried_members(specialized)
-    first = next((m.signal.name + m.first for m in members if m.learnt), "")
-    rules = ruled([member for member in members if member.learnt])
-    negative = {"first_rule": rules[0].signal.name + rules[0].first, **about} if rules else {}
-    about_weights = {
-        "first_weight": first,
-        "negative_test": filled(TEMPLATES / "negative_test.c", negative) if rules else "",
-        **about,
-    }
-    values = {
-        "weights_test": filled(TEMPLATES / "weights_test.c", about_weights) if learnt else "",
-        "weights_held": filled(TEMPLATES / "held_test.c", about) if learnt else "",
-        "weights_call": "    test_modes(&state, &params);\n" if learnt else "",
-        "tolerance_double": f"{TOLERANCE_DOUBLE * specialized.limits.force:.2g}",
-        "tolerance_single": f"{TOLERANCE_SINGLE * specialized.limits.force:.2g}",
-        "single_option": "ON" if single else "OFF",
-        **about,
-    }
+    values = {"single_option": "ON" if single else "OFF", **about}
     return {
-        "CMakeLists.txt": filled(TEMPLATES / "CMakeLists.txt", values),
-        "examples/main.c": filled(TEMPLATES / "main.c", values),
-        f"tests/test_{name}.c": filled(TEMPLATES / "test.c", values),
-        "tests/vectors.h": vectors_header(vectors(specialized)),
+        "CMakeLists.txt": filled(C / "CMakeLists.txt", values),
+        **c_files(C, PROGRAMS, {PREFIX: specialized.name}),
+        "tests/vectors.h": vectors_header(specialized, vectors(specialized)),
     }
+
+
+def tolerances(specialized: SpecializedStep) -> tuple[str, str]:
+    """Return the largest difference of a force that the self-test allows [N], double and float.
+
+    Parameters
+    ----------
+    specialized : the step.
+    """
+    force = specialized.limits.force
+    return f"{TOLERANCE_DOUBLE * force:.2g}", f"{TOLERANCE_SINGLE * force:.2g}"
 
 
 def readme(package: Package, about_figures: str) -> str:
@@ -394,14 +334,11 @@ def readme(package: Package, about_figures: str) -> str:
         f"| `{m.path}` | {_shape(m)} | {m.signal.unit} | {m.signal.description} |\n" for m in state
     )
     modes = _modes(specialized)
-    tolerance = (
-        TOLERANCE_DOUBLE * specialized.limits.force,
-        TOLERANCE_SINGLE * specialized.limits.force,
-    )
-    equations = package.files[f"src/{specialized.name}_equations.h"]
+    double, single = tolerances(specialized)
+    equations = package.files[f"src/{specialized.name}_equations.c"]
     called = [f"`{word}`" for word in ("sqrt", "fabs", "floor") if f" {word}(x)" in equations]
     return filled(
-        TEMPLATES / "README.md",
+        C / "README.md",
         {
             "input_table": _table([Member(s, (1, 1), False) for s in specialized.inputs]),
             "output_table": _table(output_members(specialized)),
@@ -412,8 +349,8 @@ def readme(package: Package, about_figures: str) -> str:
             **_about_gaps(specialized),
             "libraries": f"{', '.join(called) or 'nothing'} of `<math.h>`, copies of structures",
             "samples": str(SAMPLES),
-            "tolerance_double": f"{tolerance[0]:.2g}",
-            "tolerance_single": f"{tolerance[1]:.2g}",
+            "tolerance_double": double,
+            "tolerance_single": single,
             "figures": about_figures,
             **package.about,
         },

@@ -4,7 +4,6 @@ A recording runs through the package; what comes back is a hash of every state a
 and, from QEMU, what a step costs. QEMU lets one instruction take 1 ns, and SysTick counts.
 """
 
-import json
 import shutil
 import subprocess
 import tempfile
@@ -17,7 +16,8 @@ import numpy as np
 
 from codegen import CompilationError
 from codegen.arrays import Array
-from codegen.template import filled
+from codegen.package import manifest_with_figures, renamed
+from identifier.export.c_source import PREFIX
 from identifier.export.package import Package, synthetic_samples
 
 TARGET = Path(__file__).parent / "target"
@@ -255,7 +255,7 @@ def _build(
 ) -> None:
     sources = _write(folder, files)
     for path in TARGET.iterdir():
-        text = filled(path, {"name": name, "NAME": name.upper()})
+        text = renamed(path.read_text(encoding="utf-8"), {PREFIX: name})
         (folder / path.name).write_text(text, encoding="utf-8")
     (folder / "samples.bin").write_bytes(np.ascontiguousarray(samples, dtype="<f8").tobytes())
     own = [f"-D{name.upper()}_SINGLE={int(single)}", "-Iinclude", "-Isrc", "-I."]
@@ -389,4 +389,4 @@ def with_figures(manifest: str, costs: Sequence[Cost]) -> str:
         }
         for cost in costs
     ]
-    return json.dumps({**json.loads(manifest), "figures": figures}, indent=2) + "\n"
+    return manifest_with_figures(manifest, figures)

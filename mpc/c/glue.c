@@ -1,8 +1,8 @@
 #include <stddef.h>
 
-size_t @name@_sizes(int which)
+size_t tireid_mpc_sizes(int which)
 {
-  const size_t sizes[] = { sizeof(@name@_params), sizeof(@name@_state), sizeof(@name@_input),
-                           sizeof(@name@_work) };
+  const size_t sizes[] = { sizeof(tireid_mpc_params), sizeof(tireid_mpc_state), sizeof(tireid_mpc_input),
+                           sizeof(tireid_mpc_work) };
   return sizes[which];
 }

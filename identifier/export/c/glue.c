@@ -1,30 +1,93 @@
+/* What Python asks of an instance, in one translation unit with the library: see compiled.py. */
 #include <string.h>
 
-typedef struct { @name@_state state; @name@_params params; } @name@_instance;
+#include "tireid.h"
 
-size_t @name@_instance_size(void) { return sizeof(@name@_instance); }
-size_t @name@_state_size(void) { return sizeof(@name@_state); }
-void @name@_instance_init(@name@_instance *it)
+typedef struct {
+    tireid_state state;
+    tireid_params params;
+} tireid_instance;
+
+size_t tireid_instance_size(void);
+void tireid_instance_init(tireid_instance *it);
+void tireid_instance_reset(tireid_instance *it);
+void tireid_instance_run(tireid_instance *it, long n, const double *samples, double *output,
+    int *status);
+unsigned tireid_instance_faults(const tireid_instance *it);
+
+size_t tireid_instance_size(void)
 {
-  memset(it, 0, sizeof *it);
-  @name@_default_params(&it->params);
-  @name@_init(&it->state);
+    return sizeof(tireid_instance);
 }
-void @name@_instance_reset(@name@_instance *it) { @name@_reset(&it->state); }
-void @name@_instance_run(@name@_instance *it, long n, const double *samples, double *output,
-                         int *status)
+
+void tireid_instance_init(tireid_instance *it)
 {
-  const size_t size = sizeof(@name@_output) / sizeof(@name@_real);
-  @name@_real told[sizeof(@name@_output) / sizeof(@name@_real)];
-  long k;
-  size_t i;
-  for (k = 0; k < n; ++k) {
-    const double *s = samples + 5 * k;
-    const @name@_input input = { (@name@_real)s[0], (@name@_real)s[1], (@name@_real)s[2],
-                                  (@name@_real)s[3], (@name@_real)s[4] };
-    status[k] = (int)@name@_step(&it->state, &it->params, &input);
-    memcpy(told, &it->state.output, sizeof told);
-    for (i = 0; i < size; ++i) output[k * (long)size + (long)i] = (double)told[i];
-  }
+    (void)memset(it, 0, sizeof *it);
+    (void)tireid_default_params(&it->params);
+    (void)tireid_init(&it->state);
 }
-unsigned @name@_instance_faults(const @name@_instance *it) { return it->state.faults; }
+
+void tireid_instance_reset(tireid_instance *it)
+{
+    (void)tireid_reset(&it->state);
+}
+
+/* Samples are rows of v_x, v_y, r, delta_f, delta_r; outputs rows of all numbers of tireid_output. */
+void tireid_instance_run(tireid_instance *it, long n, const double *samples, double *output,
+    int *status)
+{
+    tireid_real numbers[sizeof(tireid_output) / sizeof(tireid_real)];
+    const size_t size = sizeof numbers / sizeof numbers[0];
+    long k;
+    size_t i;
+    for (k = 0; k < n; k++) {
+        const double *s = &samples[5 * k];
+        const tireid_input input = { (tireid_real)s[0], (tireid_real)s[1], (tireid_real)s[2],
+            (tireid_real)s[3], (tireid_real)s[4] };
+        status[k] = (int)tireid_step(&it->state, &it->params, &input);
+        (void)memcpy(numbers, &it->state.output, sizeof numbers);
+        for (i = 0; i < size; i++) {
+            output[((size_t)k * size) + i] = (double)numbers[i];
+        }
+    }
+}
+
+unsigned tireid_instance_faults(const tireid_instance *it)
+{
+    return it->state.faults;
+}
+
+#if TIREID_LEARNS
+void tireid_instance_adapt(tireid_instance *it, int adapts);
+void tireid_instance_weights(const tireid_instance *it, double *flat);
+int tireid_instance_take(tireid_instance *it, const double *flat);
+
+void tireid_instance_adapt(tireid_instance *it, int adapts)
+{
+    (void)tireid_set_adaptation(&it->state, adapts != 0);
+}
+
+void tireid_instance_weights(const tireid_instance *it, double *flat)
+{
+    tireid_weights weights;
+    tireid_real numbers[sizeof weights / sizeof(tireid_real)];
+    size_t i;
+    (void)tireid_get_weights(&it->state, &weights);
+    (void)memcpy(numbers, &weights, sizeof weights);
+    for (i = 0; i < (sizeof numbers / sizeof numbers[0]); i++) {
+        flat[i] = (double)numbers[i];
+    }
+}
+
+int tireid_instance_take(tireid_instance *it, const double *flat)
+{
+    tireid_weights weights;
+    tireid_real numbers[sizeof weights / sizeof(tireid_real)];
+    size_t i;
+    for (i = 0; i < (sizeof numbers / sizeof numbers[0]); i++) {
+        numbers[i] = (tireid_real)flat[i];
+    }
+    (void)memcpy(&weights, numbers, sizeof weights);
+    return (int)tireid_set_weights(&it->state, &weights);
+}
+#endif

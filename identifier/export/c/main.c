@@ -1,15 +1,15 @@
-/* Reads a recording, writes the forces that @name@ identifies.
+/* Reads a recording, writes the forces that are identified.
  *
- *     @name@_example log.csv > forces.csv
+ *     tireid_example log.csv > forces.csv
  *
  * The log is CSV with a header and, in any order, the columns t [s], vx, vy [m/s], r [rad/s],
- * delta_f [rad] and, where there is one, delta_r [rad]; one row each @dt@ s.
+ * delta_f [rad] and, where there is one, delta_r [rad]; one row each TIREID_SAMPLE_TIME.
  */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "@name@.h"
+#include "tireid.h"
 
 #define LINE 4096
 #define COLUMNS 64
@@ -50,7 +50,7 @@ static int find_columns(char *header, int column[SIGNALS])
             }
         }
         if ((column[i] < 0) && (i < (SIGNALS - 1))) {
-            fprintf(stderr, "@name@_example: the log has no column %s\n", names[i]);
+            fprintf(stderr, "tireid_example: the log has no column %s\n", names[i]);
             return 0;
         }
     }
@@ -75,8 +75,8 @@ int main(int argc, char *argv[])
 {
     static char line[LINE];
     int column[SIGNALS];
-    @name@_state state;
-    @name@_params params;
+    tireid_state state;
+    tireid_params params;
     FILE *log;
     if (argc != 2) {
         fprintf(stderr, "usage: %s log.csv > forces.csv\n", argv[0]);
@@ -91,26 +91,26 @@ int main(int argc, char *argv[])
         (void)fclose(log);
         return 2;
     }
-    (void)@name@_default_params(&params);
-    (void)@name@_init(&state);
+    (void)tireid_default_params(&params);
+    (void)tireid_init(&state);
     printf("t,Fyf,Fyr,status\n");
     while (fgets(line, LINE, log) != NULL) {
         char *piece[COLUMNS];
         const int count = split(line, piece);
-        @name@_input input;
-        @name@_real force[2];
-        @name@_status status;
-        input.v_x = (@name@_real)number(piece, count, column[1]);
-        input.v_y = (@name@_real)number(piece, count, column[2]);
-        input.r = (@name@_real)number(piece, count, column[3]);
-        input.delta_f = (@name@_real)number(piece, count, column[4]);
-        input.delta_r = (@name@_real)number(piece, count, column[5]);
-        status = @name@_step(&state, &params, &input);
-        (void)@name@_get_forces(&state, force);
+        tireid_input input;
+        tireid_real force[2];
+        tireid_status status;
+        input.v_x = (tireid_real)number(piece, count, column[1]);
+        input.v_y = (tireid_real)number(piece, count, column[2]);
+        input.r = (tireid_real)number(piece, count, column[3]);
+        input.delta_f = (tireid_real)number(piece, count, column[4]);
+        input.delta_r = (tireid_real)number(piece, count, column[5]);
+        status = tireid_step(&state, &params, &input);
+        (void)tireid_get_forces(&state, force);
         printf("%.6f,%.9g,%.9g,%d\n", number(piece, count, column[0]), (double)force[0],
             (double)force[1], (int)status);
     }
     (void)fclose(log);
-    fprintf(stderr, "%s; faults: %lu\n", @name@_version(), (unsigned long)state.faults);
+    fprintf(stderr, "%s; faults: %lu\n", tireid_version(), (unsigned long)state.faults);
     return 0;
 }

@@ -1,5 +1,5 @@
-/* Runs a recording through @name@ and prints a hash of all that came out, and what it cost. */
-#include "@name@.h"
+/* Runs a recording through tireid and prints a hash of all that came out, and what it cost. */
+#include "tireid.h"
 #include "machine.h"
 
 #define SPOT 16U /* the stack is looked at each so many steps */
@@ -11,7 +11,7 @@ typedef struct {
 extern const sample recorded_samples[];
 extern const sample recorded_end[];
 
-static @name@_state state; /* in .bss: bytes between its members are zero everywhere */
+static tireid_state state; /* in .bss: bytes between its members are zero everywhere */
 
 static uint64_t hash_bytes(uint64_t hash, const void *start, uint32_t size)
 {
@@ -40,7 +40,7 @@ static void print(const char *key, uint64_t number)
 
 int main(void)
 {
-    @name@_params params;
+    tireid_params params;
     uint64_t hash = 14695981039346656037U;
     uint64_t total = 0U;
     uint32_t most = 0U;
@@ -48,31 +48,31 @@ int main(void)
     uint32_t driven = 0U;
     uint32_t stack = 0U;
     const sample *at;
-    (void)@name@_default_params(&params);
-    (void)@name@_init(&state);
+    (void)tireid_default_params(&params);
+    (void)tireid_init(&state);
     machine_start_clock();
     for (at = recorded_samples; at < recorded_end; at++) {
-        @name@_input input;
+        tireid_input input;
         uint32_t code; /* an enum has not the same size everywhere */
         uint32_t before;
         uint32_t spent;
-        input.v_x = (@name@_real)at->value[0];
-        input.v_y = (@name@_real)at->value[1];
-        input.r = (@name@_real)at->value[2];
-        input.delta_f = (@name@_real)at->value[3];
-        input.delta_r = (@name@_real)at->value[4];
+        input.v_x = (tireid_real)at->value[0];
+        input.v_y = (tireid_real)at->value[1];
+        input.r = (tireid_real)at->value[2];
+        input.delta_f = (tireid_real)at->value[3];
+        input.delta_r = (tireid_real)at->value[4];
         if ((steps % SPOT) == 0U) {
             machine_paint_stack();
         }
         before = machine_instructions();
-        code = (uint32_t)@name@_step(&state, &params, &input);
+        code = (uint32_t)tireid_step(&state, &params, &input);
         spent = machine_instructions() - before;
         spent = (spent > 0x80000000U) ? 0U : spent; /* the counter wrapped */
         if ((steps % SPOT) == 0U) {
             const uint32_t used = machine_painted_stack_used();
             stack = (used > stack) ? used : stack;
         }
-        if (code == (uint32_t)@NAME@_OK) {
+        if (code == (uint32_t)TIREID_OK) {
             total += spent;
             driven++;
         }

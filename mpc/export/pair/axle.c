@@ -13,7 +13,7 @@ static const real ladder[UNITS] = { @ladder@ }; /* scales of the units [rad] */
 static const real max_slip[2] = { @max_slip@ }; /* of the tracker, at most [rad] */
 
 /* Weights of the prediction: offsets and lag, scales, then compliance, least lag and units. */
-static bool convert(const @name@_weights *learnt, real w[WEIGHTS])
+static bool convert(const tireid_weights *learnt, real w[WEIGHTS])
 {
     bool is_tire = true;
     uint32_t i;
@@ -75,7 +75,7 @@ static real useful_slip(const real w[WEIGHTS], uint32_t i, real first)
 }
 
 /* How far the curves of the tire are believed, and how they go on. */
-static void believe(@name@_mpc_params *params)
+static void believe(tireid_mpc_params *params)
 {
     uint32_t i;
     for (i = 0U; i < 2U; i++) {

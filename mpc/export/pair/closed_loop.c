@@ -1,6 +1,6 @@
-/* @name@ and @name@_mpc on a car: learn the tires while driving, and steer by what was learnt.
+/* tireid and tireid_mpc on a car: learn the tires while driving, and steer by what was learnt.
  *
- *     @name@_closed_loop [log.csv]
+ *     tireid_closed_loop [log.csv]
  *
  * Drives the same double lane changes twice: by the tires of the export, and learning. Returns 0
  * where the learning car stays on the road and, once it has learnt, within LEARNT_PEAK.
@@ -10,10 +10,10 @@
 #include <string.h>
 #include <time.h>
 
-#include "@name@.h"
-#include "@name@_handover.h"
-#include "@name@_mpc.h"
-#include "@name@_mpc_params.h"
+#include "tireid.h"
+#include "tireid_handover.h"
+#include "tireid_mpc.h"
+#include "tireid_mpc_params.h"
 #include "simulated_car.h"
 #include "lane_changes.h"
 
@@ -51,39 +51,39 @@ static double noise(double size)
 }
 
 /* The car against the road, and the road ahead. */
-static @name@_mpc_input look(const simulated_car *car, const @name@_mpc_params *params)
+static tireid_mpc_input look(const simulated_car *car, const tireid_mpc_params *params)
 {
     const double period = (double)params->period;
     const double ahead = fmax((double)params->delay - (0.5 * period), 0.0);
-    @name@_mpc_input in;
+    tireid_mpc_input in;
     unsigned k;
-    in.e_y = (@name@_mpc_real)(car->e_y + noise(0.005));
-    in.e_psi = (@name@_mpc_real)(car->e_psi + noise(0.001));
-    in.v_y = (@name@_mpc_real)(car->v_y + noise(0.02));
-    in.r = (@name@_mpc_real)(car->r + noise(0.002));
-    for (k = 0; k <= @NAME@_MPC_HORIZON; k++) {
+    in.e_y = (tireid_mpc_real)(car->e_y + noise(0.005));
+    in.e_psi = (tireid_mpc_real)(car->e_psi + noise(0.001));
+    in.v_y = (tireid_mpc_real)(car->v_y + noise(0.02));
+    in.r = (tireid_mpc_real)(car->r + noise(0.002));
+    for (k = 0; k <= TIREID_MPC_HORIZON; k++) {
         const double stage = ((double)k - 0.5) * (double)params->stage_time;
         const double t = (k == 0) ? 0.0 : (ahead + stage);
-        in.kappa[k] = (@name@_mpc_real)lane_changes_curvature(car->s + (car->v_x * t));
-        in.v_x[k] = (@name@_mpc_real)car->v_x;
+        in.kappa[k] = (tireid_mpc_real)lane_changes_curvature(car->s + (car->v_x * t));
+        in.v_x[k] = (tireid_mpc_real)car->v_x;
     }
     return in;
 }
 
 /* Tell the identifier what the sensors say, and hand over what it has learnt. */
-static bool learn(@name@_state *identifier, const @name@_params *limits, const simulated_car *car,
-    const @name@_mpc_input *seen, @name@_mpc_params *params, bool hands_over)
+static bool learn(tireid_state *identifier, const tireid_params *limits, const simulated_car *car,
+    const tireid_mpc_input *seen, tireid_mpc_params *params, bool hands_over)
 {
-    @name@_input in;
-    @name@_weights learnt;
-    in.v_x = (@name@_real)car->v_x;
-    in.v_y = (@name@_real)seen->v_y;
-    in.r = (@name@_real)seen->r;
-    in.delta_f = (@name@_real)car->delta;
+    tireid_input in;
+    tireid_weights learnt;
+    in.v_x = (tireid_real)car->v_x;
+    in.v_y = (tireid_real)seen->v_y;
+    in.r = (tireid_real)seen->r;
+    in.delta_f = (tireid_real)car->delta;
     in.delta_r = 0;
-    (void)@name@_step(identifier, limits, &in);
-    (void)@name@_get_weights(identifier, &learnt);
-    return hands_over && @name@_handover(&learnt, params, (@name@_mpc_real)SHARE);
+    (void)tireid_step(identifier, limits, &in);
+    (void)tireid_get_weights(identifier, &learnt);
+    return hands_over && tireid_handover(&learnt, params, (tireid_mpc_real)SHARE);
 }
 
 static void add(score *pass, double e_y)
@@ -95,11 +95,11 @@ static void add(score *pass, double e_y)
 
 static result drive(bool learns, FILE *log)
 {
-    static @name@_state identifier;
-    static @name@_mpc_state tracker;
-    static @name@_mpc_work work;
-    static @name@_params limits;
-    static @name@_mpc_params params;
+    static tireid_state identifier;
+    static tireid_mpc_state tracker;
+    static tireid_mpc_work work;
+    static tireid_params limits;
+    static tireid_mpc_params params;
     double on_the_way[TRANSPORT] = { 0.0 }; /* commands, the oldest last */
     simulated_car_numbers numbers = { 0.0, 0.0, { 0.0, 0.0 }, 0.95, 15.0, 0.4, ACTUATOR };
     simulated_car car;
@@ -107,30 +107,30 @@ static result drive(bool learns, FILE *log)
     unsigned i;
     (void)memset(&car, 0, sizeof car);
     (void)memset(&found, 0, sizeof found);
-    (void)@name@_default_params(&limits);
-    (void)@name@_init(&identifier);
-    (void)@name@_mpc_default_params(&params);
-    (void)@name@_mpc_init(&tracker);
+    (void)tireid_default_params(&limits);
+    (void)tireid_init(&identifier);
+    (void)tireid_mpc_default_params(&params);
+    (void)tireid_mpc_init(&tracker);
     numbers.mass = (double)params.car[0];
     numbers.inertia = (double)params.car[1];
     numbers.l[0] = (double)params.car[2];
     numbers.l[1] = (double)params.car[3];
-    params.delay = ((@name@_mpc_real)TRANSPORT * params.period) + (@name@_mpc_real)ACTUATOR;
+    params.delay = ((tireid_mpc_real)TRANSPORT * params.period) + (tireid_mpc_real)ACTUATOR;
     car.v_x = SPEED;
     seed = 1UL;
     while ((car.s < (PASSES * LANE_CHANGES_PASS)) && (fabs(car.e_y) < WIDEST)) {
         const double t = (double)found.steps * (double)params.period;
-        const @name@_mpc_input seen = look(&car, &params);
-        @name@_mpc_real steering = 0;
-        @name@_mpc_status status;
+        const tireid_mpc_input seen = look(&car, &params);
+        tireid_mpc_real steering = 0;
+        tireid_mpc_status status;
         clock_t start;
         found.taken += learn(&identifier, &limits, &car, &seen, &params, learns && (t > LEARN_FIRST))
             ? 1UL
             : 0UL;
         start = clock();
-        status = @name@_mpc_step(&tracker, &params, &work, &seen, &steering);
+        status = tireid_mpc_step(&tracker, &params, &work, &seen, &steering);
         found.solve_time += (double)(clock() - start) / (double)CLOCKS_PER_SEC;
-        found.faults += (status >= @NAME@_MPC_QP_FAILED) ? 1UL : 0UL;
+        found.faults += (status >= TIREID_MPC_QP_FAILED) ? 1UL : 0UL;
         found.steps++;
         add(&found.pass[(int)(car.s / LANE_CHANGES_PASS)], car.e_y);
         if (log != NULL) {
@@ -185,7 +185,7 @@ int main(int argc, char *argv[])
     print("tires that are learnt", &learnt);
     good = learnt.completed && (learnt.faults == 0UL) && (learnt.taken > 0UL)
         && (learnt.pass[PASSES - 1].peak <= LEARNT_PEAK);
-    printf("%s; the last pass stays within %.2f m of %.2f m allowed: %s\n", @name@_mpc_version(),
+    printf("%s; the last pass stays within %.2f m of %.2f m allowed: %s\n", tireid_mpc_version(),
         learnt.pass[PASSES - 1].peak, LEARNT_PEAK, good ? "yes" : "NO");
     return good ? 0 : 1;
 }

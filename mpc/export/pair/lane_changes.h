@@ -1,6 +1,6 @@
 /* The road of the example: a double lane change after the other. */
-#ifndef @NAME@_LANE_CHANGES_H
-#define @NAME@_LANE_CHANGES_H
+#ifndef TIREID_LANE_CHANGES_H
+#define TIREID_LANE_CHANGES_H
 
 #define LANE_CHANGES_PASS 180.0 /* m from one double lane change to the next */
 

@@ -6,7 +6,7 @@ static const real stiffness[2] = { @stiffness@ }; /* of the linear tire that the
 static const real scale[INPUTS] = { @scale@ };    /* of the inputs [SI] */
 
 /* Weights of the prediction: stiffness, W and V by columns, in N and SI. */
-static bool convert(const @name@_weights *learnt, real w[WEIGHTS])
+static bool convert(const tireid_weights *learnt, real w[WEIGHTS])
 {
     bool is_tire = true;
     uint32_t i;

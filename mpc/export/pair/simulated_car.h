@@ -1,6 +1,6 @@
-/* A car that is neither what @name@ nor what @name@_mpc believes in: for the example. */
-#ifndef @NAME@_SIMULATED_CAR_H
-#define @NAME@_SIMULATED_CAR_H
+/* A car that is neither what tireid nor what tireid_mpc believes in: for the example. */
+#ifndef TIREID_SIMULATED_CAR_H
+#define TIREID_SIMULATED_CAR_H
 
 typedef struct {
     double mass;      /* kg */

@@ -1,13 +1,13 @@
-/* Takes the vectors of the self-test through @name@; prints a hash of all that came out, and what
+/* Takes the vectors of the self-test through tireid_mpc; prints a hash of all that came out, and what
  * it cost. */
-#include "@name@.h"
-#include "@name@_params.h"
+#include "tireid_mpc.h"
+#include "tireid_mpc_params.h"
 #include "machine.h"
 #include "vectors.h"
 
-static @name@_state state; /* in .bss: bytes between its members are zero everywhere */
-static @name@_work work;
-static @name@_params params;
+static tireid_mpc_state state; /* in .bss: bytes between its members are zero everywhere */
+static tireid_mpc_work work;
+static tireid_mpc_params params;
 
 static uint64_t hash_bytes(uint64_t hash, const void *start, uint32_t size)
 {
@@ -40,18 +40,18 @@ static uint32_t since(uint32_t before, uint32_t after)
     return (after >= before) ? (after - before) : ((after + (0x1000000U * 40U)) - before);
 }
 
-static @name@_input vector(uint32_t k)
+static tireid_mpc_input vector(uint32_t k)
 {
-    @name@_input input;
+    tireid_mpc_input input;
     uint32_t j;
-    input.e_y = (@name@_real)vector_input[k][0];
-    input.e_psi = (@name@_real)vector_input[k][1];
-    input.v_y = (@name@_real)vector_input[k][2];
-    input.r = (@name@_real)vector_input[k][3];
-    for (j = 0U; j <= @NAME@_HORIZON; j++) {
+    input.e_y = (tireid_mpc_real)vector_input[k][0];
+    input.e_psi = (tireid_mpc_real)vector_input[k][1];
+    input.v_y = (tireid_mpc_real)vector_input[k][2];
+    input.r = (tireid_mpc_real)vector_input[k][3];
+    for (j = 0U; j <= TIREID_MPC_HORIZON; j++) {
         const uint32_t at = (j == 0U) ? k : (k + VECTOR_OFFSET + (VECTOR_STRIDE * (j - 1U)));
-        input.kappa[j] = (@name@_real)vector_road[at][0];
-        input.v_x[j] = (@name@_real)vector_road[at][1];
+        input.kappa[j] = (tireid_mpc_real)vector_road[at][0];
+        input.v_x[j] = (tireid_mpc_real)vector_road[at][1];
     }
     return input;
 }
@@ -64,24 +64,24 @@ int main(void)
     uint32_t planned = 0U;
     uint32_t stack = 0U;
     uint32_t k;
-    (void)@name@_default_params(&params);
-    (void)@name@_init(&state);
+    (void)tireid_mpc_default_params(&params);
+    (void)tireid_mpc_init(&state);
     machine_start_clock();
     for (k = 0U; k < @steps@U; k++) {
-        static @name@_input input;
-        @name@_real steering;
+        static tireid_mpc_input input;
+        tireid_mpc_real steering;
         uint32_t code; /* an enum has not the same size everywhere */
         uint32_t before;
         uint32_t spent;
         input = vector(k);
         machine_paint_stack();
         before = machine_instructions();
-        code = (uint32_t)@name@_step(&state, &params, &work, &input, &steering);
+        code = (uint32_t)tireid_mpc_step(&state, &params, &work, &input, &steering);
         spent = since(before, machine_instructions());
         if (machine_painted_stack_used() > stack) {
             stack = machine_painted_stack_used();
         }
-        if (code <= (uint32_t)@NAME@_ITERATION_LIMIT) {
+        if (code <= (uint32_t)TIREID_MPC_ITERATION_LIMIT) {
             total += spent;
             planned++;
         }

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "@name@.h"
+#include "tireid.h"
 
 static uint64_t seed;
 
@@ -20,51 +20,51 @@ static double uniform(void)
     return (double)(draw() >> 11) / 9007199254740992.0;
 }
 
-static @name@_real odd_number(void)
+static tireid_real odd_number(void)
 {
     const double zero = 0.0;
     switch (draw() % 8U) {
     case 0:
-        return (@name@_real)(zero / zero);
+        return (tireid_real)(zero / zero);
     case 1:
-        return (@name@_real)(1.0 / zero);
+        return (tireid_real)(1.0 / zero);
     case 2:
-        return (@name@_real)(-1.0 / zero);
+        return (tireid_real)(-1.0 / zero);
     case 3:
-        return (@name@_real)1e-42;
+        return (tireid_real)1e-42;
     case 4:
-        return (@name@_real)(-1e-42);
+        return (tireid_real)(-1e-42);
     case 5:
-        return (@name@_real)3e38;
+        return (tireid_real)3e38;
     case 6:
-        return (@name@_real)(1e3 * (uniform() - 0.5));
+        return (tireid_real)(1e3 * (uniform() - 0.5));
     default:
-        return (@name@_real)0;
+        return (tireid_real)0;
     }
 }
 
 #define SPELL 200 /* samples of calm driving, then as many without sense or without numbers */
 
-static @name@_input calm(long k)
+static tireid_input calm(long k)
 {
     const double t = 0.01 * (double)k;
-    @name@_input in;
-    in.v_x = (@name@_real)(20.0 + 15.0 * sin(0.2 * t));
-    in.v_y = (@name@_real)(0.3 * sin(2.0 * t));
-    in.r = (@name@_real)(0.2 * sin(2.1 * t));
-    in.delta_f = (@name@_real)(0.03 * sin(2.2 * t));
-    in.delta_r = (@name@_real)(0.003 * sin(1.1 * t));
+    tireid_input in;
+    in.v_x = (tireid_real)(20.0 + 15.0 * sin(0.2 * t));
+    in.v_y = (tireid_real)(0.3 * sin(2.0 * t));
+    in.r = (tireid_real)(0.2 * sin(2.1 * t));
+    in.delta_f = (tireid_real)(0.03 * sin(2.2 * t));
+    in.delta_r = (tireid_real)(0.003 * sin(1.1 * t));
     return in;
 }
 
 /* Plausible, stuck, reversed, at the limits, and anything at all. */
-static @name@_input next_input(@name@_input last, long k)
+static tireid_input next_input(tireid_input last, long k)
 {
-    @name@_input in = last;
+    tireid_input in = last;
     const uint64_t kind = draw() % 16U;
     if (((k / SPELL) % 8) == 7) { /* a sensor that is not there for 2 s */
         in.r = odd_number();
-        in.v_x = (@name@_real)3e38;
+        in.v_x = (tireid_real)3e38;
         return in;
     }
     if ((((k / SPELL) % 2) == 0) && ((draw() % 50U) != 0U)) {
@@ -79,25 +79,25 @@ static @name@_input next_input(@name@_input last, long k)
         in.r = -in.r;
         return in;
     }
-    in.v_x = (@name@_real)(40.0 * uniform());
-    in.v_y = (@name@_real)(4.0 * (uniform() - 0.5));
-    in.r = (@name@_real)(2.0 * (uniform() - 0.5));
-    in.delta_f = (@name@_real)(0.6 * (uniform() - 0.5));
-    in.delta_r = (@name@_real)(0.2 * (uniform() - 0.5));
+    in.v_x = (tireid_real)(40.0 * uniform());
+    in.v_y = (tireid_real)(4.0 * (uniform() - 0.5));
+    in.r = (tireid_real)(2.0 * (uniform() - 0.5));
+    in.delta_f = (tireid_real)(0.6 * (uniform() - 0.5));
+    in.delta_r = (tireid_real)(0.2 * (uniform() - 0.5));
     if (kind == 2U) {
-        in.v_x = (@name@_real)(290.0 * uniform());
-        in.v_y = (@name@_real)(580.0 * (uniform() - 0.5));
-        in.r = (@name@_real)(15.0 * (uniform() - 0.5));
+        in.v_x = (tireid_real)(290.0 * uniform());
+        in.v_y = (tireid_real)(580.0 * (uniform() - 0.5));
+        in.r = (tireid_real)(15.0 * (uniform() - 0.5));
     } else if (kind < 8U) {
-        @name@_real *const field[5] = { &in.v_x, &in.v_y, &in.r, &in.delta_f, &in.delta_r };
+        tireid_real *const field[5] = { &in.v_x, &in.v_y, &in.r, &in.delta_f, &in.delta_r };
         *field[draw() % 5U] = odd_number();
     }
     return in;
 }
 
-static int all_finite(const @name@_values *values)
+static int all_finite(const tireid_values *values)
 {
-    @name@_real number[sizeof *values / sizeof(@name@_real)];
+    tireid_real number[sizeof *values / sizeof(tireid_real)];
     size_t i;
     memcpy(number, values, sizeof number);
     for (i = 0; i < sizeof number / sizeof number[0]; i++) {
@@ -113,15 +113,15 @@ static int all_finite(const @name@_values *values)
 #define ALL (UNITS + 3)
 
 /* Whether the weights are in their boxes, P = U D U' definite and its variances within limits. */
-static int within_bounds(const @name@_weights *weights)
+static int within_bounds(const tireid_weights *weights)
 {
     static const long double scale[UNITS] = { LADDER };
     static const long double offset[2] = { STEERING, V_Y };
     static const long double widest[2][4] = { WIDEST };
     int axle, i, j;
     for (axle = 0; axle < 2; axle++) {
-        const @name@_real *const w = weights->W[axle];
-        const @name@_real *const own = weights->own[axle];
+        const tireid_real *const w = weights->W[axle];
+        const tireid_real *const own = weights->own[axle];
         long double U[ALL][ALL] = { { 0 } };
         long double D[ALL];
         long double size[4] = { 0 };
@@ -174,11 +174,11 @@ static int within_bounds(const @name@_weights *weights)
 #endif
 
 /* Whether weights kept their values, but for the rounding of a projection onto their bounds. */
-static int held(const @name@_weights *before, const @name@_weights *after)
+static int held(const tireid_weights *before, const tireid_weights *after)
 {
-    const double rounding = (sizeof(@name@_real) == sizeof(float)) ? 1e-6 : 1e-14;
-    @name@_real old[sizeof *before / sizeof(@name@_real)];
-    @name@_real new[sizeof *after / sizeof(@name@_real)];
+    const double rounding = (sizeof(tireid_real) == sizeof(float)) ? 1e-6 : 1e-14;
+    tireid_real old[sizeof *before / sizeof(tireid_real)];
+    tireid_real new[sizeof *after / sizeof(tireid_real)];
     size_t i;
     memcpy(old, before, sizeof old);
     memcpy(new, after, sizeof new);
@@ -190,23 +190,23 @@ static int held(const @name@_weights *before, const @name@_weights *after)
     return 1;
 }
 
-static int torture(@name@_params *params)
+static int torture(tireid_params *params)
 {
-    static @name@_state state;
-    @name@_input in = { 0 };
+    static tireid_state state;
+    tireid_input in = { 0 };
     uint32_t faults = 0;
     uint32_t missed = 0;
     uint32_t kinds[8] = { 0 };
     long k;
     seed = 88172645463325252U;
-    @name@_init(&state);
+    tireid_init(&state);
     for (k = 0; k < 1000000; k++) {
-        const @name@_state before = state;
-        @name@_status status;
+        const tireid_state before = state;
+        tireid_status status;
         in = next_input(in, k);
-        status = @name@_step(&state, params, &in);
+        status = tireid_step(&state, params, &in);
         kinds[status]++;
-        faults += (status >= @NAME@_IMPLAUSIBLE) ? 1U : 0U;
+        faults += (status >= TIREID_IMPLAUSIBLE) ? 1U : 0U;
         if (state.faults != faults) {
             printf("fault %ld was not counted\n", k);
             return 1;
@@ -226,12 +226,12 @@ static int torture(@name@_params *params)
             printf("a force is beyond the limit after %ld\n", k);
             return 1;
         }
-        missed = (status >= @NAME@_BAD_INPUT) ? missed + 1U : 0U;
-        if ((status == @NAME@_STALE) != (missed >= @NAME@_STALE_SAMPLES)) {
+        missed = (status >= TIREID_BAD_INPUT) ? missed + 1U : 0U;
+        if ((status == TIREID_STALE) != (missed >= TIREID_STALE_SAMPLES)) {
             printf("status %d after %u refused samples in a row\n", (int)status, missed);
             return 1;
         }
-        if ((status == @NAME@_STALE)
+        if ((status == TIREID_STALE)
             && ((state.output.axle_force[0] != 0) || (state.output.axle_force[1] != 0))) {
             printf("a stale force is not zero after %ld\n", k);
             return 1;
@@ -249,27 +249,27 @@ static int torture(@name@_params *params)
 #define INSTANCES 10
 #define STEPS 2000
 
-static void drive(@name@_state *state, const @name@_params *params, int which, int k)
+static void drive(tireid_state *state, const tireid_params *params, int which, int k)
 {
     const double t = 0.01 * k;
-    @name@_input in;
-    in.v_x = (@name@_real)(10.0 + which);
-    in.v_y = (@name@_real)(0.3 * sin(2.0 * t + which));
-    in.r = (@name@_real)(0.2 * sin(2.1 * t + which));
-    in.delta_f = (@name@_real)(0.03 * sin(2.2 * t + which));
-    in.delta_r = (@name@_real)0;
-    (void)@name@_step(state, params, &in);
+    tireid_input in;
+    in.v_x = (tireid_real)(10.0 + which);
+    in.v_y = (tireid_real)(0.3 * sin(2.0 * t + which));
+    in.r = (tireid_real)(0.2 * sin(2.1 * t + which));
+    in.delta_f = (tireid_real)(0.03 * sin(2.2 * t + which));
+    in.delta_r = (tireid_real)0;
+    (void)tireid_step(state, params, &in);
 }
 
-static int side_by_side(const @name@_params *params)
+static int side_by_side(const tireid_params *params)
 {
-    static @name@_state together[INSTANCES];
-    static @name@_state alone;
-    static @name@_state moved;
+    static tireid_state together[INSTANCES];
+    static tireid_state alone;
+    static tireid_state moved;
     int i;
     int k;
     for (i = 0; i < INSTANCES; i++) {
-        @name@_init(&together[i]);
+        tireid_init(&together[i]);
     }
     for (k = 0; k < STEPS; k++) {
         for (i = 0; i < INSTANCES; i++) {
@@ -282,7 +282,7 @@ static int side_by_side(const @name@_params *params)
         }
     }
     for (i = 0; i < INSTANCES; i++) {
-        @name@_init(&alone);
+        tireid_init(&alone);
         for (k = 0; k < STEPS; k++) {
             drive(&alone, params, i, k);
         }
@@ -296,7 +296,7 @@ static int side_by_side(const @name@_params *params)
 
 int main(void)
 {
-    static @name@_params params;
-    @name@_default_params(&params);
+    static tireid_params params;
+    tireid_default_params(&params);
     return torture(&params) || side_by_side(&params);
 }

@@ -35,9 +35,7 @@ def declared(package, **changed):
 
 
 def build(folder, run, compiler, single, macros=()):
-    (folder / "hostile.c").write_text(
-        HOSTILE.replace("@name@", "tireid").replace("@NAME@", "TIREID")
-    )
+    (folder / "hostile.c").write_text(HOSTILE)
     flags = [*SANITIZED.split(), f"-DTIREID_SINGLE={single}", *macros, "-Iinclude", "-Isrc"]
     answer = run(compiler, *flags, *SOURCES, "-lm", "-o", "hostile", cwd=folder)
     if "cannot find" in answer.stderr and "san" in answer.stderr:

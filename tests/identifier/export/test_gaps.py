@@ -81,7 +81,7 @@ def test_every_channel_heals(law, channel, gap, shipped, slalom):
 
 def test_the_time_that_makes_forces_stale_may_be_set(packages, rows):
     package = packages["axle"]
-    header = "include/tireid.h"
+    header = "include/tireid_config.h"
     assert f"#define TIREID_STALE_TIME ({STALE_TIME})" in package.files[header]
     files = {**package.files, header: "#define TIREID_STALE_TIME 0.1\n" + package.files[header]}
     run = CompiledPackage.of(package._replace(files=files)).run_samples(rows)
@@ -93,8 +93,8 @@ def test_the_time_that_makes_forces_stale_may_be_set(packages, rows):
 
 def test_a_result_that_is_refused_is_a_gap_too(packages, slalom):
     """Forces beyond what the caller allows: held, then stale, and back with the next good one."""
-    limit, place = r"(params->max_force = \(tireid_real\))\S+;", "src/tireid.c"
-    text, count = re.subn(limit, r"\g<1>1000.0;", packages["integral"].files[place])
+    limit, place = r"(#define TIREID_MAX_FORCE )\S+", "include/tireid_config.h"
+    text, count = re.subn(limit, r"\g<1>(1000.0)", packages["integral"].files[place])
     assert count == 1
     files = {**packages["integral"].files, place: text}
     run = CompiledPackage.of(packages["integral"]._replace(files=files)).run(slalom)

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.export.layout import Member, sum_terms
-from identifier.export.package import PackageNameError, build_package, readme
-from identifier.export.specialize import Signal
+from codegen.package import PackageNameError
+from identifier.export.compiled import CompiledPackage
+from identifier.export.package import build_package, readme
 from identifier.methods import METHODS, make_method
 from identifier.paper.network import Network
 from models.recordings import write_recording
@@ -22,15 +22,19 @@ MISRA_FINDINGS = 2  # may only become fewer: one operator ##, one macro for user
 ALLOWED = {"sqrt", "sqrtf", "floor", "floorf", "memcpy", "memset"}
 
 
-@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (2, 3), (2, 5), (3, 40)])
-def test_every_number_of_a_structure_is_in_the_sum_that_sees_what_is_not_finite(shape):
-    """Each entry once by itself, or all of them by a call that is told how many they are."""
-    terms = sum_terms([Member(Signal("m", "-", "numbers"), shape, False)], "tireid", "now->")
-    size = shape[0] * shape[1]
-    if len(terms) > 1 or size == 1:
-        assert len(set(terms)) == size
-    else:
-        assert re.fullmatch(rf"tireid_sum\(&now->m\S*, {size}U\)", terms[0])
+@pytest.mark.parametrize("law", ["integral", "axle", "stiffness_rls"])
+def test_every_number_of_the_weights_is_looked_at_before_they_are_taken(law):
+    """The structure is read as one array: not one number less, and the last one too."""
+    run = CompiledPackage.of(build_package(make_method(law, CAR), CAR))
+    weights = run.weights
+    run.set_weights(weights)
+    for name, value in weights.items():
+        for place in np.ndindex(value.shape):
+            for bad in (np.nan, np.inf, -np.inf):
+                spoilt = {**weights, name: value.copy()}
+                spoilt[name][place] = bad
+                with pytest.raises(ValueError, match="finite"):
+                    run.set_weights(spoilt)
 
 
 @pytest.mark.parametrize("law", ["integral", "axle"])

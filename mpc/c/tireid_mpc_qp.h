@@ -1,8 +1,8 @@
-/* Inside of @name@: not for users. One quadratic program of the tracker and its solution. */
-#ifndef @NAME@_QP_H
-#define @NAME@_QP_H
+/* Inside of tireid_mpc: not for users. One quadratic program of the tracker and its solution. */
+#ifndef TIREID_MPC_QP_H
+#define TIREID_MPC_QP_H
 
-#include "@name@.h"
+#include "tireid_mpc.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -14,7 +14,7 @@ extern "C" {
  * one by s. Everything is the difference from the plan that was linearized at.
  *
  * Return what became of it, with du, dx and the count of iterations in `work`. */
-@name@_status @name@_qp(@name@_work *work, const @name@_params *params);
+tireid_mpc_status tireid_mpc_qp(tireid_mpc_work *work, const tireid_mpc_params *params);
 
 #ifdef __cplusplus
 }

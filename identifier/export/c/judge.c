@@ -1,3 +1,0 @@
-    if (!@name@_believed(&next, input)) {
-        status = @NAME@_IMPLAUSIBLE;
-    }

@@ -1,0 +1,50 @@
+/* Between the equations, the tables and the guards: not for users. */
+#ifndef TIREID_EQUATIONS_H
+#define TIREID_EQUATIONS_H
+
+#include "tireid.h"
+
+#if TIREID_SINGLE
+#define TIREID_C(x) x##F
+#else
+#define TIREID_C(x) x
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#if TIREID_RULES
+/* Numbers of the weights that must be right to be taken over: which, and from which one on. */
+typedef enum {
+    TIREID_NOT_NEGATIVE, /* `order` numbers */
+    TIREID_FACTORS,      /* U D U' of a covariance: its upper triangle by rows, D on the diagonal */
+    TIREID_TRIANGLE,     /* upper triangle of a covariance, by rows */
+    TIREID_MATRIX        /* a whole covariance */
+} tireid_kind;
+
+typedef struct {
+    tireid_kind kind;
+    uint32_t first;
+    uint32_t order; /* rows of the matrix */
+} tireid_rule;
+#endif
+
+#if TIREID_DECIDES
+/* Where the equations of a driving car hold. */
+bool tireid_drives(const tireid_input *in);
+
+/* One step at rest, and with a sample that no car can be in. */
+void tireid_elsewhere(const tireid_values *now, const tireid_input *in, tireid_values *next,
+    tireid_output *out);
+#endif
+
+/* One step from `now` to `next`, which are not the same. */
+void tireid_driving(const tireid_values *now, const tireid_input *in, tireid_values *next,
+    tireid_output *out);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

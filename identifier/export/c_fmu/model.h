@@ -1,0 +1,14 @@
+/* Which component the FMU holds. */
+#ifndef MODEL_H
+#define MODEL_H
+
+#include "tireid.h"
+#include "token.h"
+
+/* All names begin with that of the component, for programs that hold several. */
+#define MODEL(name) tireid_##name
+
+#define MODEL_DT TIREID_SAMPLE_TIME
+#define MODEL_MIN_SPEED TIREID_MIN_SPEED
+
+#endif

@@ -1,0 +1,41 @@
+/* Inside of tireid_mpc: not for users. */
+#ifndef TIREID_MPC_ITERATION_H
+#define TIREID_MPC_ITERATION_H
+
+#include "tireid_mpc.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Whether x is a number: the difference of infinities, and of NaN, is not zero. */
+bool tireid_mpc_finite(tireid_mpc_real x);
+
+/* Whether |x| <= limit, which NaN is not. */
+bool tireid_mpc_within(tireid_mpc_real x, tireid_mpc_real limit);
+
+/* x, not beyond +-limit. */
+tireid_mpc_real tireid_mpc_clipped(tireid_mpc_real x, tireid_mpc_real limit);
+
+/* Whether numbers may be carried: finite, and far from what would overflow. */
+bool tireid_mpc_carriable(const tireid_mpc_real *x, uint32_t n);
+
+/* No plan: nothing moves. */
+void tireid_mpc_clear(tireid_mpc_state *state);
+
+/* Whether a state is where the prediction holds. */
+bool tireid_mpc_on_map(const tireid_mpc_params *params, const tireid_mpc_real *x);
+
+/* The plan, a time later: between its states, and its last input goes on. */
+void tireid_mpc_shift(tireid_mpc_state *state, const tireid_mpc_params *params);
+
+/* A plan without a solution: from `x` to the path, on which the car rolls without slip. Nothing
+ * moves where that is not finite. */
+void tireid_mpc_guess(tireid_mpc_state *state, const tireid_mpc_params *params, const tireid_mpc_real *x,
+    const tireid_mpc_real *kappa, const tireid_mpc_real *v_x);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
