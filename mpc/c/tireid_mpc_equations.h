@@ -1,16 +1,14 @@
-/* Inside of tireid_mpc: not for users. */
+/* Inside of the tracker: not for users. */
 #ifndef TIREID_MPC_EQUATIONS_H
 #define TIREID_MPC_EQUATIONS_H
-
-#include <math.h>
 
 #include "tireid_mpc.h"
 
 #if TIREID_MPC_SINGLE
 #define TIREID_MPC_C(x) x##F
-@macros_single@#else
+#else
 #define TIREID_MPC_C(x) x
-@macros_double@#endif
+#endif
 
 #ifdef __cplusplus
 extern "C" {

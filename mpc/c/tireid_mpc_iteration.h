@@ -1,4 +1,4 @@
-/* Inside of tireid_mpc: not for users. */
+/* Inside of the tracker: not for users. */
 #ifndef TIREID_MPC_ITERATION_H
 #define TIREID_MPC_ITERATION_H
 

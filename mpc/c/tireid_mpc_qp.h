@@ -1,4 +1,4 @@
-/* Inside of tireid_mpc: not for users. One quadratic program of the tracker and its solution. */
+/* Inside of the tracker: not for users. One quadratic program of the tracker and its solution. */
 #ifndef TIREID_MPC_QP_H
 #define TIREID_MPC_QP_H
 

@@ -1,4 +1,4 @@
-/* Inside of tireid_mpc: not for users. A Newton step of the interior point. */
+/* Inside of the tracker: not for users. A Newton step of the interior point. */
 #ifndef TIREID_MPC_RICCATI_H
 #define TIREID_MPC_RICCATI_H
 

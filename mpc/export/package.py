@@ -12,20 +12,22 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from codegen.escape import c_string
-from codegen.template import Values, Words, filled
-from identifier.export.package import (
-    NAME,
-    PackageNameError,
+from codegen.package import (
+    c_files,
+    check_name,
     digest,
+    header,
     manifest_text,
     plain,
+    rows,
     tireid_version,
 )
+from codegen.template import Values, Words, filled
 from identifier.method import vehicle_numbers
 from mpc.prediction import build_stage, state_size
 from mpc.problem import Problem
 from mpc.realtime import Measurement, Status, Tracker
-from mpc.realtime.c_source import c_sources
+from mpc.realtime.c_source import PREFIX, c_sources
 from mpc.realtime.tracker import TOLERANCE as SOLVER_TOLERANCE
 from mpc.tires import PredictionTire
 from mpc.tires.tire import ALL
@@ -190,22 +192,28 @@ def vectors_header(found: Vectors) -> str:
     ----------
     found : the vectors.
     """
-    return (
-        "/* Generated. Measurements e_y, e_psi, v_y, r; steering [rad] and status that follow; "
-        "curvature\n * and speed each period: row k now, k + offset + stride j in stage j. SI. */\n"
-        f"#define VECTORS {len(found.measured)}U\n"
-        f"#define VECTOR_OFFSET {found.offset}U\n#define VECTOR_STRIDE {found.stride}U\n\n"
-        f"static const double vector_input[VECTORS][4] = {{\n{_rows(found.measured)}}};\n\n"
-        f"static const double vector_output[VECTORS][2] = {{\n{_rows(found.expected)}}};\n\n"
-        f"static const double vector_road[{len(found.road)}][2] = {{\n{_rows(found.road)}}};\n"
+    return header(
+        "vectors.h",
+        "Generated. Measurements e_y, e_psi, v_y, r; steering [rad] and status that follow; "
+        "curvature\nand speed each period: row k now, k + offset + stride j in stage j. SI.",
+        [
+            f"#define VECTORS {len(found.measured)}U\n"
+            f"#define VECTOR_OFFSET {found.offset}U\n#define VECTOR_STRIDE {found.stride}U\n"
+            f"#define VECTOR_TOLERANCE_DOUBLE {TOLERANCE_DOUBLE:g} /* rad */\n"
+            f"#define VECTOR_TOLERANCE_SINGLE {TOLERANCE_SINGLE:g} /* rad */\n",
+            f"static const double vector_input[VECTORS][4] = {{\n{rows(found.measured)}}};\n",
+            f"static const double vector_output[VECTORS][2] = {{\n{rows(found.expected)}}};\n",
+            f"static const double vector_road[{len(found.road)}][2] = {{\n{rows(found.road)}}};\n",
+        ],
     )
 
 
-def _rows(table: Array) -> str:
-    return "".join(f"    {{ {', '.join(repr(float(v)) for v in row)} }},\n" for row in table)
-
-
-TEMPLATES = Path(__file__).parent / "c"
+C = Path(__file__).parent / "c"
+PLACES: Mapping[str, str] = {
+    "tireid_mpc_params.h": "include",
+    "tireid_mpc_params.c": "src",
+    "test_tireid_mpc.c": "tests",
+}
 UNTOLD = ("weights", "speeds", "gains")  # in the manifest; the gains have a table of their own
 FORMAT = "tireid mpc package 1"
 # Largest differences of the steering that the self-test allows [rad]. In double compilers differ by
@@ -259,10 +267,7 @@ def build_mpc_package(
     ValueError
         Where a number is out of its range.
     """
-    if not NAME.fullmatch(name.removesuffix("_mpc")):
-        raise PackageNameError(
-            f"name must be lower-case letters, digits and _, at most 31, not {name!r}"
-        )
+    check_name(name, "_mpc")
     tracker = Tracker(tire, problem, period=period, delay=delay)
     params = params_of(tracker)
     content = _ingredients(tracker, params, name, single=single)
@@ -271,25 +276,13 @@ def build_mpc_package(
         tire.structure, horizon=tracker.problem.horizon, name=name, single=single, about=about
     )
     vectors = record(tracker)
-    values = {
-        **about,
-        "about_numbers": _about_numbers(tracker),
-        "numbers": initializers(params),
-        "solver_double": f"{float(params['tolerance'])!r}",
-        "solver_single": f"{SOLVER_TOLERANCE[True]!r}",
-        "tolerance_double": f"{TOLERANCE_DOUBLE:g}",
-        "tolerance_single": f"{TOLERANCE_SINGLE:g}",
-        "single_option": "ON" if single else "OFF",
-    }
+    values = {"single_option": "ON" if single else "OFF", **about}
     files |= {
-        f"include/{name}_params.h": filled(TEMPLATES / "params.h", values),
-        f"src/{name}_params.c": filled(TEMPLATES / "params.c", values),
-        f"tests/test_{name}.c": filled(TEMPLATES / "test.c", values),
+        "CMakeLists.txt": filled(C / "CMakeLists.txt", values),
+        **c_files(C, PLACES, {PREFIX: name}),
+        f"src/{name}_tables.h": _tables(name, params, about),
         "tests/vectors.h": vectors_header(vectors),
     }
-    sources = sorted(path for path in files if path.startswith("src/") and path.endswith(".c"))
-    values["sources"] = "\n".join(f"  {path}" for path in sources)
-    files |= {"CMakeLists.txt": filled(TEMPLATES / "CMakeLists.txt", values)}
     files |= {f"{name}.json": manifest_text(content, files)}
     return MpcPackage(name, tire, tracker.problem, params, files, vectors, about)
 
@@ -307,7 +300,7 @@ def mpc_readme(package: MpcPackage, about_figures: str) -> str:
         f"| `{name}` | {_in_words(value)} |\n" for name, value in p.items() if name not in UNTOLD
     )
     return filled(
-        TEMPLATES / "README.md",
+        C / "README.md",
         {
             "numbers_table": rows,
             "gains_table": "".join(
@@ -373,8 +366,18 @@ def _summary(tracker: Tracker, content: Mapping[str, Any]) -> dict[str, str | Wo
     }
 
 
-def _about_numbers(tracker: Tracker) -> Words:
-    return Words(
-        f"Those of the export: the car {tracker.tire.vehicle.name}, period {tracker.period:g} s, "
-        f"delay {tracker.delay:g} s."
+def _tables(name: str, params: Params, about: Values) -> str:
+    """Return the numbers of the export as C."""
+    generated = f"Generated by tireid {about['version']} from {about['hash']}"
+    return header(
+        f"{name}_tables.h",
+        f"The numbers of the export. {generated}: do not edit, export again.",
+        [
+            f'#include "{name}.h"\n',
+            f"#define R(x) (({name}_real)(x))\n",
+            f"#if {name.upper()}_SINGLE\n"
+            f"#define TOLERANCE R({SOLVER_TOLERANCE[True]!r}) /* the least that float comes to */\n"
+            f"#else\n#define TOLERANCE R({float(params['tolerance'])!r})\n#endif\n",
+            f"static const {name}_params {name}_exported = {{\n{initializers(params)}}};\n",
+        ],
     )

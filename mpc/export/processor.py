@@ -1,6 +1,5 @@
 """A package on a Cortex-M7 in QEMU, and on this machine: the same bits, and what a step costs."""
 
-import json
 import platform
 import subprocess
 import tempfile
@@ -11,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen import CompilationError
-from codegen.template import filled
+from codegen.package import manifest_with_figures, renamed
 from identifier.export.processor import (
     CROSS_COMPILER,
     EMULATOR,
@@ -25,6 +24,7 @@ from identifier.export.processor import (
 from identifier.export.processor import TARGET as BOARD
 from mpc.export.package import MpcPackage
 from mpc.realtime import Tracker
+from mpc.realtime.c_source import PREFIX
 
 TARGET = Path(__file__).parent / "target"
 PROCESSOR = PROCESSORS[-1]  # the one that computes in double
@@ -120,13 +120,12 @@ def _replayed(
             (folder / path).parent.mkdir(exist_ok=True)
             (folder / path).write_text(text, encoding="utf-8")
         for board in ("board.c", "host.c", "machine.h", "mps2.ld"):
-            (folder / board).write_text(
-                (BOARD / board).read_text(encoding="utf-8"), encoding="utf-8"
-            )
-        values = {"name": name, "NAME": name.upper(), "steps": str(steps)}
-        (folder / "replay.c").write_text(filled(TARGET / "replay.c", values), encoding="utf-8")
+            (folder / board).write_text((BOARD / board).read_text(encoding="utf-8"))
+        replay = (TARGET / "replay.c").read_text(encoding="utf-8")
+        (folder / "replay.c").write_text(renamed(replay, {PREFIX: name}), encoding="utf-8")
         sources = sorted(path for path in package.files if path.startswith("src/"))
-        own = [f"-D{name.upper()}_SINGLE={int(single)}", "-Iinclude", "-Isrc", "-Itests", "-I."]
+        macros = [f"-D{name.upper()}_SINGLE={int(single)}", f"-DSTEPS={steps}U"]
+        own = [*macros, "-Iinclude", "-Isrc", "-Itests", "-I."]
         files = [path for path in sources if path.endswith(".c")]
         first, *words = compiler
         answer = _run([first, *own, *files, "replay.c", *words, "-o", "replay"], folder)
@@ -273,4 +272,4 @@ def with_mpc_figures(manifest: str, costs: Sequence[MpcCost]) -> str:
         }
         for cost in costs
     ]
-    return json.dumps({**json.loads(manifest), "figures": figures}, indent=2) + "\n"
+    return manifest_with_figures(manifest, figures)

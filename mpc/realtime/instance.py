@@ -17,7 +17,7 @@ from codegen.arrays import Array
 from codegen.compiler import keep, kept
 from mpc.prediction import state_size
 from mpc.problem import N_ERRORS, Guards, Problem
-from mpc.realtime.c_source import c_sources, one_file
+from mpc.realtime.c_source import c_sources, python_file
 from mpc.realtime.fall_back import N_GAINS, N_SPEEDS
 from mpc.tires.tire import TireStructure
 
@@ -196,7 +196,7 @@ def tracker_source(structure: TireStructure, horizon: int, *, single: bool) -> s
 def _generated(structure: TireStructure, horizon: int, single: bool) -> str:
     about = {"title": "The tracker", "version": "", "version_text": NAME}
     files = c_sources(structure, horizon=horizon, name=NAME, about=about)
-    return one_file(files, name=NAME, single=single)
+    return python_file(files, name=NAME, single=single)
 
 
 @cache

@@ -1,4 +1,4 @@
-/* Runs a recording through tireid and prints a hash of all that came out, and what it cost. */
+/* Runs a recording through the package and prints a hash of all that came out, and what it cost. */
 #include "tireid.h"
 #include "machine.h"
 

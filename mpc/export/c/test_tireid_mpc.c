@@ -1,4 +1,4 @@
-/* Self-test of tireid_mpc: steering against vectors that were computed elsewhere, guards, weights. */
+/* Self-test: steering against vectors that were computed elsewhere, guards, weights. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -8,9 +8,9 @@
 #include "vectors.h"
 
 #if TIREID_MPC_SINGLE
-#define TOLERANCE @tolerance_single@ /* rad */
+#define TOLERANCE VECTOR_TOLERANCE_SINGLE /* rad */
 #else
-#define TOLERANCE @tolerance_double@ /* rad */
+#define TOLERANCE VECTOR_TOLERANCE_DOUBLE /* rad */
 #endif
 
 static int failures = 0;

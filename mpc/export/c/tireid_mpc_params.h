@@ -1,4 +1,4 @@
-/* The numbers that tireid_mpc was exported with, and guards for others; see tireid_mpc.h. */
+/* The numbers of the export, and guards for others; see tireid_mpc.h. */
 #ifndef TIREID_MPC_PARAMS_H
 #define TIREID_MPC_PARAMS_H
 
@@ -8,7 +8,7 @@
 extern "C" {
 #endif
 
-/* @about_numbers@ */
+/* Those of the export: its car, tire, period and delay. */
 tireid_mpc_status tireid_mpc_default_params(tireid_mpc_params *params);
 
 /* Whether all numbers are within 1e12, and 1e-12 or more where they must be positive; whether delay,

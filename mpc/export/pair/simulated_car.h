@@ -1,4 +1,4 @@
-/* A car that is neither what tireid nor what tireid_mpc believes in: for the example. */
+/* A car that is neither what the identifier nor what the tracker believes in: for the example. */
 #ifndef TIREID_SIMULATED_CAR_H
 #define TIREID_SIMULATED_CAR_H
 

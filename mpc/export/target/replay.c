@@ -1,9 +1,13 @@
-/* Takes the vectors of the self-test through tireid_mpc; prints a hash of all that came out, and what
+/* Takes the vectors of the self-test through the tracker; prints a hash of all that came out, and what
  * it cost. */
 #include "tireid_mpc.h"
 #include "tireid_mpc_params.h"
 #include "machine.h"
 #include "vectors.h"
+
+#ifndef STEPS
+#define STEPS VECTORS /* that are taken */
+#endif
 
 static tireid_mpc_state state; /* in .bss: bytes between its members are zero everywhere */
 static tireid_mpc_work work;
@@ -67,7 +71,7 @@ int main(void)
     (void)tireid_mpc_default_params(&params);
     (void)tireid_mpc_init(&state);
     machine_start_clock();
-    for (k = 0U; k < @steps@U; k++) {
+    for (k = 0U; k < STEPS; k++) {
         static tireid_mpc_input input;
         tireid_mpc_real steering;
         uint32_t code; /* an enum has not the same size everywhere */

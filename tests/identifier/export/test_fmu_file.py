@@ -75,7 +75,7 @@ def test_its_component_is_the_c_package():
     shipped = build_package(DESIGN, CAR).files
     shared = {path: text for path, text in shipped.items() if path.split("/")[0] in PARTS}
     inside = fmu_text(specialize(DESIGN, CAR), 3)
-    assert len(shared) == 4
+    assert len(shared) == 6
     for path, text in shared.items():
         assert inside[f"sources/{path.split('/')[1]}"] == text
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.export.package import PackageNameError
+from codegen.package import PackageNameError
 from models.vehicle import sedan
 from mpc.export.package import build_mpc_package, mpc_readme
 from mpc.problem import Cost, Problem
@@ -145,7 +145,7 @@ def test_the_vectors_are_those_of_a_tracker_that_plans_and_falls_back(packages):
     ("file", "pattern", "replacement", "complaint"),
     [
         ("tests/vectors.h", r"(vector_output.*\n    \{ -?0\.0)", r"\g<1>1", "steering is that"),
-        ("src/tireid_mpc_params.c", r"car \*/ \{ R\(1", r"\g<0>1", "steering is that"),
+        ("src/tireid_mpc_tables.h", r"car \*/ \{ R\(1", r"\g<0>1", "steering is that"),
         ("src/tireid_mpc.c", r"!is_number\(in\)", "false", "NaN is refused"),
         ("src/tireid_mpc.c", r"(count\(state, status\);)", r"/* \1 */", "refused is counted"),
     ],

@@ -18,8 +18,7 @@ SANITIZED = (  # -O1: a solve takes a millisecond
 
 
 def build(folder, run, single, steps=3000):
-    text = HOSTILE.replace("@name@", "tireid_mpc").replace("@NAME@", "TIREID_MPC")
-    (folder / "hostile.c").write_text(text)
+    (folder / "hostile.c").write_text(HOSTILE)
     flags = [*SANITIZED.split(), f"-DTIREID_MPC_SINGLE={single}", f"-DSTEPS={steps}L"]
     words = [*flags, "-Iinclude", "-Isrc", *c_files(folder), "hostile.c", "-lm", "-o", "hostile"]
     answer = run("gcc", *words, cwd=folder)

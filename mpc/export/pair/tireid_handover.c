@@ -1,16 +1,25 @@
-#define UNITS @units@U
+/* What was learnt, for the prediction of the tracker. */
+#include "tireid_handover.h"
+
+#include <math.h>
+#include <stddef.h>
+
+#include "tireid_handover_tables.h"
+
+#define real tireid_mpc_real
+#define WEIGHTS TIREID_MPC_WEIGHTS
+#define UNITS TIREID_HANDOVER_UNITS
+#define MAX_FORCE ((real)TIREID_HANDOVER_MAX_FORCE) /* of an axle [N] */
+
+#if TIREID_HANDOVER_CURVES
 #define AXLE (UNITS + 2U)                      /* weights of an axle */
-#define SHORTEST ((real)@shortest@) /* lag that is always there [m] */
-#define SWAY ((real)@sway@) /* g over the square of the roll's frequency [m] */
+#define SHORTEST ((real)TIREID_HANDOVER_SHORTEST) /* lag that is always there [m] */
+#define SWAY ((real)TIREID_HANDOVER_SWAY) /* g over the square of the roll's frequency [m] */
 #define LEAST_SLOPE ((real)0.1)                /* of a force curve at zero [static loads a rad] */
 #define MAX_SLIP ((real)0.5)                   /* up to which a flat curve is looked for [rad] */
 #define STEPS 250U
 #define FLAT ((real)0.05) /* of the slope at zero: there the peak is reached */
 #define LEAST_RISE ((real)0.04) /* of the slope at zero, beyond the slip that is of use */
-
-static const real load[2] = { @load@ };    /* static, of the axles [N] */
-static const real ladder[UNITS] = { @ladder@ }; /* scales of the units [rad] */
-static const real max_slip[2] = { @max_slip@ }; /* of the tracker, at most [rad] */
 
 /* Weights of the prediction: offsets and lag, scales, then compliance, least lag and units. */
 static bool convert(const tireid_weights *learnt, real w[WEIGHTS])
@@ -88,4 +97,59 @@ static void believe(tireid_mpc_params *params)
         params->rise[i] = (rise > (real)0.0) ? rise : (real)0.0;
     }
 }
+#else
+#define INPUTS TIREID_HANDOVER_INPUTS
+#define FORCE_UNIT ((real)TIREID_HANDOVER_FORCE_UNIT) /* of the weights [N] */
 
+/* Weights of the prediction: stiffness, W and V by columns, in N and SI. */
+static bool convert(const tireid_weights *learnt, real w[WEIGHTS])
+{
+    bool is_tire = true;
+    uint32_t i;
+    uint32_t j;
+    uint32_t k;
+    for (i = 0U; i < 2U; i++) {
+        real most = (real)0.0;
+        w[i] = stiffness[i];
+        for (j = 0U; j < UNITS; j++) {
+            const real force = FORCE_UNIT * (real)learnt->W[i][j];
+            w[2U + (2U * j) + i] = force;
+            most += (force < (real)0.0) ? -force : force;
+        }
+        is_tire = is_tire && (most <= MAX_FORCE); /* which NaN is not */
+    }
+    for (k = 0U; k < INPUTS; k++) {
+        for (j = 0U; j < UNITS; j++) {
+            const real v = (real)learnt->V[j][k] / scale[k];
+            w[2U + (2U * UNITS) + (k * UNITS) + j] = v;
+            is_tire = is_tire && ((v - v) <= (real)0.0);
+        }
+    }
+    return is_tire;
+}
+#endif
+
+static bool is_share(real share)
+{
+    return (share >= (real)0.0) && (share <= (real)1.0);
+}
+
+bool tireid_handover(const tireid_weights *learnt, tireid_mpc_params *params, real share)
+{
+    bool taken = false;
+    if ((learnt != NULL) && (params != NULL) && is_share(share)) {
+        real w[WEIGHTS];
+        taken = convert(learnt, w);
+        if (taken) {
+            uint32_t i;
+            for (i = 0U; i < WEIGHTS; i++) {
+                const real moved = params->weights[i] + (share * (w[i] - params->weights[i]));
+                params->weights[i] = (share < (real)1.0) ? moved : w[i];
+            }
+#if TIREID_HANDOVER_CURVES
+            believe(params);
+#endif
+        }
+    }
+    return taken;
+}

@@ -1,1 +1,0 @@
-            believe(params);
