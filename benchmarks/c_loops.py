@@ -15,25 +15,26 @@ import numpy as np
 
 from codegen import find_compiler
 from codegen.arrays import Array
+from codegen.package import renamed
 from identifier.export.package import Package
 
 Loop = Callable[[Array], Array]
 HAND_WRITTEN = Path(__file__).with_name("hand_written_step.c")
 
 PACKAGE_LOOP = """
-#include "@name@.h"
+#include "tireid.h"
 void run(long n, const double *s, double *force)
 {
-    @name@_state state;
-    @name@_params params;
-    @name@_default_params(&params);
-    @name@_init(&state);
+    tireid_state state;
+    tireid_params params;
+    tireid_default_params(&params);
+    tireid_init(&state);
     for (long k = 0; k < n; ++k, s += 5) {
-        const @name@_input in = { (@name@_real)s[0], (@name@_real)s[1], (@name@_real)s[2],
-                                  (@name@_real)s[3], (@name@_real)s[4] };
-        @name@_real now[2];
-        @name@_step(&state, &params, &in);
-        @name@_get_forces(&state, now);
+        const tireid_input in = { (tireid_real)s[0], (tireid_real)s[1], (tireid_real)s[2],
+                                  (tireid_real)s[3], (tireid_real)s[4] };
+        tireid_real now[2];
+        tireid_step(&state, &params, &in);
+        tireid_get_forces(&state, now);
         force[2 * k] = (double)now[0];
         force[2 * k + 1] = (double)now[1];
     }
@@ -71,7 +72,7 @@ def package_loop(package: Package, *, single: bool, flags: Sequence[str]) -> Loo
     name = package.specialized.name
     files = {p: t for p, t in package.files.items() if p.startswith(("include/", "src/"))}
     define = f"-D{name.upper()}_SINGLE={int(single)}"
-    source = PACKAGE_LOOP.replace("@name@", name)
+    source = renamed(PACKAGE_LOOP, {"tireid": name})
     library = _build({**files, "loop.c": source}, [*flags, define, "-Iinclude", "-Isrc"])
     return lambda samples: _forces(library, samples)
 

@@ -130,9 +130,7 @@ def build(subject: Subject, folder: Path, *, single: bool = False, compiler: str
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, encoding="utf-8")
     for file in ("reader.h", subject.harness):
-        text = (HARNESSES / file).read_text(encoding="utf-8")
-        named = text.replace("@name@", subject.name).replace("@NAME@", subject.name.upper())
-        (folder / file).write_text(named, encoding="utf-8")
+        (folder / file).write_bytes((HARNESSES / file).read_bytes())
     sources = sorted(path for path in subject.files if re.fullmatch(r"src/.*\.c", path))
     macros = [f"-D{subject.name.upper()}_SINGLE={int(single)}", *(f"-D{m}" for m in subject.macros)]
     sanitized = [f"-fsanitize={SANITIZERS}", f"-fno-sanitize={LEFT_OUT}"]

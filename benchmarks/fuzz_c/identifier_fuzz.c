@@ -5,14 +5,14 @@
  * least and most of their sum, OWN least and most of the rest, per axle. */
 #include "reader.h"
 
-#include "@name@.h"
+#include "tireid.h"
 
-#define REALS(type) (sizeof(type) / sizeof(@name@_real))
+#define REALS(type) (sizeof(type) / sizeof(tireid_real))
 
-static @name@_params exported;
-static @name@_params params;
-static @name@_state state;
-static @name@_input input;
+static tireid_params exported;
+static tireid_params params;
+static tireid_state state;
+static tireid_input input;
 static int told; /* weights that were not learnt are in the state */
 
 static struct {
@@ -21,7 +21,7 @@ static struct {
 
 static void check_numbers(const void *numbers, size_t size)
 {
-    @name@_real number;
+    tireid_real number;
     size_t at;
     for (at = 0U; (at + sizeof number) <= size; at += sizeof number) {
         (void)memcpy(&number, (const char *)numbers + at, sizeof number);
@@ -34,9 +34,9 @@ static void check_boxes(void)
 #ifdef BOXES
     static const double grip[2] = { GRIP };
     static const double own[2][3][2] = { OWN };
-    @name@_weights weights;
+    tireid_weights weights;
     unsigned axle, i;
-    CHECK(@name@_get_weights(&state, &weights) == @NAME@_OK);
+    CHECK(tireid_get_weights(&state, &weights) == TIREID_OK);
     for (axle = 0U; (axle < 2U) && (told == 0); axle++) {
         const unsigned n = sizeof weights.W[0] / sizeof weights.W[0][0];
         double sum = 0.0;
@@ -57,8 +57,8 @@ static void check_boxes(void)
 /* Weights are as they were; those on their bounds are put there again, which rounds. */
 static void check_kept(const void *now, const void *then, size_t size)
 {
-    const double ulp = (sizeof(@name@_real) > 4U) ? DBL_EPSILON : FLT_EPSILON;
-    @name@_real a, b;
+    const double ulp = (sizeof(tireid_real) > 4U) ? DBL_EPSILON : FLT_EPSILON;
+    tireid_real a, b;
     size_t at;
     for (at = 0U; (at + sizeof a) <= size; at += sizeof a) {
         (void)memcpy(&a, (const char *)now + at, sizeof a);
@@ -70,27 +70,27 @@ static void check_kept(const void *now, const void *then, size_t size)
 
 static void take_step(void)
 {
-    static @name@_state before;
-    @name@_output output;
-    @name@_real force[2];
-    @name@_status status;
+    static tireid_state before;
+    tireid_output output;
+    tireid_real force[2];
+    tireid_status status;
     before = state;
-    status = @name@_step(&state, &params, &input);
-    CHECK(status != @NAME@_BAD_CALL);
+    status = tireid_step(&state, &params, &input);
+    CHECK(status != TIREID_BAD_CALL);
     check_numbers(&state.values, sizeof state.values);
-    CHECK(@name@_get_output(&state, &output) == @NAME@_OK);
+    CHECK(tireid_get_output(&state, &output) == TIREID_OK);
     check_numbers(&output, sizeof output);
-    CHECK(@name@_get_forces(&state, force) == @NAME@_OK);
+    CHECK(tireid_get_forces(&state, force) == TIREID_OK);
     CHECK(fabs((double)force[0]) <= (double)exported.max_force);
     CHECK(fabs((double)force[1]) <= (double)exported.max_force);
     CHECK((state.faults - before.faults) <= 1U);
-    CHECK((status != @NAME@_BAD_INPUT) || (state.faults == (before.faults + 1U)));
+    CHECK((status != TIREID_BAD_INPUT) || (state.faults == (before.faults + 1U)));
 #ifdef LEARNT
     if ((told == 0)
-        && ((state.adapts == 0U) || (status == @NAME@_BAD_INPUT) || (status == @NAME@_BAD_RESULT))) {
-        @name@_weights now, then; /* what is refused teaches nothing; told ones enter their boxes */
-        CHECK(@name@_get_weights(&state, &now) == @NAME@_OK);
-        CHECK(@name@_get_weights(&before, &then) == @NAME@_OK);
+        && ((state.adapts == 0U) || (status == TIREID_BAD_INPUT) || (status == TIREID_BAD_RESULT))) {
+        tireid_weights now, then; /* what is refused teaches nothing; told ones enter their boxes */
+        CHECK(tireid_get_weights(&state, &now) == TIREID_OK);
+        CHECK(tireid_get_weights(&before, &then) == TIREID_OK);
         check_kept(now.LEARNT, then.LEARNT, sizeof now.LEARNT);
     }
 #endif
@@ -101,7 +101,7 @@ static void take_step(void)
 /* A car on tires that saturate, steered by a wave. */
 static void sense(void)
 {
-    const double T = (double)@NAME@_SAMPLE_TIME;
+    const double T = (double)TIREID_SAMPLE_TIME;
     const double delta = car.amplitude * sin(car.phase);
     const double v_x = fmax(car.v_x, 1.0);
     const double front = 8000.0 * tanh(15.0 * (delta - ((car.v_y + (1.15 * car.r)) / v_x)));
@@ -111,11 +111,11 @@ static void sense(void)
     car.r += T * ((1.15 * front) - (1.55 * rear)) / 2500.0;
     car.v_y = fmin(fmax(car.v_y, -20.0), 20.0);
     car.r = fmin(fmax(car.r, -5.0), 5.0);
-    input.v_x = (@name@_real)car.v_x;
-    input.v_y = (@name@_real)car.v_y;
-    input.r = (@name@_real)car.r;
-    input.delta_f = (@name@_real)delta;
-    input.delta_r = (@name@_real)0;
+    input.v_x = (tireid_real)car.v_x;
+    input.v_y = (tireid_real)car.v_y;
+    input.r = (tireid_real)car.r;
+    input.delta_f = (tireid_real)delta;
+    input.delta_r = (tireid_real)0;
 }
 
 static void begin_road(reader *from)
@@ -136,17 +136,17 @@ static void drive(reader *from)
 {
     const uint32_t fault = take_byte(from);
     unsigned n = 1U + take_byte(from);
-    @name@_real *const signals[] = { &input.v_x, &input.v_y, &input.r, &input.delta_f };
-    @name@_real *const signal = signals[fault % 4U];
-    const @name@_real held = *signal;
+    tireid_real *const signals[] = { &input.v_x, &input.v_y, &input.r, &input.delta_f };
+    tireid_real *const signal = signals[fault % 4U];
+    const tireid_real held = *signal;
     const double wrong = ((fault & 0xF0U) == 0xF0U) ? hostile(from) : between(from, -3.0, 3.0);
     for (; n > 0U; n--) {
         sense();
         switch ((fault >> 2U) % 8U) {
         case 4: *signal = held; break;
-        case 5: *signal = (@name@_real)((double)*signal + wrong); break;
+        case 5: *signal = (tireid_real)((double)*signal + wrong); break;
         case 6: *signal = -*signal; break;
-        case 7: *signal = (@name@_real)wrong; break;
+        case 7: *signal = (tireid_real)wrong; break;
         default: break;
         }
         take_step();
@@ -157,13 +157,13 @@ static void drive(reader *from)
 static void strike(reader *from)
 {
     const uint32_t kind = take_byte(from);
-    @name@_real number[REALS(@name@_input)];
+    tireid_real number[REALS(tireid_input)];
     unsigned n = 1U + (kind % 3U);
     unsigned again = 1U + (kind >> 2U);
     sense();
     (void)memcpy(number, &input, sizeof number);
     for (; n > 0U; n--) {
-        number[take_byte(from) % REALS(@name@_input)] = (@name@_real)hostile(from);
+        number[take_byte(from) % REALS(tireid_input)] = (tireid_real)hostile(from);
     }
     (void)memcpy(&input, number, sizeof number);
     for (; again > 0U; again--) {
@@ -177,16 +177,16 @@ static void set_params(reader *from)
     const uint32_t kind = take_byte(from);
     params = exported;
     if ((kind & 1U) != 0U) {
-        params.max_speed = (@name@_real)hostile(from);
+        params.max_speed = (tireid_real)hostile(from);
     }
     if ((kind & 2U) != 0U) {
-        params.max_yaw_rate = (@name@_real)hostile(from);
+        params.max_yaw_rate = (tireid_real)hostile(from);
     }
     if ((kind & 4U) != 0U) {
-        params.max_steering = (@name@_real)hostile(from);
+        params.max_steering = (tireid_real)hostile(from);
     }
     if ((kind & 8U) != 0U) {
-        params.max_force *= (@name@_real)between(from, 0.0, 1.0);
+        params.max_force *= (tireid_real)between(from, 0.0, 1.0);
     }
 }
 
@@ -194,24 +194,24 @@ static void set_params(reader *from)
 /* Weights that were learnt, in part or wholly others; refused ones change nothing. */
 static void set_weights(reader *from)
 {
-    @name@_weights weights;
-    const @name@_state before = state;
+    tireid_weights weights;
+    const tireid_state before = state;
     const uint32_t kind = take_byte(from);
-    @name@_status status;
+    tireid_status status;
     unsigned i;
-    CHECK(@name@_get_weights(&state, &weights) == @NAME@_OK);
+    CHECK(tireid_get_weights(&state, &weights) == TIREID_OK);
     for (i = 0U; i < (kind % 4U); i++) {
-        @name@_real number[REALS(@name@_weights)];
-        const unsigned at = take_byte(from) % REALS(@name@_weights);
+        tireid_real number[REALS(tireid_weights)];
+        const unsigned at = take_byte(from) % REALS(tireid_weights);
         (void)memcpy(number, &weights, sizeof number);
-        number[at] = (@name@_real)(((kind & 4U) != 0U)
+        number[at] = (tireid_real)(((kind & 4U) != 0U)
                 ? hostile(from)
                 : between(from, -2.0, 2.0) * (double)number[at]);
         (void)memcpy(&weights, number, sizeof number);
     }
-    status = @name@_set_weights(&state, &weights);
-    CHECK((status == @NAME@_OK) || (status == @NAME@_BAD_INPUT));
-    if (status == @NAME@_BAD_INPUT) {
+    status = tireid_set_weights(&state, &weights);
+    CHECK((status == TIREID_OK) || (status == TIREID_BAD_INPUT));
+    if (status == TIREID_BAD_INPUT) {
         CHECK(memcmp(&before, &state, sizeof before) == 0);
     } else if ((kind % 4U) != 0U) {
         told = 1;
@@ -225,21 +225,21 @@ static void set_weights(reader *from)
 static void change_mode(reader *from)
 {
     const uint32_t kind = take_byte(from) % 8U;
-    const @name@_state before = state;
+    const tireid_state before = state;
     if (kind == 0U) {
-        CHECK(@name@_init(&state) == @NAME@_OK);
+        CHECK(tireid_init(&state) == TIREID_OK);
         told = 0;
     } else if (kind < 4U) {
-        CHECK(@name@_reset(&state) == @NAME@_OK);
+        CHECK(tireid_reset(&state) == TIREID_OK);
         CHECK(state.faults == before.faults);
     } else if (kind == 4U) {
-        CHECK(@name@_step(NULL, &params, &input) == @NAME@_BAD_CALL);
-        CHECK(@name@_step(&state, NULL, &input) == @NAME@_BAD_CALL);
-        CHECK(@name@_step(&state, &params, NULL) == @NAME@_BAD_CALL);
+        CHECK(tireid_step(NULL, &params, &input) == TIREID_BAD_CALL);
+        CHECK(tireid_step(&state, NULL, &input) == TIREID_BAD_CALL);
+        CHECK(tireid_step(&state, &params, NULL) == TIREID_BAD_CALL);
         CHECK(memcmp(&before, &state, sizeof before) == 0);
     } else {
 #ifdef LEARNT
-        CHECK(@name@_set_adaptation(&state, kind != 5U) == @NAME@_OK);
+        CHECK(tireid_set_adaptation(&state, kind != 5U) == TIREID_OK);
 #endif
     }
 }
@@ -248,9 +248,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     reader from = { data, size };
     inputs++;
-    CHECK(@name@_default_params(&exported) == @NAME@_OK);
+    CHECK(tireid_default_params(&exported) == TIREID_OK);
     params = exported;
-    CHECK(@name@_init(&state) == @NAME@_OK);
+    CHECK(tireid_init(&state) == TIREID_OK);
     told = 0;
     car.v_y = car.r = car.phase = 0.0;
     begin_road(&from);

@@ -4,26 +4,26 @@
  * refused sample does, which is to move it on by a period. */
 #include "reader.h"
 
-#include "@name@.h"
-#include "@name@_params.h"
+#include "tireid_mpc.h"
+#include "tireid_mpc_params.h"
 
-#define REALS(type) (sizeof(type) / sizeof(@name@_real))
-#define NUMBERS ((sizeof(@name@_params) - (2U * sizeof(uint32_t))) / sizeof(@name@_real))
+#define REALS(type) (sizeof(type) / sizeof(tireid_mpc_real))
+#define NUMBERS ((sizeof(tireid_mpc_params) - (2U * sizeof(uint32_t))) / sizeof(tireid_mpc_real))
 #define CARRIED 1e13 /* more than any number that is carried */
 
-static @name@_params exported;
-static @name@_params params;
-static @name@_state state;
-static @name@_state twin;
-static @name@_work work;
-static @name@_input input;
+static tireid_mpc_params exported;
+static tireid_mpc_params params;
+static tireid_mpc_state state;
+static tireid_mpc_state twin;
+static tireid_mpc_work work;
+static tireid_mpc_input input;
 
 /* Where the car is and what the road does, of a drive with sense. */
 static struct {
     double v_x, e_y, e_psi, v_y, r, kappa;
 } car;
 
-static int are_carried(const @name@_real *x, size_t n)
+static int are_carried(const tireid_mpc_real *x, size_t n)
 {
     size_t i;
     for (i = 0U; i < n; i++) {
@@ -44,7 +44,7 @@ static void check_state(void)
 }
 
 /* What of the state a refused sample may not touch but by a period. */
-static int same_plan(const @name@_state *a, const @name@_state *b)
+static int same_plan(const tireid_mpc_state *a, const tireid_mpc_state *b)
 {
     return (memcmp(a->x, b->x, sizeof a->x) == 0) && (memcmp(a->u, b->u, sizeof a->u) == 0)
         && (memcmp(a->feedback, b->feedback, sizeof a->feedback) == 0)
@@ -52,28 +52,28 @@ static int same_plan(const @name@_state *a, const @name@_state *b)
         && (a->age == b->age) && (a->guessed == b->guessed) && (a->started == b->started);
 }
 
-static void check_refused(const @name@_state *before)
+static void check_refused(const tireid_mpc_state *before)
 {
-    static @name@_input nothing;
-    @name@_real steering;
+    static tireid_mpc_input nothing;
+    tireid_mpc_real steering;
     twin = *before;
     nothing = input;
-    nothing.e_y = (@name@_real)NAN;
-    CHECK(@name@_step(&twin, &params, &work, &nothing, &steering) == @NAME@_NOT_FINITE);
+    nothing.e_y = (tireid_mpc_real)NAN;
+    CHECK(tireid_mpc_step(&twin, &params, &work, &nothing, &steering) == TIREID_MPC_NOT_FINITE);
     CHECK(same_plan(&state, &twin));
 }
 
 static double take_step(void)
 {
-    static @name@_state before;
-    @name@_real steering = (@name@_real)NAN;
-    @name@_status status;
+    static tireid_mpc_state before;
+    tireid_mpc_real steering = (tireid_mpc_real)NAN;
+    tireid_mpc_status status;
     double most, moved;
     unsigned i;
     before = state;
-    status = @name@_step(&state, &params, &work, &input, &steering);
-    CHECK((unsigned)status < @NAME@_STATUSES);
-    CHECK((status != @NAME@_LATE) && (status != @NAME@_BAD_CALL));
+    status = tireid_mpc_step(&state, &params, &work, &input, &steering);
+    CHECK((unsigned)status < TIREID_MPC_STATUSES);
+    CHECK((status != TIREID_MPC_LATE) && (status != TIREID_MPC_BAD_CALL));
     CHECK(fabs((double)steering) <= ((double)params.max_steering * 1.000001));
     most = (double)params.max_rate * (double)params.period;
     moved = fabs((double)steering - (double)before.commands[0]);
@@ -82,15 +82,15 @@ static double take_step(void)
     }
     CHECK(memcmp(&steering, &state.commands[0], sizeof steering) == 0);
     CHECK(state.iterations <= params.max_iterations);
-    for (i = 0U; i < @NAME@_STATUSES; i++) {
+    for (i = 0U; i < TIREID_MPC_STATUSES; i++) {
         CHECK(state.faults[i] == (before.faults[i] + ((i == (unsigned)status) ? 1U : 0U)));
     }
     check_state();
-    for (i = 0U; (status <= @NAME@_ITERATION_LIMIT) && (i < @NAME@_HORIZON); i++) {
+    for (i = 0U; (status <= TIREID_MPC_ITERATION_LIMIT) && (i < TIREID_MPC_HORIZON); i++) {
         CHECK(fabs((double)state.u[i]) <= ((double)params.max_rate * 1.000001));
         CHECK(fabs((double)state.x[i][4]) <= ((double)params.max_steering * 1.000001));
     }
-    if (status >= @NAME@_NOT_FINITE) {
+    if (status >= TIREID_MPC_NOT_FINITE) {
         check_refused(&before);
     }
     count_step((unsigned)status);
@@ -101,13 +101,13 @@ static double take_step(void)
 static void sense(void)
 {
     unsigned k;
-    input.e_y = (@name@_real)car.e_y;
-    input.e_psi = (@name@_real)car.e_psi;
-    input.v_y = (@name@_real)car.v_y;
-    input.r = (@name@_real)car.r;
-    for (k = 0U; k <= @NAME@_HORIZON; k++) {
-        input.kappa[k] = (@name@_real)car.kappa;
-        input.v_x[k] = (@name@_real)car.v_x;
+    input.e_y = (tireid_mpc_real)car.e_y;
+    input.e_psi = (tireid_mpc_real)car.e_psi;
+    input.v_y = (tireid_mpc_real)car.v_y;
+    input.r = (tireid_mpc_real)car.r;
+    for (k = 0U; k <= TIREID_MPC_HORIZON; k++) {
+        input.kappa[k] = (tireid_mpc_real)car.kappa;
+        input.v_x[k] = (tireid_mpc_real)car.v_x;
     }
 }
 
@@ -134,7 +134,7 @@ static void drive(reader *from)
 {
     const uint32_t fault = take_byte(from);
     unsigned n = 1U + (take_byte(from) % 16U);
-    const @name@_input held = input;
+    const tireid_mpc_input held = input;
     const double wrong = ((fault & 0xF0U) == 0xF0U) ? hostile(from) : between(from, -2.0, 2.0);
     for (; n > 0U; n--) {
         sense();
@@ -143,10 +143,10 @@ static void drive(reader *from)
         case 9: input.e_psi = held.e_psi; break;
         case 10: input.v_y = held.v_y; break;
         case 11: input.r = held.r; break;
-        case 12: input.e_y += (@name@_real)wrong; break;
-        case 13: input.e_psi += (@name@_real)wrong; break;
-        case 14: input.v_y = (@name@_real)wrong; break;
-        case 15: input.r = (@name@_real)wrong; break;
+        case 12: input.e_y += (tireid_mpc_real)wrong; break;
+        case 13: input.e_psi += (tireid_mpc_real)wrong; break;
+        case 14: input.v_y = (tireid_mpc_real)wrong; break;
+        case 15: input.r = (tireid_mpc_real)wrong; break;
         default: break;
         }
         go_on(take_step());
@@ -162,12 +162,12 @@ static void strike(reader *from)
     const uint32_t kind = take_byte(from);
     unsigned n = 1U + (kind % 4U);
     unsigned again = 1U + ((kind >> 4U) % 8U);
-    @name@_real number[REALS(@name@_input)];
+    tireid_mpc_real number[REALS(tireid_mpc_input)];
     sense();
     (void)memcpy(number, &input, sizeof number);
     for (; n > 0U; n--) {
         const unsigned at = (take_byte(from) << 8U) | take_byte(from);
-        number[at % REALS(@name@_input)] = (@name@_real)hostile(from);
+        number[at % REALS(tireid_mpc_input)] = (tireid_mpc_real)hostile(from);
     }
     (void)memcpy(&input, number, sizeof number);
     for (; again > 0U; again--) {
@@ -182,34 +182,34 @@ static void strike_center(reader *from)
     const double near = between(from, 0.0, 2.0);
     unsigned k;
     sense();
-    input.e_y = (@name@_real)e_y;
-    for (k = 0U; k <= @NAME@_HORIZON; k++) {
-        input.kappa[k] = (@name@_real)((e_y != 0.0) ? (near / e_y) : near);
+    input.e_y = (tireid_mpc_real)e_y;
+    for (k = 0U; k <= TIREID_MPC_HORIZON; k++) {
+        input.kappa[k] = (tireid_mpc_real)((e_y != 0.0) ? (near / e_y) : near);
     }
     if ((take_byte(from) % 2U) == 0U) {
-        input.kappa[0] = (@name@_real)0; /* the center comes later */
+        input.kappa[0] = (tireid_mpc_real)0; /* the center comes later */
     }
     (void)take_step();
 }
 
 static void swap_weights(reader *from)
 {
-    @name@_real weights[@NAME@_WEIGHTS];
+    tireid_mpc_real weights[TIREID_MPC_WEIGHTS];
     const uint32_t kind = take_byte(from);
     const double share = between(from, 0.4, 1.4);
-    @name@_params before = params;
+    tireid_mpc_params before = params;
     int sane = 1;
     unsigned i;
-    for (i = 0U; i < @NAME@_WEIGHTS; i++) {
-        weights[i] = (@name@_real)(share * (double)exported.weights[i]);
+    for (i = 0U; i < TIREID_MPC_WEIGHTS; i++) {
+        weights[i] = (tireid_mpc_real)(share * (double)exported.weights[i]);
     }
     for (i = 0U; i < (kind % 4U); i++) {
-        weights[take_byte(from) % @NAME@_WEIGHTS] = (@name@_real)hostile(from);
+        weights[take_byte(from) % TIREID_MPC_WEIGHTS] = (tireid_mpc_real)hostile(from);
     }
-    for (i = 0U; i < @NAME@_WEIGHTS; i++) {
+    for (i = 0U; i < TIREID_MPC_WEIGHTS; i++) {
         sane = sane && isfinite(weights[i]);
     }
-    if (@name@_set_weights(&params, weights) == @NAME@_OK) {
+    if (tireid_mpc_set_weights(&params, weights) == TIREID_MPC_OK) {
         CHECK(sane);
     } else {
         CHECK(memcmp(&before, &params, sizeof before) == 0);
@@ -219,17 +219,17 @@ static void swap_weights(reader *from)
 /* Any number in any place of the parameters, as far as they are accepted. */
 static void set_param(reader *from)
 {
-    const @name@_params before = params;
-    @name@_real number[NUMBERS];
+    const tireid_mpc_params before = params;
+    tireid_mpc_real number[NUMBERS];
     const unsigned at = (take_byte(from) << 8U) | take_byte(from);
     (void)memcpy(number, &params, sizeof number);
     number[at % NUMBERS] = ((at & 0x8000U) != 0U)
-        ? (@name@_real)hostile(from)
-        : (@name@_real)(between(from, 0.2, 3.0) * (double)number[at % NUMBERS]);
+        ? (tireid_mpc_real)hostile(from)
+        : (tireid_mpc_real)(between(from, 0.2, 3.0) * (double)number[at % NUMBERS]);
     (void)memcpy(&params, number, sizeof number);
     params.max_iterations = 1U + (take_byte(from) % 40U);
     params.linearizations = take_byte(from) % 3U;
-    if (!@name@_accepts(&params)) {
+    if (!tireid_mpc_accepts(&params)) {
         params = before;
     }
 }
@@ -238,44 +238,44 @@ static void tell_angle(reader *from)
 {
     const uint32_t kind = take_byte(from);
     const double angle = ((kind % 2U) == 0U) ? between(from, -0.7, 0.7) : hostile(from);
-    const @name@_state before = state;
-    const @name@_status status = ((kind & 2U) != 0U) ? @name@_late(&state, (@name@_real)angle)
-                                                      : @name@_reset(&state, (@name@_real)angle);
-    CHECK((status == @NAME@_OK) || (status == @NAME@_BAD_CALL));
-    CHECK((status == @NAME@_OK) || (memcmp(&before, &state, sizeof before) == 0));
+    const tireid_mpc_state before = state;
+    const tireid_mpc_status status = ((kind & 2U) != 0U) ? tireid_mpc_late(&state, (tireid_mpc_real)angle)
+                                                      : tireid_mpc_reset(&state, (tireid_mpc_real)angle);
+    CHECK((status == TIREID_MPC_OK) || (status == TIREID_MPC_BAD_CALL));
+    CHECK((status == TIREID_MPC_OK) || (memcmp(&before, &state, sizeof before) == 0));
     check_state();
 }
 
 /* An iteration from any place. */
 static void solve(reader *from)
 {
-    @name@_real x0[@NAME@_STATES];
-    @name@_status status;
-    const @name@_state before = state;
+    tireid_mpc_real x0[TIREID_MPC_STATES];
+    tireid_mpc_status status;
+    const tireid_mpc_state before = state;
     unsigned i;
     sense();
-    for (i = 0U; i < @NAME@_STATES; i++) {
-        x0[i] = (@name@_real)((take_byte(from) < 64U) ? hostile(from) : between(from, -1.0, 1.0));
+    for (i = 0U; i < TIREID_MPC_STATES; i++) {
+        x0[i] = (tireid_mpc_real)((take_byte(from) < 64U) ? hostile(from) : between(from, -1.0, 1.0));
     }
     if (take_byte(from) < 64U) {
-        input.kappa[1U + (take_byte(from) % @NAME@_HORIZON)] = (@name@_real)hostile(from);
+        input.kappa[1U + (take_byte(from) % TIREID_MPC_HORIZON)] = (tireid_mpc_real)hostile(from);
     }
-    status = @name@_solve(&state, &params, &work, x0, &input.kappa[1], &input.v_x[1]);
-    CHECK(status <= @NAME@_QP_FAILED);
-    CHECK((status != @NAME@_QP_FAILED) || same_plan(&before, &state));
+    status = tireid_mpc_solve(&state, &params, &work, x0, &input.kappa[1], &input.v_x[1]);
+    CHECK(status <= TIREID_MPC_QP_FAILED);
+    CHECK((status != TIREID_MPC_QP_FAILED) || same_plan(&before, &state));
     check_state();
     count_step((unsigned)status);
 }
 
 static void call_without(reader *from)
 {
-    const @name@_state before = state;
+    const tireid_mpc_state before = state;
     const uint32_t kind = take_byte(from) % 5U;
-    @name@_real steering = 0;
-    CHECK(@name@_step((kind == 0U) ? NULL : &state, (kind == 1U) ? NULL : &params,
+    tireid_mpc_real steering = 0;
+    CHECK(tireid_mpc_step((kind == 0U) ? NULL : &state, (kind == 1U) ? NULL : &params,
               (kind == 2U) ? NULL : &work, (kind == 3U) ? NULL : &input,
               (kind == 4U) ? NULL : &steering)
-        == @NAME@_BAD_CALL);
+        == TIREID_MPC_BAD_CALL);
     CHECK(memcmp(&before, &state, sizeof before) == 0);
     (void)memset(&work, (int)take_byte(from), sizeof work); /* means nothing between two steps */
 }
@@ -284,9 +284,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     reader from = { data, size };
     inputs++;
-    CHECK(@name@_default_params(&exported) == @NAME@_OK);
+    CHECK(tireid_mpc_default_params(&exported) == TIREID_MPC_OK);
     params = exported;
-    CHECK(@name@_init(&state) == @NAME@_OK);
+    CHECK(tireid_mpc_init(&state) == TIREID_MPC_OK);
     car.e_y = car.e_psi = car.v_y = car.r = 0.0;
     begin_road(&from);
     sense();

@@ -1,7 +1,7 @@
 """Every fault that the rules know of a C file, found on its tokens.
 
-Comments, texts and preprocessor lines are no tokens, and `@name@` of a template is one, so that a
-fault is planted in code alone. A fault that leaves the sequence of tokens as it was is none.
+Comments, texts and preprocessor lines are no tokens, so that a fault is planted in code alone. A
+fault that leaves the sequence of tokens as it was is none.
 """
 
 import re
@@ -14,7 +14,7 @@ from benchmarks.mutation.python_faults import AXLES, OTHER_AXLE
 TOKEN = re.compile(
     r"""(?P<skip>\s+|/\*.*?\*/|//[^\n]*|^[ \t]*\#(?:\\\n|[^\n])*)
     |(?P<text>"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')
-    |(?P<word>(?:@\w+@|[A-Za-z_])(?:@\w+@|\w)*)
+    |(?P<word>[A-Za-z_]\w*)
     |(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?[uUlLfF]*)
     |(?P<sign><<=|>>=|->|\+\+|--|<<|>>|[-+*/%&|^<>=!]=|&&|\|\||.)""",
     re.S | re.M | re.X,
@@ -54,7 +54,7 @@ def tokens(source: bytes) -> list[Token]:
 
     Parameters
     ----------
-    source : of a C file or of a template of one, ASCII.
+    source : of a C file, ASCII.
     """
     found = TOKEN.finditer(source.decode("latin-1"))
     return [
@@ -107,7 +107,7 @@ def _signs(read: list[Token]) -> Iterator[Change]:
             yield (kind if token.text in _COMPARED else "arithmetic"), token.start, token.end, new
         value = before.kind in ("word", "number") or before.text in (")", "]")
         if token.text in BINARY and value and after.text not in (")", ",", "*"):
-            if before.text not in _JUMPS_AND_TYPES and not before.text.startswith("@"):
+            if before.text not in _JUMPS_AND_TYPES and not before.text.startswith("tireid_"):
                 yield "arithmetic", token.start, token.end, BINARY[token.text]
         elif token.text == "-" and not value:
             yield "sign", token.start, token.end, ""

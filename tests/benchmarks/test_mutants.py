@@ -131,7 +131,7 @@ void step(double *x, int n)
 {
     int i;
     for (i = 0; i < n; i++) {
-        x[0] += @NAME@_C(0.5) * -x[1];
+        x[0] += TIREID_C(0.5) * -x[1];
     }
     if (!done && (n == 1)) {
         write("a + b");
@@ -143,7 +143,7 @@ void step(double *x, int n)
 def test_comments_texts_and_preprocessor_lines_of_c_are_no_tokens():
     words = [token.text for token in tokens(C.encode())]
     assert "include" not in words and "N" not in words and "a" not in words
-    assert '"a + b"' in words and "@NAME@_C" in words
+    assert '"a + b"' in words and "TIREID_C" in words
     kept = ("/* a + b, x[0] */", '#include "toy.h"', "#define N 4U", "// a < b", '"a + b"')
     for faulty in chain(*planted(C, "toy.c").values()):
         assert faulty.count("a + b") >= 1
@@ -158,11 +158,11 @@ def test_comments_texts_and_preprocessor_lines_of_c_are_no_tokens():
         ("comparison", "n != 1"),
         ("logic", "!done || (n"),
         ("logic", "if (done"),
-        ("arithmetic", "x[0] -= @NAME@_C"),
+        ("arithmetic", "x[0] -= TIREID_C"),
         ("arithmetic", "(0.5) / -x"),
         ("sign", "* x[1]"),
         ("number", "gain = 3.0;"),
-        ("number", "@NAME@_C(0.75)"),
+        ("number", "TIREID_C(0.75)"),
         ("index", "* -x[0]"),
         ("forgotten statement", "i++) {\n        ;\n    }"),
         ("forgotten statement", "1)) {\n        ;\n    }"),

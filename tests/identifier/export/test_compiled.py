@@ -244,7 +244,7 @@ def test_an_input_on_its_limit_is_taken_and_one_beyond_is_not(packages):
     package = packages["integral"]
     text = "\n".join(package.files.values())
     limit = {
-        name: float(re.search(rf"params->{name} = \(\w+\)(\S+);", text).group(1))
+        name: float(re.search(rf"#define TIREID_{name.upper()} \((\S+)\)", text).group(1))
         for name in ("max_speed", "max_yaw_rate", "max_steering")
     }
     names = ("max_speed", "max_speed", "max_yaw_rate", "max_steering", "max_steering")
