@@ -11,7 +11,8 @@ SMOKE := tests/test_imports.py tests/codegen tests/models/test_vehicle.py \
 	tests/mpc/path/test_waypoints.py tests/mpc/path/test_gates.py tests/tireid/test_cli.py
 SMOKE_ONNX := tests/identifier/export/test_onnx.py tests/identifier/export/test_onnx_model.py
 
-.PHONY: demo test heavy lint docs bench mutants fuzz fuzz-c numbers newest lowest lock wheel clean
+.PHONY: demo test heavy lint docs bench mutants fuzz fuzz-c numbers reference newest lowest lock wheel \
+	clean
 
 demo: $(VENV)/.demo
 	$(VENV)/bin/tireid demo --out out/demo --force
@@ -38,6 +39,10 @@ bench: $(VENV)/.bench
 # What `python -m benchmarks.run_all --record` measured, written into README.md and docs.
 numbers: $(VENV)/.bench
 	$(PY) -m benchmarks.documents
+
+# The generated headers that the C of the repository is compiled, linted and read with.
+reference: $(VENV)/.test
+	$(PY) -m tests.c_reference.write
 
 # Faults that a program draws: how many do the tests catch?
 mutants: $(VENV)/.mutants

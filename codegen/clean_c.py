@@ -5,7 +5,7 @@ that one text serves both precisions. Every compound operand is in parentheses.
 """
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -161,12 +161,6 @@ BINARY: Mapping[str, str] = {
     "or": "||",
 }
 MACROS: Mapping[str, str] = {"sqrt": "SQRT", "fabs": "FABS", "floor": "FLOOR"}
-FUNCTIONS: Mapping[str, tuple[str, str]] = {  # in float and in double
-    "PICK": ("PICK(x, y) x##F", "PICK(x, y) y"),
-    "SQRT": ("SQRT(x) sqrtf(x)", "SQRT(x) sqrt(x)"),
-    "FABS": ("FABS(x) fabsf(x)", "FABS(x) fabs(x)"),
-    "FLOOR": ("FLOOR(x) floorf(x)", "FLOOR(x) floor(x)"),
-}
 
 
 def literal(value: float, prefix: str) -> str:
@@ -384,48 +378,3 @@ def _groups(graph: Graph) -> list[list[int]]:
             level[place] += 1
             found.setdefault((node.op, level[place]), []).append(place)
     return list(found.values())
-
-
-# What the statements need around them.
-
-
-def own_functions(prefix: str, called: Collection[str]) -> str:
-    """Return those of our own functions that are called, each over an array, from one expression.
-
-    Parameters
-    ----------
-    prefix : of every function and macro.
-    called : their names, of `OWN`.
-    """
-    texts = []
-    for own in sorted(called):
-        x = ca.SX.sym("x")
-        graph = recognized(graph_of(ca.Function(own, [x], [OWN[own](x)])), whole=False)
-        statements = Statements(graph, prefix=prefix, read=_entry, write=_entry)
-        texts.append(
-            f"static void {prefix}_{own}({prefix}_real *x, uint32_t n)\n{{\n    uint32_t i;\n"
-            f"    for (i = 0U; i < n; i++) {{\n{statements.block(indent=8)}    }}\n}}\n\n"
-        )
-    return "".join(texts)
-
-
-def _entry(_port: int, _entry: int) -> str:
-    return "x[i]"
-
-
-def used_macros(prefix: str, text: str) -> str:
-    """Return the definitions of the functions of both precisions that a text calls.
-
-    Parameters
-    ----------
-    prefix : of every macro.
-    text : in C.
-    """
-    capital = prefix.upper()
-    used = [key for key in FUNCTIONS if f"{capital}_{key}(" in text]
-    if not used:
-        return ""
-    single, double = (
-        "".join(f"#define {capital}_{FUNCTIONS[key][i]}\n" for key in used) for i in (0, 1)
-    )
-    return f"#if {capital}_SINGLE\n{single}#else\n{double}#endif\n\n"

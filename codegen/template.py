@@ -1,16 +1,14 @@
-"""Templates: files with `@key@` for what is filled in, once; what was filled in is never read."""
+"""Templates of prose and of build files: `@key@` is filled in, once, and not read again."""
 
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from codegen.escape import c_comment, cmake_comment, markdown
+from codegen.escape import cmake_comment, markdown
 
 KEY = re.compile(r"@(\w+)@")
 LANGUAGES: Mapping[str, Callable[[str], str]] = {  # by the ending of the template
-    ".c": c_comment,
-    ".h": c_comment,
     ".md": markdown,
     ".txt": cmake_comment,
 }

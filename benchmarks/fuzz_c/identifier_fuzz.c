@@ -87,7 +87,8 @@ static void take_step(void)
     CHECK((status != TIREID_BAD_INPUT) || (state.faults == (before.faults + 1U)));
 #ifdef LEARNT
     if ((told == 0)
-        && ((state.adapts == 0U) || (status == TIREID_BAD_INPUT) || (status == TIREID_BAD_RESULT))) {
+        && ((state.adapts == 0U) || (status == TIREID_BAD_INPUT)
+            || (status == TIREID_BAD_RESULT))) {
         tireid_weights now, then; /* what is refused teaches nothing; told ones enter their boxes */
         CHECK(tireid_get_weights(&state, &now) == TIREID_OK);
         CHECK(tireid_get_weights(&before, &then) == TIREID_OK);
@@ -143,11 +144,20 @@ static void drive(reader *from)
     for (; n > 0U; n--) {
         sense();
         switch ((fault >> 2U) % 8U) {
-        case 4: *signal = held; break;
-        case 5: *signal = (tireid_real)((double)*signal + wrong); break;
-        case 6: *signal = -*signal; break;
-        case 7: *signal = (tireid_real)wrong; break;
-        default: break;
+        case 4:
+            *signal = held;
+            break;
+        case 5:
+            *signal = (tireid_real)((double)*signal + wrong);
+            break;
+        case 6:
+            *signal = -*signal;
+            break;
+        case 7:
+            *signal = (tireid_real)wrong;
+            break;
+        default:
+            break;
         }
         take_step();
     }
@@ -204,9 +214,9 @@ static void set_weights(reader *from)
         tireid_real number[REALS(tireid_weights)];
         const unsigned at = take_byte(from) % REALS(tireid_weights);
         (void)memcpy(number, &weights, sizeof number);
-        number[at] = (tireid_real)(((kind & 4U) != 0U)
-                ? hostile(from)
-                : between(from, -2.0, 2.0) * (double)number[at]);
+        number[at] =
+            (tireid_real)(((kind & 4U) != 0U) ? hostile(from)
+                                              : between(from, -2.0, 2.0) * (double)number[at]);
         (void)memcpy(&weights, number, sizeof number);
     }
     status = tireid_set_weights(&state, &weights);
@@ -257,15 +267,38 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     sense();
     while (from.left > 0U) {
         switch (take_byte(&from) % 16U) {
-        case 0: case 1: case 2: case 3: case 4: case 5: case 6: drive(&from); break;
-        case 7: case 8: begin_road(&from); break;
-        case 9: case 10: case 11: strike(&from); break;
-        case 12: set_params(&from); break;
-        case 13: change_mode(&from); break;
+        case 0:
+        case 1:
+        case 2:
+        case 3:
+        case 4:
+        case 5:
+        case 6:
+            drive(&from);
+            break;
+        case 7:
+        case 8:
+            begin_road(&from);
+            break;
+        case 9:
+        case 10:
+        case 11:
+            strike(&from);
+            break;
+        case 12:
+            set_params(&from);
+            break;
+        case 13:
+            change_mode(&from);
+            break;
 #ifdef LEARNT
-        case 14: set_weights(&from); break;
+        case 14:
+            set_weights(&from);
+            break;
 #endif
-        default: params = exported; break;
+        default:
+            params = exported;
+            break;
         }
     }
     return 0;

@@ -23,12 +23,12 @@ static unsigned long long inputs;
 static unsigned long long statuses[STATUSES];
 
 /* A rule that holds after every call; libFuzzer keeps the input that breaks one. */
-#define CHECK(rule)                                                                 \
-    do {                                                                            \
-        if (!(rule)) {                                                              \
-            (void)fprintf(stderr, "BROKEN: %s, line %d\n", #rule, __LINE__);        \
-            __builtin_trap();                                                       \
-        }                                                                           \
+#define CHECK(rule)                                                                                \
+    do {                                                                                           \
+        if (!(rule)) {                                                                             \
+            (void)fprintf(stderr, "BROKEN: %s, line %d\n", #rule, __LINE__);                       \
+            __builtin_trap();                                                                      \
+        }                                                                                          \
     } while (0)
 
 static uint32_t take_byte(reader *from)

@@ -139,15 +139,32 @@ static void drive(reader *from)
     for (; n > 0U; n--) {
         sense();
         switch (fault % 16U) {
-        case 8: input.e_y = held.e_y; break;
-        case 9: input.e_psi = held.e_psi; break;
-        case 10: input.v_y = held.v_y; break;
-        case 11: input.r = held.r; break;
-        case 12: input.e_y += (tireid_mpc_real)wrong; break;
-        case 13: input.e_psi += (tireid_mpc_real)wrong; break;
-        case 14: input.v_y = (tireid_mpc_real)wrong; break;
-        case 15: input.r = (tireid_mpc_real)wrong; break;
-        default: break;
+        case 8:
+            input.e_y = held.e_y;
+            break;
+        case 9:
+            input.e_psi = held.e_psi;
+            break;
+        case 10:
+            input.v_y = held.v_y;
+            break;
+        case 11:
+            input.r = held.r;
+            break;
+        case 12:
+            input.e_y += (tireid_mpc_real)wrong;
+            break;
+        case 13:
+            input.e_psi += (tireid_mpc_real)wrong;
+            break;
+        case 14:
+            input.v_y = (tireid_mpc_real)wrong;
+            break;
+        case 15:
+            input.r = (tireid_mpc_real)wrong;
+            break;
+        default:
+            break;
         }
         go_on(take_step());
         if (!(fabs(car.e_y) < 20.0) || !(fabs(car.e_psi) < 3.0)) {
@@ -239,8 +256,9 @@ static void tell_angle(reader *from)
     const uint32_t kind = take_byte(from);
     const double angle = ((kind % 2U) == 0U) ? between(from, -0.7, 0.7) : hostile(from);
     const tireid_mpc_state before = state;
-    const tireid_mpc_status status = ((kind & 2U) != 0U) ? tireid_mpc_late(&state, (tireid_mpc_real)angle)
-                                                      : tireid_mpc_reset(&state, (tireid_mpc_real)angle);
+    const tireid_mpc_status status = ((kind & 2U) != 0U)
+        ? tireid_mpc_late(&state, (tireid_mpc_real)angle)
+        : tireid_mpc_reset(&state, (tireid_mpc_real)angle);
     CHECK((status == TIREID_MPC_OK) || (status == TIREID_MPC_BAD_CALL));
     CHECK((status == TIREID_MPC_OK) || (memcmp(&before, &state, sizeof before) == 0));
     check_state();
@@ -255,7 +273,8 @@ static void solve(reader *from)
     unsigned i;
     sense();
     for (i = 0U; i < TIREID_MPC_STATES; i++) {
-        x0[i] = (tireid_mpc_real)((take_byte(from) < 64U) ? hostile(from) : between(from, -1.0, 1.0));
+        x0[i] =
+            (tireid_mpc_real)((take_byte(from) < 64U) ? hostile(from) : between(from, -1.0, 1.0));
     }
     if (take_byte(from) < 64U) {
         input.kappa[1U + (take_byte(from) % TIREID_MPC_HORIZON)] = (tireid_mpc_real)hostile(from);
@@ -292,15 +311,40 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     sense();
     while (from.left > 0U) {
         switch (take_byte(&from) % 16U) {
-        case 0: case 1: case 2: case 3: case 4: case 5: case 6: drive(&from); break;
-        case 7: begin_road(&from); break;
-        case 8: case 9: strike(&from); break;
-        case 10: strike_center(&from); break;
-        case 11: swap_weights(&from); break;
-        case 12: set_param(&from); break;
-        case 13: tell_angle(&from); break;
-        case 14: solve(&from); break;
-        default: call_without(&from); break;
+        case 0:
+        case 1:
+        case 2:
+        case 3:
+        case 4:
+        case 5:
+        case 6:
+            drive(&from);
+            break;
+        case 7:
+            begin_road(&from);
+            break;
+        case 8:
+        case 9:
+            strike(&from);
+            break;
+        case 10:
+            strike_center(&from);
+            break;
+        case 11:
+            swap_weights(&from);
+            break;
+        case 12:
+            set_param(&from);
+            break;
+        case 13:
+            tell_angle(&from);
+            break;
+        case 14:
+            solve(&from);
+            break;
+        default:
+            call_without(&from);
+            break;
         }
     }
     return 0;

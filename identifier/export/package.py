@@ -8,16 +8,16 @@ import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
-from codegen.escape import c_string
 from codegen.package import (
+    about_package,
     c_files,
     check_name,
-    digest,
+    cmake,
+    content_head,
     header,
     manifest_text,
     plain,
     rows,
-    tireid_version,
 )
 from codegen.template import Values, Words, filled
 from identifier.export.c_source import PREFIX, PROGRAMS, C, c_sources
@@ -31,6 +31,7 @@ from models.vehicle import Vehicle
 # <name>.json: everything that went into a package, what is in it, and their hashes.
 
 FORMAT = "tireid package 1"
+FLAGS = ("-ffp-contract=off", "-fno-math-errno")  # of the library
 
 
 def ingredients(specialized: SpecializedStep, *, single: bool) -> dict[str, Any]:
@@ -46,10 +47,7 @@ def ingredients(specialized: SpecializedStep, *, single: bool) -> dict[str, Any]
         asdict(method) if is_dataclass(method) and not isinstance(method, type) else {}
     )
     return {
-        "format": FORMAT,
-        "name": specialized.name,
-        "tireid": tireid_version(),
-        "precision": "float" if single else "double",
+        **content_head(FORMAT, specialized.name, single=single),
         "method": {"kind": type(method).__name__, **plain(numbers)},
         "certificate": certificate(method, specialized.vehicle),
         "vehicle": plain(vehicle_numbers(specialized.vehicle)),
@@ -97,19 +95,12 @@ def summary(specialized: SpecializedStep, content: Mapping[str, Any]) -> dict[st
     specialized : the step.
     content : what `ingredients` returned.
     """
-    short, version = digest(content)[:12], tireid_version()
     return {
-        "title": Words(f"Tire forces of the car {specialized.vehicle.name}"),
+        **about_package(content, f"Tire forces of the car {specialized.vehicle.name}"),
         "method": type(specialized.method).__name__,
-        "version": version,
-        "hash": short,
         "certificate": _certificate_text(specialized.method, specialized.vehicle),
-        "version_text": c_string(f"{specialized.name} {short}, tireid {version}"),
-        "single": str(int(content["precision"] == "float")),
         "dt": f"{specialized.dt:g}",
         "min_speed": f"{specialized.min_speed:.3g}",
-        "name": specialized.name,
-        "NAME": specialized.name.upper(),
     }
 
 
@@ -240,7 +231,7 @@ def vectors_header(specialized: SpecializedStep, found: Vectors) -> str:
     kept = rules([member for member in carried_members(specialized) if member.learnt])
     negative = [f"#define VECTOR_NOT_NEGATIVE {rule.first}U /* a weight */\n" for rule in kept]
     return header(
-        "vectors.h",
+        f"{specialized.name}_vectors.h",
         "Generated. Samples v_x, v_y, r, delta_f, delta_r [SI] and forces front, rear [N].",
         [
             f"#define VECTORS {len(found.samples)}\n"
@@ -296,16 +287,15 @@ def build_package(
     content = ingredients(specialized, single=single)
     about = summary(specialized, content)
     files = c_sources(specialized, single=single, about=about)
-    files |= _other_files(specialized, about, single=single)
+    files |= _programs(specialized)
+    files |= cmake(files, about, flags=FLAGS, so_that="square roots without a call")
     return Package(specialized, files | {f"{name}.json": manifest_text(content, files)}, about)
 
 
-def _other_files(specialized: SpecializedStep, about: Values, *, single: bool) -> dict[str, str]:
-    values = {"single_option": "ON" if single else "OFF", **about}
+def _programs(specialized: SpecializedStep) -> dict[str, str]:
     return {
-        "CMakeLists.txt": filled(C / "CMakeLists.txt", values),
         **c_files(C, PROGRAMS, {PREFIX: specialized.name}),
-        "tests/vectors.h": vectors_header(specialized, vectors(specialized)),
+        f"tests/{specialized.name}_vectors.h": vectors_header(specialized, vectors(specialized)),
     }
 
 

@@ -10,7 +10,7 @@ import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -128,23 +128,19 @@ def replay_on(
         libraries = ["board.c", "--specs=nosys.specs", "-Wl,--no-warnings", "-lm"]
         command = [CROSS_COMPILER, *processor.flags, "-std=gnu99", *board, *libraries]
         _build(folder, name, files, samples, [*command[:1], *FLAGS, *command[1:]], single=single)
-        return _result(
-            [
-                EMULATOR,
-                "-M",
-                processor.machine,
-                "-nographic",
-                "-monitor",
-                "none",
-                "-semihosting-config",
-                "enable=on,target=native",
-                "-icount",
-                "shift=0",
-                "-kernel",
-                "replay",
-            ],
-            folder,
-        )
+        return _result(emulation(processor), folder)
+
+
+def emulation(processor: Processor) -> list[str]:
+    """Return the command that runs the program `replay` on a processor in QEMU.
+
+    Parameters
+    ----------
+    processor : one of `PROCESSORS`; an instruction takes 1 ns.
+    """
+    machine = ["-M", processor.machine, "-nographic", "-monitor", "none", "-icount", "shift=0"]
+    semihosting = ["-semihosting-config", "enable=on,target=native"]
+    return [EMULATOR, *machine, *semihosting, "-kernel", "replay"]
 
 
 def replay_here(
@@ -211,7 +207,7 @@ def size_on(
         define = f"-D{name.upper()}_SINGLE={int(single)}"
         for source in sources:
             words = [*processor.flags, *FLAGS, level, define, "-Iinclude", "-Isrc", "-c", source]
-            _compile([CROSS_COMPILER, *words], folder)
+            compile_in(folder, [CROSS_COMPILER, *words])
         objects = [Path(source).with_suffix(".o").name for source in sources]
         answer = subprocess.run(
             [SIZE, *objects], cwd=folder, capture_output=True, text=True, check=True
@@ -260,10 +256,23 @@ def _build(
     (folder / "samples.bin").write_bytes(np.ascontiguousarray(samples, dtype="<f8").tobytes())
     own = [f"-D{name.upper()}_SINGLE={int(single)}", "-Iinclude", "-Isrc", "-I."]
     compiler, *words = command
-    _compile([compiler, *own, *sources, "replay.c", "samples.S", *words, "-o", "replay"], folder)
+    files_and_words = [*sources, "replay.c", "samples.S", *words]
+    compile_in(folder, [compiler, *own, *files_and_words, "-o", "replay"])
 
 
-def _compile(command: Sequence[str], folder: Path) -> None:
+def compile_in(folder: Path, command: Sequence[str]) -> None:
+    """Compile files of a package.
+
+    Parameters
+    ----------
+    folder : where they lie.
+    command : of the compiler.
+
+    Raises
+    ------
+    CompilationError
+        Where the compiler refuses a file.
+    """
     answer = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if answer.returncode != 0:
         first_lines = "\n".join(answer.stderr.splitlines()[:5])
@@ -271,6 +280,23 @@ def _compile(command: Sequence[str], folder: Path) -> None:
 
 
 def _result(command: Sequence[str], folder: Path) -> Replay:
+    return Replay(**printed(command, folder, Replay._fields))
+
+
+def printed(command: Sequence[str], folder: Path, wanted: Sequence[str]) -> dict[str, Any]:
+    """Run a replay; return its hash and the numbers that it prints by name.
+
+    Parameters
+    ----------
+    command : of the program.
+    folder : where it lies.
+    wanted : names of what it prints, the hash among them.
+
+    Raises
+    ------
+    ReplayError
+        Where the program does not come to its end.
+    """
     try:
         answer = subprocess.run(
             command,
@@ -290,8 +316,7 @@ def _result(command: Sequence[str], folder: Path) -> Replay:
     )
     if answer.returncode != 0 or "hash" not in found:
         raise ReplayError(f"{command[0]} ended with {answer.returncode}: {answer.stderr[:200]}")
-    numbers = {key: int(found[key], 16) for key in Replay._fields if key != "hash"}
-    return Replay(hash=found["hash"], **numbers)
+    return {key: found[key] if key == "hash" else int(found[key], 16) for key in wanted}
 
 
 # Flash, RAM, stack and instructions of a package, measured where the tools for Arm are there.

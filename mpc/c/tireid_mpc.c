@@ -12,7 +12,7 @@
 #define LAGGED 5U   /* of lagged slip, where there is */
 #define TURN 5U     /* column of the table: steering that a curvature of 1/m asks for [rad m] */
 #define DRIFT 6U    /* v_y in that turn [m^2/s] */
-#define NEAREST TIREID_MPC_C(0.1)  /* 1 - kappa e_y: nearer to the center of a turn is no place */
+#define NEAREST TIREID_MPC_C(0.1)    /* 1 - kappa e_y: nearer to the center of a turn is no place */
 #define MOST_ANGLE TIREID_MPC_C(3.2) /* of wheels [rad] that a caller may tell */
 
 #define real tireid_mpc_real
@@ -20,8 +20,8 @@
 /* Whether all of a measurement are numbers: x - x is zero, and does not overflow. */
 static bool is_number(const tireid_mpc_input *in)
 {
-    real sum = (in->e_y - in->e_y) + (in->e_psi - in->e_psi) + (in->v_y - in->v_y)
-        + (in->r - in->r);
+    real sum =
+        (in->e_y - in->e_y) + (in->e_psi - in->e_psi) + (in->v_y - in->v_y) + (in->r - in->r);
     uint32_t k;
     for (k = 0U; k <= N; k++) {
         sum += (in->kappa[k] - in->kappa[k]) + (in->v_x[k] - in->v_x[k]);
@@ -60,8 +60,8 @@ static tireid_mpc_status judge(const tireid_mpc_params *params, const tireid_mpc
 }
 
 /* The car as it is measured, with the lagged slip that was predicted for now. */
-static void take_measurement(tireid_mpc_state *state, const tireid_mpc_params *params, tireid_mpc_work *work,
-    const tireid_mpc_input *in, real *x)
+static void take_measurement(tireid_mpc_state *state, const tireid_mpc_params *params,
+    tireid_mpc_work *work, const tireid_mpc_input *in, real *x)
 {
     uint32_t i;
     x[0] = in->e_y;
@@ -73,8 +73,8 @@ static void take_measurement(tireid_mpc_state *state, const tireid_mpc_params *p
         x[i] = state->lagged[i - LAGGED];
     }
     if ((LAGGED < NX) && (state->started == 0U)) {
-        tireid_mpc_linearize_end(params, params->cost_end, x, in->kappa[0], in->v_x[0],
-            &work->stage[N]);
+        tireid_mpc_linearize_end(
+            params, params->cost_end, x, in->kappa[0], in->v_x[0], &work->stage[N]);
         for (i = LAGGED; i < NX; i++) {
             x[i] = work->stage[N].slip[i - LAGGED];
         }
@@ -82,8 +82,8 @@ static void take_measurement(tireid_mpc_state *state, const tireid_mpc_params *p
 }
 
 /* Lead x from a measurement to `until` [s] later; `reach` is when the last command ends to act. */
-static void lead(const tireid_mpc_state *state, const tireid_mpc_params *params, const tireid_mpc_input *in,
-    real reach, real until, real *x)
+static void lead(const tireid_mpc_state *state, const tireid_mpc_params *params,
+    const tireid_mpc_input *in, real reach, real until, real *x)
 {
     real now = TIREID_MPC_C(0.0);
     uint32_t j;
@@ -121,8 +121,7 @@ static real at_speed(const tireid_mpc_params *params, uint32_t column, real v_x)
             const real way = v_x - speeds[k - 1U];
             const real share = (way < width) ? (way / width) : TIREID_MPC_C(1.0);
             const real row = params->gains[k][column];
-            found = params->gains[k - 1U][column]
-                + (share * (row - params->gains[k - 1U][column]));
+            found = params->gains[k - 1U][column] + (share * (row - params->gains[k - 1U][column]));
         }
     }
     return found;
@@ -148,7 +147,8 @@ static real known(real x, real limit, real missing)
 /* Steering [rad] that brings the car back to its path without a plan: feedback of what it is off the
  * steady turn on the path, by gains of its speed. What is not a number is taken as in that turn;
  * without heading or yaw rate the turn alone is steered; without curvature or speed wheels stay. */
-static real track(const tireid_mpc_state *state, const tireid_mpc_params *params, const tireid_mpc_input *in)
+static real track(
+    const tireid_mpc_state *state, const tireid_mpc_params *params, const tireid_mpc_input *in)
 {
     real wanted = state->commands[0];
     if (tireid_mpc_finite(in->kappa[0]) && tireid_mpc_finite(in->v_x[0])) {
@@ -161,7 +161,8 @@ static real track(const tireid_mpc_state *state, const tireid_mpc_params *params
         const real r = in->r - (kappa * v_x);
         wanted = turn;
         if (tireid_mpc_finite(e_psi) && tireid_mpc_finite(r)) {
-            wanted -= (at_speed(params, 0U, v_x) * known(in->e_y, params->max_e_y, TIREID_MPC_C(0.0)))
+            wanted -=
+                (at_speed(params, 0U, v_x) * known(in->e_y, params->max_e_y, TIREID_MPC_C(0.0)))
                 + (at_speed(params, 1U, v_x) * tireid_mpc_clipped(e_psi, params->widest_e_psi))
                 + (at_speed(params, 2U, v_x) * (known(in->v_y, params->max_v_y, v_y) - v_y))
                 + (at_speed(params, 3U, v_x) * tireid_mpc_clipped(r, params->max_yaw_rate))
@@ -172,15 +173,15 @@ static real track(const tireid_mpc_state *state, const tireid_mpc_params *params
 }
 
 /* Steering [rad] of the plan, or else of damped tracking, within the hard limits. */
-static real next_steering(const tireid_mpc_state *state, const tireid_mpc_params *params,
-    const tireid_mpc_input *in)
+static real next_steering(
+    const tireid_mpc_state *state, const tireid_mpc_params *params, const tireid_mpc_input *in)
 {
     const real last = state->commands[0];
     const real most = params->period * params->max_rate;
     const real wanted = follows_plan(state, params) ? (last + (params->period * state->u[0]))
                                                     : track(state, params, in);
-    const real next = tireid_mpc_clipped(last + tireid_mpc_clipped(wanted - last, most),
-        params->max_steering);
+    const real next =
+        tireid_mpc_clipped(last + tireid_mpc_clipped(wanted - last, most), params->max_steering);
     return tireid_mpc_finite(next) ? next : last;
 }
 
@@ -263,8 +264,8 @@ static tireid_mpc_status plan_from(tireid_mpc_state *state, const tireid_mpc_par
 }
 
 /* Make the plan new from a measurement, `now`; without one the plan stays, if there is one. */
-static tireid_mpc_status plan(tireid_mpc_state *state, const tireid_mpc_params *params, tireid_mpc_work *work,
-    const tireid_mpc_input *in, const real *now)
+static tireid_mpc_status plan(tireid_mpc_state *state, const tireid_mpc_params *params,
+    tireid_mpc_work *work, const tireid_mpc_input *in, const real *now)
 {
     const real ahead = params->delay - (TIREID_MPC_C(0.5) * params->period);
     real x[NX];
@@ -281,8 +282,8 @@ static tireid_mpc_status plan(tireid_mpc_state *state, const tireid_mpc_params *
     return status;
 }
 
-tireid_mpc_status tireid_mpc_step(tireid_mpc_state *state, const tireid_mpc_params *params, tireid_mpc_work *work,
-    const tireid_mpc_input *input, real *steering)
+tireid_mpc_status tireid_mpc_step(tireid_mpc_state *state, const tireid_mpc_params *params,
+    tireid_mpc_work *work, const tireid_mpc_input *input, real *steering)
 {
     tireid_mpc_status status = TIREID_MPC_BAD_CALL;
     if ((state != NULL) && (params != NULL) && (work != NULL) && (input != NULL)

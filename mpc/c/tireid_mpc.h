@@ -28,7 +28,7 @@
 extern "C" {
 #endif
 
-#define TIREID_MPC_ROWS 5U     /* bounds a stage: rate, angle, deviation, slip in front, at the rear */
+#define TIREID_MPC_ROWS 5U /* bounds a stage: rate, angle, deviation, slip in front, at the rear */
 #define TIREID_MPC_COMMANDS 32U /* past commands that a delay may reach back */
 #define TIREID_MPC_STATUSES 9U
 
@@ -45,57 +45,59 @@ typedef enum {
 } tireid_mpc_status;
 
 typedef struct {
-    tireid_mpc_real car[4];                    /* mass [kg], yaw inertia [kg m^2], l_f, l_r [m] */
+    tireid_mpc_real car[4];                      /* mass [kg], yaw inertia [kg m^2], l_f, l_r [m] */
     tireid_mpc_real weights[TIREID_MPC_WEIGHTS]; /* of the tire; may change between two steps */
     tireid_mpc_real cost[TIREID_MPC_ERRORS];     /* q of 1/2 q y^2 a stage, y in SI */
     tireid_mpc_real cost_end[TIREID_MPC_ERRORS]; /* q at the end of the plan */
-    tireid_mpc_real cost_rate;                 /* R of 1/2 R u^2 a stage, u [rad/s] */
-    tireid_mpc_real stage_time;                /* of a stage of the plan [s] */
-    tireid_mpc_real period;                    /* between two steps [s], at most stage_time */
-    tireid_mpc_real delay;                     /* from a measurement to its command's effect [s] */
-    tireid_mpc_real max_steering;              /* |delta| [rad], hard */
-    tireid_mpc_real max_rate;                  /* |u| [rad/s], hard */
-    tireid_mpc_real max_e_y;                   /* |e_y| [m], soft */
-    tireid_mpc_real max_slip[2];               /* |alpha|, front and rear [rad], soft; curves end there */
-    tireid_mpc_real rise[2];                   /* of the axle forces beyond max_slip [N/rad] */
-    tireid_mpc_real soft_e_y;                  /* Z of 1/2 Z s^2 where |e_y| is s beyond [1/m^2] */
-    tireid_mpc_real soft_slip;                 /* Z of slip [1/rad^2] */
-    tireid_mpc_real widest_e_y;                /* |e_y| [m] beyond which the car is off the path */
-    tireid_mpc_real widest_e_psi;              /* |e_psi| [rad] */
-    tireid_mpc_real max_v_y;                   /* |v_y| [m/s] beyond which the tire is not known */
-    tireid_mpc_real max_yaw_rate;              /* |r| [rad/s] */
-    tireid_mpc_real min_speed;                 /* v_x [m/s], positive, now and ahead */
-    tireid_mpc_real max_speed;                 /* v_x [m/s] beyond which no input is believed */
-    tireid_mpc_real max_curvature;             /* |kappa| [1/m], likewise */
-    tireid_mpc_real speeds[TIREID_MPC_SPEEDS];   /* of the rows below [m/s], rising */
+    tireid_mpc_real cost_rate;                   /* R of 1/2 R u^2 a stage, u [rad/s] */
+    tireid_mpc_real stage_time;                  /* of a stage of the plan [s] */
+    tireid_mpc_real period;                      /* between two steps [s], at most stage_time */
+    tireid_mpc_real delay;         /* from a measurement to its command's effect [s] */
+    tireid_mpc_real max_steering;  /* |delta| [rad], hard */
+    tireid_mpc_real max_rate;      /* |u| [rad/s], hard */
+    tireid_mpc_real max_e_y;       /* |e_y| [m], soft */
+    tireid_mpc_real max_slip[2];   /* |alpha|, front and rear [rad], soft; curves end there */
+    tireid_mpc_real rise[2];       /* of the axle forces beyond max_slip [N/rad] */
+    tireid_mpc_real soft_e_y;      /* Z of 1/2 Z s^2 where |e_y| is s beyond [1/m^2] */
+    tireid_mpc_real soft_slip;     /* Z of slip [1/rad^2] */
+    tireid_mpc_real widest_e_y;    /* |e_y| [m] beyond which the car is off the path */
+    tireid_mpc_real widest_e_psi;  /* |e_psi| [rad] */
+    tireid_mpc_real max_v_y;       /* |v_y| [m/s] beyond which the tire is not known */
+    tireid_mpc_real max_yaw_rate;  /* |r| [rad/s] */
+    tireid_mpc_real min_speed;     /* v_x [m/s], positive, now and ahead */
+    tireid_mpc_real max_speed;     /* v_x [m/s] beyond which no input is believed */
+    tireid_mpc_real max_curvature; /* |kappa| [1/m], likewise */
+    tireid_mpc_real speeds[TIREID_MPC_SPEEDS]; /* of the rows below [m/s], rising */
     tireid_mpc_real gains[TIREID_MPC_SPEEDS][TIREID_MPC_GAINS]; /* of steering without a plan, SI */
-    tireid_mpc_real hold_time;                 /* how long an old plan is followed [s] */
-    tireid_mpc_real tolerance;                 /* of the solver, in parts: 1e-8, in float 1e-5 */
-    uint32_t max_iterations;                /* of the solver */
-    uint32_t linearizations;                /* a step, 1 in real time */
+    tireid_mpc_real hold_time; /* how long an old plan is followed [s] */
+    tireid_mpc_real tolerance; /* of the solver, in parts: 1e-8, in float 1e-5 */
+    uint32_t max_iterations;   /* of the solver */
+    uint32_t linearizations;   /* a step, 1 in real time */
 } tireid_mpc_params;
 
 typedef struct {
-    tireid_mpc_real e_y;                          /* deviation from the path [m], > 0 left of it */
-    tireid_mpc_real e_psi;                        /* heading against the path [rad] */
-    tireid_mpc_real v_y;                          /* lateral velocity [m/s] */
-    tireid_mpc_real r;                            /* yaw rate [rad/s] */
-    tireid_mpc_real kappa[TIREID_MPC_HORIZON + 1U]; /* curvature [1/m]: now, then in mid of each stage */
-    tireid_mpc_real v_x[TIREID_MPC_HORIZON + 1U];   /* speed [m/s], likewise */
+    tireid_mpc_real e_y;   /* deviation from the path [m], > 0 left of it */
+    tireid_mpc_real e_psi; /* heading against the path [rad] */
+    tireid_mpc_real v_y;   /* lateral velocity [m/s] */
+    tireid_mpc_real r;     /* yaw rate [rad/s] */
+    /* curvature [1/m] and speed [m/s]: now, then in mid of each stage */
+    tireid_mpc_real kappa[TIREID_MPC_HORIZON + 1U];
+    tireid_mpc_real v_x[TIREID_MPC_HORIZON + 1U];
 } tireid_mpc_input;
 
 typedef struct {
-    tireid_mpc_real x[TIREID_MPC_HORIZON + 1U][TIREID_MPC_STATES]; /* plan, from the time of the command on */
-    tireid_mpc_real u[TIREID_MPC_HORIZON];                       /* steering rate [rad/s] */
-    tireid_mpc_real feedback[TIREID_MPC_HORIZON][TIREID_MPC_STATES]; /* of u, per state off the plan */
-    tireid_mpc_real commands[TIREID_MPC_COMMANDS];               /* steering [rad], the last one first */
-    tireid_mpc_real lagged[2];                                 /* slip of lagging tires now [rad] */
-    uint32_t faults[TIREID_MPC_STATUSES];                      /* steps of each status, from init on */
-    uint32_t iterations;                                    /* of the last solution */
-    uint32_t age;                                           /* steps since the plan was new */
-    uint32_t planned;                                       /* 0 until there is a plan */
-    uint32_t guessed;                                       /* 1: x and u without a solution */
-    uint32_t started;                                       /* 0 until the first step */
+    /* plan, from the time of the command on; steering rate [rad/s]; its feedback of each state */
+    tireid_mpc_real x[TIREID_MPC_HORIZON + 1U][TIREID_MPC_STATES];
+    tireid_mpc_real u[TIREID_MPC_HORIZON];
+    tireid_mpc_real feedback[TIREID_MPC_HORIZON][TIREID_MPC_STATES];
+    tireid_mpc_real commands[TIREID_MPC_COMMANDS]; /* steering [rad], the last one first */
+    tireid_mpc_real lagged[2];                     /* slip of lagging tires now [rad] */
+    uint32_t faults[TIREID_MPC_STATUSES];          /* steps of each status, from init on */
+    uint32_t iterations;                           /* of the last solution */
+    uint32_t age;                                  /* steps since the plan was new */
+    uint32_t planned;                              /* 0 until there is a plan */
+    uint32_t guessed;                              /* 1: x and u without a solution */
+    uint32_t started;                              /* 0 until the first step */
 } tireid_mpc_state;
 
 /* A stage, linearized: x_next = A x + B u + c, all as differences from the plan; by columns. */
@@ -109,7 +111,8 @@ typedef struct {
     tireid_mpc_real slip_x[2U * TIREID_MPC_STATES];
 } tireid_mpc_stage;
 
-typedef tireid_mpc_real tireid_mpc_sides[2][TIREID_MPC_HORIZON * TIREID_MPC_ROWS]; /* v <= 1 and -v <= 1 */
+/* v <= 1 and -v <= 1 */
+typedef tireid_mpc_real tireid_mpc_sides[2][TIREID_MPC_HORIZON * TIREID_MPC_ROWS];
 
 typedef struct {
     tireid_mpc_stage stage[TIREID_MPC_HORIZON + 1U];
@@ -143,14 +146,14 @@ tireid_mpc_status tireid_mpc_reset(tireid_mpc_state *state, tireid_mpc_real stee
 
 /* Take a measurement; steering [rad] is what to command now, whatever the status. No number that is
  * not finite enters the state: what is refused leaves the plan that there was. */
-tireid_mpc_status tireid_mpc_step(tireid_mpc_state *state, const tireid_mpc_params *params, tireid_mpc_work *work,
-    const tireid_mpc_input *input, tireid_mpc_real *steering);
+tireid_mpc_status tireid_mpc_step(tireid_mpc_state *state, const tireid_mpc_params *params,
+    tireid_mpc_work *work, const tireid_mpc_input *input, tireid_mpc_real *steering);
 
 /* One iteration from the plan in the state, which is not shifted, and stays where there is no other.
  * x0 is the car at the beginning of the first stage; kappa and v_x are those of the stages. */
-tireid_mpc_status tireid_mpc_solve(tireid_mpc_state *state, const tireid_mpc_params *params, tireid_mpc_work *work,
-    const tireid_mpc_real x0[TIREID_MPC_STATES], const tireid_mpc_real kappa[TIREID_MPC_HORIZON],
-    const tireid_mpc_real v_x[TIREID_MPC_HORIZON]);
+tireid_mpc_status tireid_mpc_solve(tireid_mpc_state *state, const tireid_mpc_params *params,
+    tireid_mpc_work *work, const tireid_mpc_real x0[TIREID_MPC_STATES],
+    const tireid_mpc_real kappa[TIREID_MPC_HORIZON], const tireid_mpc_real v_x[TIREID_MPC_HORIZON]);
 
 /* Say that the command of the last step came too late, and what was steered instead [rad], at most
  * 3.2 to either side. */

@@ -15,16 +15,17 @@ extern "C" {
 #endif
 
 /* The stage from x[] with input u; its c is x_next itself. */
-void tireid_mpc_linearize(const tireid_mpc_params *params, const tireid_mpc_real *q, const tireid_mpc_real *x,
-    tireid_mpc_real u, tireid_mpc_real kappa, tireid_mpc_real v_x, tireid_mpc_stage *stage);
+void tireid_mpc_linearize(const tireid_mpc_params *params, const tireid_mpc_real *q,
+    const tireid_mpc_real *x, tireid_mpc_real u, tireid_mpc_real kappa, tireid_mpc_real v_x,
+    tireid_mpc_stage *stage);
 
 /* Cost and slip at the end. */
-void tireid_mpc_linearize_end(const tireid_mpc_params *params, const tireid_mpc_real *q, const tireid_mpc_real *x,
-    tireid_mpc_real kappa, tireid_mpc_real v_x, tireid_mpc_stage *stage);
+void tireid_mpc_linearize_end(const tireid_mpc_params *params, const tireid_mpc_real *q,
+    const tireid_mpc_real *x, tireid_mpc_real kappa, tireid_mpc_real v_x, tireid_mpc_stage *stage);
 
 /* Where x[] is after a time dt [s] without an input. */
-void tireid_mpc_predict(const tireid_mpc_params *params, const tireid_mpc_real *x, tireid_mpc_real kappa,
-    tireid_mpc_real v_x, tireid_mpc_real dt, tireid_mpc_real *x_next);
+void tireid_mpc_predict(const tireid_mpc_params *params, const tireid_mpc_real *x,
+    tireid_mpc_real kappa, tireid_mpc_real v_x, tireid_mpc_real dt, tireid_mpc_real *x_next);
 
 #ifdef __cplusplus
 }

@@ -9,7 +9,8 @@
 #define N TIREID_MPC_HORIZON
 #define NX TIREID_MPC_STATES
 #define STEERING 4U /* place of the angle among the states */
-#define MOST TIREID_MPC_C(1e12) /* of a number that is carried: what is computed of it does not overflow */
+#define MOST                                                                                       \
+    TIREID_MPC_C(1e12) /* of a number that is carried: what is computed of it does not overflow */
 
 #define real tireid_mpc_real
 
@@ -60,14 +61,16 @@ void tireid_mpc_clear(tireid_mpc_state *state)
 
 bool tireid_mpc_on_map(const tireid_mpc_params *params, const real *x)
 {
-    return tireid_mpc_within(x[0], params->widest_e_y) && tireid_mpc_within(x[1], params->widest_e_psi)
-        && tireid_mpc_within(x[2], params->max_v_y) && tireid_mpc_within(x[3], params->max_yaw_rate);
+    return tireid_mpc_within(x[0], params->widest_e_y)
+        && tireid_mpc_within(x[1], params->widest_e_psi) && tireid_mpc_within(x[2], params->max_v_y)
+        && tireid_mpc_within(x[3], params->max_yaw_rate);
 }
 
 void tireid_mpc_shift(tireid_mpc_state *state, const tireid_mpc_params *params)
 {
     const real told = params->period / params->stage_time;
-    const real share = ((told >= TIREID_MPC_C(0.0)) && (told <= TIREID_MPC_C(1.0))) ? told : TIREID_MPC_C(1.0);
+    const real share =
+        ((told >= TIREID_MPC_C(0.0)) && (told <= TIREID_MPC_C(1.0))) ? told : TIREID_MPC_C(1.0);
     uint32_t k;
     uint32_t i;
     for (k = 0U; k < N; k++) {
@@ -118,8 +121,8 @@ void tireid_mpc_guess(tireid_mpc_state *state, const tireid_mpc_params *params, 
 }
 
 /* Input of the plan, fed back what the car is off it, within the hard limits. */
-static real fed_back(const tireid_mpc_state *state, const tireid_mpc_params *params, uint32_t k,
-    const real *x)
+static real fed_back(
+    const tireid_mpc_state *state, const tireid_mpc_params *params, uint32_t k, const real *x)
 {
     const real dt = params->stage_time;
     real u = state->u[k];
@@ -136,8 +139,8 @@ static real fed_back(const tireid_mpc_state *state, const tireid_mpc_params *par
 /* Linearize along the way that the prediction takes from x0 under the plan and its feedback, which
  * answers most of what the car is off the plan before anything is solved. A guess, and what leaves
  * the map, is gone on with along the plan itself. */
-static void linearize(const tireid_mpc_state *state, const tireid_mpc_params *params, tireid_mpc_work *work,
-    const real *x0, const real *kappa, const real *v_x)
+static void linearize(const tireid_mpc_state *state, const tireid_mpc_params *params,
+    tireid_mpc_work *work, const real *x0, const real *kappa, const real *v_x)
 {
     bool rolls;
     uint32_t k;
@@ -158,8 +161,8 @@ static void linearize(const tireid_mpc_state *state, const tireid_mpc_params *pa
             stage->c[i] -= next[i];
         }
     }
-    tireid_mpc_linearize_end(params, params->cost_end, work->x[N], kappa[N - 1U], v_x[N - 1U],
-        &work->stage[N]);
+    tireid_mpc_linearize_end(
+        params, params->cost_end, work->x[N], kappa[N - 1U], v_x[N - 1U], &work->stage[N]);
 }
 
 /* Values of the rows at the plan, in parts of their limits. */
@@ -197,13 +200,15 @@ static bool is_plan(const tireid_mpc_work *work)
     uint32_t k;
     for (k = 0U; k < N; k++) {
         plan = plan && tireid_mpc_carriable(work->x[k + 1U], NX)
-            && tireid_mpc_carriable(work->dx[k + 1U], NX) && tireid_mpc_carriable(work->feedback[k], NX);
+            && tireid_mpc_carriable(work->dx[k + 1U], NX)
+            && tireid_mpc_carriable(work->feedback[k], NX);
     }
     return plan;
 }
 
 /* Take the step, and keep the hard limits to the last bit. */
-static void take(tireid_mpc_state *state, const tireid_mpc_params *params, const tireid_mpc_work *work)
+static void take(
+    tireid_mpc_state *state, const tireid_mpc_params *params, const tireid_mpc_work *work)
 {
     uint32_t k;
     uint32_t i;
@@ -225,8 +230,8 @@ static void take(tireid_mpc_state *state, const tireid_mpc_params *params, const
     }
 }
 
-tireid_mpc_status tireid_mpc_solve(tireid_mpc_state *state, const tireid_mpc_params *params, tireid_mpc_work *work,
-    const real x0[NX], const real kappa[N], const real v_x[N])
+tireid_mpc_status tireid_mpc_solve(tireid_mpc_state *state, const tireid_mpc_params *params,
+    tireid_mpc_work *work, const real x0[NX], const real kappa[N], const real v_x[N])
 {
     tireid_mpc_status status = TIREID_MPC_BAD_CALL;
     if ((state != NULL) && (params != NULL) && (work != NULL) && (x0 != NULL) && (kappa != NULL)

@@ -31,8 +31,8 @@ void tireid_mpc_shift(tireid_mpc_state *state, const tireid_mpc_params *params);
 
 /* A plan without a solution: from `x` to the path, on which the car rolls without slip. Nothing
  * moves where that is not finite. */
-void tireid_mpc_guess(tireid_mpc_state *state, const tireid_mpc_params *params, const tireid_mpc_real *x,
-    const tireid_mpc_real *kappa, const tireid_mpc_real *v_x);
+void tireid_mpc_guess(tireid_mpc_state *state, const tireid_mpc_params *params,
+    const tireid_mpc_real *x, const tireid_mpc_real *kappa, const tireid_mpc_real *v_x);
 
 #ifdef __cplusplus
 }

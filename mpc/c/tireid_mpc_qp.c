@@ -11,11 +11,11 @@
 #include "tireid_mpc_riccati.h"
 
 #define SIDE (TIREID_MPC_HORIZON * TIREID_MPC_ROWS) /* rows of all stages */
-#define SMALLEST_GAP TIREID_MPC_C(0.1) /* to begin with */
-#define NEAR TIREID_MPC_C(10.0)        /* products l t to begin with */
-#define FAR TIREID_MPC_C(1e4)          /* the same, where the first way was blocked */
-#define BLOCKED TIREID_MPC_C(0.2)      /* step of the gaps that is too short */
-#define KEPT TIREID_MPC_C(0.995)       /* share of the way to the nearest bound that a step goes */
+#define SMALLEST_GAP TIREID_MPC_C(0.1)              /* to begin with */
+#define NEAR TIREID_MPC_C(10.0)                     /* products l t to begin with */
+#define FAR TIREID_MPC_C(1e4)                       /* the same, where the first way was blocked */
+#define BLOCKED TIREID_MPC_C(0.2)                   /* step of the gaps that is too short */
+#define KEPT TIREID_MPC_C(0.995) /* share of the way to the nearest bound that a step goes */
 #if TIREID_MPC_SINGLE
 #define LEAST TIREID_MPC_C(3e-6) /* gap or multiplier, which rounding would make zero */
 #else

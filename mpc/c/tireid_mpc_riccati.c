@@ -72,8 +72,8 @@ static void mirror(const real *restrict M, real *restrict P)
 }
 
 /* What stage k has of the cost P behind it: P c, P B and B'P B + R. False where not convex. */
-static bool look_behind(tireid_mpc_work *work, uint32_t k, real R, const real *restrict P,
-    real *restrict PB)
+static bool look_behind(
+    tireid_mpc_work *work, uint32_t k, real R, const real *restrict P, real *restrict PB)
 {
     const tireid_mpc_stage *stage = &work->stage[k];
     const real weight = work->weight[0][k * ROWS] + work->weight[1][k * ROWS];
@@ -91,7 +91,8 @@ static bool look_behind(tireid_mpc_work *work, uint32_t k, real R, const real *r
         work->Pc[k][i] = pc;
         lambda += stage->B[i] * pb;
     }
-    work->per_lambda[k] = (lambda > TIREID_MPC_C(0.0)) ? (TIREID_MPC_C(1.0) / lambda) : TIREID_MPC_C(0.0);
+    work->per_lambda[k] =
+        (lambda > TIREID_MPC_C(0.0)) ? (TIREID_MPC_C(1.0) / lambda) : TIREID_MPC_C(0.0);
     return lambda > TIREID_MPC_C(0.0);
 }
 
@@ -158,8 +159,8 @@ bool tireid_mpc_factorize(tireid_mpc_work *work, real R)
 }
 
 /* s = p + P c of the gradient p behind stage k; return that of the input. */
-static real feed_forward(tireid_mpc_work *work, uint32_t k, real R, const real *restrict p,
-    real *restrict s)
+static real feed_forward(
+    tireid_mpc_work *work, uint32_t k, real R, const real *restrict p, real *restrict s)
 {
     const tireid_mpc_stage *stage = &work->stage[k];
     real l = (R * work->u[k]) + (work->slope[k * ROWS] * work->scale[0]);

@@ -1,7 +1,6 @@
 """A package on a Cortex-M7 in QEMU, and on this machine: the same bits, and what a step costs."""
 
 import platform
-import subprocess
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,16 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from codegen import CompilationError
 from codegen.package import manifest_with_figures, renamed
 from identifier.export.processor import (
     CROSS_COMPILER,
     EMULATOR,
     PROCESSORS,
-    TIMEOUT,
-    ReplayError,
+    compile_in,
     compiler_version,
+    emulation,
     missing_tools,
+    printed,
     size_on,
 )
 from identifier.export.processor import TARGET as BOARD
@@ -70,10 +69,7 @@ def replay_on_processor(package: MpcPackage, *, single: bool, steps: int = STEPS
     board = ["-std=gnu99", "-ffreestanding", "-nostartfiles", "-T", "mps2.ld", "board.c"]
     libraries = ["--specs=nosys.specs", "-Wl,--no-warnings", "-lm"]
     compiler = [CROSS_COMPILER, *FLAGS, *PROCESSOR.flags, *board, *libraries]
-    machine = ["-M", PROCESSOR.machine, "-nographic", "-monitor", "none", "-icount", "shift=0"]
-    semihosting = ["-semihosting-config", "enable=on,target=native"]
-    command = [EMULATOR, *machine, *semihosting, "-kernel", "replay"]
-    return _replayed(package, compiler, command, single=single, steps=steps)
+    return _replayed(package, compiler, emulation(PROCESSOR), single=single, steps=steps)
 
 
 def replay_here(
@@ -128,35 +124,8 @@ def _replayed(
         own = [*macros, "-Iinclude", "-Isrc", "-Itests", "-I."]
         files = [path for path in sources if path.endswith(".c")]
         first, *words = compiler
-        answer = _run([first, *own, *files, "replay.c", *words, "-o", "replay"], folder)
-        if answer.returncode != 0:
-            lines = "\n".join(answer.stderr.splitlines()[:5])
-            raise CompilationError(f"{first} refused the package:\n{lines}")
-        return _result(_run(command, folder), command[0])
-
-
-def _run(command: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
-    try:
-        return subprocess.run(
-            command,
-            cwd=folder,
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=TIMEOUT,
-            stdin=subprocess.DEVNULL,
-        )
-    except subprocess.TimeoutExpired as error:
-        raise ReplayError(f"{command[0]} did not end within {TIMEOUT:g} s") from error
-
-
-def _result(answer: subprocess.CompletedProcess[str], program: str) -> Replay:
-    lines = (answer.stdout + answer.stderr).splitlines()
-    found = dict(line.split() for line in lines if line.count(" ") == 1)
-    if answer.returncode != 0 or "hash" not in found:
-        raise ReplayError(f"{program} ended with {answer.returncode}: {answer.stderr[:200]}")
-    numbers = {key: int(found[key], 16) for key in Replay._fields if key != "hash"}
-    return Replay(hash=found["hash"], **numbers)
+        compile_in(folder, [first, *own, *files, "replay.c", *words, "-o", "replay"])
+        return Replay(**printed(command, folder, Replay._fields))
 
 
 # Flash, RAM, stack and instructions of a tracker on a Cortex-M7, and its time on this machine.

@@ -194,7 +194,7 @@ def tracker_source(structure: TireStructure, horizon: int, *, single: bool) -> s
 
 
 def _generated(structure: TireStructure, horizon: int, single: bool) -> str:
-    about = {"title": "The tracker", "version": "", "version_text": NAME}
+    about = {"title": "The tracker", "version": "", "hash": "", "version_text": NAME}
     files = c_sources(structure, horizon=horizon, name=NAME, about=about)
     return python_file(files, name=NAME, single=single)
 

@@ -52,7 +52,7 @@ def test_a_spoiled_package_fails_its_self_test(story, tmp_path):
         pytest.skip("needs a C compiler")
     folder = tmp_path / "package"
     ship(story, folder)
-    vectors = folder / "tests" / "vectors.h"
+    vectors = folder / "tests" / "tireid_vectors.h"
     text = vectors.read_text()
     head, rows = text.split("vector_force", 1)
     first = rows.index("{", rows.index("{") + 1)

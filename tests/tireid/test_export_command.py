@@ -55,7 +55,8 @@ def test_learnt_weights_are_shipped(tmp_path, logs):
 
 def test_single_precision_is_the_default_of_the_build(tmp_path):
     assert main(["export", "--out", str(tmp_path / "a"), "--single"]) == 0
-    assert "#define TIREID_SINGLE 1" in (tmp_path / "a" / "include" / "tireid.h").read_text()
+    config = tmp_path / "a" / "include" / "tireid_config.h"
+    assert "#define TIREID_SINGLE 1" in config.read_text()
     assert json.loads((tmp_path / "a" / "tireid.json").read_text())["precision"] == "float"
 
 

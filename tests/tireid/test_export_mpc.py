@@ -64,7 +64,7 @@ def test_a_car_named_as_the_example_builds_and_drives(tmp_path):
             command.split(), cwd=out, capture_output=True, text=True, check=False
         )
         assert answer.returncode == 0, answer.stdout + answer.stderr
-    assert "#define CAR_MPC_SINGLE 1" in (out / "mpc" / "include" / "car_mpc.h").read_text()
+    assert "#define CAR_MPC_SINGLE 1" in (out / "mpc" / "include" / "car_mpc_config.h").read_text()
     assert json.loads((out / "mpc" / "car_mpc.json").read_text())["precision"] == "float"
 
 

@@ -11,8 +11,8 @@ typedef struct {
 size_t tireid_instance_size(void);
 void tireid_instance_init(tireid_instance *it);
 void tireid_instance_reset(tireid_instance *it);
-void tireid_instance_run(tireid_instance *it, long n, const double *samples, double *output,
-    int *status);
+void tireid_instance_run(
+    tireid_instance *it, long n, const double *samples, double *output, int *status);
 unsigned tireid_instance_faults(const tireid_instance *it);
 
 size_t tireid_instance_size(void)
@@ -33,8 +33,8 @@ void tireid_instance_reset(tireid_instance *it)
 }
 
 /* Samples are rows of v_x, v_y, r, delta_f, delta_r; outputs rows of all numbers of tireid_output. */
-void tireid_instance_run(tireid_instance *it, long n, const double *samples, double *output,
-    int *status)
+void tireid_instance_run(
+    tireid_instance *it, long n, const double *samples, double *output, int *status)
 {
     tireid_real numbers[sizeof(tireid_output) / sizeof(tireid_real)];
     const size_t size = sizeof numbers / sizeof numbers[0];
@@ -70,7 +70,7 @@ void tireid_instance_adapt(tireid_instance *it, int adapts)
 void tireid_instance_weights(const tireid_instance *it, double *flat)
 {
     tireid_weights weights;
-    tireid_real numbers[sizeof weights / sizeof(tireid_real)];
+    tireid_real numbers[sizeof weights / sizeof(tireid_real)] = { 0 };
     size_t i;
     (void)tireid_get_weights(&it->state, &weights);
     (void)memcpy(numbers, &weights, sizeof weights);
@@ -82,7 +82,7 @@ void tireid_instance_weights(const tireid_instance *it, double *flat)
 int tireid_instance_take(tireid_instance *it, const double *flat)
 {
     tireid_weights weights;
-    tireid_real numbers[sizeof weights / sizeof(tireid_real)];
+    tireid_real numbers[sizeof weights / sizeof(tireid_real)] = { 0 };
     size_t i;
     for (i = 0; i < (sizeof numbers / sizeof numbers[0]); i++) {
         numbers[i] = (tireid_real)flat[i];

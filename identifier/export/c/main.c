@@ -49,7 +49,7 @@ static int find_columns(char *header, int column[SIGNALS])
                 column[i] = k;
             }
         }
-        if ((column[i] < 0) && (i < (SIGNALS - 1))) {
+        if ((i < (SIGNALS - 1)) && (column[i] < 0)) {
             fprintf(stderr, "tireid_example: the log has no column %s\n", names[i]);
             return 0;
         }

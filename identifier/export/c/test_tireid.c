@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "tireid.h"
-#include "vectors.h"
+#include "tireid_vectors.h"
 
 #if TIREID_SINGLE
 #define TOLERANCE VECTOR_TOLERANCE_SINGLE /* N */
@@ -53,8 +53,8 @@ static double drive(tireid_state *state, const tireid_params *params, int n)
     return worst;
 }
 
-static void refuse(tireid_state *state, const tireid_params *params, const tireid_input *input,
-    const char *rule)
+static void refuse(
+    tireid_state *state, const tireid_params *params, const tireid_input *input, const char *rule)
 {
     const bool lasts = (state->missed + 1U) >= TIREID_STALE_SAMPLES;
     check(tireid_step(state, params, input) == (lasts ? TIREID_STALE : TIREID_BAD_INPUT), rule);

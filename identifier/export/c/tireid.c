@@ -62,12 +62,12 @@ static bool tireid_accepts(const tireid_params *params, const tireid_input *in)
 }
 
 /* Whether a result is finite, as a whole, with forces that a car may have. */
-static bool tireid_believes(const tireid_params *params, const tireid_values *values,
-    const tireid_output *out)
+static bool tireid_believes(
+    const tireid_params *params, const tireid_values *values, const tireid_output *out)
 {
     const tireid_real *told = tireid_numbers(out);
-    tireid_real sum = tireid_sum(tireid_numbers(values),
-        (uint32_t)(sizeof(tireid_values) / sizeof(tireid_real)));
+    tireid_real sum =
+        tireid_sum(tireid_numbers(values), (uint32_t)(sizeof(tireid_values) / sizeof(tireid_real)));
     uint32_t i;
     for (i = 0U; i < (uint32_t)(sizeof(tireid_output) / sizeof(tireid_real)); i++) {
         sum += told[i];
@@ -134,8 +134,8 @@ static bool tireid_believed(const tireid_values *next, const tireid_input *in)
 #endif
 
 /* Take a sample that is accepted, where the result can be believed. */
-static tireid_status tireid_advance(tireid_state *state, const tireid_params *params,
-    const tireid_input *input)
+static tireid_status tireid_advance(
+    tireid_state *state, const tireid_params *params, const tireid_input *input)
 {
     tireid_values next;
     tireid_output out;
@@ -185,7 +185,8 @@ static void tireid_pass(tireid_state *state, const tireid_params *params)
 }
 #else
 /* Rest at a sample: observers take the measurement, filters begin anew, weights stay. */
-static void tireid_begin(tireid_state *state, const tireid_params *params, const tireid_input *input)
+static void tireid_begin(
+    tireid_state *state, const tireid_params *params, const tireid_input *input)
 {
     tireid_values next;
     tireid_output out;
@@ -224,7 +225,8 @@ static bool tireid_is_stale(tireid_state *state)
     return stale;
 }
 
-tireid_status tireid_step(tireid_state *state, const tireid_params *params, const tireid_input *input)
+tireid_status tireid_step(
+    tireid_state *state, const tireid_params *params, const tireid_input *input)
 {
     tireid_status status;
     if ((state == NULL) || (params == NULL) || (input == NULL)) {

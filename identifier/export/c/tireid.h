@@ -34,10 +34,10 @@ typedef enum {
     TIREID_OK = 0,          /* the step was taken */
     TIREID_REST = 1,        /* slower than TIREID_MIN_SPEED: forces are zero, weights hold */
     TIREID_IMPLAUSIBLE = 2, /* a sample no car can be in: nothing is learnt from it; a fault */
-    TIREID_BAD_INPUT = 3,   /* not finite or beyond the limits: refused, but time goes on; a fault */
-    TIREID_BAD_RESULT = 4,  /* not finite or beyond the limits: refused, but time goes on; a fault */
-    TIREID_BAD_CALL = 5,    /* a null pointer: nothing was done */
-    TIREID_STALE = 6        /* refused for TIREID_STALE_TIME or longer: forces are zero; a fault */
+    TIREID_BAD_INPUT = 3,  /* not finite or beyond the limits: refused, but time goes on; a fault */
+    TIREID_BAD_RESULT = 4, /* not finite or beyond the limits: refused, but time goes on; a fault */
+    TIREID_BAD_CALL = 5,   /* a null pointer: nothing was done */
+    TIREID_STALE = 6       /* refused for TIREID_STALE_TIME or longer: forces are zero; a fault */
 } tireid_status;
 
 /* Limits of what is accepted; see tireid_default_params. */
@@ -67,7 +67,8 @@ tireid_status tireid_init(tireid_state *state);
 tireid_status tireid_reset(tireid_state *state);
 
 /* Take one sample. */
-tireid_status tireid_step(tireid_state *state, const tireid_params *params, const tireid_input *input);
+tireid_status tireid_step(
+    tireid_state *state, const tireid_params *params, const tireid_input *input);
 
 /* Outputs of the last step that was taken. */
 tireid_status tireid_get_output(const tireid_state *state, tireid_output *output);

@@ -35,13 +35,13 @@ typedef struct {
 bool tireid_drives(const tireid_input *in);
 
 /* One step at rest, and with a sample that no car can be in. */
-void tireid_elsewhere(const tireid_values *now, const tireid_input *in, tireid_values *next,
-    tireid_output *out);
+void tireid_elsewhere(
+    const tireid_values *now, const tireid_input *in, tireid_values *next, tireid_output *out);
 #endif
 
 /* One step from `now` to `next`, which are not the same. */
-void tireid_driving(const tireid_values *now, const tireid_input *in, tireid_values *next,
-    tireid_output *out);
+void tireid_driving(
+    const tireid_values *now, const tireid_input *in, tireid_values *next, tireid_output *out);
 
 #ifdef __cplusplus
 }

@@ -82,8 +82,7 @@ void fmi2FreeInstance(fmi2Component c) {
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance,
-                               fmi2Real startTime, fmi2Boolean stopTimeDefined,
-                               fmi2Real stopTime) {
+                               fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
   Instance *instance = c;
   (void)toleranceDefined;
   (void)tolerance;
@@ -123,12 +122,12 @@ fmi2Status fmi2Reset(fmi2Component c) {
 }
 
 /* Hands all values to one function of memory.h, declared for one value. */
-#define EACH(function, value)                                                    \
-  Instance *instance = c;                                                        \
-  size_t i;                                                                      \
-  if (!instance) return fmi2Error;                                               \
-  for (i = 0; i < nvr; ++i)                                                      \
-    if (MODEL(function)(&instance->now, vr[i], value))                           \
+#define EACH(function, value)                                         \
+  Instance *instance = c;                                             \
+  size_t i;                                                           \
+  if (!instance) return fmi2Error;                                    \
+  for (i = 0; i < nvr; ++i)                                           \
+    if (MODEL(function)(&instance->now, vr[i], value))                \
       return refuse(c, "no variable of this type has the reference"); \
   return fmi2OK
 
@@ -158,11 +157,11 @@ fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
 }
 
 /* Of these there are none: right only where none is asked for. */
-#define NO_VARIABLES(function, type)                                                             \
+#define NO_VARIABLES(function, type)                                                              \
   fmi2Status function(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, type value[]) { \
-    (void)vr;                                                                                    \
-    (void)value;                                                                                 \
-    return nvr == 0 ? fmi2OK : refuse(c, "no variable of this type can be read or set");         \
+    (void)vr;                                                                                     \
+    (void)value;                                                                                  \
+    return nvr == 0 ? fmi2OK : refuse(c, "no variable of this type can be read or set");          \
   }
 NO_VARIABLES(fmi2GetString, fmi2String)
 NO_VARIABLES(fmi2SetString, const fmi2String)
@@ -199,8 +198,8 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, si
   return fmi2OK;
 }
 
-fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate,
-                                 fmi2Byte serializedState[], size_t size) {
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[],
+                                 size_t size) {
   if (!c || !FMUstate || !serializedState || size < sizeof TOKEN + sizeof(Memory))
     return refuse(c, "there is no place for the state");
   memcpy(serializedState, TOKEN, sizeof TOKEN);
@@ -246,12 +245,12 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boo
 }
 
 /* Steps are done when fmi2DoStep returns: there is nothing else to ask. */
-#define NO_STATUS(function, type)                                               \
-  fmi2Status function(fmi2Component c, const fmi2StatusKind s, type *value) {   \
-    (void)c;                                                                    \
-    (void)s;                                                                    \
-    (void)value;                                                                \
-    return fmi2Discard;                                                         \
+#define NO_STATUS(function, type)                                             \
+  fmi2Status function(fmi2Component c, const fmi2StatusKind s, type *value) { \
+    (void)c;                                                                  \
+    (void)s;                                                                  \
+    (void)value;                                                              \
+    return fmi2Discard;                                                       \
   }
 NO_STATUS(fmi2GetStatus, fmi2Status)
 NO_STATUS(fmi2GetIntegerStatus, fmi2Integer)

@@ -104,14 +104,13 @@ fmi3Status fmi3Reset(fmi3Instance c) {
 }
 
 /* Hands all values to one function of memory.h, declared for one value. */
-#define EACH(function, value)                                                     \
-  Instance *instance = c;                                                         \
-  size_t i;                                                                       \
-  if (!instance || nValues != nValueReferences)                                   \
-    return refuse(c, "each variable has one value");                  \
-  for (i = 0; i < nValues; ++i)                                                   \
-    if (function(&instance->now, valueReferences[i], value))               \
-      return refuse(c, "no variable of this type has the reference"); \
+#define EACH(function, value)                                                                    \
+  Instance *instance = c;                                                                        \
+  size_t i;                                                                                      \
+  if (!instance || nValues != nValueReferences) return refuse(c, "each variable has one value"); \
+  for (i = 0; i < nValues; ++i)                                                                  \
+    if (function(&instance->now, valueReferences[i], value))                                     \
+      return refuse(c, "no variable of this type has the reference");                            \
   return fmi3OK
 
 fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference valueReferences[],
@@ -178,8 +177,8 @@ fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState FMUState, siz
   return fmi3OK;
 }
 
-fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState FMUState,
-                                 fmi3Byte serializedState[], size_t size) {
+fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState FMUState, fmi3Byte serializedState[],
+                                 size_t size) {
   if (!c || !FMUState || !serializedState || size < sizeof TOKEN + sizeof(Memory))
     return refuse(c, "there is no place for the state");
   memcpy(serializedState, TOKEN, sizeof TOKEN);

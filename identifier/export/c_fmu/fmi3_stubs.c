@@ -6,13 +6,13 @@
 #define IGNORE(value) (void)(value)
 
 /* Variables of a type of which there is none: right only where none is asked for. */
-#define NO_VARIABLES(access, name, type)                                                     \
-  fmi3Status access##name(fmi3Instance c, REFERENCES, type values[], size_t nValues) {       \
-    IGNORE(references), IGNORE(values), IGNORE(nValues);                                     \
-    return c && n == 0 ? fmi3OK : fmi3Error;                                                 \
+#define NO_VARIABLES(access, name, type)                                               \
+  fmi3Status access##name(fmi3Instance c, REFERENCES, type values[], size_t nValues) { \
+    IGNORE(references), IGNORE(values), IGNORE(nValues);                               \
+    return c && n == 0 ? fmi3OK : fmi3Error;                                           \
   }
-#define NO_TYPE(name)                             \
-  NO_VARIABLES(fmi3Get, name, fmi3##name)         \
+#define NO_TYPE(name)                     \
+  NO_VARIABLES(fmi3Get, name, fmi3##name) \
   NO_VARIABLES(fmi3Set, name, const fmi3##name)
 
 NO_TYPE(Float32)
@@ -26,24 +26,24 @@ NO_TYPE(UInt64)
 NO_TYPE(String)
 NO_VARIABLES(fmi3Set, Int32, const fmi3Int32)
 
-#define NO_BINARY(name, size_type, type)                                                         \
+#define NO_BINARY(name, size_type, type)                                                          \
   fmi3Status name(fmi3Instance c, REFERENCES, size_type sizes[], type values[], size_t nValues) { \
-    IGNORE(references), IGNORE(sizes), IGNORE(values), IGNORE(nValues);                          \
-    return c && n == 0 ? fmi3OK : fmi3Error;                                                     \
+    IGNORE(references), IGNORE(sizes), IGNORE(values), IGNORE(nValues);                           \
+    return c && n == 0 ? fmi3OK : fmi3Error;                                                      \
   }
 NO_BINARY(fmi3GetBinary, size_t, fmi3Binary)
 NO_BINARY(fmi3SetBinary, const size_t, const fmi3Binary)
 
 /* Functions of an instance and up to two arrays over clocks or variables. */
-#define NO_CLOCK(name, type)                                           \
-  fmi3Status name(fmi3Instance c, REFERENCES, type values[]) {         \
-    IGNORE(references), IGNORE(values);                                \
-    return c && n == 0 ? fmi3OK : fmi3Error;                           \
+#define NO_CLOCK(name, type)                                   \
+  fmi3Status name(fmi3Instance c, REFERENCES, type values[]) { \
+    IGNORE(references), IGNORE(values);                        \
+    return c && n == 0 ? fmi3OK : fmi3Error;                   \
   }
-#define NO_CLOCK_PAIR(name, type, other)                                         \
-  fmi3Status name(fmi3Instance c, REFERENCES, type values[], other others[]) {   \
-    IGNORE(references), IGNORE(values), IGNORE(others);                          \
-    return c && n == 0 ? fmi3OK : fmi3Error;                                     \
+#define NO_CLOCK_PAIR(name, type, other)                                       \
+  fmi3Status name(fmi3Instance c, REFERENCES, type values[], other others[]) { \
+    IGNORE(references), IGNORE(values), IGNORE(others);                        \
+    return c && n == 0 ? fmi3OK : fmi3Error;                                   \
   }
 NO_CLOCK(fmi3GetClock, fmi3Clock)
 NO_CLOCK(fmi3SetClock, const fmi3Clock)
@@ -62,10 +62,10 @@ fmi3Status fmi3GetIntervalFraction(fmi3Instance c, REFERENCES, fmi3UInt64 counte
 }
 
 /* Modes that Co-Simulation without events does not have. */
-#define NO_MODE(name)                    \
-  fmi3Status name(fmi3Instance c) {      \
-    IGNORE(c);                           \
-    return fmi3Error;                    \
+#define NO_MODE(name)               \
+  fmi3Status name(fmi3Instance c) { \
+    IGNORE(c);                      \
+    return fmi3Error;               \
   }
 NO_MODE(fmi3EnterEventMode)
 NO_MODE(fmi3EnterStepMode)
@@ -94,10 +94,10 @@ fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time) {
 }
 
 /* There are no continuous states and no event indicators. */
-#define NO_STATES(name, type)                                    \
-  fmi3Status name(fmi3Instance c, type values[], size_t n) {     \
-    IGNORE(values);                                              \
-    return c && n == 0 ? fmi3OK : fmi3Error;                     \
+#define NO_STATES(name, type)                                \
+  fmi3Status name(fmi3Instance c, type values[], size_t n) { \
+    IGNORE(values);                                          \
+    return c && n == 0 ? fmi3OK : fmi3Error;                 \
   }
 NO_STATES(fmi3SetContinuousStates, const fmi3Float64)
 NO_STATES(fmi3GetContinuousStateDerivatives, fmi3Float64)
@@ -115,12 +115,12 @@ NONE(fmi3GetNumberOfEventIndicators)
 NONE(fmi3GetNumberOfContinuousStates)
 
 /* Derivatives and dependencies, none of which modelDescription.xml offers. */
-#define NO_DERIVATIVE(name)                                                                      \
-  fmi3Status name(fmi3Instance c, REFERENCES, const fmi3ValueReference known[], size_t nKnown,   \
+#define NO_DERIVATIVE(name)                                                                       \
+  fmi3Status name(fmi3Instance c, REFERENCES, const fmi3ValueReference known[], size_t nKnown,    \
                   const fmi3Float64 seed[], size_t nSeed, fmi3Float64 result[], size_t nResult) { \
-    IGNORE(c), IGNORE(references), IGNORE(n), IGNORE(known), IGNORE(nKnown), IGNORE(seed);       \
-    IGNORE(nSeed), IGNORE(result), IGNORE(nResult);                                              \
-    return fmi3Error;                                                                            \
+    IGNORE(c), IGNORE(references), IGNORE(n), IGNORE(known), IGNORE(nKnown), IGNORE(seed);        \
+    IGNORE(nSeed), IGNORE(result), IGNORE(nResult);                                               \
+    return fmi3Error;                                                                             \
   }
 NO_DERIVATIVE(fmi3GetDirectionalDerivative)
 NO_DERIVATIVE(fmi3GetAdjointDerivative)

@@ -17,11 +17,11 @@ void MODEL(fmu_start)(Memory *memory) {
 
 static void take_sample(Memory *memory) {
   MODEL(input) input;
-  input.v_x = memory->input[0];
-  input.v_y = memory->input[1];
-  input.r = memory->input[2];
-  input.delta_f = memory->input[3];
-  input.delta_r = memory->input[4];
+  input.v_x = (MODEL(real))memory->input[0];
+  input.v_y = (MODEL(real))memory->input[1];
+  input.r = (MODEL(real))memory->input[2];
+  input.delta_f = (MODEL(real))memory->input[3];
+  input.delta_r = (MODEL(real))memory->input[4];
   memory->status = (int32_t)MODEL(step)(&memory->state, &memory->params, &input);
 }
 
@@ -41,7 +41,7 @@ int MODEL(fmu_get_real)(const Memory *memory, unsigned int reference, double *va
   else if (reference >= VR_INPUT && reference < VR_INPUT + INPUTS)
     *value = memory->input[reference - VR_INPUT];
   else if (reference >= VR_FORCE && reference < VR_FORCE + FORCES)
-    *value = memory->state.output.axle_force[reference - VR_FORCE];
+    *value = (double)memory->state.output.axle_force[reference - VR_FORCE];
   else if (reference == VR_SAMPLE_TIME)
     *value = MODEL_DT;
   else if (reference == VR_MIN_SPEED)

@@ -19,9 +19,8 @@
 extern uint32_t stack_top;
 void reset_handler(void);
 
-__attribute__((section(".vectors"), used)) static const void *const vectors[2] = {
-    &stack_top, (const void *)reset_handler
-};
+__attribute__((section(".vectors"), used)) static const void *const vectors[2] = { &stack_top,
+    (const void *)reset_handler };
 
 static int semihosting(int operation, const void *argument)
 {
@@ -82,6 +81,5 @@ void reset_handler(void)
     __asm__ volatile("dsb\n isb");
     status[1] = (uint32_t)main();
     (void)semihosting(SYS_EXIT_EXTENDED, status);
-    for (;;) {
-    }
+    for (;;) { }
 }

@@ -51,7 +51,7 @@ int main(void)
     (void)tireid_default_params(&params);
     (void)tireid_init(&state);
     machine_start_clock();
-    for (at = recorded_samples; at < recorded_end; at++) {
+    for (at = recorded_samples; at != recorded_end; at++) {
         tireid_input input;
         uint32_t code; /* an enum has not the same size everywhere */
         uint32_t before;

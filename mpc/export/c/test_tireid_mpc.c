@@ -5,7 +5,7 @@
 
 #include "tireid_mpc.h"
 #include "tireid_mpc_params.h"
-#include "vectors.h"
+#include "tireid_mpc_vectors.h"
 
 #if TIREID_MPC_SINGLE
 #define TOLERANCE VECTOR_TOLERANCE_SINGLE /* rad */
@@ -62,8 +62,8 @@ static double drive(tireid_mpc_state *state, const tireid_mpc_params *params)
 }
 
 /* Whether a step has a status, and steers within the limits. */
-static void refuse(tireid_mpc_state *state, const tireid_mpc_params *params, const tireid_mpc_input *input,
-    tireid_mpc_status wanted, const char *rule)
+static void refuse(tireid_mpc_state *state, const tireid_mpc_params *params,
+    const tireid_mpc_input *input, tireid_mpc_status wanted, const char *rule)
 {
     const double most = 1.000001 * (double)(params->max_rate * params->period);
     const double before = (double)state->commands[0];
@@ -96,13 +96,19 @@ static void test_guards(tireid_mpc_state *state, const tireid_mpc_params *params
     input = good;
     input.v_x[1] = params->min_speed / 2;
     refuse(state, params, &input, TIREID_MPC_TOO_SLOW, "a slow car is known");
-    check(tireid_mpc_late(state, state->commands[1]) == TIREID_MPC_OK, "a late command is accepted");
+    check(
+        tireid_mpc_late(state, state->commands[1]) == TIREID_MPC_OK, "a late command is accepted");
     check(tireid_mpc_late(state, nan) == TIREID_MPC_BAD_CALL, "NaN was not steered");
-    check(tireid_mpc_step(NULL, params, &work, &good, &steering) == TIREID_MPC_BAD_CALL, "null state");
-    check(tireid_mpc_step(state, NULL, &work, &good, &steering) == TIREID_MPC_BAD_CALL, "null params");
-    check(tireid_mpc_step(state, params, NULL, &good, &steering) == TIREID_MPC_BAD_CALL, "null work");
-    check(tireid_mpc_step(state, params, &work, NULL, &steering) == TIREID_MPC_BAD_CALL, "null input");
-    check(tireid_mpc_step(state, params, &work, &good, NULL) == TIREID_MPC_BAD_CALL, "null steering");
+    check(tireid_mpc_step(NULL, params, &work, &good, &steering) == TIREID_MPC_BAD_CALL,
+        "null state");
+    check(tireid_mpc_step(state, NULL, &work, &good, &steering) == TIREID_MPC_BAD_CALL,
+        "null params");
+    check(
+        tireid_mpc_step(state, params, NULL, &good, &steering) == TIREID_MPC_BAD_CALL, "null work");
+    check(tireid_mpc_step(state, params, &work, NULL, &steering) == TIREID_MPC_BAD_CALL,
+        "null input");
+    check(
+        tireid_mpc_step(state, params, &work, &good, NULL) == TIREID_MPC_BAD_CALL, "null steering");
 }
 
 static void test_params(const tireid_mpc_params *params)

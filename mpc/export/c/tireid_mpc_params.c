@@ -70,15 +70,14 @@ bool tireid_mpc_accepts(const tireid_mpc_params *params)
 {
     bool accepted = false;
     if (params != NULL) {
-        const tireid_mpc_real *const positive[] = { &params->car[0], &params->car[1], &params->car[2],
-            &params->car[3], &params->cost_rate, &params->stage_time, &params->period,
-            &params->max_steering, &params->max_rate, &params->max_e_y, &params->max_slip[0],
-            &params->max_slip[1], &params->soft_e_y, &params->soft_slip, &params->widest_e_y,
-            &params->widest_e_psi, &params->max_v_y, &params->max_yaw_rate, &params->min_speed,
-            &params->max_speed, &params->max_curvature, &params->tolerance };
+        const tireid_mpc_real *const positive[] = { &params->car[0], &params->car[1],
+            &params->car[2], &params->car[3], &params->cost_rate, &params->stage_time,
+            &params->period, &params->max_steering, &params->max_rate, &params->max_e_y,
+            &params->max_slip[0], &params->max_slip[1], &params->soft_e_y, &params->soft_slip,
+            &params->widest_e_y, &params->widest_e_psi, &params->max_v_y, &params->max_yaw_rate,
+            &params->min_speed, &params->max_speed, &params->max_curvature, &params->tolerance };
         accepted = are_positive(positive, (uint32_t)(sizeof positive / sizeof positive[0]))
-            && are_told(params->weights, TIREID_MPC_WEIGHTS)
-            && are_not_negative(params->rise, 2U)
+            && are_told(params->weights, TIREID_MPC_WEIGHTS) && are_not_negative(params->rise, 2U)
             && are_not_negative(params->cost, TIREID_MPC_ERRORS)
             && are_not_negative(params->cost_end, TIREID_MPC_ERRORS) && is_table(params)
             && are_not_negative(&params->hold_time, 1U) && are_not_negative(&params->delay, 1U)
@@ -88,8 +87,8 @@ bool tireid_mpc_accepts(const tireid_mpc_params *params)
     return accepted;
 }
 
-tireid_mpc_status tireid_mpc_set_weights(tireid_mpc_params *params,
-    const tireid_mpc_real weights[TIREID_MPC_WEIGHTS])
+tireid_mpc_status tireid_mpc_set_weights(
+    tireid_mpc_params *params, const tireid_mpc_real weights[TIREID_MPC_WEIGHTS])
 {
     tireid_mpc_status status = TIREID_MPC_BAD_CALL;
     if ((params != NULL) && (weights != NULL)) {

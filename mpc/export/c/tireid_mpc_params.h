@@ -17,8 +17,8 @@ bool tireid_mpc_accepts(const tireid_mpc_params *params);
 
 /* Go on with other weights of the tire, between two steps; refused with TIREID_MPC_NOT_FINITE, and
  * nothing changed, where one is not finite or beyond 1e12. */
-tireid_mpc_status tireid_mpc_set_weights(tireid_mpc_params *params,
-    const tireid_mpc_real weights[TIREID_MPC_WEIGHTS]);
+tireid_mpc_status tireid_mpc_set_weights(
+    tireid_mpc_params *params, const tireid_mpc_real weights[TIREID_MPC_WEIGHTS]);
 
 #ifdef __cplusplus
 }

@@ -17,18 +17,18 @@
 #include "simulated_car.h"
 #include "lane_changes.h"
 
-#define SPEED 21.0         /* m/s: the lane changes ask for 0.83 of the friction */
-#define PASSES 6           /* double lane changes */
-#define TRANSPORT 2        /* periods from a measurement until its command leaves */
-#define ACTUATOR 0.02      /* lag of the steering [s] */
-#define LEARN_FIRST 6.0    /* s before anything is handed over */
-#define SHARE 0.02         /* of the way to what was learnt, each period */
-#define WIDEST 1.75        /* m: the car leaves the road */
-#define LEARNT_PEAK 0.15   /* m, in the last pass: a few centimeters are usual */
+#define SPEED 21.0       /* m/s: the lane changes ask for 0.83 of the friction */
+#define PASSES 6         /* double lane changes */
+#define TRANSPORT 2      /* periods from a measurement until its command leaves */
+#define ACTUATOR 0.02    /* lag of the steering [s] */
+#define LEARN_FIRST 6.0  /* s before anything is handed over */
+#define SHARE 0.02       /* of the way to what was learnt, each period */
+#define WIDEST 1.75      /* m: the car leaves the road */
+#define LEARNT_PEAK 0.15 /* m, in the last pass: a few centimeters are usual */
 
 typedef struct {
-    double sum;   /* of squares of e_y [m^2] */
-    double peak;  /* of |e_y| [m] */
+    double sum;  /* of squares of e_y [m^2] */
+    double peak; /* of |e_y| [m] */
     long samples;
 } score;
 
@@ -124,9 +124,9 @@ static result drive(bool learns, FILE *log)
         tireid_mpc_real steering = 0;
         tireid_mpc_status status;
         clock_t start;
-        found.taken += learn(&identifier, &limits, &car, &seen, &params, learns && (t > LEARN_FIRST))
-            ? 1UL
-            : 0UL;
+        found.taken +=
+            learn(&identifier, &limits, &car, &seen, &params, learns && (t > LEARN_FIRST)) ? 1UL
+                                                                                           : 0UL;
         start = clock();
         status = tireid_mpc_step(&tracker, &params, &work, &seen, &steering);
         found.solve_time += (double)(clock() - start) / (double)CLOCKS_PER_SEC;

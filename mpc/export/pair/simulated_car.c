@@ -16,15 +16,16 @@ static double curve(const simulated_car_numbers *numbers, double slip)
     return numbers->friction * sin(SHAPE * atan(B * slip));
 }
 
-static void substep(simulated_car *car, const simulated_car_numbers *numbers, double command, double dt)
+static void substep(
+    simulated_car *car, const simulated_car_numbers *numbers, double command, double dt)
 {
     const double *l = numbers->l;
     const double kappa = lane_changes_curvature(car->s);
     const double v_x = car->v_x;
     const double slip[2] = { car->delta - atan((car->v_y + (l[0] * car->r)) / v_x),
         -atan((car->v_y - (l[1] * car->r)) / v_x) };
-    const double s_dot = ((v_x * cos(car->e_psi)) - (car->v_y * sin(car->e_psi)))
-        / (1.0 - (kappa * car->e_y));
+    const double s_dot =
+        ((v_x * cos(car->e_psi)) - (car->v_y * sin(car->e_psi))) / (1.0 - (kappa * car->e_y));
     const double e_y_dot = (v_x * sin(car->e_psi)) + (car->v_y * cos(car->e_psi));
     int i;
     for (i = 0; i < 2; i++) {
@@ -41,7 +42,8 @@ static void substep(simulated_car *car, const simulated_car_numbers *numbers, do
     car->delta += dt * (command - car->delta) / numbers->actuator;
 }
 
-void simulated_car_advance(simulated_car *car, const simulated_car_numbers *numbers, double command, double dt)
+void simulated_car_advance(
+    simulated_car *car, const simulated_car_numbers *numbers, double command, double dt)
 {
     int k;
     for (k = 0; k < SUBSTEPS; k++) {

@@ -25,6 +25,7 @@ typedef struct {
 } simulated_car;
 
 /* Go on for a time dt [s] with a command of the steering [rad]. */
-void simulated_car_advance(simulated_car *car, const simulated_car_numbers *numbers, double command, double dt);
+void simulated_car_advance(
+    simulated_car *car, const simulated_car_numbers *numbers, double command, double dt);
 
 #endif

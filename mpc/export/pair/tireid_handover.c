@@ -12,13 +12,13 @@
 #define MAX_FORCE ((real)TIREID_HANDOVER_MAX_FORCE) /* of an axle [N] */
 
 #if TIREID_HANDOVER_CURVES
-#define AXLE (UNITS + 2U)                      /* weights of an axle */
+#define AXLE (UNITS + 2U)                         /* weights of an axle */
 #define SHORTEST ((real)TIREID_HANDOVER_SHORTEST) /* lag that is always there [m] */
 #define SWAY ((real)TIREID_HANDOVER_SWAY) /* g over the square of the roll's frequency [m] */
-#define LEAST_SLOPE ((real)0.1)                /* of a force curve at zero [static loads a rad] */
-#define MAX_SLIP ((real)0.5)                   /* up to which a flat curve is looked for [rad] */
+#define LEAST_SLOPE ((real)0.1)           /* of a force curve at zero [static loads a rad] */
+#define MAX_SLIP ((real)0.5)              /* up to which a flat curve is looked for [rad] */
 #define STEPS 250U
-#define FLAT ((real)0.05) /* of the slope at zero: there the peak is reached */
+#define FLAT ((real)0.05)       /* of the slope at zero: there the peak is reached */
 #define LEAST_RISE ((real)0.04) /* of the slope at zero, beyond the slip that is of use */
 
 /* Weights of the prediction: offsets and lag, scales, then compliance, least lag and units. */

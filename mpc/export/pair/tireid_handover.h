@@ -17,8 +17,8 @@ extern "C" {
  * push with more than the identifier's max_force, a curve whose force does not rise with slip. Whether
  * enough was seen to trust it, and whether it explains the last seconds better than the tire in use,
  * is for the caller to judge. */
-bool tireid_handover(const tireid_weights *learnt, tireid_mpc_params *params,
-    tireid_mpc_real share);
+bool tireid_handover(
+    const tireid_weights *learnt, tireid_mpc_params *params, tireid_mpc_real share);
 
 #ifdef __cplusplus
 }

@@ -3,7 +3,7 @@
 #include "tireid_mpc.h"
 #include "tireid_mpc_params.h"
 #include "machine.h"
-#include "vectors.h"
+#include "tireid_mpc_vectors.h"
 
 #ifndef STEPS
 #define STEPS VECTORS /* that are taken */

@@ -164,7 +164,8 @@ static int within_bounds(const tireid_weights *weights)
         }
         for (i = 0; i < 4; i++) {
             if (!(size[i] <= widest[axle][i])) {
-                printf("variance %d is %.9g of its limit: ", i, (double)(size[i] / widest[axle][i]));
+                printf(
+                    "variance %d is %.9g of its limit: ", i, (double)(size[i] / widest[axle][i]));
                 return 0;
             }
         }
@@ -241,8 +242,8 @@ static int torture(tireid_params *params)
             return 1;
         }
     }
-    printf("ok %u rest %u implausible %u bad_input %u bad_result %u stale %u\n", kinds[0],
-        kinds[1], kinds[2], kinds[3], kinds[4], kinds[6]);
+    printf("ok %u rest %u implausible %u bad_input %u bad_result %u stale %u\n", kinds[0], kinds[1],
+        kinds[2], kinds[3], kinds[4], kinds[6]);
     return 0;
 }
 

@@ -200,7 +200,7 @@ def test_the_self_test_sees_a_wrong_sign(packages, write, run, compiler):
 
 def test_the_self_test_sees_a_wrong_vector(packages, write, run, compiler):
     folder = write(packages["integral"])
-    vectors = folder / "tests" / "vectors.h"
+    vectors = folder / "tests" / "tireid_vectors.h"
     *head, last = re.split(r"(?<=\{ )(?=-?[1-9]\d{2,}\.)", vectors.read_text())
     vectors.write_text("".join(head) + "1" + last)  # one digit more in one force
     sources = ["src/tireid.c", "src/tireid_equations.c", "tests/test_tireid.c"]

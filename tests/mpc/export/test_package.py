@@ -144,7 +144,12 @@ def test_the_vectors_are_those_of_a_tracker_that_plans_and_falls_back(packages):
 @pytest.mark.parametrize(
     ("file", "pattern", "replacement", "complaint"),
     [
-        ("tests/vectors.h", r"(vector_output.*\n    \{ -?0\.0)", r"\g<1>1", "steering is that"),
+        (
+            "tests/tireid_mpc_vectors.h",
+            r"(vector_output.*\n    \{ -?0\.0)",
+            r"\g<1>1",
+            "steering is that",
+        ),
         ("src/tireid_mpc_tables.h", r"car \*/ \{ R\(1", r"\g<0>1", "steering is that"),
         ("src/tireid_mpc.c", r"!is_number\(in\)", "false", "NaN is refused"),
         ("src/tireid_mpc.c", r"(count\(state, status\);)", r"/* \1 */", "refused is counted"),

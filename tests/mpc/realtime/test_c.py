@@ -11,7 +11,7 @@ from codegen import find_compiler
 from mpc.realtime.c_source import c_sources
 from mpc.realtime.instance import N_COMMANDS, N_STATUSES, Status
 
-ABOUT = {"title": "A test", "version": "0", "version_text": "0"}
+ABOUT = {"title": "A test", "version": "0", "hash": "0", "version_text": "0"}
 WARNINGS = ("all", "extra", "pedantic", "conversion", "shadow", "double-promotion")
 STRICT = ["-std=c99", "-O1", *(f"-W{warning}" for warning in WARNINGS)]
 NAME = "any_name"
