@@ -3,6 +3,7 @@
 import argparse
 import io
 import os
+import shlex
 import signal
 import sys
 import traceback
@@ -91,6 +92,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         complain(f"tireid: error: {one_line(error)}")
         return BAD_INPUT
     options = parser.parse_args(words)
+    options.words = shlex.join(["tireid", *words])  # what a report says it was made by
     if options.version or options.command is None:
         print(f"tireid {tireid.__version__}" if options.version else parser.format_help().rstrip())
         return 0

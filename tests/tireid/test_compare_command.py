@@ -11,6 +11,7 @@ from identifier.compare.study import run_comparison, step_lengths
 from identifier.methods import METHODS
 from models.recordings import read_recording
 from models.vehicle import sedan
+from tests.pages import faults_of, outline
 from tireid.cli import main
 from tireid.commands import compare_results
 from tireid.commands.compare_results import ERROR_COLUMNS, SWEEP_COLUMNS
@@ -161,6 +162,20 @@ def test_every_design_of_the_sweep_is_told_of(numbers, result):
         assert set(values) == set(trial["values"])
         for name, value in trial["values"].items():
             assert float(values[name]) == pytest.approx(value, rel=1e-5)
+
+
+def test_the_report_is_whole_and_says_the_numbers_of_the_summary(result):
+    page = (result / "report.html").read_text(encoding="utf-8")
+    assert faults_of(page) == []
+    told = outline(page).text
+    numbers = json.loads((result / "compare.json").read_text())
+    best = min(
+        (m["percent"]["other"], name)
+        for name, m in numbers["methods"].items()
+        if m["percent"]["other"] is not None
+    )
+    assert f"{best[0]:.1f} %" in told and best[1] in told
+    assert "tireid compare" in told
 
 
 def test_figures_are_written(result):

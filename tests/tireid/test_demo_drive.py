@@ -3,11 +3,13 @@
 import json
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from codegen import find_compiler
 from models.vehicle import sedan
 from tireid.animation import film as frames
+from tireid.animation.known import known_over_time
 from tireid.commands import demo_parts as demo_drive
 from tireid.commands import drive_results
 from tireid.commands.demo_parts import NOT_DRIVEN, drive_section, drive_story, drive_text
@@ -26,6 +28,7 @@ def quick(monkeypatch):
     monkeypatch.setattr(frames, "MOST", 4)
     empty = b"\x89PNG\r\n\x1a\n"
     monkeypatch.setattr(drive_results, "save_figure", lambda _, path: path.write_bytes(empty))
+    monkeypatch.setattr("tireid.reports.common.figure_svg", lambda _: b"<?xml")
 
 
 def test_learnt_tires_steer_as_the_true_ones_and_learning_stays_on_the_road(story, tmp_path, quick):
@@ -53,9 +56,16 @@ def test_learnt_tires_steer_as_the_true_ones_and_learning_stays_on_the_road(stor
     films = [
         block
         for block in section.blocks
-        if isinstance(block, Picture) and block.image.startswith(b"GIF89a")
+        if isinstance(block, Picture) and block.image[8:12] == b"WEBP"
     ]
-    assert len(films) == 2
+    assert len(films) == 1
+    assert all((tmp_path / folder / "drive.webp").is_file() for folder in driven)
+    run = driven["drive_slippery"].runs[0]
+    known = known_over_time(run.known, run.model, 12.7)
+    slid = np.argmin(np.abs(known.alpha - 0.07))
+    before, after = (known.steering[np.argmin(np.abs(known.t - t)), slid, 0] for t in (8.0, 15.0))
+    assert 0.0 < after < 0.75 * before, "the friction dropped to half at 8.7 s"
+    assert all(run.known == () for one in driven.values() for run in one.runs[1:])
 
 
 def test_without_a_compiler_the_report_says_so(story, tmp_path, monkeypatch):

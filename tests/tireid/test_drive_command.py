@@ -16,6 +16,7 @@ from mpc.loop import CarSensors
 from mpc.loop.sensing import cornering_limit
 from mpc.realtime import NoCompilerError
 from mpc.tires import oracle_tire, prediction_tire
+from tests.pages import faults_of, outline
 from tireid.cli import main
 from tireid.commands import drive_results
 from tireid.commands.drive_results import steady_curve
@@ -52,6 +53,7 @@ def result(bend, tmp_path_factory):
 def no_figures(monkeypatch):
     """Pictures are looked at once, in `result`."""
     monkeypatch.setattr(drive_results, "save_figure", lambda *_: None)
+    monkeypatch.setattr("tireid.reports.common.figure_svg", lambda _: b"<?xml")
 
 
 def summary_of(folder):
@@ -114,8 +116,8 @@ def test_deviation_and_forces_of_the_csv_follow_from_its_motion(result):
 def test_everything_is_written(result):
     for name in ("path", "errors", "steering", "tires", "solve_times"):
         assert (result / f"{name}.png").read_bytes().startswith(b"\x89PNG")
-    assert (result / "drive.gif").read_bytes().startswith(b"GIF89a")
-    assert (result / "drive.gif").stat().st_size < 3e6
+    assert (result / "drive.webp").read_bytes()[8:12] == b"WEBP"
+    assert (result / "drive.webp").stat().st_size < 2e6
     assert load_model(result / "weights.json").vehicle.name == "sedan"
 
 
@@ -130,7 +132,7 @@ def test_stored_weights_steer_alike_and_the_hash_tells_what_went_in(
     assert same["rms_e_y_m"] == before["rms_e_y_m"] != other["rms_e_y_m"]
     assert same["inputs"]["weights_hash"] == before["inputs"]["weights_hash"]
     assert same["hash"] == digest(same["inputs"]) != other["hash"]
-    assert not (tmp_path / "same" / "drive.gif").exists()
+    assert not (tmp_path / "same" / "drive.webp").exists()
 
 
 def test_learning_and_oracle_are_told_of_a_friction_that_drops(
@@ -147,6 +149,15 @@ def test_learning_and_oracle_are_told_of_a_friction_that_drops(
     assert drives["oracle"]["peak_e_y_m"] < drives["learning"]["peak_e_y_m"]
     reasons = " ".join(entry["note"] for entry in drives["learning"]["notes"])
     assert "friction" in reasons
+
+
+def test_the_report_is_whole_and_says_the_numbers_of_the_summary(result):
+    page = (result / "report.html").read_text(encoding="utf-8")
+    assert faults_of(page) == []
+    summary, told = json.loads((result / "summary.json").read_text()), outline(page).text
+    assert f"{summary['rms_e_y_m']:.3f} m" in told
+    assert summary["hash"] in told and "tireid drive" in told
+    assert "data:image/webp;base64," in page
 
 
 def test_a_car_that_leaves_its_path_is_told_with_exit_code_1(bend, tmp_path, capsys, no_figures):

@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 from PIL import Image, ImageSequence
 
+from models.faults import SensorFault
 from models.vehicle import sedan
 from mpc.loop import Drive, Plan
 from mpc.path import Path
 from tireid.animation import film as frames
 from tireid.animation import write_film
 from tireid.animation.ground import Camera
+from tireid.animation.known import KnownCurves
+from tireid.animation.scene import Scene
 from tireid.figures import (
     TireCurve,
     axle_slip,
@@ -109,7 +112,7 @@ def test_every_axle_has_its_own_curves_and_cloud():
         drive.delta - np.arctan((drive.v_y + CAR.l_f * drive.r) / drive.v_x),
         -np.arctan((drive.v_y - CAR.l_r * drive.r) / drive.v_x),
     ]
-    for axle, axes in enumerate(figure.axes):
+    for axle, axes in enumerate(figure.axes[:2]):
         cloud, *curves = axes.lines
         np.testing.assert_allclose(np.radians(cloud.get_xdata()), slip[axle], atol=1e-12)
         np.testing.assert_allclose(1e3 * cloud.get_ydata(), drive.axle_force[:, axle], atol=1e-6)
@@ -200,18 +203,121 @@ def test_a_long_drive_is_shown_faster_and_a_short_one_slower():
     assert long.t[0] == 0.0 and long.t[-1] == 100.0
 
 
-@pytest.mark.parametrize("drives", [ON_LANE, ON_COURSE], ids=["lane", "course"])
-def test_the_film_is_small_and_moves(drives, tmp_path, monkeypatch):
-    monkeypatch.setattr(frames, "MOST", 12)
-    file = tmp_path / "drive.gif"
+@pytest.mark.parametrize(
+    ("drives", "kind", "frame_bytes"),
+    [(ON_LANE, "webp", 2e4), (ON_COURSE, "webp", 2e4), (ON_LANE, "gif", 5e4)],
+    ids=["lane", "course", "gif"],
+)
+def test_the_film_is_crisp_and_small_and_moves(drives, kind, frame_bytes, tmp_path, monkeypatch):
+    monkeypatch.setattr(frames, "MOST", 6)
+    file = tmp_path / f"drive.{kind}"
     write_film(file, drives, CURVES, title="made up")
-    assert file.stat().st_size < 1e6
     with Image.open(file) as film:
         pictures = [np.array(frame.convert("RGB")) for frame in ImageSequence.Iterator(film)]
         assert film.info["loop"] == 0
-    assert len(pictures) == 12
-    for before, after in pairwise(pictures):
+        assert film.size == (960, 600)
+    assert file.stat().st_size < frame_bytes * len(pictures)
+    first = next(iter(drives.values()))
+    count = frames.reel(float(first.t[-1] - first.t[0])).t.size
+    assert len(pictures) >= count  # what stays at the end may be one picture that is held
+    for before, after in pairwise(pictures[:count]):
         assert (before != after).any()
+
+
+def test_the_last_picture_is_held(tmp_path, monkeypatch):
+    monkeypatch.setattr(frames, "MOST", 2)
+    file = tmp_path / "drive.gif"
+    write_film(file, ON_LANE, CURVES, title="made up")
+    with Image.open(file) as film:
+        last = [frame.info["duration"] for frame in ImageSequence.Iterator(film)][-1]
+    assert last >= 1000.0 / frames.RATE * frames.HOLD
+
+
+GROWN = np.linspace(0.2, 1.0, 11)
+KNOWN = KnownCurves(
+    t=np.linspace(0.0, 5.0, 11),
+    alpha=ALPHA,
+    steering=np.array([g * CURVES[0].force for g in np.floor(2.0 * GROWN) / 2.0]),
+    learnt=np.array([g * CURVES[0].force for g in GROWN]),
+    slip=np.radians(1.0) * np.column_stack([GROWN, 2.0 * GROWN]),
+)
+
+
+@pytest.mark.parametrize("t", [0.0, 2.3, 4.7])
+def test_the_film_shows_the_curves_as_they_were_known_then(t):
+    scene = Scene(ON_LANE, CURVES, drops=(), pace=1.0, title="made up", known=KNOWN)
+    scene.show(t)
+    k = int(t / 0.5)
+    panels = [axes for axes in scene.figure.axes if "axle" in axes.get_title("left")]
+    assert len(panels) == 2
+    for axle, axes in enumerate(panels):
+        drawn = curves(axes)
+        for label, force in (("learnt by now", KNOWN.learnt), ("steered by, now", KNOWN.steering)):
+            inside = np.abs(ALPHA) < 0.02  # beyond, a curve leaves the panel
+            np.testing.assert_allclose(
+                1e3 * drawn[label][inside, 1], force[k][inside, axle], atol=1e-6
+            )
+        edges = sorted(patch.get_x() + patch.get_width() for patch in axes.patches)
+        assert edges[0] == pytest.approx(-np.degrees(KNOWN.slip[k, axle]))
+        assert edges[1] == pytest.approx(axes.get_xlim()[1])
+
+
+def test_the_true_curve_of_a_film_is_that_of_the_road_that_the_car_is_on():
+    later = replace(CURVES[2], label="oracle at the end", force=0.5 * CURVES[2].force)
+    scene = Scene(ON_LANE, [*CURVES, later], drops=[(60.0, 0.5)], pace=1.0, title="made up")
+    for t, halved in ((1.0, False), (5.0, True)):
+        scene.show(t)
+        seen = {
+            line.get_label(): line.get_visible()
+            for line in scene.figure.axes[1].lines
+            if str(line.get_label()).startswith("oracle")
+        }
+        assert seen == {"oracle": not halved, "oracle at the end": halved}
+
+
+def test_what_was_known_only_at_the_end_is_not_in_a_film():
+    hindsight = replace(CURVES[0], label="frozen at the end")
+    scene = Scene(ON_LANE, [*CURVES, hindsight], drops=(), pace=1.0, title="made up")
+    labels = [line.get_label() for axes in scene.figure.axes for line in axes.lines]
+    assert "frozen" in labels and "frozen at the end" not in labels
+
+
+FAULT = SensorFault(channel="v_y", kind="biased", start=2.0, duration=1.5, size=0.3)
+
+
+def test_a_broken_sensor_is_shaded_and_where_it_was_noticed_is_marked():
+    noticed = replace(
+        ON_LANE["frozen"], notes=((2.5, "sensor fault: v_y and a_y"), (3.0, "learnt tire: x"))
+    )
+    for figure in (
+        drive_errors_figure({"frozen": noticed}, off_path=2.0, faults=[FAULT]),
+        drive_steering_figure({"frozen": noticed}, angle_limit=0.5, rate_limit=0.5, faults=[FAULT]),
+    ):
+        labels = [text.get_text() for text in figure.legends[0].get_texts()]
+        assert {"v_y biased", "sensor fault noticed"} <= set(labels)
+        for axes in figure.axes:
+            (shade,) = [p for p in axes.patches if p.get_label() == "v_y biased"]
+            box = shade.get_extents().transformed(axes.transData.inverted())
+            assert (box.x0, box.x1) == pytest.approx((2.0 * SPEED, 3.5 * SPEED), abs=0.1)
+            (mark,) = [line for line in axes.lines if line.get_label() == "sensor fault noticed"]
+            assert mark.get_xdata()[0] == pytest.approx(2.5 * SPEED)
+    late = replace(FAULT, start=1e3)
+    labels = drive_errors_figure({"frozen": noticed}, off_path=2.0, faults=[late]).legends[0]
+    assert "v_y biased" not in [text.get_text() for text in labels.get_texts()]
+
+
+def test_below_the_tires_stands_what_each_curve_misses_of_the_true_one_of_its_road():
+    frozen, _, oracle = CURVES
+    worn = replace(frozen, label="learning at the end", force=0.4 * frozen.force)
+    truth = replace(oracle, force=0.9 * oracle.force)
+    halved = replace(oracle, label="oracle at the end", force=0.5 * oracle.force)
+    figure = drive_tires_figure(ON_LANE["frozen"], [frozen, worn, truth, halved])
+    for axle, axes in enumerate(figure.axes[2:]):
+        drawn = [np.column_stack(line.get_data()) for line in axes.lines]
+        missed = frozen.force - truth.force, worn.force - halved.force
+        for line, expected in zip(drawn, missed, strict=True):
+            part = np.isin(np.rad2deg(ALPHA), line[:, 0])
+            np.testing.assert_allclose(1e3 * line[:, 1], expected[part, axle], atol=1e-9)
 
 
 def test_an_mp4_without_ffmpeg_is_refused_with_what_to_do(tmp_path, monkeypatch):

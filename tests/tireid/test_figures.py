@@ -194,14 +194,15 @@ def test_the_users_own_settings_do_not_change_a_figure() -> None:
 
 def test_forces_show_truth_once_in_each_panel_and_one_row_for_each_freeze() -> None:
     figure = FIGURES["forces"]()
-    assert len(figure.axes) == 6
+    assert len(figure.axes) == 8
     assert [axes.get_title("left") for axes in figure.axes[::2]] == [
         "Front axle, online",
         "Front axle, frozen at 21 s",
         "Front axle, frozen at 22 s",
+        "Front axle, residual to truth",
     ]
     assert figure.axes[2].get_title("right") == "RMSE 0.43 kN"
-    for axes in figure.axes:
+    for axes in figure.axes[:6]:
         black = [line for line in axes.lines if to_hex(line.get_color()) == BLACK]
         assert len(black) == 1
         peak = 5.0 if axes in figure.axes[::2] else 3.5
@@ -329,7 +330,7 @@ def test_every_axle_has_its_own_curves_in_the_slip_figure() -> None:
     )
     frozen = model.axle_force(recording)
     assert recording.axle_force is not None
-    for axle, axes in enumerate(figure.axes):
+    for axle, axes in enumerate(figure.axes[:2]):
         drawn = {
             str(line.get_label()): np.radians(1.0) * np.asarray(line.get_xdata())
             for line in axes.lines
@@ -351,7 +352,7 @@ def test_every_axle_has_its_own_curves_in_the_slip_figure() -> None:
         ]
         edges = sorted(min(abs(box.x0), abs(box.x1)) for box in shaded)
         assert edges == pytest.approx([np.degrees((0.02, 0.01)[axle])] * 2)
-    slopes = [np.ptp(np.asarray(axes.lines[-1].get_ydata())) for axes in figure.axes]
+    slopes = [np.ptp(np.asarray(axes.lines[-1].get_ydata())) for axes in figure.axes[:2]]
     assert slopes[0] > 1.5 * slopes[1]
 
 
@@ -541,3 +542,74 @@ def test_the_slip_figure_shows_truth_where_there_is_one_and_else_the_online_forc
         assert any(label in text for text in labels), labels
         other = "online" if label == "truth" else "truth"
         assert not any(other in text for text in labels), labels
+
+
+@pytest.mark.parametrize("truth", [True, False])
+def test_below_the_forces_stands_what_is_missed_of_them(truth: bool) -> None:
+    history = made_up(truth=truth)
+    replays = frozen_replays(history)
+    figure = force_figure(history, replays)
+    known = history.recording.axle_force if truth else history.axle_force
+    assert known is not None
+    last = replays[22.0].axle_force
+    for axle, axes in enumerate(figure.axes[-2:]):
+        drawn = {str(line.get_label()): np.asarray(line.get_ydata()) for line in axes.lines[1:]}
+        expected = {"frozen weights": (last - known)[:, axle] / 1e3}
+        if truth:
+            expected["online"] = (history.axle_force - known)[:, axle] / 1e3
+        assert drawn.keys() == expected.keys()
+        for label, values in expected.items():
+            np.testing.assert_allclose(drawn[label], values, atol=1e-12)
+
+
+def test_below_the_curve_stands_what_the_model_misses_of_the_truth() -> None:
+    history = made_up()
+    model = unlike_axles()
+    figure = slip_figure(model, history.recording)
+    assert history.recording.axle_force is not None
+    missed = (model.axle_force(history.recording) - history.recording.axle_force) / 1e3
+    for axle, axes in enumerate(figure.axes[2:]):
+        _, cloud = axes.lines
+        above = figure.axes[axle].lines[0]
+        np.testing.assert_allclose(np.asarray(cloud.get_ydata()), missed[:, axle], atol=1e-9)
+        np.testing.assert_allclose(
+            np.asarray(cloud.get_xdata(), dtype=float), np.asarray(above.get_xdata(), dtype=float)
+        )
+
+
+def overlapping_titles(figure: Figure) -> list[str]:
+    """Titles of a panel that touch each other, or those of the panel beside it."""
+    figure.canvas.draw()
+    boxes = [
+        (text.get_text(), text.get_window_extent())
+        for axes in figure.axes
+        for text in (axes.title, axes._left_title, axes._right_title)  # type: ignore[attr-defined]
+        if text.get_text()
+    ]
+    return [
+        one
+        for number, (one, box) in enumerate(boxes)
+        if any(box.overlaps(other) for _, other in boxes[number + 1 :])
+    ]
+
+
+def far_away(history: History) -> History:
+    recording = history.recording
+    return replace(history, recording=replace(recording, t=recording.t + 1.7e9))
+
+
+def test_times_of_a_clock_that_began_long_ago_fit_their_titles_and_axes() -> None:
+    history = far_away(made_up())
+    past = AxleRmse(front=260.0, rear=140.0)
+    sides = Reproduction(
+        past_against_online=past, past_against_truth=None, after_against_truth=None
+    )
+    result = replace(replayed(history), reproduction=sides)
+    figure = force_figure(history, {1.7e9 + 22.0: result})
+    assert overlapping_titles(figure) == [] and not clipped(figure)
+    assert figure.axes[2].get_title("left") == "Front axle, frozen at 22 s"
+    assert figure.axes[-1].get_xlabel() == "time since 1700000000 s [s]"
+    shown = [text.get_text() for text in figure.axes[-1].get_xticklabels()]
+    assert {"20", "22"} <= {one.split(".")[0] for one in shown}
+    figure.axes[2].set_title("Front axle, frozen at 1700000022.25 s, which is long", loc="left")
+    assert overlapping_titles(figure)

@@ -12,6 +12,7 @@ from identifier.methods import METHODS, draws_weights, load_model, make_method
 from identifier.paper.design import PaperIdentifier, design_text
 from models.recordings import read_recording
 from models.vehicle import sedan
+from tests.pages import faults_of, outline
 from tireid.cli import main
 
 METHOD_FILES = {  # figures and tables that belong to a method, and the columns of weights.csv
@@ -168,6 +169,33 @@ def test_the_vehicle_is_written_in_the_same_words_everywhere(result):
     weights = json.loads((result / "weights.json").read_text())
     assert summary["vehicle"] == weights["vehicle"]
     assert {"name", "mass", "yaw_inertia", "cornering_stiffness_rear"} <= summary["vehicle"].keys()
+
+
+def test_the_report_is_whole_and_says_the_numbers_of_the_summary(result):
+    page = (result / "report.html").read_text(encoding="utf-8")
+    assert faults_of(page) == []
+    told = outline(page).text
+    assert "tireid identify" in told and "hash" in told, "what it was made by"
+    summary = json.loads((result / "summary.json").read_text())
+    assert summary["version"] in told
+    (name, *_) = summary["rms_force_N"]
+    error = summary["rmse_N"]["online"][name]
+    assert f"{error['front']:.4g}" in told and f"{error['rear']:.4g}" in told
+
+
+def test_the_curve_is_that_of_the_model_and_says_where_it_is_known(result):
+    head, *rows = (result / "curve.csv").read_text().splitlines()
+    table = np.array([[float(cell) for cell in row.split(",")] for row in rows])
+    model = load_model(result / "weights.json")
+    names = head.split(",")
+    assert names[:3] == ["slip_rad", "Fyf_N", "Fyr_N"]
+    slip = table[:, 0]
+    np.testing.assert_allclose(table[:, 1:3], model.force_at(slip), rtol=1e-6, atol=1e-3)
+    assert (names[3:] == ["front_known", "rear_known"]) == (model.known_slip is not None)
+    if model.known_slip is not None:
+        for axle, known in enumerate(model.known_slip):
+            np.testing.assert_array_equal(table[:, 3 + axle] == 1.0, np.abs(slip) <= known)
+            assert 0.0 < table[:, 3 + axle].mean() < 1.0
 
 
 def test_figures_are_written(result):

@@ -25,6 +25,7 @@ from identifier.paper_study import (
     run_trial,
 )
 from models.vehicle import sedan
+from tests.pages import faults_of, outline
 from tireid.cli import main
 from tireid.commands.certificate_table import certificate_of
 from tireid.commands.paper import PAPER, table_text, write_study
@@ -142,7 +143,8 @@ def noted_errors(figure):
     """What stands above the panels of a figure of forces: against truth (rows, 2), and past to
     online (rows - 1, 2) [kN].
     """
-    notes = [axes.get_title("right").splitlines() for axes in figure.axes]
+    above = figure.axes[:-2]  # the lowest row holds residuals
+    notes = [axes.get_title("right").splitlines() for axes in above]
     assert all(lines[0].startswith("RMSE ") for lines in notes)
     assert all(lines[1].startswith("past to online ") for lines in notes[2:])
     assert all(line.endswith(" kN") for lines in notes for line in lines)
@@ -245,7 +247,11 @@ def test_demo_leaves_one_self_contained_report(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("tireid.commands.demo.drive_story", lambda *_: {})  # so has this
     assert main(["demo", "--out", str(tmp_path / "demo")]) == 0
     page = (tmp_path / "demo" / "report.html").read_text()
-    assert page.count("data:image/png;base64,") >= 12
+    assert page.count("data:image/") >= 12
+    assert len(page) < 4e6 and faults_of(page) == []
+    told = outline(page).text
+    assert not re.search(r"\^|\blambda\b|\beta\b|\bxi\b|->", told), "mathematics is printed"
+    assert page.index("What was learnt</h2>") < page.index("<details>")
     assert "phase margin of the sampled loop [deg]" in page
     assert "http" not in page.replace("http-equiv", "")
     assert (tmp_path / "demo" / "identify" / "weights.json").is_file()

@@ -2,16 +2,27 @@
 
 import re
 from base64 import b64decode
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
 
-from tireid.figures import figure_png
-from tireid.report import Paragraph, Picture, Section, Table, report_html, write_report
+from tests.pages import faults_of, outline
+from tireid.figures import figure_png, figure_svg
+from tireid.report import (
+    FINE,
+    Headline,
+    Paragraph,
+    Picture,
+    Report,
+    Section,
+    Subheading,
+    Table,
+    printed,
+    report_html,
+    write_report,
+)
 
-VOID = {"meta", "img"}
 PNG = figure_png(Figure(figsize=(1.0, 1.0)), resolution=20)
 SECTIONS = [
     Section(heading="What & why", blocks=[Paragraph(text="a < b <script>alert(1)</script>")]),
@@ -30,33 +41,8 @@ SECTIONS = [
 ]
 
 
-class Outline(HTMLParser):
-    """What a browser would see: elements in order, links, texts; complains of a wrong nesting."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.tags: list[tuple[str, dict[str, str | None]]] = []
-        self.text = ""
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append((tag, dict(attrs)))
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        if "style" not in self.open:
-            self.text += data
-
-
-def outline(page: str) -> Outline:
-    parser = Outline()
-    parser.feed(page)
-    assert parser.open == []
-    return parser
+def page_of(title: str, sections: list[Section], summary: str = "") -> str:
+    return report_html(Report(title=title, sections=sections, summary=summary))
 
 
 def outside_references(page: str) -> list[str]:
@@ -67,7 +53,7 @@ def outside_references(page: str) -> list[str]:
 
 
 def test_report_needs_nothing_but_itself() -> None:
-    page = report_html("A title", SECTIONS)
+    page = page_of("A title", SECTIONS)
     assert outside_references(page) == []
     assert "http" not in page and "<script" not in page and "<link" not in page
     images = [attributes["src"] for tag, attributes in outline(page).tags if tag == "img"]
@@ -80,7 +66,7 @@ def test_a_reference_to_another_file_would_be_seen() -> None:
 
 
 def test_report_says_everything_it_was_given_and_nothing_as_markup() -> None:
-    parser = outline(report_html("A <title>", SECTIONS, summary="In & short"))
+    parser = outline(page_of("A <title>", SECTIONS, summary="In & short"))
     for text in (
         "A <title>",
         "In & short",
@@ -99,15 +85,16 @@ def test_report_says_everything_it_was_given_and_nothing_as_markup() -> None:
 
 
 def test_contents_lead_to_every_section() -> None:
-    tags = outline(report_html("T", SECTIONS)).tags
+    tags = outline(page_of("T", SECTIONS)).tags
     links = [str(attributes["href"])[1:] for tag, attributes in tags if tag == "a"]
-    assert links == [attributes["id"] for tag, attributes in tags if tag == "h2"]
-    assert len(links) == len(SECTIONS)
+    headings = [attributes["id"] for tag, attributes in tags if tag == "h2"]
+    assert links[: len(SECTIONS)] == headings
+    assert len(headings) == len(SECTIONS)
 
 
 def test_columns_of_numbers_are_aligned_right_and_gaps_are_dashes() -> None:
     table = Table(caption="c", header=["a", "b"], rows=[["x", -1.5], ["y", float("nan")]])
-    page = report_html("T", [Section(heading="h", blocks=[table])])
+    page = page_of("T", [Section(heading="h", blocks=[table])])
     assert '<td>x</td><td class="number">\N{MINUS SIGN}1.5</td>' in page
     assert '<td>y</td><td class="number">\N{EN DASH}</td>' in page
 
@@ -116,7 +103,7 @@ def test_rows_that_do_not_fit_and_pictures_that_are_none_are_refused(tmp_path: P
     with pytest.raises(ValueError, match="must have 2 cells, it has 1"):
         Table(caption="c", header=["a", "b"], rows=[["x"]])
     (tmp_path / "a.png").write_text("not a picture")
-    with pytest.raises(ValueError, match="must be a PNG"):
+    with pytest.raises(ValueError, match="must be SVG, PNG"):
         Picture(image=tmp_path / "a.png", caption="c")
     with pytest.raises(FileNotFoundError):
         Picture(image=tmp_path / "missing.png", caption="c")
@@ -124,7 +111,7 @@ def test_rows_that_do_not_fit_and_pictures_that_are_none_are_refused(tmp_path: P
 
 def test_a_film_is_embedded_as_what_it_is() -> None:
     film = Picture(image=b"GIF89a and more", caption="c")
-    page = report_html("t", [Section(heading="h", blocks=[film])])
+    page = page_of("t", [Section(heading="h", blocks=[film])])
     (image,) = (attributes["src"] for tag, attributes in outline(page).tags if tag == "img")
     assert str(image).startswith("data:image/gif;base64,")
     assert b64decode(str(image).split(",")[1]) == film.image
@@ -132,21 +119,100 @@ def test_a_film_is_embedded_as_what_it_is() -> None:
 
 def test_report_replaces_the_old_one_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "report.html"
-    write_report(path, "First", SECTIONS)
+    write_report(path, Report(title="First", sections=SECTIONS))
     first = path.read_text(encoding="utf-8")
-    assert first == report_html("First", SECTIONS)
+    assert first == page_of("First", SECTIONS)
 
     def fail(self: Path, target: Path) -> Path:
         raise OSError("disk full")
 
     monkeypatch.setattr(Path, "replace", fail)
     with pytest.raises(OSError, match="disk full"):
-        write_report(path, "Second", SECTIONS)
+        write_report(path, Report(title="Second", sections=SECTIONS))
     assert path.read_text(encoding="utf-8") == first
     assert [entry.name for entry in tmp_path.iterdir()] == ["report.html"]
 
 
 def test_a_table_without_rows_still_names_all_its_columns() -> None:
     table = Table(caption="c", header=["a", "b", "c"], rows=[])
-    html = report_html("t", [Section(heading="s", blocks=[table])])
+    html = page_of("t", [Section(heading="s", blocks=[table])])
     assert re.findall(r'<th scope="col"[^>]*>(\w)</th>', html) == ["a", "b", "c"]
+
+
+def test_every_anchor_resolves_and_every_picture_has_words() -> None:
+    assert faults_of(page_of("T", SECTIONS)) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ('href="#place-2"', 'href="#place-9"', "leads nowhere: #place-9"),
+        ('id="figure-2"', 'id="figure-1"', "id twice: figure-1"),
+        ('alt="Slip &lt;angle&gt;"', 'alt=" "', "a picture without words"),
+        ("In &amp; short", "In `short`", "a back-tick"),
+    ],
+)
+def test_a_fault_of_a_page_would_be_seen(old: str, new: str, fault: str) -> None:
+    page = page_of("T", SECTIONS, summary="In & short")
+    assert old in page
+    assert fault in faults_of(page.replace(old, new))
+
+
+def test_a_figure_is_enlarged_and_put_back_by_its_own_anchors() -> None:
+    tags = outline(page_of("T", SECTIONS)).tags
+    links = [attributes["href"] for tag, attributes in tags if tag == "a"]
+    assert links[2:] == ["#figure-1", "#place-1", "#figure-2", "#place-2"]
+    assert [a["id"] for tag, a in tags if tag == "figure" and "id" in a] == ["figure-1", "figure-2"]
+
+
+def test_headline_numbers_and_warnings_come_before_everything_else() -> None:
+    numbers = [Headline("2.4 %", "missed <frozen>")]
+    report = Report(title="T", sections=SECTIONS, numbers=numbers, warnings=["a & b"])
+    text = outline(report_html(report)).text
+    places = [text.index(one) for one in ("2.4 %", "a & b", "What & why")]
+    assert places == sorted(places)
+    assert "missed <frozen>" in text and FINE not in text
+    calm = Report(title="T", sections=SECTIONS, warnings=[])
+    assert FINE in outline(report_html(calm)).text
+    assert FINE not in page_of("T", SECTIONS), "where nobody looked, nobody says that all is well"
+
+
+def test_a_folded_section_shows_its_heading_only() -> None:
+    inside = [Subheading(text="Within"), Paragraph(text="hidden")]
+    sections = [Section(heading="Study", blocks=inside, folded=True)]
+    tags = [tag for tag, _ in outline(page_of("T", sections)).tags]
+    first = tags.index("details")
+    assert tags[first : first + 5] == ["details", "summary", "h2", "h3", "p"]
+    assert "section" not in tags
+
+
+def test_commands_are_written_letter_by_letter_and_our_letters_with_their_index() -> None:
+    rows = [["command", "tireid drive --fault v_y:biased:3:inf:0.5"]]
+    table = Table(caption="of v_y", header=["a", "b"], rows=rows, verbatim=True)
+    page = page_of("T", [Section(heading="h", blocks=[table])])
+    assert "--fault v_y:biased:3:inf:0.5</td>" in page
+    assert "of <i>v</i><sub>y</sub>" in page
+
+
+@pytest.mark.parametrize(
+    ("ascii_text", "expected"),
+    [
+        ("eta1 at eta/lambda [1/s^4]", "η1 at η/λ [1/s⁴]"),
+        ("|xi - xi_hat| in `kN s^-2`", "|ξ - ξ̂| in kN s⁻²"),
+        ("11 -> 2", "11 → 2"),
+        ("theta of beta, exist", "θ of beta, exist"),
+    ],
+)
+def test_text_of_ours_is_printed_as_in_a_book(ascii_text: str, expected: str) -> None:
+    assert printed(ascii_text) == expected
+
+
+def test_a_drawing_is_embedded_as_svg_with_the_same_bytes_each_time() -> None:
+    drawings = [figure_svg(Figure(figsize=(1.0, 1.0))) for _ in range(2)]
+    assert drawings[0] == drawings[1]
+    picture = Picture(image=drawings[0], caption="c", read="how")
+    parser = outline(page_of("t", [Section(heading="h", blocks=[picture])]))
+    (image,) = (attributes["src"] for tag, attributes in parser.tags if tag == "img")
+    assert str(image).startswith("data:image/svg+xml;base64,")
+    assert b64decode(str(image).split(",")[1]) == drawings[0]
+    assert "how" in parser.text

@@ -1,33 +1,31 @@
 """A drive as a film."""
 
 import shutil
-import subprocess
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from pathlib import Path as FilePath
-from typing import NamedTuple
+from subprocess import CalledProcessError
+from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.colors import to_rgb
+from matplotlib import style
+from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from numpy.typing import NDArray
-from PIL import Image
 
 from mpc.loop import Drive
+from tireid.animation.known import KnownCurves
 from tireid.animation.scene import Scene
-from tireid.figures.style import AMBER, BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY
+from tireid.figures.style import LOOK
 from tireid.figures.tires import TireCurve
 from tireid.progress import say
 
-# Which instants of a drive are shown, how fast, and how they become a GIF or an MP4.
+# Which instants of a drive are shown, and how fast; matplotlib's writers make the file.
 
-Pixels = NDArray[np.uint8]
-
-RATE = 12.5  # frames a second; a GIF counts in hundredths of a second
-MOST = 150  # frames: what stays small and quick to draw
+RATE = 10.0  # frames a second; a GIF counts in hundredths of a second
+MOST = 120  # frames: what stays small and quick to draw
 PACES = (0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)
 HOLD = 12  # frames for which the last picture stays
-INKS = (BLACK, BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY, GREY, "#9ADBC6", "#E2E2DA", "#F6F6F2")
-TINTS = (1.0, 0.75, 0.5, 0.3, 0.12)  # of every ink on white: what smooth edges are made of
+DOTS = 150  # an inch
+QUALITY = 45  # of a WebP, to 100
 
 
 class Reel(NamedTuple):
@@ -51,67 +49,6 @@ def reel(duration: float) -> Reel:
     return Reel(np.linspace(0.0, duration, count), pace)
 
 
-def write_gif(file: Path, pictures: Iterable[Pixels]) -> None:
-    """Write pictures as a GIF that repeats.
-
-    Parameters
-    ----------
-    file : to write.
-    pictures : RGB (height, width, 3), all of one size, at least one.
-    """
-    palette = Image.new("P", (1, 1))
-    palette.putpalette(inks())
-    frames = [
-        Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
-        for picture in pictures
-    ]
-    time = round(1000.0 / RATE)
-    frames[0].save(
-        file,
-        save_all=True,
-        append_images=frames[1:],
-        duration=[time] * (len(frames) - 1) + [time * HOLD],
-        loop=0,
-        optimize=False,
-        disposal=1,
-    )
-
-
-def inks() -> list[int]:
-    """Return the palette that all frames share, R, G, B one after another: inks and their tints."""
-    colors = [(255, 255, 255)]
-    for ink in INKS:
-        rgb = 255.0 * np.array(to_rgb(ink))
-        colors += [tuple(np.round(255.0 + tint * (rgb - 255.0)).astype(int)) for tint in TINTS]
-    return [int(part) for color in colors for part in color]
-
-
-def write_mp4(file: Path, pictures: Iterable[Pixels]) -> None:
-    """Write pictures as an MP4, by ffmpeg.
-
-    Parameters
-    ----------
-    file : to write.
-    pictures : RGB (height, width, 3), all of one size, at least one.
-
-    Raises
-    ------
-    ValueError
-        Where there is no ffmpeg, or it fails.
-    """
-    ffmpeg = require_ffmpeg()
-    stream = list(pictures)
-    height, width, _ = stream[0].shape
-    words = [ffmpeg, "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"]
-    words += ["-s", f"{width}x{height}", "-r", f"{RATE}", "-i", "-"]
-    words += ["-pix_fmt", "yuv420p", "-movflags", "+faststart", str(file)]
-    film = b"".join(picture.tobytes() for picture in [*stream, *[stream[-1]] * HOLD])
-    done = subprocess.run(words, input=film, capture_output=True, check=False)
-    if done.returncode != 0:
-        said = done.stderr.decode(errors="replace").strip().splitlines()
-        raise ValueError(f"ffmpeg could not write {file.name}: {said[-1] if said else 'no reason'}")
-
-
 def require_ffmpeg() -> str:
     """Return the path of ffmpeg.
 
@@ -126,7 +63,8 @@ def require_ffmpeg() -> str:
     return found
 
 
-FORMATS = ("gif", "mp4")
+FORMATS = ("webp", "gif", "mp4")
+SHOWN = FORMATS[:2]  # by a page, as pictures
 
 
 def write_film(
@@ -136,30 +74,60 @@ def write_film(
     *,
     drops: Sequence[tuple[float, float]] = (),
     title: str,
+    known: KnownCurves | None = None,
 ) -> None:
     """Write the film of a drive; other drives ride along as ghosts.
 
     Parameters
     ----------
-    file : ends in .gif or .mp4.
+    file : ends in .webp, .gif or .mp4.
     drives : by the name in the legend, along one path; the camera follows the first.
     curves : tire curves behind the forces of the first.
     drops : arc length [m] and friction from there on.
     title : what the film is about.
+    known : of the tires while the first drove; None where nothing was learnt.
 
     Raises
     ------
     ValueError
-        For an MP4 where there is no ffmpeg.
+        For an MP4 where there is no ffmpeg, or it fails.
     """
     first = next(iter(drives.values()))
     instants, pace = reel(float(first.t[-1] - first.t[0]))
-    scene = Scene(drives, curves, drops=drops, pace=pace, title=title)
+    scene = Scene(drives, curves, drops=drops, pace=pace, title=title, known=known)
+    writer = _writer(file)
+    try:
+        with style.context(["default", LOOK]), writer.saving(scene.figure, str(file), DOTS):
+            for number, t in enumerate(instants, start=1):
+                scene.show(float(t))
+                writer.grab_frame()
+                if number == len(instants) or number % 50 == 0:
+                    say(f"film: frame {number} of {len(instants)}")
+            for _ in range(HOLD):
+                writer.grab_frame()
+    except CalledProcessError as error:
+        said = str(error.stderr or error).strip().splitlines()
+        raise ValueError(f"ffmpeg could not write {file.name}: {said[-1]}") from None
 
-    def pictures() -> Iterator[Pixels]:
-        for number, t in enumerate(instants, start=1):
-            yield scene.picture(float(t))
-            if number == len(instants) or number % 50 == 0:
-                say(f"film: frame {number} of {len(instants)}")
 
-    (write_mp4 if file.suffix == ".mp4" else write_gif)(file, pictures())
+class WebpWriter(PillowWriter):
+    """Pillow's writer at a quality that a page can hold, for which matplotlib's has no word."""
+
+    _frames: list[Any]
+
+    def finish(self) -> None:
+        """Write the file."""
+        first, *others = self._frames
+        words: dict[str, Any] = {"quality": QUALITY, "minimize_size": True, "loop": 0}
+        time = round(1000.0 / RATE)
+        first.save(self.outfile, save_all=True, append_images=others, duration=time, **words)
+
+
+def _writer(file: FilePath) -> AbstractMovieWriter:
+    if file.suffix == ".webp":
+        return WebpWriter(fps=RATE)  # type: ignore[arg-type]
+    if file.suffix == ".gif":
+        return PillowWriter(fps=RATE)  # type: ignore[arg-type]  # ms a frame: 12.5 is exact
+    require_ffmpeg()
+    words = ["-pix_fmt", "yuv420p", "-movflags", "+faststart"]
+    return FFMpegWriter(fps=RATE, extra_args=words)  # type: ignore[arg-type]

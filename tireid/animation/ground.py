@@ -93,7 +93,8 @@ class Camera:
         return View(start + np.array([along, self._middle]) @ ground, self._angle)
 
 
-Moved = list[tuple[Axes, Artist]]
+# What covers what: the ground below, then ghosts, the car, its plan and its forces.
+BELOW, GHOST, CAR, ABOVE = 0.5, 2.0, 3.0, 4.0
 
 PLAN = "#333333"
 DROP: Mapping[str, Any] = {"color": "#AA4499", "linewidth": 1.6, "linestyle": (0, (3, 1.5))}
@@ -119,44 +120,46 @@ class Ground:
     def __init__(
         self, axes: Axes, drives: Mapping[str, Drive], drops: Sequence[tuple[float, float]]
     ) -> None:
-        self._axes, self._drives = axes, list(drives.values())
+        self._drives = list(drives.values())
         path = self._path = self._drives[0].path
         plans = self._drives[0].plans
         self._plan_at = np.array([plan.period for plan in plans])
         self._plan_lines = [np.column_stack(plan.line(path)) for plan in plans]
         self._room = 1.1 * np.hypot(*(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())))
-        self._grid = LineCollection([], colors="#E2E2DA", linewidths=0.8, animated=True)
+        self._grid = LineCollection([], colors="#E2E2DA", linewidths=0.8, zorder=BELOW)
         axes.add_collection(self._grid)
-        (self._line,) = axes.plot([], [], animated=True, **PATH)
-        (self._cones,) = axes.plot([], [], animated=True, **{**CONES, "markersize": 4.5})
+        (self._line,) = axes.plot([], [], zorder=BELOW, **PATH)
+        (self._cones,) = axes.plot([], [], zorder=1.0, **{**CONES, "markersize": 4.5})
         self._drops = [
             (
                 _across(path, s),
-                axes.plot([], [], label=friction_label(mu), animated=True, **DROP)[0],
+                axes.plot([], [], label=friction_label(mu), **DROP)[0],
             )
             for s, mu in drops
         ]
         self._tracks, self._bodies, self._wheels = [], [], []
         for number, label in enumerate(drives):
             color = tire_look(label)["color"]
-            (track,) = axes.plot([], [], color=color, linewidth=1.4, alpha=0.8, animated=True)
+            order = CAR if number == 0 else GHOST - 0.1 * number
+            (track,) = axes.plot([], [], color=color, linewidth=1.4, alpha=0.8, zorder=order)
             body = PolyCollection(
                 [],
                 facecolors=[(color, 0.5), (color, 0.95)] if number == 0 else [(color, 0.12)],
                 edgecolors=color,
                 linewidths=1.2,
-                animated=True,
+                zorder=order + 0.04,
             )
-            wheels = PolyCollection([], facecolors="#222222", edgecolors="none", animated=True)
+            over = order + (0.02 if number == 0 else 0.06)
+            wheels = PolyCollection([], facecolors="#222222", edgecolors="none", zorder=over)
             for collection in (body, wheels):
                 axes.add_collection(collection)
             self._tracks.append(track)
             self._bodies.append(body)
             self._wheels.append(wheels)
         (self._plan,) = axes.plot(
-            [], [], color=PLAN, linewidth=1.3, marker="o", markersize=2.2, animated=True
+            [], [], color=PLAN, linewidth=1.3, marker="o", markersize=2.2, zorder=ABOVE
         )
-        self._forces = PolyCollection([], facecolors=PURPLE, edgecolors="none", animated=True)
+        self._forces = PolyCollection([], facecolors=PURPLE, edgecolors="none", zorder=ABOVE + 1)
         axes.add_collection(self._forces)
         self._names = ["path", "plan", *drives]
 
@@ -172,8 +175,8 @@ class Ground:
             names.append(str(line.get_label()))
         return [*marks, self._forces], [*names, "forces"]
 
-    def show(self, now: Instant) -> Moved:
-        """Return what moved, in the order of drawing.
+    def show(self, now: Instant) -> None:
+        """Move everything to where it is.
 
         Parameters
         ----------
@@ -186,24 +189,18 @@ class Ground:
             around = np.clip(around, 0.0, self._path.length)
         X, Y, _ = self._path.pose(around)
         self._line.set_data(*view.see(np.column_stack([X, Y])).T)
-        artists: list[Artist] = [self._grid, self._line]
         if len(self._path.cones):
             self._cones.set_data(*view.see(self._path.cones).T)
-            artists.append(self._cones)
         for ends, line in self._drops:
             line.set_data(*view.see(ends).T)
-            artists.append(line)
-        for number in reversed(range(len(self._drives))):
-            artists += self._car(number, t, view)
+        for number in range(len(self._drives)):
+            self._car(number, t, view)
         if self._plan_at.size:
             kept = max(int(np.searchsorted(self._plan_at, k, side="right")) - 1, 0)
             self._plan.set_data(*view.see(self._plan_lines[kept]).T)
-            artists.append(self._plan)
         self._forces.set_verts(self._arrows(drive, k, view))
-        artists.append(self._forces)
-        return [(self._axes, artist) for artist in artists]
 
-    def _car(self, number: int, t: float, view: View) -> list[Artist]:
+    def _car(self, number: int, t: float, view: View) -> None:
         drive = self._drives[number]
         k = sample_at(drive, t)
         places = np.column_stack([drive.X[: k + 1], drive.Y[: k + 1]])[-1200::4]
@@ -215,9 +212,6 @@ class Ground:
         ]  # fmt: skip
         self._bodies[number].set_verts(body)
         self._wheels[number].set_verts(list(view.see(shape.wheels)))
-        if number == 0:
-            return [self._tracks[0], self._wheels[0], self._bodies[0]]
-        return [self._tracks[number], self._bodies[number], self._wheels[number]]
 
     def _arrows(self, drive: Drive, k: int, view: View) -> list[Array]:
         """Lateral axle forces as arrows from the axles, to the side to which they push."""

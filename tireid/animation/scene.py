@@ -1,6 +1,6 @@
 """One picture of the film: the car on its path, its plan, its tire forces, and how far it is off.
 
-Everything that stays is drawn once; a frame copies it and draws only what moved.
+What is drawn stays; an instant moves it to where it was then, curves as they were known then.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,26 +12,39 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from codegen.escape import mathtext
 from mpc.loop import Drive
 from tireid.animation.ground import Camera, Ground, Instant, sample_at
-from tireid.figures.drive import mark_drops, tire_look
-from tireid.figures.style import AXLES, GREEN, LOOK, PURPLE, drawable, force_range, force_unit_of
+from tireid.animation.known import KnownCurves
+from tireid.figures.drive import AT_THE_END, ORACLE, mark_drops, tire_look
+from tireid.figures.style import (
+    AXLES,
+    BLUE,
+    GREEN,
+    LOOK,
+    PURPLE,
+    SKY,
+    drawable,
+    force_range,
+    force_unit_of,
+)
 from tireid.figures.tires import TireCurve, axle_slip
 
 # The small panels of the film: force over slip with the learnt curve, deviation, whole course.
 
-Moved = list[tuple[Axes, Artist]]
-
 TAIL = 80  # samples
 SMALL = 7.0  # points of the text
+MANY = 10  # entries of a legend that one row does not hold
+STEERING: Mapping[str, Any] = {"color": BLUE, "linewidth": 1.5, "label": "steered by, now"}
+LEARNT: Mapping[str, Any] = {"color": SKY, "linewidth": 2.6, "label": "learnt by now"}
 
 
 class ForcePanel:
-    """Force of an axle over its slip: the curves, and where the tire is now.
+    """Force of an axle over its slip: the curves as they were known then, and where the tire is.
 
     Parameters
     ----------
@@ -39,38 +52,69 @@ class ForcePanel:
     drive : the drive.
     curves : the tires.
     axle : 0 is the front axle, 1 the rear.
+    known : what was known over time; None where nothing was learnt, so that nothing changes.
+    drop : arc length [m] from which the true tire is that of the end; infinite for never.
     """
 
-    def __init__(self, axes: Axes, drive: Drive, curves: Sequence[TireCurve], axle: int) -> None:
+    def __init__(
+        self,
+        axes: Axes,
+        drive: Drive,
+        curves: Sequence[TireCurve],
+        axle: int,
+        *,
+        known: KnownCurves | None,
+        drop: float,
+    ) -> None:
         slip = axle_slip(drive)
-        unit = force_unit_of(drive.axle_force)
-        self._axes = axes
+        self._unit = force_unit_of(drive.axle_force)
+        self._axle, self._drive, self._known, self._drop = axle, drive, known, drop
         self._alpha = np.rad2deg(slip[:, axle])
-        self._force = drive.axle_force[:, axle] / unit.newtons
-        reach = 1.15 * float(np.abs(np.rad2deg(slip)).max())
-        limits = force_range(drive.axle_force / unit.newtons)
+        self._force = drive.axle_force[:, axle] / self._unit.newtons
+        self._reach = 1.15 * float(np.abs(np.rad2deg(slip)).max())
+        self._limits = force_range(drive.axle_force / self._unit.newtons)
+        self._true = {}
         for curve in curves:
-            axes.plot(
+            if curve.label.endswith(AT_THE_END) and not curve.label.startswith(ORACLE):
+                continue  # what was known only then
+            (line,) = axes.plot(
                 np.rad2deg(curve.alpha),
-                drawable(curve.force[:, axle] / unit.newtons, limits),
+                self._drawn(curve.force),
                 label=curve.label,
-                **tire_look(curve.label),
+                **tire_look(curve.label.removesuffix(AT_THE_END)),
             )
-        axes.set(xlim=(-reach, reach), ylim=limits)
+            if curve.label.startswith(ORACLE):
+                self._true[curve.label.endswith(AT_THE_END)] = line
+        self._moving: list[Any] = []
+        self._shades: list[Rectangle] = []
+        if known is not None:
+            self._moving = [axes.plot([], [], **look)[0] for look in (LEARNT, STEERING)]
+            shade: dict[str, Any] = {"facecolor": "#EFE9DD", "edgecolor": "none", "zorder": 0}
+            place = axes.get_xaxis_transform()
+            self._shades = [
+                Rectangle((0.0, 0.0), 0.0, 1.0, transform=place, **shade) for _ in range(2)
+            ]
+            for patch in self._shades:
+                axes.add_patch(patch)
+        axes.set(xlim=(-self._reach, self._reach), ylim=self._limits)
         axes.set_title(AXLES[axle], fontsize=SMALL + 0.5)
         axes.set_xlabel("slip [deg]", fontsize=SMALL, labelpad=1.0)
         if axle == 0:
-            axes.set_ylabel(f"force [{unit.name}]", fontsize=SMALL, labelpad=1.0)
+            axes.set_ylabel(f"force [{self._unit.name}]", fontsize=SMALL, labelpad=1.0)
         else:
             axes.tick_params(labelleft=False)
         _small(axes)
-        (self._tail,) = axes.plot([], [], color=PURPLE, linewidth=1.0, alpha=0.6, animated=True)
-        (self._now,) = axes.plot(
-            [], [], marker="o", markersize=5.0, color=PURPLE, linestyle="", animated=True
-        )
+        (self._tail,) = axes.plot([], [], color=PURPLE, linewidth=1.0, alpha=0.6)
+        (self._now,) = axes.plot([], [], marker="o", markersize=5.0, color=PURPLE, linestyle="")
 
-    def show(self, now: Instant) -> Moved:
-        """Return what moved.
+    def legend(self) -> tuple[list[Artist], list[str]]:
+        """Return what a legend shows of curves that no other panel names, and what it says."""
+        marks = [*self._moving, *list(self._true.values())[:1]]
+        names = [str(line.get_label()) for line in self._moving] + ["true tire"] * bool(self._true)
+        return marks, names
+
+    def show(self, now: Instant) -> None:
+        """Move everything to where it is, and curves to what was known then.
 
         Parameters
         ----------
@@ -79,7 +123,22 @@ class ForcePanel:
         part = slice(max(0, now.k - TAIL), now.k + 1)
         self._tail.set_data(self._alpha[part], self._force[part])
         self._now.set_data(self._alpha[now.k : now.k + 1], self._force[now.k : now.k + 1])
-        return [(self._axes, self._tail), (self._axes, self._now)]
+        dropped = float(self._drive.s[now.k]) >= self._drop
+        for at_the_end, line in self._true.items():
+            line.set_visible(at_the_end == (dropped and True in self._true))
+        if self._known is None:
+            return
+        known = self._known
+        k = max(int(np.searchsorted(known.t, now.t + 1e-9, side="right")) - 1, 0)
+        for line, force in zip(self._moving, (known.learnt[k], known.steering[k]), strict=True):
+            line.set_data(np.rad2deg(known.alpha), self._drawn(force))
+        slip = min(float(np.rad2deg(known.slip[k, self._axle])), self._reach)
+        shown = self._reach - slip if np.isfinite(slip) else 0.0
+        for patch, left in zip(self._shades, (-self._reach, self._reach - shown), strict=True):
+            patch.set(x=left, width=shown)
+
+    def _drawn(self, force: Array) -> Array:
+        return drawable(force[:, self._axle] / self._unit.newtons, self._limits)
 
 
 class DeviationPanel:
@@ -95,12 +154,12 @@ class DeviationPanel:
     def __init__(
         self, axes: Axes, drives: Mapping[str, Drive], drops: Sequence[tuple[float, float]]
     ) -> None:
-        self._axes, self._drives = axes, list(drives.values())
+        self._drives = list(drives.values())
         self._lines = []
         for label, drive in drives.items():
             look = tire_look(label)
             axes.plot(drive.s, drive.e_y, **(look | {"alpha": 0.3, "linewidth": 0.8}))
-            (line,) = axes.plot([], [], animated=True, **look)
+            (line,) = axes.plot([], [], **look)
             self._lines.append(line)
         largest = 1.1 * max(float(np.abs(drive.e_y).max()) for drive in self._drives)
         reach = min(max(largest, 0.05), 2.5)
@@ -113,8 +172,8 @@ class DeviationPanel:
         axes.set_xlabel("arc length [m]", fontsize=SMALL, labelpad=1.0)
         _small(axes)
 
-    def show(self, now: Instant) -> Moved:
-        """Return what moved.
+    def show(self, now: Instant) -> None:
+        """Move everything to where it is.
 
         Parameters
         ----------
@@ -123,7 +182,6 @@ class DeviationPanel:
         for drive, line in zip(self._drives, self._lines, strict=True):
             part = drive.t <= now.t
             line.set_data(drive.s[part], drive.e_y[part])
-        return [(self._axes, line) for line in reversed(self._lines)]
 
 
 class Overview:
@@ -136,11 +194,10 @@ class Overview:
     """
 
     def __init__(self, axes: Axes, drives: Mapping[str, Drive]) -> None:
-        self._axes, self._drives = axes, list(drives.values())
+        self._drives = list(drives.values())
         path = self._drives[0].path
-        (self._line,) = axes.plot(path.X, path.Y, color=GREEN, linewidth=0.9, animated=True)
+        axes.plot(path.X, path.Y, color=GREEN, linewidth=0.9)
         axes.set(xticks=[], yticks=[], aspect="equal")
-        axes.patch.set_animated(True)  # it is drawn over the ground, frame by frame
         for side in axes.spines.values():
             side.set_visible(False)
         axes.margins(0.08)
@@ -152,13 +209,12 @@ class Overview:
                 markersize=4.0,
                 linestyle="",
                 color=tire_look(label)["color"],
-                animated=True,
             )[0]
             for label in drives
         ]
 
-    def show(self, now: Instant) -> Moved:
-        """Return what moved.
+    def show(self, now: Instant) -> None:
+        """Move everything to where it is.
 
         Parameters
         ----------
@@ -167,8 +223,11 @@ class Overview:
         for drive, dot in zip(self._drives, self._dots, strict=True):
             k = sample_at(drive, now.t)
             dot.set_data([drive.X[k]], [drive.Y[k]])
-        moved = [self._axes.patch, self._line, *reversed(self._dots)]
-        return [(self._axes, artist) for artist in moved]
+
+
+def _columns(entries: int) -> int:
+    """Return how wide a legend is that has one row, or two of one width."""
+    return entries if entries < MANY else (entries + 1) // 2
 
 
 def _small(axes: Axes) -> None:
@@ -177,10 +236,7 @@ def _small(axes: Axes) -> None:
     axes.yaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10]))
 
 
-Pixels = NDArray[np.uint8]
-
 SIZE = (6.4, 4.0)  # [in]
-DOTS = 100  # an inch
 BEHIND, AHEAD = 12.0, 36.0  # what is shown along the path [m]
 
 
@@ -194,6 +250,9 @@ class Scene:
     drops : arc length [m] and friction from there on.
     pace : of the film, said in the picture.
     title : what the film is about.
+    known : of the tires while the first drove; None where nothing was learnt.
+
+    Attributes: figure.
     """
 
     def __init__(
@@ -204,46 +263,47 @@ class Scene:
         drops: Sequence[tuple[float, float]],
         pace: float,
         title: str,
+        known: KnownCurves | None = None,
     ) -> None:
         first = next(iter(drives.values()))
         path, self._drive, self._pace = first.path, first, pace
         self._camera = Camera(path)
         with style.context(["default", LOOK]):
-            self._figure = Figure(figsize=SIZE, dpi=DOTS)
-            canvas: Any = FigureCanvasAgg(self._figure)  # its methods have no types
-            self._canvas = canvas
+            self.figure = Figure(figsize=SIZE)
+            FigureCanvasAgg(self.figure)
             width, height = SIZE
             box = (0.0, 0.43, 1.0, 0.5)
-            ground = self._figure.add_axes(box, xticks=[], yticks=[], frame_on=False)
+            ground = self.figure.add_axes(box, xticks=[], yticks=[], frame_on=False)
             half = 0.5 * (BEHIND + AHEAD) * box[3] * height / width
             ground.set(xlim=(-BEHIND, AHEAD), ylim=(-half, half), facecolor="#F6F6F2")
             self._parts: list[Any] = [Ground(ground, drives, drops)]
             if path.closed:
                 self._parts.append(Overview(self._axes((0.86, 0.69, 0.135, 0.235)), drives))
             left = self._axes((0.075, 0.11, 0.19, 0.2)), self._axes((0.3, 0.11, 0.19, 0.2))
+            drop = drops[-1][0] if drops else np.inf
             for axle, axes in enumerate(left):
-                self._parts.append(ForcePanel(axes, first, curves, axle))
+                forces = ForcePanel(axes, first, curves, axle, known=known, drop=drop)
+                self._parts.append(forces)
+            (marks, names), (more, said) = self._parts[0].legend(), forces.legend()
             self._parts.append(DeviationPanel(self._axes((0.585, 0.11, 0.39, 0.2)), drives, drops))
-            self._figure.text(0.012, 0.955, mathtext(title), fontsize=9.0, fontweight="bold")
-            self._figure.legend(
-                *self._parts[0].legend(),
+            self.figure.text(0.012, 0.955, mathtext(title), fontsize=9.0, fontweight="bold")
+            self.figure.legend(
+                [*marks, *more],
+                [*names, *said],
                 loc="center",
-                bbox_to_anchor=(0.5, 0.392),
-                ncols=9,
+                bbox_to_anchor=(0.5, 0.388),
+                ncols=_columns(len(names) + len(said)),
                 fontsize=7.0,
                 handlelength=1.5,
                 handletextpad=0.5,
                 columnspacing=1.1,
             )
-            self._says = self._figure.text(
+            self._says = self.figure.text(
                 0.988, 0.955, "", ha="right", family="DejaVu Sans Mono", fontsize=7.5
             )
-            self._says.set_animated(True)
-            self._canvas.draw()
-            self._still = self._canvas.copy_from_bbox(self._figure.bbox)
 
-    def picture(self, t: float) -> Pixels:
-        """Return the picture of an instant, RGB (height, width, 3).
+    def show(self, t: float) -> None:
+        """Move the picture to an instant.
 
         Parameters
         ----------
@@ -252,18 +312,13 @@ class Scene:
         drive = self._drive
         k = sample_at(drive, t)
         now = Instant(k, float(drive.t[k]), self._camera.at(float(drive.s[k])))
-        self._canvas.restore_region(self._still)
         for part in self._parts:
-            moved: list[tuple[Axes, Artist]] = part.show(now)
-            for axes, artist in moved:
-                axes.draw_artist(artist)
+            part.show(now)
         pace = "" if self._pace == 1.0 else f"  {self._pace:g} x real time"
         self._says.set_text(
             f"{t:5.1f} s  {drive.v_x[k]:4.1f} m/s  a_y {drive.a_y[k]:+5.1f} m/s²  "
             f"e_y {drive.e_y[k]:+5.2f} m{pace}"
         )
-        self._figure.draw_artist(self._says)
-        return np.asarray(self._canvas.buffer_rgba())[:, :, :3].copy()
 
     def _axes(self, box: tuple[float, float, float, float]) -> Axes:
-        return self._figure.add_axes(box)
+        return self.figure.add_axes(box)

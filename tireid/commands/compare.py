@@ -16,7 +16,12 @@ from models.schema import require_few
 from models.vehicle import Vehicle
 from tireid.cluster import cluster
 from tireid.commands import COMMANDS
-from tireid.commands.compare_results import comparison_text, pair_tables, write_comparison
+from tireid.commands.compare_results import (
+    comparison_text,
+    pair_tables,
+    summary_rows,
+    write_comparison,
+)
 from tireid.commands.demo_story import plant_recordings
 from tireid.commands.options import (
     add_jobs,
@@ -33,6 +38,7 @@ from tireid.commands.options import (
 )
 from tireid.output import output_folder
 from tireid.progress import Progress, Stopwatch, say, tell
+from tireid.reports.compare import write_compare_report
 
 FEW_PAIRS = 4  # of recordings learnt on and replayed, all of which are printed
 
@@ -136,7 +142,9 @@ def run(options: argparse.Namespace) -> None:
             others=others,
         )
         work.begin("step times, tables and figures")
-        write_comparison(folder, comparison)
+        figures = write_comparison(folder, comparison)
+        rows = summary_rows(comparison)
+        write_compare_report(folder, comparison, rows, figures, command=options.words)
         told = [comparison_text(comparison)]
         if len(comparison.names) ** 2 <= FEW_PAIRS:
             told.append(pair_tables(comparison))

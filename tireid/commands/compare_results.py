@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from identifier.compare.course import Shares, Trial, frozen_shares, where_learnt_and_elsewhere
 from identifier.compare.study import Comparison, Frozen, ranking
@@ -33,14 +34,13 @@ HINDSIGHT = (
 )
 
 
-def summary_table(comparison: Comparison) -> str:
+def summary_rows(comparison: Comparison) -> list[list[str]]:
     """Return the means over recordings of every method, best on other recordings first.
 
     Parameters
     ----------
-    comparison : the methods.
+    comparison : the methods; the first row is the header.
     """
-    n = len(comparison.names)
     lines = [["method", "online", "frozen, where learnt", "frozen, elsewhere", "step"]]
     for name in ranking(comparison):
         trial = comparison.trials[name]
@@ -51,6 +51,17 @@ def summary_table(comparison: Comparison) -> str:
     for name, frozen in comparison.floors.items():
         cells = [_mean(comparison, pairs) for pairs in where_learnt_and_elsewhere(frozen)]
         lines.append([f"floor, {name}", "", *cells, ""])
+    return lines
+
+
+def summary_table(comparison: Comparison) -> str:
+    """Return the same as text.
+
+    Parameters
+    ----------
+    comparison : the methods.
+    """
+    n, lines = len(comparison.names), summary_rows(comparison)
     title = f"Axle force RMSE, front / rear, % of rms (N), mean over {n} recordings"
     return _text(title, lines)
 
@@ -168,8 +179,8 @@ def _text(title: str, lines: list[list[str]]) -> str:
 Row = tuple[str | float | int, ...]
 
 
-def write_comparison(folder: Path, comparison: Comparison) -> None:
-    """Write everything that was found out into a folder.
+def write_comparison(folder: Path, comparison: Comparison) -> dict[str, Figure]:
+    """Write everything that was found out into a folder; return the figures by their file's name.
 
     Parameters
     ----------
@@ -184,11 +195,14 @@ def write_comparison(folder: Path, comparison: Comparison) -> None:
     if comparison.sweeps:
         _write_rows(folder / "sweep.csv", SWEEP_COLUMNS, _sweep_rows(comparison))
     say("drawing figures")
-    save_figure(methods_figure(comparison), folder / "methods.png")
+    figures = {"methods": methods_figure(comparison)}
     if any(trial.frozen for trial in comparison.trials.values()):
-        save_figure(matrix_figure(comparison), folder / "matrix.png")
+        figures["matrix"] = matrix_figure(comparison)
     if comparison.sweeps:
-        save_figure(pareto_figure(comparison), folder / "pareto.png")
+        figures["pareto"] = pareto_figure(comparison)
+    for name, figure in figures.items():
+        save_figure(figure, folder / f"{name}.png")
+    return figures
 
 
 def comparison_text(comparison: Comparison) -> str:

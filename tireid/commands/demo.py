@@ -1,11 +1,15 @@
 """`tireid demo`: the whole story on the built-in car, in a minute, with a report."""
 
 import argparse
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
+
 from identifier.paper_study import GAINS, NETWORK, STEPS, Study, run_study
+from identifier.tire_model import TireModel
 from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import (
     HEADER,
@@ -18,7 +22,9 @@ from tireid.commands.certificate_table import (
 from tireid.commands.check import draw_check
 from tireid.commands.demo_parts import (
     FOLDER,
+    Driven,
     Shipped,
+    drive_numbers,
     drive_section,
     drive_story,
     drive_text,
@@ -39,10 +45,22 @@ from tireid.commands.paper import (
     table_text,
     write_study,
 )
-from tireid.figures import figure_png, side_by_side_figure
+from tireid.figures import side_by_side_figure
 from tireid.output import output_folder
 from tireid.progress import Progress, Stopwatch, tell
-from tireid.report import Paragraph, Picture, Section, Table, write_report
+from tireid.report import (
+    Block,
+    Paragraph,
+    Picture,
+    Report,
+    Section,
+    Subheading,
+    Table,
+    printed,
+    write_report,
+)
+from tireid.reports.common import READ, REPORT, drawing, origin
+from tireid.reports.identify import identify_headlines, identify_warnings, learnt_blocks
 
 # The demo's report: what was driven, learnt, frozen and predicted, in order.
 
@@ -52,104 +70,87 @@ REFERENCE = (
 )
 
 
-def demo_sections(story: Story, shipped: Shipped, study: Study, folder: Path) -> list[Section]:
-    """Return the sections of the report.
+def demo_report(
+    story: Story,
+    shipped: Shipped,
+    study: Study,
+    driven: dict[str, Driven],
+    figures: Mapping[str, Mapping[str, Figure]],
+    folder: Path,
+    command: str,
+) -> Report:
+    """Return the report: the product first, the paper's study folded.
 
     Parameters
     ----------
     story : the noisy drives, learnt by both methods.
     shipped : what was learnt, as a C package.
     study : the paper's study.
-    folder : with the figures in identify/, paper_network/ and paper/.
+    driven : on what was learnt, by folder.
+    figures : by folder and name.
+    folder : with films and the figures of the certificate.
+    command : as it was typed.
     """
-    default, network, tables = (folder / n for n in ("identify", "paper_network", "paper"))
-    return [
-        _drive(default),
-        _learn(default),
-        _predict(story),
-        package_section(shipped),
-        _certify(story, network),
-        _network(story, network, tables / SCHEME),
-        _slalom(study, tables),
-        _step(study, tables),
-    ]
+    learnt = story.default.learnt
+    model, runs = learnt.freeze(FREEZE), [learnt, *story.default.others]
+    return Report(
+        title=TITLE,
+        summary=SUMMARY,
+        numbers=[
+            *identify_headlines(model, runs, story.default.frozen[FREEZE]),
+            *drive_numbers(driven),
+        ],
+        warnings=identify_warnings(model, runs),
+        sections=[
+            drive_section(driven, folder),
+            _learn(figures["identify"], model),
+            _predict(story),
+            package_section(shipped),
+            Section(
+                heading="The paper's study",
+                blocks=[
+                    *_certify(story, folder / "paper_network"),
+                    *_network(story, figures["paper"]),
+                    *_slalom(study, figures["paper"]),
+                    *_step(study, figures["paper"]),
+                ],
+                folded=True,
+            ),
+            origin(command, story.car, [run.recording for run in runs]),
+        ],
+    )
 
 
-def _drive(learning: Path) -> Section:
+def _learn(figures: Mapping[str, Figure], model: TireModel) -> Section:
     return Section(
-        heading="A car is driven",
+        heading="What was learnt",
         blocks=[
             Paragraph(
                 text="The car is a double-track model of a mid-size sedan: roll, load transfer, "
                 "tire relaxation and combined slip on Magic Formula tires, integrated at 1 ms. It "
-                f"drives a slalom at {SPEED:g} m/s. The identifier sees what any log has, v_x, "
-                "v_y, r and steering at 100 Hz with sensor noise; it never sees a force."
+                f"drives a slalom at {SPEED:g} m/s. The identifier sees what any log has, speed, "
+                "lateral velocity, yaw rate and steering at 100 Hz with sensor noise; it never "
+                "sees a force."
             ),
-            Picture(image=learning / "inputs.png", caption="What the identifier is given."),
-        ],
-    )
-
-
-def _certify(story: Story, learning: Path) -> Section:
-    certificate, unit = story.certificate, story.design.force_unit
-    return Section(
-        heading="The gains of the paper's law are judged before it learns",
-        blocks=[
-            Paragraph(
-                text="The certificate follows from the gains, the network and how hard the car is "
-                f"driven, not from a run. {verdict_line(certificate).capitalize()}."
-            ),
-            Table(
-                caption="Properties of the learning loop at the worst regressor; those without a "
-                "limit are stated, not judged.",
-                header=list(HEADER),
-                rows=certificate_rows(certificate, unit),
-            ),
-            *(Paragraph(text=f"{e.title}: {e.status}; {e.advice}.") for e in advised(certificate)),
-            *(Paragraph(text=f"Note: {remark}.") for remark in notes(certificate)),
-            Picture(
-                image=learning / "locus.png",
-                caption="Poles of the sampled loop at any gain, and at the gain of the design.",
-            ),
-            Picture(
-                image=learning / "bounds.png",
-                caption="Proven bounds on the error norm, and the error that happened.",
-            ),
-        ],
-    )
-
-
-def _learn(default: Path) -> Section:
-    return Section(
-        heading="Tire forces are learnt while it drives",
-        blocks=[
             Paragraph(
                 text="Each axle has a force curve of slip, a sum of tanh units that is odd and "
                 "saturates. Slip is lagged by the relaxation of the tire, which is learnt too, and "
                 "moved by the sway of the body. The curves are learnt by recursive least squares "
                 "from motion alone; what was never excited keeps what is believed of any tire."
             ),
-            Picture(
-                image=default / "forces.png",
-                caption="Axle forces: online above, and below replayed with the weights frozen at "
+            *learnt_blocks("the default method", model, figures)[1:],
+            drawing(
+                figures["forces"],
+                "Axle forces: online above, and below replayed with the weights frozen at "
                 f"{FREEZE:g} s.",
-            ),
-            Picture(
-                image=default / "slip.png",
-                caption="The same forces over slip angle (sign of the paper: positive slip pushes "
-                "to the left), and the curve behind them. Forces form loops since tires relax and "
-                "the body sways. Slip that the model does not know is shaded.",
-            ),
-            Picture(
-                image=default / "learnt.png",
-                caption="What is learnt, in the numbers of a tire: each settles when excited.",
+                READ["forces"],
             ),
         ],
     )
 
 
 def _predict(story: Story) -> Section:
-    blocks: list[Paragraph | Table | Picture] = [
+    blocks: list[Block] = [
         Paragraph(
             text="Reproducing the drive that was learnt is the easier half. The same frozen "
             "weights predict two other maneuvers, beside them the paper's network and law, learnt "
@@ -167,7 +168,7 @@ def _predict(story: Story) -> Section:
                 "frozen",
                 "of rms",
             ],
-            rows=story.rows(),
+            rows=[[row[0].replace("_", " "), *row[1:]] for row in story.rows()],
         ),
     ]
     for history in story.default.others:
@@ -175,112 +176,131 @@ def _predict(story: Story) -> Section:
         said = name.replace("_", " ")
         figure = side_by_side_figure(story.side_by_side(name))
         caption = f"Both methods, frozen after the slalom, asked about the {said}."
-        blocks.append(Picture(image=figure_png(figure), caption=caption))
-    return Section(heading="The frozen model is asked about drives it has not seen", blocks=blocks)
+        blocks.append(drawing(figure, caption, READ["replay"]))
+    return Section(heading="Drives that were not learnt are predicted", blocks=blocks)
 
 
-def _network(story: Story, network: Path, scheme: Path) -> Section:
+def _certify(story: Story, learning: Path) -> list[Block]:
+    certificate, unit = story.certificate, story.design.force_unit
+    said = [f"{e.title}: {e.status}; {e.advice}." for e in advised(certificate)]
+    said += [f"Note: {remark}." for remark in notes(certificate)]
+    return [
+        Subheading(text="The gains of the paper's law are judged before it learns"),
+        Paragraph(
+            text="The certificate follows from the gains, the network and how hard the car is "
+            f"driven, not from a run. {printed(verdict_line(certificate)).capitalize()}."
+        ),
+        Table(
+            caption="Properties of the learning loop at the worst regressor; those without a "
+            "limit are stated, not judged.",
+            header=list(HEADER),
+            rows=[[printed(c) if isinstance(c, str) else c for c in row]
+                  for row in certificate_rows(certificate, unit)],
+        ),
+        *(Paragraph(text=printed(one)) for one in said),
+        Picture(
+            image=learning / "locus.png",
+            caption="Poles of the sampled loop at any gain, and at the gain of the design.",
+            read="All poles inside the circle: it is stable; far inside: it is damped.",
+        ),
+        Picture(
+            image=learning / "bounds.png",
+            caption="Proven bounds on the error norm, and the error that happened.",
+            read="The error stays below each bound; the gap is what the proof gives away.",
+        ),
+    ]  # fmt: skip
+
+
+def _network(story: Story, paper: Mapping[str, Figure]) -> list[Block]:
     design, gains = story.design, story.design.gains
-    return Section(
-        heading="The paper's network on the same slalom",
-        blocks=[
-            Paragraph(
-                text="At every sample an observer predicts the motion; its error drives the "
-                "weights of a network of "
-                f"{design.network.hidden} hidden units, which corrects the linear tire. The law is "
-                "the integral law of the paper: "
-                f"A_d = {gains.A_d[0][0]:.4g} I 1/s, lambda = {gains.forgetting:.4g} 1/s, eta1 = "
-                f"{gains.eta_W:.4g} 1/s^4, eta2 = {gains.eta_V:.4g} 1/(kN^2 s^4), rho1 = "
-                f"{gains.rho_W:.4g} and rho2 = {gains.rho_V:.4g} 1/(kN s^2)."
-            ),
-            Picture(
-                image=scheme,
-                caption="The identifier, as Fig. 1 of the paper; orange is what the laws differ "
-                "in, and where a freeze cuts.",
-            ),
-            Picture(
-                image=network / "forces.png",
-                caption="Axle forces: online above, and below replayed with the weights frozen at "
-                f"{FREEZE:g} s.",
-            ),
-            Picture(image=network / "slip.png", caption="The same forces over slip angle."),
-            Picture(image=network / "error.png", caption="Norm of the observer's error."),
-            Picture(image=network / "weights.png", caption="Weights of the network."),
-        ],
-    )
+    return [
+        Subheading(text="The paper's network on the same slalom"),
+        Paragraph(
+            text="At every sample an observer predicts the motion; its error drives the weights of "
+            f"a network of {design.network.hidden} hidden units, which corrects the linear tire. "
+            "The law is the integral law of the paper: A_d is "
+            f"{gains.A_d[0][0]:.4g} s⁻¹ times the identity, λ = {gains.forgetting:.4g} s⁻¹, η₁ = "
+            f"{gains.eta_W:.4g} s⁻⁴, η₂ = {gains.eta_V:.4g} kN⁻² s⁻⁴, ρ₁ = {gains.rho_W:.4g} and "
+            f"ρ₂ = {gains.rho_V:.4g} kN⁻¹ s⁻². What it predicts stands beside the default "
+            "method above; its figures are in the folder paper_network."
+        ),
+        drawing(
+            paper[SCHEME],
+            "The identifier, as Fig. 1 of the paper; orange is what the laws differ in, and where "
+            "a freeze cuts.",
+        ),
+    ]
 
 
-def _slalom(study: Study, tables: Path) -> Section:
-    return Section(
-        heading="The frozen-weight reproducibility test: slalom",
-        blocks=[
-            Paragraph(
-                text=f"{REFERENCE} freezes the weights at an instant and replays the past with "
-                "them: a law that follows the instant forgets what it learnt before. "
-                f"{MEASURES_MEAN}"
-            ),
-            Table(
-                caption=f"Table II of the paper beside ours, RMSE of the axle force [kN]: median "
-                f"and quartiles of {len(study.errors['slalom']['integral'])} seeds.",
-                header=header(),
-                rows=rows("slalom", study),
-            ),
-            Paragraph(text=MEANING),
-            Picture(
-                image=tables / "slalom_errors.png",
-                caption="The table as a picture; hollow marks are the paper's values.",
-            ),
-            Picture(
-                image=tables / "fig4_slalom_instantaneous.png",
-                caption="Instantaneous law, as Fig. 4 of the paper (seed of median error); all "
-                "errors count from the onset on.",
-            ),
-            Picture(
-                image=tables / "fig5_slalom_integral.png",
-                caption="Integral law, as Fig. 5 of the paper (seed of median error).",
-            ),
-            Picture(
-                image=tables / "control_slalom_instantaneous_scaled.png",
-                caption="The control: instantaneous law at eta/lambda (seed of median error).",
-            ),
-            Paragraph(text=settings(GAINS, NETWORK).splitlines()[0]),
-        ],
-    )
+def _slalom(study: Study, figures: Mapping[str, Figure]) -> list[Block]:
+    blocks: list[Block] = [
+        Subheading(text="The frozen-weight reproducibility test: slalom"),
+        Paragraph(
+            text=f"{REFERENCE} freezes the weights at an instant and replays the past with "
+            "them: a law that follows the instant forgets what it learnt before. "
+            f"{printed(MEASURES_MEAN)}"
+        ),
+        Table(
+            caption="Table II of the paper beside ours, RMSE of the axle force [kN]: median "
+            f"and quartiles of {len(study.errors['slalom']['integral'])} seeds.",
+            header=[printed(word) for word in header()],
+            rows=rows("slalom", study),
+        ),
+        Paragraph(text=printed(MEANING)),
+    ]
+    return [
+        *blocks,
+        *_drawn(
+            figures,
+            {
+                "slalom_errors": "The table as a picture; hollow marks are the paper's values.",
+                "fig4_slalom_instantaneous": "Instantaneous law, as Fig. 4 of the paper (seed of "
+                "median error); all errors count from the onset on.",
+                "fig5_slalom_integral": "Integral law, as Fig. 5 of the paper (seed of median "
+                "error).",
+            },
+        ),
+        Paragraph(text=printed(settings(GAINS, NETWORK).splitlines()[0])),
+    ]
 
 
-def _step(study: Study, tables: Path) -> Section:
-    return Section(
-        heading="The frozen-weight reproducibility test: step steer",
-        blocks=[
-            Paragraph(
-                text="The step is held from 29 s on and goes back to half its angle at 36 s. By "
-                "the paper's measure the order of the laws is the reverse of the slalom's; against "
-                "truth it is not: what the integral law said online on the ramp was further from "
-                "the truth than what its frozen weights say of it. After 36 s, at "
-                "an angle that was not learnt, all of them miss more than the linear tire."
-            ),
-            Table(
-                caption="Table I of the paper beside ours, RMSE of the axle force [kN].",
-                header=header(),
-                rows=rows("step_steer", study),
-            ),
-            Picture(
-                image=tables / "fig2_step_steer_instantaneous.png",
-                caption="Instantaneous law, as Fig. 2 of the paper.",
-            ),
-            Picture(
-                image=tables / "fig3_step_steer_integral.png",
-                caption="Integral law, as Fig. 3 of the paper.",
-            ),
-        ],
-    )
+def _step(study: Study, figures: Mapping[str, Figure]) -> list[Block]:
+    return [
+        Subheading(text="The frozen-weight reproducibility test: step steer"),
+        Paragraph(
+            text="The step is held from 29 s on and goes back to half its angle at 36 s. By "
+            "the paper's measure the order of the laws is the reverse of the slalom's; against "
+            "truth it is not: what the integral law said online on the ramp was further from "
+            "the truth than what its frozen weights say of it. After 36 s, at "
+            "an angle that was not learnt, all of them miss more than the linear tire."
+        ),
+        Table(
+            caption="Table I of the paper beside ours, RMSE of the axle force [kN].",
+            header=[printed(word) for word in header()],
+            rows=rows("step_steer", study),
+        ),
+        *_drawn(
+            figures,
+            {
+                "step_steer_errors": "The table as a picture; hollow marks are the paper's values. "
+                "The drives are Figs. 2 and 3 in the folder paper.",
+            },
+        ),
+    ]
+
+
+def _drawn(figures: Mapping[str, Figure], captions: Mapping[str, str]) -> list[Block]:
+    """Return the figures that there are: a law that diverged on every seed has none."""
+    return [
+        drawing(figures[name], caption) for name, caption in captions.items() if name in figures
+    ]
 
 
 TITLE = "tireid: lateral tire forces, learnt while driving"
 SUMMARY = (
-    "A car drives, its tire forces are learnt from v_x, v_y, yaw rate and steering, the weights "
-    "are frozen, and the frozen model is asked about drives that it has not seen; at the end it "
-    "steers."
+    "A car drives, its tire forces are learnt from speed, lateral velocity, yaw rate and steering, "
+    "the weights are frozen, and the frozen model steers the car and predicts drives that it has "
+    "not seen."
 )
 SEEDS = 20
 LEARNING, EXPORTING = "driving the sedan, learning, predicting", "as C, compiled and tested"
@@ -323,8 +343,11 @@ def run(options: argparse.Namespace) -> None:
         folders = {name: folder / name for name in ("identify", "paper_network", "paper")}
         for one in folders.values():
             one.mkdir()
+        figures: dict[str, Mapping[str, Figure]] = {}
         for name, part in (("identify", story.default), ("paper_network", story.paper)):
-            write_results(folders[name], part.law, part.learnt, part.others, part.frozen)
+            figures[name] = write_results(
+                folders[name], part.law, part.learnt, part.others, part.frozen
+            )
         operation, drive = story.design.operation(story.car), story.paper.learnt.recording
         draw_check(
             folders["paper_network"], drive, story.car, story.design, operation, story.certificate
@@ -332,13 +355,12 @@ def run(options: argparse.Namespace) -> None:
         work.begin(EXPORTING)
         shipped = ship(story, folder / FOLDER)
         study = run_study(SEEDS, partial(work.begin(TESTING).step, STEPS))
-        write_study(folders["paper"], study)
+        figures["paper"] = write_study(folders["paper"], study)
         work.begin(DRIVING)
         driven = drive_story(story, folder)
         work.begin(REPORTING)
-        sections = demo_sections(story, shipped, study, folder)
-        sections.append(drive_section(driven, folder))
-        write_report(folder / "report.html", TITLE, sections, summary=SUMMARY)
+        report = demo_report(story, shipped, study, driven, figures, folder, options.words)
+        write_report(folder / REPORT, report)
         told = [
             *(table_text(maneuver, study) for maneuver in study.errors),
             f"{certificate_text(story.certificate, story.design.force_unit)}\n",

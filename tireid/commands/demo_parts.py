@@ -1,10 +1,11 @@
 """What the demo learnt as a C package: written, compiled, self-tested, set beside Python."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from codegen import find_compiler
 from identifier.export.compiled import CompiledPackage
@@ -19,27 +20,33 @@ from identifier.export.processor import (
 )
 from identifier.run import identify
 from mpc.path import BUILT_IN
+from tireid.animation import FORMATS
 from tireid.commands.demo_story import FREEZE, Story
 from tireid.commands.drive import headline, inputs_of
-from tireid.commands.drive_results import drive_table, known_curves, write_drives
+from tireid.commands.drive_results import drive_table as drive_lines
+from tireid.commands.drive_results import known_curves, write_drives
 from tireid.driving import Conditions, Run, Setup, SpeedWish, run_drive
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE
 from tireid.exporting import Verdict, self_test, write_files
-from tireid.report import Block, Paragraph, Picture, Section, Table
+from tireid.report import Block, Headline, Paragraph, Picture, Section, Table
+from tireid.reports.common import READ, drawing
+from tireid.reports.drive import drive_table, known_blocks
 
 LANE_CHANGE, SLIPPERY = "drive", "drive_slippery"  # folders beside the report
 # The car of the demo drives on what it learnt: a lane change, and a road that becomes slippery.
 
+FILM = FORMATS[0]
 DELAY = 2  # periods of 10 ms
 SOURCE = "frozen ones learnt on the slalom"
 NOT_DRIVEN = "No C compiler (gcc) was found: the tracker cannot be built, the car did not drive."
 
 
 class Driven(NamedTuple):
-    """Drives along one path: what they were like, and what came of them."""
+    """Drives along one path: what they were like, what came of them, and its figures."""
 
     conditions: Conditions
     runs: Sequence[Run]
+    figures: Mapping[str, Figure]
 
 
 def drive_story(story: Story, folder: Path) -> dict[str, Driven]:
@@ -67,7 +74,7 @@ def drive_text(driven: dict[str, Driven]) -> str:
     ----------
     driven : by folder.
     """
-    blocks = [f"{headline(one.conditions)}\n{drive_table(one.runs)}" for one in driven.values()]
+    blocks = [f"{headline(one.conditions)}\n{drive_lines(one.runs)}" for one in driven.values()]
     return "\n\n".join(["Driving on what was learnt:", *blocks]) if blocks else NOT_DRIVEN
 
 
@@ -77,45 +84,60 @@ def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
     Parameters
     ----------
     driven : by folder.
-    folder : of the report, with the pictures.
+    folder : of the report, with the film.
     """
-    heading = "The car drives on what was learnt"
+    heading = "The car drives on what it learnt"
     if not driven:
         return Section(heading=heading, blocks=[Paragraph(text=NOT_DRIVEN)])
-    lane, slippery = folder / LANE_CHANGE, folder / SLIPPERY
+    lane, slippery = driven[LANE_CHANGE], driven[SLIPPERY]
     blocks: list[Block] = [
         Paragraph(
-            text="A model predictive tracker steers the double-track car along the lane change of "
-            "ISO 3888-2, at 90 % of the lateral acceleration that the tires can give. It plans 2 s "
-            "ahead, 100 times a second, with noisy sensors and 20 ms of delay. Told of the model "
-            "that was frozen after the slalom it is set beside the same tracker told of the linear "
-            "tire, and of the true one."
+            text="A model predictive tracker steers the car around the cones. It plans 2 s ahead, "
+            "100 times a second, with noisy sensors and 20 ms of delay. In the middle of the "
+            "slalom the friction drops to half, which takes all that is left, and nobody tells "
+            "the car. One tracker goes on learning: it is told of another tire where the last "
+            "moments say so, and where what is learnt explains the last seconds better. The "
+            "others keep the tires that were frozen before, or the linear ones."
         ),
-        _table(driven[LANE_CHANGE]),
         Picture(
-            image=lane / "drive.gif",
-            caption="The drive on frozen tires. Outlines are the other cars; below, force over "
-            f"slip of both axles and the deviation. The film is {LANE_CHANGE}/drive.gif.",
+            image=folder / SLIPPERY / f"drive.{FILM}",
+            caption="The drive of the learning car; outlines are the others.",
+            read=READ["film"],
         ),
-        Picture(image=lane / "errors.png", caption="Deviation, heading, acceleration and speed."),
-        Picture(
-            image=lane / "tires.png",
-            caption="The forces of the drive, and what the trackers believe of the tires.",
-        ),
+        drive_table(slippery.runs, f"{headline(slippery.conditions)}."),
+        drawing(slippery.figures["errors"], "Deviation and the rest along the path.",
+                READ["errors"]),
+        *known_blocks(slippery.runs, slippery.figures),
         Paragraph(
-            text="Then the friction drops to half in the middle of a slalom, which takes all that "
-            "is left, and nobody tells the car. One tracker goes on learning: it is told of "
-            "another tire where the last moments say so, and where what is learnt explains the "
-            "last seconds better."
+            text="The lane change of ISO 3888-2 at 90 % of the lateral acceleration that the tires "
+            "can give: told of the frozen model the tracker drives as well as one that is told of "
+            f"the true tires. The film is {LANE_CHANGE}/drive.{FILM}."
         ),
-        _table(driven[SLIPPERY]),
-        Picture(image=slippery / "drive.gif", caption="The drive of the learning car."),
-        Picture(
-            image=slippery / "errors.png",
-            caption="Deviation and the rest over arc length; diamonds mark other tires.",
-        ),
-    ]
+        drive_table(lane.runs, f"{headline(lane.conditions)}."),
+        drawing(lane.figures["errors"], "Deviation and the rest along the lane change.",
+                READ["errors"]),
+    ]  # fmt: skip
     return Section(heading=heading, blocks=blocks)
+
+
+def drive_numbers(driven: dict[str, Driven]) -> list[Headline]:
+    """Return the headline numbers of the drives.
+
+    Parameters
+    ----------
+    driven : by folder.
+    """
+    said = {
+        LANE_CHANGE: "in the lane change at 90 % of the grip",
+        SLIPPERY: "where friction drops to half",
+    }
+    return [
+        Headline(
+            " / ".join(f"{run.scores.rms_e_y_m:.3f}" for run in one.runs[:2]) + " m",
+            f"rms off the path {said[name]}, {one.runs[0].label} / {one.runs[1].label} tires",
+        )
+        for name, one in driven.items()
+    ]
 
 
 def _setup(story: Story, path: str, share: float, drops: tuple[tuple[float, float], ...]) -> Setup:
@@ -134,29 +156,15 @@ def _drive(story: Story, setup: Setup, labels: Sequence[str], folder: Path) -> D
     conditions = Conditions(setup=setup, delay=DELAY, noise=True, seed=0, laps=1.0)
     runs = [run_drive(label, conditions, learnt) for label in labels]
     folder.mkdir()
-    write_drives(
+    figures = write_drives(
         folder,
         runs,
         known_curves(runs, setup, learnt),
         inputs=inputs_of(conditions, labels, SOURCE, learnt),
         drops=setup.drops,
-        film="gif",
+        film=FILM,
     )
-    return Driven(conditions, runs)
-
-
-def _table(driven: Driven) -> Table:
-    rows = []
-    for run in driven.runs:
-        score = run.scores
-        ending = "completed" if score.completed else run.drive.ending
-        rms, peak = f"{score.rms_e_y_m:.3f}", f"{score.peak_e_y_m:.3f}"
-        rows.append([run.label, rms, peak, ending, f"{score.solve_ms['median']:.3f}"])
-    return Table(
-        caption=f"{headline(driven.conditions)}.",
-        header=["tires", "rms deviation [m]", "peak [m]", "end", "a step takes [ms], median"],
-        rows=rows,
-    )
+    return Driven(conditions, runs, figures)
 
 
 # What was exported, beside Python.
@@ -256,7 +264,7 @@ def package_section(shipped: Shipped) -> Section:
             text="The default method, beginning with what it has just learnt, is written as a C99 "
             f"package to the folder {FOLDER}/ beside this report: library, example, self-test and "
             f"README, every symbol begins with {name}_; hash {about['hash']}. It is what "
-            "`tireid export` writes."
+            "tireid export writes."
         )
     ]
     if shipped.checks:

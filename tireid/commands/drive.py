@@ -15,7 +15,7 @@ from models.faults import KINDS
 from models.files import digest
 from models.vehicle import Vehicle
 from mpc.path import BUILT_IN
-from tireid.animation import FORMATS, require_ffmpeg
+from tireid.animation import FORMATS, SHOWN, require_ffmpeg
 from tireid.commands import COMMANDS
 from tireid.commands.drive_case import ALL, conditions_of, frozen_tires, labels_of
 from tireid.commands.drive_results import NO_FILM, drive_table, known_curves, write_drives
@@ -32,6 +32,7 @@ from tireid.driving.runs import FROZEN, ORACLE, TIRES, Conditions, require_compi
 from tireid.driving.setup import PERIOD, PLANTS
 from tireid.output import output_folder
 from tireid.progress import say, tell
+from tireid.reports.drive import write_drive_report
 
 
 def headline(conditions: Conditions) -> str:
@@ -236,13 +237,23 @@ def run(options: argparse.Namespace) -> int:
             learnt.save(folder / "weights.json")
         runs = [run_drive(label, conditions, learnt) for label in labels]
         inputs = inputs_of(conditions, labels, source, learnt)
-        write_drives(
+        figures = write_drives(
             folder,
             runs,
             known_curves(runs, setup, learnt),
             inputs=inputs,
             drops=setup.drops,
             film=options.film,
+            faults=conditions.faults,
+        )
+        write_drive_report(
+            folder,
+            runs,
+            inputs,
+            figures,
+            headline=headline(conditions),
+            film=folder / f"drive.{options.film}" if options.film in SHOWN else None,
+            command=options.words,
         )
         told = f"{headline(conditions)}\ntires: {source}\n{drive_table(runs)}"
         told = "\n".join(part for part in (told, setup.vehicle.estimates) if part)

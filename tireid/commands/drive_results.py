@@ -5,17 +5,18 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import casadi as ca
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from identifier.tire_model import TireModel
+from models.faults import SensorFault
 from models.files import digest
 from mpc.loop import Drive
-from mpc.tires import Car, CurveFitError, PredictionTire, prediction_tire
-from mpc.tires.tire import Point
+from mpc.tires import CurveFitError, prediction_tire
 from tireid import __version__
 from tireid.animation import write_film
+from tireid.animation.known import known_over_time, steady_curve
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, WIDEST, Run
 from tireid.driving.setup import Setup
 from tireid.figures import (
@@ -43,8 +44,9 @@ def write_drives(
     inputs: Mapping[str, Any],
     drops: Sequence[tuple[float, float]],
     film: str,
-) -> None:
-    """Write everything about drives along one path.
+    faults: Sequence[SensorFault] = (),
+) -> dict[str, Figure]:
+    """Write everything about drives along one path; return the figures by the name of their file.
 
     Parameters
     ----------
@@ -53,7 +55,8 @@ def write_drives(
     curves : tires to draw behind the forces of the first.
     inputs : all that went in, ready for JSON.
     drops : arc length [m] and friction from there on.
-    film : gif, mp4 or none.
+    film : webp, gif, mp4 or none.
+    faults : of the sensors on the path.
     """
     first = runs[0]
     write_json(folder / "summary.json", summarize_drives(runs, inputs))
@@ -65,9 +68,13 @@ def write_drives(
     limits = first.problem.limits
     figures = {
         "path": drive_path_figure(drives),
-        "errors": drive_errors_figure(drives, off_path=WIDEST, drops=drops),
+        "errors": drive_errors_figure(drives, off_path=WIDEST, drops=drops, faults=faults),
         "steering": drive_steering_figure(
-            drives, angle_limit=limits.steering, rate_limit=limits.steering_rate, drops=drops
+            drives,
+            angle_limit=limits.steering,
+            rate_limit=limits.steering_rate,
+            drops=drops,
+            faults=faults,
         ),
         "tires": drive_tires_figure(first.drive, curves),
         "solve_times": drive_solve_figure(first.drive),
@@ -76,7 +83,15 @@ def write_drives(
         save_figure(figure, folder / f"{name}.png")
     if film != NO_FILM:
         title = f"{first.drive.path.name}: {first.label} tires"
-        write_film(folder / f"drive.{film}", drives, curves, drops=drops, title=title)
+        write_film(
+            folder / f"drive.{film}",
+            drives,
+            curves,
+            drops=drops,
+            title=title,
+            known=known_over_time(first.known, first.model, float(first.drive.v_x.mean())),
+        )
+    return figures
 
 
 def summarize_drives(runs: Sequence[Run], inputs: Mapping[str, Any]) -> dict[str, Any]:
@@ -145,27 +160,6 @@ def drive_columns(drive: Drive) -> dict[str, NDArray[np.float64]]:
 
 
 # What a tracker is told of the tires, as curves.
-
-LARGEST = 0.35  # slip up to which curves are drawn [rad]
-POINTS = 281
-
-
-def steady_curve(label: str, model: PredictionTire, v_x: float) -> TireCurve:
-    """Return the steady axle forces of a tire over slip, by sliding sideways without yawing.
-
-    Parameters
-    ----------
-    label : what legends call it.
-    model : the tire.
-    v_x : speed [m/s], which a network may look at.
-    """
-    a = ca.SX.sym("alpha")
-    car = Car(*(float(value) for value in model.car))
-    at = Point(-v_x * ca.tan(a), ca.SX(0.0), ca.SX(0.0), ca.SX(v_x), car, ca.SX(model.weights))
-    force = model.structure.force((a, a), at)
-    evaluate = ca.Function("curve", [a], [ca.vertcat(*force)])
-    alpha = np.linspace(-LARGEST, LARGEST, POINTS)
-    return TireCurve(label=label, alpha=alpha, force=np.array(evaluate(alpha[None])).T)
 
 
 def known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) -> list[TireCurve]:

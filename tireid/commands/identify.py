@@ -25,6 +25,7 @@ from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import resumed_line, verdict_line
 from tireid.commands.identify_results import (
+    NETWORK,
     error_cells,
     file_name,
     network_table,
@@ -49,6 +50,7 @@ from tireid.figures.style import paper_design
 from tireid.learning import identify
 from tireid.output import output_folder, text_table
 from tireid.progress import Progress, say, tell
+from tireid.reports.identify import write_identify_report
 
 LEARNING, DRAWING = "learning", "replays and figures"
 OWN_PAST = "  its past, against online"
@@ -137,17 +139,23 @@ def run(options: argparse.Namespace) -> None:
             progress.step(1 + len(others))
         progress.begin(DRAWING)
         if network is not None:
-            replays = write_network_results(folder, options.network, law, network, histories)
+            replays, figures = write_network_results(
+                folder, options.network, law, network, histories
+            )
+            by_key = {NETWORK: replays}
             told = network_table(law, histories, replays)
         else:
             learnt = histories[0]
             for t in freeze_times:
                 _require_trusted(learnt, t, law)
             frozen = {t: _replays(t, learnt, histories) for t in freeze_times}
-            write_results(folder, law, learnt, histories[1:], frozen)
+            figures = write_results(folder, law, learnt, histories[1:], frozen)
+            by_key = {f"{freeze_key(t)} s": replays for t, replays in frozen.items()}
             closing = _closing_line(learnt, freeze_times[-1], vehicle, resumed=start is not None)
             told = f"{error_table(histories, frozen)}\n{closing}"
         told = "\n".join(part for part in (told, vehicle.estimates) if part)
+        model = network or histories[0].freeze(freeze_times[-1])
+        write_identify_report(folder, law, model, histories, by_key, figures, command=options.words)
     tell(told)
     say(f"wrote {options.out}/")
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from identifier.method import Method, vehicle_numbers
@@ -21,6 +22,7 @@ from identifier.reproducibility import (
     replay,
 )
 from identifier.run import History
+from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid import __version__
@@ -134,8 +136,8 @@ WEIGHTS = ("W", "V", "own")  # carried matrices that are the learnt model, by wh
 
 def write_results(
     folder: Path, law: str, learnt: History, others: Sequence[History], frozen: Frozen
-) -> None:
-    """Write everything that was learnt into a folder.
+) -> dict[str, Figure]:
+    """Write everything that was learnt into a folder; return the figures by the name of their file.
 
     Parameters
     ----------
@@ -149,11 +151,13 @@ def write_results(
         folder / "summary.json", summarize(law=law, learnt=learnt, others=others, frozen=frozen)
     )
     for t in frozen:
-        name = "weights.json" if t == max(frozen) else f"weights_{freeze_key(t)}s.json"
-        learnt.freeze(t).save(folder / name)
+        last, model = "" if t == max(frozen) else f"_{freeze_key(t)}s", learnt.freeze(t)
+        model.save(folder / f"weights{last}.json")
+        columns = curve_columns(model, [run.recording for run in (learnt, *others)])
+        write_csv(folder / f"curve{last}.csv", columns)
     _write_curves(folder, learnt, others, frozen)
     say("drawing figures")
-    _draw(folder, learnt, others, frozen)
+    return _draw(folder, learnt, others, frozen)
 
 
 def file_name(recording: Recording) -> str:
@@ -241,7 +245,38 @@ def force_columns(
     return columns
 
 
-def _draw(folder: Path, learnt: History, others: Sequence[History], frozen: Frozen) -> None:
+CURVE_POINTS = 201
+FARTHER = 1.25  # than the slip that was driven, or is known
+
+
+def curve_columns(
+    model: TireModel, recordings: Sequence[Recording]
+) -> dict[str, NDArray[np.float64]]:
+    """Return curve.csv: the steady force of each axle over slip, and whether it is known there.
+
+    Parameters
+    ----------
+    model : the frozen model.
+    recordings : that were driven, which say how far the curve goes.
+    """
+    car, known = model.vehicle, model.known_slip
+    reach = [0.0 if known is None else float(known.max())]
+    for recording in recordings:
+        moving = recording.v_x >= model.min_speed
+        reach.append(float(np.abs(recording.alpha(car.l_f, car.l_r)[moving]).max(initial=0.0)))
+    end = min(FARTHER * max(reach) or 0.1, 0.5)
+    slip = np.linspace(-end, end, CURVE_POINTS)
+    force = model.force(slip)
+    columns = {"slip_rad": slip, "Fyf_N": force[:, 0], "Fyr_N": force[:, 1]}
+    if known is not None:
+        inside = (np.abs(slip)[:, None] <= known).astype(np.float64)
+        columns |= {"front_known": inside[:, 0], "rear_known": inside[:, 1]}
+    return columns
+
+
+def _draw(
+    folder: Path, learnt: History, others: Sequence[History], frozen: Frozen
+) -> dict[str, Figure]:
     name, last = learnt.recording.name, max(frozen)
     own = {t: replays[name] for t, replays in frozen.items()}
     figures = {
@@ -259,6 +294,7 @@ def _draw(folder: Path, learnt: History, others: Sequence[History], frozen: Froz
         figures[f"replay_{file_name(other.recording)}"] = prediction_figure(replay, other)
     for label, figure in figures.items():
         save_figure(figure, folder / f"{label}.png")
+    return figures
 
 
 # What `tireid identify --network` finds: a network of one's own over recordings.
@@ -271,8 +307,8 @@ NETWORK = "network"
 
 def write_network_results(
     folder: Path, file: Path, law: str, model: OnnxModel, histories: Sequence[History]
-) -> Mapping[str, Replay]:
-    """Write everything that is known of a network into a folder; return replays by recording.
+) -> tuple[Mapping[str, Replay], dict[str, Figure]]:
+    """Write everything that is known of a network into a folder; return replays and figures.
 
     Parameters
     ----------
@@ -291,16 +327,21 @@ def write_network_results(
     summary = summarize_replays(law, histories, {NETWORK: replays})
     write_json(folder / "summary.json", {**summary, NETWORK: about})
     model.save(folder / "weights.json")
+    columns = curve_columns(model, [history.recording for history in histories])
+    write_csv(folder / "curve.csv", columns)
     say("drawing figures")
+    figures: dict[str, Figure] = {}
     for history in histories:
         recording = history.recording
         name, own = file_name(recording), replays[recording.name]
         last = "" if history is histories[0] else f"_{name}"
         write_csv(folder / f"forces{last}.csv", force_columns(history, {NETWORK: own}))
-        save_figure(slip_figure(model, recording, history), folder / f"slip{last}.png")
-        save_figure(prediction_figure(own, history), folder / f"replay_{name}.png")
-    save_figure(inputs_figure(histories[0].recording), folder / "inputs.png")
-    return replays
+        figures[f"slip{last}"] = slip_figure(model, recording, history)
+        figures[f"replay_{name}"] = prediction_figure(own, history)
+    figures["inputs"] = inputs_figure(histories[0].recording)
+    for label, figure in figures.items():
+        save_figure(figure, folder / f"{label}.png")
+    return replays, figures
 
 
 def network_table(law: str, histories: Sequence[History], replays: Mapping[str, Replay]) -> str:

@@ -6,6 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
+
 from identifier.paper.design import VARIANTS
 from identifier.paper.laws import Gains
 from identifier.paper.network import Network
@@ -188,7 +190,7 @@ def settings(gains: Gains, network: Network) -> str:
 
 # The files of `tireid paper`: tables as JSON and text, seeds that diverged, Figs. 1-5 as PNG.
 
-SCHEME = "fig1_scheme.png"
+SCHEME = "fig1_scheme"
 FIGURES = {  # number of the paper's figure, by maneuver and law
     ("step_steer", "instantaneous"): "fig2",
     ("step_steer", "integral"): "fig3",
@@ -216,8 +218,8 @@ def verdicts() -> list[str]:
     ]
 
 
-def write_study(folder: Path, study: Study) -> None:
-    """Write tables.json, diverged.json, tables.txt and the figures of a study.
+def write_study(folder: Path, study: Study) -> dict[str, Figure]:
+    """Write tables.json, diverged.json, tables.txt and figures of a study; return the figures.
 
     Parameters
     ----------
@@ -228,13 +230,17 @@ def write_study(folder: Path, study: Study) -> None:
     write_json(folder / "diverged.json", study.diverged())
     (folder / "tables.txt").write_text(study_text(study) + "\n", encoding="utf-8")
     say("drawing figures")
-    save_figure(scheme_figure(), folder / SCHEME)
+    figures = {SCHEME: scheme_figure()}
     for maneuver in study.errors:
-        _draw(folder, study, maneuver)
+        figures |= _draw(study, maneuver)
+    for name, figure in figures.items():
+        save_figure(figure, folder / f"{name}.png")
+    return figures
 
 
-def _draw(folder: Path, study: Study, maneuver: str) -> None:
+def _draw(study: Study, maneuver: str) -> dict[str, Figure]:
     """Draw what did not diverge."""
+    figures = {}
     labels = _compared(maneuver)
     results = {
         law: {labels[n]: (q["median"], q["q25"], q["q75"]) for n, q in row.items() if n in labels}
@@ -245,7 +251,7 @@ def _draw(folder: Path, study: Study, maneuver: str) -> None:
         for law, row in printed_values(maneuver).items()
     }
     if any(results.values()):
-        save_figure(comparison_figure(results, printed), folder / f"{maneuver}_errors.png")
+        figures[f"{maneuver}_errors"] = comparison_figure(results, printed)
     onset = ONSETS[maneuver]
     window = (onset - 1.0, float(study.recordings[maneuver].t[-1]))
     for law in LAWS:
@@ -254,8 +260,10 @@ def _draw(folder: Path, study: Study, maneuver: str) -> None:
             say(f"{maneuver}: the {law} law diverged on every seed, no figure")
             continue
         label = FIGURES.get((maneuver, law), "control")
-        figure = force_figure(trial.history, trial.replays, window=window, since=onset)
-        save_figure(figure, folder / f"{label}_{maneuver}_{law}.png")
+        figures[f"{label}_{maneuver}_{law}"] = force_figure(
+            trial.history, trial.replays, window=window, since=onset
+        )
+    return figures
 
 
 def _compared(maneuver: str) -> dict[str, str]:

@@ -1,5 +1,6 @@
 """One drive for each tire that a tracker is told: linear, frozen, true, or learnt on the way."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +31,7 @@ from mpc.path import Path
 from mpc.problem import Problem
 from mpc.realtime import NoCompilerError, Tracker
 from mpc.tires import PredictionTire, prediction_tire
+from tireid.driving.known import Known, Witness
 from tireid.driving.setup import PERIOD, Setup, SpeedWish, require_friction
 from tireid.progress import Progress
 
@@ -149,6 +151,7 @@ class Run:
     drive : what happened.
     scores : what it is worth.
     learner : what changed the tire on the way, if anything could.
+    known : what was known of the tires over time, where it goes on learning.
     """
 
     label: str
@@ -158,6 +161,7 @@ class Run:
     drive: Drive
     scores: Scores
     learner: LearningTires | None
+    known: Sequence[Known] = ()
 
     def __repr__(self) -> str:
         rms, peak = self.scores.rms_e_y_m, self.scores.peak_e_y_m
@@ -234,6 +238,7 @@ def run_drive(
     except NoCompilerError as error:
         raise ValueError(str(error)) from None
     learner = _learner(label, setup, learnt)
+    witness = Witness(learner, PERIOD) if isinstance(learner, Learner) else None
     with Progress(f"driving on {label} tires") as progress:
         driven = drive_tracker(
             setup.path,
@@ -243,7 +248,7 @@ def run_drive(
             sensors=conditions.driving_sensors,
             delay=conditions.delay,
             rng=np.random.default_rng([conditions.seed, 2]),
-            learner=learner,
+            learner=witness or learner,
             laps=conditions.laps,
             widest=WIDEST,
             plan_every=PLAN_EVERY,
@@ -258,6 +263,7 @@ def run_drive(
         drive=driven,
         scores=scores(driven),
         learner=learner,
+        known=() if witness is None else tuple(witness.known),
     )
 
 

@@ -15,7 +15,7 @@ from tireid.figures.forces import (
 )
 from tireid.figures.paper import comparison_figure, error_figure, locus_figure, weights_figure
 from tireid.figures.scheme import scheme_figure
-from tireid.figures.style import figure_png, save_figure
+from tireid.figures.style import figure_png, figure_svg, save_figure
 from tireid.figures.tires import (
     TireCurve,
     axle_slip,
@@ -35,6 +35,7 @@ __all__ = [
     "drive_tires_figure",
     "error_figure",
     "figure_png",
+    "figure_svg",
     "force_figure",
     "inputs_figure",
     "learnt_axles_figure",

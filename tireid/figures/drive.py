@@ -10,7 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from codegen.arrays import Array
+from models.faults import SensorFault
 from models.vehicle import Vehicle
+from mpc.handover.rules import Verdict
 from mpc.loop import Drive
 from mpc.path import Path
 from tireid.figures.style import (
@@ -59,6 +61,7 @@ def drive_solve_figure(drive: Drive) -> Figure:
         markersize=2.2,
         markeredgewidth=0.0,
         color=BLUE,
+        rasterized=True,
         label="a step",
     )
     failed = drive.status != 0
@@ -108,12 +111,13 @@ CONES: Mapping[str, Any] = {
     "markerfacecolor": AMBER,
     "label": "cones",
 }
+ORACLE = "oracle"  # the name of the true tire
 AT_THE_END = " at the end"  # what a label ends with that is of a tire as it was then
 LATER = (0, (2.5, 0.9))
 TIRES: Mapping[str, Mapping[str, Any]] = {
     "linear": {"color": GREY, "linestyle": (0, (1, 1.2)), "linewidth": 1.3},
     "frozen": {"color": ORANGE, "linestyle": "-", "linewidth": 1.2},
-    "oracle": {"color": BLACK, "linestyle": (0, (5, 1.5)), "linewidth": 1.1},
+    ORACLE: {"color": BLACK, "linestyle": (0, (5, 1.5)), "linewidth": 1.1},
     "learning": {"color": BLUE, "linestyle": "-", "linewidth": 1.2},
 }
 
@@ -131,13 +135,17 @@ def tire_look(label: str) -> dict[str, Any]:
 
 # How far the car was from its path, and how fast, over the arc length of the path.
 
-TOLD = "told of another tire"
+TOLD, NOTICED = "told of another tire", "sensor fault noticed"
 ARC = "arc length of the path [m]"
 
 
 @styled
 def drive_errors_figure(
-    drives: Mapping[str, Drive], *, off_path: float, drops: Sequence[tuple[float, float]] = ()
+    drives: Mapping[str, Drive],
+    *,
+    off_path: float,
+    drops: Sequence[tuple[float, float]] = (),
+    faults: Sequence[SensorFault] = (),
 ) -> Figure:
     """Draw lateral deviation, heading error, lateral acceleration and speed over arc length.
 
@@ -146,6 +154,7 @@ def drive_errors_figure(
     drives : by the name in the legend; the first is drawn on top.
     off_path : deviation [m] at which a car counts as off the path, drawn where it comes near.
     drops : where the friction changes: arc length [m] and friction from there on.
+    faults : of the sensors, shaded while the first car drives.
     """
     figure = new_figure(PAGE, 5.2)
     panels = figure.subplots(4, 1, sharex=True)
@@ -175,6 +184,8 @@ def drive_errors_figure(
     _roomy(panels[3], min(float(drive.v_x.min()) for drive in drives.values()))
     last = max(float(drive.s[-1]) for drive in drives.values())
     panels[-1].set(xlabel=ARC, xlim=(0.0, last))
+    for axes in panels:
+        mark_faults(axes, drives, faults)
     figure.align_ylabels(panels)
     legend_above(figure, order=(*drives, TOLD, *(friction_label(mu) for _, mu in drops)))
     return figure
@@ -192,6 +203,39 @@ def mark_drops(axes: Axes, drops: Sequence[tuple[float, float]]) -> None:
         axes.axvline(
             place, color=GREY, linewidth=0.8, linestyle=(0, (4, 2)), label=friction_label(mu)
         )
+
+
+def mark_faults(axes: Axes, drives: Mapping[str, Drive], faults: Sequence[SensorFault]) -> None:
+    """Shade where a sensor is broken, and mark where a supervisor came to doubt the sensors.
+
+    Parameters
+    ----------
+    axes : panel over arc length.
+    drives : by the name in the legend; faults are placed by the time of the first.
+    faults : of the sensors.
+    """
+    first = next(iter(drives.values()))
+    for fault in faults:
+        if fault.start > first.t[-1]:
+            continue
+        span = np.interp([fault.start, fault.start + fault.duration], first.t, first.s)
+        axes.axvspan(
+            *map(float, span),
+            facecolor="#F6D9D5",
+            edgecolor="none",
+            zorder=0,
+            label=f"{fault.channel} {fault.kind}",
+        )
+    for label, drive in drives.items():
+        for t, text in drive.notes:
+            if text.startswith(Verdict.FAULT.value):
+                axes.axvline(
+                    float(np.interp(t, drive.t, drive.s)),
+                    color=tire_look(label)["color"],
+                    linewidth=1.2,
+                    linestyle=(0, (1, 1)),
+                    label=NOTICED,
+                )
 
 
 def friction_label(mu: float) -> str:
@@ -244,6 +288,7 @@ def drive_steering_figure(
     angle_limit: float,
     rate_limit: float,
     drops: Sequence[tuple[float, float]] = (),
+    faults: Sequence[SensorFault] = (),
 ) -> Figure:
     """Draw commanded angles of the front wheels over arc length, and the rate of the first drive.
 
@@ -253,6 +298,7 @@ def drive_steering_figure(
     angle_limit : that the tracker keeps [rad].
     rate_limit : that the tracker keeps [rad/s].
     drops : where the friction changes: arc length [m] and friction from there on.
+    faults : of the sensors, shaded while the first car drives.
     """
     figure = new_figure(PAGE, 3.4)
     angle, rate = figure.subplots(2, 1, sharex=True)
@@ -279,6 +325,7 @@ def drive_steering_figure(
         axes.set_ylabel(label)
         _limits(axes, float(np.rad2deg(limit)))
         mark_drops(axes, drops)
+        mark_faults(axes, drives, faults)
     rate.set(xlabel=ARC, xlim=(0.0, max(float(drive.s[-1]) for drive in drives.values())))
     figure.align_ylabels([angle, rate])
     legend_above(figure, order=tuple(drives))

@@ -1,10 +1,13 @@
 """Axle forces over time as in the paper's Figs. 2-5: online above, frozen replays below."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from codegen.arrays import Array
 from identifier.reproducibility import Replay, freeze_key, online_error
 from identifier.run import History
 from models.recordings import Recording
@@ -13,17 +16,19 @@ from tireid.figures.style import (
     BLUE,
     FROZEN,
     GREEN,
+    GREY,
     ONLINE,
     ORANGE,
     PAGE,
     PURPLE,
-    TIME,
     TRUTH,
     ForceUnit,
     Window,
     drawable,
     force_range,
     force_unit_of,
+    frozen_title,
+    label_time,
     legend_above,
     legend_beside,
     mark_freeze,
@@ -47,7 +52,8 @@ def force_figure(
 
     Above each panel stands the error, whatever the window shows: against the true force, or
     against the online force where there is no truth. That of a replay is the one it was made with;
-    below it stands the paper's measure, the past against online, where both sides are known.
+    below it stands the paper's measure, the past against online, where both sides are known. The
+    lowest row shows what the online run and the last freeze miss of that force.
 
     Parameters
     ----------
@@ -78,12 +84,18 @@ def force_figure(
     frozen = {at: replay.axle_force[part] / unit.newtons for at, replay in replays.items()}
     limits = force_range(reference / unit.newtons, online / unit.newtons, *frozen.values())
 
+    missed = [] if truth is None else [(online / unit.newtons, ONLINE)]
+    missed += [(force, FROZEN) for force in list(frozen.values())[-1:]]
+    missed = [(force - reference / unit.newtons, look) for force, look in missed]
     rows = 1 + len(replays)
-    figure = new_figure(PAGE, 0.85 + 1.45 * rows)
-    panels = figure.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)
+    ratios = [1.45] * rows + [1.05] * bool(missed)
+    figure = new_figure(PAGE, 0.85 + sum(ratios))
+    panels = figure.subplots(
+        len(ratios), 2, sharex=True, sharey="row", squeeze=False, height_ratios=ratios
+    )
     error = online_error(history, since=since)
     for axle, name in enumerate(AXLES):
-        for axes in panels[:, axle]:
+        for axes in panels[:rows, axle]:
             axes.set(xlim=ends, ylim=limits)
             if truth is not None:
                 axes.plot(t, truth[part, axle] / unit.newtons, **TRUTH)
@@ -93,17 +105,42 @@ def force_figure(
             note(panels[0, axle], f"diverged at {history.diverged_at:.4g} s")
         elif error is not None:
             note(panels[0, axle], f"RMSE {unit.format(error, axle)}")
-        for axes, (at, replay) in zip(panels[1:, axle], replays.items(), strict=True):
+        for axes, (at, replay) in zip(panels[1:rows, axle], replays.items(), strict=True):
             axes.plot(t, drawable(frozen[at][:, axle], limits), **FROZEN)
-            axes.set_title(f"{name}, frozen at {freeze_key(at)} s")
+            axes.set_title(f"{name}, {frozen_title(recording.t, at)}")
             note(axes, _errors(replay, unit, axle))
             mark_freeze(panels[0, axle], at, prediction=False)
             mark_freeze(axes, at, prediction=True)
-        panels[-1, axle].set_xlabel(TIME)
-    for axes in panels[:, 0]:
+        if missed:
+            _draw_missed(panels[-1, axle], t, [(force[:, axle], look) for force, look in missed])
+            against = "online" if truth is None else "truth"
+            panels[-1, axle].set_title(f"{name}, residual to {against}")
+        label_time(panels[-1, axle], recording.t)
+    for axes in panels[:rows, 0]:
         axes.set_ylabel(f"lateral force [{unit.name}]")
+    if missed:
+        panels[-1, 0].set_ylim(_missed_range([force for force, _ in missed], limits))
+        panels[-1, 0].set_ylabel(f"residual [{unit.name}]")
     legend_above(figure)
     return figure
+
+
+RESIDUAL: Mapping[str, Any] = {  # noise for the most part, which would make a drawing large
+    "linewidth": 0.8,
+    "linestyle": "-",
+    "rasterized": True,
+}
+
+
+def _draw_missed(axes: Axes, t: Array, curves: Sequence[tuple[Array, Mapping[str, Any]]]) -> None:
+    axes.axhline(0.0, color=GREY, linewidth=0.6)
+    for missed, look in curves:
+        axes.plot(t, np.clip(missed, -1e6, 1e6), **{**look, **RESIDUAL})
+
+
+def _missed_range(missed: Sequence[Array], limits: tuple[float, float]) -> tuple[float, float]:
+    """Return the ends of an axis of residuals, which reach no farther than the forces do."""
+    return force_range(np.zeros(1), *(np.clip(one, *limits) for one in missed))
 
 
 def _errors(replay: Replay, unit: ForceUnit, axle: int) -> str:
@@ -158,7 +195,7 @@ def prediction_figure(
     reference = reference / unit.newtons
     limits = force_range(reference, frozen)
     residual = frozen - reference
-    missed_limits = force_range(reference[:0], np.clip(residual, *limits))
+    missed_limits = _missed_range([residual], limits)
 
     ratios = [2.0] if known is None else [2.0, 1.0]
     figure = new_figure(PAGE, 1.0 + sum(ratios))
@@ -173,14 +210,14 @@ def prediction_figure(
             upper.plot(t, drawable(reference[:, axle], limits), **curve)
             missed = drawable(residual[:, axle], missed_limits)
             panels[1, axle].axhline(0.0, color=curve["color"], linewidth=0.6)
-            panels[1, axle].plot(t, missed, color=FROZEN["color"], linewidth=0.9)
+            panels[1, axle].plot(t, missed, color=FROZEN["color"], **RESIDUAL)
             panels[1, axle].set_ylim(missed_limits)
         upper.plot(t, drawable(frozen[:, axle], limits), **FROZEN)
         if error is not None:
             note(upper, f"RMSE {unit.format(error, axle)}")
         elif known is not None:
             note(upper, f"RMSE to online {unit.format(replay.against_online, axle)}")
-        panels[-1, axle].set_xlabel(TIME)
+        label_time(panels[-1, axle], recording.t)
     panels[0, 0].set_ylabel(f"lateral force [{unit.name}]")
     if known is not None:
         panels[1, 0].set_ylabel(f"residual [{unit.name}]")
@@ -225,11 +262,12 @@ def side_by_side_figure(replays: Mapping[str, Replay]) -> Figure:
         for (label, replay), color in zip(replays.items(), COLORS, strict=False):
             force = drawable(replay.axle_force[:, axle] / unit.newtons, limits)
             upper.plot(t, force, color=color, linewidth=1.1, label=label)
-            lower.plot(t, missed[label][:, axle], color=color, linewidth=0.9)
+            lower.plot(t, missed[label][:, axle], color=color, **RESIDUAL)
         upper.set(title=name, ylim=limits, xlim=(t[0], t[-1]))
-        lower.set(xlabel=TIME, ylim=(-margin, margin))
+        lower.set(ylim=(-margin, margin))
+        label_time(lower, t)
     panels[0, 0].set_ylabel(f"lateral force [{unit.name}]")
-    panels[1, 0].set_ylabel(f"missed [{unit.name}]")
+    panels[1, 0].set_ylabel(f"residual [{unit.name}]")
     legend_above(figure)
     return figure
 
@@ -283,6 +321,6 @@ def inputs_figure(recording: Recording, *, window: Window = None) -> Figure:
             label=r"rear $\delta_r$",
         )
         legend_beside(steering)
-    panels[-1].set_xlabel(TIME)
+    label_time(panels[-1], recording.t)
     figure.align_ylabels()
     return figure

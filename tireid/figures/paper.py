@@ -21,12 +21,12 @@ from tireid.figures.style import (
     PAGE,
     PURPLE,
     SERIES,
-    TIME,
     Window,
     drawable,
     force_range,
     force_unit_name,
     impulse_unit,
+    label_time,
     legend_above,
     legend_beside,
     mark_freeze,
@@ -98,9 +98,9 @@ def error_figure(
     for t_freeze in freeze_times:
         mark_freeze(axes, t_freeze, prediction=False)
     axes.set(
-        xlabel=TIME,
         ylabel=rf"error norm $|\tilde{{\xi}}|$ [{impulse_unit(paper_design(history).force_unit)}]",
     )
+    label_time(axes, recording.t)
     legend_above(figure, columns=min(4, 1 + len(known) + bool(freeze_times)))
     return figure
 
@@ -148,7 +148,8 @@ def weights_figure(
     upper.set_ylabel(rf"weights $\hat{{W}}$ [{force_unit_name(design.force_unit)}]")
     for number, name in enumerate(design.network.inputs):
         _lines(lower, t, V[:, :, number], SERIES[number % len(SERIES)], SYMBOLS[name])
-    lower.set(xlabel=TIME, ylabel=r"weights $\hat{V}$ [-]")
+    lower.set(ylabel=r"weights $\hat{V}$ [-]")
+    label_time(lower, recording.t)
     for axes, values in ((upper, W), (lower, V)):
         axes.set_ylim(force_range(_settled(values) if history.diverged_at is not None else values))
         for t_freeze in freeze_times:

@@ -4,6 +4,7 @@ Truth is black, what was identified online blue, frozen weights orange and dashe
 grey and dotted; the colors are those of Okabe and Ito, which color-blind readers tell apart.
 """
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from io import BytesIO
@@ -16,11 +17,12 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
+from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.paper.design import PaperIdentifier
-from identifier.reproducibility import AxleRmse
+from identifier.reproducibility import AxleRmse, freeze_key
 from identifier.run import History
 
 P = ParamSpec("P")
@@ -74,6 +76,7 @@ LOOK: dict[str, Any] = {
     "ytick.major.size": 3.0,
     "figure.constrained_layout.wspace": 0.04,
     "agg.path.chunksize": 20000,
+    "path.simplify_threshold": 0.3,  # dots of a PNG, points of a drawing
     "savefig.bbox": None,
 }
 
@@ -121,6 +124,32 @@ def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
     return buffer.getvalue()
 
 
+# Glyphs as outlines and names of parts from a fixed salt: a drawing looks alike wherever it is
+# opened, and the same figure has the same bytes.
+CLOUDS = 130  # dots per inch of what is pixels in a drawing
+VECTOR: dict[str, Any] = {
+    "svg.fonttype": "path",
+    "svg.hashsalt": "tireid",
+}
+
+
+def figure_svg(figure: Figure) -> bytes:
+    """Return a figure as SVG, the same bytes for the same figure; dense clouds in it are pixels.
+
+    Parameters
+    ----------
+    figure : as a function of this package returns it.
+    """
+    buffer = BytesIO()
+    with style.context(["default", LOOK, VECTOR]):
+        figure.savefig(buffer, format="svg", dpi=CLOUDS, metadata={"Date": None, "Creator": None})
+    return OUTLINE.sub(lambda path: DIGITS.sub(rb"\1", path[0]), buffer.getvalue())
+
+
+OUTLINE = re.compile(rb' d="[^"]*"')  # of a curve or a glyph, in points or finer
+DIGITS = re.compile(rb"(\.\d{2})\d+")  # more are not seen
+
+
 def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure as PNG.
 
@@ -139,6 +168,46 @@ Window = tuple[float, float] | None
 TIME = "time [s]"
 AXLES = ("Front axle", "Rear axle")
 FREEZE, PREDICTION = "freeze", "after the freeze (prediction)"
+
+
+FAR = 1e5  # s: of a clock that begins later, as a Unix time does, only the last digits are shown
+DIGITS_SHOWN = 100.0  # s
+
+
+def clock_zero(t: Array) -> float:
+    """Return what figures take off the times of a recording [s]; 0 where they are as short as is.
+
+    Parameters
+    ----------
+    t : times of the samples (n,) [s].
+    """
+    first = float(t[0])
+    return 0.0 if abs(first) < FAR else DIGITS_SHOWN * float(np.floor(first / DIGITS_SHOWN))
+
+
+def frozen_title(t: Array, t_freeze: float) -> str:
+    """Return what a title calls a freeze, in the clock of the axis below it.
+
+    Parameters
+    ----------
+    t : times of the samples (n,) [s].
+    t_freeze : time of the freeze [s].
+    """
+    return f"frozen at {freeze_key(round(t_freeze - clock_zero(t), 6))} s"
+
+
+def label_time(axes: Axes, t: Array) -> None:
+    """Name the time axis of a panel, and number it from the zero that it names.
+
+    Parameters
+    ----------
+    axes : panel over the time of a recording.
+    t : times of the samples (n,) [s].
+    """
+    zero = clock_zero(t)
+    axes.set_xlabel(TIME if zero == 0.0 else f"time since {zero:.0f} s [s]")
+    if zero != 0.0:
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value - zero:g}"))
 
 
 def time_window(t: Array, window: Window) -> tuple[float, float]:

@@ -1,7 +1,8 @@
 """Axle force against slip angle: the shape of the tire, as measured and as learnt."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,7 +16,7 @@ from identifier.tire_model import TireModel
 from models.bicycle import measured_slip
 from models.recordings import Recording
 from mpc.loop import Drive
-from tireid.figures.drive import tire_look
+from tireid.figures.drive import AT_THE_END, ORACLE, tire_look
 from tireid.figures.style import (
     AXLES,
     BLACK,
@@ -26,10 +27,10 @@ from tireid.figures.style import (
     PAGE,
     PURPLE,
     SKY,
-    TIME,
     drawable,
     force_range,
     force_unit_of,
+    label_time,
     legend_above,
     mark_freeze,
     new_figure,
@@ -37,6 +38,14 @@ from tireid.figures.style import (
 )
 
 UNKNOWN = "slip not known"
+CLOUD: Mapping[str, Any] = {  # thousands of points: pixels where the rest of a drawing is lines
+    "linestyle": "",
+    "marker": ".",
+    "markersize": 2.2,
+    "markeredgewidth": 0.0,
+    "alpha": 0.8,
+    "rasterized": True,
+}
 
 
 @styled
@@ -76,31 +85,30 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
     limits = force_range(reference, frozen)
     stiffness = vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear
 
-    figure = new_figure(PAGE, 3.2)
-    panels = figure.subplots(1, 2, sharey=True)
-    for axle, (axes, name) in enumerate(zip(panels, AXLES, strict=True)):
+    ratios = [3.2] if known is None else [3.2, 1.3]
+    figure = new_figure(PAGE, sum(ratios))
+    panels = figure.subplots(
+        len(ratios), 2, sharex="col", sharey="row", squeeze=False, height_ratios=ratios
+    )
+    for axle, name in enumerate(AXLES):
+        axes, lowest = panels[0, axle], panels[-1, axle]
         if known is not None:
             axes.plot(
                 alpha[:, axle],
                 drawable(reference[:, axle], limits),
-                linestyle="",
-                marker=".",
-                markersize=3.0,
-                markeredgewidth=0.0,
                 color=color,
-                alpha=0.35,
                 label=label,
+                **{**CLOUD, "markersize": 3.0, "alpha": 0.35},
             )
+            missed = np.clip(frozen[:, axle] - reference[:, axle], *limits)
+            lowest.axhline(0.0, color=color, linewidth=0.6)
+            lowest.plot(alpha[:, axle], missed, color=ORANGE, **CLOUD)
         axes.plot(
             alpha[:, axle],
             drawable(frozen[:, axle], limits),
-            linestyle="",
-            marker=".",
-            markersize=2.2,
-            markeredgewidth=0.0,
             color=ORANGE,
-            alpha=0.8,
             label="frozen weights",
+            **CLOUD,
         )
         low, high = float(alpha[:, axle].min()), float(alpha[:, axle].max())
         margin = 0.04 * (high - low) or 1.0
@@ -109,13 +117,20 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
         if model.known_slip is not None:
             _draw_curve(axes, model, axle, ends, unit.newtons)
             _shade_unknown(axes, float(np.rad2deg(model.known_slip[axle])), ends)
-        axes.set(
-            xlim=ends, ylim=limits, title=name, xlabel=rf"slip angle $\alpha_{'fr'[axle]}$ [deg]"
-        )
-        axes.xaxis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 5, 10]))
-    panels[0].set_ylabel(f"lateral force [{unit.name}]")
+            if known is not None:
+                _shade_unknown(lowest, float(np.rad2deg(model.known_slip[axle])), ends)
+        axes.set(xlim=ends, ylim=limits, title=name)
+        _label_slip(lowest, axle)
+    panels[0, 0].set_ylabel(f"lateral force [{unit.name}]")
+    if known is not None:
+        panels[1, 0].set_ylabel(f"residual [{unit.name}]")
     legend_above(figure, order=(UNKNOWN,))
     return figure
+
+
+def _label_slip(axes: Axes, axle: int) -> None:
+    axes.set_xlabel(rf"slip angle $\alpha_{'fr'[axle]}$ [deg]")
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 5, 10]))
 
 
 def _draw_curve(
@@ -179,6 +194,8 @@ REACH = 1.25  # curves go on this far beyond the slip of the drive
 def drive_tires_figure(drive: Drive, curves: Sequence[TireCurve]) -> Figure:
     """Draw the forces of a drive as a cloud, and the curves that trackers believed.
 
+    Below stands what each curve misses of the true one, where the true one is known.
+
     Parameters
     ----------
     drive : the drive.
@@ -191,19 +208,20 @@ def drive_tires_figure(drive: Drive, curves: Sequence[TireCurve]) -> Figure:
     within = [c.force[part] / unit.newtons for c, part in zip(curves, shown, strict=True)]
     steep = [f for c, f in zip(curves, within, strict=True) if not c.label.startswith("linear")]
     low, high = force_range(force, *steep)
-    figure = new_figure(PAGE, 3.3)
-    panels = figure.subplots(1, 2, sharey=True)
-    for axle, (axes, name) in enumerate(zip(panels, AXLES, strict=True)):
+    missed = _missed_of_truth(curves, reach, unit.newtons)
+    ratios = [3.3, 1.3] if missed else [3.3]
+    figure = new_figure(PAGE, sum(ratios))
+    panels = figure.subplots(
+        len(ratios), 2, sharex="col", sharey="row", squeeze=False, height_ratios=ratios
+    )
+    for axle, name in enumerate(AXLES):
+        axes = panels[0, axle]
         axes.plot(
             alpha[:, axle],
             force[:, axle],
-            linestyle="",
-            marker=".",
-            markersize=3.0,
-            markeredgewidth=0.0,
             color=SKY,
-            alpha=0.6,
             label="this drive, true forces",
+            **{**CLOUD, "markersize": 3.0, "alpha": 0.6},
         )
         for curve, part, values in zip(curves, shown, within, strict=True):
             axes.plot(
@@ -212,16 +230,34 @@ def drive_tires_figure(drive: Drive, curves: Sequence[TireCurve]) -> Figure:
                 label=curve.label,
                 **tire_look(curve.label),
             )
-        axes.set(
-            title=name,
-            xlabel=rf"slip angle $\alpha_{'fr'[axle]}$ [deg]",
-            xlim=(-reach, reach),
-            ylim=(low, high),
-        )
-        axes.xaxis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 5, 10]))
-    panels[0].set_ylabel(f"lateral force [{unit.name}]")
+        axes.set(title=name, xlim=(-reach, reach), ylim=(low, high))
+        for label, slip, residual in missed:
+            panels[1, axle].plot(slip, residual[:, axle], **tire_look(label))
+        _label_slip(panels[-1, axle], axle)
+    panels[0, 0].set_ylabel(f"lateral force [{unit.name}]")
+    if missed:
+        near = [one for label, _, one in missed if not label.startswith("linear")]
+        panels[1, 0].set_ylim(force_range(np.zeros(1), *near))
+        panels[1, 0].set_ylabel(f"residual [{unit.name}]")
     legend_above(figure, columns=1 + len(curves) if len(curves) < 5 else 3)
     return figure
+
+
+def _missed_of_truth(
+    curves: Sequence[TireCurve], reach: float, newtons: float
+) -> list[tuple[str, Array, Array]]:
+    """Return by label slip [deg] and what a curve misses of the true one of the same road."""
+    true = {curve.label: curve for curve in curves if curve.label.startswith(ORACLE)}
+    found = []
+    for curve in curves:
+        at_the_end = curve.label.endswith(AT_THE_END) and ORACLE + AT_THE_END in true
+        truth = true.get(ORACLE + AT_THE_END * at_the_end)
+        if truth is None or truth is curve or not np.array_equal(truth.alpha, curve.alpha):
+            continue
+        slip = np.rad2deg(curve.alpha)
+        part = np.abs(slip) <= reach
+        found.append((curve.label, slip[part], (curve.force - truth.force)[part] / newtons))
+    return [one for one in found if not one[0].startswith(ORACLE)]
 
 
 # What the axle identifier has learnt over time, in the numbers an engineer reads.
@@ -260,6 +296,6 @@ def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) ->
         axes.set_ylim(0.0, 1.1 * float(values.max()) or 1.0)
         for at in freeze_times:
             mark_freeze(axes, at, prediction=False)
-    panels[-1].set_xlabel(TIME)
+    label_time(panels[-1], t)
     legend_above(figure)
     return figure

@@ -1,0 +1,49 @@
+"""What a browser would see of a page, and what is wrong with it whatever it reports."""
+
+from html.parser import HTMLParser
+
+VOID = {"meta", "img"}
+
+
+class Outline(HTMLParser):
+    """What a browser would see: elements in order, links, texts; complains of a wrong nesting."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.text = ""
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if "style" not in self.open:
+            self.text += data
+
+
+def outline(page: str) -> Outline:
+    parser = Outline()
+    parser.feed(page)
+    assert parser.open == []
+    return parser
+
+
+def faults_of(page: str) -> list[str]:
+    """What is wrong with a page whatever it reports: anchors, pictures without words, raw text."""
+    parser = outline(page)
+    ids = [attributes["id"] for _, attributes in parser.tags if "id" in attributes]
+    found = [f"id twice: {one}" for one in set(ids) if ids.count(one) > 1]
+    for tag, attributes in parser.tags:
+        if tag == "a" and str(attributes["href"]).removeprefix("#") not in ids:
+            found.append(f"leads nowhere: {attributes['href']}")
+        if tag == "img" and not str(attributes.get("alt") or "").strip():
+            found.append("a picture without words")
+    if "`" in parser.text:
+        found.append("a back-tick")
+    return found

@@ -1,0 +1,1 @@
+"""The report.html that `tireid identify`, `compare`, `drive` and `demo` leave."""

@@ -1,0 +1,107 @@
+"""What every report.html shares: how to read a figure, and what is needed to compute it again.
+
+The order is always: headline numbers, what speaks against them, what was found with its figures and
+how to read each, and where it came from.
+"""
+
+import platform
+from collections.abc import Iterable
+
+from matplotlib.figure import Figure
+
+from identifier.method import vehicle_numbers
+from models.files import digest
+from models.recordings import Recording
+from models.vehicle import Vehicle
+from tireid import __version__
+from tireid.figures import figure_svg
+from tireid.report import Picture, Section, Table
+
+REPORT = "report.html"
+
+# How to read each figure, in one line.
+READ = {
+    "forces": "Online and frozen lie on the truth where there is one; the residual below is small "
+    "against the force and shows no pattern that repeats.",
+    "slip": "Points follow the curve. A loop around it is relaxation, a second branch another "
+    "friction, a shift an offset of steering or lateral velocity; shaded slip is not known.",
+    "learnt": "Each number comes to rest once it was excited; steps late in the drive are a "
+    "friction or a sensor that changed.",
+    "inputs": "Is the log what you think it is: signs, gaps, noise?",
+    "replay": "A drive that was not learnt; the residual is what the frozen model misses.",
+    "error": "It shrinks at first and then stays at the size of the noise.",
+    "weights": "They come to rest; weights that grow to the end are those of a law that drifts.",
+    "film": "The curve that is steered by and the one that was learnt are those known at that "
+    "moment; shaded slip was not known then.",
+    "path": "Outlines are the first car every few meters; the green band is the path.",
+    "errors": "The deviation is near zero where the tracker knows the tires. Diamonds mark a tire "
+    "that was handed over, red shades a broken sensor, dots where it was noticed.",
+    "steering": "A command at its limit is a car that has no more to give.",
+    "tires": "The cloud is what the tires did; a tracker is right where its curve passes through "
+    "it. Below, what each curve misses of the true one.",
+    "solve_times": "All steps must end within the period, far to the left of it.",
+    "methods": "Left is better; a line runs from the best recording to the worst.",
+    "matrix": "Off the diagonal is what counts: learnt on one drive, asked about another.",
+    "pareto": "Lower and farther left is better; the star is the default.",
+}
+
+
+def drawing(figure: Figure, caption: str, read: str = "") -> Picture:
+    """Return a figure as a picture of a report.
+
+    Parameters
+    ----------
+    figure : as the functions of `tireid.figures` return it.
+    caption : what it shows, plain text.
+    read : how to read it, plain text.
+    """
+    return Picture(image=figure_svg(figure), caption=caption, read=read)
+
+
+def recording_digest(recording: Recording) -> str:
+    """Return twelve characters that stand for the signals of a recording.
+
+    Parameters
+    ----------
+    recording : any.
+    """
+    signals = (recording.t, recording.v_x, recording.v_y, recording.r)
+    steering = (recording.delta_f, recording.delta_r)
+    return digest([signal.tolist() for signal in (*signals, *steering)])
+
+
+def origin(
+    command: str, vehicle: Vehicle, recordings: Iterable[Recording], **others: str
+) -> Section:
+    """Return what is needed to compute a report again.
+
+    Parameters
+    ----------
+    command : as it was typed.
+    vehicle : the car.
+    recordings : that were read or driven.
+    others : more lines, by their name with underscores for blanks.
+    """
+    rows = [
+        ["command", command],
+        ["tireid", __version__],
+        ["Python, machine", f"{platform.python_version()}, {platform.system()} on "
+         f"{platform.machine()}"],
+        ["car", f"{vehicle.name}, hash {digest(vehicle_numbers(vehicle))}"],
+        *(
+            [
+                "recording",
+                f"{one.name}: {len(one)} samples, {one.duration:.4g} s, hash "
+                f"{recording_digest(one)}",
+            ]
+            for one in recordings
+        ),
+        *([name.replace("_", " "), value] for name, value in others.items()),
+    ]  # fmt: skip
+    table = Table(
+        caption="What went in; equal hashes are equal numbers.",
+        header=["what", "value"],
+        rows=rows,
+        verbatim=True,
+    )
+    return Section(heading="To compute it again", blocks=[table])

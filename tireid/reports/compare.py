@@ -1,0 +1,103 @@
+"""The report of `tireid compare`: which method knows the tires best where it has not learnt."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from identifier.compare.study import Comparison, ranking
+from identifier.reproducibility import freeze_key
+from tireid.commands.compare_results import HINDSIGHT
+from tireid.report import Block, Headline, Report, Section, Table, write_report
+from tireid.reports.common import READ, REPORT, drawing, origin
+
+
+def write_compare_report(
+    folder: Path,
+    comparison: Comparison,
+    rows: Sequence[Sequence[str]],
+    figures: Mapping[str, Figure],
+    *,
+    command: str,
+) -> None:
+    """Write the report of a comparison.
+
+    Parameters
+    ----------
+    folder : where to.
+    comparison : the methods.
+    rows : its table, the header first.
+    figures : by the name of their files.
+    command : as it was typed.
+    """
+    course = comparison.course
+    captions = {
+        "methods": "Errors of every method.",
+        "matrix": "Learnt on one recording, asked about another.",
+        "pareto": "Random designs of every method.",
+    }
+    blocks: list[Block] = [
+        Table(
+            caption=f"RMSE of the axle force, front / rear, in percent of the rms force (and N), "
+            f"mean over {len(comparison.names)} recordings.",
+            header=rows[0],
+            rows=rows[1:],
+        )
+    ]
+    blocks += [
+        drawing(figures[name], text, READ[name])
+        for name, text in captions.items()
+        if name in figures
+    ]
+    report = Report(
+        title=f"Methods compared on {course.vehicle.name}",
+        summary="Every method learns on each recording, is frozen at its end and asked about all "
+        "of them.",
+        numbers=compare_headlines(comparison),
+        warnings=compare_warnings(comparison),
+        sections=[
+            Section(heading="Which method knows the tires", blocks=blocks),
+            origin(command, course.vehicle, course.recordings, seed=str(comparison.seed)),
+        ],
+    )
+    write_report(folder / REPORT, report)
+
+
+def compare_headlines(comparison: Comparison) -> list[Headline]:
+    """Return the frozen error of the best methods on recordings that they did not learn on.
+
+    Parameters
+    ----------
+    comparison : the methods.
+    """
+    numbers = []
+    elsewhere = len(comparison.names) > 1
+    for name in ranking(comparison):
+        shares = comparison.shares(name)
+        value = shares.other if elsewhere else shares.in_sample
+        if value is not None and np.isfinite(value):
+            where = "frozen, on other recordings" if elsewhere else "frozen, where learnt"
+            numbers.append(
+                Headline(f"{value:.1f} %", f"of the rms force missed by {name}, {where}")
+            )
+    return numbers[:4]
+
+
+def compare_warnings(comparison: Comparison) -> list[str]:
+    """Return what speaks against a comparison.
+
+    Parameters
+    ----------
+    comparison : the methods.
+    """
+    said = []
+    for name, trial in comparison.trials.items():
+        at = [f"{where} at {freeze_key(t)} s" for where, t in trial.diverged_at.items()]
+        if at:
+            said.append(f"{name} diverged on {', '.join(at)}.")
+    if len(comparison.names) == 1:
+        said.append("One recording: nothing says how a method does on a drive it did not learn on.")
+    if comparison.sweeps:
+        said.append(HINDSIGHT)
+    return said

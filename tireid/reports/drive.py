@@ -1,0 +1,180 @@
+"""The report of `tireid drive`: how far off the path, on what knowledge of the tires."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from models.files import digest
+from mpc.handover.rules import Verdict
+from tireid.driving.runs import Run
+from tireid.driving.setup import PERIOD
+from tireid.report import Block, Headline, Picture, Report, Section, Table, printed, write_report
+from tireid.reports.common import READ, REPORT, drawing, origin
+
+
+def write_drive_report(
+    folder: Path,
+    runs: Sequence[Run],
+    inputs: Mapping[str, Any],
+    figures: Mapping[str, Figure],
+    *,
+    headline: str,
+    film: Path | None,
+    command: str,
+) -> None:
+    """Write the report of drives along one path.
+
+    Parameters
+    ----------
+    folder : where to.
+    runs : the drives, the one that it is about first.
+    inputs : all that went in, ready for JSON.
+    figures : by the name of their files.
+    headline : the case in one line.
+    film : its file, where there is one that a page shows.
+    command : as it was typed.
+    """
+    first = runs[0]
+    report = Report(
+        title=f"{first.drive.path.name} on {first.label} tires",
+        summary=f"{headline}.",
+        numbers=drive_headlines(runs),
+        warnings=drive_warnings(runs),
+        sections=[
+            Section(heading="How the car drove", blocks=drive_blocks(runs, figures, film)),
+            Section(heading="What the tracker knew", blocks=known_blocks(runs, figures)),
+            Section(
+                heading="Was it in time?",
+                blocks=[
+                    drawing(figures["solve_times"], "How long a step took.", READ["solve_times"])
+                ],
+            ),
+            origin(
+                command,
+                first.drive.vehicle,
+                (),
+                tires=str(inputs["frozen"]),
+                all_inputs=f"hash {digest(inputs)}, listed in summary.json",
+            ),
+        ],
+    )
+    write_report(folder / REPORT, report)
+
+
+def drive_headlines(runs: Sequence[Run]) -> list[Headline]:
+    """Return how far the cars were off, and how long a step took.
+
+    Parameters
+    ----------
+    runs : the drives.
+    """
+    first = runs[0].scores
+    numbers = [
+        Headline(f"{first.rms_e_y_m:.3f} m", f"rms deviation from the path, {runs[0].label}"),
+        Headline(f"{first.peak_e_y_m:.3f} m", f"largest deviation, {runs[0].label}"),
+    ]
+    numbers += [
+        Headline(f"{run.scores.rms_e_y_m:.3f} m", f"rms deviation, {run.label}{_end(run)}")
+        for run in runs[1:]
+    ]
+    median, p99 = first.solve_ms["median"], first.solve_ms["p99"]
+    numbers.append(Headline(f"{median:.2g} / {p99:.2g} ms", "a step: median / 99 of 100"))
+    return numbers
+
+
+def _end(run: Run) -> str:
+    return "" if run.scores.completed else f", who {run.drive.ending}"
+
+
+def drive_warnings(runs: Sequence[Run]) -> list[str]:
+    """Return what went wrong on the way.
+
+    Parameters
+    ----------
+    runs : the drives.
+    """
+    said = []
+    for run in runs:
+        scores = run.scores
+        if not scores.completed:
+            where = float(run.drive.s[-1])
+            said.append(f"{run.label}: {run.drive.ending} at {where:.0f} m; its numbers end there.")
+        if scores.failures:
+            counted = ", ".join(f"{n} {name}" for name, n in scores.failures.items())
+            said.append(f"{run.label}: steps of the tracker failed: {counted}.")
+        if scores.solve_ms["p99"] > 1e3 * PERIOD:
+            said.append(f"{run.label}: one step in a hundred takes longer than the period.")
+        said += [
+            f"{run.label} at {t:.2f} s: {printed(text)}."
+            for t, text in run.drive.notes
+            if _bad(text)
+        ]
+    return said
+
+
+def _bad(text: str) -> bool:
+    return text.startswith(Verdict.FAULT.value) or "dead reckoning" in text
+
+
+def drive_table(runs: Sequence[Run], caption: str) -> Table:
+    """Return the scores of drives.
+
+    Parameters
+    ----------
+    runs : the drives.
+    caption : plain text.
+    """
+    rows = [
+        [
+            run.label,
+            f"{run.scores.rms_e_y_m:.3f}",
+            f"{run.scores.peak_e_y_m:.3f}",
+            "completed" if run.scores.completed else run.drive.ending,
+            f"{run.scores.solve_ms['median']:.3f}",
+        ]
+        for run in runs
+    ]
+    header = ["tires", "rms deviation [m]", "largest [m]", "end", "a step, median [ms]"]
+    return Table(caption=caption, header=header, rows=rows)
+
+
+def drive_blocks(
+    runs: Sequence[Run], figures: Mapping[str, Figure], film: Path | None
+) -> list[Block]:
+    """Return film, table and figures of drives.
+
+    Parameters
+    ----------
+    runs : the drives.
+    figures : by the name of their files.
+    film : its file, where there is one that a page shows.
+    """
+    blocks: list[Block] = [drive_table(runs, "Scores of the drives.")]
+    if film is not None:
+        caption = f"The drive on {runs[0].label} tires; outlines are the other cars."
+        blocks.append(Picture(image=film, caption=caption, read=READ["film"]))
+    captions = {
+        "path": "The path from above.",
+        "errors": "Deviation, heading, acceleration and speed along the path.",
+        "steering": "What was asked of the front wheels.",
+    }
+    return blocks + [drawing(figures[name], text, READ[name]) for name, text in captions.items()]
+
+
+def known_blocks(runs: Sequence[Run], figures: Mapping[str, Figure]) -> list[Block]:
+    """Return what trackers believed of the tires, and what they were told on the way.
+
+    Parameters
+    ----------
+    runs : the drives.
+    figures : by the name of their files.
+    """
+    caption = "Forces of the first drive, and what trackers believed of the tires."
+    blocks: list[Block] = [drawing(figures["tires"], caption, READ["tires"])]
+    notes = [[run.label, f"{t:.2f}", printed(text)] for run in runs for t, text in run.drive.notes]
+    if notes:
+        header = ["tires", "time [s]", "what"]
+        blocks.append(Table(caption="What was decided on the way.", header=header, rows=notes))
+    return blocks

@@ -1,0 +1,203 @@
+"""The report of `tireid identify`: what was learnt, how well it predicts, where not to ask it."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from identifier.reproducibility import AxleRmse, Replay, force_rms, freeze_key, online_error
+from identifier.run import History
+from identifier.tire_model import TireModel
+from models.files import digest
+from tireid.report import Block, Headline, Paragraph, Report, Section, Table, write_report
+from tireid.reports.common import READ, REPORT, drawing, origin
+
+AXLES = ("front", "rear")
+HEADLINES = 3  # facts of a model that stand at the top
+EXTRAPOLATED = 0.01  # share of the samples beyond the known slip that is worth a warning
+
+
+def write_identify_report(
+    folder: Path,
+    law: str,
+    model: TireModel,
+    runs: Sequence[History],
+    frozen: Mapping[str, Mapping[str, Replay]],
+    figures: Mapping[str, Figure],
+    *,
+    command: str,
+) -> None:
+    """Write the report of what was learnt, or of a network that was judged.
+
+    Parameters
+    ----------
+    folder : where to.
+    law : what learnt, as the user named it.
+    model : the frozen model.
+    runs : online, the one that was learnt on first.
+    frozen : by when it was frozen, replays by recording; the last is of the model.
+    figures : by the name of their files.
+    command : as it was typed.
+    """
+    learnt, last = runs[0], list(frozen.values())[-1]
+    sections = [
+        Section(heading="What was learnt", blocks=learnt_blocks(law, model, figures)),
+        Section(heading="How well it predicts", blocks=_errors(runs, frozen, figures)),
+        Section(
+            heading="What went in",
+            blocks=[
+                drawing(figures["inputs"], f"Signals of {learnt.recording.name}.", READ["inputs"])
+            ],
+        ),
+        origin(
+            command,
+            learnt.vehicle,
+            [run.recording for run in runs],
+            method=f"{law}, hash {digest(repr(learnt.design))}",
+        ),
+    ]
+    report = Report(
+        title=f"Tires of {learnt.vehicle.name}, learnt on {learnt.recording.name}",
+        summary=f"{learnt.recording.duration:.4g} s of driving, learnt sample by sample from "
+        "speed, lateral velocity, yaw rate and steering.",
+        numbers=identify_headlines(model, runs, last),
+        warnings=identify_warnings(model, runs),
+        sections=sections,
+    )
+    write_report(folder / REPORT, report)
+
+
+def identify_headlines(
+    model: TireModel, runs: Sequence[History], replays: Mapping[str, Replay]
+) -> list[Headline]:
+    """Return the errors of a frozen model, other drives first, and what it says of the tires.
+
+    Parameters
+    ----------
+    model : the frozen model.
+    runs : online, the one that was learnt on first.
+    replays : of the model, by recording.
+    """
+    numbers = []
+    for kind, some in (("not learnt on", runs[1:]), ("learnt on", runs[:1])):
+        shares = [share for run in some if (share := _share(run, replays)) is not None]
+        if shares:
+            meaning = f"of the rms force missed on drives {kind}, frozen"
+            numbers.append(Headline(f"{100.0 * float(np.mean(shares)):.1f} %", meaning))
+    for title, (front, rear), unit in model.facts()[:HEADLINES]:
+        scale, name = (1e3, f"k{unit}") if unit.startswith("N") and front >= 1e3 else (1.0, unit)
+        value = f"{front / scale:.3g} / {rear / scale:.3g} {'°' if name == 'deg' else name}"
+        numbers.append(Headline(value.replace(" °", "°"), f"{title}, front / rear"))
+    return numbers
+
+
+def _share(run: History, replays: Mapping[str, Replay]) -> float | None:
+    """Return the frozen error of both axles over their rms force, None without truth."""
+    size, replay = force_rms(run), replays.get(run.recording.name)
+    if size is None or replay is None or replay.against_truth is None or not size.both > 0.0:
+        return None
+    return replay.against_truth.both / size.both
+
+
+def identify_warnings(model: TireModel, runs: Sequence[History]) -> list[str]:
+    """Return what speaks against a frozen model: divergence, extrapolation, no truth.
+
+    Parameters
+    ----------
+    model : the frozen model.
+    runs : online, the one that was learnt on first.
+    """
+    said = [f"{model.vehicle.estimates}."] if model.vehicle.estimates else []
+    for run in runs:
+        name, recording = run.recording.name, run.recording
+        if run.diverged_at is not None:
+            said.append(f"{name}: learning diverged at {freeze_key(run.diverged_at)} s.")
+        if recording.axle_force is None:
+            said.append(
+                f"{name} has no true forces: errors are against what was identified online over "
+                "it, which asks only whether the model agrees with itself."
+            )
+        if model.known_slip is None:
+            continue
+        moving = recording.v_x >= model.min_speed
+        slip = np.abs(recording.alpha(model.vehicle.l_f, model.vehicle.l_r)[moving])
+        beyond = (slip > model.known_slip).mean(axis=0) if moving.any() else np.zeros(2)
+        for axle, share, known in zip(AXLES, beyond, np.degrees(model.known_slip), strict=True):
+            if share > EXTRAPOLATED:
+                said.append(
+                    f"{name}: {100.0 * share:.0f} % of the samples slip farther than is known at "
+                    f"the {axle} axle ({known:.1f}°): there the curve is a guess."
+                )
+    if model.known_slip is None:
+        said.append("This kind of model cannot tell where it knows the tires and where it guesses.")
+    return said
+
+
+def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> list[Block]:
+    """Return the numbers and the figures of a frozen model.
+
+    Parameters
+    ----------
+    law : what learnt, as the user named it.
+    model : the frozen model.
+    figures : by the name of their files.
+    """
+    facts = [[title, *(f"{v:.4g}" for v in values), unit] for title, values, unit in model.facts()]
+    blocks: list[Block] = [
+        Paragraph(
+            text="Slip has the sign of the paper, so that curves rise: positive slip pushes to the "
+            "left. curve.csv holds the curve with what is known of it, weights.json the model."
+        ),
+        Table(caption=f"The tires by {law}.", header=["", *AXLES, "unit"], rows=facts),
+        drawing(figures["slip"], "Axle force over slip angle: drive and curve.", READ["slip"]),
+    ]
+    for name, caption in (
+        ("learnt", "What was learnt over time."),
+        ("error", "Norm of the observer's error."),
+        ("weights", "Weights of the network."),
+    ):
+        if name in figures:
+            blocks.append(drawing(figures[name], caption, READ[name]))
+    return blocks
+
+
+def _errors(
+    runs: Sequence[History],
+    frozen: Mapping[str, Mapping[str, Replay]],
+    figures: Mapping[str, Figure],
+) -> list[Block]:
+    rows = []
+    for run in runs:
+        name, size = run.recording.name, force_rms(run)
+        rows.append([name, "online", *_cells(online_error(run), size)])
+        for when, replays in frozen.items():
+            error = replays[name].against_truth or replays[name].against_online
+            rows.append([name, f"frozen, {when}", *_cells(error, size)])
+    blocks: list[Block] = [
+        Table(
+            caption="RMSE of the axle force, and its share of the rms force where there is a "
+            "truth; without one it is against what was identified online.",
+            header=["drive", "", "front [N]", "share", "rear [N]", "share"],
+            rows=rows,
+        )
+    ]
+    if "forces" in figures:
+        caption = "Axle forces over time: online, and replayed with frozen weights."
+        blocks.append(drawing(figures["forces"], caption, READ["forces"]))
+    for name, figure in figures.items():
+        if name.startswith("replay_"):
+            caption = f"The frozen model asked about {name.removeprefix('replay_')}."
+            blocks.append(drawing(figure, caption, READ["replay"]))
+    return blocks
+
+
+def _cells(error: AxleRmse | None, size: AxleRmse | None) -> list[str | float | None]:
+    if error is None:
+        return [None] * 4
+    cells: list[str | float | None] = []
+    for newtons, force in zip(
+        (error.front, error.rear), (size.front, size.rear) if size else (0.0, 0.0), strict=True
+    ):
+        cells += [newtons, f"{100.0 * newtons / force:.1f} %" if force > 0.0 else None]
+    return cells
