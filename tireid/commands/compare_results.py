@@ -25,13 +25,9 @@ from tireid import __version__
 from tireid.figures import matrix_figure, methods_figure, pareto_figure, save_figure
 from tireid.output import text_table, write_json
 from tireid.progress import say
+from tireid.reports.compare import HINDSIGHT
 
 # The tables of `tireid compare` as text: percent of the rms force and newtons, front and rear.
-
-HINDSIGHT = (
-    "The best design of a sweep is chosen with the recordings that it is judged on, for every "
-    "method alike."
-)
 
 
 def summary_rows(comparison: Comparison) -> list[list[str]]:

@@ -8,9 +8,13 @@ from matplotlib.figure import Figure
 
 from identifier.compare.study import Comparison, ranking
 from identifier.reproducibility import freeze_key
-from tireid.commands.compare_results import HINDSIGHT
 from tireid.report import Block, Headline, Report, Section, Table, write_report
 from tireid.reports.common import READ, REPORT, drawing, origin
+
+HINDSIGHT = (
+    "The best design of a sweep is chosen with the recordings that it is judged on, for every "
+    "method alike."
+)
 
 
 def write_compare_report(
