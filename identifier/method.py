@@ -35,7 +35,6 @@ def steady_stiffness(model: TireModel, v_x: float) -> Array:
 
     Parameters
     ----------
-    model : frozen.
     v_x : speed of the slides [m/s], without yawing or steering.
     """
     t, zeros = np.arange(SLIDE) / 100.0, np.zeros(SLIDE)
@@ -202,7 +201,6 @@ class Method(ABC):
 
         Parameters
         ----------
-        vehicle : the car.
         driving : how hard it is driven; None takes what the method was designed for.
         """
         del vehicle, driving
@@ -241,7 +239,6 @@ class Method(ABC):
 
         Parameters
         ----------
-        vehicle : the car.
         state : carried values by port, at each of n instants (n, ...).
         """
         del vehicle, state
@@ -285,7 +282,6 @@ class Method(ABC):
 
         Parameters
         ----------
-        vehicle : the car.
         state : values of the carried ports at one instant.
 
         Raises
@@ -325,10 +321,6 @@ def vehicle_numbers(vehicle: Vehicle) -> dict[str, Any]:
     """Return the name and the six numbers of the bicycle by the words of a vehicle file, SI.
 
     Where some of them are estimated, `estimated` lists which.
-
-    Parameters
-    ----------
-    vehicle : the car.
     """
     numbers = {key: getattr(vehicle, key) for key in VEHICLE_KEYS}
     return numbers | ({"estimated": list(vehicle.estimated)} if vehicle.estimated else {})

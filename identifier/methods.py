@@ -91,7 +91,6 @@ def make_method(name: str, vehicle: Vehicle, seed: int = 0) -> Method:
     Parameters
     ----------
     name : one of `METHODS`.
-    vehicle : the car.
     seed : seed of the initial weights, where there are random ones.
 
     Raises
@@ -110,7 +109,6 @@ def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01) -> Method:
     Parameters
     ----------
     model : what was learnt.
-    vehicle : the car.
     dt : sampling interval [s].
 
     Raises
@@ -128,8 +126,6 @@ def certify(method: Method, vehicle: Vehicle, driving: Driving | None = None) ->
 
     Parameters
     ----------
-    method : any method.
-    vehicle : the car.
     driving : how hard it is driven; None takes what the method was designed for.
     """
     return method.certify(vehicle, driving)

@@ -241,7 +241,6 @@ class OnnxModel(TireModel):
         Parameters
         ----------
         path : the ONNX file.
-        vehicle : the car.
         min_speed : below this speed [m/s] the forces read zero.
         inputs : what the network's columns are; None goes by names and number.
         slip_sign : 1 where the network's slip angles have the paper's sign, -1 for ISO 8855.

@@ -33,12 +33,7 @@ class SampleLimits(NamedTuple):
 
     @classmethod
     def of(cls, vehicle: Vehicle) -> "SampleLimits":
-        """Return the limits of a car, by its size and weight.
-
-        Parameters
-        ----------
-        vehicle : the car.
-        """
+        """Return the limits of a car, by its size and weight."""
         return cls(
             speed=FROUDE * vehicle.froude_speed,
             yaw_rate=TURN * math.sqrt(GRAVITY / vehicle.wheelbase),

@@ -128,7 +128,6 @@ def check_sampling(recording: Recording, design: Method) -> None:
     Parameters
     ----------
     recording : what the design is to run over.
-    design : the method.
 
     Raises
     ------
@@ -198,7 +197,6 @@ class OnlineIdentifier:
 
     Parameters
     ----------
-    method : the method.
     vehicle : the car, as far as the method knows it.
     dt : interval at which `update` is called [s].
     start : stored weights to begin with; None begins afresh.

@@ -138,6 +138,22 @@ class TireModel(ABC):
         """Whether forces are in static axle loads, so that another car's model scales to a car."""
         return False
 
+    def mounted_on(self, vehicle: Vehicle) -> "TireModel":
+        """Return the tires on another car, their forces scaled by its static axle loads.
+
+        Parameters
+        ----------
+        vehicle : that carries them.
+
+        Raises
+        ------
+        ValueError
+            Where forces do not scale with load.
+        """
+        raise ValueError(
+            f"forces of a {type(self).__name__} do not scale with load: {vehicle.name}"
+        )
+
     @property
     def reference_speed(self) -> float:
         """Speed [m/s] at which a force that depends on it is given, 4 sqrt(g L): brisk driving."""
@@ -281,21 +297,12 @@ class TireModel(ABC):
         return ca.densify(ca.vertcat(v_y_dot, r_dot, slip_rate)), ca.densify(force)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the model as JSON.
-
-        Parameters
-        ----------
-        path : the file.
-        """
+        """Write the model as JSON."""
         write_atomically(path, json.dumps(self.to_dict(), indent=2) + "\n")
 
     @staticmethod
     def load(path: str | PathLike[str]) -> "TireModel":
         """Read a model of any kind, as `save` wrote it.
-
-        Parameters
-        ----------
-        path : the file.
 
         Raises
         ------
@@ -322,7 +329,6 @@ def drift(vehicle: Vehicle, slope: Any, v_x: Any) -> Any:
 
     Parameters
     ----------
-    vehicle : the car.
     slope : -(v_y ± l r)/v_x at the axles, (2,): the slip angle where it is small.
     v_x : longitudinal speed [m/s].
     """

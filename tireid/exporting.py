@@ -149,8 +149,6 @@ def export_method(
 
     Parameters
     ----------
-    method : the method.
-    vehicle : the car.
     start : model to begin with; None begins afresh.
     folder : to write.
     name : prefix of every symbol.
@@ -204,7 +202,6 @@ def write_files(folder: Path, package: Package, figures: str, costs: Sequence[Co
     Parameters
     ----------
     folder : an empty folder.
-    package : the package.
     figures : what it costs, as Markdown.
     costs : what it costs, for the JSON file.
     """

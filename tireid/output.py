@@ -154,10 +154,6 @@ def _read_marker(folder: Path) -> Written | None:
 def foreign(folder: Path) -> str | None:
     """Return the first thing below a folder that is not as a run of tireid wrote it, or None.
 
-    Parameters
-    ----------
-    folder : any.
-
     Raises
     ------
     OSError
@@ -271,7 +267,6 @@ def write_json(path: Path, data: Any) -> None:
 
     Parameters
     ----------
-    path : the file.
     data : dictionaries, lists, numbers, strings and None.
     """
     path.write_text(json.dumps(_finite(data), indent=2, allow_nan=False) + "\n", encoding="utf-8")
@@ -292,7 +287,6 @@ def write_csv(path: Path, columns: dict[str, NDArray[np.float64]]) -> None:
 
     Parameters
     ----------
-    path : the file.
     columns : name with unit, to values (n,).
     """
     table = np.column_stack(list(columns.values()))

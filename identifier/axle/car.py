@@ -45,7 +45,6 @@ def axle_impulse(car: Car, v_y: Any, r: Any) -> Any:
 
     Parameters
     ----------
-    car : the car.
     v_y : lateral velocity [m/s].
     r : yaw rate [rad/s].
     """

@@ -242,7 +242,6 @@ class AxleIdentifier(Method):
 
         Parameters
         ----------
-        vehicle : the car.
         state : W (k, 2, n) and own (k, 2, 3) at each of k instants.
         """
         W, compliance = state["W"], state["own"][:, :, 0]
@@ -259,7 +258,6 @@ class AxleIdentifier(Method):
 
         Parameters
         ----------
-        vehicle : the car.
         state : W (2, n), own (2, 3), UD (2, q (q + 1)/2) and excitation (2, 9).
         """
         return AxleModel(

@@ -1,6 +1,6 @@
 """The axle model, frozen: force curves of slip, their lag and sway, and where they are known."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -37,7 +37,6 @@ class AxleModel(TireModel):
 
     Parameters
     ----------
-    vehicle : the car.
     ladder : slip scales α_j of the units [rad].
     sway : roll of the body.
     plausibility : which samples are believed.
@@ -187,6 +186,10 @@ class AxleModel(TireModel):
     def scales_with_load(self) -> bool:
         """Whether forces are in static axle loads, so that another car's model scales to a car."""
         return True
+
+    def mounted_on(self, vehicle: Vehicle) -> "AxleModel":
+        """Return the tires on another car, their forces scaled by its static axle loads."""
+        return replace(self, vehicle=vehicle)
 
     @property
     def lagged(self) -> bool:

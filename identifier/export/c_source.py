@@ -59,7 +59,6 @@ def c_sources(specialized: SpecializedStep, *, single: bool, about: Values) -> d
 
     Parameters
     ----------
-    specialized : the step.
     single : whether float is the default precision.
     about : title, method, version and hash.
 

@@ -98,7 +98,6 @@ class CompiledPackage:
 
         Parameters
         ----------
-        package : the package.
         single : whether to compute in float; None takes the package's default.
         """
         manifest = json.loads(package.files[f"{package.specialized.name}.json"])
@@ -273,11 +272,6 @@ class CompiledPackage:
 
 
 def samples_of(recording: Recording) -> Array:
-    """Return a recording as samples (n, 5) in the order of the inputs.
-
-    Parameters
-    ----------
-    recording : the recording.
-    """
+    """Return a recording as samples (n, 5) in the order of the inputs."""
     columns = (recording.v_x, recording.v_y, recording.r, recording.delta_f, recording.delta_r)
     return np.column_stack(columns)

@@ -105,10 +105,6 @@ def token_header(token: str) -> str:
 def model_files(specialized: SpecializedStep) -> dict[str, str]:
     """Return header and sources of the C package by file name.
 
-    Parameters
-    ----------
-    specialized : the step.
-
     Raises
     ------
     UnknownOperationError
@@ -156,12 +152,7 @@ class Variable(NamedTuple):
 
 
 def variables(specialized: SpecializedStep) -> tuple[Variable, ...]:
-    """Return the variables of a step.
-
-    Parameters
-    ----------
-    specialized : the step.
-    """
+    """Return the variables of a step."""
     inputs = (
         Variable(1 + i, port.name, "real", "input", "continuous", "0", port.unit, port.description)
         for i, port in enumerate(specialized.inputs)
@@ -259,7 +250,6 @@ def description_2(specialized: SpecializedStep, token: str, sources: Sequence[st
 
     Parameters
     ----------
-    specialized : the step.
     token : the GUID.
     sources : names of the C files.
     """
@@ -308,7 +298,6 @@ def description_3(specialized: SpecializedStep, token: str) -> str:
 
     Parameters
     ----------
-    specialized : the step.
     token : the instantiation token.
     """
     table = variables(specialized)
@@ -358,7 +347,6 @@ def build_description(specialized: SpecializedStep, sources: Sequence[str]) -> s
 
     Parameters
     ----------
-    specialized : the step.
     sources : names of the C files.
     """
     files = (element("SourceFile", {"name": name}) for name in sources)
@@ -494,7 +482,6 @@ def fmu_text(specialized: SpecializedStep, version: Version) -> dict[str, str]:
 
     Parameters
     ----------
-    specialized : the step.
     version : of FMI, 2 or 3.
     """
     shared = model_files(specialized)

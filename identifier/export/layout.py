@@ -60,12 +60,7 @@ class Member(NamedTuple):
 
 
 def carried_members(specialized: SpecializedStep) -> list[Member]:
-    """Return the carried ports in their order.
-
-    Parameters
-    ----------
-    specialized : the step.
-    """
+    """Return the carried ports in their order."""
     return [
         Member(signal, specialized.function.size_in(signal.name), signal.name in specialized.learnt)
         for signal in specialized.state
@@ -73,12 +68,7 @@ def carried_members(specialized: SpecializedStep) -> list[Member]:
 
 
 def output_members(specialized: SpecializedStep) -> list[Member]:
-    """Return the outputs in their order.
-
-    Parameters
-    ----------
-    specialized : the step.
-    """
+    """Return the outputs in their order."""
     return [
         Member(signal, specialized.function.size_out(signal.name), False)
         for signal in specialized.outputs
@@ -90,7 +80,6 @@ def read_expression(specialized: SpecializedStep, port: int, entry: int) -> str:
 
     Parameters
     ----------
-    specialized : the step.
     port : number of the input.
     entry : counted by columns.
     """
@@ -106,7 +95,6 @@ def write_expression(specialized: SpecializedStep, port: int, entry: int) -> str
 
     Parameters
     ----------
-    specialized : the step.
     port : number of the output.
     entry : counted by columns.
     """

@@ -152,7 +152,6 @@ def network_graph(model: NetworkModel, *, single: bool = False) -> bytes:
 
     Parameters
     ----------
-    model : the frozen network.
     single : whether numbers are float32; else they are float64.
     """
     graph = Graph(single)
@@ -216,7 +215,6 @@ def axle_graph(model: AxleModel, *, single: bool = False) -> bytes:
 
     Parameters
     ----------
-    model : the frozen axle model.
     single : whether numbers are float32; else they are float64.
     """
     graph = Graph(single)
@@ -278,7 +276,6 @@ def export_onnx(model: TireModel, path: Path, *, single: bool = False) -> None:
     Parameters
     ----------
     model : see `onnx_bytes`.
-    path : the file.
     single : whether numbers are float32; else they are float64.
 
     Raises

@@ -39,7 +39,6 @@ def ingredients(specialized: SpecializedStep, *, single: bool) -> dict[str, Any]
 
     Parameters
     ----------
-    specialized : the step.
     single : whether float is the default precision.
     """
     method = specialized.method
@@ -79,7 +78,6 @@ def certificate(method: Method, vehicle: Vehicle) -> dict[str, Any]:
     Parameters
     ----------
     method : what was exported.
-    vehicle : the car.
     """
     if method.judged_by:
         return {"verdict": f"judged by {method.judged_by}", "held_by_construction": {}}
@@ -92,7 +90,6 @@ def summary(specialized: SpecializedStep, content: Mapping[str, Any]) -> dict[st
 
     Parameters
     ----------
-    specialized : the step.
     content : what `ingredients` returned.
     """
     return {
@@ -175,7 +172,6 @@ def run_in_virtual_machine(
 
     Parameters
     ----------
-    specialized : the step.
     samples : (n, 5) in the order of the inputs.
     """
     carry = [ca.DM(value) for value in specialized.carry.values()]
@@ -208,25 +204,14 @@ def run_in_virtual_machine(
 
 
 def vectors(specialized: SpecializedStep) -> Vectors:
-    """Return the self-test of a package.
-
-    Parameters
-    ----------
-    specialized : the step.
-    """
+    """Return the self-test of a package."""
     samples = synthetic_samples(specialized)
     outputs, _ = run_in_virtual_machine(specialized, samples)
     return Vectors(samples, outputs[:, :2])
 
 
 def vectors_header(specialized: SpecializedStep, found: Vectors) -> str:
-    """Return the vectors as a C header.
-
-    Parameters
-    ----------
-    specialized : the step.
-    found : the vectors.
-    """
+    """Return the vectors as a C header."""
     double, single = tolerances(specialized)
     kept = rules([member for member in carried_members(specialized) if member.learnt])
     negative = [f"#define VECTOR_NOT_NEGATIVE {rule.first}U /* a weight */\n" for rule in kept]
@@ -268,7 +253,6 @@ def build_package(
     Parameters
     ----------
     method : the method with its numbers.
-    vehicle : the car.
     start : weights to begin with; None begins with those of the method.
     name : beginning of every symbol and file name.
     single : whether float is the default precision.
@@ -300,12 +284,7 @@ def _programs(specialized: SpecializedStep) -> dict[str, str]:
 
 
 def tolerances(specialized: SpecializedStep) -> tuple[str, str]:
-    """Return the largest difference of a force that the self-test allows [N], double and float.
-
-    Parameters
-    ----------
-    specialized : the step.
-    """
+    """Return the largest difference of a force that the self-test allows [N], double and float."""
     force = specialized.limits.force
     return f"{TOLERANCE_DOUBLE * force:.2g}", f"{TOLERANCE_SINGLE * force:.2g}"
 

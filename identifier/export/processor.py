@@ -156,7 +156,6 @@ def replay_here(
 
     Parameters
     ----------
-    compiler : its command.
     name : of the package.
     files : its texts by path.
     samples : (n, 5) in the order of the inputs, SI.
@@ -346,7 +345,6 @@ def measure(package: Package, progress: Callable[[float], None] | None = None) -
 
     Parameters
     ----------
-    package : the package.
     progress : called with the share that is done.
     """
     if missing_tools():

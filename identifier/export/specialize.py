@@ -88,7 +88,6 @@ def specialize(
     Parameters
     ----------
     method : the method, with its numbers.
-    vehicle : the car.
     start : weights to begin with; None begins with those of the method.
     name : C identifier.
 

@@ -149,7 +149,6 @@ class PaperIdentifier(Method):
 
         Parameters
         ----------
-        vehicle : the car.
         law : one of `VARIANTS`.
         network : structure; None takes `natural_network`.
         dt : sampling interval [s].
@@ -187,7 +186,6 @@ class PaperIdentifier(Method):
 
         Parameters
         ----------
-        vehicle : the car.
         driving : how hard it is driven; None takes what it was designed for, else
             `natural_driving`.
         """
@@ -198,7 +196,6 @@ class PaperIdentifier(Method):
 
         Parameters
         ----------
-        vehicle : the car.
         driving : how hard it is driven; None takes what it was designed for, else
             `natural_driving`.
         """
@@ -260,7 +257,6 @@ class PaperIdentifier(Method):
 
         Parameters
         ----------
-        vehicle : the car.
         state : W (2, n_h) and V (n_h, n_in).
         """
         return NetworkModel(
@@ -328,7 +324,6 @@ def design_for(
 
     Parameters
     ----------
-    vehicle : the car.
     driving : how hard it is driven; it is stored with the design.
     law : "integral", "instantaneous" or "pi_lead", which gets the lead τ = 1/a.
     network : structure; None takes `natural_network`.
@@ -457,12 +452,7 @@ def read_design(path: Path) -> PaperIdentifier:
 
 
 def design_text(design: PaperIdentifier) -> str:
-    """Return a design as TOML that `read_design` reads back exactly.
-
-    Parameters
-    ----------
-    design : the design.
-    """
+    """Return a design as TOML that `read_design` reads back exactly."""
     lines = [
         _line(design, field.name) for field in fields(PaperIdentifier) if field.name not in TABLES
     ]

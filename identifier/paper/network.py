@@ -147,7 +147,6 @@ def network_signals(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> 
 
     Parameters
     ----------
-    parameters : of the bicycle.
     v_x : longitudinal speed [m/s], not zero.
     x : [v_y, r] (2,).
     u : [δ_f, δ_r] (2,).

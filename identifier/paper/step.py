@@ -88,7 +88,6 @@ def plausible(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
 
     Parameters
     ----------
-    parameters : of the bicycle.
     v_x : longitudinal speed, at least the minimum speed [m/s].
     x : [v_y, r] (2,).
     u : [δ_f, δ_r] (2,).

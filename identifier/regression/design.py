@@ -96,7 +96,6 @@ class RegressionIdentifier(Method):
 
         Parameters
         ----------
-        vehicle : the car.
         law : one of `LAWS`.
         network : structure; None takes `natural_network`.
         memory : number of pairs that concurrent learning keeps, twice the hidden units or so.
@@ -185,7 +184,6 @@ class RegressionIdentifier(Method):
 
         Parameters
         ----------
-        vehicle : the car.
         state : W (2, n_h) and V (n_h, n_in).
         """
         return NetworkModel(

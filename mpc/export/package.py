@@ -192,7 +192,6 @@ def vectors_header(name: str, found: Vectors) -> str:
     Parameters
     ----------
     name : of the package.
-    found : the vectors.
     """
     return header(
         f"{name}_vectors.h",
@@ -257,7 +256,6 @@ def build_mpc_package(
     Parameters
     ----------
     tire : of the prediction, with its car.
-    problem : what to minimize.
     period : between two steps [s].
     delay : from a measurement until its command acts [s].
     name : beginning of every symbol and file name.

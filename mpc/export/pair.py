@@ -60,7 +60,6 @@ def handover_sources(identifier: Package, tracker: MpcPackage) -> dict[str, str]
 
     Parameters
     ----------
-    identifier : package of the identifier.
     tracker : package of the tracker, `<name>_mpc`, for the tire of `frozen_start`.
 
     Raises

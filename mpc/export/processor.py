@@ -85,7 +85,6 @@ def replay_here(
     Parameters
     ----------
     package : of the tracker.
-    compiler : its command.
     single : whether to compute in float.
     steps : how many vectors.
     flags : of the compiler.
@@ -116,7 +115,8 @@ def _replayed(
             (folder / path).parent.mkdir(exist_ok=True)
             (folder / path).write_text(text, encoding="utf-8")
         for board in ("board.c", "host.c", "machine.h", "mps2.ld"):
-            (folder / board).write_text((BOARD / board).read_text(encoding="utf-8"))
+            source = (BOARD / board).read_text(encoding="utf-8")
+            (folder / board).write_text(source, encoding="utf-8")
         replay = (TARGET / "replay.c").read_text(encoding="utf-8")
         (folder / "replay.c").write_text(renamed(replay, {PREFIX: name}), encoding="utf-8")
         sources = sorted(path for path in package.files if path.startswith("src/"))

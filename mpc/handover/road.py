@@ -10,8 +10,6 @@ from mpc.handover.certificate import tire_complaint
 from mpc.handover.judge import ChiSquare, Judge, Window
 from mpc.handover.rules import Rules, Verdict
 from mpc.tires import PredictionTire
-from mpc.tires.ladder import N_AXLE, N_COMMON, LadderAxles
-from mpc.tires.network import NetworkAxles
 
 # A tire on a road of another friction, and the friction that explains the last moments best.
 #
@@ -36,13 +34,6 @@ class FrictionFit(NamedTuple):
     gain: float
 
 
-def can_scale(tire: PredictionTire) -> bool:
-    """Return whether a tire can be told for another friction."""
-    if isinstance(tire.structure, NetworkAxles):
-        return "v_x" not in tire.structure.inputs
-    return isinstance(tire.structure, LadderAxles)
-
-
 def at_friction(tire: PredictionTire, ratio: float) -> PredictionTire:
     """Return a tire where the friction is another.
 
@@ -58,19 +49,16 @@ def at_friction(tire: PredictionTire, ratio: float) -> PredictionTire:
     """
     if not 0.0 < ratio < math.inf:
         raise ValueError(f"ratio must be positive, it is {ratio}")
-    structure, w = tire.structure, tire.weights.copy()
-    if not can_scale(tire):
-        raise ValueError(f"a {type(structure).__name__} cannot be told for another friction")
-    if isinstance(structure, LadderAxles):
-        n = structure.units
-        w[N_COMMON : N_COMMON + n] /= ratio  # 1/α_j
-        axles = w[N_COMMON + n :].reshape(2, -1)  # a view
-        axles[:, N_AXLE:] *= ratio
-    elif isinstance(structure, NetworkAxles):  # C α is its own similar
-        end = 2 + 2 * structure.hidden
-        w[2:end] *= ratio
-        w[end:] /= ratio
-    return tire._replace(weights=w)
+    weights = tire.structure.at_friction(tire.weights, ratio)
+    if weights is None:
+        kind = type(tire.structure).__name__
+        raise ValueError(f"a {kind} cannot be told for another friction")
+    return tire._replace(weights=weights)
+
+
+def can_scale(tire: PredictionTire) -> bool:
+    """Return whether a tire can be told for another friction."""
+    return tire.structure.at_friction(tire.weights, 1.0) is not None
 
 
 def fit_friction(

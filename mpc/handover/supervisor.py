@@ -15,7 +15,6 @@ from mpc.handover.judge import ChiSquare, Judge, Window
 from mpc.handover.road import Road, look_at_road
 from mpc.handover.rules import Decision, Rules, Verdict
 from mpc.tires import PredictionTire, prediction_tire
-from mpc.tires.ladder import LadderAxles
 
 # Has the car been driven so that there was something to learn, and where was it learnt?
 
@@ -82,7 +81,7 @@ class Excitation:
         ----------
         tire : to be judged.
         """
-        if isinstance(tire.structure, LadderAxles):
+        if tire.structure.saturates:
             return LARGEST_SLIP
         return float(np.clip(BEYOND * self._largest.min(), 2.0 * LEARNS, LARGEST_SLIP))
 

@@ -19,6 +19,7 @@ from mpc.tires.tire import (
     PredictionTire,
     TireStructure,
     no_lag,
+    one_friction,
     small_slip,
     wheel_slip,
 )
@@ -66,6 +67,8 @@ class DugoffAxles:
 
     slip = wheel_slip
     lag_length = no_lag
+    at_friction = one_friction
+    saturates = False
     force = limited(_dugoff)
 
 
@@ -78,6 +81,8 @@ class FialaAxles:
 
     slip = wheel_slip
     lag_length = no_lag
+    at_friction = one_friction
+    saturates = False
     force = limited(_fiala)
 
 
@@ -90,6 +95,8 @@ class MagicAxles:
 
     slip = wheel_slip
     lag_length = no_lag
+    at_friction = one_friction
+    saturates = False
 
     def force(self, slip: Pair, at: Point) -> Pair:
         """Return the axle forces [N], frame of the body."""
@@ -115,6 +122,8 @@ class LinearAxles:
 
     slip = small_slip
     lag_length = no_lag
+    at_friction = one_friction
+    saturates = False
 
     def force(self, slip: Pair, at: Point) -> Pair:
         """Return the axle forces [N], frame of the body."""

@@ -42,6 +42,8 @@ class LadderAxles:
     lagged : whether the slip lags; else the lag's weights are there and do nothing.
     """
 
+    saturates = True
+
     units: int
     lagged: bool = True
 
@@ -73,6 +75,14 @@ class LadderAxles:
             slope = ca.dot(axle.W * per_scale, 1 - T * T)
             lengths.append(ca.fmax(axle.compliance * slope + at.w[2], axle.least))
         return lengths[0], lengths[1]
+
+    def at_friction(self, weights: Array, ratio: float) -> Array:
+        """Return the weights where friction is another: 1/α_j over it, W times it."""
+        w, n = weights.copy(), self.units
+        w[N_COMMON : N_COMMON + n] /= ratio  # 1/α_j
+        axles = w[N_COMMON + n :].reshape(2, -1)  # a view
+        axles[:, N_AXLE:] *= ratio
+        return w
 
     def _weights(self, w: Any) -> tuple[Any, tuple[Axle, Axle]]:
         n, size = self.units, N_AXLE + self.units

@@ -11,7 +11,7 @@ from codegen.arrays import Array
 from identifier.own_network import OnnxModel, read_network
 from identifier.paper.network import NetworkModel, network_signals
 from models.bicycle import BicycleParameters
-from mpc.tires.tire import Pair, Point, PredictionTire, no_lag, small_slip
+from mpc.tires.tire import Pair, Point, PredictionTire, no_lag, one_friction, small_slip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,6 +27,7 @@ class NetworkAxles:
     """
 
     lagged = False
+    saturates = False
 
     hidden: int
     inputs: tuple[str, ...]
@@ -38,6 +39,15 @@ class NetworkAxles:
 
     slip = small_slip
     lag_length = no_lag
+
+    def at_friction(self, weights: Array, ratio: float) -> Array | None:
+        """Return the weights where friction is another; None where the network reads the speed."""
+        if "v_x" in self.inputs:
+            return None
+        w, end = weights.copy(), 2 + 2 * self.hidden  # C α is its own similar
+        w[2:end] *= ratio
+        w[end:] /= ratio
+        return w
 
     def force(self, slip: Pair, at: Point) -> Pair:
         """Return the axle forces [N], frame of the body."""
@@ -98,6 +108,8 @@ class OnnxAxles:
 
     slip = small_slip
     lag_length = no_lag
+    at_friction = one_friction
+    saturates = False
 
     def force(self, slip: Pair, at: Point) -> Pair:
         """Return the axle forces [N], frame of the body."""

@@ -73,6 +73,21 @@ class TireStructure(Protocol):
         slip : lagged slip [rad].
         """
 
+    @property
+    def saturates(self) -> bool:
+        """Whether forces saturate whatever the weights: judged at any slip, not only where seen."""
+
+    def at_friction(self, weights: Array, ratio: float) -> Array | None:
+        """Return the weights where friction is another; None where no weights say it.
+
+        Similarity: φ(α) = μ φ₀(α/μ): the stiffness stays, force and slip of the peak shrink.
+
+        Parameters
+        ----------
+        weights : (n_weights,).
+        ratio : friction over the one that the weights have [-].
+        """
+
 
 class PredictionTire(NamedTuple):
     """A structure with its weights (n_weights,), and the car that they are of."""
@@ -102,6 +117,17 @@ def small_slip(self: TireStructure, at: Point) -> Pair:
     v_y, r, delta, v_x, car, _ = at
     per_speed = 1 / v_x
     return delta - (v_y + car.l_f * r) * per_speed, -(v_y - car.l_r * r) * per_speed
+
+
+def one_friction(self: TireStructure, weights: Array, ratio: float) -> None:
+    """Return None: weights cannot say another friction. A method `at_friction`.
+
+    Parameters
+    ----------
+    weights : not looked at, (n_weights,).
+    ratio : not looked at.
+    """
+    del self, weights, ratio
 
 
 def no_lag(self: TireStructure, slip: Pair, at: Point) -> Pair:

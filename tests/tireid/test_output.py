@@ -424,7 +424,7 @@ def test_a_run_that_is_killed_leaves_the_old_folder_or_the_new_one(tmp_path, at_
     seen, lost = {{"begin"}}, 0
     for i in range(60):
         child = forked(lambda: write(f"run {{i}}", force=True))
-        time.sleep(random.uniform(0.0, 1.3 * lasts))
+        time.sleep(random.uniform(0.0, (0.5 + i / 15) * lasts))  # on a busy machine, later
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
         folder = out

@@ -176,12 +176,7 @@ class Ground:
         return [*marks, self._forces], [*names, "forces"]
 
     def show(self, now: Instant) -> None:
-        """Move everything to where it is.
-
-        Parameters
-        ----------
-        now : the instant.
-        """
+        """Move everything to where it is."""
         drive, (k, t, view) = self._drives[0], now
         self._grid.set_segments(self._grid_lines(view))
         around = drive.s[k] + np.linspace(-SHOWN, SHOWN, 121)
@@ -257,7 +252,6 @@ def sample_at(drive: Drive, t: float) -> int:
 
     Parameters
     ----------
-    drive : the drive.
     t : time [s].
     """
     return min(int(np.searchsorted(drive.t, t)), drive.t.size - 1)

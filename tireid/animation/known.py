@@ -38,7 +38,7 @@ class Curves:
 
         Parameters
         ----------
-        weights : of the tire.
+        weights : of the tire, (n_weights,).
         """
         force: Array = np.array(self._force(self.alpha[None], weights)).T
         return force
@@ -50,7 +50,6 @@ def steady_curve(label: str, model: PredictionTire, v_x: float) -> TireCurve:
     Parameters
     ----------
     label : what legends call it.
-    model : the tire.
     v_x : speed [m/s], which a network may look at.
     """
     curves = Curves(model, v_x)

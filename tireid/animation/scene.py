@@ -48,8 +48,6 @@ class ForcePanel:
 
     Parameters
     ----------
-    axes : the panel.
-    drive : the drive.
     curves : the tires.
     axle : 0 is the front axle, 1 the rear.
     known : what was known over time; None where nothing was learnt, so that nothing changes.
@@ -114,12 +112,7 @@ class ForcePanel:
         return marks, names
 
     def show(self, now: Instant) -> None:
-        """Move everything to where it is, and curves to what was known then.
-
-        Parameters
-        ----------
-        now : the instant.
-        """
+        """Move everything to where it is, and curves to what was known then."""
         part = slice(max(0, now.k - TAIL), now.k + 1)
         self._tail.set_data(self._alpha[part], self._force[part])
         self._now.set_data(self._alpha[now.k : now.k + 1], self._force[now.k : now.k + 1])
@@ -146,7 +139,6 @@ class DeviationPanel:
 
     Parameters
     ----------
-    axes : the panel.
     drives : by the name in the legend, along one path; the first is in the middle.
     drops : arc length [m] and friction from there on.
     """
@@ -173,12 +165,7 @@ class DeviationPanel:
         _small(axes)
 
     def show(self, now: Instant) -> None:
-        """Move everything to where it is.
-
-        Parameters
-        ----------
-        now : the instant.
-        """
+        """Move everything to where it is."""
         for drive, line in zip(self._drives, self._lines, strict=True):
             part = drive.t <= now.t
             line.set_data(drive.s[part], drive.e_y[part])
@@ -189,7 +176,6 @@ class Overview:
 
     Parameters
     ----------
-    axes : the panel.
     drives : by the name in the legend, along one path; the first is in the middle.
     """
 
@@ -214,12 +200,7 @@ class Overview:
         ]
 
     def show(self, now: Instant) -> None:
-        """Move everything to where it is.
-
-        Parameters
-        ----------
-        now : the instant.
-        """
+        """Move everything to where it is."""
         for drive, dot in zip(self._drives, self._dots, strict=True):
             k = sample_at(drive, now.t)
             dot.set_data([drive.X[k]], [drive.Y[k]])

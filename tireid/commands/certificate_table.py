@@ -27,8 +27,6 @@ def certificate_of(
 
     Parameters
     ----------
-    design : the design.
-    vehicle : the car.
     driving : how hard it is driven; None takes `natural_driving`.
     """
     return certify(design, vehicle, driving)
@@ -39,7 +37,6 @@ def certificate_rows(certificate: Certificate, force_unit: float) -> list[list[s
 
     Parameters
     ----------
-    certificate : the properties.
     force_unit : the unit U of the design [N].
     """
     return [
@@ -59,7 +56,6 @@ def certificate_text(certificate: Certificate, force_unit: float) -> str:
 
     Parameters
     ----------
-    certificate : the properties.
     force_unit : the unit U of the design [N].
     """
     rows = [list(HEADER), *certificate_rows(certificate, force_unit)]
@@ -76,7 +72,6 @@ def held_text(name: str, certificate: Certificate, vehicle: Vehicle) -> str:
     ----------
     name : of the method.
     certificate : what is proven of it.
-    vehicle : the car.
     """
     default = ", the default of tireid identify" if name == DEFAULT else ""
     rows = [
@@ -99,22 +94,12 @@ def held_text(name: str, certificate: Certificate, vehicle: Vehicle) -> str:
 
 
 def advised(certificate: Certificate) -> list[Property]:
-    """Return the properties that do not pass and say what to do.
-
-    Parameters
-    ----------
-    certificate : the properties.
-    """
+    """Return the properties that do not pass and say what to do."""
     return [e for e in certificate.properties if e.advice and e.status != "pass"]
 
 
 def notes(certificate: Certificate) -> list[str]:
-    """Return what is to be said of values that are only stated, each remark once.
-
-    Parameters
-    ----------
-    certificate : the properties.
-    """
+    """Return what is to be said of values that are only stated, each remark once."""
     titles: dict[str, list[str]] = {}
     for entry in certificate.properties:
         if entry.limit is None and entry.advice:
@@ -124,12 +109,7 @@ def notes(certificate: Certificate) -> list[str]:
 
 
 def verdict_line(certificate: Certificate) -> str:
-    """Return the verdict and the margins in one line.
-
-    Parameters
-    ----------
-    certificate : the properties.
-    """
+    """Return the verdict and the margins in one line."""
     gain, phase = certificate["gain_sampled"], certificate["phase_margin"]
     worst = [e.title for e in certificate.properties if e.status == certificate.verdict]
     reason = "" if certificate.verdict == "pass" else f" ({'; '.join(worst)})"
@@ -146,7 +126,6 @@ def resumed_line(certificate: Certificate, design: PaperIdentifier, first: Weigh
 
     Parameters
     ----------
-    certificate : of the design.
     design : with its projection.
     first : weights that learning begins with.
     """
@@ -222,7 +201,6 @@ def bound_rows(certificate: Certificate, observed: Observed) -> list[Row]:
 
     Parameters
     ----------
-    certificate : of the design.
     observed : the drives.
     """
     known = {entry.name: entry for entry in certificate.properties}

@@ -79,10 +79,7 @@ def draw_check(
     ----------
     folder : where to, made if missing.
     recording : a drive, for the error to compare the bounds with.
-    vehicle : the car.
-    design : the design.
     operation : what its certificate knows.
-    certificate : its certificate.
     """
     folder.mkdir(parents=True, exist_ok=True)
     chosen = LAWS[design.law]
@@ -182,12 +179,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; return 0, or 1 where the design fails.
-
-    Parameters
-    ----------
-    options : parsed arguments.
-    """
+    """Run the command; return 0, or 1 where the design fails."""
     _require_sense(options)
     vehicle = read_vehicle(options)
     name, method = _method(options, vehicle)

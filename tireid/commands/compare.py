@@ -91,12 +91,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the command.
-
-    Parameters
-    ----------
-    options : parsed arguments.
-    """
+    """Run the command."""
     for name, least in (("sweep", 0), ("floor", 0)):
         if getattr(options, name) < least:
             raise ValueError(f"--{name} must be at least {least}, it is {getattr(options, name)}")

@@ -328,12 +328,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the command.
-
-    Parameters
-    ----------
-    options : parsed arguments.
-    """
+    """Run the command."""
     watch = Stopwatch()
     with (
         output_folder(options.out, force=options.force) as folder,

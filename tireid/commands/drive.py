@@ -216,12 +216,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; return 0 where the first car reached the end of the path, else 1.
-
-    Parameters
-    ----------
-    options : parsed arguments.
-    """
+    """Run the command; return 0 where the first car reached the end of the path, else 1."""
     labels = labels_of(options.tires)
     conditions = conditions_of(options)
     setup = conditions.setup

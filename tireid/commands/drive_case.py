@@ -136,10 +136,6 @@ def labels_of(words: Sequence[str]) -> list[str]:
 def conditions_of(options: argparse.Namespace) -> Conditions:
     """Return what is to be driven.
 
-    Parameters
-    ----------
-    options : parsed arguments.
-
     Raises
     ------
     ValueError
@@ -263,7 +259,6 @@ def frozen_tires(
 
     Parameters
     ----------
-    options : parsed arguments.
     labels : what the trackers are told.
     conditions : of the drives.
 

@@ -119,12 +119,7 @@ def _scores(run: Run) -> dict[str, Any]:
 
 
 def drive_columns(drive: Drive) -> dict[str, NDArray[np.float64]]:
-    """Return every signal of a drive by the name of its column, with its unit.
-
-    Parameters
-    ----------
-    drive : the drive.
-    """
+    """Return every signal of a drive by the name of its column, with its unit."""
     slip = axle_slip(drive)
     units = {"t": "s", "psi": "rad", "r": "rad_s", "delta": "rad", "v_x": "m_s", "v_y": "m_s"}
     measured = {

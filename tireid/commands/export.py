@@ -50,12 +50,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the command.
-
-    Parameters
-    ----------
-    options : parsed arguments.
-    """
+    """Run the command."""
     start = None if options.weights is None else load_model(options.weights)
     vehicle = _vehicle(options, start)
     method = _method(options, vehicle, start)

@@ -106,12 +106,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the command.
-
-    Parameters
-    ----------
-    options : parsed arguments.
-    """
+    """Run the command."""
     vehicle = read_vehicle(options)
     seed = None if options.seed is None else seed_of(options)
     law, design = chosen_method(options, vehicle, seed)

@@ -55,13 +55,7 @@ def _sides(sides: Reproduction) -> dict[str, dict[str, float] | None]:
 
 
 def certificate_numbers(design: Method, vehicle: Vehicle) -> dict[str, Any]:
-    """Return the verdict on a method, and which bounds hold of it whatever is measured.
-
-    Parameters
-    ----------
-    design : any method.
-    vehicle : the car.
-    """
+    """Return the verdict on a method, and which bounds hold of it whatever is measured."""
     certificate = certify(design, vehicle)
     return {"verdict": certificate.verdict, "held_by_construction": certificate.held}
 
@@ -256,7 +250,6 @@ def curve_columns(
 
     Parameters
     ----------
-    model : the frozen model.
     recordings : that were driven, which say how far the curve goes.
     """
     car, known = model.vehicle, model.known_slip

@@ -32,12 +32,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the command.
-
-    Parameters
-    ----------
-    options : parsed arguments.
-    """
+    """Run the command."""
     if options.file.suffix.lower() != ".toml":
         raise ValueError(f"{options.file}: the name must end in .toml")
     if options.file.exists() and not options.force:

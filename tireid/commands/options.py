@@ -50,12 +50,7 @@ def add_vehicle(
 
 
 def read_vehicle(options: argparse.Namespace) -> Vehicle:
-    """Return the car of --vehicle, the sedan without, and say what of it is estimated.
-
-    Parameters
-    ----------
-    options : parsed arguments.
-    """
+    """Return the car of --vehicle, the sedan without, and say what of it is estimated."""
     if options.vehicle is None:
         return sedan()
     vehicle = Vehicle.from_toml(options.vehicle)
@@ -113,10 +108,6 @@ def add_seed(parser: argparse.ArgumentParser, what: str) -> None:
 def seed_of(options: argparse.Namespace) -> int:
     """Return --seed, 0 where it is not given.
 
-    Parameters
-    ----------
-    options : parsed arguments.
-
     Raises
     ------
     ValueError
@@ -143,10 +134,6 @@ def add_jobs(parser: argparse.ArgumentParser) -> None:
 
 def jobs_of(options: argparse.Namespace) -> int:
     """Return --jobs.
-
-    Parameters
-    ----------
-    options : parsed arguments.
 
     Raises
     ------
@@ -194,10 +181,6 @@ class Chosen(NamedTuple):
 def method_is_given(options: argparse.Namespace) -> bool:
     """Return whether a command is told what learns.
 
-    Parameters
-    ----------
-    options : parsed arguments.
-
     Raises
     ------
     ValueError
@@ -214,8 +197,6 @@ def chosen_method(options: argparse.Namespace, vehicle: Vehicle, seed: int | Non
 
     Parameters
     ----------
-    options : parsed arguments.
-    vehicle : the car.
     seed : of initial weights; None where nobody asks for one.
 
     Raises
@@ -358,7 +339,6 @@ def network_model(
 
     Parameters
     ----------
-    options : parsed arguments.
     vehicle : the car, which makes slip angles.
     min_speed : below this speed [m/s] the forces read zero.
 

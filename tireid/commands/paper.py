@@ -298,12 +298,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the command.
-
-    Parameters
-    ----------
-    options : parsed arguments.
-    """
+    """Run the command."""
     if options.seeds < 1:
         raise ValueError(f"--seeds must be at least 1, it is {options.seeds}")
     require_few(ValueError, "--seeds", options.seeds, "runs", "runs")

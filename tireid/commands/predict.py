@@ -1,7 +1,7 @@
 """`tireid predict MODEL LOG`: the axle forces of a drive by a stored model, and what they miss."""
 
 import argparse
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.escape import visible
-from identifier.axle import AxleModel
 from identifier.method import vehicle_numbers
 from identifier.methods import load_model
 from identifier.reproducibility import Prediction, counted_samples
@@ -55,12 +54,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the command.
-
-    Parameters
-    ----------
-    options : parsed arguments.
-    """
+    """Run the command."""
     model = _model(options)
     recording = read_log(
         options.log,
@@ -86,14 +80,14 @@ def _model(options: argparse.Namespace) -> TireModel:
     vehicle = read_vehicle(options)
     if vehicle == model.vehicle:
         return model
-    if not isinstance(model, AxleModel):
+    if not model.scales_with_load:
         raise ValueError(
             f"{options.model} is of the car {model.vehicle.name!r} and cannot be mounted on "
             f"{vehicle.name!r}, as models of the axle identifier can: leave --vehicle out to ask "
             "it of its own car"
         )
     say(f"{options.model} is of the car {model.vehicle.name!r}: scaled by the axle loads")
-    return replace(model, vehicle=vehicle)
+    return model.mounted_on(vehicle)
 
 
 def force_columns(model: TireModel, prediction: Prediction) -> dict[str, NDArray[np.float64]]:

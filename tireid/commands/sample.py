@@ -37,12 +37,7 @@ def add_parser(commands: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Run the command.
-
-    Parameters
-    ----------
-    options : parsed arguments.
-    """
+    """Run the command."""
     seed = seed_of(options)
     if not options.log.name.lower().endswith((".csv", ".csv.gz")):
         raise ValueError(f"{options.log}: the name must end in .csv or .csv.gz")

@@ -40,7 +40,6 @@ def learning_drive(
     Parameters
     ----------
     car : to drive.
-    sensors : of the car.
     rng : of their noise.
     grip : largest lateral acceleration [m/s²], which sizes the steering.
     seed : of the steering.

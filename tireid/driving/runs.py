@@ -87,7 +87,6 @@ def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
     Parameters
     ----------
     learnt : what the tracker is told at the start.
-    vehicle : the car.
 
     Raises
     ------

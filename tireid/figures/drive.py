@@ -38,12 +38,7 @@ MILLI = 1e3
 
 @styled
 def drive_solve_figure(drive: Drive) -> Figure:
-    """Draw the solve times of a drive as a histogram and over time.
-
-    Parameters
-    ----------
-    drive : the drive.
-    """
+    """Draw the solve times of a drive as a histogram and over time."""
     times = MILLI * drive.solve_time
     median, p99, largest = np.quantile(times, [0.5, 0.99, 1.0])
     figure = new_figure(PAGE, 2.7)
@@ -212,7 +207,6 @@ def mark_faults(axes: Axes, drives: Mapping[str, Drive], faults: Sequence[Sensor
     ----------
     axes : panel over arc length.
     drives : by the name in the legend; faults are placed by the time of the first.
-    faults : of the sensors.
     """
     first = next(iter(drives.values()))
     for fault in faults:

@@ -169,7 +169,6 @@ def prediction_figure(
 
     Parameters
     ----------
-    replay : the replay.
     online : an online run over the same recording, drawn where there is no truth.
     window : first and last time to show [s]; None shows all.
 

@@ -156,7 +156,6 @@ def save_figure(figure: Figure, path: Path) -> None:
     Parameters
     ----------
     figure : as a function of this package returns it.
-    path : the file.
     """
     path.write_bytes(figure_png(figure))
 
@@ -275,7 +274,6 @@ def note(axes: Axes, text: str) -> None:
 
     Parameters
     ----------
-    axes : the panel.
     text : what to write.
     """
     axes.set_title(text, loc="right", color="#444444")

@@ -198,7 +198,6 @@ def drive_tires_figure(drive: Drive, curves: Sequence[TireCurve]) -> Figure:
 
     Parameters
     ----------
-    drive : the drive.
     curves : steady forces of the tires to compare.
     """
     unit = force_unit_of(drive.axle_force)

@@ -59,12 +59,7 @@ def drawing(figure: Figure, caption: str, read: str = "") -> Picture:
 
 
 def recording_digest(recording: Recording) -> str:
-    """Return twelve characters that stand for the signals of a recording.
-
-    Parameters
-    ----------
-    recording : any.
-    """
+    """Return twelve characters that stand for the signals of a recording."""
     signals = (recording.t, recording.v_x, recording.v_y, recording.r)
     steering = (recording.delta_f, recording.delta_r)
     return digest([signal.tolist() for signal in (*signals, *steering)])
@@ -78,7 +73,6 @@ def origin(
     Parameters
     ----------
     command : as it was typed.
-    vehicle : the car.
     recordings : that were read or driven.
     others : more lines, by their name with underscores for blanks.
     """

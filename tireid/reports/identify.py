@@ -34,7 +34,6 @@ def write_identify_report(
     ----------
     folder : where to.
     law : what learnt, as the user named it.
-    model : the frozen model.
     runs : online, the one that was learnt on first.
     frozen : by when it was frozen, replays by recording; the last is of the model.
     figures : by the name of their files.
@@ -75,7 +74,6 @@ def identify_headlines(
 
     Parameters
     ----------
-    model : the frozen model.
     runs : online, the one that was learnt on first.
     replays : of the model, by recording.
     """
@@ -105,7 +103,6 @@ def identify_warnings(model: TireModel, runs: Sequence[History]) -> list[str]:
 
     Parameters
     ----------
-    model : the frozen model.
     runs : online, the one that was learnt on first.
     """
     said = [f"{model.vehicle.estimates}."] if model.vehicle.estimates else []
@@ -140,7 +137,6 @@ def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> 
     Parameters
     ----------
     law : what learnt, as the user named it.
-    model : the frozen model.
     figures : by the name of their files.
     """
     facts = [[title, *(f"{v:.4g}" for v in values), unit] for title, values, unit in model.facts()]
