@@ -77,7 +77,7 @@ class LadderAxles:
         return lengths[0], lengths[1]
 
     def at_friction(self, weights: Array, ratio: float) -> Array:
-        """Return weights (n_weights,) of another friction: 1/α_j over it, W times it."""
+        """Return `weights` (n_weights,) of another friction: 1/α_j over it, W times it."""
         w, n = weights.copy(), self.units
         w[N_COMMON : N_COMMON + n] /= ratio  # 1/α_j
         axles = w[N_COMMON + n :].reshape(2, -1)  # a view

@@ -41,7 +41,7 @@ class NetworkAxles:
     lag_length = no_lag
 
     def at_friction(self, weights: Array, ratio: float) -> Array | None:
-        """Return weights (n_weights,) of another friction; None where it reads the speed."""
+        """Return `weights` (n_weights,) of another friction; None where it reads the speed."""
         if "v_x" in self.inputs:
             return None
         w, end = weights.copy(), 2 + 2 * self.hidden  # C α is its own similar
