@@ -7,6 +7,7 @@ from tireid.commands.demo_parts import LANE_CHANGE, drive_story
 from tireid.commands.demo_story import run_story
 from tireid.figures import figure_png, side_by_side_figure
 
+FILM = "drive.webp"
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 
 
@@ -17,8 +18,8 @@ def main() -> None:
     (DOCS / "forces.png").write_bytes(figure_png(figure, resolution=130))
     with TemporaryDirectory() as folder:
         drive_story(story, Path(folder))
-        (DOCS / "drive.gif").write_bytes((Path(folder) / LANE_CHANGE / "drive.gif").read_bytes())
-    print(f"wrote {DOCS}/forces.png and drive.gif")
+        (DOCS / FILM).write_bytes((Path(folder) / LANE_CHANGE / FILM).read_bytes())
+    print(f"wrote {DOCS}/forces.png and {FILM}")
 
 
 if __name__ == "__main__":
