@@ -14,7 +14,7 @@ from models.files import digest
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid import __version__
-from tireid.figures import figure_svg
+from tireid.figures import style
 from tireid.report import Picture, Section, Table
 
 REPORT = "report.html"
@@ -55,7 +55,7 @@ def drawing(figure: Figure, caption: str, read: str = "") -> Picture:
     caption : what it shows, plain text.
     read : how to read it, plain text.
     """
-    return Picture(image=figure_svg(figure), caption=caption, read=read)
+    return Picture(image=style.figure_svg(figure), caption=caption, read=read)
 
 
 def recording_digest(recording: Recording) -> str:
