@@ -40,7 +40,7 @@ def compiled(compiler, file, single):
 
 def test_there_is_c_to_look_at():
     names = {Path(file).name for file in HERE}
-    assert {"tireid.c", "tireid_mpc_qp.c", "tireid_handover.c", "fmi2.c", "main.c"} <= names
+    assert {"tireid.c", "tireid_mpc_qp.c", "tireid_handover.c", "fmi.c", "main.c"} <= names
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
@@ -49,6 +49,14 @@ def test_there_is_c_to_look_at():
 def test_every_file_compiles_as_it_lies_without_a_warning(file, single, compiler):
     answer = compiled(compiler, file, single)
     assert (answer.returncode, answer.stderr) == (0, ""), file
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_the_interface_of_an_fmu_compiles_for_both_standards(compiler):
+    for version in (2, 3):
+        words = ["@compile_flags.txt", "-Werror", "-fsyntax-only", f"-DMODEL_FMI={version}"]
+        answer = run(compiler, *words, "identifier/export/c_fmu/fmi.c")
+        assert (answer.returncode, answer.stderr) == (0, ""), version
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])

@@ -92,14 +92,16 @@ def build_binary(target: Target, name: str, sources: Mapping[str, bytes]) -> byt
 # What is simulated is what is shipped: the same equations, guards and status codes, in double.
 
 
-def token_header(token: str) -> str:
+def token_header(token: str, version: int) -> str:
     """Return token.h, which tells this FMU from every other one.
 
     Parameters
     ----------
     token : GUID of FMI 2.0, instantiation token of FMI 3.0.
+    version : of FMI, 2 or 3.
     """
-    return header("token.h", "Generated.", [f'#define MODEL_TOKEN "{token}"\n'])
+    standard = f"#ifndef MODEL_FMI\n#define MODEL_FMI {version} /* of the standard */\n#endif\n"
+    return header("token.h", "Generated.", [f'#define MODEL_TOKEN "{token}"\n', standard])
 
 
 def model_files(specialized: SpecializedStep) -> dict[str, str]:
@@ -432,8 +434,8 @@ Version = Literal[2, 3]
 FMU = Path(__file__).parent / "c_fmu"
 SHARED = ("model.h", "memory.h", "memory.c")
 OF_VERSION: Mapping[Version, tuple[str, ...]] = {
-    2: ("fmi2Functions.h", "fmi2.c"),
-    3: ("fmi3Functions.h", "fmi3.c", "fmi3_stubs.c"),
+    2: ("fmi2Functions.h", "fmi.c"),
+    3: ("fmi3Functions.h", "fmi.c", "fmi3_stubs.c"),
 }
 
 
@@ -495,7 +497,7 @@ def _text_with(
 ) -> dict[str, str]:
     places = dict.fromkeys((*SHARED, *OF_VERSION[version]), ".")
     text = c_files(FMU, places, {PREFIX: specialized.name})
-    text |= {**shared, "token.h": token_header(token)}
+    text |= {**shared, "token.h": token_header(token, version)}
     sources = sorted(name for name in text if name.endswith(".c"))
     members = {f"sources/{name}": content for name, content in text.items()}
     if version == 2:

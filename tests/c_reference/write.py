@@ -33,7 +33,7 @@ def reference() -> Mapping[str, str]:
     )
     headers = {
         **{Path(path).name: text for path, text in texts.items() if _is_wanted(path)},
-        "token.h": token_header("{00000000}"),
+        "token.h": token_header("{00000000}", 2),
         "tireid_vectors.h": vectors_header(package.specialized, few),
         "tireid_mpc_vectors.h": mpc_vectors_header(pair.tracker.name, found),
     }

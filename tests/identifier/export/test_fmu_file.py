@@ -99,7 +99,7 @@ def test_without_a_compiler_it_holds_sources_only_and_says_so(exported, caplog, 
     with zipfile.ZipFile(exported[2]) as archive:
         names = archive.namelist()
     assert not [name for name in names if name.startswith("binaries")]
-    assert {"modelDescription.xml", "sources/tireid_equations.c", "sources/fmi2.c"} <= set(names)
+    assert {"modelDescription.xml", "sources/tireid_equations.c", "sources/fmi.c"} <= set(names)
 
 
 def test_a_start_that_is_not_finite_is_refused(tmp_path):
