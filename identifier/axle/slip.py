@@ -18,7 +18,7 @@ from codegen.arrays import Array
 from identifier.axle.car import Car
 from identifier.axle.curve import Curve
 from identifier.axle.gate import Gate
-from models.rules import require_positive_fields
+from models.rules import require_within
 from models.vehicle import GRAVITY, Vehicle
 
 SHORTEST = 1e-3  # wheelbases: the lag never vanishes
@@ -164,14 +164,15 @@ class Sway:
     Raises
     ------
     ValueError
-        Where a number is not positive.
+        Where a number is none of a body on springs: 0.1 to 100 rad/s, damping 0.01 to 10.
     """
 
     frequency: float
     damping: float = 0.3
 
     def __post_init__(self) -> None:
-        require_positive_fields(self)
+        require_within(ValueError, 0.1, 100.0, frequency=self.frequency)
+        require_within(ValueError, 0.01, 10.0, damping=self.damping)
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle) -> "Sway":
