@@ -82,7 +82,9 @@ def run(words: Sequence[str], folder: Path, *, aside: Path, drawn: bool) -> Ende
     finally:
         os.close(handle)
     code = os.waitstatus_to_exitcode(status)
-    stopped = late or code == -signal.SIGXCPU
+    spent = usage.ru_utime + usage.ru_stime
+    # Telling the stack at the limit, in the midst of anything, may itself end in a signal.
+    stopped = late or code == -signal.SIGXCPU or (code < 0 and spent >= CPU)
     silent = time.time() - (aside / "stderr").stat().st_mtime
     out, err, trace = (_read(aside / name) for name in ("stdout", "stderr", "trace"))
     return Ended(
@@ -91,7 +93,7 @@ def run(words: Sequence[str], folder: Path, *, aside: Path, drawn: bool) -> Ende
         err,
         trace,
         _notes(aside / "notes"),
-        usage.ru_utime + usage.ru_stime,
+        spent,
         stopped,
         stopped and silent > SILENCE,
     )
