@@ -15,7 +15,7 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compi
 @pytest.mark.parametrize("tires", TIRES)
 def test_a_case_is_what_the_command_drives(tires, tmp_path, monkeypatch):
     monkeypatch.setattr(drive_results, "save_figure", lambda *_: None)
-    monkeypatch.setattr("tireid.reports.common.figure_svg", lambda _: b"<?xml")
+    monkeypatch.setattr("tireid.figures.style.figure_svg", lambda _: b"<?xml")
     case = Case("iso-3888-2", 0.9, 0.5, tires, seed=3)
     learnt_before.cache_clear()
     found = run(case).scores
@@ -34,7 +34,7 @@ def test_a_case_is_what_the_command_drives(tires, tmp_path, monkeypatch):
 
 def test_another_path_is_driven_on_the_same_learnt_tire(monkeypatch, tmp_path):
     monkeypatch.setattr(drive_results, "save_figure", lambda *_: None)
-    monkeypatch.setattr("tireid.reports.common.figure_svg", lambda _: b"<?xml")
+    monkeypatch.setattr("tireid.figures.style.figure_svg", lambda _: b"<?xml")
     out = tmp_path / "out"
     words = ["--path", "slalom", "--speed", "50%", "--seed", "4", "--film", "none"]
     assert main(["drive", *words, "--out", str(out)]) == 0

@@ -28,7 +28,7 @@ def quick(monkeypatch):
     monkeypatch.setattr(frames, "MOST", 4)
     empty = b"\x89PNG\r\n\x1a\n"
     monkeypatch.setattr(drive_results, "save_figure", lambda _, path: path.write_bytes(empty))
-    monkeypatch.setattr("tireid.reports.common.figure_svg", lambda _: b"<?xml")
+    monkeypatch.setattr("tireid.figures.style.figure_svg", lambda _: b"<?xml")
 
 
 def test_learnt_tires_steer_as_the_true_ones_and_learning_stays_on_the_road(story, tmp_path, quick):

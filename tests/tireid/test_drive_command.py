@@ -53,7 +53,7 @@ def result(bend, tmp_path_factory):
 def no_figures(monkeypatch):
     """Pictures are looked at once, in `result`."""
     monkeypatch.setattr(drive_results, "save_figure", lambda *_: None)
-    monkeypatch.setattr("tireid.reports.common.figure_svg", lambda _: b"<?xml")
+    monkeypatch.setattr("tireid.figures.style.figure_svg", lambda _: b"<?xml")
 
 
 def summary_of(folder):

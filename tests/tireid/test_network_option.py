@@ -46,7 +46,7 @@ def tire_file(path, *, iso=False, swapped=False, forces=2, peak=4e4):
 def undrawn(monkeypatch):
     """One test looks at figures; the others need not wait for them."""
     monkeypatch.setattr(network_results, "save_figure", lambda *_: None)
-    monkeypatch.setattr("tireid.reports.common.figure_svg", lambda _: b"<?xml")
+    monkeypatch.setattr("tireid.figures.style.figure_svg", lambda _: b"<?xml")
 
 
 @pytest.fixture
