@@ -80,7 +80,7 @@ def _outside(targets: Targets, learnt: Recording, unseen: Recording) -> None:
     assert isinstance(model, AxleModel) and unseen.axle_force is not None
     stiffness = [CARMAKER.cornering_stiffness_front, CARMAKER.cornering_stiffness_rear]
     linear = unseen.alpha(CARMAKER.l_f, CARMAKER.l_r) * stiffness
-    outside, known = model.outside(unseen), np.degrees(model.known_slip_range)
+    outside, known = model.outside(unseen), np.degrees(model.known_slip)
     force, truth = model.axle_force(unseen), unseen.axle_force
     targets.record("carmaker/slip_known/front", float(known[0]), "deg")
     targets.record("carmaker/slip_known/rear", float(known[1]), "deg")

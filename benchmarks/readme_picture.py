@@ -1,4 +1,4 @@
-"""The pictures of the README: `python -m benchmarks.readme_picture`."""
+"""The pictures of README and docs/driving.md: `python -m benchmarks.readme_picture`."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory

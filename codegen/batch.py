@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from codegen.arrays import Array
 from codegen.compiler import CompilationError, load_library
 from codegen.lanes import CPP_FLAGS, find_target, lanes_source, scratch_size
-from codegen.scan import Scan
+from codegen.scan import Scan, longs, shaped
 
 # Arrays to blocks of lanes and back, and the compiled loop over blocks in several threads.
 #
@@ -87,11 +87,11 @@ def run_lanes(
     outputs = {p: _aligned(n_blocks, kept.size, step.numel_out(p), lanes) for p in scan.outputs}
     before = (
         _pointers(arrays),
-        _longs(block_step),
-        _longs(sample_step),
-        _longs(shared),
+        longs(block_step),
+        longs(sample_step),
+        longs(shared),
         ctypes.c_long(kept.size),
-        _longs(kept.tolist()),
+        longs(kept.tolist()),
         _pointers([states.get(p) for p in names_in]),
         _pointers([final.get(p) for p in names_in]),
         _pointers([outputs.get(p) for p in names_out]),
@@ -154,10 +154,6 @@ def _aligned(*shape: int) -> Array:
 
 def _pointers(arrays: Sequence[Array | None]) -> "ctypes.Array[ctypes.c_void_p]":
     return (ctypes.c_void_p * len(arrays))(*(None if a is None else a.ctypes.data for a in arrays))
-
-
-def _longs(numbers: Sequence[int]) -> "ctypes.Array[ctypes.c_long]":
-    return (ctypes.c_long * max(len(numbers), 1))(*numbers)
 
 
 log = logging.getLogger("tireid.codegen")
@@ -265,7 +261,7 @@ class BatchScan:
             runs=runs,
             workers=workers,
         )
-        return {port: _shaped(flat, size[port]) for port, flat in record.items()}
+        return {port: shaped(flat, size[port]) for port, flat in record.items()}
 
     def _pack(self, n: int, values: Mapping[str, Array]) -> tuple[int, dict[str, Array]]:
         """Return the number of runs, and values (runs, rows, columns) or (rows, columns)."""
@@ -318,14 +314,6 @@ class BatchScan:
         if runs > 1:
             in_threads(lambda first, last: run(first + 1, last + 1), runs - 1, workers)
         return {port: np.stack([one[port] for one in found]) for port in found[0]}
-
-
-def _shaped(flat: Array, size: tuple[int, int]) -> Array:
-    """Return column-major numbers in their matrix shape; column vectors stay flat."""
-    rows, columns = size
-    if columns == 1:
-        return flat
-    return flat.reshape(*flat.shape[:-1], columns, rows).swapaxes(-1, -2)
 
 
 def processors() -> int:

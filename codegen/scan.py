@@ -5,7 +5,7 @@ Without a C compiler that works the CasADi virtual machine does the same, more s
 
 import ctypes
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 import casadi as ca
@@ -179,29 +179,16 @@ class Scan:
             packed[port] = np.ascontiguousarray(by_columns)
         return packed
 
-    def shaped(self, flat: Array, size: tuple[int, int]) -> Array:
-        """Return rows of column-major numbers in their matrix shape; column vectors stay flat.
-
-        Parameters
-        ----------
-        flat : numbers (..., rows columns).
-        size : rows and columns of the port.
-        """
-        rows, columns = size
-        if columns == 1:
-            return flat
-        return flat.reshape(*flat.shape[:-1], columns, rows).swapaxes(-1, -2)
-
     def _shape_all(self, record: dict[str, Array]) -> dict[str, Array]:
-        shaped = {}
+        found: dict[str, Array] = {}
         for port, flat in record.items():
             if port in self.carry:
-                everything = self.shaped(flat, self.step.size_in(port))
-                shaped[f"{port}_all"] = everything
-                shaped[port], shaped[f"{port}_final"] = everything[:-1], everything[-1]
+                everything = shaped(flat, self.step.size_in(port))
+                found[f"{port}_all"] = everything
+                found[port], found[f"{port}_final"] = everything[:-1], everything[-1]
             else:
-                shaped[port] = self.shaped(flat, self.step.size_out(port))
-        return shaped
+                found[port] = shaped(flat, self.step.size_out(port))
+        return found
 
     def _run_compiled(
         self, loop: "ctypes._NamedFuncPointer", n: int, packed: dict[str, Array], every: int
@@ -291,7 +278,21 @@ def pointers(arrays: list[Array]) -> "ctypes.Array[ctypes.c_void_p]":
     return (ctypes.c_void_p * max(len(arrays), 1))(*(a.ctypes.data for a in arrays))
 
 
-def longs(numbers: list[int]) -> "ctypes.Array[ctypes.c_long]":
+def shaped(flat: Array, size: tuple[int, int]) -> Array:
+    """Return rows of column-major numbers in their matrix shape; column vectors stay flat.
+
+    Parameters
+    ----------
+    flat : numbers (..., rows columns).
+    size : rows and columns of the port.
+    """
+    rows, columns = size
+    if columns == 1:
+        return flat
+    return flat.reshape(*flat.shape[:-1], columns, rows).swapaxes(-1, -2)
+
+
+def longs(numbers: Sequence[int]) -> "ctypes.Array[ctypes.c_long]":
     """Return integers as C wants them.
 
     Parameters
@@ -405,4 +406,4 @@ class Stepper:
         ----------
         port : one of those that are carried.
         """
-        return self._scan.shaped(self._now[port], self._scan.step.size_in(port)).copy()
+        return shaped(self._now[port], self._scan.step.size_in(port)).copy()

@@ -303,7 +303,6 @@ class FrozenModelError(ValueError):
 DEAD = 0.02  # of the stated stiffness, below which an axle does not push
 PROBE = 0.02  # rad, a slip at which every tire pushes back
 WIDE = 0.3  # rad, beyond the slip of every tire's peak
-PROBE_SPEED = 10.0  # m/s
 LARGEST_MIN_SPEED = 50.0  # m/s: above it, a car would have forces on motorways only
 
 VEHICLE_KEYS = (

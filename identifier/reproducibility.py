@@ -252,6 +252,23 @@ def counted_samples(
     return counted
 
 
+def beyond_known(model: TireModel, recording: Recording) -> tuple[float, float] | None:
+    """Return the share of the samples with more slip than the model knows; None if it cannot tell.
+
+    Parameters
+    ----------
+    model : that predicts.
+    recording : the drive; samples below the model's minimum speed do not count.
+    """
+    known = model.known_slip
+    if known is None:
+        return None
+    counted = counted_samples(recording, model.min_speed)
+    alpha = np.abs(recording.alpha(model.vehicle.l_f, model.vehicle.l_r)[counted])
+    front, rear = np.mean(alpha > known, axis=0)
+    return float(front), float(rear)
+
+
 def predict(model: TireModel, recording: Recording, *, since: float | None = None) -> Prediction:
     """Replay a recording with frozen weights and compare with its true forces, where it has any.
 

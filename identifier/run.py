@@ -1,4 +1,4 @@
-"""What a method did over a recording: forces, and every output and state of its step."""
+"""A method over a recording, with all outputs and states, and beside a car that drives."""
 
 import math
 from collections.abc import Mapping

@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any, NoReturn, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from codegen.escape import visible
 from models.limits import VARIABLE
 from models.limits import InputLimits as InputLimits
@@ -364,7 +364,7 @@ class Table:
         prefix = f"{self._prefix}{key}."
         return [Table(one, self._where, self._refusal, prefix) for one in found]
 
-    def array(self, key: str) -> NDArray[np.float64]:
+    def array(self, key: str) -> Array:
         """Return nested lists of finite numbers, all rows alike, as an array of any shape.
 
         Parameters

@@ -134,6 +134,9 @@ class Chassis:
         )
 
 
+# A dataclass of a vehicle as the text of a TOML file, with exact numbers.
+
+
 def toml_text(record: Any, *, folder: Path, table: str, leave_out: Sequence[str] = ()) -> str:
     """Return the TOML text of a dataclass and of the one dataclass inside it.
 
@@ -153,9 +156,6 @@ def toml_text(record: Any, *, folder: Path, table: str, leave_out: Sequence[str]
     if inner is not None:
         lines += ["", f"[{table}]", toml_text(inner, folder=folder, table="")]
     return "\n".join(lines).rstrip("\n") + "\n"
-
-
-# A dataclass of a vehicle as the text of a TOML file, with exact numbers.
 
 
 def _value(value: Any, folder: Path) -> str:

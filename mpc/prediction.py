@@ -1,6 +1,6 @@
 """One stage of the prediction: ẋ, one RK4 step, and the linearization that a solver needs of it.
 
-State, input and parameters are those of `mpc.prediction`. The sensitivities of the Runge-Kutta step
+State, input and parameters are those of `build_dynamics`. The sensitivities of the Runge-Kutta step
 are chained by hand from the Jacobians of its four evaluations. Stage and end are tuned as exported
 functions are: our own tanh, atan and sin, nothing of a library.
 """

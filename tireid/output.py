@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from models.schema import read_json
 from tireid.exchange import ClaimedError, claim, exchange
 from tireid.progress import say
@@ -37,6 +37,23 @@ class Written(NamedTuple):
 
     files: Mapping[str, tuple[int, str]]
     folders: frozenset[str]
+
+
+def require_free(path: Path, *, force: bool) -> None:
+    """Refuse to replace a file that is there.
+
+    Parameters
+    ----------
+    path : to be written.
+    force : whether what is there may be replaced.
+
+    Raises
+    ------
+    OutputError
+        Where there is something and it may not.
+    """
+    if path.exists() and not force:
+        raise OutputError(f"{path} exists: choose another, or add --force to replace it")
 
 
 @contextmanager
@@ -282,7 +299,7 @@ def _finite(data: Any) -> Any:
     return data
 
 
-def write_csv(path: Path, columns: dict[str, NDArray[np.float64]]) -> None:
+def write_csv(path: Path, columns: dict[str, Array]) -> None:
     """Write columns of equal length as CSV with a header: time with 15 digits, others with nine.
 
     Parameters

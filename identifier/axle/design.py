@@ -107,7 +107,7 @@ class AxleIdentifier(Method):
             sway=Sway.for_vehicle(vehicle),
             bounds=Bounds(compliance=0.12 * L, v_y=0.04 * U),
             plausibility=Plausibility(
-                min_speed=0.2 * U,
+                min_speed=vehicle.lowest_speed,
                 learning_speed=0.6 * U,
                 max_speed=60.0 * U,
                 slow=U,

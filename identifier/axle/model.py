@@ -152,7 +152,7 @@ class AxleModel(TireModel):
         return relative_sd
 
     @property
-    def known_slip_range(self) -> Array:
+    def known_slip(self) -> Array:
         """Largest slip [rad] that was seen while learning and where the doubt is small, (2,)."""
         grid = np.linspace(0.0, 1.0, 201)[1:]
         known = np.zeros(2)
@@ -163,14 +163,9 @@ class AxleModel(TireModel):
                 known[i] = largest * count / grid.size
         return known
 
-    @property
-    def known_slip(self) -> Array:
-        """Slip [rad] up to which the forces were learnt, (2,)."""
-        return self.known_slip_range
-
     def facts(self) -> tuple[Fact, ...]:
         """Return the lines of `summary`."""
-        known = self.known_slip_range
+        known = self.known_slip
         lines = [
             Fact("cornering stiffness", self.cornering_stiffness, "N/rad"),
             Fact("relaxation length", self.relaxation_length, "m"),
@@ -245,7 +240,7 @@ class AxleModel(TireModel):
         ----------
         recording : its signals are the input.
         """
-        outside: NDArray[np.bool_] = self._run(recording)["slip_size"] > self.known_slip_range
+        outside: NDArray[np.bool_] = self._run(recording)["slip_size"] > self.known_slip
         return outside
 
     def lagged_slip(self, recording: Recording) -> Array:
@@ -305,7 +300,7 @@ class AxleModel(TireModel):
             **{name: getattr(self, name).tolist() for name in ARRAYS},
             "cornering_stiffness_N_rad": self.cornering_stiffness.tolist(),
             "relaxation_length_m": self.relaxation_length.tolist(),
-            "known_slip_range_rad": self.known_slip_range.tolist(),
+            "known_slip_rad": self.known_slip.tolist(),
         }
 
     @classmethod

@@ -22,6 +22,7 @@ from models.rules import require_within
 from models.vehicle import GRAVITY, Vehicle
 
 SHORTEST = 1e-3  # wheelbases: the lag never vanishes
+SLOWEST, FASTEST = 0.1, 100.0  # rad/s, of a body that rolls on springs
 
 
 class SlipState(NamedTuple):
@@ -171,18 +172,19 @@ class Sway:
     damping: float = 0.3
 
     def __post_init__(self) -> None:
-        require_within(ValueError, 0.1, 100.0, frequency=self.frequency)
+        require_within(ValueError, SLOWEST, FASTEST, frequency=self.frequency)
         require_within(ValueError, 0.01, 10.0, damping=self.damping)
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle) -> "Sway":
-        """Return the roll that a car of this size has: 5 sqrt(g/L), 1.5 Hz for a sedan.
+        """Return the roll that a car of this size has: 5 sqrt(g/L), 1.5 Hz for a sedan; of a toy
+        below 7 cm 10 Hz.
 
         Parameters
         ----------
         vehicle : its wheelbase sets the scale of time.
         """
-        return cls(frequency=5.0 * math.sqrt(GRAVITY / vehicle.wheelbase))
+        return cls(frequency=min(5.0 * math.sqrt(GRAVITY / vehicle.wheelbase), 0.6 * FASTEST))
 
     def numbers(self) -> Array:
         """Return [ω², 2 ζ ω, 1/ω²], (3,)."""

@@ -114,7 +114,7 @@ def _scan(curve: str) -> Scan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurveEkf(Method):
-    """Tire parameters that walk at random, slowly, in the coordinates of `parametrizations`.
+    """Tire parameters that walk at random, slowly, in the coordinates of `PARAMETRIZATIONS`.
 
     Parameters
     ----------

@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen import Scan
+from codegen.arrays import Array
 from identifier.baselines.ports import OVER, axle_loads, sample_ports
 from identifier.method import (
     FORMAT,
@@ -169,7 +169,7 @@ class CurveModel(TireModel):
 
     vehicle: Vehicle
     curve: str
-    parameters: NDArray[np.float64]
+    parameters: Array
     min_speed: float
 
     def __post_init__(self) -> None:

@@ -14,6 +14,7 @@ from scipy.optimize import OptimizeResult, least_squares
 
 from codegen.arrays import Array
 from identifier.axle import AxleIdentifier, AxleModel
+from identifier.axle.curve import EDGES
 from identifier.baselines.curve_ekf import LIMITS, PARAMETRIZATIONS, SPREADS, CurveEkf
 from identifier.baselines.curves import CurveModel
 from identifier.baselines.linear import LinearBaseline, StiffnessRls
@@ -209,7 +210,7 @@ def _axle(method: AxleIdentifier, vehicle: Vehicle) -> Structure:
             own=parameters[2 * n :].reshape(2, 3) * scale,
             covariance=prior,
             prior_covariance=prior,
-            excitation=np.zeros((2, 9)),
+            excitation=np.zeros((2, 1 + len(EDGES))),
         )
 
     return Structure(start, model, lower, upper)

@@ -1,4 +1,4 @@
-"""The linear tire that the car was told of: no learning, the least that a method must beat."""
+"""The linear tire: as the vehicle states it, which is the least to beat, and learnt online."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""A folded step as an FMU for Co-Simulation: description, sources and binaries in one archive."""
+"""A specialized step as an FMU for Co-Simulation: description, sources, binaries in one file."""
 
 import hashlib
 import io
@@ -74,9 +74,9 @@ def build_binary(target: Target, name: str, sources: Mapping[str, bytes]) -> byt
         folder = Path(scratch)
         for file, content in sources.items():
             (folder / file).write_bytes(content)
-        c_files = [file for file in sources if file.endswith(".c")]
+        sources_c = [file for file in sources if file.endswith(".c")]
         library = f"{name}{target.ending}"
-        command = [*target.compiler, *KEEP_GUARDS, *FLAGS, *c_files, "-o", library, *target.flags]
+        command = [*target.compiler, *KEEP_GUARDS, *FLAGS, *sources_c, "-o", library, *target.flags]
         answer = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         if answer.returncode != 0:
             first_lines = "\n".join(answer.stderr.splitlines()[:5])
@@ -442,9 +442,9 @@ OF_VERSION: Mapping[Version, tuple[str, ...]] = {
 def export_fmu(specialized: SpecializedStep, path: Path, version: Version = 2) -> None:
     """Write an FMU for Co-Simulation; the same step gives the same bytes.
 
-    Inputs v_x, v_y, r, delta_f, delta_r and outputs F_yf, F_yr, SI; see
-    `identifier.export.fmu`. Samples are taken at multiples of the step's interval after
-    the start, whatever the communication step; a step from t to t + h takes those in [t, t + h).
+    Inputs v_x, v_y, r, delta_f, delta_r and outputs F_yf, F_yr, SI. Samples are taken at multiples
+    of the step's interval after the start, whatever the communication step; a step from t to t + h
+    takes those in [t, t + h).
 
     Parameters
     ----------
@@ -524,8 +524,3 @@ def _archive(members: Mapping[str, bytes]) -> bytes:
             member.external_attr = 0o644 << 16
             archive.writestr(member, content)
     return buffer.getvalue()
-
-
-# FMUs for Co-Simulation: a folded step as a component of a simulation.
-
-__all__ = ["export_fmu"]

@@ -157,6 +157,8 @@ def covariance_order(members: Sequence[Member]) -> int:
     members : of the weights.
     """
     orders = {rule.order for rule in rules(members) if rule.kind in ("MATRIX", "TRIANGLE")}
+    if len(orders) > 1:
+        raise ValueError(f"covariances among weights must have one size, they have {orders}")
     return max(orders, default=0)
 
 

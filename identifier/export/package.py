@@ -95,14 +95,13 @@ def summary(specialized: SpecializedStep, content: Mapping[str, Any]) -> dict[st
     return {
         **about_package(content, f"Tire forces of the car {specialized.vehicle.name}"),
         "method": type(specialized.method).__name__,
-        "certificate": _certificate_text(specialized.method, specialized.vehicle),
+        "certificate": _certificate_text(specialized.method, content["certificate"]),
         "dt": f"{specialized.dt:g}",
         "min_speed": f"{specialized.min_speed:.3g}",
     }
 
 
-def _certificate_text(method: Method, vehicle: Vehicle) -> str:
-    proven = certificate(method, vehicle)
+def _certificate_text(method: Method, proven: Mapping[str, Any]) -> str:
     if method.judged_by:
         return (
             "Stability and error bounds of this law depend on its gains: "
@@ -166,7 +165,7 @@ def _triangle(phase: Array) -> Array:
 def run_in_virtual_machine(
     specialized: SpecializedStep, samples: Array
 ) -> tuple[Array, dict[str, Array]]:
-    """Return the outputs (n, k) of a folded step, one beside the other, and what it carries then.
+    """Return the outputs (n, k) of a specialized step, one beside the other, and its state then.
 
     Samples that are refused count as time, as `identifier.refused` says.
 

@@ -1,7 +1,7 @@
-"""The step of a method with every number of it folded in: what is exported.
+"""The step of a method with every number of it put in: what is exported.
 
-Gains, T_s, vehicle and K⁻¹ become literals, so that only signals and carried values are left:
-(carried, x = [v_y, r], u = [δ_f, δ_r], v_x) -> (carried next, axle_force [N], other outputs), SI.
+Gains, T_s, vehicle and K⁻¹ become literals, so that only signals and the state are left:
+(state, x = [v_y, r], u = [δ_f, δ_r], v_x) -> (state next, axle_force [N], other outputs), SI.
 """
 
 from collections.abc import Mapping
@@ -42,7 +42,7 @@ class SpecializedStep(NamedTuple):
     """A step without constants, where it starts, and what its ports mean.
 
     name : C identifier, prefix of everything that is exported.
-    method, vehicle : what it was folded from.
+    method, vehicle : what it was made from.
     function : SX function of the carried ports, then x (2,), u (2,), v_x; returns `p_next` of each
         carried port `p`, then the outputs, axle_force (2,) [N] first.
     parts : the same function in the parts that C is written from.
@@ -99,7 +99,6 @@ def specialize(
     setup = method.setup(vehicle, start)
     step = setup.scan.step
     parts = _specialized(setup, name)
-    told = sorted(setup.scan.outputs, key=lambda port: port != "axle_force")
     return SpecializedStep(
         name=name,
         method=method,
@@ -109,7 +108,9 @@ def specialize(
         carry={port: _matrix(value, step.size_in(port)) for port, value in setup.carry.items()},
         learnt=tuple(port for port in setup.carry if method.port(port).learnt),
         inputs=INPUTS,
-        outputs=tuple(_described(method.port(port), step.numel_out(port)) for port in told),
+        outputs=tuple(
+            _described(method.port(port), step.numel_out(port)) for port in _outputs(setup)
+        ),
         state=tuple(
             _described(method.port(port), value.size) for port, value in setup.carry.items()
         ),
@@ -121,6 +122,11 @@ def specialize(
     )
 
 
+def _outputs(setup: Setup) -> list[str]:
+    """Return the outputs of a step beside its state, forces first."""
+    return sorted(setup.scan.outputs, key=lambda port: port != "axle_force")
+
+
 def _specialized(setup: Setup, name: str) -> Tuned:
     step, carry = setup.scan.step, list(setup.carry)
     ports = {port: ca.SX.sym(port, *step.size_in(port)) for port in carry}
@@ -130,8 +136,7 @@ def _specialized(setup: Setup, name: str) -> Tuned:
         port: ca.DM(_matrix(value, step.size_in(port))) for port, value in setup.constants.items()
     }
     results = step(**sampled, **constants)
-    told = sorted(setup.scan.outputs, key=lambda port: port != "axle_force")
-    wanted = [*(f"{port}_next" for port in carry), *told]
+    wanted = [*(f"{port}_next" for port in carry), *_outputs(setup)]
     literal = ca.Function(
         name,
         list(ports.values()),

@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from models.rules import require_within
 
 Direction = Callable[[Any, Any], Any]
@@ -430,7 +430,7 @@ class Gains:
                 )
 
     @property
-    def matrix(self) -> NDArray[np.float64]:
+    def matrix(self) -> Array:
         """A_d as an array (2, 2) [1/s]."""
         return np.array(self.A_d, dtype=np.float64)
 

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen import Scan
+from codegen.arrays import Array
 from codegen.elementary import tanh
 from identifier.driving import REFERENCE_WHEELBASE
 from identifier.method import (
@@ -47,8 +47,8 @@ SIGNALS: Mapping[str, float] = {
 class Weights(NamedTuple):
     """Weights of the network: W (2, n_h) in the force unit and V (n_h, n_in)."""
 
-    W: NDArray[np.float64]
-    V: NDArray[np.float64]
+    W: Array
+    V: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,11 +17,11 @@ the steering inside a sample makes that large.
 import math
 
 import numpy as np
-import numpy.typing as npt
+from numpy.typing import ArrayLike
 
+from codegen.arrays import Array
 from identifier.paper.laws import DrivingError
 from identifier.stability.lyapunov import (
-    Matrix,
     lyapunov,
     peak_gain,
     require_hurwitz,
@@ -31,14 +31,14 @@ from models.rules import require_positive
 
 
 def small_gain(
-    A_d: npt.ArrayLike,
+    A_d: ArrayLike,
     *,
     law: DrivingError,
     forgetting: float,
     eta_W: float,
     n_h: int,
     dt: float | None = None,
-    direction: Matrix | None = None,
+    direction: Array | None = None,
 ) -> float:
     """θ = c_z γ η_W |A_d⁻¹| n_h/λ² [-]; below 1 the law is bounded.
 
@@ -59,14 +59,14 @@ def small_gain(
 
 
 def steady_capacity(
-    A_d: npt.ArrayLike,
+    A_d: ArrayLike,
     *,
     law: DrivingError,
     forgetting: float,
     eta_W: float,
     rho_W: float,
     n_h: int,
-    direction: Matrix | None = None,
+    direction: Array | None = None,
 ) -> float:
     """n_h η_W |A_d⁻¹| (c_z/λ + c_ξ)/ρ_W [U]: the largest force that leakage lets W hold.
 
@@ -89,7 +89,7 @@ def steady_capacity(
     return weight
 
 
-def transient_peak(A_d: npt.ArrayLike) -> float:
+def transient_peak(A_d: ArrayLike) -> float:
     """A bound on max over t of |exp(A_d t)| [-]: 1, or sqrt(cond P), A_dᵀ P + P A_d = -I.
 
     Parameters
@@ -102,12 +102,12 @@ def transient_peak(A_d: npt.ArrayLike) -> float:
     return math.sqrt(float(np.linalg.cond(lyapunov(matrix, np.eye(2)).P)))
 
 
-def _peak(A_d: npt.ArrayLike, dt: float | None) -> float:
+def _peak(A_d: ArrayLike, dt: float | None) -> float:
     """γ of continuous time or of the Euler step [s]."""
     return peak_gain(A_d) if dt is None else sampled_peak_gain(A_d, dt)
 
 
-def _size(A_d: npt.ArrayLike, direction: Matrix | None) -> float:
+def _size(A_d: ArrayLike, direction: Array | None) -> float:
     """|D| [s]."""
     dynamics = require_hurwitz(A_d)
     return float(np.linalg.norm(np.linalg.inv(dynamics) if direction is None else direction, 2))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
-import numpy.typing as npt
+from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
 from identifier.certificate import Certificate, Property
@@ -32,7 +32,6 @@ from identifier.stability.loop import (
     spectral_radius,
     strongest,
 )
-from identifier.stability.lyapunov import Matrix
 from identifier.stability.margins import gain_margin
 from identifier.stability.operation import Operation, proven_bounds, worst_loop
 from models.bicycle import BicycleParameters
@@ -64,7 +63,7 @@ def certify(gains: Gains, law: Law, operation: Operation) -> Certificate:
 
 
 def judged_loop(
-    gains: Gains, law: DrivingError, operation: Operation, direction: Matrix, kept: float
+    gains: Gains, law: DrivingError, operation: Operation, direction: Array, kept: float
 ) -> tuple[float, Loop, list[Property]]:
     """Return the |W_hat| that margins are judged at, the worst loop there, and its margins.
 
@@ -87,7 +86,7 @@ def judged_loop(
     return operation.W_large, loop, margin_checks(loop, operation)
 
 
-def along_run(loop: Loop, gains_along: npt.ArrayLike, integrator: str, dt: float) -> Matrix:
+def along_run(loop: Loop, gains_along: ArrayLike, integrator: str, dt: float) -> Array:
     """Spectral radius of the sampled loop at each sample of a run, (n,).
 
     Parameters

@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 
+from codegen.arrays import Array
 from identifier.certificate import Property, Status, at_least, at_most, statement
 from identifier.paper.laws import DrivingError, Gains
 from identifier.stability.bounds import small_gain, steady_capacity
 from identifier.stability.loop import ComplexArray, Loop, eigenvalues, exact
-from identifier.stability.lyapunov import Matrix, lyapunov
+from identifier.stability.lyapunov import lyapunov
 from identifier.stability.margins import (
     drift_frequency,
     gain_margin,
@@ -150,7 +151,7 @@ def weight_check(gains: Gains, operation: Operation, kept: float, judged: float)
     )
 
 
-def state_space_poles(A_d: Matrix) -> ComplexArray:
+def state_space_poles(A_d: Array) -> ComplexArray:
     """Poles of ξ̃' = A_d ξ̃ + (f - f_hat), by python-control (2,) [1/s].
 
     Parameters
@@ -165,7 +166,7 @@ def state_space_poles(A_d: Matrix) -> ComplexArray:
 
 
 def drift_check(
-    gains: Gains, law: DrivingError, operation: Operation, direction: Matrix
+    gains: Gains, law: DrivingError, operation: Operation, direction: Array
 ) -> Property:
     """Whether a regressor that moves at the maneuver's bandwidth makes the weights drift.
 
@@ -261,7 +262,7 @@ CONDITION = (
 
 
 def bound_checks(
-    gains: Gains, law: DrivingError, operation: Operation, direction: Matrix, proven: Proven
+    gains: Gains, law: DrivingError, operation: Operation, direction: Array, proven: Proven
 ) -> list[Property]:
     """Small gain, bounds of |ξ̃|, |W_hat| and |V_hat|, leakage, capacity, (14).
 
@@ -384,7 +385,7 @@ def _leakage(name: str, layer: str, step: float, rho: float) -> Property:
     )
 
 
-def _capacity(gains: Gains, law: DrivingError, operation: Operation, direction: Matrix) -> Property:
+def _capacity(gains: Gains, law: DrivingError, operation: Operation, direction: Array) -> Property:
     """Judge the force that leakage lets W hold: beyond the dead zone it holds what it did."""
     resting = math.sqrt(operation.n_h) * gains.W_free
     capacity = resting + steady_capacity(

@@ -20,9 +20,11 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
+from numpy.typing import ArrayLike
 
+from codegen.arrays import Array
 from identifier.paper.laws import DrivingError, Law
-from identifier.stability.lyapunov import Matrix, require_square
+from identifier.stability.lyapunov import require_square
 
 ComplexArray = npt.NDArray[np.complex128]
 Integrator = Callable[[ComplexArray], ComplexArray]
@@ -65,7 +67,7 @@ INTEGRAL = DrivingError(1.0, 0.0)
 INSTANTANEOUS = DrivingError(0.0, 1.0)
 
 
-def direction_matrix(law: Law, A_d: npt.ArrayLike) -> Matrix:
+def direction_matrix(law: Law, A_d: ArrayLike) -> Array:
     """Return D of the law, (2, 2) [s]: -A_d⁻ᵀ as printed, P for the PI-lead law.
 
     Parameters
@@ -73,7 +75,7 @@ def direction_matrix(law: Law, A_d: npt.ArrayLike) -> Matrix:
     law : of `identifier.paper.laws.LAWS`.
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     """
-    found: Matrix = -np.array(ca.DM(law.direction(ca.DM(require_square(A_d)), ca.DM.eye(2))))
+    found: Array = -np.array(ca.DM(law.direction(ca.DM(require_square(A_d)), ca.DM.eye(2))))
     return found
 
 
@@ -92,13 +94,13 @@ class Loop:
     direction : (2, 2) matrix D that replaces -A_d⁻ᵀ [s], None for (11) and (12) as printed.
     """
 
-    A_d: Matrix
+    A_d: Array
     forgetting: float
     law: DrivingError
-    G: Matrix
+    G: Array
     leakage: float = 0.0
-    input_feedback: Matrix | None = None
-    direction: Matrix | None = None
+    input_feedback: Array | None = None
+    direction: Array | None = None
 
     def __post_init__(self) -> None:
         """Check shapes and signs once, here."""
@@ -109,7 +111,7 @@ class Loop:
         if not self.leakage >= 0.0:
             raise ValueError(f"leakage must not be negative, it is {self.leakage}")
 
-    def matrix(self) -> Matrix:
+    def matrix(self) -> Array:
         """Return the (6, 6) matrix of the states (ξ̃, z, p)."""
         eye, zero = np.eye(2), np.zeros((2, 2))
         c_z, c_xi = self.law
@@ -134,7 +136,7 @@ class Loop:
         return replace(self, G=factor * self.G)
 
 
-def scaled_matrices(loop: Loop, factors: npt.ArrayLike) -> ComplexArray:
+def scaled_matrices(loop: Loop, factors: ArrayLike) -> ComplexArray:
     """Stack the loop's matrices for many (complex) factors on the loop gain, (n, 6, 6).
 
     Parameters
@@ -148,7 +150,7 @@ def scaled_matrices(loop: Loop, factors: npt.ArrayLike) -> ComplexArray:
     return stack
 
 
-def eigenvalues(matrices: npt.ArrayLike) -> ComplexArray:
+def eigenvalues(matrices: ArrayLike) -> ComplexArray:
     """Eigenvalues as complex numbers, (..., n) [1/s].
 
     Parameters
@@ -158,7 +160,7 @@ def eigenvalues(matrices: npt.ArrayLike) -> ComplexArray:
     return np.asarray(np.linalg.eigvals(np.asarray(matrices)), dtype=np.complex128)
 
 
-def root_locus(loop: Loop, factors: npt.ArrayLike) -> ComplexArray:
+def root_locus(loop: Loop, factors: ArrayLike) -> ComplexArray:
     """Eigenvalues of the loop for many factors on the gain, (n, 6) [1/s], unsorted.
 
     Parameters
@@ -169,9 +171,7 @@ def root_locus(loop: Loop, factors: npt.ArrayLike) -> ComplexArray:
     return eigenvalues(scaled_matrices(loop, factors))
 
 
-def growth_rate(
-    matrices: npt.ArrayLike, integrator: Integrator = exact, dt: float = 1.0
-) -> npt.NDArray[np.float64]:
+def growth_rate(matrices: ArrayLike, integrator: Integrator = exact, dt: float = 1.0) -> Array:
     """Log max|R(μ dt)| / dt [1/s]: negative is stable; the spectral abscissa for `exact`.
 
     Parameters
@@ -187,7 +187,7 @@ def growth_rate(
     return np.asarray(growth, dtype=np.float64)
 
 
-def spectral_radius(matrices: npt.ArrayLike, integrator: Integrator, dt: float) -> Matrix:
+def spectral_radius(matrices: ArrayLike, integrator: Integrator, dt: float) -> Array:
     """max|R(μ dt)|: below one the sampled loop is stable.
 
     Parameters
@@ -243,10 +243,10 @@ def regressor_gains(
     *,
     eta_W: float,
     eta_V: float,
-    s: npt.ArrayLike,
-    x_bar: npt.ArrayLike,
-    W: npt.ArrayLike,
-) -> Matrix:
+    s: ArrayLike,
+    x_bar: ArrayLike,
+    W: ArrayLike,
+) -> Array:
     """G along a run, (n, 2, 2).
 
     Parameters
@@ -269,11 +269,11 @@ def regressor_gains(
     slope = np.broadcast_to(W, (n, 2, n_h)) * (1.0 - s**2)[:, None, :]  # W (I - Λ)
     through_W = eta_W * np.sum(s**2, axis=1)[:, None, None] * np.eye(2)
     through_V = eta_V * np.sum(x_bar**2, axis=1)[:, None, None]
-    gains: Matrix = through_W + through_V * (slope @ slope.transpose(0, 2, 1))
+    gains: Array = through_W + through_V * (slope @ slope.transpose(0, 2, 1))
     return gains
 
 
-def strongest(gains: npt.ArrayLike) -> tuple[int, float]:
+def strongest(gains: ArrayLike) -> tuple[int, float]:
     """Index of the sample with the largest λ_max(G), and that value.
 
     Parameters

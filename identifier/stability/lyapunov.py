@@ -7,11 +7,10 @@ A_d: (2, 2) error dynamics [1/s].   P, Q: symmetric positive definite, A_dᵀ P 
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
+from numpy.typing import ArrayLike
 
+from codegen.arrays import Array
 from identifier.paper.laws import NotHurwitzError
-
-Matrix = npt.NDArray[np.float64]
 
 
 class LyapunovError(ValueError):
@@ -30,13 +29,13 @@ class LyapunovPair:
     residual : |A_dᵀ P + P A_d + Q| / |Q| [-].
     """
 
-    A_d: Matrix
-    P: Matrix
-    Q: Matrix
+    A_d: Array
+    P: Array
+    Q: Array
     residual: float
 
 
-def require_square(A_d: npt.ArrayLike) -> Matrix:
+def require_square(A_d: ArrayLike) -> Array:
     """Return A_d as a finite (2, 2) array.
 
     Parameters
@@ -54,7 +53,7 @@ def require_square(A_d: npt.ArrayLike) -> Matrix:
     return matrix
 
 
-def require_hurwitz(A_d: npt.ArrayLike) -> Matrix:
+def require_hurwitz(A_d: ArrayLike) -> Array:
     """Return A_d as an array after checking that all its eigenvalues have Re < 0.
 
     Parameters
@@ -74,7 +73,7 @@ def require_hurwitz(A_d: npt.ArrayLike) -> Matrix:
     return matrix
 
 
-def lyapunov_residual(A_d: npt.ArrayLike, P: npt.ArrayLike, Q: npt.ArrayLike) -> float:
+def lyapunov_residual(A_d: ArrayLike, P: ArrayLike, Q: ArrayLike) -> float:
     """Substitute P back: |A_dᵀ P + P A_d + Q| / |Q|.
 
     Parameters
@@ -87,7 +86,7 @@ def lyapunov_residual(A_d: npt.ArrayLike, P: npt.ArrayLike, Q: npt.ArrayLike) ->
     return float(np.linalg.norm(A_d.T @ P + P @ A_d + Q, 2) / np.linalg.norm(Q, 2))
 
 
-def lyapunov(A_d: npt.ArrayLike, Q: npt.ArrayLike) -> LyapunovPair:
+def lyapunov(A_d: ArrayLike, Q: ArrayLike) -> LyapunovPair:
     """Solve A_dᵀ P + P A_d = -Q (the P and Q of (14)) and check the answer by substitution.
 
     Parameters
@@ -115,7 +114,7 @@ def lyapunov(A_d: npt.ArrayLike, Q: npt.ArrayLike) -> LyapunovPair:
     return LyapunovPair(A_d=A_d, P=P, Q=Q, residual=residual)
 
 
-def peak_gain(A_d: npt.ArrayLike) -> float:
+def peak_gain(A_d: ArrayLike) -> float:
     """γ = ∫₀^∞ |exp(A_d t)| dt [s], so that |xi_tilde| <= γ sup|f - f_hat| from rest.
 
     1 / min|Re pole| where A_d is normal (symmetric, or a multiple of the identity plus a
@@ -152,7 +151,7 @@ def peak_gain(A_d: npt.ArrayLike) -> float:
     raise ArithmeticError(f"the integral of |exp(A_d t)| did not converge for {A_d.tolist()}")
 
 
-def transition_norm(A_d: npt.ArrayLike, t: npt.ArrayLike) -> Matrix:
+def transition_norm(A_d: ArrayLike, t: ArrayLike) -> Array:
     """|exp(A_d t)| of a 2x2 matrix in closed form, exp(m t + asinh(k S(t))), t > 0.
 
     m = tr A_d/2, k = |the symmetric part of A_d - m I|, S = sinh(q t)/q, q² = m² - det A_d: the
@@ -177,7 +176,7 @@ def transition_norm(A_d: npt.ArrayLike, t: npt.ArrayLike) -> Matrix:
     return np.asarray(np.exp(m * t + growth), dtype=np.float64)
 
 
-def sampled_peak_gain(A_d: npt.ArrayLike, dt: float) -> float:
+def sampled_peak_gain(A_d: ArrayLike, dt: float) -> float:
     """γ of the Euler step: dt ∑ |(I + dt A_d)^k| [s]; equal to γ for A_d = -a I, a dt <= 1.
 
     Parameters
@@ -197,7 +196,7 @@ def sampled_peak_gain(A_d: npt.ArrayLike, dt: float) -> float:
     return dt * power_norms(step, np.eye(2))[1]
 
 
-def power_norms(step: Matrix, entry: Matrix) -> tuple[float, float]:
+def power_norms(step: Array, entry: Array) -> tuple[float, float]:
     """Largest and sum of |step^k entry| over k = 0, 1, ...
 
     Parameters
@@ -221,7 +220,7 @@ def power_norms(step: Matrix, entry: Matrix) -> tuple[float, float]:
     return largest, total
 
 
-def _quadrature(A_d: Matrix, edges: Matrix) -> float:
+def _quadrature(A_d: Array, edges: Array) -> float:
     """Integrate |exp(A_d t)| over the panels between the edges, 12 Gauss nodes each."""
     nodes, weights = np.polynomial.legendre.leggauss(12)
     half = np.diff(edges)[:, None] / 2.0

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq, minimize_scalar
 
+from codegen.arrays import Array
 from identifier.paper.laws import DrivingError
 from identifier.stability.loop import (
     Integrator,
@@ -24,7 +25,7 @@ from identifier.stability.loop import (
     growth_rate,
     scaled_matrices,
 )
-from identifier.stability.lyapunov import Matrix, require_hurwitz
+from identifier.stability.lyapunov import require_hurwitz
 from models.rules import require_positive
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ def gain_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) -> 
     dt : step [s]; irrelevant for `exact`.
     """
 
-    def growth_at(log_factors: Matrix) -> Matrix:
+    def growth_at(log_factors: Array) -> Array:
         return growth_rate(scaled_matrices(loop, np.exp(log_factors)), integrator, dt)
 
     span = np.log(LARGEST_FACTOR)
@@ -85,7 +86,7 @@ def phase_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) ->
     dt : step [s]; irrelevant for `exact`.
     """
 
-    def growth_at(angles: Matrix) -> Matrix:
+    def growth_at(angles: Array) -> Array:
         return growth_rate(scaled_matrices(loop, np.exp(-1j * angles)), integrator, dt)
 
     grid = np.linspace(0.0, np.pi, 721)
@@ -147,7 +148,7 @@ def scalar_margins(loop: "control.TransferFunction") -> tuple[float, float, floa
 
 
 def _first_crossing(
-    growth_at: Callable[[Matrix], Matrix], grid: Matrix, threshold: float
+    growth_at: Callable[[Array], Array], grid: Array, threshold: float
 ) -> float | None:
     """Where the growth rate first turns positive on the grid, refined; None if it never does.
 
@@ -197,13 +198,13 @@ def _rate(loop: Loop) -> float:
 
 
 def passivity(
-    frequency: npt.ArrayLike,
+    frequency: ArrayLike,
     *,
-    A_d: npt.ArrayLike,
+    A_d: ArrayLike,
     forgetting: float,
     law: DrivingError,
-    direction: Matrix | None = None,
-) -> Matrix:
+    direction: Array | None = None,
+) -> Array:
     """λ_min of the Hermitian part of H(jω), (n,): negative where a regressor drifts.
 
     Parameters
@@ -226,7 +227,7 @@ def passivity(
 
 
 def drift_frequency(
-    *, A_d: npt.ArrayLike, forgetting: float, law: DrivingError, direction: Matrix | None = None
+    *, A_d: ArrayLike, forgetting: float, law: DrivingError, direction: Array | None = None
 ) -> float:
     """Lowest frequency from which a regressor drifts [rad/s]; inf where H is positive real.
 
@@ -241,7 +242,7 @@ def drift_frequency(
     direction : (2, 2) D, None for -A_d⁻ᵀ.
     """
 
-    def relative(frequency: npt.ArrayLike) -> Matrix:
+    def relative(frequency: ArrayLike) -> Array:
         """λ_min He H with the decay of H taken out, so that round-off is told from a sign."""
         lowest = passivity(frequency, A_d=A_d, forgetting=forgetting, law=law, direction=direction)
         return lowest * (size + np.atleast_1d(np.asarray(frequency))) / reference
@@ -263,19 +264,19 @@ def drift_frequency(
 
 
 def passivity_shortage(
-    *, A_d: npt.ArrayLike, forgetting: float, law: DrivingError, direction: Matrix | None = None
+    *, A_d: ArrayLike, forgetting: float, law: DrivingError, direction: Array | None = None
 ) -> float:
     """Max over ω of -λ_min He H(jω), zero where H is positive real.
 
     For A_d = -a I and the integral law: 1/(a (a + λ) (√a + √λ)²), `shortage_formula`. The other
-    arguments are those of `drift_frequency`.
+    arguments are those of `drift_frequency`, `direction` (2, 2) [s].
 
     Parameters
     ----------
     A_d : (2, 2) Hurwitz error dynamics [1/s].
     """
 
-    def lowest(log_frequency: npt.ArrayLike) -> Matrix:
+    def lowest(log_frequency: ArrayLike) -> Array:
         return passivity(
             np.exp(log_frequency), A_d=A_d, forgetting=forgetting, law=law, direction=direction
         )
@@ -305,12 +306,12 @@ def shortage_formula(a: float, lam: float) -> float:
 
 def sufficient_leakage(
     *,
-    A_d: npt.ArrayLike,
+    A_d: ArrayLike,
     forgetting: float,
     law: DrivingError,
     eta_W: float,
     n_h: int,
-    direction: Matrix | None = None,
+    direction: Array | None = None,
 ) -> float:
     """Constant leakage rate s0 [1/s] above which no regressor can drift, η |s|²_max shortage.
 

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
-import numpy.typing as npt
+from numpy.typing import ArrayLike
 
+from codegen.arrays import Array
 from identifier.driving import SPEED_SPREAD, YAW_OVERSHOOT, Driving
 from identifier.paper.laws import DrivingError, Gains
 from identifier.paper.network import network_signals
 from identifier.stability.loop import INTEGRATORS, Integrator, Loop, spectral_radius, worst_gain
-from identifier.stability.lyapunov import Matrix
 from identifier.stability.sampled_bound import (
     Disturbance,
     ErrorGains,
@@ -60,7 +60,7 @@ class Operation:
     disturbance: Disturbance
     needed_force: float
     x_bar_max: float
-    input_feedback: Matrix | None
+    input_feedback: Array | None
     W_M: float
     w_bar: float
     V_start: float = 0.0
@@ -91,7 +91,7 @@ class Operation:
         """The integrator as a function of eigenvalues."""
         return INTEGRATORS[self.integrator]
 
-    def resolves(self, A_d: Matrix) -> bool:
+    def resolves(self, A_d: Array) -> bool:
         """Whether the step keeps the error dynamics stable.
 
         Parameters
@@ -145,7 +145,7 @@ NOTHING = Proven(leakage=None, projection=None, V=math.inf, leakage_step=0.0, le
 
 
 def proven_bounds(
-    gains: Gains, law: DrivingError, operation: Operation, direction: Matrix
+    gains: Gains, law: DrivingError, operation: Operation, direction: Array
 ) -> Proven:
     """Return all bounds that are proven, for the start of `sampled_bound.py`.
 
@@ -179,7 +179,7 @@ def proven_bounds(
     )
 
 
-def _unleaked(error: ErrorGains, learning: Learning, operation: Operation, A_d: Matrix) -> float:
+def _unleaked(error: ErrorGains, learning: Learning, operation: Operation, A_d: Array) -> float:
     """Estimate |ξ̃| where nothing is proven: leakage of small steps, in continuous time."""
     smooth = replace(learning, dt=0.0)
     found = by_leakage(error, smooth, A_d, operation.disturbance, operation.n_h)
@@ -187,7 +187,7 @@ def _unleaked(error: ErrorGains, learning: Learning, operation: Operation, A_d: 
 
 
 def _kept_V(
-    gains: Gains, learning: Learning, found: Proven, operation: Operation, direction: Matrix
+    gains: Gains, learning: Learning, found: Proven, operation: Operation, direction: Array
 ) -> float:
     """Bound on |V_hat|: |x_bar| and |W_hat| drive it; its leakage or projection keep it [-]."""
     X, W = found.stage, found.W
@@ -204,7 +204,7 @@ def _kept_V(
 
 
 def worst_loop(
-    gains: Gains, law: DrivingError, operation: Operation, direction: Matrix, W: float
+    gains: Gains, law: DrivingError, operation: Operation, direction: Array, W: float
 ) -> Loop:
     """Return the loop at the worst regressor, and |W_hat| up to W.
 
@@ -243,7 +243,7 @@ def worst_loop(
 # F' = 0. (8)c prints x_hat; x is measured, so that reading x costs nothing and has no such limit.
 
 
-def axle_coupling(*, m: float, I_z: float, l_f: float, l_r: float) -> Matrix:
+def axle_coupling(*, m: float, I_z: float, l_f: float, l_r: float) -> Array:
     """N = [1 l_f; 1 -l_r] K [1/kg], (2, 2), with K of (6).
 
     Parameters
@@ -256,7 +256,7 @@ def axle_coupling(*, m: float, I_z: float, l_f: float, l_r: float) -> Matrix:
     require_positive(ValueError, m=m, I_z=I_z, l_f=l_f, l_r=l_r)
     K = np.array([[1.0 / m, 1.0 / m], [l_f / I_z, -l_r / I_z]])  # (6) prints a transpose
     slip = np.array([[1.0, l_f], [1.0, -l_r]])
-    coupling: Matrix = slip @ K
+    coupling: Array = slip @ K
     return coupling
 
 
@@ -266,9 +266,9 @@ def estimated_input_feedback(
     I_z: float,
     l_f: float,
     l_r: float,
-    stiffness_lost: npt.ArrayLike,
+    stiffness_lost: ArrayLike,
     v_x: float,
-) -> Matrix:
+) -> Array:
     """J_f K = diag(C - F') N / v_x [1/s], (2, 2): what reading x_hat adds to A_d.
 
     Parameters
@@ -287,7 +287,7 @@ def estimated_input_feedback(
     return np.diag(lost) @ axle_coupling(m=m, I_z=I_z, l_f=l_f, l_r=l_r) / v_x
 
 
-def minimal_decay(feedback: npt.ArrayLike) -> float:
+def minimal_decay(feedback: ArrayLike) -> float:
     """Smallest a [1/s] with -a I + J_f K Hurwitz.
 
     Parameters
@@ -297,9 +297,7 @@ def minimal_decay(feedback: npt.ArrayLike) -> float:
     return float(np.max(np.linalg.eigvals(np.asarray(feedback)).real))
 
 
-def jacobian_feedback(
-    *, W: npt.ArrayLike, V_x: npt.ArrayLike, s: npt.ArrayLike, K: npt.ArrayLike
-) -> Matrix:
+def jacobian_feedback(*, W: ArrayLike, V_x: ArrayLike, s: ArrayLike, K: ArrayLike) -> Array:
     """J_f K = W (I - Λ) V_x K of the present network [1/s], (2, 2).
 
     Parameters
@@ -310,7 +308,7 @@ def jacobian_feedback(
     K : (2, 2) of (6) for forces in U.
     """
     W, V_x, s, K = np.asarray(W), np.asarray(V_x), np.asarray(s), np.asarray(K)
-    feedback: Matrix = (W * (1.0 - s**2)) @ V_x @ K
+    feedback: Array = (W * (1.0 - s**2)) @ V_x @ K
     return feedback
 
 
@@ -528,6 +526,6 @@ def operation(design: "PaperIdentifier", vehicle: Vehicle, driving: Driving) -> 
     )
 
 
-def _stiffness(vehicle: Vehicle) -> Matrix:
+def _stiffness(vehicle: Vehicle) -> Array:
     """C of both axles (2,) [N/rad]."""
     return np.array([vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear])

@@ -16,10 +16,11 @@ A_d symmetric and Q = 2 I give P = -A_d⁻¹, S = 0, and the law as printed.
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
+from numpy.typing import ArrayLike
 
+from codegen.arrays import Array
 from identifier.paper.laws import DrivingError
-from identifier.stability.lyapunov import LyapunovPair, Matrix
+from identifier.stability.lyapunov import LyapunovPair
 from models.rules import require_positive
 
 
@@ -33,8 +34,8 @@ class Storage:
     N : (2k, 2k) dissipation matrix, both positive semidefinite where the law is passive.
     """
 
-    M: Matrix
-    N: Matrix
+    M: Array
+    N: Array
 
     @property
     def proves_passivity(self) -> bool:
@@ -90,7 +91,7 @@ def storage(pair: LyapunovPair, *, forgetting: float, tau: float) -> Storage:
 
 
 def storage_residual(
-    stored: Storage, *, A_d: npt.ArrayLike, forgetting: float, output: npt.ArrayLike
+    stored: Storage, *, A_d: ArrayLike, forgetting: float, output: ArrayLike
 ) -> float:
     """Substitute: |Fᵀ M + M F + N| and |M B - Cᵀ| against the size of M F.
 

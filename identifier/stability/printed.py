@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
+from numpy.typing import ArrayLike
 
 from identifier.certificate import Property, statement
 from identifier.paper.laws import DrivingError, Gains
@@ -56,7 +56,7 @@ def tight_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: 
     return (W_M + math.sqrt(n_h) * coupling) / 2.0
 
 
-def canceling_pair(A_d: npt.ArrayLike, *, eta_W: float, rho_W: float) -> LyapunovPair:
+def canceling_pair(A_d: ArrayLike, *, eta_W: float, rho_W: float) -> LyapunovPair:
     """P = -(η/ρ) sym(A_d⁻¹) and its Q: cancels the coupling where A_d is symmetric.
 
     Parameters
@@ -83,7 +83,7 @@ def canceling_pair(A_d: npt.ArrayLike, *, eta_W: float, rho_W: float) -> Lyapuno
 def k_b_with_V(
     k_b: float,
     *,
-    A_d: npt.ArrayLike,
+    A_d: ArrayLike,
     W_M: float,
     V_M: float,
     x_bar_max: float,
@@ -136,7 +136,7 @@ def bound_14(pair: LyapunovPair, *, w_bar: float, k_b: float) -> float:
     return float(2.0 * (np.linalg.norm(pair.P, 2) * w_bar + k_b**2) / np.linalg.eigvalsh(pair.Q)[0])
 
 
-def trivial_bound(A_d: npt.ArrayLike, residual_bound: float) -> float:
+def trivial_bound(A_d: ArrayLike, residual_bound: float) -> float:
     """γ sup|f| [U s]: the ultimate bound of an identifier that has no network at all.
 
     A bound above this one says nothing about learning.

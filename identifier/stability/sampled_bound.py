@@ -33,9 +33,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from codegen.arrays import Array
 from identifier.paper.laws import DrivingError, Gains
 from identifier.stability.bounds import transient_peak
-from identifier.stability.lyapunov import Matrix, peak_gain, power_norms
+from identifier.stability.lyapunov import peak_gain, power_norms
 from models.rules import require_positive
 
 # What acts on the error dynamics from outside: bounds that hold on every declared drive.
@@ -106,7 +107,7 @@ class ErrorGains:
     inner: tuple[tuple[float, float, tuple[float, ...]], ...] = ()
 
 
-def error_gains(A_d: Matrix, integrator: str, dt: float) -> ErrorGains:
+def error_gains(A_d: Array, integrator: str, dt: float) -> ErrorGains:
     """Return the gains of the error dynamics.
 
     Parameters
@@ -210,7 +211,7 @@ class Learning:
 
 
 def output_layer(
-    gains: Gains, law: DrivingError, direction: Matrix, *, n_h: int, integrator: str, dt: float
+    gains: Gains, law: DrivingError, direction: Array, *, n_h: int, integrator: str, dt: float
 ) -> Learning:
     """Return how W is driven: g' = η_W |D| √n_h.
 
@@ -235,7 +236,7 @@ def output_layer(
 
 
 def by_leakage(
-    error: ErrorGains, learning: Learning, A_d: Matrix, acting: Disturbance, n_h: int
+    error: ErrorGains, learning: Learning, A_d: Array, acting: Disturbance, n_h: int
 ) -> SampledBounds | None:
     """Return the bounds that leakage gives, or None where the circle does not close.
 
@@ -277,7 +278,7 @@ def by_leakage(
 
 
 def by_projection(
-    error: ErrorGains, A_d: Matrix, acting: Disturbance, *, n_h: int, W_max: float
+    error: ErrorGains, A_d: Array, acting: Disturbance, *, n_h: int, W_max: float
 ) -> SampledBounds:
     """Return the bounds while |W_hat| <= W_max at every stage: for any law and any gain.
 
@@ -295,7 +296,7 @@ def by_projection(
 
 
 def _error(
-    error: ErrorGains, A_d: Matrix, acting: Disturbance, forces: tuple[float, ...]
+    error: ErrorGains, A_d: Array, acting: Disturbance, forces: tuple[float, ...]
 ) -> tuple[float, float]:
     """Bound |ξ̃| at the samples and at every stage, from |f_hat| of each stage."""
     e = error.start * acting.noise + error.force * (acting.residual + _norm(A_d) * acting.noise)
@@ -311,5 +312,5 @@ def _error(
     return measured, max([measured, *stages])
 
 
-def _norm(matrix: Matrix) -> float:
+def _norm(matrix: Array) -> float:
     return float(np.linalg.norm(matrix, 2))

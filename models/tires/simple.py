@@ -1,4 +1,4 @@
-"""The tire of the linear bicycle: force proportional to slip, without limit."""
+"""Tires of few numbers: the linear one, Fiala's brush, Dugoff's hyperbola."""
 
 from dataclasses import dataclass
 

@@ -39,16 +39,6 @@ Params = NDArray[np.void]
 MACROS = {"tolerance": "TOLERANCE"}  # members that are other in float
 
 
-def params_of(tracker: Tracker) -> Params:
-    """Return the numbers that a tracker reads, of `mpc.realtime.instance.params_type`.
-
-    Parameters
-    ----------
-    tracker : in double.
-    """
-    return tracker.params
-
-
 def initializers(params: Params) -> str:
     """Return the members of the C structure, one a line with its name.
 
@@ -236,7 +226,7 @@ class MpcPackage(NamedTuple):
     name: str
     tire: PredictionTire
     problem: Problem
-    params: NDArray[np.void]
+    params: Params
     files: Mapping[str, str]
     vectors: Vectors
     about: Values
@@ -272,7 +262,7 @@ def build_mpc_package(
     """
     check_name(name, "_mpc")
     tracker = Tracker(tire, problem, period=period, delay=delay)
-    params = params_of(tracker)
+    params: Params = tracker.params
     content = _ingredients(tracker, params, name, single=single)
     about = _summary(tracker, content)
     files = c_sources(
@@ -323,9 +313,7 @@ def _in_words(value: Any) -> str:
     return ", ".join(f"{number:.6g}" for number in values)
 
 
-def _ingredients(
-    tracker: Tracker, params: NDArray[np.void], name: str, *, single: bool
-) -> dict[str, Any]:
+def _ingredients(tracker: Tracker, params: Params, name: str, *, single: bool) -> dict[str, Any]:
     tire, problem = tracker.tire, tracker.problem
     structure = tire.structure
     numbers = (

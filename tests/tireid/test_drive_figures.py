@@ -275,6 +275,17 @@ def test_the_true_curve_of_a_film_is_that_of_the_road_that_the_car_is_on():
         assert seen == {"oracle": not halved, "oracle at the end": halved}
 
 
+def test_the_panels_of_a_film_show_the_true_curve_as_far_as_the_car_slips():
+    grippy = replace(CURVES[2], label="oracle", force=3.0 * CURVES[2].force)
+    free, tall = (
+        Scene(ON_LANE, tires, drops=(), pace=1.0, title="made up").figure.axes[1]
+        for tires in (CURVES[:1], [*CURVES[:1], grippy])
+    )
+    inside = np.abs(np.rad2deg(grippy.alpha)) <= tall.get_xlim()[1]
+    assert 1e-3 * np.abs(grippy.force[inside, 0]).max() > free.get_ylim()[1]  # else it says nothing
+    assert 1e-3 * np.abs(grippy.force[inside]).max() < tall.get_ylim()[1]
+
+
 def test_what_was_known_only_at_the_end_is_not_in_a_film():
     hindsight = replace(CURVES[0], label="frozen at the end")
     scene = Scene(ON_LANE, [*CURVES, hindsight], drops=(), pace=1.0, title="made up")

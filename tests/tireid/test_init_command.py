@@ -47,7 +47,7 @@ def test_nothing_is_replaced_unasked(tmp_path, capsys):
     path = tmp_path / "car.toml"
     path.write_text("precious", encoding="utf-8")
     assert main(["init", str(path)]) == 2
-    assert "exists: --force replaces it" in capsys.readouterr().err
+    assert "exists: choose another, or add --force" in capsys.readouterr().err
     assert path.read_text(encoding="utf-8") == "precious"
     assert main(["init", str(path), "--force"]) == 0
     assert path.read_text(encoding="utf-8") != "precious"

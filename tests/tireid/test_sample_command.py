@@ -32,8 +32,8 @@ def test_the_car_is_the_one_that_drove_and_both_can_be_learnt_from(written):
     ("words", "told"),
     [
         (["log.txt"], ".csv"),
-        (["log.csv"], "exists: --force replaces it"),
-        (["new.csv", "--car", "car.toml"], "car.toml exists: --force replaces it"),
+        (["log.csv"], "exists: choose another, or add --force"),
+        (["new.csv", "--car", "car.toml"], "car.toml exists: choose another, or add --force"),
         (["new.csv", "--seed", "-1"], "--seed must not be negative"),
     ],
 )

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib import style
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from mpc.loop import Drive
 from tireid.animation.known import KnownCurves
 from tireid.animation.scene import Scene
@@ -31,7 +31,7 @@ QUALITY = 45  # of a WebP, to 100
 class Reel(NamedTuple):
     """Instants (k,) [s] of the drive and the pace: seconds of the drive a second of the film."""
 
-    t: NDArray[np.float64]
+    t: Array
     pace: float
 
 
@@ -127,7 +127,7 @@ def _writer(file: FilePath) -> AbstractMovieWriter:
     if file.suffix == ".webp":
         return WebpWriter(fps=RATE)  # type: ignore[arg-type]
     if file.suffix == ".gif":
-        return PillowWriter(fps=RATE)  # type: ignore[arg-type]  # ms a frame: 12.5 is exact
+        return PillowWriter(fps=RATE)  # type: ignore[arg-type]
     require_ffmpeg()
     words = ["-pix_fmt", "yuv420p", "-movflags", "+faststart"]
     return FFMpegWriter(fps=RATE, extra_args=words)  # type: ignore[arg-type]

@@ -70,7 +70,7 @@ class ForcePanel:
         self._alpha = np.rad2deg(slip[:, axle])
         self._force = drive.axle_force[:, axle] / self._unit.newtons
         self._reach = 1.15 * float(np.abs(np.rad2deg(slip)).max())
-        self._limits = force_range(drive.axle_force / self._unit.newtons)
+        self._limits = self._all_forces([c for c in curves if c.label.startswith(ORACLE)])
         self._true = {}
         for curve in curves:
             if curve.label.endswith(AT_THE_END) and not curve.label.startswith(ORACLE):
@@ -129,6 +129,15 @@ class ForcePanel:
         shown = self._reach - slip if np.isfinite(slip) else 0.0
         for patch, left in zip(self._shades, (-self._reach, self._reach - shown), strict=True):
             patch.set(x=left, width=shown)
+
+    def _all_forces(self, true: Sequence[TireCurve]) -> tuple[float, float]:
+        """Return the ends of an axis that shows the drive, and the tires as far as it slips."""
+        seen = [(one.alpha, one.force) for one in true]
+        if self._known is not None:
+            seen += [(self._known.alpha, one) for one in self._known.steering]
+        within = [force[np.abs(np.rad2deg(alpha)) <= self._reach] for alpha, force in seen]
+        newtons = self._unit.newtons
+        return force_range(self._drive.axle_force / newtons, *(one / newtons for one in within))
 
     def _drawn(self, force: Array) -> Array:
         return drawable(force[:, self._axle] / self._unit.newtons, self._limits)

@@ -4,16 +4,16 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from identifier.driving import Driving
+from identifier.method import force_unit_name
 from identifier.methods import DEFAULT, certify
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.network import Weights
 from identifier.stability import Certificate, Property
 from identifier.stability.monte_carlo import Observed
 from models.vehicle import Vehicle
-from tireid.figures.style import force_unit_name
 from tireid.output import text_table
 
 ROUNDING = 1e-9  # of weights that lie on their projection, in parts of its radius
@@ -207,7 +207,7 @@ def bound_rows(certificate: Certificate, observed: Observed) -> list[Row]:
     rows = []
     for name, what, title in BOUNDS:
         if name in known and np.isfinite(known[name].value):
-            seen: NDArray[np.float64] = getattr(observed, what)
+            seen: Array = getattr(observed, what)
             bound = known[name].value
             passed = int(np.count_nonzero(~(seen <= bound * (1.0 + TOLERANCE))))
             ratio = bound / seen[np.isfinite(seen) & (seen > 0.0)]

@@ -19,7 +19,7 @@ from identifier.paper.design import PHASE_MARGIN, VARIANTS, PaperIdentifier, des
 from identifier.paper.laws import LAWS, Gains
 from identifier.run import identify
 from identifier.stability import Certificate, DesignError, Operation
-from identifier.stability.certificate import judged_loop
+from identifier.stability.certificate import judged_loop, loop_along
 from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS, with_keeping
 from identifier.stability.loop import direction_matrix
 from identifier.stability.monte_carlo import Beginning, Observed, monte_carlo
@@ -51,7 +51,7 @@ from tireid.commands.options import (
     seed_of,
 )
 from tireid.figures import error_figure, locus_figure, save_figure
-from tireid.output import OutputError, output_folder, write_json
+from tireid.output import output_folder, require_free, write_json
 from tireid.progress import Progress, say, tell
 
 # The figures of `tireid check`: root locus with its margin, bounds against a real error.
@@ -378,8 +378,6 @@ def _radii(gains: Gains) -> str:
 
 
 def _along(recording: Recording, vehicle: Vehicle, design: PaperIdentifier) -> str:
-    from identifier.stability.certificate import loop_along
-
     history = identify(recording, vehicle, design)
     if history.diverged_at is not None:
         return f"along {recording.name}: the law diverged at {history.diverged_at:g} s"
@@ -442,5 +440,5 @@ def _draw(
 
 
 def _require_free(options: argparse.Namespace) -> None:
-    if options.tune is not None and options.tune.exists() and not options.force:
-        raise OutputError(f"{options.tune} exists: choose another, or add --force to replace it")
+    if options.tune is not None:
+        require_free(options.tune, force=options.force)

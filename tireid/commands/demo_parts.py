@@ -1,4 +1,4 @@
-"""What the demo learnt as a C package: written, compiled, self-tested, set beside Python."""
+"""The demo's drives on what it learnt, and what it learnt as a C package, set beside Python."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -32,9 +32,9 @@ from tireid.report import Block, Headline, Paragraph, Picture, Section, Table
 from tireid.reports.common import READ, drawing
 from tireid.reports.drive import drive_table, known_blocks
 
-LANE_CHANGE, SLIPPERY = "drive", "drive_slippery"  # folders beside the report
 # The car of the demo drives on what it learnt: a lane change, and a road that becomes slippery.
 
+LANE_CHANGE, SLIPPERY = "drive", "drive_slippery"  # folders beside the report
 FILM = FORMATS[0]
 DELAY = 2  # periods of 10 ms
 SOURCE = "frozen ones learnt on the slalom"

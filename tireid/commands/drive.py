@@ -134,8 +134,8 @@ def add_parser(commands: Any) -> None:
         "drive",
         help=COMMANDS["drive"],
         description="Learn the tires on one drive, freeze them, and let a model predictive tracker "
-        "that is told of them steer the car along a path; write summary.json, every signal as "
-        "CSV, figures and a film.",
+        "that is told of them steer the car along a path; write report.html, summary.json, "
+        "every signal as CSV, figures and a film.",
         epilog=EPILOG,
     )
     parser.add_argument(

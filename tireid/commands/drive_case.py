@@ -22,9 +22,9 @@ from tireid.driving.setup import PERIOD, Setup, SpeedWish, require_friction
 from tireid.learning import identify
 from tireid.progress import Progress
 
-PERCENT, METERS, KILOMETERS = "%", "m/s", "km/h"
 # Words of `tireid drive` that are more than a name: how fast, and where the road is slippery.
 
+PERCENT, METERS, KILOMETERS = "%", "m/s", "km/h"
 PLAIN = 1.5  # a number without a unit up to here is a share of the grip
 
 
@@ -116,7 +116,7 @@ def parse_fault(text: str) -> SensorFault:
     return fault
 
 
-# The words of `tireid drive` made into a case, and a case told in words and numbers.
+# The words of `tireid drive` made into a case.
 
 ALL = "all"
 LONGEST_DELAY = 100.0  # ms

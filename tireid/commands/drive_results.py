@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from identifier.tire_model import TireModel
 from models.faults import SensorFault
 from models.files import digest
@@ -118,7 +118,7 @@ def _scores(run: Run) -> dict[str, Any]:
     return {**run.scores.to_dict(), "ending": run.drive.ending, "notes": notes}
 
 
-def drive_columns(drive: Drive) -> dict[str, NDArray[np.float64]]:
+def drive_columns(drive: Drive) -> dict[str, Array]:
     """Return every signal of a drive by the name of its column, with its unit."""
     slip = axle_slip(drive)
     units = {"t": "s", "psi": "rad", "r": "rad_s", "delta": "rad", "v_x": "m_s", "v_y": "m_s"}

@@ -71,7 +71,8 @@ def add_parser(commands: Any) -> None:
         "identify",
         help=COMMANDS["identify"],
         description="Learn axle forces over LOG sample by sample, freeze the weights, replay LOG "
-        "and other recordings; write summary.json, weights.json, curves as CSV and figures.",
+        "and other recordings; write report.html, summary.json, weights.json, curves as CSV and "
+        "figures.",
         epilog="LOG is CSV, CSV.gz or Parquet with the columns t [s], vx, vy [m/s], r [rad/s], "
         "delta_f [rad] and, where known, delta_r [rad], ay [m/s2], Fyf, Fyr [N] (or Fyf_inv, "
         "Fyr_inv: forces computed backwards from the motion), run; "

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from identifier.method import Method, vehicle_numbers
 from identifier.methods import certify
 from identifier.own_network import OnnxModel
@@ -208,9 +208,7 @@ def _write_curves(folder: Path, learnt: History, others: Sequence[History], froz
     write_csv(folder / "weights.csv", weights)
 
 
-def force_columns(
-    history: History, replays: Mapping[str, Replay]
-) -> dict[str, NDArray[np.float64]]:
+def force_columns(history: History, replays: Mapping[str, Replay]) -> dict[str, Array]:
     """Return the curves of forces.csv: slip angles, true, online and frozen forces.
 
     Parameters
@@ -243,9 +241,7 @@ CURVE_POINTS = 201
 FARTHER = 1.25  # than the slip that was driven, or is known
 
 
-def curve_columns(
-    model: TireModel, recordings: Sequence[Recording]
-) -> dict[str, NDArray[np.float64]]:
+def curve_columns(model: TireModel, recordings: Sequence[Recording]) -> dict[str, Array]:
     """Return curve.csv: the steady force of each axle over slip, and whether it is known there.
 
     Parameters

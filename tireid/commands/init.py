@@ -8,7 +8,7 @@ from models.files import write_atomically
 from models.vehicle import vehicle_template
 from tireid.commands import COMMANDS
 from tireid.commands.options import add_force
-from tireid.output import OutputError
+from tireid.output import require_free
 from tireid.progress import say
 
 
@@ -35,7 +35,6 @@ def run(options: argparse.Namespace) -> None:
     """Run the command."""
     if options.file.suffix.lower() != ".toml":
         raise ValueError(f"{options.file}: the name must end in .toml")
-    if options.file.exists() and not options.force:
-        raise OutputError(f"{options.file} exists: --force replaces it")
+    require_free(options.file, force=options.force)
     write_atomically(options.file, vehicle_template())
     say(f"wrote {options.file}: replace its numbers by those of your car")

@@ -6,14 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from codegen.arrays import Array
 from codegen.escape import visible
 from identifier.method import vehicle_numbers
 from identifier.methods import load_model
-from identifier.reproducibility import Prediction, counted_samples
+from identifier.reproducibility import Prediction, beyond_known
 from identifier.tire_model import TireModel
-from models.recordings import Recording
 from tireid import __version__
 from tireid.commands import COMMANDS
 from tireid.commands.identify_results import error_cells
@@ -90,7 +89,7 @@ def _model(options: argparse.Namespace) -> TireModel:
     return model.mounted_on(vehicle)
 
 
-def force_columns(model: TireModel, prediction: Prediction) -> dict[str, NDArray[np.float64]]:
+def force_columns(model: TireModel, prediction: Prediction) -> dict[str, Array]:
     """Return the columns of forces.csv: time, slip angles, predicted and true forces.
 
     Parameters
@@ -106,23 +105,6 @@ def force_columns(model: TireModel, prediction: Prediction) -> dict[str, NDArray
         if force is not None:
             columns |= {f"Fyf_{name}_N": force[:, 0], f"Fyr_{name}_N": force[:, 1]}
     return columns
-
-
-def beyond_known(model: TireModel, recording: Recording) -> tuple[float, float] | None:
-    """Return the share of the samples with more slip than the model knows; None if it cannot tell.
-
-    Parameters
-    ----------
-    model : that predicts.
-    recording : the drive; samples below the model's minimum speed do not count.
-    """
-    known = model.known_slip
-    if known is None:
-        return None
-    counted = counted_samples(recording, model.min_speed)
-    alpha = np.abs(recording.alpha(model.vehicle.l_f, model.vehicle.l_r)[counted])
-    front, rear = np.mean(alpha > known, axis=0)
-    return float(front), float(rear)
 
 
 def summary(model: TireModel, prediction: Prediction) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from models.recordings import write_recording
 from tireid.commands import COMMANDS
 from tireid.commands.options import add_force, add_seed, add_vehicle, read_vehicle, seed_of
 from tireid.driving import sample_recording
-from tireid.output import OutputError
+from tireid.output import require_free
 from tireid.progress import say
 
 
@@ -42,8 +42,7 @@ def run(options: argparse.Namespace) -> None:
     if not options.log.name.lower().endswith((".csv", ".csv.gz")):
         raise ValueError(f"{options.log}: the name must end in .csv or .csv.gz")
     for path in filter(None, (options.log, options.car)):
-        if path.exists() and not options.force:
-            raise OutputError(f"{path} exists: --force replaces it")
+        require_free(path, force=options.force)
     vehicle = read_vehicle(options)
     recording = sample_recording(vehicle, seed=seed)
     write_recording(recording, options.log)

@@ -1,4 +1,4 @@
-"""A drive to learn tires on, of a simulated car, and what a method learns on it."""
+"""A drive to learn tires on, of a simulated car."""
 
 from collections.abc import Callable
 from dataclasses import replace

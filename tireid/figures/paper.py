@@ -7,9 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from codegen.arrays import Array
+from identifier.method import force_unit_name
 from identifier.paper.design import VARIANTS
 from identifier.run import History
-from identifier.stability.loop import INTEGRATORS, Loop, eigenvalues, scaled_matrices
+from identifier.stability.loop import INTEGRATORS, Loop, eigenvalues, root_locus
 from identifier.stability.margins import gain_margin, phase_margin
 from tireid.figures.style import (
     AMBER,
@@ -24,7 +25,6 @@ from tireid.figures.style import (
     Window,
     drawable,
     force_range,
-    force_unit_name,
     impulse_unit,
     label_time,
     legend_above,
@@ -275,7 +275,7 @@ def locus_figure(loop: Loop, *, integrator: str, dt: float) -> Figure:
     dt : sampling interval [s].
     """
     step = INTEGRATORS[integrator]
-    locus = step(eigenvalues(scaled_matrices(loop, FACTORS)) * dt).ravel()
+    locus = step(root_locus(loop, FACTORS) * dt).ravel()
     design = step(eigenvalues(loop.matrix()) * dt)
     margin = gain_margin(loop, step, dt)
     circle = np.exp(1j * np.linspace(-np.pi, np.pi, 2881))

@@ -21,6 +21,7 @@ from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
+from identifier.method import force_unit_name
 from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import AxleRmse, freeze_key
 from identifier.run import History
@@ -397,17 +398,6 @@ def paper_design(history: History) -> PaperIdentifier:
     if not isinstance(history.design, PaperIdentifier):
         raise TypeError(f"a run of the paper's identifier is needed, not of {history.design}")
     return history.design
-
-
-def force_unit_name(force_unit: float) -> str:
-    """Return the name of a unit of force.
-
-    Parameters
-    ----------
-    force_unit : U [N].
-    """
-    names = {1.0: "N", 1000.0: "kN"}
-    return names.get(force_unit, f"{force_unit:g} N")
 
 
 def force_range(reference: Array, *others: Array) -> tuple[float, float]:

@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.run import History
@@ -133,9 +132,7 @@ def _label_slip(axes: Axes, axle: int) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 5, 10]))
 
 
-def _draw_curve(
-    axes: Axes, model: TireModel, axle: int, ends: NDArray[np.float64], newtons: float
-) -> None:
+def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: float) -> None:
     """Draw the steady curve of an axle."""
     slip = np.linspace(np.deg2rad(ends[0]), np.deg2rad(ends[1]), 200)
     axes.plot(
@@ -147,7 +144,7 @@ def _draw_curve(
     )
 
 
-def _shade_unknown(axes: Axes, known: float, ends: NDArray[np.float64]) -> None:
+def _shade_unknown(axes: Axes, known: float, ends: Array) -> None:
     """Shade the slip [deg] that the model does not know."""
     for low, high in ((ends[0], -known), (known, ends[1])):
         if low < high:

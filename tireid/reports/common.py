@@ -34,8 +34,9 @@ READ = {
     "film": "The curve that is steered by and the one that was learnt are those known at that "
     "moment; shaded slip was not known then.",
     "path": "Outlines are the first car every few meters; the green band is the path.",
-    "errors": "The deviation is near zero where the tracker knows the tires. Diamonds mark a tire "
-    "that was handed over, red shades a broken sensor, dots where it was noticed.",
+    "errors": "The deviation is near zero where the tracker knows the tires. Where there are any: "
+    "diamonds mark a tire that was handed over, red shades a broken sensor, dots where it was "
+    "noticed.",
     "steering": "A command at its limit is a car that has no more to give.",
     "tires": "The cloud is what the tires did; a tracker is right where its curve passes through "
     "it. Below, what each curve misses of the true one.",
@@ -59,10 +60,12 @@ def drawing(figure: Figure, caption: str, read: str = "") -> Picture:
 
 
 def recording_digest(recording: Recording) -> str:
-    """Return twelve characters that stand for the signals of a recording."""
+    """Return twelve characters that stand for the signals of a recording and its true forces."""
     signals = (recording.t, recording.v_x, recording.v_y, recording.r)
     steering = (recording.delta_f, recording.delta_r)
-    return digest([signal.tolist() for signal in (*signals, *steering)])
+    truth = (recording.a_y, recording.axle_force)
+    parts = [part for part in (*signals, *steering, *truth) if part is not None]
+    return digest([part.tolist() for part in parts])
 
 
 def origin(

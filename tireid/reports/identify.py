@@ -6,7 +6,14 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from identifier.reproducibility import AxleRmse, Replay, force_rms, freeze_key, online_error
+from identifier.reproducibility import (
+    AxleRmse,
+    Replay,
+    beyond_known,
+    force_rms,
+    freeze_key,
+    online_error,
+)
 from identifier.run import History
 from identifier.tire_model import TireModel
 from models.files import digest
@@ -53,7 +60,7 @@ def write_identify_report(
             command,
             learnt.vehicle,
             [run.recording for run in runs],
-            method=f"{law}, hash {digest(repr(learnt.design))}",
+            method=f"{law}, hash {digest(learnt.design.numbers())}",
         ),
     ]
     report = Report(
@@ -115,11 +122,9 @@ def identify_warnings(model: TireModel, runs: Sequence[History]) -> list[str]:
                 f"{name} has no true forces: errors are against what was identified online over "
                 "it, which asks only whether the model agrees with itself."
             )
-        if model.known_slip is None:
+        beyond = beyond_known(model, recording)
+        if model.known_slip is None or beyond is None:
             continue
-        moving = recording.v_x >= model.min_speed
-        slip = np.abs(recording.alpha(model.vehicle.l_f, model.vehicle.l_r)[moving])
-        beyond = (slip > model.known_slip).mean(axis=0) if moving.any() else np.zeros(2)
         for axle, share, known in zip(AXLES, beyond, np.degrees(model.known_slip), strict=True):
             if share > EXTRAPOLATED:
                 said.append(

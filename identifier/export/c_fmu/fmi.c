@@ -191,6 +191,16 @@ Status FMI(ExitInitializationMode)(Component c) {
   return FMI(OK);
 }
 
+/* Takes the samples from a communication point on, over a step [s]. */
+static Status step(Component c, double point, double size) {
+  Instance *instance = c;
+  if (!instance || !instance->running) return refuse(c, "a step before initialization");
+  if (!(size >= 0.0)) return refuse(c, "the step size must not be negative");
+  if (MODEL(fmu_advance)(&instance->now, point + size))
+    return refuse(c, "the communication point is no time");
+  return FMI(OK);
+}
+
 Status FMI(Terminate)(Component c) {
   Instance *instance = c;
   if (!instance) return FMI(Error);
@@ -304,12 +314,10 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 currentCommunicationPoint,
                       fmi3Boolean noSetFMUStatePriorToCurrentPoint,
                       fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
                       fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime) {
-  Instance *instance = c;
+  const Instance *instance = c;
+  const fmi3Status status = step(c, currentCommunicationPoint, communicationStepSize);
   (void)noSetFMUStatePriorToCurrentPoint;
-  if (!instance || !instance->running) return refuse(c, "a step before initialization");
-  if (!(communicationStepSize >= 0.0)) return refuse(c, "the step size must not be negative");
-  if (MODEL(fmu_advance)(&instance->now, currentCommunicationPoint + communicationStepSize))
-    return refuse(c, "the communication point is no time");
+  if (status != fmi3OK) return status;
   *eventHandlingNeeded = fmi3False;
   *terminateSimulation = fmi3False;
   *earlyReturn = fmi3False;
@@ -368,13 +376,8 @@ NO_VARIABLES(fmi2SetInteger, const fmi2Integer)
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
                       fmi2Real communicationStepSize,
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
-  Instance *instance = c;
   (void)noSetFMUStatePriorToCurrentPoint;
-  if (!instance || !instance->running) return refuse(c, "a step before initialization");
-  if (!(communicationStepSize >= 0.0)) return refuse(c, "the step size must not be negative");
-  if (MODEL(fmu_advance)(&instance->now, currentCommunicationPoint + communicationStepSize))
-    return refuse(c, "the communication point is no time");
-  return fmi2OK;
+  return step(c, currentCommunicationPoint, communicationStepSize);
 }
 
 fmi2Status fmi2CancelStep(fmi2Component c) { return refuse(c, "steps are never pending"); }

@@ -61,13 +61,13 @@ def test_it_knows_where_it_has_been(car, drive):
     assert model.outside(hard).mean() > 0.3
     assert expert.outside(hard).mean() < 0.05
     slip = np.abs(gentle.alpha(car.l_f, car.l_r)).max(axis=0)
-    np.testing.assert_allclose(model.known_slip_range, slip, rtol=0.2)
+    np.testing.assert_allclose(model.known_slip, slip, rtol=0.2)
     relative_sd = model.relative_sd(np.array([0.01, 0.1]))
     assert (relative_sd[0] < 0.15).all()
     assert (relative_sd[1] > 2 * relative_sd[0]).all()
     new = AxleIdentifier.for_vehicle(car).frozen(car, learnt(gentle, car).state_at(0.0))
     np.testing.assert_allclose(new.relative_sd(np.array([0.01, 0.1])), 1.0)
-    np.testing.assert_array_equal(new.known_slip_range, 0.0)
+    np.testing.assert_array_equal(new.known_slip, 0.0)
     assert new.outside(gentle)[100:].any(axis=1).mean() > 0.9
     assert 10.0 < model.learning_time.sum(axis=1).min() <= 14.6
 
@@ -82,10 +82,10 @@ def test_slip_is_known_up_to_where_a_quarter_of_the_doubt_is_left(car):
     for share, known in ((0.24, [0.2, 0.1]), (0.26, [0.0, 0.0]), (0.35, [0.0, 0.0])):
         model = replace(new, excitation=seen, covariance=share**2 * new.prior_covariance)
         np.testing.assert_allclose(model.relative_sd(np.array([0.05])), share, rtol=1e-9)
-        np.testing.assert_allclose(model.known_slip_range, known)
+        np.testing.assert_allclose(model.known_slip, known)
     shares = np.array([0.3, 0.2])[:, None, None]
     uneven = replace(new, excitation=seen, covariance=shares**2 * new.prior_covariance)
-    np.testing.assert_allclose(uneven.known_slip_range, [0.0, 0.1])
+    np.testing.assert_allclose(uneven.known_slip, [0.0, 0.1])
 
     # Units of the first scale and of the last alone, the first well known, the last not at all:
     # (0.01 t_1² + t_4²)/(t_1² + t_4²) = 1/16 where (t_4/t_1)² = (1/16 - 0.01)/(1 - 1/16).
@@ -100,9 +100,9 @@ def test_slip_is_known_up_to_where_a_quarter_of_the_doubt_is_left(car):
     ratio = np.tanh(slip / design.ladder[-1]) / np.tanh(slip / design.ladder[0])
     edge = slip[np.argmax(ratio > wanted)]
     assert 0.03 < edge < 0.1
-    np.testing.assert_allclose(model.known_slip_range, edge, atol=0.2 / 200)
+    np.testing.assert_allclose(model.known_slip, edge, atol=0.2 / 200)
     recordings = np.array([-1.05, -0.9, 0.9, 1.05]) * edge
-    inside = np.abs(recordings) < model.known_slip_range[0]
+    inside = np.abs(recordings) < model.known_slip[0]
     assert inside.tolist() == [False, True, True, False]
 
 

@@ -1,5 +1,6 @@
 """Each part of the axle identifier by another road."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import casadi as ca
@@ -132,6 +133,18 @@ def test_sensitivity_is_the_derivative_of_the_lag_even_at_no_compliance(car):
         ahead, behind = (lag(alpha, s + d, dt, v_x, the_car(car))[0] for d in (e, -e))
         np.testing.assert_allclose(p, (ahead - behind) / (2 * e), rtol=1e-3, atol=1e-5)
         assert np.abs(p[-1]).min() > 1e-3
+
+
+def test_a_toy_rolls_as_fast_as_springs_allow_and_a_body_that_is_none_is_refused(car):
+    toy = replace(
+        car, l_f=0.01, l_r=0.01, mass=0.02, yaw_inertia=2e-6,
+        cornering_stiffness_front=1.0, cornering_stiffness_rear=1.0,
+    )  # fmt: skip
+    assert Sway.for_vehicle(toy).frequency < 100.0 < 5.0 * np.sqrt(9.81 / toy.wheelbase)
+    assert Sway.for_vehicle(car).frequency == 5.0 * np.sqrt(9.81 / car.wheelbase)
+    for frequency, damping in ((546.0, 0.3), (0.0, 0.3), (10.0, -1.0), (float("nan"), 0.3)):
+        with pytest.raises(ValueError, match="must lie between"):
+            Sway(frequency=frequency, damping=damping)
 
 
 def test_sway_settles_where_the_body_leans_and_a_step_swings(car):

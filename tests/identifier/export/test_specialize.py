@@ -5,8 +5,10 @@ import pytest
 
 from codegen import Scan
 from identifier.export.compiled import samples_of
+from identifier.export.layout import Member, covariance_order
 from identifier.export.package import run_in_virtual_machine, synthetic_samples
-from identifier.export.specialize import SpecializedStep, specialize
+from identifier.export.specialize import Signal, SpecializedStep, specialize
+from identifier.method import COVARIANCE
 from identifier.methods import METHODS, make_method
 from identifier.run import identify
 from models.vehicle import sedan
@@ -112,3 +114,13 @@ def test_the_self_test_begins_gently_and_grows():
     first, middle, last = (np.abs(part).max() for part in np.array_split(r, 3))
     assert first < 0.8 * middle and middle < 1.3 * last
     assert np.abs(r[: r.size // 20]).max() < 0.2 * last
+
+
+def test_covariances_of_two_sizes_among_the_weights_are_refused():
+    """The C that checks them knows one size."""
+    sizes = [Signal("P", "-", "of two", size=4, rule=COVARIANCE)]
+    member = Member(sizes[0], (2, 2), learnt=True)
+    larger = Member(sizes[0]._replace(name="Q", size=9), (3, 3), learnt=True)
+    assert covariance_order([member, member]) == 2
+    with pytest.raises(ValueError, match="one size"):
+        covariance_order([member, larger])

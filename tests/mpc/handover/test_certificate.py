@@ -147,7 +147,7 @@ def test_a_tire_must_be_known_where_the_car_is_driven(car, learnt, dry):
     for row in zip(recording.v_x, recording.v_y, recording.r, recording.delta_f, strict=True):
         excitation.add(*row)
     assert excitation.complaint(learnt, samples) is None
-    known = learnt.known_slip_range
+    known = learnt.known_slip
     v_y = -20.0 * np.tan(1.5 * known.max())
     beyond = np.tile([20.0, v_y, 0.0, 0.0], (100, 1))
     assert "it is known to" in excitation.complaint(learnt, beyond)

@@ -11,11 +11,11 @@ from mpc.prediction import build_dynamics, build_rk4
 from mpc.problem import Limits, Problem
 from mpc.realtime import Tracker
 from mpc.tires import oracle_tire, prediction_tire
-from mpc.tires.tire import ALL, LEAST_RISE, Car, Point, extrapolated_force, useful_slip, valid_slip
+from mpc.tires.tire import ALL, LEAST_RISE, Car, Point, extrapolated_force, valid_slip
 
 CAR = sedan()
 SLIPS = np.linspace(-0.4, 0.4, 161)
-MOST = (0.2, 0.2)
+MOST, NO_LIMIT = (0.2, 0.2), (np.inf, np.inf)
 
 
 def curves(tire, valid=ALL, delta=0.0):
@@ -32,7 +32,7 @@ def oracle(request):
 
 
 def test_slip_is_of_use_up_to_nearly_the_peak(oracle):
-    force, useful = curves(oracle), useful_slip(oracle)
+    force, useful = curves(oracle), valid_slip(oracle, NO_LIMIT).slip
     for axle in (0, 1):
         there = np.interp(useful[axle], SLIPS, force[axle])
         assert 0.97 < there / force[axle].max() <= 1.0
@@ -40,13 +40,13 @@ def test_slip_is_of_use_up_to_nearly_the_peak(oracle):
 
 
 def test_half_the_friction_halves_the_useful_slip():
-    dry, wet = (useful_slip(oracle_tire(CAR, mu=mu)) for mu in (1.0, 0.5))
+    dry, wet = (valid_slip(oracle_tire(CAR, mu=mu), NO_LIMIT).slip for mu in (1.0, 0.5))
     assert wet == pytest.approx(0.5 * dry, rel=0.1)
 
 
 def test_a_linear_tire_is_of_use_everywhere_and_goes_on_as_it_is():
     linear = prediction_tire(CAR)
-    assert np.isinf(useful_slip(linear)).all()
+    assert np.isinf(valid_slip(linear, NO_LIMIT).slip).all()
     valid = valid_slip(linear, MOST)
     np.testing.assert_allclose(valid.slip, MOST)
     np.testing.assert_allclose(valid.rise, linear.weights)
@@ -54,7 +54,7 @@ def test_a_linear_tire_is_of_use_everywhere_and_goes_on_as_it_is():
 
 
 def test_a_curve_is_the_tires_up_to_there_and_rises_beyond(oracle):
-    useful, valid = useful_slip(oracle), valid_slip(oracle, MOST)
+    useful, valid = valid_slip(oracle, NO_LIMIT).slip, valid_slip(oracle, MOST)
     free, kept = curves(oracle, delta=0.1), curves(oracle, valid, delta=0.1)
     first = np.gradient(curves(oracle), SLIPS, axis=1)[:, SLIPS.size // 2]
     for axle in (0, 1):
