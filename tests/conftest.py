@@ -1,4 +1,6 @@
-"""What several tests need: recordings beside the checkout, a seeded generator; what is heavy."""
+"""What several tests need: recordings beside the checkout, a seeded generator, figures that cost
+little; what is heavy.
+"""
 
 import tomllib
 from fnmatch import fnmatchcase
@@ -57,3 +59,26 @@ def shared_data() -> Path:
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(20260101)
+
+
+# What takes longest in a command is to draw its figures; who reads files and words need not wait.
+PNG, SVG = b"\x89PNG\r\n\x1a\n", b"<?xml"
+
+
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Figures are made as ever; on paper and on the page they are empty."""
+    monkeypatch.setattr("tireid.figures.style.figure_png", lambda *_, **__: PNG)
+    monkeypatch.setattr("tireid.figures.style.figure_svg", lambda _: SVG)
+
+
+@pytest.fixture
+def laid_out(monkeypatch, undrawn):
+    """As `undrawn`, but a figure for paper is laid out with all that it shows, without ink."""
+    from tireid.figures.style import styled
+
+    def empty(figure, **_):
+        styled(figure.draw_without_rendering)()
+        return PNG
+
+    monkeypatch.setattr("tireid.figures.style.figure_png", empty)

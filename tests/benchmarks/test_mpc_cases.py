@@ -7,15 +7,12 @@ import pytest
 from benchmarks.mpc_cases import TIRES, Case, learnt_before, run
 from codegen import find_compiler
 from tireid.cli import main
-from tireid.commands import drive_results
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
 
 
 @pytest.mark.parametrize("tires", TIRES)
-def test_a_case_is_what_the_command_drives(tires, tmp_path, monkeypatch):
-    monkeypatch.setattr(drive_results, "save_figure", lambda *_: None)
-    monkeypatch.setattr("tireid.figures.style.figure_svg", lambda _: b"<?xml")
+def test_a_case_is_what_the_command_drives(tires, tmp_path, undrawn):
     case = Case("iso-3888-2", 0.9, 0.5, tires, seed=3)
     learnt_before.cache_clear()
     found = run(case).scores
@@ -32,9 +29,7 @@ def test_a_case_is_what_the_command_drives(tires, tmp_path, monkeypatch):
     assert summary["inputs"]["delay_ms"] == 20.0
 
 
-def test_another_path_is_driven_on_the_same_learnt_tire(monkeypatch, tmp_path):
-    monkeypatch.setattr(drive_results, "save_figure", lambda *_: None)
-    monkeypatch.setattr("tireid.figures.style.figure_svg", lambda _: b"<?xml")
+def test_another_path_is_driven_on_the_same_learnt_tire(tmp_path, undrawn):
     out = tmp_path / "out"
     words = ["--path", "slalom", "--speed", "50%", "--seed", "4", "--film", "none"]
     assert main(["drive", *words, "--out", str(out)]) == 0

@@ -112,7 +112,7 @@ def test_the_shortest_way_learns_the_tires(run, log):
     assert missed.against_truth.front < 0.15 * missed.true_force.front
 
 
-def test_the_command_and_the_function_write_the_same_model(logs, run, tmp_path):
+def test_the_command_and_the_function_write_the_same_model(logs, run, tmp_path, undrawn):
     out = tmp_path / "out"
     words = ["identify", str(logs / "slalom.csv"), "--vehicle", str(logs / "car.toml")]
     assert main([*words, "--out", str(out)]) == 0

@@ -71,7 +71,7 @@ def test_the_linear_tire_has_the_error_of_stiffness_times_slip(numbers, logs):
     )
 
 
-def test_the_floor_of_the_linear_tire_is_least_squares(words, logs, tmp_path):
+def test_the_floor_of_the_linear_tire_is_least_squares(words, logs, tmp_path, laid_out):
     out = tmp_path / "out"
     words = [*words, "--method", "linear", "--floor", "2", "--out", str(out)]
     assert main(words) == 0
@@ -183,7 +183,7 @@ def test_figures_are_written(result):
         assert (result / f"{name}.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_the_same_seed_finds_the_same(words, numbers, tmp_path):
+def test_the_same_seed_finds_the_same(words, numbers, tmp_path, undrawn):
     out = tmp_path / "out"
     words = [*words, "--method", *METHODS_TRIED, "--sweep", "5", "--floor", "0"]
     assert main([*words, "--out", str(out)]) == 0
@@ -230,7 +230,7 @@ def test_a_log_needs_its_vehicle(logs, tmp_path, capsys):
     assert "--vehicle FILE is needed with a LOG" in capsys.readouterr().err
 
 
-def test_without_a_log_the_plant_drives(tmp_path):
+def test_without_a_log_the_plant_drives(tmp_path, laid_out):
     out = tmp_path / "out"
     words = ["compare", "--method", "linear", "--floor", "0", "--jobs", "1"]
     assert main([*words, "--out", str(out)]) == 0

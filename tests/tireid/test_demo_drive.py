@@ -11,7 +11,6 @@ from models.vehicle import sedan
 from tireid.animation import film as frames
 from tireid.animation.known import known_over_time
 from tireid.commands import demo_parts as demo_drive
-from tireid.commands import drive_results
 from tireid.commands.demo_parts import NOT_DRIVEN, drive_section, drive_story, drive_text
 from tireid.commands.demo_story import FREEZE, run_story
 from tireid.report import Picture
@@ -23,12 +22,9 @@ def story():
 
 
 @pytest.fixture
-def quick(monkeypatch):
+def quick(monkeypatch, undrawn):
     """Short films and empty pictures: both have tests of their own."""
     monkeypatch.setattr(frames, "MOST", 4)
-    empty = b"\x89PNG\r\n\x1a\n"
-    monkeypatch.setattr(drive_results, "save_figure", lambda _, path: path.write_bytes(empty))
-    monkeypatch.setattr("tireid.figures.style.figure_svg", lambda _: b"<?xml")
 
 
 def test_learnt_tires_steer_as_the_true_ones_and_learning_stays_on_the_road(story, tmp_path, quick):

@@ -18,7 +18,6 @@ from mpc.realtime import NoCompilerError
 from mpc.tires import oracle_tire, prediction_tire
 from tests.pages import faults_of, outline
 from tireid.cli import main
-from tireid.commands import drive_results
 from tireid.commands.drive_results import steady_curve
 from tireid.driving import learn as drive_learn
 from tireid.driving import runs as drive_runs
@@ -47,13 +46,6 @@ def result(bend, tmp_path_factory):
         patch.setattr(drive_learn, "GROWS", 10.0)
         assert main(words) == 0
     return out
-
-
-@pytest.fixture
-def no_figures(monkeypatch):
-    """Pictures are looked at once, in `result`."""
-    monkeypatch.setattr(drive_results, "save_figure", lambda *_: None)
-    monkeypatch.setattr("tireid.figures.style.figure_svg", lambda _: b"<?xml")
 
 
 def summary_of(folder):
@@ -122,7 +114,7 @@ def test_everything_is_written(result):
 
 
 def test_stored_weights_steer_alike_and_the_hash_tells_what_went_in(
-    result, bend, tmp_path, no_figures
+    result, bend, tmp_path, undrawn
 ):
     words = ["drive", "--path", str(bend), "--film", "none"]
     words += ["--weights", str(result / "weights.json")]
@@ -136,7 +128,7 @@ def test_stored_weights_steer_alike_and_the_hash_tells_what_went_in(
 
 
 def test_learning_and_oracle_are_told_of_a_friction_that_drops(
-    result, bend, tmp_path, capsys, no_figures
+    result, bend, tmp_path, capsys, undrawn
 ):
     words = ["drive", "--path", str(bend), "--tires", "learning", "oracle", "--film", "none"]
     words += ["--weights", str(result / "weights.json"), "--speed", "60%"]
@@ -160,7 +152,7 @@ def test_the_report_is_whole_and_says_the_numbers_of_the_summary(result):
     assert "data:image/webp;base64," in page
 
 
-def test_a_car_that_leaves_its_path_is_told_with_exit_code_1(bend, tmp_path, capsys, no_figures):
+def test_a_car_that_leaves_its_path_is_told_with_exit_code_1(bend, tmp_path, capsys, undrawn):
     words = ["drive", "--path", str(bend), "--tires", "linear", "--film", "none"]
     capsys.readouterr()
     assert main([*words, "--speed", "140%", "--out", str(tmp_path / "out")]) == 1
@@ -254,7 +246,7 @@ def test_without_a_compiler_it_says_so_before_it_learns(bend, tmp_path, capsys, 
     assert list(tmp_path.iterdir()) == []
 
 
-def test_tires_of_another_car_lead_somewhere(bend, tmp_path, capsys):
+def test_tires_of_another_car_lead_somewhere(bend, tmp_path, capsys, undrawn):
     """The name of a car is no difference, its mass is."""
     car, log = sedan(), ti.sample_recording()
     tire = ti.identify(log, car).freeze()

@@ -87,7 +87,9 @@ def test_the_summary_has_the_paper_s_measure_of_the_drive_that_was_learnt(result
             assert sides["4"]["slalom"][key][axle] == pytest.approx(rms, rel=1e-6), key
 
 
-def test_the_table_says_the_paper_s_measure_below_the_drive_that_was_learnt(logs, tmp_path, capsys):
+def test_the_table_says_the_paper_s_measure_below_the_drive_that_was_learnt(
+    logs, tmp_path, capsys, undrawn
+):
     words = ["identify", str(logs / "slalom.csv"), "--vehicle", str(logs / "car.toml")]
     words += ["--replay", str(logs / "quick.csv"), "--freeze", "4", "--out", str(tmp_path / "out")]
     assert main(words) == 0
@@ -210,7 +212,7 @@ def test_nothing_is_overwritten_unasked(result, logs, capsys):
     assert (result / "summary.json").read_bytes() == before
 
 
-def test_a_log_without_forces_has_no_error_against_them(logs, tmp_path):
+def test_a_log_without_forces_has_no_error_against_them(logs, tmp_path, laid_out):
     lines = (logs / "slalom.csv").read_text().splitlines()
     header = lines[0].split(",")
     keep = [i for i, name in enumerate(header) if not name.startswith("Fy")]
@@ -236,7 +238,7 @@ def rewritten(log, target, change):
     return target
 
 
-def test_a_log_on_a_unix_clock_keeps_its_freeze_times_apart(logs, tmp_path):
+def test_a_log_on_a_unix_clock_keeps_its_freeze_times_apart(logs, tmp_path, laid_out):
     def to_unix(row):
         row["t"] = f"{float(row['t']) + 1.7e9:.2f}"
 
@@ -252,7 +254,7 @@ def test_a_log_on_a_unix_clock_keeps_its_freeze_times_apart(logs, tmp_path):
     np.testing.assert_allclose(np.diff(forces["t_s"]), 0.01, atol=1e-5)
 
 
-def test_samples_at_rest_count_nowhere(logs, tmp_path, capsys):
+def test_samples_at_rest_count_nowhere(logs, tmp_path, capsys, laid_out):
     """A halt of the second half, with forces that are not zero, changes neither size nor error."""
 
     def halt(row):
@@ -290,7 +292,7 @@ def written_design(path, **changes):
     return path
 
 
-def test_a_design_from_a_file_is_the_one_that_runs(logs, tmp_path, capsys):
+def test_a_design_from_a_file_is_the_one_that_runs(logs, tmp_path, capsys, undrawn):
     design = written_design(tmp_path / "design.toml", law="instantaneous", seed=3, eta_W=12.5)
     words = ["identify", str(logs / "slalom.csv"), "--vehicle", str(logs / "car.toml")]
     words += ["--design", str(design), "--out", str(tmp_path / "out")]
@@ -317,7 +319,9 @@ def test_a_seed_that_would_change_nothing_is_refused(logs, tmp_path, capsys):
         assert draws_weights(name) == drawn, name
 
 
-def test_a_law_that_diverges_on_a_replayed_log_is_refused_by_its_name(logs, tmp_path, capsys):
+def test_a_law_that_diverges_on_a_replayed_log_is_refused_by_its_name(
+    logs, tmp_path, capsys, laid_out
+):
     """Nothing is learnt at rest and nothing diverges there; on the other drive it does."""
     design = written_design(
         tmp_path / "design.toml", law="instantaneous", eta_W=1e7, eta_V=1e7, rho_W=0.0, rho_V=0.0
@@ -376,7 +380,7 @@ def test_a_log_in_degrees_is_refused_by_its_column(logs, tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
-def test_learning_goes_on_from_stored_weights(result, law, logs, tmp_path):
+def test_learning_goes_on_from_stored_weights(result, law, logs, tmp_path, undrawn):
     """What was learnt on the slalom serves from the first sample of the next drive."""
     words = ["identify", str(logs / "quick.csv"), "--vehicle", str(logs / "car.toml")]
     words += ["--method", law]
@@ -389,7 +393,7 @@ def test_learning_goes_on_from_stored_weights(result, law, logs, tmp_path):
 
 
 @pytest.mark.parametrize("layer", ["W", "V"])
-def test_resumed_weights_beyond_what_is_proven_are_told(logs, tmp_path, capsys, layer):
+def test_resumed_weights_beyond_what_is_proven_are_told(logs, tmp_path, capsys, layer, undrawn):
     """On either side of the bound that `tireid check` states of the same gains."""
     check = ["check", "--paper", "--vehicle", str(logs / "car.toml"), "--json"]
     assert main(check) == 0
@@ -414,7 +418,7 @@ def test_resumed_weights_beyond_what_is_proven_are_told(logs, tmp_path, capsys, 
     assert f"proven up to {bound:.4g}" in line
 
 
-def test_drawn_weights_are_no_resumed_ones(logs, tmp_path, capsys):
+def test_drawn_weights_are_no_resumed_ones(logs, tmp_path, capsys, undrawn):
     words = ["identify", str(logs / "quick.csv"), "--vehicle", str(logs / "car.toml"), "--paper"]
     assert main([*words, "--out", str(tmp_path / "out")]) == 0
     assert "does not cover" not in capsys.readouterr().out
@@ -443,7 +447,7 @@ def test_a_filter_of_forces_has_nothing_to_freeze(logs, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("name", ["integral", "instantaneous", "instantaneous_scaled", "axle"])
-def test_a_recorded_car_is_identified_by_every_law(shared_data, tmp_path, name):
+def test_a_recorded_car_is_identified_by_every_law(shared_data, tmp_path, name, laid_out):
     """On the high-fidelity slalom each law beats the linear tire it started from."""
     car = tmp_path / "car.toml"
     car.write_text(
@@ -474,7 +478,7 @@ def test_a_recorded_car_is_identified_by_every_law(shared_data, tmp_path, name):
     assert set(frozen) == {"carmaker:slalom1_14_5ms", "carmaker:experiment2_40kmh"}
 
 
-def test_an_axle_that_does_not_push_is_not_handed_on(logs, tmp_path, capsys, monkeypatch):
+def test_an_axle_that_does_not_push_is_not_handed_on(logs, tmp_path, capsys, monkeypatch, laid_out):
     whole = AxleModel.axle_force
     words = ["identify", logs / "slalom.csv", "--vehicle", logs / "car.toml", "--freeze", 4]
     for share in ([1.0, 0.004], [np.nan, 1.0], [1.0, -1.0]):

@@ -13,7 +13,6 @@ from identifier.run import identify
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tireid.cli import main
-from tireid.commands import identify_results as network_results
 
 onnx = pytest.importorskip("onnx", reason="needs the package onnx")
 CAR = sedan()
@@ -40,13 +39,6 @@ def tire_file(path, *, iso=False, swapped=False, forces=2, peak=4e4):
     opset = [onnx.helper.make_opsetid("", 13)]
     onnx.save(onnx.helper.make_model(graph, opset_imports=opset, ir_version=7), path)
     return path
-
-
-@pytest.fixture
-def undrawn(monkeypatch):
-    """One test looks at figures; the others need not wait for them."""
-    monkeypatch.setattr(network_results, "save_figure", lambda *_: None)
-    monkeypatch.setattr("tireid.figures.style.figure_svg", lambda _: b"<?xml")
 
 
 @pytest.fixture
@@ -130,7 +122,7 @@ def test_other_signs_and_orders_are_told_by_options(words, tmp_path, undrawn):
     assert results["plain"] == results["swapped"]
 
 
-def test_compare_sets_it_beside_the_methods(logs, tmp_path, capsys):
+def test_compare_sets_it_beside_the_methods(logs, tmp_path, capsys, laid_out):
     path = tire_file(tmp_path / "tire.onnx")
     words = ["compare", str(logs / "slalom.csv"), str(logs / "quick.csv"), "--floor", "0"]
     words += ["--vehicle", str(logs / "car.toml"), "--method", "linear", "--network", str(path)]

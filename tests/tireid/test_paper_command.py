@@ -25,6 +25,7 @@ from identifier.paper_study import (
     run_trial,
 )
 from models.vehicle import sedan
+from tests.conftest import PNG
 from tests.pages import faults_of, outline
 from tireid.cli import main
 from tireid.commands.certificate_table import certificate_of
@@ -173,7 +174,7 @@ def test_figures_say_the_errors_of_the_tables(study, tmp_path, monkeypatch):
     assert whole[0, 0] < 0.8 * noted[0][0, 0]
 
 
-def test_a_law_that_diverges_is_counted_and_does_not_stop_the_command(study, tmp_path):
+def test_a_law_that_diverges_is_counted_and_does_not_stop_the_command(study, tmp_path, laid_out):
     slalom = study.errors["slalom"]
     some = {**slalom, "instantaneous": ({},) * 20, "integral": ({}, *slalom["integral"][1:])}
     wild = replace(study, errors={"slalom": some})
@@ -220,7 +221,7 @@ def test_the_papers_values_are_those_of_its_tables():
     assert slalom["instantaneous"]["40"] / slalom["integral"]["40"] == pytest.approx(3.566, 1e-3)
 
 
-def test_paper_command_writes_tables_and_figures(tmp_path, capsys):
+def test_paper_command_writes_tables_and_figures(tmp_path, capsys, laid_out):
     assert main(["paper", "--seeds", "2", "--out", str(tmp_path / "out")]) == 0
     printed = capsys.readouterr().out
     assert "0.4077" in printed
@@ -245,6 +246,7 @@ def test_demo_leaves_one_self_contained_report(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(tireid.commands.demo, "SEEDS", 2)
     monkeypatch.setattr("tireid.commands.demo_parts.measure", lambda *_: [])  # has tests of its own
     monkeypatch.setattr("tireid.commands.demo.drive_story", lambda *_: {})  # so has this
+    monkeypatch.setattr("tireid.figures.style.figure_png", lambda *_, **__: PNG)  # a page has SVG
     assert main(["demo", "--out", str(tmp_path / "demo")]) == 0
     page = (tmp_path / "demo" / "report.html").read_text()
     assert page.count("data:image/") >= 12
