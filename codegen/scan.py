@@ -7,6 +7,7 @@ import ctypes
 import logging
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from typing import NamedTuple, TypeAlias
 
 import casadi as ca
 import numpy as np
@@ -54,6 +55,25 @@ int {name}_scan(long n, long every, const double** arg, const long* arg_step,
 """
 
 
+Longs: TypeAlias = "ctypes.Array[ctypes.c_long]"
+
+
+class Layout(NamedTuple):
+    """What is alike in every call of a compiled loop: places and sizes of ports, for C."""
+
+    arg_step: Longs
+    carry_arg: Longs
+    carry_res: Longs
+    carry_size: Longs
+    out_res: Longs
+    out_size: Longs
+    out_sizes: list[int]
+    sz_arg: int
+    sz_res: int
+    sz_iw: int
+    sz_w: int
+
+
 class Scan:
     """A step function run over samples, `carry, outputs = step(carry, sample, constants)`.
 
@@ -95,6 +115,8 @@ class Scan:
         self.over = over
         self.constants = tuple(p for p in names_in if p not in carry and p not in over)
         self.outputs = tuple(p for p in names_out if p.removesuffix("_next") not in carry)
+        self._size_in = {p: step.size_in(p) for p in names_in}
+        self._size_out = {p: step.size_out(p) for p in names_out}
 
     @cached_property
     def loop(self) -> "ctypes._NamedFuncPointer | None":
@@ -109,6 +131,27 @@ class Scan:
             log.warning("running in the CasADi virtual machine, more slowly: %s", reason)
             return None
         return None if library is None else library[f"{name}_scan"]
+
+    @cached_property
+    def layout(self) -> Layout:
+        """Places and sizes of the ports, as the loop wants them."""
+        step = self.step
+        names_in, names_out = list(self._size_in), list(self._size_out)
+        out_sizes = [step.numel_out(p) for p in self.outputs]
+        strides = [step.numel_in(p) if p in self.over else 0 for p in names_in]
+        return Layout(
+            arg_step=longs([*strides, -1]),
+            carry_arg=longs([names_in.index(p) for p in self.carry]),
+            carry_res=longs([names_out.index(f"{p}_next") for p in self.carry]),
+            carry_size=longs([step.numel_in(p) for p in self.carry]),
+            out_res=longs([names_out.index(p) for p in self.outputs]),
+            out_size=longs(out_sizes),
+            out_sizes=out_sizes,
+            sz_arg=max(step.sz_arg(), len(names_in)),
+            sz_res=max(step.sz_res(), len(names_out)),
+            sz_iw=max(step.sz_iw(), 1),
+            sz_w=max(step.sz_w(), 1),
+        )
 
     def __call__(self, n: int, values: Mapping[str, Array], *, every: int = 1) -> dict[str, Array]:
         """Run `n` samples.
@@ -153,15 +196,15 @@ class Scan:
         ValueError
             Where a value is missing, unknown, or has the wrong shape.
         """
-        expected = set(self.step.name_in())
-        if set(values) != expected:
+        if values.keys() != self._size_in.keys():
+            expected = set(self._size_in)
             missing, unknown = sorted(expected - set(values)), sorted(set(values) - expected)
             raise ValueError(
                 f"{self.step.name()}: missing inputs {missing}, unknown inputs {unknown}"
             )
         packed = {}
         for port, value in values.items():
-            rows, columns = self.step.size_in(port)
+            rows, columns = self._size_in[port]
             array = np.asarray(value, dtype=np.float64)
             expected_shape = (n, rows * columns) if port in self.over else (rows, columns)
             if (
@@ -183,53 +226,49 @@ class Scan:
         found: dict[str, Array] = {}
         for port, flat in record.items():
             if port in self.carry:
-                everything = shaped(flat, self.step.size_in(port))
+                everything = shaped(flat, self._size_in[port])
                 found[f"{port}_all"] = everything
                 found[port], found[f"{port}_final"] = everything[:-1], everything[-1]
             else:
-                found[port] = shaped(flat, self.step.size_out(port))
+                found[port] = shaped(flat, self._size_out[port])
         return found
 
     def _run_compiled(
         self, loop: "ctypes._NamedFuncPointer", n: int, packed: dict[str, Array], every: int
     ) -> dict[str, Array]:
-        step, n_rows = self.step, -(-n // every)
-        names_in, names_out = list(step.name_in()), list(step.name_out())
-        size = {p: step.numel_in(p) for p in self.carry}
+        layout, n_rows = self.layout, -(-n // every)
         now = [packed[p].copy() for p in self.carry]
         following = [np.empty_like(a) for a in now]
-        state = [np.empty((n_rows + 1, size[p])) for p in self.carry]
-        outputs = [np.empty((n_rows, step.numel_out(p))) for p in self.outputs]
-        scratch = [np.empty(step.numel_out(p)) for p in self.outputs]
-        arrays = [packed[p] for p in names_in]
-        stride = [step.numel_in(p) if p in self.over else 0 for p in names_in]
-        work = np.empty(max(step.sz_w(), 1))
-        integer_work = np.empty(max(step.sz_iw(), 1), dtype=np.int64)
+        state = [np.empty((n_rows + 1, a.size)) for a in now]
+        outputs = [np.empty((n_rows, size)) for size in layout.out_sizes]
+        scratch = [np.empty(size) for size in layout.out_sizes]
+        arrays = [packed[p] for p in self._size_in]
+        integer_work, work = np.empty(layout.sz_iw, dtype=np.int64), np.empty(layout.sz_w)
         now_pointers, next_pointers = pointers(now), pointers(following)
         failed = loop(
             ctypes.c_long(n),
             ctypes.c_long(every),
             pointers(arrays),
-            longs([*stride, -1]),
+            layout.arg_step,
             ctypes.c_long(len(self.carry)),
-            longs([names_in.index(p) for p in self.carry]),
-            longs([names_out.index(f"{p}_next") for p in self.carry]),
-            longs([size[p] for p in self.carry]),
+            layout.carry_arg,
+            layout.carry_res,
+            layout.carry_size,
             now_pointers,
             next_pointers,
             pointers(state),
             ctypes.c_long(len(self.outputs)),
-            longs([names_out.index(p) for p in self.outputs]),
-            longs([step.numel_out(p) for p in self.outputs]),
+            layout.out_res,
+            layout.out_size,
             pointers(outputs),
             pointers(scratch),
-            (ctypes.c_void_p * max(step.sz_arg(), len(names_in)))(),
-            (ctypes.c_void_p * max(step.sz_res(), len(names_out)))(),
+            (ctypes.c_void_p * layout.sz_arg)(),
+            (ctypes.c_void_p * layout.sz_res)(),
             integer_work.ctypes.data_as(ctypes.c_void_p),
             work.ctypes.data_as(ctypes.c_void_p),
         )
         if failed:
-            raise RuntimeError(f"{step.name()} reported a failure")
+            raise RuntimeError(f"{self.step.name()} reported a failure")
         for rows, last in zip(state, following if n % 2 else now, strict=True):
             rows[-1] = last
         record = dict(zip(self.carry, state, strict=True))
@@ -340,35 +379,33 @@ class Stepper:
 
     def _laid_out(self, packed: dict[str, Array]) -> list[object]:
         """Return the arguments of the loop, for one sample; the loop swaps the carried arrays."""
-        scan, step = self._scan, self._scan.step
-        names_in, names_out = list(step.name_in()), list(step.name_out())
-        size = [step.numel_in(port) for port in scan.carry]
+        scan, layout = self._scan, self._scan.layout
         self._kept = [  # arrays that only the loop knows
             *packed.values(),
-            *(before := [np.empty(n) for n in size]),
-            work := np.empty(max(step.sz_w(), 1)),
+            *(before := [np.empty_like(array) for array in self._now.values()]),
+            work := np.empty(layout.sz_w),
         ]
-        self._integer_work = np.empty(max(step.sz_iw(), 1), dtype=np.int64)
+        self._integer_work = np.empty(layout.sz_iw, dtype=np.int64)
         outputs = pointers(list(self.outputs.values()))
         return [
             ctypes.c_long(1),
             ctypes.c_long(1),
-            pointers([packed[port] for port in names_in]),
-            longs([*(step.numel_in(p) if p in scan.over else 0 for p in names_in), -1]),
+            pointers([packed[port] for port in scan.step.name_in()]),
+            layout.arg_step,
             ctypes.c_long(len(scan.carry)),
-            longs([names_in.index(port) for port in scan.carry]),
-            longs([names_out.index(f"{port}_next") for port in scan.carry]),
-            longs(size),
+            layout.carry_arg,
+            layout.carry_res,
+            layout.carry_size,
             pointers(list(self._now.values())),
             pointers(list(self._following.values())),
             pointers(before),
             ctypes.c_long(len(scan.outputs)),
-            longs([names_out.index(port) for port in scan.outputs]),
-            longs([step.numel_out(port) for port in scan.outputs]),
+            layout.out_res,
+            layout.out_size,
             outputs,
             outputs,
-            (ctypes.c_void_p * max(step.sz_arg(), len(names_in)))(),
-            (ctypes.c_void_p * max(step.sz_res(), len(names_out)))(),
+            (ctypes.c_void_p * layout.sz_arg)(),
+            (ctypes.c_void_p * layout.sz_res)(),
             self._integer_work.ctypes.data_as(ctypes.c_void_p),
             work.ctypes.data_as(ctypes.c_void_p),
         ]

@@ -1,8 +1,9 @@
 """What a driving car measures of itself, sample by sample, and sees of the path before it."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, fields
-from typing import NamedTuple, Protocol
+from functools import cache
+from typing import NamedTuple, Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -280,9 +281,16 @@ def cornering_limit(
     mu : friction of the road over that of the tire's measurement [-].
     speed : at which the car is driven [m/s].
     """
+    return _steady_limit(vehicle, cast(Hashable, tire), mu, speed)
+
+
+@cache
+def _steady_limit(vehicle: Vehicle, tire: Hashable, mu: float, speed: float) -> float:
+    """Drive the ramp once for each car and road: setting up a drive asks a dozen times."""
     rate = LARGEST_ANGLE * mu / RAMP_TIME
     ramp = SlowlyIncreasingSteer(
         amplitude=LARGEST_ANGLE * mu, rate=rate, rate_limit=rate, onset=0.1, duration=RAMP_TIME
     )
-    run = Plant(vehicle, tire).simulate(ramp, speed=speed, friction=Friction(scale=mu))
+    plant = Plant(vehicle, cast(Tire | None, tire))
+    run = plant.simulate(ramp, speed=speed, friction=Friction(scale=mu))
     return float(np.abs(run.a_y).max())
