@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import tireid as ti
 from identifier.methods import load_model
@@ -17,6 +18,7 @@ from mpc.loop.sensing import cornering_limit
 from mpc.realtime import NoCompilerError
 from mpc.tires import oracle_tire, prediction_tire
 from tests.pages import faults_of, outline
+from tireid.animation import film
 from tireid.cli import main
 from tireid.commands.drive_results import steady_curve
 from tireid.driving import learn as drive_learn
@@ -44,6 +46,7 @@ def result(bend, tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(drive_learn, "DURATION", 15.0)
         patch.setattr(drive_learn, "GROWS", 10.0)
+        patch.setattr(film, "MOST", 20)
         assert main(words) == 0
     return out
 
@@ -109,7 +112,10 @@ def test_everything_is_written(result):
     for name in ("path", "errors", "steering", "tires", "solve_times"):
         assert (result / f"{name}.png").read_bytes().startswith(b"\x89PNG")
     assert (result / "drive.webp").read_bytes()[8:12] == b"WEBP"
-    assert (result / "drive.webp").stat().st_size < 2e6
+    with Image.open(result / "drive.webp") as shown:
+        assert 10 <= shown.n_frames <= 20
+        longest = film.MOST / shown.n_frames * (result / "drive.webp").stat().st_size
+    assert longest < 2e6
     assert load_model(result / "weights.json").vehicle.name == "sedan"
 
 
