@@ -11,22 +11,30 @@ SMOKE := tests/test_imports.py tests/codegen tests/models/test_vehicle.py \
 	tests/mpc/path/test_waypoints.py tests/mpc/path/test_gates.py tests/tireid/test_cli.py
 SMOKE_ONNX := tests/identifier/export/test_onnx.py tests/identifier/export/test_onnx_model.py
 
-.PHONY: demo test heavy lint docs bench mutants fuzz fuzz-c numbers reference newest lowest lock wheel \
+.PHONY: demo test heavy lint format types tests docs bench mutants fuzz fuzz-c numbers reference newest lowest lock wheel \
 	clean
 
 demo: $(VENV)/.demo
 	$(VENV)/bin/tireid demo --out out/demo --force
 
-test: $(VENV)/.test lint
+# Types are checked beside the first tests: one process at a time would leave a core idle.
+test: $(VENV)/.test format
+	$(MAKE) --no-print-directory --jobs=2 types tests
+
+tests: $(VENV)/.test
 	$(PY) -m pytest -n auto --dist worksteal -m "not heavy"
 
 # The sweeps that tests/heavy.toml lists.
 heavy: $(VENV)/.test
 	$(PY) -m pytest -n auto --dist worksteal -m heavy
 
-lint: $(VENV)/.test
+lint: format types
+
+format: $(VENV)/.test
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
+
+types: $(VENV)/.test
 	$(VENV)/bin/mypy
 
 # The documents as a site, out/docs/index.html; a warning is an error.

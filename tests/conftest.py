@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+# Of these each test takes longest: begun first, they do not keep one worker busy at the end.
+LONGEST = ("tests/tireid/", "tests/benchmarks/")
 HEAVY = tomllib.loads(Path(__file__).with_name("heavy.toml").read_text(encoding="utf-8"))["heavy"]
 
 
@@ -44,6 +46,7 @@ def sort_out(items, entries) -> list[str]:
 @pytest.hookimpl(tryfirst=True)  # before -m chooses
 def pytest_collection_modifyitems(config, items):
     unmet = sort_out(items, HEAVY)
+    items.sort(key=lambda item: not item.nodeid.startswith(LONGEST))
     if unmet and config.args == config.getini("testpaths") and not config.option.keyword:
         raise pytest.UsageError("tests/heavy.toml names what is not there: " + ", ".join(unmet))
 

@@ -46,8 +46,12 @@ def test_each_entry_says_what_stays(entry):
 
 def test_what_make_test_leaves_is_run_by_make_heavy_and_by_continuous_integration():
     make = (ROOT / "Makefile").read_text(encoding="utf-8")
-    chosen = re.findall(r"^(test|heavy):.*\n\t\$\(PY\) -m pytest .* -m \"?([\w ]+)\"?$", make, re.M)
-    assert chosen == [("test", "not heavy"), ("heavy", "heavy")]
+    chosen = re.findall(
+        r"^(tests|heavy):.*\n\t\$\(PY\) -m pytest .* -m \"?([\w ]+)\"?$", make, re.M
+    )
+    assert chosen == [("tests", "not heavy"), ("heavy", "heavy")]
+    (asked,) = re.findall(r"^test: (.*)\n\t\$\(MAKE\) .* (types tests)$", make, re.M)
+    assert "format" in asked[0].split(), "and both halves of lint"
     ran = re.findall(r"^make (\w+)", (ROOT / ".ci" / "run").read_text(encoding="utf-8"), re.M)
     assert ran.index("test") < ran.index("heavy")
 

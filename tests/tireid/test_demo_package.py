@@ -1,5 +1,7 @@
 """What the demo makes of what it learnt: a package that compiles, passes and agrees with Python."""
 
+import shutil
+
 import pytest
 
 from codegen import find_compiler
@@ -15,17 +17,25 @@ def story():
     return run_story()
 
 
-@pytest.fixture(autouse=True)
-def quick(monkeypatch):
+@pytest.fixture(autouse=True, scope="module")
+def quick():
     """Costs on Arm have tests of their own."""
-    monkeypatch.setattr(demo_package, "measure", lambda *_: [])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(demo_package, "measure", lambda *_: [])
+        yield
 
 
-def test_it_compiles_passes_and_computes_what_python_computes(story, tmp_path):
+@pytest.fixture(scope="module")
+def whole(story, quick, tmp_path_factory):
+    """The package as it is shipped, and its folder."""
     if find_compiler() is None:
         pytest.skip("needs a C compiler")
-    folder = tmp_path / "package"
-    shipped = ship(story, folder)
+    folder = tmp_path_factory.mktemp("demo") / "package"
+    return ship(story, folder), folder
+
+
+def test_it_compiles_passes_and_computes_what_python_computes(whole):
+    shipped, folder = whole
     double, single = shipped.checks
     assert (double.precision, single.precision) == ("double", "float")
     assert double.verdict.verdict == single.verdict.verdict == "passed"
@@ -47,11 +57,8 @@ def test_without_a_compiler_the_report_says_so(story, tmp_path, monkeypatch):
     assert self_test.self_test(tmp_path / "package", "tireid", single=False) is None
 
 
-def test_a_spoiled_package_fails_its_self_test(story, tmp_path):
-    if find_compiler() is None:
-        pytest.skip("needs a C compiler")
-    folder = tmp_path / "package"
-    ship(story, folder)
+def test_a_spoiled_package_fails_its_self_test(whole, tmp_path):
+    folder = shutil.copytree(whole[1], tmp_path / "package")
     vectors = folder / "tests" / "tireid_vectors.h"
     text = vectors.read_text()
     head, rows = text.split("vector_force", 1)

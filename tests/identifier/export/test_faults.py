@@ -10,9 +10,8 @@ import pytest
 from identifier.axle import AxleIdentifier
 
 HOSTILE = (Path(__file__).parent / "hostile.c").read_text()
-SANITIZED = (
-    "-std=c99 -O1 -g -ffp-contract=off -fsanitize=address,undefined -fno-sanitize-recover=all"
-)
+SANITIZED = "-std=c99 -g -ffp-contract=off -fsanitize=address,undefined -fno-sanitize-recover=all"
+SAMPLES, BUILDS = "-O1", "-O0"  # a million samples wait for the program, an alarm for the compiler
 SOURCES = ["src/tireid.c", "src/tireid_equations.c", "hostile.c"]
 
 
@@ -34,9 +33,10 @@ def declared(package, **changed):
     return ["-DBOUNDED=1", *(f"-D{key}={value}" for key, value in numbers.items())]
 
 
-def build(folder, run, compiler, single, macros=()):
+def build(folder, run, compiler, single, macros=(), optimized=SAMPLES):
     (folder / "hostile.c").write_text(HOSTILE)
-    flags = [*SANITIZED.split(), f"-DTIREID_SINGLE={single}", *macros, "-Iinclude", "-Isrc"]
+    macros = [f"-DTIREID_SINGLE={single}", *macros]
+    flags = [*SANITIZED.split(), optimized, *macros, "-Iinclude", "-Isrc"]
     answer = run(compiler, *flags, *SOURCES, "-lm", "-o", "hostile", cwd=folder)
     if "cannot find" in answer.stderr and "san" in answer.stderr:
         pytest.skip(f"needs the sanitizers of {compiler}")
@@ -63,7 +63,7 @@ def test_a_million_hostile_samples_find_nothing(law, single, packages, write, ru
 )
 def test_bounds_narrower_than_the_declared_are_broken(changed, complaint, packages, write, run):
     macros = declared(packages["axle"], **changed)
-    answer = run(str(build(write(packages["axle"]), run, "gcc", 1, macros)))
+    answer = run(str(build(write(packages["axle"]), run, "gcc", 1, macros, BUILDS)))
     assert answer.returncode != 0
     assert re.search(f"{complaint}.*a bound is broken after", answer.stdout), answer.stdout
 
@@ -90,6 +90,6 @@ def test_without_a_guard_the_alarm_rings(guard, complaint, packages, write, run)
     if guard.startswith("tireid_accepts"):  # a second guard alone still keeps the state
         without = without.replace("tireid_believes(params, &next, &out)", "true")
     source.write_text(without)
-    answer = run(str(build(folder, run, "gcc", 0)))
+    answer = run(str(build(folder, run, "gcc", 0, optimized=BUILDS)))
     assert answer.returncode != 0
     assert re.search(complaint, answer.stdout), answer.stdout

@@ -12,14 +12,14 @@ from mpc.tires import prediction_tire
 from tests.mpc.export.conftest import LAWS, c_files
 
 HOSTILE = (Path(__file__).parent / "hostile.c").read_text()
-SANITIZED = (  # -O1: a solve takes a millisecond
-    "-std=c99 -O1 -g -ffp-contract=off -fsanitize=address,undefined -fno-sanitize-recover=all"
-)
+SANITIZED = "-std=c99 -g -ffp-contract=off -fsanitize=address,undefined -fno-sanitize-recover=all"
+SOLVES, BUILDS = "-O1", "-O0"  # thousands of solves wait for the program, an alarm for the compiler
 
 
-def build(folder, run, single, steps=3000):
+def build(folder, run, single, steps=3000, optimized=SOLVES):
     (folder / "hostile.c").write_text(HOSTILE)
-    flags = [*SANITIZED.split(), f"-DTIREID_MPC_SINGLE={single}", f"-DSTEPS={steps}L"]
+    macros = [f"-DTIREID_MPC_SINGLE={single}", f"-DSTEPS={steps}L"]
+    flags = [*SANITIZED.split(), optimized, *macros]
     words = [*flags, "-Iinclude", "-Isrc", *c_files(folder), "hostile.c", "-lm", "-o", "hostile"]
     answer = run("gcc", *words, cwd=folder)
     if "cannot find" in answer.stderr and "san" in answer.stderr:
@@ -68,7 +68,7 @@ def test_without_a_guard_the_alarm_rings(file, pattern, replacement, complaint, 
     changed = re.sub(pattern, replacement, text, count=1)
     assert changed != text
     (folder / file).write_text(changed)
-    answer = run(build(folder, run, 0, steps=500))
+    answer = run(build(folder, run, 0, steps=500, optimized=BUILDS))
     assert answer.returncode != 0
     if complaint:
         assert re.search(complaint, answer.stdout), answer.stdout + answer.stderr
@@ -90,6 +90,6 @@ def test_without_all_that_keeps_numbers_finite_the_alarm_rings(write, run):
         for pattern, replacement in guards.items():
             text = re.sub(pattern, replacement, text)
         source.write_text(text)
-    answer = run(build(folder, run, 0, steps=500))
+    answer = run(build(folder, run, 0, steps=500, optimized=BUILDS))
     assert answer.returncode != 0
     assert re.search("not finite|nan|inf", answer.stdout), answer.stdout + answer.stderr
