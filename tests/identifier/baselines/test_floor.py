@@ -56,7 +56,7 @@ def test_planted_parameters_are_found_exactly(car, curve_drive, rng):
     ],
 )
 def test_no_method_gets_below_the_floor_of_its_structure(make, car, drive, rng):
-    recording, method = drive(n=600), make(car)
+    recording, method = drive(n=400), make(car)
     learnt = identify(recording, car, method).freeze(99.0)
     floor = fit_floor(structure_of(method, car), [recording], rng=rng, starts=2, steps=25)
     assert type(floor) is type(learnt)
