@@ -53,7 +53,9 @@ def test_nothing_is_found(name, package_of, tmp_path):
         ),
     ],
 )
-def test_a_planted_fault_is_found(name, file, pattern, replacement, complaint, package_of, tmp_path):
+def test_a_planted_fault_is_found(
+    name, file, pattern, replacement, complaint, package_of, tmp_path
+):
     subject = package_of(name)
     planted = re.sub(pattern, replacement, subject.files[file])
     assert planted != subject.files[file]
