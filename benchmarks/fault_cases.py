@@ -244,7 +244,7 @@ def _random_fault(vehicle: Vehicle, rng: np.random.Generator) -> Fault:
         lambda: Held(channels=(channel,), every=0.5, lasts=size(0.02, 0.5)),
         lambda: Held(channels=("v_x", "v_y"), every=0.1, lasts=0.1),
         lambda: Jitter(size=by.time * size(0.005, 0.08), seed=seed),
-        lambda: ClockJump(at=rng.uniform(8.0, 15.0), size=sign * size(0.05, 2.0)),
+        lambda: ClockJump(at=rng.uniform(3.0, 9.0), size=sign * size(0.05, 2.0)),
         lambda: Bank(vehicle=vehicle, angle=sign * size(0.005, 0.08), period=size(10.0, 300.0)),
         StraightOnly,
     )

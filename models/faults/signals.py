@@ -405,14 +405,26 @@ class ClockJump:
         return f"clock jumps by {self.size:g} s at {self.at:g} s"
 
     def apply(self, recording: Recording) -> Recording:
-        """Return the recording with the jump; it ends where the drive does, forces jump with it."""
+        """Return the recording with the jump; it ends where the drive does, forces jump with it.
+
+        Parameters
+        ----------
+        recording : the drive without it.
+
+        Raises
+        ------
+        FaultError
+            Where the recording does not hold that time.
+        """
         t = recording.t
+        if not t[0] <= self.at <= t[-1]:
+            raise FaultError(f"at must be within {t[0]:g} to {t[-1]:g} s, it is {self.at}")
         stamps = (
             t
             if self.size >= 0.0
             else t[0] + recording.dt * np.arange(t.size + int(-self.size / recording.dt + 1e-6))
         )
-        taken = np.where(stamps < self.at, stamps, stamps + self.size)
+        taken = np.where(stamps < self.at, stamps, np.maximum(stamps + self.size, t[0]))
         keep = (taken >= t[0]) & (taken <= t[-1])
         stamps, taken = stamps[keep], taken[keep]
         logged = {

@@ -167,6 +167,13 @@ def test_a_clock_that_jumps_misses_or_repeats_time_in_all_channels(size):
     assert shown.dt == pytest.approx(0.01)
 
 
+def test_a_clock_that_jumps_back_to_before_the_log_repeats_its_first_sample():
+    shown = ClockJump(at=0.2, size=-0.5).apply(waves())
+    assert len(shown) == T.size + 50
+    again = (shown.t >= 0.2) & (shown.t < 0.495)
+    assert (shown.v_x[again] == waves().v_x[0]).all()
+
+
 def test_a_turned_sensor_keeps_the_speed_and_turns_its_direction_back(drive):
     shown = Misaligned(angle=0.02).apply(drive)
     np.testing.assert_allclose(np.hypot(shown.v_x, shown.v_y), np.hypot(drive.v_x, drive.v_y))
@@ -253,6 +260,7 @@ def test_cars_are_told_wrongly_by_the_size():
         (lambda: Held(channels=(), every=0.1, lasts=0.2), "lasts must be at most"),
         (lambda: Jitter(size=-1.0), "size must be positive"),
         (lambda: ClockJump(at=1.0, size=math.inf), "size must be finite"),
+        (lambda: ClockJump(at=30.0, size=-1.0).apply(waves()), "at must be within 0 to 20 s"),
         (lambda: Misaligned(angle=math.nan), "angle must be finite"),
         (lambda: Bank(vehicle=CAR, angle=0.1, period=0.0), "period positive"),
         (lambda: Passing(fault=BIAS, until=1.0, fade=-1.0), "not negative"),
