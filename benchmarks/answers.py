@@ -6,7 +6,9 @@ learns, the model is frozen at the end, `run.verdict` judges. None of them sees 
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
+from itertools import count
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +22,7 @@ from models.vehicle import Vehicle
 DEAD = 0.1  # of the true stiffness: an axle below it learnt nothing that is a tire
 REFUSED = "refused"  # in place of a code of the verdict: the log is not let in
 Pair = tuple[float, float]
+MakeBeginning = Callable[[Vehicle, np.random.Generator], Beginning]
 
 
 class Answer(NamedTuple):
@@ -117,32 +120,36 @@ def _verdict(run: ti.History) -> tuple[bool | None, list[str]]:
     return verdict.valid, sorted({one.code for one in verdict.findings if one.refuses})
 
 
-def is_dead(found: Answer, vehicle: Vehicle) -> bool:
-    """Return whether an axle has next to no stiffness left, or there is no model at all.
+def is_dead(found: Answer, right: Pair) -> bool:
+    """Return whether an axle was left with next to no stiffness, or no model at all came out.
+
+    A log that was not let in leaves nothing dead.
 
     Parameters
     ----------
     found : the answer.
-    vehicle : the car that drove.
+    right : stiffness of the axles, front and rear [N/rad].
     """
-    true = vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear
-    return not all(np.array(found.stiffness) >= DEAD * np.array(true))
+    alive = np.array(found.stiffness) >= DEAD * np.array(right)
+    return REFUSED not in found.codes and not bool(alive.all())
 
 
-def drawn(kind: str, seed: int, beginning: Callable[..., Beginning] | None = None) -> RandomDrive:
-    """Return the drive of a seed; where a car has no drive that is good, another is drawn.
+def drawn(
+    kind: str, seed: int, beginning: MakeBeginning | None = None, number: int = 0
+) -> RandomDrive:
+    """Return a drive of the car of a seed; where it has no good one, another car is drawn.
 
     Parameters
     ----------
     kind : class of the car.
-    seed : of all that is drawn.
+    seed : of the car.
     beginning : makes one from car and generator; None is a straight road.
+    number : of the drive, each another.
     """
-    rng = np.random.default_rng([seed, *kind.encode()])
-    while True:
-        car = random_car(kind, rng)
+    for attempt in count():
+        car = random_car(kind, np.random.default_rng([seed, attempt, *kind.encode()]))
+        rng = np.random.default_rng([seed, attempt, number, *kind.encode()])
         begin = None if beginning is None else beginning(car.vehicle, rng)
-        try:
+        with suppress(PlantError):
             return random_drive(car, rng, begin)
-        except PlantError:
-            continue
+    raise AssertionError("it counts for ever")

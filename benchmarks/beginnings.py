@@ -17,17 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.answers import Answer, answer, is_dead
-from benchmarks.random_cars import (
-    BEGINNINGS,
-    CLASSES,
-    FIRST_SEED,
-    random_beginning,
-    random_car,
-    random_drive,
-)
+from benchmarks.answers import Answer, answer, drawn, is_dead
+from benchmarks.random_cars import BEGINNINGS, CLASSES, FIRST_SEED, random_beginning
 from benchmarks.targets import Targets, keeps, show
-from models.plant import PlantError
 
 CARS, EACH = 30, 4  # a class; beginnings of each car
 FLOOR, WITHIN, WRONG = 1.0, 1.3, 15.0  # %, -, %
@@ -63,23 +55,18 @@ def begun(job: tuple[str, int]) -> list[Begun]:
     job : class of the car, and its number.
     """
     kind, number = job
-    rng = np.random.default_rng([FIRST_SEED + number, *kind.encode()])
-    found: list[Begun] = []
-    while len(found) < EACH:
-        car = random_car(kind, rng)
-        try:
-            found = []
-            for k in range(EACH):
-                name = BEGINNINGS[(EACH * number + k) % len(BEGINNINGS)]
-                drive = random_drive(car, rng, random_beginning(name, car.vehicle, rng))
-                log = drive.log(rng)
-                corner = drive.cornering(log)
-                ask = partial(answer, told=car.told, judged=corner, verdict=False)
-                learnt = ask(log)
-                dead = is_dead(learnt, car.vehicle)
-                found.append(Begun(kind, name, FIRST_SEED + number, learnt, ask(corner), dead))
-        except PlantError:  # no good drive in this car
-            continue
+    seed, found = FIRST_SEED + number, []
+    for k in range(EACH):
+        name = BEGINNINGS[(EACH * number + k) % len(BEGINNINGS)]
+        drive = drawn(kind, seed, partial(random_beginning, name), k)
+        log = drive.log(np.random.default_rng([seed, k, *kind.encode()]))
+        corner, car = drive.cornering(log), drive.car
+        ask = partial(answer, told=car.told, judged=corner, verdict=False)
+        learnt = ask(log)
+        vehicle = car.vehicle
+        right = vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear
+        dead = is_dead(learnt, right)
+        found.append(Begun(kind, name, seed, learnt, ask(corner), dead))
     return found
 
 

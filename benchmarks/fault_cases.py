@@ -96,6 +96,24 @@ class Case(NamedTuple):
         """
         return recording if self.fault is None else self.fault.apply(recording)
 
+    def judged(self, recording: Recording) -> Recording:
+        """Return the drive on which what was learnt is judged: what stays wrong is wrong there too.
+
+        Sensors are mounted, biased, scaled and late as they were, but noise, samples that are held
+        or stamped wrongly, and the lack of corners are of one log only.
+
+        Parameters
+        ----------
+        recording : of good sensors.
+        """
+        parts = self.fault.faults if isinstance(self.fault, Together) else (self.fault,)
+        for part in parts:
+            passing = isinstance(part, StraightOnly | Held | Jitter | ClockJump)
+            noise = isinstance(part, SensorFault) and part.kind == "noisy"
+            if part is not None and not passing and not noise:
+                recording = part.apply(recording)
+        return recording
+
     def car(self, vehicle: Vehicle) -> Vehicle:
         """Return the car as it is told.
 
@@ -179,6 +197,9 @@ def cases(vehicle: Vehicle) -> Mapping[str, Case]:
 def random_case(vehicle: Vehicle, rng: np.random.Generator) -> Case:
     """Return something that is wrong, of any kind, from next to nothing to plainly too much.
 
+    A wrong mass is not seen in motion, nor is the center of gravity but for a little: these are
+    told within 14 % and within 8 % of the wheelbase, as from a data sheet.
+
     Parameters
     ----------
     vehicle : the car that drives, told rightly.
@@ -196,13 +217,13 @@ def _random_told(vehicle: Vehicle, rng: np.random.Generator) -> Told:
     """A wrong number of the car, or another car."""
     sign = float(rng.choice([-1.0, 1.0]))
     makes = (
-        lambda: WrongNumber(field="mass", factor=math.exp(sign * rng.uniform(0.02, 0.4))),
+        lambda: WrongNumber(field="mass", factor=math.exp(sign * rng.uniform(0.02, 0.13))),
         lambda: WrongNumber(field="yaw_inertia", factor=math.exp(sign * rng.uniform(0.05, 2.0))),
         lambda: WrongNumber(
             field=f"cornering_stiffness_{rng.choice(['front', 'rear'])}",
             factor=math.exp(sign * rng.uniform(0.1, 1.0)),
         ),
-        lambda: ShiftedCenter(share=sign * rng.uniform(0.01, 0.15)),
+        lambda: ShiftedCenter(share=sign * rng.uniform(0.01, 0.08)),
         SwappedAxles,
         lambda: AnotherCar(told=_other_car(vehicle)),
     )

@@ -58,31 +58,27 @@ class CarClass(NamedTuple):
     """Of the steering [Hz]."""
 
 
+SEDAN = CarClass(
+    mass=(1400.0, 2200.0),
+    wheelbase=(2.6, 3.1),
+    front=(0.40, 0.52),
+    stiffness=(12.0, 20.0),
+    friction=(0.75, 1.0),
+    height=(0.17, 0.22),
+    relaxation=(0.12, 0.3),
+    inertia=(0.9, 1.1),
+    roll=(6.0, 12.0),
+    frequency=(0.4, 0.7),
+)
 CLASSES: Mapping[str, CarClass] = {
-    "compact": CarClass(
+    "compact": SEDAN._replace(
         mass=(850.0, 1250.0),
         wheelbase=(2.3, 2.6),
         front=(0.38, 0.45),
         stiffness=(13.0, 20.0),
-        friction=(0.75, 1.0),
         height=(0.19, 0.24),
-        relaxation=(0.12, 0.3),
-        inertia=(0.9, 1.1),
-        roll=(6.0, 12.0),
-        frequency=(0.4, 0.7),
     ),
-    "sedan": CarClass(
-        mass=(1400.0, 2200.0),
-        wheelbase=(2.6, 3.1),
-        front=(0.40, 0.52),
-        stiffness=(12.0, 20.0),
-        friction=(0.75, 1.0),
-        height=(0.17, 0.22),
-        relaxation=(0.12, 0.3),
-        inertia=(0.9, 1.1),
-        roll=(6.0, 12.0),
-        frequency=(0.4, 0.7),
-    ),
+    "sedan": SEDAN,
     "race": CarClass(
         mass=(550.0, 900.0),
         wheelbase=(2.6, 3.2),
@@ -95,7 +91,7 @@ CLASSES: Mapping[str, CarClass] = {
         roll=(20.0, 40.0),
         frequency=(0.5, 1.0),
     ),
-    "tenth": CarClass(
+    "tenth": SEDAN._replace(
         mass=(1.2, 2.5),
         wheelbase=(0.16, 0.33),
         front=(0.42, 0.56),
@@ -104,7 +100,6 @@ CLASSES: Mapping[str, CarClass] = {
         height=(0.12, 0.25),
         relaxation=(0.05, 0.25),
         inertia=(0.4, 1.0),
-        roll=(6.0, 12.0),
         frequency=(0.6, 1.5),
     ),
 }
