@@ -24,11 +24,11 @@ from models.faults import (
     Late,
     Mirrored,
     Misaligned,
+    SensorElsewhere,
     SensorFault,
     ShiftedCenter,
     SwappedAxles,
     Together,
-    VelocityElsewhere,
     WrongNumber,
     WrongUnit,
 )
@@ -171,7 +171,10 @@ def cases(vehicle: Vehicle) -> Mapping[str, Case]:
     found |= {
         f"mounting/{size:g}": Case(Misaligned(angle=-math.radians(size))) for size in (0.5, 1.0)
     }
-    found |= {f"ahead/{size:g}": Case(VelocityElsewhere(x=size * by.length)) for size in (0.5, 0.8)}
+    found |= {
+        f"ahead/{size:g}": Case(SensorElsewhere(sensor="velocity", x=size * by.length))
+        for size in (0.5, 0.8)
+    }
     found |= {f"steering/{size:g}": biased("delta_f", math.radians(size)) for size in (0.5, 1.0)}
     found |= {
         f"late/{size}": Case(Late(channels=("delta_f",), delay=1e-3 * size * by.time))
@@ -257,8 +260,10 @@ def _random_fault(vehicle: Vehicle, rng: np.random.Generator) -> Fault:
         lambda: SensorFault(channel="delta_f", kind="scaled", size=rng.uniform(8.0, 20.0)),
         lambda: Mirrored(channels=(("v_y", "a_y"), ("r", "delta_f"))[int(rng.integers(2))]),
         lambda: Misaligned(angle=sign * size(0.002, 0.05)),
-        lambda: VelocityElsewhere(
-            x=sign * by.length * size(0.05, 1.5), y=by.length * rng.uniform(-0.5, 0.5)
+        lambda: SensorElsewhere(
+            sensor="velocity",
+            x=sign * by.length * size(0.05, 1.5),
+            y=by.length * rng.uniform(-0.5, 0.5),
         ),
         lambda: Late(channels=tuple(map(str, late)), delay=by.time * size(0.005, 0.15)),
         lambda: Lagging(channels=tuple(map(str, late)), time_constant=by.time * size(0.01, 0.4)),

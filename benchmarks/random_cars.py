@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,28 +34,23 @@ Range = tuple[float, float]
 
 
 class CarClass(NamedTuple):
-    """From what to what the numbers of a class of cars go."""
+    """From what to what the numbers of a class of cars go.
+
+    Mass [kg], wheelbase L [m], l_f over L; stiffness of the front axle over its load [1/rad],
+    friction of its tires; height of the center of gravity and relaxation length over L; yaw inertia
+    over m l_f l_r, roll stiffness over the weight times its arm; frequency of the steering [Hz].
+    """
 
     mass: Range
-    """[kg]"""
     wheelbase: Range
-    """[m]"""
     front: Range
-    """l_f over the wheelbase [-]."""
     stiffness: Range
-    """Of the front axle over its load [1/rad]."""
     friction: Range
-    """Of the front tires [-]."""
     height: Range
-    """Of the center of gravity over the wheelbase [-]."""
     relaxation: Range
-    """Relaxation length over the wheelbase [-]."""
     inertia: Range
-    """Yaw inertia over m l_f l_r [-]."""
     roll: Range
-    """Roll stiffness over m g times the roll arm [-]."""
     frequency: Range
-    """Of the steering [Hz]."""
 
 
 SEDAN = CarClass(
@@ -451,18 +446,17 @@ def _after_rest(recording: Recording, begin: Beginning) -> Recording:
     first = float(recording.v_x[0])
     slowest = 0.0 if begin.speed == "standing" else -4.0 * first
     before = np.maximum(slowest, first - PULL * recording.dt * np.arange(n, 0, -1))
-    zeros = np.zeros(n)
-    assert recording.a_y is not None and recording.axle_force is not None
+    assert recording.axle_force is not None
+    longer: dict[str, Any] = {
+        name: np.append(np.zeros(n), getattr(recording, name))
+        for name in ("v_y", "r", "delta_f", "delta_r", "a_y")
+    }
     return replace(
         recording,
         t=recording.dt * np.arange(n + len(recording), dtype=np.float64),
         v_x=np.append(before, recording.v_x),
-        v_y=np.append(zeros, recording.v_y),
-        r=np.append(zeros, recording.r),
-        delta_f=np.append(zeros, recording.delta_f),
-        delta_r=np.append(zeros, recording.delta_r),
-        a_y=np.append(zeros, recording.a_y),
         axle_force=np.vstack((np.zeros((n, 2)), recording.axle_force)),
+        **longer,
     )
 
 

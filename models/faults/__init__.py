@@ -6,15 +6,14 @@ Forces, where they are known, stay those of the drive. `str` of a fault says it 
 """
 
 from models.faults.drives import (
-    AccelerometerElsewhere,
     AnotherCar,
     Bank,
     Misaligned,
     Passing,
+    SensorElsewhere,
     ShiftedCenter,
     SwappedAxles,
     Together,
-    VelocityElsewhere,
     WrongNumber,
 )
 from models.faults.signals import (
@@ -39,7 +38,6 @@ __all__ = [
     "KINDS",
     "SIZED",
     "UNITS",
-    "AccelerometerElsewhere",
     "AnotherCar",
     "Bank",
     "ClockJump",
@@ -52,11 +50,11 @@ __all__ = [
     "Mirrored",
     "Misaligned",
     "Passing",
+    "SensorElsewhere",
     "SensorFault",
     "ShiftedCenter",
     "SwappedAxles",
     "Together",
-    "VelocityElsewhere",
     "WrongNumber",
     "WrongUnit",
 ]

@@ -22,6 +22,8 @@ from models.vehicle import GRAVITY, Vehicle
 
 # Of mounting: where a sensor sits and where it looks.
 
+PLACED = ("velocity", "accelerometer")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Misaligned:
@@ -54,64 +56,43 @@ class Misaligned:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class VelocityElsewhere:
-    """A velocity that was taken beside the center of gravity: v_x - y r, v_y + x r.
+class SensorElsewhere:
+    """A sensor that is not at the center of gravity.
+
+    Of velocity it shows v_x - y r and v_y + x r, of acceleration a_y + x dr/dt - y r^2, with the
+    slope of r between neighboring samples.
 
     Parameters
     ----------
-    x, y : of the sensor from the center of gravity, ahead and to the left [m].
+    sensor : one of `PLACED`.
+    x, y : where it is from the center of gravity, ahead and to the left [m].
 
     Raises
     ------
     FaultError
-        For a place that is not finite.
+        For an unknown sensor, or a place that is not finite.
     """
 
+    sensor: str
     x: float = 0.0
     y: float = 0.0
 
     def __post_init__(self) -> None:
+        if self.sensor not in PLACED:
+            raise FaultError(f"sensor must be one of {', '.join(PLACED)}, it is {self.sensor!r}")
         require_finite(self)
 
     def __str__(self) -> str:
         """Return it in words."""
-        return f"velocity {self.x:g} m ahead and {self.y:g} m left of the c.g."
+        return f"{self.sensor} {self.x:g} m ahead and {self.y:g} m left of the c.g."
 
     def apply(self, recording: Recording) -> Recording:
-        """Return the recording with the velocity of that place."""
-        v_x, v_y, r = recording.v_x, recording.v_y, recording.r
-        return replace(recording, v_x=v_x - self.y * r, v_y=v_y + self.x * r)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AccelerometerElsewhere:
-    """A lateral acceleration that was taken beside the center of gravity: a_y + x r_dot - y r^2.
-
-    Parameters
-    ----------
-    x, y : of the sensor from the center of gravity, ahead and to the left [m].
-
-    Raises
-    ------
-    FaultError
-        For a place that is not finite.
-    """
-
-    x: float = 0.0
-    y: float = 0.0
-
-    def __post_init__(self) -> None:
-        require_finite(self)
-
-    def __str__(self) -> str:
-        """Return it in words."""
-        return f"accelerometer {self.x:g} m ahead and {self.y:g} m left of the c.g."
-
-    def apply(self, recording: Recording) -> Recording:
-        """Return the recording with a_y of that place; r_dot is the slope between neighbors."""
-        a_y, r = channel_of(recording, "a_y"), recording.r
+        """Return the recording with the signals of that place."""
+        x, y, r = self.x, self.y, recording.r
+        if self.sensor == "velocity":
+            return replace(recording, v_x=recording.v_x - y * r, v_y=recording.v_y + x * r)
         r_dot = np.gradient(r, recording.dt)
-        return replace(recording, a_y=a_y + self.x * r_dot - self.y * r**2)
+        return replace(recording, a_y=channel_of(recording, "a_y") + x * r_dot - y * r**2)
 
 
 # Of the road.

@@ -19,7 +19,7 @@ from benchmarks.random_cars import (
     random_car,
     random_drive,
 )
-from models.faults import VelocityElsewhere
+from models.faults import SensorElsewhere
 from models.maneuvers import StepSteer
 from models.plant import PlantError
 from models.tires import DugoffTire, FialaTire, MagicFormula
@@ -192,7 +192,7 @@ def test_faults_are_scaled_to_the_size_of_the_car():
     assert Scale.of(sedan()) == (1.0, 1.0, 1.0)
     assert by.speed == pytest.approx(by.length / by.time)
     ahead = cases(small)["ahead/0.5"].fault
-    assert isinstance(ahead, VelocityElsewhere)
+    assert isinstance(ahead, SensorElsewhere)
     assert ahead.x == pytest.approx(0.5 * small.wheelbase / sedan().wheelbase)
 
 

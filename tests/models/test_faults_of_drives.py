@@ -8,7 +8,6 @@ import pytest
 
 from models.faults import (
     CHANNELS,
-    AccelerometerElsewhere,
     AnotherCar,
     Bank,
     ClockJump,
@@ -20,11 +19,11 @@ from models.faults import (
     Mirrored,
     Misaligned,
     Passing,
+    SensorElsewhere,
     SensorFault,
     ShiftedCenter,
     SwappedAxles,
     Together,
-    VelocityElsewhere,
     WrongNumber,
     WrongUnit,
 )
@@ -49,8 +48,8 @@ ALL = (
     Jitter(size=0.02),
     ClockJump(at=5.0, size=0.5),
     Misaligned(angle=0.01),
-    VelocityElsewhere(x=0.5, y=0.2),
-    AccelerometerElsewhere(x=0.5, y=0.2),
+    SensorElsewhere(sensor="velocity", x=0.5, y=0.2),
+    SensorElsewhere(sensor="accelerometer", x=0.5, y=0.2),
     Bank(vehicle=CAR, angle=0.05, period=20.0),
     Together(faults=(BIAS, Misaligned(angle=0.01))),
     Passing(fault=BIAS, until=2.0, fade=1.0),
@@ -183,7 +182,7 @@ def test_a_turned_sensor_keeps_the_speed_and_turns_its_direction_back(drive):
 
 def test_velocity_elsewhere_is_that_of_the_rigid_body(drive):
     """At the front axle its direction plus the slip is the steering; v_x falls inside."""
-    shown = VelocityElsewhere(x=CAR.l_f, y=0.7).apply(drive)
+    shown = SensorElsewhere(sensor="velocity", x=CAR.l_f, y=0.7).apply(drive)
     alpha = drive.alpha(CAR.l_f, CAR.l_r)[:, 0]
     np.testing.assert_allclose(np.arctan2(shown.v_y, drive.v_x) + alpha, drive.delta_f, atol=1e-12)
     np.testing.assert_allclose(drive.v_x - shown.v_x, 0.7 * drive.r, atol=1e-12)
@@ -195,7 +194,7 @@ def test_an_accelerometer_elsewhere_feels_the_acceleration_of_its_place():
     t = np.linspace(0.0, 20.0, 2001)
     r = 0.4 + 0.1 * np.cos(t)
     still = replace(waves(), r=r, a_y=np.zeros_like(t))  # the c.g. rests, the car turns about it
-    shown = AccelerometerElsewhere(x=1.2, y=0.5).apply(still).a_y
+    shown = SensorElsewhere(sensor="accelerometer", x=1.2, y=0.5).apply(still).a_y
     e = 1e-4
 
     def place(t):
@@ -261,6 +260,8 @@ def test_cars_are_told_wrongly_by_the_size():
         (lambda: Jitter(size=-1.0), "size must be positive"),
         (lambda: ClockJump(at=1.0, size=math.inf), "size must be finite"),
         (lambda: ClockJump(at=30.0, size=-1.0).apply(waves()), "at must be within 0 to 20 s"),
+        (lambda: SensorElsewhere(sensor="nose"), "sensor must be one of velocity"),
+        (lambda: SensorElsewhere(sensor="velocity", x=math.nan), "x must be finite"),
         (lambda: Misaligned(angle=math.nan), "angle must be finite"),
         (lambda: Bank(vehicle=CAR, angle=0.1, period=0.0), "period positive"),
         (lambda: Passing(fault=BIAS, until=1.0, fade=-1.0), "not negative"),
