@@ -12,7 +12,7 @@ are chosen with `--first` below `FIRST_SEED`, where there are no recordings.
 import argparse
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import cache, partial
@@ -30,7 +30,13 @@ from models.vehicle import Vehicle
 
 EACH, PER_CAR = 100, 5  # answers of each class and of recordings; of one plant car
 WRONG, RIGHT = 20.0, 8.0  # % of the rms force, worse axle
-FILES = {"carmaker.csv.gz": CARMAKER, "dart.csv.gz": DART, "dart_imu.csv.gz": DART}
+OWN_SENSORS = {"r": "r_imu", "ay": "ay_imu", "vx": "vx_encoder"}  # 90 ms late, as they come
+FILES: tuple[tuple[str, Vehicle, Mapping[str, str]], ...] = (
+    ("carmaker.csv.gz", CARMAKER, {}),
+    ("dart.csv.gz", DART, {}),
+    ("dart_imu.csv.gz", DART, {}),
+    ("dart_imu.csv.gz", DART, OWN_SENSORS),
+)
 LASTS, DRIVING = (20.0, 40.0), 0.6  # s; share of a part in which the car drives
 PROCESSES = 2
 
@@ -72,12 +78,15 @@ def plant_answers(job: tuple[str, int]) -> list[Judged]:
 
 @cache
 def recordings() -> tuple[tuple[Recording, Vehicle], ...]:
-    """Return every recording with its car; none where they are not there."""
+    """Return every recording with its car, the 1:10 one by a camera and by its own sensors too.
+
+    None where they are not there.
+    """
     if not DATA.is_dir():
         return ()
     return tuple(
-        (read_recording(DATA / file, run=run), car)
-        for file, car in FILES.items()
+        (read_recording(DATA / file, run=run, check=False, columns=columns), car)
+        for file, car, columns in FILES
         for run in runs(DATA / file)
     )
 
