@@ -12,6 +12,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from benchmarks.random_cars import good_sensors
 from benchmarks.recorded_cars import DART
 from models.faults import (
     AnotherCar,
@@ -33,6 +34,7 @@ from models.faults import (
     WrongUnit,
 )
 from models.recordings import Recording
+from models.sensors import Sensors
 from models.vehicle import Vehicle, sedan
 
 STRAIGHT = 0.005  # of the lateral motion of a drive is left on a straight road
@@ -50,9 +52,18 @@ class Told(Protocol):
         """
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class StraightOnly:
-    """A drive that never corners: all lateral signals shrink to `STRAIGHT` of themselves."""
+    """A drive that never corners: all lateral signals shrink to `STRAIGHT` of themselves.
+
+    Parameters
+    ----------
+    sensors : whose noise does not shrink.
+    seed : of that noise.
+    """
+
+    sensors: Sensors
+    seed: int = 0
 
     def __str__(self) -> str:
         """Return it in words."""
@@ -66,7 +77,7 @@ class StraightOnly:
         recording : a drive with corners.
         """
         s, force, a_y = STRAIGHT, recording.axle_force, recording.a_y
-        return replace(
+        straight = replace(
             recording,
             v_y=s * recording.v_y,
             r=s * recording.r,
@@ -75,6 +86,7 @@ class StraightOnly:
             a_y=None if a_y is None else s * a_y,
             axle_force=None if force is None else s * force,
         )
+        return self.sensors.apply(straight, np.random.default_rng(self.seed))
 
 
 class Case(NamedTuple):
@@ -191,7 +203,7 @@ def cases(vehicle: Vehicle) -> Mapping[str, Case]:
         "center/0.05": Case(told=ShiftedCenter(share=0.05)),
         "swapped": Case(told=SwappedAxles()),
         "other_car": Case(told=AnotherCar(told=_other_car(vehicle))),
-        "straight": Case(StraightOnly()),
+        "straight": Case(StraightOnly(sensors=good_sensors(vehicle))),
         "v_y_zero": Case(SensorFault(channel="v_y", kind="zero")),
     }
     return found
@@ -272,6 +284,6 @@ def _random_fault(vehicle: Vehicle, rng: np.random.Generator) -> Fault:
         lambda: Jitter(size=by.time * size(0.005, 0.08), seed=seed),
         lambda: ClockJump(at=rng.uniform(3.0, 9.0), size=sign * size(0.05, 2.0)),
         lambda: Bank(vehicle=vehicle, angle=sign * size(0.005, 0.08), period=size(10.0, 300.0)),
-        StraightOnly,
+        lambda: StraightOnly(sensors=good_sensors(vehicle), seed=seed),
     )
     return makes[int(rng.integers(len(makes)))]()

@@ -5,12 +5,14 @@
 Each fault of `fault_cases.cases` on the two CarMaker runs, where they are there, and on plant cars
 of four classes: learnt stiffness, error of the force of the frozen model (on the same sensors, on a
 drive with corners) and the verdict. Where a fault can be seen the error at most doubles, where it
-can not the answer is called not valid. Writes OUT/fault_table.md for docs/benchmarks.md.
+can not the answer is called not valid; a wrong mass alone nobody can see. Writes
+OUT/fault_table.md for docs/benchmarks.md.
 """
 
 import argparse
 import math
 import sys
+import textwrap
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -45,6 +47,8 @@ LABELS = {  # by the first part of the key of a case; its size follows
     "straight": "no corner driven",
     "v_y_zero": "v_y always zero",
 }
+UNSEEN = {"mass/1.2": 20.0}  # % that no motion shows: all forces grow with the mass
+SHOWN, WIDTH = {"tenth": "1:10"}, 110  # name of a class in documents; characters of their lines
 PROCESSES = 2
 Answers = Mapping[str, Answer]  # by case
 
@@ -89,15 +93,16 @@ def of_carmaker() -> dict[str, list[Answers]]:
     return found
 
 
-def is_told(found: Answer, clean: Answer) -> bool:
+def is_told(found: Answer, clean: Answer, unseen: float = 0.0) -> bool:
     """Return whether the error at most doubles, or the answer is called not valid.
 
     Parameters
     ----------
     found : with the fault.
     clean : without.
+    unseen : error that is added and that nobody can see [%].
     """
-    return found.valid is False or found.worse <= max(TWICE * clean.worse, SMALL)
+    return found.valid is False or found.worse <= max(TWICE * clean.worse, SMALL) + unseen
 
 
 def label_of(case: str) -> str:
@@ -123,8 +128,12 @@ def report(found: Mapping[str, list[Answers]], targets: Targets) -> str:
     plants = [name for name in found if name in CLASSES]
     logs = [name for name in found if name not in CLASSES]
     head = [f"CarMaker {name}{what}" for name in logs for what in (" [kN/rad]", " [%]")]
-    head = ["what is wrong", *head, *(f"{name} [%]" for name in plants), "called valid"]
-    lines, sources = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"], ["fault_table:"]
+    asked = sum(map(len, found.values()))
+    targets.record("drives", asked)
+    head += [f"{SHOWN.get(name, name)} [%]" for name in plants]
+    head = ["what is wrong", *head, f"valid, of {asked}"]
+    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
+    sources = ["name=1:10"] * ("tenth" in plants) + ["fault_table:", "drives"]
     silent: list[tuple[str, str, Answer]] = []
     dead = 0
     for name, label in labels.items():
@@ -139,7 +148,11 @@ def report(found: Mapping[str, list[Answers]], targets: Targets) -> str:
             row.append(_pair(targets, f"{name}/{group}/error", some))
             clean = [answers["clean"] for answers in drives]
             pairs = list(zip(some, clean, strict=True))
-            silent += [(group, name, one) for one, good in pairs if not is_told(one, good)]
+            silent += [
+                (group, name, one)
+                for one, good in pairs
+                if not is_told(one, good, UNSEEN.get(name, 0.0))
+            ]
             dead += sum(is_dead(one, good.stiffness) for one, good in pairs)
         every = [answers[name] for drives in found.values() for answers in drives]
         valid = sum(one.valid is True for one in every)
@@ -159,7 +172,9 @@ def report(found: Mapping[str, list[Answers]], targets: Targets) -> str:
     targets.at_most("answers that leave an axle dead", dead, 0, "", "dead")
     stopped = sum(not np.isfinite(one.stiffness).all() for one in everything)
     targets.at_most("answers that stopped the program", stopped, 0, "", "stopped")
-    return "\n".join([*lines, f"<!-- numbers {' '.join(sources)} -->"]) + "\n"
+    comment = f"<!-- numbers {' '.join(sources)} -->"
+    lines += textwrap.wrap(comment, WIDTH, break_long_words=False, break_on_hyphens=False)
+    return "\n".join(lines) + "\n"
 
 
 def _pair(targets: Targets, key: str, some: list[Answer]) -> str:

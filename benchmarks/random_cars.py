@@ -128,10 +128,20 @@ class RandomCar:
 
     @property
     def sensors(self) -> Sensors:
-        """Good sensors of its size: 0.03 m/s and 0.003 rad/s for a sedan."""
-        size = math.sqrt(self.vehicle.wheelbase / sedan().wheelbase)
-        speed = Sensor(noise=0.03 * size)
-        return Sensors(v_x=speed, v_y=speed, r=Sensor(noise=0.003 / size), delta=Sensor(noise=5e-4))
+        """Good sensors of its size."""
+        return good_sensors(self.vehicle)
+
+
+def good_sensors(vehicle: Vehicle) -> Sensors:
+    """Return sensors with the noise of good ones: 0.03 m/s and 0.003 rad/s in a sedan.
+
+    Parameters
+    ----------
+    vehicle : by whose size the noise scales.
+    """
+    size = math.sqrt(vehicle.wheelbase / sedan().wheelbase)
+    speed = Sensor(noise=0.03 * size)
+    return Sensors(v_x=speed, v_y=speed, r=Sensor(noise=0.003 / size), delta=Sensor(noise=5e-4))
 
 
 def random_car(kind: str, rng: np.random.Generator) -> RandomCar:

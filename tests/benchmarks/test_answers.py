@@ -108,11 +108,20 @@ def test_judged_is_what_stays_wrong_without_what_passes(drive):
     exact, noise = drive.exact, SensorFault(channel="r", kind="noisy", size=0.1)
     bias = biased("v_y", 0.2)
     assert Case(noise).judged(exact) is exact
-    assert Case(StraightOnly()).judged(exact) is exact
+    straight = StraightOnly(sensors=drive.car.sensors)
+    assert Case(straight).judged(exact) is exact
     assert Case().judged(exact) is exact
     both = Case(Together(faults=(noise, bias.fault)))
     np.testing.assert_array_equal(both.judged(exact).v_y, bias.log(exact).v_y)
     np.testing.assert_array_equal(both.judged(exact).r, exact.r)
+
+
+def test_a_straight_drive_has_next_to_no_force_and_all_of_the_noise(drive):
+    good = drive.car.sensors
+    shown = StraightOnly(sensors=good).apply(drive.exact)
+    assert np.abs(shown.axle_force).max() < 0.006 * np.abs(drive.exact.axle_force).max()
+    assert np.std(shown.v_y) == pytest.approx(good.v_y.noise, rel=0.1)
+    assert np.std(shown.r) == pytest.approx(good.r.noise, rel=0.1)
 
 
 # Beginnings.
@@ -197,6 +206,13 @@ def test_an_exception_and_a_stiffness_of_nothing_are_found(monkeypatch):
 )
 def test_an_error_that_doubles_must_be_told(found, told):
     assert fault_table.is_told(found, GOOD) is told
+
+
+def test_a_wrong_mass_is_forgiven_what_it_adds_to_all_forces_and_no_more():
+    off = fault_table.UNSEEN["mass/1.2"]
+    assert off == pytest.approx(100.0 * (1.2 - 1.0))
+    assert fault_table.is_told(GOOD._replace(error=(27.9, 24.0)), GOOD, off)
+    assert not fault_table.is_told(GOOD._replace(error=(28.1, 24.0)), GOOD, off)
 
 
 def test_the_table_is_markdown_whose_numbers_are_those_recorded():
