@@ -12,7 +12,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from benchmarks.random_cars import good_sensors
+from benchmarks.random_cars import LIKE, good_sensors
 from benchmarks.recorded_cars import DART
 from models.faults import (
     AnotherCar,
@@ -35,7 +35,7 @@ from models.faults import (
 )
 from models.recordings import Recording
 from models.sensors import Sensors
-from models.vehicle import Vehicle, sedan
+from models.vehicle import Vehicle
 
 STRAIGHT = 0.005  # of the lateral motion of a drive is left on a straight road
 
@@ -151,11 +151,10 @@ class Scale(NamedTuple):
         ----------
         vehicle : the car.
         """
-        like = sedan()
         return cls(
-            vehicle.wheelbase / like.wheelbase,
-            vehicle.froude_speed / like.froude_speed,
-            vehicle.froude_time / like.froude_time,
+            vehicle.wheelbase / LIKE.wheelbase,
+            vehicle.froude_speed / LIKE.froude_speed,
+            vehicle.froude_time / LIKE.froude_time,
         )
 
 
@@ -247,7 +246,7 @@ def _random_told(vehicle: Vehicle, rng: np.random.Generator) -> Told:
 
 def _other_car(vehicle: Vehicle) -> Vehicle:
     """A 1:10 car for a full-size one, and the other way round."""
-    return DART if vehicle.mass > 100.0 else replace(sedan(), chassis=None)
+    return DART if vehicle.mass > 100.0 else replace(LIKE, chassis=None)
 
 
 def _random_fault(vehicle: Vehicle, rng: np.random.Generator) -> Fault:

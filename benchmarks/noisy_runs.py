@@ -115,12 +115,12 @@ def run(seed: int) -> Ended:
         history = ti.identify(log, told, check=False)
         for t in (float(log.t[len(log) // 2]), None):
             tire = history.freeze(t)
-            stiffness = tire.stiffness
-            assert stiffness is not None
-            if not (np.isfinite(stiffness).all() and (np.array(stiffness) > 0.0).all()):
-                return Ended(seed, drive.car.kind, "stiffness that is none")
             if not np.isfinite(tire.axle_force(log)).all():
                 return Ended(seed, drive.car.kind, "force that is not finite")
+        stiffness = tire.stiffness
+        assert stiffness is not None
+        if not (np.isfinite(stiffness).all() and (np.array(stiffness) > 0.0).all()):
+            return Ended(seed, drive.car.kind, "stiffness that is none")
     except Exception as error:
         return Ended(seed, drive.car.kind, f"{type(error).__name__}: {error}")
     sound = np.isfinite(history.axle_force).all()

@@ -26,6 +26,7 @@ from models.tires import DugoffTire, FialaTire, MagicFormula, Tire
 from models.vehicle import GRAVITY, Chassis, Vehicle, sedan
 
 FIRST_SEED = 1000
+LIKE = sedan()  # to whose size noise and faults are told
 TIRES = ("fiala", "dugoff", "magic_formula")
 LEAD, DRIVEN = 8.0, 30.0  # s straight, s of swings
 REACHED, SPIN, SLOWED = 0.5, 0.45, 0.5  # of the grip; |v_y/v_x|; of the wanted speed
@@ -139,7 +140,7 @@ def good_sensors(vehicle: Vehicle) -> Sensors:
     ----------
     vehicle : by whose size the noise scales.
     """
-    size = math.sqrt(vehicle.wheelbase / sedan().wheelbase)
+    size = math.sqrt(vehicle.wheelbase / LIKE.wheelbase)
     speed = Sensor(noise=0.03 * size)
     return Sensors(v_x=speed, v_y=speed, r=Sensor(noise=0.003 / size), delta=Sensor(noise=5e-4))
 
@@ -212,7 +213,7 @@ def _chassis(drawn: CarClass, car: Vehicle, rng: np.random.Generator) -> Chassis
 def _tire(name: str, C: float, load: float, friction: float) -> Tire:
     """One tire of stiffness C [N/rad] at a load [N]."""
     if name == "magic_formula":
-        tire = MagicFormula.from_tir(str(sedan().require_chassis().tire))
+        tire = MagicFormula.from_tir(str(LIKE.require_chassis().tire))
         c = replace(tire.coefficients, FNOMIN=load, LMUX=friction, LMUY=friction)
         stiffness = float(replace(tire, coefficients=c).cornering_stiffness(load))
         return replace(tire, coefficients=replace(c, LKY=C / stiffness), name="random")

@@ -183,6 +183,9 @@ def test_an_exception_and_a_stiffness_of_nothing_are_found(monkeypatch):
     class Tire:
         stiffness = np.array([1e5, 0.0])
 
+        def axle_force(self, log):
+            return log.x
+
     class History:
         def freeze(self, _):
             return Tire()
