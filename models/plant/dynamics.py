@@ -217,20 +217,24 @@ def rotate(x: Any, y: Any, angle: Any) -> tuple[Any, Any]:
     return x * c - y * s, x * s + y * c
 
 
-def dynamics(vehicle: Vehicle, tire: Tire, driver: Driver) -> ca.Function:
-    """Return f(x, command, v_ref, mu, places) -> (x_dot, *OUTPUTS), an SX function.
+def dynamics(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver) -> ca.Function:
+    """Return f(x, command, v_ref, mu, places, aside) -> (x_dot, *OUTPUTS), an SX function.
+
+    `aside` is what pushes the body to the left at its center of gravity beside the tires, over its
+    mass [m/s^2]: the slope of a banked road, which an accelerometer does not feel, and wind.
 
     Parameters
     ----------
     vehicle : the car, with chassis.
-    tire : mounted on all four wheels.
+    tires : of the two front and of the two rear wheels.
     driver : who holds the speed.
     """
     m, I_z, l_f, l_r = vehicle.mass, vehicle.yaw_inertia, vehicle.l_f, vehicle.l_r
     c, h = vehicle.require_chassis(), vehicle.roll_arm
     x = ca.SX.sym("x", N_STATES)
     command, v_ref, mu = ca.SX.sym("command", 2), ca.SX.sym("v_ref"), ca.SX.sym("mu")
-    places = ca.SX.sym("places", 3, MAX_PLACES)
+    places, aside = ca.SX.sym("places", 3, MAX_PLACES), ca.SX.sym("aside", 2)
+    slope, wind = aside[0], aside[1]
     v_x, v_y, r, roll, roll_rate, X, _, psi = ca.vertsplit(x[:8])
     slip, delta, F_lagged, a_x_lagged, integral = x[8:12], x[12:14], x[14:16], x[16], x[17]
 
@@ -250,7 +254,8 @@ def dynamics(vehicle: Vehicle, tire: Tire, driver: Driver) -> ca.Function:
         here = X + wheel.x * ca.cos(psi) - wheel.y * ca.sin(psi)
         grip = mu + place_change(places, here)
         camber = (c.roll_camber_front, c.roll_camber_rear)[axle] * roll
-        of_tire = tire_force(mounted(tire, wheel), slip[k], camber, 0.5 * drive[axle], F_z[k], grip)
+        tire = mounted(tires[axle], wheel)
+        of_tire = tire_force(tire, slip[k], camber, 0.5 * drive[axle], F_z[k], grip)
         F_x.append(of_tire[0])
         F_y.append(of_tire[1])
         forward, sideward = rotate(of_tire[0], of_tire[1], angle)
@@ -260,13 +265,14 @@ def dynamics(vehicle: Vehicle, tire: Tire, driver: Driver) -> ca.Function:
 
     a_x, a_y = force / m, (axle_force[0] + axle_force[1]) / m
     r_dot = (l_f * axle_force[0] - l_r * axle_force[1] + moment) / I_z
-    # About the center of gravity: the roll arm carries a_y and the weight of the leaning body.
+    # About the center of gravity: the roll arm carries what the tires push, not what pushes at the
+    # center itself, and the weight of the leaning body.
     restoring = c.roll_stiffness * roll + c.roll_damping * roll_rate
     roll_acceleration = (m * h * a_y + vehicle.weight * h * roll - restoring) / c.roll_inertia
     X_dot, Y_dot = rotate(v_x, v_y, psi)
     x_dot = ca.vertcat(
         a_x + v_y * r,
-        a_y - v_x * r,
+        a_y + slope + wind - v_x * r,
         r_dot,
         roll_rate,
         roll_acceleration,
@@ -280,12 +286,12 @@ def dynamics(vehicle: Vehicle, tire: Tire, driver: Driver) -> ca.Function:
         integral_dot,
     )
     outputs = [ca.vertcat(*v) for v in (F_x, F_y)] + [F_z]
-    outputs += [ca.vertcat(*v) for v in (alpha, axle_force, (a_x, a_y))]
+    outputs += [ca.vertcat(*v) for v in (alpha, axle_force, (a_x, a_y + wind))]
     return ca.Function(
         "car",
-        [x, command, v_ref, mu, places],
+        [x, command, v_ref, mu, places, aside],
         [x_dot, *outputs],
-        ["x", "command", "v_ref", "mu", "places"],
+        ["x", "command", "v_ref", "mu", "places", "aside"],
         ["x_dot", *OUTPUTS],
     )
 

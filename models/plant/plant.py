@@ -1,10 +1,10 @@
 """A plant ready to drive: the car, its tires and the compiled loop over time."""
 
 import os
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from models.plant.dynamics import N_STATES, Driver, dynamics, runge_kutta
 from models.recordings import Recording
 from models.sensors import Sensors
 from models.tires import MagicFormula, Tire
-from models.vehicle import Vehicle, VehicleError
+from models.vehicle import GRAVITY, Vehicle, VehicleError
 
 # What a plant recorded: the motion, and the forces behind it, which no car measures.
 
@@ -32,7 +32,8 @@ class PlantRun:
     t : time [s], (n,).
     v_x, v_y : velocity of the center of gravity in the body frame [m/s], (n,).
     r : yaw rate [rad/s], (n,).
-    a_x, a_y : acceleration of the center of gravity, a_y = dv_y/dt + v_x r [m/s^2], (n,).
+    a_x, a_y : what an accelerometer at the center of gravity feels [m/s^2], (n,); on a road that is
+        not banked a_y = dv_y/dt + v_x r.
     command : steering asked for, [δ_f, δ_r] [rad], (n, 2).
     delta_f, delta_r : actual angles of the road wheels [rad], (n,).
     roll, roll_rate : of the body, positive when the right side dips [rad], [rad/s], (n,).
@@ -131,7 +132,7 @@ class PlantRun:
         return sensors.apply(exact, rng)
 
 
-Speed = float | Callable[[Array], Array]
+OverTime = float | Callable[[Array], Array]  # a number, or a function of the times (n,) [s]
 
 
 class PlantError(ArithmeticError):
@@ -139,18 +140,18 @@ class PlantError(ArithmeticError):
 
 
 @cache
-def compiled_loop(vehicle: Vehicle, tire: Tire, driver: Driver, dt: float) -> Scan:
+def compiled_loop(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver, dt: float) -> Scan:
     """Return the compiled loop of a plant over time, built once.
 
     Parameters
     ----------
     vehicle : the car, with chassis.
-    tire : of all four wheels, hashable.
+    tires : of the front and the rear wheels, hashable.
     driver : who holds the speed.
     dt : step of the integration [s].
     """
-    step = runge_kutta(dynamics(vehicle, tire, driver), dt)
-    return Scan(step, carry=("x",), over=("command", "v_ref", "mu"))
+    step = runge_kutta(dynamics(vehicle, tires, driver), dt)
+    return Scan(step, carry=("x",), over=("command", "v_ref", "mu", "aside"))
 
 
 class Plant:
@@ -160,6 +161,7 @@ class Plant:
     ----------
     vehicle : the car; it needs a chassis.
     tire : of all four wheels, a frozen record; None reads the file named by the chassis.
+    rear_tire : of the two rear wheels, where they have another.
     driver : who holds the speed.
 
     Raises
@@ -169,7 +171,12 @@ class Plant:
     """
 
     def __init__(
-        self, vehicle: Vehicle, tire: Tire | None = None, *, driver: Driver | None = None
+        self,
+        vehicle: Vehicle,
+        tire: Tire | None = None,
+        *,
+        rear_tire: Tire | None = None,
+        driver: Driver | None = None,
     ) -> None:
         file = vehicle.require_chassis().tire
         if tire is None and file is None:
@@ -178,14 +185,17 @@ class Plant:
         if tire is None:
             tire = MagicFormula.from_tir(os.fspath(file or ""))
         self.tire: Tire = tire
+        self.rear_tire: Tire = tire if rear_tire is None else rear_tire
         self.driver = driver if driver is not None else Driver()
 
     def simulate(
         self,
         maneuver: Maneuver,
         *,
-        speed: Speed,
+        speed: OverTime,
         friction: Friction | None = None,
+        bank: OverTime = 0.0,
+        wind: OverTime = 0.0,
         dt: float = 1e-3,
         sample_time: float = 0.01,
         name: str | None = None,
@@ -197,6 +207,9 @@ class Plant:
         maneuver : what the wheels are asked to do, and for how long.
         speed : wanted speed [m/s], a number or a function of the times (n,) [s].
         friction : of the road; None is what the tire was measured on.
+        bank : slope of the road across the car [rad], positive where it falls to the left; wheel
+            loads stay those of a level road. A number or a function of the times.
+        wind : side force on the body at its center of gravity, positive to the left [N]; the same.
         dt : step of the integration [s].
         sample_time : step of the record [s], a multiple of `dt`.
         name : of the run; None takes the name of the maneuver's class.
@@ -219,8 +232,10 @@ class Plant:
         t = dt * np.arange(n, dtype=np.float64)
         middle = t + 0.5 * dt  # inputs are held over a step: at its middle they are not late
         command = maneuver.steering(middle)
-        v_ref = speed(middle) if callable(speed) else np.full(n, float(speed))
-        for label, given, shape in (("steering", command, (n, 2)), ("speed", v_ref, (n,))):
+        v_ref, slope, push = (_over_time(one, middle) for one in (speed, bank, wind))
+        inputs = {"steering": command, "speed": v_ref, "bank": slope, "wind": push}
+        for label, given in inputs.items():
+            shape = (n, 2) if label == "steering" else (n,)
             if np.shape(given) != shape or not np.isfinite(given).all():
                 raise ValueError(f"{label} must be finite and of shape {shape}")
         if not v_ref[0] > 0.0:
@@ -230,15 +245,27 @@ class Plant:
         start[0] = v_ref[0]
         values = {"x": start, "command": command, "v_ref": v_ref}
         values |= {"mu": road.over_time(middle), "places": road.over_place()}
-        record = compiled_loop(self.vehicle, cast(Hashable, self.tire), self.driver, dt)(
-            n, values, every=every
-        )
+        values["aside"] = np.column_stack((GRAVITY * np.sin(slope), push / self.vehicle.mass))
+        record = self.loop(dt)(n, values, every=every)
         finite = np.isfinite(record["x"]).all(axis=1)
         if not finite.all():
             raise PlantError(f"the car's state is not finite from t = {t[::every][~finite][0]} s")
         name = name if name is not None else type(maneuver).__name__
         t = t[::every]
         return PlantRun.from_record(name, self.vehicle, t, maneuver.steering(t), record)
+
+    def loop(self, dt: float) -> Scan:
+        """Return the compiled loop over time.
+
+        Parameters
+        ----------
+        dt : step of the integration [s].
+        """
+        return compiled_loop(self.vehicle, (self.tire, self.rear_tire), self.driver, dt)
+
+
+def _over_time(given: OverTime, t: Array) -> Array:
+    return given(t) if callable(given) else np.full(t.size, float(given))
 
 
 # The plant one control period at a time: for a driver or a controller that looks before it steers.
@@ -299,7 +326,7 @@ class StepwisePlant:
         self.dt = dt
         self._every = every
         self._places = self.friction.over_place()
-        self._scan = compiled_loop(plant.vehicle, cast(Hashable, plant.tire), plant.driver, dt)
+        self._scan = plant.loop(dt)
 
     def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> PlantState:
         """Return the car rolling straight ahead.
@@ -350,6 +377,7 @@ class StepwisePlant:
             "v_ref": np.full(n, v_ref),
             "mu": self.friction.over_time(middle),
             "places": self._places,
+            "aside": np.zeros((n, 2)),
         }
         record = self._scan(n, values, every=max(n - 1, 1))
         now = start + n - 1

@@ -1,0 +1,214 @@
+"""What faults of logs and of what is told do to the answer, and whether its verdict says so.
+
+    python -m benchmarks.fault_table OUT [--cars N] [--record]
+
+Each fault of `fault_cases.cases` on the two CarMaker runs, where they are there, and on plant cars
+of four classes: learnt stiffness, error of the force of the frozen model (on the same sensors, on a
+drive with corners) and the verdict. Where a fault can be seen the error at most doubles, where it
+can not the answer is called not valid; a wrong mass alone nobody can see. Writes
+OUT/fault_table.md for docs/benchmarks.md.
+"""
+
+import argparse
+import math
+import sys
+import textwrap
+from collections.abc import Mapping
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.answers import Answer, answer, drawn, is_dead
+from benchmarks.documents import numbers
+from benchmarks.fault_cases import cases
+from benchmarks.random_cars import CLASSES, FIRST_SEED
+from benchmarks.recorded_cars import CARMAKER, DATA
+from benchmarks.targets import Targets, keeps, show
+from models.recordings import Recording, read_recording
+from models.vehicle import Vehicle, sedan
+
+CARS = 5  # of each class
+RUNS = {"slalom": "slalom1_14_5ms", "sine": "experiment2_40kmh"}
+TWICE, SMALL = 2.0, 5.0  # times the error without the fault; % that is good whatever that was
+LABELS = {  # by the first part of the key of a case; its size follows
+    "clean": "nothing",
+    "v_y_bias": "v_y off by {} m/s",
+    "mounting": "velocity sensor turned by {}°",
+    "ahead": "velocity sensor {} m ahead",
+    "steering": "steering off by {}°",
+    "late": "steering {} ms late",
+    "bank": "road banked by {}°",
+    "mass": "mass told {} times",
+    "inertia": "yaw inertia told {} times",
+    "center": "c.g. told {} wheelbases too far back",
+    "swapped": "l_f and l_r swapped",
+    "other_car": "a car of another size told",
+    "straight": "no corner driven",
+    "v_y_zero": "v_y always zero",
+}
+UNSEEN = {"mass/1.2": 20.0}  # % that no motion shows: all forces grow with the mass
+SHOWN, WIDTH = {"tenth": "1:10"}, 110  # name of a class in documents; characters of their lines
+PROCESSES = 2
+Answers = Mapping[str, Answer]  # by case
+
+
+def of_log(log: Recording, drive: Recording, told: Vehicle) -> dict[str, Answer]:
+    """Return the answer to each fault of a drive.
+
+    Parameters
+    ----------
+    log : of good sensors.
+    drive : the same without noise.
+    told : the car, told rightly.
+    """
+    return {
+        name: answer(case.log(log), case.car(told), case.judged(drive))
+        for name, case in cases(told).items()
+    }
+
+
+def of_car(job: tuple[str, int]) -> dict[str, Answer]:
+    """Return the answer to each fault of a drive of a plant car.
+
+    Parameters
+    ----------
+    job : class of the car, and its number.
+    """
+    kind, number = job
+    drive = drawn(kind, FIRST_SEED + number)
+    rng = np.random.default_rng([FIRST_SEED + number, 1])
+    return of_log(drive.log(rng), drive.exact, drive.car.told)
+
+
+def of_carmaker() -> dict[str, list[Answers]]:
+    """Return the answers on the recordings of CarMaker; none where they are not there."""
+    found: dict[str, list[Answers]] = {}
+    if not DATA.is_dir():
+        print(f"  without recordings: they are not there: {DATA} (set TIREID_DATA)")
+        return found
+    for name, run in RUNS.items():
+        recording = read_recording(DATA / "carmaker.csv.gz", run=run)
+        found[name] = [of_log(recording, recording, CARMAKER)]
+    return found
+
+
+def is_told(found: Answer, clean: Answer, unseen: float = 0.0) -> bool:
+    """Return whether the error at most doubles, or the answer is called not valid.
+
+    Parameters
+    ----------
+    found : with the fault.
+    clean : without.
+    unseen : error that is added and that nobody can see [%].
+    """
+    return found.valid is False or found.worse <= max(TWICE * clean.worse, SMALL) + unseen
+
+
+def label_of(case: str) -> str:
+    """Return a case in words.
+
+    Parameters
+    ----------
+    case : its key.
+    """
+    kind, _, size = case.partition("/")
+    return LABELS[kind].format(size)
+
+
+def report(found: Mapping[str, list[Answers]], targets: Targets) -> str:
+    """Record and judge the numbers; return the table as Markdown with its sources.
+
+    Parameters
+    ----------
+    found : by recording or class, for each of its drives.
+    targets : collects what is missed.
+    """
+    labels = {name: label_of(name) for name in cases(sedan())}
+    plants = [name for name in found if name in CLASSES]
+    logs = [name for name in found if name not in CLASSES]
+    head = [f"CarMaker {name}{what}" for name in logs for what in (" [kN/rad]", " [%]")]
+    asked = sum(map(len, found.values()))
+    targets.record("drives", asked)
+    head += [f"{SHOWN.get(name, name)} [%]" for name in plants]
+    head = ["what is wrong", *head, f"valid, of {asked}"]
+    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
+    sources = ["name=1:10"] * ("tenth" in plants) + ["fault_table:", "drives"]
+    silent: list[tuple[str, str, Answer]] = []
+    dead = 0
+    for name, label in labels.items():
+        row = [label]
+        sources += [f"input={number.text}" for number in numbers(label)]
+        sources.append(f"{name}/{{{','.join(logs)}}}/{{stiffness,error}}/{{front,rear}}")
+        sources.append(f"{name}/{{{','.join(plants)}}}/error/{{front,rear}}")
+        for group, drives in found.items():
+            some = [answers[name] for answers in drives]
+            if group in logs:
+                row.append(_pair(targets, f"{name}/{group}/stiffness", some))
+            row.append(_pair(targets, f"{name}/{group}/error", some))
+            clean = [answers["clean"] for answers in drives]
+            pairs = list(zip(some, clean, strict=True))
+            silent += [
+                (group, name, one)
+                for one, good in pairs
+                if not is_told(one, good, UNSEEN.get(name, 0.0))
+            ]
+            dead += sum(is_dead(one, good.stiffness) for one, good in pairs)
+        every = [answers[name] for drives in found.values() for answers in drives]
+        valid = sum(one.valid is True for one in every)
+        targets.record(f"{name}/valid", valid)
+        sources.append(f"{name}/valid")
+        lines.append(f"| {' | '.join([*row, str(valid)])} |")
+        codes = sorted({code for one in every for code in one.codes})
+        show(label, f"{valid} of {len(every)} valid  {', '.join(codes)}")
+    for group, name, one in silent[:20]:
+        show(f"says nothing: {group}, {labels[name]}", f"{one.error[0]:.1f} / {one.error[1]:.1f} %")
+    everything = [
+        one for drives in found.values() for answers in drives for one in answers.values()
+    ]
+    targets.record("answers", len(everything))
+    label = "answers whose error doubles and that are not called not valid"
+    targets.at_most(label, len(silent), 0, "", "silent")
+    targets.at_most("answers that leave an axle dead", dead, 0, "", "dead")
+    stopped = sum(not np.isfinite(one.stiffness).all() for one in everything)
+    targets.at_most("answers that stopped the program", stopped, 0, "", "stopped")
+    comment = f"<!-- numbers {' '.join(sources)} -->"
+    lines += textwrap.wrap(comment, WIDTH, break_long_words=False, break_on_hyphens=False)
+    return "\n".join(lines) + "\n"
+
+
+def _pair(targets: Targets, key: str, some: list[Answer]) -> str:
+    """A cell, front / rear: the medians over drives, recorded; the infinite error of no model."""
+    if key.endswith("/stiffness"):
+        values, unit, digits = [1e-3 * np.array(one.stiffness) for one in some], "kN/rad", 0
+    else:
+        values, unit, digits = [np.array(one.error) for one in some], "%", 1
+    cells = []
+    for axle, value in zip(("front", "rear"), np.median(values, axis=0).tolist(), strict=True):
+        sound = math.isfinite(value)
+        targets.record(f"{key}/{axle}", value if sound else "no model", unit)
+        cells.append(f"{value:.{digits}f}" if sound else "no model")
+    return " / ".join(cells)
+
+
+def main() -> int:
+    """Run everything; return the exit code."""
+    keep = keeps()
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("out", type=Path, metavar="OUT")
+    parser.add_argument("--cars", type=int, default=CARS, help="of each class")
+    options, targets = parser.parse_args(), Targets("fault_table")
+    jobs = [(kind, number) for kind in CLASSES for number in range(options.cars)]
+    found = of_carmaker()
+    with ProcessPoolExecutor(PROCESSES) as pool:
+        for (kind, _), answers in zip(jobs, pool.map(of_car, jobs), strict=True):
+            found.setdefault(kind, []).append(answers)
+    table = report(found, targets)
+    print(table)
+    options.out.mkdir(parents=True, exist_ok=True)
+    (options.out / "fault_table.md").write_text(table, encoding="utf-8")
+    return targets.finish(keep=keep and options.cars == CARS and len(found) > len(CLASSES))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

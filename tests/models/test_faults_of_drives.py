@@ -1,0 +1,332 @@
+"""Each fault of a drive does what its size says; the sizes are found again by another road."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.faults import (
+    CHANNELS,
+    AnotherCar,
+    Bank,
+    ClockJump,
+    FaultError,
+    Held,
+    Jitter,
+    Lagging,
+    Late,
+    Mirrored,
+    Misaligned,
+    Passing,
+    SensorElsewhere,
+    SensorFault,
+    ShiftedCenter,
+    SwappedAxles,
+    Together,
+    WrongNumber,
+    WrongUnit,
+)
+from models.maneuvers import RandomSteer, StepSteer
+from models.plant import Plant
+from models.recordings import Recording
+from models.tires import DugoffTire, FialaTire
+from models.vehicle import GRAVITY, sedan
+
+CAR = sedan()
+TIRE = FialaTire(C_alpha=50e3, C_kappa=80e3, friction=1.0)
+T = 0.01 * np.arange(2001)
+STEER = RandomSteer(amplitude=0.08, frequency=0.5, seed=3, onset=1.0, rate_limit=2.0, duration=12.0)
+BIAS = SensorFault(channel="v_y", kind="biased", size=0.3)
+ALL = (
+    BIAS,
+    WrongUnit(channel="r", unit="deg"),
+    Mirrored(channels=("v_y", "a_y")),
+    Late(channels=("delta_f",), delay=0.02),
+    Lagging(channels=("r",), time_constant=0.38),
+    Held(channels=(), every=0.1, lasts=0.1),
+    Jitter(size=0.02),
+    ClockJump(at=5.0, size=0.5),
+    Misaligned(angle=0.01),
+    SensorElsewhere(sensor="velocity", x=0.5, y=0.2),
+    SensorElsewhere(sensor="accelerometer", x=0.5, y=0.2),
+    Bank(vehicle=CAR, angle=0.05, period=20.0),
+    Together(faults=(BIAS, Misaligned(angle=0.01))),
+    Passing(fault=BIAS, until=2.0, fade=1.0),
+)
+
+
+@pytest.fixture(scope="module")
+def drive():
+    return Plant(CAR, TIRE).simulate(STEER, speed=20.0).recording()
+
+
+def waves() -> Recording:
+    """Signals with closed forms: another frequency in each channel."""
+    wave = {name: 0.1 * np.sin((1.0 + 0.3 * k) * T) for k, name in enumerate(CHANNELS)}
+    wave["v_x"] = 20.0 + wave["v_x"]
+    return Recording(name="waves", t=T, **wave)
+
+
+@pytest.mark.parametrize("fault", ALL, ids=str)
+def test_a_fault_is_pure_leaves_the_truth_and_changes_what_is_logged(drive, fault):
+    before = {name: getattr(drive, name).copy() for name in CHANNELS}
+    once, again = fault.apply(drive), fault.apply(drive)
+    assert any(not np.array_equal(getattr(once, name), before[name]) for name in CHANNELS)
+    for name in CHANNELS:
+        np.testing.assert_array_equal(getattr(once, name), getattr(again, name))
+        np.testing.assert_array_equal(getattr(drive, name), before[name])
+    if not isinstance(fault, ClockJump):
+        np.testing.assert_array_equal(once.axle_force, drive.axle_force)
+
+
+def test_each_fault_has_its_own_name():
+    assert len({str(fault) for fault in ALL}) == len(ALL)
+    assert str(BIAS) == "v_y biased 0.3"
+
+
+def test_a_broken_channel_is_broken_from_start_to_end_and_alone():
+    fault = SensorFault(channel="r", kind="biased", start=3.0, duration=2.0, size=0.05)
+    good, shown = waves(), fault.apply(waves())
+    inside = (T >= 3.0) & (T < 5.0)
+    np.testing.assert_allclose(shown.r - good.r, 0.05 * inside, atol=1e-15)
+    np.testing.assert_array_equal(shown.v_y, good.v_y)
+
+
+def test_a_stuck_channel_holds_what_it_showed_when_it_stuck():
+    shown = SensorFault(channel="r", kind="stuck", start=3.0).apply(waves()).r
+    assert set(shown[300:]) == {waves().r[300]}
+
+
+def test_noise_has_its_size_and_its_seed():
+    def noise(seed):
+        fault = SensorFault(channel="v_y", kind="noisy", size=0.05, seed=seed)
+        return fault.apply(waves()).v_y - waves().v_y
+
+    assert np.std(noise(1)) == pytest.approx(0.05, rel=0.06)
+    assert np.corrcoef(noise(1), noise(2))[0, 1] == pytest.approx(0.0, abs=0.08)
+
+
+def test_units_are_those_of_the_books():
+    in_units = Together(
+        faults=(
+            WrongUnit(channel="r", unit="deg"),
+            WrongUnit(channel="v_x", unit="km/h"),
+            WrongUnit(channel="a_y", unit="g"),
+        )
+    ).apply(waves())
+    np.testing.assert_allclose(np.radians(in_units.r), waves().r)
+    np.testing.assert_allclose(in_units.v_x / waves().v_x, 3600.0 / 1000.0)
+    np.testing.assert_allclose(in_units.a_y * 9.81, waves().a_y)
+
+
+def test_late_channels_are_the_wave_some_time_ago():
+    shown = Late(channels=("r",), delay=0.0537).apply(waves())
+    rate = 1.0 + 0.3 * CHANNELS.index("r")
+    np.testing.assert_allclose(shown.r[10:], 0.1 * np.sin(rate * (T - 0.0537))[10:], atol=1e-5)
+    assert (shown.r[:6] == 0.0).all()
+    np.testing.assert_array_equal(shown.delta_f, waves().delta_f)
+
+
+def test_a_lagging_channel_has_gain_and_phase_of_a_first_order_low_pass():
+    lag, rate = 0.38, 1.0 + 0.3 * CHANNELS.index("r")
+    shown = Lagging(channels=("r",), time_constant=lag).apply(waves()).r
+    gain, phase = 1.0 / math.hypot(1.0, rate * lag), math.atan(rate * lag)
+    late = slice(400, None)
+    np.testing.assert_allclose(shown[late], 0.1 * gain * np.sin(rate * T[late] - phase), atol=2e-5)
+
+
+def test_held_channels_change_once_in_a_period_and_are_right_when_they_do():
+    shown = Held(channels=("v_y",), every=0.1, lasts=0.1).apply(waves()).v_y
+    np.testing.assert_array_equal(shown[::10], waves().v_y[::10])
+    np.testing.assert_array_equal(shown, np.repeat(waves().v_y[::10], 10)[: T.size])
+    some = Held(channels=("v_y",), every=1.0, lasts=0.2).apply(waves()).v_y
+    stale = np.flatnonzero(some != waves().v_y)
+    assert set(stale % 100) == set(range(1, 20))
+
+
+def test_random_lateness_is_within_its_size_and_the_same_for_all_channels():
+    ramp = replace(waves(), v_y=T, r=2.0 * T)
+    shown = Jitter(size=0.03, seed=4).apply(ramp)
+    age = T - shown.v_y
+    assert age[10:].min() >= -1e-12
+    assert 0.028 < age.max() <= 0.03
+    np.testing.assert_allclose(shown.r, 2.0 * shown.v_y, atol=1e-12)
+
+
+@pytest.mark.parametrize("size", [0.5, -0.5])
+def test_a_clock_that_jumps_misses_or_repeats_time_in_all_channels(size):
+    ramp = replace(waves(), v_y=T, axle_force=np.column_stack((T, T)))
+    shown = ClockJump(at=5.0, size=size).apply(ramp)
+    before = shown.t < 5.0
+    np.testing.assert_allclose(shown.v_y[before], shown.t[before], atol=1e-12)
+    np.testing.assert_allclose(shown.v_y[~before], shown.t[~before] + size, atol=1e-12)
+    np.testing.assert_array_equal(shown.axle_force[:, 0], shown.v_y)
+    assert shown.t[-1] == pytest.approx(T[-1] - size)
+    assert shown.dt == pytest.approx(0.01)
+
+
+def test_a_clock_that_jumps_back_to_before_the_log_repeats_its_first_sample():
+    shown = ClockJump(at=0.2, size=-0.5).apply(waves())
+    assert len(shown) == T.size + 50
+    again = (shown.t >= 0.2) & (shown.t < 0.495)
+    assert (shown.v_x[again] == waves().v_x[0]).all()
+
+
+def test_a_turned_sensor_keeps_the_speed_and_turns_its_direction_back(drive):
+    shown = Misaligned(angle=0.02).apply(drive)
+    np.testing.assert_allclose(np.hypot(shown.v_x, shown.v_y), np.hypot(drive.v_x, drive.v_y))
+    turned = np.arctan2(shown.v_y, shown.v_x) - np.arctan2(drive.v_y, drive.v_x)
+    np.testing.assert_allclose(turned, -0.02, atol=1e-12)
+
+
+def test_velocity_elsewhere_is_that_of_the_rigid_body(drive):
+    """At the front axle its direction plus the slip is the steering; v_x falls inside."""
+    shown = SensorElsewhere(sensor="velocity", x=CAR.l_f, y=0.7).apply(drive)
+    alpha = drive.alpha(CAR.l_f, CAR.l_r)[:, 0]
+    np.testing.assert_allclose(np.arctan2(shown.v_y, drive.v_x) + alpha, drive.delta_f, atol=1e-12)
+    np.testing.assert_allclose(drive.v_x - shown.v_x, 0.7 * drive.r, atol=1e-12)
+
+
+def test_an_accelerometer_elsewhere_feels_the_acceleration_of_its_place():
+    """On a circle of closed form: the second derivative of the path of the place itself."""
+    rate = lambda t: 0.4 * t + 0.1 * np.sin(t)  # noqa: E731  (heading)
+    t = np.linspace(0.0, 20.0, 2001)
+    r = 0.4 + 0.1 * np.cos(t)
+    still = replace(waves(), r=r, a_y=np.zeros_like(t))  # the c.g. rests, the car turns about it
+    shown = SensorElsewhere(sensor="accelerometer", x=1.2, y=0.5).apply(still).a_y
+    e = 1e-4
+
+    def place(t):
+        c, s = np.cos(rate(t)), np.sin(rate(t))
+        return np.array([1.2 * c - 0.5 * s, 1.2 * s + 0.5 * c])
+
+    a = (place(t + e) - 2.0 * place(t) + place(t - e)) / e**2
+    aside = -a[0] * np.sin(rate(t)) + a[1] * np.cos(rate(t))
+    np.testing.assert_allclose(shown[1:-1], aside[1:-1], atol=1e-5)
+
+
+def test_a_banked_recording_keeps_slip_and_obeys_newton_with_the_slope(drive):
+    fault = Bank(vehicle=CAR, angle=math.radians(3.0), period=60.0)
+    shown, m = fault.apply(drive), CAR.mass
+    np.testing.assert_allclose(
+        shown.alpha(CAR.l_f, CAR.l_r), drive.alpha(CAR.l_f, CAR.l_r), atol=1e-13
+    )
+    np.testing.assert_array_equal(shown.a_y, drive.a_y)
+    slope = GRAVITY * np.sin(fault.angle_at(drive.t))
+    inertial = m * (np.gradient(shown.v_y, shown.dt) + shown.v_x * shown.r)
+    rest = inertial - drive.axle_force.sum(axis=1) - m * slope
+    assert np.abs(rest[2:-2]).max() < 0.02 * m * np.abs(slope).max()
+
+
+def test_no_bank_is_put_under_a_car_that_stands():
+    still = replace(waves(), v_x=np.zeros_like(T))
+    shown = Bank(vehicle=CAR, angle=0.05).apply(still)
+    np.testing.assert_array_equal(shown.r, still.r)
+
+
+def test_a_passing_fault_is_there_in_full_fades_and_is_gone():
+    shown = Passing(fault=BIAS, until=4.0, fade=2.0).apply(waves()).v_y - waves().v_y
+    np.testing.assert_allclose(shown[T <= 4.0], 0.3)
+    np.testing.assert_allclose(shown[500], 0.15)
+    assert (np.abs(shown[T >= 6.0]) < 1e-15).all()
+
+
+def test_faults_together_act_in_their_order():
+    turn = Misaligned(angle=0.3)
+    first = Together(faults=(BIAS, turn)).apply(waves()).v_y
+    np.testing.assert_array_equal(first, turn.apply(BIAS.apply(waves())).v_y)
+    assert not np.array_equal(first, BIAS.apply(turn.apply(waves())).v_y)
+
+
+def test_cars_are_told_wrongly_by_the_size():
+    assert WrongNumber(field="mass", factor=1.1).tell(CAR).mass == pytest.approx(1.1 * CAR.mass)
+    swapped = SwappedAxles().tell(CAR)
+    assert (swapped.l_f, swapped.l_r) == (CAR.l_r, CAR.l_f)
+    shifted = ShiftedCenter(share=0.05).tell(CAR)
+    assert shifted.wheelbase == pytest.approx(CAR.wheelbase)
+    rear = shifted.axle_loads[1] - CAR.axle_loads[1]
+    assert rear == pytest.approx(0.05 * CAR.weight)
+    assert AnotherCar(told=swapped).tell(CAR) is swapped
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: WrongUnit(channel="r", unit="furlong"), "unit must be one of"),
+        (lambda: Late(channels=(), delay=0.0), "delay must be positive"),
+        (lambda: Lagging(channels=(), time_constant=math.nan), "time_constant must be positive"),
+        (lambda: Held(channels=(), every=0.1, lasts=0.2), "lasts must be at most"),
+        (lambda: Jitter(size=-1.0), "size must be positive"),
+        (lambda: ClockJump(at=1.0, size=math.inf), "size must be finite"),
+        (lambda: ClockJump(at=30.0, size=-1.0).apply(waves()), "at must be within 0 to 20 s"),
+        (lambda: SensorElsewhere(sensor="nose"), "sensor must be one of velocity"),
+        (lambda: SensorElsewhere(sensor="velocity", x=math.nan), "x must be finite"),
+        (lambda: Misaligned(angle=math.nan), "angle must be finite"),
+        (lambda: Bank(vehicle=CAR, angle=0.1, period=0.0), "period positive"),
+        (lambda: Passing(fault=BIAS, until=1.0, fade=-1.0), "not negative"),
+        (lambda: WrongNumber(field="color", factor=2.0), "field must be one of mass"),
+        (lambda: WrongNumber(field="mass", factor=0.0), "factor must be positive"),
+        (lambda: ShiftedCenter(share=0.5), "share must lie within"),
+        (lambda: SensorFault(channel="yaw", kind="zero").apply(waves()), "no channel 'yaw'"),
+        (lambda: SensorFault(channel="r", kind="lost").apply(waves()), "holds numbers only"),
+        (lambda: Mirrored(channels=("a_y",)).apply(replace(waves(), a_y=None)), "no channel 'a_y'"),
+    ],
+)
+def test_what_is_no_fault_is_refused(make, words):
+    with pytest.raises(FaultError, match=words):
+        make()
+
+
+# Banked roads, wind and other tires behind, on the plant.
+
+STRAIGHT = StepSteer(amplitude=0.0, onset=1.0, rate_limit=1.0, duration=20.0)
+
+
+def newton(run):
+    """Side force of inertia, m (dv_y/dt + v_x r) [N]."""
+    return CAR.mass * (np.gradient(run.v_y, run.t) + run.v_x * run.r)
+
+
+def test_on_a_banked_road_the_plant_obeys_newton_with_the_slope_and_a_y_is_that_of_the_tires():
+    bank = Bank(vehicle=CAR, angle=math.radians(3.0), period=8.0)
+    run = Plant(CAR, TIRE).simulate(STEER, speed=20.0, bank=bank.angle_at)
+    slope = GRAVITY * np.sin(math.radians(3.0) * np.cos(2.0 * math.pi * run.t / 8.0))
+    force = run.axle_force.sum(axis=1)
+    rest = newton(run) - force - CAR.mass * slope
+    assert np.abs(rest[3:-3]).max() < 0.01 * np.abs(force).max()
+    np.testing.assert_allclose(CAR.mass * run.a_y, force, rtol=1e-12, atol=1e-9)
+
+
+def test_wind_is_felt_by_the_accelerometer_and_the_car_drifts_downwind():
+    run = Plant(CAR, TIRE).simulate(STRAIGHT, speed=20.0, wind=500.0)
+    force = run.axle_force.sum(axis=1)
+    np.testing.assert_allclose(CAR.mass * run.a_y, force + 500.0, rtol=1e-12, atol=1e-9)
+    assert np.abs((newton(run) - force - 500.0)[3:-3]).max() < 5.0
+    assert run.Y[-1] > 1.0
+
+
+def test_level_and_still_is_what_a_plant_drives_on_where_nothing_is_said():
+    plain, told = (
+        Plant(CAR, TIRE).simulate(STEER, speed=20.0, **road)
+        for road in ({}, {"bank": lambda t: 0.0 * t, "wind": 0.0})
+    )
+    np.testing.assert_array_equal(plain.v_y, told.v_y)
+    np.testing.assert_array_equal(plain.axle_force, told.axle_force)
+
+
+def test_a_bank_that_is_not_finite_is_refused_by_name():
+    with pytest.raises(ValueError, match="bank must be finite"):
+        Plant(CAR, TIRE).simulate(STEER, speed=20.0, bank=math.nan)
+
+
+def test_rear_wheels_may_have_tires_of_their_own():
+    """Force over slip of each axle, at small slip, is the stiffness of its own two tires."""
+    rear = DugoffTire(C_alpha=80e3, C_kappa=80e3, friction=1.0)
+    gentle = replace(STEER, amplitude=0.005)
+    run = Plant(CAR, TIRE, rear_tire=rear).simulate(gentle, speed=20.0)
+    late = run.t > 2.0
+    alpha = run.alpha[late].reshape(-1, 2, 2).mean(axis=2)
+    force = run.axle_force[late]
+    stiffness = np.sum(alpha * force, axis=0) / np.sum(alpha**2, axis=0)
+    np.testing.assert_allclose(stiffness, [100e3, 160e3], rtol=0.08)
