@@ -315,7 +315,7 @@ class MagicFormula:
 
     @classmethod
     def from_tir(cls, path: str | PathLike[str]) -> Self:
-        """Read a tire property file (PAC2002 or MF-Tyre 5.2).
+        """Read a tire property file (PAC2002 or MF-Tyre 5.0 to 5.2).
 
         Parameters
         ----------

@@ -278,11 +278,20 @@ def _unquoted(value: str) -> str:
 
 
 # From a tire property file to the Magic Formula 5.2: that model, complete, and possible.
+#
+# MF-Tyre 5.0, 5.1 and 5.2 and PAC2002 write the lateral and the longitudinal force with the same
+# equations and names; TNO's own label for 5.0 is PROPERTY_FILE_FORMAT = 'MF_05' with FITTYP = 5.
+# MF-Tyre 6.x and the motorcycle's MF-MCTyre reuse most of the names in other equations, and their
+# files often keep an old label. So a file is judged by its coefficients as well as by its labels.
 
 FITTYPS = (5, 6, 21, 51, 52)  # MF-Tyre up to 5.2 under its several numbers; 60 and above is 6.x
-FORMATS = ("PAC2002", "MF52", "MFTYRE", "MFTYRE52", "DELFTTYRE", "USER")
+FORMATS = ("PAC2002", "MF05", "MF52", "MFTYRE", "MFTYRE52", "DELFTTYRE", "USER")
 PRESSURE = ("PPX1", "PPX2", "PPX3", "PPX4", "PPY1", "PPY2", "PPY3", "PPY4")
-MARKS_OF_6 = ("PKY4", "PKY6", "PPY5", "RBX3", "RBY4", "NOMPRES")
+# No equation of 5.2 has these. Zero is how programs that list all names say "not used": a tire of
+# 6.1 is not hidden by it, with PKY4 = 0 it would have no cornering stiffness.
+MARKS_OF_OTHERS = (
+    "PKY4", "PKY5", "PKY6", "PKY7", "PEY5", "PPY5", "RBX3", "RBY4", "PCY2", "NOMPRES", "INFLPRES",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -335,7 +344,7 @@ class MagicFormulaFile(NamedTuple):
 
 
 def read_magic_formula(path: str | PathLike[str]) -> MagicFormulaFile:
-    """Read a PAC2002 or MF-Tyre 5.2 property file.
+    """Read a PAC2002 or MF-Tyre 5.0 to 5.2 property file.
 
     Parameters
     ----------
@@ -373,12 +382,16 @@ def _require_mf52(tir: TirFile) -> None:
     plain = re.sub(r"[^A-Z0-9]", "", model.upper())
     if model and plain not in FORMATS:
         raise tir.error(
-            f"PROPERTY_FILE_FORMAT = {model!r} is another tire model; only PAC2002 and MF 5.2 "
-            "(MF-TYRE or USER with FITTYP 6, 21 or 52) are read"
+            f"PROPERTY_FILE_FORMAT = {model!r} is another tire model; only PAC2002, MF_05 and "
+            "MF 5.2 (MF-TYRE or USER with FITTYP 5, 6, 21 or 52) are read"
         )
-    marks = [key for key in MARKS_OF_6 if key in tir]
-    if fittyp is None and plain != "PAC2002" and marks:
-        raise tir.error(f"{', '.join(marks)} belong to Magic Formula 6.x, only MF 5.2 is read")
+    if marks := [f"{key} = {value:g}" for key in MARKS_OF_OTHERS if (value := tir.number(key))]:
+        label = f"it calls itself {model}" if model else "it has no PROPERTY_FILE_FORMAT"
+        label += "" if fittyp is None else f", FITTYP {fittyp:g}"
+        raise tir.error(
+            f"{', '.join(marks)} belong to Magic Formula 6.x or MF-MCTyre, whose equations differ, "
+            f"although {label}; only MF 5.2 and PAC2002 are read"
+        )
 
 
 def _coefficients(tir: TirFile) -> Coefficients:

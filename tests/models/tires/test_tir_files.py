@@ -164,9 +164,12 @@ def test_files_of_the_same_formula_are_accepted(tmp_path: Path) -> None:
         "PROPERTY_FILE_FORMAT = 'USER'\nFITTYP = 6",
         "PROPERTY_FILE_FORMAT = 'MF-TYRE'\nFITTYP = 52",
         "PROPERTY_FILE_FORMAT = 'MF52'",
+        "PROPERTY_FILE_FORMAT = 'MF_05'\nFITTYP = 5",
+        "PROPERTY_FILE_FORMAT = 'MF-TYRE'\nFITTYP = 5",
         "FITTYP = 21",
     ):
-        MagicFormula.from_tir(written(tmp_path, f"{head}\n{PLAIN}"))
+        tire = MagicFormula.from_tir(written(tmp_path, f"{head}\n{PLAIN}"))
+        assert tire.coefficients == MagicFormula.from_tir(written(tmp_path, PLAIN)).coefficients
 
 
 @pytest.mark.parametrize(
@@ -178,13 +181,67 @@ def test_files_of_the_same_formula_are_accepted(tmp_path: Path) -> None:
         ("PROPERTY_FILE_FORMAT = 'MF-SWIFT'\nFITTYP = 21", "MF-SWIFT"),
         ("PROPERTY_FILE_FORMAT = 'PAC89'", "PAC89"),
         ("PROPERTY_FILE_FORMAT = 'FTIRE'", "FTIRE"),
-        ("PKY4 = 2.0", "PKY4 belong to Magic Formula 6.x"),
+        ("PROPERTY_FILE_FORMAT = 'MF_05'\nFITTYP = 61", "Magic Formula 6.x"),
+        ("PROPERTY_FILE_FORMAT = 'MF_94'", "only PAC2002, MF_05 and MF 5.2"),
+        ("PKY4 = 2.0", "PKY4 = 2 belong to Magic Formula 6.x"),
     ],
 )
 def test_other_models_are_refused_because_their_equations_differ(
     tmp_path: Path, head: str, says: str
 ) -> None:
     assert says in complaint(tmp_path, f"{head}\n{PLAIN}")
+
+
+@pytest.mark.parametrize(
+    ("label", "called"),
+    [
+        ("PROPERTY_FILE_FORMAT = 'PAC2002'", "it calls itself PAC2002"),
+        ("PROPERTY_FILE_FORMAT = 'USER'\nFITTYP = 6", "it calls itself USER, FITTYP 6"),
+        ("PROPERTY_FILE_FORMAT = 'MF_05'\nFITTYP = 5", "it calls itself MF_05, FITTYP 5"),
+        ("FITTYP = 21", "it has no PROPERTY_FILE_FORMAT, FITTYP 21"),
+    ],
+)
+@pytest.mark.parametrize(
+    "mark",
+    [
+        "PKY4 = 2",
+        "PKY6 = -0.9",
+        "PEY5 = -28.4",
+        "PPY5 = -0.6",
+        "RBY4 = 3",
+        "PCY2 = 0.8",
+        "NOMPRES = 220000",
+        "INFLPRES = 2.2D5",
+    ],
+)
+def test_a_file_of_another_version_is_told_by_its_coefficients_whatever_it_calls_itself(
+    tmp_path: Path, label: str, called: str, mark: str
+) -> None:
+    message = complaint(tmp_path, f"{label}\n{PLAIN}\n{mark}")
+    assert message.startswith(mark.split(" = ")[0] + " = ")
+    assert "Magic Formula 6.x or MF-MCTyre, whose equations differ" in message
+    assert called in message
+
+
+def test_all_marks_of_another_version_are_named_at_once(tmp_path: Path) -> None:
+    marks = "PPY5 = -0.6\nNOMPRES = 2\n[LATERAL_COEFFICIENTS]\nPKY4 = 2"
+    assert complaint(tmp_path, f"{PLAIN}\n{marks}").startswith("PKY4 = 2, PPY5 = -0.6, NOMPRES = 2")
+
+
+def test_a_coefficient_of_another_version_that_is_zero_does_nothing(tmp_path: Path) -> None:
+    """With PKY4 = 0 a tire of 6.1 would have no cornering stiffness: it is a list of all names."""
+    listed = "FITTYP = 6\nPKY4 = 0\nPKY5 = 0\nPPY5 = 0.0\nNOMPRES = 0"
+    plain = MagicFormula.from_tir(written(tmp_path, PLAIN))
+    tire = MagicFormula.from_tir(written(tmp_path, f"{PLAIN}\n{listed}"))
+    assert tire.coefficients == plain.coefficients
+
+
+def test_the_pressure_coefficients_of_pac2002_are_no_mark_of_another_version(
+    tmp_path: Path,
+) -> None:
+    """PPX1-4 and PPY1-4 beside IP and IP_NOM are PAC2002's own; only PPY5 is not."""
+    own = edited(IP="2", IP_NOM="2", PPX1="0.5", PPY1="-0.4", PPY4="0.1")
+    MagicFormula.from_tir(written(tmp_path, f"PROPERTY_FILE_FORMAT = 'PAC2002'\n{own}"))
 
 
 def test_all_missing_coefficients_are_named_at_once(tmp_path: Path) -> None:
