@@ -2,11 +2,12 @@
 
 α = δ - atan((v_y ± l r)/v_x) in the paper's sign, the negative of ISO 8855, so that F = +C α.
 Each curve gives both axle forces in the frame of the body, F cos δ; only the linear one is the
-paper's (3) as it stands, with neither atan nor cos.
+paper's (3) as it stands, with neither atan nor cos. A frozen curve reads the slip with the offsets
+of the sensors taken off, lagged by the relaxation length; both may be zero.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -15,7 +16,15 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
-from identifier.baselines.ports import OVER, axle_loads, sample_ports
+from identifier.baselines.ports import (
+    LAG_PORTS,
+    OVER,
+    SHORTEST,
+    axle_loads,
+    lag_symbols,
+    lagged,
+    sample_ports,
+)
 from identifier.method import (
     FORMAT,
     FrozenModelError,
@@ -24,22 +33,38 @@ from identifier.method import (
     vehicle_from,
     vehicle_numbers,
 )
-from identifier.tire_model import TireModel, drift
-from models.bicycle import BicycleParameters, linear_axle_force, slip_angles
+from identifier.tire_model import Fact, TireModel
+from models.bicycle import BicycleParameters, slip_angles
 from models.schema import Table
 from models.vehicle import GRAVITY, Vehicle
 
 TINY = 1e-9  # rad: keeps Dugoff's λ finite at zero slip, where it does not matter
+LONGEST = 10.0  # wheelbases, of a relaxation length
+MOST_OFFSET = np.array([0.5, 10.0])  # rad and m/s: beyond it a sensor is not mounted, but broken
 
 
 class Curve(NamedTuple):
-    """A curve: its parameters, named with their units, and its forces.
+    """A curve: its parameters, named with their units, the slip it reads, and its forces.
 
-    force(bicycle parameters, curve parameters (2, n), loads (2,), v_x, x, u) -> (2,) [N].
+    slip(bicycle parameters, v_x, x, u) -> α (2,) [rad].
+    force(curve parameters (2, n), loads (2,) [N], α (2,) [rad], u (2,) [rad]) -> (2,) [N].
     """
 
     parameters: tuple[str, ...]
+    slip: Callable[..., Any]
     force: Callable[..., Any]
+
+
+def small_slip(p: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
+    """Return slip angles α = δ - (v_y ± l r)/v_x of (3), (2,) [rad].
+
+    Parameters
+    ----------
+    v_x : longitudinal speed [m/s], not zero.
+    x : [v_y, r] (2,).
+    u : [δ_f, δ_r] (2,).
+    """
+    return slip_angles(p.l_f, p.l_r, v_x, x, u)
 
 
 def wheel_slip(p: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
@@ -51,26 +76,24 @@ def wheel_slip(p: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     x : [v_y, r] (2,).
     u : [δ_f, δ_r] (2,).
     """
-    return u + ca.atan(slip_angles(p.l_f, p.l_r, v_x, x, u) - u)
+    return u + ca.atan(small_slip(p, v_x, x, u) - u)
 
 
-def linear(p: BicycleParameters, q: Any, loads: Any, v_x: Any, x: Any, u: Any) -> Any:
+def linear(q: Any, loads: Any, alpha: Any, u: Any) -> Any:
     """Return F = C α of (3), (2,) [N].
 
     Parameters
     ----------
-    p : of the bicycle; its stiffness is not looked at.
     q : C [N/rad] (2, 1).
     loads : not looked at.
-    v_x : longitudinal speed [m/s], not zero.
-    x : [v_y, r] (2,).
-    u : [δ_f, δ_r] (2,).
+    alpha : slip angles (2,) [rad].
+    u : not looked at.
     """
-    del loads
-    return linear_axle_force(p._replace(C_f=q[0, 0], C_r=q[1, 0]), v_x, x, u)
+    del loads, u
+    return q[:, 0] * alpha
 
 
-def magic_formula(p: BicycleParameters, q: Any, loads: Any, v_x: Any, x: Any, u: Any) -> Any:
+def magic_formula(q: Any, loads: Any, alpha: Any, u: Any) -> Any:
     """Return F = D sin(C atan(B α)) cos δ, the Magic Formula without E, (2,) [N].
 
     Source: Pacejka, Tyre and Vehicle Dynamics, 2nd ed., (4.49) with E = 0.
@@ -79,17 +102,15 @@ def magic_formula(p: BicycleParameters, q: Any, loads: Any, v_x: Any, x: Any, u:
     ----------
     q : B [1/rad], C [-], D [N] (2, 3).
     loads : not looked at.
-    v_x : longitudinal speed [m/s], not zero.
-    x : [v_y, r] (2,).
+    alpha : slip angles (2,) [rad].
     u : [δ_f, δ_r] (2,).
     """
     del loads
     B, C, D = q[:, 0], q[:, 1], q[:, 2]
-    alpha = wheel_slip(p, v_x, x, u)
     return D * ca.sin(C * ca.atan(B * alpha)) * ca.cos(u)
 
 
-def dugoff(p: BicycleParameters, q: Any, loads: Any, v_x: Any, x: Any, u: Any) -> Any:
+def dugoff(q: Any, loads: Any, alpha: Any, u: Any) -> Any:
     """Return Dugoff's force without longitudinal slip, times cos δ, (2,) [N].
 
     F = C tan α f(λ), λ = μ F_z/(2 C |tan α|), f = λ (2 - λ) for λ < 1, else 1.
@@ -99,42 +120,62 @@ def dugoff(p: BicycleParameters, q: Any, loads: Any, v_x: Any, x: Any, u: Any) -
     ----------
     q : C [N/rad], μ [-] (2, 2).
     loads : F_z (2,) [N].
-    v_x : longitudinal speed [m/s], not zero.
-    x : [v_y, r] (2,).
+    alpha : slip angles (2,) [rad].
     u : [δ_f, δ_r] (2,).
     """
     C, mu = q[:, 0], q[:, 1]
-    slope = ca.tan(ca.fmin(ca.fmax(wheel_slip(p, v_x, x, u), -1.5), 1.5))  # short of a right angle
+    slope = ca.tan(ca.fmin(ca.fmax(alpha, -1.5), 1.5))  # short of a right angle
     lam = ca.fmin(mu * loads / (2 * C * ca.fmax(ca.fabs(slope), TINY)), 1)
     return C * slope * lam * (2 - lam) * ca.cos(u)
 
 
 CURVES: Mapping[str, Curve] = {
-    "linear": Curve(("C_N_rad",), linear),
-    "magic_formula": Curve(("B_1_rad", "C", "D_N"), magic_formula),
-    "dugoff": Curve(("C_N_rad", "mu"), dugoff),
+    "linear": Curve(("C_N_rad",), small_slip, linear),
+    "magic_formula": Curve(("B_1_rad", "C", "D_N"), wheel_slip, magic_formula),
+    "dugoff": Curve(("C_N_rad", "mu"), wheel_slip, dugoff),
 }
+
+
+def measured_slip(curve: Curve, p: BicycleParameters, offset: Any, v_x: Any, x: Any, u: Any) -> Any:
+    """Return the slip angles of a curve, the offsets of the sensors taken off, (2,) [rad].
+
+    Parameters
+    ----------
+    curve : whose slip it is.
+    offset : zero of the front steering δ₀ [rad], which is added, and bias b of v_y [m/s], (2,).
+    v_x : longitudinal speed [m/s], not zero.
+    x : [v_y, r] as the sensors read them (2,).
+    u : [δ_f, δ_r] (2,).
+    """
+    return curve.slip(p, v_x, x - ca.vertcat(offset[1], 0), u + ca.vertcat(offset[0], 0))
+
 
 # A frozen curve of axle force over slip angle: linear, Magic Formula or Dugoff.
 
 
 def build_curve(name: str) -> ca.Function:
-    """Return a curve as a function with one result, axle_force (2,) [N]; at rest 0.
+    """Return a curve of lagged slip as a step with one output, axle_force (2,) [N]; at rest 0.
+
+    Carried: `LaggedSlip`. Constant: parameters of the curve (2, n), lag (2,) = σ [m], offset (2,) =
+    δ₀ [rad] and b [m/s].
 
     Parameters
     ----------
     name : one of `CURVES`.
     """
-    s = sample_ports()
+    s, last = sample_ports(), lag_symbols()
     q = ca.SX.sym("parameters", 2, len(CURVES[name].parameters))
+    sigma, offset = ca.SX.sym("lag", 2), ca.SX.sym("offset", 2)
     p = s.parameters
-    force = CURVES[name].force(p, q, axle_loads(p, GRAVITY), s.speed, s.x, s.u)
+    alpha = measured_slip(CURVES[name], p, offset, s.speed, s.x, s.u)
+    slip = lagged(last, alpha, s.speed * s.sampling[0], sigma)
+    force = CURVES[name].force(q, axle_loads(p, GRAVITY), slip, s.u)
     return ca.Function(
         f"frozen_{name}",
-        [q, s.x, s.u, s.v_x, s.vehicle, s.sampling],
-        [ca.if_else(s.moving, force, 0)],
-        ["parameters", *OVER, "vehicle", "sampling"],
-        ["axle_force"],
+        [*last, q, sigma, offset, s.x, s.u, s.v_x, s.vehicle, s.sampling],
+        [slip, alpha, ca.if_else(s.moving, 1, 0), ca.if_else(s.moving, force, 0)],
+        [*LAG_PORTS, "parameters", "lag", "offset", *OVER, "vehicle", "sampling"],
+        [*(f"{port}_next" for port in LAG_PORTS), "axle_force"],
     )
 
 
@@ -146,7 +187,12 @@ def curve_scan(name: str) -> Scan:
     ----------
     name : one of `CURVES`.
     """
-    return Scan(build_curve(name), carry=(), over=OVER)
+    return Scan(build_curve(name), carry=LAG_PORTS, over=OVER)
+
+
+def unlagged() -> dict[str, Array]:
+    """Return the carried values of a lag that has not begun, by port."""
+    return {"slip": np.zeros(2), "alpha": np.zeros(2), "begun": np.zeros(1)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -158,11 +204,14 @@ class CurveModel(TireModel):
     curve : one of `CURVES`.
     parameters : of the curve, front and rear (2, n), SI.
     min_speed : below this speed [m/s] the forces read zero.
+    relaxation_length : σ by which the slip lags (2,) [m]; 0 is no lag.
+    offset : zero of the front steering δ₀ [rad] and bias b of v_y [m/s], (2,).
 
     Raises
     ------
     ValueError
-        Where the curve is unknown, a parameter not positive and finite, or their shape wrong.
+        Where the curve is unknown, a parameter not positive and finite, their shape wrong, or a
+        lag or an offset impossible.
     """
 
     kind = "curve"
@@ -171,6 +220,8 @@ class CurveModel(TireModel):
     curve: str
     parameters: Array
     min_speed: float
+    relaxation_length: Array = field(default_factory=lambda: np.zeros(2))
+    offset: Array = field(default_factory=lambda: np.zeros(2))
 
     def __post_init__(self) -> None:
         if self.curve not in CURVES:
@@ -183,6 +234,16 @@ class CurveModel(TireModel):
             )
         if not (np.isfinite(self.parameters) & (self.parameters > 0.0)).all():
             raise ValueError(f"parameters must be positive, they are {self.parameters.tolist()}")
+        longest = LONGEST * self.vehicle.wheelbase
+        for name, value, low, high in (
+            ("relaxation_length [m]", self.relaxation_length, 0.0, longest),
+            ("offset [rad, m/s]", self.offset, -MOST_OFFSET, MOST_OFFSET),
+        ):
+            if value.shape != (2,) or not ((low <= value) & (value <= high)).all():
+                raise ValueError(
+                    f"{name} must be two numbers within {np.round(low, 6)} and "
+                    f"{np.round(high, 6)}, it is {value.tolist()}"
+                )
 
     def setup(self, dt: float) -> Setup:
         """Return what a replay needs.
@@ -193,13 +254,25 @@ class CurveModel(TireModel):
         """
         return Setup(
             scan=curve_scan(self.curve),
-            carry={},
+            carry=unlagged(),
             constants={
                 "parameters": self.parameters,
+                "lag": self.relaxation_length,
+                "offset": self.offset,
                 "vehicle": np.array(self.vehicle.bicycle),
                 "sampling": np.array([dt, self.min_speed]),
             },
         )
+
+    @property
+    def lagged(self) -> bool:
+        """Whether the force follows a lagged slip, two more states."""
+        return bool((self.relaxation_length > 0.0).any())
+
+    def facts(self) -> tuple[Fact, ...]:
+        """Return the lines of `summary`."""
+        lag = Fact("relaxation length", self.relaxation_length, "m")
+        return (*TireModel.facts(self), *((lag,) if self.lagged else ()))
 
     def curve_expression(self, alpha: Any, v_x: Any) -> Any:
         """Return the steady axle forces (2,) [N] as a CasADi expression.
@@ -207,31 +280,34 @@ class CurveModel(TireModel):
         Parameters
         ----------
         alpha : slip angles (2,) [rad], the wheels straight ahead.
-        v_x : longitudinal speed [m/s].
+        v_x : not looked at.
         """
-        slope = alpha if self.curve == "linear" else ca.tan(alpha)
-        return self._static_force(drift(self.vehicle, slope, v_x), 0.0, v_x)
+        del v_x
+        return self._force(alpha, 0.0)
 
     def force_expression(
         self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
     ) -> tuple[Any, Any]:
-        """Return the axle forces (2,) [N] as a CasADi expression, and no rate: nothing lags.
+        """Return the axle forces (2,) [N] and the rate of lagged slip, (2,) or none [rad/s].
 
         Parameters
         ----------
-        slip : empty.
-        x : [v_y, r] (2,).
+        slip : lagged slip (2,) where `lagged`, else empty [rad].
+        x : [v_y, r] (2,), as the sensors read them while learning.
         delta : angle of the front wheels [rad].
         v_x : longitudinal speed [m/s], positive.
-        least_lag : not looked at.
+        least_lag : time under which no lag falls [s].
         """
-        del slip, least_lag
-        return self._static_force(x, delta, v_x), ca.MX(0, 1)
+        p, u = self.vehicle.bicycle, ca.vertcat(delta, 0)
+        alpha = measured_slip(CURVES[self.curve], p, self.offset, v_x, x, u)
+        if not self.lagged:
+            return self._force(alpha, delta), ca.MX(0, 1)
+        time = ca.fmax(ca.DM(np.maximum(self.relaxation_length, SHORTEST)) / v_x, least_lag)
+        return self._force(slip, delta), (alpha - slip) / time
 
-    def _static_force(self, x: Any, delta: Any, v_x: Any) -> Any:
-        q, p = ca.DM(self.parameters), self.vehicle.bicycle
-        loads = ca.DM(self.vehicle.axle_loads)
-        return CURVES[self.curve].force(p, q, loads, v_x, x, ca.vertcat(delta, 0))
+    def _force(self, alpha: Any, delta: Any) -> Any:
+        q, loads = ca.DM(self.parameters), ca.DM(self.vehicle.axle_loads)
+        return CURVES[self.curve].force(q, loads, alpha, ca.vertcat(delta, 0))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the model as plain numbers and words, ready for JSON."""
@@ -242,6 +318,8 @@ class CurveModel(TireModel):
             "vehicle": vehicle_numbers(self.vehicle),
             "curve": self.curve,
             "min_speed_m_s": self.min_speed,
+            "relaxation_length_m": self.relaxation_length.tolist(),
+            "offset_rad_m_s": self.offset.tolist(),
             "front": dict(zip(names, self.parameters[0].tolist(), strict=True)),
             "rear": dict(zip(names, self.parameters[1].tolist(), strict=True)),
         }
@@ -274,6 +352,14 @@ class CurveModel(TireModel):
                 curve=curve,
                 parameters=np.array(axles),
                 min_speed=table.number("min_speed_m_s"),
+                **{  # files of earlier versions have neither
+                    name: table.array(key)
+                    for name, key in (
+                        ("relaxation_length", "relaxation_length_m"),
+                        ("offset", "offset_rad_m_s"),
+                    )
+                    if key in table
+                },
             )
         except ValueError as error:
             raise FrozenModelError(f"{source}: {error}") from error

@@ -8,14 +8,13 @@ from collections.abc import Callable, Sequence
 from functools import partial, singledispatch
 from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
 from codegen.arrays import Array
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.curve import EDGES
-from identifier.baselines.curve_ekf import LIMITS, PARAMETRIZATIONS, SPREADS, CurveEkf
+from identifier.baselines.curve_ekf import CurveEkf
 from identifier.baselines.curves import CurveModel
 from identifier.baselines.linear import LinearBaseline, StiffnessRls
 from identifier.method import CannotFreezeError
@@ -218,43 +217,39 @@ def _axle(method: AxleIdentifier, vehicle: Vehicle) -> Structure:
 
 @structure_of.register
 def _curve(method: CurveEkf, vehicle: Vehicle) -> Structure:
-    """The filter's own coordinates of a Magic Formula or Dugoff's tire."""
-    kinds, decode, _ = PARAMETRIZATIONS[method.curve]
-    spread = np.array([getattr(method, SPREADS[kind]) for kind in kinds])
-    limit = np.array([LIMITS[kind] for kind in kinds])
-    loads = ca.DM(vehicle.axle_loads)
+    """The filter's own coordinates of a Magic Formula or Dugoff's tire, its lag and offsets."""
 
     def start(rng: np.random.Generator) -> Array:
-        return SCATTER * spread * rng.standard_normal(spread.size)
+        return SCATTER * method.spread * rng.standard_normal(method.spread.size)
 
     def model(parameters: Array) -> CurveModel:
-        values = decode(vehicle.bicycle, method.friction, loads, ca.DM(parameters))
-        return CurveModel(
-            vehicle=vehicle,
-            curve=method.curve,
-            parameters=np.array(ca.DM(values)),
-            min_speed=method.min_speed,
-        )
+        return method.model(vehicle, parameters)
 
-    return Structure(start, model, -limit, limit)
+    return Structure(start, model, -method.limit, method.limit)
 
 
 @structure_of.register(LinearBaseline)
 @structure_of.register(StiffnessRls)
 def _linear(method: LinearBaseline | StiffnessRls, vehicle: Vehicle) -> Structure:
-    """Logarithms of both stiffnesses over those that the car states."""
-    stated = np.array([vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear])
-    limit = np.full(2, 4.0)
+    """Logarithms of both stiffnesses over those that the car states, and offsets over bounds."""
+    stated = np.array(vehicle.bicycle)[4:]
+    learnt = isinstance(method, StiffnessRls)
+    most = np.array([method.most_steering, method.most_v_y]) if learnt else np.zeros(2)
+    lag = np.full(2, method.relaxation_length if learnt else 0.0)
+    limit = np.full(4 if most.any() else 2, 4.0)
+    limit[2:] = 1.0
 
     def start(rng: np.random.Generator) -> Array:
-        return SCATTER * rng.standard_normal(2)
+        return SCATTER * rng.standard_normal(limit.size)
 
     def model(parameters: Array) -> CurveModel:
         return CurveModel(
             vehicle=vehicle,
             curve="linear",
-            parameters=(stated * np.exp(parameters)).reshape(2, 1),
+            parameters=(stated * np.exp(parameters[:2])).reshape(2, 1),
             min_speed=method.min_speed,
+            relaxation_length=lag,
+            offset=most * parameters[2:] if most.any() else np.zeros(2),
         )
 
     return Structure(start, model, -limit, limit)

@@ -1,18 +1,20 @@
-"""One extended Kalman filter for every unknown that makes axle forces: [v_y, r, θ].
+"""One extended Kalman filter for every unknown that makes axle forces: [v_y, r, α', θ].
 
-ẋ = K F(θ, x, u) - [v_x r, 0] + w_x,   θ̇ = w_θ (random walk),   measured: x + noise.
+ẋ = K F(θ, α', u) - [v_x r, 0] + w_x,   α̇' = v_x/σ (α(x, u, θ) - α'),   θ̇ = w_θ (random walk),
+measured: x + noise. α' is there for a tire that lags; else F reads α itself.
 The sampled map is the linearly implicit midpoint rule, which no stiff tire at low speed makes
-unstable: x⁺ = x + T_s (I - T_s J/2)⁻¹ f, with f and J = ∂f/∂x at the mean of steering and speed.
-Its Jacobian is taken by automatic differentiation; the covariance is updated in Joseph's form. An
-innovation beyond `outlier` standard deviations moves θ no further than one at that distance, x
-follows it all the way. Source: Simon, Optimal State Estimation, 2006, sections 5.1 and 13.2.
+unstable: z⁺ = z + T_s (I - T_s J/2)⁻¹ f, z = [x, α'], with f and J = ∂f/∂z at the mean of steering
+and speed. Its Jacobian is taken by automatic differentiation; the covariance is updated in Joseph's
+form. An innovation beyond `outlier` standard deviations moves α' and θ no further than one at that
+distance, x follows it all the way. Source: Simon, Optimal State Estimation, 2006, sections 5.1 and
+13.2.
 """
 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import casadi as ca
 import numpy as np
@@ -20,8 +22,11 @@ import numpy as np
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.baselines.ports import (
+    LAG_PORTS,
     OVER,
     axle_loads,
+    lag_symbols,
+    lagged,
     motion_rate,
     sample_ports,
 )
@@ -43,70 +48,105 @@ PORTS = (
 )
 NOISE = ("v_y_noise", "r_noise", "v_y_disturbance", "r_disturbance", "outlier")
 
-# (bicycle parameters, prior, θ, v_x, x, u) -> axle forces (2,) [N]
-Force = Callable[[BicycleParameters, Any, Any, Any, Any, Any], Any]
+
+class FilteredTire(NamedTuple):
+    """What makes the forces by θ: all functions of symbols.
+
+    slip(bicycle parameters, prior, θ, v_x, x, u) -> α (2,) [rad].
+    force(bicycle parameters, prior, θ, slip (2,), u) -> axle forces (2,) [N].
+    lag(prior, θ) -> σ (2,) [m]; None: the force reads α, nothing lags.
+    unknowns, prior : sizes of θ and of whatever else it reads.
+    follows : whether the force told is that of the corrected θ (a signal), else that of the θ
+        carried into the sample (a model, which then freezes to the same force).
+    """
+
+    slip: Callable[[BicycleParameters, Any, Any, Any, Any, Any], Any]
+    force: Callable[[BicycleParameters, Any, Any, Any, Any], Any]
+    lag: Callable[[Any, Any], Any] | None
+    unknowns: int
+    prior: int
+    follows: bool
+
+    @property
+    def carry(self) -> tuple[str, ...]:
+        """Names of what its filter carries."""
+        return CARRY if self.lag is None else (*CARRY, *LAG_PORTS)
 
 
-def build_step(name: str, force: Force, *, unknowns: int, prior: int, follows: bool) -> ca.Function:
+def build_step(name: str, tire: FilteredTire) -> ca.Function:
     """Return the filter's step; all numbers stay inputs of it.
 
-    Carried: estimate (2 + n,) = [v_y, r, θ], its covariance P, before (3,) = δ_f, δ_r and v_x of
-    the last sample, running (1 after a sample in motion). Constant: noise in the order of `NOISE`
-    (standard deviations [m/s], [rad/s]; disturbances per root of time [m/s/√s], [rad/s/√s]), walk
-    (n,) of θ [1/√s], limit (n,) of |θ|, learning_speed [m/s], prior: whatever the force needs.
-    Below that speed θ and its covariance are kept, and x begins anew from the measurement.
+    Carried: estimate (n,) = [v_y, r, α' where it lags, θ], its covariance P, before (3,) = δ_f, δ_r
+    and v_x of the last sample, running (1 after a sample in motion); for a tire that lags also the
+    `LaggedSlip` of what is measured, which the force told reads as the frozen model does. Constant:
+    noise in the order of `NOISE` (standard deviations [m/s], [rad/s]; disturbances per root of time
+    [m/s/√s], [rad/s/√s]), walk of θ [1/√s], limit of |θ|, learning_speed [m/s], prior: whatever
+    the tire needs. Below that speed θ and its covariance are kept, and x and α' begin anew from
+    the measurement.
 
     Parameters
     ----------
     name : of the function.
-    force : axle forces by θ.
-    unknowns : n, size of θ.
-    prior : size of the prior.
-    follows : whether the force told is that of the corrected θ (a signal), else that of the θ
-        carried into the sample (a model, which then freezes to the same force).
+    tire : forces by θ.
     """
     s = sample_ports()
-    p, dt, n = s.parameters, s.sampling[0], 2 + unknowns
+    lags = 0 if tire.lag is None else 2
+    p, dt, n = s.parameters, s.sampling[0], 2 + lags + tire.unknowns
     estimate, P, before = ca.SX.sym("estimate", n), ca.SX.sym("P", n, n), ca.SX.sym("before", 3)
     running, noise = ca.SX.sym("running"), ca.SX.sym("noise", len(NOISE))
-    walk, limit = ca.SX.sym("walk", unknowns), ca.SX.sym("limit", unknowns)
-    known, learning_speed = ca.SX.sym("prior", prior), ca.SX.sym("learning_speed")
-    x, theta = estimate[:2], estimate[2:]
+    walk, limit = ca.SX.sym("walk", tire.unknowns), ca.SX.sym("limit", tire.unknowns)
+    known, learning_speed = ca.SX.sym("prior", tire.prior), ca.SX.sym("learning_speed")
+    moved, theta = estimate[: 2 + lags], estimate[2 + lags :]
+    x = estimate[:2]
     learning = s.v_x >= learning_speed
 
     u_mean = (before[:2] + s.u) / 2
     v_mean = ca.fmax((before[2] + s.v_x) / 2, learning_speed)
-    rate = motion_rate(p, v_mean, x, force(p, known, theta, v_mean, x, u_mean))
-    implicit = ca.inv_minor(ca.SX.eye(2) - dt / 2 * ca.jacobian(rate, estimate)[:, :2])
-    ahead = ca.vertcat(x + dt * implicit @ rate, theta)
+    alpha = tire.slip(p, known, theta, v_mean, x, u_mean)
+    slip = alpha if tire.lag is None else moved[2:]
+    rate = motion_rate(p, v_mean, x, tire.force(p, known, theta, slip, u_mean))
+    if tire.lag is not None:
+        rate = ca.vertcat(rate, v_mean / tire.lag(known, theta) * (alpha - slip))
+    implicit = ca.inv_minor(
+        ca.SX.eye(2 + lags) - dt / 2 * ca.jacobian(rate, estimate)[:, : 2 + lags]
+    )
+    ahead = ca.vertcat(moved + dt * implicit @ rate, theta)
     F = ca.jacobian(ahead, estimate)
-    Q = ca.diag(ca.vertcat(noise[2:4], walk) ** 2 * dt)
+    Q = ca.diag(ca.vertcat(noise[2:4], ca.SX(lags, 1), walk) ** 2 * dt)
     R = ca.diag(noise[:2] ** 2)
     corrected, P_corrected = correct(ahead, F @ P @ F.T + Q, R, s.x, noise[4])
 
     going = ca.logic_and(learning, running > 0.5)
-    afresh = ca.vertcat(s.x, theta)
-    P_afresh = ca.diagcat(R, P[2:, 2:])
+    here = tire.slip(p, known, theta, s.speed, s.x, s.u)
+    afresh = ca.vertcat(s.x, here[:lags], theta)
+    at_once = ca.jacobian(afresh, ca.vertcat(s.x, theta))  # a start is taken for a steady slide
+    P_afresh = at_once @ ca.diagcat(R, P[2 + lags :, 2 + lags :]) @ at_once.T
     following = ca.if_else(going, corrected, afresh)
-    theta_next = ca.fmin(ca.fmax(following[2:], -limit), limit)
-    output_theta = theta_next if follows else theta
-    axle_force = force(p, known, output_theta, s.speed, s.x, s.u)
+    theta_next = ca.fmin(ca.fmax(following[2 + lags :], -limit), limit)
+    output_theta = theta_next if tire.follows else theta
+    last = lag_symbols()
+    lag_next: tuple[Any, ...] = ()
+    if tire.lag is not None:
+        here = lagged(last, here, s.speed * dt, tire.lag(known, theta))
+        lag_next = (here, tire.slip(p, known, theta, s.speed, s.x, s.u), ca.if_else(s.moving, 1, 0))
+    axle_force = tire.force(p, known, output_theta, here, s.u)
     return ca.Function(
         name,
         [
-            *(estimate, P, before, running),
+            *(estimate, P, before, running, *last[: len(lag_next)]),
             *(s.x, s.u, s.v_x),
             *(noise, walk, limit, known, learning_speed, s.vehicle, s.sampling),
         ],
         [
-            ca.vertcat(following[:2], theta_next),
+            ca.vertcat(following[: 2 + lags], theta_next),
             ca.densify(ca.if_else(going, P_corrected, P_afresh)),
             ca.vertcat(s.u, s.v_x),
             ca.if_else(learning, 1, 0),
+            *lag_next,
             ca.if_else(s.moving, axle_force, 0),
         ],
-        [*CARRY, *OVER, *CONSTANTS, "vehicle", "sampling"],
-        [*(f"{port}_next" for port in CARRY), "axle_force"],
+        [*tire.carry, *OVER, *CONSTANTS, "vehicle", "sampling"],
+        [*(f"{port}_next" for port in tire.carry), "axle_force"],
         {"cse": True},
     )
 
@@ -142,15 +182,22 @@ def correct(estimate: Any, P: Any, R: Any, x: Any, outlier: Any) -> tuple[Any, A
 LIMIT = 5.0  # static axle loads: no tire reaches it
 
 
-def _force(p: BicycleParameters, known: Any, theta: Any, v_x: Any, x: Any, u: Any) -> Any:
-    del known, v_x, x, u
+def _slip(p: BicycleParameters, known: Any, theta: Any, v_x: Any, x: Any, u: Any) -> Any:
+    del p, known, theta, v_x, x, u
+    return ca.SX(2, 1)  # no tire reads it
+
+
+def _force(p: BicycleParameters, known: Any, theta: Any, slip: Any, u: Any) -> Any:
+    del known, slip, u
     return axle_loads(p, GRAVITY) * theta
+
+
+FORCE_WALK = FilteredTire(slip=_slip, force=_force, lag=None, unknowns=2, prior=1, follows=True)
 
 
 @cache
 def _scan() -> Scan:
-    step = build_step("force_ekf", _force, unknowns=2, prior=1, follows=True)
-    return Scan(step, carry=CARRY, over=OVER)
+    return Scan(build_step("force_ekf", FORCE_WALK), carry=CARRY, over=OVER)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,12 +3,16 @@
 x = [v_y, r] [m/s, rad/s].   u = [δ_f, δ_r] [rad].   F: axle forces [N], frame of the body.
 ẋ = K F - [v_x r, 0]   and, with ξ = K⁻¹ x [N s],   ξ̇ = F - n,   n = m v_x r [l_r, l_f]/L:
 n is the force that holds a steady turn. Equation numbers: Hong and Choi.
+The tire's lag is dα'/dt = v_x/σ (α - α'), σ the relaxation length (Pacejka, Tyre and Vehicle
+Dynamics, 2nd ed., (7.7)): it is solved exactly for α linear over the step, so that no short σ makes
+it unstable and σ = 0 is no lag at all.
 """
 
 from typing import Any, NamedTuple
 
 import casadi as ca
 
+from identifier.method import Port
 from models.bicycle import BicycleParameters, bicycle
 
 OVER = ("x", "u", "v_x")
@@ -94,3 +98,40 @@ def motion_rate(p: BicycleParameters, v_x: Any, x: Any, F: Any) -> Any:
     F : axle forces (2,) [N].
     """
     return bicycle(p, 1.0).K @ F - ca.vertcat(v_x * x[1], 0)
+
+
+class LaggedSlip(NamedTuple):
+    """What the lag keeps from one sample to the next: α' and α (2,) [rad], 1 once it has begun."""
+
+    slip: Any
+    alpha: Any
+    begun: Any
+
+
+LAG_PORTS = ("slip", "alpha", "begun")
+LAG_DESCRIBED = (
+    Port("slip", "rad", "lagged slip of what was measured, front and rear"),
+    Port("alpha", "rad", "slip angles of the last sample, front and rear"),
+    Port("begun", "-", "1 after a sample in motion, from which slip lags"),
+)
+SHORTEST = 1e-9  # m: keeps v_x T_s/σ finite without a lag, where e^(-v_x T_s/σ) is zero
+
+
+def lag_symbols() -> LaggedSlip:
+    """Return fresh symbols."""
+    return LaggedSlip(ca.SX.sym("slip", 2), ca.SX.sym("alpha", 2), ca.SX.sym("begun"))
+
+
+def lagged(last: LaggedSlip, alpha: Any, way: Any, sigma: Any) -> Any:
+    """Return α' after a step (2,) [rad]; the first sample begins without lag.
+
+    Parameters
+    ----------
+    last : before the step.
+    alpha : slip angles now (2,) [rad].
+    way : v_x T_s, what the tire has rolled [m].
+    sigma : relaxation lengths (2,) [m], not negative.
+    """
+    e = ca.exp(-way / ca.fmax(sigma, SHORTEST))
+    follow = e * (last.slip - last.alpha) - (1 - e) * sigma / way * (alpha - last.alpha)
+    return alpha + ca.if_else(last.begun > 0.5, follow, 0)

@@ -22,6 +22,7 @@ STRUCTURES: Mapping[str, str] = {  # name of the structure to a method that has 
     "Magic Formula": "magic_formula_ekf",
     "Dugoff": "dugoff_ekf",
     "linear tire": "linear",
+    "lagged linear tire": "stiffness_rls",
 }
 FLOOR_OF: Mapping[str, str] = {
     DEFAULT: "axle units",
@@ -29,7 +30,7 @@ FLOOR_OF: Mapping[str, str] = {
     "magic_formula_ekf": "Magic Formula",
     "dugoff_ekf": "Dugoff",
     "linear": "linear tire",
-    "stiffness_rls": "linear tire",
+    "stiffness_rls": "lagged linear tire",
 }
 
 

@@ -110,6 +110,47 @@ class MagicAxles:
         return front * ca.cos(delta), rear
 
 
+@dataclass(frozen=True, slots=True)
+class LaggedAxles:
+    """A curve of lagged slip, offsets of the sensors taken off; w = [curve's, σ_f, σ_r, δ_0, b].
+
+    σ [m]: relaxation lengths. δ_0 [rad]: zero of the steering. b [m/s]: bias of v_y. The tracker
+    reads the same sensors as the identifier did.
+
+    Parameters
+    ----------
+    curve : whose slip and force it has.
+    lagged : whether the slip lags; else σ does nothing.
+    """
+
+    curve: TireStructure
+    lagged: bool = True
+
+    saturates = False
+    at_friction = one_friction
+
+    @property
+    def n_weights(self) -> int:
+        """Those of the curve and 4."""
+        return self.curve.n_weights + 4
+
+    def slip(self, at: Point) -> Pair:
+        """Return the slip angles, offsets of the sensors taken off [rad]."""
+        n = self.curve.n_weights
+        front, rear = self.curve.slip(at._replace(v_y=at.v_y - at.w[n + 3]))
+        return front + at.w[n + 2], rear
+
+    def force(self, slip: Pair, at: Point) -> Pair:
+        """Return the axle forces [N], frame of the body."""
+        return self.curve.force(slip, at._replace(w=at.w[: self.curve.n_weights]))
+
+    def lag_length(self, slip: Pair, at: Point) -> Pair:
+        """Return the relaxation lengths [m]."""
+        del slip
+        n = self.curve.n_weights
+        return at.w[n], at.w[n + 1]
+
+
 # The linear tire of the textbook: F = C α of the paper's (3), without a limit.
 
 

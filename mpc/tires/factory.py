@@ -12,7 +12,7 @@ from identifier.paper.network import NetworkModel
 from identifier.tire_model import TireModel
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
 from models.vehicle import Vehicle
-from mpc.tires.curves import DugoffAxles, FialaAxles, MagicAxles, linear_tire
+from mpc.tires.curves import DugoffAxles, FialaAxles, LaggedAxles, MagicAxles, linear_tire
 from mpc.tires.ladder import axle_tire, mounted_tire
 from mpc.tires.network import network_tire, onnx_tire
 from mpc.tires.tire import PredictionTire
@@ -56,6 +56,16 @@ def curve_tire(model: CurveModel) -> PredictionTire:
     ----------
     model : its parameters.
     """
+    plain = _plain_curve(model)
+    if not (model.lagged or model.offset.any()):
+        return plain
+    weights = np.concatenate([plain.weights, model.relaxation_length, model.offset])
+    structure = LaggedAxles(curve=plain.structure, lagged=model.lagged)
+    return PredictionTire(structure, weights, model.vehicle)
+
+
+def _plain_curve(model: CurveModel) -> PredictionTire:
+    """Return the curve without its lag and offsets."""
     q = model.parameters
     if model.curve == "linear":
         return linear_tire(model.vehicle, q[:, 0])
