@@ -192,6 +192,11 @@ class Method(ABC):
     judged_by = ""  # what gives the certificate, where a package cannot hold it
 
     @property
+    def remark(self) -> str:
+        """What a table of methods must say of it beside its name; empty: nothing."""
+        return ""
+
+    @property
     def ports(self) -> tuple[Port, ...]:
         """Outputs and state of its step, axle_force first."""
         return (AXLE_FORCE,)

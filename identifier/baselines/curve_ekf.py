@@ -249,6 +249,13 @@ class CurveEkf(Method):
         """Outputs and state of its step, axle_force first."""
         return PORTS if self.textbook else (*PORTS, *LAG_DESCRIBED)
 
+    @property
+    def remark(self) -> str:
+        """Say whether it is more than the textbook's."""
+        if self.textbook:
+            return "the textbook's, without lag and offsets"
+        return "lag of the tires and offsets of the sensors are learnt, as by the default"
+
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs.
 
@@ -277,7 +284,7 @@ class CurveEkf(Method):
             own = self._own_of(stored)
         lags = 0 if self.textbook else 2
         prior = () if self.textbook else OWN_PRIOR
-        noise = [self.v_y_noise, self.r_noise, *[0.0] * lags]
+        noise = [self.v_y_noise, self.r_noise, *[self.v_y_noise / self.learning_speed] * lags]
         return Setup(
             scan=_scan(self.curve, self.textbook),
             carry={

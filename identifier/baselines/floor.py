@@ -228,28 +228,36 @@ def _curve(method: CurveEkf, vehicle: Vehicle) -> Structure:
     return Structure(start, model, -method.limit, method.limit)
 
 
-@structure_of.register(LinearBaseline)
-@structure_of.register(StiffnessRls)
-def _linear(method: LinearBaseline | StiffnessRls, vehicle: Vehicle) -> Structure:
-    """Logarithms of both stiffnesses over those that the car states, and offsets over bounds."""
+@structure_of.register
+def _linear(method: LinearBaseline, vehicle: Vehicle) -> Structure:
+    """Logarithms of both stiffnesses over those that the car states."""
+    return _straight(vehicle, method.min_speed, 0.0, np.zeros(2))
+
+
+@structure_of.register
+def _lagged_linear(method: StiffnessRls, vehicle: Vehicle) -> Structure:
+    """The same with the lag that it is given, and both offsets over their bounds."""
+    most = np.array([method.most_steering, method.most_v_y])
+    return _straight(vehicle, method.min_speed, method.relaxation_length, most)
+
+
+def _straight(vehicle: Vehicle, min_speed: float, lag: float, most: Array) -> Structure:
     stated = np.array(vehicle.bicycle)[4:]
-    learnt = isinstance(method, StiffnessRls)
-    most = np.array([method.most_steering, method.most_v_y]) if learnt else np.zeros(2)
-    lag = np.full(2, method.relaxation_length if learnt else 0.0)
-    limit = np.full(4 if most.any() else 2, 4.0)
-    limit[2:] = 1.0
+    limit = np.array([4.0, 4.0, *[1.0] * np.count_nonzero(most)])
 
     def start(rng: np.random.Generator) -> Array:
         return SCATTER * rng.standard_normal(limit.size)
 
     def model(parameters: Array) -> CurveModel:
+        offset = np.zeros(2)
+        offset[most > 0.0] = parameters[2:]
         return CurveModel(
             vehicle=vehicle,
             curve="linear",
             parameters=(stated * np.exp(parameters[:2])).reshape(2, 1),
-            min_speed=method.min_speed,
-            relaxation_length=lag,
-            offset=most * parameters[2:] if most.any() else np.zeros(2),
+            min_speed=min_speed,
+            relaxation_length=np.full(2, lag),
+            offset=most * offset,
         )
 
     return Structure(start, model, -limit, limit)

@@ -5,9 +5,9 @@ measured: x + noise. α' is there for a tire that lags; else F reads α itself.
 The sampled map is the linearly implicit midpoint rule, which no stiff tire at low speed makes
 unstable: z⁺ = z + T_s (I - T_s J/2)⁻¹ f, z = [x, α'], with f and J = ∂f/∂z at the mean of steering
 and speed. Its Jacobian is taken by automatic differentiation; the covariance is updated in Joseph's
-form. An innovation beyond `outlier` standard deviations moves α' and θ no further than one at that
-distance, x follows it all the way. Source: Simon, Optimal State Estimation, 2006, sections 5.1 and
-13.2.
+form. An innovation beyond `outlier` standard deviations moves θ no further than one at that
+distance. x follows it all the way, unless slip lags: α' would remember it. Source: Simon, Optimal
+State Estimation, 2006, sections 5.1 and 13.2.
 """
 
 import math
@@ -114,13 +114,17 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
     F = ca.jacobian(ahead, estimate)
     Q = ca.diag(ca.vertcat(noise[2:4], ca.SX(lags, 1), walk) ** 2 * dt)
     R = ca.diag(noise[:2] ** 2)
-    corrected, P_corrected = correct(ahead, F @ P @ F.T + Q, R, s.x, noise[4])
+    corrected, P_corrected = correct(ahead, F @ P @ F.T + Q, R, s.x, noise[4], follow=lags == 0)
 
     going = ca.logic_and(learning, running > 0.5)
     here = tire.slip(p, known, theta, s.speed, s.x, s.u)
     afresh = ca.vertcat(s.x, here[:lags], theta)
     at_once = ca.jacobian(afresh, ca.vertcat(s.x, theta))  # a start is taken for a steady slide
+    unsteady = ca.vertcat(
+        ca.SX(2, 1), ca.repmat(noise[0] / s.speed, lags, 1), ca.SX(n - 2 - lags, 1)
+    )
     P_afresh = at_once @ ca.diagcat(R, P[2 + lags :, 2 + lags :]) @ at_once.T
+    P_afresh += ca.diag(unsteady**2)
     following = ca.if_else(going, corrected, afresh)
     theta_next = ca.fmin(ca.fmax(following[2 + lags :], -limit), limit)
     output_theta = theta_next if tire.follows else theta
@@ -151,7 +155,9 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
     )
 
 
-def correct(estimate: Any, P: Any, R: Any, x: Any, outlier: Any) -> tuple[Any, Any]:
+def correct(
+    estimate: Any, P: Any, R: Any, x: Any, outlier: Any, *, follow: bool
+) -> tuple[Any, Any]:
     """Return estimate and covariance after the measurement of the first two states.
 
     Parameters
@@ -161,13 +167,15 @@ def correct(estimate: Any, P: Any, R: Any, x: Any, outlier: Any) -> tuple[Any, A
     R : covariance of the measurement (2, 2).
     x : the measurement (2,).
     outlier : standard deviations from which an innovation counts no more for the other states.
+    follow : whether it counts for the first two all the same.
     """
     S = P[:2, :2] + R
     gain = P[:, :2] @ ca.inv_minor(S)
     innovation = x - estimate[:2]
     deviation = ca.sqrt(ca.vertcat(S[0, 0], S[1, 1]))
     trusted = ca.fmin(ca.fmax(innovation, -outlier * deviation), outlier * deviation)
-    move = ca.vertcat(gain[:2, :] @ innovation, gain[2:, :] @ trusted)
+    leading = innovation if follow else trusted
+    move = ca.vertcat(gain[:2, :] @ leading, gain[2:, :] @ trusted)
     keep = ca.SX.eye(estimate.numel())
     keep[:, :2] -= gain
     after = keep @ P @ keep.T + gain @ R @ gain.T  # Joseph

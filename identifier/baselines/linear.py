@@ -266,6 +266,13 @@ class StiffnessRls(Method):
         """Outputs and state of its step, axle_force first."""
         return PORTS
 
+    @property
+    def remark(self) -> str:
+        """Say whether it is more than the textbook's."""
+        if not any(getattr(self, name) for name in OWN):
+            return "the textbook's, without lag and offsets"
+        return "the lag of the tires is given, offsets of the sensors are learnt"
+
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs.
 

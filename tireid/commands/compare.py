@@ -19,6 +19,7 @@ from tireid.commands import COMMANDS
 from tireid.commands.compare_results import (
     comparison_text,
     pair_tables,
+    remarks,
     summary_rows,
     write_comparison,
 )
@@ -139,7 +140,9 @@ def run(options: argparse.Namespace) -> None:
         work.begin("step times, tables and figures")
         figures = write_comparison(folder, comparison)
         rows = summary_rows(comparison)
-        write_compare_report(folder, comparison, rows, figures, command=options.words)
+        write_compare_report(
+            folder, comparison, rows, figures, remarks=remarks(comparison), command=options.words
+        )
         told = [comparison_text(comparison)]
         if len(comparison.names) ** 2 <= FEW_PAIRS:
             told.append(pair_tables(comparison))

@@ -20,6 +20,7 @@ from identifier.compare.course import Shares, Trial, frozen_shares, where_learnt
 from identifier.compare.study import Comparison, Frozen, ranking
 from identifier.compare.sweep import Candidate, best_candidate, frozen_share, pareto_front
 from identifier.method import vehicle_numbers
+from identifier.methods import METHODS, make_method
 from identifier.reproducibility import AxleRmse
 from tireid import __version__
 from tireid.figures import matrix_figure, methods_figure, pareto_figure, save_figure
@@ -59,7 +60,22 @@ def summary_table(comparison: Comparison) -> str:
     """
     n, lines = len(comparison.names), summary_rows(comparison)
     title = f"Axle force RMSE, front / rear, % of rms (N), mean over {n} recordings"
-    return _text(title, lines)
+    return _text(title, lines) + "".join(f"  {line}\n" for line in remarks(comparison))
+
+
+def remarks(comparison: Comparison) -> list[str]:
+    """Return what the methods say of themselves below the table, those alike in one line.
+
+    Parameters
+    ----------
+    comparison : the methods.
+    """
+    told: dict[str, list[str]] = {}
+    for name in comparison.trials:
+        if name in METHODS:
+            method = make_method(name, comparison.course.vehicle, comparison.seed)
+            told.setdefault(method.remark, []).append(name)
+    return [f"{', '.join(names)}: {remark}" for remark, names in told.items() if remark]
 
 
 def pair_tables(comparison: Comparison) -> str:

@@ -23,6 +23,7 @@ def write_compare_report(
     rows: Sequence[Sequence[str]],
     figures: Mapping[str, Figure],
     *,
+    remarks: Sequence[str],
     command: str,
 ) -> None:
     """Write the report of a comparison.
@@ -33,6 +34,7 @@ def write_compare_report(
     comparison : the methods.
     rows : its table, the header first.
     figures : by the name of their files.
+    remarks : what the methods say of themselves, a line each.
     command : as it was typed.
     """
     course = comparison.course
@@ -44,7 +46,8 @@ def write_compare_report(
     blocks: list[Block] = [
         Table(
             caption=f"RMSE of the axle force, front / rear, in percent of the rms force (and N), "
-            f"mean over {len(comparison.names)} recordings.",
+            f"mean over {len(comparison.names)} recordings."
+            + "".join(f" {line}." for line in remarks),
             header=rows[0],
             rows=rows[1:],
         )

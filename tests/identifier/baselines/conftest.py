@@ -14,27 +14,34 @@ def steering(t, amplitude):
     return amplitude * (0.55 + 0.45 * sin(0.23 * t)) * sin(2.0 * t + 0.8 * sin(0.31 * t))
 
 
-def rates(car, curve, speed, v_y, r, delta):
-    """dv_y/dt, dr/dt and both axle forces in the frame of the body."""
-    F_f = cos(delta) * curve(0, delta - atan2(v_y + car.l_f * r, speed))
-    F_r = curve(1, -atan2(v_y - car.l_r * r, speed))
+def slips(car, speed, v_y, r, delta):
+    """Slip angles of both axles in the paper's sign."""
+    return np.array([delta - atan2(v_y + car.l_f * r, speed), -atan2(v_y - car.l_r * r, speed)])
+
+
+def rates(car, curve, speed, moved, delta, lag):
+    """Rates of [v_y, r, α'] and both axle forces in the frame of the body; lag [m] or None."""
+    v_y, r = moved[:2]
+    alpha = slips(car, speed, v_y, r, delta)
+    slip = alpha if lag is None else moved[2:]
+    F_f, F_r = cos(delta) * curve(0, slip[0]), curve(1, slip[1])
     rate = (F_f + F_r) / car.mass - speed * r, (car.l_f * F_f - car.l_r * F_r) / car.yaw_inertia
-    return *rate, F_f, F_r
+    slip_rate = np.zeros(2) if lag is None else speed / lag * (alpha - slip)
+    return np.array([*rate, *slip_rate]), F_f, F_r
 
 
-def simulate(car, curve, n=2000, dt=0.01, speed=20.0, amplitude=0.1, rng=None):
-    """A bicycle on curve(axle, alpha) [N], by midpoint steps; rng makes v_y and r noisy."""
-    v_y = r = 0.0
+def simulate(car, curve, n=2000, dt=0.01, speed=20.0, amplitude=0.1, rng=None, lag=None):
+    """A bicycle on curve(axle, α' or α) [N], by midpoint steps; rng makes v_y and r noisy."""
+    moved = np.zeros(4)
     rows, fine = [], 5
     h = dt / fine
     for k in range(n * fine):
         t = k * h
-        here = rates(car, curve, speed, v_y, r, steering(t, amplitude))
+        here, *forces = rates(car, curve, speed, moved, steering(t, amplitude), lag)
         if k % fine == 0:
-            rows.append((t, v_y, r, steering(t, amplitude), *here[2:]))
-        half = v_y + h / 2 * here[0], r + h / 2 * here[1]
-        middle = rates(car, curve, speed, *half, steering(t + h / 2, amplitude))
-        v_y, r = v_y + h * middle[0], r + h * middle[1]
+            rows.append((t, *moved[:2], steering(t, amplitude), *forces))
+        half = moved + h / 2 * here
+        moved = moved + h * rates(car, curve, speed, half, steering(t + h / 2, amplitude), lag)[0]
     t, v_y, r, delta, F_f, F_r = np.array(rows).T
     if rng is not None:
         v_y = v_y + 0.02 * rng.standard_normal(n)
@@ -53,7 +60,7 @@ def simulate(car, curve, n=2000, dt=0.01, speed=20.0, amplitude=0.1, rng=None):
 
 @pytest.fixture(name="curve_drive")
 def a_curve_drive():
-    """The function `simulate(car, curve, n, dt, speed, amplitude, rng)`."""
+    """The function `simulate(car, curve, n, dt, speed, amplitude, rng, lag)`."""
     return simulate
 
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.baselines import CurveModel, dugoff_ekf, magic_formula_ekf
+from identifier.baselines import CurveModel, dugoff_ekf, magic_formula_ekf, share_of_force
+from identifier.baselines.ports import LAG_PORTS
 from identifier.run import identify
 
 MAGIC = np.array([[12.0, 1.5, 6000.0], [14.0, 1.3, 5200.0]])  # B, C, D
@@ -48,11 +49,53 @@ def test_dugoff_is_found_on_data_that_it_made(car, curve_drive, rng):
 
 @pytest.mark.parametrize("make", [magic_formula_ekf, dugoff_ekf])
 def test_frozen_and_online_force_agree_at_the_instant_of_freezing(make, car, drive):
-    history = identify(drive(n=600), car, make(car))
+    history = identify(drive(n=600), car, make(car, textbook=True))
     for k in (350, 521):
         frozen = history.freeze(0.01 * k).axle_force(history.recording)
         np.testing.assert_allclose(history.axle_force[k], frozen[k], rtol=1e-9)
         assert np.abs(frozen - history.axle_force)[: k - 100].max() > 10.0
+
+
+@pytest.mark.parametrize("make", [magic_formula_ekf, dugoff_ekf])
+def test_with_a_lag_they_agree_from_the_slip_on_that_was_carried(make, car, drive):
+    history = identify(drive(n=600), car, make(car))
+    for k in (350, 521):
+        frozen = history.freeze(0.01 * k)
+        setup, rest = frozen.setup(0.01), history.recording.between(0.01 * k - 1e-6, 99.0)
+        carried = {name: history.state[name][k] for name in LAG_PORTS}
+        force = setup._replace(carry=carried).run(rest)["axle_force"]
+        np.testing.assert_allclose(force[0], history.axle_force[k], rtol=1e-9)
+        whole = frozen.axle_force(history.recording)[k]  # the past had other parameters
+        np.testing.assert_allclose(whole, force[0], atol=0.01 * np.abs(whole).max())
+        unlagged = replace(frozen, relaxation_length=np.zeros(2)).axle_force(history.recording)[k]
+        assert np.abs(unlagged - whole).max() > 10.0
+
+
+LAG, OFFSET = np.array([0.9, 0.6]), np.array([0.004, -0.08])  # m; rad and m/s
+
+
+@pytest.mark.parametrize("curve", ["magic_formula", "dugoff"])
+def test_lag_and_offsets_are_found_on_a_car_that_has_them(curve, car, curve_drive, rng):
+    """The car drives on its lagged tires; its steering and v_y are read with offsets."""
+    make = {"magic_formula": magic_formula_ekf, "dugoff": dugoff_ekf}[curve]
+    force = {"magic_formula": magic, "dugoff": dugoff_on(car)}[curve]
+    recording = curve_drive(car, force, n=6000, rng=rng, lag=LAG)
+    read = replace(recording, delta_f=recording.delta_f - OFFSET[0], v_y=recording.v_y + OFFSET[1])
+    found = identify(read, car, make(car)).freeze()
+    np.testing.assert_allclose(found.relaxation_length, LAG, rtol=0.15)
+    assert (np.abs(found.offset - OFFSET) < [0.001, 0.02]).all()
+    plain = identify(read, car, make(car, textbook=True)).freeze()
+    assert (share_of_force(found, read) < 0.03).all()
+    assert (share_of_force(plain, read) > 3.0 * share_of_force(found, read)).all()
+
+
+def test_a_stored_lag_and_offsets_begin_the_next_run(car, drive):
+    recording, method = drive(n=600), magic_formula_ekf(car)
+    model = identify(recording, car, method).freeze(99.0)
+    again = identify(recording, car, method, start=model).freeze(0.0)
+    assert model.lagged and np.abs(model.offset).min() > 0.0
+    np.testing.assert_allclose(again.relaxation_length, model.relaxation_length, rtol=1e-9)
+    np.testing.assert_allclose(again.offset, model.offset, rtol=1e-9)
 
 
 @pytest.mark.parametrize("make", [magic_formula_ekf, dugoff_ekf])

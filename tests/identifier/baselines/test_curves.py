@@ -1,9 +1,12 @@
 """Curves and their files: the same force as other code says, and honest errors."""
 
+import json
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
+from scipy.signal import lsim
 
 from identifier.baselines import CurveModel, LinearBaseline
 from identifier.baselines.curves import CURVES
@@ -59,6 +62,59 @@ def test_magic_formula_is_the_printed_formula(car, drive):
 
 
 @pytest.mark.parametrize("curve", list(CURVES))
+def test_slip_lags_as_scipy_solves_it_and_offsets_are_taken_off(curve, car, drive):
+    """σ dα'/dt = v_x (α - α'), α linear between samples, begun in a steady slide."""
+    recording, sigma, offset = drive(n=300), np.array([0.6, 1.3]), np.array([0.01, -0.2])
+    plain = model_of(curve, car)
+    lagged = replace(plain, relaxation_length=sigma, offset=offset)
+    read = replace(recording, delta_f=recording.delta_f - offset[0], v_y=recording.v_y + offset[1])
+    if curve == "linear":
+        arm = np.array([car.l_f, -car.l_r])
+        drift = (recording.v_y[:, None] + arm * recording.r[:, None]) / recording.v_x[:, None]
+        alpha = recording.u - drift
+    else:
+        alpha = recording.alpha(car.l_f, car.l_r)
+    rates = recording.v_x[0] / sigma
+    slip = [
+        lsim(([rate], [1.0, rate]), a, recording.t, X0=a[0] / rate)[1]
+        for a, rate in zip(alpha.T, rates, strict=True)
+    ]
+    q, loads = np.array(PARAMETERS[curve]), np.array(car.axle_loads)
+    expected = [
+        np.array(ca.DM(CURVES[curve].force(ca.DM(q), ca.DM(loads), ca.DM(a), ca.DM(u)))).ravel()
+        for a, u in zip(np.array(slip).T, read.u, strict=True)
+    ]
+    np.testing.assert_allclose(lagged.axle_force(read), expected, rtol=1e-9, atol=1e-6)
+    assert np.abs(plain.axle_force(recording) - expected).max() > 100.0, "the lag is seen"
+
+
+def test_without_lag_and_offsets_nothing_is_added_to_the_slip(car, drive):
+    recording, plain = drive(n=100), model_of("magic_formula", car)
+    assert not plain.lagged
+    short = replace(plain, relaxation_length=np.full(2, 1e-7))
+    assert short.lagged
+    np.testing.assert_allclose(
+        short.axle_force(recording), plain.axle_force(recording), rtol=1e-4, atol=0.1
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"relaxation_length": np.array([0.5, -0.1])}, "relaxation_length"),
+        ({"relaxation_length": np.array([0.5, np.nan])}, "relaxation_length"),
+        ({"relaxation_length": np.array([0.5, 100.0])}, "relaxation_length"),
+        ({"relaxation_length": np.array([0.5])}, "relaxation_length"),
+        ({"offset": np.array([0.6, 0.0])}, "offset"),
+        ({"offset": np.array([0.0, -11.0])}, "offset"),
+    ],
+)
+def test_a_lag_or_an_offset_that_no_car_has_is_refused(change, said, car):
+    with pytest.raises(ValueError, match=rf"{said} .* must be two numbers within"):
+        replace(model_of("dugoff", car), **change)
+
+
+@pytest.mark.parametrize("curve", list(CURVES))
 def test_a_curve_is_silent_at_rest_and_finite_in_any_slide(curve, car, drive):
     recording = drive(n=50)
     v_x, v_y = recording.v_x.copy(), recording.v_y.copy()
@@ -70,12 +126,22 @@ def test_a_curve_is_silent_at_rest_and_finite_in_any_slide(curve, car, drive):
 
 @pytest.mark.parametrize("curve", list(CURVES))
 def test_a_model_comes_back_from_its_file(curve, car, drive, tmp_path):
-    model, path = model_of(curve, car), tmp_path / "weights.json"
-    model.save(path)
+    own = {"relaxation_length": np.array([0.5, 0.9]), "offset": np.array([0.003, -0.1])}
+    recording, path = drive(n=50), tmp_path / "weights.json"
+    for model in (model_of(curve, car), replace(model_of(curve, car), **own)):
+        model.save(path)
+        again = load_model(path)
+        assert again.vehicle == model.vehicle
+        np.testing.assert_array_equal(again.axle_force(recording), model.axle_force(recording))
+
+
+def test_a_file_without_lag_and_offsets_is_a_curve_without_them(car, tmp_path):
+    path, data = tmp_path / "weights.json", model_of("dugoff", car).to_dict()
+    del data["relaxation_length_m"], data["offset_rad_m_s"]
+    path.write_text(json.dumps(data))
     again = load_model(path)
-    assert again.vehicle == model.vehicle
-    recording = drive(n=50)
-    np.testing.assert_array_equal(again.axle_force(recording), model.axle_force(recording))
+    assert not again.lagged
+    assert not again.offset.any()
 
 
 @pytest.mark.parametrize(
@@ -87,6 +153,8 @@ def test_a_model_comes_back_from_its_file(curve, car, drive, tmp_path):
         (lambda d: d["front"].update(C=float("nan")), "must be positive"),
         (lambda d: d.update(curve="brush"), "curve must be one of"),
         (lambda d: d["vehicle"].update(mass=0.0), "mass"),
+        (lambda d: d.update(relaxation_length_m=[0.5, -0.5]), "relaxation_length"),
+        (lambda d: d.update(offset_rad_m_s=[0.0]), "offset"),
     ],
 )
 def test_a_wrong_file_is_refused_in_one_line(change, said, car, refused_in_one_line):

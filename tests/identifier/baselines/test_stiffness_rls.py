@@ -63,6 +63,51 @@ def test_the_stiffness_of_a_linear_car_is_found_and_frozen(car, curve_drive, rng
     np.testing.assert_array_equal(again.state["stiffness"][0], model.parameters[:, 0])
 
 
+LAG, OFFSET = 0.8, np.array([0.004, -0.08])  # m; rad and m/s
+
+
+def read_with_offsets(recording):
+    return replace(recording, delta_f=recording.delta_f - OFFSET[0], v_y=recording.v_y + OFFSET[1])
+
+
+def test_stiffness_and_offsets_of_a_lagged_car_are_found(car, curve_drive, rng):
+    true = np.array([8.5e4, 1.45e5])
+    recording = curve_drive(
+        car, lambda i, a: true[i] * a, n=6000, amplitude=0.03, rng=rng, lag=np.array([LAG, LAG])
+    )
+    read = read_with_offsets(recording)
+    fair = replace(METHOD, relaxation_length=LAG, most_steering=0.01, most_v_y=0.2)
+    model = identify(read, car, fair).freeze()
+    np.testing.assert_allclose(model.parameters[:, 0], true, rtol=0.05)
+    assert (np.abs(model.offset - OFFSET) < [0.001, 0.02]).all()
+    np.testing.assert_array_equal(model.relaxation_length, [LAG, LAG])
+    plain = identify(read, car, METHOD).freeze()
+    assert np.abs(plain.parameters[:, 0] / true - 1.0).max() > 0.1, "the textbook is misled"
+    again = identify(read, car, fair, start=model)
+    np.testing.assert_array_equal(again.state["offset"][0], model.offset)
+
+
+def test_offsets_rest_in_a_bend(car, drive):
+    """A curve that saturates has an offset from a straight line that no sensor has."""
+    recording = drive(n=800)
+    method = StiffnessRls.for_vehicle(car)
+    offset = identify(recording, car, method).state["offset"]
+    keep = np.exp(-method.cutoff * method.dt)
+    force = lfilter([1 - keep], [1, -keep], recording.axle_force / car.axle_loads, axis=0)
+    moved = np.diff(offset, axis=0) != 0.0
+    warm = recording.t > 1.0
+    assert moved[(np.abs(force) < 0.05) & warm[:, None]].all()
+    assert (np.abs(force) > 0.2).any(axis=0).all()
+    assert not moved[np.abs(force) > 0.2].any()
+
+
+def test_a_model_freezes_to_the_force_it_told(car, drive):
+    recording = drive(n=600)
+    history = identify(recording, car, StiffnessRls.for_vehicle(car))
+    frozen = history.freeze(5.0).axle_force(recording)[500]
+    np.testing.assert_allclose(frozen, history.axle_force[500], rtol=1e-3)
+
+
 def test_straight_driving_forgets_nothing(car, curve_drive):
     recording = curve_drive(car, lambda i, a: 8e4 * a, n=800, amplitude=0.0)
     history = identify(recording, car, METHOD)
