@@ -5,16 +5,27 @@ vehicles of `recorded_cars`. The recordings of ../shared/data are not part of th
 them this part is skipped.
 """
 
+from collections.abc import Callable, Iterable
+from functools import partial
+
 import numpy as np
 
 from benchmarks.recorded_cars import CARMAKER, DART, DATA
 from benchmarks.targets import Targets, show
 from codegen.arrays import Array
 from identifier.axle import AxleModel
-from identifier.compare.course import Course, where_learnt_and_elsewhere
+from identifier.baselines import StiffnessRls, dugoff_ekf, magic_formula_ekf
+from identifier.compare.course import (
+    Course,
+    Shares,
+    cross_replay,
+    shares,
+    where_learnt_and_elsewhere,
+)
 from identifier.compare.study import Comparison, Frozen, run_comparison
 from identifier.compare.sweep import best_candidate
-from identifier.methods import DEFAULT, REFERENCE, make_method
+from identifier.method import Method
+from identifier.methods import DEFAULT, METHODS, REFERENCE, make_method
 from identifier.reproducibility import AxleRmse, axle_rms
 from identifier.run import identify
 from models.recordings import Recording, read_recording
@@ -25,9 +36,18 @@ REAL_RUNS = ("ramp_steer02", "free_10_02_28", "free_10_12_05")
 SEEDS = 10
 STARTS = 3  # of each floor, as `tireid compare` has it
 DESIGNS = 200  # of each method, tuned in hindsight on the real car
+BRISK = "ramp_steerneg025"  # of the real car, too
+SLOW = ("free_10_01_01", "rubber_12_37_59")  # forces below 1 N rms, of which half is not motion
+TILES = "tape_tiles_steer_neg03"  # another floor: nothing learnt elsewhere knows its friction
+BEHIND = 1.0 / 0.9  # the default over any other method: none is better by more than 10 %
 BASELINES = ("linear", "stiffness_rls", "magic_formula_ekf", "dugoff_ekf", REFERENCE)
 BEST = "magic_formula_ekf"  # of the baselines on the real car, which is a target
 FLOOR = "axle units"
+TEXTBOOK: dict[str, Callable[[Vehicle], Method]] = {
+    "magic_formula_ekf": partial(magic_formula_ekf, textbook=True),
+    "dugoff_ekf": partial(dugoff_ekf, textbook=True),
+    "stiffness_rls": partial(StiffnessRls.for_vehicle, textbook=True),
+}
 AXLES = ("front", "rear")
 LIMITS = {("hard", "hard"): (9.0, 5.0), ("hard", "mild"): (15.0, 15.0)}  # front, rear [%]
 
@@ -151,6 +171,68 @@ def dart(targets: Targets) -> None:
     label = f"real car: mean over the six, against {best}"
     targets.at_most(label, means[DEFAULT], means[best], key="dart/mean_against_best")
     _in_hindsight(targets, runs)
+
+
+def side_by_side(targets: Targets) -> None:
+    """Judge the default beside every method that has a model, on every recording of both cars.
+
+    Baselines with the lag of the tires and the offsets of the sensors, as `tireid compare` runs
+    them; below them the textbook's. Errors of both axles, means over learnt and replayed drives.
+
+    Parameters
+    ----------
+    targets : collects what is missed.
+    """
+    print("Every method on every recording, both axles [% of rms force]: online, frozen where")
+    print("learnt, frozen elsewhere; CarMaker, the real car's 4 brisk drives, all its 6, on tiles")
+    rows: dict[str, dict[str, Shares]] = {}
+    for place, (vehicle, recordings) in _courses().items():
+        found = _compare(tuple(METHODS), vehicle, recordings)
+        errors = {name: found.shares(name) for name in METHODS}
+        for name, make in TEXTBOOK.items():
+            errors[f"{name}, textbook"] = shares(
+                cross_replay(make(vehicle), found.course), found.course
+            )
+        for name, error in errors.items():
+            if error.in_sample is not None:
+                rows.setdefault(name, {})[place] = error
+                for part, value in error._asdict().items():
+                    if value is not None:
+                        key = f"side_by_side/{place}/{name.replace(', ', '_')}/{part}"
+                        targets.record(key, float(value), "%")
+    for where in ("brisk", "dart"):
+        means = {
+            name: float(np.mean([errors[place].other for place in ("carmaker", where)]))
+            for name, errors in rows.items()
+        }
+        for name, value in means.items():
+            targets.record(f"side_by_side/both_{where}/{name.replace(', ', '_')}", value, "%")
+        best = min((name for name in means if name != DEFAULT), key=means.__getitem__)
+        targets.record(f"side_by_side/best_{where}", best)
+        label = f"elsewhere, CarMaker and {where}, {means[DEFAULT]:.1f} % over that of {best}"
+        over, key = means[DEFAULT] / means[best], f"side_by_side/over_best_{where}"
+        targets.at_most(label, over, BEHIND, "-", key=key)
+    for name in sorted(means, key=means.__getitem__):
+        cells = (
+            "  ".join("     " if value is None else f"{value:5.1f}" for value in error)
+            for error in rows[name].values()
+        )
+        print(f"  {name:28} {'   '.join(cells)}   {means[name]:5.1f}")
+
+
+def _courses() -> dict[str, tuple[Vehicle, tuple[Recording, ...]]]:
+    """Cars and their recordings, by place."""
+
+    def read(file: str, runs: Iterable[str]) -> tuple[Recording, ...]:
+        return tuple(read_recording(DATA / file, run=run) for run in runs)
+
+    brisk = read("dart.csv.gz", REAL_RUNS) + read("dart_imu.csv.gz", [BRISK])
+    return {
+        "carmaker": (CARMAKER, read("carmaker.csv.gz", RUNS.values())),
+        "brisk": (DART, brisk),
+        "dart": (DART, brisk + read("dart_imu.csv.gz", SLOW)),
+        "tiles": (DART, read("dart_imu.csv.gz", [TILES])),
+    }
 
 
 def _in_hindsight(targets: Targets, runs: tuple[Recording, ...]) -> None:

@@ -12,7 +12,7 @@ from functools import partial
 from benchmarks.batch_speed import shortest
 from benchmarks.extrapolate_faults import faults
 from benchmarks.extrapolate_plant import friction_drop, maneuvers
-from benchmarks.extrapolate_recorded import carmaker, dart
+from benchmarks.extrapolate_recorded import carmaker, dart, side_by_side
 from benchmarks.recorded_cars import DATA
 from benchmarks.targets import Targets, keeps, show
 from identifier.compare.course import step_times
@@ -53,6 +53,7 @@ def main() -> int:
     if DATA.is_dir():
         carmaker(targets)
         dart(targets)
+        side_by_side(targets)
     else:
         print(f"skipped CarMaker and the real car: no recordings in {DATA}")
     maneuvers(targets)

@@ -152,15 +152,15 @@ class CurveEkf(Method):
     r_noise : standard deviation of the measured yaw rate [rad/s].
     v_y_disturbance : what the curve misses, as random change of v_y [m/s/√s].
     r_disturbance : what the curve misses, as random change of the yaw rate [rad/s/√s].
+    relaxation_length : what σ of both axles is held for at first [m].
+    v_y_spread : standard deviation of the bias of v_y at first [m/s].
+    steering_spread : standard deviation of the zero of the front steering at first [rad].
+    relaxation_spread : standard deviation of the logarithm of σ at first [-].
+    textbook : without lag and offsets, as papers have this filter; then the last four do nothing.
     friction : what friction is held for at first [-].
     stiffness_spread : standard deviation of the logarithm of stiffness at first [-].
     shape_spread : standard deviation of the Magic Formula's shape at first, as its logit [-].
     friction_spread : standard deviation of the logarithm of friction at first [-].
-    relaxation_length : what σ of both axles is held for at first [m].
-    relaxation_spread : standard deviation of the logarithm of σ at first [-].
-    steering_spread : standard deviation of the zero of the front steering at first [rad].
-    v_y_spread : standard deviation of the bias of v_y at first [m/s].
-    textbook : without lag and offsets, as papers have this filter; then the last four do nothing.
     outlier : standard deviations from which an innovation teaches no more.
     dt : sampling interval [s].
     learning_speed : below this speed [m/s] learning rests.

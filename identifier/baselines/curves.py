@@ -22,7 +22,7 @@ from identifier.baselines.ports import (
     SHORTEST,
     axle_loads,
     lag_symbols,
-    lagged,
+    lagged_slip,
     sample_ports,
 )
 from identifier.method import (
@@ -153,41 +153,50 @@ def measured_slip(curve: Curve, p: BicycleParameters, offset: Any, v_x: Any, x: 
 # A frozen curve of axle force over slip angle: linear, Magic Formula or Dugoff.
 
 
-def build_curve(name: str) -> ca.Function:
-    """Return a curve of lagged slip as a step with one output, axle_force (2,) [N]; at rest 0.
+def build_curve(name: str, *, lagged: bool) -> ca.Function:
+    """Return a curve as a step with one output, axle_force (2,) [N]; at rest 0.
 
-    Carried: `LaggedSlip`. Constant: parameters of the curve (2, n), lag (2,) = σ [m], offset (2,) =
-    δ₀ [rad] and b [m/s].
+    Carried: `LaggedSlip` where it lags, else nothing. Constant: parameters of the curve (2, n),
+    offset (2,) = δ₀ [rad] and b [m/s], and where it lags lag (2,) = σ [m].
 
     Parameters
     ----------
     name : one of `CURVES`.
+    lagged : whether the slip lags.
     """
     s, last = sample_ports(), lag_symbols()
     q = ca.SX.sym("parameters", 2, len(CURVES[name].parameters))
     sigma, offset = ca.SX.sym("lag", 2), ca.SX.sym("offset", 2)
-    p = s.parameters
+    p, carry = s.parameters, LAG_PORTS if lagged else ()
     alpha = measured_slip(CURVES[name], p, offset, s.speed, s.x, s.u)
-    slip = lagged(last, alpha, s.speed * s.sampling[0], sigma)
+    slip = lagged_slip(last, alpha, s.speed * s.sampling[0], sigma) if lagged else alpha
     force = CURVES[name].force(q, axle_loads(p, GRAVITY), slip, s.u)
     return ca.Function(
         f"frozen_{name}",
-        [*last, q, sigma, offset, s.x, s.u, s.v_x, s.vehicle, s.sampling],
-        [slip, alpha, ca.if_else(s.moving, 1, 0), ca.if_else(s.moving, force, 0)],
-        [*LAG_PORTS, "parameters", "lag", "offset", *OVER, "vehicle", "sampling"],
-        [*(f"{port}_next" for port in LAG_PORTS), "axle_force"],
+        [
+            *last[: len(carry)],
+            *(q, offset, s.x, s.u, s.v_x, s.vehicle, s.sampling),
+            *((sigma,) if lagged else ()),
+        ],
+        [*(slip, alpha, ca.if_else(s.moving, 1, 0))[: len(carry)], ca.if_else(s.moving, force, 0)],
+        [
+            *(*carry, "parameters", "offset", *OVER, "vehicle", "sampling"),
+            *(("lag",) if lagged else ()),
+        ],
+        [*(f"{port}_next" for port in carry), "axle_force"],
     )
 
 
 @cache
-def curve_scan(name: str) -> Scan:
+def curve_scan(name: str, *, lagged: bool) -> Scan:
     """Return the compiled loop of `build_curve`.
 
     Parameters
     ----------
     name : one of `CURVES`.
+    lagged : whether the slip lags.
     """
-    return Scan(build_curve(name), carry=LAG_PORTS, over=OVER)
+    return Scan(build_curve(name, lagged=lagged), carry=LAG_PORTS if lagged else (), over=OVER)
 
 
 def unlagged() -> dict[str, Array]:
@@ -253,11 +262,11 @@ class CurveModel(TireModel):
         dt : sampling interval of what is replayed [s].
         """
         return Setup(
-            scan=curve_scan(self.curve),
-            carry=unlagged(),
+            scan=curve_scan(self.curve, lagged=self.lagged),
+            carry=unlagged() if self.lagged else {},
             constants={
                 "parameters": self.parameters,
-                "lag": self.relaxation_length,
+                **({"lag": self.relaxation_length} if self.lagged else {}),
                 "offset": self.offset,
                 "vehicle": np.array(self.vehicle.bicycle),
                 "sampling": np.array([dt, self.min_speed]),

@@ -26,7 +26,7 @@ from identifier.baselines.ports import (
     OVER,
     axle_loads,
     lag_symbols,
-    lagged,
+    lagged_slip,
     motion_rate,
     sample_ports,
 )
@@ -131,7 +131,7 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
     last = lag_symbols()
     lag_next: tuple[Any, ...] = ()
     if tire.lag is not None:
-        here = lagged(last, here, s.speed * dt, tire.lag(known, theta))
+        here = lagged_slip(last, here, s.speed * dt, tire.lag(known, theta))
         lag_next = (here, tire.slip(p, known, theta, s.speed, s.x, s.u), ca.if_else(s.moving, 1, 0))
     axle_force = tire.force(p, known, output_theta, here, s.u)
     return ca.Function(

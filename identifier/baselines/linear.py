@@ -19,7 +19,7 @@ from identifier.baselines.ports import (
     axle_loads,
     impulse,
     lag_symbols,
-    lagged,
+    lagged_slip,
     sample_ports,
     turning_force,
 )
@@ -143,7 +143,7 @@ def build_step() -> ca.Function:
     last = lag_symbols()
     xi = impulse(p, s.x)
     alpha = slip_angles(p.l_f, p.l_r, s.speed, s.x, s.u)
-    slip = lagged(last, alpha, s.speed * dt, ca.vertcat(sigma, sigma))
+    slip = lagged_slip(last, alpha, s.speed * dt, ca.vertcat(sigma, sigma))
     arriving = ca.vertcat(kappa * xi - turning_force(p, s.v_x, s.x), slip, 1 / s.speed)
     keep = ca.exp(-kappa * dt)
     filtered = keep * filters + (1 - keep) / 2 * (inputs + arriving)

@@ -122,7 +122,7 @@ def lag_symbols() -> LaggedSlip:
     return LaggedSlip(ca.SX.sym("slip", 2), ca.SX.sym("alpha", 2), ca.SX.sym("begun"))
 
 
-def lagged(last: LaggedSlip, alpha: Any, way: Any, sigma: Any) -> Any:
+def lagged_slip(last: LaggedSlip, alpha: Any, way: Any, sigma: Any) -> Any:
     """Return α' after a step (2,) [rad]; the first sample begins without lag.
 
     Parameters
