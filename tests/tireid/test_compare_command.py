@@ -98,6 +98,21 @@ def test_a_signal_estimator_has_no_frozen_error(numbers, result):
     assert "a signal, no model" in (result / "tables.txt").read_text()
 
 
+def test_the_table_says_which_baselines_know_lag_and_offsets(words, tmp_path, capsys):
+    out, names = tmp_path / "out", ("linear", "stiffness_rls", "magic_formula_ekf", "dugoff_ekf")
+    assert main([*words, "--method", *names, "--floor", "0", "--out", str(out)]) == 0
+    learnt = "magic_formula_ekf, dugoff_ekf: lag of the tires and offsets of the sensors are learnt"
+    given = "stiffness_rls: the lag of the tires is given, offsets of the sensors are learnt"
+    for text in (
+        capsys.readouterr().out,
+        (out / "tables.txt").read_text(),
+        (out / "report.html").read_text(),
+    ):
+        assert learnt in text
+        assert given in text
+        assert "linear: " not in text, "it has neither, and says nothing"
+
+
 def test_times_are_over_that_of_the_integral_law(numbers):
     methods = numbers["methods"]
     assert methods["integral"]["step_ratio"] == 1.0

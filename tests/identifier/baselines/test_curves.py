@@ -64,7 +64,7 @@ def test_magic_formula_is_the_printed_formula(car, drive):
 @pytest.mark.parametrize("curve", list(CURVES))
 def test_slip_lags_as_scipy_solves_it_and_offsets_are_taken_off(curve, car, drive):
     """σ dα'/dt = v_x (α - α'), α linear between samples, begun in a steady slide."""
-    recording, sigma, offset = drive(n=300), np.array([0.6, 1.3]), np.array([0.01, -0.2])
+    recording, sigma, offset = drive(n=150, dt=0.02), np.array([0.6, 1.3]), np.array([0.01, -0.2])
     plain = model_of(curve, car)
     lagged = replace(plain, relaxation_length=sigma, offset=offset)
     read = replace(recording, delta_f=recording.delta_f - offset[0], v_y=recording.v_y + offset[1])
