@@ -156,7 +156,7 @@ class CurveEkf(Method):
     v_y_spread : standard deviation of the bias of v_y at first [m/s].
     steering_spread : standard deviation of the zero of the front steering at first [rad].
     relaxation_spread : standard deviation of the logarithm of σ at first [-].
-    textbook : without lag and offsets, as papers have this filter; then the last four do nothing.
+    textbook : without lag and offsets, as papers have this filter; the four before do nothing then.
     friction : what friction is held for at first [-].
     stiffness_spread : standard deviation of the logarithm of stiffness at first [-].
     shape_spread : standard deviation of the Magic Formula's shape at first, as its logit [-].

@@ -117,8 +117,8 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
     corrected, P_corrected = correct(ahead, F @ P @ F.T + Q, R, s.x, noise[4], follow=lags == 0)
 
     going = ca.logic_and(learning, running > 0.5)
-    here = tire.slip(p, known, theta, s.speed, s.x, s.u)
-    afresh = ca.vertcat(s.x, here[:lags], theta)
+    told_slip = alpha_now = tire.slip(p, known, theta, s.speed, s.x, s.u)
+    afresh = ca.vertcat(s.x, alpha_now[:lags], theta)
     at_once = ca.jacobian(afresh, ca.vertcat(s.x, theta))  # a start is taken for a steady slide
     unsteady = ca.vertcat(
         ca.SX(2, 1), ca.repmat(noise[0] / s.speed, lags, 1), ca.SX(n - 2 - lags, 1)
@@ -131,9 +131,9 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
     last = lag_symbols()
     lag_next: tuple[Any, ...] = ()
     if tire.lag is not None:
-        here = lagged_slip(last, here, s.speed * dt, tire.lag(known, theta))
-        lag_next = (here, tire.slip(p, known, theta, s.speed, s.x, s.u), ca.if_else(s.moving, 1, 0))
-    axle_force = tire.force(p, known, output_theta, here, s.u)
+        told_slip = lagged_slip(last, alpha_now, s.speed * dt, tire.lag(known, theta))
+        lag_next = (told_slip, alpha_now, ca.if_else(s.moving, 1, 0))
+    axle_force = tire.force(p, known, output_theta, told_slip, s.u)
     return ca.Function(
         name,
         [
