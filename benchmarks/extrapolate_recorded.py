@@ -18,6 +18,7 @@ from identifier.baselines import StiffnessRls, dugoff_ekf, magic_formula_ekf
 from identifier.compare.course import (
     Course,
     Shares,
+    Trial,
     cross_replay,
     shares,
     where_learnt_and_elsewhere,
@@ -156,6 +157,9 @@ def dart(targets: Targets) -> None:
             show(name, "diverged")
         else:
             rows[name] = trial.frozen
+    for name, trial in _textbooks(found.course).items():
+        if trial.frozen is not None:
+            rows[name] = trial.frozen
     means: dict[str, float] = {}
     for name, frozen in rows.items():
         both, axles = _elsewhere(found.course, frozen)
@@ -163,10 +167,10 @@ def dart(targets: Targets) -> None:
         cells = "  ".join(f"{value:5.1f}" for value in both)
         show(f"{name}: from ramp to both, from 02_28 to both, from 12_05 to both", cells)
         show(f"{name}: mean, front / rear", f"{means[name]:.1f}, {_pair(axles)}")
-        targets.record(f"dart/{name}/both", means[name], "%")
+        targets.record(f"dart/{_key(name)}/both", means[name], "%")
         for axle, value in zip(AXLES, axles, strict=True):
-            targets.record(f"dart/{name}/{axle}", value, "%")
-    best = min((name for name in BASELINES if name in means), key=means.__getitem__)
+            targets.record(f"dart/{_key(name)}/{axle}", value, "%")
+    best = min((name for name in means if name not in (DEFAULT, "floor")), key=means.__getitem__)
     targets.record("dart/best_baseline", best)
     label = f"real car: mean over the six, against {best}"
     targets.at_most(label, means[DEFAULT], means[best], key="dart/mean_against_best")
@@ -189,16 +193,14 @@ def side_by_side(targets: Targets) -> None:
     for place, (vehicle, recordings) in _courses().items():
         found = _compare(tuple(METHODS), vehicle, recordings)
         errors = {name: found.shares(name) for name in METHODS}
-        for name, make in TEXTBOOK.items():
-            errors[f"{name}, textbook"] = shares(
-                cross_replay(make(vehicle), found.course), found.course
-            )
+        for name, trial in _textbooks(found.course).items():
+            errors[name] = shares(trial, found.course)
         for name, error in errors.items():
             if error.in_sample is not None:
                 rows.setdefault(name, {})[place] = error
                 for part, value in error._asdict().items():
                     if value is not None:
-                        key = f"side_by_side/{place}/{name.replace(', ', '_')}/{part}"
+                        key = f"side_by_side/{place}/{_key(name)}/{part}"
                         targets.record(key, float(value), "%")
     for where in ("brisk", "dart"):
         means = {
@@ -206,7 +208,7 @@ def side_by_side(targets: Targets) -> None:
             for name, errors in rows.items()
         }
         for name, value in means.items():
-            targets.record(f"side_by_side/both_{where}/{name.replace(', ', '_')}", value, "%")
+            targets.record(f"side_by_side/both_{where}/{_key(name)}", value, "%")
         best = min((name for name in means if name != DEFAULT), key=means.__getitem__)
         targets.record(f"side_by_side/best_{where}", best)
         label = f"elsewhere, CarMaker and {where}, {means[DEFAULT]:.1f} % over that of {best}"
@@ -218,6 +220,18 @@ def side_by_side(targets: Targets) -> None:
             for error in rows[name].values()
         )
         print(f"  {name:28} {'   '.join(cells)}   {means[name]:5.1f}")
+
+
+def _textbooks(course: Course) -> dict[str, Trial]:
+    """Return what the forms of the textbooks make of a course, by their name in a table."""
+    return {
+        f"{name}, textbook": cross_replay(make(course.vehicle), course)
+        for name, make in TEXTBOOK.items()
+    }
+
+
+def _key(name: str) -> str:
+    return name.replace(", ", "_")
 
 
 def _courses() -> dict[str, tuple[Vehicle, tuple[Recording, ...]]]:
