@@ -351,7 +351,7 @@ class CurveEkf(Method):
         ----------
         state : estimate, which ends with θ.
         """
-        return self.model(vehicle, state["estimate"][-self.limit.size :])
+        return self.model(vehicle, state["estimate"].ravel()[-self.limit.size :])
 
     def _own_of(self, stored: CurveModel) -> Array:
         """Return the lag and the offsets of a stored curve as unknowns, (4,) or none."""

@@ -322,5 +322,5 @@ class StiffnessRls(Method):
             parameters=state["stiffness"].reshape(2, 1).copy(),
             min_speed=self.min_speed,
             relaxation_length=np.full(2, self.relaxation_length),
-            offset=state["offset"].copy(),
+            offset=state["offset"].ravel().copy(),
         )
