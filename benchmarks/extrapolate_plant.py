@@ -1,11 +1,17 @@
 """Learn on a noisy slalom of our plant, freeze, predict other maneuvers; and a drop of friction."""
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
+from benchmarks.extrapolate_recorded import BEHIND, TEXTBOOK, key_of
+from benchmarks.random_cars import CLASSES, FIRST_SEED, random_car, random_drive
 from benchmarks.targets import Targets, show
-from identifier.baselines import fit_floor, structure_of
+from identifier.baselines import fit_floor, share_of_force, structure_of
 from identifier.compare.course import Course
 from identifier.compare.floors import STRUCTURES
+from identifier.method import Method
 from identifier.methods import DEFAULT, METHODS, REFERENCE, make_method
 from identifier.reproducibility import AxleRmse
 from identifier.run import identify
@@ -13,10 +19,11 @@ from models.friction import Friction, FrictionChange
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.recordings import Recording
-from models.vehicle import sedan
+from models.vehicle import Vehicle, sedan
 from tireid.commands.demo_story import DRIVES, RATE_LIMIT, SENSORS, SLALOM, plant_recordings
 
 SEEDS = 5
+CARS = 6  # of each class
 CHANGE, BACK, END = 20.0, 40.0, 60.0  # s
 SETTLED = 2.0  # s of excitation
 DROPS = (0.5, 0.7)
@@ -77,6 +84,47 @@ def maneuvers(targets: Targets) -> None:
     largest = max(clean.front, clean.rear) / 1e3
     label = "in-sample without noise, larger axle"
     targets.at_most(label, largest, 0.1, "kN", key="plant/in_sample/exact")
+
+
+def random_fleet(targets: Targets) -> None:
+    """Judge the default beside the baselines on random cars: one drive learnt, another asked about.
+
+    The cars are others than those on which the numbers of the baselines were chosen.
+
+    Parameters
+    ----------
+    targets : collects what is missed.
+    """
+    makes: dict[str, Callable[[Vehicle], Method]] = {
+        **{name: partial(make_method, name) for name in (DEFAULT, *TEXTBOOK)},
+        **{f"{name}, textbook": make for name, make in TEXTBOOK.items()},
+    }
+    errors: dict[str, list[float]] = {name: [] for name in makes}
+    for number, kind in enumerate(CLASSES):
+        for seed in range(FIRST_SEED, FIRST_SEED + CARS):
+            rng = np.random.default_rng([seed, number])
+            car = random_car(kind, rng)
+            learnt, unseen = (random_drive(car, rng).log(rng) for _ in range(2))
+            for name, make in makes.items():
+                model = identify(learnt, car.told, make(car.told)).freeze()
+                errors[name].append(100.0 * float(np.mean(share_of_force(model, unseen))))
+    means = {name: float(np.mean(values)) for name, values in errors.items()}
+    print(
+        f"{CARS} random cars of each of {len(CLASSES)} classes, learnt on one drive, frozen, asked"
+    )
+    print("about another, mean of both axles [% of rms force]")
+    for name, value in means.items():
+        show(name, f"{value:.1f}, worst {max(errors[name]):.1f}")
+        targets.record(f"fleet/{key_of(name)}", value, "%")
+    best = min((name for name in means if name != DEFAULT), key=means.__getitem__)
+    targets.record("fleet/best", best)
+    label = f"random cars, over {best}"
+    targets.at_most(label, means[DEFAULT] / means[best], BEHIND, "-", key="fleet/over_best")
+    for name in TEXTBOOK:
+        gain = means[name] / means[f"{name}, textbook"]
+        targets.at_most(
+            f"{name}, over its textbook's form", gain, 1.0, "-", key=f"fleet/gain/{name}"
+        )
 
 
 def friction_drop(targets: Targets) -> None:

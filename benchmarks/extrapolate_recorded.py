@@ -167,9 +167,9 @@ def dart(targets: Targets) -> None:
         cells = "  ".join(f"{value:5.1f}" for value in both)
         show(f"{name}: from ramp to both, from 02_28 to both, from 12_05 to both", cells)
         show(f"{name}: mean, front / rear", f"{means[name]:.1f}, {_pair(axles)}")
-        targets.record(f"dart/{_key(name)}/both", means[name], "%")
+        targets.record(f"dart/{key_of(name)}/both", means[name], "%")
         for axle, value in zip(AXLES, axles, strict=True):
-            targets.record(f"dart/{_key(name)}/{axle}", value, "%")
+            targets.record(f"dart/{key_of(name)}/{axle}", value, "%")
     best = min((name for name in means if name not in (DEFAULT, "floor")), key=means.__getitem__)
     targets.record("dart/best_baseline", best)
     label = f"real car: mean over the six, against {best}"
@@ -200,7 +200,7 @@ def side_by_side(targets: Targets) -> None:
                 rows.setdefault(name, {})[place] = error
                 for part, value in error._asdict().items():
                     if value is not None:
-                        key = f"side_by_side/{place}/{_key(name)}/{part}"
+                        key = f"side_by_side/{place}/{key_of(name)}/{part}"
                         targets.record(key, float(value), "%")
     for where in ("brisk", "dart"):
         means = {
@@ -208,7 +208,7 @@ def side_by_side(targets: Targets) -> None:
             for name, errors in rows.items()
         }
         for name, value in means.items():
-            targets.record(f"side_by_side/both_{where}/{_key(name)}", value, "%")
+            targets.record(f"side_by_side/both_{where}/{key_of(name)}", value, "%")
         best = min((name for name in means if name != DEFAULT), key=means.__getitem__)
         targets.record(f"side_by_side/best_{where}", best)
         label = f"elsewhere, CarMaker and {where}, {means[DEFAULT]:.1f} % over that of {best}"
@@ -230,7 +230,8 @@ def _textbooks(course: Course) -> dict[str, Trial]:
     }
 
 
-def _key(name: str) -> str:
+def key_of(name: str) -> str:
+    """Return the name of a method in a table as a word of a key."""
     return name.replace(", ", "_")
 
 

@@ -11,7 +11,7 @@ from functools import partial
 
 from benchmarks.batch_speed import shortest
 from benchmarks.extrapolate_faults import faults
-from benchmarks.extrapolate_plant import friction_drop, maneuvers
+from benchmarks.extrapolate_plant import friction_drop, maneuvers, random_fleet
 from benchmarks.extrapolate_recorded import carmaker, dart, side_by_side
 from benchmarks.recorded_cars import DATA
 from benchmarks.targets import Targets, keeps, show
@@ -57,6 +57,7 @@ def main() -> int:
     else:
         print(f"skipped CarMaker and the real car: no recordings in {DATA}")
     maneuvers(targets)
+    random_fleet(targets)
     friction_drop(targets)
     faults(targets)
     cost(targets)
