@@ -165,7 +165,7 @@ def test_noisy_runs_end_well():
 
 
 def test_noisy_logs_are_noisy_by_what_is_said_and_short(drive):
-    times = []
+    times, steps = [], set()
     for seed in range(200):
         rng = np.random.default_rng(seed)
         sensors = noisy_runs.noisy(drive.car.sensors, rng)
@@ -174,8 +174,17 @@ def test_noisy_logs_are_noisy_by_what_is_said_and_short(drive):
         assert log.axle_force is None
         assert log.t[0] == 0.0
         assert 1.5 < log.duration < 14.5
+        steps.add(log.dt)
     assert min(times) < 0.02
-    assert max(times) > 20.0
+    assert max(times) > 60.0
+    assert steps == set(noisy_runs.SAMPLED)
+
+
+def test_a_drive_sampled_anew_is_the_same_drive(drive):
+    part = drive.exact.between(10.0, 15.0)
+    fine = noisy_runs.sampled(part, 0.002)
+    assert fine.dt == 0.002
+    np.testing.assert_allclose(fine.r[::5], part.r[:-1], atol=1e-9)
 
 
 @pytest.mark.usefixtures("shared")
