@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.answers import Answer, answer, drawn
+from benchmarks.answers import REFUSED, Answer, answer, drawn
 from benchmarks.fault_cases import Case, random_case
 from benchmarks.random_cars import BEGINNINGS, CLASSES, FIRST_SEED, random_beginning
 from benchmarks.recorded_cars import CARMAKER, DART, DATA
@@ -181,7 +181,7 @@ class Counts:
 
     def __str__(self) -> str:
         """Return them as a row."""
-        door = sum("refused" in one.found.codes for one in self.all)
+        door = sum(REFUSED in one.found.codes for one in self.all)
         between = f"{sum(bool(one.found.valid) for one in self.between)} of {len(self.between)}"
         return (
             f"{len(self.all):7}{len(self.wrong):7}{len(self.wrong_valid):14}{len(self.right):7}"
