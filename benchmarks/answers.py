@@ -16,12 +16,18 @@ import numpy as np
 import tireid as ti
 from benchmarks.random_cars import Beginning, RandomDrive, random_car, random_drive
 from models.plant import PlantError
-from models.recordings import Recording, RecordingError, check_physics
+from models.recordings import (
+    Recording,
+    RecordingError,
+    check_against_vehicle,
+    check_physics,
+)
 from models.vehicle import Vehicle
 
 DEAD = 0.1  # of the true stiffness: an axle below it learnt nothing that is a tire
 REFUSED = "refused"  # in place of a code of the verdict: the log is not let in
 Pair = tuple[float, float]
+NO_FORCE, NO_TIRE = (math.inf, math.inf), (math.nan, math.nan)
 MakeBeginning = Callable[[Vehicle, np.random.Generator], Beginning]
 
 
@@ -41,6 +47,11 @@ class Answer(NamedTuple):
     def worse(self) -> float:
         """Error of the worse axle [% of the rms force]."""
         return max(self.error)
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the program stopped where it should have answered or refused."""
+        return REFUSED not in self.codes and not all(map(math.isfinite, self.stiffness))
 
 
 def force_error(tire: ti.TireModel, recording: Recording) -> Pair:
@@ -67,7 +78,7 @@ def blind(recording: Recording) -> Recording:
     return replace(recording, axle_force=None)
 
 
-def answer(log: Recording, told: Vehicle, judged: Recording, *, verdict: bool = True) -> Answer:
+def answer(log: Recording, told: Vehicle, judged: Recording, *, ask: bool = True) -> Answer:
     """Return what a user gets for a log, and what it is wrong by.
 
     Where the log is refused before anything is learnt, the error is that of a user who insists.
@@ -77,47 +88,51 @@ def answer(log: Recording, told: Vehicle, judged: Recording, *, verdict: bool = 
     log : what reaches the identifier.
     told : the car as it is told.
     judged : the drive on which the error is measured, with true forces.
-    verdict : whether one is asked for.
+    ask : whether the log is judged and a verdict asked for; a user who insists does neither.
     """
-    log, codes = blind(log), []
+    log = blind(log)
     valid: bool | None = None
+    codes: tuple[str, ...] = ()
+    if log.v_x.max() < told.lowest_speed:  # a car of that size never drives
+        return Answer(NO_FORCE, NO_TIRE, False, (REFUSED,))
     try:
-        check_physics(log)
-        run = ti.identify(log, told)
-    except RecordingError:
-        valid, codes = False, [REFUSED]
-    except Exception as error:
-        return _none(error)
-    try:
-        run = ti.identify(log, told, check=False) if codes else run
+        if ask and not _is_let_in(log, told):
+            valid, codes = False, (REFUSED,)
+        run = ti.identify(log, told, check=False)
         tire = run.freeze()
-        if verdict and not codes:
+        if ask and not codes:
             valid, codes = _verdict(run)
         stiffness = tire.stiffness
         assert stiffness is not None
         missed = force_error(tire, judged)
     except Exception as error:
-        return _none(error)
+        return Answer(NO_FORCE, NO_TIRE, False, (type(error).__name__,))
     return Answer(
-        missed if all(map(math.isfinite, missed)) else (math.inf, math.inf),
+        missed if all(map(math.isfinite, missed)) else NO_FORCE,
         (float(stiffness[0]), float(stiffness[1])),
         valid,
-        tuple(codes),
+        codes,
     )
 
 
-def _none(error: Exception) -> Answer:
-    """What is left where the program stopped."""
-    return Answer((math.inf, math.inf), (math.nan, math.nan), False, (type(error).__name__,))
+def _is_let_in(log: Recording, told: Vehicle) -> bool:
+    """Whether a log passes the checks of a file that is read and learnt from."""
+    try:
+        check_physics(log)
+        check_against_vehicle(log, told)
+    except RecordingError:
+        return False
+    return True
 
 
-def _verdict(run: ti.History) -> tuple[bool | None, list[str]]:
+def _verdict(run: ti.History) -> tuple[bool | None, tuple[str, ...]]:
     """The verdict and the codes of what refuses."""
     ask: Callable[[], Any] | None = getattr(run, "verdict", None)
     if ask is None:
-        return None, []
+        return None, ()
     verdict = ask()
-    return verdict.valid, sorted({one.code for one in verdict.findings if one.refuses})
+    codes = {one.code for one in verdict.findings if one.refuses}
+    return verdict.valid, tuple(sorted(codes))
 
 
 def is_dead(found: Answer, right: Pair) -> bool:

@@ -41,11 +41,6 @@ class Begun(NamedTuple):
         """Error over that of the same drive begun in a corner."""
         return max(self.learnt.worse, FLOOR) / max(self.corner.worse, FLOOR)
 
-    @property
-    def stopped(self) -> bool:
-        """Whether there was an exception in place of a model."""
-        return not np.isfinite(self.learnt.stiffness).all()
-
 
 def begun(job: tuple[str, int]) -> list[Begun]:
     """Return what becomes of the beginnings of one car.
@@ -61,12 +56,12 @@ def begun(job: tuple[str, int]) -> list[Begun]:
         drive = drawn(kind, seed, partial(random_beginning, name), k)
         log = drive.log(np.random.default_rng([seed, k, *kind.encode()]))
         corner, car = drive.cornering(log), drive.car
-        ask = partial(answer, told=car.told, judged=corner, verdict=False)
-        learnt = ask(log)
+        of_log = partial(answer, told=car.told, judged=corner, ask=False)
+        learnt = of_log(log)
         vehicle = car.vehicle
         right = vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear
         dead = is_dead(learnt, right)
-        found.append(Begun(kind, name, seed, learnt, ask(corner), dead))
+        found.append(Begun(kind, name, seed, learnt, of_log(corner), dead))
     return found
 
 
@@ -96,7 +91,7 @@ def report(found: Sequence[Begun], targets: Targets) -> None:
     wrong = sum(one.learnt.worse > WRONG for one in found)
     targets.at_most(f"drives with an axle more than {WRONG:g} % wrong", wrong, 0, "", "wrong")
     targets.at_most("drives after which an axle is dead", sum(o.dead for o in found), 0, "", "dead")
-    stopped = sum(one.stopped for one in found)
+    stopped = sum(one.learnt.stopped for one in found)
     targets.at_most("drives that stopped the program", stopped, 0, "", "stopped")
 
 

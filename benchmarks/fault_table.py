@@ -170,7 +170,7 @@ def report(found: Mapping[str, list[Answers]], targets: Targets) -> str:
     label = "answers whose error doubles and that are not called not valid"
     targets.at_most(label, len(silent), 0, "", "silent")
     targets.at_most("answers that leave an axle dead", dead, 0, "", "dead")
-    stopped = sum(not np.isfinite(one.stiffness).all() for one in everything)
+    stopped = sum(one.stopped for one in everything)
     targets.at_most("answers that stopped the program", stopped, 0, "", "stopped")
     comment = f"<!-- numbers {' '.join(sources)} -->"
     lines += textwrap.wrap(comment, WIDTH, break_long_words=False, break_on_hyphens=False)

@@ -20,22 +20,30 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.answers import Answer, answer, drawn
+from benchmarks.answers import REFUSED, Answer, answer, drawn
 from benchmarks.fault_cases import Case, random_case
 from benchmarks.random_cars import BEGINNINGS, CLASSES, FIRST_SEED, random_beginning
 from benchmarks.recorded_cars import CARMAKER, DART, DATA
 from benchmarks.targets import Targets, keeps, show
-from models.recordings import Recording, read_recording, runs
+from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle
 
 EACH, PER_CAR = 100, 5  # answers of each class and of recordings; of one plant car
 WRONG, RIGHT = 20.0, 8.0  # % of the rms force, worse axle
 OWN_SENSORS = {"r": "r_imu", "ay": "ay_imu", "vx": "vx_encoder"}  # 90 ms late, as they come
-FILES: tuple[tuple[str, Vehicle, Mapping[str, str]], ...] = (
-    ("carmaker.csv.gz", CARMAKER, {}),
-    ("dart.csv.gz", DART, {}),
-    ("dart_imu.csv.gz", DART, {}),
-    ("dart_imu.csv.gz", DART, OWN_SENSORS),
+FREE = ("free_10_02_28", "free_10_12_05")
+BY_CAMERA = (
+    "free_10_01_01",
+    "rubber_12_37_59",
+    "ramp_steerneg025",
+    "tape_tiles_steer_neg03",
+    *FREE,
+)
+RUNS: tuple[tuple[str, Vehicle, tuple[str, ...], Mapping[str, str]], ...] = (
+    ("carmaker.csv.gz", CARMAKER, ("slalom1_14_5ms", "experiment2_40kmh"), {}),
+    ("dart.csv.gz", DART, ("ramp_steer02", *FREE), {}),
+    ("dart_imu.csv.gz", DART, BY_CAMERA, {}),
+    ("dart_imu.csv.gz", DART, BY_CAMERA, OWN_SENSORS),
 )
 LASTS, DRIVING = (20.0, 40.0), 0.6  # s; share of a part in which the car drives
 PROCESSES = 2
@@ -86,8 +94,8 @@ def recordings() -> tuple[tuple[Recording, Vehicle], ...]:
         return ()
     return tuple(
         (read_recording(DATA / file, run=run, check=False, columns=columns), car)
-        for file, car, columns in FILES
-        for run in runs(DATA / file)
+        for file, car, names, columns in RUNS
+        for run in names
     )
 
 
@@ -181,7 +189,7 @@ class Counts:
 
     def __str__(self) -> str:
         """Return them as a row."""
-        door = sum("refused" in one.found.codes for one in self.all)
+        door = sum(REFUSED in one.found.codes for one in self.all)
         between = f"{sum(bool(one.found.valid) for one in self.between)} of {len(self.between)}"
         return (
             f"{len(self.all):7}{len(self.wrong):7}{len(self.wrong_valid):14}{len(self.right):7}"

@@ -54,10 +54,11 @@ def test_nothing_that_judges_sees_a_true_force(drive, log, monkeypatch):
     def sees(recording, *_, **__):
         seen.append(recording.axle_force)
 
-    monkeypatch.setattr("benchmarks.answers.check_physics", sees)
+    for check in ("check_physics", "check_against_vehicle"):
+        monkeypatch.setattr(f"benchmarks.answers.{check}", sees)
     monkeypatch.setattr("benchmarks.answers.ti.identify", sees)
     answer(log, drive.car.told, drive.exact)
-    assert seen == [None, None]
+    assert seen == [None, None, None]
     assert log.axle_force is not None
 
 
@@ -77,7 +78,21 @@ def test_a_program_that_stops_is_no_valid_answer(drive, log, monkeypatch):
     found = answer(log, drive.car.told, drive.exact)
     assert found == NONE._replace(codes=("ZeroDivisionError",), stiffness=found.stiffness)
     assert is_dead(found, (1e5, 1e5))
+    assert found.stopped
     assert found.worse == math.inf
+
+
+def test_a_car_that_never_drives_is_refused_and_nothing_stopped(drive, log):
+    slow = replace(log, v_x=0.02 * log.v_x)
+    found = answer(slow, drive.car.told, drive.exact)
+    assert found.codes == (REFUSED,)
+    assert not found.stopped
+    assert not is_dead(found, (1e5, 1e5))
+
+
+def test_a_user_who_insists_is_let_in(drive, log):
+    found = answer(Mirrored(channels=("r",)).apply(log), drive.car.told, drive.exact, ask=False)
+    assert (found.valid, found.codes) == (None, ())
 
 
 def test_the_verdict_is_asked_and_what_refuses_is_kept(drive, log, monkeypatch):
@@ -90,9 +105,7 @@ def test_the_verdict_is_asked_and_what_refuses_is_kept(drive, log, monkeypatch):
         findings = (Finding("b", True), Finding("note", False), Finding("a", True))
 
     monkeypatch.setattr("identifier.run.History.verdict", lambda _: Verdict, raising=False)
-    asked, not_asked = (
-        answer(log, drive.car.told, drive.exact, verdict=verdict) for verdict in (True, False)
-    )
+    asked, not_asked = (answer(log, drive.car.told, drive.exact, ask=ask) for ask in (True, False))
     assert (asked.valid, asked.codes) == (False, ("a", "b"))
     assert (not_asked.valid, not_asked.codes) == (None, ())
 
@@ -165,7 +178,7 @@ def test_noisy_runs_end_well():
 
 
 def test_noisy_logs_are_noisy_by_what_is_said_and_short(drive):
-    times = []
+    times, steps = [], set()
     for seed in range(200):
         rng = np.random.default_rng(seed)
         sensors = noisy_runs.noisy(drive.car.sensors, rng)
@@ -174,8 +187,17 @@ def test_noisy_logs_are_noisy_by_what_is_said_and_short(drive):
         assert log.axle_force is None
         assert log.t[0] == 0.0
         assert 1.5 < log.duration < 14.5
+        steps.add(log.dt)
     assert min(times) < 0.02
-    assert max(times) > 20.0
+    assert max(times) > 60.0
+    assert steps == set(noisy_runs.SAMPLED)
+
+
+def test_a_drive_sampled_anew_is_the_same_drive(drive):
+    part = drive.exact.between(10.0, 15.0)
+    fine = noisy_runs.sampled(part, 0.002)
+    assert fine.dt == 0.002
+    np.testing.assert_allclose(fine.r[::5], part.r[:-1], atol=1e-9)
 
 
 @pytest.mark.usefixtures("shared")
