@@ -16,7 +16,7 @@ from identifier.axle.car import larger, reciprocal
 
 Symmetric = dict[tuple[int, int], Any]
 
-LEAST_VARIANCE = 1e-14  # of stored weights: of a parameter given those after it, in its unit
+LEAST_VARIANCE = 1e-14  # of a parameter given those after it, in its unit
 TINY = 1e-30  # keeps quotients of factors finite where one has vanished
 ROUNDING = 1e-5  # share of the limit that rounding in float may take in a step
 
@@ -167,14 +167,14 @@ def width(trace: Any, others: list[Any], limits: list[Any]) -> Any:
 
 
 def scaled(factors: Factors, wide: Any) -> Factors:
-    """Return the factors of P/wide where wide > 1, else of P.
+    """Return the factors of P/wide where wide > 1, else of P; no D falls below `LEAST_VARIANCE`.
 
     Parameters
     ----------
     wide : from `width`.
     """
     scale = reciprocal(larger(wide, 1))
-    return Factors(factors.U, [D * scale for D in factors.D])
+    return Factors(factors.U, [larger(D * scale, LEAST_VARIANCE) for D in factors.D])
 
 
 def inflated(factors: Factors, direction: list[Any], amount: Any) -> Factors:
@@ -195,6 +195,31 @@ def inflated(factors: Factors, direction: list[Any], amount: Any) -> Factors:
             U[i, j] = U[i, j] + cv * per_D * v[i]
         c = c * old * per_D
     return Factors(U, D)
+
+
+def loosened(
+    factors: Factors, spread: Spread, amount: Any, limits: list[Any]
+) -> tuple[Factors, Spread]:
+    """Return the factors and the spread of P + amount u u', u the last column of U.
+
+    The last parameter becomes less sure, and the others by what they owe to it. Where P would grow
+    beyond its limits it stays as it is.
+
+    Parameters
+    ----------
+    spread : of P.
+    amount : variance to add to the last parameter, not negative.
+    limits : as in `width`.
+    """
+    U, D = factors
+    q, n = len(D), len(D) - len(spread.others)
+    u = [*(U[i, q - 1] for i in range(q - 1)), 1.0]
+    squares = [sum(one * one for one in u[:n]), *(one * one for one in u[n:])]
+    sizes = [spread.trace, *spread.others]
+    trace, *others = (a + amount * b for a, b in zip(sizes, squares, strict=True))
+    amount = amount * (width(trace, others, limits) <= 1)
+    trace, *others = (a + amount * b for a, b in zip(sizes, squares, strict=True))
+    return Factors(U, [*D[:-1], D[-1] + amount]), spread._replace(trace=trace, others=others)
 
 
 class Excited(NamedTuple):

@@ -103,9 +103,9 @@ class AxleIdentifier(Method):
         """
         L, U = vehicle.wheelbase, vehicle.froude_speed
         return cls(
-            prior=Prior(compliance=0.01 * L, sd_compliance=0.01 * L, sd_v_y=0.005 * U),
+            prior=Prior(compliance=0.01 * L, sd_compliance=0.01 * L, sd_v_y=0.01 * U),
             sway=Sway.for_vehicle(vehicle),
-            bounds=Bounds(compliance=0.12 * L, v_y=0.04 * U),
+            bounds=Bounds(compliance=0.12 * L, v_y=0.15 * U),
             plausibility=Plausibility(
                 min_speed=vehicle.lowest_speed,
                 learning_speed=0.6 * U,
@@ -117,6 +117,7 @@ class AxleIdentifier(Method):
                 max_yaw_acceleration=6.0 * GRAVITY / L,
                 yaw_jump=0.2 * U / L,
             ),
+            regression=Regression(noise=0.001 * U),
             dt=dt,
         )
 
@@ -140,6 +141,11 @@ class AxleIdentifier(Method):
                 "grip_static_axle_loads": [b.least_grip, b.most_grip],
                 "weight_static_axle_loads": [-b.weight, b.weight],
                 **({} if rising is None else {"force_curves_rise_at_slip_rad": rising}),
+                **(
+                    {"stiffness_static_axle_loads_rad": [b.least_stiffness, b.most_stiffness]}
+                    if rising == 0.0
+                    else {}
+                ),
                 "compliance_m": [0.0, b.compliance],
                 "sway_share": [0.0, 1.0],
                 "steering_offset_rad": [-b.steering, b.steering],
@@ -205,7 +211,7 @@ class AxleIdentifier(Method):
                 "regression": self.regression.numbers(self.dt),
                 "change": self.change.numbers(self.dt),
                 "watching": self.watch.numbers(self.dt),
-                "bounds": self.bounds.numbers(n),
+                "bounds": self._bound_numbers(),
                 "friction_direction": friction_direction(self.ladder),
                 "per_variance": widest,
                 **self._rising(),
@@ -214,9 +220,9 @@ class AxleIdentifier(Method):
 
     def _within_bounds(self, W: Array, own: Array, P: Array) -> tuple[Array, Array]:
         """Return what is begun with, within bounds: a file or a prior may lie outside."""
-        n, b = len(self.ladder), self.bounds
+        n = len(self.ladder)
         slope = self._rising().get("rising")
-        numbers = b.numbers(n)
+        numbers = self._bound_numbers()
         row = np.zeros(n) if slope is None else slope
         project = _projection(n, slope is not None)
         kept = np.vstack(
@@ -229,13 +235,22 @@ class AxleIdentifier(Method):
         )
         return kept[:, :n], kept[:, n:]
 
+    def _bound_numbers(self) -> Array:
+        """Return the numbers of `BoundNumbers` for this ladder."""
+        slopes = float(self._slopes().sum())
+        return self.bounds.numbers(len(self.ladder), slopes, self.rising_until)
+
     def _rising(self) -> dict[str, Array]:
         """Return the derivatives of the units where curves shall not fall, over their sum."""
         if self.rising_until is None:
             return {}
-        scales = np.array(self.ladder)
-        slopes = 1.0 / (scales * np.cosh(self.rising_until / scales) ** 2)
+        slopes = self._slopes()
         return {"rising": slopes / slopes.sum()}
+
+    def _slopes(self) -> Array:
+        """Return the derivatives of the units where the slope of curves is bounded (n,) [1/rad]."""
+        scales, slip = np.array(self.ladder), self.rising_until or 0.0
+        return np.asarray(1.0 / (scales * np.cosh(slip / scales) ** 2), dtype=np.float64)
 
     def tracks(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Track, ...]:
         """Return cornering stiffness, relaxation length, and the force that curves saturate at.

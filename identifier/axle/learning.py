@@ -30,9 +30,13 @@ class Regression:
     error : additive error of y [static axle loads]: 0.02 is 0.2 m/s².
     relative_error : of y [-], the model's.
     correlation_time : of these errors [s]; it makes the result independent of the sampling.
+    lateness : by which steering and force may differ in time [s].
+    noise : of v_y, which sits in the slip [m/s].
+    sure : force from which on samples teach the curve, and not the sensors' offset alone
+        [`error`]: a smaller one could be theirs.
+    sure_time : its memory [s]: between left and right a curve is learnt at small forces, too.
     clip : largest error that counts in full [its standard deviation].
     widest : trace of the covariance of weights at which forgetting stops, over the prior's [-].
-    excitation_time : a force above `error` is excitation for this long [s].
 
     Raises
     ------
@@ -45,15 +49,18 @@ class Regression:
     error: float = 0.02
     relative_error: float = 0.04
     correlation_time: float = 0.1
+    lateness: float = 0.005
+    noise: float = 0.005
+    sure: float = 3.5
+    sure_time: float = 0.7
     clip: float = 5.0
     widest: float = 2.0
-    excitation_time: float = 1.0
 
     def __post_init__(self) -> None:
         require_positive_fields(self)
 
     def numbers(self, dt: float) -> Array:
-        """Return the numbers of `RegressionNumbers`, (9,).
+        """Return the numbers of `RegressionNumbers`, (12,).
 
         Parameters
         ----------
@@ -69,14 +76,19 @@ class Regression:
                 self.error,
                 self.relative_error,
                 self.correlation_time / dt,
+                self.lateness * self.bandwidth,
+                self.noise,
+                self.sure * self.error,
+                math.exp(-dt / self.sure_time),
                 self.clip,
-                math.exp(-dt / self.excitation_time),
             ]
         )
 
 
 class RegressionNumbers(NamedTuple):
-    """κ, e, (1 - e)/2; (1 - λ)/λ; errors; correlated samples; clip; decay of excitation."""
+    """κ, e, (1 - e)/2; (1 - λ)/λ; errors; correlated samples; κ lateness; noise of v_y; least force
+    to learn from and the decay of its memory; clip.
+    """
 
     bandwidth: Any
     e: Any
@@ -85,8 +97,11 @@ class RegressionNumbers(NamedTuple):
     error: Any
     relative_error: Any
     samples: Any
-    clip: Any
+    lateness: Any
+    noise: Any
+    least_force: Any
     decay: Any
+    clip: Any
 
 
 def filtered(numbers: RegressionNumbers, v: Any, u: Any, first: Any) -> tuple[Any, Any]:
@@ -177,6 +192,7 @@ def update(
 
 LARGEST_Q = 25.0  # one outlier alone is no alarm
 SLOW_Q = 4.0  # and the slow mean shall not follow a change
+MOST_SLOW = 4.0  # errors above twice what is told are no noise that learning may get used to
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -189,6 +205,8 @@ class ChangeDetector:
     fast, slow : time constants of the means [s].
     step : change of ln μ [-] that ...
     step_time : ... may happen in this time [s] during an alarm.
+    offset_time : in which an alarm at an axle that is not known yet makes its offset as unsure as
+        it may get [s]: a bias that was there on the straight is gone, or a new one came.
 
     Raises
     ------
@@ -201,32 +219,44 @@ class ChangeDetector:
     slow: float = 20.0
     step: float = 0.5
     step_time: float = 0.3
+    offset_time: float = 5.0
 
     def __post_init__(self) -> None:
         require_positive_fields(self)
 
     def numbers(self, dt: float) -> Array:
-        """Return [1/threshold, dt/fast, dt/slow, inflation a sample], (4,).
+        """Return the numbers of `ChangeNumbers`, (5,).
 
         Parameters
         ----------
         dt : sampling interval [s].
         """
         inflation = dt * self.step**2 / self.step_time
-        return np.array([1.0 / self.threshold, dt / self.fast, dt / self.slow, inflation])
+        return np.array(
+            [
+                1.0 / self.threshold,
+                dt / self.fast,
+                dt / self.slow,
+                inflation,
+                dt / self.offset_time,
+            ]
+        )
 
 
 class ChangeNumbers(NamedTuple):
-    """1/threshold, gains of fast and slow mean, inflation a sample."""
+    """1/threshold, gains of fast and slow mean, and what an alarm adds a sample: variance along the
+    change of friction, and to the offset over its limit.
+    """
 
     per_threshold: Any
     fast: Any
     slow: Any
     inflation: Any
+    offset: Any
 
 
 class ErrorState(NamedTuple):
-    """Columns (2,): fast and slow mean of q [-], recent peak of |ŷ| [static axle loads]."""
+    """Columns (2,): fast and slow mean of q [-], recent peak of |y| [static axle loads]."""
 
     fast: Any
     slow: Any
@@ -246,11 +276,11 @@ def error_means(numbers: ChangeNumbers, state: ErrorState, q: Any, learns: Any) 
     q = smaller(q, LARGEST_Q)
     fast = state.fast + learns * numbers.fast * (q - state.fast)
     slow = state.slow + learns * numbers.slow * (smaller(q, SLOW_Q * state.slow) - state.slow)
-    return fast, larger(slow, 1)
+    return fast, within(slow, 1, MOST_SLOW)
 
 
 def alarm(numbers: ChangeNumbers, fast: Any, slow: Any) -> Any:
-    """Return how much the friction is taken to have changed, from 0 to 1.
+    """Return how much each axle is taken to have changed, from 0 to 1, (2,).
 
     Parameters
     ----------
@@ -258,8 +288,7 @@ def alarm(numbers: ChangeNumbers, fast: Any, slow: Any) -> Any:
     fast : mean of q (2,).
     slow : mean of q (2,).
     """
-    ratio = fast / slow
-    excess = smaller(ratio[0], ratio[1]) * numbers.per_threshold - 1
+    excess = fast / slow * numbers.per_threshold - 1
     return smaller(larger(excess, 0), 1)
 
 
@@ -283,7 +312,10 @@ class Bounds:
 
     Parameters
     ----------
-    least_grip, most_grip : of the saturated force [static axle loads].
+    least_grip, most_grip : of the saturated force [static axle loads]; a slick under downforce
+        reaches three.
+    least_stiffness, most_stiffness : of the curve at no slip [static axle loads/rad]; tires of cars
+        and of their models lie between 4 and 40.
     weight : of each weight [static axle loads].
     compliance : [m per static axle load].
     steering : of the steering's zero [rad].
@@ -296,50 +328,64 @@ class Bounds:
     """
 
     least_grip: float = 0.1
-    most_grip: float = 1.5
+    most_grip: float = 3.0
+    least_stiffness: float = 2.0
+    most_stiffness: float = 80.0
     weight: float = 3.0
     compliance: float
-    steering: float = 0.01
+    steering: float = 0.03
     v_y: float
 
     def __post_init__(self) -> None:
         require_positive_fields(self)
-        if not self.least_grip < self.most_grip:
-            raise ValueError(
-                f"least_grip must be below most_grip, they are {self.least_grip}, {self.most_grip}"
-            )
+        for of in ("grip", "stiffness"):
+            least, most = getattr(self, f"least_{of}"), getattr(self, f"most_{of}")
+            if not least < most:
+                raise ValueError(f"least_{of} must be below most_{of}, they are {least}, {most}")
 
-    def numbers(self, n: int) -> Array:
-        """Return the numbers of `BoundNumbers`, (10,).
+    def numbers(self, n: int, slopes: float, rising_until: float | None) -> Array:
+        """Return the numbers of `BoundNumbers`, (12,).
 
         n products of weights that lie in the box sum up to within n + 8 roundings.
 
         Parameters
         ----------
         n : number of units.
+        slopes : sum of their derivatives where the slope is bounded [1/rad].
+        rising_until : the slip of that [rad]; the least stiffness is one at zero slip.
 
         Raises
         ------
         ValueError
-            Where n weights within their box, all equal, cannot carry the middle of the grip.
+            Where n weights within their box, all equal, cannot carry the middle of the grip, or
+            are stiffer or softer than they may.
         """
         rounding = (n + 8) * FLOAT * self.weight
         least, most = self.least_grip + n * rounding, self.most_grip - n * rounding
         center = 0.5 * (least + most) / n
         radius = self.weight - center - rounding
-        if not (least < most and radius > 0.0 and center > rounding):
+        if not (least < most and radius > 0.0):
             raise ValueError(
                 f"{n} weights up to {self.weight} cannot carry a grip of {self.least_grip} to "
                 f"{self.most_grip}"
+            )
+        flattest = (0.0 if rising_until else self.least_stiffness / slopes) + rounding
+        steepest = self.most_stiffness / slopes - rounding
+        if rising_until is not None and not flattest < center < steepest:
+            raise ValueError(
+                f"a ladder of {n} units of equal weight has a stiffness of {center * slopes:g} "
+                f"loads/rad, outside of {self.least_stiffness:g} to {self.most_stiffness:g}"
             )
         return np.array(
             [
                 least,
                 most,
-                rounding,
+                flattest,
+                steepest,
                 center,
                 2.0 / (most - least),
-                1.0 / (center - rounding),
+                1.0 / (center - flattest),
+                1.0 / (steepest - center),
                 1.0 / radius,
                 _inward(self.compliance),
                 _inward(self.steering),
@@ -355,17 +401,20 @@ def _inward(limit: float) -> float:
 
 
 class BoundNumbers(NamedTuple):
-    """Ends of grip and slope, the center, 1/half width of grip, slope and weight; other limits.
+    """Ends of grip and slope, the center, 1/its distance from them and from the box; other limits.
 
-    Grip, slope and weight are inside the declared bounds by what rounding may do.
+    Grip, slope and weight are inside the declared bounds by what rounding may do. The slope is
+    that of the curve over the sum of the units' slopes.
     """
 
     least_grip: Any
     most_grip: Any
     least_slope: Any
+    most_slope: Any
     center: Any
     per_grip: Any
-    per_slope: Any
+    per_falling: Any
+    per_rising: Any
     per_weight: Any
     compliance: Any
     steering: Any
@@ -387,7 +436,7 @@ def bounded(
     theta : parameters, n + 3 entries.
     P : covariance of the weights, the metric: upper triangle by place.
     offset : bound of the last one.
-    slope : derivatives of the units at a slip over their sum, n entries; the curve shall not fall
+    slope : derivatives of the units at a slip over their sum, n entries; the curve's is bounded
         there.
     """
     n = len(theta) - 3
@@ -419,17 +468,20 @@ def _gripping(numbers: BoundNumbers, w: list[Any], P: Symmetric) -> list[Any]:
 
 
 def _rising(numbers: BoundNumbers, w: list[Any], P: Symmetric, slope: list[Any]) -> list[Any]:
-    """Move w by the least, in the metric of P, so that its grip is in range and its slope rises.
+    """Move w by the least, in the metric of P, so that its grip and its slope are in range.
 
-    Where the curve falls once the grip alone is mended, the slope ends at its bound: the move to
-    it, then one along it (P-orthogonal, which leaves the slope) to the grip.
+    Where the slope is not once the grip alone is mended, it ends at its bound: the move to it, then
+    one along it (P-orthogonal, which leaves the slope) to the grip.
     """
     by_grip, by_slope = _times(P, [1] * len(w)), _times(P, slope)
     A, B, C = sum(by_grip), sum(by_slope), _dot(slope, by_slope)
     least, most = numbers.least_grip, numbers.most_grip
-    grip, missing = sum(w), numbers.least_slope - _dot(slope, w)
-    falls = missing * A > B * (within(grip, least, most) - grip)
-    per_C = ca.if_else(falls, reciprocal(C + TINY), 0)
+    grip, steep = sum(w), _dot(slope, w)
+    by_grip_alone = B * (within(grip, least, most) - grip)
+    falls = (numbers.least_slope - steep) * A > by_grip_alone
+    rises = (numbers.most_slope - steep) * A < by_grip_alone
+    missing = ca.if_else(falls, numbers.least_slope, numbers.most_slope) - steep
+    per_C = ca.if_else(ca.logic_or(falls, rises), reciprocal(C + TINY), 0)
     to_slope, share = missing * per_C, B * per_C
     grip = grip + B * to_slope
     to_grip = (within(grip, least, most) - grip) / (A - B * share + TINY)
@@ -442,7 +494,8 @@ def _towards_center(numbers: BoundNumbers, w: list[Any], slope: list[Any] | None
     away = [one - numbers.center for one in w]
     over = larger(ca.fabs(sum(away)) * numbers.per_grip, 1)
     if slope is not None:
-        over = larger(-_dot(slope, away) * numbers.per_slope, over)
+        steep = _dot(slope, away)
+        over = larger(larger(-steep * numbers.per_falling, steep * numbers.per_rising), over)
     for one in away:
         over = larger(ca.fabs(one) * numbers.per_weight, over)
     part = reciprocal(over)

@@ -2,7 +2,7 @@
 
 Carried, rows front and rear: W (2, n) and own (2, 3), what is learnt; UD (2, q (q + 1)/2) the
 factors of its covariance P = U D U', D on the diagonal, q = n + 3; gate, sway, slip as in
-`forward`; sensitivity (2, 3); filters (2, q + 1); errors (2, 3); excitation (2, 9); watch (6,) and
+`forward`; sensitivity (2, 3); filters (2, q + 1); errors (2, 3); excitation (2, 9); watch (7,) and
 kept (2, q), the weights that are gone back to after a fault. Sampled: x, u, v_x. Everything else is
 a number that stays an input. Forces are told with the weights before the sample.
 """
@@ -11,8 +11,17 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from identifier.axle.car import Car, axle_impulse, axle_port, larger, named_port, within
-from identifier.axle.covariance import factors_of, inflated, row_of, spread, triangle
+from identifier.axle.car import (
+    Car,
+    axle_impulse,
+    axle_port,
+    larger,
+    named_port,
+    reciprocal,
+    smaller,
+    within,
+)
+from identifier.axle.covariance import factors_of, inflated, loosened, row_of, spread, triangle
 from identifier.axle.curve import EDGES, Curve, curve, excited
 from identifier.axle.gate import Gate, GateState, gate
 from identifier.axle.learning import (
@@ -214,7 +223,7 @@ PORTS = (
     Port(
         "errors",
         f"-; -; {LOAD}",
-        "fast and slow mean squared error, peak force, per axle",
+        "fast and slow mean squared error, peak of the measured force, per axle",
         learnt=True,
         rule=NOT_NEGATIVE,
     ),
@@ -227,9 +236,9 @@ PORTS = (
     ),
     Port(
         "watch",
-        "s; s; -",
+        "s; s; -; s",
         "time in doubt, and in which kept explained again; mean squared error of W and of kept, "
-        "front and rear",
+        "front and rear; time for which W explained forces",
         learnt=True,
         rule=NOT_NEGATIVE,
     ),
@@ -245,15 +254,19 @@ PORTS = (
 class RegressionSample(NamedTuple):
     """A sample of the regression, rows front and rear.
 
-    h : regressor (2, q).   innovation : y - h'w, clipped (2,).   R : its variance (2,).
-    inflation : variance to add along a change of friction.   learns : 1 or 0, (2,).
+    h : regressor (2, q), zero but for the offset where there is no force to learn from.
+    innovation : y - h'w, clipped (2,).   R : its variance (2,).   learns : 1 or 0.
+    holds : whether there is a force to learn from (2,).   inflation : variance to add along a
+    change of friction.   drift : of the offset, over its limit (2,).
     """
 
     h: Any
     innovation: Any
     R: Any
-    inflation: Any
     learns: Any
+    holds: Any
+    inflation: Any
+    drift: Any
 
 
 def build_step(steps: tuple[int, ...], *, rises: bool = False) -> ca.Function:
@@ -276,7 +289,7 @@ def build_step(steps: tuple[int, ...], *, rises: bool = False) -> ca.Function:
     if rises:
         ports["rising"] = ca.SX.sym("rising", n)
     axles = [_learn(ports, sample, i) for i in (0, 1)]
-    watch = _watch(f, ports, sample, y, ca.vertcat(*(axle.uncertainty for axle in axles)))
+    watch = _watch(f, ports, h, y, ca.vertcat(*(axle.uncertainty for axle in axles)))
     theta = ca.vertcat(*(_kept(ports, limits, axles[i], watch, i) for i in (0, 1)))
     next_state |= f.next_state
     next_state["W"], next_state["own"] = theta[:, :n], theta[:, n:]
@@ -324,52 +337,69 @@ def _sample_of(
 ) -> tuple[RegressionSample, ErrorState]:
     """Return the sample of the regression, and means of its errors; adds its ports."""
     ports["errors"], errors = axle_port(ErrorState, "errors")
-    ports["excitation"] = ca.SX.sym("excitation", 2, 1 + len(EDGES))
+    ports["watch"], watch = named_port(WatchState, "watch")
+    ports["watching"], watching = named_port(WatchNumbers, "watching")
     ports["change"], change = named_port(ChangeNumbers, "change")
     numbers = RegressionNumbers(*ca.vertsplit(ports["regression"]))
     learns, W = f.gated.learns, ports["W"]
     y_hat = ca.sum2(W * h[:, : W.shape[1]])
     innovation = y - y_hat
-    sigma = numbers.error + numbers.relative_error * ca.fabs(y_hat)
+    sigma = _deviation(f, numbers, y_hat)
     fast, slow = error_means(change, errors, (innovation / sigma) ** 2, learns)
-    peak = larger(ca.fabs(y_hat), errors.peak * numbers.decay)
-    peak = ca.if_else(learns, peak, errors.peak)
     bound = numbers.clip * sigma * slow
+    peak = larger(ca.fabs(y), errors.peak * numbers.decay)
+    peak = ca.if_else(learns, peak, errors.peak)
+    holds = peak >= numbers.least_force
+    alarms = learns * alarm(change, fast, slow)
+    both = (
+        ca.logic_and(holds[0], holds[1])
+        * smaller(alarms[0], alarms[1])
+        * (watch.known >= watching.known)
+    )
     sample = RegressionSample(
-        h=h,
+        h=ca.horzcat(h[:, :-1] * holds, h[:, -1]),
         innovation=within(innovation, -bound, bound),
         R=sigma**2 * slow * numbers.samples,
-        inflation=learns * change.inflation * alarm(change, fast, slow),
-        learns=ca.logic_and(learns, peak >= numbers.error),
+        learns=learns,
+        holds=holds,
+        inflation=change.inflation * both,
+        drift=change.offset * (watch.known < watching.known) * alarms,
     )
     return sample, ErrorState(fast, slow, peak)
 
 
-def _watch(
-    f: Forward, ports: dict[str, Any], sample: RegressionSample, y: Any, uncertainty: Any
-) -> Watched:
+def _deviation(f: Forward, numbers: RegressionNumbers, y_hat: Any) -> Any:
+    """Return the standard deviation that y is told to have (2,).
+
+    What the force is wrong by, and what slip is: by a force that is late, whose y changes by
+    κ (φ cos δ - ŷ) a second, and by noise of v_y (effective variance, errors in variables).
+    """
+    late = ca.fabs(f.curve.force * f.cos_delta - y_hat)
+    noisy = f.curve.carcass_slope * reciprocal(f.gated.v_x)
+    of_force = numbers.error + numbers.relative_error * ca.fabs(y_hat)
+    return of_force + numbers.lateness * late + numbers.noise * noisy
+
+
+def _watch(f: Forward, ports: dict[str, Any], h: Any, y: Any, uncertainty: Any) -> Watched:
     """Return whether there is an alarm on the weights; adds its ports."""
     n = f.curve.units.shape[1]
-    ports["watch"], state = named_port(WatchState, "watch")
-    ports["watching"], numbers = named_port(WatchNumbers, "watching")
     ports["kept"] = ca.SX.sym("kept", 2, n + 3)
-    expected = RegressionNumbers(*ca.vertsplit(ports["regression"]))
+    numbers = RegressionNumbers(*ca.vertsplit(ports["regression"]))
     slow = ports["errors"][:, 1]
 
     def normalized(W: Any) -> Any:
-        y_hat = ca.sum2(W * sample.h[:, :n])
-        sigma = expected.error + expected.relative_error * ca.fabs(y_hat)
-        return (y - y_hat) ** 2 / (sigma**2 * slow + uncertainty)
+        y_hat = ca.sum2(W * h[:, :n])
+        return (y - y_hat) ** 2 / (_deviation(f, numbers, y_hat) ** 2 * slow + uncertainty)
 
     size = ca.fabs(y)
     return watched(
-        numbers,
-        state,
+        WatchNumbers(*ca.vertsplit(ports["watching"])),
+        WatchState(*ca.vertsplit(ports["watch"])),
         normalized(ports["W"]),
         normalized(ports["kept"][:, :n]),
         dt=ports["dt"],
         learns=f.gated.learns,
-        moving=larger(size[0], size[1]) > MOVING * expected.error,
+        moving=larger(size[0], size[1]) > MOVING * numbers.error,
     )
 
 
@@ -377,13 +407,14 @@ def _kept_books(
     f: Forward, ports: dict[str, Any], sample: RegressionSample, means: ErrorState, watch: Watched
 ) -> dict[str, Any]:
     """Return means of errors and excitation; in an alarm the mean error and what is known rest."""
+    ports["excitation"] = ca.SX.sym("excitation", 2, 1 + len(EDGES))
     slow = ca.if_else(watch.rests, ports["errors"][:, 1], means.slow)
     times = excited(
         ports["excitation"],
         f.size,
         dt=ports["dt"],
         samples=RegressionNumbers(*ca.vertsplit(ports["regression"])).samples,
-        learns=ca.logic_and(sample.learns, ca.logic_not(watch.rests)),
+        learns=sample.learns * sample.holds * ca.logic_not(watch.rests),
     )
     return {"errors": ca.horzcat(means.fast, slow, means.peak), "excitation": times}
 
@@ -401,6 +432,8 @@ def _learn(ports: dict[str, Any], sample: RegressionSample, i: int) -> Learnt:
     trace = before.trace + sum(sample.inflation * d * d for d in direction)
     fits = trace * widest[0] <= 1
     P = inflated(P, direction, ca.if_else(fits, sample.inflation, 0))
+    now = before._replace(trace=ca.if_else(fits, trace, before.trace))
+    P, now = loosened(P, now, sample.drift[i] / widest[-1], widest)
     return update(
         theta,
         P,
@@ -408,9 +441,9 @@ def _learn(ports: dict[str, Any], sample: RegressionSample, i: int) -> Learnt:
         innovation=sample.innovation[i],
         R=sample.R[i],
         forgetting=forgetting,
-        spread=before._replace(trace=ca.if_else(fits, trace, before.trace)),
+        spread=now,
         limits=widest,
-        learns=sample.learns[i],
+        learns=sample.learns,
     )
 
 

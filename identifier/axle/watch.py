@@ -28,6 +28,7 @@ from identifier.axle.car import larger, smaller
 from models.rules import require_positive_fields
 
 LARGEST_Q = 25.0  # one outlier alone is no fault
+UNSURE = 0.5  # of what was known is lost by going back: frequent alarms are the model's own fault
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +42,7 @@ class Watch:
     calm : mean of q below which weights explain what is measured [-].
     behind : time by which the old weights follow the learnt ones [s].
     again : time for which the old weights must explain forces that are there [s].
+    known : time for which weights must have explained forces before there is an alarm on them [s].
     give_up : time of alarm after which it is taken for another road [s].
 
     Raises
@@ -54,13 +56,14 @@ class Watch:
     calm: float = 2.0
     behind: float = 1.0
     again: float = 0.3
+    known: float = 3.0
     give_up: float = 6.0
 
     def __post_init__(self) -> None:
         require_positive_fields(self)
 
     def numbers(self, dt: float) -> Array:
-        """Return the numbers of `WatchNumbers`, (6,).
+        """Return the numbers of `WatchNumbers`, (7,).
 
         Parameters
         ----------
@@ -73,6 +76,7 @@ class Watch:
                 self.calm,
                 min(dt / self.behind, 1.0),
                 self.again,
+                self.known,
                 self.give_up,
             ]
         )
@@ -86,12 +90,14 @@ class WatchNumbers(NamedTuple):
     calm: Any
     follow: Any
     again: Any
+    known: Any
     give_up: Any
 
 
 class WatchState(NamedTuple):
     """Time of alarm, 0 outside of it, and time in which the kept weights explained again [s]; means
-    of q of the learnt and of the kept weights, front and rear.
+    of q of the learnt and of the kept weights, front and rear; time for which the learnt ones
+    explained forces that were there, up to `Watch.known` [s].
     """
 
     alarm: Any
@@ -100,13 +106,14 @@ class WatchState(NamedTuple):
     learnt_rear: Any
     kept_front: Any
     kept_rear: Any
+    known: Any
 
 
-BEGIN = WatchState(0.0, 0.0, 1.0, 1.0, 1.0, 1.0)
+BEGIN = WatchState(0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0)
 
 
 class Watched(NamedTuple):
-    """What is to be done, 1 or 0, and the next state (6,).
+    """What is to be done, 1 or 0, and the next state (7,).
 
     rests : whether lag, offsets and what is known of errors and slip rest.   returns : whether the
     kept weights take the place of the learnt ones.   follow : share by which the kept weights go
@@ -148,7 +155,8 @@ def watched(
     learnt = [mean(a, b) for a, b in zip(state[2:4], ca.vertsplit(q), strict=True)]
     kept = [mean(a, b) for a, b in zip(state[4:6], ca.vertsplit(q_kept), strict=True)]
     worst, worst_kept = larger(*learnt), larger(*kept)
-    rests = ca.logic_or(state.alarm > 0, worst > numbers.noticed)
+    wrong = ca.logic_and(worst > numbers.noticed, state.known >= numbers.known)
+    rests = ca.logic_or(state.alarm > 0, wrong)
     alarm = ca.if_else(rests, state.alarm + time, 0)
     explained = ca.logic_and(rests, worst_kept < numbers.calm)
     again = ca.if_else(explained, state.again + time * moving, 0)
@@ -163,9 +171,16 @@ def watched(
         ca.if_else(returns, b, ca.if_else(goes_on, smaller(a, 1), a))
         for a, b in zip(learnt, kept, strict=True)
     ]
+    known = smaller(state.known + time * moving * calm, numbers.known)
     return Watched(
         rests=rests,
         returns=returns,
         follow=ca.if_else(goes_on, 1, calm * learns * numbers.follow),
-        state=ca.vertcat(ca.if_else(over, 0, alarm), ca.if_else(over, 0, again), *learnt, *kept),
+        state=ca.vertcat(
+            ca.if_else(over, 0, alarm),
+            ca.if_else(over, 0, again),
+            *learnt,
+            *kept,
+            ca.if_else(goes_on, 0, known * (1 - returns * UNSURE)),
+        ),
     )

@@ -193,7 +193,8 @@ def test_designs_are_similar_for_a_model_car(car, model_car):
     assert full.prior.compliance / small.prior.compliance == pytest.approx(10.0)
     assert full.min_speed / small.min_speed == pytest.approx(np.sqrt(10.0))
     assert small.sway.frequency / full.sway.frequency == pytest.approx(np.sqrt(10.0))
-    assert full.regression == small.regression
+    assert full.regression.noise / small.regression.noise == pytest.approx(np.sqrt(10.0))
+    assert full.regression == replace(small.regression, noise=full.regression.noise)
 
 
 def test_curves_may_be_kept_from_falling_before_a_slip(car, drive):

@@ -13,7 +13,9 @@ from identifier.axle.covariance import LEAST_VARIANCE, narrowed, packed, per_var
 from identifier.axle.curve import LADDER
 from identifier.run import identify
 
-ROW = 1 / np.array(LADDER) / np.sum(1 / np.array(LADDER))
+SLOPES = np.sum(1 / np.array(LADDER))
+ROW = 1 / np.array(LADDER) / SLOPES
+FLAT, STEEP = 2.0 / SLOPES, 80.0 / SLOPES  # the least and the most stiffness, by the same sum
 
 
 def dead_yaw_rate(s, rng):
@@ -106,7 +108,8 @@ def broken(design, car, state):
             s, k, o = own[i]
             held = Fraction(b.least_grip) <= grip <= Fraction(b.most_grip)
             found |= set() if held else {"grip"}
-            found |= {"stiffness"} if not slope >= 0 else set()
+            stiff = Fraction(b.least_stiffness) <= slope <= Fraction(b.most_stiffness)
+            found |= set() if stiff else {"stiffness"}
             found |= {"weight"} if not np.abs(w).max() <= b.weight else set()
             found |= {"compliance"} if not 0.0 <= s <= b.compliance else set()
             found |= {"share"} if not 0.0 <= k <= 1.0 else set()
@@ -139,7 +142,8 @@ def test_a_dead_yaw_rate_sensor_leads_to_the_bounds_and_not_beyond(car, drive):
     history = identify(spoilt(drive(n=4000, amplitude=0.07), dead_yaw_rate), car, design)
     grip = history.state["W"].sum(axis=2)
     assert broken(design, car, history.state) == set()
-    assert min(grip.min() - 0.1, 1.5 - grip.max()) < 1e-4
+    slope = (history.state["W"] / np.array(design.ladder)).sum(axis=2)
+    assert min(grip.min() - 0.1, 3.0 - grip.max(), slope.min() - 2.0) < 1e-3
     narrower = replace(
         design,
         bounds=replace(design.bounds, least_grip=0.3, most_grip=0.7, weight=0.5),
@@ -165,7 +169,7 @@ def kept(theta, P, **limits):
     """[w, s, k, offset] within bounds, in double."""
     n = len(theta) - 3
     declared = bounds.Bounds(compliance=0.3, v_y=0.2, **limits)
-    numbers = bounds.BoundNumbers(*declared.numbers(n))
+    numbers = bounds.BoundNumbers(*declared.numbers(n, SLOPES, 0.0))
     upper = {(i, j): P[i, j] for i in range(n) for j in range(i, n)}
     found = bounds.bounded(
         numbers, [ca.SX(float(t)) for t in theta], upper, offset=0.01, slope=list(ROW)
@@ -175,22 +179,25 @@ def kept(theta, P, **limits):
 
 def test_the_move_is_the_least_in_the_metric_of_the_covariance(rng):
     """No point of the set, among many near it, is nearer in that metric."""
-    at_both = 0
-    for _ in range(60):
+    at_both, at_steepest = 0, 0
+    for _ in range(90):
         A = rng.standard_normal((4, 4))
         P = A @ A.T + 0.05 * np.eye(4)
         theta = np.concatenate([rng.standard_normal(4) * 1.5, [0.1, 0.2, 0.001]])
         found = kept(theta, P, weight=50.0)[:4]
-        assert 0.1 <= found.sum() <= 1.5
-        assert ROW @ found >= 0.0
+        assert 0.1 <= found.sum() <= 3.0
+        assert FLAT <= ROW @ found <= STEEP
         metric = np.linalg.inv(P)
         size = (found - theta[:4]) @ metric @ (found - theta[:4])
         near = found + 10.0 ** rng.uniform(-3, 0, (4000, 1)) * rng.standard_normal((4000, 4))
-        inside = (near.sum(1) >= 0.101) & (near.sum(1) <= 1.499) & (near @ ROW >= 1e-3)
+        inside = (near.sum(1) >= 0.101) & (near.sum(1) <= 2.999)
+        inside &= (near @ ROW >= FLAT + 1e-3) & (near @ ROW <= STEEP - 1e-3)
         away = near[inside] - theta[:4]
         assert (np.einsum("ki,ij,kj->k", away, metric, away) > size - 1e-2 * (1 + size)).all()
-        at_both += ROW @ found < 1e-3 and min(found.sum() - 0.1, 1.5 - found.sum()) < 1e-2
-    assert at_both >= 3
+        at_bound = min(found.sum() - 0.1, 3.0 - found.sum()) < 1e-2
+        at_both += at_bound and ROW @ found < FLAT + 1e-3
+        at_steepest += ROW @ found > STEEP - 1e-3
+    assert at_both >= 3 and at_steepest >= 3
 
 
 def test_what_is_inside_is_not_moved_by_a_bit(rng):
@@ -207,21 +214,26 @@ def test_the_set_is_reached_from_anywhere_by_any_metric(scale, rng):
         P = v @ v.T - 1e-9 * np.eye(4) * (k % 2)
         theta = scale * rng.standard_normal(7)
         w = kept(theta, P)[:4]
-        assert Fraction(0.1) <= sum(map(Fraction, w)) <= Fraction(1.5)
-        assert sum(Fraction(a) / Fraction(b) for a, b in zip(w, LADDER, strict=True)) >= 0
+        assert Fraction(0.1) <= sum(map(Fraction, w)) <= Fraction(3.0)
+        slope = sum(Fraction(a) / Fraction(b) for a, b in zip(w, LADDER, strict=True))
+        assert 2 <= slope <= 80
         assert np.abs(w).max() <= 3.0
 
 
 def test_bounds_that_no_weights_can_keep_are_refused():
     with pytest.raises(ValueError, match="least_grip must be below most_grip"):
-        bounds.Bounds(compliance=0.1, v_y=0.1, least_grip=2.0)
+        bounds.Bounds(compliance=0.1, v_y=0.1, least_grip=4.0)
+    with pytest.raises(ValueError, match="least_stiffness must be below most_stiffness"):
+        bounds.Bounds(compliance=0.1, v_y=0.1, least_stiffness=90.0)
     with pytest.raises(ValueError, match=r"4 weights up to 0\.1 cannot carry"):
-        bounds.Bounds(compliance=0.1, v_y=0.1, weight=0.1).numbers(4)
+        bounds.Bounds(compliance=0.1, v_y=0.1, weight=0.1).numbers(4, SLOPES, 0.0)
+    with pytest.raises(ValueError, match=r"stiffness of .* loads/rad, outside of 2 to 80"):
+        bounds.Bounds(compliance=0.1, v_y=0.1).numbers(4, 1000.0, 0.0)
 
 
 def test_limits_are_floats_that_are_not_above_the_declared():
     for limit in (0.1, 0.3, 0.324, 1 / 3, 0.01):
-        numbers = bounds.Bounds(compliance=limit, v_y=limit).numbers(4)
+        numbers = bounds.Bounds(compliance=limit, v_y=limit).numbers(4, SLOPES, 0.0)
         assert (np.float32(numbers[-3:]).astype(float) == numbers[-3:]).all()
         assert limit * (1 - 2e-7) < numbers[-1] <= limit
 

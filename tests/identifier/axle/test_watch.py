@@ -26,7 +26,7 @@ STARTS, LASTS, AGAIN = 14.0, 2.0, 3.0  # s
 @cache
 def judge():
     """`watched` as a function of numbers."""
-    ports = [ca.SX.sym(name, size) for name, size in (("s", 6), ("q", 2), ("k", 2), ("on", 2))]
+    ports = [ca.SX.sym(name, size) for name, size in (("s", 7), ("q", 2), ("k", 2), ("on", 2))]
     numbers = WatchNumbers(*ca.vertsplit(ca.DM(Watch().numbers(DT))))
     state, q, kept, (learns, moving) = ports[0], ports[1], ports[2], ca.vertsplit(ports[3])
     found = watched(
@@ -41,7 +41,10 @@ def judge():
     return ca.Function("judge", ports, list(found))
 
 
-def judged(samples, state=BEGIN, axle=0):
+KNOWN = BEGIN._replace(known=Watch().known)  # so that there may be an alarm
+
+
+def judged(samples, state=KNOWN, axle=0):
     """Rests, returns and follow of samples (q and q of the kept ones at an axle, learns, moving).
 
     The other axle is as it should be.
@@ -75,7 +78,7 @@ def test_kept_weights_that_explain_forces_again_are_gone_back_to(axle):
     (back,) = np.flatnonzero(told[:, 1])
     calm_after = 0.2 * np.log((20.0 - 1.0) / (Watch().calm - 1.0))  # of a mean from 20 to 1
     assert (back - 200) * DT == pytest.approx(calm_after + Watch().again, abs=3 * DT)
-    assert state.alarm > 0.0  # what learns goes on to be wrong, so that there is doubt again
+    assert state.alarm == 0.0 and state.known == 0.5 * Watch().known
     told, state = judged([BAD] * 200 + [(20.0, 1.0, 1, 0)] * 200)
     assert not told[:, 1].any(), "without forces every weight explains what is measured"
 
@@ -89,6 +92,23 @@ def test_another_road_is_believed_after_a_while_and_nothing_is_waited_for_for_ev
         assert (end - begin) * DT == pytest.approx(wait, abs=2 * DT)
 
 
+def test_there_is_no_alarm_before_forces_were_explained_for_a_while():
+    """Weights that never explained a force cannot know better than the sensors."""
+    need = round(Watch().known / DT)
+    for before, alarms in ((need - 20, False), (need + 20, True)):
+        told, state = judged([GOOD] * before + [BAD] * 50, BEGIN)
+        assert bool(told[:, 0].any()) == alarms
+        assert state.known == pytest.approx(min(before + 5, need) * DT, abs=0.1)
+    assert not judged([(1.0, 1.0, 1, 0)] * 2 * need + [BAD] * 50, BEGIN)[0][:, 0].any()
+
+
+def test_what_was_known_is_halved_by_going_back_and_gone_by_going_on():
+    _, state = judged([BAD] * 100 + [(1.0, 1.0, 1, 1)] * 100)
+    assert state.known < 0.9 * Watch().known
+    told, state = judged([BAD] * 10 + [(1.0, 20.0, 1, 1)] * round(Watch().give_up / DT + 1))
+    assert told[:, 2].max() == 1.0 and state.known < 0.2
+
+
 def test_without_forces_that_tell_them_apart_the_kept_weights_are_believed_in_the_end():
     quiet = [(1.0, 1.0, 1, 0)] * 1400
     told, _ = judged([BAD] * 10 + quiet)
@@ -98,7 +118,7 @@ def test_without_forces_that_tell_them_apart_the_kept_weights_are_believed_in_th
 
 
 def test_nothing_changes_where_learning_does_not_run():
-    for begun in (BEGIN, WatchState(3.0, 0.2, 9.0, 8.0, 1.0, 1.5), WatchState(7.0, 0, 3, 3, 5, 5)):
+    for begun in (BEGIN, WatchState(3, 0.2, 9, 8, 1, 1.5, 3), WatchState(7, 0, 3, 3, 5, 5, 1)):
         _, state = judged([(20.0, 0.1, 0, 1), (0.1, 20.0, 0, 1)] * 50, begun)
         np.testing.assert_array_equal(state, begun)
 
@@ -132,7 +152,7 @@ def off_afterwards(recording, design):
     later = recording.t >= STARTS + LASTS + AGAIN
     off = np.sqrt(np.mean((history.axle_force - without_fault())[later] ** 2, axis=0))
     size = np.sqrt(np.mean(without_fault() ** 2, axis=0))
-    doubts = history.state["watch"].reshape(recording.t.size + 1, 6)[:, 0] > 0.0
+    doubts = history.state["watch"].reshape(recording.t.size + 1, 7)[:, 0] > 0.0
     return (off / size).max(), recording.t[np.flatnonzero(doubts[1:])]
 
 
@@ -153,7 +173,7 @@ def test_what_a_broken_sensor_taught_is_gone_three_seconds_after_it_is_good(faul
     design, recording = AxleIdentifier.for_vehicle(sedan()), broken(*fault)
     off, doubted = off_afterwards(recording, design)
     assert off < 0.05
-    assert STARTS < doubted[0] < STARTS + 0.5
+    assert STARTS < doubted[0] < STARTS + 0.6
     assert doubted[-1] < STARTS + LASTS + AGAIN
 
 
