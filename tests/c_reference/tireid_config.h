@@ -28,7 +28,7 @@ typedef double tireid_real;
 #define TIREID_MAX_STEERING (1.5) /* likewise [rad] */
 #define TIREID_MAX_FORCE (73575.0) /* likewise [N] */
 #define TIREID_NOWHERE (1000000.0) /* speed of no car [m/s] */
-#define TIREID_VERSION "tireid, tireid" /* name, hash, version of tireid */
+#define TIREID_VERSION "reference" /* name, hash, version of tireid */
 
 /* Time [s] without a sample that could be taken after which no force is told any
  * more; may be set by who compiles the library. */
@@ -56,12 +56,12 @@ typedef struct {
     tireid_real own[2][3];
     /* covariance U D U' of W and own: D, and U above it, by rows; front and rear [of W and own] */
     tireid_real UD[2][28];
-    /* fast and slow mean squared error, peak force, per axle [-; -; static axle loads] */
+    /* fast and slow mean squared error, peak of the measured force, per axle [-; -; static axle loads] */
     tireid_real errors[2][3];
     /* largest slip, then time of learning above each edge, per axle [rad; s] */
     tireid_real excitation[2][9];
-    /* time in doubt, and in which kept explained again; mean squared error of W and of kept, front and rear [s; s; -] */
-    tireid_real watch[6];
+    /* time in doubt, and in which kept explained again; mean squared error of W and of kept, front and rear; time for which W explained forces [s; s; -; s] */
+    tireid_real watch[7];
     /* W and own that are gone back to after a fault, front and rear [of W and own] */
     tireid_real kept[2][7];
 } tireid_weights;

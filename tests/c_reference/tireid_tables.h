@@ -34,7 +34,7 @@ static const tireid_values tireid_start = {
               TIREID_C(-1.5599865674243356), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0),
               TIREID_C(0.03816309137529061), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0),
               TIREID_C(0.0007290000000000002), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.09),
-              TIREID_C(0.0), TIREID_C(0.000662175) } },
+              TIREID_C(0.0), TIREID_C(0.0026487) } },
         {
             { TIREID_C(0.0), TIREID_C(1.0), TIREID_C(0.0) },
             { TIREID_C(0.0), TIREID_C(1.0), TIREID_C(0.0) } },
@@ -43,7 +43,8 @@ static const tireid_values tireid_start = {
               TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0) },
             { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0),
               TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0) } },
-        { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(1.0), TIREID_C(1.0), TIREID_C(1.0), TIREID_C(1.0) },
+        { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(1.0), TIREID_C(1.0), TIREID_C(1.0), TIREID_C(1.0),
+          TIREID_C(0.0) },
         {
             { TIREID_C(0.06545572125330795), TIREID_C(0.7053531714662584),
               TIREID_C(0.08723676334811209), TIREID_C(-0.0628737155301445),
@@ -74,7 +75,7 @@ static const tireid_rule tireid_rules[TIREID_RULES] = {
     { TIREID_FACTORS, 42U, 7U },
     { TIREID_NOT_NEGATIVE, 70U, 6U },
     { TIREID_NOT_NEGATIVE, 76U, 18U },
-    { TIREID_NOT_NEGATIVE, 94U, 6U },
+    { TIREID_NOT_NEGATIVE, 94U, 7U },
 };
 
 #endif

@@ -325,7 +325,7 @@ def test_representations_are_short(tires, run, log, car):
 def test_only_the_paper_s_identifier_is_certified(car):
     axle = ti.certify(ti.AxleIdentifier.for_vehicle(car), car)
     assert axle.verdict == "not certified" and not axle.properties
-    assert axle.held["grip_static_axle_loads"] == [0.1, 1.5]
+    assert axle.held["grip_static_axle_loads"] == [0.1, 3.0]
     assert "not certified" in str(axle)
     paper = ti.certify(ti.PaperIdentifier.for_vehicle(car), car)
     assert paper.verdict in ("pass", "warn") and paper["phase_margin"].value > 30.0
