@@ -5,10 +5,11 @@ from functools import partial
 
 import numpy as np
 
+from benchmarks.answers import force_error
 from benchmarks.extrapolate_recorded import BEHIND, TEXTBOOK, key_of
 from benchmarks.random_cars import CLASSES, FIRST_SEED, random_car, random_drive
 from benchmarks.targets import Targets, show
-from identifier.baselines import fit_floor, share_of_force, structure_of
+from identifier.baselines import fit_floor, structure_of
 from identifier.compare.course import Course
 from identifier.compare.floors import STRUCTURES
 from identifier.method import Method
@@ -107,7 +108,7 @@ def random_fleet(targets: Targets) -> None:
             learnt, unseen = (random_drive(car, rng).log(rng) for _ in range(2))
             for name, make in makes.items():
                 model = identify(learnt, car.told, make(car.told)).freeze()
-                errors[name].append(100.0 * float(np.mean(share_of_force(model, unseen))))
+                errors[name].append(float(np.mean(force_error(model, unseen))))
     means = {name: float(np.mean(values)) for name, values in errors.items()}
     print(
         f"{CARS} random cars of each of {len(CLASSES)} classes, learnt on one drive, frozen, asked"
