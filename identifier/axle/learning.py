@@ -34,6 +34,7 @@ class Regression:
     noise : of v_y, which sits in the slip [m/s].
     sure : force from which on samples teach the curve, and not the sensors' offset alone
         [`error`]: a smaller one could be theirs.
+    moment : over which that force is meant [s]: noise is no force.
     sure_time : its memory [s]: between left and right a curve is learnt at small forces, too.
     clip : largest error that counts in full [its standard deviation].
     widest : trace of the covariance of weights at which forgetting stops, over the prior's [-].
@@ -53,6 +54,7 @@ class Regression:
     noise: float = 0.005
     sure: float = 3.5
     sure_time: float = 0.7
+    moment: float = 0.2
     clip: float = 5.0
     widest: float = 2.0
 
@@ -60,7 +62,7 @@ class Regression:
         require_positive_fields(self)
 
     def numbers(self, dt: float) -> Array:
-        """Return the numbers of `RegressionNumbers`, (12,).
+        """Return the numbers of `RegressionNumbers`, (13,).
 
         Parameters
         ----------
@@ -80,6 +82,7 @@ class Regression:
                 self.noise,
                 self.sure * self.error,
                 math.exp(-dt / self.sure_time),
+                min(dt / self.moment, 1.0),
                 self.clip,
             ]
         )
@@ -87,7 +90,7 @@ class Regression:
 
 class RegressionNumbers(NamedTuple):
     """κ, e, (1 - e)/2; (1 - λ)/λ; errors; correlated samples; κ lateness; noise of v_y; least force
-    to learn from and the decay of its memory; clip.
+    to learn from, the decay of its memory and the gain of its mean; clip.
     """
 
     bandwidth: Any
@@ -101,6 +104,7 @@ class RegressionNumbers(NamedTuple):
     noise: Any
     least_force: Any
     decay: Any
+    smooth: Any
     clip: Any
 
 
@@ -256,11 +260,14 @@ class ChangeNumbers(NamedTuple):
 
 
 class ErrorState(NamedTuple):
-    """Columns (2,): fast and slow mean of q [-], recent peak of |y| [static axle loads]."""
+    """Columns (2,): fast and slow mean of q [-], recent peak of the size of the
+    last one, the mean of y over a moment [static axle loads].
+    """
 
     fast: Any
     slow: Any
     peak: Any
+    force: Any
 
 
 def error_means(numbers: ChangeNumbers, state: ErrorState, q: Any, learns: Any) -> tuple[Any, Any]:

@@ -2,7 +2,7 @@
 
 Carried, rows front and rear: W (2, n) and own (2, 3), what is learnt; UD (2, q (q + 1)/2) the
 factors of its covariance P = U D U', D on the diagonal, q = n + 3; gate, sway, slip as in
-`forward`; sensitivity (2, 3); filters (2, q + 1); errors (2, 3); excitation (2, 9); watch (7,) and
+`forward`; sensitivity (2, 3); filters (2, q + 1); errors (2, 4); excitation (2, 9); watch (7,) and
 kept (2, q), the weights that are gone back to after a fault. Sampled: x, u, v_x. Everything else is
 a number that stays an input. Forces are told with the weights before the sample.
 """
@@ -223,9 +223,8 @@ PORTS = (
     Port(
         "errors",
         f"-; -; {LOAD}",
-        "fast and slow mean squared error, peak of the measured force, per axle",
+        "fast and slow mean squared error, peak and mean of the measured force, per axle",
         learnt=True,
-        rule=NOT_NEGATIVE,
     ),
     Port(
         "excitation",
@@ -347,7 +346,8 @@ def _sample_of(
     sigma = _deviation(f, numbers, y_hat)
     fast, slow = error_means(change, errors, (innovation / sigma) ** 2, learns)
     bound = numbers.clip * sigma * slow
-    peak = larger(ca.fabs(y), errors.peak * numbers.decay)
+    force = errors.force + learns * numbers.smooth * (y - errors.force)
+    peak = larger(ca.fabs(force), errors.peak * numbers.decay)
     peak = ca.if_else(learns, peak, errors.peak)
     holds = peak >= numbers.least_force
     alarms = learns * alarm(change, fast, slow)
@@ -365,7 +365,7 @@ def _sample_of(
         inflation=change.inflation * both,
         drift=change.offset * (watch.known < watching.known) * alarms,
     )
-    return sample, ErrorState(fast, slow, peak)
+    return sample, ErrorState(fast, slow, peak, force)
 
 
 def _deviation(f: Forward, numbers: RegressionNumbers, y_hat: Any) -> Any:
@@ -416,7 +416,7 @@ def _kept_books(
         samples=RegressionNumbers(*ca.vertsplit(ports["regression"])).samples,
         learns=sample.learns * sample.holds * ca.logic_not(watch.rests),
     )
-    return {"errors": ca.horzcat(means.fast, slow, means.peak), "excitation": times}
+    return {"errors": ca.horzcat(means.fast, slow, means.peak, means.force), "excitation": times}
 
 
 def _learn(ports: dict[str, Any], sample: RegressionSample, i: int) -> Learnt:

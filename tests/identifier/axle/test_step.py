@@ -37,7 +37,8 @@ class ByHand:
         self.last = np.zeros(5)
         self.bad = self.stuck = 0
         self.steady = 0.0
-        self.fast, self.slow, self.peak = np.zeros(2), np.ones(2), np.zeros(2)
+        self.fast, self.slow = np.zeros(2), np.ones(2)
+        self.peak, self.force = np.zeros(2), np.zeros(2)
         self.longest, self.time = np.zeros(2), np.zeros(2)
         self.kept = self.theta.copy()
         self.alarm = self.again = self.known = 0.0
@@ -145,7 +146,8 @@ class ByHand:
         before = self.theta.copy(), self.slow.copy()
         y_hat = (self.theta[:, :n] * whole[:, :n]).sum(1)
         error, sd = y - y_hat, self.deviation(y_hat, force)
-        self.peak = np.maximum(np.abs(y), self.peak * np.exp(-dt / m.sure_time))
+        self.force += min(dt / m.moment, 1.0) * (y - self.force)
+        self.peak = np.maximum(np.abs(self.force), self.peak * np.exp(-dt / m.sure_time))
         holds = self.peak >= m.sure * m.error
         h = np.where(holds[:, None], whole, np.eye(q)[-1] * whole)
         squared = np.minimum((error / sd) ** 2, 25)

@@ -173,7 +173,7 @@ def test_what_a_broken_sensor_taught_is_gone_three_seconds_after_it_is_good(faul
     design, recording = AxleIdentifier.for_vehicle(sedan()), broken(*fault)
     off, doubted = off_afterwards(recording, design)
     assert off < 0.05
-    assert STARTS < doubted[0] < STARTS + 0.6
+    assert STARTS < doubted[0] < STARTS + 0.55
     assert doubted[-1] < STARTS + LASTS + AGAIN
 
 
