@@ -246,6 +246,18 @@ class TireModel(ABC):
         """Slip [rad] up to which the forces were learnt, (2,); None where the model cannot tell."""
         return None
 
+    def relative_sd(self, alpha: Array) -> Array | None:
+        """Return how unsure the forces at slip angles still are, (k, 2); None: it cannot tell.
+
+        Standard deviation of the force over that before learning: 1 is what was believed.
+
+        Parameters
+        ----------
+        alpha : slip angles [rad], (k,), not zero.
+        """
+        del alpha
+        return None
+
     def estimates(self) -> tuple[Estimate, ...]:
         """Return what a verdict tells of each axle: stiffness, without a doubt that is known."""
         told = self.vehicle.bicycle[4:]

@@ -2,8 +2,10 @@
 
 import argparse
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
+from codegen.escape import visible
 from identifier.verdict import Number, Verdict
 from tireid.output import text_table
 from tireid.progress import complain
@@ -80,6 +82,20 @@ def verdict_text(verdict: Verdict, *, numbers: bool = True) -> str:
     """
     table = [text_table([list(HEADER), *number_rows(verdict)])] if numbers else []
     return "\n".join([*table, *verdict.lines])
+
+
+def verdicts_text(verdicts: Mapping[str, Verdict]) -> str:
+    """Return what is found on several recordings, as lines of text.
+
+    Parameters
+    ----------
+    verdicts : on the default method, by the name of the recording that it learnt on.
+    """
+    lines = []
+    for name, verdict in verdicts.items():
+        lines.append(f"default learnt on {visible(name)}: {verdict.headline}")
+        lines += [f"  {finding.line}" for finding in verdict.findings]
+    return "\n".join(lines)
 
 
 def verdict_headline(verdict: Verdict) -> Headline:

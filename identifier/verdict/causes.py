@@ -192,8 +192,9 @@ def _least(missed: Callable[[float], float], here: float, cause: Cause) -> tuple
         around = sizes[at - 1 : at + 2]
         values = [tried[one] ** 2 for one in around]
         if np.isfinite(values).all():
-            bent = float(-0.5 * np.polyfit(around, values, 2)[1] / np.polyfit(around, values, 2)[0])
-            if around[0] < bent < around[2]:
+            a, b, _ = np.polyfit(around, values, 2)
+            bent = float(-0.5 * b / a) if a > 0.0 else best
+            if around[0] < bent < around[2] and bent not in tried:
                 tried[bent] = missed(bent)
     best = min(tried, key=lambda one: tried[one])
     return best, tried[best]

@@ -191,8 +191,8 @@ def _elsewhere(history: History, found: Evidence) -> Array | None:
         missed.append(np.where(counted, away, 0.0))
         force.append(np.where(counted, found.measured, 0.0))
     both, size = np.vstack(missed), np.vstack(force)
-    counted_share = np.maximum(np.mean(size != 0.0, axis=0), 1e-12)
-    return clean_share(both, size, found.noise * counted_share)
+    seen = np.mean(size != 0.0, axis=0)
+    return np.where(seen > 0.0, clean_share(both, size, found.noise * seen), 0.0)
 
 
 def _taught(

@@ -17,15 +17,17 @@ MOST_MISSED = 0.12  # share of the force, rms, that the frozen model may miss at
 MOST_MISSED_ELSEWHERE = 0.3  # and a model of half of the drive of the other half
 MOST_APART = 0.25  # online from frozen, over the later half of the drive
 LEAST_FORCE = 0.1  # static axle loads: less is no force to learn from
-LEAST_KNOWN = 0.5  # share of the force (squared) that must lie within the known slip
+MOST_DOUBT = 0.5  # standard deviation of the curve over the prior's, where the force is
+LEAST_SLIP = 1e-4  # rad: every curve is known at zero
 STIFFNESS = (2.0, 100.0)  # 1/rad, over static load: scale cars have 4, race cars 50
 REAR_OVER_FRONT = (0.4, 3.0)  # of these
-FAR_FROM_TOLD = 4.0  # ratio of learnt to told stiffness, or told to learnt
+FAR_FROM_TOLD = 3.0  # ratio of learnt to told stiffness, or told to learnt
 STIFFENS = 1.6  # secant at the known slip over slope at zero: no tire stiffens with slip
 INERTIA = (0.3, 2.0)  # I_z/(m l_f l_r): two points on the axles have 1
 MOST_A_Y = 0.25  # share of the recorded a_y that v_y, r and v_x do not give
 CENTER = 0.08  # of the wheelbase, that the center of gravity may seem off
-CERTAIN = 0.4  # share of what is missed (squared) that another center of gravity must explain
+CERTAIN = 0.4  # share of what is missed (squared) that another center of gravity must explain,
+NOTICED = 0.02  # and the share of the force (rms) that this must be
 PERCENT = 100.0
 
 
@@ -92,7 +94,7 @@ def _cause(drive: Drive) -> str:
 
 def _missed(drive: Drive) -> Iterator[Finding]:
     for axle, missed, none in zip(AXLES, drive.found.missed, _forceless(drive), strict=True):
-        if missed > MOST_MISSED and not none:
+        if not (missed <= MOST_MISSED or none):
             yield Finding(
                 "force_missed",
                 axle,
@@ -119,22 +121,21 @@ def _elsewhere(drive: Drive) -> Iterator[Finding]:
 
 
 def _unknown(drive: Drive) -> Iterator[Finding]:
-    known = drive.model.known_slip
-    if known is None:
-        return
     car, windows = drive.model.vehicle, drive.found.windows
     slip = np.abs(windows.mean(np.asarray(drive.recording.alpha(car.l_f, car.l_r))))
-    power = drive.found.measured**2
-    inside = np.sum(power * (slip <= known), axis=0) / np.maximum(np.sum(power, axis=0), 1e-12)
     for i, axle in enumerate(AXLES):
-        if inside[i] < LEAST_KNOWN and not _forceless(drive)[i]:
-            share = PERCENT * float(inside[i])
+        doubt = drive.model.relative_sd(np.maximum(slip[:, i], LEAST_SLIP))
+        if doubt is None:
+            return
+        power = drive.found.measured[:, i] ** 2
+        mean = float(np.sqrt(np.sum(power * doubt[:, i] ** 2) / max(float(power.sum()), 1e-12)))
+        if mean > MOST_DOUBT and not _forceless(drive)[i]:
             yield Finding(
                 "prior",
                 axle,
-                f"the force is known up to {np.degrees(known[i]):.1f} degrees of slip, which holds "
-                f"{share:.0f} % of the drive's force: elsewhere stands what was believed before; "
-                "drive longer, or as hard as the answer is needed",
+                f"where the drive's force is, the curve is still {PERCENT * mean:.0f} % as unsure "
+                f"as before the first sample ({PERCENT * MOST_DOUBT:.0f} % are allowed): what "
+                "stands there was believed, not learnt; drive longer, or as hard as this",
                 True,
             )
 
@@ -162,8 +163,8 @@ def _stiffness(drive: Drive) -> Iterator[Finding]:
                 "far_from_told",
                 axle,
                 f"a cornering stiffness of {C:.3g} N/rad against {before:.3g} told: l_f and l_r "
-                "swapped, or the vehicle file of another car or of other tires",
-                True,
+                "swapped, the vehicle file of another car, or an estimate that was far off",
+                False,
             )
     ratio = float(relative[1] / relative[0]) if relative[0] > 0.0 else np.inf
     if usual and not REAR_OVER_FRONT[0] <= ratio <= REAR_OVER_FRONT[1]:
@@ -247,7 +248,9 @@ def _center(drive: Drive) -> Iterator[Finding]:
     for suspect in drive.geometry[:1]:
         off = abs(suspect.size) / drive.model.vehicle.wheelbase
         moved = suspect.cause.code == "center_of_gravity" and off > CENTER
-        if moved and suspect.share > CERTAIN and not any(_forceless(drive)):
+        gained = float(np.sqrt(np.mean(drive.found.missed**2) * max(suspect.share, 0.0)))
+        certain = suspect.share > CERTAIN and gained > NOTICED
+        if moved and certain and not any(_forceless(drive)):
             yield Finding(
                 "center_of_gravity",
                 None,

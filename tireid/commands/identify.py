@@ -52,7 +52,7 @@ from tireid.learning import identify
 from tireid.output import output_folder, text_table
 from tireid.progress import Progress, say, tell
 from tireid.reports.identify import write_identify_report
-from tireid.verdicts import add_accept, exit_code, verdict_text
+from tireid.verdicts import add_accept, exit_code, verdict_text, warn_of_stored
 
 LEARNING, DRAWING = "learning", "replays and figures"
 OWN_PAST = "  its past, against online"
@@ -113,6 +113,8 @@ def run(options: argparse.Namespace) -> int:
     if options.network is not None and options.freeze is not None:
         raise ValueError("--freeze is for what is learnt: the network of --network is frozen")
     start = None if options.weights is None else load_model(options.weights)
+    if options.weights is not None:
+        warn_of_stored(options.weights)
     recording = _read(options.log, options.run_name, vehicle, design, options)
     others = [_read(log, None, vehicle, design, options) for log in options.replay]
     _require_distinct([recording, *others])
