@@ -16,7 +16,8 @@ from models.recordings import Recording
 from models.vehicle import Vehicle
 
 TELLING = 0.3  # share of what is missed (squared) that a cause must explain to be named
-DOUBLINGS = 4  # of a size that is tried, while it helps
+DOUBLINGS = 5  # sizes of one sign that are tried, each twice the last
+PATIENCE = 2  # sizes in a row that do not help, after which no larger one is tried
 
 
 class Mended(NamedTuple):
@@ -173,18 +174,16 @@ def suspects(
 
 
 def _least(missed: Callable[[float], float], here: float, cause: Cause) -> tuple[float, float]:
-    """Return the size that leaves least, and what it leaves: doubled while it helps, then bent."""
+    """Return the size that leaves least, and what it leaves: doubled, then by a parabola."""
     tried = {0.0: here}
     for sign in (1.0, -1.0) if cause.signed else (1.0,):
-        size = sign * cause.step
-        for _ in range(DOUBLINGS):
-            if abs(size) > cause.most:
+        worse = 0
+        for size in sign * cause.step * 2.0 ** np.arange(DOUBLINGS):
+            if abs(size) > cause.most or worse == PATIENCE:
                 break
             before = min(tried.values())
-            tried[size] = missed(size)
-            if not tried[size] < before:
-                break
-            size *= 2.0
+            tried[float(size)] = missed(float(size))
+            worse = 0 if tried[float(size)] < before else worse + 1
     best = min(tried, key=lambda one: tried[one])
     sizes = sorted(tried)
     at = sizes.index(best)
