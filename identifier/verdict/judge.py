@@ -1,20 +1,32 @@
 """Judging a run, and a model that is asked about a drive."""
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.method import Method
 from identifier.run import History, identify
 from identifier.tire_model import TireModel
 from identifier.verdict.causes import CAUSES, Ask, Mended, Suspect, suspects
-from identifier.verdict.motion import FEWEST, Evidence, clean_share, evidence, modelled_force
-from identifier.verdict.rules import MOST_MISSED, Drive, findings
+from identifier.verdict.motion import (
+    FEWEST,
+    Evidence,
+    Windows,
+    clean_share,
+    evidence,
+    modelled_force,
+)
+from identifier.verdict.rules import MOST_MISSED, PERCENT, Drive, center_moved, findings
 from identifier.verdict.verdict import Finding, Number, Verdict
-from models.recordings import Recording, RecordingError
-from models.vehicle import Vehicle
+from models.recordings import Recording
 
+STRETCH = 0.3  # share of the windows that may be missed in one piece
+REST_MISSED = 0.08  # of the force elsewhere, where a piece is
+PARTS = 4  # of the drive, each of which is left out once
+Indices = NDArray[np.intp]
 GEOMETRY = tuple(one for one in CAUSES if one.code in ("sensor_ahead", "center_of_gravity"))
 
 
@@ -34,24 +46,22 @@ def judge(history: History, t: float | None = None) -> Verdict:
         Where the method estimates a signal, not a model.
     """
     model, recording = history.freeze(t), history.recording
-    found = evidence(model, recording)
-    if found is None:
+
+    def taught(mended: Mended) -> TireModel:
+        return identify(mended.recording, mended.vehicle, history.design).freeze()
+
+    looked = _looked_at(taught, model, recording)
+    if looked is None:
         return _too_short(model)
-
-    def taught(mended: Mended) -> float:
-        learnt = identify(mended.recording, mended.vehicle, history.design).freeze()
-        return _missed(learnt, mended)
-
-    drive = Drive(
-        model=model,
-        recording=recording,
-        found=found,
-        suspects=_suspects(taught, model, recording, found),
-        geometry=suspects(taught, recording, model.vehicle, GEOMETRY),
+    drive, notes = looked
+    found = drive.found
+    drive = drive._replace(
+        geometry=_geometry(taught, drive),
         elsewhere=_elsewhere(history, found),
         apart=_apart(history, found),
         learns=True,
     )
+    end = float(recording.t[-1]) if t is None else t
     reached = [
         Finding(
             "at_bound",
@@ -59,9 +69,9 @@ def judge(history: History, t: float | None = None) -> Verdict:
             f"the {one.title} rests at its bound, {one.value:.3g} {one.unit}: {one.meaning}",
             one.refuses,
         )
-        for one in history.design.reached(history.vehicle, history.state_at(_end(history, t)))
+        for one in history.design.reached(history.vehicle, history.state_at(end))
     ]
-    return _verdict(drive, [*findings(drive), *reached])
+    return _verdict(drive, [*findings(drive), *reached, *notes])
 
 
 def judge_prediction(model: TireModel, recording: Recording) -> Verdict:
@@ -72,48 +82,93 @@ def judge_prediction(model: TireModel, recording: Recording) -> Verdict:
     model : that learns nothing from it.
     recording : the drive.
     """
-    found = evidence(model, recording)
-    if found is None:
+
+    def mounted(mended: Mended) -> TireModel:
+        return model if mended.vehicle == model.vehicle else model.mounted_on(mended.vehicle)
+
+    looked = _looked_at(mounted, model, recording)
+    if looked is None:
         return _too_short(model)
+    drive, notes = looked
+    return _verdict(drive, [*findings(drive), *notes])
 
-    def asked(mended: Mended) -> float:
-        same = mended.vehicle == model.vehicle
-        return _missed(model if same else model.mounted_on(mended.vehicle), mended)
 
+Tires = Callable[[Mended], TireModel]  # of a car and a drive that a fault was taken out of
+
+
+def _looked_at(
+    tires: Tires, model: TireModel, recording: Recording
+) -> tuple[Drive, list[Finding]] | None:
+    """Return what the rules look at, and what is said of a stretch that is left out of it.
+
+    One stretch may be missed, as before a sensor has settled, where all the rest is explained.
+    """
+    found, notes = evidence(model, recording), []
+    if found is None:
+        return None
+    if not (found.missed <= MOST_MISSED).all():
+        first, last = found.worst_stretch(STRETCH)
+        rest = found.without(first, last)
+        if len(rest.windows) >= FEWEST and (rest.missed <= REST_MISSED).all():
+            notes.append(_stretch(found, rest, recording, first, last))
+            found = rest
+    bad = not (found.missed <= MOST_MISSED).all()
+    windows = found.windows
     drive = Drive(
         model=model,
         recording=recording,
         found=found,
-        suspects=_suspects(asked, model, recording, found),
+        suspects=suspects(_ask(tires, windows), recording, model.vehicle) if bad else (),
         geometry=(),
         elsewhere=None,
         apart=None,
         learns=False,
     )
-    return _verdict(drive, findings(drive))
+    return drive, notes
 
 
-def _missed(model: TireModel, mended: Mended) -> float:
+def _stretch(
+    found: Evidence, rest: Evidence, recording: Recording, first: int, last: int
+) -> Finding:
+    starts = found.windows.starts
+    begin, end = recording.t[starts[first]], recording.t[starts[last - 1] + found.windows.n]
+    return Finding(
+        "stretch",
+        None,
+        f"from {begin:.4g} to {end:.4g} s the motion is not explained, elsewhere all but "
+        f"{PERCENT * float(rest.missed.max()):.0f} % of the force is: a sensor that had not "
+        "settled, or a banked or slippery stretch",
+        False,
+    )
+
+
+def _geometry(tires: Tires, drive: Drive) -> tuple[Suspect, ...]:
+    """Return whether things sit elsewhere in the car; all causes, where it seems so."""
+    ask, vehicle = _ask(tires, drive.found.windows), drive.model.vehicle
+    listed = suspects(ask, drive.recording, vehicle, GEOMETRY)
+    if not any(center_moved(one, drive) for one in listed) or drive.suspects:
+        return listed
+    others = [one for one in CAUSES if one not in GEOMETRY]
+    return (*listed, *suspects(ask, drive.recording, vehicle, others))
+
+
+def _ask(tires: Tires, windows: Windows) -> Ask:
+    """Return what asks for the share of the force that is missed of a mended drive."""
+
+    def ask(mended: Mended) -> float:
+        return _missed(tires(mended), mended, windows)
+
+    return ask
+
+
+def _missed(model: TireModel, mended: Mended, windows: Windows) -> float:
     """Return the share of the force that a model misses of a mended drive, of both axles."""
-    found = evidence(model, mended.recording)
+    found = evidence(model, mended.recording, windows)
     if found is None:
         return math.inf
     measured = found.measured + mended.bank
     missed = clean_share(measured - found.modelled, measured, found.noise)
     return float(np.sqrt(np.mean(missed**2)))
-
-
-def _suspects(
-    ask: Ask, model: TireModel, recording: Recording, found: Evidence
-) -> tuple[Suspect, ...]:
-    """Return the likely causes, where there is something to be explained."""
-    if not (found.missed > MOST_MISSED).any():
-        return ()
-    return suspects(ask, recording, model.vehicle)
-
-
-def _end(history: History, t: float | None) -> float:
-    return float(history.recording.t[-1]) if t is None else t
 
 
 def _verdict(drive: Drive, listed: list[Finding]) -> Verdict:
@@ -165,41 +220,38 @@ def _apart(history: History, found: Evidence) -> Array:
 
 
 def _elsewhere(history: History, found: Evidence) -> Array | None:
-    """Return what models of each half of the drive miss of the other, over its force (2,).
+    """Return what models taught without a part of the drive miss of that part, over its force (2,).
 
-    The halves hold equal shares of the force (squared); a window counts where the slip is known.
+    The parts follow one another and hold equal shares of the force (squared); in the one that is
+    left out the car is made to stand, so that learning rests. A window counts where such a model
+    knows the slip.
     """
+    recording, windows, car = history.recording, found.windows, history.vehicle
     power = np.cumsum(np.sum(found.measured**2, axis=1))
-    recording, windows = history.recording, found.windows
-    middle = float(recording.t[windows.starts[int(np.searchsorted(power, 0.5 * power[-1]))]])
-    begins = recording.t[windows.starts]
-    missed, force = [], []
-    for first, last, other in (
-        (float(recording.t[0]), middle, begins > middle),
-        (middle, float(recording.t[-1]), begins + windows.duration <= middle),
-    ):
-        model = _taught(recording, first, last, history.vehicle, history.design)
-        if model is None or np.count_nonzero(other) < FEWEST:
+    part = np.minimum((PARTS * power / power[-1]).astype(np.intp), PARTS - 1)
+    slip = np.abs(windows.mean(np.asarray(recording.alpha(car.l_f, car.l_r))))
+    missed, force = np.zeros_like(found.measured), np.zeros_like(found.measured)
+    for k in range(PARTS):
+        mine = part == k
+        if not mine.any():
+            continue
+        model = _taught_without(history, windows.starts[mine], windows.n)
+        if model is None:
             return None
         known = model.known_slip
-        counted = np.repeat(other[:, None], 2, axis=1)
-        if known is not None:
-            car = history.vehicle
-            slip = np.abs(windows.mean(np.asarray(recording.alpha(car.l_f, car.l_r))))
-            counted &= slip <= known
+        counted = mine[:, None] & (np.full_like(slip, True) if known is None else slip <= known)
         away = found.measured - modelled_force(model, recording, windows)
-        missed.append(np.where(counted, away, 0.0))
-        force.append(np.where(counted, found.measured, 0.0))
-    both, size = np.vstack(missed), np.vstack(force)
-    seen = np.mean(size != 0.0, axis=0)
-    return np.where(seen > 0.0, clean_share(both, size, found.noise * seen), 0.0)
+        missed[counted], force[counted] = away[counted], found.measured[counted]
+    seen = np.mean(force != 0.0, axis=0)
+    return np.where(seen > 0.0, clean_share(missed, force, found.noise * seen), 0.0)
 
 
-def _taught(
-    recording: Recording, first: float, last: float, vehicle: Vehicle, design: Method
-) -> TireModel | None:
-    """Return what a part of a recording teaches; None where it is too short to teach."""
+def _taught_without(history: History, starts: Indices, n: int) -> TireModel | None:
+    """Return what a drive teaches without some windows; None where nothing comes of it."""
+    recording = history.recording
+    halt = np.array(recording.v_x)
+    halt[starts[0] : starts[-1] + n + 1] = 0.0
     try:
-        return identify(recording.between(first, last), vehicle, design).freeze()
-    except (RecordingError, ArithmeticError, ValueError):
+        return identify(replace(recording, v_x=halt), history.vehicle, history.design).freeze()
+    except (ArithmeticError, ValueError):
         return None

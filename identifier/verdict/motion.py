@@ -6,7 +6,7 @@ the axle over its load, obeys dξ_i/dt = φ_i cos δ_i - v_x r/g: in means over 
 Means of what a model says over the same windows are set beside it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -172,6 +172,35 @@ class Evidence:
         """Share of the measured force that is not explained, noise taken off, (2,)."""
         return clean_share(self.measured - self.modelled, self.measured, self.noise)
 
+    def without(self, first: int, last: int) -> "Evidence":
+        """Return the evidence without the windows from first to before last.
+
+        Parameters
+        ----------
+        first, last : among the windows.
+        """
+        kept = np.r_[0:first, last : len(self.windows)]
+        return replace(
+            self,
+            windows=replace(self.windows, starts=self.windows.starts[kept]),
+            measured=self.measured[kept],
+            modelled=self.modelled[kept],
+        )
+
+    def worst_stretch(self, share: float) -> tuple[int, int]:
+        """Return the stretch of a share of the windows in which most is missed: first, past last.
+
+        Parameters
+        ----------
+        share : of the windows.
+        """
+        n = max(1, int(share * len(self.windows)))
+        size = np.maximum(np.mean(self.measured**2, axis=0), 1e-12)
+        missed = np.sum((self.measured - self.modelled) ** 2 / size, axis=1)
+        total = np.concatenate([[0.0], np.cumsum(missed)])
+        first = int(np.argmax(total[n:] - total[:-n]))
+        return first, first + n
+
     def accelerations(self, vehicle: Vehicle) -> tuple[float, float]:
         """Return the shares of lateral and yaw acceleration explained: 1 - missed² over rms².
 
@@ -215,16 +244,20 @@ def clean_share(missed: Array, force: Array, noise: Array) -> Array:
     return share
 
 
-def evidence(model: TireModel, recording: Recording) -> Evidence | None:
+def evidence(
+    model: TireModel, recording: Recording, windows: Windows | None = None
+) -> Evidence | None:
     """Return what a model explains of a drive; None where too little of it is driven.
 
     Parameters
     ----------
     model : frozen.
     recording : the drive.
+    windows : where to look; None takes all in which the car drives.
     """
     vehicle = model.vehicle
-    windows = Windows.of(recording, max(model.min_speed, BRISK * vehicle.froude_speed))
+    if windows is None:
+        windows = Windows.of(recording, max(model.min_speed, BRISK * vehicle.froude_speed))
     if len(windows) < FEWEST:
         return None
     return Evidence(
