@@ -123,6 +123,7 @@ def _looked_at(
         elsewhere=None,
         apart=None,
         learns=False,
+        partial=bool(notes),
     )
     return drive, notes
 
@@ -144,6 +145,8 @@ def _stretch(
 
 def _geometry(tires: Tires, drive: Drive) -> tuple[Suspect, ...]:
     """Return whether things sit elsewhere in the car; all causes, where it seems so."""
+    if drive.partial:
+        return ()  # models taught anew meet the stretch that is left out
     ask, vehicle = _ask(tires, drive.found.windows), drive.model.vehicle
     listed = suspects(ask, drive.recording, vehicle, GEOMETRY)
     if not any(center_moved(one, drive) for one in listed) or drive.suspects:
