@@ -24,7 +24,8 @@ from identifier.verdict.verdict import Finding, Number, Verdict
 from models.recordings import Recording
 
 STRETCH = 0.3  # share of the windows that may be missed in one piece
-REST_MISSED = 0.08  # of the force elsewhere, where a piece is
+REST_MISSED = 0.08  # of the force elsewhere, where a piece is,
+CONFINED = 0.6  # and of what is missed with the piece
 PARTS = 4  # of the drive, each of which is left out once
 Indices = NDArray[np.intp]
 GEOMETRY = tuple(one for one in CAUSES if one.code in ("sensor_ahead", "center_of_gravity"))
@@ -106,10 +107,11 @@ def _looked_at(
     found, notes = evidence(model, recording), []
     if found is None:
         return None
-    if not (found.missed <= MOST_MISSED).all():
+    if not (found.missed <= REST_MISSED).all():
         first, last = found.worst_stretch(STRETCH)
         rest = found.without(first, last)
-        if len(rest.windows) >= FEWEST and (rest.missed <= REST_MISSED).all():
+        confined = (rest.missed <= np.minimum(REST_MISSED, CONFINED * found.missed.max())).all()
+        if len(rest.windows) >= FEWEST and confined:
             notes.append(_stretch(found, rest, recording, first, last))
             found = rest
     bad = not (found.missed <= MOST_MISSED).all()

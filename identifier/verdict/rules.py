@@ -31,7 +31,6 @@ CENTER = (-0.065, 0.13)  # of the wheelbase: where right cars seem to have their
 CERTAIN = 0.25  # share of what is missed (squared) that another center of gravity must explain,
 NOTICED = 0.011  # and the share of the force (rms) that this must be
 RIVAL = 0.85  # and of what the best other cause explains
-PLACES = ("center_of_gravity", "sensor_ahead")  # which look alike
 PERCENT = 100.0
 
 
@@ -257,7 +256,7 @@ def center_moved(suspect: Suspect, drive: Drive) -> bool:
     suspect : any.
     drive : what the rules look at.
     """
-    if suspect.cause.code != PLACES[0] or drive.partial or any(_forceless(drive)):
+    if suspect.cause.code != "center_of_gravity" or drive.partial or any(_forceless(drive)):
         return False
     off = suspect.size / drive.model.vehicle.wheelbase
     gained = float(np.sqrt(np.mean(drive.found.missed**2) * max(suspect.share, 0.0)))
@@ -266,8 +265,7 @@ def center_moved(suspect: Suspect, drive: Drive) -> bool:
 
 def _center(drive: Drive) -> Iterator[Finding]:
     """The split of the force between the axles follows the center of gravity, and nothing else."""
-    others = [one.share for one in drive.geometry if one.cause.code not in PLACES]
-    least = RIVAL * max(others, default=0.0)
+    least = RIVAL * max((one.share for one in drive.geometry), default=0.0)
     for suspect in drive.geometry:
         if center_moved(suspect, drive) and suspect.share >= least:
             yield Finding(
