@@ -71,9 +71,12 @@ def _zero(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
 
 
 def _earlier(name: str) -> Mend:
+    """Return what takes out a delay, by whole samples: to interpolate would take noise out too."""
+
     def mend(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
-        t, signal = recording.t, getattr(recording, name)
-        return Mended(replace(recording, **{name: np.interp(t + size, t, signal)}), vehicle)
+        signal, k = getattr(recording, name), round(size / recording.dt)
+        later = np.concatenate([signal[k:], np.full(min(k, len(recording)), signal[-1])])
+        return Mended(replace(recording, **{name: later}), vehicle)
 
     return mend
 

@@ -1,6 +1,5 @@
 """Judging a run, and a model that is asked about a drive."""
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -17,7 +16,9 @@ from identifier.verdict.motion import (
     Windows,
     clean_share,
     evidence,
+    measured_force,
     modelled_force,
+    noise_variance,
 )
 from identifier.verdict.rules import MOST_MISSED, PERCENT, Drive, center_moved, findings
 from identifier.verdict.verdict import Finding, Number, Verdict
@@ -120,7 +121,7 @@ def _looked_at(
         model=model,
         recording=recording,
         found=found,
-        suspects=suspects(_ask(tires, windows), recording, model.vehicle) if bad else (),
+        suspects=suspects(_ask(tires, recording, windows), recording, model.vehicle) if bad else (),
         geometry=(),
         elsewhere=None,
         apart=None,
@@ -149,7 +150,7 @@ def _geometry(tires: Tires, drive: Drive) -> tuple[Suspect, ...]:
     """Return whether things sit elsewhere in the car; all causes, where it seems so."""
     if drive.partial:
         return ()  # models taught anew meet the stretch that is left out
-    ask, vehicle = _ask(tires, drive.found.windows), drive.model.vehicle
+    ask, vehicle = _ask(tires, drive.recording, drive.found.windows), drive.model.vehicle
     listed = suspects(ask, drive.recording, vehicle, GEOMETRY)
     if not any(center_moved(one, drive) for one in listed) or drive.suspects:
         return listed
@@ -157,23 +158,20 @@ def _geometry(tires: Tires, drive: Drive) -> tuple[Suspect, ...]:
     return (*listed, *suspects(ask, drive.recording, vehicle, others))
 
 
-def _ask(tires: Tires, windows: Windows) -> Ask:
-    """Return what asks for the share of the force that is missed of a mended drive."""
+def _ask(tires: Tires, recording: Recording, windows: Windows) -> Ask:
+    """Return what asks for the share of the force, of both axles, missed of a mended drive.
+
+    The noise is that of the drive as it was recorded: to mend is no way to less of it.
+    """
 
     def ask(mended: Mended) -> float:
-        return _missed(tires(mended), mended, windows)
+        model = tires(mended)
+        force = measured_force(mended.recording, model.vehicle, windows) + mended.bank
+        away = force - modelled_force(model, mended.recording, windows)
+        noise = noise_variance(recording, model.vehicle, windows)
+        return float(np.sqrt(np.mean(clean_share(away, force, noise) ** 2)))
 
     return ask
-
-
-def _missed(model: TireModel, mended: Mended, windows: Windows) -> float:
-    """Return the share of the force that a model misses of a mended drive, of both axles."""
-    found = evidence(model, mended.recording, windows)
-    if found is None:
-        return math.inf
-    measured = found.measured + mended.bank
-    missed = clean_share(measured - found.modelled, measured, found.noise)
-    return float(np.sqrt(np.mean(missed**2)))
 
 
 def _verdict(drive: Drive, listed: list[Finding]) -> Verdict:
