@@ -8,7 +8,7 @@ cause whose best size leaves least is named, with that size.
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -76,7 +76,8 @@ def _earlier(name: str) -> Mend:
     def mend(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
         signal, k = getattr(recording, name), round(size / recording.dt)
         later = np.concatenate([signal[k:], np.full(min(k, len(recording)), signal[-1])])
-        return Mended(replace(recording, **{name: later}), vehicle)
+        changes: dict[str, Any] = {name: later}
+        return Mended(replace(recording, **changes), vehicle)
 
     return mend
 
@@ -154,7 +155,8 @@ def suspects(
 
     Parameters
     ----------
-    ask : returns the share of the force that is missed where a fault was taken out.
+    ask : returns the share of the force (squared) that is missed where a fault was taken out,
+        noise taken off: below zero by chance.
     recording : the drive as it was measured.
     vehicle : the car as it was told.
     causes : that are tried.
@@ -171,7 +173,7 @@ def suspects(
                 return math.inf  # no car, or no drive, is left
 
         size, left = _least(missed, here, cause)
-        share = 1.0 - (left / here) ** 2 if here > 0.0 else 0.0
+        share = (here - left) / here if here > 0.0 else 0.0
         listed.append(Suspect(cause, size * unit, share))
     return tuple(sorted(listed, key=lambda one: -one.share))
 
@@ -192,7 +194,7 @@ def _least(missed: Callable[[float], float], here: float, cause: Cause) -> tuple
     at = sizes.index(best)
     if 0 < at < len(sizes) - 1:
         around = sizes[at - 1 : at + 2]
-        values = [tried[one] ** 2 for one in around]
+        values = [tried[one] for one in around]
         if np.isfinite(values).all():
             a, b, _ = np.polyfit(around, values, 2)
             bent = float(-0.5 * b / a) if a > 0.0 else best

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from codegen.arrays import Array
 from identifier.run import History, identify
 from identifier.tire_model import TireModel
-from identifier.verdict.causes import CAUSES, Ask, Mended, Suspect, suspects
+from identifier.verdict.causes import CAUSES, Ask, Mended, suspects
 from identifier.verdict.motion import (
     FEWEST,
     Evidence,
@@ -20,16 +20,17 @@ from identifier.verdict.motion import (
     modelled_force,
     noise_variance,
 )
-from identifier.verdict.rules import MOST_MISSED, PERCENT, Drive, center_moved, findings
+from identifier.verdict.rules import MOST_MISSED, PERCENT, Drive, findings
 from identifier.verdict.verdict import Finding, Number, Verdict
 from models.recordings import Recording
 
 STRETCH = 0.3  # share of the windows that may be missed in one piece
 REST_MISSED = 0.08  # of the force elsewhere, where a piece is,
 CONFINED = 0.6  # and of what is missed with the piece
+TINY = 1e-9  # of a force, squared [static axle loads²]
 PARTS = 4  # of the drive, each of which is left out once
 Indices = NDArray[np.intp]
-GEOMETRY = tuple(one for one in CAUSES if one.code in ("sensor_ahead", "center_of_gravity"))
+CENTER = tuple(one for one in CAUSES if one.code == "center_of_gravity")
 
 
 def judge(history: History, t: float | None = None) -> Verdict:
@@ -58,7 +59,9 @@ def judge(history: History, t: float | None = None) -> Verdict:
     drive, notes = looked
     found = drive.found
     drive = drive._replace(
-        geometry=_geometry(taught, drive),
+        center=None
+        if notes
+        else suspects(_ask(taught, found.windows), recording, model.vehicle, CENTER)[0],
         elsewhere=_elsewhere(history, found),
         apart=_apart(history, found),
         learns=True,
@@ -121,12 +124,11 @@ def _looked_at(
         model=model,
         recording=recording,
         found=found,
-        suspects=suspects(_ask(tires, recording, windows), recording, model.vehicle) if bad else (),
-        geometry=(),
+        suspects=suspects(_ask(tires, windows), recording, model.vehicle) if bad else (),
+        center=None,
         elsewhere=None,
         apart=None,
         learns=False,
-        partial=bool(notes),
     )
     return drive, notes
 
@@ -146,30 +148,16 @@ def _stretch(
     )
 
 
-def _geometry(tires: Tires, drive: Drive) -> tuple[Suspect, ...]:
-    """Return whether things sit elsewhere in the car; all causes, where it seems so."""
-    if drive.partial:
-        return ()  # models taught anew meet the stretch that is left out
-    ask, vehicle = _ask(tires, drive.recording, drive.found.windows), drive.model.vehicle
-    listed = suspects(ask, drive.recording, vehicle, GEOMETRY)
-    if not any(center_moved(one, drive) for one in listed) or drive.suspects:
-        return listed
-    others = [one for one in CAUSES if one not in GEOMETRY]
-    return (*listed, *suspects(ask, drive.recording, vehicle, others))
-
-
-def _ask(tires: Tires, recording: Recording, windows: Windows) -> Ask:
-    """Return what asks for the share of the force, of both axles, missed of a mended drive.
-
-    The noise is that of the drive as it was recorded: to mend is no way to less of it.
-    """
+def _ask(tires: Tires, windows: Windows) -> Ask:
+    """Return what asks for the share of the force, of both axles, missed of a mended drive."""
 
     def ask(mended: Mended) -> float:
-        model = tires(mended)
-        force = measured_force(mended.recording, model.vehicle, windows) + mended.bank
-        away = force - modelled_force(model, mended.recording, windows)
+        recording, model = mended.recording, tires(mended)
+        force = measured_force(recording, model.vehicle, windows) + mended.bank
+        away = force - modelled_force(model, recording, windows)
         noise = noise_variance(recording, model.vehicle, windows)
-        return float(np.sqrt(np.mean(clean_share(away, force, noise) ** 2)))
+        power = np.mean(force**2, axis=0)
+        return float(np.mean((np.mean(away**2, axis=0) - noise) / np.maximum(power, TINY)))
 
     return ask
 
@@ -185,8 +173,8 @@ def _verdict(drive: Drive, listed: list[Finding]) -> Verdict:
         "online_from_frozen": _pair(drive.apart),
         "rms_force_static_loads": _pair(found.force),
         "peak_force_static_loads": _pair(found.peak),
-        **{f"{one.cause.code}_m": one.size for one in drive.geometry},
-        **{f"{one.cause.code}_explains": one.share for one in drive.geometry},
+        "center_of_gravity_m": None if drive.center is None else drive.center.size,
+        "center_of_gravity_explains": None if drive.center is None else drive.center.share,
         "explained_lateral": lateral,
         "explained_yaw": yaw,
     }

@@ -30,7 +30,6 @@ CENTER = (-0.065, 0.13)  # of the wheelbase: where right cars seem to have their
 # forward and back of the told one; the body rolls, which looks like a center farther back
 CERTAIN = 0.25  # share of what is missed (squared) that another center of gravity must explain,
 NOTICED = 0.011  # and the share of the force (rms) that this must be
-RIVAL = 0.85  # and of what the best other cause explains
 PERCENT = 100.0
 
 
@@ -38,22 +37,20 @@ class Drive(NamedTuple):
     """What the rules look at.
 
     model, recording : what was learnt, or asked, and the drive.   found : what the model explains.
-    suspects : causes of what is missed, the likeliest first.   geometry : the same, of where
-    things are in the car.   elsewhere : force missed by models taught without a part of the drive
-    in that part, over the force (2,), None unknown.   apart : online from frozen (2,).
-    learns : whether the model was learnt on this drive.   partial : whether a stretch of the
-    drive is left out.
+    suspects : causes of what is missed, the likeliest first.   center : the center of gravity that
+    explains most, None where it was not asked.   elsewhere : force missed by models taught without
+    a part of the drive in that part, over the force (2,), None unknown.   apart : online from
+    frozen (2,).   learns : whether the model was learnt on this drive.
     """
 
     model: TireModel
     recording: Recording
     found: Evidence
     suspects: tuple[Suspect, ...]
-    geometry: tuple[Suspect, ...]
+    center: Suspect | None
     elsewhere: Array | None
     apart: Array | None
     learns: bool
-    partial: bool
 
 
 def findings(drive: Drive) -> list[Finding]:
@@ -248,33 +245,23 @@ def _car(drive: Drive) -> Iterator[Finding]:
         yield from _a_y(drive, vehicle, found)
 
 
-def center_moved(suspect: Suspect, drive: Drive) -> bool:
-    """Return whether a suspect says that the center of gravity is not where it was told.
-
-    Parameters
-    ----------
-    suspect : any.
-    drive : what the rules look at.
-    """
-    if suspect.cause.code != "center_of_gravity" or drive.partial or any(_forceless(drive)):
-        return False
-    off = suspect.size / drive.model.vehicle.wheelbase
-    gained = float(np.sqrt(np.mean(drive.found.missed**2) * max(suspect.share, 0.0)))
-    return not CENTER[0] <= off <= CENTER[1] and suspect.share > CERTAIN and gained > NOTICED
-
-
 def _center(drive: Drive) -> Iterator[Finding]:
     """The split of the force between the axles follows the center of gravity, and nothing else."""
-    least = RIVAL * max((one.share for one in drive.geometry), default=0.0)
-    for suspect in drive.geometry:
-        if center_moved(suspect, drive) and suspect.share >= least:
-            yield Finding(
-                "center_of_gravity",
-                None,
-                f"{suspect.text}: that would explain {PERCENT * suspect.share:.0f} % of what is "
-                "missed; are l_f and l_r swapped?",
-                True,
-            )
+    suspect, vehicle = drive.center, drive.model.vehicle
+    if suspect is None or any(_forceless(drive)):
+        return
+    off = suspect.size / vehicle.wheelbase
+    gained = float(np.sqrt(np.mean(drive.found.missed**2) * max(suspect.share, 0.0)))
+    moved = not CENTER[0] <= off <= CENTER[1]
+    if moved and suspect.share > CERTAIN and gained > NOTICED:
+        share = PERCENT * min(suspect.share, 1.0)
+        yield Finding(
+            "center_of_gravity",
+            None,
+            f"{suspect.text}: that would explain {share:.0f} % of what is missed; are l_f and l_r "
+            "swapped? A v_y that is late or measured elsewhere looks alike",
+            True,
+        )
 
 
 def _a_y(drive: Drive, vehicle: Vehicle, found: Evidence) -> Iterator[Finding]:

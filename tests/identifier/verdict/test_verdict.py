@@ -233,8 +233,7 @@ def looked_at(clean, **changes):
     model, recording = clean.freeze(), clean.recording
     found = evidence(model, recording)
     assert found is not None
-    parts = {"suspects": (), "geometry": (), "elsewhere": None, "apart": None, "learns": True}
-    parts |= {"partial": False}
+    parts = {"suspects": (), "center": None, "elsewhere": None, "apart": None, "learns": True}
     parts |= {"model": model, "recording": recording, "found": found} | changes
     return {(one.code, one.axle) for one in findings(Drive(**parts)) if one.refuses}
 
