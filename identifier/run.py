@@ -58,6 +58,7 @@ class History:
     axle_force : forces that were identified online (n, 2) [N].
     state : by port, the carried values in effect at each sample and after the last (n + 1, ...).
     outputs : by port, the other outputs of the step at each sample (n, ...).
+    start : the stored model that the run began with; None where it began afresh.
     """
 
     vehicle: Vehicle
@@ -66,6 +67,7 @@ class History:
     axle_force: Array
     state: Mapping[str, Array]
     outputs: Mapping[str, Array]
+    start: TireModel | None = None
 
     @property
     def diverged_at(self) -> float | None:
@@ -191,6 +193,7 @@ def identify(
         axle_force=record["axle_force"],
         state={name: record[f"{name}_all"] for name in setup.scan.carry},
         outputs={name: record[name] for name in setup.scan.outputs if name != "axle_force"},
+        start=start,
     )
 
 

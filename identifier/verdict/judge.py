@@ -23,6 +23,7 @@ from identifier.verdict.motion import (
 from identifier.verdict.rules import MOST_MISSED, PERCENT, Drive, findings
 from identifier.verdict.verdict import Finding, Number, Verdict
 from models.recordings import Recording
+from models.vehicle import Vehicle
 
 STRETCH = 0.3  # share of the windows that may be missed in one piece
 REST_MISSED = 0.08  # of the force elsewhere, where a piece is,
@@ -51,7 +52,7 @@ def judge(history: History, t: float | None = None) -> Verdict:
     model, recording = history.freeze(t), history.recording
 
     def taught(mended: Mended) -> TireModel:
-        return identify(mended.recording, mended.vehicle, history.design).freeze()
+        return _learnt(history, mended.recording, mended.vehicle)
 
     looked = _looked_at(taught, model, recording)
     if looked is None:
@@ -162,6 +163,11 @@ def _ask(tires: Tires, windows: Windows) -> Ask:
     return ask
 
 
+def _learnt(history: History, recording: Recording, vehicle: Vehicle) -> TireModel:
+    """Return what the method of a run, begun as it was, learns of another drive or car."""
+    return identify(recording, vehicle, history.design, history.start).freeze()
+
+
 def _verdict(drive: Drive, listed: list[Finding]) -> Verdict:
     """Return the verdict of what was found."""
     listed.sort(key=lambda finding: not finding.refuses)
@@ -230,7 +236,7 @@ def _elsewhere(history: History, found: Evidence) -> Array | None:
         if model is None:
             return None
         known = model.known_slip
-        counted = mine[:, None] & (np.full_like(slip, True) if known is None else slip <= known)
+        counted = mine[:, None] & (slip <= (np.inf if known is None else known))
         away = found.measured - modelled_force(model, recording, windows)
         missed[counted], force[counted] = away[counted], found.measured[counted]
     seen = np.mean(force != 0.0, axis=0)
@@ -243,6 +249,6 @@ def _taught_without(history: History, starts: Indices, n: int) -> TireModel | No
     halt = np.array(recording.v_x)
     halt[starts[0] : starts[-1] + n + 1] = 0.0
     try:
-        return identify(replace(recording, v_x=halt), history.vehicle, history.design).freeze()
+        return _learnt(history, replace(recording, v_x=halt), history.vehicle)
     except (ArithmeticError, ValueError):
         return None

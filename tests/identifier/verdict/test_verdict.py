@@ -11,6 +11,7 @@ import pytest
 import identifier.verdict
 from identifier.axle import AxleIdentifier
 from identifier.method import Reached
+from identifier.methods import make_method
 from identifier.run import identify
 from identifier.verdict import judge_prediction
 from identifier.verdict.judge import judge
@@ -302,6 +303,37 @@ def test_a_prediction_has_a_verdict_of_its_own(clean, drive):
     verdict = judge_prediction(half, drive)
     assert "force_missed" in codes(verdict)
     assert all(0.4 < missed < 0.6 for missed in verdict.measures["force_missed"])
+
+
+@pytest.mark.parametrize("name", ["rls", "integral", "linear", "magic_formula_ekf"])
+def test_every_method_that_freezes_has_a_verdict(drive, name):
+    """And where it is valid, the axles miss less than a fifth of the true force."""
+    car = sedan()
+    run = identify(drive, car, make_method(name, car))
+    verdict = run.verdict()
+    missed = run.freeze().axle_force(drive) - drive.axle_force
+    share = np.sqrt(np.mean(missed**2, axis=0) / np.mean(drive.axle_force**2, axis=0))
+    assert not (verdict.valid and share.max() > 0.2)
+    assert np.allclose(verdict.measures["force_missed"], share, atol=0.05)
+    learnt = {number.learnt for number in verdict.numbers}
+    assert learnt == ({False} if name == "linear" else {True})
+
+
+def test_a_run_that_went_on_from_a_stored_model_is_judged_with_it(clean, drive):
+    """Two seconds teach little; what was stored is known to be right."""
+    short = drive.between(8.0, 11.0)
+    car = sedan()
+    went_on = identify(short, car, AxleIdentifier.for_vehicle(car), clean.freeze())
+    assert went_on.start is not None
+    assert went_on.verdict().valid
+
+
+def test_a_stretch_that_a_sensor_needed_to_settle_is_a_note(drive):
+    settling = replace(drive, v_y=drive.v_y + np.clip(5.0 - drive.t, 0.0, 1.0))
+    verdict = answer(settling).verdict()
+    (note,) = [one for one in verdict.findings if one.code == "stretch"]
+    assert not note.refuses
+    assert note.text.startswith("from 0 to ")
 
 
 def test_a_verdict_on_an_earlier_freeze_is_on_that_model(clean):
