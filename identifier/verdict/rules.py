@@ -26,7 +26,7 @@ STIFFENS = 1.6  # secant at the known slip over slope at zero: no tire stiffens 
 INERTIA = (0.3, 2.0)  # I_z/(m l_f l_r): two points on the axles have 1
 MOST_A_Y = 0.25  # share of the recorded a_y that v_y, r and v_x do not give
 A_Y_SLOPE = (0.87, 1.2)  # of the recorded a_y on theirs: a body that rolls reads up to 1.15
-CENTER = (-0.065, 0.13)  # of the wheelbase: where right cars seem to have their center of gravity,
+CENTER = (-0.065, 0.12)  # of the wheelbase: where right cars seem to have their center of gravity,
 # forward and back of the told one; the body rolls, which looks like a center farther back
 CERTAIN = 0.25  # share of what is missed (squared) that another center of gravity must explain,
 NOTICED = 0.011  # and the share of the force (rms) that this must be
