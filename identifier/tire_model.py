@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
-STIFFNESS = "cornering stiffness"  # as summaries and verdicts name it
+STIFFNESS, GRIP = "cornering stiffness", "grip"  # as summaries and verdicts name them
 
 
 class TireFunctions(NamedTuple):

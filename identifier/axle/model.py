@@ -17,7 +17,7 @@ from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.slip import SHORTEST, Sway, SwayState
 from identifier.axle.step import FROZEN_CARRY, OVER, build_frozen
 from identifier.method import FORMAT, FrozenModelError, Setup, vehicle_from, vehicle_numbers
-from identifier.tire_model import AXLES, STIFFNESS, Estimate, Fact, TireModel
+from identifier.tire_model import AXLES, GRIP, STIFFNESS, Estimate, Fact, TireModel
 from models.recordings import Recording
 from models.schema import Table
 from models.vehicle import Vehicle
@@ -184,7 +184,7 @@ class AxleModel(TireModel):
             name, unit, scale = offset[i]
             rows = (
                 (STIFFNESS, steep, slope[i] * load, load, "N/rad", told[i], True),
-                ("grip", level, self.W[i].sum(), 1.0, "static load", None, bends[i]),
+                (GRIP, level, self.W[i].sum(), 1.0, "static load", None, bends[i]),
                 ("relaxation length", lag, self.relaxation_length[i], max(slope[i], 0.0), "m",
                  None, True),
                 (name, zero, scale * self.own[i, 2], scale, unit, 0.0, True),

@@ -1,5 +1,6 @@
 """Judging a run, and a model that is asked about a drive."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.run import History, identify
-from identifier.tire_model import TireModel
+from identifier.tire_model import AXLES, GRIP, STIFFNESS, Estimate, TireModel
 from identifier.verdict.causes import CAUSES, Ask, Mended, suspects
 from identifier.verdict.motion import (
     FEWEST,
@@ -185,11 +186,25 @@ def _verdict(drive: Drive, listed: list[Finding]) -> Verdict:
         "explained_yaw": yaw,
     }
     refused = {one.axle for one in listed if one.refuses}
+    missed = dict(zip(AXLES, found.missed, strict=True))
     numbers = tuple(
-        Number(*one, valid=one.learnt and not refused & {None, one.axle})
+        Number(
+            *one._replace(sd=_doubt(one, float(missed[one.axle]))),
+            valid=one.learnt and not refused & {None, one.axle},
+        )
         for one in drive.model.estimates()
     )
     return Verdict(findings=tuple(listed), numbers=numbers, measures=measures)
+
+
+def _doubt(one: Estimate, missed: float) -> float | None:
+    """Return the standard deviation of a number: of a force, with the share that is missed of it.
+
+    The recursion knows of noise only; what its curves cannot say is in what they miss.
+    """
+    if one.sd is None or one.title not in (STIFFNESS, GRIP):
+        return one.sd
+    return math.hypot(one.sd, missed * one.value)
 
 
 def _pair(values: Array | None) -> tuple[float, ...] | None:

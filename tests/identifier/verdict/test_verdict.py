@@ -206,13 +206,13 @@ def test_swapped_axles_are_noticed_by_the_center_of_gravity(drive):
 
 
 def test_each_learnt_number_holds_the_truth_within_its_doubt(good):
-    """The stiffness of the plant's tires at their static load, within three sigma and 15 %."""
+    """The stiffness of the plant's tires at their static load, within three sigma."""
     told = dict(zip(("front", "rear"), sedan().bicycle[4:], strict=True))
     for number in good.numbers:
         if number.title == "cornering stiffness":
             assert number.state == "valid"
-            slack = 3.0 * number.sd + 0.15 * told[number.axle]
-            assert abs(number.value - told[number.axle]) < slack
+            assert abs(number.value - told[number.axle]) < 3.0 * number.sd
+            assert 0.01 * number.value < number.sd < 0.2 * number.value
     assert {number.title for number in good.numbers if number.axle == "rear"} == {
         "cornering stiffness",
         "grip",
