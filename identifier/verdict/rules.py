@@ -72,12 +72,16 @@ def _forceless(drive: Drive) -> list[bool]:
 def _no_force(drive: Drive) -> Iterator[Finding]:
     for axle, peak, none in zip(AXLES, drive.found.peak, _forceless(drive), strict=True):
         if none:
+            said = (
+                "what is printed is what was told, not learnt; drive a slalom"
+                if drive.learns
+                else "whether the model is right cannot be seen here"
+            )
             yield Finding(
                 "no_force",
                 axle,
-                f"the drive holds no force to learn from (at most {peak:.2g} of the static load, "
-                f"{LEAST_FORCE:g} are needed): what is printed is what was told, not learnt; "
-                "drive a slalom",
+                f"the drive holds no force to learn from or to judge by (at most {peak:.2g} of "
+                f"the static load, {LEAST_FORCE:g} are needed): {said}",
                 drive.learns,
             )
 
