@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 from identifier.tire_model import Axle
 
 UNSEEN = (
-    "a wrong mass scales all forces alike and cannot be seen in a log of motion: weigh the car",
+    "a wrong mass, which scales all forces alike: weigh the car",
+    "l_f and l_r where all changes are slow, as for a small car: measure them",
 )
 
 
