@@ -180,7 +180,7 @@ def _stiffness(drive: Drive) -> Iterator[Finding]:
             f"the rear tires are {ratio:.2g} times as stiff over their load as the front ones, "
             f"cars have {REAR_OVER_FRONT[0]:g} to {REAR_OVER_FRONT[1]:g}: l_f and l_r swapped, "
             "v_y measured far from the center of gravity, or steering scaled",
-            True,
+            False,
         )
 
 
@@ -201,7 +201,7 @@ def _shape(drive: Drive) -> Iterator[Finding]:
                 f"the curve is {steepest:.2g} times as steep at "
                 f"{np.degrees(grid[int(np.argmax(secant))]):.1f} degrees of slip as at zero, as no "
                 "tire is: an offset that was not found, play in the steering, or a delay",
-                True,
+                False,
             )
 
 
