@@ -28,7 +28,7 @@ MOST_A_Y = 0.25  # share of the recorded a_y that v_y, r and v_x do not give
 A_Y_SLOPE = (0.87, 1.2)  # of the recorded a_y on theirs: a body that rolls reads up to 1.15
 CENTER = (-0.065, 0.12)  # of the wheelbase: where right cars seem to have their center of gravity,
 # forward and back of the told one; the body rolls, which looks like a center farther back
-CERTAIN = 0.25  # share of what is missed (squared) that another center of gravity must explain,
+CERTAIN = 0.3  # share of what is missed (squared) that another center of gravity must explain,
 NOTICED = 0.011  # and the share of the force (rms) that this must be
 PERCENT = 100.0
 
@@ -180,7 +180,7 @@ def _stiffness(drive: Drive) -> Iterator[Finding]:
             f"the rear tires are {ratio:.2g} times as stiff over their load as the front ones, "
             f"cars have {REAR_OVER_FRONT[0]:g} to {REAR_OVER_FRONT[1]:g}: l_f and l_r swapped, "
             "v_y measured far from the center of gravity, or steering scaled",
-            False,
+            True,
         )
 
 
@@ -201,7 +201,7 @@ def _shape(drive: Drive) -> Iterator[Finding]:
                 f"the curve is {steepest:.2g} times as steep at "
                 f"{np.degrees(grid[int(np.argmax(secant))]):.1f} degrees of slip as at zero, as no "
                 "tire is: an offset that was not found, play in the steering, or a delay",
-                False,
+                True,
             )
 
 
