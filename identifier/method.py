@@ -15,7 +15,7 @@ from codegen import Scan
 from codegen.arrays import Array
 from identifier.certificate import Certificate
 from identifier.driving import Driving
-from identifier.tire_model import TireModel
+from identifier.tire_model import Axle, TireModel
 from identifier.tuning import Range, with_numbers
 from models.recordings import Recording
 from models.rules import LARGEST_FORCE
@@ -174,6 +174,20 @@ class Track(NamedTuple):
     values: Array
 
 
+class Reached(NamedTuple):
+    """A learnt number at its bound: of which axle, what, how much, and what that means.
+
+    refuses : whether an answer that rests on it is not valid.
+    """
+
+    axle: Axle
+    title: str
+    value: float
+    unit: str
+    meaning: str
+    refuses: bool
+
+
 class Method(ABC):
     """A way to identify axle forces: everything that is chosen before the car drives."""
 
@@ -245,6 +259,16 @@ class Method(ABC):
         Parameters
         ----------
         state : carried values by port, at each of n instants (n, ...).
+        """
+        del vehicle, state
+        return ()
+
+    def reached(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Reached, ...]:
+        """Return the learnt numbers that rest at their bounds: none, where there are no bounds.
+
+        Parameters
+        ----------
+        state : carried values by port at one instant.
         """
         del vehicle, state
         return ()

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from identifier.refused import NOWHERE, STALE_TIME, SampleLimits, judges_samples
 from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from identifier.verdict import Verdict  # which runs the method again, on parts of the drive
 
 IMPOSSIBLE_FORCE = 100.0  # times the car's weight: no tire reaches it, so the law has diverged
 
@@ -54,6 +58,7 @@ class History:
     axle_force : forces that were identified online (n, 2) [N].
     state : by port, the carried values in effect at each sample and after the last (n + 1, ...).
     outputs : by port, the other outputs of the step at each sample (n, ...).
+    start : the stored model that the run began with; None where it began afresh.
     """
 
     vehicle: Vehicle
@@ -62,6 +67,7 @@ class History:
     axle_force: Array
     state: Mapping[str, Array]
     outputs: Mapping[str, Array]
+    start: TireModel | None = None
 
     @property
     def diverged_at(self) -> float | None:
@@ -113,6 +119,26 @@ class History:
         if diverged_at is not None and diverged_at <= t:
             raise DivergedError(f"the law diverged at {diverged_at:g} s, before {t:g} s")
         return self.design.frozen(self.vehicle, state)
+
+    def verdict(self, t: float | None = None) -> "Verdict":
+        """Return whether the answer is good, and what speaks against it; computed at each call.
+
+        Parameters
+        ----------
+        t : time of the freeze in the recording's own clock [s]; None is the end.
+
+        Raises
+        ------
+        DivergedError
+            Where the law had diverged by then.
+        CannotFreezeError
+            Where the method estimates a signal, not a model.
+        ValueError
+            Where the recording begins after that time.
+        """
+        from identifier.verdict import judge
+
+        return judge(self, t)
 
     def __repr__(self) -> str:
         diverged = "" if self.diverged_at is None else f", diverged at {self.diverged_at:g} s"
@@ -167,6 +193,7 @@ def identify(
         axle_force=record["axle_force"],
         state={name: record[f"{name}_all"] for name in setup.scan.carry},
         outputs={name: record[name] for name in setup.scan.outputs if name != "axle_force"},
+        start=start,
     )
 
 

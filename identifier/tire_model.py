@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
+STIFFNESS, GRIP = "cornering stiffness", "grip"  # as summaries and verdicts name them
 
 
 class TireFunctions(NamedTuple):
@@ -46,6 +47,22 @@ class Fact(NamedTuple):
     title: str
     values: Array
     unit: str
+
+
+class Estimate(NamedTuple):
+    """A number of one axle that a drive may have decided.
+
+    title, axle : what.   value, unit : how much.   sd : its standard deviation, None unknown.
+    told : what was said of it before, None nothing.   learnt : whether the drive decided it.
+    """
+
+    title: str
+    axle: Axle
+    value: float
+    sd: float | None
+    unit: str
+    told: float | None
+    learnt: bool
 
 
 class TireModel(ABC):
@@ -229,9 +246,29 @@ class TireModel(ABC):
         """Slip [rad] up to which the forces were learnt, (2,); None where the model cannot tell."""
         return None
 
+    def relative_sd(self, alpha: Array) -> Array | None:
+        """Return how unsure the forces at slip angles still are, (k, 2); None: it cannot tell.
+
+        Standard deviation of the force over that before learning: 1 is what was believed.
+
+        Parameters
+        ----------
+        alpha : slip angles [rad], (k,), not zero.
+        """
+        del alpha
+        return None
+
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Return what a verdict tells of each axle: stiffness, without a doubt that is known."""
+        told = self.vehicle.bicycle[4:]
+        return tuple(
+            Estimate(STIFFNESS, axle, float(C), None, "N/rad", before, not np.isclose(C, before))
+            for axle, C, before in zip(AXLES, self.stiffness, told, strict=True)
+        )
+
     def facts(self) -> tuple[Fact, ...]:
         """Return the lines of `summary`."""
-        lines = [Fact("cornering stiffness", self.stiffness, "N/rad")]
+        lines = [Fact(STIFFNESS, self.stiffness, "N/rad")]
         if self.known_slip is not None:
             lines.append(Fact("known up to a slip of", np.degrees(self.known_slip), "deg"))
         return tuple(lines)
@@ -296,9 +333,15 @@ class TireModel(ABC):
         r_dot = (l_f * force[0] - l_r * force[1]) / I_z
         return ca.densify(ca.vertcat(v_y_dot, r_dot, slip_rate)), ca.densify(force)
 
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write the model as JSON."""
-        write_atomically(path, json.dumps(self.to_dict(), indent=2) + "\n")
+    def save(self, path: str | PathLike[str], *, valid: bool | None = None) -> None:
+        """Write the model as JSON.
+
+        Parameters
+        ----------
+        valid : the verdict on it, told to whoever reads the file; None where there is none.
+        """
+        told = {} if valid is None else {"valid": valid}
+        write_atomically(path, json.dumps(self.to_dict() | told, indent=2) + "\n")
 
     @staticmethod
     def load(path: str | PathLike[str]) -> "TireModel":

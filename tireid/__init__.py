@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from identifier.reproducibility import Prediction
     from identifier.run import History
     from identifier.tire_model import TireModel
+    from identifier.verdict import Verdict
     from models.recordings import Recording, read_recording
     from models.vehicle import Vehicle, sedan
     from mpc import path as paths
@@ -37,6 +38,7 @@ _HOMES = {
     "Recording": ("models.recordings", "Recording"),
     "TireModel": ("identifier.tire_model", "TireModel"),
     "Vehicle": ("models.vehicle", "Vehicle"),
+    "Verdict": ("identifier.verdict", "Verdict"),
     "certify": ("identifier.methods", "certify"),
     "drive": ("tireid.driving", "drive"),
     "export": ("tireid.exporting", "export"),
@@ -57,6 +59,7 @@ __all__ = [
     "Recording",
     "TireModel",
     "Vehicle",
+    "Verdict",
     "__version__",
     "certify",
     "drive",

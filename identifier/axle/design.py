@@ -22,8 +22,8 @@ from identifier.axle.step import CARRY, OVER, PORTS, build_step
 from identifier.axle.watch import BEGIN, Watch
 from identifier.certificate import Certificate
 from identifier.driving import Driving
-from identifier.method import OTHER_STRUCTURE, Method, Port, Setup, Track, resumed
-from identifier.tire_model import TireModel
+from identifier.method import OTHER_STRUCTURE, Method, Port, Reached, Setup, Track, resumed
+from identifier.tire_model import AXLES, Axle, TireModel
 from identifier.tuning import Range, ranges_around
 from models.vehicle import GRAVITY, Vehicle
 
@@ -266,6 +266,39 @@ class AxleIdentifier(Method):
             Track("cornering stiffness", "N/rad", slope * np.array(vehicle.axle_loads)),
             Track("relaxation length", "m", lag),
             Track("force at saturation", "static load", W.sum(axis=2)),
+        )
+
+    def reached(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Reached, ...]:
+        """Return grip, lag and offsets that rest within a hundredth of their bounds.
+
+        Parameters
+        ----------
+        vehicle : not looked at: the bounds are in static axle loads.
+        state : W (2, n) and own (2, 3).
+        """
+        del vehicle
+        b = self.bounds
+        grip, own = state["W"].sum(axis=1), state["own"]
+        elsewhere = "a sensor is off by more than that, or sits elsewhere than is told"
+        late = "a sensor is late, or the tires are very soft"
+        rows: list[tuple[Axle, str, float, float, float, str, str, bool]] = [
+            ("front", "zero of the steering", own[0, 2], -b.steering, b.steering, "rad",
+             elsewhere, True),
+            ("rear", "bias of v_y", own[1, 2], -b.v_y, b.v_y, "m/s", elsewhere, True),
+        ]  # fmt: skip
+        for i, axle in enumerate(AXLES):
+            rows.append(
+                (axle, "compliance", own[i, 0], -b.compliance, b.compliance, "m per load", late,
+                 False)
+            )  # fmt: skip
+            rows.append(
+                (axle, "grip", grip[i], b.least_grip, b.most_grip, "static loads",
+                 "no such curve was seen, or mass, signs or units are wrong", False)
+            )  # fmt: skip
+        return tuple(
+            Reached(axle, title, float(value), unit, meaning, refuses)
+            for axle, title, value, least, most, unit, meaning, refuses in rows
+            if not 0.01 <= (value - least) / (most - least) <= 0.99
         )
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> AxleModel:

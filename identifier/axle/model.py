@@ -17,7 +17,7 @@ from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.slip import SHORTEST, Sway, SwayState
 from identifier.axle.step import FROZEN_CARRY, OVER, build_frozen
 from identifier.method import FORMAT, FrozenModelError, Setup, vehicle_from, vehicle_numbers
-from identifier.tire_model import Fact, TireModel
+from identifier.tire_model import AXLES, GRIP, STIFFNESS, Estimate, Fact, TireModel
 from models.recordings import Recording
 from models.schema import Table
 from models.vehicle import Vehicle
@@ -27,6 +27,8 @@ LARGEST = 1e9  # of the numbers in a file, SI and static axle loads
 LARGEST_WEIGHT = 100.0  # static axle loads: no unit of a tire carries more
 ROUNDING = 1e-6  # of correlations, as learning in float leaves them
 LARGEST_SD = 0.25  # standard deviation over the prior's, above which a slip is not known
+DECIDED = 0.5  # standard deviation over the prior's, up to which a drive decided a number
+BENT = 0.4  # slope over that at zero, below which a curve shows where it saturates
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -162,6 +164,47 @@ class AxleModel(TireModel):
                 count = sure.size if sure.all() else int(np.argmin(sure))
                 known[i] = largest * count / grid.size
         return known
+
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Return stiffness, grip, relaxation length and offset of each axle, with their doubt.
+
+        A number is learnt where its standard deviation is at most half of the prior's; the grip,
+        where the curve also bends within the known slip.
+        """
+        n, scales = len(self.ladder), np.array(self.ladder)
+        steep, level = np.zeros(n + 3), np.zeros(n + 3)
+        steep[:n], level[:n] = 1.0 / scales, 1.0
+        lag, zero = np.eye(n + 3)[n], np.eye(n + 3)[n + 2]
+        slope = (self.W / scales).sum(axis=1)
+        bends = self._slope_at_known() < BENT * slope
+        told = self.vehicle.bicycle[4:]
+        offset = (("zero of the steering", "deg", np.degrees(1.0)), ("bias of v_y", "m/s", 1.0))
+        listed = []
+        for i, (axle, load) in enumerate(zip(AXLES, self._loads, strict=True)):
+            name, unit, scale = offset[i]
+            rows = (
+                (STIFFNESS, steep, slope[i] * load, load, "N/rad", told[i], True),
+                (GRIP, level, self.W[i].sum(), 1.0, "static load", None, bends[i]),
+                ("relaxation length", lag, self.relaxation_length[i], max(slope[i], 0.0), "m",
+                 None, True),
+                (name, zero, scale * self.own[i, 2], scale, unit, 0.0, True),
+            )  # fmt: skip
+            for title, along, value, per, its_unit, before, seen in rows:
+                now, prior = (
+                    float(np.sqrt(along @ P[i] @ along))
+                    for P in (self.covariance, self.prior_covariance)
+                )
+                learnt = bool(seen and now <= DECIDED * prior)
+                listed.append(
+                    Estimate(title, axle, float(value), float(per) * now, its_unit, before, learnt)
+                )
+        return tuple(listed)
+
+    def _slope_at_known(self) -> Array:
+        """Return the slope of the curves where they end to be known [static loads/rad], (2,)."""
+        scales = np.array(self.ladder)
+        bent: Array = (self.W / (scales * np.cosh(self.known_slip[:, None] / scales) ** 2)).sum(1)
+        return bent
 
     def facts(self) -> tuple[Fact, ...]:
         """Return the lines of `summary`."""

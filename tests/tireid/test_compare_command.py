@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from identifier.compare.course import INFINITE, Shares
 from identifier.compare.study import run_comparison, step_lengths
 from identifier.methods import METHODS
-from models.recordings import read_recording
+from models.recordings import read_recording, write_recording
 from models.vehicle import sedan
 from tests.pages import faults_of, outline
 from tireid.cli import main
@@ -251,6 +252,18 @@ def test_without_a_log_the_plant_drives(tmp_path, laid_out):
     assert main([*words, "--out", str(out)]) == 0
     data = json.loads((out / "compare.json").read_text())
     assert set(data["recordings"]) == {"slalom_20", "step_steer", "lane_change", "slalom_25"}
+
+
+def test_a_recording_that_teaches_nothing_right_makes_the_exit_code(logs, tmp_path, capsys):
+    log = read_recording(logs / "slalom.csv")
+    write_recording(replace(log, v_y=log.v_y + 0.6), tmp_path / "biased.csv")
+    words = ["compare", str(tmp_path / "biased.csv"), "--vehicle", str(logs / "car.toml")]
+    words += ["--method", "linear", "--floor", "0", "--no-check"]
+    assert main([*words, "--out", str(tmp_path / "refused")]) == 3
+    assert "default learnt on biased: verdict: NOT VALID" in capsys.readouterr().out
+    assert main([*words, "--accept", "--out", str(tmp_path / "accepted")]) == 0
+    found = json.loads((tmp_path / "accepted" / "compare.json").read_text())["verdict"]
+    assert found["biased"]["valid"] is False
 
 
 def test_the_registry_has_every_name_that_is_promised():

@@ -50,6 +50,7 @@ def words(logs, tmp_path):
         str(logs / "car.toml"),
         "--replay",
         str(logs / "quick.csv"),
+        "--accept",  # a network that was drawn
         "--out",
         str(tmp_path / "out"),
     ]
@@ -61,6 +62,7 @@ def test_its_errors_are_those_of_onnxruntime(words, logs, tmp_path, capsys, undr
     assert main([*words, "--network", str(path)]) == 0
     assert "axle, learning online" in capsys.readouterr().out
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert not summary["verdict"]["valid"]
     session = runtime.InferenceSession(path)
     for name in ("slalom", "quick"):
         log = read_recording(logs / f"{name}.csv")

@@ -21,8 +21,8 @@ def model(logs, tmp_path_factory):
     return path
 
 
-def predicted(out, *words):
-    assert main(["predict", *(str(word) for word in words), "--out", str(out)]) == 0
+def predicted(out, *words, status=0):
+    assert main(["predict", *(str(word) for word in words), "--out", str(out)]) == status
     with (out / "forces.csv").open(encoding="utf-8") as file:
         rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
     columns = {key: np.array([row[key] for row in rows]) for key in rows[0]}
@@ -63,7 +63,10 @@ def test_a_model_of_half_the_force_explains_less(model, logs, tmp_path):
     path = tmp_path / "weak.json"
     path.write_text(json.dumps(weak), encoding="utf-8")
     whole, _ = predicted(tmp_path / "whole", model, logs / "quick.csv")
-    half, _ = predicted(tmp_path / "half", path, logs / "quick.csv")
+    half, _ = predicted(tmp_path / "half", path, logs / "quick.csv", status=3)
+    predicted(tmp_path / "accepted", path, logs / "quick.csv", "--accept")
+    assert whole["verdict"]["valid"]
+    assert {one["code"] for one in half["verdict"]["findings"]} >= {"force_missed"}
     assert whole["motion"]["explained_lateral"] > 0.98
     assert half["motion"]["explained_lateral"] == pytest.approx(0.75, abs=0.05)
 

@@ -1,6 +1,7 @@
 """`tireid compare LOG [LOG ...] --vehicle FILE --out DIR`: methods side by side, fairly tuned."""
 
 import argparse
+from collections.abc import Sequence
 from contextlib import nullcontext
 from typing import Any
 
@@ -11,6 +12,7 @@ from identifier.method import Method
 from identifier.methods import METHODS
 from identifier.own_network import FrozenMethod
 from identifier.paper.design import PaperIdentifier
+from identifier.verdict import Verdict
 from models.recordings import Recording
 from models.schema import require_few
 from models.vehicle import Vehicle
@@ -37,9 +39,11 @@ from tireid.commands.options import (
     read_vehicle,
     seed_of,
 )
+from tireid.learning import identify
 from tireid.output import output_folder
 from tireid.progress import Progress, Stopwatch, say, tell
 from tireid.reports.compare import write_compare_report
+from tireid.verdicts import add_accept, exit_code, verdicts_text
 
 FEW_PAIRS = 4  # of recordings learnt on and replayed, all of which are printed
 
@@ -87,12 +91,13 @@ def add_parser(commands: Any) -> None:
     )
     add_log_reading(parser)
     add_network_arguments(parser, "compare with this network, which learns nothing")
+    add_accept(parser)
     add_output(parser, "compare")
     parser.set_defaults(run=run)
 
 
-def run(options: argparse.Namespace) -> None:
-    """Run the command."""
+def run(options: argparse.Namespace) -> int:
+    """Run the command; return 3 where what the default learns on a recording is not valid."""
     for name, least in (("sweep", 0), ("floor", 0)):
         if getattr(options, name) < least:
             raise ValueError(f"--{name} must be at least {least}, it is {getattr(options, name)}")
@@ -138,16 +143,36 @@ def run(options: argparse.Namespace) -> None:
             others=others,
         )
         work.begin("step times, tables and figures")
-        figures = write_comparison(folder, comparison)
+        verdicts = default_verdicts(recordings, vehicle)
+        figures = write_comparison(folder, comparison, verdicts)
         rows = summary_rows(comparison)
         write_compare_report(
-            folder, comparison, rows, figures, remarks=remarks(comparison), command=options.words
+            folder,
+            comparison,
+            rows,
+            figures,
+            verdicts,
+            remarks=remarks(comparison),
+            command=options.words,
         )
         told = [comparison_text(comparison)]
         if len(comparison.names) ** 2 <= FEW_PAIRS:
             told.append(pair_tables(comparison))
-    tell("\n".join([*told, vehicle.estimates]).rstrip("\n"))
+    told += [vehicle.estimates] if vehicle.estimates else []
+    tell("\n".join([*told, verdicts_text(verdicts)]))
     say(f"wrote {options.out}/ in {watch.seconds:.0f} s")
+    return max(exit_code(verdict, options) for verdict in verdicts.values())
+
+
+def default_verdicts(recordings: Sequence[Recording], vehicle: Vehicle) -> dict[str, Verdict]:
+    """Return the verdict on what the default learns on each recording, by its name.
+
+    Parameters
+    ----------
+    recordings : that are compared on.
+    vehicle : that drove them.
+    """
+    return {one.name: identify(one, vehicle, check=False).verdict() for one in recordings}
 
 
 def _network(options: argparse.Namespace, vehicle: Vehicle) -> dict[str, Method]:

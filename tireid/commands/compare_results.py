@@ -4,6 +4,7 @@ compare.json: recordings (samples, duration, rms_force_N); methods: by name onli
 frozen_N by recording learnt on and recording replayed (null: a signal, no model), diverged_at_s by
 recording, percent (means of both axles: online, in_sample, other), step_s and step_ratio; floors:
 by network frozen_N and percent; sweep: by method designs, diverged, default, best, front, trials.
+verdict: by recording, of the default learnt there (valid, findings, numbers, measures).
 Errors are {"front", "rear"} in N; null stands for what diverged or is not there.
 """
 
@@ -22,6 +23,7 @@ from identifier.compare.sweep import Candidate, best_candidate, frozen_share, pa
 from identifier.method import vehicle_numbers
 from identifier.methods import METHODS, make_method
 from identifier.reproducibility import AxleRmse
+from identifier.verdict import Verdict
 from tireid import __version__
 from tireid.figures import matrix_figure, methods_figure, pareto_figure, save_figure
 from tireid.output import text_table, write_json
@@ -191,15 +193,20 @@ def _text(title: str, lines: list[list[str]]) -> str:
 Row = tuple[str | float | int, ...]
 
 
-def write_comparison(folder: Path, comparison: Comparison) -> dict[str, Figure]:
+def write_comparison(
+    folder: Path, comparison: Comparison, verdicts: Mapping[str, Verdict]
+) -> dict[str, Figure]:
     """Write everything that was found out into a folder; return the figures by their file's name.
 
     Parameters
     ----------
     folder : an empty folder.
     comparison : the methods.
+    verdicts : on what the default learns, by recording.
     """
-    write_json(folder / "compare.json", comparison_numbers(comparison))
+    numbers = comparison_numbers(comparison)
+    judged = {name: verdict.to_dict() for name, verdict in verdicts.items()}
+    write_json(folder / "compare.json", numbers | {"verdict": judged})
     (folder / "tables.txt").write_text(
         comparison_text(comparison) + pair_tables(comparison), encoding="utf-8"
     )

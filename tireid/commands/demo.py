@@ -61,6 +61,7 @@ from tireid.report import (
 )
 from tireid.reports.common import READ, REPORT, drawing, origin
 from tireid.reports.identify import identify_headlines, identify_warnings, learnt_blocks
+from tireid.verdicts import verdict_headline, verdict_section, verdict_warnings
 
 # The demo's report: what was driven, learnt, frozen and predicted, in order.
 
@@ -93,15 +94,18 @@ def demo_report(
     """
     learnt = story.default.learnt
     model, runs = learnt.freeze(FREEZE), [learnt, *story.default.others]
+    verdict = learnt.verdict(FREEZE)
     return Report(
         title=TITLE,
         summary=SUMMARY,
         numbers=[
+            verdict_headline(verdict),
             *identify_headlines(model, runs, story.default.frozen[FREEZE]),
             *drive_numbers(driven),
         ],
-        warnings=identify_warnings(model, runs),
+        warnings=[*verdict_warnings(verdict), *identify_warnings(model, runs)],
         sections=[
+            verdict_section(verdict),
             drive_section(driven, folder),
             _learn(figures["identify"], model),
             _predict(story),
@@ -341,7 +345,12 @@ def run(options: argparse.Namespace) -> None:
         figures: dict[str, Mapping[str, Figure]] = {}
         for name, part in (("identify", story.default), ("paper_network", story.paper)):
             figures[name] = write_results(
-                folders[name], part.law, part.learnt, part.others, part.frozen
+                folders[name],
+                part.law,
+                part.learnt,
+                part.others,
+                part.frozen,
+                part.learnt.verdict(FREEZE),
             )
         operation, drive = story.design.operation(story.car), story.paper.learnt.recording
         draw_check(

@@ -21,6 +21,7 @@ from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, Conditions
 from tireid.driving.setup import PERIOD, Setup, SpeedWish, require_friction
 from tireid.learning import identify
 from tireid.progress import Progress
+from tireid.verdicts import warn_of, warn_of_stored
 
 # Words of `tireid drive` that are more than a name: how fast, and where the road is slippery.
 
@@ -272,6 +273,7 @@ def frozen_tires(
         return "nothing was learnt", None
     if options.weights is not None:
         model = load_model(options.weights)
+        warn_of_stored(options.weights)
         _require_its_car(options, model.vehicle, setup)
         return f"frozen ones from {options.weights}", model
     network = network_model(options, setup.vehicle, 1.0)
@@ -287,12 +289,13 @@ def frozen_tires(
             seed=conditions.seed,
             progress=progress,
         )
-    model = identify(recording, setup.vehicle, method, check=False).freeze()
+    history = identify(recording, setup.vehicle, method, check=False)
+    warn_of(history.verdict(), f"what {law} learnt to drive on")
     assert recording.a_y is not None
     return (
         f"frozen ones learnt by {law} on {recording.duration:.0f} s of random steering on an open "
         f"field, up to {np.abs(recording.a_y).max():.1f} m/s² sidewards"
-    ), model
+    ), history.freeze()
 
 
 def _require_its_car(options: argparse.Namespace, learnt: Vehicle, setup: Setup) -> None:

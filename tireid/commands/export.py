@@ -19,6 +19,7 @@ from tireid.commands.options import (
 )
 from tireid.exporting import export_method
 from tireid.progress import say
+from tireid.verdicts import warn_of_stored
 
 
 def add_parser(commands: Any) -> None:
@@ -52,6 +53,8 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> None:
     """Run the command."""
     start = None if options.weights is None else load_model(options.weights)
+    if options.weights is not None:
+        warn_of_stored(options.weights)
     vehicle = _vehicle(options, start)
     method = _method(options, vehicle, start)
     exported = export_method(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from codegen.escape import visible
-from identifier.method import DEAD, CannotFreezeError, Method, require_alive, steady_stiffness
+from identifier.method import CannotFreezeError, Method
 from identifier.methods import load_model
 from identifier.paper.network import Weights
 from identifier.reproducibility import (
@@ -20,6 +20,7 @@ from identifier.reproducibility import (
 )
 from identifier.run import History
 from identifier.tire_model import TireModel
+from identifier.verdict import judge_prediction
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
@@ -51,13 +52,10 @@ from tireid.learning import identify
 from tireid.output import output_folder, text_table
 from tireid.progress import Progress, say, tell
 from tireid.reports.identify import write_identify_report
+from tireid.verdicts import add_accept, exit_code, verdict_text, warn_of_stored
 
 LEARNING, DRAWING = "learning", "replays and figures"
 OWN_PAST = "  its past, against online"
-
-
-class NotTrustedError(ValueError):
-    """What was learnt is no tire: the recording, or the vehicle file, is not that of a car."""
 
 
 def add_parser(commands: Any) -> None:
@@ -102,18 +100,21 @@ def add_parser(commands: Any) -> None:
     add_weights(parser, "begin learning with it")
     add_seed(parser, "the initial weights of the paper's network")
     add_network_arguments(parser, "freeze nothing, judge this network instead")
+    add_accept(parser)
     add_output(parser, "identify")
     parser.set_defaults(run=run)
 
 
-def run(options: argparse.Namespace) -> None:
-    """Run the command."""
+def run(options: argparse.Namespace) -> int:
+    """Run the command; return 3 where what was learnt is not valid."""
     vehicle = read_vehicle(options)
     seed = None if options.seed is None else seed_of(options)
     law, design = chosen_method(options, vehicle, seed)
     if options.network is not None and options.freeze is not None:
         raise ValueError("--freeze is for what is learnt: the network of --network is frozen")
     start = None if options.weights is None else load_model(options.weights)
+    if options.weights is not None:
+        warn_of_stored(options.weights)
     recording = _read(options.log, options.run_name, vehicle, design, options)
     others = [_read(log, None, vehicle, design, options) for log in options.replay]
     _require_distinct([recording, *others])
@@ -135,25 +136,29 @@ def run(options: argparse.Namespace) -> None:
             progress.step(1 + len(others))
         progress.begin(DRAWING)
         if network is not None:
+            verdict = judge_prediction(network, histories[0].recording)
             replays, figures = write_network_results(
-                folder, options.network, law, network, histories
+                folder, options.network, law, network, histories, verdict
             )
             by_key = {NETWORK: replays}
             told = network_table(law, histories, replays)
         else:
             learnt = histories[0]
-            for t in freeze_times:
-                _require_trusted(learnt, t, law)
+            verdict = learnt.verdict(freeze_times[-1])
             frozen = {t: _replays(t, learnt, histories) for t in freeze_times}
-            figures = write_results(folder, law, learnt, histories[1:], frozen)
+            figures = write_results(folder, law, learnt, histories[1:], frozen, verdict)
             by_key = {f"{freeze_key(t)} s": replays for t, replays in frozen.items()}
             closing = _closing_line(learnt, freeze_times[-1], vehicle, resumed=start is not None)
             told = f"{error_table(histories, frozen)}\n{closing}"
-        told = "\n".join(part for part in (told, vehicle.estimates) if part)
+        parts_told = (told, vehicle.estimates, verdict_text(verdict))
+        told = "\n".join(part for part in parts_told if part)
         model = network or histories[0].freeze(freeze_times[-1])
-        write_identify_report(folder, law, model, histories, by_key, figures, command=options.words)
+        write_identify_report(
+            folder, law, model, histories, by_key, figures, verdict, command=options.words
+        )
     tell(told)
     say(f"wrote {options.out}/")
+    return exit_code(verdict, options)
 
 
 def _require_model(law: str, design: Method, vehicle: Vehicle) -> None:
@@ -173,34 +178,12 @@ def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool)
         return "\n".join(line for line in (verdict_line(certificate), beyond) if line)
     if model.known_slip is None:
         return "frozen; `tireid compare` sets it beside the other methods"
-    facts = {fact.title: fact.values for fact in model.facts()}
-    stiffness, length = facts["cornering stiffness"], facts["relaxation length"]
     known = np.degrees(model.known_slip)
     return (
-        f"learnt: cornering stiffness {stiffness[0]:.4g} / {stiffness[1]:.4g} N/rad, relaxation "
-        f"length {length[0]:.2g} / {length[1]:.2g} m, known to {known[0]:.1f} / {known[1]:.1f} deg "
-        "of slip (front / rear)\n"
+        f"known to {known[0]:.1f} / {known[1]:.1f} deg of slip (front / rear)\n"
         f"certificate: {certificate.verdict}; grip, cornering stiffness, weights, offsets and "
         "covariance stay in their boxes by construction (summary.json lists them)"
     )
-
-
-def _require_trusted(learnt: History, t: float, law: str) -> None:
-    """Refuse tires that do not push at the speed driven: what was learnt then is not the car's."""
-    model, vehicle, v_x = learnt.freeze(t), learnt.vehicle, learnt.recording.v_x
-    where = f"{learnt.recording.name}: what {law} learnt until {freeze_key(t)} s"
-    try:
-        require_alive(NotTrustedError, model)
-    except NotTrustedError as error:
-        raise NotTrustedError(f"{where} is not to be trusted: {error}") from None
-    stiffness = steady_stiffness(model, float(v_x[v_x >= model.min_speed].mean()))
-    told = np.array(vehicle.bicycle)[4:]
-    for axle, learnt_one, told_one in zip(("front", "rear"), stiffness, told, strict=True):
-        if not learnt_one >= DEAD * told_one:
-            raise NotTrustedError(
-                f"{where} is not to be trusted: the {axle} axle has {learnt_one:.4g} N/rad, the "
-                f"vehicle file says {told_one:.4g}; check signs, units and sensors of the recording"
-            )
 
 
 def _learn(

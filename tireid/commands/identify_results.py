@@ -23,6 +23,7 @@ from identifier.reproducibility import (
 )
 from identifier.run import History
 from identifier.tire_model import TireModel
+from identifier.verdict import Verdict
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid import __version__
@@ -66,6 +67,7 @@ def summarize(
     learnt: History,
     others: Sequence[History],
     frozen: Mapping[float, Mapping[str, Replay]],
+    verdict: Verdict | None = None,
 ) -> dict[str, Any]:
     """Return what summary.json holds: errors by recording and freeze time, and all that went in.
 
@@ -80,13 +82,17 @@ def summarize(
     learnt : the online run that the weights come from.
     others : online runs of the same design over the other recordings.
     frozen : freeze time [s] to recording name to replay.
+    verdict : on the model of the last freeze.
     """
     by_key = {freeze_key(t): replays for t, replays in frozen.items()}
-    return summarize_replays(law, [learnt, *others], by_key)
+    return summarize_replays(law, [learnt, *others], by_key, verdict)
 
 
 def summarize_replays(
-    law: str, runs: Sequence[History], frozen: Mapping[str, Mapping[str, Replay]]
+    law: str,
+    runs: Sequence[History],
+    frozen: Mapping[str, Mapping[str, Replay]],
+    verdict: Verdict | None,
 ) -> dict[str, Any]:
     """Return the same of any replays.
 
@@ -95,9 +101,11 @@ def summarize_replays(
     law : the law as the user named it.
     runs : online runs of one design, the first the one that was learnt.
     frozen : key in the summary to recording name to replay.
+    verdict : on the model that was replayed last.
     """
     learnt = runs[0]
     return {
+        "verdict": None if verdict is None else verdict.to_dict(),
         "rms_force_N": {h.recording.name: _axles(force_rms(h)) for h in runs},
         "rmse_N": {
             "online": {h.recording.name: _axles(online_error(h)) for h in runs},
@@ -129,7 +137,12 @@ WEIGHTS = ("W", "V", "own")  # carried matrices that are the learnt model, by wh
 
 
 def write_results(
-    folder: Path, law: str, learnt: History, others: Sequence[History], frozen: Frozen
+    folder: Path,
+    law: str,
+    learnt: History,
+    others: Sequence[History],
+    frozen: Frozen,
+    verdict: Verdict | None = None,
 ) -> dict[str, Figure]:
     """Write everything that was learnt into a folder; return the figures by the name of their file.
 
@@ -140,13 +153,16 @@ def write_results(
     learnt : the online run that the weights come from.
     others : online runs of the same design over the recordings to predict.
     frozen : freeze time [s] to recording name to replay.
+    verdict : on the model of the last freeze.
     """
     write_json(
-        folder / "summary.json", summarize(law=law, learnt=learnt, others=others, frozen=frozen)
+        folder / "summary.json",
+        summarize(law=law, learnt=learnt, others=others, frozen=frozen, verdict=verdict),
     )
     for t in frozen:
         last, model = "" if t == max(frozen) else f"_{freeze_key(t)}s", learnt.freeze(t)
-        model.save(folder / f"weights{last}.json")
+        judged = verdict if t == max(frozen) else None
+        model.save(folder / f"weights{last}.json", valid=None if judged is None else judged.valid)
         columns = curve_columns(model, [run.recording for run in (learnt, *others)])
         write_csv(folder / f"curve{last}.csv", columns)
     _write_curves(folder, learnt, others, frozen)
@@ -295,7 +311,12 @@ NETWORK = "network"
 
 
 def write_network_results(
-    folder: Path, file: Path, law: str, model: OnnxModel, histories: Sequence[History]
+    folder: Path,
+    file: Path,
+    law: str,
+    model: OnnxModel,
+    histories: Sequence[History],
+    verdict: Verdict,
 ) -> tuple[Mapping[str, Replay], dict[str, Figure]]:
     """Write everything that is known of a network into a folder; return replays and figures.
 
@@ -306,6 +327,7 @@ def write_network_results(
     law : what learns beside it, as the user named it.
     model : the network.
     histories : what was identified online over each recording.
+    verdict : on the network.
     """
     replays = {history.recording.name: replay(model, history) for history in histories}
     about = {
@@ -313,9 +335,9 @@ def write_network_results(
         "inputs": list(model.signals),
         "slip_sign": model.slip_sign,
     }
-    summary = summarize_replays(law, histories, {NETWORK: replays})
+    summary = summarize_replays(law, histories, {NETWORK: replays}, verdict)
     write_json(folder / "summary.json", {**summary, NETWORK: about})
-    model.save(folder / "weights.json")
+    model.save(folder / "weights.json", valid=verdict.valid)
     columns = curve_columns(model, [history.recording for history in histories])
     write_csv(folder / "curve.csv", columns)
     say("drawing figures")

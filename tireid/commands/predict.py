@@ -13,6 +13,7 @@ from identifier.method import vehicle_numbers
 from identifier.methods import load_model
 from identifier.reproducibility import Prediction, beyond_known
 from identifier.tire_model import TireModel
+from identifier.verdict import Verdict, judge_prediction
 from tireid import __version__
 from tireid.commands import COMMANDS
 from tireid.commands.identify_results import error_cells
@@ -26,6 +27,7 @@ from tireid.commands.options import (
 from tireid.learning import replay
 from tireid.output import output_folder, text_table, write_csv, write_json
 from tireid.progress import say, tell
+from tireid.verdicts import add_accept, exit_code, verdict_text, warn_of_stored
 
 
 def add_parser(commands: Any) -> None:
@@ -48,12 +50,13 @@ def add_parser(commands: Any) -> None:
     add_vehicle(parser, default="that of the model")
     parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
     add_log_reading(parser)
+    add_accept(parser)
     add_output(parser, "predict")
     parser.set_defaults(run=run)
 
 
-def run(options: argparse.Namespace) -> None:
-    """Run the command."""
+def run(options: argparse.Namespace) -> int:
+    """Run the command; return 3 where the model does not give back the drive's motion."""
     model = _model(options)
     recording = read_log(
         options.log,
@@ -62,18 +65,20 @@ def run(options: argparse.Namespace) -> None:
         columns=options.columns,
         check=not options.no_check,
     )
-    prediction = replay(model, recording)
+    prediction, verdict = replay(model, recording), judge_prediction(model, recording)
     with output_folder(options.out, force=options.force) as folder:
         write_csv(folder / "forces.csv", force_columns(model, prediction))
-        write_json(folder / "summary.json", summary(model, prediction))
+        write_json(folder / "summary.json", summary(model, prediction, verdict))
         told = prediction_text(model, prediction)
-    tell(told)
+    tell(f"{told}\n{verdict_text(verdict, numbers=False)}")
     say(f"wrote {options.out}/")
+    return exit_code(verdict, options)
 
 
 def _model(options: argparse.Namespace) -> TireModel:
     """Return the model, on the car that drove."""
     model = load_model(options.model)
+    warn_of_stored(options.model)
     if options.vehicle is None:
         return model
     vehicle = read_vehicle(options)
@@ -107,18 +112,20 @@ def force_columns(model: TireModel, prediction: Prediction) -> dict[str, Array]:
     return columns
 
 
-def summary(model: TireModel, prediction: Prediction) -> dict[str, Any]:
+def summary(model: TireModel, prediction: Prediction, verdict: Verdict) -> dict[str, Any]:
     """Return what summary.json holds; null stands for what cannot be known.
 
     Parameters
     ----------
     model : that predicted.
     prediction : of a recording.
+    verdict : on the model over that recording.
     """
     error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
     beyond, known = beyond_known(model, prediction.recording), model.known_slip
     shares = (None, None) if motion is None else motion.explained
     return {
+        "verdict": verdict.to_dict(),
         "recording": prediction.recording.name,
         "samples": len(prediction.recording),
         "rmse_N": None if error is None else asdict(error),

@@ -8,8 +8,10 @@ from matplotlib.figure import Figure
 
 from identifier.compare.study import Comparison, ranking
 from identifier.reproducibility import freeze_key
+from identifier.verdict import Verdict
 from tireid.report import Block, Headline, Report, Section, Table, write_report
 from tireid.reports.common import READ, REPORT, drawing, origin
+from tireid.verdicts import verdict_warnings
 
 HINDSIGHT = (
     "The best design of a sweep is chosen with the recordings that it is judged on, for every "
@@ -22,6 +24,7 @@ def write_compare_report(
     comparison: Comparison,
     rows: Sequence[Sequence[str]],
     figures: Mapping[str, Figure],
+    verdicts: Mapping[str, Verdict],
     *,
     remarks: Sequence[str],
     command: str,
@@ -34,6 +37,7 @@ def write_compare_report(
     comparison : the methods.
     rows : its table, the header first.
     figures : by the name of their files.
+    verdicts : on what the default learns, by recording.
     remarks : what the methods say of themselves, a line each.
     command : as it was typed.
     """
@@ -62,7 +66,14 @@ def write_compare_report(
         summary="Every method learns on each recording, is frozen at its end and asked about all "
         "of them.",
         numbers=compare_headlines(comparison),
-        warnings=compare_warnings(comparison),
+        warnings=[
+            *compare_warnings(comparison),
+            *(
+                f"The default learnt on {name}: {one}"
+                for name, verdict in verdicts.items()
+                for one in verdict_warnings(verdict)
+            ),
+        ],
         sections=[
             Section(heading="Which method knows the tires", blocks=blocks),
             origin(command, course.vehicle, course.recordings, seed=str(comparison.seed)),

@@ -16,9 +16,11 @@ from identifier.reproducibility import (
 )
 from identifier.run import History
 from identifier.tire_model import TireModel
+from identifier.verdict import Verdict
 from models.files import digest
 from tireid.report import Block, Headline, Paragraph, Report, Section, Table, write_report
 from tireid.reports.common import READ, REPORT, drawing, origin
+from tireid.verdicts import verdict_headline, verdict_section, verdict_warnings
 
 AXLES = ("front", "rear")
 HEADLINES = 3  # facts of a model that stand at the top
@@ -32,6 +34,7 @@ def write_identify_report(
     runs: Sequence[History],
     frozen: Mapping[str, Mapping[str, Replay]],
     figures: Mapping[str, Figure],
+    verdict: Verdict,
     *,
     command: str,
 ) -> None:
@@ -44,10 +47,12 @@ def write_identify_report(
     runs : online, the one that was learnt on first.
     frozen : by when it was frozen, replays by recording; the last is of the model.
     figures : by the name of their files.
+    verdict : on the model.
     command : as it was typed.
     """
     learnt, last = runs[0], list(frozen.values())[-1]
     sections = [
+        verdict_section(verdict),
         Section(heading="What was learnt", blocks=learnt_blocks(law, model, figures)),
         Section(heading="How well it predicts", blocks=_errors(runs, frozen, figures)),
         Section(
@@ -67,8 +72,8 @@ def write_identify_report(
         title=f"Tires of {learnt.vehicle.name}, learnt on {learnt.recording.name}",
         summary=f"{learnt.recording.duration:.4g} s of driving, learnt sample by sample from "
         "speed, lateral velocity, yaw rate and steering.",
-        numbers=identify_headlines(model, runs, last),
-        warnings=identify_warnings(model, runs),
+        numbers=[verdict_headline(verdict), *identify_headlines(model, runs, last)],
+        warnings=[*verdict_warnings(verdict), *identify_warnings(model, runs)],
         sections=sections,
     )
     write_report(folder / REPORT, report)

@@ -1,0 +1,269 @@
+"""Judging a run, and a model that is asked about a drive."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import Array
+from identifier.run import History, identify
+from identifier.tire_model import AXLES, GRIP, STIFFNESS, Estimate, TireModel
+from identifier.verdict.causes import CAUSES, Ask, Mended, suspects
+from identifier.verdict.motion import (
+    FEWEST,
+    Evidence,
+    Windows,
+    clean_share,
+    evidence,
+    measured_force,
+    modelled_force,
+    noise_variance,
+)
+from identifier.verdict.rules import MOST_MISSED, PERCENT, Drive, findings
+from identifier.verdict.verdict import Finding, Number, Verdict
+from models.recordings import Recording
+from models.vehicle import Vehicle
+
+STRETCH = 0.3  # share of the windows that may be missed in one piece
+REST_MISSED = 0.08  # of the force elsewhere, where a piece is,
+CONFINED = 0.6  # and of what is missed with the piece
+TINY = 1e-9  # of a force, squared [static axle loads²]
+PARTS = 4  # of the drive, each of which is left out once
+Indices = NDArray[np.intp]
+CENTER = tuple(one for one in CAUSES if one.code == "center_of_gravity")
+
+
+def judge(history: History, t: float | None = None) -> Verdict:
+    """Return the verdict on a run: on the model that was frozen, over all of its recording.
+
+    Parameters
+    ----------
+    history : the run.
+    t : time of the freeze in the recording's own clock [s]; None is the end.
+
+    Raises
+    ------
+    DivergedError
+        Where the law had diverged by then.
+    CannotFreezeError
+        Where the method estimates a signal, not a model.
+    """
+    model, recording = history.freeze(t), history.recording
+
+    def taught(mended: Mended) -> TireModel:
+        return _learnt(history, mended.recording, mended.vehicle)
+
+    looked = _looked_at(taught, model, recording)
+    if looked is None:
+        return _too_short(model)
+    drive, notes = looked
+    found = drive.found
+    drive = drive._replace(
+        center=None
+        if notes
+        else suspects(_ask(taught, found.windows), recording, model.vehicle, CENTER)[0],
+        elsewhere=_elsewhere(history, found),
+        apart=_apart(history, found),
+        learns=True,
+    )
+    end = float(recording.t[-1]) if t is None else t
+    reached = [
+        Finding(
+            "at_bound",
+            one.axle,
+            f"the {one.title} rests at its bound, {one.value:.3g} {one.unit}: {one.meaning}",
+            one.refuses,
+        )
+        for one in history.design.reached(history.vehicle, history.state_at(end))
+    ]
+    return _verdict(drive, [*findings(drive), *reached, *notes])
+
+
+def judge_prediction(model: TireModel, recording: Recording) -> Verdict:
+    """Return the verdict on a stored model over a drive: does it give back the drive's motion?
+
+    Parameters
+    ----------
+    model : that learns nothing from it.
+    recording : the drive.
+    """
+
+    def mounted(mended: Mended) -> TireModel:
+        return model if mended.vehicle == model.vehicle else model.mounted_on(mended.vehicle)
+
+    looked = _looked_at(mounted, model, recording)
+    if looked is None:
+        return _too_short(model)
+    drive, notes = looked
+    return _verdict(drive, [*findings(drive), *notes])
+
+
+Tires = Callable[[Mended], TireModel]  # of a car and a drive that a fault was taken out of
+
+
+def _looked_at(
+    tires: Tires, model: TireModel, recording: Recording
+) -> tuple[Drive, list[Finding]] | None:
+    """Return what the rules look at, and what is said of a stretch that is left out of it.
+
+    One stretch may be missed, as before a sensor has settled, where all the rest is explained.
+    """
+    found, notes = evidence(model, recording), []
+    if found is None:
+        return None
+    if not (found.missed <= REST_MISSED).all():
+        first, last = found.worst_stretch(STRETCH)
+        rest = found.without(first, last)
+        confined = (rest.missed <= np.minimum(REST_MISSED, CONFINED * found.missed.max())).all()
+        if len(rest.windows) >= FEWEST and confined:
+            notes.append(_stretch(found, rest, recording, first, last))
+            found = rest
+    bad = not (found.missed <= MOST_MISSED).all()
+    windows = found.windows
+    drive = Drive(
+        model=model,
+        recording=recording,
+        found=found,
+        suspects=suspects(_ask(tires, windows), recording, model.vehicle) if bad else (),
+        center=None,
+        elsewhere=None,
+        apart=None,
+        learns=False,
+    )
+    return drive, notes
+
+
+def _stretch(
+    found: Evidence, rest: Evidence, recording: Recording, first: int, last: int
+) -> Finding:
+    starts = found.windows.starts
+    begin, end = recording.t[starts[first]], recording.t[starts[last - 1] + found.windows.n]
+    return Finding(
+        "stretch",
+        None,
+        f"from {begin:.4g} to {end:.4g} s the motion is not explained, elsewhere all but "
+        f"{PERCENT * float(rest.missed.max()):.0f} % of the force is: a sensor that had not "
+        "settled, or a banked or slippery stretch",
+        False,
+    )
+
+
+def _ask(tires: Tires, windows: Windows) -> Ask:
+    """Return what asks for the share of the force, of both axles, missed of a mended drive."""
+
+    def ask(mended: Mended) -> float:
+        recording, model = mended.recording, tires(mended)
+        force = measured_force(recording, model.vehicle, windows) + mended.bank
+        away = force - modelled_force(model, recording, windows)
+        noise = noise_variance(recording, model.vehicle, windows)
+        power = np.mean(force**2, axis=0)
+        return float(np.mean((np.mean(away**2, axis=0) - noise) / np.maximum(power, TINY)))
+
+    return ask
+
+
+def _learnt(history: History, recording: Recording, vehicle: Vehicle) -> TireModel:
+    """Return what the method of a run, begun as it was, learns of another drive or car."""
+    return identify(recording, vehicle, history.design, history.start).freeze()
+
+
+def _verdict(drive: Drive, listed: list[Finding]) -> Verdict:
+    """Return the verdict of what was found."""
+    listed.sort(key=lambda finding: not finding.refuses)
+    found, car = drive.found, drive.model.vehicle
+    lateral, yaw = found.accelerations(car)
+    measures: dict[str, tuple[float, ...] | float | None] = {
+        "force_missed": _pair(found.missed),
+        "force_missed_elsewhere": _pair(drive.elsewhere),
+        "online_from_frozen": _pair(drive.apart),
+        "rms_force_static_loads": _pair(found.force),
+        "peak_force_static_loads": _pair(found.peak),
+        "center_of_gravity_m": None if drive.center is None else drive.center.size,
+        "center_of_gravity_explains": None if drive.center is None else drive.center.share,
+        "explained_lateral": lateral,
+        "explained_yaw": yaw,
+    }
+    refused = {one.axle for one in listed if one.refuses}
+    missed = dict(zip(AXLES, found.missed, strict=True))
+    numbers = tuple(
+        Number(
+            *one._replace(sd=_doubt(one, float(missed[one.axle]))),
+            valid=one.learnt and not refused & {None, one.axle},
+        )
+        for one in drive.model.estimates()
+    )
+    return Verdict(findings=tuple(listed), numbers=numbers, measures=measures)
+
+
+def _doubt(one: Estimate, missed: float) -> float | None:
+    """Return the standard deviation of a number: of a force, with the share that is missed of it.
+
+    The recursion knows of noise only; what its curves cannot say is in what they miss.
+    """
+    if one.sd is None or one.title not in (STIFFNESS, GRIP):
+        return one.sd
+    return math.hypot(one.sd, missed * one.value)
+
+
+def _pair(values: Array | None) -> tuple[float, ...] | None:
+    return None if values is None else tuple(float(value) for value in values)
+
+
+def _too_short(model: TireModel) -> Verdict:
+    finding = Finding(
+        "too_short",
+        None,
+        f"fewer than {FEWEST} windows of 0.3 s are driven briskly: there is nothing to judge by, "
+        "and nothing to learn from",
+        True,
+    )
+    numbers = tuple(Number(*one, valid=False) for one in model.estimates())
+    return Verdict(findings=(finding,), numbers=numbers, measures={})
+
+
+def _apart(history: History, found: Evidence) -> Array:
+    """Return how far online lies from frozen over the later half, over the frozen force (2,)."""
+    windows = found.windows
+    online = windows.mean(history.axle_force / np.array(history.vehicle.axle_loads))
+    half = slice(len(windows) // 2, None)
+    return clean_share((online - found.modelled)[half], found.modelled[half], np.zeros(2))
+
+
+def _elsewhere(history: History, found: Evidence) -> Array | None:
+    """Return what models taught without a part of the drive miss of that part, over its force (2,).
+
+    The parts follow one another and hold equal shares of the force (squared); in the one that is
+    left out the car is made to stand, so that learning rests. A window counts where such a model
+    knows the slip.
+    """
+    recording, windows, car = history.recording, found.windows, history.vehicle
+    power = np.cumsum(np.sum(found.measured**2, axis=1))
+    part = np.minimum((PARTS * power / power[-1]).astype(np.intp), PARTS - 1)
+    slip = np.abs(windows.mean(np.asarray(recording.alpha(car.l_f, car.l_r))))
+    missed, force = np.zeros_like(found.measured), np.zeros_like(found.measured)
+    for k in range(PARTS):
+        mine = part == k
+        if not mine.any():
+            continue
+        model = _taught_without(history, windows.starts[mine], windows.n)
+        if model is None:
+            return None
+        known = model.known_slip
+        counted = mine[:, None] & (slip <= (np.inf if known is None else known))
+        away = found.measured - modelled_force(model, recording, windows)
+        missed[counted], force[counted] = away[counted], found.measured[counted]
+    seen = np.mean(force != 0.0, axis=0)
+    return np.where(seen > 0.0, clean_share(missed, force, found.noise * seen), 0.0)
+
+
+def _taught_without(history: History, starts: Indices, n: int) -> TireModel | None:
+    """Return what a drive teaches without some windows; None where nothing comes of it."""
+    recording = history.recording
+    halt = np.array(recording.v_x)
+    halt[starts[0] : starts[-1] + n + 1] = 0.0
+    try:
+        return _learnt(history, replace(recording, v_x=halt), history.vehicle)
+    except (ArithmeticError, ValueError):
+        return None

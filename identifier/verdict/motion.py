@@ -1,0 +1,268 @@
+"""What a model's forces explain of the measured motion, axle by axle, without a true force.
+
+φ = F/F_z [static axle loads], rows front and rear.   ξ_i = v_y/g ± I_z r/(L F_z,i), the impulse of
+the axle over its load, obeys dξ_i/dt = φ_i cos δ_i - v_x r/g: in means over a window of T seconds
+φ̄_i = [ξ_i(t + T) - ξ_i(t)]/T + mean(v_x r)/g is measured, without a derivative and without a tire.
+Means of what a model says over the same windows are set beside it.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import Array
+from identifier.axle.car import Car as Loads
+from identifier.axle.car import axle_impulse, car_numbers
+from identifier.tire_model import TireModel
+from models.recordings import Recording
+from models.vehicle import GRAVITY, Vehicle
+
+WINDOW = 0.3  # T [s]: shorter ones show the noise of the sensors, longer ones no transient
+BRISK = 0.6  # speed in sqrt(g L) from which a window counts; slower, slip angles mean little
+FEWEST = 8  # windows, below which nothing can be said
+NORMAL_MEDIAN = 0.6745  # of |x|, for x normal with variance one
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Windows:
+    """Where means are taken: half-overlapping windows of n samples in which the car drives.
+
+    Parameters
+    ----------
+    starts : index of the first sample of each window (m,).
+    n : steps in a window.
+    duration : T [s].
+    """
+
+    starts: NDArray[np.intp]
+    n: int
+    duration: float
+
+    @classmethod
+    def of(cls, recording: Recording, min_speed: float) -> "Windows":
+        """Return the windows of a recording.
+
+        Parameters
+        ----------
+        min_speed : a window counts where the car is never slower [m/s].
+        """
+        n = max(2, round(WINDOW / recording.dt))
+        starts = np.arange(0, max(len(recording) - n, 0), max(1, n // 2))
+        total = np.concatenate([[0], np.cumsum(recording.v_x < min_speed)])
+        drives = total[starts + n + 1] == total[starts] if starts.size else starts > 0
+        return cls(starts=starts[drives], n=n, duration=n * recording.dt)
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return int(self.starts.size)
+
+    def mean(self, signal: Array) -> Array:
+        """Return means over the windows by the trapezoidal rule, (m,) or (m, k).
+
+        Parameters
+        ----------
+        signal : samples (n,) or (n, k).
+        """
+        steps = 0.5 * (signal[1:] + signal[:-1])
+        total = np.concatenate([np.zeros((1, *steps.shape[1:])), np.cumsum(steps, axis=0)])
+        means: Array = (total[self.starts + self.n] - total[self.starts]) / self.n
+        return means
+
+    def rate(self, signal: Array) -> Array:
+        """Return rates of change over the windows, (m,) or (m, k).
+
+        Parameters
+        ----------
+        signal : samples (n,) or (n, k).
+        """
+        change: Array = signal[self.starts + self.n] - signal[self.starts]
+        return change / self.duration
+
+
+def measured_force(recording: Recording, vehicle: Vehicle, windows: Windows) -> Array:
+    """Return mean axle forces that the motion shows [static axle loads], (m, 2).
+
+    Parameters
+    ----------
+    recording : v_x, v_y and r.
+    vehicle : mass, inertia and geometry.
+    windows : of the recording.
+    """
+    car = Loads(*car_numbers(vehicle).T)
+    impulse = np.column_stack(
+        [axle_impulse(Loads(*row), recording.v_y, recording.r) for row in zip(*car, strict=True)]
+    )
+    centripetal = windows.mean(recording.v_x * recording.r) / GRAVITY
+    force: Array = windows.rate(impulse) + centripetal[:, None]
+    return force
+
+
+def modelled_force(model: TireModel, recording: Recording, windows: Windows) -> Array:
+    """Return mean axle forces of a model over the same windows [static axle loads], (m, 2).
+
+    Parameters
+    ----------
+    model : frozen.
+    recording : its signals are the input.
+    windows : of the recording.
+    """
+    loads = np.array(model.vehicle.axle_loads)
+    return windows.mean(model.axle_force(recording) / loads)
+
+
+def white_noise(signal: Array) -> float:
+    """Return the standard deviation of the white part of a signal, by its second differences.
+
+    Their median is taken: steps and outliers are not noise.
+
+    Parameters
+    ----------
+    signal : samples (n,).
+    """
+    bend = signal[2:] - 2.0 * signal[1:-1] + signal[:-2]
+    return float(np.median(np.abs(bend)) / (NORMAL_MEDIAN * np.sqrt(6.0)))
+
+
+def noise_variance(recording: Recording, vehicle: Vehicle, windows: Windows) -> Array:
+    """Return the variance that white noise of v_y and r leaves in `measured_force`, (2,).
+
+    Parameters
+    ----------
+    recording : with the noise.
+    vehicle : mass, inertia and geometry.
+    windows : of the recording.
+    """
+    inertia = car_numbers(vehicle)[:, 2]
+    lateral = white_noise(recording.v_y) / GRAVITY
+    variance: Array = 2.0 * (lateral**2 + (inertia * white_noise(recording.r)) ** 2)
+    return variance / windows.duration**2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evidence:
+    """Measured and modelled mean forces over the windows of a drive.
+
+    Parameters
+    ----------
+    windows : where.
+    measured, modelled : [static axle loads], (m, 2).
+    noise : variance of white sensor noise in `measured` (2,).
+    """
+
+    windows: Windows
+    measured: Array
+    modelled: Array
+    noise: Array
+
+    @property
+    def force(self) -> Array:
+        """Force that was there to learn from, noise taken off: rms [static axle loads], (2,)."""
+        return clean_rms(self.measured, self.noise)
+
+    @property
+    def peak(self) -> Array:
+        """Force that 2 % of the windows exceed, three sigma of noise taken off, (2,)."""
+        largest = np.percentile(np.abs(self.measured), 98.0, axis=0)
+        peak: Array = np.maximum(largest - 3.0 * np.sqrt(self.noise), 0.0)
+        return peak
+
+    @property
+    def missed(self) -> Array:
+        """Share of the measured force that is not explained, noise taken off, (2,)."""
+        return clean_share(self.measured - self.modelled, self.measured, self.noise)
+
+    def without(self, first: int, last: int) -> "Evidence":
+        """Return the evidence without the windows from first to before last.
+
+        Parameters
+        ----------
+        first, last : among the windows.
+        """
+        kept = np.r_[0:first, last : len(self.windows)]
+        return replace(
+            self,
+            windows=replace(self.windows, starts=self.windows.starts[kept]),
+            measured=self.measured[kept],
+            modelled=self.modelled[kept],
+        )
+
+    def worst_stretch(self, share: float) -> tuple[int, int]:
+        """Return the stretch of a share of the windows in which most is missed: first, past last.
+
+        Parameters
+        ----------
+        share : of the windows.
+        """
+        n = max(1, int(share * len(self.windows)))
+        size = np.maximum(np.mean(self.measured**2, axis=0), 1e-12)
+        missed = np.sum((self.measured - self.modelled) ** 2 / size, axis=1)
+        total = np.concatenate([[0.0], np.cumsum(missed)])
+        first = int(np.argmax(total[n:] - total[:-n]))
+        return first, first + n
+
+    def accelerations(self, vehicle: Vehicle) -> tuple[float, float]:
+        """Return the shares of lateral and yaw acceleration explained: 1 - missed² over rms².
+
+        Parameters
+        ----------
+        vehicle : that drove.
+        """
+        loads = np.array(vehicle.axle_loads)
+        arms = np.array([vehicle.l_f, -vehicle.l_r])
+        shares = []
+        for weights in (loads, arms * loads):
+            size = float(np.mean((self.measured @ weights) ** 2))
+            noise = float(weights**2 @ self.noise)
+            missed = float(np.mean(((self.measured - self.modelled) @ weights) ** 2)) - noise
+            shares.append(1.0 - max(missed, 0.0) / size if size > 0.0 else 0.0)
+        return shares[0], shares[1]
+
+
+def clean_rms(signal: Array, noise: Array) -> Array:
+    """Return the root mean square of a signal whose noise has a known variance, (2,).
+
+    Parameters
+    ----------
+    signal : (m, 2).
+    noise : its variance (2,).
+    """
+    rms: Array = np.sqrt(np.maximum(np.mean(signal**2, axis=0) - noise, 0.0))
+    return rms
+
+
+def clean_share(missed: Array, force: Array, noise: Array) -> Array:
+    """Return the rms of what is missed over that of the force, (2,); one where there is no force.
+
+    Parameters
+    ----------
+    missed, force : (m, 2).
+    noise : variance in `missed` (2,).
+    """
+    size = np.sqrt(np.mean(force**2, axis=0))
+    share: Array = np.divide(clean_rms(missed, noise), size, out=np.ones(2), where=size > 0.0)
+    return share
+
+
+def evidence(
+    model: TireModel, recording: Recording, windows: Windows | None = None
+) -> Evidence | None:
+    """Return what a model explains of a drive; None where too little of it is driven.
+
+    Parameters
+    ----------
+    model : frozen.
+    recording : the drive.
+    windows : where to look; None takes all in which the car drives.
+    """
+    vehicle = model.vehicle
+    if windows is None:
+        windows = Windows.of(recording, max(model.min_speed, BRISK * vehicle.froude_speed))
+    if len(windows) < FEWEST:
+        return None
+    return Evidence(
+        windows=windows,
+        measured=measured_force(recording, vehicle, windows),
+        modelled=modelled_force(model, recording, windows),
+        noise=noise_variance(recording, vehicle, windows),
+    )

@@ -1,0 +1,124 @@
+"""Is the answer good? A verdict on a tire model, from the motion alone: no true force is needed.
+
+The rule is one: the frozen model, integrated over windows of the drive, must give back the force
+that the motion shows, at each axle, where it learnt and where it did not. Around it stand rules on
+what that cannot see: no force to learn from, numbers that no tire has, a car that is not the one
+that was told. Thresholds are physical or were set on simulated cars of four classes, never on a
+recording.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from identifier.tire_model import Axle
+
+UNSEEN = (
+    "a wrong mass, which scales all forces alike: weigh the car",
+    "l_f and l_r where all changes are slow, as for a small car: measure them",
+)
+
+
+class Finding(NamedTuple):
+    """What speaks against an answer.
+
+    code : for machines.   axle : that it is about, None for the car or the drive.
+    text : what it means and the likely cause, one line.   refuses : whether it makes it not valid.
+    """
+
+    code: str
+    axle: Axle | None
+    text: str
+    refuses: bool
+
+    @property
+    def line(self) -> str:
+        """The finding as a line of text."""
+        where = f"{self.axle} axle: " if self.axle else ""
+        return f"{'not valid' if self.refuses else 'note'}: {where}{self.text}"
+
+
+class Number(NamedTuple):
+    """A number that was learnt, or not.
+
+    title, axle : what.   value, unit : how much.   sd : its standard deviation ±, None unknown.
+    told : what was said of it before, None nothing.   learnt : whether the drive decided it.
+    valid : whether it is learnt, within its bounds, and nothing was found against its axle.
+    """
+
+    title: str
+    axle: Axle
+    value: float
+    sd: float | None
+    unit: str
+    told: float | None
+    learnt: bool
+    valid: bool
+
+    @property
+    def state(self) -> str:
+        """What it is: "valid", "not valid", or "told, not learnt"."""
+        if not self.learnt:
+            return "told, not learnt"
+        return "valid" if self.valid else "not valid"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Verdict:
+    """Whether an answer is good, and all that speaks against it.
+
+    Parameters
+    ----------
+    findings : those that refuse first.
+    numbers : what was learnt, each with its doubt.
+    measures : what was measured on the way, by name, front and rear or one value.
+    """
+
+    findings: tuple[Finding, ...]
+    numbers: tuple[Number, ...]
+    measures: Mapping[str, tuple[float, ...] | float | None]
+
+    @property
+    def valid(self) -> bool:
+        """Whether nothing was found that refuses the answer."""
+        return not any(finding.refuses for finding in self.findings)
+
+    def valid_at(self, axle: Axle) -> bool:
+        """Return whether nothing refuses what was found of an axle.
+
+        Parameters
+        ----------
+        axle : "front" or "rear".
+        """
+        return not any(one.refuses and one.axle in (None, axle) for one in self.findings)
+
+    @property
+    def headline(self) -> str:
+        """The verdict in one line."""
+        against = sum(finding.refuses for finding in self.findings)
+        if self.valid:
+            return "verdict: valid"
+        return f"verdict: NOT VALID, {against} finding{'s' if against > 1 else ''} against it"
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """Headline, a line for each finding, and what nobody can see."""
+        unseen = tuple(f"not seen: {text}" for text in UNSEEN)
+        return (self.headline, *(finding.line for finding in self.findings), *unseen)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the verdict as plain numbers and words, ready for JSON."""
+        return {
+            "valid": self.valid,
+            "findings": [finding._asdict() for finding in self.findings],
+            "numbers": [number._asdict() | {"state": number.state} for number in self.numbers],
+            "measures": dict(self.measures),
+            "unseen": list(UNSEEN),
+        }
+
+    def __repr__(self) -> str:
+        codes = ", ".join(
+            finding.code + (f" ({finding.axle})" if finding.axle else "")
+            for finding in self.findings
+        )
+        return f"<Verdict: {'valid' if self.valid else 'not valid'}{f': {codes}' if codes else ''}>"

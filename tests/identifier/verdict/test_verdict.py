@@ -1,0 +1,356 @@
+"""The verdict rings on what is planted, names it, and stays silent on a drive that is right."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import identifier.verdict
+from identifier.axle import AxleIdentifier
+from identifier.method import Reached
+from identifier.methods import make_method
+from identifier.run import identify
+from identifier.tire_model import GRIP, STIFFNESS
+from identifier.verdict import judge_prediction
+from identifier.verdict.judge import judge
+from identifier.verdict.motion import (
+    Windows,
+    clean_share,
+    evidence,
+    measured_force,
+    noise_variance,
+    white_noise,
+)
+from identifier.verdict.rules import Drive, findings
+from models.maneuvers import RandomSteer
+from models.plant import Plant
+from models.sensors import Sensor, Sensors
+from models.vehicle import sedan
+
+SENSORS = Sensors(
+    v_x=Sensor(noise=0.03), v_y=Sensor(noise=0.03), r=Sensor(noise=0.003), delta=Sensor(noise=5e-4)
+)
+ONSET = 4.0  # s
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """A drive that begins straight and is steered at random then, without noise."""
+    steering = RandomSteer(
+        amplitude=0.06, frequency=0.6, seed=3, onset=ONSET, rate_limit=0.8, duration=24.0
+    )
+    return Plant(sedan()).simulate(steering, speed=20.0, name="random").recording()
+
+
+@pytest.fixture(scope="module")
+def drive(whole):
+    return SENSORS.apply(whole, np.random.default_rng(1))
+
+
+def answer(recording, car=None):
+    car = sedan() if car is None else car
+    return identify(recording, car, AxleIdentifier.for_vehicle(car))
+
+
+@pytest.fixture(scope="module")
+def clean(drive):
+    return answer(drive)
+
+
+@pytest.fixture(scope="module")
+def good(clean):
+    return clean.verdict()
+
+
+def codes(verdict, *, refusing=True):
+    return {one.code for one in verdict.findings if one.refuses or not refusing}
+
+
+def test_a_right_answer_is_valid_and_it_is_right(clean, good, drive):
+    assert good.valid
+    assert codes(good) == set()
+    missed = clean.freeze().axle_force(drive) - drive.axle_force
+    share = np.sqrt(np.mean(missed**2, axis=0) / np.mean(drive.axle_force**2, axis=0))
+    assert (share < 0.08).all()
+    assert good.measures["explained_lateral"] > 0.98
+    assert repr(good) == "<Verdict: valid>"
+
+
+def test_a_verdict_is_plain_data(good):
+    data = json.loads(json.dumps(good.to_dict()))
+    assert data["valid"] is True
+    assert {"findings", "numbers", "measures", "unseen"} < set(data)
+    assert good.lines[0] == "verdict: valid"
+    assert "mass" in good.lines[-2]
+
+
+def test_what_is_measured_is_the_true_force(whole):
+    """Newton over windows gives the force that the plant integrated, roll and lag and all."""
+    car = sedan()
+    windows = Windows.of(whole, 3.0)
+    measured = measured_force(whole, car, windows)
+    true = windows.mean(whole.axle_force / np.array(car.axle_loads))
+    assert clean_share(measured - true, true, np.zeros(2)).max() < 0.03
+
+
+def test_noise_is_told_from_motion(whole, drive):
+    """The variance that is predicted is the one that the same drive shows with noise and without"""
+    car, windows = sedan(), Windows.of(whole, 3.0)
+    assert white_noise(drive.v_y) == pytest.approx(0.03, rel=0.1)
+    away = measured_force(drive, car, windows) - measured_force(whole, car, windows)
+    found = noise_variance(drive, car, windows)
+    np.testing.assert_allclose(np.mean(away**2, axis=0), found, rtol=0.35)
+
+
+def test_windows_leave_out_what_is_not_driven(drive):
+    halt = np.where((drive.t > 10.0) & (drive.t < 12.0), 0.1, drive.v_x)
+    stopped = replace(drive, v_x=halt)
+    kept = Windows.of(stopped, 3.0)
+    begins, ends = drive.t[kept.starts], drive.t[kept.starts + kept.n]
+    assert not ((begins < 12.0) & (ends > 10.01)).any()
+    assert 0 < len(kept) < len(Windows.of(drive, 3.0))
+
+
+def late(drive, name, seconds):
+    signal = getattr(drive, name)
+    return replace(drive, **{name: np.interp(drive.t - seconds, drive.t, signal)})
+
+
+def turned(drive, degrees):
+    a = np.radians(degrees)
+    v_x, v_y = drive.v_x, drive.v_y
+    return replace(
+        drive,
+        v_x=v_x * np.cos(a) - v_y * np.sin(a),
+        v_y=v_y * np.cos(a) + v_x * np.sin(a),
+    )
+
+
+NUMBER = r"([-+]?\d[\d.]*)"
+PLANTED = {
+    "bias of v_y": (
+        lambda d: replace(d, v_y=d.v_y + 2.0),
+        rf"v_y reads {NUMBER} m/s|turned by {NUMBER} degrees",
+        (2.0, 5.7),
+    ),
+    "turned sensor": (
+        lambda d: turned(d, 5.0),
+        rf"v_y reads {NUMBER} m/s|turned by {NUMBER} degrees",
+        (1.75, 5.0),
+    ),
+    "late steering": (
+        lambda d: late(d, "delta_f", 0.15),
+        rf"steering angle is {NUMBER} ms late",
+        (150.0,),
+    ),
+    "late yaw rate": (
+        lambda d: late(d, "r", 0.12),
+        rf"yaw rate is {NUMBER} ms late",
+        (120.0,),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_a_planted_fault_is_refused_and_named_with_its_size(drive, name):
+    plant, said, sizes = PLANTED[name]
+    verdict = answer(plant(drive)).verdict()
+    assert not verdict.valid
+    missed = [one for one in verdict.findings if one.code == "force_missed"]
+    assert missed
+    found = re.search(said, missed[0].text)
+    assert found, missed[0].text
+    for group, size in zip(found.groups(), sizes, strict=True):
+        if group is not None:
+            assert float(group) == pytest.approx(size, rel=0.4)
+
+
+def test_a_wrong_inertia_is_refused_and_named(drive):
+    car = replace(sedan(), yaw_inertia=10.0 * sedan().yaw_inertia)
+    verdict = answer(drive, car).verdict()
+    assert not verdict.valid
+    assert "yaw_inertia" in codes(verdict, refusing=False)
+    assert any("yaw inertia is about" in one.text for one in verdict.findings)
+
+
+def test_a_straight_drive_teaches_nothing_and_nothing_is_called_learnt(drive):
+    verdict = answer(drive.between(0.0, ONSET)).verdict()
+    assert not verdict.valid
+    assert codes(verdict) == {"no_force"}
+    tires = [number for number in verdict.numbers if number.title in (STIFFNESS, GRIP)]
+    assert {number.state for number in tires} == {"told, not learnt"}
+    assert not [number for number in verdict.numbers if number.valid]
+
+
+def test_v_y_that_is_not_measured_is_noticed(drive):
+    verdict = answer(replace(drive, v_y=np.zeros(len(drive)))).verdict()
+    assert "v_y_stuck" in codes(verdict)
+
+
+def test_a_drive_of_a_moment_is_too_short(drive):
+    assert codes(answer(drive.between(6.0, 6.9)).verdict()) == {"too_short"}
+
+
+def test_a_y_that_contradicts_the_motion_is_noticed(drive):
+    banked = replace(drive, a_y=drive.a_y + 3.0)
+    verdict = answer(banked).verdict()
+    (one,) = [finding for finding in verdict.findings if finding.code == "a_y_disagrees"]
+    assert "+3 m/s²" in one.text
+    assert "a_y_disagrees" not in codes(answer(drive).verdict())
+
+
+def test_swapped_axles_are_noticed_by_the_center_of_gravity(drive):
+    car = sedan()
+    swapped = replace(car, l_f=car.l_r, l_r=car.l_f)
+    assert "center_of_gravity" in codes(answer(drive, swapped).verdict())
+
+
+def test_each_learnt_number_holds_the_truth_within_its_doubt(good):
+    """The stiffness of the plant's tires at their static load, within three sigma."""
+    told = dict(zip(("front", "rear"), sedan().bicycle[4:], strict=True))
+    for number in good.numbers:
+        if number.title == STIFFNESS:
+            assert number.state == "valid"
+            assert abs(number.value - told[number.axle]) < 3.0 * number.sd
+            assert 0.01 * number.value < number.sd < 0.2 * number.value
+    assert {number.title for number in good.numbers if number.axle == "rear"} == {
+        "cornering stiffness",
+        "grip",
+        "relaxation length",
+        "bias of v_y",
+    }
+
+
+def test_a_number_of_a_refused_axle_is_not_valid(drive):
+    verdict = answer(replace(drive, v_y=drive.v_y + 2.0)).verdict()
+    assert not [number for number in verdict.numbers if number.valid]
+    assert "not valid" in {number.state for number in verdict.numbers}
+
+
+# Rules that a learner does not run into of itself are shown what they look for.
+
+
+def looked_at(clean, **changes):
+    model, recording = clean.freeze(), clean.recording
+    found = evidence(model, recording)
+    assert found is not None
+    parts = {"suspects": (), "center": None, "elsewhere": None, "apart": None, "learns": True}
+    parts |= {"model": model, "recording": recording, "found": found} | changes
+    return {(one.code, one.axle) for one in findings(Drive(**parts))}
+
+
+def test_no_rule_speaks_where_nothing_is_wrong(clean):
+    assert looked_at(clean) == set()
+    assert looked_at(clean, elsewhere=np.array([0.1, 0.1]), apart=np.array([0.05, 0.05])) == set()
+
+
+def test_halves_that_teach_different_things_are_refused(clean):
+    found = looked_at(clean, elsewhere=np.array([0.1, 0.7]))
+    assert found == {("not_repeated", "rear")}
+
+
+def test_a_model_that_was_still_moving_is_refused(clean):
+    assert looked_at(clean, apart=np.array([0.4, 0.1])) == {("online_apart", "front")}
+
+
+def with_weights(clean, change):
+    model = clean.freeze()
+    return replace(model, W=change(model.W.copy()))
+
+
+def test_a_dead_axle_is_no_tire(clean):
+    dead = with_weights(clean, lambda W: W * np.array([[1.0], [1e-9]]))
+    assert ("no_tire", "rear") in looked_at(clean, model=dead)
+
+
+def test_a_rear_axle_of_five_times_the_front_is_noticed(clean):
+    stiff = with_weights(clean, lambda W: W * np.array([[0.6], [3.0]]))
+    assert ("front_against_rear", None) in looked_at(clean, model=stiff)
+
+
+def test_a_curve_that_stiffens_with_slip_is_noticed(clean):
+    def s_shape(W):
+        slope = W[0] / np.array(clean.design.ladder)
+        W[0, 0] -= 0.85 * slope.sum() * clean.design.ladder[0]
+        return W
+
+    assert ("curve_stiffens", "front") in looked_at(clean, model=with_weights(clean, s_shape))
+
+
+def test_what_is_still_believed_is_refused_where_the_force_is(clean):
+    model = clean.freeze()
+    unsure = replace(model, covariance=model.prior_covariance)
+    assert looked_at(clean, model=unsure) == {("prior", "front"), ("prior", "rear")}
+
+
+def test_numbers_at_their_bounds_are_told(clean):
+    design, state = clean.design, clean.state_at(clean.recording.t[-1])
+    assert design.reached(clean.vehicle, state) == ()
+    own = state["own"].copy()
+    own[0, 2], own[1, 2], own[1, 0] = design.bounds.steering, -design.bounds.v_y, 0.0
+    reached = design.reached(clean.vehicle, {**state, "own": own})
+    assert [(one.axle, one.title, one.refuses) for one in reached] == [
+        ("front", "zero of the steering", True),
+        ("rear", "bias of v_y", True),
+    ]
+    assert all(isinstance(one, Reached) for one in reached)
+
+
+def test_a_prediction_has_a_verdict_of_its_own(clean, drive):
+    model = clean.freeze()
+    assert judge_prediction(model, drive).valid
+    half = with_weights(clean, lambda W: 0.5 * W)
+    verdict = judge_prediction(half, drive)
+    assert "force_missed" in codes(verdict)
+    assert all(0.4 < missed < 0.6 for missed in verdict.measures["force_missed"])
+
+
+@pytest.mark.parametrize("name", ["rls", "integral", "linear", "magic_formula_ekf"])
+def test_every_method_that_freezes_has_a_verdict(drive, name):
+    """And where it is valid, the axles miss less than a fifth of the true force."""
+    car = sedan()
+    run = identify(drive, car, make_method(name, car))
+    verdict = run.verdict()
+    missed = run.freeze().axle_force(drive) - drive.axle_force
+    share = np.sqrt(np.mean(missed**2, axis=0) / np.mean(drive.axle_force**2, axis=0))
+    assert not (verdict.valid and share.max() > 0.2)
+    assert np.allclose(verdict.measures["force_missed"], share, atol=0.05)
+    learnt = {number.learnt for number in verdict.numbers}
+    assert learnt == ({False} if name == "linear" else {True})
+
+
+def test_a_run_that_went_on_from_a_stored_model_is_judged_with_it(clean, drive):
+    """Two seconds teach little; what was stored is known to be right."""
+    short = drive.between(8.0, 11.0)
+    car = sedan()
+    went_on = identify(short, car, AxleIdentifier.for_vehicle(car), clean.freeze())
+    assert went_on.start is not None
+    assert went_on.verdict().valid
+
+
+def test_a_stretch_that_a_sensor_needed_to_settle_is_a_note(drive):
+    settling = replace(drive, v_y=drive.v_y + np.clip(ONSET - drive.t, 0.0, 0.5))
+    verdict = answer(settling).verdict()
+    (note,) = [one for one in verdict.findings if one.code == "stretch"]
+    assert not note.refuses
+    assert note.text.startswith("from 0 to ")
+
+
+def test_a_verdict_on_an_earlier_freeze_is_on_that_model(clean):
+    early = judge(clean, ONSET - 1.0)
+    assert not early.valid
+    assert "prior" in codes(early)
+
+
+def test_every_finding_is_in_the_documents():
+    folder = Path(identifier.verdict.__file__).parent
+    written = set()
+    for file in ("rules.py", "judge.py"):
+        text = (folder / file).read_text(encoding="utf-8")
+        written |= set(re.findall(r'Finding\(\s*"(\w+)"', text))
+    page = (folder.parents[1] / "docs" / "results.md").read_text(encoding="utf-8")
+    assert len(written) > 10
+    assert written == set(re.findall(r"^\| `(\w+)` \| (?:no|yes)", page, flags=re.MULTILINE))

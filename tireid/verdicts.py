@@ -1,0 +1,156 @@
+"""A verdict as commands tell it: lines, a table of what was learnt, the exit code, a section."""
+
+import argparse
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+from codegen.escape import visible
+from identifier.verdict import Number, Verdict
+from tireid.output import text_table
+from tireid.progress import complain
+from tireid.report import Block, Headline, Paragraph, Section, Table, printed
+
+NOT_VALID = 3  # exit code; 0 is valid, 1 a check that failed, 2 bad input
+HEADER = ("", "front", "", "rear", "")
+
+
+def add_accept(parser: argparse.ArgumentParser) -> None:
+    """Add the option that takes an answer as it is.
+
+    Parameters
+    ----------
+    parser : of a command that ends with a verdict.
+    """
+    parser.add_argument(
+        "--accept",
+        action="store_true",
+        help=f"exit with 0 where the verdict is not valid, in place of {NOT_VALID}",
+    )
+
+
+def exit_code(verdict: Verdict, options: argparse.Namespace) -> int:
+    """Return the exit code that a verdict makes.
+
+    Parameters
+    ----------
+    options : with `accept`.
+    """
+    return 0 if verdict.valid or options.accept else NOT_VALID
+
+
+def number_cells(number: Number) -> tuple[str, str]:
+    """Return a number with its doubt, and what it is worth, as text.
+
+    Parameters
+    ----------
+    number : of a verdict.
+    """
+    doubt = "" if number.sd is None else f" ± {number.sd:.2g}"
+    return f"{number.value:.4g}{doubt}", number.state
+
+
+def number_rows(verdict: Verdict) -> list[list[str]]:
+    """Return the numbers of a verdict by title: front, its state, rear, its state.
+
+    Parameters
+    ----------
+    verdict : with numbers of both axles.
+    """
+    rows: dict[str, dict[str, Number]] = {}
+    for number in verdict.numbers:
+        rows.setdefault(f"{number.title} [{number.unit}]", {})[number.axle] = number
+    return [
+        [
+            title,
+            *(
+                cell
+                for axle in ("front", "rear")
+                for cell in (number_cells(by_axle[axle]) if axle in by_axle else ("", ""))
+            ),
+        ]
+        for title, by_axle in rows.items()
+    ]
+
+
+def verdict_text(verdict: Verdict, *, numbers: bool = True) -> str:
+    """Return a verdict as lines of text.
+
+    Parameters
+    ----------
+    numbers : whether the table of what was learnt stands above it.
+    """
+    table = [text_table([list(HEADER), *number_rows(verdict)])] if numbers else []
+    return "\n".join([*table, *verdict.lines])
+
+
+def verdicts_text(verdicts: Mapping[str, Verdict]) -> str:
+    """Return what is found on several recordings, as lines of text.
+
+    Parameters
+    ----------
+    verdicts : on the default method, by the name of the recording that it learnt on.
+    """
+    lines = []
+    for name, verdict in verdicts.items():
+        lines.append(f"default learnt on {visible(name)}: {verdict.headline}")
+        lines += [f"  {finding.line}" for finding in verdict.findings]
+    return "\n".join(lines)
+
+
+def verdict_headline(verdict: Verdict) -> Headline:
+    """Return the verdict as the first number of a report."""
+    against = sum(finding.refuses for finding in verdict.findings)
+    meaning = "the verdict on this answer: it gives back the motion that was measured"
+    if not verdict.valid:
+        meaning = f"the verdict on this answer: {against} finding{'s' * (against > 1)} against it"
+    return Headline("valid" if verdict.valid else "NOT VALID", meaning)
+
+
+def verdict_warnings(verdict: Verdict) -> list[str]:
+    """Return the findings as warnings of a report."""
+    return [printed(finding.line) for finding in verdict.findings]
+
+
+def verdict_section(verdict: Verdict) -> Section:
+    """Return the section of a report that holds a verdict."""
+    header = ["", "front", "is", "rear", "is"]
+    blocks: list[Block] = [
+        Paragraph(
+            text="The frozen model is integrated over the drive and must give back the force that "
+            "the motion shows, at each axle, where it learnt and where it did not. ± is one "
+            "standard deviation."
+        ),
+        *(Paragraph(text=printed(line)) for line in verdict.lines),
+        Table(caption="What was learnt, and what is worth it.", header=header,
+              rows=number_rows(verdict)),
+    ]  # fmt: skip
+    return Section(heading="Is it good?", blocks=blocks)
+
+
+def warn_of_stored(path: Path | str) -> None:
+    """Say on standard error where a stored model was found not valid when it was learnt.
+
+    Parameters
+    ----------
+    path : of the file.
+    """
+    try:
+        data = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return  # who loads it says so
+    if isinstance(data, dict) and data.get("valid") is False:
+        complain(f"warning: {path} was found not valid when it was learnt: see its summary.json")
+
+
+def warn_of(verdict: Verdict, what: str) -> None:
+    """Say on standard error where what is about to be used is not valid.
+
+    Parameters
+    ----------
+    verdict : on it.
+    what : is used.
+    """
+    if not verdict.valid:
+        first = next(finding for finding in verdict.findings if finding.refuses)
+        complain(f"warning: {what} is not valid: {first.line.removeprefix('not valid: ')}")
