@@ -86,15 +86,18 @@ OTHER_STRUCTURE = "the stored weights are of another structure than the design's
 class Setup(NamedTuple):
     """A run, ready to go: the compiled step, the values it carries at the start, its constants.
 
-    The step reads x = [v_y, r] (2,), u = [δ_f, δ_r] (2,) and v_x sample by sample, SI, and has an
-    output axle_force (2,) [N]. An observer that starts at the first measurement carries zero until
-    that is known: `observe` takes its x and returns the carried values that begin with it, by port.
+    The step reads x = [v_y, r] (2,), u = [δ_f, δ_r] (2,), v_x and, where it can use it, a_y (NaN
+    where there is none) sample by sample, SI: `signals_of`. It has an output axle_force (2,) [N].
+    An observer that starts at the first measurement carries zero until that is known: `observe`
+    takes its x and returns the carried values that begin with it, by port.
+    Carried ports of `only_with_a_y` change no other one, and no output, where a_y is never there.
     """
 
     scan: Scan
     carry: Mapping[str, Array]
     constants: Mapping[str, Array]
     observe: Callable[[Array], Mapping[str, Array]] | None = None
+    only_with_a_y: tuple[str, ...] = ()
 
     def begin(self, x: Array) -> "Setup":
         """Return the setup whose observers begin at a measurement.
@@ -114,10 +117,22 @@ class Setup(NamedTuple):
         ----------
         recording : its signals are the input; its forces are not looked at.
         """
-        signals = {"x": recording.x, "u": recording.u, "v_x": recording.v_x}
-        sampled = {name: signals[name] for name in self.scan.over}
         carry = self.begin(recording.x[0]).carry
+        sampled = signals_of(recording, self.scan.over)
         return self.scan(len(recording), {**carry, **sampled, **self.constants})
+
+
+def signals_of(recording: Recording, over: Iterable[str]) -> dict[str, Array]:
+    """Return what a step reads of a recording sample by sample, by port.
+
+    Parameters
+    ----------
+    over : ports that are read, of x (n, 2), u (n, 2), v_x (n,) and a_y (n,), which is NaN where it
+        was not logged.
+    """
+    a_y = np.full(len(recording), np.nan) if recording.a_y is None else recording.a_y
+    signals = {"x": recording.x, "u": recording.u, "v_x": recording.v_x, "a_y": a_y}
+    return {port: signals[port] for port in over}
 
 
 # Rules of numbers that are taken over from elsewhere: a file, another controller.

@@ -258,7 +258,7 @@ class OnlineIdentifier:
         self._judges = False
         self._diverged = False
 
-    def update(self, x: Array, u: Array, v_x: float) -> Array:
+    def update(self, x: Array, u: Array, v_x: float, a_y: float | None = None) -> Array:
         """Take a sample; return the axle forces (2,) [N], with the weights before it.
 
         Where the sample is refused, those of the last one it took, and zero once it is `stale`.
@@ -268,6 +268,8 @@ class OnlineIdentifier:
         x : [v_y, r] (2,) [m/s, rad/s].
         u : [δ_f, δ_r] (2,), angles of the road wheels [rad].
         v_x : longitudinal speed [m/s].
+        a_y : of an accelerometer at the center of gravity, positive to the left [m/s²]; None, or a
+            number that is not finite, where there is none. No sample is refused for it.
 
         Raises
         ------
@@ -275,21 +277,24 @@ class OnlineIdentifier:
             Where x or u are not pairs.
         """
         (v_y, r), (delta_f, delta_r) = x, u
+        felt = math.nan if a_y is None else float(a_y)
         if not self.limits.accept(v_x, v_y, r, delta_f, delta_r):
             return self._refused()
         if self._stepper is None:
             self._begun(x)
         elif self.counts.missed and not self._judges:
             self._take((v_y, r), (delta_f, delta_r), 0.0)  # a rest, so that the step begins anew
-        self._take((v_y, r), (delta_f, delta_r), v_x)
+        self._take((v_y, r), (delta_f, delta_r), v_x, felt)
         self.counts.samples += 1
         self.counts.missed = 0
         return self._force.copy()
 
-    def _take(self, x: tuple[float, float], u: tuple[float, float], v_x: float) -> None:
+    def _take(
+        self, x: tuple[float, float], u: tuple[float, float], v_x: float, a_y: float = math.nan
+    ) -> None:
         stepper = self._stepper
         assert stepper is not None
-        values = {"x": x, "u": u, "v_x": (v_x,)}
+        values = {"x": x, "u": u, "v_x": (v_x,), "a_y": (a_y,)}
         for port, array in stepper.inputs.items():
             array[:] = values[port]
         stepper.advance()

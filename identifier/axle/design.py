@@ -10,6 +10,7 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
+from identifier.axle.bank import RoadSlope, SlopeState
 from identifier.axle.car import car_numbers
 from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
@@ -18,7 +19,7 @@ from identifier.axle.learning import BoundNumbers, Bounds, ChangeDetector, Regre
 from identifier.axle.model import AxleModel
 from identifier.axle.prior import Prior, friction_direction
 from identifier.axle.slip import SHORTEST, SensitivityState, Sway, SwayState
-from identifier.axle.step import CARRY, OVER, PORTS, build_step
+from identifier.axle.step import CARRY, LEARNING_OVER, PORTS, build_step
 from identifier.axle.watch import BEGIN, Watch
 from identifier.certificate import Certificate
 from identifier.driving import Driving
@@ -61,6 +62,7 @@ class AxleIdentifier(Method):
     regression : filter, error model and memory.
     change : detector of a change of friction.
     watch : when what is measured is not what was learnt, and how long to wait for it.
+    road : what of an accelerometer's a_y tells of a road that is not level.
     ladder : slip scales of the units [rad], rising by powers of two.
     rising_until : slip at which force curves shall not fall yet [rad]; None leaves them free. At
         0 the cornering stiffness cannot turn negative, where steering has play or data mislead.
@@ -80,6 +82,7 @@ class AxleIdentifier(Method):
     regression: Regression = field(default_factory=Regression)
     change: ChangeDetector = field(default_factory=ChangeDetector)
     watch: Watch = field(default_factory=Watch)
+    road: RoadSlope = field(default_factory=RoadSlope)
     ladder: tuple[float, ...] = LADDER
     rising_until: float | None = 0.0
     dt: float = 0.01
@@ -201,6 +204,7 @@ class AxleIdentifier(Method):
                 "excitation": excitation,
                 "watch": np.array(BEGIN._replace(known=0.0 if start is None else self.watch.known)),
                 "kept": np.hstack([W, own]),
+                "bank": np.zeros(len(SlopeState._fields)),
             },
             constants={
                 "dt": np.array(self.dt),
@@ -211,11 +215,13 @@ class AxleIdentifier(Method):
                 "regression": self.regression.numbers(self.dt),
                 "change": self.change.numbers(self.dt),
                 "watching": self.watch.numbers(self.dt),
+                "road": self.road.numbers(self.dt),
                 "bounds": self._bound_numbers(),
                 "friction_direction": friction_direction(self.ladder),
                 "per_variance": widest,
                 **self._rising(),
             },
+            only_with_a_y=("bank",),
         )
 
     def _within_bounds(self, W: Array, own: Array, P: Array) -> tuple[Array, Array]:
@@ -338,4 +344,4 @@ def _projection(n: int, rises: bool) -> ca.Function:
 
 @cache
 def _scan(steps: tuple[int, ...], rises: bool) -> Scan:
-    return Scan(build_step(steps, rises=rises), carry=CARRY, over=OVER)
+    return Scan(build_step(steps, rises=rises), carry=CARRY, over=LEARNING_OVER)

@@ -3,7 +3,8 @@
 Carried, rows front and rear: W (2, n) and own (2, 3), what is learnt; UD (2, q (q + 1)/2) the
 factors of its covariance P = U D U', D on the diagonal, q = n + 3; gate, sway, slip as in
 `forward`; sensitivity (2, 3); filters (2, q + 1); errors (2, 4); excitation (2, 9); watch (7,) and
-kept (2, q), the weights that are gone back to after a fault. Sampled: x, u, v_x. Everything else is
+kept (2, q), the weights that are gone back to after a fault; bank (4,), of the accelerometer.
+Sampled: x, u, v_x, and a_y [m/s²] of an accelerometer, NaN where there is none. Everything else is
 a number that stays an input. Forces are told with the weights before the sample.
 """
 
@@ -11,6 +12,7 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
+from identifier.axle.bank import SlopeNumbers, SlopeState, compared, told
 from identifier.axle.car import (
     Car,
     axle_impulse,
@@ -182,8 +184,9 @@ def build_frozen(steps: tuple[int, ...]) -> ca.Function:
 
 
 MOVING = 2.0  # errors of y that a force must have to tell weights apart
+LEARNING_OVER = (*OVER, "a_y")
 LEARNT = ("W", "own", "UD")
-BESIDE = ("errors", "excitation", "watch", "kept")
+BESIDE = ("errors", "excitation", "watch", "kept", "bank")
 CARRY = (*LEARNT, "gate", "sway", "slip", "sensitivity", "filters", *BESIDE)
 LOAD = "static axle loads"
 PORTS = (
@@ -247,6 +250,12 @@ PORTS = (
         "W and own that are gone back to after a fault, front and rear",
         learnt=True,
     ),
+    Port(
+        "bank",
+        "-",
+        "filter of a_y/g; slow means of what motion has more, and of motion; mean of what a_y "
+        "explains of it",
+    ),
 )
 
 
@@ -283,6 +292,7 @@ def build_step(steps: tuple[int, ...], *, rises: bool = False) -> ca.Function:
     ports["friction_direction"] = ca.SX.sym("friction_direction", n, n)
     ports["per_variance"] = ca.SX.sym("per_variance", 2, 4)
     h, y, next_state = _regression(f, ports)
+    y, next_state["bank"] = _without_bank(f, ports, y)
     sample, means = _sample_of(f, ports, h, y)
     ports["bounds"], limits = named_port(BoundNumbers, "bounds")
     if rises:
@@ -329,6 +339,24 @@ def _regression(f: Forward, ports: dict[str, Any]) -> tuple[Any, Any, dict[str, 
     low, filters = filtered(numbers, ports["filters"], inputs, gated.first)
     next_state = {"sensitivity": ca.horzcat(p_s, p_k, f.curve.bend), "filters": filters}
     return low[:, :q], xi - low[:, q], next_state
+
+
+def _without_bank(f: Forward, ports: dict[str, Any], y: Any) -> tuple[Any, Any]:
+    """Return y without what the road pushes (2,), and the state behind it; adds its ports."""
+    ports["bank"], state = named_port(SlopeState, "bank")
+    ports["a_y"], (ports["road"], numbers) = ca.SX.sym("a_y"), named_port(SlopeNumbers, "road")
+    regression = RegressionNumbers(*ca.vertsplit(ports["regression"]))
+    after = compared(
+        numbers,
+        regression,
+        state,
+        a_y=ports["a_y"],
+        motion=ca.dot(f.car.share, y),
+        first=f.gated.first,
+        on=f.gated.on,
+        learns=f.gated.learns,
+    )
+    return y - told(numbers, state, 0.5 * regression.least_force), after
 
 
 def _sample_of(

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from codegen import BatchScan, Scan
 from codegen.arrays import Array
-from identifier.method import CannotFreezeError, Method
+from identifier.method import CannotFreezeError, Method, signals_of
 from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
 from identifier.run import identify
 from identifier.tire_model import TireModel
@@ -284,13 +284,12 @@ def run_scored(
     workers : threads; None takes one for each processor.
     """
     n = len(recording)
-    signals = {"x": recording.x, "u": recording.u, "v_x": recording.v_x}
     truth = np.zeros((n, 2)) if recording.axle_force is None else recording.axle_force
     record = _scored_scan(scan)(
         n,
         {
             **{port: np.stack([one[port] for one in values]) for port in values[0]},
-            **{port: signals[port] for port in scan.over},
+            **signals_of(recording, scan.over),
             "truth": truth,
             "counts": counts.astype(np.float64),
             "impossible": np.array(impossible),
@@ -339,13 +338,12 @@ def step_times(
     recording : what is run over.
     repeats : turns; the shortest counts.
     """
-    signals = {"x": recording.x, "u": recording.u, "v_x": recording.v_x}
-    signals = {port: _long(signal) for port, signal in signals.items()}
-    n = len(signals["v_x"])
+    n = len(_long(recording.v_x))
     runs = {}
     for name, method in methods.items():
         setup = method.setup(vehicle).begin(recording.x[0])
-        sampled = {port: signals[port] for port in setup.scan.over}
+        signals = signals_of(recording, setup.scan.over)
+        sampled = {port: _long(signal) for port, signal in signals.items()}
         runs[name] = setup.scan, {**setup.carry, **sampled, **setup.constants}
         setup.scan(n, runs[name][1])  # compiled and warm
     shortest = dict.fromkeys(methods, math.inf)

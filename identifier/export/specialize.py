@@ -2,6 +2,7 @@
 
 Gains, T_s, vehicle and K⁻¹ become literals, so that only signals and the state are left:
 (state, x = [v_y, r], u = [δ_f, δ_r], v_x) -> (state next, axle_force [N], other outputs), SI.
+There is no a_y among them: a method that could use one goes without, as where none is logged.
 """
 
 from collections.abc import Mapping
@@ -98,26 +99,25 @@ def specialize(
     """
     setup = method.setup(vehicle, start)
     step = setup.scan.step
-    parts = _specialized(setup, name)
+    carry = {port: one for port, one in setup.carry.items() if port not in setup.only_with_a_y}
+    parts = _specialized(setup, list(carry), name)
     return SpecializedStep(
         name=name,
         method=method,
         vehicle=vehicle,
         function=parts.function,
         parts=parts,
-        carry={port: _matrix(value, step.size_in(port)) for port, value in setup.carry.items()},
-        learnt=tuple(port for port in setup.carry if method.port(port).learnt),
+        carry={port: _matrix(value, step.size_in(port)) for port, value in carry.items()},
+        learnt=tuple(port for port in carry if method.port(port).learnt),
         inputs=INPUTS,
         outputs=tuple(
             _described(method.port(port), step.numel_out(port)) for port in _outputs(setup)
         ),
-        state=tuple(
-            _described(method.port(port), value.size) for port, value in setup.carry.items()
-        ),
+        state=tuple(_described(method.port(port), value.size) for port, value in carry.items()),
         dt=method.dt,
         min_speed=method.min_speed,
         rests_first=setup.observe is not None,
-        believed=GATE if judges_samples(setup.carry) else None,
+        believed=GATE if judges_samples(carry) else None,
         limits=SampleLimits.of(vehicle),
     )
 
@@ -127,13 +127,16 @@ def _outputs(setup: Setup) -> list[str]:
     return sorted(setup.scan.outputs, key=lambda port: port != "axle_force")
 
 
-def _specialized(setup: Setup, name: str) -> Tuned:
-    step, carry = setup.scan.step, list(setup.carry)
+def _specialized(setup: Setup, carry: list[str], name: str) -> Tuned:
+    step = setup.scan.step
     ports = {port: ca.SX.sym(port, *step.size_in(port)) for port in carry}
     ports |= {"x": ca.SX.sym("x", 2), "u": ca.SX.sym("u", 2), "v_x": ca.SX.sym("v_x")}
-    sampled = {port: ports[port] for port in (*carry, *setup.scan.over)}
+    signals: dict[str, ca.SX] = {**ports, "a_y": ca.SX(np.nan)}
+    sampled = {port: signals[port] for port in (*carry, *setup.scan.over)}
+    rest = {port: value for port, value in setup.carry.items() if port not in carry}
     constants = {
-        port: ca.DM(_matrix(value, step.size_in(port))) for port, value in setup.constants.items()
+        port: ca.DM(_matrix(value, step.size_in(port)))
+        for port, value in (*setup.constants.items(), *rest.items())
     }
     results = step(**sampled, **constants)
     wanted = [*(f"{port}_next" for port in carry), *_outputs(setup)]

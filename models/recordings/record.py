@@ -53,7 +53,9 @@ class Recording:
     r : yaw rate [rad/s], positive to the left, shape (n,).
     delta_f : front road-wheel angle [rad], positive to the left, shape (n,).
     delta_r : rear road-wheel angle [rad], positive to the left, shape (n,).
-    a_y : lateral acceleration v̇_y + v_x r [m/s^2], shape (n,), or None when it was not logged.
+    a_y : what an accelerometer at the center of gravity shows [m/s^2], positive to the left, shape
+        (n,), or None when it was not logged. It feels tires and wind: v̇_y + v_x r on a level road,
+        less g sin of its angle on one that falls to the left.
     axle_force : front and rear lateral axle force [N], positive to the left, shape (n, 2), or
         None when there is no truth.
 

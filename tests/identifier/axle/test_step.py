@@ -7,6 +7,7 @@ import pytest
 
 from identifier.axle import AxleIdentifier
 from identifier.run import identify
+from models.faults import Bank
 
 G = 9.81
 
@@ -44,6 +45,7 @@ class ByHand:
         self.alarm = self.again = self.known = 0.0
         self.q_learnt, self.q_kept = np.ones(2), np.ones(2)
         self.ends = []  # of doubts
+        self.gap = self.motion = self.explained = 0.0  # of the accelerometer
 
     def sizes(self, P):
         """Trace of the weights' block and the other variances, which are bounded."""
@@ -77,7 +79,36 @@ class ByHand:
         self.steady = self.steady + dt if calm else 0.0
         return restart, good and self.stuck < 3 and self.steady >= p.settle - 1e-9
 
-    def step(self, sample):
+    def road(self):
+        """What the road pushes to the left, as far as it was told before this sample [loads]."""
+        d, m = self.d.road, self.d.regression
+        if self.explained < -(d.doubt**2) or abs(self.gap) > d.most:
+            return 0.0
+        beyond = self.gap - np.clip(self.gap, *np.sort([0.0, -d.roll * self.motion]))
+        counted = np.interp(abs(beyond), [0, d.level, 2 * d.level, 1], [0, 0, 2 * d.level, 1])
+        most = d.most if self.explained > 0 else 0.5 * m.sure * m.error
+        return np.clip(np.sign(beyond) * counted, -most, most)
+
+    def feel(self, y, a_y, first, learns):
+        """Compare the accelerometer with the motion."""
+        d, dt, e = self.d.road, self.d.dt, np.exp(-self.d.regression.bandwidth * self.d.dt)
+        motion = (self.load * y).sum() / self.load.sum()
+        there = abs(a_y) < d.largest
+        felt = a_y / G if there else motion
+        if first or not there:
+            self.felt_low = felt
+        else:
+            self.felt_low = e * self.felt_low + (1 - e) * (felt + self.felt) / 2
+        self.felt, gap = felt, motion - self.felt_low
+        if not first:
+            share = 1 - np.exp(-dt / d.time)
+            self.gap += share * np.clip(gap - self.gap, -d.step, d.step)
+            self.motion += share * (motion - self.motion)
+        if there and learns:
+            now = (d.share * (motion - self.motion)) ** 2 - (gap - self.gap) ** 2
+            self.explained += (1 - np.exp(-dt / d.memory)) * (now - self.explained)
+
+    def step(self, sample, a_y=np.nan):
         first, learns = self.believe(np.asarray(sample, dtype=float))
         if not self.on:
             return np.zeros(2)
@@ -129,9 +160,12 @@ class ByHand:
             self.low = e * self.low + (1 - e) * (now + self.before) / 2
         self.before, self.x, self.alpha0, self.p_s, self.p_k = now, x, alpha, p_s, p_k
         self.C, self.phi, self.bend, self.b0 = C, phi, bend, b
+        y = xi - self.low[:, -1]
+        road = self.road()
+        self.feel(y, a_y, first, learns)
         if learns:
             force = phi * cos, C / v_x
-            self.learn(xi - self.low[:, -1], np.maximum(np.abs(seen), np.abs(x)), force)
+            self.learn(y - road, np.maximum(np.abs(seen), np.abs(x)), force)
         return phi * cos * self.load
 
     def deviation(self, y_hat, force):
@@ -267,7 +301,8 @@ def assert_by_hand(design, car, recording):
     history = identify(recording, car, design)
     hand = ByHand(design, car)
     samples = np.column_stack([recording.v_x, recording.x, recording.u])
-    forces = np.array([hand.step(sample) for sample in samples])
+    felt = np.full(len(recording), np.nan) if recording.a_y is None else recording.a_y
+    forces = np.array([hand.step(*sample) for sample in zip(samples, felt, strict=True)])
     largest = np.abs(forces).max()
     np.testing.assert_allclose(history.axle_force, forces, rtol=0, atol=1e-6 * largest)
     model = history.freeze(1e9)
@@ -279,7 +314,32 @@ def assert_by_hand(design, car, recording):
     np.testing.assert_allclose(last["kept"], hand.kept, rtol=1e-4, atol=1e-6)
     means = [hand.alarm, hand.again, *hand.q_learnt, *hand.q_kept, hand.known]
     np.testing.assert_allclose(last["watch"], means, rtol=1e-3, atol=1e-6)
+    road = [hand.gap, hand.motion, hand.explained]
+    np.testing.assert_allclose(last["bank"][1:], road, rtol=1e-6, atol=1e-12)
     return hand
+
+
+def with_accelerometer(car, recording, angle):
+    """The recording with what an accelerometer shows on a crown: noisy, and lost for a while."""
+    t, rng = recording.t, np.random.default_rng(6)
+    felt = recording.axle_force.sum(axis=1) / car.mass + 0.3 * rng.standard_normal(t.size)
+    felt[(t > 4.0) & (t < 4.6)] = 1e4  # m/s², of no car
+    return replace(Bank(vehicle=car, angle=angle, period=7.0).apply(recording), a_y=felt)
+
+
+@pytest.mark.parametrize(
+    ("angle", "road"),
+    [(0.02, {}), (-0.03, {}), (0.06, {"most": 0.03}), (0.06, {"share": 0.05, "doubt": 0.01})],
+    ids=str,
+)
+def test_step_repeats_the_equations_with_an_accelerometer(angle, road, car, drive):
+    """On a crown that is believed, on one that is too steep for a road, and doubting a sensor."""
+    recording = with_accelerometer(car, disturbed(drive(n=1500, amplitude=0.08)), angle)
+    design = AxleIdentifier.for_vehicle(car)
+    design = replace(design, road=replace(design.road, **road))
+    hand = assert_by_hand(design, car, recording)
+    without = identify(replace(recording, a_y=None), car, design).freeze(1e9)
+    assert np.abs(hand.theta - np.hstack([without.W, without.own])).max() > 1e-3
 
 
 def with_a_rest(recording):

@@ -211,6 +211,7 @@ def test_samples_that_are_no_number_are_as_impossible_ones(channel, at):
             "x": np.column_stack([seen["v_y"], seen["r"]]),
             "u": np.column_stack([seen["delta_f"], seen["delta_r"]]),
             "v_x": seen["v_x"],
+            "a_y": np.full(len(clean), np.nan),
         }
         carried.append(setup.scan(len(clean), {**setup.carry, **over, **setup.constants}))
     for name, values in carried[0].items():
