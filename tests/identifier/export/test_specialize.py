@@ -1,5 +1,7 @@
 """A folded step against the method that it came from."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -124,3 +126,19 @@ def test_covariances_of_two_sizes_among_the_weights_are_refused():
     assert covariance_order([member, member]) == 2
     with pytest.raises(ValueError, match="one size"):
         covariance_order([member, larger])
+
+
+def test_the_exported_step_goes_without_an_accelerometer(slalom):
+    """As the method does where none is logged; and a log of a banked road would tell it."""
+    method = make_method("axle", CAR)
+    specialized = specialize(method, CAR)
+    assert "bank" in method.setup(CAR).carry
+    assert "bank" not in specialized.carry
+    assert "a_y" not in specialized.function.name_in()
+    felt = slalom.axle_force.sum(axis=1) / CAR.mass - 0.5
+    told, untold = (
+        identify(replace(slalom, a_y=a_y), CAR, method).axle_force for a_y in (felt, None)
+    )
+    folded = run_folded(specialized, replace(slalom, a_y=felt))
+    assert np.abs(folded - untold).max() <= 1e-6
+    assert np.abs(told - untold).max() > 1.0
