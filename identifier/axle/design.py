@@ -199,8 +199,8 @@ class AxleIdentifier(Method):
                 "sway": np.zeros(len(SwayState._fields)),
                 "slip": np.tile([0.0, 0.0, 1.0, 0.0], (2, 1)),  # slope 1: never divided by zero
                 "sensitivity": np.zeros((2, len(SensitivityState._fields))),
-                "filters": np.zeros((2, n + 4)),
-                "errors": np.tile([0.0, 1.0, 0.0, 0.0], (2, 1)),
+                "filters": np.zeros((2, n + 5)),
+                "errors": np.tile([0.0, 1.0, 0.0], (2, 1)),
                 "excitation": excitation,
                 "watch": np.array(BEGIN._replace(known=0.0 if start is None else self.watch.known)),
                 "kept": np.hstack([W, own]),

@@ -53,8 +53,8 @@ class Regression:
     lateness: float = 0.005
     noise: float = 0.005
     sure: float = 3.5
-    sure_time: float = 0.7
     moment: float = 0.2
+    sure_time: float = 0.7
     clip: float = 5.0
     widest: float = 2.0
 
@@ -260,14 +260,13 @@ class ChangeNumbers(NamedTuple):
 
 
 class ErrorState(NamedTuple):
-    """Columns (2,): fast and slow mean of q [-], recent peak of the size of the
-    last one, the mean of y over a moment [static axle loads].
+    """Columns (2,): fast and slow mean of q [-]; recent peak of the measured force, a mean of y over
+    a moment [static axle loads].
     """
 
     fast: Any
     slow: Any
     peak: Any
-    force: Any
 
 
 def error_means(numbers: ChangeNumbers, state: ErrorState, q: Any, learns: Any) -> tuple[Any, Any]:

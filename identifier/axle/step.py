@@ -2,7 +2,7 @@
 
 Carried, rows front and rear: W (2, n) and own (2, 3), what is learnt; UD (2, q (q + 1)/2) the
 factors of its covariance P = U D U', D on the diagonal, q = n + 3; gate, sway, slip as in
-`forward`; sensitivity (2, 3); filters (2, q + 1); errors (2, 4); excitation (2, 9); watch (7,) and
+`forward`; sensitivity (2, 3); filters (2, q + 2); errors (2, 3); excitation (2, 9); watch (7,) and
 kept (2, q), the weights that are gone back to after a fault; bank (4,), of the accelerometer.
 Sampled: x, u, v_x, and a_y [m/s²] of an accelerometer, NaN where there is none. Everything else is
 a number that stays an input. Forces are told with the weights before the sample.
@@ -222,12 +222,13 @@ PORTS = (
         "rad; rad; 1/rad^2",
         "of slip to compliance and sway share, bend, per axle",
     ),
-    Port("filters", LOAD, "filters of the regressors and of the target, per axle"),
+    Port("filters", LOAD, "filters of the regressors and of the target; mean force; per axle"),
     Port(
         "errors",
         f"-; -; {LOAD}",
-        "fast and slow mean squared error, peak and mean of the measured force, per axle",
+        "fast and slow mean squared error, peak of the measured force, per axle",
         learnt=True,
+        rule=NOT_NEGATIVE,
     ),
     Port(
         "excitation",
@@ -264,6 +265,7 @@ class RegressionSample(NamedTuple):
 
     h : regressor (2, q), zero but for the offset where there is no force to learn from.
     innovation : y - h'w, clipped (2,).   R : its variance (2,).   learns : 1 or 0.
+    force : mean of y over a moment (2,).
     holds : whether there is a force to learn from (2,).   inflation : variance to add along a
     change of friction.   drift : of the offset, over its limit (2,).
     """
@@ -272,6 +274,7 @@ class RegressionSample(NamedTuple):
     innovation: Any
     R: Any
     learns: Any
+    force: Any
     holds: Any
     inflation: Any
     drift: Any
@@ -303,6 +306,7 @@ def build_step(steps: tuple[int, ...], *, rises: bool = False) -> ca.Function:
     next_state |= f.next_state
     next_state["W"], next_state["own"] = theta[:, :n], theta[:, n:]
     next_state["UD"] = ca.vertcat(*(ca.horzcat(*row_of(axle.P)) for axle in axles))
+    next_state["filters"] = ca.horzcat(next_state["filters"], sample.force)
     next_state |= _kept_books(f, ports, sample, means, watch)
     next_state["watch"] = watch.state
     next_state["kept"] = ports["kept"] + watch.follow * (theta - ports["kept"])
@@ -320,7 +324,7 @@ def _regression(f: Forward, ports: dict[str, Any]) -> tuple[Any, Any, dict[str, 
     """Return h (2, q) and y (2,), and the states behind them; adds its ports."""
     q = f.curve.units.shape[1] + 3
     ports["sensitivity"], lasting = axle_port(SensitivityState, "sensitivity")
-    ports["filters"] = ca.SX.sym("filters", 2, q + 1)
+    ports["filters"] = ca.SX.sym("filters", 2, q + 2)
     ports["regression"], numbers = named_port(RegressionNumbers, "regression")
     gated = f.gated
     p_s, p_k = sensitivity(
@@ -336,7 +340,7 @@ def _regression(f: Forward, ports: dict[str, Any]) -> tuple[Any, Any, dict[str, 
     g = force_gradient(f.curve, p_s, p_k, f.cos_delta, gated.v_x)
     xi = numbers.bandwidth * axle_impulse(f.car, gated.v_y, gated.r)
     inputs = ca.horzcat(g, xi - gated.v_x * gated.r / GRAVITY)
-    low, filters = filtered(numbers, ports["filters"], inputs, gated.first)
+    low, filters = filtered(numbers, ports["filters"][:, : q + 1], inputs, gated.first)
     next_state = {"sensitivity": ca.horzcat(p_s, p_k, f.curve.bend), "filters": filters}
     return low[:, :q], xi - low[:, q], next_state
 
@@ -374,7 +378,8 @@ def _sample_of(
     sigma = _deviation(f, numbers, y_hat)
     fast, slow = error_means(change, errors, (innovation / sigma) ** 2, learns)
     bound = numbers.clip * sigma * slow
-    force = errors.force + learns * numbers.smooth * (y - errors.force)
+    last = ports["filters"][:, -1]
+    force = last + learns * numbers.smooth * (y - last)
     peak = larger(ca.fabs(force), errors.peak * numbers.decay)
     peak = ca.if_else(learns, peak, errors.peak)
     holds = peak >= numbers.least_force
@@ -389,11 +394,12 @@ def _sample_of(
         innovation=within(innovation, -bound, bound),
         R=sigma**2 * slow * numbers.samples,
         learns=learns,
+        force=force,
         holds=holds,
         inflation=change.inflation * both,
         drift=change.offset * (watch.known < watching.known) * alarms,
     )
-    return sample, ErrorState(fast, slow, peak, force)
+    return sample, ErrorState(fast, slow, peak)
 
 
 def _deviation(f: Forward, numbers: RegressionNumbers, y_hat: Any) -> Any:
@@ -444,7 +450,7 @@ def _kept_books(
         samples=RegressionNumbers(*ca.vertsplit(ports["regression"])).samples,
         learns=sample.learns * sample.holds * ca.logic_not(watch.rests),
     )
-    return {"errors": ca.horzcat(means.fast, slow, means.peak, means.force), "excitation": times}
+    return {"errors": ca.horzcat(means.fast, slow, means.peak), "excitation": times}
 
 
 def _learn(ports: dict[str, Any], sample: RegressionSample, i: int) -> Learnt:

@@ -18,7 +18,7 @@ typedef double tireid_real;
 #define TIREID_JUDGES 1 /* the step has a gate of its own */
 #define TIREID_DECIDES 0 /* equations at rest are others than those of driving */
 #define TIREID_RESTS_FIRST 0 /* the first sample of all is one to rest at before it is taken */
-#define TIREID_RULES 4U /* of weights that are taken over */
+#define TIREID_RULES 5U /* of weights that are taken over */
 #define TIREID_COVARIANCE 0U /* rows of a covariance among the weights */
 
 #define TIREID_SAMPLE_TIME (0.01) /* from one sample to the next [s] */
@@ -28,7 +28,7 @@ typedef double tireid_real;
 #define TIREID_MAX_STEERING (1.5) /* likewise [rad] */
 #define TIREID_MAX_FORCE (73575.0) /* likewise [N] */
 #define TIREID_NOWHERE (1000000.0) /* speed of no car [m/s] */
-#define TIREID_VERSION "reference" /* name, hash, version of tireid */
+#define TIREID_VERSION "tireid, tireid" /* name, hash, version of tireid */
 
 /* Time [s] without a sample that could be taken after which no force is told any
  * more; may be set by who compiles the library. */
@@ -56,8 +56,8 @@ typedef struct {
     tireid_real own[2][3];
     /* covariance U D U' of W and own: D, and U above it, by rows; front and rear [of W and own] */
     tireid_real UD[2][28];
-    /* fast and slow mean squared error, peak and mean of the measured force, per axle [-; -; static axle loads] */
-    tireid_real errors[2][4];
+    /* fast and slow mean squared error, peak of the measured force, per axle [-; -; static axle loads] */
+    tireid_real errors[2][3];
     /* largest slip, then time of learning above each edge, per axle [rad; s] */
     tireid_real excitation[2][9];
     /* time in doubt, and in which kept explained again; mean squared error of W and of kept, front and rear; time for which W explained forces [s; s; -; s] */
@@ -76,8 +76,8 @@ typedef struct {
     tireid_real slip[2][4];
     /* of slip to compliance and sway share, bend, per axle [rad; rad; 1/rad^2] */
     tireid_real sensitivity[2][3];
-    /* filters of the regressors and of the target, per axle [static axle loads] */
-    tireid_real filters[2][8];
+    /* filters of the regressors and of the target; mean force; per axle [static axle loads] */
+    tireid_real filters[2][9];
 } tireid_values;
 
 #endif

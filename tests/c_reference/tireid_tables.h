@@ -36,8 +36,8 @@ static const tireid_values tireid_start = {
               TIREID_C(0.0007290000000000002), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.09),
               TIREID_C(0.0), TIREID_C(0.0026487) } },
         {
-            { TIREID_C(0.0), TIREID_C(1.0), TIREID_C(0.0), TIREID_C(0.0) },
-            { TIREID_C(0.0), TIREID_C(1.0), TIREID_C(0.0), TIREID_C(0.0) } },
+            { TIREID_C(0.0), TIREID_C(1.0), TIREID_C(0.0) },
+            { TIREID_C(0.0), TIREID_C(1.0), TIREID_C(0.0) } },
         {
             { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0),
               TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0) },
@@ -63,9 +63,9 @@ static const tireid_values tireid_start = {
         { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0) } },
     {
         { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0),
-          TIREID_C(0.0), TIREID_C(0.0) },
+          TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0) },
         { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0),
-          TIREID_C(0.0), TIREID_C(0.0) } }
+          TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0) } }
 };
 
 static const tireid_output tireid_no_output = { { TIREID_C(0.0), TIREID_C(0.0) } };
@@ -73,8 +73,9 @@ static const tireid_output tireid_no_output = { { TIREID_C(0.0), TIREID_C(0.0) }
 static const tireid_rule tireid_rules[TIREID_RULES] = {
     { TIREID_FACTORS, 14U, 7U },
     { TIREID_FACTORS, 42U, 7U },
-    { TIREID_NOT_NEGATIVE, 78U, 18U },
-    { TIREID_NOT_NEGATIVE, 96U, 7U },
+    { TIREID_NOT_NEGATIVE, 70U, 6U },
+    { TIREID_NOT_NEGATIVE, 76U, 18U },
+    { TIREID_NOT_NEGATIVE, 94U, 7U },
 };
 
 #endif

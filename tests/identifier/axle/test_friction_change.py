@@ -30,7 +30,7 @@ class Means(NamedTuple):
 
 
 def means(q, *, fast=(1.0, 1.0), slow=(1.0, 1.0), learns=1, dt=DT) -> Means:
-    state = ErrorState(ca.DM(fast), ca.DM(slow), ca.DM([1.0, 1.0]), ca.DM([0.0, 0.0]))
+    state = ErrorState(ca.DM(fast), ca.DM(slow), ca.DM([1.0, 1.0]))
     found = error_means(numbers(dt), state, ca.DM(q), learns)
     return Means(*(np.array(value).ravel() for value in found))
 
