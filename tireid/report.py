@@ -101,7 +101,7 @@ LETTERS = {
     "lambda": "λ",
     "theta": "θ",
 }
-INDEXED = re.compile(r"\b(v_x|v_y|a_x|a_y|e_y|A_d|T_freeze)\b")
+INDEXED = re.compile(r"\b(v_x|v_y|a_x|a_y|e_y|l_f|l_r|A_d|T_freeze)\b")
 RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
