@@ -18,8 +18,9 @@ NUMBER = re.compile(r"(?<![\w.:/-])[-+]?(?:nan|inf(?:inity)?)(?![\w.:/-])", re.I
 NO_LIMIT = re.compile(r"\binf\b")  # as certificates say that there is none
 NAME = re.compile(r"""^\s*"?name"?\s*[=:]\s*"([^"\n]{2,})"\s*,?\s*$""", re.MULTILINE)
 CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f]")
-GOOD, BAD = (0, 1), 2
+GOOD, BAD, NOT_VALID = (0, 1), 2, 3
 CODES = (*GOOD, BAD, 74)
+JUDGES = ("identify", "predict", "compare")  # commands that say by exit code 3 that it is not valid
 DEAD = 0.02  # of the stiffness of the linear tire
 LONGEST_LINE = 1000  # letters that say what is wrong
 OURS = ("out/summary.json", "out/deep/old.csv", "out/.tireid")  # of an earlier run: may be replaced
@@ -84,16 +85,16 @@ def judge(
     ended : how it ended.
     allowed : places where a number is not finite where all of the input is right.
     """
-    found = [*_ending(ended), *_lost(words, folder, before), *_left(folder, before, ended)]
+    found = [*_ending(words, ended), *_lost(words, folder, before), *_left(folder, before, ended)]
     if ended.stopped or (found and found[0].kind in ("traceback", "hang", "crash")):
         return found
     found += _output(words, ended)
-    if ended.code in GOOD:
+    if ended.code in (*GOOD, NOT_VALID):
         found += [one for one in _numbers(words, folder, before, ended) if one.place not in allowed]
     return found
 
 
-def _ending(ended: Ended) -> list[Finding]:
+def _ending(words: Sequence[str], ended: Ended) -> list[Finding]:
     frames = FRAME.findall(ended.err)
     place = ":".join(frames[-1]) if frames else "?"
     if ended.hung:
@@ -108,6 +109,8 @@ def _ending(ended: Ended) -> list[Finding]:
         stuck = FRAME.findall(ended.trace)
         where = ":".join(stuck[0]) if stuck else "?"
         return [Finding("crash", f"{where} signal {-ended.code}", ended.trace[:2000])]
+    if ended.code == NOT_VALID and words[0] in JUDGES and "NOT VALID" in ended.out:
+        return []
     if ended.code not in CODES:
         return [Finding("exit code", str(ended.code), ended.err[-500:])]
     return []
@@ -198,7 +201,8 @@ def _numbers(
             if column:
                 found.append(Finding("not finite", f"{path.name} {column}", name))
     for name, shares in ended.notes.get("frozen", {}).items():
-        if not all(math.isfinite(share) and share >= DEAD for share in shares):
+        warned = ended.code == NOT_VALID or "--accept" in words
+        if not warned and not all(math.isfinite(share) and share >= DEAD for share in shares):
             found.append(
                 Finding("dead axle", " ".join(words[:1]), f"{name}: {shares} of the linear tire")
             )

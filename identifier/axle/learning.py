@@ -260,8 +260,8 @@ class ChangeNumbers(NamedTuple):
 
 
 class ErrorState(NamedTuple):
-    """Columns (2,): fast and slow mean of q [-]; recent peak of the measured force, a mean of y over
-    a moment [static axle loads].
+    """Columns (2,): fast and slow mean of q [-]; recent peak of the measured force, which is a mean
+    of y over a moment [static axle loads].
     """
 
     fast: Any

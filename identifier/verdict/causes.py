@@ -105,8 +105,8 @@ def _bank(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
 
 DEGREE, MILLI = math.degrees(1.0), 1e3
 CAUSES = (
-    Cause("sensor_ahead", "v_y is measured {size:+.2g} m from the center of gravity (+: ahead)", 1.0,
-          0.1, 0.8, True, "length", _ahead),
+    Cause("sensor_ahead", "v_y is measured {size:+.2g} m from the center of gravity (+: ahead)",
+          1.0, 0.1, 0.8, True, "length", _ahead),
     Cause("v_y_bias", "v_y reads {size:+.2g} m/s too much", 1.0, 0.02, 0.4, True, "speed", _bias),
     Cause("mount", "the v_y sensor is turned by {size:+.2g} degrees about the vertical", DEGREE,
           0.008, 0.1, True, "", _turned),
