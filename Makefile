@@ -22,7 +22,7 @@ test: $(VENV)/.test format
 	$(MAKE) --no-print-directory --jobs=2 types tests
 
 tests: $(VENV)/.test
-	env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL $(PY) -m pytest -n auto --dist worksteal -m "not heavy"
+	$(PY) -m pytest -n auto --dist worksteal -m "not heavy"
 
 # The sweeps that tests/heavy.toml lists.
 heavy: $(VENV)/.test

@@ -2,12 +2,16 @@
 little; what is heavy.
 """
 
+import os
 import tomllib
 from fnmatch import fnmatchcase
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+for flag in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL"):  # packages are built as from a shell
+    os.environ.pop(flag, None)
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 # Of these each test takes longest: begun first, they do not keep one worker busy at the end.
