@@ -117,9 +117,27 @@ class Setup(NamedTuple):
         ----------
         recording : its signals are the input; its forces are not looked at.
         """
+        return self.scan(len(recording), self._values(recording))
+
+    def last(self, recording: Recording, n: int) -> dict[str, Array]:
+        """Return the values that are carried after the first n samples, by port; nothing else.
+
+        Parameters
+        ----------
+        recording : its signals are the input.
+        n : samples that are taken.
+        """
+        values = self._values(recording)
+        if n == 0:
+            return {port: np.asarray(values[port]) for port in self.scan.carry}
+        cut = values | {port: values[port][:n] for port in self.scan.over}
+        record = self.scan(n, cut, every=n)
+        return {port: record[f"{port}_final"] for port in self.scan.carry}
+
+    def _values(self, recording: Recording) -> dict[str, Array]:
+        """Return all that the step reads over a recording, by port."""
         carry = self.begin(recording.x[0]).carry
-        sampled = signals_of(recording, self.scan.over)
-        return self.scan(len(recording), {**carry, **sampled, **self.constants})
+        return {**carry, **signals_of(recording, self.scan.over), **self.constants}
 
 
 def signals_of(recording: Recording, over: Iterable[str]) -> dict[str, Array]:
@@ -287,6 +305,18 @@ class Method(ABC):
         """
         del vehicle, state
         return ()
+
+    def road_push(self, state: Mapping[str, Array]) -> Array | None:
+        """Return what a banked road pushed to the left by the accelerometer, (n,) [weights].
+
+        What learning did not take for a force of the tires; None where a method takes all for one.
+
+        Parameters
+        ----------
+        state : carried values by port at n + 1 instants, of a run.
+        """
+        del state
+        return None
 
     def port(self, name: str) -> Port:
         """Return what stands in an output or a carried value.

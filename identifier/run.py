@@ -197,6 +197,37 @@ def identify(
     )
 
 
+def learn(
+    recording: Recording,
+    vehicle: Vehicle,
+    design: Method,
+    start: TireModel | None = None,
+    t: float | None = None,
+) -> TireModel:
+    """Return what a method has learnt, without a record of the way there: `identify` and freeze.
+
+    Parameters
+    ----------
+    recording, vehicle, design, start : as of `identify`.
+    t : time of the freeze in the recording's own clock [s]; None is the end.
+
+    Raises
+    ------
+    DivergedError
+        Where a number of the law is not finite then.
+    CannotFreezeError
+        Where the method estimates a signal, not a model.
+    ValueError
+        Where the recording begins after that time, or is not sampled at the design's interval.
+    """
+    check_sampling(recording, design)
+    n = len(recording) if t is None else state_index(recording, t)
+    state = design.setup(vehicle, start).last(recording, n)
+    if not all(np.isfinite(value).all() for value in state.values()):
+        raise DivergedError(f"the law diverged within {n} samples")
+    return design.frozen(vehicle, state)
+
+
 # A method beside a car that drives: sample in, axle forces out, and the model learnt so far.
 #
 # The compiled step is that of `identify`, so that a drive and its recording teach the same bits.

@@ -29,6 +29,8 @@ from identifier.axle.learning import RegressionNumbers, filtered
 from models.rules import require_positive_fields
 from models.vehicle import GRAVITY
 
+UNPROVEN = 0.5  # of the force that teaches curves: the most that an unproven channel may change
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RoadSlope:
@@ -112,7 +114,7 @@ class SlopeState(NamedTuple):
     explained: Any
 
 
-def compared(
+def slope_step(
     numbers: SlopeNumbers,
     regression: RegressionNumbers,
     state: SlopeState,
@@ -150,7 +152,7 @@ def compared(
     return ca.vertcat(filter_state, mean_gap, mean_motion, mean_explained)
 
 
-def told(numbers: SlopeNumbers, state: SlopeState, offsets_alone: Any) -> Any:
+def road_push(numbers: SlopeNumbers, state: SlopeState, offsets_alone: Any) -> Any:
     """Return what the road pushes to the left [weights], 0 where nothing tells it.
 
     Parameters

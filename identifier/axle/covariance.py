@@ -16,7 +16,7 @@ from identifier.axle.car import larger, reciprocal
 
 Symmetric = dict[tuple[int, int], Any]
 
-LEAST_VARIANCE = 1e-14  # of a parameter given those after it, in its unit
+LEAST_VARIANCE = 1e-14  # of stored weights: of a parameter given those after it, in its unit
 TINY = 1e-30  # keeps quotients of factors finite where one has vanished
 ROUNDING = 1e-5  # share of the limit that rounding in float may take in a step
 
@@ -167,14 +167,14 @@ def width(trace: Any, others: list[Any], limits: list[Any]) -> Any:
 
 
 def scaled(factors: Factors, wide: Any) -> Factors:
-    """Return the factors of P/wide where wide > 1, else of P; no D falls below `LEAST_VARIANCE`.
+    """Return the factors of P/wide where wide > 1, else of P.
 
     Parameters
     ----------
     wide : from `width`.
     """
     scale = reciprocal(larger(wide, 1))
-    return Factors(factors.U, [larger(D * scale, LEAST_VARIANCE) for D in factors.D])
+    return Factors(factors.U, [D * scale for D in factors.D])
 
 
 def inflated(factors: Factors, direction: list[Any], amount: Any) -> Factors:

@@ -10,7 +10,7 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
-from identifier.axle.bank import RoadSlope, SlopeState
+from identifier.axle.bank import UNPROVEN, RoadSlope, SlopeNumbers, SlopeState, road_push
 from identifier.axle.car import car_numbers
 from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
@@ -24,11 +24,13 @@ from identifier.axle.watch import BEGIN, Watch
 from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.method import OTHER_STRUCTURE, Method, Port, Reached, Setup, Track, resumed
-from identifier.tire_model import AXLES, Axle, TireModel
+from identifier.tire_model import AXLES, TireModel
 from identifier.tuning import Range, ranges_around
 from models.vehicle import GRAVITY, Vehicle
 
 STEERING, V_Y = (BoundNumbers._fields.index(name) for name in ("steering", "v_y"))
+
+NEAR = 0.99  # of a bound, from which on a number rests at it
 
 
 # What a search may vary of it, and what the number is multiplied and divided by.
@@ -275,7 +277,7 @@ class AxleIdentifier(Method):
         )
 
     def reached(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Reached, ...]:
-        """Return grip, lag and offsets that rest within a hundredth of their bounds.
+        """Return grip, lag and offsets that rest at their bounds, to a hundredth of them.
 
         Parameters
         ----------
@@ -283,29 +285,38 @@ class AxleIdentifier(Method):
         state : W (2, n) and own (2, 3).
         """
         del vehicle
-        b = self.bounds
-        grip, own = state["W"].sum(axis=1), state["own"]
+        b, grip, own = self.bounds, state["W"].sum(axis=1), state["own"]
         elsewhere = "a sensor is off by more than that, or sits elsewhere than is told"
         late = "a sensor is late, or the tires are very soft"
-        rows: list[tuple[Axle, str, float, float, float, str, str, bool]] = [
-            ("front", "zero of the steering", own[0, 2], -b.steering, b.steering, "rad",
-             elsewhere, True),
-            ("rear", "bias of v_y", own[1, 2], -b.v_y, b.v_y, "m/s", elsewhere, True),
+        unseen = "no such curve was seen, or mass, signs or units are wrong"
+        zero, bias = float(own[0, 2]), float(own[1, 2])
+        listed = [
+            (abs(zero) > NEAR * b.steering,
+             Reached("front", "zero of the steering", zero, "rad", elsewhere, True)),
+            (abs(bias) > NEAR * b.v_y,
+             Reached("rear", "bias of v_y", bias, "m/s", elsewhere, True)),
         ]  # fmt: skip
-        for i, axle in enumerate(AXLES):
-            rows.append(
-                (axle, "compliance", own[i, 0], -b.compliance, b.compliance, "m per load", late,
-                 False)
-            )  # fmt: skip
-            rows.append(
-                (axle, "grip", grip[i], b.least_grip, b.most_grip, "static loads",
-                 "no such curve was seen, or mass, signs or units are wrong", False)
-            )  # fmt: skip
-        return tuple(
-            Reached(axle, title, float(value), unit, meaning, refuses)
-            for axle, title, value, least, most, unit, meaning, refuses in rows
-            if not 0.01 <= (value - least) / (most - least) <= 0.99
-        )
+        for axle, soft, level in zip(AXLES, own[:, 0], grip, strict=True):
+            listed += [
+                (soft > NEAR * b.compliance,  # none at all is a stiff tire
+                 Reached(axle, "compliance", float(soft), "m per load", late, False)),
+                (not b.least_grip / NEAR <= level <= NEAR * b.most_grip,
+                 Reached(axle, "grip", float(level), "static loads", unseen, False)),
+            ]  # fmt: skip
+        return tuple(one for rests, one in listed if rests)
+
+    def road_push(self, state: Mapping[str, Array]) -> Array | None:
+        """Return what a banked road pushed to the left by the accelerometer, (n,) [weights].
+
+        Parameters
+        ----------
+        state : bank (n + 1, 4), of a run.
+        """
+        offsets_alone = UNPROVEN * self.regression.sure * self.regression.error
+        before = np.asarray(state["bank"]).reshape(-1, len(SlopeState._fields))[:-1].T
+        numbers = self.road.numbers(self.dt)
+        push = road_push(SlopeNumbers(*numbers), SlopeState(*map(ca.DM, before)), offsets_alone)
+        return np.array(push, dtype=np.float64).ravel()
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> AxleModel:
         """Return the model with the carried weights.

@@ -239,8 +239,8 @@ class ChangeDetector:
         return np.array(
             [
                 1.0 / self.threshold,
-                dt / self.fast,
-                dt / self.slow,
+                min(dt / self.fast, 1.0),
+                min(dt / self.slow, 1.0),
                 inflation,
                 dt / self.offset_time,
             ]

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from identifier.axle.bank import SlopeNumbers, SlopeState, compared, told
+from identifier.axle.bank import UNPROVEN, SlopeNumbers, SlopeState, road_push, slope_step
 from identifier.axle.car import (
     Car,
     axle_impulse,
@@ -350,7 +350,7 @@ def _without_bank(f: Forward, ports: dict[str, Any], y: Any) -> tuple[Any, Any]:
     ports["bank"], state = named_port(SlopeState, "bank")
     ports["a_y"], (ports["road"], numbers) = ca.SX.sym("a_y"), named_port(SlopeNumbers, "road")
     regression = RegressionNumbers(*ca.vertsplit(ports["regression"]))
-    after = compared(
+    after = slope_step(
         numbers,
         regression,
         state,
@@ -360,7 +360,7 @@ def _without_bank(f: Forward, ports: dict[str, Any], y: Any) -> tuple[Any, Any]:
         on=f.gated.on,
         learns=f.gated.learns,
     )
-    return y - told(numbers, state, 0.5 * regression.least_force), after
+    return y - road_push(numbers, state, UNPROVEN * regression.least_force), after
 
 
 def _sample_of(

@@ -12,6 +12,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from models.faults import (
+    Misaligned,
+    SensorElsewhere,
+    SensorFault,
+    ShiftedCenter,
+    WrongNumber,
+)
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
@@ -21,11 +28,14 @@ PATIENCE = 2  # sizes in a row that do not help, after which no larger one is tr
 
 
 class Mended(NamedTuple):
-    """A drive and a car from which a fault was taken out; bank [rad] adds g φ to what tires do."""
+    """A drive and a car from which a fault was taken out.
+
+    road : what a bank pushes to the left, taken off what the motion shows [weights].
+    """
 
     recording: Recording
     vehicle: Vehicle
-    bank: float = 0.0
+    road: float = 0.0
 
 
 Mend = Callable[[Recording, Vehicle, float], Mended]
@@ -54,20 +64,20 @@ class Cause(NamedTuple):
 
 
 def _ahead(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
-    return Mended(replace(recording, v_y=recording.v_y - size * recording.r), vehicle)
-
-
-def _bias(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
-    return Mended(replace(recording, v_y=recording.v_y - size), vehicle)
+    return Mended(SensorElsewhere(sensor="velocity", x=-size).apply(recording), vehicle)
 
 
 def _turned(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
-    v_x, v_y, c, s = recording.v_x, recording.v_y, math.cos(size), math.sin(size)
-    return Mended(replace(recording, v_x=v_x * c + v_y * s, v_y=v_y * c - v_x * s), vehicle)
+    return Mended(Misaligned(angle=-size).apply(recording), vehicle)
 
 
-def _zero(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
-    return Mended(replace(recording, delta_f=recording.delta_f - size), vehicle)
+def _off(name: str) -> Mend:
+    def mend(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
+        return Mended(
+            SensorFault(channel=name, kind="biased", size=-size).apply(recording), vehicle
+        )
+
+    return mend
 
 
 def _earlier(name: str) -> Mend:
@@ -84,19 +94,19 @@ def _earlier(name: str) -> Mend:
 
 def _scaled(name: str) -> Mend:
     def mend(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
-        signal = getattr(recording, name)
-        return Mended(replace(recording, **{name: signal / (1.0 + size)}), vehicle)
+        fault = SensorFault(channel=name, kind="scaled", size=1.0 / (1.0 + size))
+        return Mended(fault.apply(recording), vehicle)
 
     return mend
 
 
 def _inertia(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
-    return Mended(recording, replace(vehicle, yaw_inertia=vehicle.yaw_inertia * math.exp(-size)))
+    told = WrongNumber(field="yaw_inertia", factor=math.exp(-size))
+    return Mended(recording, told.tell(vehicle))
 
 
 def _center(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
-    moved = replace(vehicle, l_f=vehicle.l_f + size, l_r=vehicle.l_r - size)
-    return Mended(recording, moved)
+    return Mended(recording, ShiftedCenter(share=size / vehicle.wheelbase).tell(vehicle))
 
 
 def _bank(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
@@ -107,11 +117,12 @@ DEGREE, MILLI = math.degrees(1.0), 1e3
 CAUSES = (
     Cause("sensor_ahead", "v_y is measured {size:+.2g} m from the center of gravity (+: ahead)",
           1.0, 0.1, 0.8, True, "length", _ahead),
-    Cause("v_y_bias", "v_y reads {size:+.2g} m/s too much", 1.0, 0.02, 0.4, True, "speed", _bias),
-    Cause("mount", "the v_y sensor is turned by {size:+.2g} degrees about the vertical", DEGREE,
+    Cause("v_y_bias", "v_y reads {size:+.2g} m/s too much", 1.0, 0.02, 0.4, True, "speed",
+          _off("v_y")),
+    Cause("mount", "the velocity sensor is turned by {size:+.2g} degrees (+: to the left)", DEGREE,
           0.008, 0.1, True, "", _turned),
     Cause("steering_zero", "the zero of the steering is off by {size:+.2g} degrees", DEGREE,
-          0.008, 0.1, True, "", _zero),
+          0.008, 0.1, True, "", _off("delta_f")),
     Cause("steering_late", "the steering angle is {size:.0f} ms late against the motion", MILLI,
           0.03, 0.4, False, "", _earlier("delta_f")),
     Cause("yaw_rate_late", "the yaw rate is {size:.0f} ms late (filtered?)", MILLI,
@@ -122,8 +133,8 @@ CAUSES = (
           0.5, 4.0, True, "", _inertia),
     Cause("center_of_gravity", "the center of gravity is {size:+.2g} m farther back than told "
           "(l_f and l_r)", 1.0, 0.06, 0.3, True, "length", _center),
-    Cause("bank", "the road is banked, or wind blows, as if by {size:+.2g} degrees", DEGREE,
-          0.02, 0.2, True, "", _bank),
+    Cause("bank", "the road falls by {size:+.2g} degrees (+: to the left), or wind pushes so",
+          DEGREE, 0.02, 0.2, True, "", _bank),
     Cause("v_y_scale", "v_y is scaled by {size:+.0f} %", 100.0,
           0.1, 0.5, True, "", _scaled("v_y")),
     Cause("yaw_rate_scale", "the yaw rate is scaled by {size:+.0f} %", 100.0,

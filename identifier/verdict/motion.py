@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.axle.car import Car as Loads
-from identifier.axle.car import axle_impulse, car_numbers
+from identifier.axle.car import Car, axle_impulse, car_numbers
 from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
@@ -80,7 +79,9 @@ class Windows:
         return change / self.duration
 
 
-def measured_force(recording: Recording, vehicle: Vehicle, windows: Windows) -> Array:
+def measured_force(
+    recording: Recording, vehicle: Vehicle, windows: Windows, road: Array | None = None
+) -> Array:
     """Return mean axle forces that the motion shows [static axle loads], (m, 2).
 
     Parameters
@@ -88,13 +89,13 @@ def measured_force(recording: Recording, vehicle: Vehicle, windows: Windows) -> 
     recording : v_x, v_y and r.
     vehicle : mass, inertia and geometry.
     windows : of the recording.
+    road : what a banked road pushes to the left at each sample, taken off [weights], (n,); None
+        where nobody knows of one.
     """
-    car = Loads(*car_numbers(vehicle).T)
-    impulse = np.column_stack(
-        [axle_impulse(Loads(*row), recording.v_y, recording.r) for row in zip(*car, strict=True)]
-    )
-    centripetal = windows.mean(recording.v_x * recording.r) / GRAVITY
-    force: Array = windows.rate(impulse) + centripetal[:, None]
+    car = Car(*car_numbers(vehicle).T)
+    impulse = axle_impulse(car, recording.v_y[:, None], recording.r[:, None])
+    sideways = recording.v_x * recording.r / GRAVITY - (0.0 if road is None else road)
+    force: Array = windows.rate(impulse) + windows.mean(sideways)[:, None]
     return force
 
 
@@ -201,23 +202,6 @@ class Evidence:
         first = int(np.argmax(total[n:] - total[:-n]))
         return first, first + n
 
-    def accelerations(self, vehicle: Vehicle) -> tuple[float, float]:
-        """Return the shares of lateral and yaw acceleration explained: 1 - missed² over rms².
-
-        Parameters
-        ----------
-        vehicle : that drove.
-        """
-        loads = np.array(vehicle.axle_loads)
-        arms = np.array([vehicle.l_f, -vehicle.l_r])
-        shares = []
-        for weights in (loads, arms * loads):
-            size = float(np.mean((self.measured @ weights) ** 2))
-            noise = float(weights**2 @ self.noise)
-            missed = float(np.mean(((self.measured - self.modelled) @ weights) ** 2)) - noise
-            shares.append(1.0 - max(missed, 0.0) / size if size > 0.0 else 0.0)
-        return shares[0], shares[1]
-
 
 def clean_rms(signal: Array, noise: Array) -> Array:
     """Return the root mean square of a signal whose noise has a known variance, (2,).
@@ -244,25 +228,22 @@ def clean_share(missed: Array, force: Array, noise: Array) -> Array:
     return share
 
 
-def evidence(
-    model: TireModel, recording: Recording, windows: Windows | None = None
-) -> Evidence | None:
+def evidence(model: TireModel, recording: Recording, road: Array | None = None) -> Evidence | None:
     """Return what a model explains of a drive; None where too little of it is driven.
 
     Parameters
     ----------
     model : frozen.
     recording : the drive.
-    windows : where to look; None takes all in which the car drives.
+    road : as in `measured_force`.
     """
     vehicle = model.vehicle
-    if windows is None:
-        windows = Windows.of(recording, max(model.min_speed, BRISK * vehicle.froude_speed))
+    windows = Windows.of(recording, max(model.min_speed, BRISK * vehicle.froude_speed))
     if len(windows) < FEWEST:
         return None
     return Evidence(
         windows=windows,
-        measured=measured_force(recording, vehicle, windows),
+        measured=measured_force(recording, vehicle, windows, road),
         modelled=modelled_force(model, recording, windows),
         noise=noise_variance(recording, vehicle, windows),
     )

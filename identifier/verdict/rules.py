@@ -37,32 +37,33 @@ class Drive(NamedTuple):
     """What the rules look at.
 
     model, recording : what was learnt, or asked, and the drive.   found : what the model explains.
-    suspects : causes of what is missed, the likeliest first.   center : the center of gravity that
-    explains most, None where it was not asked.   elsewhere : force missed by models taught without
-    a part of the drive in that part, over the force (2,), None unknown.   apart : online from
-    frozen (2,).   learns : whether the model was learnt on this drive.
+    suspects : causes of what is missed, the likeliest first.   notes : what is said beside.
+    center : the center of gravity that explains most, None where it was not asked.   elsewhere :
+    force missed by models taught without a part of the drive in that part, over the force (2,),
+    None unknown.   apart : online from frozen (2,), None unknown.   learns : whether the model was
+    learnt on this drive.
     """
 
     model: TireModel
     recording: Recording
     found: Evidence
-    suspects: tuple[Suspect, ...]
-    center: Suspect | None
-    elsewhere: Array | None
-    apart: Array | None
-    learns: bool
+    suspects: tuple[Suspect, ...] = ()
+    notes: tuple[Finding, ...] = ()
+    center: Suspect | None = None
+    elsewhere: Array | None = None
+    apart: Array | None = None
+    learns: bool = False
 
 
 def findings(drive: Drive) -> list[Finding]:
-    """Return all that is found, those that refuse first.
+    """Return all that is found.
 
     Parameters
     ----------
     drive : what the rules look at.
     """
     rules = (_v_y_stuck, _no_force, _missed, _elsewhere, _unknown, _stiffness, _shape, _apart, _car)
-    listed = [finding for rule in rules for finding in rule(drive)]
-    return sorted(listed, key=lambda finding: not finding.refuses)
+    return [*(finding for rule in rules for finding in rule(drive)), *drive.notes]
 
 
 def _forceless(drive: Drive) -> list[bool]:
@@ -70,19 +71,25 @@ def _forceless(drive: Drive) -> list[bool]:
 
 
 def _no_force(drive: Drive) -> Iterator[Finding]:
-    for axle, peak, none in zip(AXLES, drive.found.peak, _forceless(drive), strict=True):
+    forceless = _forceless(drive)
+    noise = np.sqrt(drive.found.noise)
+    for axle, peak, none, hidden in zip(
+        AXLES, drive.found.peak, forceless, noise > LEAST_FORCE, strict=True
+    ):
         if none:
             said = (
                 "what is printed is what was told, not learnt; drive a slalom"
                 if drive.learns
                 else "whether the model is right cannot be seen here"
             )
+            if hidden:
+                said = "noise of v_y and yaw rate hides it: mend the sensors"
             yield Finding(
                 "no_force",
                 axle,
-                f"the drive holds no force to learn from or to judge by (at most {peak:.2g} of "
+                f"the drive shows no force to learn from or to judge by (at most {peak:.2g} of "
                 f"the static load, {LEAST_FORCE:g} are needed): {said}",
-                drive.learns,
+                drive.learns or all(forceless),
             )
 
 
@@ -115,7 +122,7 @@ def _elsewhere(drive: Drive) -> Iterator[Finding]:
         return
     found = zip(AXLES, drive.elsewhere, drive.found.missed, _forceless(drive), strict=True)
     for axle, missed, here, none in found:
-        if missed > MOST_MISSED_ELSEWHERE and here <= MOST_MISSED and not none:
+        if not (missed <= MOST_MISSED_ELSEWHERE or here > MOST_MISSED or none):
             yield Finding(
                 "not_repeated",
                 axle,
@@ -135,7 +142,7 @@ def _unknown(drive: Drive) -> Iterator[Finding]:
             return
         power = drive.found.measured[:, i] ** 2
         mean = float(np.sqrt(np.sum(power * doubt[:, i] ** 2) / max(float(power.sum()), 1e-12)))
-        if mean > MOST_DOUBT and not _forceless(drive)[i]:
+        if not (mean <= MOST_DOUBT or _forceless(drive)[i]):
             yield Finding(
                 "prior",
                 axle,
@@ -209,7 +216,7 @@ def _apart(drive: Drive) -> Iterator[Finding]:
     if drive.apart is None:
         return
     for axle, apart, none in zip(AXLES, drive.apart, _forceless(drive), strict=True):
-        if apart > MOST_APART and not none:
+        if not (apart <= MOST_APART or none):
             yield Finding(
                 "online_apart",
                 axle,

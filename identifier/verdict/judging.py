@@ -8,11 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.run import History, identify
+from identifier.axle import AxleIdentifier
+from identifier.method import Method
+from identifier.reproducibility import motion_error
+from identifier.run import History, identify, learn
 from identifier.tire_model import AXLES, GRIP, STIFFNESS, Estimate, TireModel
-from identifier.verdict.causes import CAUSES, Ask, Mended, suspects
+from identifier.verdict.causes import CAUSES, Ask, Mended, Suspect, suspects
 from identifier.verdict.motion import (
     FEWEST,
+    WINDOW,
     Evidence,
     Windows,
     clean_share,
@@ -32,7 +36,8 @@ CONFINED = 0.6  # and of what is missed with the piece
 TINY = 1e-9  # of a force, squared [static axle loads²]
 PARTS = 4  # of the drive, each of which is left out once
 Indices = NDArray[np.intp]
-CENTER = tuple(one for one in CAUSES if one.code == "center_of_gravity")
+GEOMETRY = "center_of_gravity"
+CENTER = tuple(one for one in CAUSES if one.code == GEOMETRY)
 
 
 def judge(history: History, t: float | None = None) -> Verdict:
@@ -51,21 +56,18 @@ def judge(history: History, t: float | None = None) -> Verdict:
         Where the method estimates a signal, not a model.
     """
     model, recording = history.freeze(t), history.recording
+    road = history.design.road_push(history.state)
 
     def taught(mended: Mended) -> TireModel:
-        return _learnt(history, mended.recording, mended.vehicle)
+        return learn(mended.recording, mended.vehicle, history.design, history.start, t)
 
-    looked = _looked_at(taught, model, recording)
-    if looked is None:
+    drive = _looked_at(taught, model, recording, road)
+    if drive is None:
         return _too_short(model)
-    drive, notes = looked
-    found = drive.found
     drive = drive._replace(
-        center=None
-        if notes
-        else suspects(_ask(taught, found.windows), recording, model.vehicle, CENTER)[0],
-        elsewhere=_elsewhere(history, found),
-        apart=_apart(history, found),
+        center=None if drive.notes else _center(drive, taught, road),
+        elsewhere=_elsewhere(history, drive.found, t),
+        apart=_apart(history, drive.found),
         learns=True,
     )
     end = float(recording.t[-1]) if t is None else t
@@ -78,7 +80,7 @@ def judge(history: History, t: float | None = None) -> Verdict:
         )
         for one in history.design.reached(history.vehicle, history.state_at(end))
     ]
-    return _verdict(drive, [*findings(drive), *reached, *notes])
+    return _verdict(drive, [*findings(drive), *reached])
 
 
 def judge_prediction(model: TireModel, recording: Recording) -> Verdict:
@@ -93,24 +95,31 @@ def judge_prediction(model: TireModel, recording: Recording) -> Verdict:
     def mounted(mended: Mended) -> TireModel:
         return model if mended.vehicle == model.vehicle else model.mounted_on(mended.vehicle)
 
-    looked = _looked_at(mounted, model, recording)
-    if looked is None:
-        return _too_short(model)
-    drive, notes = looked
-    return _verdict(drive, [*findings(drive), *notes])
+    drive = _looked_at(mounted, model, recording, _road_driven(recording, model.vehicle))
+    return _too_short(model) if drive is None else _verdict(drive, findings(drive))
+
+
+def _road_driven(recording: Recording, vehicle: Vehicle) -> Array | None:
+    """Return what the default takes a banked road to push, by the accelerometer (n,) [weights]."""
+    if recording.a_y is None:
+        return None
+    design: Method = AxleIdentifier.for_vehicle(vehicle, dt=recording.dt)
+    return design.road_push(identify(recording, vehicle, design).state)
 
 
 Tires = Callable[[Mended], TireModel]  # of a car and a drive that a fault was taken out of
 
 
 def _looked_at(
-    tires: Tires, model: TireModel, recording: Recording
-) -> tuple[Drive, list[Finding]] | None:
-    """Return what the rules look at, and what is said of a stretch that is left out of it.
+    tires: Tires, model: TireModel, recording: Recording, road: Array | None
+) -> Drive | None:
+    """Return what the rules look at; None where too little is driven.
 
-    One stretch may be missed, as before a sensor has settled, where all the rest is explained.
+    One stretch may be missed, as before a sensor has settled, where all the rest is explained: it
+    is left out, and noted.
     """
-    found, notes = evidence(model, recording), []
+    found = evidence(model, recording, road)
+    notes: tuple[Finding, ...] = ()
     if found is None:
         return None
     if not (found.missed <= REST_MISSED).all():
@@ -118,21 +127,19 @@ def _looked_at(
         rest = found.without(first, last)
         confined = (rest.missed <= np.minimum(REST_MISSED, CONFINED * found.missed.max())).all()
         if len(rest.windows) >= FEWEST and confined:
-            notes.append(_stretch(found, rest, recording, first, last))
+            notes = (_stretch(found, rest, recording, first, last),)
             found = rest
-    bad = not (found.missed <= MOST_MISSED).all()
-    windows = found.windows
-    drive = Drive(
-        model=model,
-        recording=recording,
-        found=found,
-        suspects=suspects(_ask(tires, windows), recording, model.vehicle) if bad else (),
-        center=None,
-        elsewhere=None,
-        apart=None,
-        learns=False,
-    )
-    return drive, notes
+    listed: tuple[Suspect, ...] = ()
+    if not (found.missed <= MOST_MISSED).all():
+        listed = suspects(_ask(tires, found.windows, road), recording, model.vehicle)
+    return Drive(model=model, recording=recording, found=found, suspects=listed, notes=notes)
+
+
+def _center(drive: Drive, tires: Tires, road: Array | None) -> Suspect:
+    """Return the center of gravity that would explain most."""
+    ask = _ask(tires, drive.found.windows, road)
+    listed = drive.suspects or suspects(ask, drive.recording, drive.model.vehicle, CENTER)
+    return next(one for one in listed if one.cause.code == GEOMETRY)
 
 
 def _stretch(
@@ -150,12 +157,12 @@ def _stretch(
     )
 
 
-def _ask(tires: Tires, windows: Windows) -> Ask:
+def _ask(tires: Tires, windows: Windows, road: Array | None) -> Ask:
     """Return what asks for the share of the force, of both axles, missed of a mended drive."""
 
     def ask(mended: Mended) -> float:
         recording, model = mended.recording, tires(mended)
-        force = measured_force(recording, model.vehicle, windows) + mended.bank
+        force = measured_force(recording, model.vehicle, windows, road) - mended.road
         away = force - modelled_force(model, recording, windows)
         noise = noise_variance(recording, model.vehicle, windows)
         power = np.mean(force**2, axis=0)
@@ -164,16 +171,14 @@ def _ask(tires: Tires, windows: Windows) -> Ask:
     return ask
 
 
-def _learnt(history: History, recording: Recording, vehicle: Vehicle) -> TireModel:
-    """Return what the method of a run, begun as it was, learns of another drive or car."""
-    return identify(recording, vehicle, history.design, history.start).freeze()
-
-
 def _verdict(drive: Drive, listed: list[Finding]) -> Verdict:
     """Return the verdict of what was found."""
     listed.sort(key=lambda finding: not finding.refuses)
-    found, car = drive.found, drive.model.vehicle
-    lateral, yaw = found.accelerations(car)
+    found, model, recording = drive.found, drive.model, drive.recording
+    motion = motion_error(
+        model.axle_force(recording), recording, model.vehicle, recording.v_x >= model.min_speed
+    )
+    lateral, yaw = (None, None) if motion is None else motion.explained
     measures: dict[str, tuple[float, ...] | float | None] = {
         "force_missed": _pair(found.missed),
         "force_missed_elsewhere": _pair(drive.elsewhere),
@@ -192,7 +197,7 @@ def _verdict(drive: Drive, listed: list[Finding]) -> Verdict:
             *one._replace(sd=_doubt(one, float(missed[one.axle]))),
             valid=one.learnt and not refused & {None, one.axle},
         )
-        for one in drive.model.estimates()
+        for one in model.estimates()
     )
     return Verdict(findings=tuple(listed), numbers=numbers, measures=measures)
 
@@ -215,8 +220,8 @@ def _too_short(model: TireModel) -> Verdict:
     finding = Finding(
         "too_short",
         None,
-        f"fewer than {FEWEST} windows of 0.3 s are driven briskly: there is nothing to judge by, "
-        "and nothing to learn from",
+        f"fewer than {FEWEST} windows of {WINDOW:g} s are driven briskly: there is nothing to "
+        "judge by",
         True,
     )
     numbers = tuple(Number(*one, valid=False) for one in model.estimates())
@@ -227,11 +232,12 @@ def _apart(history: History, found: Evidence) -> Array:
     """Return how far online lies from frozen over the later half, over the frozen force (2,)."""
     windows = found.windows
     online = windows.mean(history.axle_force / np.array(history.vehicle.axle_loads))
-    half = slice(len(windows) // 2, None)
-    return clean_share((online - found.modelled)[half], found.modelled[half], np.zeros(2))
+    later = np.arange(len(windows)) >= len(windows) // 2
+    later &= np.isfinite(online).all(axis=1)  # before a law diverged
+    return clean_share((online - found.modelled)[later], found.modelled[later], np.zeros(2))
 
 
-def _elsewhere(history: History, found: Evidence) -> Array | None:
+def _elsewhere(history: History, found: Evidence, t: float | None) -> Array | None:
     """Return what models taught without a part of the drive miss of that part, over its force (2,).
 
     The parts follow one another and hold equal shares of the force (squared); in the one that is
@@ -240,6 +246,8 @@ def _elsewhere(history: History, found: Evidence) -> Array | None:
     """
     recording, windows, car = history.recording, found.windows, history.vehicle
     power = np.cumsum(np.sum(found.measured**2, axis=1))
+    if not power[-1] > 0.0:
+        return None
     part = np.minimum((PARTS * power / power[-1]).astype(np.intp), PARTS - 1)
     slip = np.abs(windows.mean(np.asarray(recording.alpha(car.l_f, car.l_r))))
     missed, force = np.zeros_like(found.measured), np.zeros_like(found.measured)
@@ -247,7 +255,7 @@ def _elsewhere(history: History, found: Evidence) -> Array | None:
         mine = part == k
         if not mine.any():
             continue
-        model = _taught_without(history, windows.starts[mine], windows.n)
+        model = _taught_without(history, windows.starts[mine], windows.n, t)
         if model is None:
             return None
         known = model.known_slip
@@ -258,12 +266,13 @@ def _elsewhere(history: History, found: Evidence) -> Array | None:
     return np.where(seen > 0.0, clean_share(missed, force, found.noise * seen), 0.0)
 
 
-def _taught_without(history: History, starts: Indices, n: int) -> TireModel | None:
+def _taught_without(history: History, starts: Indices, n: int, t: float | None) -> TireModel | None:
     """Return what a drive teaches without some windows; None where nothing comes of it."""
     recording = history.recording
     halt = np.array(recording.v_x)
     halt[starts[0] : starts[-1] + n + 1] = 0.0
     try:
-        return _learnt(history, replace(recording, v_x=halt), history.vehicle)
+        halted = replace(recording, v_x=halt)
+        return learn(halted, history.vehicle, history.design, history.start, t)
     except (ArithmeticError, ValueError):
         return None
