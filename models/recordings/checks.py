@@ -13,6 +13,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from models.bicycle import measured_slip
+from models.logs.log import RecordingError
 from models.recordings.evidence import (
     STRIDE,
     Steering,
@@ -23,7 +24,7 @@ from models.recordings.evidence import (
     steering,
     windows,
 )
-from models.recordings.record import Recording, RecordingError
+from models.recordings.record import Recording
 
 LARGEST_STEERING = 1.2  # [rad], 69 degrees: beyond every road wheel and scale car (about 50)
 LARGEST_SPEED = 110.0  # [m/s], 396 km/h; a sedan's 110 km/h reads 110

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
+from models.logs.log import RecordingError
 from models.recordings.checks import check_physics
-from models.recordings.record import LARGEST, MINIMUM_SAMPLES, Recording, RecordingError, resample
+from models.recordings.record import LARGEST, MINIMUM_SAMPLES, Recording, resample
 from models.schema import (
     LONGEST_NAME,
     limits,

@@ -17,6 +17,7 @@ import numpy as np
 from codegen.arrays import Array
 from models.bicycle import measured_slip
 from models.files import write_atomically
+from models.logs.log import RecordingError
 from models.rules import LARGEST_FORCE
 
 MINIMUM_SAMPLES = 10
@@ -34,10 +35,6 @@ LARGEST = {
     "a_y": 1e5,
     "axle_force": LARGEST_FORCE,
 }
-
-
-class RecordingError(ValueError):
-    """A log or a recording breaks a rule; one line: file or name, column, rule, value, remedy."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)

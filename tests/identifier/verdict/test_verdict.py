@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from identifier.verdict.judging import judge
 
 import identifier.verdict
 from identifier.axle import AxleIdentifier
@@ -16,6 +15,7 @@ from identifier.methods import make_method
 from identifier.run import identify
 from identifier.tire_model import GRIP, STIFFNESS
 from identifier.verdict import judge_prediction
+from identifier.verdict.judging import judge
 from identifier.verdict.motion import (
     Windows,
     clean_share,

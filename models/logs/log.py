@@ -1,0 +1,90 @@
+"""What a logger wrote, before anything of it is understood: named channels, each on its own clock.
+
+A format reads a file and gives a `LogFile`; what the channels mean (which is v_y, in which unit,
+from which sensor) is told by a map, and only then a `Recording` in SI is made of them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import Array
+
+
+class RecordingError(ValueError):
+    """A log or a recording breaks a rule; one line: file or name, column, rule, value, remedy."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Listed:
+    """A channel as a file lists it.
+
+    Parameters
+    ----------
+    name : as in the file, unique in it; a message's field has its topic before it.
+    unit : as in the file, "" where it tells none.
+    samples : how many there are.
+    rate : typical samples per second [Hz], NaN where it is not known without reading them.
+    """
+
+    name: str
+    unit: str
+    samples: int
+    rate: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Channel:
+    """One signal as it was written.
+
+    Parameters
+    ----------
+    name, unit : as in `Listed`.
+    t : time of each sample [s], (n,), on the clock of the log; channels of one clock share it.
+    values : (n,) float64 as in the file, NaN for an empty cell.
+    place : what a sample is in the file, for messages: "line", "row", "message" or "sample".
+    rows : which one each sample is in, (n,).
+    """
+
+    name: str
+    unit: str
+    t: Array
+    values: Array
+    place: str
+    rows: NDArray[np.int64]
+
+
+class LogFile(Protocol):
+    """What every format answers; nothing is read beyond what was asked for."""
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+
+    @property
+    def format(self) -> str:
+        """Its format as users call it, for example "CSV" or "MDF4"."""
+
+    def listed(self) -> tuple[Listed, ...]:
+        """Return the numeric channels in the order of the file, but for the clock."""
+
+    def runs(self) -> tuple[str, ...]:
+        """Return the names of the runs that the file holds apart; empty where it holds one."""
+
+    def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
+        """Return channels in the order of their names.
+
+        Parameters
+        ----------
+        names : as listed.
+        run : one of `runs`; None where there are none.
+
+        Raises
+        ------
+        RecordingError
+            One line: file, channel, rule, value, remedy.
+        """
