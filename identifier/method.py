@@ -22,37 +22,9 @@ from models.rules import LARGEST_FORCE
 from models.schema import Table
 from models.vehicle import Vehicle
 
-SLIP = 0.02  # rad, below the peak of every tire
-SLIDE = 300  # samples of 10 ms: after them a lag of the force is over
-
 
 class CannotFreezeError(ValueError):
     """The method estimates a signal: there is no model of the tire to freeze."""
-
-
-def steady_stiffness(model: TireModel, v_x: float) -> Array:
-    """Return the slope of both axle forces over slip between two steady slides, (2,) [N/rad].
-
-    Parameters
-    ----------
-    v_x : speed of the slides [m/s], without yawing or steering.
-    """
-    t, zeros = np.arange(SLIDE) / 100.0, np.zeros(SLIDE)
-    right, left = (
-        model.axle_force(
-            Recording(
-                name="a steady slide",
-                t=t,
-                v_x=np.full(SLIDE, v_x),
-                v_y=np.full(SLIDE, -v_x * np.tan(alpha)),
-                r=zeros,
-                delta_f=zeros,
-                delta_r=zeros,
-            )
-        )[-1]
-        for alpha in (-SLIP, SLIP)
-    )
-    return np.asarray((left - right) / (2.0 * SLIP))
 
 
 Model = TypeVar("Model", bound=TireModel)

@@ -10,6 +10,7 @@ them, and any other recording too. There are two measures, and they answer diffe
 """
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ from identifier.run import History
 from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from identifier.verdict import Verdict
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,6 +163,7 @@ class Prediction:
 
     Parameters
     ----------
+    model : that predicted.
     recording : what was predicted.
     axle_force : forces of the frozen model (n, 2) [N].
     against_truth : error over the samples that count, against the true force; None without truth.
@@ -166,6 +171,7 @@ class Prediction:
     motion : what the forces miss of the measured motion; None where the recording is too short.
     """
 
+    model: TireModel
     recording: Recording
     axle_force: Array
     against_truth: AxleRmse | None
@@ -182,6 +188,12 @@ class Prediction:
             f"<Prediction of {name!r}: {error.front:.0f} / {error.rear:.0f} N rms missed, "
             f"{front:.1f} / {rear:.1f} % of the force, front / rear>"
         )
+
+    def verdict(self) -> "Verdict":
+        """Return whether the model gives back the drive's motion; computed at each call."""
+        from identifier.verdict import judge_prediction
+
+        return judge_prediction(self.model, self.recording)
 
     def motion_text(self) -> str:
         """Return what the forces explain of the motion, in a line; empty where nobody knows."""
@@ -287,6 +299,7 @@ def predict(model: TireModel, recording: Recording, *, since: float | None = Non
     counted = counted_samples(recording, model.min_speed, since)
     truth = recording.axle_force
     return Prediction(
+        model=model,
         recording=recording,
         axle_force=force,
         against_truth=None if truth is None else axle_rms(force - truth, counted),

@@ -9,7 +9,7 @@ import numpy as np
 
 from identifier.compare.study import run_comparison, step_lengths
 from identifier.method import Method
-from identifier.methods import METHODS
+from identifier.methods import DEFAULT, METHODS
 from identifier.own_network import FrozenMethod
 from identifier.paper.design import PaperIdentifier
 from identifier.verdict import Verdict
@@ -143,7 +143,7 @@ def run(options: argparse.Namespace) -> int:
             others=others,
         )
         work.begin("step times, tables and figures")
-        verdicts = default_verdicts(recordings, vehicle)
+        verdicts = default_verdicts(recordings, vehicle) if DEFAULT in names else {}
         figures = write_comparison(folder, comparison, verdicts)
         rows = summary_rows(comparison)
         write_compare_report(
@@ -159,9 +159,10 @@ def run(options: argparse.Namespace) -> int:
         if len(comparison.names) ** 2 <= FEW_PAIRS:
             told.append(pair_tables(comparison))
     told += [vehicle.estimates] if vehicle.estimates else []
-    tell("\n".join([*told, verdicts_text(verdicts)]))
+    told += [verdicts_text(verdicts)] if verdicts else []
+    tell("\n".join(told))
     say(f"wrote {options.out}/ in {watch.seconds:.0f} s")
-    return max(exit_code(verdict, options) for verdict in verdicts.values())
+    return max((exit_code(verdict, options) for verdict in verdicts.values()), default=0)
 
 
 def default_verdicts(recordings: Sequence[Recording], vehicle: Vehicle) -> dict[str, Verdict]:

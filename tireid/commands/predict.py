@@ -13,7 +13,7 @@ from identifier.method import vehicle_numbers
 from identifier.methods import load_model
 from identifier.reproducibility import Prediction, beyond_known
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict, judge_prediction
+from identifier.verdict import Verdict
 from tireid import __version__
 from tireid.commands import COMMANDS
 from tireid.commands.identify_results import error_cells
@@ -65,7 +65,8 @@ def run(options: argparse.Namespace) -> int:
         columns=options.columns,
         check=not options.no_check,
     )
-    prediction, verdict = replay(model, recording), judge_prediction(model, recording)
+    prediction = replay(model, recording)
+    verdict = prediction.verdict()
     with output_folder(options.out, force=options.force) as folder:
         write_csv(folder / "forces.csv", force_columns(model, prediction))
         write_json(folder / "summary.json", summary(model, prediction, verdict))
