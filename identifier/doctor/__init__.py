@@ -1,0 +1,5 @@
+"""The doctor: what is wrong with a log, or with what is told of its car, from the log alone."""
+
+from identifier.doctor.finding import Finding
+
+__all__ = ["Finding"]

@@ -1,0 +1,224 @@
+"""What takes known faults out of a log: units, offsets, delays, lags, sensors that sit elsewhere.
+
+What a log shows of a drive is made in this order: the place of the sensor, the way it looks, its
+low pass, its delay, its offset, its factor. It is taken out backwards. Conventions are those of
+`models.faults`: a fault that is applied and repaired gives the drive back.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
+
+from codegen.arrays import Array
+from models.logs.log import RecordingError
+from models.recordings.record import MINIMUM_SAMPLES, Recording
+from models.schema import Table, shown
+from models.vehicle import Vehicle
+
+CHANNELS = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")
+NUMBERS = (
+    "mass",
+    "yaw_inertia",
+    "l_f",
+    "l_r",
+    "cornering_stiffness_front",
+    "cornering_stiffness_rear",
+)  # of a `Vehicle`
+SMOOTHED = 0.08  # half the width of the window before a low pass is inverted, over sqrt(L/g)
+
+
+def nothing() -> Mapping[str, float]:
+    """Return no number at all."""
+    return {}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Repair:
+    """Numbers that bring a log, and the car told with it, to what was driven; SI throughout.
+
+    Parameters
+    ----------
+    factor : by channel, what the logged value is multiplied by [-].
+    offset : by channel, what is then taken off, in its unit.
+    delay : by channel, how late it is against the others [s]; negative where it is early. The
+        repaired recording ends, or begins, where a channel has no sample any more.
+    lag : by channel, time constant of a low pass of first order that it is behind [s].
+    velocity_sensor_x : how far ahead of the center of gravity v_y is measured [m].
+    velocity_sensor_angle : by which that sensor is turned to the left [rad].
+    acceleration_sensor_x : how far ahead of the center of gravity a_y is measured [m].
+    vehicle : numbers of the car in place of the told ones, by their names in `Vehicle`.
+
+    Raises
+    ------
+    RecordingError
+        For an unknown channel or number of a car, for a value that is not finite, for a factor of
+        zero, a lag that is not positive, or a number of a car that is not.
+    """
+
+    factor: Mapping[str, float] = field(default_factory=nothing)
+    offset: Mapping[str, float] = field(default_factory=nothing)
+    delay: Mapping[str, float] = field(default_factory=nothing)
+    lag: Mapping[str, float] = field(default_factory=nothing)
+    velocity_sensor_x: float = 0.0
+    velocity_sensor_angle: float = 0.0
+    acceleration_sensor_x: float = 0.0
+    vehicle: Mapping[str, float] = field(default_factory=nothing)
+
+    def __post_init__(self) -> None:
+        for name in TABLES:
+            known = NUMBERS if name == "vehicle" else CHANNELS
+            for key, value in getattr(self, name).items():
+                if key not in known:
+                    raise RecordingError(
+                        f"repair: {name} must be of {', '.join(known)}, not of {shown(key)}"
+                    )
+                _require_finite(f"{name}.{key}", value)
+                if name == "factor" and value == 0.0:
+                    raise RecordingError(f"repair: factor.{key} must not be 0")
+                if name in ("lag", "vehicle") and not value > 0.0:
+                    raise RecordingError(f"repair: {name}.{key} must be positive, it is {value}")
+        for name in SCALARS:
+            _require_finite(name, getattr(self, name))
+
+    def __bool__(self) -> bool:
+        """Whether there is anything to repair."""
+        return self != Repair()
+
+    def apply(self, recording: Recording, vehicle: Vehicle) -> tuple[Recording, Vehicle]:
+        """Return the recording and the car without the faults; true forces stay those of the drive.
+
+        Parameters
+        ----------
+        recording : as it was logged.
+        vehicle : as it was told.
+
+        Raises
+        ------
+        RecordingError
+            Where the recording lacks a channel that is to be repaired, or nothing of it is left.
+        VehicleError
+            Where the numbers of the car are those of no car.
+        """
+        told = {name for name in TABLES if name != "vehicle" for name in getattr(self, name)}
+        if self.acceleration_sensor_x:
+            told.add("a_y")
+        signals: dict[str, Array] = {}
+        for name in CHANNELS:
+            signal: Array | None = getattr(recording, name)
+            if signal is not None:
+                signals[name] = signal * self.factor.get(name, 1.0) - self.offset.get(name, 0.0)
+            elif name in told:
+                raise RecordingError(f"{recording.name}: has no {name} that could be repaired")
+        for name, delay in self.delay.items():
+            signals[name] = np.interp(recording.t + delay, recording.t, signals[name])
+        width = round(SMOOTHED * vehicle.froude_time / recording.dt)
+        for name, lag in self.lag.items():
+            signals[name] = without_low_pass(signals[name], lag, recording.dt, width)
+        c, s = math.cos(self.velocity_sensor_angle), math.sin(self.velocity_sensor_angle)
+        v_x, v_y, r = signals["v_x"], signals["v_y"], signals["r"]
+        signals["v_x"] = c * v_x - s * v_y
+        signals["v_y"] = c * v_y + s * v_x - self.velocity_sensor_x * r
+        if self.acceleration_sensor_x:
+            signals["a_y"] = signals["a_y"] - self.acceleration_sensor_x * np.gradient(
+                r, recording.dt
+            )
+        signals["t"] = recording.t
+        if recording.axle_force is not None:
+            signals["axle_force"] = recording.axle_force
+        kept = self._kept(recording)
+        changes: dict[str, Any] = {name: signal[kept] for name, signal in signals.items()}
+        repaired = replace(recording, **changes)
+        numbers: dict[str, Any] = dict(self.vehicle)
+        return repaired, replace(vehicle, **numbers) if numbers else vehicle
+
+    def _kept(self, recording: Recording) -> slice:
+        """Return the samples at which every channel was measured."""
+        late = max(0.0, *self.delay.values(), 0.0)
+        early = max(0.0, *(-delay for delay in self.delay.values()), 0.0)
+        first, last = (math.ceil(time / recording.dt - 1e-6) for time in (early, late))
+        if len(recording) - first - last < MINIMUM_SAMPLES:
+            raise RecordingError(
+                f"{recording.name}: delays of {1e3 * late:g} and {1e3 * early:g} ms leave nothing "
+                f"of its {recording.duration:g} s"
+            )
+        return slice(first, len(recording) - last)
+
+    def merged(self, other: "Repair") -> "Repair":
+        """Return what both take out, as of numbers that were estimated together.
+
+        Factors multiply, all else adds; of the numbers of the car the other's hold.
+
+        Parameters
+        ----------
+        other : repairs that come beside these.
+        """
+        sums: dict[str, Any] = {
+            name: _added(getattr(self, name), getattr(other, name))
+            for name in ("offset", "delay", "lag")
+        }
+        factor = dict(self.factor)
+        for key, value in other.factor.items():
+            factor[key] = factor.get(key, 1.0) * value
+        places = {name: getattr(self, name) + getattr(other, name) for name in SCALARS}
+        return Repair(factor=factor, vehicle={**self.vehicle, **other.vehicle}, **sums, **places)
+
+    def tables(self) -> dict[str, Any]:
+        """Return it as a document holds it: only what repairs something, tables after numbers."""
+        numbers = {name: value for name in SCALARS if (value := getattr(self, name))}
+        tables = {name: dict(value) for name in TABLES if (value := getattr(self, name))}
+        return {**numbers, **tables}
+
+    @classmethod
+    def of_table(cls, table: Table) -> "Repair":
+        """Return it as a document says it.
+
+        Parameters
+        ----------
+        table : as `tables` returns it; what is missing repairs nothing.
+
+        Raises
+        ------
+        ValueError
+            Of the table's class for a key or type that is not known; `RecordingError` for a value.
+        """
+        table.only(*SCALARS, *TABLES)
+        given: dict[str, Any] = {name: table.number(name) for name in SCALARS if name in table}
+        for name in TABLES:
+            if name in table:
+                inner = table.table(name)
+                given[name] = {key: inner.number(key) for key in inner.data}
+        return cls(**given)
+
+
+TABLES = ("factor", "offset", "delay", "lag", "vehicle")
+SCALARS = tuple(one.name for one in fields(Repair) if one.name not in TABLES)
+
+
+def _require_finite(name: str, value: float) -> None:
+    if not math.isfinite(value):
+        raise RecordingError(f"repair: {name} must be finite, it is {value}")
+
+
+def _added(one: Mapping[str, float], other: Mapping[str, float]) -> dict[str, float]:
+    return {key: one.get(key, 0.0) + other.get(key, 0.0) for key in {**one, **other}}
+
+
+def without_low_pass(signal: Array, lag: float, dt: float, width: int) -> Array:
+    """Return what went into a low pass, u = y + T ẏ, of y smoothed by a window without phase.
+
+    Parameters
+    ----------
+    signal : y, what came out (n,).
+    lag : time constant T of the low pass [s].
+    dt : sampling interval [s].
+    width : samples on each side of the Hann window that takes noise off first; 0 for none.
+    """
+    if width > 0:
+        window = np.hanning(2 * width + 3)[1:-1]
+        padded = np.pad(signal, width, mode="reflect", reflect_type="odd")
+        signal = np.convolve(padded, window / window.sum(), "valid")
+    source: Array = signal + lag * np.gradient(signal, dt)
+    return source

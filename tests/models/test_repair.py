@@ -1,0 +1,227 @@
+"""A fault that is applied and repaired gives the drive back, kind by kind."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.faults import (
+    UNITS,
+    Lagging,
+    Late,
+    Mirrored,
+    Misaligned,
+    SensorElsewhere,
+    SensorFault,
+    ShiftedCenter,
+    SwappedAxles,
+    Together,
+    WrongNumber,
+    WrongUnit,
+)
+from models.recordings import Recording, RecordingError, Repair
+from models.schema import Table
+from models.vehicle import VehicleError, sedan
+
+CAR = sedan()
+
+
+@pytest.fixture(scope="module")
+def drive():
+    """Smooth swings at a speed that varies."""
+    t = 0.01 * np.arange(2000)
+
+    def swing(late):
+        return np.sin(2.0 * np.pi * 0.4 * (t - late)) * np.sin(0.2 * (t - late))
+
+    return Recording(
+        name="swings",
+        t=t,
+        v_x=20.0 + 2.0 * np.sin(0.3 * t),
+        v_y=0.5 * swing(0.15),
+        r=0.3 * swing(0.1),
+        delta_f=0.05 * swing(0.0),
+        delta_r=0.0 * t,
+        a_y=6.0 * swing(0.1),
+        axle_force=np.column_stack([swing(0.0), swing(0.1)]),
+    )
+
+
+def biased(channel, size):
+    return SensorFault(channel=channel, kind="biased", size=size)
+
+
+REPAIRS = {
+    "offset": (biased("v_y", 0.2), Repair(offset={"v_y": 0.2})),
+    "factor": (SensorFault(channel="r", kind="scaled", size=1.25), Repair(factor={"r": 0.8})),
+    "steering wheel": (
+        SensorFault(channel="delta_f", kind="scaled", size=16.0),
+        Repair(factor={"delta_f": 1.0 / 16.0}),
+    ),
+    "sign": (
+        Mirrored(channels=("v_y", "a_y")),
+        Repair(factor={"v_y": -1.0, "a_y": -1.0}),
+    ),
+    "unit": (WrongUnit(channel="a_y", unit="g"), Repair(factor={"a_y": 1.0 / UNITS["g"]})),
+    "misaligned": (Misaligned(angle=0.02), Repair(velocity_sensor_angle=0.02)),
+    "ahead": (SensorElsewhere(sensor="velocity", x=0.7), Repair(velocity_sensor_x=0.7)),
+    "accelerometer": (
+        SensorElsewhere(sensor="accelerometer", x=-0.4),
+        Repair(acceleration_sensor_x=-0.4),
+    ),
+    "order": (
+        Together(
+            faults=(
+                SensorElsewhere(sensor="velocity", x=0.7),
+                Misaligned(angle=0.02),
+                Late(channels=("v_y",), delay=0.05),
+                biased("v_y", 0.2),
+                SensorFault(channel="v_y", kind="scaled", size=-3.6),
+            )
+        ),
+        Repair(
+            velocity_sensor_x=0.7,
+            velocity_sensor_angle=0.02,
+            delay={"v_y": 0.05},
+            offset={"v_y": 0.2},
+            factor={"v_y": -1.0 / 3.6},
+        ),
+    ),
+}
+
+
+def apart(one, other):
+    """Return the largest difference of each channel over its size, where both have samples."""
+    n = len(one)
+    return {
+        name: np.abs(getattr(one, name) - getattr(other, name)[:n]).max()
+        / max(np.abs(getattr(other, name)).max(), 1e-9)
+        for name in ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")
+    }
+
+
+@pytest.mark.parametrize("name", REPAIRS)
+def test_what_is_applied_and_repaired_gives_the_drive_back(drive, name):
+    fault, repair = REPAIRS[name]
+    repaired, car = repair.apply(fault.apply(drive), CAR)
+    # a misaligned sensor turns v_x too, and v_x is not late with v_y in the case of an order
+    assert max(apart(repaired, drive).values()) < (2e-3 if name == "order" else 1e-12)
+    assert car is CAR
+    np.testing.assert_array_equal(repaired.axle_force, drive.axle_force[: len(repaired)])
+
+
+@pytest.mark.parametrize("name", REPAIRS)
+def test_another_repair_does_not(drive, name):
+    fault, _ = REPAIRS[name]
+    assert max(apart(fault.apply(drive), drive).values()) > 0.02
+
+
+@pytest.mark.parametrize("delay", [0.05, 0.0333])
+def test_a_delay_is_taken_out_and_the_end_that_nobody_measured_is_cut(drive, delay):
+    late = Late(channels=("r", "a_y"), delay=delay).apply(drive)
+    repaired, _ = Repair(delay={"r": delay, "a_y": delay}).apply(late, CAR)
+    assert len(repaired) == len(drive) - int(np.ceil(delay / drive.dt))
+    assert max(apart(repaired, drive).values()) < 1e-3
+    assert max(apart(late, drive).values()) > 0.05
+
+
+def test_a_channel_that_is_early_cuts_the_beginning(drive):
+    others = Late(channels=("v_x", "v_y", "r", "delta_r", "a_y"), delay=0.05).apply(drive)
+    repaired, _ = Repair(delay={"delta_f": -0.05}).apply(others, CAR)
+    assert repaired.t[0] == pytest.approx(drive.t[0] + 0.05)
+    np.testing.assert_allclose(repaired.delta_f, drive.delta_f[:-5], atol=1e-12)
+    np.testing.assert_allclose(repaired.r, drive.r[:-5], atol=1e-12)
+
+
+@pytest.mark.parametrize("lag", [0.05, 0.2])
+def test_a_low_pass_is_taken_out(drive, lag):
+    lagging = Lagging(channels=("v_y", "r"), time_constant=lag).apply(drive)
+    repaired, _ = Repair(lag={"v_y": lag, "r": lag}).apply(lagging, CAR)
+    assert max(apart(repaired, drive).values()) < 0.015
+    assert max(apart(lagging, drive).values()) > 0.1
+
+
+def test_noise_behind_a_low_pass_is_not_blown_up(drive):
+    lagging = Lagging(channels=("v_y",), time_constant=0.2).apply(drive)
+    noise = np.random.default_rng(0).normal(0.0, 0.03, len(drive))
+    noisy = replace(lagging, v_y=lagging.v_y + noise)
+    repaired, _ = Repair(lag={"v_y": 0.2}).apply(noisy, CAR)
+    left = repaired.v_y - drive.v_y
+    plain = noisy.v_y + 0.2 * np.gradient(noisy.v_y, drive.dt) - drive.v_y
+    assert np.std(left) < 4.0 * 0.03
+    assert np.std(plain) > 10.0 * 0.03
+
+
+@pytest.mark.parametrize(
+    "told", [SwappedAxles(), ShiftedCenter(share=0.05), WrongNumber(field="yaw_inertia", factor=2)]
+)
+def test_numbers_of_the_car_are_put_right(drive, told):
+    right = {name: getattr(CAR, name) for name in ("yaw_inertia", "l_f", "l_r")}
+    repaired, car = Repair(vehicle=right).apply(drive, told.tell(CAR))
+    assert car == CAR
+    assert told.tell(CAR) != CAR
+    np.testing.assert_array_equal(repaired.v_y, drive.v_y)
+
+
+def test_nothing_repaired_is_nothing_changed(drive):
+    repaired, car = Repair().apply(drive, CAR)
+    assert not Repair()
+    assert Repair(delay={"r": 0.01})
+    assert car is CAR
+    assert all(value == 0.0 for value in apart(repaired, drive).values())
+
+
+def test_a_document_holds_a_repair_bit_for_bit():
+    repair = Repair(
+        factor={"delta_f": 1.0 / 15.9},
+        offset={"v_y": 0.1},
+        delay={"a_y": 0.09},
+        lag={"r": 0.02},
+        velocity_sensor_x=0.3,
+        vehicle={"l_f": 1.2},
+    )
+    assert Repair.of_table(Table(repair.tables(), "log.toml: ", RecordingError)) == repair
+    assert Repair().tables() == {}
+
+
+def test_repairs_that_were_estimated_together_merge():
+    one = Repair(factor={"r": 2.0}, offset={"v_y": 0.1}, velocity_sensor_x=0.2)
+    other = Repair(factor={"r": 0.5, "v_y": -1.0}, offset={"v_y": 0.1}, vehicle={"l_f": 1.2})
+    assert one.merged(other) == Repair(
+        factor={"r": 1.0, "v_y": -1.0},
+        offset={"v_y": 0.2},
+        velocity_sensor_x=0.2,
+        vehicle={"l_f": 1.2},
+    )
+    assert one.merged(Repair()) == one == Repair().merged(one)
+
+
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        ({"factor": {"v_z": 1.0}}, "factor must be of v_x"),
+        ({"factor": {"v_y": 0.0}}, "must not be 0"),
+        ({"offset": {"v_y": np.nan}}, "offset.v_y must be finite"),
+        ({"delay": {"v_y": np.inf}}, "delay.v_y must be finite"),
+        ({"lag": {"v_y": -0.1}}, "lag.v_y must be positive"),
+        ({"vehicle": {"wheelbase": 2.7}}, "vehicle must be of mass"),
+        ({"vehicle": {"mass": 0.0}}, "vehicle.mass must be positive"),
+        ({"velocity_sensor_x": np.nan}, "velocity_sensor_x must be finite"),
+    ],
+)
+def test_what_repairs_nothing_is_refused(made, words):
+    with pytest.raises(RecordingError, match=words):
+        Repair(**made)
+
+
+def test_what_cannot_be_applied_is_refused(drive):
+    without = replace(drive, a_y=None)
+    for repair in (Repair(delay={"a_y": 0.1}), Repair(acceleration_sensor_x=0.1)):
+        with pytest.raises(RecordingError, match="has no a_y"):
+            repair.apply(without, CAR)
+    with pytest.raises(RecordingError, match="leave nothing"):
+        Repair(delay={"r": 30.0}).apply(drive, CAR)
+    with pytest.raises(VehicleError):
+        Repair(vehicle={"mass": 1e-9}).apply(drive, CAR)
+    with pytest.raises(RecordingError, match=r"repair\.lags"):
+        Repair.of_table(Table({"lags": {}}, "", RecordingError, "repair."))
