@@ -265,7 +265,7 @@ def counted_samples(
 
 
 def beyond_known(model: TireModel, recording: Recording) -> tuple[float, float] | None:
-    """Return the share of the samples with more slip than the model knows; None if it cannot tell.
+    """Return the share of the samples with more slip than the model knows; None if nobody can tell.
 
     Parameters
     ----------
@@ -275,7 +275,9 @@ def beyond_known(model: TireModel, recording: Recording) -> tuple[float, float] 
     known = model.known_slip
     if known is None:
         return None
-    counted = counted_samples(recording, model.min_speed)
+    counted = recording.v_x >= model.min_speed
+    if not counted.any():
+        return None
     alpha = np.abs(recording.alpha(model.vehicle.l_f, model.vehicle.l_r)[counted])
     front, rear = np.mean(alpha > known, axis=0)
     return float(front), float(rear)

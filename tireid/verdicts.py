@@ -8,11 +8,11 @@ from pathlib import Path
 from codegen.escape import visible
 from identifier.methods import stored_verdict
 from identifier.verdict import Number, Verdict
+from tireid.commands import DONE, NOT_VALID
 from tireid.output import text_table
 from tireid.progress import complain
 from tireid.report import Block, Headline, Paragraph, Section, Table, printed
 
-NOT_VALID = 3  # exit code; 0 is valid, 1 a check that failed, 2 bad input
 HEADER = ("", "front", "is", "rear", "is")
 
 
@@ -37,7 +37,7 @@ def exit_code(verdict: Verdict, options: argparse.Namespace) -> int:
     ----------
     options : with `accept`.
     """
-    return 0 if verdict.valid or options.accept else NOT_VALID
+    return DONE if verdict.valid or options.accept else NOT_VALID
 
 
 def number_cells(number: Number) -> tuple[str, str]:

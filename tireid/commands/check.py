@@ -28,7 +28,7 @@ from models.files import write_atomically
 from models.recordings import Recording
 from models.schema import require_few
 from models.vehicle import Vehicle
-from tireid.commands import COMMANDS
+from tireid.commands import COMMANDS, DONE, FAILS
 from tireid.commands.certificate_table import (
     bound_rows,
     certificate_of,
@@ -109,7 +109,6 @@ def error_bounds(certificate: Certificate) -> dict[str, float]:
     return {title: known[name] for name, title in BOUNDS.items() if name in known}
 
 
-FAILS = 1
 CONDITIONS = {  # field of the declared driving, and the option that says otherwise
     "v_x": "speed",
     "slip": "slip",
@@ -262,7 +261,7 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
             write_atomically(options.tune, design_text(design))
     tell(json.dumps(numbers, indent=2) if options.json else text)
     _say_written(options)
-    return FAILS if certificate.verdict == "fail" or passed else 0
+    return FAILS if certificate.verdict == "fail" or passed else DONE
 
 
 def _with_estimates(text: str, vehicle: Vehicle) -> str:

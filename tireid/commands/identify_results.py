@@ -67,7 +67,7 @@ def summarize(
     learnt: History,
     others: Sequence[History],
     frozen: Mapping[float, Mapping[str, Replay]],
-    verdict: Verdict | None = None,
+    verdict: Verdict,
 ) -> dict[str, Any]:
     """Return what summary.json holds: errors by recording and freeze time, and all that went in.
 
@@ -142,7 +142,7 @@ def write_results(
     learnt: History,
     others: Sequence[History],
     frozen: Frozen,
-    verdict: Verdict | None = None,
+    verdict: Verdict,
 ) -> dict[str, Figure]:
     """Write everything that was learnt into a folder; return the figures by the name of their file.
 
