@@ -13,7 +13,8 @@ from typing import NoReturn
 
 import tireid
 from models.limits import LimitError, limits_text
-from tireid.commands import BAD_INPUT, COMMANDS, INTERRUPTED, NOT_TOLD, add_command
+from tireid.commands import COMMANDS, add_command
+from tireid.exit_codes import BAD_INPUT, INTERRUPTED, NOT_TOLD
 from tireid.progress import complain, flush_out, listen_to_library, unwritten
 
 LONGEST_LINE = 900  # characters of a message, command and option not counted

@@ -8,7 +8,7 @@ from pathlib import Path
 from codegen.escape import visible
 from identifier.methods import stored_verdict
 from identifier.verdict import Number, Verdict
-from tireid.commands import DONE, NOT_VALID
+from tireid.exit_codes import DONE, NOT_VALID
 from tireid.output import text_table
 from tireid.progress import complain
 from tireid.report import Block, Headline, Paragraph, Section, Table, printed
