@@ -1,11 +1,6 @@
 """From a log file to a Recording: one run, rising time, finite values, uniform grid, physics."""
 
-import csv
 import difflib
-import io
-import math
-import sys
-from array import array
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,28 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
+from models.logs.door import ENDINGS, open_log
 from models.logs.log import RecordingError
+from models.logs.stamps import not_rising
+from models.logs.table import RUN, Kind, TableLog, Words
 from models.recordings.checks import check_physics
 from models.recordings.record import LARGEST, MINIMUM_SAMPLES, Recording, resample
-from models.schema import (
-    LONGEST_NAME,
-    limits,
-    read_bytes,
-    require_few,
-    require_file,
-    shown,
-    unpack,
-)
+from models.schema import require_few, shown
 
-# Read the numeric columns of a log file: CSV, gzipped CSV or Parquet.
+# Read the numeric columns of a log.
 
 NEEDED = ("t", "vx", "vy", "r", "delta_f")
 OPTIONAL = ("delta_r", "ay", "Fyf", "Fyr")
-RUN = "run"
 # Forces that were computed backwards from the motion stand in where none were measured.
 INVERSE = {"Fyf_inv": "Fyf", "Fyr_inv": "Fyr"}
 NO_NAMES: Mapping[str, str] = {}
-ENDINGS = (".csv", ".csv.gz", ".parquet")
 ALIASES = {
     "t": ("time", "timestamp", "time_s", "sec"),
     "vx": ("v_x", "u", "speed", "velocity_x", "vel_x", "v"),
@@ -48,37 +36,48 @@ ALIASES = {
 class Table(NamedTuple):
     """Columns of a log as written, with the line (CSV) or row (Parquet) of every sample.
 
-    columns: name -> (n,) float64, NaN for an empty cell; run: (n,) strings or None; row: (n,).
+    columns: name -> (n,) float64, NaN for an empty cell; run: which each row is of, or None, and
+    all that there are; row: (n,).
     """
 
     columns: dict[str, Array]
-    run: NDArray[Any] | None
+    run: Words | None
     row: NDArray[np.int64]
     unit: str
 
 
-def read_table(path: Path, only_runs: bool = False, columns: Mapping[str, str] = NO_NAMES) -> Table:
+def read_table(path: Path, columns: Mapping[str, str] = NO_NAMES, run: str | None = None) -> Table:
     """Read the columns a recording needs; others are ignored.
 
     Parameters
     ----------
-    path : a .csv, .csv.gz or .parquet file with a header.
-    only_runs : read the run column alone.
+    path : a log with a header.
     columns : by our name of a column, the name that it has in this file, where they differ.
+    run : name of the run to read; None reads all.
 
     Raises
     ------
     RecordingError
         If the file cannot be read, or a column is missing, doubled or not numeric.
     """
-    if path.is_dir() or not path.exists():
-        raise RecordingError(f"{path}: there is no such file")
-    name = path.name.lower()
-    if not name.endswith(ENDINGS):
-        raise RecordingError(f"{path}: the name must end in one of {', '.join(ENDINGS)}")
-    if name.endswith(".parquet"):
-        return _read_parquet(path, only_runs, columns)
-    return _read_csv(path, only_runs, columns)
+    log = open_log(path)
+    if not isinstance(log, TableLog):
+        raise RecordingError(f"{path}: {log.format} needs a map of its channels")
+    table = log.table
+    header = _standard_names(path, list(table.names), columns)
+    names = _choose(path, header)
+    kinds = {header.index(name): Kind.NUMBER for name in names}
+    if RUN in header:
+        kinds[header.index(RUN)] = Kind.WORD
+    place = (header.index(RUN), run) if RUN in header and run is not None else None
+    cells = table.cells(kinds, place)
+    words = cells.words[header.index(RUN)] if RUN in header else None
+    return Table(
+        {name: cells.columns[header.index(name)] for name in names},
+        words,
+        cells.rows,
+        table.place,
+    )
 
 
 def table_of_arrays(name: str, data: Any, columns: Mapping[str, str] = NO_NAMES) -> Table:
@@ -104,13 +103,12 @@ def table_of_arrays(name: str, data: Any, columns: Mapping[str, str] = NO_NAMES)
             f"{name}: a data frame or a mapping of arrays is needed, not {type(data).__name__}"
         ) from None
     ours = dict(zip(_standard_names(name, header, columns), header, strict=True))
-    values = {key: _array(name, key, arrays[ours[key]]) for key in _choose(name, list(ours), False)}
+    values = {key: _array(name, key, arrays[ours[key]]) for key in _choose(name, list(ours))}
     sizes = {key: value.size for key, value in values.items()}
     run = None
     if RUN in ours:
-        run = np.array([str(word) for word in arrays[ours[RUN]].tolist()], dtype=object)
-    if run is not None:
-        sizes[RUN] = run.size
+        run = Words.of([str(word) for word in arrays[ours[RUN]].tolist()])
+        sizes[RUN] = run.codes.size
     if len(set(sizes.values())) > 1:
         raise RecordingError(f"{name}: columns must have one length, they have {sizes}")
     return Table(values, run, np.arange(values["t"].size), "index")
@@ -130,119 +128,6 @@ def _array(name: str, column: str, value: NDArray[Any]) -> Array:
         ) from None
 
 
-def _read_csv(path: Path, only_runs: bool, columns_named: Mapping[str, str]) -> Table:
-    """Read a CSV, plain or gzipped, line by line; columns that nobody asks for are not kept."""
-    reader = csv.reader(io.TextIOWrapper(io.BytesIO(_text(path)), "utf-8-sig", newline=""))
-    most = limits().samples
-    lines: list[int] = []
-    runs: list[str] = []
-    try:
-        header = [cell.strip() for cell in next(reader, [])]
-        require_few(RecordingError, str(path), len(header), "columns", "columns")
-        header = _standard_names(path, header, columns_named)
-        names = _choose(path, header, only_runs)
-        places = [header.index(name) for name in names]
-        columns = [array("d") for _ in names]
-        run = header.index(RUN) if RUN in header else None
-        for cells in reader:
-            if not cells:
-                continue
-            line = reader.line_num
-            if len(cells) != len(header):
-                raise RecordingError(
-                    f"{path}: line {line} has {len(cells)} cells, the header has {len(header)}; "
-                    "was the file cut off?"
-                )
-            if len(lines) >= most:
-                require_few(RecordingError, str(path), len(lines) + 1, "samples", "rows")
-            lines.append(line)
-            for name, place, column in zip(names, places, columns, strict=True):
-                column.append(_number(path, name, cells[place], line))
-            if run is not None:
-                runs.append(_run_name(path, cells[run], line))
-    except csv.Error as error:
-        raise RecordingError(f"{path}: line {reader.line_num} is not CSV ({error})") from None
-    if not lines:
-        raise RecordingError(f"{path}: there is a header but no row of data")
-    return Table(
-        {name: np.array(column) for name, column in zip(names, columns, strict=True)},
-        None if run is None else np.array(runs, dtype=object),
-        np.array(lines),
-        "line",
-    )
-
-
-def _text(path: Path) -> bytes:
-    """Read and decompress a file, which holds text in UTF-8."""
-    data = read_bytes(path, RecordingError, limit="megabytes")
-    zipped = data.startswith(b"\x1f\x8b")
-    if path.name.lower().endswith(".gz"):
-        if not zipped:
-            raise RecordingError(f"{path}: is not gzip, although its name ends in .gz")
-        data = unpack(path, data, RecordingError, limit="megabytes")
-    elif zipped:
-        raise RecordingError(f"{path}: is gzip, rename it to end in .csv.gz")
-    try:
-        data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise RecordingError(
-            f"{path}: is not a text file in UTF-8 (byte {error.start}); a recording is CSV"
-        ) from None
-    if b"\0" in data:
-        raise RecordingError(f"{path}: is a binary file (it has NUL bytes); a recording is CSV")
-    if not data.strip():
-        raise RecordingError(f"{path}: is empty")
-    return data
-
-
-def _read_parquet(path: Path, only_runs: bool, columns_named: Mapping[str, str]) -> Table:
-    """Read a Parquet file."""
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError:
-        raise RecordingError(
-            f"{path}: reading Parquet needs pyarrow: pip install tireid[parquet]"
-        ) from None
-    require_file(path, RecordingError, limit="megabytes")
-    try:
-        with pyarrow.parquet.ParquetFile(path) as file:
-            _require_small(path, file.metadata)
-            found = list(file.schema_arrow.names)
-            header = _standard_names(path, found, columns_named)
-            names = _choose(path, header, only_runs)
-            known = names + [RUN] * (RUN in header)
-            data: Any = file.read(columns=[found[header.index(name)] for name in known])
-            data = data.rename_columns(known)
-    except (pyarrow.ArrowException, OSError, UnicodeDecodeError) as error:
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
-        raise RecordingError(f"{path}: is not a Parquet file ({reason})") from None
-    if data.num_rows == 0:
-        raise RecordingError(f"{path}: has columns but no row of data")
-    row = np.arange(1, data.num_rows + 1)
-    columns = {}
-    for name in names:
-        kind = data.schema.field(name).type
-        if not (pyarrow.types.is_floating(kind) or pyarrow.types.is_integer(kind)):
-            raise RecordingError(f"{path}: {name} must be numeric, its type is {kind}")
-        values = data.column(name).cast(pyarrow.float64(), safe=False)
-        columns[name] = np.array(values.to_numpy(), dtype=np.float64)
-    run = None
-    if RUN in header:
-        cells = data.column(RUN).to_pylist()
-        names_of_runs = [_run_name(path, str(cell), k) for k, cell in enumerate(cells, start=1)]
-        run = np.array(names_of_runs, dtype=object)
-    return Table(columns, run, row, "row")
-
-
-def _require_small(path: Path, about: Any) -> None:
-    """Refuse a Parquet file that unpacks to more than is allowed, by what it says of itself."""
-    require_few(RecordingError, str(path), about.num_columns, "columns", "columns")
-    require_few(RecordingError, str(path), about.num_rows, "samples", "rows")
-    size = sum(about.row_group(k).total_byte_size for k in range(about.num_row_groups))
-    require_few(RecordingError, str(path), size / 1e6, "megabytes", "megabytes")
-
-
 def _standard_names(path: str | Path, header: list[str], columns: Mapping[str, str]) -> list[str]:
     """Return the header with our names for the columns that the file calls otherwise."""
     known = (*NEEDED, *OPTIONAL, RUN)
@@ -259,19 +144,14 @@ def _standard_names(path: str | Path, header: list[str], columns: Mapping[str, s
     return renamed
 
 
-def _choose(path: str | Path, header: list[str], only_runs: bool) -> list[str]:
+def _choose(path: str | Path, header: list[str]) -> list[str]:
     """Check the header and return the numeric columns to read."""
     known = (*NEEDED, *OPTIONAL, RUN)
     doubled = [name for name in known if header.count(name) > 1]
     if doubled:
         raise RecordingError(f"{path}: column {', '.join(doubled)} appears more than once")
-    if only_runs:
-        return []
     missing = [name for name in NEEDED if name not in header]
     if missing:
-        only = header[0] if len(header) == 1 else ""
-        if ";" in only or "\t" in only:
-            raise RecordingError(f"{path}: cells must be separated by commas, found {only[:40]!r}")
         hints = [f"{found!r} for {name}" for name in missing if (found := _similar(name, header))]
         listing = ", ".join(header[:12]) + (", ..." if len(header) > 12 else "")
         raise RecordingError(
@@ -296,26 +176,6 @@ def _similar(name: str, header: list[str]) -> str | None:
                 return lower[column]
     close = difflib.get_close_matches(name, list(lower), n=1, cutoff=0.75)
     return lower[close[0]] if close else None
-
-
-def _number(path: Path, name: str, cell: str, line: int) -> float:
-    """Convert a cell; an empty one is NaN."""
-    try:
-        if "_" not in cell:  # which Python takes for a mark between digits
-            return float(cell) if cell else math.nan
-    except ValueError:
-        if not cell.strip():
-            return math.nan
-    raise RecordingError(f"{path}: {name} must be numeric, line {line} has {shown(cell)}")
-
-
-def _run_name(path: Path, cell: str, line: int) -> str:
-    name = sys.intern(cell.strip())  # the same in every row
-    if len(name) > LONGEST_NAME:
-        raise RecordingError(
-            f"{path}: run must be at most {LONGEST_NAME} characters, line {line} has {shown(name)}"
-        )
-    return name
 
 
 FIELDS = {"vx": "v_x", "vy": "v_y", "ay": "a_y", "Fyf": "axle_force", "Fyr": "axle_force"}
@@ -359,7 +219,7 @@ def read_recording(
     """
     path = Path(path)
     _require_positive(str(path), dt)
-    table = read_table(path, columns=columns)
+    table = read_table(path, columns=columns, run=run)
     return recording_from_table(str(path), _stem(path), table, run=run, dt=dt, check=check)
 
 
@@ -423,8 +283,7 @@ def runs(path: str | Path) -> list[str]:
     ----------
     path : a .csv, .csv.gz or .parquet file.
     """
-    run = read_table(Path(path), only_runs=True).run
-    return [] if run is None else list(dict.fromkeys(run.tolist()))
+    return list(open_log(path).runs())
 
 
 def split_log_argument(argument: str) -> tuple[Path, str | None]:
@@ -465,13 +324,15 @@ def _one_run(path: str, table: Table, run: str | None) -> tuple[Table, str | Non
         if run is not None:
             raise RecordingError(f"{path}: there is no column run, so no run {run!r}; leave it out")
         return table, None
-    names = list(dict.fromkeys(table.run.tolist()))
+    names, codes = table.run
     if run is None and len(names) > 1:
         raise RecordingError(f"{path}: name one of its runs: {_some(names)}")
     if run is not None and run not in names:
         raise RecordingError(f"{path}: there is no run {shown(run)}, the runs are: {_some(names)}")
     run = names[0] if run is None else run
-    keep = table.run == run
+    keep = codes == names.index(run)
+    if keep.all():  # as it was read: nothing is copied
+        return table, run
     columns = {name: value[keep] for name, value in table.columns.items()}
     return Table(columns, None, table.row[keep], table.unit), run
 
@@ -507,11 +368,7 @@ def _check_time(label: str, table: Table) -> None:
     steps = np.diff(t)
     back = np.flatnonzero(~(steps > 0.0))
     if back.size:
-        k = back[0]
-        raise RecordingError(
-            f"{label}: t must increase, {table.unit} {table.row[k + 1]} has {t[k + 1]:.9g} after "
-            f"{t[k]:.9g}; several runs in one file need a column run"
-        )
+        raise RecordingError(f"{label}: t {not_rising(t, table.row, table.unit)}")
     typical = float(np.median(steps))
     limit = LONGEST_GAP * (1.0 + 1e-6)
     if typical > limit:
