@@ -109,17 +109,18 @@ class Setup(NamedTuple):
                 outputs={port: record[port] for port in self.scan.outputs},
             )
 
-    def force(self, recording: Recording) -> Array:
-        """Return the axle forces that the step tells over a recording, (n, 2) [N].
+    def output(self, recording: Recording, port: str) -> Array:
+        """Return an output that is a column, over a recording, (n, size).
 
         Parameters
         ----------
         recording : its signals are the input; its forces are not looked at.
+        port : of the output.
         """
-        force = large((len(recording), 2))
+        told = large((len(recording), self.scan.step.numel_out(port)))
         for stretch in self.run(recording):
-            force[stretch.part] = stretch.outputs["axle_force"]
-        return force
+            told[stretch.part] = stretch.outputs[port]
+        return told
 
     def last(self, recording: Recording, n: int) -> dict[str, Array]:
         """Return the values that are carried after the first n samples, by port; nothing else.

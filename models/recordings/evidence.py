@@ -174,9 +174,7 @@ def thinning(n: int) -> int:
     return -(-n // LONG)
 
 
-def _sums(
-    signal: Callable[[Any], Array], n: int, start: NDArray[np.intp], width: int
-) -> Array:
+def _sums(signal: Callable[[Any], Array], n: int, start: NDArray[np.intp], width: int) -> Array:
     """Return the sums of `width` samples of a signal from each start.
 
     Parameters
@@ -188,5 +186,4 @@ def _sums(
         sums: Array = np.sum([signal(start + k) for k in range(width)], axis=0)
         return sums
     total = np.concatenate([[0.0], np.cumsum(signal(slice(n)))])
-    sums = total[start + width] - total[start]
-    return sums
+    return np.asarray(total[start + width] - total[start])
