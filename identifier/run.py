@@ -84,8 +84,26 @@ class History:
     @property
     def tracks(self) -> tuple[Track, ...]:
         """What the method says it had learnt of the axles at each sample."""
-        before = {name: values[:-1] for name, values in self.state.items()}
-        return self.design.tracks(self.vehicle, before)
+        joined: tuple[Track, ...] = ()
+        for stretch in self.stretches():
+            tracks = self.tracks_over(stretch)
+            if stretch.part == slice(0, len(self.recording)):
+                return tracks
+            if not joined:
+                shape = (len(self.recording), 2)
+                joined = tuple(track._replace(values=large(shape)) for track in tracks)
+            for track, here in zip(joined, tracks, strict=True):
+                track.values[stretch.part] = here.values
+        return joined
+
+    def tracks_over(self, stretch: Stretch) -> tuple[Track, ...]:
+        """Return what the method says it had learnt of the axles over a stretch of the run.
+
+        Parameters
+        ----------
+        stretch : of k samples.
+        """
+        return self.design.tracks(self.vehicle, stretch.before)
 
     def stretches(self) -> Iterator[Stretch]:
         """Yield the run block by block: state and outputs over parts of the recording."""

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from codegen.arrays import LONG, Array, blocks, large
 from models.bicycle import measured_slip
@@ -172,7 +173,7 @@ class Recording:
         """Time from the first to the last sample [s]."""
         return float(self.t[-1] - self.t[0])
 
-    def alpha(self, l_f: float, l_r: float, part: slice = ALL) -> Array:
+    def alpha(self, l_f: float, l_r: float, part: slice | NDArray[Any] = ALL) -> Array:
         """Slip angles of the axles in the paper's sign, the negative of ISO 8855.
 
         alpha = delta - atan2(v_y +- l r, v_x), so that F_y = +C alpha. Meaningless at standstill.

@@ -308,7 +308,7 @@ def _draw(
     if OBSERVED in learnt.outputs:
         figures["error"] = error_figure(learnt, freeze_times=list(frozen))
         figures["weights"] = weights_figure(learnt, list(frozen))
-    if learnt.tracks:
+    if learnt.tracks_over(next(learnt.stretches())):
         figures["learnt"] = learnt_axles_figure(learnt, list(frozen))
     for other in others:
         replay = frozen[last][other.recording.name]
