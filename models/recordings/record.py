@@ -238,7 +238,7 @@ def peak(signal: Array) -> float:
 
     Parameters
     ----------
-    signal : samples, of any shape.
+    signal : samples, any shape (...).
     """
     return max(abs(float(signal.min())), abs(float(signal.max())))
 
