@@ -1,6 +1,53 @@
-"""The kind of array that everything here is made of."""
+"""The kind of array that everything here is made of; how long ones are gone through, and kept.
+
+A recording of ten hours has millions of samples. What is computed of every sample goes through them
+block by block, and what is kept of every sample lies on disk where it is large: memory then does
+not grow with the recording. Up to `LONG` samples there is one block, and all is in memory.
+"""
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+LONG = 60_000  # samples, ten minutes at 100 Hz, up to which there is one block
+BLOCK = 16_384  # samples of a block beyond that
+IN_MEMORY = 8 * 8 * LONG  # bytes, beyond which an array lies on disk
+
+
+def blocks(n: int, first: int = 0, *, overlap: int = 0) -> Iterator[slice]:
+    """Yield consecutive parts of samples: one where there are at most `LONG`, else of `BLOCK`.
+
+    Parameters
+    ----------
+    n : samples, the end of the last part.
+    first : sample to begin at.
+    overlap : samples by which a part reaches into the next.
+    """
+    size = BLOCK if n > LONG else max(n, 1)
+    for begin in range(first, n, size):
+        yield slice(begin, min(begin + size + overlap, n))
+
+
+def large(shape: tuple[int, ...]) -> Array:
+    """Return an array to be filled: in memory, or in a file without a name where it is large.
+
+    The file lies in the folder for temporary files (TMPDIR) and goes with the array. Where that
+    folder has no room the array is in memory.
+
+    Parameters
+    ----------
+    shape : of the array.
+    """
+    size = 8 * int(np.prod(shape, dtype=np.int64))
+    if size > IN_MEMORY:
+        with suppress(OSError), tempfile.TemporaryFile(prefix="tireid-") as file:
+            if hasattr(os, "posix_fallocate"):  # else a disk that is full would kill the process
+                os.posix_fallocate(file.fileno(), 0, size)
+            return np.asarray(np.memmap(file, np.float64, "w+", shape=shape))
+    return np.empty(shape)

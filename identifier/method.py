@@ -5,14 +5,14 @@ the same code; they differ in the `Method` that is handed over.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeVar, cast
 
 import numpy as np
 
 from codegen import Scan
-from codegen.arrays import Array
+from codegen.arrays import Array, blocks, large
 from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.tire_model import Axle, TireModel
@@ -82,14 +82,45 @@ class Setup(NamedTuple):
             return self
         return self._replace(carry={**self.carry, **self.observe(x)})
 
-    def run(self, recording: Recording) -> dict[str, Array]:
-        """Return what the compiled step records over a recording, by port.
+    def run(
+        self,
+        recording: Recording,
+        parts: Iterable[slice] | None = None,
+        carry: Mapping[str, Array] | None = None,
+    ) -> Iterator["Stretch"]:
+        """Yield what the compiled step records over a recording, block by block.
+
+        Values are carried from block to block: the bits are those of one piece.
 
         Parameters
         ----------
         recording : its signals are the input; its forces are not looked at.
+        parts : of the recording, one after the other; None takes all of it in `blocks`.
+        carry : values that are carried into the first part; None begins with the recording.
         """
-        return self.scan(len(recording), self._values(recording))
+        following = self._begun(recording) if carry is None else dict(carry)
+        for part in blocks(len(recording)) if parts is None else parts:
+            values = {**following, **signals_of(recording, self.scan.over, part), **self.constants}
+            record = self.scan(part.stop - part.start, values)
+            following = {port: record[f"{port}_final"] for port in self.scan.carry}
+            yield Stretch(
+                part=part,
+                state={port: record[f"{port}_all"] for port in self.scan.carry},
+                outputs={port: record[port] for port in self.scan.outputs},
+            )
+
+    def output(self, recording: Recording, port: str) -> Array:
+        """Return an output that is a column, over a recording, (n, size).
+
+        Parameters
+        ----------
+        recording : its signals are the input; its forces are not looked at.
+        port : of the output.
+        """
+        told = large((len(recording), self.scan.step.numel_out(port)))
+        for stretch in self.run(recording):
+            told[stretch.part] = stretch.outputs[port]
+        return told
 
     def last(self, recording: Recording, n: int) -> dict[str, Array]:
         """Return the values that are carried after the first n samples, by port; nothing else.
@@ -99,29 +130,54 @@ class Setup(NamedTuple):
         recording : its signals are the input.
         n : samples that are taken.
         """
-        values = self._values(recording)
-        if n == 0:
-            return {port: np.asarray(values[port]) for port in self.scan.carry}
-        cut = values | {port: values[port][:n] for port in self.scan.over}
-        record = self.scan(n, cut, every=n)
-        return {port: record[f"{port}_final"] for port in self.scan.carry}
+        following = self._begun(recording)
+        for part in blocks(n):
+            values = {**following, **signals_of(recording, self.scan.over, part), **self.constants}
+            count = part.stop - part.start
+            record = self.scan(count, values, every=count)
+            following = {port: record[f"{port}_final"] for port in self.scan.carry}
+        return {port: np.asarray(value) for port, value in following.items()}
 
-    def _values(self, recording: Recording) -> dict[str, Array]:
-        """Return all that the step reads over a recording, by port."""
-        carry = self.begin(recording.x[0]).carry
-        return {**carry, **signals_of(recording, self.scan.over), **self.constants}
+    def _begun(self, recording: Recording) -> dict[str, Array]:
+        """Return what is carried into the first sample of a recording, by port."""
+        return dict(self.begin(np.array([recording.v_y[0], recording.r[0]])).carry)
 
 
-def signals_of(recording: Recording, over: Iterable[str]) -> dict[str, Array]:
+class Stretch(NamedTuple):
+    """What a step records over a part of a recording of k samples.
+
+    part : the samples.   state : by port, the carried values in effect at each sample and after the
+    last (k + 1, ...).   outputs : by port, the other outputs at each sample (k, ...).
+    """
+
+    part: slice
+    state: Mapping[str, Array]
+    outputs: Mapping[str, Array]
+
+    @property
+    def before(self) -> dict[str, Array]:
+        """Carried values in effect at each sample, by port, (k, ...)."""
+        return {port: values[:-1] for port, values in self.state.items()}
+
+
+def signals_of(
+    recording: Recording, over: Iterable[str], part: slice = slice(None)
+) -> dict[str, Array]:
     """Return what a step reads of a recording sample by sample, by port.
 
     Parameters
     ----------
     over : ports that are read, of x (n, 2), u (n, 2), v_x (n,) and a_y (n,), which is NaN where it
         was not logged.
+    part : samples that are read.
     """
-    a_y = np.full(len(recording), np.nan) if recording.a_y is None else recording.a_y
-    signals = {"x": recording.x, "u": recording.u, "v_x": recording.v_x, "a_y": a_y}
+    v_x, a_y = recording.v_x[part], recording.a_y
+    signals = {
+        "x": np.column_stack([recording.v_y[part], recording.r[part]]),
+        "u": np.column_stack([recording.delta_f[part], recording.delta_r[part]]),
+        "v_x": v_x,
+        "a_y": np.full(v_x.size, np.nan) if a_y is None else a_y[part],
+    }
     return {port: signals[port] for port in over}
 
 

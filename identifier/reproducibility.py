@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import Array
+from codegen.arrays import Array, blocks
 from identifier.run import History
 from identifier.tire_model import TireModel
 from models.recordings import Recording
@@ -44,17 +44,24 @@ class AxleRmse:
         return float(np.sqrt((self.front**2 + self.rear**2) / 2))
 
 
-def axle_rms(force: Array, where: NDArray[np.bool_] | None = None) -> AxleRmse:
+def axle_rms(
+    force: Array, where: NDArray[np.bool_] | None = None, reference: Array | None = None
+) -> AxleRmse:
     """Return the root mean square of axle forces, or of their errors.
 
     Parameters
     ----------
     force : (n, 2) [N].
     where : samples that count (n,); None counts all.
+    reference : forces that they are compared with (n, 2) [N]; None takes the forces themselves.
     """
-    kept = force if where is None else force[where]
-    with np.errstate(over="ignore", invalid="ignore"):  # a diverged law: infinite
-        front, rear = np.sqrt(np.mean(kept**2, axis=0))
+    squares, count = np.zeros(2), 0
+    for part in blocks(len(force)):
+        away = force[part] if reference is None else force[part] - reference[part]
+        kept = away if where is None else away[where[part]]
+        with np.errstate(over="ignore", invalid="ignore"):  # a diverged law: infinite
+            squares, count = squares + np.sum(kept**2, axis=0), count + len(kept)
+            front, rear = np.sqrt(squares / count) if count else (np.nan, np.nan)
     return AxleRmse(front=float(front), rear=float(rear))
 
 
@@ -130,8 +137,6 @@ def motion_error(
         return None
     m, I_z, l_f, l_r = vehicle.bicycle[:4]
     T = n * recording.dt
-    lateral = (force[:, 0] + force[:, 1]) / m
-    yaw = (l_f * force[:, 0] - l_r * force[:, 1]) / I_z
 
     def mean(signal: Array) -> Array:
         """Mean over each window, by the trapezoidal rule."""
@@ -139,21 +144,22 @@ def motion_error(
         windows: Array = np.lib.stride_tricks.sliding_window_view(steps, n).mean(axis=1)
         return windows
 
-    whole = np.lib.stride_tricks.sliding_window_view(counted, n + 1).all(axis=1)
-    if not whole.any():
-        return None
-    a_y = (recording.v_y[n:] - recording.v_y[:-n]) / T + mean(recording.v_x * recording.r)
-    r_dot = (recording.r[n:] - recording.r[:-n]) / T
-
-    def rms(signal: Array) -> float:
+    squares, count = np.zeros(4), 0
+    for part in blocks(recording.t.size - n):
+        some = slice(part.start, part.stop + n)
+        whole = np.lib.stride_tricks.sliding_window_view(counted[some], n + 1).all(axis=1)
+        F, v_y, r = force[some], recording.v_y[some], recording.r[some]
+        a_y = (v_y[n:] - v_y[:-n]) / T + mean(recording.v_x[some] * r)
+        r_dot = (r[n:] - r[:-n]) / T
+        lateral, yaw = mean((F[:, 0] + F[:, 1]) / m), mean((l_f * F[:, 0] - l_r * F[:, 1]) / I_z)
         with np.errstate(over="ignore", invalid="ignore"):
-            return float(np.sqrt(np.mean(signal[whole] ** 2)))
-
+            powers = [np.sum(s[whole] ** 2) for s in (a_y - lateral, r_dot - yaw, a_y, r_dot)]
+        squares, count = squares + powers, count + int(np.count_nonzero(whole))
+    if not count:
+        return None
+    missed_lateral, missed_yaw, lateral_rms, yaw_rms = map(float, np.sqrt(squares / count))
     return MotionError(
-        lateral=rms(a_y - mean(lateral)),
-        yaw=rms(r_dot - mean(yaw)),
-        lateral_rms=rms(a_y),
-        yaw_rms=rms(r_dot),
+        lateral=missed_lateral, yaw=missed_yaw, lateral_rms=lateral_rms, yaw_rms=yaw_rms
     )
 
 
@@ -278,8 +284,11 @@ def beyond_known(model: TireModel, recording: Recording) -> tuple[float, float] 
     counted = recording.v_x >= model.min_speed
     if not counted.any():
         return None
-    alpha = np.abs(recording.alpha(model.vehicle.l_f, model.vehicle.l_r)[counted])
-    front, rear = np.mean(alpha > known, axis=0)
+    beyond, car = np.zeros(2), model.vehicle
+    for part in blocks(len(recording)):
+        alpha = np.abs(recording.alpha(car.l_f, car.l_r, part)[counted[part]])
+        beyond += np.count_nonzero(alpha > known, axis=0)
+    front, rear = beyond / np.count_nonzero(counted)
     return float(front), float(rear)
 
 
@@ -304,7 +313,7 @@ def predict(model: TireModel, recording: Recording, *, since: float | None = Non
         model=model,
         recording=recording,
         axle_force=force,
-        against_truth=None if truth is None else axle_rms(force - truth, counted),
+        against_truth=None if truth is None else axle_rms(force, counted, truth),
         true_force=None if truth is None else axle_rms(truth, counted),
         motion=motion_error(force, recording, model.vehicle, counted),
     )
@@ -331,7 +340,7 @@ def replay(model: TireModel, online: History, *, since: float | None = None) -> 
         recording=told.recording,
         axle_force=told.axle_force,
         against_truth=told.against_truth,
-        against_online=axle_rms(told.axle_force - online.axle_force, counted),
+        against_online=axle_rms(told.axle_force, counted, online.axle_force),
     )
 
 
@@ -371,7 +380,7 @@ def reproduce(online: History, t_freeze: float, *, since: float | None = None) -
 def _side(force: Array, reference: Array | None, where: NDArray[np.bool_]) -> AxleRmse | None:
     if reference is None or not where.any():
         return None
-    return axle_rms(force - reference, where)
+    return axle_rms(force, where, reference)
 
 
 def online_error(history: History, *, since: float | None = None) -> AxleRmse | None:
@@ -391,7 +400,7 @@ def online_error(history: History, *, since: float | None = None) -> AxleRmse | 
     if truth is None:
         return None
     counted = counted_samples(history.recording, history.design.min_speed, since)
-    return axle_rms(history.axle_force - truth, counted)
+    return axle_rms(history.axle_force, counted, truth)
 
 
 def force_rms(history: History, *, since: float | None = None) -> AxleRmse | None:

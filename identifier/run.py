@@ -1,15 +1,15 @@
 """A method over a recording, with all outputs and states, and beside a car that drives."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
 from codegen import Stepper
-from codegen.arrays import Array
-from identifier.method import Method, Setup, Track
+from codegen.arrays import Array, blocks, large
+from identifier.method import AXLE_FORCE, Method, Setup, Stretch, Track
 from identifier.refused import NOWHERE, STALE_TIME, SampleLimits, judges_samples, stale_samples
 from identifier.tire_model import TireModel
 from models.recordings import Recording
@@ -58,6 +58,8 @@ class History:
     axle_force : forces that were identified online (n, 2) [N].
     state : by port, the carried values in effect at each sample and after the last (n + 1, ...).
     outputs : by port, the other outputs of the step at each sample (n, ...).
+        Of a long recording both are computed again where they are asked for: `stretches` and
+        `state_at` do so without having all of them at once.
     start : the stored model that the run began with; None where it began afresh.
     """
 
@@ -72,15 +74,49 @@ class History:
     @property
     def diverged_at(self) -> float | None:
         """Time [s] from which a force is not finite or a hundred times the weight, or None."""
-        possible = np.abs(self.axle_force) < IMPOSSIBLE_FORCE * self.vehicle.weight
-        sane = possible.all(axis=1)
-        return None if sane.all() else float(self.recording.t[np.argmin(sane)])
+        for part in blocks(len(self.recording)):
+            possible = np.abs(self.axle_force[part]) < IMPOSSIBLE_FORCE * self.vehicle.weight
+            sane = possible.all(axis=1)
+            if not sane.all():
+                return float(self.recording.t[part][np.argmin(sane)])
+        return None
 
     @property
     def tracks(self) -> tuple[Track, ...]:
         """What the method says it had learnt of the axles at each sample."""
-        before = {name: values[:-1] for name, values in self.state.items()}
-        return self.design.tracks(self.vehicle, before)
+        joined: tuple[Track, ...] = ()
+        for stretch in self.stretches():
+            tracks = self.tracks_over(stretch)
+            if stretch.part == slice(0, len(self.recording)):
+                return tracks
+            if not joined:
+                shape = (len(self.recording), 2)
+                joined = tuple(track._replace(values=large(shape)) for track in tracks)
+            for track, here in zip(joined, tracks, strict=True):
+                track.values[stretch.part] = here.values
+        return joined
+
+    def tracks_over(self, stretch: Stretch) -> tuple[Track, ...]:
+        """Return what the method says it had learnt of the axles over a stretch of the run.
+
+        Parameters
+        ----------
+        stretch : of k samples.
+        """
+        return self.design.tracks(self.vehicle, stretch.before)
+
+    def stretches(self) -> Iterator[Stretch]:
+        """Yield the run block by block: state and outputs over parts of the recording."""
+        if isinstance(self.state, Recalled):
+            yield from self.state.run.stretches()
+            return
+        for part in blocks(len(self.recording)):
+            around = slice(part.start, part.stop + 1)
+            yield Stretch(
+                part=part,
+                state={name: values[around] for name, values in self.state.items()},
+                outputs={name: values[part] for name, values in self.outputs.items()},
+            )
 
     def state_at(self, t: float) -> dict[str, Array]:
         """Return the carried values in effect at a time; from the end on, those after the last.
@@ -95,6 +131,8 @@ class History:
             Where the recording begins after that time.
         """
         index = state_index(self.recording, t)
+        if isinstance(self.state, Recalled):
+            return self.state.run.state_at(index)
         return {name: values[index] for name, values in self.state.items()}
 
     def freeze(self, t: float | None = None) -> TireModel:
@@ -145,6 +183,83 @@ class History:
         return f"<{type(self.design).__name__} over {self.recording!r}{diverged}>"
 
 
+# A run over a long recording: of the way there only where each block began is kept.
+
+
+class LongRun(NamedTuple):
+    """A run that is computed again, block by block.
+
+    setup : of the run.   recording : what it ran over.   begins : carried values at the first
+    sample of each block, by port.   last : after the last sample.
+    """
+
+    setup: Setup
+    recording: Recording
+    begins: tuple[Mapping[str, Array], ...]
+    last: Mapping[str, Array]
+
+    def stretches(self) -> Iterator[Stretch]:
+        """Yield what was recorded, block by block."""
+        for stretch in self.setup.run(self.recording):
+            yield stretch._replace(outputs=without_force(stretch.outputs))
+
+    def state_at(self, index: int) -> dict[str, Array]:
+        """Return the carried values in effect at a sample, or after the last.
+
+        Parameters
+        ----------
+        index : of the sample; n is after the last.
+        """
+        for part, begin in zip(blocks(len(self.recording)), self.begins, strict=True):
+            if part.start <= index < part.stop:
+                until = [slice(part.start, index + 1)]
+                (stretch,) = self.setup.run(self.recording, until, begin)
+                return {port: values[-2] for port, values in stretch.state.items()}
+        return dict(self.last)
+
+
+class Recalled(Mapping[str, Array]):
+    """By port, what a long run recorded: computed again when it is asked for.
+
+    Parameters
+    ----------
+    run : computed again.
+    kind : "state" or "outputs".
+    ports : names of them.
+    """
+
+    def __init__(self, run: LongRun, kind: Literal["state", "outputs"], ports: tuple[str, ...]):
+        self.run, self._kind, self._ports = run, kind, ports
+
+    def __getitem__(self, port: str) -> Array:
+        if port not in self._ports:
+            raise KeyError(port)
+        n, found = len(self.run.recording), np.empty(0)
+        for stretch in self.run.stretches():
+            values = getattr(stretch, self._kind)[port]
+            if not found.size:
+                found = large((n + (self._kind == "state"), *values.shape[1:]))
+            found[stretch.part.start : stretch.part.start + len(values)] = values
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._ports)
+
+    def __len__(self) -> int:
+        """Return how many ports there are."""
+        return len(self._ports)
+
+
+def without_force(outputs: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the outputs of a step but for the axle forces.
+
+    Parameters
+    ----------
+    outputs : by port.
+    """
+    return {port: values for port, values in outputs.items() if port != AXLE_FORCE.name}
+
+
 # Running a method over a recording, in compiled code.
 
 
@@ -167,7 +282,12 @@ def check_sampling(recording: Recording, design: Method) -> None:
 
 
 def identify(
-    recording: Recording, vehicle: Vehicle, design: Method, start: TireModel | None = None
+    recording: Recording,
+    vehicle: Vehicle,
+    design: Method,
+    start: TireModel | None = None,
+    *,
+    progress: Callable[[float], None] | None = None,
 ) -> History:
     """Run a method over a recording, sample by sample.
 
@@ -177,6 +297,7 @@ def identify(
     vehicle : the car, as far as the method knows it.
     design : the method: a `PaperIdentifier` of the paper's identifier, or any other.
     start : stored weights to begin with; None begins afresh.
+    progress : called now and then with the share that is done, 0 to 1.
 
     Raises
     ------
@@ -185,14 +306,27 @@ def identify(
     """
     check_sampling(recording, design)
     setup = design.setup(vehicle, start)
-    record = setup.run(recording)
+    force, begins, parts = large((len(recording), 2)), [], blocks(len(recording))
+    state: Mapping[str, Array] = {}
+    outputs: Mapping[str, Array] = {}
+    for stretch in setup.run(recording, parts):
+        force[stretch.part] = stretch.outputs["axle_force"]
+        state, outputs = stretch.state, without_force(stretch.outputs)
+        begins.append({port: values[0].copy() for port, values in state.items()})
+        if progress is not None:
+            progress(stretch.part.stop / len(recording))
+    if len(begins) > 1:
+        last = {port: values[-1].copy() for port, values in state.items()}
+        run = LongRun(setup, recording, tuple(begins), last)
+        state = Recalled(run, "state", tuple(state))
+        outputs = Recalled(run, "outputs", tuple(outputs))
     return History(
         vehicle=vehicle,
         design=design,
         recording=recording,
-        axle_force=record["axle_force"],
-        state={name: record[f"{name}_all"] for name in setup.scan.carry},
-        outputs={name: record[name] for name in setup.scan.outputs if name != "axle_force"},
+        axle_force=force,
+        state=state,
+        outputs=outputs,
         start=start,
     )
 

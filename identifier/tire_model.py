@@ -98,7 +98,7 @@ class TireModel(ABC):
         ----------
         recording : its signals are the input; its forces are not looked at.
         """
-        return self.setup(recording.dt).run(recording)["axle_force"]
+        return self.setup(recording.dt).output(recording, "axle_force")
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:

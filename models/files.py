@@ -3,6 +3,7 @@
 import hashlib
 import json
 import tempfile
+from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -36,5 +37,17 @@ def digest(content: Any) -> str:
     ----------
     content : ready for JSON.
     """
-    text = json.dumps(content, sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:12]
+    return digest_of_text([json.dumps(content, sort_keys=True)])
+
+
+def digest_of_text(parts: Iterable[str]) -> str:
+    """Return twelve characters that stand for a text.
+
+    Parameters
+    ----------
+    parts : of it, one after the other.
+    """
+    found = hashlib.sha256()
+    for part in parts:
+        found.update(part.encode())
+    return found.hexdigest()[:12]

@@ -11,7 +11,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -299,16 +299,35 @@ def _finite(data: Any) -> Any:
     return data
 
 
-def write_csv(path: Path, columns: dict[str, Array]) -> None:
+def write_csv(path: Path, columns: Mapping[str, Array]) -> None:
     """Write columns of equal length as CSV with a header: time with 15 digits, others with nine.
 
     Parameters
     ----------
     columns : name with unit, to values (n,).
     """
-    table = np.column_stack(list(columns.values()))
-    digits = ["%.15g" if name == "t_s" else "%.9g" for name in columns]  # t_s may be a Unix time
-    np.savetxt(path, table, fmt=digits, delimiter=",", header=",".join(columns), comments="")
+    write_long_csv(path, [columns])
+
+
+ROWS = 4096  # that are put into words at once
+
+
+def write_long_csv(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
+    """Write columns that come part by part, as `write_csv` does.
+
+    Parameters
+    ----------
+    parts : each with the same columns.
+    """
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        for k, columns in enumerate(parts):
+            if k == 0:
+                file.write(",".join(columns) + "\n")
+            row = ",".join("%.15g" if name == "t_s" else "%.9g" for name in columns) + "\n"
+            table = np.column_stack(list(columns.values()))  # t_s may be a Unix time
+            for first in range(0, len(table), ROWS):
+                some = table[first : first + ROWS]
+                file.write((row * len(some)) % tuple(some.ravel().tolist()))
 
 
 def text_table(rows: Sequence[Sequence[str]], align: str = "", *, indent: str = "") -> str:

@@ -283,7 +283,9 @@ class AxleModel(TireModel):
         ----------
         recording : its signals are the input.
         """
-        outside: NDArray[np.bool_] = self._run(recording)["slip_size"] > self.known_slip
+        outside: NDArray[np.bool_] = (
+            self.setup(recording.dt).output(recording, "slip_size") > self.known_slip
+        )
         return outside
 
     def lagged_slip(self, recording: Recording) -> Array:
@@ -293,7 +295,7 @@ class AxleModel(TireModel):
         ----------
         recording : its signals are the input.
         """
-        return self._run(recording)["lagged_slip"]
+        return self.setup(recording.dt).output(recording, "lagged_slip")
 
     def setup(self, dt: float) -> Setup:
         """Return what a replay needs.
@@ -319,9 +321,6 @@ class AxleModel(TireModel):
                 "roll": self.sway.numbers(),
             },
         )
-
-    def _run(self, recording: Recording) -> dict[str, Array]:
-        return self.setup(recording.dt).run(recording)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the model as plain numbers and words, ready for JSON."""

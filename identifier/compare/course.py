@@ -78,7 +78,8 @@ class Course:
         force : (n, 2) [N].
         """
         assert recording.axle_force is not None
-        found = axle_rms(force - recording.axle_force, counted_samples(recording, self.min_speed))
+        counted = counted_samples(recording, self.min_speed)
+        found = axle_rms(force, counted, recording.axle_force)
         return found if np.isfinite([found.front, found.rear]).all() else INFINITE
 
     def replays(self, model: TireModel) -> dict[str, AxleRmse]:

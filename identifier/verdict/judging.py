@@ -11,7 +11,7 @@ from codegen.arrays import Array
 from identifier.axle import AxleIdentifier
 from identifier.method import Method
 from identifier.reproducibility import motion_error
-from identifier.run import History, identify, learn
+from identifier.run import History, identify, learn, state_index
 from identifier.tire_model import AXLES, GRIP, STIFFNESS, Estimate, TireModel
 from identifier.verdict.causes import CAUSES, Ask, Mended, Suspect, suspects
 from identifier.verdict.motion import (
@@ -28,6 +28,7 @@ from identifier.verdict.motion import (
 from identifier.verdict.rules import MOST_MISSED, PERCENT, Drive, findings
 from identifier.verdict.verdict import Finding, Number, Verdict
 from models.recordings import Recording
+from models.recordings.portion import Portion, portion
 from models.vehicle import Vehicle
 
 STRETCH = 0.3  # share of the windows that may be missed in one piece
@@ -55,22 +56,25 @@ def judge(history: History, t: float | None = None) -> Verdict:
     CannotFreezeError
         Where the method estimates a signal, not a model.
     """
-    model, recording = history.freeze(t), history.recording
-    road = history.design.road_push(history.state)
+    model, whole = history.freeze(t), history.recording
+    end = float(whole.t[-1]) if t is None else t
+    frozen = state_index(whole, end)
+    asked = portion(whole, frozen)
+    n, road = asked.place(frozen), _road_felt(history, asked)
+    until = None if n == len(asked.recording) else float(asked.recording.t[n])
 
     def taught(mended: Mended) -> TireModel:
-        return learn(mended.recording, mended.vehicle, history.design, history.start, t)
+        return learn(mended.recording, mended.vehicle, history.design, history.start, until)
 
-    drive = _looked_at(taught, model, recording, road)
+    drive = _looked_at(taught, model, asked, whole.t, road)
     if drive is None:
         return _too_short(model)
     drive = drive._replace(
         center=None if drive.notes else _center(drive, taught, road),
-        elsewhere=_elsewhere(history, drive.found, t),
-        apart=_apart(history, drive.found),
+        elsewhere=_elsewhere(taught, drive, history.vehicle),
+        apart=_apart(history.axle_force[asked.samples], history.vehicle, drive.found),
         learns=True,
     )
-    end = float(recording.t[-1]) if t is None else t
     reached = [
         Finding(
             "at_bound",
@@ -80,7 +84,19 @@ def judge(history: History, t: float | None = None) -> Verdict:
         )
         for one in history.design.reached(history.vehicle, history.state_at(end))
     ]
-    return _verdict(drive, [*findings(drive), *reached])
+    return _verdict(drive, [*findings(drive), *reached, *_asked_of(asked, whole)])
+
+
+def _road_felt(history: History, asked: Portion) -> Array | None:
+    """Return what a banked road pushed over a portion of a run (k,) [weights]; None unknown."""
+    pushes = []
+    for stretch in history.stretches():
+        push = history.design.road_push(stretch.state)
+        if push is None:
+            return None
+        first, last = np.searchsorted(asked.samples, [stretch.part.start, stretch.part.stop])
+        pushes.append(push[asked.samples[first:last] - stretch.part.start])
+    return np.concatenate(pushes)
 
 
 def judge_prediction(model: TireModel, recording: Recording) -> Verdict:
@@ -95,8 +111,28 @@ def judge_prediction(model: TireModel, recording: Recording) -> Verdict:
     def mounted(mended: Mended) -> TireModel:
         return model if mended.vehicle == model.vehicle else model.mounted_on(mended.vehicle)
 
-    drive = _looked_at(mounted, model, recording, _road_driven(recording, model.vehicle))
-    return _too_short(model) if drive is None else _verdict(drive, findings(drive))
+    asked = portion(recording)
+    road = _road_driven(asked.recording, model.vehicle)
+    drive = _looked_at(mounted, model, asked, recording.t, road)
+    if drive is None:
+        return _too_short(model)
+    return _verdict(drive, [*findings(drive), *_asked_of(asked, recording)])
+
+
+def _asked_of(asked: Portion, whole: Recording) -> list[Finding]:
+    """Return a note where only a portion of a drive was asked."""
+    if len(asked.recording) == len(whole):
+        return []
+    minutes = len(asked.recording) * whole.dt / 60.0, whole.duration / 60.0
+    return [
+        Finding(
+            "portion",
+            None,
+            "judged by {:.3g} of its {:.3g} minutes: of each part of the drive those in which the "
+            "car was turned hardest".format(*minutes),
+            False,
+        )
+    ]
 
 
 def _road_driven(recording: Recording, vehicle: Vehicle) -> Array | None:
@@ -111,13 +147,14 @@ Tires = Callable[[Mended], TireModel]  # of a car and a drive that a fault was t
 
 
 def _looked_at(
-    tires: Tires, model: TireModel, recording: Recording, road: Array | None
+    tires: Tires, model: TireModel, asked: Portion, clock: Array, road: Array | None
 ) -> Drive | None:
     """Return what the rules look at; None where too little is driven.
 
     One stretch may be missed, as before a sensor has settled, where all the rest is explained: it
     is left out, and noted.
     """
+    recording = asked.recording
     found = evidence(model, recording, road)
     notes: tuple[Finding, ...] = ()
     if found is None:
@@ -127,7 +164,7 @@ def _looked_at(
         rest = found.without(first, last)
         confined = (rest.missed <= np.minimum(REST_MISSED, CONFINED * found.missed.max())).all()
         if len(rest.windows) >= FEWEST and confined:
-            notes = (_stretch(found, rest, recording, first, last),)
+            notes = (_stretch(found, rest, clock[asked.samples], first, last),)
             found = rest
     listed: tuple[Suspect, ...] = ()
     if not (found.missed <= MOST_MISSED).all():
@@ -142,11 +179,9 @@ def _center(drive: Drive, tires: Tires, road: Array | None) -> Suspect:
     return next(one for one in listed if one.cause.code == GEOMETRY)
 
 
-def _stretch(
-    found: Evidence, rest: Evidence, recording: Recording, first: int, last: int
-) -> Finding:
+def _stretch(found: Evidence, rest: Evidence, t: Array, first: int, last: int) -> Finding:
     starts = found.windows.starts
-    begin, end = recording.t[starts[first]], recording.t[starts[last - 1] + found.windows.n]
+    begin, end = t[starts[first]], t[starts[last - 1] + found.windows.n]
     return Finding(
         "stretch",
         None,
@@ -228,23 +263,24 @@ def _too_short(model: TireModel) -> Verdict:
     return Verdict(findings=(finding,), numbers=numbers, measures={})
 
 
-def _apart(history: History, found: Evidence) -> Array:
+def _apart(force: Array, vehicle: Vehicle, found: Evidence) -> Array:
     """Return how far online lies from frozen over the later half, over the frozen force (2,)."""
     windows = found.windows
-    online = windows.mean(history.axle_force / np.array(history.vehicle.axle_loads))
+    online = windows.mean(force / np.array(vehicle.axle_loads))
     later = np.arange(len(windows)) >= len(windows) // 2
     later &= np.isfinite(online).all(axis=1)  # before a law diverged
     return clean_share((online - found.modelled)[later], found.modelled[later], np.zeros(2))
 
 
-def _elsewhere(history: History, found: Evidence, t: float | None) -> Array | None:
+def _elsewhere(taught: Tires, drive: Drive, car: Vehicle) -> Array | None:
     """Return what models taught without a part of the drive miss of that part, over its force (2,).
 
     The parts follow one another and hold equal shares of the force (squared); in the one that is
     left out the car is made to stand, so that learning rests. A window counts where such a model
     knows the slip.
     """
-    recording, windows, car = history.recording, found.windows, history.vehicle
+    recording, found = drive.recording, drive.found
+    windows = found.windows
     power = np.cumsum(np.sum(found.measured**2, axis=1))
     if not power[-1] > 0.0:
         return None
@@ -255,7 +291,7 @@ def _elsewhere(history: History, found: Evidence, t: float | None) -> Array | No
         mine = part == k
         if not mine.any():
             continue
-        model = _taught_without(history, windows.starts[mine], windows.n, t)
+        model = _taught_without(taught, recording, car, windows.starts[mine], windows.n)
         if model is None:
             return None
         known = model.known_slip
@@ -266,13 +302,13 @@ def _elsewhere(history: History, found: Evidence, t: float | None) -> Array | No
     return np.where(seen > 0.0, clean_share(missed, force, found.noise * seen), 0.0)
 
 
-def _taught_without(history: History, starts: Indices, n: int, t: float | None) -> TireModel | None:
+def _taught_without(
+    taught: Tires, recording: Recording, vehicle: Vehicle, starts: Indices, n: int
+) -> TireModel | None:
     """Return what a drive teaches without some windows; None where nothing comes of it."""
-    recording = history.recording
     halt = np.array(recording.v_x)
     halt[starts[0] : starts[-1] + n + 1] = 0.0
     try:
-        halted = replace(recording, v_x=halt)
-        return learn(halted, history.vehicle, history.design, history.start, t)
+        return taught(Mended(replace(recording, v_x=halt), vehicle))
     except (ArithmeticError, ValueError):
         return None

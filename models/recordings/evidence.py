@@ -4,16 +4,17 @@ Over a window of length T the lateral kinematics hold exactly without differenti
 mean(a_y) = (v_y(t + T) - v_y(t))/T + mean(v_x r).
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import Array
+from codegen.arrays import LONG, Array
 from models.recordings.record import Recording
 
 WINDOW = 0.2  # [s]: keeps maneuvers up to 2 Hz, averages 20 samples of noise at 100 Hz
-STRIDE = 0.05  # [s]
+STRIDE = 0.05  # [s], longer where a recording is: evenly over it, as many as of `LONG` samples
 SLOWEST = 0.5  # [m/s]: below it slip and curvature are noise, for scale cars too
 TAIL_OUT = 0.15  # [rad]: sideslip against the turn beyond which a driver may countersteer
 
@@ -65,12 +66,13 @@ def windows(recording: Recording) -> Windows:
     """
     n, dt = len(recording), recording.dt
     width = max(round(WINDOW / dt), 1)
-    start = np.arange(0, max(n - width, 0), max(round(STRIDE / dt), 1))
-    slow = recording.v_x < max(SLOWEST, 0.3 * float(np.percentile(recording.v_x, 95)))
-    start = start[_sums(slow.astype(np.float64), start, width) == 0.0]
+    start = np.arange(0, max(n - width, 0), max(round(STRIDE / dt), 1) * thinning(n))
+    fast = max(SLOWEST, 0.3 * float(np.percentile(recording.v_x[:: thinning(n)], 95)))
+    start = start[_sums(lambda at: (recording.v_x[at] < fast) + 0.0, n, start, width) == 0.0]
 
-    def mean(signal: Array) -> Array:
-        means: Array = _sums(signal, start, width) / width
+    def mean(signal: Array, by: Array | None = None) -> Array:
+        product = signal.__getitem__ if by is None else lambda at: signal[at] * by[at]
+        means: Array = _sums(product, n, start, width) / width
         return means
 
     def slope(signal: Array) -> Array:
@@ -86,7 +88,7 @@ def windows(recording: Recording) -> Windows:
         delta_r=mean(recording.delta_r),
         v_y_dot=slope(recording.v_y),
         r_dot=slope(recording.r),
-        v_x_r=mean(recording.v_x * recording.r),
+        v_x_r=mean(recording.v_x, recording.r),
         a_y=None if recording.a_y is None else mean(recording.a_y),
         force=None if force is None else np.column_stack([mean(force[:, 0]), mean(force[:, 1])]),
     )
@@ -162,8 +164,26 @@ def _wheelbase(w: Windows, keep: NDArray[np.bool_]) -> Steering | None:
     return Steering(float(np.sqrt(dd / rr)), correlation(r, kinematic))
 
 
-def _sums(signal: Array, start: NDArray[np.intp], width: int) -> Array:
-    """Return the sums of `width` samples from each start."""
-    total = np.concatenate([[0.0], np.cumsum(signal)])
-    sums: Array = total[start + width] - total[start]
-    return sums
+def thinning(n: int) -> int:
+    """Return which sample is looked at where not all are: each one of at most `LONG`.
+
+    Parameters
+    ----------
+    n : samples.
+    """
+    return -(-n // LONG)
+
+
+def _sums(signal: Callable[[Any], Array], n: int, start: NDArray[np.intp], width: int) -> Array:
+    """Return the sums of `width` samples of a signal from each start.
+
+    Parameters
+    ----------
+    signal : its values at samples.
+    n : samples that there are.
+    """
+    if n > LONG:  # windows are far apart: their samples are looked at alone
+        sums: Array = np.sum([signal(start + k) for k in range(width)], axis=0)
+        return sums
+    total = np.concatenate([[0.0], np.cumsum(signal(slice(n)))])
+    return np.asarray(total[start + width] - total[start])

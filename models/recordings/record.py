@@ -7,14 +7,16 @@ ISO axes: x forward, y left, z up; r and delta turn left when positive, forces p
 import csv
 import gzip
 import io
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from codegen.arrays import Array
+from codegen.arrays import LONG, Array, blocks, large
 from models.bicycle import measured_slip
 from models.files import write_atomically
 from models.logs.log import RecordingError
@@ -23,6 +25,8 @@ from models.rules import LARGEST_FORCE
 MINIMUM_SAMPLES = 10
 JITTER = 0.02  # largest departure of a sample from the uniform grid, as a share of one step
 
+
+ALL = slice(None)
 
 # Beyond these, in SI, a number is no signal of a car whatever its unit: degrees, g and km/h fit.
 LARGEST = {
@@ -40,6 +44,9 @@ LARGEST = {
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Recording:
     """Signals of one run, all of the same length n, uniformly sampled and read-only.
+
+    Arrays that nobody may write, as those of a file that is mapped, are kept as they are; others
+    are copied.
 
     Parameters
     ----------
@@ -89,20 +96,20 @@ class Recording:
                 raise RecordingError(
                     f"{self.name}: {field.name} must have shape {shape}, it has {array.shape}"
                 )
-            bad = np.count_nonzero(~np.isfinite(array))
+            bad = sum(np.count_nonzero(~np.isfinite(array[part])) for part in blocks(n))
             if bad:
                 raise RecordingError(
                     f"{self.name}: {field.name} must be finite, {bad} of its values are not"
                 )
-            peak = float(np.abs(array).max())
-            if peak > LARGEST[field.name]:
+            largest = peak(array)
+            if largest > LARGEST[field.name]:
                 raise RecordingError(
                     f"{self.name}: {field.name} must be of a car, within +-"
-                    f"{LARGEST[field.name]:g}, its peak is {peak:.4g}"
+                    f"{LARGEST[field.name]:g}, its peak is {largest:.4g}"
                 )
             object.__setattr__(self, field.name, array)
         step = (self.t[-1] - self.t[0]) / (n - 1)
-        off_grid = np.abs(self.t - self.t[0] - step * np.arange(n)).max()
+        off_grid = _off_grid(self.t, step)
         if not (step > 0.0 and off_grid <= JITTER * step):
             raise RecordingError(
                 f"{self.name}: t must rise in equal steps, mean step {step:.6g} s, "
@@ -149,12 +156,12 @@ class Recording:
     @property
     def x(self) -> Array:
         """State [v_y, r] [m/s, rad/s], shape (n, 2)."""
-        return _read_only(np.column_stack([self.v_y, self.r]))
+        return _side_by_side(self.v_y, self.r)
 
     @property
     def u(self) -> Array:
         """Steering [delta_f, delta_r] [rad], shape (n, 2)."""
-        return _read_only(np.column_stack([self.delta_f, self.delta_r]))
+        return _side_by_side(self.delta_f, self.delta_r)
 
     @property
     def dt(self) -> float:
@@ -166,7 +173,7 @@ class Recording:
         """Time from the first to the last sample [s]."""
         return float(self.t[-1] - self.t[0])
 
-    def alpha(self, l_f: float, l_r: float) -> Array:
+    def alpha(self, l_f: float, l_r: float, part: slice | NDArray[Any] = ALL) -> Array:
         """Slip angles of the axles in the paper's sign, the negative of ISO 8855.
 
         alpha = delta - atan2(v_y +- l r, v_x), so that F_y = +C alpha. Meaningless at standstill.
@@ -175,15 +182,17 @@ class Recording:
         ----------
         l_f : distance from the center of gravity to the front axle [m].
         l_r : distance from the center of gravity to the rear axle [m].
+        part : samples that are asked for.
 
         Returns
         -------
         Array
             [alpha_f, alpha_r] [rad], shape (n, 2).
         """
-        motion = {"v_x": self.v_x, "v_y": self.v_y, "r": self.r}
-        steering = {"delta_f": self.delta_f, "delta_r": self.delta_r}
-        return _read_only(measured_slip(l_f, l_r, **motion, **steering))
+        names = ("v_x", "v_y", "r", "delta_f", "delta_r")
+        slip: Array = measured_slip(l_f, l_r, **{name: getattr(self, name)[part] for name in names})
+        slip.setflags(write=False)
+        return slip
 
     def between(self, t0: float, t1: float) -> "Recording":
         """Return the part with t0 <= t <= t1.
@@ -199,10 +208,13 @@ class Recording:
             If fewer than 10 samples are left.
         """
         slack = 1e-6 * self.dt
-        keep = (self.t >= t0 - slack) & (self.t <= t1 + slack)
-        if np.count_nonzero(keep) < MINIMUM_SAMPLES:
+        first = int(np.searchsorted(self.t, t0 - slack, side="left"))
+        last = int(np.searchsorted(self.t, t1 + slack, side="right"))
+        keep = slice(first, max(first, last))
+        count = keep.stop - keep.start
+        if count < MINIMUM_SAMPLES:
             raise RecordingError(
-                f"{self.name}: between {t0:g} and {t1:g} s there are {np.count_nonzero(keep)} "
+                f"{self.name}: between {t0:g} and {t1:g} s there are {count} "
                 f"samples, at least {MINIMUM_SAMPLES} are needed; the recording runs from "
                 f"{self.t[0]:g} to {self.t[-1]:g} s"
             )
@@ -221,11 +233,39 @@ class Recording:
         )
 
 
+def peak(signal: Array) -> float:
+    """Return the largest size of a signal.
+
+    Parameters
+    ----------
+    signal : samples, any shape (...).
+    """
+    return max(abs(float(signal.min())), abs(float(signal.max())))
+
+
 def _read_only(value: object) -> Array:
-    """Copy to float64 and forbid writing."""
+    """Return an array of float64 that nobody may write, a copy where somebody may."""
+    if isinstance(value, np.ndarray) and value.dtype == np.float64 and not value.flags.writeable:
+        return np.asarray(value)
     array = np.array(value, dtype=np.float64)
     array.setflags(write=False)
     return array
+
+
+def _side_by_side(first: Array, second: Array) -> Array:
+    """Return two signals as columns that nobody may write, (n, 2)."""
+    both = large((first.size, 2))
+    both[:, 0], both[:, 1] = first, second
+    both.setflags(write=False)
+    return both
+
+
+def _off_grid(t: Array, step: float) -> float:
+    """Return how far times lie at most from the uniform grid of a step that begins with them."""
+    return max(
+        float(np.abs(t[part] - t[0] - step * np.arange(part.start, part.stop)).max())
+        for part in blocks(t.size)
+    )
 
 
 # Write a recording as a CSV that `read_recording` reads back bit for bit.
@@ -300,33 +340,55 @@ def resample(t: Array, columns: dict[str, Array], dt: float) -> tuple[Array, dic
     columns : name -> values, shape (n,).
     dt : step of the grid [s].
     """
-    grid = t[0] + dt * np.arange(t.size)
-    off = np.abs(t - grid).max()
+    off = _off_grid(t, dt)
     if off <= ON_GRID * dt:
-        return t if off <= SAME * dt else grid, columns
+        return (t if off <= SAME * dt else _grid(t[0], dt, t.size)), columns
     count = int(np.floor((t[-1] - t[0]) / dt + 1e-6)) + 1
-    grid = np.minimum(t[0] + dt * np.arange(count), t[-1])
-    if float(np.median(np.diff(t))) > dt / 1.5:
-        return grid, {name: np.interp(grid, t, value) for name, value in columns.items()}
-    half = np.minimum(dt / 2.0, np.minimum(grid - t[0], t[-1] - grid))
-    inside = half > 1e-9 * dt
+    grid = _grid(t[0], dt, count, t[-1])
+    slower = float(np.median(np.diff(t[: LONG + 1]))) > dt / 1.5
     resampled = {}
     for name, value in columns.items():
-        new = np.interp(grid, t, value)
-        area = _integral(t, value, (grid + half)[inside]) - _integral(
-            t, value, (grid - half)[inside]
-        )
-        new[inside] = area / (2.0 * half[inside])
+        new = large((count,))
+        area = None if slower else _area(t, value)
+        for part in blocks(count):
+            new[part] = np.interp(grid[part], t, value)
+            if area is not None:
+                _average(new[part], grid[part], t, value, area, dt)
         resampled[name] = new
     return grid, resampled
 
 
-def _integral(t: Array, value: Array, at: Array) -> Array:
+def _grid(begin: float, dt: float, count: int, end: float = math.inf) -> Array:
+    """Return times of equal steps, none beyond an end."""
+    grid = large((count,))
+    for part in blocks(count):
+        grid[part] = np.minimum(begin + dt * np.arange(part.start, part.stop), end)
+    return grid
+
+
+def _average(new: Array, grid: Array, t: Array, value: Array, area: Array, dt: float) -> None:
+    """Put the mean over a step about each instant of the grid in the place of the value there."""
+    half = np.minimum(dt / 2.0, np.minimum(grid - t[0], t[-1] - grid))
+    inside = half > 1e-9 * dt
+    ends = (_integral(t, value, area, (grid + side * half)[inside]) for side in (1.0, -1.0))
+    new[inside] = (next(ends) - next(ends)) / (2.0 * half[inside])
+
+
+def _area(t: Array, value: Array) -> Array:
+    """Return the integral of the straight lines between samples from t[0] to each sample."""
+    total = large((t.size,))
+    total[0] = 0.0
+    for part in blocks(t.size, overlap=1):
+        here, signal = t[part], value[part]
+        steps = np.diff(here) * (signal[1:] + signal[:-1]) / 2.0
+        total[part] = np.cumsum(np.concatenate([[total[part.start]], steps]))
+    return total
+
+
+def _integral(t: Array, value: Array, total: Array, at: Array) -> Array:
     """Integrate the straight lines between samples from t[0] to each time `at`, exactly."""
-    steps = np.diff(t)
-    total = np.concatenate([[0.0], np.cumsum(steps * (value[1:] + value[:-1]) / 2.0)])
     k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 2)
     ahead = at - t[k]
-    slope = (value[k + 1] - value[k]) / steps[k]
+    slope = (value[k + 1] - value[k]) / (t[k + 1] - t[k])
     area: Array = total[k] + ahead * (value[k] + slope * ahead / 2.0)
     return area

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from codegen.arrays import Array
-from identifier.method import Method, vehicle_numbers
+from codegen.arrays import Array, blocks
+from identifier.method import Method, Stretch, vehicle_numbers
 from identifier.methods import certify
 from identifier.own_network import OnnxModel
 from identifier.reproducibility import (
@@ -37,7 +37,7 @@ from tireid.figures import (
     slip_figure,
     weights_figure,
 )
-from tireid.output import text_table, write_csv, write_json
+from tireid.output import text_table, write_csv, write_json, write_long_csv
 from tireid.progress import say
 
 # The machine-readable result of `tireid identify`: summary.json, whose keys are stable.
@@ -203,44 +203,58 @@ def _write_curves(folder: Path, learnt: History, others: Sequence[History], froz
             for t, by_name in frozen.items()
         }
         name = "forces.csv" if history is learnt else f"forces_{file_name(history.recording)}.csv"
-        write_csv(folder / name, force_columns(history, replays))
-    t, n = learnt.recording.t, learnt.recording.t.size
+        write_forces(folder / name, history, replays)
     if OBSERVED in learnt.outputs:
-        write_csv(
-            folder / "errors.csv",
-            {
-                "t_s": t,
-                "xi_tilde_f_Us": learnt.outputs[OBSERVED][:, 0],
-                "xi_tilde_r_Us": learnt.outputs[OBSERVED][:, 1],
-                "z_f_Us2": learnt.state["z"][:-1, 0],
-                "z_r_Us2": learnt.state["z"][:-1, 1],
-            },
-        )
-    weights = {"t_s": t}
-    for matrix in [name for name in WEIGHTS if name in learnt.state]:
-        values = learnt.state[matrix]
+        stretches = learnt.stretches()
+        write_long_csv(folder / "errors.csv", (_error_columns(learnt, one) for one in stretches))
+    parts = (_weight_columns(learnt, one) for one in learnt.stretches())
+    write_long_csv(folder / "weights.csv", parts)
+
+
+def _error_columns(learnt: History, stretch: Stretch) -> dict[str, Array]:
+    observed, z = stretch.outputs[OBSERVED], stretch.before["z"]
+    return {
+        "t_s": learnt.recording.t[stretch.part],
+        "xi_tilde_f_Us": observed[:, 0],
+        "xi_tilde_r_Us": observed[:, 1],
+        "z_f_Us2": z[:, 0],
+        "z_r_Us2": z[:, 1],
+    }
+
+
+def _weight_columns(learnt: History, stretch: Stretch) -> dict[str, Array]:
+    weights = {"t_s": learnt.recording.t[stretch.part]}
+    for matrix in [name for name in WEIGHTS if name in stretch.state]:
+        values = stretch.before[matrix]
         for i, j in np.ndindex(values.shape[1:]):
-            weights[f"{matrix}_{i + 1}_{j + 1}"] = values[:n, i, j]
-    write_csv(folder / "weights.csv", weights)
+            weights[f"{matrix}_{i + 1}_{j + 1}"] = values[:, i, j]
+    return weights
 
 
-def force_columns(history: History, replays: Mapping[str, Replay]) -> dict[str, Array]:
-    """Return the curves of forces.csv: slip angles, true, online and frozen forces.
+def write_forces(path: Path, history: History, replays: Mapping[str, Replay]) -> None:
+    """Write the curves of forces.csv: slip angles, true, online and frozen forces.
 
     Parameters
     ----------
     history : an online run.
     replays : replays of the same recording by the name of their columns.
     """
+    parts = blocks(len(history.recording))
+    write_long_csv(path, (_force_columns(history, replays, part) for part in parts))
+
+
+def _force_columns(
+    history: History, replays: Mapping[str, Replay], part: slice
+) -> dict[str, Array]:
     recording, car = history.recording, history.vehicle
-    alpha = recording.alpha(car.l_f, car.l_r)
+    alpha = recording.alpha(car.l_f, car.l_r, part)
     columns = {
-        "t_s": recording.t,
-        "v_x_m_s": recording.v_x,
-        "v_y_m_s": recording.v_y,
-        "r_rad_s": recording.r,
-        "delta_f_rad": recording.delta_f,
-        "delta_r_rad": recording.delta_r,
+        "t_s": recording.t[part],
+        "v_x_m_s": recording.v_x[part],
+        "v_y_m_s": recording.v_y[part],
+        "r_rad_s": recording.r[part],
+        "delta_f_rad": recording.delta_f[part],
+        "delta_r_rad": recording.delta_r[part],
         "alpha_f_rad": alpha[:, 0],
         "alpha_r_rad": alpha[:, 1],
     }
@@ -249,7 +263,7 @@ def force_columns(history: History, replays: Mapping[str, Replay]) -> dict[str, 
     if recording.axle_force is not None:
         curves = {"true": recording.axle_force} | curves
     for name, force in curves.items():
-        columns |= {f"Fyf_{name}_N": force[:, 0], f"Fyr_{name}_N": force[:, 1]}
+        columns |= {f"Fyf_{name}_N": force[part, 0], f"Fyr_{name}_N": force[part, 1]}
     return columns
 
 
@@ -267,8 +281,10 @@ def curve_columns(model: TireModel, recordings: Sequence[Recording]) -> dict[str
     car, known = model.vehicle, model.known_slip
     reach = [0.0 if known is None else float(known.max())]
     for recording in recordings:
-        moving = recording.v_x >= model.min_speed
-        reach.append(float(np.abs(recording.alpha(car.l_f, car.l_r)[moving]).max(initial=0.0)))
+        for part in blocks(len(recording)):
+            moving = recording.v_x[part] >= model.min_speed
+            slip = np.abs(recording.alpha(car.l_f, car.l_r, part)[moving])
+            reach.append(float(slip.max(initial=0.0)))
     end = min(FARTHER * max(reach) or 0.1, 0.5)
     slip = np.linspace(-end, end, CURVE_POINTS)
     force = model.force(slip)
@@ -292,7 +308,7 @@ def _draw(
     if OBSERVED in learnt.outputs:
         figures["error"] = error_figure(learnt, freeze_times=list(frozen))
         figures["weights"] = weights_figure(learnt, list(frozen))
-    if learnt.tracks:
+    if learnt.tracks_over(next(learnt.stretches())):
         figures["learnt"] = learnt_axles_figure(learnt, list(frozen))
     for other in others:
         replay = frozen[last][other.recording.name]
@@ -346,7 +362,7 @@ def write_network_results(
         recording = history.recording
         name, own = file_name(recording), replays[recording.name]
         last = "" if history is histories[0] else f"_{name}"
-        write_csv(folder / f"forces{last}.csv", force_columns(history, {NETWORK: own}))
+        write_forces(folder / f"forces{last}.csv", history, {NETWORK: own})
         figures[f"slip{last}"] = slip_figure(model, recording, history)
         figures[f"replay_{name}"] = prediction_figure(own, history)
     figures["inputs"] = inputs_figure(histories[0].recording)

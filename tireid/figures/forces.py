@@ -34,10 +34,10 @@ from tireid.figures.style import (
     mark_freeze,
     new_figure,
     note,
-    shown,
     styled,
     time_window,
 )
+from tireid.figures.thinned import Signal, shown
 
 
 @styled
@@ -77,7 +77,8 @@ def force_figure(
                 f"the online run of {recording.name}"
             )
     ends = time_window(recording.t, window)
-    part = shown(recording.t, ends)
+    curves = [history.axle_force, *(replay.axle_force for replay in replays.values())]
+    part = shown(recording.t, ends, *_with_residuals(curves, truth))
     t, online = recording.t[part], history.axle_force[part]
     reference = online if truth is None else truth[part]
     unit = force_unit_of(reference)
@@ -123,6 +124,16 @@ def force_figure(
         panels[-1, 0].set_ylabel(f"residual [{unit.name}]")
     legend_above(figure)
     return figure
+
+
+def _with_residuals(curves: Sequence[Array], known: Array | None) -> list[Signal]:
+    """Return forces that are drawn, and what they miss of a known one or of the first."""
+    against = curves[0] if known is None else known
+
+    def missed(force: Array) -> Signal:
+        return lambda at: force[at] - against[at]
+
+    return [*(force.__getitem__ for force in (against, *curves)), *map(missed, curves)]
 
 
 RESIDUAL: Mapping[str, Any] = {  # noise for the most part, which would make a drawing large
@@ -183,11 +194,11 @@ def prediction_figure(
             f"the replay is of {recording.name}, the online run of {online.recording.name}"
         )
     ends = time_window(recording.t, window)
-    part = shown(recording.t, ends)
-    t = recording.t[part]
     curve, known = TRUTH, truth
     if truth is None and online is not None:
         curve, known = ONLINE, online.axle_force
+    part = shown(recording.t, ends, *_with_residuals([replay.axle_force], known))
+    t = recording.t[part]
     reference = replay.axle_force[part] if known is None else known[part]
     unit = force_unit_of(reference)
     frozen = replay.axle_force[part] / unit.newtons
@@ -289,24 +300,26 @@ def inputs_figure(recording: Recording, *, window: Window = None) -> Figure:
         Where the window holds no sample.
     """
     ends = time_window(recording.t, window)
-    part = shown(recording.t, ends)
+    logged = [recording.v_x, recording.delta_f, recording.delta_r, recording.v_y, recording.r]
+    logged += [] if recording.a_y is None else [recording.a_y]
+    part = shown(recording.t, ends, *(signal.__getitem__ for signal in logged))
     signals = {
-        "$v_x$ [m/s]": recording.v_x,
-        "steering [deg]": np.rad2deg(recording.delta_f),
-        "$v_y$ [m/s]": recording.v_y,
-        "$r$ [deg/s]": np.rad2deg(recording.r),
+        "$v_x$ [m/s]": recording.v_x[part],
+        "steering [deg]": np.rad2deg(recording.delta_f[part]),
+        "$v_y$ [m/s]": recording.v_y[part],
+        "$r$ [deg/s]": np.rad2deg(recording.r[part]),
     }
     if recording.a_y is not None:
-        signals["$a_y$ [m/s²]"] = recording.a_y
+        signals["$a_y$ [m/s²]"] = recording.a_y[part]
 
     figure = new_figure(PAGE, 0.5 + 1.05 * len(signals))
     panels = figure.subplots(len(signals), 1, sharex=True)
     panels[0].set_xlim(ends)
     for axes, (label, values) in zip(panels, signals.items(), strict=True):
-        axes.plot(recording.t[part], values[part], color=BLUE, linewidth=0.9, label=label)
+        axes.plot(recording.t[part], values, color=BLUE, linewidth=0.9, label=label)
         axes.set_ylabel(label)
-        span = float(np.ptp(values[part]))
-        middle = float(values[part].min()) + span / 2
+        span = float(np.ptp(values))
+        middle = float(values.min()) + span / 2
         if span < 0.05 * abs(middle):  # a speed that is held shows as held
             axes.set_ylim(middle - 0.05 * abs(middle), middle + 0.05 * abs(middle))
     if np.any(recording.delta_r):

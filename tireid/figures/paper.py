@@ -32,10 +32,10 @@ from tireid.figures.style import (
     mark_freeze,
     new_figure,
     paper_design,
-    shown,
     styled,
     time_window,
 )
+from tireid.figures.thinned import shown_of_run
 
 # A table as a picture: medians and quartiles by law and column, with the paper's values.
 
@@ -68,9 +68,10 @@ def error_figure(
     """
     recording = history.recording
     ends = time_window(recording.t, window)
-    part = shown(recording.t, ends)
     # A root of squares would overflow where a law diverges; hypot does not.
-    norm = np.hypot(history.outputs["xi_tilde"][part, 0], history.outputs["xi_tilde"][part, 1])
+    t, (norm,) = shown_of_run(
+        history, ends, lambda stretch: [np.hypot(*stretch.outputs["xi_tilde"].T)]
+    )
     known = {name: bound for name, bound in (bounds or {}).items() if np.isfinite(bound)}
     drawn = norm[np.isfinite(norm) & (norm > 0.0) & (norm < 1e12)]
     typical, peak = (float(np.median(drawn)), float(drawn.max())) if drawn.size else (1.0, 1.0)
@@ -85,7 +86,7 @@ def error_figure(
     else:
         axes.set_ylim(0.0, 1.08 * top)
     axes.plot(
-        recording.t[part],
+        t,
         np.minimum(norm, 1e3 * top),
         color=BLUE,
         linewidth=0.9,
@@ -137,8 +138,9 @@ def weights_figure(
     """
     recording, design = history.recording, paper_design(history)
     ends = time_window(recording.t, window)
-    part = shown(recording.t, ends)
-    t, W, V = recording.t[part], history.state["W"][:-1][part], history.state["V"][:-1][part]
+    t, (W, V) = shown_of_run(
+        history, ends, lambda stretch: [stretch.before["W"], stretch.before["V"]]
+    )
 
     figure = new_figure(PAGE, 4.2)
     upper, lower = figure.subplots(2, 1, sharex=True)

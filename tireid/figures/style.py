@@ -18,7 +18,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.ticker import FuncFormatter
-from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.method import force_unit_name
@@ -231,18 +230,6 @@ def time_window(t: Array, window: Window) -> tuple[float, float]:
             f"a window must lie within {t[0]:g} s to {t[-1]:g} s, it is {first:g} s to {last:g} s"
         )
     return max(first, float(t[0])), min(last, float(t[-1]))
-
-
-def shown(t: Array, ends: tuple[float, float]) -> NDArray[np.bool_]:
-    """Return which samples lie within the ends of a time axis, (n,).
-
-    Parameters
-    ----------
-    t : times of the samples (n,) [s].
-    ends : first and last time [s].
-    """
-    within: NDArray[np.bool_] = (t >= ends[0]) & (t <= ends[1])
-    return within
 
 
 def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool) -> None:

@@ -35,6 +35,7 @@ from tireid.figures.style import (
     new_figure,
     styled,
 )
+from tireid.figures.thinned import cloud, shown_of_run
 
 UNKNOWN = "slip not known"
 CLOUD: Mapping[str, Any] = {  # thousands of points: pixels where the rest of a drawing is lines
@@ -69,16 +70,20 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
         raise ValueError(
             f"the model is drawn on {recording.name}, the online run is of {online.recording.name}"
         )
-    moving = recording.v_x >= model.min_speed
-    if not moving.any():
+    if not (recording.v_x >= model.min_speed).any():
         raise ValueError(f"{recording.name}: v_x never reaches {model.min_speed:g} m/s")
-    vehicle = model.vehicle
-    alpha = np.rad2deg(recording.alpha(vehicle.l_f, vehicle.l_r)[moving])
-    frozen = model.axle_force(recording)[moving]
+    vehicle, force = model.vehicle, model.axle_force(recording)
     known, color, label = recording.axle_force, BLACK, "truth"
     if known is None and online is not None:
         known, color, label = online.axle_force, BLUE, "online"
-    reference = frozen if known is None else known[moving]
+    against = force if known is None else known
+
+    def slip(at: Any) -> Array:
+        return np.rad2deg(recording.alpha(vehicle.l_f, vehicle.l_r, at))
+
+    heights = [force.__getitem__, against.__getitem__, lambda at: force[at] - against[at]]
+    part = cloud(len(recording), slip, heights, lambda at: recording.v_x[at] >= model.min_speed)
+    alpha, frozen, reference = slip(part), force[part], against[part]
     unit = force_unit_of(reference)
     frozen, reference = frozen / unit.newtons, reference / unit.newtons
     limits = force_range(reference, frozen)
@@ -276,22 +281,27 @@ def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) ->
     TypeError
         Where the method has none.
     """
-    tracks = history.tracks
+    tracks = history.tracks_over(next(history.stretches()))
     if not tracks:
         raise TypeError(f"{history.design} does not say what it learns of the axles")
     t = history.recording.t
+    at, curves = shown_of_run(
+        history,
+        (float(t[0]), float(t[-1])),
+        lambda stretch: [track.values for track in history.tracks_over(stretch)],
+    )
     figure = new_figure(PAGE, 4.4)
     panels = figure.subplots(len(tracks), 1, sharex=True)
-    for axes, (title, unit, values) in zip(panels, tracks, strict=True):
+    for axes, (title, unit, _), values in zip(panels, tracks, curves, strict=True):
         label = f"{title}\n[{unit}]"
         if unit == "N/rad" and float(values.max()) >= 1000.0:
             label, values = f"{title}\n[kN/rad]", values / 1000.0
         for axle, color in enumerate((GREEN, PURPLE)):
-            axes.plot(t, values[:, axle], color=color, linewidth=1.0, label=AXLES[axle].lower())
+            axes.plot(at, values[:, axle], color=color, linewidth=1.0, label=AXLES[axle].lower())
         axes.set(ylabel=label, xlim=(t[0], t[-1]))
         axes.set_ylim(0.0, 1.1 * float(values.max()) or 1.0)
-        for at in freeze_times:
-            mark_freeze(axes, at, prediction=False)
+        for freeze in freeze_times:
+            mark_freeze(axes, freeze, prediction=False)
     label_time(panels[-1], t)
     legend_above(figure)
     return figure

@@ -4,13 +4,15 @@ The order is always: headline numbers, what speaks against them, what was found 
 how to read each, and where it came from.
 """
 
+import json
 import platform
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 
 from matplotlib.figure import Figure
 
+from codegen.arrays import Array, blocks
 from identifier.method import vehicle_numbers
-from models.files import digest
+from models.files import digest, digest_of_text
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid import __version__
@@ -65,7 +67,19 @@ def recording_digest(recording: Recording) -> str:
     steering = (recording.delta_f, recording.delta_r)
     truth = (recording.a_y, recording.axle_force)
     parts = [part for part in (*signals, *steering, *truth) if part is not None]
-    return digest([part.tolist() for part in parts])
+    return digest_of_text(_json(parts))
+
+
+def _json(signals: Sequence[Array]) -> Iterator[str]:
+    """Yield a list of signals as JSON, block by block."""
+    yield "["
+    for k, signal in enumerate(signals):
+        yield ", [" if k else "["
+        for part in blocks(len(signal)):
+            inner = json.dumps(signal[part].tolist())[1:-1]
+            yield f", {inner}" if part.start else inner
+        yield "]"
+    yield "]"
 
 
 def origin(

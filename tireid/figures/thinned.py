@@ -1,0 +1,138 @@
+"""What is drawn of a long recording: of each column of pixels the lowest and the highest sample.
+
+A drawing of millions of points takes minutes and looks like one of the few thousand that reach
+farthest. Up to `LONG` samples all are drawn.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import LONG, Array, blocks
+from identifier.method import Stretch
+from identifier.run import History
+
+COLUMNS = 1500  # of pixels, more than any panel has
+CELLS = (400, 240)  # of a cloud, across and up: a dot covers several
+
+Samples = NDArray[Any]  # indices, or whether each sample is meant
+Signal = Callable[[slice | Samples], NDArray[Any]]  # values (k,) or (k, m) at some samples
+
+
+def shown(t: Array, ends: tuple[float, float], *signals: Signal) -> Samples:
+    """Return which samples within the ends of a time axis are drawn.
+
+    Parameters
+    ----------
+    t : times of the samples (n,) [s].
+    ends : first and last time [s].
+    signals : that are drawn; where samples are many, those that reach farthest in one of them.
+    """
+    if len(t) <= LONG:
+        within: Samples = (t >= ends[0]) & (t <= ends[1])
+        return within
+    first = int(np.searchsorted(t, ends[0], side="left"))
+    last = int(np.searchsorted(t, ends[1], side="right"))
+    if last - first <= LONG:
+        return np.arange(first, last)
+    width = -(-(last - first) // COLUMNS)
+    size = width * max(1, LONG // (4 * width))  # whole columns at once
+    found = [np.array([first, last - 1])]
+    for begin in range(first, last, size):
+        part = slice(begin, min(begin + size, last))
+        found.append(begin + farthest([signal(part) for signal in signals], width))
+    return np.unique(np.concatenate(found))
+
+
+def farthest(signals: Iterable[Array], width: int) -> NDArray[np.intp]:
+    """Return the samples that are lowest or highest among `width` neighbors, rising.
+
+    Parameters
+    ----------
+    signals : (k,) or (k, m) each; the last neighbors may be fewer.
+    width : samples of a column.
+    """
+    found = []
+    for signal in signals:
+        values = np.asarray(signal).reshape(len(signal), -1)
+        missing = -len(values) % width
+        columns = np.pad(values, ((0, missing), (0, 0)), mode="edge").reshape(
+            -1, width, values.shape[1]
+        )
+        begins = width * np.arange(len(columns))[:, None]
+        for ends in (columns.argmin(axis=1), columns.argmax(axis=1)):
+            found.append(np.minimum(begins + ends, len(values) - 1).ravel())
+    return np.unique(np.concatenate(found))
+
+
+def shown_of_run(
+    history: History, ends: tuple[float, float], tell: Callable[[Stretch], Sequence[Array]]
+) -> tuple[Array, list[Array]]:
+    """Return times and values of what a run recorded, as they are drawn: (k,) and (k, ...) each.
+
+    Parameters
+    ----------
+    history : the run.
+    ends : first and last time [s].
+    tell : returns what is drawn of a stretch, one value a sample.
+    """
+    t = history.recording.t
+    width = 1 if len(t) <= LONG else -(-len(t) // COLUMNS)
+    times, values = [], []
+    for stretch in history.stretches():
+        told, here = tell(stretch), t[stretch.part]
+        part: Samples = (here >= ends[0]) & (here <= ends[1])
+        if width > 1:
+            part = np.flatnonzero(part)
+            inside = [one[part].reshape(len(part), -1) for one in told]
+            part = part[farthest(inside, width)] if len(part) else part
+        times.append(here[part])
+        values.append([one[part] for one in told])
+    joined = [np.concatenate(one) for one in zip(*values, strict=True)]
+    return np.concatenate(times), joined
+
+
+def cloud(n: int, slips: Signal, heights: Sequence[Signal], counts: Signal) -> Samples:
+    """Return which samples a cloud of points shows: of those that look alike the first.
+
+    Parameters
+    ----------
+    n : samples.
+    slips : across (k, m).
+    heights : of each curve (k, m).
+    counts : whether samples are drawn at all (k,).
+    """
+    if n <= LONG:
+        everything: Samples = counts(slice(0, n))
+        return everything
+    signals = [slips, *heights]
+    low = [np.full(2, np.inf) for _ in signals]
+    high = [np.full(2, -np.inf) for _ in signals]
+    for part in blocks(n):
+        kept = counts(part)
+        for k, signal in enumerate(signals):
+            values = signal(part)[kept]
+            low[k] = np.minimum(low[k], values.min(axis=0, initial=np.inf))
+            high[k] = np.maximum(high[k], values.max(axis=0, initial=-np.inf))
+    seen = np.zeros((len(heights), 2, *CELLS), dtype=bool)
+    found = []
+    for part in blocks(n):
+        kept = np.flatnonzero(counts(part))
+        across = _cells(slips(part)[kept], low[0], high[0], CELLS[0])
+        for k, signal in enumerate(heights):
+            up = _cells(signal(part)[kept], low[1 + k], high[1 + k], CELLS[1])
+            for axle in (0, 1):
+                place = across[:, axle] * CELLS[1] + up[:, axle]
+                places, firsts = np.unique(place, return_index=True)
+                marks = seen[k, axle].reshape(-1)
+                found.append(part.start + kept[firsts[~marks[places]]])
+                marks[places] = True
+    return np.unique(np.concatenate(found))
+
+
+def _cells(values: Array, low: Array, high: Array, count: int) -> NDArray[np.intp]:
+    """Return in which of `count` cells from low to high values lie."""
+    share = (values - low) / np.maximum(high - low, 1e-300)
+    return np.clip(np.nan_to_num(share) * count, 0, count - 1).astype(np.intp)
