@@ -123,7 +123,7 @@ def motion_error(
     force : lateral axle forces (n, 2) [N], frame of the body.
     recording : the motion.
     vehicle : mass, inertia and geometry.
-    counted : samples that count (n,); a window counts where all of its samples do.
+    counted : samples that count (n,); a window counts where all of its samples do, in one stretch.
     """
     n = round(WINDOW / recording.dt)
     if recording.t.size <= n:
@@ -140,6 +140,7 @@ def motion_error(
         return windows
 
     whole = np.lib.stride_tricks.sliding_window_view(counted, n + 1).all(axis=1)
+    whole &= recording.within_a_stretch(np.arange(whole.size), n)
     if not whole.any():
         return None
     a_y = (recording.v_y[n:] - recording.v_y[:-n]) / T + mean(recording.v_x * recording.r)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.logs.log import Channel, Listed, LogFile
+from models.logs.log import Channel, Listed, LogFile, RecordingError
 from models.logs.signals import BETA, COLUMNS, NEEDED, QUANTITIES, Signal
 from models.logs.units import ANGLE, FORCE, RATE, is_told, quantities, to_si
 
@@ -56,7 +56,8 @@ NOT_BODY = (*WHEELS, *CORNERS, *REFERENCE)
 RULES: Mapping[str, Rule] = {
     "v_x": Rule(
         ("vx", "velx", "xvel", "velocityx", "vxb", "vlon", "vlong", "vellong", "vellon", "velfwd",
-         "velforward", "longvel", "vlgt", "vlaengs","laengsgeschwindigkeit","wheelbasedvehiclespeed", "vxcg", "vxcog", "carvx", "vxcar", "vxref"),
+         "velforward", "longvel", "vlgt", "vlaengs", "vxcg", "vxcog",
+         "carvx", "vxcar", "vxref", "laengsgeschwindigkeit", "wheelbasedvehiclespeed"),
         (f"{LONGITUDINAL};{VELOCITY}", "linear;x"),
         ("speed|velocity|spd|geschwindigkeit|fahrgeschwindigkeit|vfzg|vehspd|vveh|v|vel|"
          "speed2d|kmh|fahrzeuggeschwindigkeit|vehv|groundspeed|vehiclespeed",),
@@ -284,33 +285,21 @@ def name_confidence(signal: str, name: str) -> float:
     return 0.0
 
 
-def propose(log: LogFile, run: str | None = None, *, look: bool = True) -> Proposal:
+def propose(log: LogFile, listed: Sequence[Listed], run: str | None = None) -> Proposal:
     """Return what the channels of a log probably are.
 
     Parameters
     ----------
-    log : as a format reads it.
+    log : as a format reads it; numbers are read of the channels that are in question.
+    listed : its channels.
     run : which of its runs is looked at; None the only one, or the first.
-    look : whether numbers are read, of the channels that are in question.
-
-    Raises
-    ------
-    RecordingError
-        Where a channel cannot be read.
     """
-    listed = log.listed()
     candidates = {name: _candidates(name, listed) for name in QUANTITIES}
-    if look:
-        runs = log.runs()
-        chosen = run if run is not None or not runs else runs[0]
-        asked = {one for guesses in candidates.values() for guess in guesses
-                 for one in guess.channel}  # fmt: skip
-        names = [one.name for one in listed if one.name in asked]
-        seen = {one.name: one for one in log.read(names, chosen)} if names else {}
-        candidates = {
-            name: [_looked(name, guess, seen) for guess in guesses]
-            for name, guesses in candidates.items()
-        }
+    asked = {name for found in candidates.values() for guess in found for name in guess.channel}
+    seen = _seen(log, [one.name for one in listed if one.name in asked], run)
+    candidates = {
+        name: [_looked(name, guess, seen) for guess in found] for name, found in candidates.items()
+    }
     guesses: dict[str, Guess] = {}
     rivals: dict[str, tuple[Guess, ...]] = {}
     for name, found in candidates.items():
@@ -323,6 +312,20 @@ def propose(log: LogFile, run: str | None = None, *, look: bool = True) -> Propo
         if len(equal) > 1:
             rivals[name] = equal
     return Proposal(guesses=guesses, rivals=rivals)
+
+
+def _seen(log: LogFile, names: list[str], run: str | None) -> dict[str, Channel]:
+    """Return channels by name; without those that cannot be read."""
+    runs = log.runs()
+    chosen = run if run is not None or not runs else runs[0]
+    if not names:
+        return {}
+    try:
+        return dict(zip(names, log.read(names, chosen), strict=True))
+    except RecordingError:
+        if len(names) == 1:
+            return {}
+    return {key: one for name in names for key, one in _seen(log, [name], run).items()}
 
 
 def _candidates(signal: str, listed: Sequence[Listed]) -> list[Guess]:
@@ -401,6 +404,8 @@ def _looked(signal: str, guess: Guess, seen: Mapping[str, Channel]) -> Guess:
     """Return a guess by what the numbers say of it."""
     size = 0.0
     for name in guess.channel:
+        if name not in seen:
+            return replace(guess, confidence=0.0)
         values = seen[name].values
         finite = values[np.isfinite(values)]
         finite = finite[:: max(1, finite.size // LOOKED_AT)]

@@ -138,7 +138,8 @@ class Signal:
         inside: Array = np.interp(angle, hand, road)
         first, last = np.diff(road)[[0, -1]] / np.diff(hand)[[0, -1]]
         below, above = np.minimum(angle - hand[0], 0.0), np.maximum(angle - hand[-1], 0.0)
-        return inside + first * below + last * above
+        road_wheel: Array = inside + first * below + last * above
+        return road_wheel
 
 
 def require_fitting(signals: Mapping[str, Signal], where: str) -> None:
