@@ -88,19 +88,41 @@ def chosen_signals(
                 )
     if log_map.is_complete:
         return Reading(dict(log_map.signals), ())
-    standard = standard_signals(log, names)
-    told = _beside(standard, log_map.signals)
-    missing = _missing(told)
+    told = _beside(standard_signals(log, names), log_map.signals)
+    missing = missing_signals(told)
     if not missing:
         return Reading(told, ())
+    _refuse_words(log, names, missing, run)
     proposal = propose(log, listed, run)
-    likely = {name: one for name, one in proposal.signals().items() if name not in told}
-    found = _beside(likely, told)
-    if _missing(found):
-        raise RecordingError(missing_text(log, _missing(found), proposal, names))
-    taken = [name for name in QUANTITIES if name in found and name not in told]
-    notes = tuple(_taken_text(name, found[name]) for name in taken)
-    return Reading({name: found[name] for name in QUANTITIES if name in found}, notes)
+    found = likely_signals(told, proposal)
+    if missing := missing_signals(found):
+        raise RecordingError(missing_text(log, missing, proposal, names))
+    taken = [name for name in found if name not in told]
+    return Reading(found, tuple(_taken_text(name, found[name]) for name in taken))
+
+
+def likely_signals(told: Mapping[str, Signal], proposal: Proposal) -> dict[str, Signal]:
+    """Return what is told, and what a proposal is sure of beside it, in the order of signals.
+
+    Parameters
+    ----------
+    told : by our name.
+    proposal : of the same log.
+    """
+    sure = {name: one for name, one in proposal.signals().items() if name not in told}
+    found = _beside(sure, told)
+    if ("Fyf" in found) != ("Fyr" in found):
+        found = {name: one for name, one in found.items() if name not in ("Fyf", "Fyr")}
+    return {name: found[name] for name in QUANTITIES if name in found}
+
+
+def _refuse_words(log: LogFile, names: list[str], missing: list[str], run: str | None) -> None:
+    """Refuse columns of standard names that are there and not numeric, with their first word."""
+    unlisted = set(getattr(log, "names", ())) - set(names)
+    for column in map(column_of, missing):
+        if column in unlisted:
+            log.read([column], run)
+            raise RecordingError(f"{log.path}: {column} must be numeric, its cells are words")
 
 
 def standard_signals(log: LogFile, names: list[str]) -> dict[str, Signal]:
@@ -139,7 +161,13 @@ def _beside(more: Mapping[str, Signal], told: Mapping[str, Signal]) -> dict[str,
     return found
 
 
-def _missing(signals: Mapping[str, Signal]) -> list[str]:
+def missing_signals(signals: Mapping[str, Signal]) -> list[str]:
+    """Return the needed signals that are not there; beta stands in for v_y.
+
+    Parameters
+    ----------
+    signals : by our name.
+    """
     there = {"v_y" if name == BETA else name for name in signals}
     return [name for name in NEEDED if name not in there]
 
@@ -164,24 +192,8 @@ def missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: li
     proposal : what the channels probably are.
     names : of the channels.
     """
-    parts, words = [], []
-    for name in missing:
-        guess, rivals = proposal.guesses.get(name), proposal.rivals.get(name, ())
-        if rivals:
-            listed = " or ".join(repr(" + ".join(one.channel)) for one in rivals[:3])
-            parts.append(f"{listed} for {column_of(name)}, equally")
-        elif guess is not None:
-            why = f" ({guess.why})" if guess.why else ""
-            hand = " of the hand wheel" if guess.hand else ""
-            parts.append(f"{' + '.join(guess.channel)!r}{hand} for {column_of(name)}{why}")
-        if guess is not None:
-            unit = guess.unit or SI[QUANTITIES[name]]
-            ratio = " /RATIO" if guess.hand else ""
-            words.append(f'"{column_of(name)}={" + ".join(guess.channel)} [{unit}]{ratio}"')
-    words_of_file = set(getattr(log, "names", ())) - set(names)
-    for name in missing:
-        if column_of(name) in words_of_file:
-            return f"{log.path}: {column_of(name)} must be numeric, its cells are words"
+    parts = [said for name in missing if (said := likely_text(name, proposal))]
+    words = [word for name in missing if (word := column_word(name, proposal))]
     columns = ", ".join(column_of(name) for name in missing)
     said = f"{log.path}: column {columns} is missing; "
     if parts:
@@ -189,6 +201,40 @@ def missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: li
     else:
         said += f"tireid channels {log.path} lists what is there; "
     return said + _listing(names)
+
+
+def likely_text(name: str, proposal: Proposal) -> str:
+    """Return which channels may be a signal, in words; empty where none may.
+
+    Parameters
+    ----------
+    name : of the signal.
+    proposal : what the channels probably are.
+    """
+    guess, rivals = proposal.guesses.get(name), proposal.rivals.get(name, ())
+    if rivals:
+        listed = " or ".join(repr(" + ".join(one.channel)) for one in rivals[:3])
+        return f"{listed} for {column_of(name)}, equally"
+    if guess is None:
+        return ""
+    why = f" ({guess.why})" if guess.why else ""
+    hand = " of the hand wheel" if guess.hand else ""
+    return f"{' + '.join(guess.channel)!r}{hand} for {column_of(name)}{why}"
+
+
+def column_word(name: str, proposal: Proposal) -> str:
+    """Return the word of --columns that would tell a signal; empty where no channel may be it.
+
+    Parameters
+    ----------
+    name : of the signal.
+    proposal : what the channels probably are.
+    """
+    guess = proposal.guesses.get(name)
+    if guess is None:
+        return ""
+    unit, ratio = guess.unit or SI[QUANTITIES[name]], " /RATIO" if guess.hand else ""
+    return f'"{column_of(name)}={" + ".join(guess.channel)} [{unit}]{ratio}"'
 
 
 def recording_of(
@@ -223,7 +269,7 @@ def recording_of(
     wants_clock = _wants_clock(log, listed, log_map.clock)
     parts = _channels(log, label, reading.signals, log_map if wants_clock else None, run)
     stretches = _stretches(label, reading.signals, parts, log_map, dt)
-    notes = (*getattr(log, "notes", ()), *reading.notes, *_gap_notes(stretches.kept))
+    notes = (*_notes(log), *reading.notes, *_gap_notes(stretches.kept))
     if stretches.short:
         notes += (f"left out: {stretches.short} stretches of less than {SHORTEST:g} s",)
     recordings = [
@@ -232,6 +278,13 @@ def recording_of(
     ]
     whole = joined(recordings, recordings[0].name)
     return replace(whole, notes=notes) if notes else whole
+
+
+def _notes(log: LogFile) -> tuple[str, ...]:
+    """Return what a format says of what it took or mended."""
+    clock = getattr(log, "clock", None)
+    said = () if clock is None or clock.unit == "s" else (f"time is {clock.words}",)
+    return (*said, *getattr(log, "notes", ()))
 
 
 def _wants_clock(log: LogFile, listed: Sequence[Listed], clock: str) -> bool:

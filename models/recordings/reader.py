@@ -10,9 +10,11 @@ from models.logs.door import ENDINGS, open_log
 from models.logs.log import LogFile, RecordingError
 from models.logs.memory import ArrayLog
 from models.recordings.assembly import recording_of
-from models.recordings.checks import check_physics
+from models.recordings.checks import check_against_vehicle, check_physics
 from models.recordings.map import LogMap, told_signals
 from models.recordings.record import Recording
+from models.recordings.repair import Repair
+from models.vehicle import Vehicle
 
 NO_NAMES: Mapping[str, str] = {}
 DT = 0.01  # [s], the sample time of every method
@@ -62,6 +64,56 @@ def read_recording(
     path = Path(path)
     told = with_columns(map_of(log_map), columns)
     return _judged(open_log(path), _stem(path), told, run=run, dt=dt, check=check)
+
+
+def read_repaired(
+    path: str | Path,
+    vehicle: Vehicle,
+    run: str | None = None,
+    dt: float = DT,
+    *,
+    check: bool = True,
+    columns: Mapping[str, str] = NO_NAMES,
+    log_map: Told = None,
+) -> tuple[Recording, Vehicle]:
+    """Read one run of a log and take out what the map's repair says, of the log and of the car.
+
+    Parameters
+    ----------
+    path, run, dt, columns, log_map : as of `read_recording`.
+    vehicle : as it was told.
+    check : whether what contradicts physics or the car, after the repair, is refused.
+
+    Raises
+    ------
+    RecordingError
+        One line: file and run, column, rule, value, remedy.
+    """
+    told = map_of(log_map)
+    recording = read_recording(path, run, dt, check=check, columns=columns, log_map=told)
+    if told.repair:
+        recording, vehicle = told.repair.apply(recording, vehicle)
+        note = f"repaired by the map: {repair_text(told.repair)}"
+        recording = replace(recording, notes=(*recording.notes, note))
+        if check:
+            check_physics(recording)
+    if check:
+        check_against_vehicle(recording, vehicle)
+    return recording, vehicle
+
+
+def repair_text(repair: Repair) -> str:
+    """Return a repair as words: each number with its name.
+
+    Parameters
+    ----------
+    repair : of a log.
+    """
+    words = []
+    for name, value in repair.tables().items():
+        inner = value if isinstance(value, dict) else {"": value}
+        words += [f"{name}{'.' * bool(key)}{key} = {one:.4g}" for key, one in inner.items()]
+    return ", ".join(words)
 
 
 def recording_from_arrays(
@@ -116,7 +168,7 @@ def _judged(
     log: LogFile, name: str, told: LogMap, *, run: str | None, dt: float, check: bool
 ) -> Recording:
     recording = recording_of(log, name, told, run=run, dt=dt)
-    if check:
+    if check and not told.repair:  # which is judged when it is repaired
         try:
             check_physics(recording)
         except RecordingError as error:
