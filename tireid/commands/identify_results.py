@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from codegen.arrays import Array, blocks
-from identifier.method import Method, Stretch, vehicle_numbers
+from identifier.method import Block, Method, vehicle_numbers
 from identifier.methods import certify
 from identifier.own_network import OnnxModel
 from identifier.reproducibility import (
@@ -68,6 +68,7 @@ def summarize(
     others: Sequence[History],
     frozen: Mapping[float, Mapping[str, Replay]],
     verdict: Verdict,
+    parts: Sequence[History] = (),
 ) -> dict[str, Any]:
     """Return what summary.json holds: errors by recording and freeze time, and all that went in.
 
@@ -83,9 +84,10 @@ def summarize(
     others : online runs of the same design over the other recordings.
     frozen : freeze time [s] to recording name to replay.
     verdict : on the model of the last freeze.
+    parts : of the online run, over each of several logs that were learnt on.
     """
     by_key = {freeze_key(t): replays for t, replays in frozen.items()}
-    return summarize_replays(law, [learnt, *others], by_key, verdict)
+    return summarize_replays(law, [learnt, *parts, *others], by_key, verdict)
 
 
 def summarize_replays(
@@ -143,6 +145,7 @@ def write_results(
     others: Sequence[History],
     frozen: Frozen,
     verdict: Verdict,
+    parts: Sequence[History] = (),
 ) -> dict[str, Figure]:
     """Write everything that was learnt into a folder; return the figures by the name of their file.
 
@@ -154,10 +157,13 @@ def write_results(
     others : online runs of the same design over the recordings to predict.
     frozen : freeze time [s] to recording name to replay.
     verdict : on the model of the last freeze.
+    parts : of the online run, over each of several logs that were learnt on.
     """
     write_json(
         folder / "summary.json",
-        summarize(law=law, learnt=learnt, others=others, frozen=frozen, verdict=verdict),
+        summarize(
+            law=law, learnt=learnt, others=others, frozen=frozen, verdict=verdict, parts=parts
+        ),
     )
     for t in frozen:
         last, model = "" if t == max(frozen) else f"_{freeze_key(t)}s", learnt.freeze(t)
@@ -205,16 +211,16 @@ def _write_curves(folder: Path, learnt: History, others: Sequence[History], froz
         name = "forces.csv" if history is learnt else f"forces_{file_name(history.recording)}.csv"
         write_forces(folder / name, history, replays)
     if OBSERVED in learnt.outputs:
-        stretches = learnt.stretches()
-        write_long_csv(folder / "errors.csv", (_error_columns(learnt, one) for one in stretches))
-    parts = (_weight_columns(learnt, one) for one in learnt.stretches())
+        found = learnt.blocks()
+        write_long_csv(folder / "errors.csv", (_error_columns(learnt, one) for one in found))
+    parts = (_weight_columns(learnt, one) for one in learnt.blocks())
     write_long_csv(folder / "weights.csv", parts)
 
 
-def _error_columns(learnt: History, stretch: Stretch) -> dict[str, Array]:
-    observed, z = stretch.outputs[OBSERVED], stretch.before["z"]
+def _error_columns(learnt: History, block: Block) -> dict[str, Array]:
+    observed, z = block.outputs[OBSERVED], block.before["z"]
     return {
-        "t_s": learnt.recording.t[stretch.part],
+        "t_s": learnt.recording.t[block.part],
         "xi_tilde_f_Us": observed[:, 0],
         "xi_tilde_r_Us": observed[:, 1],
         "z_f_Us2": z[:, 0],
@@ -222,10 +228,10 @@ def _error_columns(learnt: History, stretch: Stretch) -> dict[str, Array]:
     }
 
 
-def _weight_columns(learnt: History, stretch: Stretch) -> dict[str, Array]:
-    weights = {"t_s": learnt.recording.t[stretch.part]}
-    for matrix in [name for name in WEIGHTS if name in stretch.state]:
-        values = stretch.before[matrix]
+def _weight_columns(learnt: History, block: Block) -> dict[str, Array]:
+    weights = {"t_s": learnt.recording.t[block.part]}
+    for matrix in [name for name in WEIGHTS if name in block.state]:
+        values = block.before[matrix]
         for i, j in np.ndindex(values.shape[1:]):
             weights[f"{matrix}_{i + 1}_{j + 1}"] = values[:, i, j]
     return weights
@@ -308,7 +314,7 @@ def _draw(
     if OBSERVED in learnt.outputs:
         figures["error"] = error_figure(learnt, freeze_times=list(frozen))
         figures["weights"] = weights_figure(learnt, list(frozen))
-    if learnt.tracks_over(next(learnt.stretches())):
+    if learnt.tracks_over(next(learnt.blocks())):
         figures["learnt"] = learnt_axles_figure(learnt, list(frozen))
     for other in others:
         replay = frozen[last][other.recording.name]
