@@ -36,6 +36,7 @@ _SPELT = {"sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", 
 # Between 1980 and 2100 in each unit: a number so large counts from 1970.
 EPOCHS = {"s": (3e8, 4.2e9), "ms": (3e11, 4.2e12), "us": (3e14, 4.2e15), "ns": (3e17, 4.2e18)}
 FASTEST, SLOWEST = 1e-5, 0.11  # [s] between samples of a car's log
+COARSEST = 1.0  # between stamps without a unit: more than that are no seconds
 TICKS = tuple(10.0**-k for k in range(10))  # [s]: what stamps may be rounded to
 WORTH = 0.05  # share of a step by which rounding must shift stamps to be taken out
 SHARED = 1.2  # samples that share a stamp, on average: with fewer they are doubled, not rounded
@@ -149,9 +150,10 @@ def _unit(t: Array, told: str) -> tuple[str, bool]:
             return unit, True
     if told:
         return told, False
-    for unit in ("s", "ms", "us", "ns"):
-        if 0.0 < _step(finite, unit) <= SLOWEST and (unit == "s" or _step(finite, unit) >= FASTEST):
-            return unit, False
+    if not _step(finite, "s") < COARSEST:
+        for unit in ("ms", "us", "ns"):
+            if FASTEST <= _step(finite, unit) <= SLOWEST:
+                return unit, False
     return "s", False
 
 
@@ -271,8 +273,6 @@ def _in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
         return _mapped(values, lambda part: (part - first) / 1e9)
     if clock.unit == "hhmmss":
         return _mapped(values, _of_digits)
-    if clock.epoch:  # float64 holds the seconds since 1970 to 0.24 us
-        return _mapped(values, lambda part: np.round((part - first) / per_second, 6))
     return values if per_second == 1.0 else _mapped(values, lambda part: part / per_second)
 
 
