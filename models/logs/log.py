@@ -75,6 +75,9 @@ class LogFile(Protocol):
     def runs(self) -> tuple[str, ...]:
         """Return the names of the runs that the file holds apart; empty where it holds one."""
 
+    def notes(self) -> tuple[str, ...]:
+        """Return what of the file is left out or taken for granted, a line each."""
+
     def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
         """Return channels in the order of their names.
 

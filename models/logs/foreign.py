@@ -1,0 +1,233 @@
+"""Files that libraries of others read: each is an extra, and whatever it raises becomes one line.
+
+Such a library is imported when a file of its format is opened. It is given bytes that anybody may
+have written, raises what it likes, warns and logs; a user sees the file and the rule.
+"""
+
+import difflib
+import importlib
+import logging
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from codegen.arrays import Array
+from models.logs.log import RecordingError
+from models.schema import require_few, shown
+
+LONGEST_REASON = 160  # characters
+MOST_NOTED = 5  # names that a note lists
+LOGGERS = ("asammdf", "can", "cantools", "canmatrix", "h5py", "rosbags")
+# Names of a time, and seconds of its unit.
+SECONDS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0}
+
+T = TypeVar("T")
+
+
+def need(path: Path, module: str, format: str, extra: str) -> Any:
+    """Import what reads a format.
+
+    Parameters
+    ----------
+    path : of the file, for the message.
+    module : to import.
+    format : as users call it.
+    extra : of tireid that installs it.
+
+    Raises
+    ------
+    RecordingError
+        Where it is not installed: how to install it.
+    """
+    try:
+        with _quiet():
+            return importlib.import_module(module)
+    except ImportError:
+        library = module.partition(".")[0]
+        raise RecordingError(
+            f"{path}: reading {format} needs {library}: pip install tireid[{extra}]"
+        ) from None
+
+
+@contextmanager
+def one_line(path: Path, format: str) -> Iterator[None]:
+    """Let a library read a file: what it raises is a refusal, what it warns of is not said.
+
+    Parameters
+    ----------
+    path : of the file.
+    format : that it is read as, with its article.
+
+    Raises
+    ------
+    RecordingError
+        One line: file, format and what the library says.
+    """
+    try:
+        with _quiet():
+            yield
+    except RecordingError:
+        raise
+    except FileNotFoundError:
+        raise RecordingError(f"{path}: there is no such file") from None
+    except PermissionError:
+        raise RecordingError(f"{path}: may not be read") from None
+    except Exception as error:  # libraries raise anything of a file that is not theirs
+        raise RecordingError(
+            f"{path}: is not {format}, or is damaged or cut off ({_reason(error)})"
+        ) from None
+
+
+def _reason(error: Exception) -> str:
+    """Return the first words of an error, on one line."""
+    text = " ".join(str(error).split())
+    if not text:
+        return type(error).__name__
+    return (
+        shown(text[:LONGEST_REASON]).strip("'\"")
+        if not text.isprintable()
+        else (text if len(text) <= LONGEST_REASON else f"{text[:LONGEST_REASON]}...")
+    )
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    loggers = [logging.getLogger(name) for name in LOGGERS]
+    before = [logger.disabled for logger in loggers]
+    try:
+        for logger in loggers:
+            logger.disabled = True
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            with np.errstate(all="ignore"):
+                yield
+    finally:
+        for logger, disabled in zip(loggers, before, strict=True):
+            logger.disabled = disabled
+
+
+def require_clock(path: Path, clock: str, t: Array, place: str) -> None:
+    """Refuse times that are not finite, fall, or stand still throughout.
+
+    Parameters
+    ----------
+    path : of the file.
+    clock : whose times they are.
+    t : times [s], (n,).
+    place : what a sample is in the file.
+
+    Raises
+    ------
+    RecordingError
+        One line: file, clock, rule, value.
+    """
+    bad = np.flatnonzero(~np.isfinite(t))
+    if bad.size:
+        raise RecordingError(
+            f"{path}: the clock of {clock} must be finite, {place} {bad[0] + 1} has {t[bad[0]]}"
+        )
+    back = np.flatnonzero(np.diff(t) < 0.0)
+    if back.size:
+        k = back[0] + 1
+        raise RecordingError(
+            f"{path}: the clock of {clock} must rise, {place} {k + 1} has {t[k]:.9g} s after "
+            f"{t[k - 1]:.9g} s; cut the log there"
+        )
+    if t.size > 1 and not t[-1] > t[0]:
+        raise RecordingError(
+            f"{path}: the clock of {clock} must rise, all of its {t.size} samples have {t[0]:.9g} s"
+        )
+
+
+def require_room(path: Path, samples: float, width: float) -> None:
+    """Refuse more samples, or bytes in memory, than is allowed.
+
+    Parameters
+    ----------
+    path : of the file.
+    samples : of a channel.
+    width : bytes that all of what is read takes for each of them.
+    """
+    require_few(RecordingError, str(path), samples, "samples", "samples of a channel")
+    require_few(RecordingError, str(path), samples * width / 1e6, "megabytes", "megabytes")
+
+
+def typical_rate(t: Array) -> float:
+    """Return the samples per second [Hz] of times, NaN of fewer than two.
+
+    Parameters
+    ----------
+    t : times [s], (n,).
+    """
+    steps = np.diff(t)
+    step = float(np.median(steps)) if steps.size else 0.0
+    return 1.0 / step if step > 0.0 else float("nan")
+
+
+def chosen(path: Path, names: Sequence[str], known: Mapping[str, T], run: str | None) -> list[T]:
+    """Return what is known by names, of a file that holds no runs apart.
+
+    Parameters
+    ----------
+    path : of the file.
+    names : asked for.
+    known : by name as listed.
+    run : asked for.
+
+    Raises
+    ------
+    RecordingError
+        Where a name is not listed, or a run is asked for.
+    """
+    if run is not None:
+        raise RecordingError(f"{path}: holds one run without a name, so no run {shown(run)}")
+    for name in names:
+        if name not in known:
+            similar = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+            raise RecordingError(
+                f"{path}: there is no channel {shown(name)}"
+                + (f"; did you mean {shown(similar[0])}?" if similar else "")
+            )
+    return [known[name] for name in names]
+
+
+def unique(names: Iterable[tuple[str, str]]) -> list[str]:
+    """Return names; what several share gets the name of its group before it, then a number behind.
+
+    Parameters
+    ----------
+    names : group and name of each.
+    """
+    pairs = list(names)
+    count: dict[str, int] = {}
+    for _, name in pairs:
+        count[name] = count.get(name, 0) + 1
+    result: list[str] = []
+    taken: set[str] = set()
+    for group, name in pairs:
+        full = name if count[name] == 1 else f"{group}/{name}"
+        number = 1
+        while (one := full if number == 1 else f"{full} ({number})") in taken:
+            number += 1
+        taken.add(one)
+        result.append(one)
+    return result
+
+
+def noted(what: str, names: Sequence[str]) -> tuple[str, ...]:
+    """Return a note of names, none where there are none.
+
+    Parameters
+    ----------
+    what : they are, with the reason.
+    names : all of them; the first few are listed.
+    """
+    if not names:
+        return ()
+    some = ", ".join(names[:MOST_NOTED])
+    more = f", ... ({len(names)})" if len(names) > MOST_NOTED else ""
+    return (f"{what}: {some}{more}",)

@@ -1,0 +1,293 @@
+"""ASAM MDF 3 and 4: groups of channels, each group on its own clock.
+
+A channel that stands in several groups has the name of its group before its own. Enumerations
+(values that a table turns into words) are no signals; where such a table only names states beside
+numbers, as "not available", these samples are NaN. So are samples that the logger marked invalid.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import Array
+from models.logs.foreign import (
+    chosen,
+    need,
+    noted,
+    one_line,
+    require_clock,
+    require_room,
+    typical_rate,
+    unique,
+)
+from models.logs.log import Channel, Listed, RecordingError
+from models.schema import LONGEST_NAME, require_few
+
+MAGIC = (b"MDF     ", b"UnFinMF ")
+NUMERIC_4, NUMERIC_3 = frozenset(range(6)), frozenset((0, 1, 2, 3, *range(9, 17)))
+WORDS_4, WORDS_3 = frozenset((7, 8, 9, 10, 11)), frozenset((11, 12))
+FORMULA_4, FORMULA_3 = 3, 10  # kinds of conversion
+# A formula is computed only where it is one: numbers, x, operators and functions.
+FORMULA = re.compile(
+    r"(?:[\s\d.+\-*/(),]|\d[eE][+-]?\d|\b[xX]1?\b|\b(?:sin|cos|tan|asin|acos|atan|sinh|cosh|tanh"
+    r"|exp|log|log10|abs|sqrt|pow)\b)*"
+)
+VALUES, TIME = (0, 6), 1  # types of a channel, of what a master counts
+BUS_EVENT = 1 << 1  # flag of a channel group that holds frames of a bus
+PROBED = 200  # samples of a clock that its rate is taken from
+
+
+class _Place(NamedTuple):
+    """Where a channel is in the file."""
+
+    group: int
+    index: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MdfFile:
+    """A measurement file, as `LogFile` says.
+
+    Parameters
+    ----------
+    path : of the file.
+    format : "MDF3" or "MDF4".
+    channels : as listed.
+    places : of the channels.
+    said : what is left out.
+    """
+
+    path: Path
+    format: str
+    channels: tuple[Listed, ...]
+    places: tuple[_Place, ...]
+    said: tuple[str, ...]
+
+    def listed(self) -> tuple[Listed, ...]:
+        """Return the numeric channels."""
+        return self.channels
+
+    def runs(self) -> tuple[str, ...]:
+        """Return no names: a measurement is one run."""
+        return ()
+
+    def notes(self) -> tuple[str, ...]:
+        """Return what is left out."""
+        return self.said
+
+    def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
+        """Return channels in the order of their names.
+
+        Parameters
+        ----------
+        names : as listed.
+        run : None.
+        """
+        known = {
+            one.name: (one, place) for one, place in zip(self.channels, self.places, strict=True)
+        }
+        asked = chosen(self.path, names, known, run)
+        clocks: dict[int, tuple[Array, NDArray[np.int64]]] = {}
+        result = []
+        with one_line(self.path, "an MDF file"), _opened(self.path) as file:
+            for listed, place in asked:
+                require_room(self.path, listed.samples, 8 * len(asked))
+                _require_blocks(self.path, file, place.group)
+                signal = file.get(
+                    group=place.group, index=place.index, ignore_invalidation_bits=True
+                )
+                values = _numbers(self.path, listed.name, signal.samples)
+                if signal.invalidation_bits is not None:
+                    values[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan
+                if place.group not in clocks:
+                    t = np.array(signal.timestamps, dtype=np.float64)
+                    require_clock(self.path, listed.name, t, "sample")
+                    clocks[place.group] = t, np.arange(1, t.size + 1)
+                t, rows = clocks[place.group]
+                if values.size != t.size or t.size != listed.samples:
+                    raise RecordingError(
+                        f"{self.path}: {listed.name} must have {listed.samples} samples, it has "
+                        f"{min(values.size, t.size)}; was the file cut off?"
+                    )
+                result.append(
+                    Channel(
+                        name=listed.name,
+                        unit=listed.unit,
+                        t=t,
+                        values=values,
+                        place="sample",
+                        rows=rows,
+                    )
+                )
+        return tuple(result)
+
+
+def recognizes(head: bytes, path: Path) -> bool:
+    """Whether a file is of this format.
+
+    Parameters
+    ----------
+    head : its first bytes.
+    path : of the file.
+    """
+    return head[:8] in MAGIC and path.is_file()
+
+
+def open_(path: Path) -> MdfFile:
+    """List the channels of a file.
+
+    Parameters
+    ----------
+    path : of the file.
+
+    Raises
+    ------
+    RecordingError
+        One line, where it is no such file or holds no numeric channel.
+    """
+    with one_line(path, "an MDF file"), _opened(path) as file:
+        return _list(path, file)
+
+
+def _opened(path: Path) -> Any:
+    asammdf = need(path, "asammdf", "MDF", "mdf")
+    return asammdf.MDF(path, process_bus_logging=False)
+
+
+def _list(path: Path, file: Any) -> MdfFile:
+    """List the channels of an open file."""
+    is_4 = str(file.version) >= "4"
+    require_few(
+        RecordingError,
+        str(path),
+        sum(len(group.channels) for group in file.groups),
+        "columns",
+        "channels",
+    )
+    found: list[tuple[str, str, Listed, _Place]] = []
+    words, formulas, clockless, frames = [], [], [], []
+    for number, group in enumerate(file.groups):
+        samples = int(group.channel_group.cycles_nr)
+        master = file.masters_db.get(number)
+        names = [(index, one) for index, one in enumerate(group.channels) if index != master]
+        if is_4 and int(group.channel_group.flags) & BUS_EVENT:
+            frames.append(_group_name(group, number))
+            continue
+        if master is None or not _tells_time(group.channels[master], is_4):
+            clockless += [one.name for _, one in names]
+            continue
+        if not samples:
+            continue
+        rate = typical_rate(
+            np.asarray(
+                file.get_master(number, record_offset=0, record_count=min(samples, PROBED)),
+                dtype=np.float64,
+            )
+        )
+        for index, channel in names:
+            kind = _kind(group, index, is_4)
+            if kind == "number":
+                unit = str(file.get_channel_unit(group=number, index=index) or "").strip()
+                listed = Listed(name=channel.name, unit=unit, samples=samples, rate=rate)
+                place = _Place(number, index)
+                found.append((_group_name(group, number), channel.name, listed, place))
+            elif kind == "word":
+                words.append(channel.name)
+            elif kind == "formula":
+                formulas.append(channel.name)
+    said = (
+        *noted("enumerations and texts are no signals", words),
+        *noted("a conversion must be a formula of numbers, x, + - * / and functions", formulas),
+        *noted("there is no time beside", clockless),
+        *noted("frames of a bus need a DBC file to be read", frames),
+    )
+    if not found:
+        raise RecordingError(
+            f"{path}: holds no numeric channel with a clock" + "".join(f"; {one}" for one in said)
+        )
+    names = unique((group, name) for group, name, _, _ in found)
+    return MdfFile(
+        path=path,
+        format="MDF4" if is_4 else "MDF3",
+        channels=tuple(
+            Listed(name=name, unit=one.unit, samples=one.samples, rate=one.rate)
+            for name, (_, _, one, _) in zip(names, found, strict=True)
+        ),
+        places=tuple(place for _, _, _, place in found),
+        said=said,
+    )
+
+
+def _group_name(group: Any, number: int) -> str:
+    """Return what a group of channels is called."""
+    about = group.channel_group
+    for name in (getattr(about, "acq_name", None), getattr(about, "comment", None)):
+        if isinstance(name, str) and name.strip() and name.isprintable():
+            return name.strip()[:LONGEST_NAME]
+    return f"group {number + 1}"
+
+
+def _tells_time(master: Any, is_4: bool) -> bool:
+    """Whether a master channel is a time; others are angles, distances or counts."""
+    return not is_4 or int(master.sync_type) in (0, TIME)
+
+
+def _kind(group: Any, index: int, is_4: bool) -> str:
+    """Return what a channel holds: "number", "word", "formula" that is none, or "array"."""
+    channel = group.channels[index]
+    if group.channel_dependencies[index]:
+        return "array"
+    if is_4 and int(channel.channel_type) not in VALUES:
+        return "word"
+    if channel.data_type not in (NUMERIC_4 if is_4 else NUMERIC_3):
+        return "word"
+    return _kind_of_conversion(channel.conversion, is_4)
+
+
+def _kind_of_conversion(conversion: Any, is_4: bool) -> str:
+    if conversion is None:
+        return "number"
+    kind = int(conversion.conversion_type)
+    if kind == (FORMULA_4 if is_4 else FORMULA_3):
+        return "number" if FORMULA.fullmatch(_text(conversion.formula)) else "formula"
+    if kind not in (WORDS_4 if is_4 else WORDS_3):
+        return "number"
+    # Words: all of its values are, or some beside a default that is a conversion of its own.
+    inner = getattr(conversion, "referenced_blocks", None) or {}
+    kinds = {
+        _kind_of_conversion(one, is_4)
+        for one in inner.values()
+        if one is not None and not isinstance(one, str | bytes)
+    }
+    if kinds - {"number"}:
+        return "formula" if "formula" in kinds else "word"
+    default = inner.get("default_addr")
+    return "word" if default is None or isinstance(default, str | bytes) else "number"
+
+
+def _text(formula: Any) -> str:
+    return formula.decode("latin-1").strip(" \0") if isinstance(formula, bytes) else str(formula)
+
+
+def _numbers(path: Path, name: str, samples: Any) -> Array:
+    """Return samples as numbers, NaN for the words among them."""
+    values = np.asarray(samples)
+    if values.dtype.kind == "O":
+        values = np.array(
+            [float(one) if isinstance(one, int | float | np.number) else np.nan for one in values]
+        )
+    if values.ndim != 1 or values.dtype.kind not in "fiub":
+        raise RecordingError(f"{path}: {name} must be numeric, its samples are {values.dtype}")
+    return values.astype(np.float64)
+
+
+def _require_blocks(path: Path, file: Any, number: int) -> None:
+    """Refuse a group whose blocks unpack to more than is allowed."""
+    blocks = list(file.groups[number].get_data_blocks())
+    size = sum(int(block.original_size or 0) for block in blocks)
+    require_few(RecordingError, str(path), size / 1e6, "megabytes", "megabytes of a group")
