@@ -7,7 +7,7 @@ numbers, as "not available", these samples are NaN. So are samples that the logg
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -39,6 +39,14 @@ FORMULA = re.compile(
 )
 VALUES, TIME = (0, 6), 1  # types of a channel, of what a master counts
 BUS_EVENT = 1 << 1  # flag of a channel group that holds frames of a bus
+# Why a channel is not listed, by its kind.
+REASONS = {
+    "word": "enumerations and texts are no signals",
+    "array": "arrays are not read",
+    "formula": "a conversion must be a formula of numbers, x, + - * / and functions",
+    "clockless": "there is no time beside",
+    "frames": "frames of a bus need a DBC file to be read",
+}
 PROBED = 200  # samples of a clock that its rate is taken from
 
 
@@ -46,7 +54,7 @@ class _Place(NamedTuple):
     """Where a channel is in the file."""
 
     group: int
-    index: int
+    channel: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,7 +107,7 @@ class MdfFile:
                 require_room(self.path, listed.samples, 8 * len(asked))
                 _require_blocks(self.path, file, place.group)
                 signal = file.get(
-                    group=place.group, index=place.index, ignore_invalidation_bits=True
+                    group=place.group, index=place.channel, ignore_invalidation_bits=True
                 )
                 values = _numbers(self.path, listed.name, signal.samples)
                 if signal.invalidation_bits is not None:
@@ -159,66 +167,62 @@ def _opened(path: Path) -> Any:
     return asammdf.MDF(path, process_bus_logging=False)
 
 
+class _Found:
+    """What the groups of a file hold: numeric channels, and the names of others by the reason."""
+
+    def __init__(self) -> None:
+        self.channels: list[tuple[str, Listed, _Place]] = []
+        self.others: dict[str, list[str]] = {reason: [] for reason in REASONS}
+
+    def group(self, file: Any, number: int, is_4: bool) -> None:
+        """Collect the channels of a group."""
+        group = file.groups[number]
+        about = group.channel_group
+        samples, master = int(about.cycles_nr), file.masters_db.get(number)
+        name = _group_name(group, number)
+        if is_4 and int(about.flags) & BUS_EVENT:
+            self.others["frames"].append(name)
+            return
+        clock = master is not None and _tells_time(group.channels[master], is_4)
+        rate = float("nan")
+        if clock and samples:
+            probed = min(samples, PROBED)
+            t = file.get_master(number, record_offset=0, record_count=probed)
+            rate = typical_rate(np.asarray(t, dtype=np.float64))
+        for index, channel in enumerate(group.channels):
+            if index == master or not samples:
+                continue
+            kind = _kind(group, index, is_4) if clock else "clockless"
+            if kind != "number":
+                self.others[kind].append(str(channel.name))
+                continue
+            unit = str(file.get_channel_unit(group=number, index=index) or "").strip()
+            listed = Listed(name=str(channel.name), unit=unit, samples=samples, rate=rate)
+            self.channels.append((name, listed, _Place(number, index)))
+
+
 def _list(path: Path, file: Any) -> MdfFile:
     """List the channels of an open file."""
     is_4 = str(file.version) >= "4"
-    require_few(
-        RecordingError,
-        str(path),
-        sum(len(group.channels) for group in file.groups),
-        "columns",
-        "channels",
+    count = sum(len(group.channels) for group in file.groups)
+    require_few(RecordingError, str(path), count, "columns", "channels")
+    found = _Found()
+    for number in range(len(file.groups)):
+        found.group(file, number, is_4)
+    said = tuple(
+        note for kind, reason in REASONS.items() for note in noted(reason, found.others[kind])
     )
-    found: list[tuple[str, str, Listed, _Place]] = []
-    words, formulas, clockless, frames = [], [], [], []
-    for number, group in enumerate(file.groups):
-        samples = int(group.channel_group.cycles_nr)
-        master = file.masters_db.get(number)
-        names = [(index, one) for index, one in enumerate(group.channels) if index != master]
-        if is_4 and int(group.channel_group.flags) & BUS_EVENT:
-            frames.append(_group_name(group, number))
-            continue
-        if master is None or not _tells_time(group.channels[master], is_4):
-            clockless += [one.name for _, one in names]
-            continue
-        if not samples:
-            continue
-        rate = typical_rate(
-            np.asarray(
-                file.get_master(number, record_offset=0, record_count=min(samples, PROBED)),
-                dtype=np.float64,
-            )
-        )
-        for index, channel in names:
-            kind = _kind(group, index, is_4)
-            if kind == "number":
-                unit = str(file.get_channel_unit(group=number, index=index) or "").strip()
-                listed = Listed(name=channel.name, unit=unit, samples=samples, rate=rate)
-                place = _Place(number, index)
-                found.append((_group_name(group, number), channel.name, listed, place))
-            elif kind == "word":
-                words.append(channel.name)
-            elif kind == "formula":
-                formulas.append(channel.name)
-    said = (
-        *noted("enumerations and texts are no signals", words),
-        *noted("a conversion must be a formula of numbers, x, + - * / and functions", formulas),
-        *noted("there is no time beside", clockless),
-        *noted("frames of a bus need a DBC file to be read", frames),
-    )
-    if not found:
-        raise RecordingError(
-            f"{path}: holds no numeric channel with a clock" + "".join(f"; {one}" for one in said)
-        )
-    names = unique((group, name) for group, name, _, _ in found)
+    if not found.channels:
+        why = "".join(f"; {one}" for one in said)
+        raise RecordingError(f"{path}: holds no numeric channel with a time{why}")
+    names = unique((group, one.name) for group, one, _ in found.channels)
     return MdfFile(
         path=path,
         format="MDF4" if is_4 else "MDF3",
         channels=tuple(
-            Listed(name=name, unit=one.unit, samples=one.samples, rate=one.rate)
-            for name, (_, _, one, _) in zip(names, found, strict=True)
+            replace(one, name=name) for name, (_, one, _) in zip(names, found.channels, strict=True)
         ),
-        places=tuple(place for _, _, _, place in found),
+        places=tuple(place for _, _, place in found.channels),
         said=said,
     )
 
