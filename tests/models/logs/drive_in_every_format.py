@@ -85,3 +85,76 @@ def write_mdf(path: Path, t: np.ndarray, columns: Columns, version: str = "4.10"
         )
         file.save(path, overwrite=True, compression=2 if version >= "4" else 0)
     return path
+
+
+def write_bag(path: Path, t: np.ndarray, columns: Columns, storage: str = "sqlite3") -> Path:
+    """Odometry, an IMU and a steering angle; in a folder, by "sqlite3" or "mcap"."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    plugin = {"sqlite3": StoragePlugin.SQLITE3, "mcap": StoragePlugin.MCAP}[storage]
+    ns = FIRST_NS + np.round(t * 1e9).astype(np.int64)
+    with Writer(path, version=9, storage_plugin=plugin) as bag:
+        odometry, imu, steering = (
+            bag.add_connection(topic, kind, typestore=store)
+            for topic, kind in (
+                ("/odom", "nav_msgs/msg/Odometry"),
+                ("/imu", "sensor_msgs/msg/Imu"),
+                ("/steering", "std_msgs/msg/Float64"),
+            )
+        )
+        for k, time in enumerate(ns.tolist()):
+            header = _header(store, time)
+            one = {name: float(values[k]) for name, values in columns.items()}
+            for connection, message in (
+                (odometry, _odometry(store, header, one)),
+                (imu, _imu(store, header, one)),
+                (steering, store.types["std_msgs/msg/Float64"](one["delta_f"])),
+            ):
+                raw = store.serialize_cdr(message, message.__msgtype__)
+                bag.write(connection, time, raw)
+    return path
+
+
+# What the columns are in such a bag.
+IN_BAG = {
+    "v_x": "/odom/twist.twist.linear.x",
+    "v_y": "/odom/twist.twist.linear.y",
+    "r": "/odom/twist.twist.angular.z",
+    "delta_f": "/steering/data",
+    "a_y": "/imu/linear_acceleration.y",
+}
+
+
+def _header(store, ns: int, frame: str = "base_link"):
+    time = store.types["builtin_interfaces/msg/Time"](ns // 10**9, ns % 10**9)
+    return store.types["std_msgs/msg/Header"](time, frame)
+
+
+def _vector(store, x: float = 0.0, y: float = 0.0, z: float = 0.0):
+    return store.types["geometry_msgs/msg/Vector3"](x, y, z)
+
+
+def _odometry(store, header, one):
+    kinds = store.types
+    rest = kinds["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0)
+    pose = kinds["geometry_msgs/msg/Pose"](kinds["geometry_msgs/msg/Point"](1.0, 2.0, 3.0), rest)
+    twist = kinds["geometry_msgs/msg/Twist"](
+        _vector(store, one["v_x"], one["v_y"]), _vector(store, z=one["r"])
+    )
+    none = np.zeros(36)
+    return kinds["nav_msgs/msg/Odometry"](
+        header,
+        "base_link",
+        kinds["geometry_msgs/msg/PoseWithCovariance"](pose, none),
+        kinds["geometry_msgs/msg/TwistWithCovariance"](twist, none),
+    )
+
+
+def _imu(store, header, one):
+    kinds, none = store.types, np.zeros(9)
+    rest = kinds["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0)
+    return kinds["sensor_msgs/msg/Imu"](
+        header, rest, none, _vector(store, z=one["r"]), none, _vector(store, y=one["a_y"]), none
+    )
