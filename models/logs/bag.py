@@ -141,26 +141,27 @@ class BagFile:
             one.name: (one, place) for one, place in zip(self.channels, self.places, strict=True)
         }
         asked = chosen(self.path, names, known, run)
-        topics: dict[str, tuple[_Topic, list[Field]]] = {}
+        fields: dict[_Topic, list[Field]] = {}
         for _, (topic, field) in asked:
-            topics.setdefault(topic.name, (topic, []))[1].append(field)
-        result: dict[tuple[str, str], tuple[Array, Array]] = {}
+            fields.setdefault(topic, []).append(field)
         with one_line(self.path, "a ROS 2 bag"), _opened(self.path) as bag:
             definitions, _ = _definitions(self.path, bag)
-            for topic, fields in topics.values():
-                require_room(self.path, topic.messages, 8 * len(fields))
-                t, values = _read(self.path, bag, definitions, topic, fields)
-                require_clock(self.path, topic.name, t, "message")
-                for field in fields:
-                    result[topic.name, field.path] = t, values[field.path]
+            readings = {
+                topic.name: _Reading(self.path, definitions, topic, some)
+                for topic, some in fields.items()
+            }
+            for name, received, raw in _messages(bag, list(fields)):
+                readings[name].add(received, raw)
+            read = {name: reading.finish() for name, reading in readings.items()}
+        rows = {name: np.arange(1, t.size + 1) for name, (t, _) in read.items()}
         return tuple(
             Channel(
                 name=listed.name,
                 unit=listed.unit,
-                t=result[topic.name, field.path][0],
-                values=result[topic.name, field.path][1],
+                t=read[topic.name][0],
+                values=read[topic.name][1][field.path],
                 place="message",
-                rows=np.arange(1, result[topic.name, field.path][0].size + 1),
+                rows=rows[topic.name],
             )
             for listed, (topic, field) in asked
         )
@@ -285,6 +286,9 @@ def _topics(bag: Any, definitions: Definitions) -> tuple[list[_Topic], dict[str,
     for (name, kind), count in counts.items():
         if count < 1:
             continue
+        if name in {topic.name for topic, _ in found}:
+            skipped[name] = f"{kind} is a second type of it"
+            continue
         try:
             fields = tuple(fields_of(definitions, kind))
             stamp = next((one for one in STAMPS if _has_time(fields, one)), None)
@@ -328,7 +332,7 @@ def _with_zero(found: list[tuple[_Topic, int]]) -> list[_Topic]:
 
 def _first(bag: Any, definitions: Definitions, topic: _Topic) -> tuple[int, int | None]:
     """Return when the first message of a topic was received, and its stamp if it has one [ns]."""
-    for received, raw in _messages(bag, topic):
+    for _, received, raw in _messages(bag, [topic]):
         layout = layout_of(definitions, topic.kind, raw)
         if topic.stamp is None:
             return received, None
@@ -337,59 +341,72 @@ def _first(bag: Any, definitions: Definitions, topic: _Topic) -> tuple[int, int 
     raise CdrError("it holds no message")
 
 
-def _messages(bag: Any, topic: _Topic) -> Iterator[tuple[int, bytes]]:
-    """Yield the messages of a topic: when they were received [ns], and their bytes."""
-    connections = [
-        one for one in bag.connections if (one.topic, one.msgtype) == (topic.name, topic.kind)
-    ]
-    for _, received, raw in bag.messages(connections):
-        yield int(received), raw
+def _messages(bag: Any, topics: Sequence[_Topic]) -> Iterator[tuple[str, int, bytes]]:
+    """Yield the messages of topics: of which, when they were received [ns], and their bytes."""
+    wanted = {(topic.name, topic.kind) for topic in topics}
+    connections = [one for one in bag.connections if (one.topic, one.msgtype) in wanted]
+    for connection, received, raw in bag.messages(connections):
+        yield connection.topic, int(received), raw
 
 
-def _read(
-    path: Path, bag: Any, definitions: Definitions, topic: _Topic, fields: Sequence[Field]
-) -> tuple[Array, Mapping[str, Array]]:
-    """Return the times of a topic's messages [s] and some of their numbers."""
-    received: list[NDArray[np.int64]] = []
-    clocks: list[NDArray[np.int64]] = []
-    parts: dict[str, list[Array]] = {field.path: [] for field in fields}
-    layouts: dict[int, list[Layout]] = {}
-    count = 0
-    for times, raws in _batches(_messages(bag, topic)):
-        count += len(raws)
-        require_room(path, count, 8 * len(fields))
-        received.append(np.array(times, dtype=np.int64))
-        stamps = np.zeros(len(raws), dtype=np.int64)
-        values = {field.path: np.empty(len(raws)) for field in fields}
-        for layout, which, rows in _grouped(definitions, topic.kind, raws, layouts):
-            for field in fields:
+class _Reading:
+    """Numbers of a topic as its messages come, some of them at a time.
+
+    Parameters
+    ----------
+    path : of the bag.
+    definitions : by name of a type.
+    topic : that is read.
+    fields : of its messages that are kept.
+    """
+
+    def __init__(
+        self, path: Path, definitions: Definitions, topic: _Topic, fields: Sequence[Field]
+    ) -> None:
+        self.path, self.definitions, self.topic, self.fields = path, definitions, topic, fields
+        self.times: list[int] = []
+        self.raws: list[bytes] = []
+        self.layouts: dict[int, list[Layout]] = {}
+        self.clock: list[NDArray[np.int64]] = []
+        self.parts: dict[str, list[Array]] = {field.path: [] for field in fields}
+        self.count = 0
+
+    def add(self, time: int, raw: bytes) -> None:
+        """Take the next message."""
+        self.times.append(time)
+        self.raws.append(raw)
+        if len(self.raws) == TOGETHER:
+            self._read()
+
+    def _read(self) -> None:
+        """Read the messages that were taken."""
+        raws, stamp = self.raws, self.topic.stamp
+        self.count += len(raws)
+        require_room(self.path, self.count, 8 * len(self.fields))
+        ns = np.array(self.times, dtype=np.int64)
+        values = {field.path: np.empty(len(raws)) for field in self.fields}
+        for layout, which, rows in _grouped(self.definitions, self.topic.kind, raws, self.layouts):
+            for field in self.fields:
                 values[field.path][which] = numbers(layout, rows, field)
-            if topic.stamp is not None:
-                stamps[which] = _stamps(layout, rows, topic.stamp)
-        clocks.append(stamps)
+            if stamp is not None:
+                ns[which] = _stamps(layout, rows, stamp)
+        self.clock.append(ns)
         for name, one in values.items():
-            parts[name].append(one)
-    if count != topic.messages:
-        raise RecordingError(
-            f"{path}: {topic.name} must have {topic.messages} messages, it has {count}; was the "
-            "bag cut off?"
-        )
-    ns = np.concatenate(received if topic.stamp is None else clocks)
-    return (ns - topic.zero) / NS, {name: np.concatenate(one) for name, one in parts.items()}
+            self.parts[name].append(one)
+        self.times, self.raws = [], []
 
-
-def _batches(messages: Iterator[tuple[int, bytes]]) -> Iterator[tuple[list[int], list[bytes]]]:
-    """Yield some messages at a time."""
-    times: list[int] = []
-    raws: list[bytes] = []
-    for time, raw in messages:
-        times.append(time)
-        raws.append(raw)
-        if len(raws) == TOGETHER:
-            yield times, raws
-            times, raws = [], []
-    if raws:
-        yield times, raws
+    def finish(self) -> tuple[Array, Mapping[str, Array]]:
+        """Return the times of the messages [s] and the numbers by the path of their field."""
+        if self.raws:
+            self._read()
+        if self.count != self.topic.messages:
+            raise RecordingError(
+                f"{self.path}: {self.topic.name} must have {self.topic.messages} messages, it has "
+                f"{self.count}; was the bag cut off?"
+            )
+        t = (np.concatenate(self.clock) - self.topic.zero) / NS
+        require_clock(self.path, self.topic.name, t, "message")
+        return t, {name: np.concatenate(one) for name, one in self.parts.items()}
 
 
 def _grouped(

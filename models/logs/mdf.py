@@ -45,7 +45,7 @@ REASONS = {
     "array": "arrays are not read",
     "formula": "a conversion must be a formula of numbers, x, + - * / and functions",
     "clockless": "there is no time beside",
-    "frames": "frames of a bus need a DBC file to be read",
+    "frames": 'frames of a bus need a DBC, in the [file] of log.toml dbc = "car.dbc"',
 }
 PROBED = 200  # samples of a clock that its rate is taken from
 

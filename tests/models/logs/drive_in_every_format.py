@@ -158,3 +158,60 @@ def _imu(store, header, one):
     return kinds["sensor_msgs/msg/Imu"](
         header, rest, none, _vector(store, z=one["r"]), none, _vector(store, y=one["a_y"]), none
     )
+
+
+# A frame of a double for each column: no factor rounds it.
+DBC = 'VERSION ""\n\nBU_: Car\n' + "".join(
+    f'\nBO_ {256 + k} Frame_{name}: 8 Car\n SG_ {name} : 0|64@1- (1,0) [0|0] "{unit}" Car\n'
+    for k, (name, unit) in enumerate(UNITS.items())
+)
+DBC += "".join(f"\nSIG_VALTYPE_ {256 + k} {name} : 2;" for k, name in enumerate(UNITS)) + "\n"
+
+
+def write_can(path: Path, t: np.ndarray, columns: Columns) -> Path:
+    """One frame a column and sample; ".asc", ".blf", ".log" (candump) or ".trc". The DBC: `DBC`."""
+    import struct
+
+    import can
+
+    with can.Logger(str(path)) as log:
+        for k, time in enumerate(t.tolist()):
+            for number, name in enumerate(UNITS):
+                if name in columns:
+                    log.on_message_received(
+                        can.Message(
+                            timestamp=FIRST_NS / 1e9 + time,
+                            arbitration_id=256 + number,
+                            is_extended_id=False,
+                            data=struct.pack("<d", columns[name][k]),
+                        )
+                    )
+    path.with_suffix(".dbc").write_text(DBC)
+    return path
+
+
+def write_mdf_bus(path: Path, t: np.ndarray, columns: Columns) -> Path:
+    """The same frames as MDF4 that logs a bus. The DBC: `DBC`."""
+    from asammdf import MDF, Signal, Source
+
+    order = [name for name in UNITS if name in columns]
+    count = t.size * len(order)
+    kind = [("CAN_DataFrame.BusChannel", "u1"), ("CAN_DataFrame.ID", "<u4")]
+    kind += [("CAN_DataFrame.IDE", "u1"), ("CAN_DataFrame.DLC", "u1")]
+    kind += [("CAN_DataFrame.DataLength", "u1"), ("CAN_DataFrame.DataBytes", "u1", (8,))]
+    frames = np.zeros(count, dtype=kind)
+    frames["CAN_DataFrame.BusChannel"] = 1
+    frames["CAN_DataFrame.ID"] = np.tile([256 + list(UNITS).index(one) for one in order], t.size)
+    frames["CAN_DataFrame.DLC"] = frames["CAN_DataFrame.DataLength"] = 8
+    values = np.column_stack([columns[one] for one in order]).reshape(-1)
+    frames["CAN_DataFrame.DataBytes"] = values.view("u1").reshape(count, 8)
+    bus = Source(name="CAN", path="CAN", comment="", source_type=2, bus_type=2)
+    with MDF(version="4.10") as file:
+        signal = Signal(frames, np.repeat(t, len(order)), name="CAN_DataFrame", source=bus)
+        file.append(signal, acq_source=bus, common_timebase=True)
+        file.groups[0].channel_group.flags |= 2 | 4
+        for channel in file.groups[0].channels:
+            channel.flags |= 1 << 10
+        file.save(path, overwrite=True)
+    path.with_suffix(".dbc").write_text(DBC)
+    return path
