@@ -7,7 +7,7 @@ counts from the first message that is read of any topic.
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,8 +25,10 @@ from models.logs.cdr import (
     layout_of,
     numbers,
 )
-from models.logs.foreign import chosen, need, noted, one_line, require_clock, require_room, unique
+from models.logs.foreign import chosen, need, noted, one_line, seconds_of, unique
+from models.logs.growing import Growing
 from models.logs.log import Channel, Listed, RecordingError
+from models.logs.stamps import Stamps
 from models.logs.unpacking import bounded
 from models.schema import require_few, require_file
 
@@ -116,6 +118,12 @@ class BagFile:
     channels: tuple[Listed, ...]
     places: tuple[tuple[_Topic, Field], ...]
     said: tuple[str, ...]
+    _mended: list[str] = field(default_factory=list, compare=False, repr=False)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is left out or taken for granted, and what was mended in what has been read."""
+        return (*self.said, *dict.fromkeys(self._mended))
 
     def listed(self) -> tuple[Listed, ...]:
         """Return the numbers of all messages that have a definition."""
@@ -124,10 +132,6 @@ class BagFile:
     def runs(self) -> tuple[str, ...]:
         """Return no names: a bag is one run."""
         return ()
-
-    def notes(self) -> tuple[str, ...]:
-        """Return what is left out or taken for granted."""
-        return self.said
 
     def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
         """Return channels in the order of their names.
@@ -142,8 +146,8 @@ class BagFile:
         }
         asked = chosen(self.path, names, known, run)
         fields: dict[_Topic, list[Field]] = {}
-        for _, (topic, field) in asked:
-            fields.setdefault(topic, []).append(field)
+        for _, (topic, one) in asked:
+            fields.setdefault(topic, []).append(one)
         with one_line(self.path, "a ROS 2 bag"), _opened(self.path) as bag:
             definitions, _ = _definitions(self.path, bag)
             readings = {
@@ -153,12 +157,14 @@ class BagFile:
             for name, received, raw in _messages(bag, list(fields)):
                 readings[name].add(received, raw)
             read = {name: reading.finish() for name, reading in readings.items()}
-        rows = {name: np.arange(1, t.size + 1) for name, (t, _) in read.items()}
+        rows = {name: np.arange(1, stamps.t.size + 1) for name, (stamps, _) in read.items()}
+        for stamps, _ in read.values():
+            self._mended.extend(stamps.notes)
         return tuple(
             Channel(
                 name=listed.name,
                 unit=listed.unit,
-                t=read[topic.name][0],
+                t=read[topic.name][0].t,
                 values=read[topic.name][1][field.path],
                 place="message",
                 rows=rows[topic.name],
@@ -367,9 +373,8 @@ class _Reading:
         self.times: list[int] = []
         self.raws: list[bytes] = []
         self.layouts: dict[int, list[Layout]] = {}
-        self.clock: list[NDArray[np.int64]] = []
-        self.parts: dict[str, list[Array]] = {field.path: [] for field in fields}
-        self.count = 0
+        self.clock = Growing(np.int64)
+        self.parts = {one.path: Growing() for one in fields}
 
     def add(self, time: int, raw: bytes) -> None:
         """Take the next message."""
@@ -381,32 +386,33 @@ class _Reading:
     def _read(self) -> None:
         """Read the messages that were taken."""
         raws, stamp = self.raws, self.topic.stamp
-        self.count += len(raws)
-        require_room(self.path, self.count, 8 * len(self.fields))
         ns = np.array(self.times, dtype=np.int64)
-        values = {field.path: np.empty(len(raws)) for field in self.fields}
+        values = {one.path: np.empty(len(raws)) for one in self.fields}
         for layout, which, rows in _grouped(self.definitions, self.topic.kind, raws, self.layouts):
-            for field in self.fields:
-                values[field.path][which] = numbers(layout, rows, field)
+            for one in self.fields:
+                values[one.path][which] = numbers(layout, rows, one)
             if stamp is not None:
                 ns[which] = _stamps(layout, rows, stamp)
-        self.clock.append(ns)
-        for name, one in values.items():
-            self.parts[name].append(one)
+        self.clock.extend(ns)
+        for name, numbers_of in values.items():
+            self.parts[name].extend(numbers_of)
+        require_few(
+            RecordingError, str(self.path), len(self.clock), "samples", "messages of a topic"
+        )
         self.times, self.raws = [], []
 
-    def finish(self) -> tuple[Array, Mapping[str, Array]]:
-        """Return the times of the messages [s] and the numbers by the path of their field."""
+    def finish(self) -> tuple[Stamps, Mapping[str, Array]]:
+        """Return the times of the messages and the numbers by the path of their field."""
         if self.raws:
             self._read()
-        if self.count != self.topic.messages:
+        if len(self.clock) != self.topic.messages:
             raise RecordingError(
                 f"{self.path}: {self.topic.name} must have {self.topic.messages} messages, it has "
-                f"{self.count}; was the bag cut off?"
+                f"{len(self.clock)}; was the bag cut off?"
             )
-        t = (np.concatenate(self.clock) - self.topic.zero) / NS
-        require_clock(self.path, self.topic.name, t, "message")
-        return t, {name: np.concatenate(one) for name, one in self.parts.items()}
+        t = (self.clock.finished() - self.topic.zero) / NS
+        stamps = seconds_of(self.path, self.topic.name, t, "message")
+        return stamps, {name: one.finished() for name, one in self.parts.items()}
 
 
 def _grouped(

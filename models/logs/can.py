@@ -6,7 +6,7 @@ values that the DBC names as not available or invalid are NaN.
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -14,11 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from models.logs.foreign import chosen, need, one_line, require_clock, typical_rate, unique
-from models.logs.frames import EXTENDED, Frames, gather, kind_of
+from models.logs.foreign import chosen, need, one_line, seconds_of, typical_rate, unique
+from models.logs.frames import EXTENDED, TOGETHER, Frames, gather, kind_of
+from models.logs.growing import Growing
 from models.logs.log import Channel, Listed, RecordingError
 from models.schema import LONGEST_NAME, read_bytes, require_few
 
+PROBED = 200  # frames that a rate is taken from
 # Names that a DBC gives to values that are no numbers.
 NO_NUMBER = re.compile(
     r"\b(?:sna|snv|invalid|ung(?:ue|ü)ltig|not[ _]?(?:avail\w*|valid)|unavailable|undefined|error"
@@ -56,6 +58,12 @@ class CanFile:
     channels: tuple[Listed, ...]
     places: tuple[_Place, ...]
     said: tuple[str, ...]
+    _mended: list[str] = field(default_factory=list, compare=False, repr=False)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """How many frames are left out, and what was mended in what has been read."""
+        return (*self.said, *dict.fromkeys(self._mended))
 
     def listed(self) -> tuple[Listed, ...]:
         """Return the signals that the DBC tells of the frames in the log."""
@@ -64,10 +72,6 @@ class CanFile:
     def runs(self) -> tuple[str, ...]:
         """Return no names: a log is one run."""
         return ()
-
-    def notes(self) -> tuple[str, ...]:
-        """Return how many frames are left out."""
-        return self.said
 
     def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
         """Return channels in the order of their names.
@@ -84,15 +88,20 @@ class CanFile:
         with one_line(self.path, "a CAN log"):
             for listed, (frames, signal, selectors) in chosen(self.path, names, known, run):
                 sent = _sent(frames, selectors)
-                require_clock(self.path, listed.name, frames.t[sent], "message")
+                stamps = seconds_of(self.path, listed.name, frames.t[sent], "message")
+                self._mended.extend(stamps.notes)
+                values = Growing()
+                for k in range(0, sent.size, TOGETHER):
+                    some = slice(k, k + TOGETHER)
+                    values.extend(values_of(frames.data[some][sent[some]], signal))
                 result.append(
                     Channel(
                         name=listed.name,
                         unit=listed.unit,
-                        t=frames.t[sent],
-                        values=values_of(frames.data[sent], signal),
+                        t=stamps.t,
+                        values=values.finished(),
                         place="message",
-                        rows=np.flatnonzero(sent) + 1,
+                        rows=np.arange(1, len(values) + 1),
                     )
                 )
         return tuple(result)
@@ -133,29 +142,24 @@ def open_(path: Path, dbc: Path | None = None) -> CanFile:
             kind = kind_of(file.read(4096))
         if not kind:
             raise RecordingError(f"{path}: is no CAN log: neither ASC, BLF, candump, TRC nor MDF4")
-        log = gather(path, kind, messages)
-    found: list[tuple[str, Listed, _Place]] = []
-    with one_line(path, "a CAN log"):
+        log = gather(path, kind, {key: one.length for key, one in messages.items()})
+        found: list[tuple[str, Listed, _Place]] = []
         for (bus, identifier), frames in log.frames.items():
             message = messages[identifier]
-            whole = frames.sizes >= message.length
-            short = int(np.sum(~whole))
-            if short:
-                log.others["cut short"] = log.others.get("cut short", 0) + short
-            data = frames.data[whole, : message.length]
-            kept = Frames(frames.t[whole], data, frames.sizes[whole])
-            for signal in message.signals if short < whole.size else ():
-                place = _Place(kept, signal, _selectors(message, signal))
-                sent = _sent(kept, place.selectors)
+            for signal in message.signals:
+                place = _Place(frames, signal, _selectors(message, signal))
+                sent = _sent(frames, place.selectors)
                 if sent.any():
                     listed = Listed(
                         name=f"{message.name}.{signal.name}",
                         unit=(signal.unit or "").strip()[:LONGEST_NAME],
                         samples=int(sent.sum()),
-                        rate=typical_rate(kept.t[sent]),
+                        rate=typical_rate(frames.t[sent][:PROBED]),
                     )
                     found.append((f"bus {bus}", listed, place))
-    said = tuple(f"{count} {what} frames are not read" for what, count in log.others.items())
+    said = tuple(
+        f"{count} {what} frames are not read" for what, count in log.others.items() if count
+    )
     if not found:
         why = "".join(f"; {one}" for one in said)
         raise RecordingError(f"{path}: holds no frame that {dbc} knows{why}")
@@ -208,7 +212,9 @@ def _sent(frames: Frames, selectors: Selectors) -> NDArray[np.bool_]:
     """Return which frames hold a signal: of multiplexed ones not all do."""
     sent = np.ones(frames.t.size, dtype=bool)
     for selector, ids in selectors:
-        sent &= np.isin(raw_values(frames.data, selector), ids)
+        for k in range(0, sent.size, TOGETHER):
+            some = slice(k, k + TOGETHER)
+            sent[some] &= np.isin(raw_values(frames.data[some], selector), ids)
     return sent
 
 

@@ -17,13 +17,12 @@ import numpy as np
 
 from codegen.arrays import Array
 from models.logs.log import RecordingError
+from models.logs.stamps import Clock, Stamps, seconds
 from models.schema import require_few, shown
 
 LONGEST_REASON = 160  # characters
 MOST_NOTED = 5  # names that a note lists
 LOGGERS = ("asammdf", "can", "cantools", "canmatrix", "h5py", "rosbags")
-# Names of a time, and seconds of its unit.
-SECONDS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0}
 
 T = TypeVar("T")
 
@@ -110,8 +109,8 @@ def _quiet() -> Iterator[None]:
             logger.disabled = disabled
 
 
-def require_clock(path: Path, clock: str, t: Array, place: str) -> None:
-    """Refuse times that are not finite, fall, or stand still throughout.
+def seconds_of(path: Path, clock: str, t: Array, place: str) -> Stamps:
+    """Return times that rise, as `stamps.seconds` mends them where they were rounded.
 
     Parameters
     ----------
@@ -123,37 +122,23 @@ def require_clock(path: Path, clock: str, t: Array, place: str) -> None:
     Raises
     ------
     RecordingError
-        One line: file, clock, rule, value.
+        One line, where they are not finite or do not rise.
     """
-    bad = np.flatnonzero(~np.isfinite(t))
-    if bad.size:
-        raise RecordingError(
-            f"{path}: the clock of {clock} must be finite, {place} {bad[0] + 1} has {t[bad[0]]}"
-        )
-    back = np.flatnonzero(np.diff(t) < 0.0)
-    if back.size:
-        k = back[0] + 1
-        raise RecordingError(
-            f"{path}: the clock of {clock} must rise, {place} {k + 1} has {t[k]:.9g} s after "
-            f"{t[k - 1]:.9g} s; cut the log there"
-        )
-    if t.size > 1 and not t[-1] > t[0]:
-        raise RecordingError(
-            f"{path}: the clock of {clock} must rise, all of its {t.size} samples have {t[0]:.9g} s"
-        )
+    told = Clock(0, f"the clock of {clock}", "s", False, "")
+    return seconds(str(path), told, t, np.arange(1, t.size + 1), place)
 
 
 def require_room(path: Path, samples: float, width: float) -> None:
-    """Refuse more samples, or bytes in memory, than is allowed.
+    """Refuse what is read whole where it is too large.
 
     Parameters
     ----------
     path : of the file.
     samples : of a channel.
-    width : bytes that all of what is read takes for each of them.
+    width : bytes that each of them takes.
     """
     require_few(RecordingError, str(path), samples, "samples", "samples of a channel")
-    require_few(RecordingError, str(path), samples * width / 1e6, "megabytes", "megabytes")
+    require_few(RecordingError, str(path), samples * width / 1e6, "block", "megabytes of a block")
 
 
 def typical_rate(t: Array) -> float:

@@ -8,7 +8,8 @@ import re
 import struct
 import zlib
 from array import array
-from collections.abc import Container, Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,7 +18,8 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from models.limits import limits
-from models.logs.foreign import need, require_room
+from models.logs.foreign import need
+from models.logs.growing import Growing
 from models.logs.log import RecordingError
 from models.schema import require_few
 
@@ -28,6 +30,9 @@ ASC = re.compile(
 )
 CANDUMP = re.compile(rb"\s*\(\d+\.\d+\)\s+\S+\s+[0-9A-Fa-f]+#")
 TRC = re.compile(rb"\s*;\$FILEVERSION=")
+FRAME = "CAN_DataFrame"  # of MDF
+TOGETHER = 1 << 16  # frames that are stored at a time
+SHORT = 0x7FF  # largest identifier of 11 bits
 EXTENDED = 1 << 31  # marks an identifier of 29 bits
 IDENTIFIER = (1 << 29) - 1
 EPOCH = 1e8  # s: stamps above are of the calendar, which doubles hold to less than a microsecond
@@ -44,20 +49,43 @@ Key = tuple[str, int]  # bus, identifier with EXTENDED
 class Frames(NamedTuple):
     """Frames of one identifier on one bus.
 
-    t: (n,) [s]; data: (n, bytes), of which `sizes` (n,) were sent.
+    t: (n,) [s]; data: (n, bytes).
     """
 
     t: Array
     data: NDArray[np.uint8]
-    sizes: NDArray[np.int64]
 
 
 class _Gathered:
-    """Frames as they come."""
+    """Frames of one identifier as they come, all of the same bytes.
 
-    def __init__(self) -> None:
-        self.t = array("d")
-        self.data: list[bytes] = []
+    Parameters
+    ----------
+    width : bytes that are kept of each.
+    """
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+        self._times = array("d")
+        self._bytes = bytearray()
+        self._t, self._data = Growing(), Growing(np.uint8)
+
+    def add(self, time: float, data: bytes) -> None:
+        """Take the next frame."""
+        self._times.append(time)
+        self._bytes += data[: self.width]
+        if len(self._times) == TOGETHER:
+            self._store()
+
+    def _store(self) -> None:
+        self._t.extend(np.frombuffer(self._times, np.float64))
+        self._data.extend(np.frombuffer(self._bytes, np.uint8))
+        self._times, self._bytes = array("d"), bytearray()
+
+    def finished(self) -> Frames:
+        """Return all of them."""
+        self._store()
+        return Frames(self._t.finished(), self._data.finished().reshape(-1, self.width))
 
 
 class Log(NamedTuple):
@@ -65,7 +93,7 @@ class Log(NamedTuple):
 
     format: str
     frames: dict[Key, Frames]
-    others: dict[str, int]
+    others: Counter[str]
 
 
 def kind_of(head: bytes) -> str:
@@ -83,14 +111,14 @@ def kind_of(head: bytes) -> str:
     return next((name for name, pattern in texts.items() if pattern.match(head)), "")
 
 
-def gather(path: Path, kind: str, known: Container[int]) -> Log:
+def gather(path: Path, kind: str, known: Mapping[int, int]) -> Log:
     """Read the frames of a log.
 
     Parameters
     ----------
     path : of the file.
     kind : as `kind_of` names it.
-    known : identifiers that are kept, with `EXTENDED`.
+    known : by identifier, with `EXTENDED`, how many bytes its frames have.
 
     Raises
     ------
@@ -100,37 +128,38 @@ def gather(path: Path, kind: str, known: Container[int]) -> Log:
     if kind == "MDF4":
         return _of_mdf(path, known)
     found: dict[Key, _Gathered] = {}
-    others: dict[str, int] = {}
+    others: Counter[str] = Counter()
     count = 0
     for message in _messages(path, kind):
         identifier = message.arbitration_id | (EXTENDED if message.is_extended_id else 0)
         if message.is_error_frame or message.is_remote_frame:
-            others["error and remote"] = others.get("error and remote", 0) + 1
+            others["error and remote"] += 1
         elif identifier not in known:
-            others["unknown"] = others.get("unknown", 0) + 1
+            others["unknown"] += 1
+        elif len(message.data) < known[identifier]:
+            others["cut short"] += 1
         else:
-            one = found.setdefault((str(message.channel), identifier), _Gathered())
-            one.t.append(message.timestamp)
-            one.data.append(bytes(message.data))
+            key = str(message.channel), identifier
+            if key not in found:
+                found[key] = _Gathered(known[identifier])
+            found[key].add(message.timestamp, message.data)
             count += 1
-            if count % 65536 == 0:
-                require_few(RecordingError, str(path), 16 * count / 1e6, "megabytes", "megabytes")
-    frames = {key: _frames(path, one) for key, one in found.items()}
+            if count % TOGETHER == 0:
+                require_few(RecordingError, str(path), count, "samples", "frames")
+    frames = {key: one.finished() for key, one in found.items()}
     first = min((float(kept.t.min()) for kept in frames.values()), default=0.0)
     if first > EPOCH:
         for key, kept in frames.items():
-            t = np.round((kept.t - first) * MICROSECONDS) / MICROSECONDS
-            frames[key] = kept._replace(t=t)
+            frames[key] = kept._replace(t=_since(kept.t, first))
     return Log(f"CAN {kind}", frames, others)
 
 
-def _frames(path: Path, one: _Gathered) -> Frames:
-    sizes = np.array([len(data) for data in one.data], dtype=np.int64)
-    width = int(sizes.max(initial=0))
-    require_room(path, sizes.size, width + 8)
-    data = b"".join(raw.ljust(width, b"\0") for raw in one.data)
-    bytes_ = np.frombuffer(data, np.uint8).reshape(sizes.size, width)
-    return Frames(np.array(one.t, dtype=np.float64), bytes_, sizes)
+def _since(t: Array, first: float) -> Array:
+    """Return times of the calendar since the first; a double tells them to the microsecond."""
+    grown = Growing()
+    for k in range(0, t.size, TOGETHER):
+        grown.extend(np.round((t[k : k + TOGETHER] - first) * MICROSECONDS) / MICROSECONDS)
+    return grown.finished()
 
 
 def _messages(path: Path, kind: str) -> Iterator[Any]:
@@ -155,7 +184,7 @@ def _messages(path: Path, kind: str) -> Iterator[Any]:
 
 def _require_whole_blf(path: Path) -> None:
     """Refuse a file that is shorter than it says, or inflates to more than is allowed."""
-    most = 1e6 * limits().megabytes
+    most = 1e6 * limits().block
     size = path.stat().st_size
     with path.open("rb") as file:
         head = file.read(144)
@@ -171,69 +200,98 @@ def _require_whole_blf(path: Path) -> None:
             if kind == CONTAINER and body * INFLATION > most:
                 data = file.read(body)[16:]
                 inflated = len(zlib.decompressobj().decompress(data, int(most) + 1))
-                require_few(RecordingError, str(path), inflated / 1e6, "megabytes", "megabytes")
+                require_few(
+                    RecordingError, str(path), inflated / 1e6, "block", "megabytes of a block"
+                )
                 body = 0
             file.seek(body + length % 4, 1)
 
 
-def _of_mdf(path: Path, known: Container[int]) -> Log:
+def _of_mdf(path: Path, known: Mapping[int, int]) -> Log:
     """Read the frames of the buses that an MDF4 file logs."""
     asammdf = need(path, "asammdf", "CAN frames of MDF", "mdf")
     found: dict[Key, list[Frames]] = {}
-    others: dict[str, int] = {}
+    others: Counter[str] = Counter()
     with asammdf.MDF(path, process_bus_logging=False) as file:
         if str(file.version) < "4":
             raise RecordingError(f"{path}: an MDF3 file holds no frames; leave the DBC out")
         for number, group in enumerate(file.groups):
-            names = {channel.name for channel in group.channels}
-            if not int(group.channel_group.flags) & BUS_EVENT or "CAN_DataFrame.ID" not in names:
+            samples = int(group.channel_group.cycles_nr)
+            require_few(RecordingError, str(path), samples, "samples", "frames")
+            if not int(group.channel_group.flags) & BUS_EVENT:
                 continue
-
-            def values(name: str, number: int = number, names: set[Any] = names) -> Any:
-                full = f"CAN_DataFrame.{name}"
-                if full not in names:
-                    return None
-                return file.get(full, group=number, ignore_invalidation_bits=True, raw=True)
-
-            identifiers = values("ID")
-            data = values("DataBytes")
-            count = len(identifiers.samples) if identifiers is not None else 0
-            if not count or data is None:
-                continue
-            require_room(path, count, 24 + int(np.prod(data.samples.shape[1:])))
-            bytes_ = np.asarray(data.samples, dtype=np.uint8).reshape(count, -1)
-            extended, lengths, bus = values("IDE"), values("DataLength"), values("BusChannel")
-            raw = np.asarray(identifiers.samples).astype(np.int64)
-            ids = raw & IDENTIFIER
-            is_long = raw & EXTENDED if extended is None else np.asarray(extended.samples)
-            ids = np.where(is_long.astype(bool) | (ids > 0x7FF), ids | EXTENDED, ids)
-            sizes = (
-                np.full(count, bytes_.shape[1])
-                if lengths is None
-                else np.minimum(np.asarray(lengths.samples).astype(np.int64), bytes_.shape[1])
-            )
-            buses = np.zeros(count, int) if bus is None else np.asarray(bus.samples).astype(int)
-            t = np.asarray(identifiers.timestamps, dtype=np.float64)
-            for one in np.unique(ids).tolist():
-                if one not in known:
-                    others["unknown"] = others.get("unknown", 0) + int(np.sum(ids == one))
-                    continue
-                for channel in np.unique(buses[ids == one]).tolist():
-                    which = (ids == one) & (buses == channel)
-                    part = Frames(t[which], bytes_[which], sizes[which])
-                    found.setdefault((str(channel), one), []).append(part)
-    return Log("CAN MDF4", {key: _joined(parts) for key, parts in found.items()}, others)
+            for first in range(0, samples, TOGETHER):
+                part = _of_group(file, number, first, min(TOGETHER, samples - first))
+                if part is not None:
+                    _sort(part, known, found, others)
+    frames = {}
+    for key, parts in found.items():
+        t, data = (np.concatenate(some) for some in zip(*parts, strict=True))
+        order = np.argsort(t, kind="stable")  # groups follow one another
+        frames[key] = Frames(t[order], data[order])
+    return Log("CAN MDF4", frames, others)
 
 
-def _joined(parts: list[Frames]) -> Frames:
-    """Return frames of several groups in the order of their times."""
-    width = max(part.data.shape[1] for part in parts)
-    t = np.concatenate([part.t for part in parts])
-    data = np.concatenate(
-        [np.pad(part.data, ((0, 0), (0, width - part.data.shape[1]))) for part in parts]
+class _Part(NamedTuple):
+    """Some frames of a group: all of (n,), but for the data (n, bytes)."""
+
+    t: Array
+    ids: NDArray[np.int64]
+    buses: NDArray[np.int64]
+    sizes: NDArray[np.int64]
+    data: NDArray[np.uint8]
+
+
+def _of_group(file: Any, number: int, first: int, count: int) -> _Part | None:
+    """Return some frames of a group; None where it holds others than data frames."""
+    names = {channel.name for channel in file.groups[number].channels}
+
+    def signal(name: str) -> Any:
+        full = f"{FRAME}.{name}"
+        if full not in names:
+            return None
+        return file.get(
+            full,
+            group=number,
+            raw=True,
+            ignore_invalidation_bits=True,
+            record_offset=first,
+            record_count=count,
+        )
+
+    def whole(name: str, otherwise: Any) -> NDArray[np.int64]:
+        found = signal(name)
+        return np.broadcast_to(otherwise, count) if found is None else found.samples.astype(int)
+
+    identifiers, data = signal("ID"), signal("DataBytes")
+    if identifiers is None or data is None:
+        return None
+    bytes_ = np.asarray(data.samples, dtype=np.uint8).reshape(count, -1)
+    raw = identifiers.samples.astype(np.int64)
+    ids = raw & IDENTIFIER
+    is_long = whole("IDE", (raw & EXTENDED != 0) | (ids > SHORT)) != 0
+    return _Part(
+        np.asarray(identifiers.timestamps, dtype=np.float64),
+        np.where(is_long, ids | EXTENDED, ids),
+        whole("BusChannel", 0),
+        np.minimum(whole("DataLength", bytes_.shape[1]), bytes_.shape[1]),
+        bytes_,
     )
-    sizes = np.concatenate([part.sizes for part in parts])
-    if len(parts) == 1:
-        return Frames(t, data, sizes)
-    order = np.argsort(t, kind="stable")
-    return Frames(t[order], data[order], sizes[order])
+
+
+def _sort(
+    part: _Part, known: Mapping[int, int], found: dict[Key, list[Frames]], others: Counter[str]
+) -> None:
+    """Add frames to those of their bus and identifier."""
+    for identifier in np.unique(part.ids).tolist():
+        mine = part.ids == identifier
+        if identifier not in known:
+            others["unknown"] += int(mine.sum())
+            continue
+        width = known[identifier]
+        whole = mine & (part.sizes >= width)
+        others["cut short"] += int(mine.sum() - whole.sum())
+        for bus in np.unique(part.buses[whole]).tolist():
+            which = whole & (part.buses == bus)
+            frames = Frames(part.t[which], part.data[which, :width])
+            found.setdefault((str(bus), identifier), []).append(frames)

@@ -124,9 +124,11 @@ class _Variable(NamedTuple):
             )
         if not self.deflated:
             return memoryview(raw)
-        allowed = int(min(1e6 * limits().megabytes, 2.0**62))
+        allowed = int(min(1e6 * limits().block, 2.0**62))
         inflated = zlib.decompressobj().decompress(raw, (allowed + 1) if most is None else most + 8)
-        require_few(RecordingError, str(self.path), len(inflated) / 1e6, "megabytes", "megabytes")
+        require_few(
+            RecordingError, str(self.path), len(inflated) / 1e6, "block", "megabytes of a variable"
+        )
         if len(inflated) < 8:
             raise DamagedError(f"the variable at byte {self.place} is cut off")
         kind, length = struct.unpack(self.order + "II", inflated[:8])

@@ -1,8 +1,9 @@
 """MATLAB files: version 5 to 7 as they are, 7.3 (which is HDF5) and other HDF5 files by h5py."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +14,13 @@ from models.logs.foreign import (
     chosen,
     noted,
     one_line,
-    require_clock,
     require_room,
+    seconds_of,
     typical_rate,
 )
 from models.logs.log import Channel, Listed, RecordingError
-from models.logs.tree import Clock, Signal, line_of, signals_of, times_of
+from models.logs.stamps import PER_SECOND, find_clock
+from models.logs.tree import HEAD, Clock, Signal, line_of, signals_of, times_of
 
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 HDF5_PLACES = (0, 512)  # MATLAB puts a header before
@@ -27,6 +29,19 @@ REMEDY = (
     "save vectors and their time, for example s = struct('t', x.Time, 'v', x.Data); "
     "save('log.mat', '-struct', 's')"
 )
+
+
+class _Time(NamedTuple):
+    """How a clock is read.
+
+    per_second: of its unit; epoch: whether it counts from 1970; zero: what is taken off [s];
+    rate: typical [Hz].
+    """
+
+    per_second: float
+    epoch: bool
+    zero: float
+    rate: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,6 +54,7 @@ class MatlabFile:
     format : "MATLAB", "MATLAB 7.3" or "HDF5".
     channels : as listed.
     signals : where they are.
+    times : how each of their clocks is read.
     said : what is left out.
     """
 
@@ -46,7 +62,14 @@ class MatlabFile:
     format: str
     channels: tuple[Listed, ...]
     signals: tuple[Signal, ...]
+    times: dict[Clock, _Time]
     said: tuple[str, ...]
+    _mended: list[str] = field(default_factory=list, compare=False, repr=False)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is left out, and what was mended in what has been read."""
+        return (*self.said, *dict.fromkeys(self._mended))
 
     def listed(self) -> tuple[Listed, ...]:
         """Return the vectors that have a clock."""
@@ -55,10 +78,6 @@ class MatlabFile:
     def runs(self) -> tuple[str, ...]:
         """Return no names: runs that a file holds apart are channels with clocks of their own."""
         return ()
-
-    def notes(self) -> tuple[str, ...]:
-        """Return what is left out."""
-        return self.said
 
     def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
         """Return channels in the order of their names.
@@ -82,9 +101,10 @@ class MatlabFile:
                     if signal.leaf is not leaf:
                         continue
                     if signal.clock not in clocks:
-                        t = times_of(signal.clock)
-                        require_clock(self.path, signal.clock.name, t, "sample")
-                        clocks[signal.clock] = t, np.arange(1, t.size + 1)
+                        t = _seconds(times_of(signal.clock), self.times[signal.clock])
+                        stamps = seconds_of(self.path, signal.clock.name, t, "sample")
+                        self._mended.extend(stamps.notes)
+                        clocks[signal.clock] = stamps.t, np.arange(1, t.size + 1)
                     t, rows = clocks[signal.clock]
                     result[signal.name] = Channel(
                         name=signal.name,
@@ -149,17 +169,38 @@ def open_(path: Path) -> MatlabFile:
         if not found.signals:
             why = "; ".join(said) or "there is no vector of numbers"
             raise RecordingError(f"{path}: holds no signal with a time; {why}; {REMEDY}")
-        rates: dict[Clock, float] = {}
-        for signal in found.signals:
-            if signal.clock not in rates:
-                rates[signal.clock] = typical_rate(times_of(signal.clock))
+        times = _times(found.signals)
     return MatlabFile(
         path=path,
         format=format,
         channels=tuple(
-            Listed(name=one.name, unit=one.unit, samples=one.samples, rate=rates[one.clock])
+            Listed(name=one.name, unit=one.unit, samples=one.samples, rate=times[one.clock].rate)
             for one in found.signals
         ),
         signals=found.signals,
+        times=times,
         said=said,
     )
+
+
+def _times(signals: Sequence[Signal]) -> dict[Clock, _Time]:
+    """Return how the clocks are read; those of the calendar count from the first of all."""
+    result: dict[Clock, _Time] = {}
+    first: list[float] = []
+    for clock in dict.fromkeys(signal.clock for signal in signals):
+        t = times_of(clock)
+        cells = [repr(one) for one in t[:HEAD].tolist()]
+        known = find_clock(["t"], [clock.unit], {0: cells})
+        per_second = PER_SECOND[known.unit] if known is not None else 1.0
+        epoch = known is not None and known.epoch
+        if epoch:
+            first.append(float(t[0]) / per_second)
+        result[clock] = _Time(per_second, epoch, 0.0, typical_rate(t / per_second))
+    zero = min(first, default=0.0)
+    return {clock: one._replace(zero=zero) if one.epoch else one for clock, one in result.items()}
+
+
+def _seconds(t: Array, time: _Time) -> Array:
+    if time.epoch:  # a double holds the seconds since 1970 to 0.24 us
+        return np.round(t / time.per_second - time.zero, 6)
+    return t / time.per_second if time.per_second != 1.0 else t

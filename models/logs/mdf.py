@@ -7,7 +7,7 @@ numbers, as "not available", these samples are NaN. So are samples that the logg
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,11 +20,11 @@ from models.logs.foreign import (
     need,
     noted,
     one_line,
-    require_clock,
-    require_room,
+    seconds_of,
     typical_rate,
     unique,
 )
+from models.logs.growing import Growing
 from models.logs.log import Channel, Listed, RecordingError
 from models.schema import LONGEST_NAME, require_few
 
@@ -47,6 +47,7 @@ REASONS = {
     "clockless": "there is no time beside",
     "frames": 'frames of a bus need a DBC, in the [file] of log.toml dbc = "car.dbc"',
 }
+TOGETHER = 1 << 20  # records that are read at a time
 PROBED = 200  # samples of a clock that its rate is taken from
 
 
@@ -75,6 +76,12 @@ class MdfFile:
     channels: tuple[Listed, ...]
     places: tuple[_Place, ...]
     said: tuple[str, ...]
+    _mended: list[str] = field(default_factory=list, compare=False, repr=False)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is left out, and what was mended in what has been read."""
+        return (*self.said, *dict.fromkeys(self._mended))
 
     def listed(self) -> tuple[Listed, ...]:
         """Return the numeric channels."""
@@ -83,10 +90,6 @@ class MdfFile:
     def runs(self) -> tuple[str, ...]:
         """Return no names: a measurement is one run."""
         return ()
-
-    def notes(self) -> tuple[str, ...]:
-        """Return what is left out."""
-        return self.said
 
     def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
         """Return channels in the order of their names.
@@ -103,25 +106,15 @@ class MdfFile:
         clocks: dict[int, tuple[Array, NDArray[np.int64]]] = {}
         result = []
         with one_line(self.path, "an MDF file"), _opened(self.path) as file:
+            for group in {place.group for _, place in asked}:
+                _require_blocks(self.path, file, group)
             for listed, place in asked:
-                require_room(self.path, listed.samples, 8 * len(asked))
-                _require_blocks(self.path, file, place.group)
-                signal = file.get(
-                    group=place.group, index=place.channel, ignore_invalidation_bits=True
-                )
-                values = _numbers(self.path, listed.name, signal.samples)
-                if signal.invalidation_bits is not None:
-                    values[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan
-                if place.group not in clocks:
-                    t = np.array(signal.timestamps, dtype=np.float64)
-                    require_clock(self.path, listed.name, t, "sample")
-                    clocks[place.group] = t, np.arange(1, t.size + 1)
+                t, values = _read(self.path, file, listed, place, place.group not in clocks)
+                if t is not None:
+                    stamps = seconds_of(self.path, listed.name, t, "sample")
+                    self._mended.extend(stamps.notes)
+                    clocks[place.group] = stamps.t, np.arange(1, t.size + 1)
                 t, rows = clocks[place.group]
-                if values.size != t.size or t.size != listed.samples:
-                    raise RecordingError(
-                        f"{self.path}: {listed.name} must have {listed.samples} samples, it has "
-                        f"{min(values.size, t.size)}; was the file cut off?"
-                    )
                 result.append(
                     Channel(
                         name=listed.name,
@@ -133,6 +126,35 @@ class MdfFile:
                     )
                 )
         return tuple(result)
+
+
+def _read(
+    path: Path, file: Any, listed: Listed, place: _Place, timed: bool
+) -> tuple[Array | None, Array]:
+    """Return the times and values of a channel, read some records at a time."""
+    require_few(RecordingError, str(path), listed.samples, "samples", "samples of a channel")
+    times, numbers = Growing(), Growing()
+    for first in range(0, listed.samples, TOGETHER):
+        signal = file.get(
+            group=place.group,
+            index=place.channel,
+            ignore_invalidation_bits=True,
+            record_offset=first,
+            record_count=min(TOGETHER, listed.samples - first),
+        )
+        values = _numbers(path, listed.name, signal.samples)
+        if signal.invalidation_bits is not None:
+            values[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan
+        numbers.extend(values)
+        if timed:
+            times.extend(np.asarray(signal.timestamps, dtype=np.float64))
+    counts = (len(numbers), len(times)) if timed else (len(numbers),)
+    if set(counts) != {listed.samples}:
+        raise RecordingError(
+            f"{path}: {listed.name} must have {listed.samples} samples, it has {min(counts)}; was "
+            "the file cut off?"
+        )
+    return times.finished() if timed else None, numbers.finished()
 
 
 def recognizes(head: bytes, path: Path) -> bool:
@@ -291,7 +313,7 @@ def _numbers(path: Path, name: str, samples: Any) -> Array:
 
 
 def _require_blocks(path: Path, file: Any, number: int) -> None:
-    """Refuse a group whose blocks unpack to more than is allowed."""
-    blocks = list(file.groups[number].get_data_blocks())
-    size = sum(int(block.original_size or 0) for block in blocks)
-    require_few(RecordingError, str(path), size / 1e6, "megabytes", "megabytes of a group")
+    """Refuse a group with a block that unpacks to more than is allowed."""
+    for block in file.groups[number].get_data_blocks():
+        size = int(block.original_size or 0) / 1e6
+        require_few(RecordingError, str(path), size, "block", "megabytes of a block")

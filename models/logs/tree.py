@@ -14,9 +14,13 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from models.logs.foreign import SECONDS, unique
+from models.logs.foreign import unique
+from models.logs.stamps import NAMES
 
-CLOCK = re.compile(r"(?:t|time|times|timestamps?|time_?stamps?|tout|zeit)(?:_?(s|sec|ms|us|ns))?")
+# Of a variable: a name that a clock has, and the unit that may follow it.
+CLOCK = re.compile(r"([a-z_ ]+?)(?:_?(s|sec|ms|us|ns))?")
+OTHER_CLOCKS = ("tout", "timestep")
+HEAD = 200  # times by which a clock is known
 DATA = ("data", "values", "value", "samples", "raw")
 NAME = ("name", "label", "signalname", "blockname")
 UNIT = ("unit", "units")
@@ -56,13 +60,13 @@ Tree = Leaf | Unread | str | list["Tree"] | dict[str, "Tree"]
 class Clock(NamedTuple):
     """Times of samples.
 
-    leaf, column: where they are; seconds: of its unit.
+    leaf, column: where they are; unit: that is told of it, "" for none.
     """
 
     name: str
     leaf: Leaf
     column: int | None
-    seconds: float
+    unit: str
 
 
 class Signal(NamedTuple):
@@ -112,15 +116,14 @@ def signals_of(tree: Mapping[str, Tree]) -> Found:
 
 
 def times_of(clock: Clock) -> Array:
-    """Read the times of a clock [s], (n,).
+    """Read the times of a clock as they are in the file, (n,).
 
     Parameters
     ----------
     clock : where they are.
     """
     values = clock.leaf.load()
-    t = values.reshape(-1) if clock.column is None else _line(values, clock.column, clock.leaf)
-    return np.asarray(t * clock.seconds if clock.seconds != 1.0 else t, dtype=np.float64)
+    return values.reshape(-1) if clock.column is None else _line(values, clock.column, clock.leaf)
 
 
 def _line(values: Array, place: int, leaf: Leaf) -> Array:
@@ -243,29 +246,38 @@ def line_of(values: Array, signal: Signal) -> Array:
 def _clocks_of(node: dict[str, Tree], path: str) -> Iterator[Clock]:
     """Yield the clocks of a struct."""
     for key, child in node.items():
-        word = CLOCK.fullmatch(key.strip().lower())
+        unit = _unit_of_clock(key)
         name = f"{path}.{key}" if path else key
-        unit = word[1] if word else None
-        if word and isinstance(child, dict):
+        if unit is not None and isinstance(child, dict):
             inner = _pick(child, DATA)
             unit, child = _unit(child) or unit, inner if inner is not None else child
-        if word and isinstance(child, Leaf) and 1 in child.shape and max(child.shape) > 1:
+        if unit is not None and isinstance(child, Leaf) and 1 in child.shape:
             units = _pick(node, UNIT)
             if isinstance(units, dict) and isinstance(told := units.get(key), str):
                 unit = told
-            yield Clock(name, child, None, SECONDS.get((unit or "s").strip().lower(), 1.0))
+            if max(child.shape) > 1:
+                yield Clock(name, child, None, unit)
     x, y = node.get("X"), node.get("Y")  # of dSPACE: the clock is X, the signals are Y(k)
     if isinstance(x, dict) and isinstance(y, dict | list):
         data = _pick(x, DATA)
         if isinstance(data, Leaf) and 1 in data.shape:
-            yield Clock(f"{path}.X" if path else "X", data, None, 1.0)
+            yield Clock(f"{path}.X" if path else "X", data, None, "")
+
+
+def _unit_of_clock(name: str) -> str | None:
+    """Return the unit that the name of a clock tells, "" for none; None where it names no clock."""
+    found = CLOCK.fullmatch(name.strip().lower())
+    if found is None:
+        return None
+    word = re.sub("[^a-z]", "", found[1])
+    return (found[2] or "") if word in NAMES or word in OTHER_CLOCKS else None
 
 
 def _clock_inside(leaf: Leaf, name: str) -> Clock | None:
     """Return the first column of a matrix, or row of a wide one, where it rises as a clock does."""
     if min(leaf.shape) < 2 or min(leaf.shape) > MOST_COLUMNS or max(leaf.shape) < 3:
         return None
-    clock = Clock(name, leaf, 0, 1.0)
+    clock = Clock(name, leaf, 0, "")
     return clock if bool(np.all(np.diff(times_of(clock)) > 0.0)) else None
 
 
@@ -287,7 +299,7 @@ def _several(node: dict[str, Tree]) -> bool:
         if isinstance(child, Leaf)
         and max(child.shape) > 1
         and key.lower() not in DATA
-        and not CLOCK.fullmatch(key.lower())
+        and _unit_of_clock(key) is None
         and key.lower() not in ("dimensions", "x", "quality")
     ]
     return bool(other)

@@ -44,7 +44,7 @@ def bounded(path: Path) -> Iterator[None]:
         return bytes(lz4.LZ4FrameDecompressor().decompress(data, max_length=size + 1))
 
     def of_message(data: bytes) -> bytes:
-        return of_zstd(data, int(1e6 * limits().megabytes))
+        return of_zstd(data, int(1e6 * limits().block))
 
     table: dict[str, Unpack] = mcap.DECOMPRESSORS
     before = dict(table)
@@ -58,7 +58,7 @@ def bounded(path: Path) -> Iterator[None]:
 
 
 def _require(path: Path, size: int) -> None:
-    require_few(RecordingError, str(path), size / 1e6, "megabytes", "megabytes of a chunk")
+    require_few(RecordingError, str(path), size / 1e6, "block", "megabytes of a chunk")
 
 
 def _require_small(path: Path, zstd: Any) -> None:
