@@ -5,11 +5,15 @@ have written, raises what it likes, warns and logs; a user sees the file and the
 """
 
 import difflib
+import gc
 import importlib
+import io
 import logging
+import sys
+import traceback
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -66,19 +70,29 @@ def one_line(path: Path, format: str) -> Iterator[None]:
     RecordingError
         One line: file, format and what the library says.
     """
-    try:
-        with _quiet():
+    with _quiet():
+        try:
             yield
-    except RecordingError:
-        raise
-    except FileNotFoundError:
-        raise RecordingError(f"{path}: there is no such file") from None
-    except PermissionError:
-        raise RecordingError(f"{path}: may not be read") from None
-    except Exception as error:  # libraries raise anything of a file that is not theirs
-        raise RecordingError(
-            f"{path}: is not {format}, or is damaged or cut off ({_reason(error)})"
-        ) from None
+        except RecordingError:
+            raise
+        except Exception as error:  # libraries raise anything of a file that is not theirs
+            reason = _reason(error)
+            _forget(error)
+            if isinstance(error, FileNotFoundError) and not path.exists():
+                raise RecordingError(f"{path}: there is no such file") from None
+            if isinstance(error, PermissionError):
+                raise RecordingError(f"{path}: may not be read") from None
+            raise RecordingError(
+                f"{path}: is not {format}, or is damaged or cut off ({reason})"
+            ) from None
+
+
+def _forget(error: BaseException | None) -> None:
+    """Let go of what a library was building: some complain aloud when they are taken away."""
+    while error is not None:
+        traceback.clear_frames(error.__traceback__)
+        error = error.__context__
+    gc.collect()
 
 
 def _reason(error: Exception) -> str:
@@ -95,16 +109,24 @@ def _reason(error: Exception) -> str:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
+    """Say nothing that a library says: on the screen, in warnings, in logs or when it is freed."""
     loggers = [logging.getLogger(name) for name in LOGGERS]
     before = [logger.disabled for logger in loggers]
+    hook = sys.unraisablehook
+    sys.unraisablehook = lambda _: None
+    for logger in loggers:
+        logger.disabled = True
     try:
-        for logger in loggers:
-            logger.disabled = True
-        with warnings.catch_warnings():
+        with (
+            warnings.catch_warnings(),
+            np.errstate(all="ignore"),
+            redirect_stdout(io.StringIO()),
+            redirect_stderr(io.StringIO()),
+        ):
             warnings.simplefilter("ignore")
-            with np.errstate(all="ignore"):
-                yield
+            yield
     finally:
+        sys.unraisablehook = hook
         for logger, disabled in zip(loggers, before, strict=True):
             logger.disabled = disabled
 

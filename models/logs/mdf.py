@@ -6,7 +6,7 @@ numbers, as "not available", these samples are NaN. So are samples that the logg
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,6 +20,7 @@ from models.logs.foreign import (
     need,
     noted,
     one_line,
+    require_room,
     seconds_of,
     typical_rate,
     unique,
@@ -47,7 +48,7 @@ REASONS = {
     "clockless": "there is no time beside",
     "frames": 'frames of a bus need a DBC, in the [file] of log.toml dbc = "car.dbc"',
 }
-TOGETHER = 1 << 20  # records that are read at a time
+TOGETHER = 1 << 23  # numbers that are read at a time
 PROBED = 200  # samples of a clock that its rate is taken from
 
 
@@ -103,58 +104,71 @@ class MdfFile:
             one.name: (one, place) for one, place in zip(self.channels, self.places, strict=True)
         }
         asked = chosen(self.path, names, known, run)
+        values: dict[_Place, Array] = {}
         clocks: dict[int, tuple[Array, NDArray[np.int64]]] = {}
-        result = []
         with one_line(self.path, "an MDF file"), _opened(self.path) as file:
-            for group in {place.group for _, place in asked}:
+            for some in _portions(asked):
+                group = some[0][1].group
                 _require_blocks(self.path, file, group)
-            for listed, place in asked:
-                t, values = _read(self.path, file, listed, place, place.group not in clocks)
-                if t is not None:
-                    stamps = seconds_of(self.path, listed.name, t, "sample")
-                    self._mended.extend(stamps.notes)
-                    clocks[place.group] = stamps.t, np.arange(1, t.size + 1)
-                t, rows = clocks[place.group]
-                result.append(
-                    Channel(
-                        name=listed.name,
-                        unit=listed.unit,
-                        t=t,
-                        values=values,
-                        place="sample",
-                        rows=rows,
-                    )
-                )
-        return tuple(result)
-
-
-def _read(
-    path: Path, file: Any, listed: Listed, place: _Place, timed: bool
-) -> tuple[Array | None, Array]:
-    """Return the times and values of a channel, read some records at a time."""
-    require_few(RecordingError, str(path), listed.samples, "samples", "samples of a channel")
-    times, numbers = Growing(), Growing()
-    for first in range(0, listed.samples, TOGETHER):
-        signal = file.get(
-            group=place.group,
-            index=place.channel,
-            ignore_invalidation_bits=True,
-            record_offset=first,
-            record_count=min(TOGETHER, listed.samples - first),
+                for (listed, place), (t, numbers) in zip(
+                    some, _read(self.path, file, some), strict=True
+                ):
+                    if group not in clocks:
+                        stamps = seconds_of(self.path, listed.name, t, "sample")
+                        self._mended.extend(stamps.notes)
+                        clocks[group] = _kept(stamps.t), np.arange(1, t.size + 1)
+                    values[place] = _kept(numbers)
+        return tuple(
+            Channel(
+                name=listed.name,
+                unit=listed.unit,
+                t=clocks[place.group][0],
+                values=values[place],
+                place="sample",
+                rows=clocks[place.group][1],
+            )
+            for listed, place in asked
         )
+
+
+_Asked = tuple[Listed, _Place]
+
+
+def _portions(asked: Sequence[_Asked]) -> Iterator[list[_Asked]]:
+    """Yield channels that are read together: of one group, and few enough for the memory."""
+    for group in dict.fromkeys(place.group for _, place in asked):
+        mine = [one for one in asked if one[1].group == group]
+        several = max(1, TOGETHER // max(mine[0][0].samples, 1))
+        for k in range(0, len(mine), several):
+            yield mine[k : k + several]
+
+
+def _read(path: Path, file: Any, some: Sequence[_Asked]) -> list[tuple[Array, Array]]:
+    """Return times and values of channels of one group."""
+    samples = some[0][0].samples
+    require_room(path, samples, 8)
+    places = [(None, place.group, place.channel) for _, place in some]
+    signals = file.select(places, copy_master=False)
+    result = []
+    for (listed, _), signal in zip(some, signals, strict=True):
         values = _numbers(path, listed.name, signal.samples)
         if signal.invalidation_bits is not None:
             values[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan
-        numbers.extend(values)
-        if timed:
-            times.extend(np.asarray(signal.timestamps, dtype=np.float64))
-    counts = (len(numbers), len(times)) if timed else (len(numbers),)
-    if set(counts) != {listed.samples}:
-        raise RecordingError(
-            f"{path}: {listed.name} must have {listed.samples} samples, it has {min(counts)}; was "
-            "the file cut off?"
-        )
-    return times.finished() if timed else None, numbers.finished()
+        t = np.array(signal.timestamps, dtype=np.float64)
+        if not t.size == values.size == samples:
+            raise RecordingError(
+                f"{path}: {listed.name} must have {samples} samples, it has "
+                f"{min(t.size, values.size)}; was the file cut off?"
+            )
+        result.append((t, values))
+    return result
+
+
+def _kept(values: Array) -> Array:
+    """Return numbers as they are kept: on disk where they are many."""
+    grown = Growing()
+    grown.extend(values)
+    return grown.finished()
 
 
 def recognizes(head: bytes, path: Path) -> bool:
