@@ -33,7 +33,7 @@ from models.logs.unpacking import bounded
 from models.schema import require_few, require_file
 
 METADATA = "metadata.yaml"
-SQLITE, MCAP = b"SQLite format 3\x00", b"\x89MCAP0\r\n"
+SQLITE, MCAP, ROS1 = b"SQLite format 3\x00", b"\x89MCAP0\r\n", b"#ROSBAG"
 NS = 1e9  # in a second
 OTHER_CLOCK = 3600  # seconds between stamps and the bag's own time, above which these differ
 TOGETHER = 2048  # messages that are read at a time
@@ -183,7 +183,7 @@ def recognizes(head: bytes, path: Path) -> bool:
     """
     if path.is_dir():
         return (path / METADATA).is_file()
-    return head.startswith((SQLITE, MCAP))
+    return head.startswith((SQLITE, MCAP, ROS1))
 
 
 def open_(path: Path) -> BagFile:
@@ -232,7 +232,7 @@ def _plugin(path: Path) -> str:
         return "dir"
     with path.open("rb") as file:
         head = file.read(16)
-    if head.startswith(b"#ROSBAG"):
+    if head.startswith(ROS1):
         raise RecordingError(f"{path}: is a bag of ROS 1; convert it: rosbags-convert --src {path}")
     if not head.startswith((SQLITE, MCAP)):
         raise RecordingError(f"{path}: is not a ROS 2 bag: neither SQLite nor MCAP")

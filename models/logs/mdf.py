@@ -179,7 +179,7 @@ def recognizes(head: bytes, path: Path) -> bool:
     head : its first bytes.
     path : of the file.
     """
-    return head[:8] in MAGIC and path.is_file()
+    return path.is_file() and head[:8] in MAGIC
 
 
 def open_(path: Path) -> MdfFile:
