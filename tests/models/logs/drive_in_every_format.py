@@ -1,7 +1,9 @@
 """One drive, written in every format that is read: the same doubles, the same clock."""
 
-from collections.abc import Mapping
+import warnings
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -215,3 +217,109 @@ def write_mdf_bus(path: Path, t: np.ndarray, columns: Columns) -> Path:
         file.save(path, overwrite=True)
     path.with_suffix(".dbc").write_text(DBC)
     return path
+
+
+class Written(NamedTuple):
+    """A drive in a file: the file, its DBC or None, and by column the name of its channel."""
+
+    path: Path
+    dbc: Path | None
+    names: dict[str, str]
+
+
+# By format: how a drive is written, into a folder. All of them hold the same doubles.
+def _same(columns: Columns) -> dict[str, str]:
+    return {name: name for name in columns}
+
+
+def _bus(columns: Columns) -> dict[str, str]:
+    return {name: f"Frame_{name}.{name}" for name in columns}
+
+
+def _csv(folder: Path, t: np.ndarray, columns: Columns) -> Written:
+    rows = np.column_stack([t, *columns.values()]).tolist()
+    text = ",".join(["t", *columns]) + "\n"
+    text += "".join(",".join(map(repr, row)) + "\n" for row in rows)
+    path = folder / "drive.csv"
+    path.write_text(text)
+    return Written(path, None, _same(columns))
+
+
+def _parquet(folder: Path, t: np.ndarray, columns: Columns) -> Written:
+    import pyarrow
+    import pyarrow.parquet
+
+    path = folder / "drive.parquet"
+    pyarrow.parquet.write_table(pyarrow.table({"t": t, **columns}), path)
+    return Written(path, None, _same(columns))
+
+
+def _mat5(folder: Path, t: np.ndarray, columns: Columns) -> Written:
+    return Written(write_mat5(folder / "drive5.mat", t, columns), None, _same(columns))
+
+
+def _mat73(folder: Path, t: np.ndarray, columns: Columns) -> Written:
+    tree = {"log": {"t": t, **columns, "units": UNITS}}
+    names = {name: f"log.{name}" for name in columns}
+    return Written(write_mat73(folder / "drive73.mat", tree), None, names)
+
+
+def _mdf4(folder: Path, t: np.ndarray, columns: Columns) -> Written:
+    return Written(write_mdf(folder / "drive.mf4", t, columns), None, _same(columns))
+
+
+def _mdf3(folder: Path, t: np.ndarray, columns: Columns) -> Written:
+    return Written(write_mdf(folder / "drive.mdf", t, columns, "3.30"), None, _same(columns))
+
+
+def _bag(folder: Path, t: np.ndarray, columns: Columns) -> Written:
+    path = write_bag(folder / "bag", t, columns)
+    return Written(path, None, {name: IN_BAG[name] for name in columns})
+
+
+def _db3(folder: Path, t: np.ndarray, columns: Columns) -> Written:
+    path = write_bag(folder / "one", t, columns) / "one.db3"
+    return Written(path, None, {name: IN_BAG[name] for name in columns})
+
+
+def _mcap(folder: Path, t: np.ndarray, columns: Columns) -> Written:
+    path = write_bag(folder / "chunks", t, columns, "mcap") / "chunks.mcap"
+    return Written(path, None, {name: IN_BAG[name] for name in columns})
+
+
+def _frames(ending: str) -> Callable[[Path, np.ndarray, Columns], Written]:
+    def write(folder: Path, t: np.ndarray, columns: Columns) -> Written:
+        path = write_can(folder / f"drive.{ending}", t, columns)
+        return Written(path, path.with_suffix(".dbc"), _bus(columns))
+
+    return write
+
+
+def _mdf_bus(folder: Path, t: np.ndarray, columns: Columns) -> Written:
+    path = write_mdf_bus(folder / "bus.mf4", t, columns)
+    return Written(path, path.with_suffix(".dbc"), _bus(columns))
+
+
+FORMATS: dict[str, Callable[[Path, np.ndarray, Columns], Written]] = {
+    "CSV": _csv,
+    "Parquet": _parquet,
+    "MATLAB": _mat5,
+    "MATLAB 7.3": _mat73,
+    "MDF4": _mdf4,
+    "MDF3": _mdf3,
+    "ROS 2 bag": _bag,
+    "db3": _db3,
+    "MCAP": _mcap,
+    "CAN ASC": _frames("asc"),
+    "CAN BLF": _frames("blf"),
+    "CAN candump": _frames("log"),
+    "CAN TRC": _frames("trc"),
+    "CAN MDF4": _mdf_bus,
+}
+
+
+def write(format: str, folder: Path, t: np.ndarray, columns: Columns) -> Written:
+    """A drive in a format; what the libraries that write warn of is theirs."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return FORMATS[format](folder, t, columns)
