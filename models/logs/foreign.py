@@ -92,7 +92,7 @@ def _forget(error: BaseException | None) -> None:
     while error is not None:
         traceback.clear_frames(error.__traceback__)
         error = error.__context__
-    gc.collect()
+    gc.collect(1)  # it is young
 
 
 def _reason(error: Exception) -> str:

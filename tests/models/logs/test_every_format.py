@@ -130,7 +130,7 @@ def test_damaged_files_are_refused_in_one_line_or_read(format, tmp_path, drive, 
     whole = path.read_bytes()
     capfd.readouterr()
     refused = 0
-    for seed in range(24):
+    for seed in range(12):
         rng = random.Random(seed)
         damaged = bytearray(whole)
         if seed % 2:
@@ -145,7 +145,7 @@ def test_damaged_files_are_refused_in_one_line_or_read(format, tmp_path, drive, 
             refused += 1
             text = str(error)
             assert "\n" not in text and len(text) < 700 and str(tmp_path) in text
-    assert refused > 4
+    assert refused >= 3
     assert capfd.readouterr() == ("", "")
 
 
