@@ -144,6 +144,8 @@ class _Walk:
         clocks = (*_clocks_of(node, path), *clocks)
         own = [clock.leaf for clock in clocks]
         data = _pick(node, DATA)
+        if any(data is leaf for leaf in own):
+            return
         if isinstance(data, Leaf) and (clocks or _text(node, UNIT)) and not _several(node):
             label = _text(node, NAME) or path
             self.leaf(data, label, _unit(node), clocks, _columns(node))
