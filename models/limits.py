@@ -21,6 +21,7 @@ class InputLimits:
     samples : rows of a log, steps of a recording.
     path : samples of a path, rows of way-points.
     columns : of a log or of way-points.
+    block : megabytes of a part of a log that is read whole: a MATLAB variable, a compressed chunk.
     document : megabytes of a JSON, ONNX or tire file, or of way-points.
     toml : megabytes of a TOML file.
     line : characters of a line of TOML.
@@ -36,6 +37,7 @@ class InputLimits:
     samples: float = 1e8
     path: float = 4e5
     columns: float = 1e4
+    block: float = 1000.0
     document: float = 32.0
     toml: float = 0.1
     line: float = 4000.0

@@ -15,7 +15,7 @@ from models.logs.log import LogFile, RecordingError
 # Endings of names that logs have; "LOG:RUN" is split after one, and a recording's name lacks it.
 ENDINGS = (
     ".csv", ".csv.gz", ".parquet", ".txt", ".txt.gz", ".dat", ".dat.gz", ".asc", ".tsv", ".vbo",
-    ".mat", ".mf4", ".mdf", ".mcap", ".db3", ".bag", ".blf", ".trc",
+    ".mat", ".h5", ".hdf5", ".mf4", ".mdf", ".mcap", ".db3", ".bag", ".blf", ".trc", ".log",
 )  # fmt: skip
 HEAD = 1 << 12  # bytes that tell the format
 
@@ -30,21 +30,31 @@ class Format(NamedTuple):
     opener: str
 
 
+def _of(module: str) -> Format:
+    """Return the format of a module that knows its files: it has `recognizes` and `open_`."""
+    return Format(
+        lambda path, head: bool(import_module(module).recognizes(head, path)), module + ":open_"
+    )
+
+
 FORMATS: tuple[Format, ...] = (
     Format(
         lambda path, head: head[:4] == b"PAR1" or path.suffix.lower() == ".parquet",
         "models.logs.parquet:open_parquet",
     ),
+    *(_of("models.logs." + name) for name in ("mdf", "matlab", "bag", "can")),
 )
+CAN = "models.logs.can:open_"
 TEXT = "models.logs.text:open_text"
 
 
-def open_log(path: str | Path) -> LogFile:
+def open_log(path: str | Path, dbc: str | Path | None = None) -> LogFile:
     """Open a log of any format; nothing but its beginning is read.
 
     Parameters
     ----------
     path : of a file; of a folder, where a format keeps a log in one.
+    dbc : of the file that tells the signals in the frames of a CAN bus.
 
     Raises
     ------
@@ -59,8 +69,9 @@ def open_log(path: str | Path) -> LogFile:
         opener = next((one.opener for one in FORMATS if one.is_it(path, head)), TEXT)
         if path.is_dir() and opener == TEXT:
             raise RecordingError(f"{path}: there is no such file, it is a folder")
-        module, _, function = opener.partition(":")
-        opened: LogFile = getattr(import_module(module), function)(path)
+        told = () if dbc is None else (Path(dbc),)
+        module, _, function = (CAN if told else opener).partition(":")
+        opened: LogFile = getattr(import_module(module), function)(path, *told)
         return opened
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read ({error.strerror or error})") from None

@@ -75,6 +75,10 @@ class LogFile(Protocol):
     def runs(self) -> tuple[str, ...]:
         """Return the names of the runs that the file holds apart; empty where it holds one."""
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is left out, taken for granted, or was mended in what has been read, a line each."""
+
     def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
         """Return channels in the order of their names.
 

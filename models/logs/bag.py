@@ -1,0 +1,467 @@
+"""ROS 2 bags without ROS: a folder with metadata.yaml, one .db3, one .mcap.
+
+Every number of a message is a channel "topic/field"; its clock is the stamp of the message, or of
+its header, and where there is none (or it is not set) the time at which the bag received it. Time
+counts from the first message that is read of any topic.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import Array
+from models.logs.cdr import (
+    CdrError,
+    Definitions,
+    Field,
+    Layout,
+    fields_of,
+    fits,
+    layout_of,
+    numbers,
+)
+from models.logs.foreign import chosen, need, noted, one_line, seconds_of, unique
+from models.logs.growing import Growing
+from models.logs.log import Channel, Listed, RecordingError
+from models.logs.stamps import Stamps
+from models.logs.unpacking import bounded
+from models.schema import require_few, require_file
+
+METADATA = "metadata.yaml"
+SQLITE, MCAP, ROS1 = b"SQLite format 3\x00", b"\x89MCAP0\r\n", b"#ROSBAG"
+NS = 1e9  # in a second
+OTHER_CLOCK = 3600  # seconds between stamps and the bag's own time, above which these differ
+TOGETHER = 2048  # messages that are read at a time
+STAMPS = ("header.stamp.", "stamp.")
+TIME = ("sec", "nanosec")
+
+# Messages that cars tell their motion by and that are in no distribution of ROS.
+_DRIVE = "float32 steering_angle\nfloat32 steering_angle_velocity\nfloat32 speed\n" + (
+    "float32 acceleration\nfloat32 jerk"
+)
+_STEERING = "builtin_interfaces/Time stamp\nfloat32 steering_tire_angle"
+_VELOCITY = "std_msgs/Header header\nfloat32 longitudinal_velocity\nfloat32 lateral_velocity\n" + (
+    "float32 heading_rate"
+)
+KNOWN = {
+    "ackermann_msgs/msg/AckermannDrive": _DRIVE,
+    "ackermann_msgs/msg/AckermannDriveStamped": (
+        "std_msgs/Header header\nackermann_msgs/AckermannDrive drive"
+    ),
+    "autoware_vehicle_msgs/msg/SteeringReport": _STEERING,
+    "autoware_vehicle_msgs/msg/VelocityReport": _VELOCITY,
+    "autoware_auto_vehicle_msgs/msg/SteeringReport": _STEERING,
+    "autoware_auto_vehicle_msgs/msg/VelocityReport": _VELOCITY,
+}
+# By package-free type and field: the unit of it and of all in it.
+UNITS = {
+    ("Twist", "linear"): "m/s",
+    ("Twist", "angular"): "rad/s",
+    ("Accel", "linear"): "m/s^2",
+    ("Accel", "angular"): "rad/s^2",
+    ("Pose", "position"): "m",
+    ("Imu", "angular_velocity"): "rad/s",
+    ("Imu", "linear_acceleration"): "m/s^2",
+    ("AckermannDrive", "steering_angle"): "rad",
+    ("AckermannDrive", "steering_angle_velocity"): "rad/s",
+    ("AckermannDrive", "speed"): "m/s",
+    ("AckermannDrive", "acceleration"): "m/s^2",
+    ("AckermannDrive", "jerk"): "m/s^3",
+    ("SteeringReport", "steering_tire_angle"): "rad",
+    ("VelocityReport", "longitudinal_velocity"): "m/s",
+    ("VelocityReport", "lateral_velocity"): "m/s",
+    ("VelocityReport", "heading_rate"): "rad/s",
+}
+PACKAGES = (
+    "geometry_msgs",
+    "sensor_msgs",
+    "ackermann_msgs",
+    "autoware_vehicle_msgs",
+    "autoware_auto_vehicle_msgs",
+)
+
+
+class _Topic(NamedTuple):
+    """Messages of one name and type.
+
+    stamp: begins the paths of its clock, None where that is the bag's; zero: of its clock [ns].
+    """
+
+    name: str
+    kind: str
+    messages: int
+    fields: tuple[Field, ...]
+    stamp: str | None
+    zero: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BagFile:
+    """A bag, as `LogFile` says.
+
+    Parameters
+    ----------
+    path : of the file or folder.
+    format : "ROS 2 bag" or "MCAP".
+    channels : as listed.
+    places : topic and field of the channels.
+    said : what is left out or taken for granted.
+    """
+
+    path: Path
+    format: str
+    channels: tuple[Listed, ...]
+    places: tuple[tuple[_Topic, Field], ...]
+    said: tuple[str, ...]
+    _mended: list[str] = field(default_factory=list, compare=False, repr=False)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is left out or taken for granted, and what was mended in what has been read."""
+        return (*self.said, *dict.fromkeys(self._mended))
+
+    def listed(self) -> tuple[Listed, ...]:
+        """Return the numbers of all messages that have a definition."""
+        return self.channels
+
+    def runs(self) -> tuple[str, ...]:
+        """Return no names: a bag is one run."""
+        return ()
+
+    def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
+        """Return channels in the order of their names.
+
+        Parameters
+        ----------
+        names : as listed.
+        run : None.
+        """
+        known = {
+            one.name: (one, place) for one, place in zip(self.channels, self.places, strict=True)
+        }
+        asked = chosen(self.path, names, known, run)
+        fields: dict[_Topic, list[Field]] = {}
+        for _, (topic, one) in asked:
+            fields.setdefault(topic, []).append(one)
+        with one_line(self.path, "a ROS 2 bag"), _opened(self.path) as bag:
+            definitions, _ = _definitions(self.path, bag)
+            readings = {
+                topic.name: _Reading(self.path, definitions, topic, some)
+                for topic, some in fields.items()
+            }
+            for name, received, raw in _messages(bag, list(fields)):
+                readings[name].add(received, raw)
+            read = {name: reading.finish() for name, reading in readings.items()}
+        rows = {name: np.arange(1, stamps.t.size + 1) for name, (stamps, _) in read.items()}
+        for stamps, _ in read.values():
+            self._mended.extend(stamps.notes)
+        return tuple(
+            Channel(
+                name=listed.name,
+                unit=listed.unit,
+                t=read[topic.name][0].t,
+                values=read[topic.name][1][field.path],
+                place="message",
+                rows=rows[topic.name],
+            )
+            for listed, (topic, field) in asked
+        )
+
+
+def recognizes(head: bytes, path: Path) -> bool:
+    """Whether a file or folder is of this format.
+
+    Parameters
+    ----------
+    head : its first bytes, none of a folder.
+    path : of the file or folder.
+    """
+    if path.is_dir():
+        return (path / METADATA).is_file()
+    return head.startswith((SQLITE, MCAP, ROS1))
+
+
+def open_(path: Path) -> BagFile:
+    """List the channels of a bag.
+
+    Parameters
+    ----------
+    path : of the file or folder.
+
+    Raises
+    ------
+    RecordingError
+        One line, where it is no such bag or no message in it has numbers.
+    """
+    with one_line(path, "a ROS 2 bag"), _opened(path) as bag:
+        definitions, undefined = _definitions(path, bag)
+        topics, skipped = _topics(bag, definitions)
+        said = _said(topics, {**undefined, **skipped})
+        seconds = (bag.metadata.end_time - bag.metadata.start_time) / NS
+    found = [(topic, field) for topic in topics for field in topic.fields]
+    if not found:
+        why = "".join(f"; {one}" for one in said)
+        raise RecordingError(f"{path}: holds no message with numbers{why}")
+    require_few(RecordingError, str(path), len(found), "columns", "channels")
+    names = unique((topic.kind, f"{topic.name}/{field.path}") for topic, field in found)
+    return BagFile(
+        path=path,
+        format="ROS 2 bag" if _plugin(path) != ".mcap" else "MCAP",
+        channels=tuple(
+            Listed(
+                name=name,
+                unit=_unit(field),
+                samples=topic.messages,
+                rate=(topic.messages - 1) / seconds if seconds > 0.0 else float("nan"),
+            )
+            for name, (topic, field) in zip(names, found, strict=True)
+        ),
+        places=tuple(found),
+        said=said,
+    )
+
+
+def _plugin(path: Path) -> str:
+    """Return what rosbags reads a path by."""
+    if path.is_dir():
+        return "dir"
+    with path.open("rb") as file:
+        head = file.read(16)
+    if head.startswith(ROS1):
+        raise RecordingError(f"{path}: is a bag of ROS 1; convert it: rosbags-convert --src {path}")
+    if not head.startswith((SQLITE, MCAP)):
+        raise RecordingError(f"{path}: is not a ROS 2 bag: neither SQLite nor MCAP")
+    return ".mcap" if head.startswith(MCAP) else ".db3"
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """Open a bag; what is compressed in it unpacks to no more than is allowed."""
+    plugin = _plugin(path)
+    reader = need(path, "rosbags.rosbag2.reader", "ROS 2 bags", "ros")
+    if plugin == "dir":
+        require_file(path / METADATA, RecordingError, limit="document")
+    with bounded(path):
+        bag = reader.Reader.STORAGE_PLUGINS[plugin](path)
+        bag.open()
+        try:
+            yield bag
+        finally:
+            bag.close()
+
+
+def _definitions(path: Path, bag: Any) -> tuple[Definitions, dict[str, str]]:
+    """Return the definitions of types, the bag's own first, and why a topic has none."""
+    typesys = need(path, "rosbags.typesys", "ROS 2 bags", "ros")
+    result = dict(typesys.get_typestore(typesys.Stores.LATEST).fielddefs)
+    for kind, text in KNOWN.items():
+        result.update(typesys.get_types_from_msg(text, kind))
+    bad: dict[str, str] = {}
+    for connection in bag.connections:
+        form, text = connection.msgdef.format.name, connection.msgdef.data
+        try:
+            if form == "MSG":
+                result.update(typesys.get_types_from_msg(text, connection.msgtype))
+            elif form == "IDL":
+                for part in text.split("=" * 80 + "\n"):
+                    _, _, body = (
+                        part.partition("\n") if part.startswith("IDL: ") else ("", "", part)
+                    )
+                    result.update(typesys.get_types_from_idl(body) if body.strip() else {})
+        except Exception:  # a grammar that fails on what anybody wrote
+            bad[connection.topic] = "its definition cannot be parsed"
+    return result, bad
+
+
+def _topics(bag: Any, definitions: Definitions) -> tuple[list[_Topic], dict[str, str]]:
+    """Return the topics with numbers, and why others have none."""
+    counts: dict[tuple[str, str], int] = {}
+    skipped: dict[str, str] = {}
+    for connection in bag.connections:
+        if connection.ext.serialization_format != "cdr":
+            skipped[connection.topic] = f"is not CDR but {connection.ext.serialization_format}"
+            continue
+        key = connection.topic, connection.msgtype
+        counts[key] = counts.get(key, 0) + int(connection.msgcount)
+    found: list[tuple[_Topic, int]] = []
+    for (name, kind), count in counts.items():
+        if count < 1:
+            continue
+        if name in {topic.name for topic, _ in found}:
+            skipped[name] = f"{kind} is a second type of it"
+            continue
+        try:
+            fields = tuple(fields_of(definitions, kind))
+            stamp = next((one for one in STAMPS if _has_time(fields, one)), None)
+            kept = tuple(one for one in fields if stamp is None or not one.path.startswith(stamp))
+            if not kept:
+                continue
+            topic = _Topic(name, kind, count, kept, stamp, 0)
+            first, stamped = _first(bag, definitions, topic)
+        except CdrError as error:
+            skipped[name] = str(error)
+            continue
+        if stamped is None:
+            topic = topic._replace(stamp=None)
+        found.append((topic._replace(zero=first if stamped is None else stamped), first))
+    return _with_zero(found), skipped
+
+
+def _has_time(fields: Sequence[Field], stamp: str) -> bool:
+    return {stamp + one for one in TIME} <= {field.path for field in fields}
+
+
+def _with_zero(found: list[tuple[_Topic, int]]) -> list[_Topic]:
+    """Let the clocks count from the first message of any topic; apart where stamps are not near."""
+    stamped = [topic.zero for topic, _ in found if topic.stamp is not None]
+    received = [first for _, first in found]
+    apart = any(
+        abs(topic.zero - first) > OTHER_CLOCK * NS
+        for topic, first in found
+        if topic.stamp is not None
+    )
+    first_stamp = min(stamped, default=0)
+    first_received = min(received, default=0)
+    both = min(first_stamp, first_received) if stamped else first_received
+    return [
+        topic._replace(
+            zero=both if not apart else first_received if topic.stamp is None else first_stamp
+        )
+        for topic, _ in found
+    ]
+
+
+def _first(bag: Any, definitions: Definitions, topic: _Topic) -> tuple[int, int | None]:
+    """Return when the first message of a topic was received, and its stamp if it has one [ns]."""
+    for _, received, raw in _messages(bag, [topic]):
+        layout = layout_of(definitions, topic.kind, raw)
+        if topic.stamp is None:
+            return received, None
+        stamp = int(_stamps(layout, _rows([raw]), topic.stamp)[0])
+        return received, stamp or None
+    raise CdrError("it holds no message")
+
+
+def _messages(bag: Any, topics: Sequence[_Topic]) -> Iterator[tuple[str, int, bytes]]:
+    """Yield the messages of topics: of which, when they were received [ns], and their bytes."""
+    wanted = {(topic.name, topic.kind) for topic in topics}
+    connections = [one for one in bag.connections if (one.topic, one.msgtype) in wanted]
+    for connection, received, raw in bag.messages(connections):
+        yield connection.topic, int(received), raw
+
+
+class _Reading:
+    """Numbers of a topic as its messages come, some of them at a time.
+
+    Parameters
+    ----------
+    path : of the bag.
+    definitions : by name of a type.
+    topic : that is read.
+    fields : of its messages that are kept.
+    """
+
+    def __init__(
+        self, path: Path, definitions: Definitions, topic: _Topic, fields: Sequence[Field]
+    ) -> None:
+        self.path, self.definitions, self.topic, self.fields = path, definitions, topic, fields
+        self.times: list[int] = []
+        self.raws: list[bytes] = []
+        self.layouts: dict[int, list[Layout]] = {}
+        self.clock = Growing(np.int64)
+        self.parts = {one.path: Growing() for one in fields}
+
+    def add(self, time: int, raw: bytes) -> None:
+        """Take the next message."""
+        self.times.append(time)
+        self.raws.append(raw)
+        if len(self.raws) == TOGETHER:
+            self._read()
+
+    def _read(self) -> None:
+        """Read the messages that were taken."""
+        raws, stamp = self.raws, self.topic.stamp
+        ns = np.array(self.times, dtype=np.int64)
+        values = {one.path: np.empty(len(raws)) for one in self.fields}
+        for layout, which, rows in _grouped(self.definitions, self.topic.kind, raws, self.layouts):
+            for one in self.fields:
+                values[one.path][which] = numbers(layout, rows, one)
+            if stamp is not None:
+                ns[which] = _stamps(layout, rows, stamp)
+        self.clock.extend(ns)
+        for name, numbers_of in values.items():
+            self.parts[name].extend(numbers_of)
+        require_few(
+            RecordingError, str(self.path), len(self.clock), "samples", "messages of a topic"
+        )
+        self.times, self.raws = [], []
+
+    def finish(self) -> tuple[Stamps, Mapping[str, Array]]:
+        """Return the times of the messages and the numbers by the path of their field."""
+        if self.raws:
+            self._read()
+        if len(self.clock) != self.topic.messages:
+            raise RecordingError(
+                f"{self.path}: {self.topic.name} must have {self.topic.messages} messages, it has "
+                f"{len(self.clock)}; was the bag cut off?"
+            )
+        t = (self.clock.finished() - self.topic.zero) / NS
+        stamps = seconds_of(self.path, self.topic.name, t, "message")
+        return stamps, {name: one.finished() for name, one in self.parts.items()}
+
+
+def _grouped(
+    definitions: Definitions, kind: str, raws: list[bytes], layouts: dict[int, list[Layout]]
+) -> Iterator[tuple[Layout, NDArray[np.intp], NDArray[np.uint8]]]:
+    """Yield messages by layout: it, which they are, and their bytes (n, size)."""
+    sizes = np.array([len(raw) for raw in raws])
+    for size in np.unique(sizes).tolist():
+        left = np.flatnonzero(sizes == size)
+        known = layouts.setdefault(size, [])
+        tried = 0
+        while left.size:
+            rows = _rows([raws[k] for k in left])
+            if tried == len(known):
+                known.append(layout_of(definitions, kind, raws[left[0]]))
+            same = fits(known[tried], rows)
+            if same.any():
+                yield known[tried], left[same], rows[same]
+            left = left[~same]
+            tried += 1
+
+
+def _rows(raws: list[bytes]) -> NDArray[np.uint8]:
+    return np.frombuffer(b"".join(raws), np.uint8).reshape(len(raws), -1)
+
+
+def _stamps(layout: Layout, rows: NDArray[np.uint8], stamp: str) -> NDArray[np.int64]:
+    """Return the stamps of messages [ns]."""
+    sec, nanosec = (
+        numbers(layout, rows, Field(stamp + name, (), kind)).astype(np.int64)
+        for name, kind in zip(TIME, ("i4", "u4"), strict=True)
+    )
+    return np.asarray(sec * 1_000_000_000 + nanosec)
+
+
+def _unit(field: Field) -> str:
+    """Return the unit that the type of a known message gives."""
+    for kind, name in reversed(field.owners):
+        package, _, word = kind.partition("/")
+        unit = UNITS.get((word.rpartition("/")[2], name))
+        if unit and package in PACKAGES:
+            return unit
+    return ""
+
+
+def _said(topics: Sequence[_Topic], skipped: Mapping[str, str]) -> tuple[str, ...]:
+    """Return what is left out or taken for granted."""
+    received = [topic.name for topic in topics if topic.stamp is None]
+    return (
+        *noted("no stamp in the message, its clock is when the bag received it", received),
+        *noted("not read", [f"{name} ({why})" for name, why in skipped.items()]),
+    )

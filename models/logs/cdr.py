@@ -1,0 +1,227 @@
+"""Numbers of ROS 2 messages, from their definitions alone: nothing is generated or executed.
+
+A message is serialized as CDR: four bytes that tell the byte order, then the fields in their order,
+each aligned to its size. Where a field lies thus depends on the lengths of the texts and sequences
+before it alone; messages of the same lengths share a layout and are read together.
+"""
+
+import struct
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.limits import limits
+
+PREFIX = 4  # bytes
+ORDERS = {b"\x00\x00": ">", b"\x00\x01": "<"}
+# numpy's kind and bytes of what has a fixed size; no signals are what is told by a bool, or words.
+NUMBERS = {
+    **{f"int{8 * size}": f"i{size}" for size in (1, 2, 4, 8)},
+    **{f"uint{8 * size}": f"u{size}" for size in (1, 2, 4, 8)},
+    **{"float32": "f4", "float64": "f8"},
+}
+SIZES = {name: int(kind[1]) for name, kind in NUMBERS.items()} | {"bool": 1, "byte": 1, "char": 1}
+BASE, NAME, ARRAY, SEQUENCE = 1, 2, 3, 4  # kinds of a node of a definition
+
+# By name of a type: its constants, and name and node of each field.
+Definitions = Mapping[str, tuple[Any, list[tuple[str, Any]]]]
+
+
+class CdrError(ValueError):
+    """A message or definition cannot be read; the message says why."""
+
+
+class Field(NamedTuple):
+    """A number of a message.
+
+    path: its name, with those of the messages that it lies in; owners: types and fields of these,
+    the outermost first; kind: as numpy calls it.
+    """
+
+    path: str
+    owners: tuple[tuple[str, str], ...]
+    kind: str
+
+
+class Layout(NamedTuple):
+    """Where numbers lie in messages of the same lengths.
+
+    size: bytes of the message; lengths: place and value of each length; places: of the fields.
+    """
+
+    order: str
+    size: int
+    lengths: tuple[tuple[int, int], ...]
+    places: Mapping[str, int]
+
+
+def fields_of(
+    definitions: Definitions, kind: str, prefix: str = "", owners: tuple[tuple[str, str], ...] = ()
+) -> Iterator[Field]:
+    """Yield the numbers of a message, without those in arrays and sequences.
+
+    Parameters
+    ----------
+    definitions : by name of a type.
+    kind : of the message.
+    prefix : of the paths.
+    owners : of the message.
+
+    Raises
+    ------
+    CdrError
+        Where a type has no definition.
+    """
+    _require_shallow(len(owners))
+    for name, node in _fields(definitions, kind):
+        inner = (*owners, (kind, name))
+        number, value = _kind(node), node[1]
+        if number == NAME:
+            yield from fields_of(definitions, value, f"{prefix}{name}.", inner)
+        elif number == BASE and value[0] in NUMBERS:
+            yield Field(prefix + name, inner, NUMBERS[value[0]])
+        elif number in (ARRAY, SEQUENCE) and _kind(value[0]) == NAME:
+            for _ in fields_of(definitions, value[0][1], "", inner):  # it must be known, too
+                pass
+
+
+def layout_of(definitions: Definitions, kind: str, raw: bytes) -> Layout:
+    """Return the layout of a message.
+
+    Parameters
+    ----------
+    definitions : by name of a type.
+    kind : of the message.
+    raw : the message.
+
+    Raises
+    ------
+    CdrError
+        Where it is not as its type says.
+    """
+    order = ORDERS.get(bytes(raw[:2]))
+    if order is None:
+        raise CdrError("a message is not plain CDR")
+    walk = _Walk(definitions, order, raw)
+    walk.message(kind, "", 0)
+    if walk.place + PREFIX > len(raw):
+        raise CdrError(f"a message of {kind} is cut off")
+    return Layout(order, len(raw), tuple(walk.lengths), walk.places)
+
+
+def fits(layout: Layout, messages: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Return which messages have a layout.
+
+    Parameters
+    ----------
+    layout : of a message of their size.
+    messages : (n, size).
+    """
+    order = next(word for word, one in ORDERS.items() if one == layout.order)
+    same: NDArray[np.bool_] = np.all(messages[:, :2] == np.frombuffer(order, np.uint8), axis=1)
+    for place, value in layout.lengths:
+        raw = np.frombuffer(struct.pack(layout.order + "I", value), np.uint8)
+        same &= np.all(messages[:, place : place + 4] == raw, axis=1)
+    return same
+
+
+def numbers(layout: Layout, messages: NDArray[np.uint8], field: Field) -> NDArray[Any]:
+    """Return a number of each message, (n,), as it is stored.
+
+    Parameters
+    ----------
+    layout : of the messages.
+    messages : (n, size).
+    field : of the message.
+    """
+    place, kind = layout.places[field.path], np.dtype(layout.order + field.kind)
+    raw = np.ascontiguousarray(messages[:, place : place + kind.itemsize])
+    return raw.reshape(-1).view(kind)
+
+
+class _Walk:
+    """Goes through a message field by field."""
+
+    def __init__(self, definitions: Definitions, order: str, raw: bytes) -> None:
+        self.definitions, self.order, self.raw = definitions, order, raw
+        self.place = 0  # behind the prefix
+        self.lengths: list[tuple[int, int]] = []
+        self.places: dict[str, int] = {}
+
+    def message(self, kind: str, prefix: str | None, depth: int) -> None:
+        """Go through a message; numbers of one in an array, whose prefix is None, are not kept."""
+        _require_shallow(depth)
+        for name, node in _fields(self.definitions, kind):
+            path = None if prefix is None else prefix + name
+            number, value = _kind(node), node[1]
+            if number in (BASE, NAME):
+                self.one(node, path, depth)
+            else:
+                count = value[1] if number == ARRAY else self.length()
+                self.many(value[0], count, depth)
+
+    def one(self, node: Any, path: str | None, depth: int) -> None:
+        """Go through one value."""
+        number, value = _kind(node), node[1]
+        if number == NAME:
+            self.message(value, None if path is None else f"{path}.", depth + 1)
+        elif number != BASE:
+            raise CdrError("a definition has arrays of arrays")
+        elif value[0] == "string":
+            length = self.length()  # moves the place, too
+            self.place += length
+        else:
+            size = self.align(value[0])
+            if path is not None:
+                self.places[path] = self.place + PREFIX
+            self.place += size
+        if self.place + PREFIX > len(self.raw):
+            raise CdrError("a message is cut off")
+
+    def many(self, node: Any, count: int, depth: int) -> None:
+        """Go through the values of an array or a sequence."""
+        if count > len(self.raw):
+            raise CdrError("a message is cut off")
+        if _kind(node) == BASE and node[1][0] != "string":
+            if count:
+                size = self.align(node[1][0])  # moves the place, too
+                self.place += count * size
+            return
+        for _ in range(count):
+            self.one(node, None, depth)
+
+    def align(self, name: str) -> int:
+        """Go to where a number begins; return its size."""
+        size = SIZES.get(name)
+        if size is None:
+            raise CdrError(f"a definition has the type {name}, which is not read")
+        self.place += -self.place % size
+        return size
+
+    def length(self) -> int:
+        """Read a length."""
+        self.align("uint32")
+        place = self.place + PREFIX
+        if place + 4 > len(self.raw):
+            raise CdrError("a message is cut off")
+        value = int(struct.unpack_from(self.order + "I", self.raw, place)[0])
+        self.lengths.append((place, value))
+        self.place += 4
+        return value
+
+
+def _fields(definitions: Definitions, kind: str) -> list[tuple[str, Any]]:
+    if kind not in definitions:
+        raise CdrError(f"the type {kind} has no definition")
+    return definitions[kind][1]
+
+
+def _kind(node: Any) -> int:
+    return int(getattr(node[0], "value", node[0]))
+
+
+def _require_shallow(depth: int) -> None:
+    if depth > limits().depth:
+        raise CdrError(f"types must lie in one another at most {limits().depth:g} deep")

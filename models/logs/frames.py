@@ -1,0 +1,297 @@
+"""Frames of a CAN bus as logs keep them: ASC, BLF, candump, TRC and MDF4 with a bus in it.
+
+Frames are gathered by bus and identifier, times beside bytes; what is no data frame, or not in the
+database, is counted.
+"""
+
+import re
+import struct
+import zlib
+from array import array
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import Array
+from models.limits import limits
+from models.logs.foreign import need
+from models.logs.growing import Growing
+from models.logs.log import RecordingError
+from models.schema import require_few
+
+BLF = b"LOGG"
+MDF = (b"MDF     ", b"UnFinMF ")
+ASC = re.compile(
+    rb"\s*(?://[^\n]*\n\s*)*date\s[^\n]*\n\s*(?://[^\n]*\n\s*)*base\s+(?:hex|dec)\b", re.I
+)
+CANDUMP = re.compile(rb"\s*\(\d+\.\d+\)\s+\S+\s+[0-9A-Fa-f]+#")
+TRC = re.compile(rb"\s*;\$FILEVERSION=")
+FRAME = "CAN_DataFrame"  # of MDF
+TOGETHER = 1 << 16  # frames that are stored at a time
+SHORT = 0x7FF  # largest identifier of 11 bits
+EXTENDED = 1 << 31  # marks an identifier of 29 bits
+IDENTIFIER = (1 << 29) - 1
+EPOCH = 1e8  # s: stamps above are of the calendar, which doubles hold to less than a microsecond
+MICROSECONDS = 1e6
+BUS_EVENT = 1 << 1  # flag of a group of an MDF file
+INFLATION = 1032  # most bytes that deflate makes of one
+OBJECT = struct.Struct("<4sHHII")  # of BLF: mark, size and version of the header, size, type
+CONTAINER, DEFLATED = 10, 2
+FILE_SIZE = struct.Struct("<Q")  # of BLF, at byte 16 of its header
+
+Key = tuple[str, int]  # bus, identifier with EXTENDED
+
+
+class Frames(NamedTuple):
+    """Frames of one identifier on one bus.
+
+    t: (n,) [s]; data: (n, bytes).
+    """
+
+    t: Array
+    data: NDArray[np.uint8]
+
+
+class _Gathered:
+    """Frames of one identifier as they come, all of the same bytes.
+
+    Parameters
+    ----------
+    width : bytes that are kept of each.
+    """
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+        self._times = array("d")
+        self._bytes = bytearray()
+        self._t, self._data = Growing(), Growing(np.uint8)
+
+    def add(self, time: float, data: bytes) -> None:
+        """Take the next frame."""
+        self._times.append(time)
+        self._bytes += data[: self.width]
+        if len(self._times) == TOGETHER:
+            self._store()
+
+    def _store(self) -> None:
+        self._t.extend(np.frombuffer(self._times, np.float64))
+        self._data.extend(np.frombuffer(self._bytes, np.uint8))
+        self._times, self._bytes = array("d"), bytearray()
+
+    def finished(self) -> Frames:
+        """Return all of them."""
+        self._store()
+        return Frames(self._t.finished(), self._data.finished().reshape(-1, self.width))
+
+
+class Log(NamedTuple):
+    """Frames of a log by bus and identifier; how many others it has, by what they are."""
+
+    format: str
+    frames: dict[Key, Frames]
+    others: Counter[str]
+
+
+def kind_of(head: bytes) -> str:
+    """Return which log of frames a file is, "" for none.
+
+    Parameters
+    ----------
+    head : its first bytes.
+    """
+    if head.startswith(BLF):
+        return "BLF"
+    if head[:8] in MDF:
+        return "MDF4"
+    texts = {"ASC": ASC, "candump": CANDUMP, "TRC": TRC}
+    return next((name for name, pattern in texts.items() if pattern.match(head)), "")
+
+
+def gather(path: Path, kind: str, known: Mapping[int, int]) -> Log:
+    """Read the frames of a log.
+
+    Parameters
+    ----------
+    path : of the file.
+    kind : as `kind_of` names it.
+    known : by identifier, with `EXTENDED`, how many bytes its frames have.
+
+    Raises
+    ------
+    RecordingError
+        Where there are more than is allowed, or the file is cut off.
+    """
+    if kind == "MDF4":
+        return _of_mdf(path, known)
+    found: dict[Key, _Gathered] = {}
+    others: Counter[str] = Counter()
+    count = 0
+    for message in _messages(path, kind):
+        identifier = message.arbitration_id | (EXTENDED if message.is_extended_id else 0)
+        if message.is_error_frame or message.is_remote_frame:
+            others["error and remote"] += 1
+        elif identifier not in known:
+            others["unknown"] += 1
+        elif len(message.data) < known[identifier]:
+            others["cut short"] += 1
+        else:
+            key = str(message.channel), identifier
+            if key not in found:
+                found[key] = _Gathered(known[identifier])
+            found[key].add(message.timestamp, message.data)
+            count += 1
+            if count % TOGETHER == 0:
+                require_few(RecordingError, str(path), count, "samples", "frames")
+    frames = {key: one.finished() for key, one in found.items()}
+    first = min((float(kept.t.min()) for kept in frames.values()), default=0.0)
+    if first > EPOCH:
+        for key, kept in frames.items():
+            frames[key] = kept._replace(t=_since(kept.t, first))
+    return Log(f"CAN {kind}", frames, others)
+
+
+def _since(t: Array, first: float) -> Array:
+    """Return times of the calendar since the first; a double tells them to the microsecond."""
+    grown = Growing()
+    for k in range(0, t.size, TOGETHER):
+        grown.extend(np.round((t[k : k + TOGETHER] - first) * MICROSECONDS) / MICROSECONDS)
+    return grown.finished()
+
+
+def _messages(path: Path, kind: str) -> Iterator[Any]:
+    """Yield the messages of a log."""
+    io = need(path, "can.io", "CAN logs", "can")
+    if kind == "BLF":
+        _require_whole_blf(path)
+        with io.BLFReader(path) as reader:
+            yield from reader
+        return
+    reader_of = {"ASC": io.ASCReader, "candump": io.CanutilsLogReader, "TRC": io.TRCReader}[kind]
+    with path.open("r", encoding="latin-1") as text, reader_of(text) as reader:
+        messages = iter(reader)
+        for message in messages:
+            if getattr(reader, "timestamps_format", None) == "relative":
+                raise RecordingError(
+                    f"{path}: its times count from the frame before each; save it with "
+                    "timestamps absolute"
+                )
+            yield message
+
+
+def _require_whole_blf(path: Path) -> None:
+    """Refuse a file that is shorter than it says, or inflates to more than is allowed."""
+    most = 1e6 * limits().block
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        head = file.read(144)
+        told = FILE_SIZE.unpack_from(head, 16)[0]
+        if told > size:
+            raise RecordingError(f"{path}: is cut off, it has {size} of {told} bytes")
+        file.seek(struct.unpack_from("<I", head, 4)[0])
+        while len(mark := file.read(OBJECT.size)) == OBJECT.size:
+            signature, _, _, length, kind = OBJECT.unpack(mark)
+            if signature != b"LOBJ" or length < OBJECT.size or length > size:
+                return  # the reader says so
+            body = length - OBJECT.size
+            if kind == CONTAINER and body * INFLATION > most:
+                data = file.read(body)[16:]
+                inflated = len(zlib.decompressobj().decompress(data, int(most) + 1))
+                require_few(
+                    RecordingError, str(path), inflated / 1e6, "block", "megabytes of a block"
+                )
+                body = 0
+            file.seek(body + length % 4, 1)
+
+
+def _of_mdf(path: Path, known: Mapping[int, int]) -> Log:
+    """Read the frames of the buses that an MDF4 file logs."""
+    asammdf = need(path, "asammdf", "CAN frames of MDF", "mdf")
+    found: dict[Key, list[Frames]] = {}
+    others: Counter[str] = Counter()
+    with asammdf.MDF(path, process_bus_logging=False) as file:
+        if str(file.version) < "4":
+            raise RecordingError(f"{path}: an MDF3 file holds no frames; leave the DBC out")
+        for number, group in enumerate(file.groups):
+            samples = int(group.channel_group.cycles_nr)
+            require_few(RecordingError, str(path), samples, "samples", "frames")
+            if not int(group.channel_group.flags) & BUS_EVENT:
+                continue
+            for first in range(0, samples, TOGETHER):
+                part = _of_group(file, number, first, min(TOGETHER, samples - first))
+                if part is not None:
+                    _sort(part, known, found, others)
+    frames = {}
+    for key, parts in found.items():
+        t, data = (np.concatenate(some) for some in zip(*parts, strict=True))
+        order = np.argsort(t, kind="stable")  # groups follow one another
+        frames[key] = Frames(t[order], data[order])
+    return Log("CAN MDF4", frames, others)
+
+
+class _Part(NamedTuple):
+    """Some frames of a group: all of (n,), but for the data (n, bytes)."""
+
+    t: Array
+    ids: NDArray[np.int64]
+    buses: NDArray[np.int64]
+    sizes: NDArray[np.int64]
+    data: NDArray[np.uint8]
+
+
+def _of_group(file: Any, number: int, first: int, count: int) -> _Part | None:
+    """Return some frames of a group; None where it holds others than data frames."""
+    names = {channel.name for channel in file.groups[number].channels}
+
+    def signal(name: str) -> Any:
+        full = f"{FRAME}.{name}"
+        if full not in names:
+            return None
+        return file.get(
+            full,
+            group=number,
+            raw=True,
+            ignore_invalidation_bits=True,
+            record_offset=first,
+            record_count=count,
+        )
+
+    def whole(name: str, otherwise: Any) -> NDArray[np.int64]:
+        found = signal(name)
+        return np.broadcast_to(otherwise, count) if found is None else found.samples.astype(int)
+
+    identifiers, data = signal("ID"), signal("DataBytes")
+    if identifiers is None or data is None:
+        return None
+    bytes_ = np.asarray(data.samples, dtype=np.uint8).reshape(count, -1)
+    raw = identifiers.samples.astype(np.int64)
+    ids = raw & IDENTIFIER
+    is_long = whole("IDE", (raw & EXTENDED != 0) | (ids > SHORT)) != 0
+    return _Part(
+        np.asarray(identifiers.timestamps, dtype=np.float64),
+        np.where(is_long, ids | EXTENDED, ids),
+        whole("BusChannel", 0),
+        np.minimum(whole("DataLength", bytes_.shape[1]), bytes_.shape[1]),
+        bytes_,
+    )
+
+
+def _sort(
+    part: _Part, known: Mapping[int, int], found: dict[Key, list[Frames]], others: Counter[str]
+) -> None:
+    """Add frames to those of their bus and identifier."""
+    for identifier in np.unique(part.ids).tolist():
+        mine = part.ids == identifier
+        if identifier not in known:
+            others["unknown"] += int(mine.sum())
+            continue
+        width = known[identifier]
+        whole = mine & (part.sizes >= width)
+        others["cut short"] += int(mine.sum() - whole.sum())
+        for bus in np.unique(part.buses[whole]).tolist():
+            which = whole & (part.buses == bus)
+            frames = Frames(part.t[which], part.data[which, :width])
+            found.setdefault((str(bus), identifier), []).append(frames)

@@ -1,0 +1,141 @@
+"""HDF5 files, and MATLAB's of version 7.3, as a tree of what is not read yet.
+
+MATLAB stores arrays transposed, texts as numbers, and cells and structs of several elements as
+references. Links to other files and arrays that lie in them are not followed.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from codegen.arrays import Array
+from models.logs.foreign import need, require_room
+from models.logs.log import RecordingError
+from models.logs.tree import Leaf, Tree, Unread
+from models.schema import require_few
+
+OWN = ("#refs#", "#subsystem#")  # groups that MATLAB keeps for itself
+LONGEST_TEXT = 100_000  # characters
+
+
+def read_tree(path: Path) -> dict[str, Tree]:
+    """Return the variables of a file; numbers are read when they are asked for.
+
+    Parameters
+    ----------
+    path : of the file.
+
+    Raises
+    ------
+    RecordingError
+        Where it holds more than is allowed.
+    """
+    h5py = need(path, "h5py", "MATLAB 7.3 or HDF5", "mat")
+    with h5py.File(path, "r") as file:
+        reader = _Reader(path, h5py, file)
+        return {name: reader.tree(one, 0) for name, one in reader.members(file) if name not in OWN}
+
+
+class _Reader:
+    """Reads an open file."""
+
+    def __init__(self, path: Path, h5py: Any, file: Any) -> None:
+        self.path, self.h5py, self.file = path, h5py, file
+        self.count = 0
+
+    def members(self, group: Any) -> list[tuple[str, Any]]:
+        """Return what a group holds itself, not by links to elsewhere."""
+        require_few(RecordingError, str(self.path), len(group), "columns", "members of a group")
+        hard = [
+            name for name in group if isinstance(group.get(name, getlink=True), self.h5py.HardLink)
+        ]
+        return [(name, group[name]) for name in hard]
+
+    def tree(self, node: Any, depth: int) -> Tree:
+        """Return what a group or dataset holds."""
+        self.count += 1
+        require_few(RecordingError, str(self.path), depth, "depth", "levels of groups")
+        require_few(RecordingError, str(self.path), self.count, "values", "groups and arrays")
+        kind = _matlab_class(node)
+        if "MATLAB_object_decode" in node.attrs and kind not in ("struct", "cell"):
+            return Unread(kind or "an object")
+        if isinstance(node, self.h5py.Group):
+            if "MATLAB_sparse" in node.attrs:
+                return Unread("sparse")
+            return self.struct(
+                {name: (one, self.tree(one, depth + 1)) for name, one in self.members(node)}
+            )
+        if not isinstance(node, self.h5py.Dataset):
+            return Unread("no array")
+        return self.dataset(node, kind, depth)
+
+    def struct(self, members: dict[str, tuple[Any, Tree]]) -> Tree:
+        """Return a struct; where all fields are references, it is one of several elements."""
+        lists = [
+            tree
+            for node, tree in members.values()
+            if isinstance(tree, list) and _matlab_class(node) != "cell"
+        ]
+        sizes = {len(tree) for tree in lists}
+        if members and len(lists) == len(members) and len(sizes) == 1:
+            return [
+                {name: tree[k] for name, (_, tree) in members.items() if isinstance(tree, list)}
+                for k in range(sizes.pop())
+            ]
+        return {name: tree for name, (_, tree) in members.items()}
+
+    def dataset(self, node: Any, kind: str, depth: int) -> Tree:
+        """Return what a dataset holds."""
+        if node.external or node.is_virtual:
+            return Unread("in another file")
+        if "MATLAB_empty" in node.attrs or node.shape is None:
+            return Leaf(shape=(0, 0), load=lambda: np.zeros((0, 0)))
+        if self.h5py.check_ref_dtype(node.dtype) is self.h5py.Reference:
+            require_few(RecordingError, str(self.path), node.size, "values", "cells")
+            references = np.asarray(node[()]).reshape(-1)
+            return [self.tree(self.file[one], depth + 1) for one in references if one]
+        text = self.h5py.check_string_dtype(node.dtype)
+        if text is not None or kind == "char":
+            return self.text(node, text is None)
+        if node.dtype.kind not in "fiub" or node.ndim > 2:
+            return Unread(
+                f"{node.dtype}" if node.ndim <= 2 else f"an array of {node.ndim} dimensions"
+            )
+        name, path, turned = node.name, self.path, bool(kind)
+        if name is None:
+            return Unread("without a name")
+        shape = (*node.shape, 1, 1)[:2] if node.ndim < 2 else node.shape
+        rows, columns = shape[::-1] if turned else shape
+        return Leaf(
+            shape=(int(rows), int(columns)), load=lambda: _load(path, name, (rows, columns), turned)
+        )
+
+    def text(self, node: Any, is_numbers: bool) -> Tree:
+        """Return a text, or a list of them."""
+        if node.size > LONGEST_TEXT:
+            return Unread("a long text")
+        if is_numbers:
+            codes = np.asarray(node[()])
+            rows = [codes] if codes.ndim < 2 else list(codes.T)
+            words: list[Tree] = ["".join(chr(int(one)) for one in row) for row in rows]
+        else:
+            words = [
+                one.decode("utf-8", errors="replace") if isinstance(one, bytes) else str(one)
+                for one in np.asarray(node[()]).reshape(-1)
+            ]
+        return words[0] if len(words) == 1 else words
+
+
+def _load(path: Path, name: str, shape: tuple[int, int], turned: bool) -> Array:
+    """Read a dataset, (rows, columns)."""
+    h5py = need(path, "h5py", "MATLAB 7.3 or HDF5", "mat")
+    require_room(path, max(shape), 8 * min(shape))  # an array may be larger than its file
+    with h5py.File(path, "r") as file:
+        values = np.asarray(file[name][()], dtype=np.float64)
+    return values.T.reshape(shape) if turned else values.reshape(shape)
+
+
+def _matlab_class(node: Any) -> str:
+    kind = node.attrs.get("MATLAB_class", b"")
+    return kind.decode("latin-1") if isinstance(kind, bytes) else str(kind)

@@ -1,0 +1,300 @@
+"""MATLAB's own binary files (`save` of version 5, 6 and 7) as a tree of what is not read yet.
+
+A file is a row of elements: type, size, data. A variable is an element of type 14, plain or
+deflated (type 15), of elements itself: flags, dimensions, name, then numbers or further variables.
+Nothing here trusts a size: each lies in what holds it, and depth and what is inflated have limits.
+"""
+
+import math
+import struct
+import zlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from codegen.arrays import Array
+from models.limits import limits
+from models.logs.log import RecordingError
+from models.logs.tree import Leaf, Tree, Unread
+from models.schema import require_few
+
+HEADER = 128  # bytes
+MATRIX, COMPRESSED = 14, 15  # types of an element
+NUMBERS = {
+    1: "i1",
+    2: "u1",
+    3: "i2",
+    4: "u2",
+    5: "i4",
+    6: "u4",
+    7: "f4",
+    9: "f8",
+    12: "i8",
+    13: "u8",
+}
+TEXTS = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
+CELL, STRUCT, OBJECT, CHAR, SPARSE, OPAQUE = 1, 2, 3, 4, 5, 17  # classes of a variable
+NUMERIC = range(6, 16)
+COMPLEX = 0x0800  # flag
+BEGINNING = 4096  # bytes that hold what a variable of numbers says of itself
+LARGEST_DIMENSION = 2**40
+
+Load = Callable[[], memoryview]
+
+
+class DamagedError(ValueError):
+    """The file is not what it says."""
+
+
+class _Element(NamedTuple):
+    """An element: type and data."""
+
+    kind: int
+    data: memoryview
+
+
+class _Beginning(NamedTuple):
+    """What a variable says of itself, and the elements that follow."""
+
+    kind: int
+    is_complex: bool
+    shape: tuple[int, int]
+    dimensions: int
+    name: str
+    rest: memoryview
+
+
+def read_tree(path: Path) -> dict[str, Tree]:
+    """Return the variables of a file; numbers are read when they are asked for.
+
+    Parameters
+    ----------
+    path : of the file.
+
+    Raises
+    ------
+    RecordingError
+        Where it holds more than is allowed.
+    DamagedError
+        Where it is not what it says.
+    """
+    with path.open("rb") as file:
+        header = file.read(HEADER)
+        order = {b"IM": "<", b"MI": ">"}.get(header[126:128])
+        if order is None:
+            raise DamagedError("its header has no byte order")
+        size = path.stat().st_size
+        result: dict[str, Tree] = {}
+        place = HEADER
+        while place < size:
+            file.seek(place)
+            tag = file.read(8)
+            if len(tag) < 8:
+                raise DamagedError(f"cut off at byte {place}")
+            kind, length = struct.unpack(order + "II", tag)
+            place += 8
+            if length > size - place:
+                raise DamagedError(f"the variable at byte {place - 8} is cut off")
+            if kind in (MATRIX, COMPRESSED):
+                variable = _Variable(path, place, length, kind == COMPRESSED, order)
+                if (found := variable.tree()) is not None:
+                    result[found[0]] = found[1]
+                require_few(RecordingError, str(path), len(result), "columns", "variables")
+            place += length + (0 if kind == COMPRESSED else -length % 8)
+    return result
+
+
+class _Variable(NamedTuple):
+    """Where a variable lies in a file."""
+
+    path: Path
+    place: int
+    length: int
+    deflated: bool
+    order: str
+
+    def data(self, most: int | None = None) -> memoryview:
+        """Read the element's data, or their beginning."""
+        with self.path.open("rb") as file:
+            file.seek(self.place)
+            raw = file.read(
+                self.length if self.deflated or most is None else min(most, self.length)
+            )
+        if not self.deflated:
+            return memoryview(raw)
+        allowed = int(min(1e6 * limits().block, 2.0**62))
+        inflated = zlib.decompressobj().decompress(raw, (allowed + 1) if most is None else most + 8)
+        require_few(
+            RecordingError, str(self.path), len(inflated) / 1e6, "block", "megabytes of a variable"
+        )
+        if len(inflated) < 8:
+            raise DamagedError(f"the variable at byte {self.place} is cut off")
+        kind, length = struct.unpack(self.order + "II", inflated[:8])
+        if kind != MATRIX or (most is None and length > len(inflated) - 8):
+            raise DamagedError(f"the variable at byte {self.place} is cut off")
+        return memoryview(inflated)[8 : 8 + length]
+
+    def tree(self) -> tuple[str, Tree] | None:
+        """Return its name and what it holds, None of what MATLAB keeps for itself."""
+        begin = _beginning(self.data(BEGINNING), self.order)
+        if not begin.name or begin.name.startswith("__"):
+            return None
+        if begin.kind in NUMERIC and not begin.is_complex and begin.dimensions == 2:
+            return begin.name, Leaf(shape=begin.shape, load=self._load)
+        if begin.kind not in (CELL, STRUCT, CHAR):
+            return begin.name, _unread(begin)
+        return begin.name, _tree(self.path, self.data(), self.order, 0)
+
+    def _load(self) -> Array:
+        return _load(_beginning(self.data(), self.order), self.order)
+
+
+def _elements(data: memoryview, order: str) -> Iterator[_Element]:
+    """Yield the elements of data one by one."""
+    place = 0
+    while place + 8 <= len(data):
+        kind, length = struct.unpack(order + "II", data[place : place + 8])
+        if kind >> 16:  # small: size and type share a word, the data are in the other
+            yield _Element(kind & 0xFFFF, data[place + 4 : place + 4 + min(kind >> 16, 4)])
+            place += 8
+            continue
+        yield _Element(kind, data[place + 8 : place + 8 + length])
+        place += 8 + length + (-length % 8)
+
+
+def _beginning(data: memoryview, order: str) -> _Beginning:
+    """Return what a variable says of itself."""
+    if not data:
+        return _Beginning(6, False, (0, 0), 2, "", data)
+    place, parts = 0, []
+    for element in _elements(data, order):
+        parts.append(element)
+        if len(parts) == 1 and len(element.data) < 8:
+            break
+        if len(parts) == 3:
+            break
+    if len(parts) < 2 or len(parts[0].data) < 8:
+        raise DamagedError("a variable has no flags")
+    flags = struct.unpack(order + "I", parts[0].data[:4])[0]
+    kind = flags & 0xFF
+    if kind == OPAQUE:  # it has no dimensions: name, system, class
+        words = [bytes(one.data).decode("latin-1") for one in parts[1:]]
+        return _Beginning(kind, False, (0, 0), 0, words[0], data[:0])
+    if len(parts) < 3:
+        raise DamagedError("a variable has no name")
+    raw = parts[1].data
+    dimensions = [one for (one,) in struct.iter_unpack(order + "i", raw[: len(raw) // 4 * 4])]
+    if len(dimensions) < 2 or min(dimensions) < 0:
+        raise DamagedError("a variable has no dimensions")
+    shape = dimensions[0], math.prod(dimensions[1:])
+    if math.prod(shape) > LARGEST_DIMENSION:
+        raise DamagedError("a variable is too large")
+    place = _after(data, order, 3)
+    return _Beginning(
+        kind,
+        bool(flags & COMPLEX),
+        shape,
+        len(dimensions),
+        bytes(parts[2].data).decode("latin-1"),
+        data[place:],
+    )
+
+
+def _after(data: memoryview, order: str, count: int) -> int:
+    """Return where the elements after the first few begin."""
+    place = 0
+    for _ in range(count):
+        kind, length = struct.unpack(order + "II", data[place : place + 8])
+        place += 8 if kind >> 16 else 8 + length + (-length % 8)
+    return place
+
+
+def _load(begin: _Beginning, order: str) -> Array:
+    """Return the numbers of a variable, (rows, columns)."""
+    element = next(_elements(begin.rest, order), None)
+    count = begin.shape[0] * begin.shape[1]
+    if element is None or element.kind not in NUMBERS:
+        if not count:
+            return np.zeros(begin.shape)
+        raise DamagedError("a variable has no numbers")
+    stored = np.dtype(order + NUMBERS[element.kind])
+    if len(element.data) < count * stored.itemsize:
+        raise DamagedError("the numbers of a variable are cut off")
+    flat = np.frombuffer(element.data, stored, count)
+    return flat.astype(np.float64).reshape(begin.shape, order="F")
+
+
+def _tree(path: Path, data: memoryview, order: str, depth: int) -> Tree:
+    """Return what a variable holds."""
+    require_few(RecordingError, str(path), depth, "depth", "levels of structs and cells")
+    begin = _beginning(data, order)
+    if begin.kind in NUMERIC and not begin.is_complex and begin.dimensions == 2:
+        return Leaf(shape=begin.shape, load=lambda: _load(begin, order))
+    if begin.kind == CHAR:
+        return _words(begin, order)
+    count = begin.shape[0] * begin.shape[1]
+    require_few(RecordingError, str(path), count, "values", "cells")
+    elements = _elements(begin.rest, order)
+    if begin.kind == CELL:
+        cells: list[Tree] = [
+            _tree(path, one.data, order, depth + 1) for one in _take(elements, count)
+        ]
+        return cells
+    if begin.kind != STRUCT:
+        return _unread(begin)
+    head = [next(elements, None), next(elements, None)]
+    if head[0] is None or head[1] is None or len(head[0].data) < 4:
+        raise DamagedError("a struct has no fields")
+    longest = struct.unpack(order + "i", head[0].data[:4])[0]
+    if longest < 1:
+        raise DamagedError("a struct has no fields")
+    raw = bytes(head[1].data)
+    names = [
+        raw[k : k + longest].split(b"\0")[0].decode("latin-1") for k in range(0, len(raw), longest)
+    ]
+    require_few(RecordingError, str(path), count * len(names), "values", "fields")
+    structs: list[Tree] = [
+        {
+            name: _tree(path, one.data, order, depth + 1)
+            for name, one in zip(names, _take(elements, len(names)), strict=True)
+        }
+        for _ in range(count)
+    ]
+    return structs[0] if count == 1 else structs
+
+
+def _take(elements: Iterator[_Element], count: int) -> list[_Element]:
+    """Return so many variables."""
+    result = []
+    for _ in range(count):
+        element = next(elements, None)
+        if element is None or element.kind != MATRIX:
+            raise DamagedError("a cell or struct is cut off")
+        result.append(element)
+    return result
+
+
+def _words(begin: _Beginning, order: str) -> Tree:
+    """Return a text; of several rows a list."""
+    element = next(_elements(begin.rest, order), None)
+    if element is None or element.kind not in TEXTS:
+        return ""
+    encoding = TEXTS[element.kind]
+    if encoding.startswith("utf-") and encoding != "utf-8":
+        encoding += "-le" if order == "<" else "-be"
+    text = bytes(element.data).decode(encoding, errors="replace")
+    rows, columns = begin.shape
+    if rows <= 1:
+        return text[:columns] if element.kind != 16 else text
+    return [text[k::rows].strip() for k in range(rows)]
+
+
+def _unread(begin: _Beginning) -> Unread:
+    if begin.is_complex:
+        return Unread("complex numbers")
+    kinds = {OPAQUE: "a table, timeseries or other object", OBJECT: "an object", SPARSE: "sparse"}
+    if begin.kind in NUMERIC:
+        return Unread(f"an array of {begin.dimensions} dimensions")
+    return Unread(kinds.get(begin.kind, f"class {begin.kind}"))

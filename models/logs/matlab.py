@@ -1,0 +1,206 @@
+"""MATLAB files: version 5 to 7 as they are, 7.3 (which is HDF5) and other HDF5 files by h5py."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import Array
+from models.logs import hdf5, mat5
+from models.logs.foreign import (
+    chosen,
+    noted,
+    one_line,
+    require_room,
+    seconds_of,
+    typical_rate,
+)
+from models.logs.log import Channel, Listed, RecordingError
+from models.logs.stamps import PER_SECOND, find_clock
+from models.logs.tree import HEAD, Clock, Signal, line_of, signals_of, times_of
+
+HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
+HDF5_PLACES = (0, 512)  # MATLAB puts a header before
+MAT5_ORDERS = (b"IM", b"MI")
+REMEDY = (
+    "save vectors and their time, for example s = struct('t', x.Time, 'v', x.Data); "
+    "save('log.mat', '-struct', 's')"
+)
+
+
+class _Time(NamedTuple):
+    """How a clock is read.
+
+    per_second: of its unit; epoch: whether it counts from 1970; zero: what is taken off [s];
+    rate: typical [Hz].
+    """
+
+    per_second: float
+    epoch: bool
+    zero: float
+    rate: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MatlabFile:
+    """A MATLAB or HDF5 file, as `LogFile` says.
+
+    Parameters
+    ----------
+    path : of the file.
+    format : "MATLAB", "MATLAB 7.3" or "HDF5".
+    channels : as listed.
+    signals : where they are.
+    times : how each of their clocks is read.
+    said : what is left out.
+    """
+
+    path: Path
+    format: str
+    channels: tuple[Listed, ...]
+    signals: tuple[Signal, ...]
+    times: dict[Clock, _Time]
+    said: tuple[str, ...]
+    _mended: list[str] = field(default_factory=list, compare=False, repr=False)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is left out, and what was mended in what has been read."""
+        return (*self.said, *dict.fromkeys(self._mended))
+
+    def listed(self) -> tuple[Listed, ...]:
+        """Return the vectors that have a clock."""
+        return self.channels
+
+    def runs(self) -> tuple[str, ...]:
+        """Return no names: runs that a file holds apart are channels with clocks of their own."""
+        return ()
+
+    def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
+        """Return channels in the order of their names.
+
+        Parameters
+        ----------
+        names : as listed.
+        run : None.
+        """
+        known = {signal.name: signal for signal in self.signals}
+        asked = chosen(self.path, names, known, run)
+        clocks: dict[Clock, tuple[Array, NDArray[np.int64]]] = {}
+        result: dict[str, Channel] = {}
+        with one_line(self.path, f"a {self.format} file"):
+            # Signals of one matrix are read together, and the matrix is not kept.
+            leaves = {id(signal.leaf): signal.leaf for signal in asked}
+            for leaf in leaves.values():
+                require_room(self.path, max(leaf.shape), 8 * min(leaf.shape))
+                values = leaf.load()
+                for signal in asked:
+                    if signal.leaf is not leaf:
+                        continue
+                    if signal.clock not in clocks:
+                        t = _seconds(times_of(signal.clock), self.times[signal.clock])
+                        stamps = seconds_of(self.path, signal.clock.name, t, "sample")
+                        self._mended.extend(stamps.notes)
+                        clocks[signal.clock] = stamps.t, np.arange(1, t.size + 1)
+                    t, rows = clocks[signal.clock]
+                    result[signal.name] = Channel(
+                        name=signal.name,
+                        unit=signal.unit,
+                        t=t,
+                        values=line_of(values, signal),
+                        place="sample",
+                        rows=rows,
+                    )
+        return tuple(result[signal.name] for signal in asked)
+
+
+def recognizes(head: bytes, path: Path) -> bool:
+    """Whether a file is of this format.
+
+    Parameters
+    ----------
+    head : its first bytes, at least 520.
+    path : of the file.
+    """
+    return path.is_file() and (_is_hdf5(head) or _is_mat5(head))
+
+
+def _is_hdf5(head: bytes) -> bool:
+    return any(head[k : k + 8] == HDF5_MAGIC for k in HDF5_PLACES)
+
+
+def _is_mat5(head: bytes) -> bool:
+    return head[:6] == b"MATLAB" and head[126:128] in MAT5_ORDERS
+
+
+def open_(path: Path) -> MatlabFile:
+    """List the channels of a file.
+
+    Parameters
+    ----------
+    path : of the file.
+
+    Raises
+    ------
+    RecordingError
+        One line, where it is no such file or holds no vector with a time.
+    """
+    with one_line(path, "a MATLAB file"):
+        with path.open("rb") as file:
+            head = file.read(520)
+        if _is_hdf5(head):
+            format = "MATLAB 7.3" if head[:6] == b"MATLAB" else "HDF5"
+            found = signals_of(hdf5.read_tree(path))
+        elif _is_mat5(head):
+            format = "MATLAB"
+            found = signals_of(mat5.read_tree(path))
+        else:
+            raise RecordingError(
+                f"{path}: is not a MATLAB file of version 5, 6, 7 or 7.3; save it with "
+                "save(..., '-v7')"
+            )
+        said = (
+            *noted("not read", found.unread),
+            *noted("there is no vector t or time of the same length for", found.clockless),
+        )
+        if not found.signals:
+            why = "; ".join(said) or "there is no vector of numbers"
+            raise RecordingError(f"{path}: holds no signal with a time; {why}; {REMEDY}")
+        times = _times(found.signals)
+    return MatlabFile(
+        path=path,
+        format=format,
+        channels=tuple(
+            Listed(name=one.name, unit=one.unit, samples=one.samples, rate=times[one.clock].rate)
+            for one in found.signals
+        ),
+        signals=found.signals,
+        times=times,
+        said=said,
+    )
+
+
+def _times(signals: Sequence[Signal]) -> dict[Clock, _Time]:
+    """Return how the clocks are read; those of the calendar count from the first of all."""
+    result: dict[Clock, _Time] = {}
+    first: list[float] = []
+    for clock in dict.fromkeys(signal.clock for signal in signals):
+        t = times_of(clock)
+        cells = [repr(one) for one in t[:HEAD].tolist()]
+        known = find_clock(["t"], [clock.unit], {0: cells})
+        per_second = PER_SECOND[known.unit] if known is not None else 1.0
+        epoch = known is not None and known.epoch
+        if epoch:
+            first.append(float(t[0]) / per_second)
+        result[clock] = _Time(per_second, epoch, 0.0, typical_rate(t / per_second))
+    zero = min(first, default=0.0)
+    return {clock: one._replace(zero=zero) if one.epoch else one for clock, one in result.items()}
+
+
+def _seconds(t: Array, time: _Time) -> Array:
+    if time.epoch:  # a double holds the seconds since 1970 to 0.24 us
+        return np.round(t / time.per_second - time.zero, 6)
+    return t / time.per_second if time.per_second != 1.0 else t

@@ -1,0 +1,333 @@
+"""ASAM MDF 3 and 4: groups of channels, each group on its own clock.
+
+A channel that stands in several groups has the name of its group before its own. Enumerations
+(values that a table turns into words) are no signals; where such a table only names states beside
+numbers, as "not available", these samples are NaN. So are samples that the logger marked invalid.
+"""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import Array
+from models.logs.foreign import (
+    chosen,
+    need,
+    noted,
+    one_line,
+    require_room,
+    seconds_of,
+    typical_rate,
+    unique,
+)
+from models.logs.growing import Growing
+from models.logs.log import Channel, Listed, RecordingError
+from models.schema import LONGEST_NAME, require_few
+
+MAGIC = (b"MDF     ", b"UnFinMF ")
+NUMERIC_4, NUMERIC_3 = frozenset(range(6)), frozenset((0, 1, 2, 3, *range(9, 17)))
+WORDS_4, WORDS_3 = frozenset((7, 8, 9, 10, 11)), frozenset((11, 12))
+FORMULA_4, FORMULA_3 = 3, 10  # kinds of conversion
+# A formula is computed only where it is one: numbers, x, operators and functions.
+FORMULA = re.compile(
+    r"(?:[\s\d.+\-*/(),]|\d[eE][+-]?\d|\b[xX]1?\b|\b(?:sin|cos|tan|asin|acos|atan|sinh|cosh|tanh"
+    r"|exp|log|log10|abs|sqrt|pow)\b)*"
+)
+VALUES, TIME = (0, 6), 1  # types of a channel, of what a master counts
+BUS_EVENT = 1 << 1  # flag of a channel group that holds frames of a bus
+# Why a channel is not listed, by its kind.
+REASONS = {
+    "word": "enumerations and texts are no signals",
+    "array": "arrays are not read",
+    "formula": "a conversion must be a formula of numbers, x, + - * / and functions",
+    "clockless": "there is no time beside",
+    "frames": 'frames of a bus need a DBC, in the [file] of log.toml dbc = "car.dbc"',
+}
+TOGETHER = 1 << 23  # numbers that are read at a time
+PROBED = 200  # samples of a clock that its rate is taken from
+
+
+class _Place(NamedTuple):
+    """Where a channel is in the file."""
+
+    group: int
+    channel: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MdfFile:
+    """A measurement file, as `LogFile` says.
+
+    Parameters
+    ----------
+    path : of the file.
+    format : "MDF3" or "MDF4".
+    channels : as listed.
+    places : of the channels.
+    said : what is left out.
+    """
+
+    path: Path
+    format: str
+    channels: tuple[Listed, ...]
+    places: tuple[_Place, ...]
+    said: tuple[str, ...]
+    _mended: list[str] = field(default_factory=list, compare=False, repr=False)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is left out, and what was mended in what has been read."""
+        return (*self.said, *dict.fromkeys(self._mended))
+
+    def listed(self) -> tuple[Listed, ...]:
+        """Return the numeric channels."""
+        return self.channels
+
+    def runs(self) -> tuple[str, ...]:
+        """Return no names: a measurement is one run."""
+        return ()
+
+    def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
+        """Return channels in the order of their names.
+
+        Parameters
+        ----------
+        names : as listed.
+        run : None.
+        """
+        known = {
+            one.name: (one, place) for one, place in zip(self.channels, self.places, strict=True)
+        }
+        asked = chosen(self.path, names, known, run)
+        values: dict[_Place, Array] = {}
+        clocks: dict[int, tuple[Array, NDArray[np.int64]]] = {}
+        with one_line(self.path, "an MDF file"), _opened(self.path) as file:
+            for some in _portions(asked):
+                group = some[0][1].group
+                _require_blocks(self.path, file, group)
+                for (listed, place), (t, numbers) in zip(
+                    some, _read(self.path, file, some), strict=True
+                ):
+                    if group not in clocks:
+                        stamps = seconds_of(self.path, listed.name, t, "sample")
+                        self._mended.extend(stamps.notes)
+                        clocks[group] = _kept(stamps.t), np.arange(1, t.size + 1)
+                    values[place] = _kept(numbers)
+        return tuple(
+            Channel(
+                name=listed.name,
+                unit=listed.unit,
+                t=clocks[place.group][0],
+                values=values[place],
+                place="sample",
+                rows=clocks[place.group][1],
+            )
+            for listed, place in asked
+        )
+
+
+_Asked = tuple[Listed, _Place]
+
+
+def _portions(asked: Sequence[_Asked]) -> Iterator[list[_Asked]]:
+    """Yield channels that are read together: of one group, and few enough for the memory."""
+    for group in dict.fromkeys(place.group for _, place in asked):
+        mine = [one for one in asked if one[1].group == group]
+        several = max(1, TOGETHER // max(mine[0][0].samples, 1))
+        for k in range(0, len(mine), several):
+            yield mine[k : k + several]
+
+
+def _read(path: Path, file: Any, some: Sequence[_Asked]) -> list[tuple[Array, Array]]:
+    """Return times and values of channels of one group."""
+    samples = some[0][0].samples
+    require_room(path, samples, 8)
+    places = [(None, place.group, place.channel) for _, place in some]
+    signals = file.select(places, copy_master=False)
+    result = []
+    for (listed, _), signal in zip(some, signals, strict=True):
+        values = _numbers(path, listed.name, signal.samples)
+        if signal.invalidation_bits is not None:
+            values[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan
+        t = np.array(signal.timestamps, dtype=np.float64)
+        if not t.size == values.size == samples:
+            raise RecordingError(
+                f"{path}: {listed.name} must have {samples} samples, it has "
+                f"{min(t.size, values.size)}; was the file cut off?"
+            )
+        result.append((t, values))
+    return result
+
+
+def _kept(values: Array) -> Array:
+    """Return numbers as they are kept: on disk where they are many."""
+    grown = Growing()
+    grown.extend(values)
+    return grown.finished()
+
+
+def recognizes(head: bytes, path: Path) -> bool:
+    """Whether a file is of this format.
+
+    Parameters
+    ----------
+    head : its first bytes.
+    path : of the file.
+    """
+    return path.is_file() and head[:8] in MAGIC
+
+
+def open_(path: Path) -> MdfFile:
+    """List the channels of a file.
+
+    Parameters
+    ----------
+    path : of the file.
+
+    Raises
+    ------
+    RecordingError
+        One line, where it is no such file or holds no numeric channel.
+    """
+    with one_line(path, "an MDF file"), _opened(path) as file:
+        return _list(path, file)
+
+
+def _opened(path: Path) -> Any:
+    asammdf = need(path, "asammdf", "MDF", "mdf")
+    return asammdf.MDF(path, process_bus_logging=False)
+
+
+class _Found:
+    """What the groups of a file hold: numeric channels, and the names of others by the reason."""
+
+    def __init__(self) -> None:
+        self.channels: list[tuple[str, Listed, _Place]] = []
+        self.others: dict[str, list[str]] = {reason: [] for reason in REASONS}
+
+    def group(self, file: Any, number: int, is_4: bool) -> None:
+        """Collect the channels of a group."""
+        group = file.groups[number]
+        about = group.channel_group
+        samples, master = int(about.cycles_nr), file.masters_db.get(number)
+        name = _group_name(group, number)
+        if is_4 and int(about.flags) & BUS_EVENT:
+            self.others["frames"].append(name)
+            return
+        clock = master is not None and _tells_time(group.channels[master], is_4)
+        rate = float("nan")
+        if clock and samples:
+            probed = min(samples, PROBED)
+            t = file.get_master(number, record_offset=0, record_count=probed)
+            rate = typical_rate(np.asarray(t, dtype=np.float64))
+        for index, channel in enumerate(group.channels):
+            if index == master or not samples:
+                continue
+            kind = _kind(group, index, is_4) if clock else "clockless"
+            if kind != "number":
+                self.others[kind].append(str(channel.name))
+                continue
+            unit = str(file.get_channel_unit(group=number, index=index) or "").strip()
+            listed = Listed(name=str(channel.name), unit=unit, samples=samples, rate=rate)
+            self.channels.append((name, listed, _Place(number, index)))
+
+
+def _list(path: Path, file: Any) -> MdfFile:
+    """List the channels of an open file."""
+    is_4 = str(file.version) >= "4"
+    count = sum(len(group.channels) for group in file.groups)
+    require_few(RecordingError, str(path), count, "columns", "channels")
+    found = _Found()
+    for number in range(len(file.groups)):
+        found.group(file, number, is_4)
+    said = tuple(
+        note for kind, reason in REASONS.items() for note in noted(reason, found.others[kind])
+    )
+    if not found.channels:
+        why = "".join(f"; {one}" for one in said)
+        raise RecordingError(f"{path}: holds no numeric channel with a time{why}")
+    names = unique((group, one.name) for group, one, _ in found.channels)
+    return MdfFile(
+        path=path,
+        format="MDF4" if is_4 else "MDF3",
+        channels=tuple(
+            replace(one, name=name) for name, (_, one, _) in zip(names, found.channels, strict=True)
+        ),
+        places=tuple(place for _, _, place in found.channels),
+        said=said,
+    )
+
+
+def _group_name(group: Any, number: int) -> str:
+    """Return what a group of channels is called."""
+    about = group.channel_group
+    for name in (getattr(about, "acq_name", None), getattr(about, "comment", None)):
+        if isinstance(name, str) and name.strip() and name.isprintable():
+            return name.strip()[:LONGEST_NAME]
+    return f"group {number + 1}"
+
+
+def _tells_time(master: Any, is_4: bool) -> bool:
+    """Whether a master channel is a time; others are angles, distances or counts."""
+    return not is_4 or int(master.sync_type) in (0, TIME)
+
+
+def _kind(group: Any, index: int, is_4: bool) -> str:
+    """Return what a channel holds: "number", "word", "formula" that is none, or "array"."""
+    channel = group.channels[index]
+    if group.channel_dependencies[index]:
+        return "array"
+    if is_4 and int(channel.channel_type) not in VALUES:
+        return "word"
+    if channel.data_type not in (NUMERIC_4 if is_4 else NUMERIC_3):
+        return "word"
+    return _kind_of_conversion(channel.conversion, is_4)
+
+
+def _kind_of_conversion(conversion: Any, is_4: bool) -> str:
+    if conversion is None:
+        return "number"
+    kind = int(conversion.conversion_type)
+    if kind == (FORMULA_4 if is_4 else FORMULA_3):
+        return "number" if FORMULA.fullmatch(_text(conversion.formula)) else "formula"
+    if kind not in (WORDS_4 if is_4 else WORDS_3):
+        return "number"
+    # Words: all of its values are, or some beside a default that is a conversion of its own.
+    inner = getattr(conversion, "referenced_blocks", None) or {}
+    kinds = {
+        _kind_of_conversion(one, is_4)
+        for one in inner.values()
+        if one is not None and not isinstance(one, str | bytes)
+    }
+    if kinds - {"number"}:
+        return "formula" if "formula" in kinds else "word"
+    default = inner.get("default_addr")
+    return "word" if default is None or isinstance(default, str | bytes) else "number"
+
+
+def _text(formula: Any) -> str:
+    return formula.decode("latin-1").strip(" \0") if isinstance(formula, bytes) else str(formula)
+
+
+def _numbers(path: Path, name: str, samples: Any) -> Array:
+    """Return samples as numbers, NaN for the words among them."""
+    values = np.asarray(samples)
+    if values.dtype.kind == "O":
+        values = np.array(
+            [float(one) if isinstance(one, int | float | np.number) else np.nan for one in values]
+        )
+    if values.ndim != 1 or values.dtype.kind not in "fiub":
+        raise RecordingError(f"{path}: {name} must be numeric, its samples are {values.dtype}")
+    return values.astype(np.float64)
+
+
+def _require_blocks(path: Path, file: Any, number: int) -> None:
+    """Refuse a group with a block that unpacks to more than is allowed."""
+    for block in file.groups[number].get_data_blocks():
+        size = int(block.original_size or 0) / 1e6
+        require_few(RecordingError, str(path), size, "block", "megabytes of a block")

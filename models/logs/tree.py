@@ -1,0 +1,331 @@
+"""Numbers in structs of structs, as MATLAB and HDF5 files hold them, and the channels among them.
+
+A clock is a vector called t or time; it is the clock of what has its length beside it and in the
+structs below it, the nearest first. A struct of data, with a time or a unit beside it, is one
+channel: so are a timeseries that was made a struct, and each signal of a Simulink or dSPACE log.
+A matrix is a channel for each column, or row. What has no clock is no channel.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from codegen.arrays import Array
+from models.logs.foreign import unique
+from models.logs.stamps import NAMES
+
+# Of a variable: a name that a clock has, and the unit that may follow it.
+CLOCK = re.compile(r"([a-z_ ]+?)(?:_?(s|sec|ms|us|ns))?")
+OTHER_CLOCKS = ("tout", "timestep")
+HEAD = 200  # times by which a clock is known
+DATA = ("data", "values", "value", "samples", "raw")
+NAME = ("name", "label", "signalname", "blockname")
+UNIT = ("unit", "units")
+COLUMNS = ("names", "labels", "channels", "columns", "header", "headers", "varnames", "signals")
+MOST_COLUMNS = 1000  # of a matrix that is a table of signals
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Leaf:
+    """An array of real numbers that is not read yet.
+
+    Parameters
+    ----------
+    shape : rows and columns.
+    load : reads it, (rows, columns) float64.
+    """
+
+    shape: tuple[int, int]
+    load: Callable[[], Array]
+
+
+@dataclass(frozen=True, slots=True)
+class Unread:
+    """What is not read: an object, a sparse or complex array.
+
+    Parameters
+    ----------
+    kind : what it is, for messages.
+    """
+
+    kind: str
+
+
+Tree = Leaf | Unread | str | list["Tree"] | dict[str, "Tree"]
+
+
+class Clock(NamedTuple):
+    """Times of samples.
+
+    leaf, column: where they are; unit: that is told of it, "" for none.
+    """
+
+    name: str
+    leaf: Leaf
+    column: int | None
+    unit: str
+
+
+class Signal(NamedTuple):
+    """A channel of a tree.
+
+    place: which column, or row where `along` is 1, of the leaf.
+    """
+
+    name: str
+    unit: str
+    leaf: Leaf
+    place: int
+    along: int
+    clock: Clock
+
+    @property
+    def samples(self) -> int:
+        """How many there are."""
+        return self.leaf.shape[self.along]
+
+
+class Found(NamedTuple):
+    """What a tree holds: signals, names of vectors without clock, names of what is not read."""
+
+    signals: tuple[Signal, ...]
+    clockless: tuple[str, ...]
+    unread: tuple[str, ...]
+
+
+def signals_of(tree: Mapping[str, Tree]) -> Found:
+    """Return the channels of a tree, in its order.
+
+    Parameters
+    ----------
+    tree : by name of a variable.
+    """
+    walk = _Walk()
+    walk.struct(dict(tree), "", ())
+    names = unique(
+        (signal.clock.name.rpartition(".")[0] or "top", signal.name) for signal in walk.signals
+    )
+    return Found(
+        tuple(one._replace(name=name) for one, name in zip(walk.signals, names, strict=True)),
+        tuple(walk.clockless),
+        tuple(walk.unread),
+    )
+
+
+def times_of(clock: Clock) -> Array:
+    """Read the times of a clock as they are in the file, (n,).
+
+    Parameters
+    ----------
+    clock : where they are.
+    """
+    values = clock.leaf.load()
+    return values.reshape(-1) if clock.column is None else _line(values, clock.column, clock.leaf)
+
+
+def _line(values: Array, place: int, leaf: Leaf) -> Array:
+    """Return the column of a tall matrix, the row of a wide one."""
+    return values[:, place] if leaf.shape[0] >= leaf.shape[1] else values[place]
+
+
+class _Walk:
+    """Collects what a tree holds."""
+
+    def __init__(self) -> None:
+        self.signals: list[Signal] = []
+        self.clockless: list[str] = []
+        self.unread: list[str] = []
+
+    def struct(self, node: dict[str, Tree], path: str, clocks: tuple[Clock, ...]) -> None:
+        """Collect the channels of a struct; clocks: of the structs around it, the nearest first."""
+        clocks = (*_clocks_of(node, path), *clocks)
+        own = [clock.leaf for clock in clocks]
+        data = _pick(node, DATA)
+        if any(data is leaf for leaf in own):
+            return
+        if isinstance(data, Leaf) and (clocks or _text(node, UNIT)) and not _several(node):
+            label = _text(node, NAME) or path
+            self.leaf(data, label, _unit(node), clocks, _columns(node))
+            return
+        units = _pick(node, UNIT)
+        known = units if isinstance(units, dict) else {}
+        for key, child in node.items():
+            name = f"{path}.{key}" if path else key
+            if isinstance(child, Leaf):
+                if not any(child is leaf for leaf in own):
+                    unit = known.get(key)
+                    self.leaf(
+                        child, name, unit if isinstance(unit, str) else "", clocks, _columns(node)
+                    )
+            else:
+                self.other(child, name, clocks)
+
+    def other(self, node: Tree, path: str, clocks: tuple[Clock, ...]) -> None:
+        """Collect the channels of anything."""
+        if isinstance(node, Leaf):
+            self.leaf(node, path, "", clocks, None)
+        elif isinstance(node, Unread):
+            self.unread.append(f"{path} ({node.kind})")
+        elif isinstance(node, dict):
+            self.struct(node, path, clocks)
+        elif isinstance(node, list):
+            structs = all(isinstance(one, dict) for one in node)
+            for k, one in enumerate(node, start=1):
+                self.other(one, f"{path}({k})" if structs else f"{path}{{{k}}}", clocks)
+
+    def leaf(
+        self,
+        leaf: Leaf,
+        name: str,
+        unit: str,
+        clocks: tuple[Clock, ...],
+        columns: tuple[list[str], list[str]] | None,
+    ) -> None:
+        """Collect a vector, or the columns of a matrix."""
+        rows, width = leaf.shape
+        if rows * width < 2:
+            return
+        for clock in clocks:
+            samples = _samples(clock)
+            if samples not in leaf.shape:
+                continue
+            along = 0 if rows == samples else 1
+            if leaf.shape[1 - along] > MOST_COLUMNS:
+                break
+            for signal in _lines(leaf, name, unit, along, clock, columns):
+                self.signals.append(signal)
+            return
+        own = _clock_inside(leaf, name)
+        if own is not None:
+            along = 0 if rows >= width else 1
+            lines = _lines(leaf, name, unit, along, own, columns)
+            self.signals += [signal for signal in lines if signal.place != own.column]
+        else:
+            self.clockless.append(name)
+
+
+def _lines(
+    leaf: Leaf,
+    name: str,
+    unit: str,
+    along: int,
+    clock: Clock,
+    columns: tuple[list[str], list[str]] | None,
+) -> Iterator[Signal]:
+    """Yield the signal of a vector, or those of the columns or rows of a matrix."""
+    width = leaf.shape[1 - along]
+    if width == 1:
+        yield Signal(name, unit, leaf, 0, along, clock)
+        return
+    names, units = columns or ([], [])
+    for k in range(width):
+        place = f"(:,{k + 1})" if along == 0 else f"({k + 1},:)"
+        yield Signal(
+            names[k] if len(names) == width else name + place,
+            units[k] if len(units) == width else unit,
+            leaf,
+            k,
+            along,
+            clock,
+        )
+
+
+def line_of(values: Array, signal: Signal) -> Array:
+    """Return the values of a channel, (n,).
+
+    Parameters
+    ----------
+    values : of its leaf, (rows, columns).
+    signal : which line of them.
+    """
+    line = values[:, signal.place] if signal.along == 0 else values[signal.place]
+    return np.array(line, dtype=np.float64)
+
+
+def _clocks_of(node: dict[str, Tree], path: str) -> Iterator[Clock]:
+    """Yield the clocks of a struct."""
+    for key, child in node.items():
+        unit = _unit_of_clock(key)
+        name = f"{path}.{key}" if path else key
+        if unit is not None and isinstance(child, dict):
+            inner = _pick(child, DATA)
+            unit, child = _unit(child) or unit, inner if inner is not None else child
+        if unit is not None and isinstance(child, Leaf) and 1 in child.shape:
+            units = _pick(node, UNIT)
+            if isinstance(units, dict) and isinstance(told := units.get(key), str):
+                unit = told
+            if max(child.shape) > 1:
+                yield Clock(name, child, None, unit)
+    x, y = node.get("X"), node.get("Y")  # of dSPACE: the clock is X, the signals are Y(k)
+    if isinstance(x, dict) and isinstance(y, dict | list):
+        data = _pick(x, DATA)
+        if isinstance(data, Leaf) and 1 in data.shape:
+            yield Clock(f"{path}.X" if path else "X", data, None, "")
+
+
+def _unit_of_clock(name: str) -> str | None:
+    """Return the unit that the name of a clock tells, "" for none; None where it names no clock."""
+    found = CLOCK.fullmatch(name.strip().lower())
+    if found is None:
+        return None
+    word = re.sub("[^a-z]", "", found[1])
+    return (found[2] or "") if word in NAMES or word in OTHER_CLOCKS else None
+
+
+def _clock_inside(leaf: Leaf, name: str) -> Clock | None:
+    """Return the first column of a matrix, or row of a wide one, where it rises as a clock does."""
+    if min(leaf.shape) < 2 or min(leaf.shape) > MOST_COLUMNS or max(leaf.shape) < 3:
+        return None
+    clock = Clock(name, leaf, 0, "")
+    return clock if bool(np.all(np.diff(times_of(clock)) > 0.0)) else None
+
+
+def _samples(clock: Clock) -> int:
+    return max(clock.leaf.shape)
+
+
+def _pick(node: dict[str, Tree], names: Sequence[str]) -> Tree | None:
+    """Return the first of a struct's fields that has one of these names, whatever its case."""
+    lower = {key.lower(): child for key, child in reversed(list(node.items()))}
+    return next((lower[name] for name in names if name in lower), None)
+
+
+def _several(node: dict[str, Tree]) -> bool:
+    """Whether a struct holds other vectors than one signal and its time."""
+    other = [
+        key
+        for key, child in node.items()
+        if isinstance(child, Leaf)
+        and max(child.shape) > 1
+        and key.lower() not in DATA
+        and _unit_of_clock(key) is None
+        and key.lower() not in ("dimensions", "x", "quality")
+    ]
+    return bool(other)
+
+
+def _text(node: dict[str, Tree], names: Sequence[str]) -> str:
+    found = _pick(node, names)
+    return found.strip() if isinstance(found, str) else ""
+
+
+def _unit(node: dict[str, Tree]) -> str:
+    """Return the unit of a struct that is a signal; a timeseries has it in DataInfo."""
+    about = _pick(node, ("datainfo",))
+    return _text(node, UNIT) or (_text(about, UNIT) if isinstance(about, dict) else "")
+
+
+def _columns(node: dict[str, Tree]) -> tuple[list[str], list[str]] | None:
+    """Return the names and units that a struct tells of the columns of its matrix."""
+
+    def words(names: Sequence[str]) -> list[str]:
+        found = _pick(node, names)
+        if not isinstance(found, list) or not all(isinstance(one, str) for one in found):
+            return []
+        return [str(one).strip() for one in found]
+
+    names = words(COLUMNS)
+    return (names, words(UNIT)) if names else None

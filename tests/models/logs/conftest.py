@@ -1,0 +1,20 @@
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def drive():
+    """Time at 100 Hz and columns of doubles that no rounding leaves as they are."""
+    t = np.arange(300) / 100
+    rng = np.random.default_rng(14)
+    return t, {name: rng.standard_normal(300) for name in ("v_x", "v_y", "r", "delta_f", "a_y")}
+
+
+def assert_equal(channels, t, columns):
+    """Values and clock are the same doubles."""
+    assert len(channels) == len(columns)
+    for channel, values in zip(channels, columns.values(), strict=True):
+        assert np.array_equal(channel.t, t)
+        assert np.array_equal(channel.values, values, equal_nan=True), channel.name
+        assert channel.t.dtype == channel.values.dtype == np.float64
+        assert np.all(np.diff(channel.rows) == 1) and channel.rows[0] in (1, 2)

@@ -1,0 +1,206 @@
+"""One drive through every format: the same doubles, the same clock; what is wrong is one line."""
+
+import builtins
+import importlib
+import random
+import shutil
+
+import numpy as np
+import pytest
+
+from models.logs.door import open_log
+from models.logs.log import RecordingError
+from tests.models.logs.conftest import assert_equal
+from tests.models.logs.drive_in_every_format import FORMATS, UNITS, write
+
+BINARY = [name for name in FORMATS if name not in ("CSV", "Parquet")]
+EXTRAS = {
+    "MATLAB 7.3": "mat",
+    "MDF4": "mdf",
+    "MDF3": "mdf",
+    "ROS 2 bag": "ros",
+    "db3": "ros",
+    "MCAP": "ros",
+    "CAN ASC": "can",
+    "CAN BLF": "can",
+    "CAN candump": "can",
+    "CAN TRC": "can",
+    "CAN MDF4": "can",
+}
+
+
+def refusal(path, dbc=None):
+    """The one line with which a log is refused, on opening or on reading."""
+    with pytest.raises(RecordingError) as caught:
+        log = open_log(path, dbc)
+        log.read([one.name for one in log.listed()])
+    text = str(caught.value)
+    assert "\n" not in text and len(text) < 700
+    return text
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_every_format_gives_the_doubles_and_the_clock_that_were_written(format, tmp_path, drive):
+    t, columns = drive
+    written = write(format, tmp_path, t, columns)
+    log = open_log(written.path, written.dbc)
+    listed = {one.name: one for one in log.listed()}
+    names = list(written.names.values())
+    assert set(names) <= set(listed)
+    assert_equal(log.read(names), t, columns)
+    back = log.read(names[::-1])
+    assert [one.name for one in back] == names[::-1]
+    assert np.array_equal(back[0].values, columns["a_y"])
+    for column, name in written.names.items():
+        assert listed[name].unit in ("", UNITS[column])
+        assert listed[name].samples == t.size
+        assert listed[name].rate == pytest.approx(100.0, rel=0.01)
+
+
+@pytest.mark.parametrize("format", [name for name in BINARY if name not in ("MATLAB", "db3")])
+def test_a_binary_format_tells_the_units(format, tmp_path, drive):
+    t, columns = drive
+    written = write(format, tmp_path, t, columns)
+    units = {one.name: one.unit for one in open_log(written.path, written.dbc).listed()}
+    told = {column: units[name] for column, name in written.names.items()}
+    if format in ("ROS 2 bag", "MCAP"):
+        assert told.pop("delta_f") == ""  # a Float64 has no unit
+    assert told == {name: UNITS[name] for name in told}
+
+
+@pytest.mark.parametrize("format", BINARY)
+def test_the_name_of_a_file_does_not_tell_its_format(format, tmp_path, drive):
+    t, columns = drive
+    written = write(format, tmp_path, t, columns)
+    other = tmp_path / "x" / "drive.csv"
+    other.parent.mkdir()
+    (shutil.copytree if written.path.is_dir() else shutil.copy)(written.path, other)
+    log = open_log(other, written.dbc)
+    assert_equal(log.read(list(written.names.values())), t, columns)
+
+
+@pytest.mark.parametrize("format", EXTRAS)
+def test_a_missing_library_is_named_with_the_pip_line(format, tmp_path, drive, monkeypatch):
+    written = write(format, tmp_path, *drive)
+    real = importlib.import_module
+
+    def without(name, package=None):
+        if name.partition(".")[0] in ("h5py", "asammdf", "rosbags", "can", "cantools"):
+            raise ImportError(name)
+        return real(name, package)
+
+    monkeypatch.setattr(importlib, "import_module", without)
+    text = refusal(written.path, written.dbc)
+    assert text.endswith(f"pip install tireid[{EXTRAS[format]}]")
+
+
+def test_no_library_of_an_extra_is_imported_for_a_text(tmp_path, drive, monkeypatch):
+    written = write("CSV", tmp_path, *drive)
+    real = builtins.__import__
+
+    def watched(name, *rest, **more):
+        assert name.partition(".")[0] not in ("h5py", "asammdf", "rosbags", "can", "cantools")
+        return real(name, *rest, **more)
+
+    monkeypatch.setattr(builtins, "__import__", watched)
+    assert open_log(written.path).read(["r"])[0].values.size == 300
+
+
+@pytest.mark.parametrize("format", BINARY)
+def test_a_channel_or_run_that_is_not_there_is_refused(format, tmp_path, drive):
+    written = write(format, tmp_path, *drive)
+    log = open_log(written.path, written.dbc)
+    name = written.names["delta_f"]
+    with pytest.raises(RecordingError, match=r"there is no channel .*; did you mean") as caught:
+        log.read([name[:-1]])
+    assert repr(name)[1:-1] in str(caught.value)
+    with pytest.raises(RecordingError, match="holds one run without a name, so no run 'lap1'"):
+        log.read([name], run="lap1")
+    assert log.runs() == ()
+
+
+@pytest.mark.parametrize("format", BINARY)
+def test_damaged_files_are_refused_in_one_line_or_read(format, tmp_path, drive, capfd):
+    """Cut off anywhere, and with bits that fell: nothing but a refusal, nothing said aside."""
+    t, columns = drive
+    written = write(format, tmp_path, t[:40], {k: v[:40] for k, v in columns.items()})
+    path = written.path
+    if path.is_dir():
+        path = path / f"{path.name}.db3"
+    whole = path.read_bytes()
+    capfd.readouterr()
+    refused = 0
+    for seed in range(12):
+        rng = random.Random(seed)
+        damaged = bytearray(whole)
+        if seed % 2:
+            damaged = damaged[: rng.randrange(1, len(whole))]
+        for _ in range(rng.choice((0, 3, 30))):
+            damaged[rng.randrange(len(damaged))] = rng.randrange(256)
+        path.write_bytes(damaged)
+        try:
+            log = open_log(written.path, written.dbc)
+            log.read([one.name for one in log.listed()])
+        except RecordingError as error:
+            refused += 1
+            text = str(error)
+            assert "\n" not in text and len(text) < 700 and str(tmp_path) in text
+    assert refused >= 3
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("format", BINARY)
+@pytest.mark.parametrize("content", [b"", b"\0" * 5000])
+def test_other_content_under_the_ending_of_a_format_is_refused(format, content, tmp_path, drive):
+    written = write(format, tmp_path, *drive)
+    path = written.path
+    if path.is_dir():
+        path = path / "metadata.yaml"
+    path.write_bytes(content)
+    assert str(tmp_path) in refusal(written.path, written.dbc)
+
+
+@pytest.mark.parametrize("format", BINARY)
+def test_what_is_only_a_beginning_of_a_format_is_refused(format, tmp_path, drive):
+    written = write(format, tmp_path, *drive)
+    path = written.path
+    if path.is_dir():
+        path = path / f"{path.name}.db3"
+    path.write_bytes(path.read_bytes()[:700] + b"\0" * 3000)
+    assert str(tmp_path) in refusal(written.path, written.dbc)
+
+
+@pytest.mark.parametrize("clock", ["nan", "back", "still"])
+@pytest.mark.parametrize("format", ["MATLAB", "MATLAB 7.3", "MDF4", "MDF3"])
+def test_a_clock_that_does_not_rise_is_refused(format, clock, tmp_path, drive):
+    t, columns = drive
+    t = t.copy()
+    if clock == "nan":
+        t[100] = np.nan
+    elif clock == "back":
+        t[100:] -= 0.5
+    else:
+        t[:] = 1.0
+    written = write(format, tmp_path, t, columns)
+    assert "clock of" in refusal(written.path, written.dbc)
+
+
+def test_messages_that_were_stamped_out_of_order_are_refused(tmp_path, drive):
+    t, columns = drive
+    written = write("MCAP", tmp_path, np.concatenate([t[:100], t[:200]]), columns)
+    assert "the clock of /odom must increase, message" in refusal(written.path)
+
+
+def test_frames_that_were_stamped_out_of_order_are_refused(tmp_path, drive):
+    t, columns = drive
+    written = write("CAN candump", tmp_path, np.concatenate([t[:100], t[:200]]), columns)
+    assert "the clock of Frame_v_x.v_x must increase, message" in refusal(written.path, written.dbc)
+
+
+@pytest.mark.parametrize("format", BINARY)
+def test_a_log_of_more_samples_than_is_allowed_is_refused(format, tmp_path, drive, monkeypatch):
+    written = write(format, tmp_path, *drive)
+    monkeypatch.setenv("TIREID_LIMITS", "samples=250")
+    if format.startswith("CAN") and format != "CAN MDF4":
+        monkeypatch.setattr("models.logs.frames.TOGETHER", 16)
+    assert "TIREID_LIMITS=samples=NUMBER" in refusal(written.path, written.dbc)
