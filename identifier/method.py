@@ -10,11 +10,13 @@ from dataclasses import asdict, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from codegen import Scan
 from codegen.arrays import Array, blocks, large
 from identifier.certificate import Certificate
 from identifier.driving import Driving
+from identifier.refused import NOWHERE, judges_samples
 from identifier.tire_model import Axle, TireModel
 from identifier.tuning import Range, with_numbers
 from models.recordings import Recording
@@ -63,6 +65,8 @@ class Setup(NamedTuple):
     An observer that starts at the first measurement carries zero until that is known: `observe`
     takes its x and returns the carried values that begin with it, by port.
     Carried ports of `only_with_a_y` change no other one, and no output, where a_y is never there.
+    Between stretches of a drive the step is shown `rest` samples, after which it begins anew with
+    what it has learnt (`identifier.refused`).
     """
 
     scan: Scan
@@ -70,6 +74,7 @@ class Setup(NamedTuple):
     constants: Mapping[str, Array]
     observe: Callable[[Array], Mapping[str, Array]] | None = None
     only_with_a_y: tuple[str, ...] = ()
+    rest: int = 1
 
     def begin(self, x: Array) -> "Setup":
         """Return the setup whose observers begin at a measurement.
@@ -90,16 +95,19 @@ class Setup(NamedTuple):
     ) -> Iterator["Stretch"]:
         """Yield what the compiled step records over a recording, block by block.
 
-        Values are carried from block to block: the bits are those of one piece.
+        Values are carried from block to block: the bits are those of one piece. Before each
+        stretch of the recording but the first the step rests.
 
         Parameters
         ----------
         recording : its signals are the input; its forces are not looked at.
-        parts : of the recording, one after the other; None takes all of it in `blocks`.
+        parts : of the recording, one after the other, none over a break; None takes all of it.
         carry : values that are carried into the first part; None begins with the recording.
         """
         following = self._begun(recording) if carry is None else dict(carry)
-        for part in blocks(len(recording)) if parts is None else parts:
+        for k, part in enumerate(parts_of(recording) if parts is None else parts):
+            if part.start in recording.breaks and (k > 0 or carry is None):
+                following = self._rested(following, recording, part.start)
             values = {**following, **signals_of(recording, self.scan.over, part), **self.constants}
             record = self.scan(part.stop - part.start, values)
             following = {port: record[f"{port}_final"] for port in self.scan.carry}
@@ -131,16 +139,48 @@ class Setup(NamedTuple):
         n : samples that are taken.
         """
         following = self._begun(recording)
-        for part in blocks(n):
+        for part in parts_of(recording, n):
+            if part.start in recording.breaks:
+                following = self._rested(following, recording, part.start)
             values = {**following, **signals_of(recording, self.scan.over, part), **self.constants}
             count = part.stop - part.start
             record = self.scan(count, values, every=count)
             following = {port: record[f"{port}_final"] for port in self.scan.carry}
         return {port: np.asarray(value) for port, value in following.items()}
 
+    def _rested(
+        self, following: Mapping[str, Array], recording: Recording, begin: int
+    ) -> dict[str, Array]:
+        """Return what is carried into a stretch that begins at a sample, after a rest, by port.
+
+        A rest is samples that no gate believes, or one at standstill for a step without a gate: no
+        difference over the gap is ever taken for one over a sampling interval.
+        """
+        rows = np.full(self.rest, begin)
+        signals = signals_of(recording, (*self.scan.over, "v_x"), rows)
+        signals["v_x"] = np.full(self.rest, NOWHERE if judges_samples(following) else 0.0)
+        if "a_y" in signals:
+            signals["a_y"] = np.full(self.rest, np.nan)
+        shown = {port: signals[port] for port in self.scan.over}
+        record = self.scan(self.rest, {**following, **shown, **self.constants}, every=self.rest)
+        return {port: record[f"{port}_final"] for port in self.scan.carry}
+
     def _begun(self, recording: Recording) -> dict[str, Array]:
         """Return what is carried into the first sample of a recording, by port."""
         return dict(self.begin(np.array([recording.v_y[0], recording.r[0]])).carry)
+
+
+def parts_of(recording: Recording, n: int | None = None) -> Iterator[slice]:
+    """Yield the parts in which a recording is gone through: blocks, of which none has a break.
+
+    Parameters
+    ----------
+    recording : of stretches.
+    n : samples from the first on that are gone through; None takes all.
+    """
+    for piece in recording.stretches:
+        end = piece.stop if n is None else min(n, piece.stop)
+        yield from blocks(end, piece.start)
 
 
 class Stretch(NamedTuple):
@@ -161,7 +201,7 @@ class Stretch(NamedTuple):
 
 
 def signals_of(
-    recording: Recording, over: Iterable[str], part: slice = slice(None)
+    recording: Recording, over: Iterable[str], part: slice | NDArray[np.int64] = slice(None)
 ) -> dict[str, Array]:
     """Return what a step reads of a recording sample by sample, by port.
 

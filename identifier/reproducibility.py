@@ -130,7 +130,7 @@ def motion_error(
     force : lateral axle forces (n, 2) [N], frame of the body.
     recording : the motion.
     vehicle : mass, inertia and geometry.
-    counted : samples that count (n,); a window counts where all of its samples do.
+    counted : samples that count (n,); a window counts where all of its samples do, in one stretch.
     """
     n = round(WINDOW / recording.dt)
     if recording.t.size <= n:
@@ -148,6 +148,7 @@ def motion_error(
     for part in blocks(recording.t.size - n):
         some = slice(part.start, part.stop + n)
         whole = np.lib.stride_tricks.sliding_window_view(counted[some], n + 1).all(axis=1)
+        whole &= recording.within_a_stretch(np.arange(part.start, part.stop), n)
         F, v_y, r = force[some], recording.v_y[some], recording.r[some]
         a_y = (v_y[n:] - v_y[:-n]) / T + mean(recording.v_x[some] * r)
         r_dot = (r[n:] - r[:-n]) / T

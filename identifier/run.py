@@ -1,15 +1,15 @@
 """A method over a recording, with all outputs and states, and beside a car that drives."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
 from codegen import Stepper
 from codegen.arrays import Array, blocks, large
-from identifier.method import AXLE_FORCE, Method, Setup, Stretch, Track
+from identifier.method import AXLE_FORCE, Method, Setup, Stretch, Track, parts_of
 from identifier.refused import NOWHERE, STALE_TIME, SampleLimits, judges_samples, stale_samples
 from identifier.tire_model import TireModel
 from models.recordings import Recording
@@ -178,6 +178,21 @@ class History:
 
         return judge(self, t)
 
+    def parts(self, recordings: Sequence[Recording]) -> "list[History]":
+        """Return the forces of the run over each of the recordings that the drive was joined of.
+
+        Parameters
+        ----------
+        recordings : in the order in which they were joined.
+        """
+        found, first = [], 0
+        for one in recordings:
+            end = first + len(one)
+            force = self.axle_force[first:end]
+            found.append(replace(self, recording=one, axle_force=force, state={}, outputs={}))
+            first = end
+        return found
+
     def __repr__(self) -> str:
         diverged = "" if self.diverged_at is None else f", diverged at {self.diverged_at:g} s"
         return f"<{type(self.design).__name__} over {self.recording!r}{diverged}>"
@@ -210,7 +225,7 @@ class LongRun(NamedTuple):
         ----------
         index : of the sample; n is after the last.
         """
-        for part, begin in zip(blocks(len(self.recording)), self.begins, strict=True):
+        for part, begin in zip(parts_of(self.recording), self.begins, strict=True):
             if part.start <= index < part.stop:
                 until = [slice(part.start, index + 1)]
                 (stretch,) = self.setup.run(self.recording, until, begin)
@@ -306,7 +321,7 @@ def identify(
     """
     check_sampling(recording, design)
     setup = design.setup(vehicle, start)
-    force, begins, parts = large((len(recording), 2)), [], blocks(len(recording))
+    force, begins, parts = large((len(recording), 2)), [], parts_of(recording)
     state: Mapping[str, Array] = {}
     outputs: Mapping[str, Array] = {}
     for stretch in setup.run(recording, parts):

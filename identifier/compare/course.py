@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from codegen import BatchScan, Scan
 from codegen.arrays import Array
 from identifier.method import CannotFreezeError, Method, signals_of
+from identifier.refused import NOWHERE, judges_samples
 from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
 from identifier.run import identify
 from identifier.tire_model import TireModel
@@ -270,6 +271,7 @@ def run_scored(
     impossible: Sequence[float],
     counts: NDArray[np.bool_],
     keep: Sequence[int] = (),
+    rest: int = 1,
     workers: int | None = None,
 ) -> Scores:
     """Run a step over a recording with many sets of numbers.
@@ -282,30 +284,74 @@ def run_scored(
     impossible : for each run, a force that no tire makes [N].
     counts : samples that count in the error (n,).
     keep : samples whose values are recorded.
+    rest : samples that each run rests between stretches of the recording, as `Setup.run` does.
     workers : threads; None takes one for each processor.
     """
-    n = len(recording)
-    truth = np.zeros((n, 2)) if recording.axle_force is None else recording.axle_force
+    truth = np.zeros((len(recording), 2)) if recording.axle_force is None else recording.axle_force
+    rests = _Rests.of(recording, rest)
     record = _scored_scan(scan)(
-        n,
+        rests.samples,
         {
             **{port: np.stack([one[port] for one in values]) for port in values[0]},
-            **signals_of(recording, scan.over),
-            "truth": truth,
-            "counts": counts.astype(np.float64),
+            **rests.signals(recording, scan.over, judges=judges_samples(values[0])),
+            "truth": rests.beside(truth),
+            "counts": rests.beside(counts.astype(np.float64)),
             "impossible": np.array(impossible),
             "squares": np.zeros(2),
             "sane_samples": np.zeros(()),
             "sane": np.ones(()),
         },
-        keep=keep,
+        keep=[int(rests.at[k]) for k in keep],
         workers=workers,
     )
+    sane = record["sane_samples_final"][:, 0].astype(np.int64)
     return Scores(
         squares=record["squares_final"] / counts.sum(),
-        sane_samples=record["sane_samples_final"][:, 0].astype(np.int64),
+        sane_samples=np.searchsorted(rests.at, sane),
         record=record,
     )
+
+
+class _Rests(NamedTuple):
+    """Samples of a recording and rests between its stretches, that all lanes are shown alike.
+
+    rows : which sample of the recording each is; at a rest, the first of the stretch to come (N,).
+    at : which of these each sample of the recording is (n,).
+    """
+
+    rows: NDArray[np.intp]
+    at: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, recording: Recording, rest: int) -> "_Rests":
+        n, breaks = len(recording), np.array(recording.breaks, dtype=np.intp)
+        first = np.repeat(breaks, rest)
+        every = np.arange(n)
+        at = every + rest * np.searchsorted(breaks, every, side="right")
+        return cls(np.insert(every, first, first), at)
+
+    @property
+    def samples(self) -> int:
+        """Return how many there are, N."""
+        return int(self.rows.size)
+
+    def beside(self, values: Array) -> Array:
+        """Return values of samples (n, ...) with zeros at rests, (N, ...)."""
+        padded = np.zeros((self.samples, *values.shape[1:]))
+        padded[self.at] = values
+        return padded
+
+    def signals(
+        self, recording: Recording, over: Sequence[str], *, judges: bool
+    ) -> dict[str, Array]:
+        """Return what a step is shown, by port."""
+        signals = signals_of(recording, over, self.rows)
+        resting = np.ones(self.samples, dtype=np.bool_)
+        resting[self.at] = False
+        for port, value in (("v_x", NOWHERE if judges else 0.0), ("a_y", np.nan)):
+            if port in signals:
+                signals[port] = np.where(resting, value, signals[port])
+        return signals
 
 
 def rmse(squares: Array) -> AxleRmse:

@@ -243,7 +243,8 @@ class TableLog:
         clock = self.clock
         t, rows = None, 0
         if clock is not None:
-            t = self._read({}, None).t
+            runs = self.runs()
+            t = self._read({}, runs[0] if runs else None).t
             rows = t.size
         rate = _rate(t)
         listed = []

@@ -62,6 +62,8 @@ class Steering(NamedTuple):
 def windows(recording: Recording) -> Windows:
     """Average a recording over windows of 0.2 s in which the car moves forward all the time.
 
+    No window reaches from one stretch into the next.
+
     Moving: v_x above 0.5 m/s and above 30 % of its 95th percentile.
     """
     n, dt = len(recording), recording.dt
@@ -69,6 +71,7 @@ def windows(recording: Recording) -> Windows:
     start = np.arange(0, max(n - width, 0), max(round(STRIDE / dt), 1) * thinning(n))
     fast = max(SLOWEST, 0.3 * float(np.percentile(recording.v_x[:: thinning(n)], 95)))
     start = start[_sums(lambda at: (recording.v_x[at] < fast) + 0.0, n, start, width) == 0.0]
+    start = start[recording.within_a_stretch(start, width)]
 
     def mean(signal: Array, by: Array | None = None) -> Array:
         product = signal.__getitem__ if by is None else lambda at: signal[at] * by[at]

@@ -59,7 +59,8 @@ def portion(recording: Recording, middle: int | None = None) -> Portion:
         begins = _hardest(power, 0, middle, count // 2) + _hardest(power, middle, n, count // 2)
     samples = np.unique(np.add.outer(begins, np.arange(STRETCH)))
     samples = samples[samples < n]
-    joints = np.append(np.diff(samples) > 1, True)
+    breaks = np.array(recording.breaks, dtype=np.intp)
+    joints = np.append((np.diff(samples) > 1) | np.isin(samples[1:], breaks), True)
     rests = np.flatnonzero(joints)[:, None] - np.arange(round(REST / recording.dt))
     v_x = recording.v_x[samples]
     v_x[np.maximum(rests, 0)] = 0.0

@@ -185,7 +185,7 @@ def log(path, column, value, *, rows=300):
         ("vy", "-1e308", "vy must be of a car"),
         ("delta_f", "1e300", "delta_f must be of a car"),
         ("Fyf", "1e30", "Fyf must be of a car, within +-1e+07, line 2 has 1e+30"),
-        ("t", "1e308", "t must be of a car"),
+        ("t", "1e308", "t must increase"),
         ("r", "1_0", "r must be numeric, line 2 has '1_0'"),
         ("r", "9" * 4000, "r must be finite"),
     ],

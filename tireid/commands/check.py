@@ -40,6 +40,7 @@ from tireid.commands.certificate_table import (
 )
 from tireid.commands.options import (
     Chosen,
+    add_log_map,
     add_method,
     add_output,
     add_seed,
@@ -49,6 +50,7 @@ from tireid.commands.options import (
     read_log,
     read_vehicle,
     seed_of,
+    told_map,
 )
 from tireid.exit_codes import DONE, FAILS
 from tireid.figures import error_figure, locus_figure, save_figure
@@ -120,7 +122,11 @@ CONDITIONS = {  # field of the declared driving, and the option that says otherw
     "noise_r": "noise_r",
     "noise_delta": "noise_delta",
 }
-OF_GAINS = (*CONDITIONS.values(), "log", "monte_carlo")  # options that ask about the paper's gains
+OF_GAINS = (
+    *CONDITIONS.values(),
+    "along",
+    "monte_carlo",
+)  # options that ask about the paper's gains
 TEXT, NUMBERS = "certificate.txt", "certificate.json"
 
 
@@ -152,7 +158,8 @@ def add_parser(commands: Any) -> None:
         parser.add_argument(
             f"--noise-{signal}", type=float, metavar=unit, help=f"largest error of {signal}"
         )
-    parser.add_argument("--log", metavar="LOG[:RUN]", help="judge the loop along a recording too")
+    parser.add_argument("--along", metavar="LOG[:RUN]", help="judge the loop along a recording too")
+    add_log_map(parser)
     parser.add_argument(
         "--monte-carlo",
         type=int,
@@ -230,7 +237,9 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
     if options.design is None:
         design = replace(design, driving=driving)
     certificate = certificate_of(design, vehicle, driving)
-    drive = None if options.log is None else read_log(options.log, vehicle, dt=design.dt)
+    drive = None
+    if options.along is not None:
+        drive = read_log(options.along, vehicle, told_map(options), dt=design.dt)
     _require_free(options)
     observed = _drive(options, vehicle, driving, design, certificate)
     rows = [] if observed is None else bound_rows(certificate, observed)

@@ -38,6 +38,7 @@ from tireid.commands.options import (
     read_log,
     read_vehicle,
     seed_of,
+    told_map,
 )
 from tireid.learning import identify
 from tireid.output import output_folder
@@ -183,10 +184,8 @@ def _network(options: argparse.Namespace, vehicle: Vehicle) -> dict[str, Method]
 
 
 def _recordings(options: argparse.Namespace, vehicle: Vehicle, seed: int) -> list[Recording]:
-    recordings = [
-        read_log(log, vehicle, columns=options.columns, check=not options.no_check)
-        for log in options.logs
-    ]
+    told = told_map(options)
+    recordings = [read_log(log, vehicle, told, check=not options.no_check) for log in options.logs]
     if options.simulate or not options.logs:
         say(f"driving the plant of {vehicle.name} with noisy sensors")
         recordings += plant_recordings(vehicle, np.random.default_rng(seed))

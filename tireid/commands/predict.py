@@ -23,6 +23,8 @@ from tireid.commands.options import (
     add_vehicle,
     read_log,
     read_vehicle,
+    repaired_vehicle,
+    told_map,
 )
 from tireid.learning import replay
 from tireid.output import output_folder, text_table, write_csv, write_json
@@ -61,8 +63,8 @@ def run(options: argparse.Namespace) -> int:
     recording = read_log(
         options.log,
         model.vehicle,
+        told_map(options),
         run_name=options.run_name,
-        columns=options.columns,
         check=not options.no_check,
     )
     prediction = replay(model, recording)
@@ -81,8 +83,9 @@ def _model(options: argparse.Namespace) -> TireModel:
     model = load_model(options.model)
     warn_of_stored(options.model)
     if options.vehicle is None:
-        return model
-    vehicle = read_vehicle(options)
+        vehicle = repaired_vehicle(model.vehicle, options)
+    else:
+        vehicle = read_vehicle(options)
     if vehicle == model.vehicle:
         return model
     if not model.scales_with_load:
