@@ -26,6 +26,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "sensor_faults": [],
     "beginnings": [],
     "noisy_runs": [],
+    "several_rates": [],
     "fault_table": ["{out}"],
     "verdicts": [],
     "plant_against_commonroad": ["{out}"],

@@ -90,12 +90,12 @@ def judge(history: History, t: float | None = None) -> Verdict:
 def _road_felt(history: History, asked: Portion) -> Array | None:
     """Return what a banked road pushed over a portion of a run (k,) [weights]; None unknown."""
     pushes = []
-    for block in history.blocks():
-        push = history.design.road_push(block.state)
+    for stretch in history.stretches():
+        push = history.design.road_push(stretch.state)
         if push is None:
             return None
-        first, last = np.searchsorted(asked.samples, [block.part.start, block.part.stop])
-        pushes.append(push[asked.samples[first:last] - block.part.start])
+        first, last = np.searchsorted(asked.samples, [stretch.part.start, stretch.part.stop])
+        pushes.append(push[asked.samples[first:last] - stretch.part.start])
     return np.concatenate(pushes)
 
 

@@ -59,6 +59,11 @@ class ArrayLog:
         """What it is."""
         return "arrays"
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was taken for granted: nothing."""
+        return ()
+
     def listed(self) -> tuple[Listed, ...]:
         """Return the columns, but for the time and the runs; which are numeric shows in reading."""
         t = self._arrays[str(self._clock)]

@@ -271,7 +271,8 @@ def recording_of(
     stretches = _stretches(label, reading.signals, parts, log_map, dt)
     notes = (*_notes(log), *reading.notes, *_gap_notes(stretches.kept))
     if stretches.short:
-        notes += (f"left out: {stretches.short} stretches of less than {SHORTEST:g} s",)
+        several = "es" if stretches.short > 1 else ""
+        notes += (f"left out: {stretches.short} stretch{several} of less than {SHORTEST:g} s",)
     recordings = [
         _recording(name if run is None else f"{name}:{run}", one, log_map, dt)
         for one in stretches.kept
@@ -284,7 +285,7 @@ def _notes(log: LogFile) -> tuple[str, ...]:
     """Return what a format says of what it took or mended."""
     clock = getattr(log, "clock", None)
     said = () if clock is None or clock.unit == "s" else (f"time is {clock.words}",)
-    return (*said, *getattr(log, "notes", ()))
+    return (*said, *log.notes)
 
 
 def _wants_clock(log: LogFile, listed: Sequence[Listed], clock: str) -> bool:

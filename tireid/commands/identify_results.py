@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from codegen.arrays import Array, blocks
-from identifier.method import Block, Method, vehicle_numbers
+from identifier.method import Method, Stretch, vehicle_numbers
 from identifier.methods import certify
 from identifier.own_network import OnnxModel
 from identifier.reproducibility import (
@@ -211,16 +211,16 @@ def _write_curves(folder: Path, learnt: History, others: Sequence[History], froz
         name = "forces.csv" if history is learnt else f"forces_{file_name(history.recording)}.csv"
         write_forces(folder / name, history, replays)
     if OBSERVED in learnt.outputs:
-        found = learnt.blocks()
-        write_long_csv(folder / "errors.csv", (_error_columns(learnt, one) for one in found))
-    parts = (_weight_columns(learnt, one) for one in learnt.blocks())
+        stretches = learnt.stretches()
+        write_long_csv(folder / "errors.csv", (_error_columns(learnt, one) for one in stretches))
+    parts = (_weight_columns(learnt, one) for one in learnt.stretches())
     write_long_csv(folder / "weights.csv", parts)
 
 
-def _error_columns(learnt: History, block: Block) -> dict[str, Array]:
-    observed, z = block.outputs[OBSERVED], block.before["z"]
+def _error_columns(learnt: History, stretch: Stretch) -> dict[str, Array]:
+    observed, z = stretch.outputs[OBSERVED], stretch.before["z"]
     return {
-        "t_s": learnt.recording.t[block.part],
+        "t_s": learnt.recording.t[stretch.part],
         "xi_tilde_f_Us": observed[:, 0],
         "xi_tilde_r_Us": observed[:, 1],
         "z_f_Us2": z[:, 0],
@@ -228,10 +228,10 @@ def _error_columns(learnt: History, block: Block) -> dict[str, Array]:
     }
 
 
-def _weight_columns(learnt: History, block: Block) -> dict[str, Array]:
-    weights = {"t_s": learnt.recording.t[block.part]}
-    for matrix in [name for name in WEIGHTS if name in block.state]:
-        values = block.before[matrix]
+def _weight_columns(learnt: History, stretch: Stretch) -> dict[str, Array]:
+    weights = {"t_s": learnt.recording.t[stretch.part]}
+    for matrix in [name for name in WEIGHTS if name in stretch.state]:
+        values = stretch.before[matrix]
         for i, j in np.ndindex(values.shape[1:]):
             weights[f"{matrix}_{i + 1}_{j + 1}"] = values[:, i, j]
     return weights
@@ -314,7 +314,7 @@ def _draw(
     if OBSERVED in learnt.outputs:
         figures["error"] = error_figure(learnt, freeze_times=list(frozen))
         figures["weights"] = weights_figure(learnt, list(frozen))
-    if learnt.tracks_over(next(learnt.blocks())):
+    if learnt.tracks_over(next(learnt.stretches())):
         figures["learnt"] = learnt_axles_figure(learnt, list(frozen))
     for other in others:
         replay = frozen[last][other.recording.name]

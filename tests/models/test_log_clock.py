@@ -1,0 +1,132 @@
+"""Channels of several rates come to one clock without a look at what was logged later."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from models.logs.clock import (
+    LONGEST_GAP,
+    Raw,
+    are_one_clock,
+    gaps,
+    on_one_clock,
+    sampled,
+    without_empty,
+)
+from models.logs.log import Channel
+
+DT = 0.01
+
+
+def raw(t, values) -> Raw:
+    t = np.asarray(t, dtype=np.float64)
+    return Raw(t, np.asarray(values, dtype=np.float64), "sample", np.arange(t.size))
+
+
+def wave(t):
+    return np.sin(2.0 * np.pi * 0.5 * t)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    rate=st.sampled_from([7.0, 10.0, 25.0, 50.0, 100.0, 130.0, 1000.0]),
+    cut=st.floats(0.3, 1.4),
+    seed=st.integers(0, 2**31),
+)
+def test_what_is_logged_later_changes_nothing(rate: float, cut: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, 2.0, 1.0 / rate)
+    grid = t[0] + DT * np.arange(180)
+    values = rng.normal(size=t.size)
+    before = sampled(raw(t, values), grid, DT)
+    later = np.where(t > cut, rng.normal(size=t.size), values)
+    after = sampled(raw(t, later), grid, DT)
+    known = grid + 1.1e-4 < cut
+    assert np.array_equal(before[known], after[known])
+    rest = grid > cut + 1.0 / rate + DT
+    assert not np.allclose(before[rest], after[rest])  # the test can fail
+
+
+def test_a_straight_line_is_followed_without_delay() -> None:
+    t = np.arange(0.0, 2.0, 0.1)
+    grid = DT * np.arange(190)
+    got = sampled(raw(t, 3.0 + 2.0 * t), grid, DT)
+    assert np.allclose(got[10:], 3.0 + 2.0 * grid[10:])
+    assert np.all(got[:10] == 3.0)  # one sample has no slope
+
+
+def test_a_slow_channel_goes_on_for_one_interval_at_most() -> None:
+    got = sampled(raw([0.0, 0.1, 0.2], [0.0, 1.0, 2.0]), np.array([0.2, 0.25, 0.3, 0.35, 0.5]), DT)
+    assert np.allclose(got, [2.0, 2.5, 3.0, 3.0, 3.0])
+
+
+def test_a_channel_on_the_clock_keeps_its_bits() -> None:
+    t, values = DT * np.arange(300), np.random.default_rng(0).normal(size=300)
+    assert np.array_equal(sampled(raw(t, values), t, DT), values)
+
+
+def test_a_fast_channel_is_the_mean_since_the_instant_before() -> None:
+    t = 0.001 * np.arange(500)
+    got = sampled(raw(t, np.arange(500.0)), DT * np.arange(40), DT)
+    assert got[0] == 0.0
+    assert np.allclose(got[1:], 10.0 * np.arange(1, 40) - 4.5)
+
+
+def test_noise_above_the_clock_is_not_folded_into_the_drive() -> None:
+    t = 0.001 * np.arange(2000)
+    tone = np.sin(2 * np.pi * 102.0 * t)
+    assert np.abs(sampled(raw(t, tone), DT * np.arange(1, 190), DT)).max() < 0.03
+
+
+def test_the_clock_is_that_of_the_channel_nearest_to_it() -> None:
+    t = 0.003 + DT * np.arange(400)
+    slow = np.arange(0.0, 4.0, 0.1)
+    (one,) = on_one_clock({"r": raw(t, wave(t)), "v_x": raw(slow, slow)}, DT, LONGEST_GAP)
+    assert np.array_equal(one.t, t[: one.t.size]) and one.t.size >= 398
+    assert np.array_equal(one.signals["r"], wave(t)[: one.t.size])
+    assert np.allclose(one.signals["v_x"][100:], one.t[100:])
+
+
+def test_a_gap_of_any_channel_ends_a_stretch_of_all() -> None:
+    t = DT * np.arange(1000)
+    hole = (t < 3.0) | (t >= 5.0)
+    slow = np.arange(0.0, 10.0, 0.1)
+    channels = {"r": raw(t, wave(t)), "v_y": raw(t[hole], wave(t[hole])), "v_x": raw(slow, slow)}
+    first, second = on_one_clock(channels, DT, LONGEST_GAP)
+    assert first.t[0] == 0.0 and first.t[-1] == pytest.approx(2.99, abs=0.011)
+    assert second.t[0] == pytest.approx(5.0) and second.t[-1] == pytest.approx(9.99)
+    for one in (first, second):
+        assert np.allclose(one.signals["v_y"], wave(one.t), atol=1e-9)
+
+
+def test_channels_that_never_overlap_have_no_stretch() -> None:
+    t = DT * np.arange(100)
+    assert on_one_clock({"a": raw(t, t), "b": raw(t + 5.0, t)}, DT, LONGEST_GAP) == []
+
+
+def test_slow_channels_have_no_gap_between_their_samples() -> None:
+    assert gaps(np.arange(0.0, 3.0, 0.1), LONGEST_GAP).size == 0
+    assert gaps(np.array([0.0, 0.1, 0.2, 0.5, 0.6, 0.7]), LONGEST_GAP).tolist() == [3]
+    assert gaps(np.array([0.0, 0.01, 0.02, 0.12, 0.13]), LONGEST_GAP).size == 0
+    assert gaps(np.array([0.0, 0.01, 0.02, 0.13, 0.14]), LONGEST_GAP).tolist() == [3]
+
+
+def test_empty_cells_of_a_slower_channel_are_no_holes_but_single_ones_are() -> None:
+    t = DT * np.arange(100)
+    every_tenth = np.where(np.arange(100) % 10 == 0, t, np.nan)
+
+    def channel(values) -> Channel:
+        rows = np.arange(100)
+        return Channel(name="v", unit="", t=t, values=values, place="line", rows=rows)
+
+    slower = without_empty(channel(every_tenth))
+    assert slower.t.size == 10 and np.isfinite(slower.values).all()
+    holes = channel(np.where(np.arange(100) % 10 == 0, np.nan, t))
+    assert without_empty(holes) is holes
+
+
+def test_clocks_are_one_where_their_numbers_are() -> None:
+    t = DT * np.arange(10)
+    assert are_one_clock([raw(t, t), raw(t.copy(), t)])
+    assert not are_one_clock([raw(t, t), raw(t + 1e-9, t)])
