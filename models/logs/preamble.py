@@ -21,6 +21,7 @@ from models.logs.spelling import is_unit, is_units_row, unit_in_name
 from models.schema import shown
 
 HEAD = 1 << 18  # bytes that are looked at
+ROWS = 400  # of data that tell what columns are
 TAIL = 40  # last lines of them that tell how cells are written
 BLANKS = " "  # the delimiter of columns that any number of blanks and tabs set apart
 DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks"}
@@ -270,8 +271,8 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
         units=tuple(units),
         first=lines[first].number,
         again=again,
-        numeric=_numeric(data, len(names), way),
-        rows=tuple(data),
+        numeric=_numeric(data, names, way),
+        rows=tuple(data[:ROWS]),
         words=tuple(words),
         made_by=made_by,
     )
@@ -328,14 +329,16 @@ def _named(zone: list[_Line], way: _Way) -> tuple[_Line, _Line | None]:
     return (fitting[at - 1], units) if at else (units, None)
 
 
-def _numeric(data: Sequence[Sequence[str]], width: int, way: _Way) -> tuple[bool, ...]:
+def _numeric(data: Sequence[Sequence[str]], names: Sequence[str], way: _Way) -> tuple[bool, ...]:
     """Return which columns hold numbers: those in which no cell, or few of them, are words."""
     found = []
-    for column in range(width):
-        cells = [row[column] for row in data[:400]]
+    for column in range(len(names)):
+        cells = [row[column] for row in data[:ROWS]]
         filled = [cell for cell in cells if cell.lower() not in MISSING]
         right = sum(_is_number(cell, way.decimal, way.thousands) for cell in filled)
         found.append(2 * right >= len(filled) and not _all_instants(filled))
+        if not names[column] and not filled:
+            found[-1] = False  # what follows the delimiter that rows end in
     return tuple(found)
 
 
@@ -434,7 +437,7 @@ def _racelogic(path: Path, lines: list[str], encoding: str, at: dict[str, int]) 
         first=first + 1,
         again=(),
         numeric=(True,) * len(names),
-        rows=tuple(data),
+        rows=tuple(data[:ROWS]),
         words=(
             _encoding_word(encoding),
             "Racelogic VBOX sections (sure)",

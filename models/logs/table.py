@@ -231,8 +231,7 @@ class TableLog:
     def clock(self) -> Clock | None:
         """The column that is the time; None where no column can be."""
         table = self.table
-        heads = {k: table.first_rows(k) for k in range(len(self.names))}
-        return find_clock(self.names, table.units, heads)
+        return find_clock(self.names, table.units, table.first_rows)
 
     @cached_property
     def _run_column(self) -> int | None:
