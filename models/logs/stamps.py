@@ -100,6 +100,18 @@ def find_clock(
     return None
 
 
+def told_clock(column: int, name: str, unit: str, head: Sequence[str]) -> Clock | None:
+    """Return a column that is said to be the time; None where its cells are none.
+
+    Parameters
+    ----------
+    column : from 0.
+    name, unit : of it.
+    head : its first cells, with decimal points.
+    """
+    return _clock(column, name, unit, head, _is_any)
+
+
 def _plain(name: str) -> str:
     """Return a name in small letters without its unit and signs."""
     unit = unit_in_name(name)
@@ -110,6 +122,7 @@ def _plain(name: str) -> str:
     return re.sub(r"[^a-z]", "", name.lower())
 
 
+@np.errstate(all="ignore")  # of numbers that are no times
 def _clock(
     column: int, name: str, unit: str, cells: Sequence[str], fits: Callable[[Array], bool]
 ) -> Clock | None:
@@ -241,6 +254,7 @@ def _of_day(text: str) -> int | None:
 # Seconds that rise.
 
 
+@np.errstate(all="ignore")  # of numbers that are no times
 def seconds(
     label: str, clock: Clock, values: NDArray[Any], rows: NDArray[np.int64], place: str
 ) -> Stamps:
@@ -348,6 +362,7 @@ class Even(NamedTuple):
     words: str
 
 
+@np.errstate(all="ignore")
 def even_clock(t: Array) -> Even | None:
     """Return the even clock that stamps were rounded from; None where there is none, or no need.
 
@@ -427,14 +442,15 @@ def _even_step(t: Array, tick: float) -> float | None:
     slope = float(centered @ (t - t.mean()) / (centered @ centered))
     if not slope > 0.0:
         return None
-    round_ones = [round(slope, digits) for digits in range(2, 8)]
-    rate = round(1.0 / slope)
-    for dt in (*round_ones, *([1.0 / rate] if rate else []), slope):
+    per_second = max(round(1.0 / slope), 1)
+    few = [round(slope, digits) for digits in range(2, 5)]
+    for dt in (*few, 1.0 / per_second, *(round(slope, digits) for digits in range(5, 8)), slope):
         if dt > 0.0 and np.ptp(t - dt * k) <= _slack(tick, t):
             return dt
     return None
 
 
+@np.errstate(all="ignore")
 def not_rising(t: Array, rows: NDArray[np.int64], place: str) -> str:
     """Return the rule that stamps break which fall or repeat, with value and remedy.
 
@@ -448,7 +464,7 @@ def not_rising(t: Array, rows: NDArray[np.int64], place: str) -> str:
     assert k is not None
     said = f"must increase, {place} {rows[k + 1]} has {t[k + 1]:.9g} after {t[k]:.9g}; "
     if t[k + 1] < t[k]:
-        if t[k + 1] - t[0] <= 0.5 * (t[k] - t[0]):
+        if t[k + 1] - t[0] <= 0.5 * (t[k] - t[0]) and t[k] > t[0]:
             return said + "the clock starts again: several runs in one file need a column run"
         return said + "samples are out of order: sort them by time, or cut the log there"
     steps = np.diff(t[k : k + LONGEST_IN_MEMORY])

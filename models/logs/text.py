@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.logs.log import RecordingError
-from models.logs.preamble import BLANKS, COMMENT, HEAD, MISSING, Layout, find_layout
+from models.logs.preamble import BLANKS, COMMENT, HEAD, MISSING, Layout, cells_of, find_layout
 from models.logs.stamps import nanoseconds
 from models.logs.table import Cells, Gathered, Kind, TableLog, Words
 from models.schema import pieces, require_few, shown
@@ -238,7 +238,7 @@ class _Python:
     def __init__(self, path: Path, layout: Layout, wanted: Mapping[int, Kind]) -> None:
         self._path, self._layout, self._wanted = path, layout, wanted
         self._width = len(layout.names)
-        again = [_stripped(_split(one, layout.delimiter)) for one in layout.again]
+        again = [list(cells_of(one, layout.delimiter)) for one in layout.again]
         self._again = [one for one in again if any(one)]
         self._marks = [one.encode() for one in COMMENT]
         self._marks += [text.strip().encode() for text in layout.again if text.strip()]
@@ -341,12 +341,6 @@ class _Python:
         return np.array(values, dtype=dtype)
 
 
-def _split(line: str, delimiter: str) -> list[str]:
-    if delimiter == BLANKS:
-        line = " ".join(line.split())
-    return next(csv.reader([line], delimiter=delimiter), [])
-
-
 def _stripped(cells: Sequence[str]) -> list[str]:
     return [cell.strip() for cell in cells]
 
@@ -394,7 +388,7 @@ def _by_arrow(
     arrow: Any, layout: Layout, wanted: Mapping[int, Kind], block: bytes
 ) -> dict[int, Any] | None:
     """Return the columns that are wanted; None where anything in the block is not plain."""
-    if layout.thousands:
+    if layout.thousands or not wanted:
         return None
     kinds = {
         str(column): arrow.float64() if kind is Kind.NUMBER else arrow.string()

@@ -1,6 +1,7 @@
 """Text files as loggers write them are read as they were meant, or refused in one clear line."""
 
 import gzip
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -99,6 +100,14 @@ def test_one_run_of_several_is_read_alone(tmp_path):
     rows = [f"{one},{'a' if k < 50 else 'b'}" for k, one in enumerate(lines[1:])]
     log = open_log(written(tmp_path, "\n".join([lines[0] + ",run", *rows])))
     assert log.runs() == ("a", "b")
+    assert [one.samples for one in log.listed()] == [120] * 4
+    assert [one.rate for one in log.listed()] == pytest.approx([100.0] * 4)
+    with pytest.raises(RecordingError, match="name one of its runs: 'a, b'"):
+        log.read(["vy [m/s]"])
+    with pytest.raises(RecordingError, match="there is no run 'c', the runs are: 'a, b'"):
+        log.read(["vy [m/s]"], run="c")
+    with pytest.raises(RecordingError, match="there is no column run, so no run 'a'"):
+        open_log(written(tmp_path, plain(), "plain.csv")).read(["vy [m/s]"], run="a")
     (channel,) = log.read(["Speed [km/h]"], run="b")
     np.testing.assert_array_equal(channel.values, drive().speed[50:])
     assert channel.rows[0] == 52
@@ -152,6 +161,60 @@ def test_the_clock_is_found_by_what_it_does_where_no_name_tells(tmp_path):
     )
 
 
+def test_runs_whose_clocks_start_anew_are_listed_and_read(tmp_path):
+    lines = plain().splitlines()
+    rows = [f"{one},{name}" for name in "ab" for one in lines[1:]]
+    log = open_log(written(tmp_path, "\n".join([lines[0] + ",run", *rows])))
+    assert log.listed()[0].samples == 240
+    for name in "ab":
+        np.testing.assert_array_equal(log.read(["vy [m/s]"], run=name)[0].t, drive().t)
+
+
+def test_a_clock_that_is_told_is_taken(tmp_path):
+    rows = [f"{k % 7},{10 * k},{DT * k:.2f}" for k in range(60)]
+    log = open_log(written(tmp_path, "\n".join(["a,Time,mine", *rows])))
+    told = replace(log, clock_name="mine")
+    np.testing.assert_array_equal(told.read(["a"])[0].t, log.read(["a"])[0].t)
+    assert [one.name for one in told.listed()] == ["a", "Time"]
+    with pytest.raises(RecordingError, match="there is no channel 'b'"):
+        replace(log, clock_name="b").listed()
+    words = open_log(written(tmp_path, "word,t\n" + "x,1\n" * 9))
+    with pytest.raises(RecordingError, match="word must be a time, its first cells are 'x, x, x'"):
+        replace(words, clock_name="word").listed()
+
+
+@pytest.mark.parametrize(
+    ("tick", "dt"), [(0.1, 0.01), (0.01, 0.0025), (0.001, 0.0025), (0.001, 1 / 60), (1.0, 0.02)]
+)
+@pytest.mark.parametrize("how", [np.floor, np.rint])
+def test_rounded_stamps_are_put_on_the_even_clock_and_it_is_said(tmp_path, tick, dt, how):
+    true = dt * np.arange(4000)
+    rows = [f"{tick * stamp:.3f},1" for stamp in how(np.round(true / tick, 6))]
+    log = open_log(written(tmp_path, "\n".join(["t,v", *rows])))
+    t = log.read(["v"])[0].t
+    assert np.ptp(t - true) < 1e-3 * dt
+    assert np.diff(t) == pytest.approx(np.full(3999, dt), rel=1e-4)
+    (note,) = log.notes
+    assert note.startswith(f"t is rounded to {tick:g} s, its samples were put on the even clock of")
+    assert f"{dt:.9g} s that explains every stamp" in note
+
+
+def test_samples_that_are_lost_among_rounded_stamps_stay_lost(tmp_path):
+    true = 0.01 * np.delete(np.arange(4000), slice(1200, 1277))
+    rows = [f"{stamp:.1f},1" for stamp in np.floor(np.round(true * 10, 6)) / 10]
+    t = open_log(written(tmp_path, "\n".join(["t,v", *rows]))).read(["v"])[0].t
+    assert np.abs(t - true).max() < 0.1
+    assert np.count_nonzero(np.diff(t) > 0.011) == 1
+    np.testing.assert_allclose(np.diff(t)[:1000], 0.01, rtol=1e-6)
+
+
+def test_stamps_that_jitter_but_rise_stay_as_they_are(tmp_path, rng):
+    t = np.round(np.cumsum(rng.uniform(0.006, 0.014, 500)), 3)
+    log = open_log(written(tmp_path, "\n".join(["t,v", *(f"{one:.3f},1" for one in t)])))
+    np.testing.assert_array_equal(log.read(["v"])[0].t, t)
+    assert log.notes == ()
+
+
 WRONG = {
     "no header": (plain().split("\n", 1)[1], "there is no header, line 1 is data already"),
     "a wrong cell": (
@@ -177,6 +240,11 @@ WRONG = {
     ),
     "a cut row": (plain()[:-12], "line 121 has 4 cells, the header has 5; was the file cut off?"),
     "a header alone": ("t,v\n", "there is a header but no row of data"),
+    "a header with units alone": ("t,v\ns,m/s\n", "there is a header but no row of data"),
+    "times of no clock": (
+        "t,v\n-1e308,1\n1e308,2\n" + "inf,1\n" * 20,
+        "t must be a time in every row, line 4 has none",
+    ),
     "nothing": ("", "is empty"),
     "blank lines": ("\n \n\n", "is empty"),
     "a picture": (b"\x89PNG\r\n\x1a\n" + bytes(40), "is a binary file (it has NUL bytes)"),
