@@ -10,7 +10,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-LONGEST_IN_MEMORY = 1 << 21  # numbers: 16 MB of a column of float64
+LONGEST_IN_MEMORY = 1 << 20  # numbers: 8 MB of a column of float64
 
 
 class Growing:
@@ -19,12 +19,12 @@ class Growing:
     Parameters
     ----------
     dtype : of its numbers.
-    in_memory : how many it holds before it goes to disk.
+    in_memory : how many it holds before it goes to disk; None takes `LONGEST_IN_MEMORY`.
     """
 
-    def __init__(self, dtype: Any = np.float64, in_memory: int = LONGEST_IN_MEMORY) -> None:
+    def __init__(self, dtype: Any = np.float64, in_memory: int | None = None) -> None:
         self._dtype = np.dtype(dtype)
-        self._in_memory = in_memory
+        self._in_memory = LONGEST_IN_MEMORY if in_memory is None else in_memory
         self._parts: list[NDArray[Any]] = []
         self._file: IO[bytes] | None = None
         self._size = 0

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -94,16 +93,15 @@ class ParquetTable:
         """How the file is written, for people."""
         return ()
 
-    @cached_property
-    def _head(self) -> Any:
-        """The first rows of every column."""
-        return next(self._batches(None, HEAD), None)
-
     def first_rows(self, column: int) -> list[str]:
-        """Return the first cells of a column as text."""
-        if self._head is None:
-            return []
-        return _as_text(self._head.column(column), self.schema.field(column).type)
+        """Return the first cells of a column as text, "" where one is missing.
+
+        Parameters
+        ----------
+        column : from 0.
+        """
+        head = next(self._batches([column], HEAD), None)
+        return [] if head is None else _as_text(head.column(0), self.schema.field(column).type)
 
     def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
         """Return columns.
@@ -138,7 +136,7 @@ class ParquetTable:
             gathered.extend(rows, columns)
         return gathered.finished()
 
-    def _batches(self, columns: list[int] | None, size: int) -> Any:
+    def _batches(self, columns: list[int], size: int) -> Any:
         """Yield batches of rows."""
         import pyarrow
         import pyarrow.parquet
@@ -146,11 +144,9 @@ class ParquetTable:
         names = self.names
         try:
             with pyarrow.parquet.ParquetFile(self.path) as file:
-                wanted = None if columns is None else [names[k] for k in columns]
+                wanted = [names[k] for k in columns]
                 for batch in file.iter_batches(batch_size=size, columns=wanted):
-                    if wanted is not None:
-                        batch = batch.select(wanted)
-                    yield batch
+                    yield batch.select(wanted)
         except (pyarrow.ArrowException, OSError, UnicodeDecodeError) as error:
             raise _not_parquet(self.path, error) from None
 

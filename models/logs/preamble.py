@@ -18,17 +18,19 @@ from typing import NamedTuple
 
 from models.logs.log import RecordingError
 from models.logs.spelling import is_unit, is_units_row, unit_in_name
-from models.schema import shown
+from models.schema import require_few, shown
 
-HEAD = 1 << 18  # bytes that are looked at
+HEAD, LINES = 1 << 18, 1500  # bytes and lines that are looked at
+ROWS = 400  # of data that tell what columns are
 TAIL = 40  # last lines of them that tell how cells are written
 BLANKS = " "  # the delimiter of columns that any number of blanks and tabs set apart
 DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks"}
 COMMENT = ("#", "%", "//")
 MISSING = ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "1.#qnan", "-1.#ind")
+MANY = 300  # cells of a line that tell how all are written
 CLEAR = 0.9  # share of cells that a way of reading must make numbers to be sure
 
-_DOT = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_DOT = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
 _COMMA = re.compile(r"[-+]?(?:\d+|\d*,\d+)(?:[eE][-+]?\d+)?")
 _POINTS = re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+(?:,\d*)?")  # 1.234.567,8
 _COMMAS = re.compile(r"[-+]?\d{1,3}(?:,\d{3})+(?:\.\d*)?")  # 1,234,567.8
@@ -115,20 +117,18 @@ def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
         raise RecordingError(f"{path}: line 1 is longer than {HEAD} characters, no header is")
     if not any(line.strip() for line in lines):
         raise RecordingError(f"{path}: is empty")
+    begun = next(k for k, line in enumerate(lines) if line.strip())
+    lines = lines[: begun + LINES]
     section = _sections(lines)
     if section is not None:
         return _racelogic(path, lines, encoding, section)
     filled = [line for line in lines if line.strip() and not line.lstrip().startswith(COMMENT)]
     way = _way(filled[-TAIL:])
     if way is None:
-        return _no_data(lines, encoding)
-    table = [_Line(k, line, _cells(line, way.delimiter)) for k, line in enumerate(lines, start=1)]
+        return _no_data(path, lines, encoding)
+    require_few(RecordingError, str(path), way.width, "columns", "columns")
+    table = [_Line(k, line, cells_of(line, way.delimiter)) for k, line in enumerate(lines, start=1)]
     return _table(path, table, way, encoding)
-
-
-def numbers(cells: Sequence[str], way: tuple[str, str] = (".", "")) -> int:
-    """Return how many cells are numbers."""
-    return sum(_is_number(cell, *way) for cell in cells)
 
 
 def _encoding(path: Path, head: bytes) -> str:
@@ -174,8 +174,14 @@ def _decoded(path: Path, head: bytes, encoding: str) -> str:
     return text
 
 
-def _cells(line: str, delimiter: str) -> tuple[str, ...]:
-    """Return the cells of one line."""
+def cells_of(line: str, delimiter: str) -> tuple[str, ...]:
+    """Return the cells of one line, the line itself where it has none.
+
+    Parameters
+    ----------
+    line : without its end.
+    delimiter : one character, " " for any number of blanks and tabs.
+    """
     if delimiter == BLANKS:
         line = " ".join(line.split())
     try:
@@ -201,11 +207,11 @@ def _way(tail: list[str]) -> _Way | None:
     """Return how cells are written; None where hardly any is a number in any way."""
     best: _Way | None = None
     for delimiter in DELIMITERS:
-        rows = [_cells(line, delimiter) for line in tail]
+        rows = [cells_of(line, delimiter) for line in tail]
         width, often = Counter(map(len, rows)).most_common(1)[0] if rows else (0, 0)
         if width < 2:
             continue
-        cells = [cell for row in rows if len(row) == width for cell in row if cell]
+        cells = [cell for row in rows if len(row) == width for cell in row[:MANY] if cell]
         for decimal, thousands in ((".", ""), (",", ""), (".", ","), (",", ".")):
             if thousands == delimiter and not any(thousands in cell for cell in cells):
                 continue
@@ -218,7 +224,7 @@ def _way(tail: list[str]) -> _Way | None:
 
 def _is_data(cells: Sequence[str], way: _Way) -> bool:
     """Return whether a line is of numbers, at least half of its cells that are filled."""
-    filled = [cell for cell in cells if cell]
+    filled = [cell for cell in cells[:MANY] if cell]
     right = sum(_is_number(cell, way.decimal, way.thousands) for cell in filled)
     return right > 0 and 2 * right >= len(filled) and not is_units_row(cells)
 
@@ -270,8 +276,8 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
         units=tuple(units),
         first=lines[first].number,
         again=again,
-        numeric=_numeric(data, len(names), way),
-        rows=tuple(data),
+        numeric=_numeric(data, names, way),
+        rows=tuple(data[:ROWS]),
         words=tuple(words),
         made_by=made_by,
     )
@@ -310,7 +316,7 @@ def _uncommented(line: _Line, way: _Way) -> tuple[str, ...]:
     text = line.text.lstrip()
     for mark in COMMENT:
         if text.startswith(mark):
-            return _cells(text.lstrip("#%/").strip(), way.delimiter)
+            return cells_of(text.lstrip("#%/").strip(), way.delimiter)
     return line.cells
 
 
@@ -328,14 +334,16 @@ def _named(zone: list[_Line], way: _Way) -> tuple[_Line, _Line | None]:
     return (fitting[at - 1], units) if at else (units, None)
 
 
-def _numeric(data: Sequence[Sequence[str]], width: int, way: _Way) -> tuple[bool, ...]:
+def _numeric(data: Sequence[Sequence[str]], names: Sequence[str], way: _Way) -> tuple[bool, ...]:
     """Return which columns hold numbers: those in which no cell, or few of them, are words."""
     found = []
-    for column in range(width):
-        cells = [row[column] for row in data[:400]]
+    for column in range(len(names)):
+        cells = [row[column] for row in data[:ROWS]]
         filled = [cell for cell in cells if cell.lower() not in MISSING]
         right = sum(_is_number(cell, way.decimal, way.thousands) for cell in filled)
         found.append(2 * right >= len(filled) and not _all_instants(filled))
+        if not names[column] and not filled:
+            found[-1] = False  # what follows the delimiter that rows end in
     return tuple(found)
 
 
@@ -368,11 +376,14 @@ def _maker(lines: Sequence[_Line]) -> str:
     return ""
 
 
-def _no_data(lines: list[str], encoding: str) -> Layout:
+def _no_data(path: Path, lines: list[str], encoding: str) -> Layout:
     """Return the layout of a header without a row of data."""
     number, text = next((k, line) for k, line in enumerate(lines, start=1) if line.strip())
     delimiter = max(DELIMITERS, key=lambda one: text.count(one) if one != BLANKS else 0)
-    names = _cells(text, delimiter)
+    names = cells_of(text, delimiter)
+    require_few(RecordingError, str(path), len(names), "columns", "columns")
+    after = cells_of(lines[number], delimiter) if number < len(lines) else ()
+    under = len(after) == len(names) and is_units_row(after)
     return Layout(
         encoding=encoding,
         delimiter=delimiter,
@@ -380,7 +391,7 @@ def _no_data(lines: list[str], encoding: str) -> Layout:
         thousands="",
         names=names,
         units=tuple(unit_in_name(name) for name in names),
-        first=number + 1,
+        first=number + 1 + under,
         again=(text,),
         numeric=(True,) * len(names),
         rows=(),
@@ -421,7 +432,7 @@ def _racelogic(path: Path, lines: list[str], encoding: str, at: dict[str, int]) 
         "hhmmss" if name.lower() == "time" else u for name, u in zip(names, units, strict=True)
     ]
     first = at["data"] + 1
-    data = [cells for line in lines[first:] if len(cells := _cells(line, BLANKS)) == len(names)]
+    data = [cells for line in lines[first:] if len(cells := cells_of(line, BLANKS)) == len(names)]
     way = _way([line for line in lines[first:] if line.strip()][-TAIL:])
     decimal = "." if way is None else way.decimal
     return Layout(
@@ -434,7 +445,7 @@ def _racelogic(path: Path, lines: list[str], encoding: str, at: dict[str, int]) 
         first=first + 1,
         again=(),
         numeric=(True,) * len(names),
-        rows=tuple(data),
+        rows=tuple(data[:ROWS]),
         words=(
             _encoding_word(encoding),
             "Racelogic VBOX sections (sure)",

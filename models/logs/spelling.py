@@ -3,6 +3,8 @@
 import re
 from collections.abc import Sequence
 
+from models.schema import LONGEST_NAME
+
 _WORDS = frozenset((
     "s", "sec", "secs", "seconds", "ms", "msec", "us", "µs", "ns", "min", "h", "hr", "m", "mm",
     "cm", "km", "in", "ft", "mi", "m/s", "mps", "km/h", "km/hr", "kmh", "kph", "kmph", "mph",
@@ -65,6 +67,8 @@ def unit_in_name(name: str) -> str:
     ----------
     name : of a column, as in the file.
     """
+    if len(name) > LONGEST_NAME:
+        return ""
     held = _BRACKETS.fullmatch(name)
     if held and (is_unit(held[1]) or "[" in name):
         return held[1]

@@ -8,7 +8,7 @@ stamp; it is said. Stamps that fall are no rounding: a clock that starts again, 
 import datetime
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -75,27 +75,41 @@ class Stamps(NamedTuple):
 
 
 def find_clock(
-    names: Sequence[str], units: Sequence[str], heads: Mapping[int, Sequence[str]]
+    names: Sequence[str], units: Sequence[str], head: Callable[[int], Sequence[str]]
 ) -> Clock | None:
     """Return the column that is the time, by its name or else as the first that rises evenly.
 
     Parameters
     ----------
     names, units : of the columns.
-    heads : column -> its first cells, with decimal points.
+    head : gives the first cells of a column, with decimal points.
     """
     named = [k for k, name in enumerate(names) if _plain(name) in NAMES]
     named.sort(key=lambda k: NAMES.index(_plain(names[k])))
     for k in named:
-        clock = _clock(k, names[k], units[k], heads[k], by_name=True)
-        if clock is not None:
+        if (clock := _clock(k, names[k], units[k], head(k), _rises)) is not None:
             return clock
     for k, name in enumerate(names):
-        if units[k] in ("", *PER_SECOND, *_SPELT):
-            clock = _clock(k, name, units[k], heads[k], by_name=False)
-            if clock is not None:
-                return clock
+        if k in named or units[k] not in ("", *PER_SECOND, *_SPELT):
+            continue
+        if (clock := _clock(k, name, units[k], head(k), _rises_evenly)) is not None:
+            return clock
+    for k in named:  # which does not rise, and what is wrong with it will be said
+        if (clock := _clock(k, names[k], units[k], head(k), _is_any)) is not None:
+            return clock
     return None
+
+
+def told_clock(column: int, name: str, unit: str, head: Sequence[str]) -> Clock | None:
+    """Return a column that is said to be the time; None where its cells are none.
+
+    Parameters
+    ----------
+    column : from 0.
+    name, unit : of it.
+    head : its first cells, with decimal points.
+    """
+    return _clock(column, name, unit, head, _is_any)
 
 
 def _plain(name: str) -> str:
@@ -108,29 +122,46 @@ def _plain(name: str) -> str:
     return re.sub(r"[^a-z]", "", name.lower())
 
 
+@np.errstate(all="ignore")  # of numbers that are no times
 def _clock(
-    column: int, name: str, unit: str, cells: Sequence[str], *, by_name: bool
+    column: int, name: str, unit: str, cells: Sequence[str], fits: Callable[[Array], bool]
 ) -> Clock | None:
-    """Return a column as the clock; None where its cells are no time that rises."""
+    """Return a column as the clock; None where its cells are no time whose steps fit."""
     filled = [cell for cell in cells if cell.strip()]
-    words = "by its name" if by_name else "as it rises evenly (likely)"
-    if unit == "hhmmss":
-        return Clock(column, name, "hhmmss", False, f"{name!r} as hhmmss ({words})")
+    words = "as it rises evenly (likely)" if fits is _rises_evenly else "by its name (sure)"
     values = [_number(cell) for cell in filled]
-    if any(value is None for value in values):
-        instants = [nanoseconds(cell) for cell in filled]
-        if not filled or any(one is None for one in instants):
+    kind = "hhmmss" if unit == "hhmmss" else ""
+    few = len(filled) // 10  # cells that may be wrong, which will be said when they are read
+    if values.count(None) > few:
+        values = [nanoseconds(cell) for cell in filled]
+        kind = "instant"
+        if values.count(None) > few:
             return None
-        return Clock(column, name, "instant", False, f"{name!r} as date or time of day ({words})")
-    t = np.array(values, dtype=np.float64)
-    steps = np.diff(t)
-    if not by_name and not _rises_evenly(steps):
+    t = np.array([value for value in values if value is not None], dtype=np.float64)
+    if not fits(np.diff(t)):
         return None
+    if kind == "instant":
+        return Clock(column, name, kind, False, f"{name!r} as date or time of day, {words}")
+    if kind == "hhmmss":
+        return Clock(column, name, kind, False, f"{name!r} as hhmmss, {words}")
     told = _SPELT.get(unit.strip("[]() ").lower(), unit.strip("[]() ").lower())
-    found, epoch = _unit(t, told if told in PER_SECOND else "")
-    from_1970 = ", since 1970" if epoch else ""
-    sure = "" if told in PER_SECOND else ", by its steps"
-    return Clock(column, name, found, epoch, f"{name!r} in {found}{sure}{from_1970} ({words})")
+    told = told if told in PER_SECOND else ""
+    found, epoch = _unit(t, told)
+    since = " since 1970" if epoch else ""
+    guessed = "" if told else ", a unit that its steps tell (likely)"
+    return Clock(column, name, found, epoch, f"{name!r} in {found}{since}, {words}{guessed}")
+
+
+def _is_any(_: Array) -> bool:
+    """Return that any steps will do."""
+    return True
+
+
+def _rises(steps: Array) -> bool:
+    """Return whether hardly any step falls, and some rise; a header alone may be anything."""
+    if steps.size == 0:
+        return True
+    return bool((steps >= 0.0).mean() > 0.9 and (steps > 0.0).any())
 
 
 def _rises_evenly(steps: Array) -> bool:
@@ -223,6 +254,7 @@ def _of_day(text: str) -> int | None:
 # Seconds that rise.
 
 
+@np.errstate(all="ignore")  # of numbers that are no times
 def seconds(
     label: str, clock: Clock, values: NDArray[Any], rows: NDArray[np.int64], place: str
 ) -> Stamps:
@@ -272,7 +304,8 @@ def _in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
     if clock.unit == "instant":
         return _mapped(values, lambda part: (part - first) / 1e9)
     if clock.unit == "hhmmss":
-        return _mapped(values, _of_digits)
+        start = float(_of_digits(values[:1])[0])
+        return _mapped(values, lambda part: np.round(_of_digits(part) - start, 6))
     return values if per_second == 1.0 else _mapped(values, lambda part: part / per_second)
 
 
@@ -280,7 +313,8 @@ def _of_digits(values: Array) -> Array:
     """Return hhmmss.ss in seconds."""
     hours, rest = np.divmod(values, 10000.0)
     minutes, whole = np.divmod(rest, 100.0)
-    return np.round(hours * 3600.0 + minutes * 60.0 + whole, 6)
+    total: Array = hours * 3600.0 + minutes * 60.0 + whole
+    return total
 
 
 def _past_midnight(t: Array) -> Array:
@@ -328,6 +362,7 @@ class Even(NamedTuple):
     words: str
 
 
+@np.errstate(all="ignore")
 def even_clock(t: Array) -> Even | None:
     """Return the even clock that stamps were rounded from; None where there is none, or no need.
 
@@ -387,7 +422,7 @@ def _fitted(t: Array, tick: float) -> Even | None:
     if not (np.diff(even) > 0.0).all():
         return None
     return Even(
-        even,
+        np.round(even, 9),
         f"is rounded to {tick:g} s, its samples were put on the even clock of {dt:.9g} s that "
         "explains every stamp",
     )
@@ -407,14 +442,15 @@ def _even_step(t: Array, tick: float) -> float | None:
     slope = float(centered @ (t - t.mean()) / (centered @ centered))
     if not slope > 0.0:
         return None
-    round_ones = [round(slope, digits) for digits in range(2, 8)]
-    rate = round(1.0 / slope)
-    for dt in (*round_ones, *([1.0 / rate] if rate else []), slope):
+    per_second = max(round(1.0 / slope), 1)
+    few = [round(slope, digits) for digits in range(2, 5)]
+    for dt in (*few, 1.0 / per_second, *(round(slope, digits) for digits in range(5, 8)), slope):
         if dt > 0.0 and np.ptp(t - dt * k) <= _slack(tick, t):
             return dt
     return None
 
 
+@np.errstate(all="ignore")
 def not_rising(t: Array, rows: NDArray[np.int64], place: str) -> str:
     """Return the rule that stamps break which fall or repeat, with value and remedy.
 
@@ -428,7 +464,7 @@ def not_rising(t: Array, rows: NDArray[np.int64], place: str) -> str:
     assert k is not None
     said = f"must increase, {place} {rows[k + 1]} has {t[k + 1]:.9g} after {t[k]:.9g}; "
     if t[k + 1] < t[k]:
-        if t[k + 1] - t[0] <= 0.5 * (t[k] - t[0]):
+        if t[k + 1] - t[0] <= 0.5 * (t[k] - t[0]) and t[k] > t[0]:
             return said + "the clock starts again: several runs in one file need a column run"
         return said + "samples are out of order: sort them by time, or cut the log there"
     steps = np.diff(t[k : k + LONGEST_IN_MEMORY])

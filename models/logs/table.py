@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from codegen.arrays import Array
 from models.logs.growing import Growing
 from models.logs.log import Channel, Listed, RecordingError
-from models.logs.stamps import Clock, Stamps, find_clock, seconds
+from models.logs.stamps import Clock, find_clock, seconds, told_clock
 from models.schema import LONGEST_NAME, limits, require_few, shown
 
 RUN = "run"
@@ -190,9 +190,11 @@ class TableLog:
     Parameters
     ----------
     table : of any format.
+    clock_name : of the column that is the time; empty finds it.
     """
 
     table: Table
+    clock_name: str = ""
     _noted: list[str] = field(default_factory=list, compare=False, repr=False)
 
     @property
@@ -231,8 +233,16 @@ class TableLog:
     def clock(self) -> Clock | None:
         """The column that is the time; None where no column can be."""
         table = self.table
-        heads = {k: table.first_rows(k) for k in range(len(self.names))}
-        return find_clock(self.names, table.units, heads)
+        if not self.clock_name:
+            return find_clock(self.names, table.units, table.first_rows)
+        column = self._place(self.clock_name)
+        told = told_clock(column, self.clock_name, table.units[column], table.first_rows(column))
+        if told is None:
+            raise RecordingError(
+                f"{self.path}: {self.clock_name} must be a time, its first cells are "
+                f"{shown(', '.join(table.first_rows(column)[:3]))}"
+            )
+        return told
 
     @cached_property
     def _run_column(self) -> int | None:
@@ -240,12 +250,14 @@ class TableLog:
 
     def listed(self) -> tuple[Listed, ...]:
         """Return the numeric columns in their order, but for the clock and the runs."""
-        clock = self.clock
-        t, rows = None, 0
+        clock, t = self.clock, None
+        kinds = {} if self._run_column is None else {self._run_column: Kind.WORD}
+        cells = self.table.cells(kinds | ({} if clock is None else {clock.column: _kind(clock)}))
         if clock is not None:
-            runs = self.runs()
-            t = self._read({}, runs[0] if runs else None).t
-            rows = t.size
+            stamps, rows = cells.columns[clock.column], cells.rows
+            for words in cells.words.values():  # each run has a clock of its own
+                stamps, rows = stamps[words.codes == 0], rows[words.codes == 0]
+            t = seconds(str(self.path), clock, stamps, rows, self.table.place).t
         rate = _rate(t)
         listed = []
         for k, name in enumerate(self.names):
@@ -253,15 +265,21 @@ class TableLog:
                 continue
             if clock is not None and k == clock.column:
                 continue
-            cells = self.table.first_rows(k)
-            filled = sum(cell != "" for cell in cells) / max(len(cells), 1)
+            head = self.table.first_rows(k)
+            filled = sum(cell != "" for cell in head) / max(len(head), 1)
             listed.append(
-                Listed(name=name, unit=self.table.units[k], samples=rows, rate=rate * filled)
+                Listed(
+                    name=name, unit=self.table.units[k], samples=cells.rows.size, rate=rate * filled
+                )
             )
         return tuple(listed)
 
     def runs(self) -> tuple[str, ...]:
         """Return the words of the column "run" in their order; empty where there is none."""
+        return self._runs
+
+    @cached_property
+    def _runs(self) -> tuple[str, ...]:
         if self._run_column is None:
             return ()
         return tuple(self.table.cells({self._run_column: Kind.WORD}).words[self._run_column].names)
@@ -279,20 +297,26 @@ class TableLog:
         RecordingError
             One line: file, column, rule, value, remedy.
         """
-        places = [self._place(name) for name in names]
-        if self.clock is None:
+        places, clock = [self._place(name) for name in names], self.clock
+        if clock is None:
             raise RecordingError(
                 f"{self.path}: no column is a time that rises; columns found: {some(self.names)}"
             )
-        stamps = self._read({k: Kind.NUMBER for k in places}, run)
+        kinds = {clock.column: _kind(clock)}
+        timed = clock.column in places and _kind(clock) is Kind.NUMBER  # asked for as it stands
+        kinds |= {k: Kind.NUMBER for k in places if timed or k != clock.column}
+        cells = self.table.cells(kinds, self._one_run(run))
+        label = str(self.path) if run is None else f"{self.path}:{run}"
+        stamps = seconds(label, clock, cells.columns[clock.column], cells.rows, self.table.place)
+        self._noted.extend(stamps.notes)
         return tuple(
             Channel(
                 name=name,
                 unit=self.table.units[k],
                 t=stamps.t,
-                values=stamps.columns[k],
+                values=stamps.t if k == clock.column and not timed else cells.columns[k],
                 place=self.table.place,
-                rows=stamps.rows,
+                rows=cells.rows,
             )
             for name, k in zip(names, places, strict=True)
         )
@@ -304,37 +328,28 @@ class TableLog:
             )
         return self.names.index(name)
 
-    def _read(self, kinds: dict[int, Kind], run: str | None) -> "_Timed":
-        """Return columns with the time in seconds."""
-        clock = self.clock
-        assert clock is not None
-        place = self._one_run(run)
-        kind = Kind.INSTANT if clock.unit == "instant" else Kind.NUMBER
-        cells = self.table.cells({**kinds, clock.column: kind}, place)
-        label = str(self.path) if run is None else f"{self.path}:{run}"
-        stamps: Stamps = seconds(
-            label, clock, cells.columns[clock.column], cells.rows, self.table.place
-        )
-        self._noted.extend(stamps.notes)
-        return _Timed(stamps.t, cells.columns, cells.rows)
-
     def _one_run(self, run: str | None) -> tuple[int, str] | None:
         """Return column and word of a run."""
-        if run is None:
-            return None
         if self._run_column is None:
+            if run is None:
+                return None
             raise RecordingError(
                 f"{self.path}: there is no column run, so no run {shown(run)}; leave it out"
+            )
+        if run is None and len(self.runs()) == 1:
+            return None
+        if run is None:
+            raise RecordingError(f"{self.path}: name one of its runs: {some(self.runs())}")
+        if run not in self.runs():
+            raise RecordingError(
+                f"{self.path}: there is no run {shown(run)}, the runs are: {some(self.runs())}"
             )
         return self._run_column, run
 
 
-class _Timed(NamedTuple):
-    """Columns with their time [s]."""
-
-    t: Array
-    columns: dict[int, NDArray[Any]]
-    rows: NDArray[np.int64]
+def _kind(clock: Clock) -> Kind:
+    """Return how the cells of a clock are read."""
+    return Kind.INSTANT if clock.unit == "instant" else Kind.NUMBER
 
 
 def _rate(t: Array | None) -> float:

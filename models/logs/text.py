@@ -20,16 +20,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.logs.log import RecordingError
-from models.logs.preamble import BLANKS, COMMENT, HEAD, MISSING, Layout, find_layout
+from models.logs.preamble import BLANKS, COMMENT, HEAD, MISSING, Layout, cells_of, find_layout
 from models.logs.stamps import nanoseconds
 from models.logs.table import Cells, Gathered, Kind, TableLog, Words
 from models.schema import pieces, require_few, shown
 
-BLOCK = 1 << 22  # bytes of text that are read at once
+BLOCK, SMALL_BLOCK = 1 << 22, 1 << 19  # bytes of text that are read at once: pyarrow, Python
+QUOTES = 8  # that may stand before the end of a block and not close
 LARGEST_LINE = 1 << 23  # bytes: 10 000 columns of 800
 WORTH_ARROW = 1 << 22  # bytes of a file from which on importing pyarrow takes less than it saves
+_ODD_NAN = re.compile(rb"(?i)nan\(")  # a number to pyarrow alone
 _BLANK = re.compile(rb"[ \t]+")
-_MARGIN = re.compile(rb"^ | (?=\r?$)", re.MULTILINE)
+_MARGIN = re.compile(rb"^ | $", re.MULTILINE)
 
 
 def open_text(path: Path) -> TableLog:
@@ -130,7 +132,7 @@ class TextTable:
         gathered = Gathered(self.path, wanted, self.names, "line", run)
         reader = _Python(self.path, self.layout, wanted)
         fast = _arrow() if _use_arrow(self.arrow, self.path) else None
-        for line, block in _blocks(self.path, self.layout):
+        for line, block in _blocks(self.path, self.layout, BLOCK if fast else SMALL_BLOCK):
             plain = fast is not None and reader.is_plain(block)
             columns = _by_arrow(fast, self.layout, wanted, block) if plain else None
             if columns is None:
@@ -146,9 +148,9 @@ class TextTable:
 # From the bytes of a file to blocks of whole lines in UTF-8.
 
 
-def _blocks(path: Path, layout: Layout) -> Iterator[tuple[int, bytes]]:
+def _blocks(path: Path, layout: Layout, size: int) -> Iterator[tuple[int, bytes]]:
     """Yield the number of the first line of a block, and the block; from the first row of data."""
-    line, rest, begun = layout.first, b"", False
+    line, rest, reach, begun = layout.first, b"", size, False
     for text in _in_utf8(path, layout.encoding):
         rest += text
         if not begun:
@@ -156,40 +158,46 @@ def _blocks(path: Path, layout: Layout) -> Iterator[tuple[int, bytes]]:
             begun = True
             if len(split) < layout.first:
                 return
-        if len(rest) < BLOCK:
-            continue
-        cut = _whole_lines(rest)
-        if cut == 0 and len(rest) > LARGEST_LINE:
-            raise RecordingError(
-                f"{path}: line {line} is longer than {LARGEST_LINE} bytes, or opens a quote that "
-                "is never closed"
-            )
-        if cut:
-            yield line, _plain(path, layout, line, rest[:cut])
-            line += rest.count(b"\n", 0, cut)
-            rest = rest[cut:]
+        while len(rest) >= reach:
+            cut = _whole_lines(rest[:reach])
+            if cut:
+                yield line, _plain(path, layout, line, rest[:cut])
+                line += rest.count(b"\n", 0, cut)
+                rest, reach = rest[cut:], size
+            elif reach >= LARGEST_LINE:
+                raise RecordingError(
+                    f"{path}: line {line} is longer than {LARGEST_LINE} bytes, or opens a quote "
+                    "that is never closed"
+                )
+            else:
+                reach *= 2
     if rest:
         yield line, _plain(path, layout, line, rest)
 
 
 def _in_utf8(path: Path, encoding: str) -> Iterator[bytes]:
-    """Yield the text of a file in UTF-8, with line feeds where it has only carriage returns."""
+    """Yield the text of a file in UTF-8, each line of which ends in a line feed alone."""
     decoder = codecs.getincrementaldecoder(encoding)("replace")
-    returns: bool | None = None
+    held = b""
     for part in pieces(path, RecordingError, limit="megabytes"):
         if encoding not in ("utf-8", "utf-8-sig", "cp1252"):
             part = decoder.decode(part).encode("utf-8", "replace")
-        if returns is None:
-            returns = b"\n" not in part and b"\r" in part
-        yield part.replace(b"\r", b"\n") if returns else part
+        part = held + part
+        held = b"\r" if part.endswith(b"\r") else b""  # what follows may be its line feed
+        part = part.removesuffix(b"\r")
+        yield part.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in part else part
+    if held:
+        yield b"\n"
 
 
 def _whole_lines(text: bytes) -> int:
-    """Return where the last whole line ends that does not end within quotes."""
+    """Return where the last whole line ends that does not end within quotes; 0 if none is near."""
     cut = text.rfind(b"\n") + 1
-    while cut and b'"' in text and text.count(b'"', 0, cut) % 2:
+    for _ in range(QUOTES):
+        if not (cut and text.count(b'"', 0, cut) % 2):
+            return cut
         cut = text.rfind(b"\n", 0, text.rfind(b'"', 0, cut)) + 1
-    return cut
+    return 0
 
 
 def _plain(path: Path, layout: Layout, line: int, block: bytes) -> bytes:
@@ -230,7 +238,7 @@ class _Python:
     def __init__(self, path: Path, layout: Layout, wanted: Mapping[int, Kind]) -> None:
         self._path, self._layout, self._wanted = path, layout, wanted
         self._width = len(layout.names)
-        again = [_stripped(_split(one, layout.delimiter)) for one in layout.again]
+        again = [list(cells_of(one, layout.delimiter)) for one in layout.again]
         self._again = [one for one in again if any(one)]
         self._marks = [one.encode() for one in COMMENT]
         self._marks += [text.strip().encode() for text in layout.again if text.strip()]
@@ -238,6 +246,8 @@ class _Python:
 
     def is_plain(self, block: bytes) -> bool:
         """Return whether no line of a block is a comment or the header once more."""
+        if b"(" in block and _ODD_NAN.search(block):
+            return False
         return not any(
             mark in block and (block.startswith(mark) or b"\n" + mark in block)
             for mark in self._marks
@@ -331,12 +341,6 @@ class _Python:
         return np.array(values, dtype=dtype)
 
 
-def _split(line: str, delimiter: str) -> list[str]:
-    if delimiter == BLANKS:
-        line = " ".join(line.split())
-    return next(csv.reader([line], delimiter=delimiter), [])
-
-
 def _stripped(cells: Sequence[str]) -> list[str]:
     return [cell.strip() for cell in cells]
 
@@ -384,7 +388,7 @@ def _by_arrow(
     arrow: Any, layout: Layout, wanted: Mapping[int, Kind], block: bytes
 ) -> dict[int, Any] | None:
     """Return the columns that are wanted; None where anything in the block is not plain."""
-    if layout.thousands:
+    if layout.thousands or not wanted:
         return None
     kinds = {
         str(column): arrow.float64() if kind is Kind.NUMBER else arrow.string()

@@ -1,0 +1,230 @@
+"""Text files as loggers write them: one drive in every dialect, told by its columns."""
+
+import datetime
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+N, DT = 120, 0.01
+
+
+class Drive(NamedTuple):
+    """Columns in the units that the file is in."""
+
+    t: np.ndarray
+    speed: np.ndarray  # km/h
+    lateral: np.ndarray  # m/s
+    yaw: np.ndarray  # deg/s
+    steer: np.ndarray  # deg
+
+
+def drive(n: int = N) -> Drive:
+    """A slalom, to three digits, as files hold it."""
+    t = np.round(DT * np.arange(n), 3)
+    wave = np.sin(2.0 * t)
+    return Drive(
+        t,
+        *(np.round(one, 3) for one in (60.0 + 2.0 * wave, 0.1 * wave, 11.3 * wave, -2.5 * wave)),
+    )
+
+
+def number(value: float, decimal: str = ".", digits: int = 3) -> str:
+    return f"{value:.{digits}f}".replace(".", decimal)
+
+
+def table(rows, delimiter=",", decimal=".", end="\n", quoted=False, trailing=False) -> str:
+    lines = []
+    for row in rows:
+        cells = [number(one, decimal) for one in row]
+        cells = [f'"{cell}"' for cell in cells] if quoted else cells
+        lines.append(delimiter.join(cells) + (delimiter if trailing else ""))
+    return end.join(lines) + end
+
+
+def plain(delimiter: str = ",", decimal: str = ".", **how) -> str:
+    header = delimiter.join(
+        ["Time [s]", "Speed [km/h]", "vy [m/s]", "Yaw Rate [deg/s]", "Steering [deg]"]
+    )
+    return header + "\n" + table(zip(*drive(), strict=True), delimiter, decimal, **how)
+
+
+def units_row(delimiter: str = ";", decimal: str = ",") -> str:
+    lines = [delimiter.join(["Time", "Speed", "vy", "Yaw Rate", "Steering"])]
+    lines += [delimiter.join(["s", "km/h", "m/s", "°/s", "°"])]
+    return "\n".join(lines) + "\n" + table(zip(*drive(), strict=True), delimiter, decimal)
+
+
+def motec() -> str:
+    """MoTeC i2: every cell quoted, a preamble of pairs, names, units, a blank line."""
+    lines = [
+        '"Format","MoTeC CSV File",,,"Workbook","Circuit"',
+        '"Venue","Nürburgring",,,"Worksheet","Default"',
+        '"Vehicle","Car 7",,,"Vehicle Desc",""',
+        '"Driver","A. Driver",,,"Engine ID",""',
+        '"Device","M1"',
+        '"Comment","wet, then dry"',
+        '"Log Date","12/05/2023",,,"Origin Time","0.000","s"',
+        '"Log Time","10:11:12",,,"Start Time","0.000","s"',
+        '"Sample Rate","100.000","Hz",,"End Time","1.190","s"',
+        '"Duration","1.190","s",,"Start Distance","0","m"',
+        '"Range","entire outing",,,"End Distance","20","m"',
+        '"Beacon Markers","61.2 122.7"',
+        "",
+        "",
+        '"Time","Ground Speed","Lateral Velocity","Gyro Yaw Velocity","Steering Wheel Angle"',
+        '"s","km/h","m/s","deg/s","deg"',
+        "",
+        "",
+    ]
+    body = table(zip(*drive(), strict=True), quoted=True, end="\r\n")
+    return "\r\n".join(lines) + "\r\n" + body
+
+
+def aim() -> str:
+    """AiM Race Studio: pairs, names, units, and each a line of its own."""
+    lines = [
+        '"Format","AiM CSV File"',
+        '"Session","Track day"',
+        '"Vehicle","Kart"',
+        '"Racer","B"',
+        '"Championship","X"',
+        '"Comment",""',
+        '"Date","Saturday, May 20, 2023"',
+        '"Time","2:31 PM"',
+        '"Sample Rate","100"',
+        '"Duration","1.190"',
+        '"Segment","Session"',
+        '"Beacon Markers","59.1","118.2"',
+        '"Segment Times","0:59.100","0:59.100"',
+        "",
+        '"Time","GPS Speed","Lat Vel","GPS Gyro","Steering"',
+        '"s","km/h","m/s","deg/s","deg"',
+        "",
+    ]
+    return "\n".join(lines) + "\n" + table(zip(*drive(), strict=True), quoted=True)
+
+
+def carmaker_dat() -> str:
+    """IPG CarMaker: columns apart by blanks, names and units in comments."""
+    lines = ["#INFOFILE1.1 - Do not remove this line!", "## Testrun: Slalom", "#"]
+    lines += ["# Time Car.v Car.vy Car.YawRate Steer.WhlAng", "# s km/h m/s deg/s deg"]
+    rows = ["  ".join(f"{one:12.3f}" for one in row) for row in zip(*drive(), strict=True)]
+    return "\n".join(lines + rows) + "\n"
+
+
+def carmaker_csv() -> str:
+    header = "#Time;Car.v [km/h];Car.vy [m/s];Car.YawRate [deg/s];Steer.WhlAng [deg]"
+    return header + "\n" + table(zip(*drive(), strict=True), ";")
+
+
+def two_d() -> str:
+    """2D datarecording: a title, names, units in brackets, decimal commas, tabs."""
+    lines = ["2D Datarecording WinARace export", "Event:\tTest", ""]
+    lines += ["Time\tV_GPS\tVy\tGyro_Z\tSteer", "[s]\t[km/h]\t[m/s]\t[°/s]\t[°]"]
+    return "\r\n".join(lines) + "\r\n" + table(zip(*drive(), strict=True), "\t", ",", end="\r\n")
+
+
+def vbox() -> str:
+    """Racelogic VBOX: sections; time is hhmmss.ss."""
+    lines = [
+        "File created on 20/05/2023 at 14:31:00",
+        "",
+        "[header]",
+        "time",
+        "velocity kmh",
+        "vy m/s",
+        "yaw rate deg/s",
+        "steering deg",
+        "",
+        "[channel units]",
+        "m/s",
+        "deg/s",
+        "deg",
+        "",
+        "[comments]",
+        "VBOX 3i, 100 Hz",
+        "",
+        "[column names]",
+        "time velocity Vy YawRate Steering",
+        "",
+        "[data]",
+    ]
+    one = drive()
+    rows = [
+        f"{clock(t).replace(':', '')} {v:+08.3f} {vy:+.3f} {r:+.3f} {d:+.3f}"
+        for t, v, vy, r, d in zip(*one, strict=True)
+    ]
+    return "\r\n".join(lines + rows) + "\r\n"
+
+
+def clock(t: float, start: float = 14 * 3600 + 31 * 60 + 59.5) -> str:
+    """Time of day as hh:mm:ss.sss; a minute passes in the middle of the drive."""
+    at = round((start + t) * 1000) % 86_400_000
+    return f"{at // 3600000:02d}:{at // 60000 % 60:02d}:{at // 1000 % 60:02d}.{at % 1000:03d}"
+
+
+def stamped(stamp: Callable[[float], str], name: str = "Time") -> str:
+    """The table with another clock."""
+    lines = [f"{name},Speed [km/h],vy [m/s],Yaw Rate [deg/s],Steering [deg]"]
+    one = drive()
+    for t, *rest in zip(*one, strict=True):
+        lines.append(",".join([stamp(t), *map(number, rest)]))
+    return "\n".join(lines) + "\n"
+
+
+def iso(t: float) -> str:
+    start = datetime.datetime(2023, 12, 31, 23, 59, 59, 500_000)
+    return (start + datetime.timedelta(milliseconds=round(1000 * t))).isoformat(
+        timespec="milliseconds"
+    )
+
+
+def rounded(t: float, tick: float) -> str:
+    """A stamp that is cut to a tick."""
+    return f"{math.floor(round(t / tick, 6)) * tick:.3f}"
+
+
+SPEEDS = {"Speed_kmh": "km/h", "Speed:km/h": "km/h", "Speed (km/h)": "km/h", "Speed": ""}
+
+DIALECTS: dict[str, bytes] = {
+    "commas": plain().encode(),
+    "semicolons": plain(";").encode(),
+    "semicolons and decimal commas": plain(";", ",").encode(),
+    "tabs": plain("\t").encode(),
+    "tabs and decimal commas": plain("\t", ",").encode(),
+    "bars": plain("|").encode(),
+    "quoted": plain(quoted=True).encode(),
+    "quoted decimal commas between commas": plain(decimal=",", quoted=True).encode(),
+    "rows that end in a delimiter": plain(";", trailing=True).encode(),
+    "CRLF": plain().replace("\n", "\r\n").encode(),
+    "CR": plain().replace("\n", "\r").encode(),
+    "Latin-1": units_row().encode("latin-1"),
+    "UTF-8": units_row().encode(),
+    "UTF-8 with mark": units_row().encode("utf-8-sig"),
+    "UTF-16": units_row().encode("utf-16"),
+    "UTF-16 without mark": plain().encode("utf-16-le"),
+    "units in a row, tabs": units_row("\t", ".").encode("cp1252"),
+    "MoTeC": motec().encode("cp1252"),
+    "AiM": aim().encode(),
+    "CarMaker .dat": carmaker_dat().encode(),
+    "CarMaker .csv": carmaker_csv().encode(),
+    "2D": two_d().encode("cp1252"),
+    "VBOX": vbox().encode(),
+    "milliseconds told": stamped(lambda t: f"{1000 * t:.0f}", "Time [ms]").encode(),
+    "milliseconds by their steps": stamped(lambda t: f"{1000 * t:.0f}").encode(),
+    "nanoseconds": stamped(lambda t: f"{round(1e6 * t) * 1000}", "timestamp").encode(),
+    "epoch in s": stamped(lambda t: f"{1684592000 + t:.3f}", "timestamp").encode(),
+    "epoch in ms": stamped(lambda t: f"{1684592000000 + round(1000 * t)}").encode(),
+    "epoch in us": stamped(lambda t: f"{1684592000000000 + round(1e6 * t)}").encode(),
+    "epoch in ns": stamped(lambda t: f"{1684592000000000000 + round(1e9 * t)}").encode(),
+    "ISO 8601": stamped(iso).encode(),
+    "ISO 8601 with zone": stamped(lambda t: iso(t).replace("T", " ") + "+02:00").encode(),
+    "time of day": stamped(clock).encode(),
+    "over midnight": stamped(lambda t: clock(t, 86399.5)).encode(),
+    "minutes and seconds": stamped(lambda t: f"{int(t + 59.5) // 60:02d}:{(t + 59.5) % 60:06.3f}")
+    .encode(),
+    "rounded to 0.1 s": stamped(lambda t: rounded(t, 0.1)).encode(),
+    "comments": plain().replace("\n", "\n# a comment, with, commas\n", 1).encode(),
+}  # fmt: skip

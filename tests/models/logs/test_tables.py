@@ -1,0 +1,222 @@
+"""Tables are read the same with and without pyarrow, and long ones do not fill memory."""
+
+import random
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow
+import pyarrow.parquet
+import pytest
+
+from models.logs import text
+from models.logs.door import open_log
+from models.logs.growing import Growing
+from models.logs.log import RecordingError
+from models.logs.table import TableLog
+from models.recordings import read_recording
+from tests.models.logs.loggers import DIALECTS, DT, drive, plain
+
+# What is put in the place of a cell, or anywhere.
+SPOILS = [
+    b"", b" ", b",", b";", b"\t", b"\n", b"\n\n", b"\r", b'"', b'""', b"#", b"%", b"nan", b"inf",
+    b"-", b"1e5", b"1e999", b"1_0", b"+1.5", b"1,5", b"1.5", b"0x10", b"\xff", b"\xc3\xa9", b"\0",
+    b"1.", b".5", b"1e", b"N/A", b"None", b"10:00:00.5", b"infinity", b"1d5", b" 1 ", b"\xc2\xa0",
+    b"True", b"\x0b", b"-0", b"1e-400", b"9" * 400, b"Nan", b"nan(1)", b"[data]",
+]  # fmt: skip
+
+
+def spoilt(rng, data):
+    """A text with some cells and bytes changed."""
+    data = bytearray(data)
+    for _ in range(rng.choice((1, 1, 2, 3, 9))):
+        k = end = rng.randrange(len(data))
+        while end < len(data) and data[end : end + 1] not in b",;\t|\n ":
+            end += 1
+        chance = rng.random()
+        if chance < 0.7:
+            data[k : end if chance < 0.4 else k] = rng.choice(SPOILS)
+        elif chance < 0.9:
+            del data[k : k + rng.randrange(1, 20)]
+        else:
+            data[k:k] = data[max(0, k - rng.randrange(200)) : k]
+    return bytes(data) or b"x"
+
+
+def outcome(path, arrow):
+    """All that a text gives, or the line that it is refused with."""
+    try:
+        log = open_log(path)
+        log = TableLog(table=replace(log.table, arrow=arrow))
+        names, runs = [one.name for one in log.listed()], log.runs()
+        channels = log.read(names, run=runs[0] if runs else None)
+    except RecordingError as error:
+        assert "\n" not in str(error)
+        return str(error)
+    return [names, runs, log.notes, log.dialect] + [
+        (one.t.tobytes(), np.nan_to_num(one.values, nan=0.123).tobytes(), one.rows.tobytes())
+        for one in channels
+    ]
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_pyarrow_changes_neither_bits_nor_messages_however_a_text_is_spoilt(
+    tmp_path, monkeypatch, dialect
+):
+    rng = random.Random(dialect)
+    path = tmp_path / "log.csv"
+    for k in range(12):
+        path.write_bytes(spoilt(rng, DIALECTS[dialect]) if k else DIALECTS[dialect])
+        size = rng.choice((200, 1500, 1 << 22))
+        monkeypatch.setattr(text, "BLOCK", size)
+        monkeypatch.setattr(text, "SMALL_BLOCK", size)
+        assert outcome(path, True) == outcome(path, False)
+
+
+def test_pyarrow_reads_what_is_plain_itself(tmp_path, monkeypatch):
+    path = tmp_path / "log.csv"
+    path.write_text(plain())
+
+    def never(*_):
+        raise AssertionError("Python reads what pyarrow can")
+
+    monkeypatch.setattr(text._Python, "read", never)
+    assert len(outcome(path, True)) == 8
+    with pytest.raises(AssertionError):
+        outcome(path, False)
+
+
+def test_without_pyarrow_a_text_is_read_all_the_same(tmp_path, monkeypatch):
+    path = tmp_path / "log.csv"
+    path.write_text(plain())
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert len(outcome(path, True)) == 8
+
+
+@pytest.mark.parametrize("block", [60, 61, 127, 1000])
+def test_blocks_may_end_anywhere_but_within_quotes(tmp_path, monkeypatch, block):
+    path = tmp_path / "log.csv"
+    rows = [f'"a ""word"",\nof {k}",{DT * k:.2f},{k}' for k in range(50)]
+    path.write_text("\n".join(["note,t,v", *rows]))
+    monkeypatch.setattr(text, "BLOCK", block)
+    monkeypatch.setattr(text, "SMALL_BLOCK", block)
+    for arrow in (True, False):
+        log = TableLog(table=replace(open_log(path).table, arrow=arrow))
+        (channel,) = log.read(["v"])
+        np.testing.assert_array_equal(channel.values, np.arange(50.0))
+        np.testing.assert_array_equal(channel.rows, 3 + 2 * np.arange(50))
+
+
+def test_a_column_that_grows_goes_to_disk_and_comes_back(tmp_path, monkeypatch):
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr("tempfile.tempdir", None)
+    parts = [np.arange(k, dtype=np.float64) for k in (3, 0, 5, 1000, 7)]
+    short, long = Growing(in_memory=10_000), Growing(in_memory=10)
+    for part in parts:
+        short.extend(part)
+        long.extend(part)
+    assert len(long) == 1015
+    a, b = short.finished(), long.finished()
+    np.testing.assert_array_equal(a, np.concatenate(parts))
+    np.testing.assert_array_equal(b, a)
+    assert isinstance(b.base, np.memmap) or isinstance(b, np.memmap)
+    assert not a.flags.writeable
+    assert not b.flags.writeable
+    assert list(tmp_path.iterdir()) == [], "its file has no name that could be left behind"
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="counts the pages of Linux")
+def test_memory_does_not_grow_with_the_log(tmp_path):
+    """Anonymous memory after reading; what is mapped from disk the system can drop."""
+    script = """
+import re, sys
+from dataclasses import replace
+from models.logs import growing
+from models.logs.door import open_log
+from models.logs.table import TableLog
+growing.LONGEST_IN_MEMORY = int(sys.argv[1])
+def anonymous():
+    return int(re.search(r"RssAnon:\\s+(\\d+)", open("/proc/self/status").read())[1]) / 1e3
+sizes = []
+for path in sys.argv[2:]:
+    log = TableLog(table=replace(open_log(path).table, arrow=False))
+    channels = log.read(["vx", "vy", "r", "delta_f"])
+    sizes.append(anonymous())
+    del channels
+print(sizes[1] - sizes[0])
+"""
+    paths = []
+    for name, n in (("short.csv", 50_000), ("long.csv", 600_000)):
+        path = tmp_path / name
+        with path.open("w") as file:
+            file.write("t,vx,vy,r,delta_f\n")
+            for k in range(0, n, 1000):
+                file.writelines(
+                    f"{0.001 * (k + j):.3f},20.125,0.001,0.002,0.003\n" for j in range(1000)
+                )
+        paths.append(str(path))
+    grown = {
+        in_memory: float(
+            subprocess.run(
+                [sys.executable, "-c", script, str(in_memory), *paths],
+                capture_output=True,
+                text=True,
+                check=True,
+            ).stdout
+        )
+        for in_memory in (1 << 16, 1 << 30)
+    }
+    assert grown[1 << 16] < 12.0  # [MB]; six columns of 600 000 numbers are 29
+    assert grown[1 << 30] > 20.0, "the alarm rings where all is held in memory"
+
+
+def test_parquet_bears_units_and_times_of_the_calendar(tmp_path):
+    path = tmp_path / "log.parquet"
+    one = drive()
+    start = np.datetime64("2023-05-20T10:00:00", "ns")
+    times = start + np.round(one.t * 1e9).astype("timedelta64[ns]")
+    fields = [
+        pyarrow.field("stamp", pyarrow.timestamp("ns")),
+        pyarrow.field("speed", pyarrow.float32(), metadata={"unit": "km/h"}),
+        pyarrow.field("steer [deg]", pyarrow.float64()),
+        pyarrow.field("gear", pyarrow.string()),
+    ]
+    columns = [times, one.speed.astype(np.float32), one.steer, ["3"] * one.t.size]
+    pyarrow.parquet.write_table(pyarrow.table(columns, schema=pyarrow.schema(fields)), path)
+    log = open_log(path)
+    assert [(c.name, c.unit, c.samples) for c in log.listed()] == [
+        ("speed", "km/h", 120),
+        ("steer [deg]", "deg", 120),
+    ]
+    speed, steer = log.read(["speed", "steer [deg]"])
+    np.testing.assert_array_equal(steer.values, one.steer)
+    np.testing.assert_array_equal(steer.t, one.t)
+    np.testing.assert_array_equal(speed.values, one.speed.astype(np.float32))
+    assert (log.format, speed.place, speed.rows[0]) == ("Parquet", "row", 1)
+    with pytest.raises(RecordingError, match="gear must be numeric, its type is string"):
+        log.read(["gear"])
+
+
+@pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
+def test_parquet_knows_durations(tmp_path, unit):
+    path = tmp_path / "log.parquet"
+    per_second = {"s": 1, "ms": 1000, "us": 10**6, "ns": 10**9}[unit]
+    whole = np.arange(60) if unit == "s" else np.arange(60) * per_second // 100
+    t = pyarrow.array(whole, pyarrow.duration(unit))
+    pyarrow.parquet.write_table(pyarrow.table({"time": t, "v": np.arange(60.0)}), path)
+    expected = np.arange(60.0) * (1.0 if unit == "s" else 0.01)
+    np.testing.assert_allclose(open_log(path).read(["v"])[0].t, expected, atol=1e-12)
+
+
+def test_a_recording_that_was_written_reads_back_bit_by_bit_through_the_door(tmp_path):
+    path = tmp_path / "log.csv"
+    t = DT * np.arange(200)
+    rows = np.column_stack([t, 20 + 0 * t, 1e-3 * np.sin(t), 1e-3 * np.cos(t), 1e-4 * np.sin(t)])
+    np.savetxt(path, rows, "%.17g", ",", header="t,vx,vy,r,delta_f", comments="")
+    recording = read_recording(path, check=False)
+    np.testing.assert_array_equal(recording.v_y, rows[:, 2])
+    (channel,) = open_log(path).read(["vy"])
+    np.testing.assert_array_equal(channel.values, rows[:, 2])
+    np.testing.assert_array_equal(channel.t, t)
