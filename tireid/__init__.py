@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from identifier.run import History
     from identifier.tire_model import TireModel
     from identifier.verdict import Verdict
-    from models.recordings import Recording, read_recording
+    from models.recordings import LogMap, Recording, read_recording, read_repaired
     from models.vehicle import Vehicle, sedan
     from mpc import path as paths
     from tireid.driving import drive, sample_recording
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "AxleIdentifier": ("identifier.axle", "AxleIdentifier"),
     "History": ("identifier.run", "History"),
+    "LogMap": ("models.recordings", "LogMap"),
     "Method": ("identifier.method", "Method"),
     "PaperIdentifier": ("identifier.paper.design", "PaperIdentifier"),
     "Prediction": ("identifier.reproducibility", "Prediction"),
@@ -46,6 +47,7 @@ _HOMES = {
     "make_method": ("identifier.methods", "make_method"),
     "paths": ("mpc.path", ""),
     "read_recording": ("models.recordings", "read_recording"),
+    "read_repaired": ("models.recordings", "read_repaired"),
     "replay": ("tireid.learning", "replay"),
     "sample_recording": ("tireid.driving", "sample_recording"),
     "sedan": ("models.vehicle", "sedan"),
@@ -53,6 +55,7 @@ _HOMES = {
 __all__ = [
     "AxleIdentifier",
     "History",
+    "LogMap",
     "Method",
     "PaperIdentifier",
     "Prediction",
@@ -68,6 +71,7 @@ __all__ = [
     "make_method",
     "paths",
     "read_recording",
+    "read_repaired",
     "replay",
     "sample_recording",
     "sedan",

@@ -323,7 +323,10 @@ def check_against_vehicle(recording: Recording, vehicle: Axles) -> None:
                 "units, or name the right vehicle"
             )
     rear = a if w.force is None else w.force[:, 1]
-    _check_rises(recording, alpha_r, rear, "vy" if w.force is None else "Fyr")
+    if w.force is None:
+        _check_rear_rises(recording, alpha_r, w, l_r)
+    else:
+        _check_rises(recording, alpha_r, rear, "Fyr")
     if w.force is not None:
         _check_rises(recording, alpha_f, w.force[:, 0], "Fyf")
         _check_mass(recording, w.force.sum(axis=1), a, vehicle.mass)
@@ -339,13 +342,38 @@ def _check_mass(recording: Recording, force: Array, a: Array, mass: float) -> No
         )
 
 
+RISES = "must rise with its slip angle (paper's sign, alpha = delta - atan2(v_y +- l r, v_x))"
+
+
 def _check_rises(recording: Recording, alpha: Array, force: Array, column: str) -> None:
-    """Refuse a force (or acceleration) that falls with the slip angle that makes it."""
+    """Refuse a force that falls with the slip angle that makes it."""
     together = correlation(alpha, force)
     if together < -0.3 and np.sqrt(np.mean(alpha**2)) > 0.003:
-        what = "lateral acceleration" if column == "vy" else column
         raise RecordingError(
-            f"{recording.name}: {what} must rise with its slip angle (paper's sign, "
-            f"alpha = delta - atan2(v_y +- l r, v_x)), their correlation is {together:.2f}; "
-            f"change the sign of {column}" + ("" if column == "vy" else " or of vy")
+            f"{recording.name}: {column} {RISES}, their correlation is {together:.2f}; change the "
+            f"sign of {column} or of vy"
         )
+
+
+def _check_rear_rises(recording: Recording, alpha: Array, w: Windows, l_r: float) -> None:
+    """Refuse a lateral acceleration that falls with the slip of the rear: by v_y or by the car.
+
+    Where an accelerometer has the slope 1 on v̇_y the sign of v_y is right, and the car is wrong.
+    """
+    a = w.v_x_r + w.v_y_dot
+    together = correlation(alpha, a)
+    if not (together < -0.3 and np.sqrt(np.mean(alpha**2)) > 0.003):
+        return
+    car = f"name the right vehicle, of which l_r = {l_r:g} m is told"
+    remedy = f"change the sign of vy, or {car}"
+    if w.a_y is not None:
+        fit = least_squares(np.column_stack([w.v_x_r, w.v_y_dot, w.r_dot]), w.a_y)
+        slope, error = fit.theta[1], 4.0 * fit.error[1]
+        if slope > 0.3 > error:
+            remedy = f"vy has the sign of ay: {car}, or move vy to the center of gravity"
+        elif slope < -0.3 < -error:
+            remedy = "change the sign of vy"
+    raise RecordingError(
+        f"{recording.name}: lateral acceleration {RISES}, their correlation is {together:.2f}; "
+        f"{remedy}"
+    )

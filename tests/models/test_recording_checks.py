@@ -339,3 +339,17 @@ def test_real_runs_pass_and_their_corruptions_ring(shared_data: Path, file: str)
                     message = refusal(plant(part))
                     assert message.startswith(start), (run, error, message)
                     assert remedy in message
+
+
+def test_of_the_wrong_car_it_is_not_the_sign_of_v_y_that_is_to_blame() -> None:
+    """At low speed v_y is l_r r: with a shorter l_r the rear slips the other way, with -v_y too."""
+    slow, short = drive(speed=8.0), SimpleNamespace(l_f=0.8, l_r=0.2, mass=1600.0)
+    check_against_vehicle(slow, SEDAN_AXLES)
+    told = replace(slow, axle_force=None)
+    with pytest.raises(RecordingError, match=r"vy has the sign of ay: name the right vehicle"):
+        check_against_vehicle(told, short)
+    with pytest.raises(RecordingError, match=r"change the sign of vy, or name the right vehicle"):
+        check_against_vehicle(replace(told, a_y=None), short)
+    with pytest.raises(RecordingError, match=r"change the sign of vy$"):
+        fast = replace(drive(speed=20.0), axle_force=None)
+        check_against_vehicle(replace(fast, v_y=-fast.v_y), short)

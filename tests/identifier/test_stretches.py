@@ -1,0 +1,160 @@
+"""A drive in stretches: nothing is differenced from one to the next, and what was learnt stays."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tireid as ti
+from identifier.compare.batch import identify_batch, replay_batch
+from identifier.methods import METHODS, make_method
+from identifier.reproducibility import counted_samples, motion_error, predict
+from identifier.run import identify, learn
+from identifier.verdict.motion import Windows
+from models.recordings import Recording, RecordingError, Repair, joined
+from models.recordings.evidence import windows
+from models.recordings.portion import portion
+
+CAR = ti.sedan()
+
+
+@pytest.fixture(scope="module")
+def log() -> Recording:
+    return ti.sample_recording(CAR)
+
+
+@pytest.fixture(scope="module")
+def cut(log: Recording) -> Recording:
+    """The same drive without two seconds in the middle of a corner."""
+    n = len(log)
+    return log.taken(np.r_[0 : n // 2, n // 2 + 200 : n])
+
+
+def test_a_recording_counts_its_stretches_and_not_the_gaps(log, cut) -> None:
+    n = len(log)
+    assert cut.breaks == (n // 2,) and len(cut) == n - 200 and cut.dt == log.dt
+    assert cut.duration == pytest.approx(log.duration - 2.0 - log.dt)
+    assert [piece.stop for piece in cut.stretches] == [n // 2, n - 200]
+    assert "in 2 stretches" in repr(cut) and "stretches" not in repr(log)
+    again = cut.between(float(cut.t[100]), float(cut.t[-100]))
+    assert again.breaks == (n // 2 - 100,)
+    assert cut.between(0.0, 5.0).breaks == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "rule"),
+    [
+        ({"breaks": (5,)}, "each stretch of a recording needs at least 10 samples, it has 5"),
+        ({"breaks": ()}, "t must rise in equal steps"),
+        ({"breaks": (400,)}, "t must rise in equal steps"),
+    ],
+)
+def test_stretches_that_are_none_are_refused(cut, change, rule) -> None:
+    with pytest.raises(RecordingError, match=rule):
+        replace(cut, **change)
+
+
+def test_time_must_rise_from_stretch_to_stretch(log) -> None:
+    t = np.concatenate([log.t[:500], log.t[: len(log) - 500]])
+    with pytest.raises(RecordingError, match="from one stretch to the next"):
+        replace(log, t=t, breaks=(500,))
+
+
+def test_logs_are_joined_in_their_order_and_overlapping_clocks_are_moved(log) -> None:
+    first, second = log.between(0.0, 5.0), log.between(3.0, 9.0)
+    both = joined([first, replace(second, name="b")])
+    assert both.breaks == (len(first),) and len(both) == len(first) + len(second)
+    assert both.name == f"{log.name} + b"
+    assert both.t[len(first)] == pytest.approx(float(first.t[-1]) + 1.0)
+    assert "moved by" in both.notes[-1]
+    later = joined([first, log.between(7.0, 9.0)])
+    assert later.t[len(first)] == log.between(7.0, 9.0).t[0] and not later.notes
+    with pytest.raises(RecordingError, match="one interval"):
+        joined([first, replace(second, t=2.0 * second.t)])
+
+
+def glued(cut: Recording) -> Recording:
+    """The same samples, as if there were no gap: what must not happen."""
+    return replace(cut, t=cut.dt * np.arange(len(cut)), breaks=())
+
+
+@pytest.mark.parametrize("name", sorted(METHODS))
+def test_what_is_learnt_stays_over_a_gap_and_the_rest_begins_anew(name, log, cut) -> None:
+    method = make_method(name, CAR)
+    whole, run = identify(log, CAR, method), identify(cut, CAR, method)
+    k = cut.breaks[0]
+    assert np.array_equal(run.axle_force[:k], whole.axle_force[:k])
+    assert run.axle_force.shape == (len(cut), 2)
+    for port in method.ports:
+        if port.learnt and port.name in run.state:
+            states = run.state[port.name]
+            assert states.shape[0] == len(cut) + 1
+            assert np.array_equal(states[k], whole.state[port.name][k]), port.name
+    # the first force after the gap is that of a run that begins there with what was learnt
+    assert np.isfinite(run.axle_force).all()
+    lost = identify(glued(cut), CAR, method)
+    if run.state:  # else it has no memory
+        assert not np.array_equal(lost.axle_force[k + 1 :], run.axle_force[k + 1 :])
+
+
+def test_after_a_gap_a_frozen_model_starts_as_at_the_beginning(log, cut) -> None:
+    tire = ti.identify(log, CAR).freeze()
+    second = cut.taken(cut.stretches[1])
+    alone, together = tire.predict(second), tire.predict(cut)
+    assert np.array_equal(together[cut.breaks[0] :], alone)
+
+
+def test_a_lane_of_a_batch_has_the_bits_of_the_run_alone(log, cut) -> None:
+    method = make_method("axle", CAR)
+    alone = identify(cut, CAR, method)
+    (lane,) = identify_batch(cut, CAR, [method], freeze_times=[float(cut.t[-300])])
+    for port, values in lane.state[np.inf].items():
+        assert np.array_equal(values, alone.state[port][-1]), port
+    t = float(cut.t[-300])
+    for port, values in lane.state[t].items():
+        assert np.array_equal(values, alone.state_at(t)[port]), port
+    model = alone.freeze()
+    counts = counted_samples(cut, model.min_speed)
+    (error,) = replay_batch(cut, [model], counts=counts)
+    told = predict(model, cut).against_truth
+    assert told is not None and error.front == pytest.approx(told.front, rel=1e-9)
+    assert learn(cut, CAR, method).to_dict() == alone.freeze().to_dict()
+
+
+def test_no_window_reaches_over_a_gap(cut) -> None:
+    k, dt = cut.breaks[0], cut.dt
+    found = Windows.of(cut, 1.0)
+    over = (found.starts < k) & (found.starts + found.n >= k)
+    assert not over.any() and len(found) > 20
+    assert len(Windows.of(glued(cut), 1.0)) > len(found)
+    assert windows(cut).r.size < windows(glued(cut)).r.size
+    exact = replace(
+        cut,
+        v_y=np.where(np.arange(len(cut)) < k, 0.0, 5.0),
+        r=np.zeros(len(cut)),
+    )
+    counted = np.ones(len(cut), dtype=bool)
+    rest = motion_error(np.zeros((len(cut), 2)), exact, CAR, counted)
+    assert rest is not None and rest.lateral == 0.0
+    jump = motion_error(np.zeros((len(cut), 2)), glued(exact), CAR, counted)
+    assert jump is not None and jump.lateral > 5.0 * dt
+
+
+def test_a_repair_keeps_to_each_stretch(log, cut) -> None:
+    late = Repair(delay={"r": 0.05})
+    mended, _ = late.apply(cut, CAR)
+    assert len(mended.stretches) == 2 and len(mended) == len(cut) - 10
+    for piece, source in zip(mended.stretches, cut.stretches, strict=True):
+        alone, _ = late.apply(cut.taken(source), CAR)
+        assert np.array_equal(mended.r[piece], alone.r)
+
+
+def test_a_gap_costs_no_more_than_the_seconds_that_are_missing(log, cut) -> None:
+    other = ti.sample_recording(CAR, seed=1)
+    whole, parts = (ti.identify(one, CAR).freeze() for one in (log, cut))
+    errors = [predict(tire, other).against_truth for tire in (whole, parts)]
+    assert all(errors) and errors[1].both < 1.3 * errors[0].both
+
+
+def test_a_portion_of_a_long_recording_does_not_join_over_a_gap(cut) -> None:
+    assert portion(cut).recording is cut

@@ -1,0 +1,214 @@
+"""`tireid channels`: what a log holds, the map that it writes, and logs that are read by one."""
+
+import csv
+import json
+import tomllib
+
+import numpy as np
+import pytest
+
+import tireid as ti
+from models.recordings import RecordingError, read_recording, write_recording
+from tireid.cli import main
+
+CAR = ti.sedan()
+
+
+@pytest.fixture(scope="module")
+def log():
+    return ti.sample_recording(CAR)
+
+
+@pytest.fixture(scope="module")
+def folder(log, tmp_path_factory):
+    """A car, a log in SI, and the same as a logger writes it: degrees, km/h, g, hand wheel."""
+    folder = tmp_path_factory.mktemp("logs")
+    CAR.to_toml(folder / "car.toml")
+    write_recording(log, folder / "plain.csv")
+    columns = {
+        "Time": ("s", log.t),
+        "Ground Speed": ("km/h", 3.6 * log.v_x),
+        "Vel Lat": ("km/h", 3.6 * log.v_y),
+        "Gyro Yaw Velocity": ("deg/s", np.degrees(log.r)),
+        "Steered Angle": ("deg", 14.6 * np.degrees(log.delta_f)),
+        "G Force Lat": ("G", log.a_y / 9.80665),
+        "Engine RPM": ("rpm", 3000.0 + 0.0 * log.t),
+    }
+    with (folder / "motec.csv").open("w", encoding="latin-1", newline="") as file:
+        table = csv.writer(file, quoting=csv.QUOTE_ALL)
+        table.writerows([["Format", "MoTeC CSV File"], ["Sample Rate", "100.000", "Hz"], []])
+        table.writerow(columns)
+        table.writerow([unit for unit, _ in columns.values()])
+        table.writerow([])
+        table.writerows(np.column_stack([values for _, values in columns.values()]).tolist())
+    return folder
+
+
+RATIO = "delta_f=Steered Angle [deg] /14.6"
+
+
+def test_it_lists_what_is_there_and_what_is_missing(folder, capsys):
+    assert main(["channels", str(folder / "motec.csv")]) == 1
+    said = capsys.readouterr().out
+    assert "MoTeC" in said
+    row = next(line for line in said.splitlines() if line.startswith("Vel Lat"))
+    assert "km/h" in row and "vy: lateral velocity (95%)" in row and " 100 " in row
+    row = next(line for line in said.splitlines() if line.startswith("Steered Angle"))
+    assert "perhaps delta_f" in row and "tell its ratio" in row
+    assert '--columns "delta_f=Steered Angle [deg] /RATIO"' in said
+    assert main(["channels", str(folder / "plain.csv")]) == 0
+    assert "all that is needed is there" in capsys.readouterr().out
+
+
+def test_a_log_of_a_logger_goes_to_the_verdict_of_the_same_in_si(folder, tmp_path, capsys):
+    told = tmp_path / "log.toml"
+    motec, car = str(folder / "motec.csv"), str(folder / "car.toml")
+    assert main(["channels", motec, "--columns", RATIO, "--write", str(told)]) == 0
+    data = tomllib.loads(told.read_text())
+    assert data["signals"]["delta_f"] == {"channel": "Steered Angle", "unit": "deg", "ratio": 14.6}
+    words = ["identify", motec, "--vehicle", car, "--out", str(tmp_path / "out")]
+    assert main([*words, "--log", str(told)]) == 0
+    plain = ["identify", str(folder / "plain.csv"), "--vehicle", car]
+    assert main([*plain, "--out", str(tmp_path / "plain")]) == 0
+    found, same = (
+        json.loads((tmp_path / one / "weights.json").read_text()) for one in ("out", "plain")
+    )
+    stiffness = [one["cornering_stiffness_N_rad"] for one in (found, same)]
+    assert np.allclose(stiffness[0], stiffness[1], rtol=1e-6)
+
+
+def test_what_is_taken_by_its_name_is_said_and_stands_in_the_report(folder, tmp_path, capsys):
+    out = tmp_path / "out"
+    words = ["identify", str(folder / "motec.csv"), "--vehicle", str(folder / "car.toml")]
+    assert main([*words, "--columns", RATIO, "--out", str(out)]) == 0
+    said = capsys.readouterr().err
+    assert "vy is taken from Vel Lat [km/h], by its name" in said
+    assert "vy is taken from Vel Lat [km/h], by its name" in (out / "report.html").read_text()
+
+
+def test_an_error_shows_the_word_that_mends_it(folder, capsys):
+    words = ["identify", str(folder / "motec.csv"), "--vehicle", str(folder / "car.toml")]
+    assert main(words) == 2
+    said = capsys.readouterr().err
+    assert "column delta_f is missing; did you mean 'Steered Angle' of the hand wheel" in said
+    assert 'tell it by --columns "delta_f=Steered Angle [deg] /RATIO"' in said
+    assert "delta_fr" not in said
+
+
+def test_a_rear_or_right_wheel_is_not_taken_for_the_front_axle(log, tmp_path):
+    columns = {"t": log.t, "vx": log.v_x, "vy": log.v_y, "r": log.r}
+    columns |= {"delta_fl": log.delta_f, "delta_fr": log.delta_f}
+    with pytest.raises(RecordingError) as caught:
+        ti.Recording.from_dataframe(columns)
+    assert "did you mean 'delta_fl + delta_fr' for delta_f (goes to 0.12; mean of two" in str(caught.value)
+    told = ti.Recording.from_dataframe(columns, columns={"delta_f": "delta_fl + delta_fr [rad]"})
+    assert np.array_equal(told.delta_f, log.delta_f)
+
+
+def test_sideslip_is_read_in_place_of_lateral_velocity(log):
+    columns = {"t": log.t, "vx": log.v_x, "r": log.r, "delta_f": log.delta_f}
+    columns["Schwimmwinkel"] = np.degrees(np.arctan2(log.v_y, log.v_x))
+    told = ti.Recording.from_dataframe(columns, columns={"beta": "Schwimmwinkel [deg]"})
+    assert np.allclose(told.v_y, log.v_y, atol=1e-12)
+
+
+def test_mirrored_axes_and_a_filter_are_told_by_the_map(log):
+    columns = {"t": log.t, "vx": log.v_x, "vy": -log.v_y, "r": -log.r, "delta_f": -log.delta_f}
+    columns["ay"] = -log.a_y
+    told = ti.Recording.from_dataframe(columns, log_map=ti.LogMap(axes="SAE"))
+    for name in ("v_x", "v_y", "r", "delta_f", "a_y"):
+        assert np.array_equal(getattr(told, name), getattr(log, name))
+    smooth = ti.Recording.from_dataframe(columns, log_map=ti.LogMap(axes="SAE", low_pass=5.0))
+    ahead = ti.Recording.from_dataframe(
+        {name: np.where(log.t > 20.0, 0.0, value) if name == "vy" else value
+         for name, value in columns.items()},
+        log_map=ti.LogMap(axes="SAE", low_pass=5.0), check=False,
+    )  # fmt: skip
+    before = log.t < 20.0
+    assert np.array_equal(ahead.v_y[before], smooth.v_y[before])  # no look at later samples
+    assert np.std(np.diff(smooth.a_y, n=2)) < 0.2 * np.std(np.diff(log.a_y, n=2))
+
+
+def test_several_logs_teach_one_model_with_errors_of_each(log, folder, tmp_path, capsys):
+    write_recording(log.between(0.0, 22.0), tmp_path / "a.csv")
+    write_recording(log.between(18.0, 39.0), tmp_path / "b.csv")
+    out, car = tmp_path / "out", str(folder / "car.toml")
+    logs = [str(tmp_path / "a.csv"), str(tmp_path / "b.csv")]
+    assert main(["identify", *logs, "--vehicle", car, "--out", str(out)]) == 0
+    said = capsys.readouterr()
+    rows = [line.split() for line in said.out.splitlines()]
+    assert any(row[2:3] == ["a"] for row in rows) and any(row[2:3] == ["b"] for row in rows)
+    errors = json.loads((out / "summary.json").read_text())["rmse_N"]
+    assert {"a + b", "a", "b"} == set(errors["online"])
+    frozen = next(iter(errors["frozen"].values()))
+    whole, parts = frozen["a + b"]["front"], [frozen[one]["front"] for one in "ab"]
+    n = [len(read_recording(path)) for path in logs]
+    mean = np.sqrt(np.average(np.square(parts), weights=n))
+    assert whole == pytest.approx(mean, rel=0.02)  # but for the first force after the joint
+    assert main(["identify", *logs, "--run", "x", "--vehicle", car, "--out", str(out)]) == 2
+    assert "name runs as LOG:RUN" in capsys.readouterr().err
+
+
+def test_a_repair_of_the_map_is_taken_out_of_log_and_car_and_said(log, folder, tmp_path, capsys):
+    off = ti.Recording.from_dataframe(
+        {"t": log.t, "vx": log.v_x, "vy": log.v_y, "r": -log.r, "delta_f": log.delta_f},
+        check=False,
+    )
+    write_recording(off, tmp_path / "off.csv")
+    (tmp_path / "log.toml").write_text("[repair.factor]\nr = -1.0\n[repair.vehicle]\nmass = 1400\n")
+    words = ["identify", str(tmp_path / "off.csv"), "--vehicle", str(folder / "car.toml")]
+    assert main([*words, "--out", str(tmp_path / "no")]) == 2
+    capsys.readouterr()
+    done = [*words, "--log", str(tmp_path / "log.toml"), "--out", str(tmp_path / "out")]
+    assert main(done) in (0, 3)
+    said = capsys.readouterr().err
+    assert "repairs the car: mass = 1400" in said and "factor.r = -1" in said
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["vehicle"]["mass"] == 1400.0
+
+
+def test_channels_of_several_rates_and_a_gap_are_read_from_one_table(log, tmp_path):
+    """A table at 100 Hz in which v_y has a cell in every fifth row, and two seconds are missing."""
+    rows = ["t,vx,vy,r,delta_f"]
+    for k in range(len(log)):
+        if 1000 <= k < 1200:
+            continue
+        vy = repr(float(log.v_y[k])) if k % 5 == 0 else ""
+        numbers = (log.v_x[k], log.r[k], log.delta_f[k])
+        vx, r, delta = (repr(float(x)) for x in numbers)
+        rows.append(f"{k / 100:.2f},{vx},{vy},{r},{delta}")
+    (tmp_path / "slow.csv").write_text("\n".join(rows) + "\n")
+    got = read_recording(tmp_path / "slow.csv")
+    assert len(got.stretches) == 2 and got.dt == 0.01
+    assert "2 stretches" in got.notes[-1]
+    at = np.round(got.t * 100).astype(int)
+    assert np.array_equal(got.r, log.r[at])
+    every = at % 5 == 0
+    assert np.array_equal(got.v_y[every], log.v_y[at][every])
+    assert np.std(got.v_y - log.v_y[at]) < 0.2 * np.std(log.v_y)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["nowhere.csv"], "no such file"),
+        (["plain.csv", "--write", "log.json"], "must end in .toml"),
+        (["plain.csv", "--run", "lap"], "there is no run 'lap'"),
+        (["plain.csv", "--columns", "speed=vx"], "'speed' is no column of ours"),
+        (["plain.csv", "--columns", "r=a", "r=b"], "tells r twice"),
+        (["plain.csv", "--log", "nowhere.toml"], "nowhere.toml"),
+    ],
+)
+def test_words_that_are_wrong_are_told_in_one_line(folder, words, said, monkeypatch, capsys):
+    monkeypatch.chdir(folder)
+    assert main(["channels", *words]) == 2
+    error = capsys.readouterr().err
+    assert said in error and len(error.strip().splitlines()) == 1
+
+
+def test_a_map_that_is_there_is_not_replaced(folder, tmp_path, capsys):
+    (tmp_path / "log.toml").write_text("")
+    words = ["channels", str(folder / "plain.csv"), "--write", str(tmp_path / "log.toml")]
+    assert main(words) == 2
+    assert main([*words, "--force"]) == 0
+    assert "[signals.v_x]" in (tmp_path / "log.toml").read_text()
