@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from codegen import Stepper
 from codegen.arrays import Array, blocks, large
@@ -105,10 +106,15 @@ class History:
         """
         return self.design.tracks(self.vehicle, block.before)
 
-    def blocks(self) -> Iterator[Block]:
-        """Yield the run block by block: state and outputs over parts of the recording."""
+    def blocks(self, samples: NDArray[np.intp] | None = None) -> Iterator[Block]:
+        """Yield the run block by block: state and outputs over parts of the recording.
+
+        Parameters
+        ----------
+        samples : rising indices; blocks without one are left out. None yields all.
+        """
         if isinstance(self.state, Recalled):
-            yield from self.state.run.blocks()
+            yield from self.state.run.blocks(samples)
             return
         for part in blocks(len(self.recording)):
             around = slice(part.start, part.stop + 1)
@@ -228,16 +234,22 @@ class LongRun(NamedTuple):
         """Return the number of samples of the part."""
         return self.end - self.first
 
-    def blocks(self) -> Iterator[Block]:
-        """Yield what was recorded, block by block, counted from the first sample of the part."""
+    def blocks(self, samples: NDArray[np.intp] | None = None) -> Iterator[Block]:
+        """Yield what was recorded, block by block, counted from the first sample of the part.
+
+        Parameters
+        ----------
+        samples : rising indices; blocks without one are left out. None yields all.
+        """
         for whole, begin in zip(blocks(len(self.recording)), self.begins, strict=True):
             begins, ends = max(whole.start, self.first), min(whole.stop, self.end)
-            if begins >= ends:
+            part = slice(begins - self.first, ends - self.first)
+            if begins >= ends or not _holds(part, samples):
                 continue
             (block,) = self.setup.run(self.recording, [slice(whole.start, ends)], begin)
             cut = begins - whole.start
             yield Block(
-                part=slice(begins - self.first, ends - self.first),
+                part=part,
                 state={port: values[cut:] for port, values in block.state.items()},
                 outputs={
                     port: values[cut:] for port, values in without_force(block.outputs).items()
@@ -258,6 +270,14 @@ class LongRun(NamedTuple):
                 (block,) = self.setup.run(self.recording, until, begin)
                 return {port: values[-2] for port, values in block.state.items()}
         return dict(self.last)
+
+
+def _holds(part: slice, samples: NDArray[np.intp] | None) -> bool:
+    """Return whether one of the samples, which rise, lies in a part; None are all."""
+    if samples is None:
+        return True
+    first, last = np.searchsorted(samples, [part.start, part.stop])
+    return bool(first < last)
 
 
 class Recalled(Mapping[str, Array]):

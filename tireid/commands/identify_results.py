@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from codegen.arrays import Array, blocks
+from codegen.arrays import Array, blocks, thinning
 from identifier.method import Block, Method, vehicle_numbers
 from identifier.methods import certify
 from identifier.own_network import OnnxModel
@@ -229,9 +229,12 @@ def _error_columns(learnt: History, block: Block) -> dict[str, Array]:
 
 
 def _weight_columns(learnt: History, block: Block) -> dict[str, Array]:
-    weights = {"t_s": learnt.recording.t[block.part]}
+    """Return the columns of weights.csv: of a long run a row for each of at most `LONG` samples."""
+    each = thinning(len(learnt.recording))
+    rows = slice(-block.part.start % each, None, each)
+    weights = {"t_s": learnt.recording.t[block.part][rows]}
     for matrix in [name for name in WEIGHTS if name in block.state]:
-        values = block.before[matrix]
+        values = block.before[matrix][rows]
         for i, j in np.ndindex(values.shape[1:]):
             weights[f"{matrix}_{i + 1}_{j + 1}"] = values[:, i, j]
     return weights
