@@ -34,6 +34,16 @@ def blocks(n: int, first: int = 0, *, overlap: int = 0) -> Iterator[slice]:
         yield slice(begin, min(begin + size + overlap, n))
 
 
+def thinning(n: int) -> int:
+    """Return which sample is looked at where not all are: each one of at most `LONG`.
+
+    Parameters
+    ----------
+    n : samples.
+    """
+    return -(-n // LONG)
+
+
 def large(shape: tuple[int, ...]) -> Array:
     """Return an array to be filled: in memory, or in a file without a name where it is large.
 

@@ -20,6 +20,7 @@ from identifier.refused import NOWHERE, judges_samples
 from identifier.tire_model import Axle, TireModel
 from identifier.tuning import Range, with_numbers
 from models.recordings import Recording
+from models.recordings.record import ALL
 from models.rules import LARGEST_FORCE
 from models.schema import Table
 from models.vehicle import Vehicle
@@ -61,7 +62,7 @@ class Setup(NamedTuple):
     """A run, ready to go: the compiled step, the values it carries at the start, its constants.
 
     The step reads x = [v_y, r] (2,), u = [δ_f, δ_r] (2,), v_x and, where it can use it, a_y (NaN
-    where there is none) sample by sample, SI: `signals_of`. It has an output axle_force (2,) [N].
+    where there is none) sample by sample, SI: `shown`. It has an output axle_force (2,) [N].
     An observer that starts at the first measurement carries zero until that is known: `observe`
     takes its x and returns the carried values that begin with it, by port.
     Carried ports of `only_with_a_y` change no other one, and no output, where a_y is never there.
@@ -92,29 +93,26 @@ class Setup(NamedTuple):
         recording: Recording,
         parts: Iterable[slice] | None = None,
         carry: Mapping[str, Array] | None = None,
-    ) -> Iterator["Stretch"]:
+    ) -> Iterator["Block"]:
         """Yield what the compiled step records over a recording, block by block.
 
-        Values are carried from block to block: the bits are those of one piece. Before each
-        stretch of the recording but the first the step rests.
+        Values are carried from block to block: the bits are those of one piece.
 
         Parameters
         ----------
         recording : its signals are the input; its forces are not looked at.
-        parts : of the recording, one after the other, none over a break; None takes all of it.
+        parts : of the recording, one after the other; None takes all of it in `blocks`.
         carry : values that are carried into the first part; None begins with the recording.
         """
-        following = self._begun(recording) if carry is None else dict(carry)
-        for k, part in enumerate(parts_of(recording) if parts is None else parts):
-            if part.start in recording.breaks and (k > 0 or carry is None):
-                following = self._rested(following, recording, part.start)
-            values = {**following, **signals_of(recording, self.scan.over, part), **self.constants}
-            record = self.scan(part.stop - part.start, values)
+        following = self.begun(recording) if carry is None else dict(carry)
+        for part in blocks(len(recording)) if parts is None else parts:
+            shown = self.shown(recording, part)
+            record = self.scan(shown.samples, {**following, **shown.signals, **self.constants})
             following = {port: record[f"{port}_final"] for port in self.scan.carry}
-            yield Stretch(
+            yield Block(
                 part=part,
-                state={port: record[f"{port}_all"] for port in self.scan.carry},
-                outputs={port: record[port] for port in self.scan.outputs},
+                state={port: shown.of_recording(record[f"{port}_all"]) for port in self.scan.carry},
+                outputs={port: shown.of_recording(record[port]) for port in self.scan.outputs},
             )
 
     def output(self, recording: Recording, port: str) -> Array:
@@ -126,8 +124,8 @@ class Setup(NamedTuple):
         port : of the output.
         """
         told = large((len(recording), self.scan.step.numel_out(port)))
-        for stretch in self.run(recording):
-            told[stretch.part] = stretch.outputs[port]
+        for block in self.run(recording):
+            told[block.part] = block.outputs[port]
         return told
 
     def last(self, recording: Recording, n: int) -> dict[str, Array]:
@@ -138,53 +136,37 @@ class Setup(NamedTuple):
         recording : its signals are the input.
         n : samples that are taken.
         """
-        following = self._begun(recording)
-        for part in parts_of(recording, n):
-            if part.start in recording.breaks:
-                following = self._rested(following, recording, part.start)
-            values = {**following, **signals_of(recording, self.scan.over, part), **self.constants}
-            count = part.stop - part.start
-            record = self.scan(count, values, every=count)
+        following = self.begun(recording)
+        for part in blocks(n):
+            shown = self.shown(recording, part)
+            values = {**following, **shown.signals, **self.constants}
+            record = self.scan(shown.samples, values, every=shown.samples)
             following = {port: record[f"{port}_final"] for port in self.scan.carry}
         return {port: np.asarray(value) for port, value in following.items()}
 
-    def _rested(
-        self, following: Mapping[str, Array], recording: Recording, begin: int
-    ) -> dict[str, Array]:
-        """Return what is carried into a stretch that begins at a sample, after a rest, by port.
+    def begun(self, recording: Recording) -> dict[str, Array]:
+        """Return what is carried into the first sample of a recording, by port.
 
-        A rest is samples that no gate believes, or one at standstill for a step without a gate: no
-        difference over the gap is ever taken for one over a sampling interval.
+        Parameters
+        ----------
+        recording : its first sample is looked at.
         """
-        rows = np.full(self.rest, begin)
-        signals = signals_of(recording, (*self.scan.over, "v_x"), rows)
-        signals["v_x"] = np.full(self.rest, NOWHERE if judges_samples(following) else 0.0)
-        if "a_y" in signals:
-            signals["a_y"] = np.full(self.rest, np.nan)
-        shown = {port: signals[port] for port in self.scan.over}
-        record = self.scan(self.rest, {**following, **shown, **self.constants}, every=self.rest)
-        return {port: record[f"{port}_final"] for port in self.scan.carry}
-
-    def _begun(self, recording: Recording) -> dict[str, Array]:
-        """Return what is carried into the first sample of a recording, by port."""
         return dict(self.begin(np.array([recording.v_y[0], recording.r[0]])).carry)
 
+    def shown(self, recording: Recording, part: slice = ALL) -> "Shown":
+        """Return what the step is shown of a recording.
 
-def parts_of(recording: Recording, n: int | None = None) -> Iterator[slice]:
-    """Yield the parts in which a recording is gone through: blocks, of which none has a break.
-
-    Parameters
-    ----------
-    recording : of stretches.
-    n : samples from the first on that are gone through; None takes all.
-    """
-    for piece in recording.stretches:
-        end = piece.stop if n is None else min(n, piece.stop)
-        yield from blocks(end, piece.start)
+        Parameters
+        ----------
+        recording : its signals are the input.
+        part : samples that are shown.
+        """
+        judges = judges_samples(self.carry)
+        return shown(recording, self.scan.over, rest=self.rest, judges=judges, part=part)
 
 
-class Stretch(NamedTuple):
-    """What a step records over a part of a recording of k samples.
+class Block(NamedTuple):
+    """What a step records over a part of a recording, k samples.
 
     part : the samples.   state : by port, the carried values in effect at each sample and after the
     last (k + 1, ...).   outputs : by port, the other outputs at each sample (k, ...).
@@ -200,25 +182,89 @@ class Stretch(NamedTuple):
         return {port: values[:-1] for port, values in self.state.items()}
 
 
-def signals_of(
-    recording: Recording, over: Iterable[str], part: slice | NDArray[np.int64] = slice(None)
-) -> dict[str, Array]:
-    """Return what a step reads of a recording sample by sample, by port.
+class Shown(NamedTuple):
+    """What a step is shown of a part of a recording: samples, and rests between its stretches.
+
+    signals : by port of `over`, (N, ...).   samples : N, rests included.
+    at : which of these each sample of the part is (n,); None where there is no rest.
+    """
+
+    signals: dict[str, Array]
+    samples: int
+    at: NDArray[np.intp] | None
+
+    def place(self, k: int) -> int:
+        """Return which of what is shown a sample of the part is.
+
+        Parameters
+        ----------
+        k : from 0 to n, that after the last.
+        """
+        if self.at is None:
+            return k
+        return int(self.at[k]) if k < self.at.size else self.samples
+
+    def of_recording(self, values: Array) -> Array:
+        """Return what was recorded at the samples of the part, without rests.
+
+        Parameters
+        ----------
+        values : of all that was shown, (N, ...) or (N + 1, ...) with that after the last.
+        """
+        if self.at is None:
+            return values
+        after = len(values) == self.samples + 1
+        return values[np.append(self.at, self.samples) if after else self.at]
+
+    def with_rests(self, values: Array) -> Array:
+        """Return values of the part's samples with zeros at rests, (N, ...).
+
+        Parameters
+        ----------
+        values : (n, ...).
+        """
+        if self.at is None:
+            return values
+        padded = np.zeros((self.samples, *values.shape[1:]))
+        padded[self.at] = values
+        return padded
+
+
+def shown(
+    recording: Recording, over: Iterable[str], *, rest: int, judges: bool, part: slice = ALL
+) -> Shown:
+    """Return a recording as a step is shown it: before each stretch but the first it rests.
+
+    A rest is a sample that no gate believes, or one at standstill for a step without a gate, so
+    that no difference over the gap is ever taken for one over a sampling interval.
 
     Parameters
     ----------
-    over : ports that are read, of x (n, 2), u (n, 2), v_x (n,) and a_y (n,), which is NaN where it
-        was not logged.
-    part : samples that are read.
+    recording : its samples.
+    over : ports that are read: x (N, 2), u (N, 2), v_x (N,), a_y (N,), NaN where there is none.
+    rest : samples of a rest.
+    judges : whether the step judges samples itself.
+    part : samples that are shown; a stretch that begins with the first of them has its rest.
     """
-    v_x, a_y = recording.v_x[part], recording.a_y
+    first, last, _ = part.indices(len(recording))
+    v_x, a_y, n = recording.v_x[part], recording.a_y, last - first
     signals = {
         "x": np.column_stack([recording.v_y[part], recording.r[part]]),
         "u": np.column_stack([recording.delta_f[part], recording.delta_r[part]]),
         "v_x": v_x,
-        "a_y": np.full(v_x.size, np.nan) if a_y is None else a_y[part],
+        "a_y": np.full(n, np.nan) if a_y is None else a_y[part],
     }
-    return {port: signals[port] for port in over}
+    breaks = np.array([k - first for k in recording.breaks if first <= k < last], dtype=np.intp)
+    if not breaks.size:
+        return Shown({port: signals[port] for port in over}, n, None)
+    at = np.arange(n) + rest * np.searchsorted(breaks, np.arange(n), side="right")
+    begins = np.repeat(breaks, rest)  # first sample of the stretch that follows a rest
+    rows = np.insert(np.arange(n), begins, begins)
+    resting = np.insert(np.zeros(n, dtype=np.bool_), begins, np.ones(begins.size, dtype=np.bool_))
+    padded = {port: np.array(signal[rows]) for port, signal in signals.items()}
+    padded["v_x"][resting] = NOWHERE if judges else 0.0
+    padded["a_y"][resting] = np.nan
+    return Shown({port: padded[port] for port in over}, rows.size, at)
 
 
 # Rules of numbers that are taken over from elsewhere: a file, another controller.

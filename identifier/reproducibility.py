@@ -148,7 +148,7 @@ def motion_error(
     for part in blocks(recording.t.size - n):
         some = slice(part.start, part.stop + n)
         whole = np.lib.stride_tricks.sliding_window_view(counted[some], n + 1).all(axis=1)
-        whole &= recording.within_a_stretch(np.arange(part.start, part.stop), n)
+        whole &= recording.within_a_stretch(part.start + np.arange(whole.size), n)
         F, v_y, r = force[some], recording.v_y[some], recording.r[some]
         a_y = (v_y[n:] - v_y[:-n]) / T + mean(recording.v_x[some] * r)
         r_dot = (r[n:] - r[:-n]) / T

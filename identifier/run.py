@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from codegen import Stepper
 from codegen.arrays import Array, blocks, large
-from identifier.method import AXLE_FORCE, Method, Setup, Stretch, Track, parts_of
+from identifier.method import AXLE_FORCE, Block, Method, Setup, Track
 from identifier.refused import NOWHERE, STALE_TIME, SampleLimits, judges_samples, stale_samples
 from identifier.tire_model import TireModel
 from models.recordings import Recording
@@ -58,7 +59,7 @@ class History:
     axle_force : forces that were identified online (n, 2) [N].
     state : by port, the carried values in effect at each sample and after the last (n + 1, ...).
     outputs : by port, the other outputs of the step at each sample (n, ...).
-        Of a long recording both are computed again where they are asked for: `stretches` and
+        Of a long recording both are computed again where they are asked for: `blocks` and
         `state_at` do so without having all of them at once.
     start : the stored model that the run began with; None where it began afresh.
     """
@@ -85,34 +86,39 @@ class History:
     def tracks(self) -> tuple[Track, ...]:
         """What the method says it had learnt of the axles at each sample."""
         joined: tuple[Track, ...] = ()
-        for stretch in self.stretches():
-            tracks = self.tracks_over(stretch)
-            if stretch.part == slice(0, len(self.recording)):
+        for block in self.blocks():
+            tracks = self.tracks_over(block)
+            if block.part == slice(0, len(self.recording)):
                 return tracks
             if not joined:
                 shape = (len(self.recording), 2)
                 joined = tuple(track._replace(values=large(shape)) for track in tracks)
             for track, here in zip(joined, tracks, strict=True):
-                track.values[stretch.part] = here.values
+                track.values[block.part] = here.values
         return joined
 
-    def tracks_over(self, stretch: Stretch) -> tuple[Track, ...]:
-        """Return what the method says it had learnt of the axles over a stretch of the run.
+    def tracks_over(self, block: Block) -> tuple[Track, ...]:
+        """Return what the method says it had learnt of the axles over a block of the run.
 
         Parameters
         ----------
-        stretch : of k samples.
+        block : of k samples.
         """
-        return self.design.tracks(self.vehicle, stretch.before)
+        return self.design.tracks(self.vehicle, block.before)
 
-    def stretches(self) -> Iterator[Stretch]:
-        """Yield the run block by block: state and outputs over parts of the recording."""
+    def blocks(self, samples: NDArray[np.intp] | None = None) -> Iterator[Block]:
+        """Yield the run block by block: state and outputs over parts of the recording.
+
+        Parameters
+        ----------
+        samples : rising indices; blocks without one are left out. None yields all.
+        """
         if isinstance(self.state, Recalled):
-            yield from self.state.run.stretches()
+            yield from self.state.run.blocks(samples)
             return
         for part in blocks(len(self.recording)):
             around = slice(part.start, part.stop + 1)
-            yield Stretch(
+            yield Block(
                 part=part,
                 state={name: values[around] for name, values in self.state.items()},
                 outputs={name: values[part] for name, values in self.outputs.items()},
@@ -179,7 +185,7 @@ class History:
         return judge(self, t)
 
     def parts(self, recordings: Sequence[Recording]) -> "list[History]":
-        """Return the forces of the run over each of the recordings that the drive was joined of.
+        """Return the run over each of the recordings that the drive was joined of.
 
         Parameters
         ----------
@@ -188,8 +194,16 @@ class History:
         found, first = [], 0
         for one in recordings:
             end = first + len(one)
+            state, outputs = self.state, self.outputs
+            if isinstance(state, Recalled) and isinstance(outputs, Recalled):
+                state, outputs = state.of(first, end), outputs.of(first, end)
+            else:
+                state = {name: values[first : end + 1] for name, values in state.items()}
+                outputs = {name: values[first:end] for name, values in outputs.items()}
             force = self.axle_force[first:end]
-            found.append(replace(self, recording=one, axle_force=force, state={}, outputs={}))
+            found.append(
+                replace(self, recording=one, axle_force=force, state=state, outputs=outputs)
+            )
             first = end
         return found
 
@@ -202,35 +216,68 @@ class History:
 
 
 class LongRun(NamedTuple):
-    """A run that is computed again, block by block.
+    """A run that is computed again, block by block, or a part of it.
 
-    setup : of the run.   recording : what it ran over.   begins : carried values at the first
-    sample of each block, by port.   last : after the last sample.
+    setup : of the run.   recording : what it ran over.   begins : values carried into each block,
+    by port.   last : after the last sample.   first, end : samples of the part, from first to
+    before end.
     """
 
     setup: Setup
     recording: Recording
     begins: tuple[Mapping[str, Array], ...]
     last: Mapping[str, Array]
+    first: int
+    end: int
 
-    def stretches(self) -> Iterator[Stretch]:
-        """Yield what was recorded, block by block."""
-        for stretch in self.setup.run(self.recording):
-            yield stretch._replace(outputs=without_force(stretch.outputs))
+    def __len__(self) -> int:
+        """Return the number of samples of the part."""
+        return self.end - self.first
+
+    def blocks(self, samples: NDArray[np.intp] | None = None) -> Iterator[Block]:
+        """Yield what was recorded, block by block, counted from the first sample of the part.
+
+        Parameters
+        ----------
+        samples : rising indices; blocks without one are left out. None yields all.
+        """
+        for whole, begin in zip(blocks(len(self.recording)), self.begins, strict=True):
+            begins, ends = max(whole.start, self.first), min(whole.stop, self.end)
+            part = slice(begins - self.first, ends - self.first)
+            if begins >= ends or not _holds(part, samples):
+                continue
+            (block,) = self.setup.run(self.recording, [slice(whole.start, ends)], begin)
+            cut = begins - whole.start
+            yield Block(
+                part=part,
+                state={port: values[cut:] for port, values in block.state.items()},
+                outputs={
+                    port: values[cut:] for port, values in without_force(block.outputs).items()
+                },
+            )
 
     def state_at(self, index: int) -> dict[str, Array]:
         """Return the carried values in effect at a sample, or after the last.
 
         Parameters
         ----------
-        index : of the sample; n is after the last.
+        index : of the sample, counted from the first of the part.
         """
-        for part, begin in zip(parts_of(self.recording), self.begins, strict=True):
-            if part.start <= index < part.stop:
-                until = [slice(part.start, index + 1)]
-                (stretch,) = self.setup.run(self.recording, until, begin)
-                return {port: values[-2] for port, values in stretch.state.items()}
+        sample = self.first + index
+        for part, begin in zip(blocks(len(self.recording)), self.begins, strict=True):
+            if part.start <= sample < part.stop:
+                until = [slice(part.start, sample + 1)]
+                (block,) = self.setup.run(self.recording, until, begin)
+                return {port: values[-2] for port, values in block.state.items()}
         return dict(self.last)
+
+
+def _holds(part: slice, samples: NDArray[np.intp] | None) -> bool:
+    """Return whether one of the samples, which rise, lies in a part; None are all."""
+    if samples is None:
+        return True
+    first, last = np.searchsorted(samples, [part.start, part.stop])
+    return bool(first < last)
 
 
 class Recalled(Mapping[str, Array]):
@@ -249,13 +296,22 @@ class Recalled(Mapping[str, Array]):
     def __getitem__(self, port: str) -> Array:
         if port not in self._ports:
             raise KeyError(port)
-        n, found = len(self.run.recording), np.empty(0)
-        for stretch in self.run.stretches():
-            values = getattr(stretch, self._kind)[port]
+        n, found = len(self.run), np.empty(0)
+        for block in self.run.blocks():
+            values = getattr(block, self._kind)[port]
             if not found.size:
                 found = large((n + (self._kind == "state"), *values.shape[1:]))
-            found[stretch.part.start : stretch.part.start + len(values)] = values
+            found[block.part.start : block.part.start + len(values)] = values
         return found
+
+    def of(self, first: int, end: int) -> "Recalled":
+        """Return the same of the samples from first to before end.
+
+        Parameters
+        ----------
+        first, end : of the whole run.
+        """
+        return Recalled(self.run._replace(first=first, end=end), self._kind, self._ports)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._ports)
@@ -321,18 +377,19 @@ def identify(
     """
     check_sampling(recording, design)
     setup = design.setup(vehicle, start)
-    force, begins, parts = large((len(recording), 2)), [], parts_of(recording)
+    force, begins, parts = large((len(recording), 2)), [], blocks(len(recording))
     state: Mapping[str, Array] = {}
     outputs: Mapping[str, Array] = {}
-    for stretch in setup.run(recording, parts):
-        force[stretch.part] = stretch.outputs["axle_force"]
-        state, outputs = stretch.state, without_force(stretch.outputs)
-        begins.append({port: values[0].copy() for port, values in state.items()})
+    following: Mapping[str, Array] = setup.begun(recording)
+    for block in setup.run(recording, parts):
+        force[block.part] = block.outputs["axle_force"]
+        state, outputs = block.state, without_force(block.outputs)
+        begins.append(following)
+        following = {port: values[-1].copy() for port, values in state.items()}
         if progress is not None:
-            progress(stretch.part.stop / len(recording))
+            progress(block.part.stop / len(recording))
     if len(begins) > 1:
-        last = {port: values[-1].copy() for port, values in state.items()}
-        run = LongRun(setup, recording, tuple(begins), last)
+        run = LongRun(setup, recording, tuple(begins), following, 0, len(recording))
         state = Recalled(run, "state", tuple(state))
         outputs = Recalled(run, "outputs", tuple(outputs))
     return History(

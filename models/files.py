@@ -37,17 +37,17 @@ def digest(content: Any) -> str:
     ----------
     content : ready for JSON.
     """
-    return digest_of_text([json.dumps(content, sort_keys=True)])
+    return digest_of_bytes([json.dumps(content, sort_keys=True).encode()])
 
 
-def digest_of_text(parts: Iterable[str]) -> str:
-    """Return twelve characters that stand for a text.
+def digest_of_bytes(parts: Iterable[bytes]) -> str:
+    """Return twelve characters that stand for bytes.
 
     Parameters
     ----------
-    parts : of it, one after the other.
+    parts : of them, one after the other.
     """
     found = hashlib.sha256()
     for part in parts:
-        found.update(part.encode())
+        found.update(part)
     return found.hexdigest()[:12]

@@ -1,5 +1,7 @@
 """Learning from a recording and asking what was learnt about another, as commands and users do."""
 
+from collections.abc import Callable
+
 from identifier.axle import AxleIdentifier
 from identifier.method import Method
 from identifier.reproducibility import Prediction, counted_samples, freeze_key, predict
@@ -17,6 +19,7 @@ def identify(
     *,
     start: TireModel | None = None,
     check: bool = True,
+    progress: Callable[[float], None] | None = None,
 ) -> History:
     """Learn the tires of a car from a drive, sample by sample.
 
@@ -27,6 +30,7 @@ def identify(
     method : the identifier; None takes `AxleIdentifier.for_vehicle` at the recording's interval.
     start : model to go on learning from; None begins afresh.
     check : whether a recording that this vehicle cannot have driven is refused.
+    progress : called now and then with the share that is done, 0 to 1.
 
     Raises
     ------
@@ -41,7 +45,7 @@ def identify(
     if check:
         check_against_vehicle(recording, vehicle)
     counted_samples(recording, design.min_speed)  # refuses a car that never drives
-    history = run_over(recording, vehicle, design, start)
+    history = run_over(recording, vehicle, design, start, progress=progress)
     if history.diverged_at is not None:
         at = freeze_key(history.diverged_at)
         law = getattr(design, "law", type(design).__name__)

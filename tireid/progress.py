@@ -227,6 +227,15 @@ class Progress:
 
         return told
 
+    def within(self, first: float, last: float) -> Callable[[float], None]:
+        """Return who is told the share that is done of a piece of the part.
+
+        Parameters
+        ----------
+        first, last : shares of the part at which the piece begins and ends, 0 to 1.
+        """
+        return lambda share: self(first + (last - first) * share)
+
     def __call__(self, share: float, text: str = "") -> None:
         """Tell it where it is time.
 

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from codegen import BatchScan, Scan
 from codegen.arrays import Array
-from identifier.method import CannotFreezeError, Method, signals_of
-from identifier.refused import NOWHERE, judges_samples
+from identifier.method import CannotFreezeError, Method, shown
+from identifier.refused import judges_samples
 from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
 from identifier.run import identify
 from identifier.tire_model import TireModel
@@ -284,74 +284,33 @@ def run_scored(
     impossible : for each run, a force that no tire makes [N].
     counts : samples that count in the error (n,).
     keep : samples whose values are recorded.
-    rest : samples that each run rests between stretches of the recording, as `Setup.run` does.
+    rest : samples that each run rests between stretches of the recording.
     workers : threads; None takes one for each processor.
     """
+    seen = shown(recording, scan.over, rest=rest, judges=judges_samples(values[0]))
     truth = np.zeros((len(recording), 2)) if recording.axle_force is None else recording.axle_force
-    rests = _Rests.of(recording, rest)
+    counted = counts.astype(np.float64)
     record = _scored_scan(scan)(
-        rests.samples,
+        seen.samples,
         {
             **{port: np.stack([one[port] for one in values]) for port in values[0]},
-            **rests.signals(recording, scan.over, judges=judges_samples(values[0])),
-            "truth": rests.beside(truth),
-            "counts": rests.beside(counts.astype(np.float64)),
+            **seen.signals,
+            "truth": seen.with_rests(truth),
+            "counts": seen.with_rests(counted),
             "impossible": np.array(impossible),
             "squares": np.zeros(2),
             "sane_samples": np.zeros(()),
             "sane": np.ones(()),
         },
-        keep=[int(rests.at[k]) for k in keep],
+        keep=[seen.place(k) for k in keep],
         workers=workers,
     )
     sane = record["sane_samples_final"][:, 0].astype(np.int64)
     return Scores(
         squares=record["squares_final"] / counts.sum(),
-        sane_samples=np.searchsorted(rests.at, sane),
+        sane_samples=sane if seen.at is None else np.searchsorted(seen.at, sane),
         record=record,
     )
-
-
-class _Rests(NamedTuple):
-    """Samples of a recording and rests between its stretches, that all lanes are shown alike.
-
-    rows : which sample of the recording each is; at a rest, the first of the stretch to come (N,).
-    at : which of these each sample of the recording is (n,).
-    """
-
-    rows: NDArray[np.intp]
-    at: NDArray[np.intp]
-
-    @classmethod
-    def of(cls, recording: Recording, rest: int) -> "_Rests":
-        n, breaks = len(recording), np.array(recording.breaks, dtype=np.intp)
-        first = np.repeat(breaks, rest)
-        every = np.arange(n)
-        at = every + rest * np.searchsorted(breaks, every, side="right")
-        return cls(np.insert(every, first, first), at)
-
-    @property
-    def samples(self) -> int:
-        """Return how many there are, N."""
-        return int(self.rows.size)
-
-    def beside(self, values: Array) -> Array:
-        """Return values of samples (n, ...) with zeros at rests, (N, ...)."""
-        padded = np.zeros((self.samples, *values.shape[1:]))
-        padded[self.at] = values
-        return padded
-
-    def signals(
-        self, recording: Recording, over: Sequence[str], *, judges: bool
-    ) -> dict[str, Array]:
-        """Return what a step is shown, by port."""
-        signals = signals_of(recording, over, self.rows)
-        resting = np.ones(self.samples, dtype=np.bool_)
-        resting[self.at] = False
-        for port, value in (("v_x", NOWHERE if judges else 0.0), ("a_y", np.nan)):
-            if port in signals:
-                signals[port] = np.where(resting, value, signals[port])
-        return signals
 
 
 def rmse(squares: Array) -> AxleRmse:
@@ -385,21 +344,20 @@ def step_times(
     recording : what is run over.
     repeats : turns; the shortest counts.
     """
-    n = len(_long(recording.v_x))
-    runs = {}
+    runs: dict[str, tuple[Scan, dict[str, Array], int]] = {}
     for name, method in methods.items():
         setup = method.setup(vehicle).begin(recording.x[0])
-        signals = signals_of(recording, setup.scan.over)
-        sampled = {port: _long(signal) for port, signal in signals.items()}
-        runs[name] = setup.scan, {**setup.carry, **sampled, **setup.constants}
+        sampled = {port: _long(signal) for port, signal in setup.shown(recording).signals.items()}
+        n = len(sampled["v_x"])
+        runs[name] = setup.scan, {**setup.carry, **sampled, **setup.constants}, n
         setup.scan(n, runs[name][1])  # compiled and warm
     shortest = dict.fromkeys(methods, math.inf)
     for _ in range(repeats):
-        for name, (scan, values) in runs.items():
+        for name, (scan, values, n) in runs.items():
             start = time.thread_time()
             scan(n, values, every=n)
-            shortest[name] = min(shortest[name], time.thread_time() - start)
-    return {name: duration / n for name, duration in shortest.items()}
+            shortest[name] = min(shortest[name], (time.thread_time() - start) / n)
+    return shortest
 
 
 def _long(signal: Array) -> Array:

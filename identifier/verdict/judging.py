@@ -90,12 +90,14 @@ def judge(history: History, t: float | None = None) -> Verdict:
 def _road_felt(history: History, asked: Portion) -> Array | None:
     """Return what a banked road pushed over a portion of a run (k,) [weights]; None unknown."""
     pushes = []
-    for stretch in history.stretches():
-        push = history.design.road_push(stretch.state)
+    for block in history.blocks(asked.samples):
+        first, last = np.searchsorted(asked.samples, [block.part.start, block.part.stop])
+        mine = asked.samples[first:last] - block.part.start
+        around = slice(mine[0], mine[-1] + 2)
+        push = history.design.road_push({port: v[around] for port, v in block.state.items()})
         if push is None:
             return None
-        first, last = np.searchsorted(asked.samples, [stretch.part.start, stretch.part.stop])
-        pushes.append(push[asked.samples[first:last] - stretch.part.start])
+        pushes.append(push[mine - mine[0]])
     return np.concatenate(pushes)
 
 

@@ -355,6 +355,9 @@ def _first_step(t: Array, wrong: Callable[[Array], NDArray[Any]]) -> int | None:
 # Rounded stamps of an even clock.
 
 
+LOST = 2.5  # usual steps, beyond which samples are lost
+
+
 class Even(NamedTuple):
     """An even clock: time [s], (n,), and what was mended, after the name of the column."""
 
@@ -384,7 +387,9 @@ def even_clock(t: Array) -> Even | None:
     repeats = bool(moves.size < steps.size)
     if repeats and shared < SHARED:
         return None
-    if not repeats and (tick < WORTH * float(np.median(moves)) or np.ptp(moves) < 0.5 * tick):
+    usual = float(np.median(moves))
+    together = moves[moves < LOST * usual]  # without gaps
+    if not repeats and (tick < WORTH * usual or np.ptp(together) < 0.5 * tick):
         return None
     return _fitted(t, tick)
 
@@ -403,7 +408,7 @@ def _fitted(t: Array, tick: float) -> Even | None:
     """Return the even clock of which every stamp is less than a tick away, lost samples aside."""
     steps = np.diff(t)
     usual = float(np.median(steps[steps > 0.0]))
-    cuts = np.flatnonzero(steps > max(2.5 * usual, usual + 1.5 * tick)) + 1
+    cuts = np.flatnonzero(steps > max(LOST * usual, usual + 1.5 * tick)) + 1
     edges = np.concatenate([[0], cuts, [t.size]])
     longest = int(np.argmax(np.diff(edges)))
     dt = _even_step(t[edges[longest] : edges[longest + 1]], tick)

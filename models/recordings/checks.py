@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from codegen.arrays import Array
+from codegen.arrays import Array, thinning
 from models.bicycle import measured_slip
 from models.logs.log import RecordingError
 from models.recordings.evidence import (
@@ -22,7 +22,6 @@ from models.recordings.evidence import (
     least_squares,
     onset,
     steering,
-    thinning,
     windows,
 )
 from models.recordings.record import Recording, peak

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import LONG, Array
+from codegen.arrays import LONG, Array, thinning
 from models.recordings.record import Recording
 
 WINDOW = 0.2  # [s]: keeps maneuvers up to 2 Hz, averages 20 samples of noise at 100 Hz
@@ -165,16 +165,6 @@ def _wheelbase(w: Windows, keep: NDArray[np.bool_]) -> Steering | None:
     if dd == 0.0:
         return None
     return Steering(float(np.sqrt(dd / rr)), correlation(r, kinematic))
-
-
-def thinning(n: int) -> int:
-    """Return which sample is looked at where not all are: each one of at most `LONG`.
-
-    Parameters
-    ----------
-    n : samples.
-    """
-    return -(-n // LONG)
 
 
 def _sums(signal: Callable[[Any], Array], n: int, start: NDArray[np.intp], width: int) -> Array:

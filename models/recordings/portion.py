@@ -1,5 +1,6 @@
 """A portion of a long recording that stands for all of it, where something is asked many times."""
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -7,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import LONG, Array, blocks
-from models.recordings.record import Recording
+from models.recordings.record import MINIMUM_SAMPLES, Recording
 from models.vehicle import GRAVITY
 
 STRETCH = 2000  # samples of one, 20 s at 100 Hz
@@ -19,9 +20,8 @@ HARDEST = 2.0 * GRAVITY  # m/s² that count: what is beyond is a sensor, not a d
 class Portion(NamedTuple):
     """Stretches of a recording, joined.
 
-    recording : of them; its clock is its own, and at the end of each stretch the car stands, so
-    that learning rests and no window reaches over the joint.   samples : which samples of the whole
-    they are (k,).
+    recording : of them; at the end of each stretch the car stands, so that a signal that is moved
+    in time leaves the next alone.   samples : which samples of the whole they are (k,).
     """
 
     recording: Recording
@@ -59,24 +59,20 @@ def portion(recording: Recording, middle: int | None = None) -> Portion:
         begins = _hardest(power, 0, middle, count // 2) + _hardest(power, middle, n, count // 2)
     samples = np.unique(np.add.outer(begins, np.arange(STRETCH)))
     samples = samples[samples < n]
-    breaks = np.array(recording.breaks, dtype=np.intp)
-    joints = np.append((np.diff(samples) > 1) | np.isin(samples[1:], breaks), True)
-    rests = np.flatnonzero(joints)[:, None] - np.arange(round(REST / recording.dt))
-    v_x = recording.v_x[samples]
-    v_x[np.maximum(rests, 0)] = 0.0
-    a_y, force = recording.a_y, recording.axle_force
-    taken = Recording(
-        name=recording.name,
-        t=np.arange(samples.size, dtype=np.float64) * recording.dt,
-        v_x=v_x,
-        v_y=recording.v_y[samples],
-        r=recording.r[samples],
-        delta_f=recording.delta_f[samples],
-        delta_r=recording.delta_r[samples],
-        a_y=None if a_y is None else a_y[samples],
-        axle_force=None if force is None else force[samples],
-    )
-    return Portion(taken, samples)
+    samples = _without_scraps(samples, recording)
+    taken = recording.taken(samples)
+    ends = np.array([piece.stop for piece in taken.stretches])
+    v_x = taken.v_x.copy()
+    v_x[np.maximum(ends[:, None] - 1 - np.arange(round(REST / recording.dt)), 0)] = 0.0
+    return Portion(replace(taken, v_x=v_x), samples)
+
+
+def _without_scraps(samples: NDArray[np.intp], recording: Recording) -> NDArray[np.intp]:
+    """Return the samples but for those of stretches that are too short to be any."""
+    own = np.searchsorted(np.array(recording.breaks, dtype=np.intp), samples, side="right")
+    begins = np.flatnonzero((np.diff(own) > 0) | (np.diff(samples) > 1)) + 1
+    lengths = np.diff([0, *begins, samples.size])
+    return samples[np.repeat(lengths >= MINIMUM_SAMPLES, lengths)]
 
 
 def _power(recording: Recording) -> Array:

@@ -60,7 +60,7 @@ class Recording:
     Parameters
     ----------
     name : "FILE:RUN", or "FILE" when the file has no run column.
-    t : time [s], shape (n,), rising, uniform to 2 % of one step in each stretch.
+    t : time [s], shape (n,), uniform to 2 % of one step in each stretch, and rising.
     v_x : forward speed at the center of gravity [m/s], shape (n,).
     v_y : lateral velocity at the center of gravity [m/s], positive to the left, shape (n,).
     r : yaw rate [rad/s], positive to the left, shape (n,).
@@ -124,11 +124,7 @@ class Recording:
                     f"{LARGEST[name]:g}, its peak is {largest:.4g}"
                 )
             object.__setattr__(self, name, array)
-        self._require_uniform()
-
-    def _require_uniform(self) -> None:
-        """Refuse time that does not rise in equal steps, or does not from stretch to stretch."""
-        step, before = self._step, -math.inf
+        step = self._step
         for piece in self.stretches:
             off_grid = _off_grid(self.t[piece], step)
             if not (step > 0.0 and off_grid <= JITTER * step):
@@ -136,12 +132,11 @@ class Recording:
                     f"{self.name}: t must rise in equal steps, mean step {step:.6g} s, "
                     f"largest departure {off_grid:.3g} s; read the log with read_recording"
                 )
-            if not self.t[piece.start] > before:
+            if piece.start and not self.t[piece.start] > self.t[piece.start - 1]:
                 raise RecordingError(
                     f"{self.name}: t must rise from one stretch to the next, "
-                    f"{self.t[piece.start]:.9g} s comes after {before:.9g} s"
+                    f"{self.t[piece.start]:.9g} s comes after {self.t[piece.start - 1]:.9g} s"
                 )
-            before = float(self.t[piece.stop - 1])
 
     @classmethod
     def from_dataframe(
@@ -273,30 +268,27 @@ class Recording:
                 f"samples, at least {MINIMUM_SAMPLES} are needed; the recording runs from "
                 f"{self.t[0]:g} to {self.t[-1]:g} s"
             )
-        return self.taken(keep)
+        return self.taken(np.arange(keep.start, keep.stop))
 
-    def taken(self, kept: slice | NDArray[np.intp]) -> "Recording":
+    def taken(self, kept: NDArray[np.intp]) -> "Recording":
         """Return some of the samples; where some are left out between, a stretch begins.
 
         Parameters
         ----------
-        kept : samples: a slice of them, or their indices, rising.
+        kept : indices of samples, rising.
 
         Raises
         ------
         RecordingError
             Where fewer than 10 samples are left of a stretch.
         """
-        if isinstance(kept, slice):
-            breaks = [k - kept.start for k in self.breaks if kept.start < k < kept.stop]
-        else:
-            stretch = np.searchsorted(np.array(self.breaks, dtype=np.intp), kept, side="right")
-            begins = (np.diff(stretch) > 0) | (np.diff(kept) > 1)
-            breaks = (np.flatnonzero(begins) + 1).tolist()
+        stretch = np.searchsorted(np.array(self.breaks, dtype=np.intp), kept, side="right")
+        begins = (np.diff(stretch) > 0) | (np.diff(kept) > 1)
+        breaks = tuple(int(k) for k in np.flatnonzero(begins) + 1)
         cut: dict[str, Any] = {
             name: getattr(self, name)[kept] for name in SIGNALS if getattr(self, name) is not None
         }
-        return replace(self, **cut, breaks=tuple(breaks))
+        return replace(self, **cut, breaks=breaks)
 
     def __repr__(self) -> str:
         truth = "" if self.axle_force is None else ", with axle forces"
@@ -340,28 +332,40 @@ def joined(recordings: Sequence[Recording], name: str | None = None) -> Recordin
     name = " + ".join(one.name for one in recordings) if name is None else name
     if len(recordings) == 1:
         return replace(first, name=name)
-    t, breaks, notes = [np.asarray(first.t)], list(first.breaks), list(first.notes)
+    t = large((sum(map(len, recordings)),))
+    n, breaks, notes = len(first), list(first.breaks), list(first.notes)
+    t[:n] = first.t
     for one in recordings[1:]:
         if abs(one.dt - first.dt) > JITTER * first.dt / len(one):
             raise RecordingError(
                 f"{one.name} is sampled at {one.dt:g} s, {first.name} at {first.dt:g} s: logs "
                 "that are learnt on together must be brought to one interval"
             )
-        n, end = sum(map(np.size, t)), float(t[-1][-1])
+        end = float(t[n - 1])
         moved = 0.0 if one.t[0] > end + first.dt else end + PAUSE - float(one.t[0])
-        t.append(np.asarray(one.t) + moved if moved else np.asarray(one.t))
+        t[n : n + len(one)] = one.t
+        if moved:
+            t[n : n + len(one)] += moved
         breaks += [n, *(n + k for k in one.breaks)]
         notes += [note for note in one.notes if note not in notes]
         if moved:
             notes.append(f"the time of {one.name} is moved by {moved:.6g} s, to follow on")
+        n += len(one)
+    t.setflags(write=False)
     signals: dict[str, Any] = {
-        name: np.concatenate([getattr(one, name) for one in recordings])
+        name: _in_a_row([getattr(one, name) for one in recordings])
         for name in SIGNALS[1:]
         if all(getattr(one, name) is not None for one in recordings)
     }
-    return Recording(
-        name=name, t=np.concatenate(t), **signals, breaks=tuple(breaks), notes=tuple(notes)
-    )
+    return Recording(name=name, t=t, **signals, breaks=tuple(breaks), notes=tuple(notes))
+
+
+def _in_a_row(signals: Sequence[Array]) -> Array:
+    """Return signals one after the other, as what nobody may write."""
+    row = large((sum(map(len, signals)), *signals[0].shape[1:]))
+    np.concatenate(signals, out=row)
+    row.setflags(write=False)
+    return row
 
 
 def _read_only(value: object) -> Array:

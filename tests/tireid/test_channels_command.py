@@ -100,7 +100,9 @@ def test_a_rear_or_right_wheel_is_not_taken_for_the_front_axle(log, tmp_path):
     columns |= {"delta_fl": log.delta_f, "delta_fr": log.delta_f}
     with pytest.raises(RecordingError) as caught:
         ti.Recording.from_dataframe(columns)
-    assert "did you mean 'delta_fl + delta_fr' for delta_f (goes to 0.12; mean of two" in str(caught.value)
+    assert "did you mean 'delta_fl + delta_fr' for delta_f (goes to 0.12; mean of two" in str(
+        caught.value
+    )
     told = ti.Recording.from_dataframe(columns, columns={"delta_f": "delta_fl + delta_fr [rad]"})
     assert np.array_equal(told.delta_f, log.delta_f)
 

@@ -19,7 +19,6 @@ from identifier.reproducibility import (
     reproduce,
 )
 from identifier.run import History
-from identifier.tire_model import TireModel
 from identifier.verdict import judge_prediction
 from models.recordings import Recording, joined
 from models.vehicle import Vehicle
@@ -55,7 +54,7 @@ from tireid.progress import Progress, say, tell
 from tireid.reports.identify import write_identify_report
 from tireid.verdicts import add_accept, exit_code, verdict_text, warn_of_stored
 
-LEARNING, DRAWING = "learning", "replays and figures"
+LEARNING, JUDGING, DRAWING = "learning", "replays and verdict", "curves and figures"
 OWN_PAST = "  its past, against online"
 
 
@@ -132,19 +131,24 @@ def run(options: argparse.Namespace) -> int:
         _require_model(law, design, vehicle)
     if start is not None and start.scales_with_load and start.vehicle != vehicle:
         say(f"{options.weights} is of the car {start.vehicle.name!r}: scaled by the axle loads")
-    parts = {LEARNING: 2.0 + len(others), DRAWING: 3.0 + len(others)}
+    count = 1.0 + len(others)
+    parts = {LEARNING: 1.0 + count, JUDGING: count, DRAWING: 2.0 + 3.0 * count}
     with (
         output_folder(options.out, force=options.force) as folder,
         Progress("identify", parts) as progress,
     ):
         histories: list[History] = []
         pieces: list[History] = []
-        for one in (recording, *others):
-            histories.append(_learn(one, vehicle, law, design, start))
-            progress.step(1 + len(others))
-        progress.begin(DRAWING)
+        for k, one in enumerate((recording, *others)):
+            share = progress.within(k / count, (k + 1) / count)
+            histories.append(  # checked when they were read
+                identify(one, vehicle, design, start=start, check=False, progress=share)
+            )
+            say(f"learnt {law} over {one.name}")
+        progress.begin(JUDGING)
         if network is not None:
             verdict = judge_prediction(network, histories[0].recording)
+            progress.begin(DRAWING)
             replays, figures = write_network_results(
                 folder, options.network, law, network, histories, verdict
             )
@@ -155,7 +159,16 @@ def run(options: argparse.Namespace) -> int:
             pieces = learnt.parts(logs) if len(logs) > 1 else []
             verdict = learnt.verdict(freeze_times[-1])
             frozen = {t: _replays(t, learnt, [*pieces, *histories[1:]]) for t in freeze_times}
-            figures = write_results(folder, law, learnt, histories[1:], frozen, verdict, pieces)
+            figures = write_results(
+                folder,
+                law,
+                learnt,
+                histories[1:],
+                frozen,
+                verdict,
+                pieces,
+                progress=progress.begin(DRAWING),
+            )
             by_key = {f"{freeze_key(t)} s": replays for t, replays in frozen.items()}
             closing = _closing_line(learnt, freeze_times[-1], vehicle, resumed=start is not None)
             told = f"{error_table([*histories, *pieces], frozen)}\n{closing}"
@@ -193,18 +206,6 @@ def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool)
         f"certificate: {certificate.verdict}; grip, cornering stiffness, weights, offsets and "
         "covariance stay in their boxes by construction (summary.json lists them)"
     )
-
-
-def _learn(
-    recording: Recording,
-    vehicle: Vehicle,
-    law: str,
-    design: Method,
-    start: TireModel | None,
-) -> History:
-    history = identify(recording, vehicle, design, start=start, check=False)  # it was when read
-    say(f"learnt {law} over {recording.name}")
-    return history
 
 
 def _read(

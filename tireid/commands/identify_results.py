@@ -1,15 +1,15 @@
 """The files of `tireid identify`: numbers as JSON, every curve as CSV, figures as PNG."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from codegen.arrays import Array, blocks
-from identifier.method import Method, Stretch, vehicle_numbers
+from codegen.arrays import Array, blocks, thinning
+from identifier.method import Block, Method, vehicle_numbers
 from identifier.methods import certify
 from identifier.own_network import OnnxModel
 from identifier.reproducibility import (
@@ -38,7 +38,7 @@ from tireid.figures import (
     weights_figure,
 )
 from tireid.output import text_table, write_csv, write_json, write_long_csv
-from tireid.progress import say
+from tireid.progress import Progress, say
 
 # The machine-readable result of `tireid identify`: summary.json, whose keys are stable.
 
@@ -135,6 +135,7 @@ def summarize_replays(
 
 Frozen = Mapping[float, Mapping[str, Replay]]
 OBSERVED = "xi_tilde"  # the output of a method that learns from the error of an observer
+WRITING = 0.6  # share of the time of curves and figures that a long recording's curves take
 WEIGHTS = ("W", "V", "own")  # carried matrices that are the learnt model, by whatever method
 
 
@@ -146,6 +147,8 @@ def write_results(
     frozen: Frozen,
     verdict: Verdict,
     parts: Sequence[History] = (),
+    *,
+    progress: Progress | None = None,
 ) -> dict[str, Figure]:
     """Write everything that was learnt into a folder; return the figures by the name of their file.
 
@@ -158,6 +161,7 @@ def write_results(
     frozen : freeze time [s] to recording name to replay.
     verdict : on the model of the last freeze.
     parts : of the online run, over each of several logs that were learnt on.
+    progress : told how far it is; None tells nobody.
     """
     write_json(
         folder / "summary.json",
@@ -171,7 +175,7 @@ def write_results(
         model.save(folder / f"weights{last}.json", valid=None if judged is None else judged.valid)
         columns = curve_columns(model, [run.recording for run in (learnt, *others)])
         write_csv(folder / f"curve{last}.csv", columns)
-    _write_curves(folder, learnt, others, frozen)
+    _write_curves(folder, learnt, others, frozen, progress or Progress("curves"))
     say("drawing figures")
     return _draw(folder, learnt, others, frozen)
 
@@ -202,25 +206,33 @@ def error_cells(error: AxleRmse, size: AxleRmse | None) -> tuple[str, str]:
     return front, rear
 
 
-def _write_curves(folder: Path, learnt: History, others: Sequence[History], frozen: Frozen) -> None:
-    for history in (learnt, *others):
+def _write_curves(
+    folder: Path,
+    learnt: History,
+    others: Sequence[History],
+    frozen: Frozen,
+    progress: Progress,
+) -> None:
+    count = 1 + len(others)
+    for k, history in enumerate((learnt, *others)):
         replays = {
             f"frozen_{freeze_key(t)}s": by_name[history.recording.name]
             for t, by_name in frozen.items()
         }
         name = "forces.csv" if history is learnt else f"forces_{file_name(history.recording)}.csv"
-        write_forces(folder / name, history, replays)
+        told = progress.within(WRITING * k / count, WRITING * (k + 1) / count)
+        write_forces(folder / name, history, replays, told)
     if OBSERVED in learnt.outputs:
-        stretches = learnt.stretches()
-        write_long_csv(folder / "errors.csv", (_error_columns(learnt, one) for one in stretches))
-    parts = (_weight_columns(learnt, one) for one in learnt.stretches())
+        found = learnt.blocks()
+        write_long_csv(folder / "errors.csv", (_error_columns(learnt, one) for one in found))
+    parts = (_weight_columns(learnt, one) for one in learnt.blocks())
     write_long_csv(folder / "weights.csv", parts)
 
 
-def _error_columns(learnt: History, stretch: Stretch) -> dict[str, Array]:
-    observed, z = stretch.outputs[OBSERVED], stretch.before["z"]
+def _error_columns(learnt: History, block: Block) -> dict[str, Array]:
+    observed, z = block.outputs[OBSERVED], block.before["z"]
     return {
-        "t_s": learnt.recording.t[stretch.part],
+        "t_s": learnt.recording.t[block.part],
         "xi_tilde_f_Us": observed[:, 0],
         "xi_tilde_r_Us": observed[:, 1],
         "z_f_Us2": z[:, 0],
@@ -228,25 +240,41 @@ def _error_columns(learnt: History, stretch: Stretch) -> dict[str, Array]:
     }
 
 
-def _weight_columns(learnt: History, stretch: Stretch) -> dict[str, Array]:
-    weights = {"t_s": learnt.recording.t[stretch.part]}
-    for matrix in [name for name in WEIGHTS if name in stretch.state]:
-        values = stretch.before[matrix]
+def _weight_columns(learnt: History, block: Block) -> dict[str, Array]:
+    """Return the columns of weights.csv: of a long run a row for each of at most `LONG` samples."""
+    each = thinning(len(learnt.recording))
+    rows = slice(-block.part.start % each, None, each)
+    weights = {"t_s": learnt.recording.t[block.part][rows]}
+    for matrix in [name for name in WEIGHTS if name in block.state]:
+        values = block.before[matrix][rows]
         for i, j in np.ndindex(values.shape[1:]):
             weights[f"{matrix}_{i + 1}_{j + 1}"] = values[:, i, j]
     return weights
 
 
-def write_forces(path: Path, history: History, replays: Mapping[str, Replay]) -> None:
+def write_forces(
+    path: Path,
+    history: History,
+    replays: Mapping[str, Replay],
+    progress: Callable[[float], None] | None = None,
+) -> None:
     """Write the curves of forces.csv: slip angles, true, online and frozen forces.
 
     Parameters
     ----------
     history : an online run.
     replays : replays of the same recording by the name of their columns.
+    progress : called now and then with the share that is done, 0 to 1.
     """
-    parts = blocks(len(history.recording))
-    write_long_csv(path, (_force_columns(history, replays, part) for part in parts))
+    n = len(history.recording)
+
+    def parts() -> Iterator[dict[str, Array]]:
+        for part in blocks(n):
+            yield _force_columns(history, replays, part)
+            if progress is not None:
+                progress(part.stop / n)
+
+    write_long_csv(path, parts())
 
 
 def _force_columns(
@@ -314,7 +342,7 @@ def _draw(
     if OBSERVED in learnt.outputs:
         figures["error"] = error_figure(learnt, freeze_times=list(frozen))
         figures["weights"] = weights_figure(learnt, list(frozen))
-    if learnt.tracks_over(next(learnt.stretches())):
+    if learnt.tracks_over(next(learnt.blocks())):
         figures["learnt"] = learnt_axles_figure(learnt, list(frozen))
     for other in others:
         replay = frozen[last][other.recording.name]

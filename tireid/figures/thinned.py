@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import LONG, Array, blocks
-from identifier.method import Stretch
+from identifier.method import Block
 from identifier.run import History
 
 COLUMNS = 1500  # of pixels, more than any panel has
@@ -68,7 +68,7 @@ def farthest(signals: Iterable[Array], width: int) -> NDArray[np.intp]:
 
 
 def shown_of_run(
-    history: History, ends: tuple[float, float], tell: Callable[[Stretch], Sequence[Array]]
+    history: History, ends: tuple[float, float], tell: Callable[[Block], Sequence[Array]]
 ) -> tuple[Array, list[Array]]:
     """Return times and values of what a run recorded, as they are drawn: (k,) and (k, ...) each.
 
@@ -76,13 +76,13 @@ def shown_of_run(
     ----------
     history : the run.
     ends : first and last time [s].
-    tell : returns what is drawn of a stretch, one value a sample.
+    tell : returns what is drawn of a block, one value a sample.
     """
     t = history.recording.t
     width = 1 if len(t) <= LONG else -(-len(t) // COLUMNS)
     times, values = [], []
-    for stretch in history.stretches():
-        told, here = tell(stretch), t[stretch.part]
+    for block in history.blocks():
+        told, here = tell(block), t[block.part]
         part: Samples = (here >= ends[0]) & (here <= ends[1])
         if width > 1:
             part = np.flatnonzero(part)

@@ -281,14 +281,14 @@ def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) ->
     TypeError
         Where the method has none.
     """
-    tracks = history.tracks_over(next(history.stretches()))
+    tracks = history.tracks_over(next(history.blocks()))
     if not tracks:
         raise TypeError(f"{history.design} does not say what it learns of the axles")
     t = history.recording.t
     at, curves = shown_of_run(
         history,
         (float(t[0]), float(t[-1])),
-        lambda stretch: [track.values for track in history.tracks_over(stretch)],
+        lambda block: [track.values for track in history.tracks_over(block)],
     )
     figure = new_figure(PAGE, 4.4)
     panels = figure.subplots(len(tracks), 1, sharex=True)

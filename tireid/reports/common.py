@@ -4,15 +4,14 @@ The order is always: headline numbers, what speaks against them, what was found 
 how to read each, and where it came from.
 """
 
-import json
 import platform
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable
 
 from matplotlib.figure import Figure
 
-from codegen.arrays import Array, blocks
+from codegen.arrays import LONG, blocks
 from identifier.method import vehicle_numbers
-from models.files import digest, digest_of_text
+from models.files import digest, digest_of_bytes
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid import __version__
@@ -62,24 +61,19 @@ def drawing(figure: Figure, caption: str, read: str = "") -> Picture:
 
 
 def recording_digest(recording: Recording) -> str:
-    """Return twelve characters that stand for the signals of a recording and its true forces."""
+    """Return twelve characters that stand for the signals of a recording and its true forces.
+
+    Of more than `LONG` samples bytes are counted, of fewer their decimals.
+    """
     signals = (recording.t, recording.v_x, recording.v_y, recording.r)
     steering = (recording.delta_f, recording.delta_r)
     truth = (recording.a_y, recording.axle_force)
     parts = [part for part in (*signals, *steering, *truth) if part is not None]
-    return digest_of_text(_json(parts))
-
-
-def _json(signals: Sequence[Array]) -> Iterator[str]:
-    """Yield a list of signals as JSON, block by block."""
-    yield "["
-    for k, signal in enumerate(signals):
-        yield ", [" if k else "["
-        for part in blocks(len(signal)):
-            inner = json.dumps(signal[part].tolist())[1:-1]
-            yield f", {inner}" if part.start else inner
-        yield "]"
-    yield "]"
+    if len(recording) <= LONG:
+        return digest([part.tolist() for part in parts])
+    return digest_of_bytes(
+        signal[part].astype("<f8").tobytes() for signal in parts for part in blocks(len(signal))
+    )
 
 
 def origin(
