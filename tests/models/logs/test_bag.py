@@ -333,7 +333,9 @@ def test_compressed_bags_are_read_and_unpack_no_further_than_allowed(mode, tmp_p
         "rosbag2_bagfile_information: [1, 2]",
         "rosbag2_bagfile_information:\n  version: 5\n",
         "a: &a [x, x]\nb: &b [*a, *a]\nrosbag2_bagfile_information: *b",
-        "[" * 5000,
+        "[" * 50_000,
+        "- " * 50_000,
+        "\n".join(" " * k + "a:" for k in range(200)),
         "\0",
     ],
 )
