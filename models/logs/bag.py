@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
+from models.logs.bounded import METADATA, bounded
 from models.logs.cdr import (
     CdrError,
     Definitions,
@@ -29,10 +30,8 @@ from models.logs.foreign import chosen, need, noted, one_line, seconds_of, uniqu
 from models.logs.growing import Growing
 from models.logs.log import Channel, Listed, RecordingError
 from models.logs.stamps import Stamps
-from models.logs.unpacking import bounded
-from models.schema import require_few, require_file
+from models.schema import require_few
 
-METADATA = "metadata.yaml"
 SQLITE, MCAP, ROS1 = b"SQLite format 3\x00", b"\x89MCAP0\r\n", b"#ROSBAG"
 NS = 1e9  # in a second
 OTHER_CLOCK = 3600  # seconds between stamps and the bag's own time, above which these differ
@@ -244,8 +243,6 @@ def _opened(path: Path) -> Iterator[Any]:
     """Open a bag; what is compressed in it unpacks to no more than is allowed."""
     plugin = _plugin(path)
     reader = need(path, "rosbags.rosbag2.reader", "ROS 2 bags", "ros")
-    if plugin == "dir":
-        require_file(path / METADATA, RecordingError, limit="document")
     with bounded(path):
         bag = reader.Reader.STORAGE_PLUGINS[plugin](path)
         bag.open()

@@ -1,5 +1,10 @@
-"""Compressed parts of a bag unpack to no more than is allowed, whatever they say of themselves."""
+"""Limits on what rosbags does with a bag, whatever the bag says of itself.
 
+Its compressed parts unpack to no more than is allowed. Its metadata, which are YAML, may not be
+deep: the parser takes the square of it; what they say of the quality of service is not parsed.
+"""
+
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,14 +14,16 @@ from typing import Any
 from models.limits import limits
 from models.logs.foreign import need
 from models.logs.log import RecordingError
-from models.schema import CHUNK, require_few
+from models.schema import CHUNK, read_text, require_few
 
 Unpack = Callable[[bytes, int], bytes]
+METADATA = "metadata.yaml"
+DEEP = re.compile(r"(?:[-?:]\s+){16}")  # lists in lists on one line
 
 
 @contextmanager
 def bounded(path: Path) -> Iterator[None]:
-    """Let rosbags unpack with limits: it would unpack a chunk or file whole.
+    """Let rosbags read with limits.
 
     Parameters
     ----------
@@ -25,13 +32,17 @@ def bounded(path: Path) -> Iterator[None]:
     Raises
     ------
     RecordingError
-        Where a file of a bag unpacks to more than is allowed; so do later the chunks.
+        Where a file of a bag unpacks to more than is allowed, or its metadata are deep; chunks are
+        refused when they are read.
     """
-    reader = need(path, "rosbags.rosbag2.reader", "ROS 2 bags", "ros")
-    mcap = need(path, "rosbags.rosbag2.storage_mcap", "ROS 2 bags", "ros")
+    reader, mcap, sqlite = (
+        need(path, f"rosbags.rosbag2.{name}", "ROS 2 bags", "ros")
+        for name in ("reader", "storage_mcap", "storage_sqlite3")
+    )
     lz4 = need(path, "lz4.frame", "ROS 2 bags", "ros")
     zstd = mcap.zstd
     if path.is_dir():
+        _require_shallow(path / METADATA)
         for one in sorted(path.glob("*.zstd")):
             _require_small(one, zstd)
 
@@ -50,11 +61,29 @@ def bounded(path: Path) -> Iterator[None]:
     before = dict(table)
     table.update(zstd=of_zstd, lz4=of_lz4)
     reader.zstd = SimpleNamespace(open=zstd.open, decompress=of_message)
+    parse = reader.parse_qos
+    for module in (reader, mcap, sqlite):
+        module.parse_qos = lambda _: []
     try:
         yield
     finally:
         table.update(before)
         reader.zstd = zstd
+        for module in (reader, mcap, sqlite):
+            module.parse_qos = parse
+
+
+def _require_shallow(path: Path) -> None:
+    """Refuse metadata of more levels than is allowed."""
+    text = read_text(path, RecordingError)
+    depth = deepest = 0
+    for mark in re.findall(r"[\[\]{}]", text):
+        depth += 1 if mark in "[{" else -1
+        deepest = max(deepest, depth)
+    indent = max((len(line) - len(line.lstrip()) for line in text.splitlines()), default=0) // 2
+    require_few(RecordingError, str(path), max(deepest, indent), "depth", "levels of metadata")
+    if DEEP.search(text):
+        raise RecordingError(f"{path}: must not hold lists in lists")
 
 
 def _require(path: Path, size: int) -> None:

@@ -1,0 +1,400 @@
+"""ROS 2 bags: messages of cars, types of their own, clocks; against what rosbags deserializes."""
+
+import sqlite3
+
+import numpy as np
+import pytest
+
+from models.logs.bag import KNOWN
+from models.logs.door import open_log
+from models.logs.log import RecordingError
+from tests.models.logs.drive_in_every_format import FIRST_NS, write_bag
+
+rosbag2 = pytest.importorskip("rosbags.rosbag2")
+typesys = pytest.importorskip("rosbags.typesys")
+STEP = 10_000_000  # ns
+STORAGES = {"sqlite3": rosbag2.StoragePlugin.SQLITE3, "mcap": rosbag2.StoragePlugin.MCAP}
+
+
+def store_of(**types):
+    """Types of a distribution, those that cars use, and more by their definitions."""
+    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    for kind, text in {**KNOWN, **types}.items():
+        store.register(typesys.get_types_from_msg(text, kind))
+    return store
+
+
+def header(store, ns, frame="base_link"):
+    time = store.types["builtin_interfaces/msg/Time"](ns // 10**9, ns % 10**9)
+    return store.types["std_msgs/msg/Header"](time, frame)
+
+
+def write(path, store, topics, storage="sqlite3"):
+    """Topics: name -> (type, [(received in ns, message)]); in the order of their times."""
+    with rosbag2.Writer(path, version=9, storage_plugin=STORAGES[storage]) as bag:
+        _fill(bag, store, topics)
+    return path
+
+
+def write_compressed(path, store, topics, mode, storage="sqlite3"):
+    bag = rosbag2.Writer(path, version=9, storage_plugin=STORAGES[storage])
+    bag.set_compression(mode, rosbag2.CompressionFormat.ZSTD)
+    with bag:
+        _fill(bag, store, topics)
+    return path
+
+
+def _fill(bag, store, topics):
+    rows = []
+    for name, (kind, messages) in topics.items():
+        connection = bag.add_connection(name, kind, typestore=store)
+        rows += [(time, connection, store.serialize_cdr(one, kind)) for time, one in messages]
+    for time, connection, raw in sorted(rows, key=lambda row: row[0]):
+        bag.write(connection, time, raw)
+
+
+def refusal(path):
+    with pytest.raises(RecordingError) as caught:
+        log = open_log(path)
+        log.read([one.name for one in log.listed()])
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def car_topics(store, count=50):
+    """Every message that cars tell their motion by, with numbers that count up."""
+    kinds = store.types
+    vector = kinds["geometry_msgs/msg/Vector3"]
+    twist = kinds["geometry_msgs/msg/Twist"]
+    accel = kinds["geometry_msgs/msg/Accel"]
+    none = np.zeros(36)
+
+    def each(kind, build):
+        messages = []
+        for k in range(count):
+            ns = FIRST_NS + k * STEP
+            messages.append((ns, build(header(store, ns), float(k))))
+        return kind, messages
+
+    def make(kind):
+        return lambda *values: kinds[kind](*values)
+
+    return {
+        "/twist": each(
+            "geometry_msgs/msg/TwistStamped",
+            lambda h, x: make("geometry_msgs/msg/TwistStamped")(
+                h, twist(vector(x, x + 1, 0), vector(0, 0, x + 2))
+            ),
+        ),
+        "/estimate": each(
+            "geometry_msgs/msg/TwistWithCovarianceStamped",
+            lambda h, x: make("geometry_msgs/msg/TwistWithCovarianceStamped")(
+                h,
+                make("geometry_msgs/msg/TwistWithCovariance")(
+                    twist(vector(x, 0, 0), vector(0, 0, 0)), none
+                ),
+            ),
+        ),
+        "/accel": each(
+            "geometry_msgs/msg/AccelStamped",
+            lambda h, x: make("geometry_msgs/msg/AccelStamped")(
+                h, accel(vector(0, x, 0), vector(0, 0, 0))
+            ),
+        ),
+        "/drive": each(
+            "ackermann_msgs/msg/AckermannDriveStamped",
+            lambda h, x: make("ackermann_msgs/msg/AckermannDriveStamped")(
+                h, make("ackermann_msgs/msg/AckermannDrive")(x / 8, 0, x, 0, 0)
+            ),
+        ),
+        "/plain": each(
+            "ackermann_msgs/msg/AckermannDrive",
+            lambda _, x: make("ackermann_msgs/msg/AckermannDrive")(x / 8, 0, x, 0, 0),
+        ),
+        **{
+            f"/{package}/steer": each(
+                f"{package}/msg/SteeringReport",
+                lambda h, x, p=package: make(f"{p}/msg/SteeringReport")(h.stamp, x / 4),
+            )
+            for package in ("autoware_vehicle_msgs", "autoware_auto_vehicle_msgs")
+        },
+        "/velocity": each(
+            "autoware_vehicle_msgs/msg/VelocityReport",
+            lambda h, x: make("autoware_vehicle_msgs/msg/VelocityReport")(h, x, x / 2, x / 4),
+        ),
+    }
+
+
+WANTED = {
+    "/twist/twist.linear.y": ("m/s", 1.0, 1.0),
+    "/twist/twist.angular.z": ("rad/s", 1.0, 2.0),
+    "/estimate/twist.twist.linear.x": ("m/s", 1.0, 0.0),
+    "/accel/accel.linear.y": ("m/s^2", 1.0, 0.0),
+    "/drive/drive.steering_angle": ("rad", 0.125, 0.0),
+    "/drive/drive.speed": ("m/s", 1.0, 0.0),
+    "/plain/steering_angle": ("rad", 0.125, 0.0),
+    "/autoware_vehicle_msgs/steer/steering_tire_angle": ("rad", 0.25, 0.0),
+    "/autoware_auto_vehicle_msgs/steer/steering_tire_angle": ("rad", 0.25, 0.0),
+    "/velocity/lateral_velocity": ("m/s", 0.5, 0.0),
+    "/velocity/heading_rate": ("rad/s", 0.25, 0.0),
+}
+
+
+def old(path, folder):
+    """The database of a bag as distributions before Iron wrote it: without definitions."""
+    one = folder / "old.db3"
+    with sqlite3.connect(next(path.glob("*.db3"))) as source, sqlite3.connect(one) as target:
+        target.execute(
+            "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, "
+            "serialization_format TEXT, offered_qos_profiles TEXT)"
+        )
+        target.execute(
+            "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, "
+            "data BLOB)"
+        )
+        words = "id, name, type, serialization_format, offered_qos_profiles"
+        target.executemany(
+            "INSERT INTO topics VALUES (?,?,?,?,?)", source.execute(f"SELECT {words} FROM topics")
+        )
+        target.executemany(
+            "INSERT INTO messages VALUES (?,?,?,?)",
+            source.execute("SELECT id, topic_id, timestamp, data FROM messages"),
+        )
+    source.close()
+    target.close()
+    return one
+
+
+@pytest.mark.parametrize("kind", ["sqlite3", "mcap", "old"])
+def test_messages_of_cars_are_read_with_their_units(kind, tmp_path):
+    store = store_of()
+    path = write(
+        tmp_path / "bag", store, car_topics(store), "mcap" if kind == "mcap" else "sqlite3"
+    )
+    log = open_log(old(path, tmp_path) if kind == "old" else path)
+    units = {one.name: one.unit for one in log.listed()}
+    k = np.arange(50.0)
+    for name, channel in zip(WANTED, log.read(list(WANTED)), strict=True):
+        unit, factor, offset = WANTED[name]
+        assert units[name] == channel.unit == unit
+        assert np.array_equal(channel.values, k * factor + offset), name
+        assert np.array_equal(channel.t, np.arange(50) / 100)
+    assert log.notes == ("no stamp in the message, its clock is when the bag received it: /plain",)
+    assert not any("covariance" in name or "stamp" in name for name in units)
+
+
+MIXED = """
+bool ready
+uint8 mode
+string word
+int16 small
+float64[] many
+float32 after
+Inner inner
+Inner[2] pair
+Inner[] more
+string[] words
+uint64 large
+int8 last
+"""
+INNER = "float64 x\nstring name\nint32 n\nuint16[3] codes"
+SCALARS = ("mode", "small", "after", "inner.x", "inner.n", "large", "last")
+
+
+def random_message(store, rng):
+    def word():
+        return "x" * int(rng.integers(0, 9))
+
+    def inner():
+        return store.types["my_msgs/msg/Inner"](
+            float(rng.standard_normal()),
+            word(),
+            int(rng.integers(-(2**31), 2**31)),
+            rng.integers(0, 2**16, 3).astype(np.uint16),
+        )
+
+    return store.types["my_msgs/msg/Mixed"](
+        bool(rng.integers(2)),
+        int(rng.integers(256)),
+        word(),
+        int(rng.integers(-(2**15), 2**15)),
+        rng.standard_normal(int(rng.integers(0, 4))),
+        float(np.float32(rng.standard_normal())),
+        inner(),
+        [inner(), inner()],
+        [inner() for _ in range(int(rng.integers(0, 3)))],
+        [word() for _ in range(int(rng.integers(0, 3)))],
+        int(rng.integers(2**53)),
+        int(rng.integers(-128, 128)),
+    )
+
+
+def mixed_store():
+    return store_of(**{"my_msgs/msg/Inner": INNER, "my_msgs/msg/Mixed": MIXED})
+
+
+def test_messages_of_any_lengths_are_read_as_rosbags_reads_them(tmp_path):
+    store, rng = mixed_store(), np.random.default_rng(2)
+    messages = [(FIRST_NS + k * STEP, random_message(store, rng)) for k in range(400)]
+    path = write(tmp_path / "bag", store, {"/a": ("my_msgs/msg/Mixed", messages)}, "mcap")
+    log = open_log(path)
+    assert tuple(one.name for one in log.listed()) == tuple(f"/a/{one}" for one in SCALARS)
+    for name, channel in zip(SCALARS, log.read([f"/a/{one}" for one in SCALARS]), strict=True):
+        expected = []
+        for _, message in messages:
+            for part in name.split("."):
+                message = getattr(message, part)
+            expected.append(float(message))
+        assert np.array_equal(channel.values, expected), name
+
+
+def test_messages_of_the_other_byte_order_are_read(tmp_path):
+    store, rng = mixed_store(), np.random.default_rng(2)
+    message = random_message(store, rng)
+    kind = "my_msgs/msg/Mixed"
+    with rosbag2.Writer(tmp_path / "bag", version=9) as bag:
+        connection = bag.add_connection("/a", kind, typestore=store)
+        for k in range(20):
+            raw = store.serialize_cdr(message, kind, little_endian=k % 2 == 0)
+            bag.write(connection, FIRST_NS + k * STEP, raw)
+    large, x = open_log(tmp_path / "bag").read(["/a/large", "/a/inner.x"])
+    assert set(large.values) == {float(message.large)}
+    assert set(x.values) == {message.inner.x}
+
+
+def test_a_type_without_definition_is_named_and_others_are_read(tmp_path):
+    store = mixed_store()
+    topics = car_topics(store)
+    topics["/mixed"] = (
+        "my_msgs/msg/Mixed",
+        [(FIRST_NS, random_message(store, np.random.default_rng(1)))],
+    )
+    path = write(tmp_path / "bag", store, {name: topics[name] for name in ("/twist", "/mixed")})
+    log = open_log(old(path, tmp_path))
+    assert {one.name.split("/")[1] for one in log.listed()} == {"twist"}
+    assert log.notes == ("not read: /mixed (the type my_msgs/msg/Mixed has no definition)",)
+
+
+def test_stamps_that_were_not_set_give_way_to_the_time_of_the_bag(tmp_path):
+    store = store_of()
+    kind, messages = car_topics(store)["/velocity"]
+    for _, message in messages:
+        message.header.stamp.sec = message.header.stamp.nanosec = 0
+    log = open_log(write(tmp_path / "bag", store, {"/velocity": (kind, messages)}))
+    assert "its clock is when the bag received it: /velocity" in log.notes[0]
+    assert np.array_equal(log.read(["/velocity/heading_rate"])[0].t, np.arange(50) / 100)
+
+
+def test_the_stamp_is_the_clock_and_not_when_the_bag_received_the_message(tmp_path):
+    store = store_of()
+    topics = car_topics(store)
+    late = [
+        (time + 7_000_000 + k % 3 * 10**6, one) for k, (time, one) in enumerate(topics["/twist"][1])
+    ]
+    topics = {"/twist": (topics["/twist"][0], late), "/plain": topics["/plain"]}
+    log = open_log(write(tmp_path / "bag", store, topics))
+    twist, plain = log.read(["/twist/twist.linear.x", "/plain/speed"])
+    assert np.array_equal(twist.t, np.arange(50) / 100)
+    assert np.array_equal(plain.t, np.arange(50) / 100)
+
+
+def test_stamps_of_a_simulation_keep_their_digits(tmp_path):
+    store = store_of()
+    topics = car_topics(store)
+    for k, (_, message) in enumerate(topics["/twist"][1]):
+        message.header.stamp.sec, message.header.stamp.nanosec = 5 + k // 100, k % 100 * STEP
+    topics = {name: topics[name] for name in ("/twist", "/plain")}
+    log = open_log(write(tmp_path / "bag", store, topics))
+    twist, plain = log.read(["/twist/twist.linear.x", "/plain/speed"])
+    assert np.array_equal(twist.t, np.arange(50) / 100)
+    assert np.array_equal(plain.t, np.arange(50) / 100)
+
+
+@pytest.mark.parametrize("mode", ["FILE", "MESSAGE", "STORAGE"])
+def test_compressed_bags_are_read_and_unpack_no_further_than_allowed(mode, tmp_path, monkeypatch):
+    store = store_of()
+    topics = {"/velocity": car_topics(store)["/velocity"]}
+    storage = "mcap" if mode == "STORAGE" else "sqlite3"
+    path = write_compressed(
+        tmp_path / "bag", store, topics, getattr(rosbag2.CompressionMode, mode), storage
+    )
+    values = open_log(path).read(["/velocity/longitudinal_velocity"])[0].values
+    assert np.array_equal(values, np.arange(50.0))
+    small = {"FILE": "megabytes=0.001", "MESSAGE": "block=0.00002", "STORAGE": "block=0.001"}
+    monkeypatch.setenv("TIREID_LIMITS", small[mode])
+    assert "must be at most" in refusal(path) or "cut off" in refusal(path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "!!python/object/apply:os.system ['touch MARK']",
+        "rosbag2_bagfile_information: !!python/object/apply:pathlib.Path.touch [MARK]",
+        "rosbag2_bagfile_information: [1, 2]",
+        "rosbag2_bagfile_information:\n  version: 5\n",
+        "a: &a [x, x]\nb: &b [*a, *a]\nrosbag2_bagfile_information: *b",
+        "[" * 50_000,
+        "- " * 50_000,
+        "\n".join(" " * k + "a:" for k in range(200)),
+        "\0",
+    ],
+)
+def test_metadata_that_is_hostile_is_refused_and_not_executed(text, tmp_path, drive):
+    path = write_bag(tmp_path / "bag", *drive)
+    mark = tmp_path / "executed"
+    (path / "metadata.yaml").write_text(text.replace("MARK", str(mark)))
+    refusal(path)
+    assert not mark.exists()
+
+
+def test_metadata_does_not_lead_out_of_the_folder(tmp_path, drive):
+    path = write_bag(tmp_path / "bag", *drive)
+    (path / "bag.db3").rename(tmp_path / "bag.db3")
+    text = (path / "metadata.yaml").read_text().replace("bag.db3", "../bag.db3")
+    (path / "metadata.yaml").write_text(text)
+    assert "missing" in refusal(path)
+
+
+def test_a_database_that_computes_its_messages_is_refused(tmp_path):
+    path = tmp_path / "bag.db3"
+    with sqlite3.connect(path) as base:
+        base.execute("CREATE TABLE topics(id, name, type, serialization_format)")
+        base.execute(
+            "CREATE VIEW messages AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i+1 FROM n) "
+            "SELECT i AS id, 1 AS topic_id, i AS timestamp, x'00' AS data FROM n"
+        )
+    base.close()
+    assert "missing tables" in refusal(path)
+
+
+def test_a_database_of_something_else_is_refused(tmp_path):
+    path = tmp_path / "bag.db3"
+    with sqlite3.connect(path) as base:
+        base.execute("CREATE TABLE songs(id, name)")
+    base.close()
+    assert "is not a ROS 2 bag" in refusal(path)
+
+
+def test_a_bag_of_ros_1_is_refused_with_what_converts_it(tmp_path):
+    path = tmp_path / "log.bag"
+    path.write_bytes(b"#ROSBAG V2.0\n" + b"\0" * 100)
+    assert "is a bag of ROS 1; convert it: rosbags-convert" in refusal(path)
+
+
+def test_a_bag_without_numbers_is_refused(tmp_path):
+    store = store_of()
+    text = store.types["std_msgs/msg/String"]("hello")
+    path = write(tmp_path / "bag", store, {"/chatter": ("std_msgs/msg/String", [(FIRST_NS, text)])})
+    assert refusal(path).endswith("holds no message with numbers")
+
+
+def test_a_type_that_holds_itself_is_refused(tmp_path):
+    store = store_of(**{"my_msgs/msg/Loop": "float64 x"})
+    message = store.types["my_msgs/msg/Loop"](1.0)
+    path = write(tmp_path / "bag", store, {"/loop": ("my_msgs/msg/Loop", [(FIRST_NS, message)])})
+    with sqlite3.connect(path / "bag.db3") as base:
+        base.execute(
+            "UPDATE message_definitions SET encoded_message_definition = 'float64 x\nLoop loop\n'"
+        )
+    base.close()
+    assert "types must lie in one another at most 32 deep" in refusal(path)

@@ -1,0 +1,242 @@
+"""CAN logs: every signal as cantools decodes it; frames that are no signals are counted."""
+
+import struct
+import warnings
+
+import numpy as np
+import pytest
+
+from models.logs.can import raw_values, values_of
+from models.logs.door import open_log
+from models.logs.log import RecordingError
+from tests.models.logs.drive_in_every_format import DBC, write_can, write_mdf_bus
+
+can = pytest.importorskip("can")
+cantools = pytest.importorskip("cantools")
+
+CAR = """VERSION ""
+
+BU_: Car
+
+BO_ 100 Steering: 8 Car
+ SG_ Angle : 0|16@1- (0.1,0) [-780|780] "°" Car
+ SG_ Rate : 23|16@0- (0.05,-1.5) [0|0] "deg/s" Car
+ SG_ Counter : 60|4@1+ (1,0) [0|15] "" Car
+
+BO_ 2566852608 Extended: 4 Car
+ SG_ Speed : 0|16@1+ (0.01,0) [0|655] "km/h" Car
+
+BO_ 200 Muxed: 8 Car
+ SG_ Page M : 0|8@1+ (1,0) [0|0] "" Car
+ SG_ First m0 : 8|16@1- (0.5,0) [0|0] "m" Car
+ SG_ Second m1 : 8|16@1- (2,1) [0|0] "s" Car
+
+VAL_ 100 Angle 32767 "SNA" 32766 "Init_Error" 1 "one step" ;
+"""
+
+
+def write(path, messages):
+    with can.Logger(str(path)) as log:
+        for time, identifier, data, more in messages:
+            log.on_message_received(
+                can.Message(
+                    **{
+                        "timestamp": time,
+                        "arbitration_id": identifier,
+                        "is_extended_id": identifier > 0x7FF,
+                        "data": data,
+                        **more,
+                    }
+                )
+            )
+    return path
+
+
+def dbc(folder, text=CAR, encoding="cp1252"):
+    path = folder / "car.dbc"
+    path.write_bytes(text.encode(encoding))
+    return path
+
+
+def refusal(path, base=None):
+    with pytest.raises(RecordingError) as caught:
+        log = open_log(path, base)
+        log.read([one.name for one in log.listed()])
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def random_signal(rng, number):
+    """A signal of any place, size, byte order and sign in a frame of 8 bytes."""
+    little, floating = bool(rng.integers(2)), rng.random() < 0.2
+    length = int(rng.choice([32, 64])) if floating else int(rng.integers(1, 65))
+    first = int(rng.integers(0, 64 - length + 1))
+    start = first if little else 8 * (first // 8) + 7 - first % 8
+    sign = "-" if floating or rng.integers(2) else "+"
+    factor, offset = rng.choice([1, 0.01, -2.5]), rng.choice([0, 3, -0.75])
+    text = f"\nBO_ {number} F{number}: 8 Car\n SG_ S : {start}|{length}@{int(little)}{sign} "
+    text += f'({factor},{offset}) [0|0] "" Car\n'
+    return text, f"\nSIG_VALTYPE_ {number} S : {length // 32};" if floating else ""
+
+
+def test_signals_of_any_place_and_kind_are_those_that_cantools_decodes():
+    rng = np.random.default_rng(11)
+    parts = [random_signal(rng, k) for k in range(1, 300)]
+    text = 'VERSION ""\n\nBU_: Car\n' + "".join(a for a, _ in parts) + "".join(b for _, b in parts)
+    base = cantools.database.load_string(text + "\n", "dbc", strict=False)
+    data = rng.integers(0, 256, (20, 8)).astype(np.uint8)
+    for message in base.messages:
+        (signal,) = message.signals
+        there = [message.decode(bytes(row), scaling=False)["S"] for row in data]
+        ours = raw_values(data, signal)
+        for one, other in zip(ours.tolist(), there, strict=True):
+            assert one == other or (np.isnan(one) and np.isnan(other)), signal
+        scaled = [float(message.decode(bytes(row))["S"]) for row in data]
+        # Integers of 64 bits lose their last digits on the way to a double.
+        with np.errstate(invalid="ignore"):  # floats of any bits
+            values = values_of(data, signal)
+        assert np.allclose(values, scaled, rtol=1e-14, atol=1e-14, equal_nan=True)
+
+
+def steering(k):
+    return struct.pack("<h", k) + struct.pack(">h", 2 * k) + b"\0\0\0" + bytes([(k % 16) << 4])
+
+
+def car_log(path, count=30):
+    messages = []
+    for k in range(count):
+        t = 1.7e9 + k * 0.02
+        messages.append((t, 100, steering(k), {}))
+        messages.append((t + 0.001, 0x18FF1000, struct.pack("<HH", 100 * k, 0), {}))
+        messages.append((t + 0.002, 200, bytes([k % 2]) + struct.pack("<h", k) + bytes(5), {}))
+        messages.append((t + 0.003, 300, b"\1\2", {}))
+    messages.append((1.7e9 + 1, 100, b"\0\0", {}))
+    messages.append((1.7e9 + 1, 100, b"", {"is_remote_frame": True, "dlc": 8}))
+    return write(path, messages)
+
+
+@pytest.mark.parametrize("ending", ["asc", "blf", "log"])
+def test_a_dbc_tells_the_signals_their_units_and_which_frames_hold_them(ending, tmp_path):
+    log = open_log(
+        car_log(tmp_path / f"log.{ending}"),
+        dbc(tmp_path),
+    )
+    listed = {one.name: (one.unit, one.samples, round(one.rate)) for one in log.listed()}
+    assert listed == {
+        "Steering.Angle": ("°", 30, 50),
+        "Steering.Rate": ("deg/s", 30, 50),
+        "Steering.Counter": ("", 30, 50),
+        "Extended.Speed": ("km/h", 30, 50),
+        "Muxed.Page": ("", 30, 50),
+        "Muxed.First": ("m", 15, 25),
+        "Muxed.Second": ("s", 15, 25),
+    }
+    assert set(log.notes) == {
+        "30 unknown frames are not read",
+        "1 cut short frames are not read",
+        "1 error and remote frames are not read",
+    }
+    k = np.arange(30)
+    angle, rate, speed, second = log.read(
+        ["Steering.Angle", "Steering.Rate", "Extended.Speed", "Muxed.Second"]
+    )
+    assert np.allclose(angle.values, 0.1 * k, rtol=0, atol=1e-12)
+    assert np.allclose(rate.values, 0.1 * k - 1.5, rtol=0, atol=1e-12)
+    assert np.allclose(speed.values, k, rtol=0, atol=1e-12)
+    assert np.array_equal(second.values, 2.0 * k[1::2] + 1)
+    assert np.allclose(angle.t, 0.02 * k, rtol=0, atol=1e-9)
+    assert np.allclose(speed.t, 0.02 * k + 0.001, rtol=0, atol=1e-9)
+    assert np.allclose(second.t, 0.02 * k[1::2] + 0.002, rtol=0, atol=1e-9)
+
+
+def test_values_that_the_dbc_names_as_no_number_are_nan(tmp_path):
+    raw = [5, 32767, 32766, 1, -5]
+    messages = [(k * 0.01, 100, struct.pack("<h", one) + bytes(6), {}) for k, one in enumerate(raw)]
+    log = open_log(write(tmp_path / "log.blf", messages), dbc(tmp_path))
+    values = log.read(["Steering.Angle"])[0].values
+    assert np.allclose(values, [0.5, np.nan, np.nan, 0.1, -0.5], equal_nan=True)
+
+
+def test_the_same_frame_on_two_buses_is_two_channels(tmp_path):
+    messages = []
+    for k in range(20):
+        messages += [(0.01 * k, 100, steering(k + 5 * bus), {"channel": bus}) for bus in (0, 1)]
+    log = open_log(write(tmp_path / "log.blf", messages), dbc(tmp_path))
+    names = [one.name for one in log.listed() if "Angle" in one.name]
+    assert names == ["bus 0/Steering.Angle", "bus 1/Steering.Angle"]
+    one, two = log.read(names)
+    assert np.allclose(two.values - one.values, 0.5)
+
+
+def test_frames_of_can_fd_are_read(tmp_path):
+    text = 'VERSION ""\n\nBU_: Car\n\nBO_ 100 Long: 64 Car\n SG_ V : 448|64@1- (1,0) [0|0] "" Car\n'
+    text += "\nSIG_VALTYPE_ 100 V : 2;\n"
+    messages = [
+        (0.01 * k, 100, bytes(56) + struct.pack("<d", k / 3), {"is_fd": True}) for k in range(20)
+    ]
+    log = open_log(write(tmp_path / "log.blf", messages), dbc(tmp_path, text))
+    assert np.array_equal(log.read(["Long.V"])[0].values, np.arange(20) / 3)
+
+
+def test_frames_of_a_bus_in_mdf_are_told_apart_from_channels(tmp_path, drive):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        path = write_mdf_bus(tmp_path / "log.mf4", *drive)
+    assert 'frames of a bus need a DBC, in the [file] of log.toml dbc = "car.dbc"' in refusal(path)
+    assert open_log(path, path.with_suffix(".dbc")).format == "CAN MDF4"
+
+
+def test_a_log_of_frames_without_dbc_asks_for_one(tmp_path, drive):
+    path = write_can(tmp_path / "log.asc", *drive)
+    assert "give the DBC file that tells their signals, in the [file] of log.toml" in refusal(path)
+
+
+def test_a_dbc_that_knows_none_of_the_frames_is_refused(tmp_path, drive):
+    path = write_can(tmp_path / "log.asc", *drive)
+    text = refusal(path, dbc(tmp_path))
+    assert "holds no frame that" in text and text.endswith("1500 unknown frames are not read")
+
+
+@pytest.mark.parametrize("content", [b"", b"hello", b"\0" * 100, DBC.encode()[:-40] + b"BO_ x"])
+def test_a_dbc_that_is_none_is_refused(content, tmp_path, drive):
+    path = write_can(tmp_path / "log.blf", *drive)
+    base = tmp_path / "bad.dbc"
+    base.write_bytes(content)
+    text = refusal(path, base)
+    assert text.startswith(f"{base}: is not a DBC file")
+
+
+def test_a_dbc_that_is_not_there_is_named(tmp_path, drive):
+    path = write_can(tmp_path / "log.blf", *drive)
+    assert refusal(path, tmp_path / "no.dbc") == f"{tmp_path / 'no.dbc'}: there is no such file"
+
+
+def test_a_dbc_is_for_logs_of_a_bus(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("t,v\n0,1\n1,2\n")
+    assert "is no CAN log" in refusal(path, dbc(tmp_path))
+
+
+def test_times_that_count_from_the_frame_before_are_refused(tmp_path, drive):
+    path = write_can(tmp_path / "log.asc", *drive)
+    path.write_text(path.read_text().replace("timestamps absolute", "timestamps relative"))
+    assert "save it with timestamps absolute" in refusal(path, path.with_suffix(".dbc"))
+
+
+def test_a_blf_that_was_cut_off_is_refused(tmp_path, drive):
+    path = write_can(tmp_path / "log.blf", *drive)
+    path.write_bytes(path.read_bytes()[:-10])
+    assert "is cut off, it has" in refusal(path, path.with_suffix(".dbc"))
+
+
+def test_a_container_that_inflates_beyond_the_limit_is_refused(tmp_path, monkeypatch):
+    frames = ((0.001 * k, 100, bytes(8), {}) for k in range(4000))
+    path = write(tmp_path / "log.blf", frames)
+    monkeypatch.setenv("TIREID_LIMITS", "block=0.1")
+    assert "megabytes of a block must be at most 0.1" in refusal(path, dbc(tmp_path))
+
+
+def test_a_signal_beyond_its_frame_is_refused(tmp_path):
+    text = 'VERSION ""\n\nBU_: Car\n\nBO_ 100 F: 2 Car\n SG_ V : 8|16@1- (1,0) [0|0] "" Car\n'
+    path = write(tmp_path / "log.blf", [(0.01 * k, 100, bytes(2), {}) for k in range(20)])
+    assert "lies beyond its frame of 2 bytes" in refusal(path, dbc(tmp_path, text))
