@@ -190,7 +190,7 @@ def _times(signals: Sequence[Signal]) -> dict[Clock, _Time]:
     for clock in dict.fromkeys(signal.clock for signal in signals):
         t = times_of(clock)
         cells = [repr(one) for one in t[:HEAD].tolist()]
-        known = find_clock(["t"], [clock.unit], {0: cells})
+        known = find_clock(["t"], [clock.unit], {0: cells}.__getitem__)
         per_second = PER_SECOND[known.unit] if known is not None else 1.0
         epoch = known is not None and known.epoch
         if epoch:

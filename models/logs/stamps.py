@@ -384,17 +384,20 @@ def even_clock(t: Array) -> Even | None:
     repeats = bool(moves.size < steps.size)
     if repeats and shared < SHARED:
         return None
-    if not repeats and (tick < WORTH * float(np.median(moves)) or np.ptp(moves) < 0.5 * tick):
-        return None
+    usual = float(np.median(moves))
+    near = moves[moves < usual + 1.5 * tick]
+    if not repeats and (not WORTH * usual < tick <= usual / 2.0 or np.ptp(near) < 0.5 * tick):
+        return None  # by a coarser tick a lost sample could look rounded
     return _fitted(t, tick)
 
 
 def _tick(t: Array) -> float | None:
     """Return what stamps are rounded to: the coarsest tick of which all are whole numbers [s]."""
     some = t[: 1 << 17]
+    lost = float(np.spacing(np.abs(some).max()))  # by floats, of seconds since 1970 0.24 us
     for tick in TICKS:
         counts = some / tick
-        if np.abs(counts - np.rint(counts)).max() < 1e-4:
+        if lost < 0.01 * tick and np.abs(counts - np.rint(counts)).max() < 1e-4 + lost / tick:
             return tick
     return None
 
