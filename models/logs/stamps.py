@@ -355,9 +355,6 @@ def _first_step(t: Array, wrong: Callable[[Array], NDArray[Any]]) -> int | None:
 # Rounded stamps of an even clock.
 
 
-LOST = 2.5  # usual steps, beyond which samples are lost
-
-
 class Even(NamedTuple):
     """An even clock: time [s], (n,), and what was mended, after the name of the column."""
 
@@ -388,18 +385,19 @@ def even_clock(t: Array) -> Even | None:
     if repeats and shared < SHARED:
         return None
     usual = float(np.median(moves))
-    together = moves[moves < LOST * usual]  # without gaps
-    if not repeats and (tick < WORTH * usual or np.ptp(together) < 0.5 * tick):
-        return None
+    near = moves[moves < usual + 1.5 * tick]
+    if not repeats and (not WORTH * usual < tick <= usual / 2.0 or np.ptp(near) < 0.5 * tick):
+        return None  # by a coarser tick a lost sample could look rounded
     return _fitted(t, tick)
 
 
 def _tick(t: Array) -> float | None:
     """Return what stamps are rounded to: the coarsest tick of which all are whole numbers [s]."""
     some = t[: 1 << 17]
+    lost = float(np.spacing(np.abs(some).max()))  # by floats, of seconds since 1970 0.24 us
     for tick in TICKS:
         counts = some / tick
-        if np.abs(counts - np.rint(counts)).max() < 1e-4:
+        if lost < 0.01 * tick and np.abs(counts - np.rint(counts)).max() < 1e-4 + lost / tick:
             return tick
     return None
 
@@ -408,7 +406,7 @@ def _fitted(t: Array, tick: float) -> Even | None:
     """Return the even clock of which every stamp is less than a tick away, lost samples aside."""
     steps = np.diff(t)
     usual = float(np.median(steps[steps > 0.0]))
-    cuts = np.flatnonzero(steps > max(LOST * usual, usual + 1.5 * tick)) + 1
+    cuts = np.flatnonzero(steps > max(2.5 * usual, usual + 1.5 * tick)) + 1
     edges = np.concatenate([[0], cuts, [t.size]])
     longest = int(np.argmax(np.diff(edges)))
     dt = _even_step(t[edges[longest] : edges[longest + 1]], tick)
