@@ -42,7 +42,7 @@ class LogMap:
     signals : by our name (v_x, v_y or beta, r, delta_f, delta_r, a_y, Fyf, Fyr) how it is read.
     axes : of the file: "ISO" (y to the left, z up) or "SAE" (y to the right, z down).
     run : which of the file's runs; empty where there is one.
-    dbc : database of a CAN log, a path; empty where there is none.
+    dbc : database of a CAN log, a path, in a log.toml from its folder; empty where there is none.
     clock : channel that is the time, where it is not what the format takes for it; empty else.
     clock_unit : of that channel; empty takes that of the file, seconds where it tells none.
     longest_gap : the log is cut where a channel has no sample for longer [s].
@@ -113,9 +113,11 @@ class LogMap:
         """
         data = read_toml(Path(path), RecordingError)
         try:
-            return cls._of_table(Table(data, "", RecordingError))
+            told = cls._of_table(Table(data, "", RecordingError))
         except RecordingError as error:
             raise RecordingError(f"{path}: {error}") from None
+        beside = Path(path).parent / told.dbc
+        return replace(told, dbc=str(beside)) if told.dbc and beside.is_file() else told
 
     @classmethod
     def _of_table(cls, table: Table) -> "LogMap":

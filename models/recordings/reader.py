@@ -63,7 +63,8 @@ def read_recording(
     """
     path = Path(path)
     told = with_columns(map_of(log_map), columns)
-    return _judged(open_log(path), _stem(path), told, run=run, dt=dt, check=check)
+    log = open_log(path, told.dbc or None)
+    return _judged(log, _stem(path), told, run=run, dt=dt, check=check)
 
 
 def read_repaired(

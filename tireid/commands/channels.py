@@ -64,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
         if options.write.suffix.lower() != ".toml":
             raise ValueError(f"{options.write}: the name must end in .toml")
         require_free(options.write, force=options.force)
-    log = open_log(path)
+    log = open_log(path, told.dbc or None)
     chosen = _run_of(log, options.run_name or named or told.run)
     listed = log.listed()
     names = [one.name for one in listed]
@@ -93,6 +93,7 @@ def _head(log: LogFile, run: str | None) -> list[str]:
     """Return what the file is, how it was understood, and its runs."""
     runs = log.runs()
     lines = [f"{log.path}: {log.format}", *(f"  {word}" for word in getattr(log, "dialect", ()))]
+    lines += [f"  {note}" for note in log.notes]
     if len(runs) > 1:
         some = ", ".join(runs[:12]) + (", ..." if len(runs) > 12 else "")
         lines.append(f"  {len(runs)} runs: {some}; what follows is of {run}")

@@ -244,7 +244,7 @@ def add_log_reading(parser: argparse.ArgumentParser) -> None:
 
 
 def add_log_map(parser: argparse.ArgumentParser) -> None:
-    """Add --log and --columns: how a log is read.
+    """Add --log, --columns and --dbc: how a log is read.
 
     Parameters
     ----------
@@ -266,17 +266,23 @@ def add_log_map(parser: argparse.ArgumentParser) -> None:
         help="read column COLUMN of the logs as NAME, for example r=yaw_rate; behind it a unit, "
         'factor, offset or steering ratio: "vy=Vel Lat [km/h]" "delta_f=SteerAngle [deg] /14.6"',
     )
+    parser.add_argument(
+        "--dbc",
+        metavar="FILE",
+        help="DBC that tells the signals in the frames of a CAN log",
+    )
 
 
 def told_map(options: argparse.Namespace) -> LogMap:
-    """Return how logs are read by --log and --columns, which come first.
+    """Return how logs are read by --log, and by --columns and --dbc, which come first.
 
     Raises
     ------
     RecordingError
         Where the file or a word is not right.
     """
-    return with_columns(map_of(options.log_map), column_words(options.columns))
+    told = with_columns(map_of(options.log_map), column_words(options.columns))
+    return told if options.dbc is None else replace(told, dbc=options.dbc)
 
 
 def read_log(

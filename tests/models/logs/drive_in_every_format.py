@@ -255,13 +255,13 @@ def _parquet(folder: Path, t: np.ndarray, columns: Columns) -> Written:
 
 
 def _mat5(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    return Written(write_mat5(folder / "drive5.mat", t, columns), None, _same(columns))
+    return Written(write_mat5(folder / "drive.mat", t, columns), None, _same(columns))
 
 
 def _mat73(folder: Path, t: np.ndarray, columns: Columns) -> Written:
     tree = {"log": {"t": t, **columns, "units": UNITS}}
     names = {name: f"log.{name}" for name in columns}
-    return Written(write_mat73(folder / "drive73.mat", tree), None, names)
+    return Written(write_mat73(folder / "drive.mat", tree), None, names)
 
 
 def _mdf4(folder: Path, t: np.ndarray, columns: Columns) -> Written:
@@ -273,17 +273,17 @@ def _mdf3(folder: Path, t: np.ndarray, columns: Columns) -> Written:
 
 
 def _bag(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    path = write_bag(folder / "bag", t, columns)
+    path = write_bag(folder / "drive", t, columns)
     return Written(path, None, {name: IN_BAG[name] for name in columns})
 
 
 def _db3(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    path = write_bag(folder / "one", t, columns) / "one.db3"
+    path = write_bag(folder / "drive", t, columns) / "drive.db3"
     return Written(path, None, {name: IN_BAG[name] for name in columns})
 
 
 def _mcap(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    path = write_bag(folder / "chunks", t, columns, "mcap") / "chunks.mcap"
+    path = write_bag(folder / "drive", t, columns, "mcap") / "drive.mcap"
     return Written(path, None, {name: IN_BAG[name] for name in columns})
 
 
@@ -296,7 +296,7 @@ def _frames(ending: str) -> Callable[[Path, np.ndarray, Columns], Written]:
 
 
 def _mdf_bus(folder: Path, t: np.ndarray, columns: Columns) -> Written:
-    path = write_mdf_bus(folder / "bus.mf4", t, columns)
+    path = write_mdf_bus(folder / "drive.mf4", t, columns)
     return Written(path, path.with_suffix(".dbc"), _bus(columns))
 
 

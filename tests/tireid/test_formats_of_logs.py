@@ -1,0 +1,66 @@
+"""The same drive through every format: the same recording, the same summary of what it taught."""
+
+import numpy as np
+import pytest
+
+from models.recordings import read_recording
+from tests.models.logs.drive_in_every_format import FORMATS, write
+from tireid.cli import main
+
+COLUMNS = {"v_x": "vx", "v_y": "vy", "r": "r", "delta_f": "delta_f", "a_y": "ay"}
+OTHERS = [name for name in FORMATS if name != "CSV"]
+
+
+@pytest.fixture(scope="module")
+def driven(logs):
+    """Times and columns of the slalom."""
+    recording = read_recording(logs / "slalom.csv")
+    t = np.arange(recording.t.size) / 100
+    return t, {name: getattr(recording, name) for name in COLUMNS}
+
+
+def words_of(written):
+    """How a drive in a file is told to a command."""
+    told = [f"{COLUMNS[name]}={channel}" for name, channel in written.names.items()]
+    dbc = [] if written.dbc is None else ["--dbc", str(written.dbc)]
+    return [str(written.path), "--columns", *told, *dbc]
+
+
+def summary_of(format, folder, driven, logs):
+    written = write(format, folder, *driven)
+    words = ["identify", *words_of(written), "--vehicle", str(logs / "car.toml")]
+    assert main([*words, "--freeze", "4", "7", "--out", str(folder / "out")]) == 0
+    return (folder / "out" / "summary.json").read_bytes()
+
+
+@pytest.fixture(scope="module")
+def summary(driven, logs, tmp_path_factory):
+    return summary_of("CSV", tmp_path_factory.mktemp("csv"), driven, logs)
+
+
+@pytest.mark.parametrize("format", OTHERS)
+def test_a_drive_gives_the_same_bytes_of_a_summary_from_every_format(
+    format, driven, summary, logs, tmp_path
+):
+    assert summary_of(format, tmp_path, driven, logs) == summary
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_channels_writes_a_map_that_reads_the_same_recording_from_every_format(
+    format, driven, tmp_path
+):
+    t, columns = driven
+    written = write(format, tmp_path, t, columns)
+    told = tmp_path / "log.toml"
+    assert main(["channels", *words_of(written), "--write", str(told)]) == 0
+    recording = read_recording(written.path, log_map=told)
+    assert recording.name == "drive"
+    assert np.array_equal(recording.t, t)
+    for name, values in columns.items():
+        assert np.array_equal(getattr(recording, name), values), name
+
+
+def test_another_drive_gives_another_summary(driven, summary, logs, tmp_path):
+    t, columns = driven
+    other = {**columns, "r": columns["r"] * 1.0000001}
+    assert summary_of("MDF4", tmp_path, (t, other), logs) != summary
