@@ -81,9 +81,11 @@ def read_repaired(
 
     Parameters
     ----------
-    path, run, dt, columns, log_map : as of `read_recording`.
+    path : a log of any format.
     vehicle : as it was told.
+    run, dt : as of `read_recording`.
     check : whether what contradicts physics or the car, after the repair, is refused.
+    columns, log_map : as of `read_recording`.
 
     Raises
     ------
