@@ -38,7 +38,7 @@ from models.recordings import Recording
 from models.sensors import Sensors
 
 RUNS, DRIVES = 20_000, 40  # drives are shared by runs
-JUDGED = 13  # shares no factor with `DRIVES`, so that runs of all drives are judged
+JUDGED = 29  # shares no factor with `DRIVES`, so that runs of all drives are judged
 LASTS = (4.0, 12.0)  # s
 NOISE = (0.01, 100.0)  # times that of good sensors
 SAMPLED = (0.002, 0.005, 0.01, 0.02)  # s
