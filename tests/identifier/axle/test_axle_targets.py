@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks.documents import recorded
-from benchmarks.extrapolate_recorded import AXLES, INSIDE, LIMITS, RUNS, told_cars
+from benchmarks.extrapolate_recorded import AXLES, INSIDE, LIMITS, REAL_RUNS, RUNS, told_cars
+from benchmarks.recorded_cars import DART
 from identifier.axle import AxleIdentifier
 from identifier.run import identify
 from models.friction import Friction, FrictionChange
@@ -14,7 +15,7 @@ from models.maneuvers import DoubleLaneChange, Slalom, StepSteer
 from models.plant import Plant
 from models.recordings import read_recording
 from models.sensors import Sensor, Sensors
-from models.vehicle import Vehicle, sedan
+from models.vehicle import sedan
 
 NOISE = Sensors(v_y=Sensor(noise=0.02), r=Sensor(noise=0.002))
 WEAVE = Slalom(amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=30.0)
@@ -80,19 +81,10 @@ def test_learnt_on_a_gentle_drive_it_knows_its_range_and_says_where_it_ends(car,
 
 def test_on_a_real_small_car_it_transfers_better_than_a_linear_tire(shared_data):
     """Cross replays of three drives; the best linear tire in hindsight misses 32 %."""
-    car = Vehicle(
-        mass=1.58,
-        yaw_inertia=0.00481,
-        l_f=0.0805,
-        l_r=0.0930,
-        cornering_stiffness_front=40.0,
-        cornering_stiffness_rear=40.0,
-    )
-    runs = ("free_10_02_28", "free_10_12_05", "ramp_steer02")
-    drives = [read_recording(shared_data / "dart.csv.gz", run) for run in runs]
+    drives = [read_recording(shared_data / "dart.csv.gz", run) for run in REAL_RUNS]
     misses = []
     for trained in drives:
-        model = learnt(trained, car)
+        model = learnt(trained, DART)
         for other in drives:
             if other is not trained:
                 moving = other.v_x > 0.8
