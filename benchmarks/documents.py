@@ -7,7 +7,8 @@ number above it, in their order:
 
     script:          whose recorded values, benchmarks/results/<script>.json, the next keys are of;
                      tireid_paper has those of the tables that a test computes again, house
-                     what docs/house.py counts of the code
+                     what docs/house.py counts of the code, and a name that ends in _before
+                     what the script printed at the commit that its file names
     key              measured: the number is the recorded value, rounded as it is printed
     key*1e3          times a factor, where the document has another unit
     key~3            rounded to three significant digits, as in 60 800

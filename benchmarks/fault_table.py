@@ -173,7 +173,7 @@ def report(found: Mapping[str, list[Answers]], targets: Targets) -> str:
     targets.at_most(label, len(silent), 0, "", "silent")
     targets.at_most("answers that leave an axle dead", len(dead), 0, "", "dead")
     untold = sum(one.valid for one in dead)
-    targets.at_most("of these called valid", untold, 0, "", "dead_valid")
+    targets.at_most("answers with a dead axle called valid", untold, 0, "", "dead_valid")
     stopped = sum(one.stopped for one in everything)
     targets.at_most("answers that stopped the program", stopped, 0, "", "stopped")
     comment = f"<!-- numbers {' '.join(sources)} -->"
