@@ -1,7 +1,8 @@
 """What a user gets for a log: tires, what they are wrong by, and the verdict on them.
 
-The road is that of a user: signs, units and axes are judged as where a file is read, `ti.identify`
-learns, the model is frozen at the end, `run.verdict` judges. None of them sees a true force.
+The road is that of a user, by public functions alone: the log is read from a table, which refuses
+wrong signs, units and axes, `ti.identify` refuses a car that cannot have driven it, and learns; the
+model is frozen at the end, `run.verdict` judges. None of them sees a true force.
 """
 
 import math
@@ -9,25 +10,26 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from itertools import count
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 import tireid as ti
 from benchmarks.random_cars import Beginning, RandomDrive, random_car, random_drive
+from identifier.reproducibility import NeverDrivesError
 from models.plant import PlantError
-from models.recordings import (
-    Recording,
-    RecordingError,
-    check_against_vehicle,
-    check_physics,
-)
+from models.recordings import Recording, RecordingError
 from models.vehicle import Vehicle
 
+WRONG, RIGHT = 20.0, 8.0  # % of the rms force, worse axle: no such is valid, and all such
 DEAD = 0.1  # of the true stiffness: an axle below it learnt nothing that is a tire
 REFUSED = "refused"  # in place of a code of the verdict: the log is not let in
 Pair = tuple[float, float]
 NO_FORCE, NO_TIRE = (math.inf, math.inf), (math.nan, math.nan)
+COLUMNS = {  # of a table that is read, by what a recording calls them
+    **{"t": "t", "vx": "v_x", "vy": "v_y", "r": "r", "ay": "a_y"},
+    **{"delta_f": "delta_f", "delta_r": "delta_r"},
+}
 MakeBeginning = Callable[[Vehicle, np.random.Generator], Beginning]
 
 
@@ -38,8 +40,8 @@ class Answer(NamedTuple):
     """Of the force of the frozen model, front and rear [% of the rms force]; inf without model."""
     stiffness: Pair
     """That was learnt, front and rear [N/rad]; NaN without model."""
-    valid: bool | None
-    """The verdict; None where nobody gave one."""
+    valid: bool
+    """The verdict."""
     codes: tuple[str, ...]
     """Of what was found against it; the name of the exception where there was one."""
 
@@ -47,6 +49,16 @@ class Answer(NamedTuple):
     def worse(self) -> float:
         """Error of the worse axle [% of the rms force]."""
         return max(self.error)
+
+    @property
+    def wrong(self) -> bool:
+        """Whether an axle is so far off that no verdict may call it valid."""
+        return not self.worse <= WRONG
+
+    @property
+    def right(self) -> bool:
+        """Whether both axles are so near that a verdict should call it valid."""
+        return self.worse <= RIGHT
 
     @property
     def stopped(self) -> bool:
@@ -78,7 +90,7 @@ def blind(recording: Recording) -> Recording:
     return replace(recording, axle_force=None)
 
 
-def answer(log: Recording, told: Vehicle, judged: Recording, *, ask: bool = True) -> Answer:
+def answer(log: Recording, told: Vehicle, judged: Recording) -> Answer:
     """Return what a user gets for a log, and what it is wrong by.
 
     Where the log is refused before anything is learnt, the error is that of a user who insists.
@@ -88,51 +100,36 @@ def answer(log: Recording, told: Vehicle, judged: Recording, *, ask: bool = True
     log : what reaches the identifier.
     told : the car as it is told.
     judged : the drive on which the error is measured, with true forces.
-    ask : whether the log is judged and a verdict asked for; a user who insists does neither.
     """
-    log = blind(log)
-    valid: bool | None = None
-    codes: tuple[str, ...] = ()
-    if log.v_x.max() < told.lowest_speed:  # a car of that size never drives
-        return Answer(NO_FORCE, NO_TIRE, False, (REFUSED,))
     try:
-        if ask and not _is_let_in(log, told):
-            valid, codes = False, (REFUSED,)
-        run = ti.identify(log, told, check=False)
+        run, let_in = _run(blind(log), told)
         tire = run.freeze()
-        if ask and not codes:
-            valid, codes = _verdict(run)
+        verdict = run.verdict() if let_in else None
         stiffness = tire.stiffness
         assert stiffness is not None
         missed = force_error(tire, judged)
+    except NeverDrivesError:  # a car of that size, whoever insists
+        return Answer(NO_FORCE, NO_TIRE, False, (REFUSED,))
     except Exception as error:
         return Answer(NO_FORCE, NO_TIRE, False, (type(error).__name__,))
+    against = {REFUSED} if verdict is None else {x.code for x in verdict.findings if x.refuses}
     return Answer(
         missed if all(map(math.isfinite, missed)) else NO_FORCE,
         (float(stiffness[0]), float(stiffness[1])),
-        valid,
-        codes,
+        verdict is not None and verdict.valid,
+        tuple(sorted(against)),
     )
 
 
-def _is_let_in(log: Recording, told: Vehicle) -> bool:
-    """Whether a log passes the checks of a file that is read and learnt from."""
+def _run(log: Recording, told: Vehicle) -> tuple[ti.History, bool]:
+    """Return the run over a log, and whether it was let in without insisting."""
+    signals = {name: getattr(log, of) for name, of in COLUMNS.items()}
+    table = {name: signal for name, signal in signals.items() if signal is not None}
     try:
-        check_physics(log)
-        check_against_vehicle(log, told)
+        read = ti.Recording.from_dataframe(table, name=log.name, dt=log.dt)
+        return ti.identify(read, told), True
     except RecordingError:
-        return False
-    return True
-
-
-def _verdict(run: ti.History) -> tuple[bool | None, tuple[str, ...]]:
-    """The verdict and the codes of what refuses."""
-    ask: Callable[[], Any] | None = getattr(run, "verdict", None)
-    if ask is None:
-        return None, ()
-    verdict = ask()
-    codes = {one.code for one in verdict.findings if one.refuses}
-    return verdict.valid, tuple(sorted(codes))
+        return ti.identify(log, told, check=False), False
 
 
 def is_dead(found: Answer, right: Pair) -> bool:

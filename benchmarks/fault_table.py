@@ -102,7 +102,7 @@ def is_told(found: Answer, clean: Answer, unseen: float = 0.0) -> bool:
     clean : without.
     unseen : error that is added and that nobody can see [%].
     """
-    return found.valid is False or found.worse <= max(TWICE * clean.worse, SMALL) + unseen
+    return not found.valid or found.worse <= max(TWICE * clean.worse, SMALL) + unseen
 
 
 def label_of(case: str) -> str:
@@ -131,13 +131,13 @@ def report(found: Mapping[str, list[Answers]], targets: Targets) -> str:
     asked = sum(map(len, found.values()))
     targets.record("drives", asked)
     head += [f"{SHOWN.get(name, name)} [%]" for name in plants]
-    head = ["what is wrong", *head, f"valid, of {asked}"]
+    head = ["what is wrong", *head, f"valid, of {asked}", "of these, wrong and not told"]
     lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     sources = ["name=1:10"] * ("tenth" in plants) + ["fault_table:", "drives"]
     silent: list[tuple[str, str, Answer]] = []
-    dead = 0
+    dead: list[Answer] = []
     for name, label in labels.items():
-        row = [label]
+        row, silent_before = [label], len(silent)
         sources += [f"input={number.text}" for number in numbers(label)]
         sources.append(f"{name}/{{{','.join(logs)}}}/{{stiffness,error}}/{{front,rear}}")
         sources.append(f"{name}/{{{','.join(plants)}}}/error/{{front,rear}}")
@@ -153,12 +153,14 @@ def report(found: Mapping[str, list[Answers]], targets: Targets) -> str:
                 for one, good in pairs
                 if not is_told(one, good, UNSEEN.get(name, 0.0))
             ]
-            dead += sum(is_dead(one, good.stiffness) for one, good in pairs)
+            dead += [one for one, good in pairs if is_dead(one, good.stiffness)]
         every = [answers[name] for drives in found.values() for answers in drives]
-        valid = sum(one.valid is True for one in every)
+        valid = sum(one.valid for one in every)
+        untold = len(silent) - silent_before
         targets.record(f"{name}/valid", valid)
-        sources.append(f"{name}/valid")
-        lines.append(f"| {' | '.join([*row, str(valid)])} |")
+        targets.record(f"{name}/silent", untold)
+        sources.append(f"{name}/{{valid,silent}}")
+        lines.append(f"| {' | '.join([*row, str(valid), str(untold)])} |")
         codes = sorted({code for one in every for code in one.codes})
         show(label, f"{valid} of {len(every)} valid  {', '.join(codes)}")
     for group, name, one in silent[:20]:
@@ -169,7 +171,9 @@ def report(found: Mapping[str, list[Answers]], targets: Targets) -> str:
     targets.record("answers", len(everything))
     label = "answers whose error doubles and that are not called not valid"
     targets.at_most(label, len(silent), 0, "", "silent")
-    targets.at_most("answers that leave an axle dead", dead, 0, "", "dead")
+    targets.at_most("answers that leave an axle dead", len(dead), 0, "", "dead")
+    untold = sum(one.valid for one in dead)
+    targets.at_most("answers with a dead axle called valid", untold, 0, "", "dead_valid")
     stopped = sum(one.stopped for one in everything)
     targets.at_most("answers that stopped the program", stopped, 0, "", "stopped")
     comment = f"<!-- numbers {' '.join(sources)} -->"

@@ -1,14 +1,16 @@
-"""20 000 noisy logs are learnt from and frozen: no exception, and every number is finite.
+"""20 000 noisy logs are learnt from, frozen and judged: no exception, and every number is finite.
 
     python -m benchmarks.noisy_runs [--runs N] [--record]
 
 Drives of random cars of four classes, of which each run takes 4 to 12 s from anywhere, standing
 starts among them, sampled every 2 to 20 ms, with fresh noise of 0.01 to 100 times that of good
 sensors in each channel, and in half of the runs with any fault of `random_case`. Logs that
-contradict the car are not refused but learnt from: a user may insist.
+contradict the car are not refused but learnt from: a user may insist. Of every `JUDGED`-th run,
+which takes twenty times as long as learning, the verdict is asked.
 """
 
 import argparse
+import json
 import sys
 import time
 from collections import Counter
@@ -36,6 +38,7 @@ from models.recordings import Recording
 from models.sensors import Sensors
 
 RUNS, DRIVES = 20_000, 40  # drives are shared by runs
+JUDGED = 29  # shares no factor with `DRIVES`, so that runs of all drives are judged
 LASTS = (4.0, 12.0)  # s
 NOISE = (0.01, 100.0)  # times that of good sensors
 SAMPLED = (0.002, 0.005, 0.01, 0.02)  # s
@@ -137,10 +140,26 @@ def run(seed: int) -> Ended:
         assert stiffness is not None
         if not (np.isfinite(stiffness).all() and (np.array(stiffness) > 0.0).all()):
             return Ended(seed, drive.car.kind, "stiffness that is none")
+        if seed % JUDGED == 0 and not is_sound(history.verdict()):
+            return Ended(seed, drive.car.kind, "verdict that is none")
     except Exception as error:
         return Ended(seed, drive.car.kind, f"{type(error).__name__}: {error}")
     sound = np.isfinite(history.axle_force).all()
     return Ended(seed, drive.car.kind, "" if sound else "force online that is not finite")
+
+
+def is_sound(verdict: ti.Verdict) -> bool:
+    """Return whether a verdict can be told: strict JSON, and all of it numbers.
+
+    Parameters
+    ----------
+    verdict : on a run.
+    """
+    try:
+        json.dumps(verdict.to_dict(), allow_nan=False)
+    except ValueError:
+        return False
+    return len(verdict.lines) > 1
 
 
 def chunk(seeds: Sequence[int]) -> list[Ended]:
@@ -164,6 +183,7 @@ def main() -> int:
         bad = [ended for some in pool.map(chunk, parts) for ended in some]
     seconds = time.perf_counter() - begin
     targets.record("runs", runs)
+    targets.record("judged", len(range(0, runs, JUDGED)))
     targets.record("seconds", seconds, "s")
     for what, count in Counter(one.what.split(":")[0] for one in bad).most_common():
         show(what, f"{count} runs")

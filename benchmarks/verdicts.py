@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.answers import REFUSED, Answer, answer, drawn
+from benchmarks.answers import REFUSED, RIGHT, WRONG, Answer, answer, drawn
 from benchmarks.fault_cases import Case, random_case
 from benchmarks.random_cars import BEGINNINGS, CLASSES, FIRST_SEED, random_beginning
 from benchmarks.recorded_cars import CARMAKER, DART, DATA
@@ -29,7 +29,6 @@ from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle
 
 EACH, PER_CAR = 100, 5  # answers of each class and of recordings; of one plant car
-WRONG, RIGHT = 20.0, 8.0  # % of the rms force, worse axle
 OWN_SENSORS = {"r": "r_imu", "ay": "ay_imu", "vx": "vx_encoder"}  # 90 ms late, as they come
 FREE = ("free_10_02_28", "free_10_12_05")
 BY_CAMERA = (
@@ -50,12 +49,13 @@ PROCESSES = 2
 
 
 class Judged(NamedTuple):
-    """An answer: group of drives, seed, what was wrong, and what came out."""
+    """An answer: group of drives, seed, what was wrong, what came out, and if nothing was wrong."""
 
     group: str
     seed: int
     what: str
     found: Answer
+    clean: bool = False
 
 
 def plant_answers(job: tuple[str, int]) -> list[Judged]:
@@ -80,7 +80,7 @@ def plant_answers(job: tuple[str, int]) -> list[Judged]:
         judged = drive.cornering(log) if fate == 1 else drive.exact
         what = str(case) if fate != 1 else f"beginning: {drive.beginning.kind}"
         result = answer(case.log(log), case.car(told), case.judged(judged))
-        found.append(Judged(kind, seed, what, result))
+        found.append(Judged(kind, seed, what, result, fate == 0))
     return found
 
 
@@ -128,7 +128,7 @@ def recorded_answer(seed: int) -> Judged:
     part = part_of(recording, car, rng)
     case = random_case(car, rng) if rng.integers(2) else Case()
     result = answer(case.log(part), case.car(car), case.judged(part))
-    return Judged("recordings", seed, f"{recording.name}: {case}", result)
+    return Judged("recordings", seed, f"{recording.name}: {case}", result, case == Case())
 
 
 def report(found: Sequence[Judged], targets: Targets) -> None:
@@ -139,34 +139,38 @@ def report(found: Sequence[Judged], targets: Targets) -> None:
     found : all answers.
     targets : collects what is missed.
     """
-    targets.record("answers", len(found))
     head = "answers  wrong  called valid  right  refused  at the door  valid in between"
     print(f"  {'group':14} {head}")
     everything = Counts(found)
-    for group in (*CLASSES, "recordings"):
-        some = Counts([one for one in found if one.group == group])
+    groups = {name: Counts([one for one in found if one.group == name]) for name in CLASSES}
+    groups["plants"] = Counts([one for one in found if one.group in CLASSES])
+    groups["recordings"] = Counts([one for one in found if one.group == "recordings"])
+    for name, some in groups.items():
         if some.all:
-            print(f"  {group:14} {some}")
-            targets.record(f"{group}/answers", len(some.all))
-            targets.record(f"{group}/wrong", len(some.wrong))
-            targets.record(f"{group}/wrong_valid", len(some.wrong_valid))
-            targets.record(f"{group}/right", len(some.right))
-            targets.record(f"{group}/right_refused", len(some.right_refused))
+            print(f"  {name:14} {some}")
+            for key, value in some.numbers().items():
+                targets.record(f"{name}/{key}", value)
     print(f"  {'all':14} {everything}")
+    for key, value in everything.numbers().items():
+        if key != "wrong_valid":
+            targets.record(key, value)
     for one in everything.wrong_valid:
         _show(one, "wrong and called valid")
     for one in everything.right_refused:
         _show(one, "right and refused")
     codes = Counter(code for one in everything.right_refused for code in one.found.codes)
-    if codes:
-        show("codes that refused right answers", ", ".join(f"{c} {n}" for c, n in codes.items()))
+    for code, number in codes.most_common():
+        show(f"refused right answers: {code}", str(number))
+        targets.record(f"right_refused_by/{code}", number)
     print("Targets")
-    targets.record("wrong", len(everything.wrong))
-    targets.record("right", len(everything.right))
     label = f"answers more than {WRONG:g} % wrong and called valid"
     targets.at_most(label, len(everything.wrong_valid), 0, "", "wrong_valid")
     share = 100.0 * len(everything.right_refused) / max(len(everything.right), 1)
-    targets.at_most(f"answers within {RIGHT:g} % and refused", share, 3.0, key="right_refused")
+    targets.at_most(f"answers within {RIGHT:g} % and refused", share, 3.0, key="refused_share")
+    for name in ("plants", "recordings"):
+        if groups[name].right:
+            share = 100.0 * len(groups[name].right_refused) / len(groups[name].right)
+            targets.record(f"{name}/refused_share", share, "%")
     if not everything.right or not everything.wrong:
         targets.at_least("answers right, and wrong", 0.0, 1.0, "")  # nothing was judged
 
@@ -176,24 +180,32 @@ class Counts:
 
     Parameters
     ----------
-    found : the answers; attributes all, wrong, wrong_valid, right, right_refused, between.
+    found : the answers; attributes all, wrong, wrong_valid, right, right_refused, clean_refused
+        (of these, where nothing was wrong), door (logs not let in), between, between_valid.
     """
 
     def __init__(self, found: Sequence[Judged]) -> None:
         self.all = list(found)
-        self.wrong = [one for one in found if not one.found.worse <= WRONG]
+        self.wrong = [one for one in found if one.found.wrong]
         self.wrong_valid = [one for one in self.wrong if one.found.valid]
-        self.right = [one for one in found if one.found.worse <= RIGHT]
+        self.right = [one for one in found if one.found.right]
         self.right_refused = [one for one in self.right if not one.found.valid]
-        self.between = [one for one in found if RIGHT < one.found.worse <= WRONG]
+        self.clean_refused = [one for one in self.right_refused if one.clean]
+        self.door = [one for one in found if REFUSED in one.found.codes]
+        self.between = [one for one in found if not (one.found.wrong or one.found.right)]
+        self.between_valid = [one for one in self.between if one.found.valid]
+
+    def numbers(self) -> dict[str, int]:
+        """Return how many there are of each, by name; all of them as `answers`."""
+        named = {"answers" if key == "all" else key: some for key, some in vars(self).items()}
+        return {key: len(some) for key, some in named.items()}
 
     def __str__(self) -> str:
         """Return them as a row."""
-        door = sum(REFUSED in one.found.codes for one in self.all)
-        between = f"{sum(bool(one.found.valid) for one in self.between)} of {len(self.between)}"
+        between = f"{len(self.between_valid)} of {len(self.between)}"
         return (
             f"{len(self.all):7}{len(self.wrong):7}{len(self.wrong_valid):14}{len(self.right):7}"
-            f"{len(self.right_refused):9}{door:13}{between:>18}"
+            f"{len(self.right_refused):9}{len(self.door):13}{between:>18}"
         )
 
 

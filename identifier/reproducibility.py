@@ -18,11 +18,15 @@ from numpy.typing import NDArray
 from codegen.arrays import Array, blocks
 from identifier.run import History
 from identifier.tire_model import TireModel
-from models.recordings import Recording
+from models.recordings import Recording, RecordingError
 from models.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from identifier.verdict import Verdict
+
+
+class NeverDrivesError(RecordingError):
+    """No sample of a recording is as fast as a sample must be to count."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -256,7 +260,7 @@ def counted_samples(
 
     Raises
     ------
-    ValueError
+    NeverDrivesError
         Where no sample is left.
     """
     counted: NDArray[np.bool_] = recording.v_x >= min_speed
@@ -264,7 +268,7 @@ def counted_samples(
         counted = counted & (recording.t >= since)
     if not counted.any():
         later = "" if since is None else f" from {freeze_key(since)} s on"
-        raise ValueError(
+        raise NeverDrivesError(
             f"{recording.name}: v_x never reaches {min_speed:.3g} m/s{later}, the speed from which "
             f"samples count; its largest value is {recording.v_x.max():.3g} m/s"
         )

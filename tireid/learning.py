@@ -38,8 +38,10 @@ def identify(
         Where the recording contradicts the vehicle.
     DivergedError
         Where the method runs away.
+    NeverDrivesError
+        Where the car never drives.
     ValueError
-        Where the car never drives, or recording and method differ in their sampling interval.
+        Where recording and method differ in their sampling interval.
     """
     design = AxleIdentifier.for_vehicle(vehicle, dt=recording.dt) if method is None else method
     if check:
@@ -64,7 +66,7 @@ def replay(tire: TireModel, recording: Recording, *, since: float | None = None)
 
     Raises
     ------
-    ValueError
+    NeverDrivesError
         Where no sample counts.
     """
     return predict(tire, recording, since=since)

@@ -230,7 +230,7 @@ def _v_y_stuck(drive: Drive) -> Iterator[Finding]:
     recording, windows = drive.recording, drive.found.windows
     brisk = windows.starts
     moves = float(np.std(recording.r[brisk] * recording.v_x[brisk])) > LEAST_FORCE * GRAVITY
-    if moves and not float(np.std(recording.v_y[brisk])) > 0.0:
+    if moves and not float(np.ptp(recording.v_y[brisk])) > 0.0:
         yield Finding(
             "v_y_stuck",
             None,

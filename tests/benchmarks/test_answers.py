@@ -1,5 +1,6 @@
 """Answers are those of a user, and the benchmarks that judge them ring where they should."""
 
+import json
 import math
 from dataclasses import replace
 from functools import partial
@@ -7,6 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+import tireid as ti
 from benchmarks import beginnings, fault_table, noisy_runs, verdicts
 from benchmarks.answers import REFUSED, Answer, answer, blind, drawn, is_dead
 from benchmarks.beginnings import Begun
@@ -15,7 +17,9 @@ from benchmarks.fault_cases import Case, StraightOnly, biased, cases
 from benchmarks.random_cars import CLASSES, random_beginning
 from benchmarks.targets import Targets
 from benchmarks.verdicts import Judged
-from models.faults import Mirrored, SensorFault, Together
+from models.faults import Late, Mirrored, SensorFault, Together
+from models.recordings import RecordingError, write_recording
+from tireid.cli import main
 
 GOOD = Answer((3.0, 4.0), (1e5, 1e5), True, ())
 BAD = Answer((3.0, 40.0), (1e5, 1e5), True, ())
@@ -34,8 +38,6 @@ def log(drive):
 
 
 def test_the_error_is_that_of_the_frozen_model_in_percent_of_the_rms_force(drive, log):
-    import tireid as ti
-
     found = answer(log, drive.car.told, drive.exact)
     force = ti.identify(blind(log), drive.car.told).freeze().axle_force(drive.exact)
     truth = drive.exact.axle_force
@@ -53,13 +55,35 @@ def test_nothing_that_judges_sees_a_true_force(drive, log, monkeypatch):
 
     def sees(recording, *_, **__):
         seen.append(recording.axle_force)
+        raise RecordingError
 
-    for check in ("check_physics", "check_against_vehicle"):
-        monkeypatch.setattr(f"benchmarks.answers.{check}", sees)
+    monkeypatch.setattr("models.recordings.reader.check_physics", lambda one: sees(one))
+    answer(log, drive.car.told, drive.exact)
+    monkeypatch.undo()
     monkeypatch.setattr("benchmarks.answers.ti.identify", sees)
     answer(log, drive.car.told, drive.exact)
-    assert seen == [None, None, None]
+    assert seen == [None, None, None]  # the check of the table; learning, and of who insists
     assert log.axle_force is not None
+
+
+@pytest.mark.parametrize(
+    ("fault", "code"),
+    [(None, 0), (Mirrored(channels=("r",)), 2), (Late(channels=("r",), delay=0.3), 3)],
+    ids=["good", "refused", "not valid"],
+)
+def test_answers_are_those_of_the_command(drive, log, tmp_path, fault, code):
+    shown, car, out = Case(fault).log(log), drive.car.told, tmp_path / "out"
+    words = [str(write_recording(blind(shown), tmp_path / "log.csv")), "--out", str(out)]
+    car.to_toml(tmp_path / "car.toml")
+    ended = main(["identify", *words, "--vehicle", str(tmp_path / "car.toml")])
+    found = answer(shown, car, drive.exact)
+    assert ended == code
+    assert found.valid == (code == 0)
+    assert (REFUSED in found.codes) == (code == 2)
+    if code != 2:
+        verdict = json.loads((out / "summary.json").read_text(encoding="utf-8"))["verdict"]
+        against = {one["code"] for one in verdict["findings"] if one["refuses"]}
+        assert found.codes == tuple(sorted(against))
 
 
 def test_a_log_that_is_not_let_in_is_refused_and_measured_all_the_same(drive, log):
@@ -90,11 +114,6 @@ def test_a_car_that_never_drives_is_refused_and_nothing_stopped(drive, log):
     assert not is_dead(found, (1e5, 1e5))
 
 
-def test_a_user_who_insists_is_let_in(drive, log):
-    found = answer(Mirrored(channels=("r",)).apply(log), drive.car.told, drive.exact, ask=False)
-    assert (found.valid, found.codes) == (None, ())
-
-
 def test_the_verdict_is_asked_and_what_refuses_is_kept(drive, log, monkeypatch):
     class Finding:
         def __init__(self, code, refuses):
@@ -105,9 +124,8 @@ def test_the_verdict_is_asked_and_what_refuses_is_kept(drive, log, monkeypatch):
         findings = (Finding("b", True), Finding("note", False), Finding("a", True))
 
     monkeypatch.setattr("identifier.run.History.verdict", lambda _: Verdict, raising=False)
-    asked, not_asked = (answer(log, drive.car.told, drive.exact, ask=ask) for ask in (True, False))
+    asked = answer(log, drive.car.told, drive.exact)
     assert (asked.valid, asked.codes) == (False, ("a", "b"))
-    assert (not_asked.valid, not_asked.codes) == (None, ())
 
 
 def test_drives_of_one_seed_are_of_one_car_and_differ(drive):
@@ -159,9 +177,18 @@ def test_a_bad_beginning_is_counted():
         return [key for key, (_, met) in targets.limits.items() if not met]
 
     assert missed(GOOD) == []
-    assert missed(BAD) == ["beyond", "ratio/median", "wrong"]
+    assert missed(BAD) == ["beyond", "ratio/median", "wrong", "wrong_valid"]
+    assert missed(TOLD) == ["beyond", "ratio/median", "wrong"]
+    assert missed(GOOD._replace(valid=False)) == ["right_refused_share"]
     assert missed(GOOD._replace(stiffness=(1e5, 9e3))) == ["dead"]
     assert missed(NONE) == ["beyond", "ratio/median", "wrong", "dead", "stopped"]
+
+
+def test_verdicts_of_beginnings_are_counted_with_those_at_the_door():
+    door = GOOD._replace(valid=False, codes=(REFUSED,))
+    answers = [GOOD, BAD, TOLD, door, GOOD._replace(valid=False, codes=("prior",))]
+    found = [Begun("sedan", "rough", 1000, one, GOOD, False) for one in answers]
+    assert beginnings.Verdicts.of(found) == (2, 1, 3, 2, 1)
 
 
 # Noisy runs.
@@ -222,12 +249,28 @@ def test_an_exception_and_a_stiffness_of_nothing_are_found(monkeypatch):
     assert noisy_runs.run(3).what == "ValueError: covariance"
 
 
+@pytest.mark.usefixtures("shared")
+def test_a_verdict_that_stops_or_is_none_is_found_where_it_is_asked(monkeypatch):
+    def stops(_):
+        raise ZeroDivisionError("of a verdict")
+
+    judged, not_judged = noisy_runs.JUDGED, noisy_runs.JUDGED + 1
+    assert math.gcd(noisy_runs.JUDGED, noisy_runs.DRIVES) == 1
+    monkeypatch.setattr("identifier.run.History.verdict", stops)
+    assert noisy_runs.run(judged).what == "ZeroDivisionError: of a verdict"
+    assert noisy_runs.run(not_judged).what == ""
+    for value in (math.nan, math.inf):
+        none = ti.Verdict(findings=(), numbers=(), measures={"force_missed": (0.1, value)})
+        monkeypatch.setattr("identifier.run.History.verdict", lambda _, none=none: none)
+        assert noisy_runs.run(judged).what == "verdict that is none"
+
+
 # The table of faults.
 
 
 @pytest.mark.parametrize(
     ("found", "told"),
-    [(GOOD, True), (BAD, False), (TOLD, True), (BAD._replace(valid=None), False), (NONE, True)],
+    [(GOOD, True), (BAD, False), (TOLD, True), (NONE, True)],
 )
 def test_an_error_that_doubles_must_be_told(found, told):
     assert fault_table.is_told(found, GOOD) is told
@@ -247,9 +290,22 @@ def test_the_table_is_markdown_whose_numbers_are_those_recorded():
     text = fault_table.report(found, targets)
     assert complaints(text, {"fault_table": targets.values}) == []
     assert "| steering 50 ms late | 100 / 100 | 3.0 / 40.0 | " in text
-    assert targets.values["silent"] == len(found)
+    assert targets.values["silent"] == targets.values["late/50/silent"] == len(found)
+    assert targets.values["late/20/silent"] == 0
+    assert text.splitlines()[2 + list(table).index("late/50")].endswith(f"| {len(found)} | 6 |")
     targets.values["late/50/sine/error/rear"] = 50.0
     assert len(complaints(text, {"fault_table": targets.values})) == 1
+
+
+def test_a_dead_axle_that_is_called_valid_is_told_from_one_that_is_not():
+    table, dead = (
+        dict.fromkeys(cases(fault_table.CARMAKER), GOOD),
+        GOOD._replace(stiffness=(1e5, 9.0)),
+    )
+    table["late/20"], table["late/50"] = dead, dead._replace(valid=False)
+    targets = Targets("fault_table")
+    fault_table.report({name: [table] for name in (*fault_table.RUNS, *CLASSES)}, targets)
+    assert (targets.values["dead"], targets.values["dead_valid"]) == (12, 6)
 
 
 def test_every_case_has_a_label_of_its_own():
@@ -273,6 +329,29 @@ def test_the_verdict_is_judged_on_answers_that_are_wrong_and_on_those_that_are_r
     assert missed(refused, TOLD) == ["answers within 8 % and refused"]
     assert missed(*[GOOD] * 40, refused, TOLD) == []
     assert missed(TOLD) == ["answers right, and wrong"]
+
+
+def test_refused_right_answers_are_told_by_group_by_cause_and_where_nothing_was_wrong():
+    refused = GOOD._replace(valid=False, codes=("prior", "at_bound"))
+    door, targets = GOOD._replace(valid=False, codes=(REFUSED,)), Targets("verdicts")
+    between = GOOD._replace(error=(15.0, 3.0))
+    found = [Judged("sedan", k, "", GOOD) for k in range(6)]
+    found += [Judged("race", 1, "", refused, True), Judged("race", 2, "", between)]
+    found += [Judged("recordings", 1, "", door), Judged("recordings", 2, "", BAD)]
+    verdicts.report(found, targets)
+    values = targets.values
+    assert (values["plants/right"], values["plants/right_refused"]) == (7, 1)
+    assert (values["plants/clean_refused"], values["recordings/clean_refused"]) == (1, 0)
+    assert (values["recordings/right_refused"], values["recordings/door"], values["door"]) == (
+        1,
+        1,
+        1,
+    )
+    assert (values["between"], values["between_valid"], values["plants/between"]) == (1, 1, 1)
+    assert values["plants/refused_share"] == pytest.approx(100.0 / 7.0)
+    assert values["refused_share"] == pytest.approx(25.0)
+    by = {key: value for key, value in values.items() if key.startswith("right_refused_by/")}
+    assert by == {f"right_refused_by/{code}": 1 for code in ("prior", "at_bound", REFUSED)}
 
 
 def test_each_third_of_the_answers_has_its_fate(monkeypatch):
