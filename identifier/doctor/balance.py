@@ -12,6 +12,7 @@ force follows slip, and the sway of its body, whose roll follows a_y, over the c
 
 import math
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -129,6 +130,9 @@ class Balance:
             name: Smooth(*(np.concatenate(one) for one in zip(*pieces, strict=True)))
             for name, pieces in smooth.items()
         }
+        self.as_logged = {
+            name: (one.value[self.at], one.slope[self.at]) for name, one in self.signals.items()
+        }
         clock = np.concatenate([one.t[::every] for one in stretches])[self.at]
         share = (clock - clock[0]) / max(clock[-1] - clock[0], 1e-9)
         self.banks = np.cos(math.pi * np.outer(share, np.arange(BANKS)))
@@ -202,7 +206,9 @@ class Balance:
         get, out = sizes.get, {}
         for name in self.names:
             factor = math.exp(-get(f"factor.{name}", 0.0))
-            value, slope = self._later(self.signals[name], get(f"delay.{name}", 0.0))
+            value, slope = self.as_logged[name]
+            if delay := get(f"delay.{name}", 0.0):
+                value, slope = self._later(self.signals[name], delay)
             signal = factor * (value + get(f"lag.{name}", 0.0) * slope)
             out[name] = signal - get(f"offset.{name}", 0.0)
         angle = get("velocity_sensor_angle", 0.0)
@@ -218,8 +224,6 @@ class Balance:
         ahead = min(max(delay / self.dt, -most), most - 1e-9)
         k = math.floor(ahead)
         f, a, b = ahead - k, self.at + k, self.at + k + 1
-        if f == 0.0:
-            return signal.value[a], signal.slope[a]
         value, slope, bend, h = signal.value, signal.slope, signal.bend, self.dt
         return (
             cubic(value[a], value[b], slope[a], slope[b], f, h),
@@ -228,6 +232,8 @@ class Balance:
 
     def _bank(self, sizes: Sizes) -> Array:
         """Return sin β (n,)."""
+        if "bank.0" not in sizes:
+            return np.zeros(self.at.size)
         swings = np.array([sizes.get(f"bank.{k}", 0.0) for k in range(BANKS)])
         return np.asarray(np.sin(self.banks @ swings), dtype=np.float64)
 
@@ -322,7 +328,7 @@ class Balance:
         return np.asarray(v_y * of_v_y + r * of_r + variance(STEERING[part]) * slope**2 * mean)
 
     def _allowed(self) -> tuple[Array, Array]:
-        """Return what may be missed, noise and a share of the force, (m, 3), and rms forces (2,)."""
+        """Return what may be missed, noise and share of the force, (m, 3), and rms forces (2,)."""
         x, car = self.channels({}), Car.of(self.vehicle, {})
         force = self._force(x, car, np.zeros(self.at.size))
         v_x = self.mean @ x["v_x"]
@@ -440,7 +446,7 @@ def stretches_of(
     total = np.concatenate([[0.0], np.cumsum(lively)])
     bounds: NDArray[np.intp] = np.linspace(0, n, pieces + 1).astype(np.intp)
     found = []
-    for first, last in zip(bounds[:-1], bounds[1:], strict=True):
+    for first, last in pairwise(bounds):
         starts = np.arange(first, last - length, max(1, length // 10))
         best = int(starts[np.argmax(total[starts + length] - total[starts])])
         found.append(recording.between(recording.t[best], recording.t[best + length]))

@@ -23,6 +23,8 @@ MOST = 4  # faults at once
 CHANCE = 6.0  # gain of J that a fault must bring
 TELLING = 2.5  # deviations, with the least size of the suspect in them, that it must have
 ALIKE = 3.0  # gain of J within which two faults cannot be told apart
+LIKELY, HOPELESS = 8, 0.5  # suspects that are looked at closely, from this share of CHANCE on
+AWRY = 9.0  # mean square of a part, from which straight lines promise nothing: all are looked at
 TEMPER = 2.0  # odds of e per this gain of J: the model is not exact
 BELIEVED = 5.0  # plausible sizes, beyond which nobody believes one
 
@@ -103,11 +105,16 @@ class Search:
 
     def candidates(self) -> list[Candidate]:
         """Return the suspects beside what is there already, the one that gains most first."""
+        left = {
+            one: self.keys(one) for one in self.suspects if self.keys(one)[0] not in self.chosen
+        }
+        promised = self.fitter.promises(self.fit, {one.key: keys for one, keys in left.items()})
+        likely = sorted(left, key=lambda one: -promised[one.key])
+        if max(self.fit.misses) < AWRY:
+            likely = [one for one in likely[:LIKELY] if promised[one.key] > HOPELESS * CHANCE]
         listed = []
-        for suspect in self.suspects:
-            keys = self.keys(suspect)
-            if keys[0] in self.chosen:
-                continue
+        for suspect in likely:
+            keys = left[suspect]
             fit = self.fitter.fit([*self.chosen, *keys], self.fit.sizes)
             gain = self.fit.J - fit.J - 0.5 * (len(keys) - 1)
             if self._believed(suspect, fit):

@@ -135,6 +135,30 @@ class Fitter:
         covariance = np.asarray(np.linalg.inv(H) * np.outer(sd, sd), dtype=np.float64)
         return Fit(sizes=sizes, J=J, covariance=covariance, misses=tuple(self.misses(found)))
 
+    def promises(self, fit: Fit, suspects: Mapping[str, list[str]]) -> dict[str, float]:
+        """Return what each suspect would gain of J if all were straight lines.
+
+        Parameters
+        ----------
+        fit : without them.
+        suspects : keys of the sizes of each, by any name.
+        """
+        sizes = dict(fit.sizes)
+        here = list(sizes)
+        for keys in suspects.values():
+            sizes.update(dict.fromkeys(keys, 0.0))
+        names = list(sizes)
+        sd = np.array([self._sd(key) for key in names])
+        gradient, H = self._slopes(self.balance.residual(sizes), sizes, names, sd)
+
+        def drop(keys: list[str]) -> float:
+            at = [names.index(key) for key in keys]
+            g = gradient[at]
+            return 0.5 * float(g @ np.linalg.solve(H[np.ix_(at, at)], g))
+
+        without = drop(here)
+        return {name: drop([*here, *keys]) - without for name, keys in suspects.items()}
+
     def _slopes(
         self, found: Residual, sizes: Sizes, names: list[str], sd: Array
     ) -> tuple[Array, Array]:
