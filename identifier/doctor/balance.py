@@ -207,7 +207,10 @@ class Balance:
         for name in self.names:
             factor = math.exp(-get(f"factor.{name}", 0.0))
             value, slope = self.as_logged[name]
-            if delay := get(f"delay.{name}", 0.0):
+            delay = get(f"delay.{name}", 0.0)
+            if name in ("r", "a_y"):
+                delay += get("delay.r+a_y", 0.0)
+            if delay:
                 value, slope = self._later(self.signals[name], delay)
             signal = factor * (value + get(f"lag.{name}", 0.0) * slope)
             out[name] = signal - get(f"offset.{name}", 0.0)

@@ -26,7 +26,7 @@ ALIKE = 3.0  # gain of J within which two faults cannot be told apart
 LIKELY, HOPELESS = 8, 0.5  # suspects that are looked at closely, from this share of CHANCE on
 AWRY = 9.0  # mean square of a part, from which straight lines promise nothing: all are looked at
 TEMPER = 2.0  # odds of e per this gain of J: the model is not exact
-BELIEVED = 5.0  # plausible sizes, beyond which nobody believes one
+BELIEVED = 3.5  # plausible sizes, beyond which nobody believes one
 
 
 class Candidate(NamedTuple):
@@ -57,7 +57,7 @@ class Search:
         self.balance, self.vehicle = balance, balance.vehicle
         self.fitter = Fitter(balance)
         self.suspects = [
-            one for one in SUSPECTS if balance.has_accelerometer or one.channel != "a_y"
+            one for one in SUSPECTS if balance.has_accelerometer or "a_y" not in one.channel
         ]
         self.found: list[Found] = []
         self.fit = self.fitter.fit((), {})
@@ -110,16 +110,22 @@ class Search:
         }
         promised = self.fitter.promises(self.fit, {one.key: keys for one, keys in left.items()})
         likely = sorted(left, key=lambda one: -promised[one.key])
-        if max(self.fit.misses) < AWRY:
+        awry = max(self.fit.misses) > AWRY
+        if not awry:
             likely = [one for one in likely[:LIKELY] if promised[one.key] > HOPELESS * CHANCE]
         listed = []
         for suspect in likely:
-            keys = left[suspect]
-            fit = self.fitter.fit([*self.chosen, *keys], self.fit.sizes)
-            gain = self.fit.J - fit.J - 0.5 * (len(keys) - 1)
-            if self._believed(suspect, fit):
-                listed.append(Candidate(suspect, fit, gain))
+            keys, start = left[suspect], self.fit.sizes
+            if awry:
+                start = self.fitter.best_start(start, keys[0])
+            listed.append(self._candidate(suspect, start))
+        listed = [one for one in listed if self._believed(one.suspect, one.fit)]
         return sorted(listed, key=lambda one: -one.gain)
+
+    def _candidate(self, suspect: Suspect, start: Sizes) -> Candidate:
+        keys = self.keys(suspect)
+        fit = self.fitter.fit([*self.chosen, *keys], start)
+        return Candidate(suspect, fit, self.fit.J - fit.J - 0.5 * (len(keys) - 1))
 
     def _believed(self, suspect: Suspect, fit: Fit) -> bool:
         size = self.size(suspect, fit.sizes)
@@ -130,13 +136,36 @@ class Search:
     def run(self) -> None:
         """Take in one fault after the other."""
         while len(self.found) < MOST:
-            listed = self.candidates()
+            listed = self._trusted(self.candidates())
             if not listed or listed[0].gain < CHANCE:
                 break
             best, *rest = listed
             alike = tuple(one for one in rest if one.gain > max(best.gain - ALIKE, 0.5 * best.gain))
             self.found.append(Found(best.suspect, best.gain, alike))
             self.fit = self.fitter.fit(self.chosen, best.fit.sizes)
+            self._drop()
+
+    def _trusted(self, listed: list[Candidate]) -> list[Candidate]:
+        """Return the candidates again, each equation trusted as far as the best explains it."""
+        if not listed or listed[0].gain < CHANCE:
+            return []
+        self.fitter.distrust(listed[0].fit.misses)
+        self.fit = self.fitter.fit(self.chosen, self.fit.sizes)
+        again = [
+            self._candidate(one.suspect, one.fit.sizes) for one in listed if one.gain > 0.5 * CHANCE
+        ]
+        again = [one for one in again if self._believed(one.suspect, one.fit)]
+        return sorted(again, key=lambda one: -one.gain)
+
+    def _drop(self) -> None:
+        """Drop what the later ones explain too."""
+        for one in self.found[:-1]:
+            keys = self.keys(one.suspect)
+            others = [key for key in self.chosen if key not in keys]
+            fit = self.fitter.fit(others, self.fit.sizes)
+            if fit.J - self.fit.J < CHANCE:
+                self.found.remove(one)
+                self.fit = fit
 
     def findings(self) -> tuple[Finding, ...]:
         """Return what was found: what explains most first, followed by what may be it instead."""

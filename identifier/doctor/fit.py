@@ -17,8 +17,10 @@ from identifier.doctor.balance import Balance, Residual, Sizes
 from identifier.doctor.suspects import NUISANCES, SUSPECTS, grown
 
 FLOOR = 0.3  # of S: below it a residual tells nothing more
+ODD = 4.0  # S from which what is left is no noise: windows that miss it are not independent
 STEP = 0.02  # of a standard deviation, for slopes
 ITERATIONS, CLOSE = 10, 0.01  # of J
+TRIED = (-2.0, -1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0, 2.0)  # believed deviations
 TRIES, DAMPED = 5, 0.1
 
 
@@ -67,6 +69,7 @@ class Fitter:
             self.mean[key], self.sd[key] = mean * scale, sd * scale
         for one in SUSPECTS:
             self.sd[one.key] = one.plausible * one.scale(balance.vehicle)
+        self.trust = (1.0,) * (3 if balance.has_accelerometer else 2)
         self.usual = balance.residual(self.mean).noise
 
     def misses(self, found: Residual) -> list[float]:
@@ -89,9 +92,33 @@ class Fitter:
         found : the residual at the sizes.
         sizes : by key.
         """
-        n = self.balance.independent
+        return self.cost_of(self.misses(found), sizes)
+
+    def cost_of(self, misses: Iterable[float], sizes: Sizes) -> float:
+        """Return J of mean squares.
+
+        Parameters
+        ----------
+        misses : S of each part.
+        sizes : by key.
+        """
         believed = sum(self._away(key, size) ** 2 for key, size in sizes.items())
-        return 0.5 * n * sum(map(math.log, self.misses(found))) + 0.5 * believed
+        logs = sum(n * math.log(S) for n, S in zip(self.counts, misses, strict=True))
+        return 0.5 * logs + 0.5 * believed
+
+    @property
+    def counts(self) -> list[float]:
+        """How many independent windows each part counts for."""
+        return [self.balance.independent * share for share in self.trust]
+
+    def distrust(self, misses: Iterable[float]) -> None:
+        """Count a part less, the more of it even the best fault leaves unexplained.
+
+        Parameters
+        ----------
+        misses : S of each part with that fault.
+        """
+        self.trust = tuple(1.0 / (1.0 + S / ODD) for S in misses)
 
     def _away(self, key: str, size: float) -> float:
         return (size - self.mean.get(key, 0.0)) / self._sd(key)
@@ -135,6 +162,17 @@ class Fitter:
         covariance = np.asarray(np.linalg.inv(H) * np.outer(sd, sd), dtype=np.float64)
         return Fit(sizes=sizes, J=J, covariance=covariance, misses=tuple(self.misses(found)))
 
+    def best_start(self, sizes: Sizes, key: str) -> Sizes:
+        """Return the sizes with one more, of those in `TRIED` that fits best.
+
+        Parameters
+        ----------
+        sizes : by key.
+        key : of the one.
+        """
+        tried = [{**sizes, key: times * self._sd(key)} for times in TRIED]
+        return min(tried, key=lambda one: self.cost(self.balance.residual(one), one))
+
     def promises(self, fit: Fit, suspects: Mapping[str, list[str]]) -> dict[str, float]:
         """Return what each suspect would gain of J if all were straight lines.
 
@@ -163,9 +201,10 @@ class Fitter:
         self, found: Residual, sizes: Sizes, names: list[str], sd: Array
     ) -> tuple[Array, Array]:
         """Return gradient and curvature of J, per standard deviation of what is believed."""
-        n, misses = self.balance.independent, self.misses(found)
+        misses, counts = self.misses(found), self.counts
         weight = [
-            math.sqrt(n / (part.size * S)) for part, S in zip(found.parts, misses, strict=True)
+            math.sqrt(n / (part.size * S))
+            for n, part, S in zip(counts, found.parts, misses, strict=True)
         ]
 
         def stacked(one: Residual) -> Array:
@@ -176,7 +215,7 @@ class Fitter:
         for k, key in enumerate(names):
             there = self.balance.residual({**sizes, key: sizes[key] + STEP * float(sd[k])})
             slopes[:, k] = (stacked(there) - here) / STEP
-            more = zip(there.noise, found.noise, misses, strict=True)
-            noise[k] = sum(0.5 * n / S * (b - a) for b, a, S in more) / STEP
+            more = zip(there.noise, found.noise, counts, misses, strict=True)
+            noise[k] = sum(0.5 * n / S * (b - a) for b, a, n, S in more) / STEP
         away = np.array([self._away(key, sizes[key]) for key in names])
         return slopes.T @ here - noise + away, slopes.T @ slopes + np.eye(len(names))

@@ -30,7 +30,8 @@ def grown(grows: str, vehicle: Vehicle) -> float:
 class Suspect(NamedTuple):
     """A number that may be wrong.
 
-    key : of its size in `balance.Sizes`.   code, channel, unit : as in `Finding`.
+    key : of its size in `balance.Sizes`.   code, channel, unit : as in `Finding`;
+    channels of one device are joined by "+".
     plausible : standard deviation of what is believed [SI], of a sedan.   least : what nobody need
     mend, and what no model of this size tells from a tire.   grows : with the size of a car.
     signed : whether it may be negative.   text : with {size} and {deviation} in `shown`.
@@ -78,7 +79,7 @@ class Suspect(NamedTuple):
             case "factor":
                 numbers = {"factor": {self.channel: math.exp(-size)}}
             case "offset" | "delay" | "lag":
-                numbers = {self.code: {self.channel: size}}
+                numbers = {self.code: dict.fromkeys(self.channel.split("+"), size)}
             case "yaw_inertia":
                 numbers = {"vehicle": {"yaw_inertia": vehicle.yaw_inertia * math.exp(-size)}}
             case "center_of_gravity":
@@ -129,6 +130,10 @@ def _channels() -> tuple[Suspect, ...]:
             f"lag.{name}", "lag", name, "s", 0.15, 0.004, "time", False,
             f"{words[name]} lags behind a low pass of {{size}}", " ms", 1e3,
         ))  # fmt: skip
+    found.append(Suspect(
+        "delay.r+a_y", "delay", "r+a_y", "s", 0.12, 0.004, "time", True,
+        "the yaw rate and the lateral acceleration, of one device, are {size} late", " ms", 1e3,
+    ))  # fmt: skip
     found += [
         Suspect(f"factor.{name}", "factor", name, "", plausible, least, "", True,
                 f"{words[name]} reads {{size}} times too much", "")
@@ -148,9 +153,9 @@ SUSPECTS = (
             "the velocity is measured {size} ahead of the center of gravity", " m"),
     Suspect("acceleration_sensor_x", "acceleration_sensor_x", "a_y", "m", 0.8, 0.04, "length",
             True, "the acceleration is measured {size} ahead of the center of gravity", " m"),
-    Suspect("center_of_gravity", "center_of_gravity", "", "m", 0.2, 0.02, "length", True,
+    Suspect("center_of_gravity", "center_of_gravity", "", "m", 0.2, 0.04, "length", True,
             "the center of gravity is told {size} too far back (l_f and l_r)", " m"),
-    Suspect("yaw_inertia", "yaw_inertia", "", "", 0.5, 0.05, "", True,
+    Suspect("yaw_inertia", "yaw_inertia", "", "", 0.5, 0.08, "", True,
             "the yaw inertia is told {size} times too large", ""),
     Suspect("bank", "bank", "", "rad", 0.03, 0.003, "", True,
             "the road falls by {size} (+: to the left), or wind pushes so", "°", DEGREE),
