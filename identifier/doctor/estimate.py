@@ -1,0 +1,221 @@
+"""The faults of a log and of what is told of its car, estimated together, with no tire known.
+
+One fault after the other is taken in, the one that explains most, as long as it explains more than
+chance and the model do; then all of them are estimated together. Faults that explain nearly as
+much are named beside it: this drive cannot tell them apart.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from identifier.doctor.balance import BANKS, Balance, Sizes, stretches_of
+from identifier.doctor.finding import Finding
+from identifier.doctor.fit import Fit, Fitter
+from identifier.doctor.suspects import SUSPECTS, Suspect
+from models.recordings import Recording
+from models.vehicle import Vehicle
+
+LONGEST, PIECES = 120.0, 6  # s that are looked at, and from how many parts of a longer log
+FEWEST = 24  # windows, below which nothing is asked
+MOST = 4  # faults at once
+CHANCE = 6.0  # gain of J that a fault must bring
+TELLING = 2.5  # deviations, with the least size of the suspect in them, that it must have
+ALIKE = 3.0  # gain of J within which two faults cannot be told apart
+LIKELY, HOPELESS = 8, 0.5  # suspects that are looked at closely, from this share of CHANCE on
+AWRY = 9.0  # mean square of a part, from which straight lines promise nothing: all are looked at
+TEMPER = 2.0  # odds of e per this gain of J: the model is not exact
+BELIEVED = 3.5  # plausible sizes, beyond which nobody believes one
+
+
+class Candidate(NamedTuple):
+    """A suspect, its fit beside what is already there, and what it gains of J."""
+
+    suspect: Suspect
+    fit: Fit
+    gain: float
+
+
+class Found(NamedTuple):
+    """A fault that was taken in, and those that this drive cannot tell from it."""
+
+    suspect: Suspect
+    gain: float
+    alike: tuple[Candidate, ...]
+
+
+class Search:
+    """The search for what is wrong with one drive.
+
+    Parameters
+    ----------
+    balance : of the drive.
+    """
+
+    def __init__(self, balance: Balance) -> None:
+        self.balance, self.vehicle = balance, balance.vehicle
+        self.fitter = Fitter(balance)
+        self.suspects = [
+            one for one in SUSPECTS if balance.has_accelerometer or "a_y" not in one.channel
+        ]
+        self.found: list[Found] = []
+        self.fit = self.fitter.fit((), {})
+
+    def keys(self, suspect: Suspect) -> list[str]:
+        """Return the keys of its sizes.
+
+        Parameters
+        ----------
+        suspect : of which a bank has several.
+        """
+        if suspect.code != "bank":
+            return [suspect.key]
+        return [f"bank.{k}" for k in range(BANKS if self.balance.has_accelerometer else 1)]
+
+    @property
+    def chosen(self) -> list[str]:
+        """Keys of what was taken in."""
+        return [key for one in self.found for key in self.keys(one.suspect)]
+
+    def size(self, suspect: Suspect, sizes: Sizes) -> float:
+        """Return the size of a suspect: of a bank, its rms over the drive.
+
+        Parameters
+        ----------
+        suspect : whose keys are among the sizes.
+        sizes : by key.
+        """
+        if suspect.code != "bank":
+            return sizes[suspect.key]
+        swings = np.array([sizes.get(f"bank.{k}", 0.0) for k in range(BANKS)])
+        angle = self.balance.banks @ swings
+        return math.copysign(math.sqrt(float(np.mean(angle**2))), float(np.mean(angle)))
+
+    def deviation(self, suspect: Suspect, fit: Fit) -> float:
+        """Return the standard deviation of a suspect's size, with what no model tells.
+
+        Parameters
+        ----------
+        suspect : whose keys are among those of the fit.
+        fit : with it.
+        """
+        least = suspect.least * suspect.scale(self.vehicle)
+        return math.hypot(fit.deviation(self.keys(suspect)[0]), least)
+
+    def candidates(self) -> list[Candidate]:
+        """Return the suspects beside what is there already, the one that gains most first."""
+        left = {
+            one: self.keys(one) for one in self.suspects if self.keys(one)[0] not in self.chosen
+        }
+        promised = self.fitter.promises(self.fit, {one.key: keys for one, keys in left.items()})
+        likely = sorted(left, key=lambda one: -promised[one.key])
+        awry = max(self.fit.misses) > AWRY
+        if not awry:
+            likely = [one for one in likely[:LIKELY] if promised[one.key] > HOPELESS * CHANCE]
+        listed = []
+        for suspect in likely:
+            keys, start = left[suspect], self.fit.sizes
+            if awry:
+                start = self.fitter.best_start(start, keys[0])
+            listed.append(self._candidate(suspect, start))
+        listed = [one for one in listed if self._believed(one.suspect, one.fit)]
+        return sorted(listed, key=lambda one: -one.gain)
+
+    def _candidate(self, suspect: Suspect, start: Sizes) -> Candidate:
+        keys = self.keys(suspect)
+        fit = self.fitter.fit([*self.chosen, *keys], start)
+        return Candidate(suspect, fit, self.fit.J - fit.J - 0.5 * (len(keys) - 1))
+
+    def _believed(self, suspect: Suspect, fit: Fit) -> bool:
+        size = self.size(suspect, fit.sizes)
+        most = BELIEVED * suspect.plausible * suspect.scale(self.vehicle)
+        telling = abs(size) > TELLING * self.deviation(suspect, fit)
+        return abs(size) < most and telling and (suspect.signed or size > 0.0)
+
+    def run(self) -> None:
+        """Take in one fault after the other."""
+        while len(self.found) < MOST:
+            listed = self._trusted(self.candidates())
+            if not listed or listed[0].gain < CHANCE:
+                break
+            best, *rest = listed
+            alike = tuple(one for one in rest if one.gain > max(best.gain - ALIKE, 0.5 * best.gain))
+            self.found.append(Found(best.suspect, best.gain, alike))
+            self.fit = self.fitter.fit(self.chosen, best.fit.sizes)
+            self._drop()
+
+    def _trusted(self, listed: list[Candidate]) -> list[Candidate]:
+        """Return the candidates again, each equation trusted as far as the best explains it."""
+        if not listed or listed[0].gain < CHANCE:
+            return []
+        self.fitter.distrust(listed[0].fit.misses)
+        self.fit = self.fitter.fit(self.chosen, self.fit.sizes)
+        again = [
+            self._candidate(one.suspect, one.fit.sizes) for one in listed if one.gain > 0.5 * CHANCE
+        ]
+        again = [one for one in again if self._believed(one.suspect, one.fit)]
+        return sorted(again, key=lambda one: -one.gain)
+
+    def _drop(self) -> None:
+        """Drop what the later ones explain too."""
+        for one in self.found[:-1]:
+            keys = self.keys(one.suspect)
+            others = [key for key in self.chosen if key not in keys]
+            fit = self.fitter.fit(others, self.fit.sizes)
+            if fit.J - self.fit.J < CHANCE:
+                self.found.remove(one)
+                self.fit = fit
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Return what was found: what explains most first, followed by what may be it instead."""
+        listed: list[Finding] = []
+        for one in self.found:
+            gains = [CHANCE, one.gain, *(other.gain for other in one.alike)]
+            odds = np.exp((np.array(gains) - one.gain) / TEMPER)
+            shares = odds / odds.sum()
+            names = [other.suspect for other in one.alike]
+            listed.append(self._finding(one.suspect, self.fit, float(shares[1]), names))
+            for other, share in zip(one.alike, shares[2:].tolist(), strict=True):
+                names = [one.suspect]
+                listed.append(self._finding(other.suspect, other.fit, share, names))
+        return tuple(listed)
+
+    def _finding(
+        self, suspect: Suspect, fit: Fit, confidence: float, alike: list[Suspect]
+    ) -> Finding:
+        size, deviation = self.size(suspect, fit.sizes), self.deviation(suspect, fit)
+        text = suspect.words(size, deviation)
+        if alike:
+            others = ", ".join(f"{one.code} {one.channel}".strip() for one in alike)
+            text += f"; this drive cannot tell it from: {others}"
+        factor = suspect.is_factor
+        repair = suspect.repair(size, self.vehicle)
+        return Finding(
+            code=suspect.code,
+            channel=suspect.channel,
+            size=math.exp(size) if factor else size,
+            deviation=math.exp(size) * deviation if factor else deviation,
+            unit=suspect.unit,
+            confidence=confidence,
+            text=text,
+            repair=repair,
+            sure=repair is not None and not alike and confidence > 0.95,
+        )
+
+
+def estimate(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
+    """Return the faults of a log and of what is told of its car, what explains most first.
+
+    Parameters
+    ----------
+    recording : as it was logged; of a long one lively stretches are looked at.
+    vehicle : as it was told; its cornering stiffnesses are not looked at.
+    """
+    stretches = stretches_of(recording, vehicle, longest=LONGEST, pieces=PIECES)
+    balance = Balance(stretches, vehicle)
+    if len(balance) < FEWEST:
+        return ()
+    search = Search(balance)
+    search.run()
+    return search.findings()
