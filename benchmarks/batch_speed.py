@@ -20,7 +20,6 @@ from codegen import BatchScan
 from codegen.batch import processors
 from codegen.lanes import find_target
 from identifier.compare.batch import BatchRun, identify_batch
-from identifier.method import signals_of
 from identifier.methods import make_method
 from identifier.paper.design import PaperIdentifier
 from identifier.run import History, identify
@@ -53,7 +52,7 @@ def shortest(
 def per_step(name: str, car: Vehicle, recording: Recording) -> tuple[float, float]:
     """Return the time of a step of one run [s]: alone, and in lanes on one core."""
     setup, n = make_method(name, car).setup(car).begin(recording.x[0]), len(recording)
-    sampled = signals_of(recording, setup.scan.over)
+    sampled = setup.shown(recording).signals
     numbers = {**setup.carry, **setup.constants}
     scan = setup.scan
     batch = BatchScan(scan.step, carry=scan.carry, over=scan.over, lanes_over=tuple(numbers))

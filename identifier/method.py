@@ -10,11 +10,13 @@ from dataclasses import asdict, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.certificate import Certificate
 from identifier.driving import Driving
+from identifier.refused import NOWHERE, judges_samples
 from identifier.tire_model import Axle, TireModel
 from identifier.tuning import Range, with_numbers
 from models.recordings import Recording
@@ -22,37 +24,9 @@ from models.rules import LARGEST_FORCE
 from models.schema import Table
 from models.vehicle import Vehicle
 
-SLIP = 0.02  # rad, below the peak of every tire
-SLIDE = 300  # samples of 10 ms: after them a lag of the force is over
-
 
 class CannotFreezeError(ValueError):
     """The method estimates a signal: there is no model of the tire to freeze."""
-
-
-def steady_stiffness(model: TireModel, v_x: float) -> Array:
-    """Return the slope of both axle forces over slip between two steady slides, (2,) [N/rad].
-
-    Parameters
-    ----------
-    v_x : speed of the slides [m/s], without yawing or steering.
-    """
-    t, zeros = np.arange(SLIDE) / 100.0, np.zeros(SLIDE)
-    right, left = (
-        model.axle_force(
-            Recording(
-                name="a steady slide",
-                t=t,
-                v_x=np.full(SLIDE, v_x),
-                v_y=np.full(SLIDE, -v_x * np.tan(alpha)),
-                r=zeros,
-                delta_f=zeros,
-                delta_r=zeros,
-            )
-        )[-1]
-        for alpha in (-SLIP, SLIP)
-    )
-    return np.asarray((left - right) / (2.0 * SLIP))
 
 
 Model = TypeVar("Model", bound=TireModel)
@@ -87,10 +61,12 @@ class Setup(NamedTuple):
     """A run, ready to go: the compiled step, the values it carries at the start, its constants.
 
     The step reads x = [v_y, r] (2,), u = [δ_f, δ_r] (2,), v_x and, where it can use it, a_y (NaN
-    where there is none) sample by sample, SI: `signals_of`. It has an output axle_force (2,) [N].
+    where there is none) sample by sample, SI: `shown`. It has an output axle_force (2,) [N].
     An observer that starts at the first measurement carries zero until that is known: `observe`
     takes its x and returns the carried values that begin with it, by port.
     Carried ports of `only_with_a_y` change no other one, and no output, where a_y is never there.
+    Between stretches of a drive the step is shown `rest` samples, after which it begins anew with
+    what it has learnt (`identifier.refused`).
     """
 
     scan: Scan
@@ -98,6 +74,7 @@ class Setup(NamedTuple):
     constants: Mapping[str, Array]
     observe: Callable[[Array], Mapping[str, Array]] | None = None
     only_with_a_y: tuple[str, ...] = ()
+    rest: int = 1
 
     def begin(self, x: Array) -> "Setup":
         """Return the setup whose observers begin at a measurement.
@@ -117,7 +94,9 @@ class Setup(NamedTuple):
         ----------
         recording : its signals are the input; its forces are not looked at.
         """
-        return self.scan(len(recording), self._values(recording))
+        shown = self.shown(recording)
+        record = self.scan(shown.samples, self._values(recording, shown.signals))
+        return {port: shown.of_recording(values) for port, values in record.items()}
 
     def last(self, recording: Recording, n: int) -> dict[str, Array]:
         """Return the values that are carried after the first n samples, by port; nothing else.
@@ -127,30 +106,108 @@ class Setup(NamedTuple):
         recording : its signals are the input.
         n : samples that are taken.
         """
-        values = self._values(recording)
+        shown = self.shown(recording)
+        values = self._values(recording, shown.signals)
         if n == 0:
             return {port: np.asarray(values[port]) for port in self.scan.carry}
+        n = shown.place(n - 1) + 1
         cut = values | {port: values[port][:n] for port in self.scan.over}
         record = self.scan(n, cut, every=n)
         return {port: record[f"{port}_final"] for port in self.scan.carry}
 
-    def _values(self, recording: Recording) -> dict[str, Array]:
+    def shown(self, recording: Recording) -> "Shown":
+        """Return what the step is shown of a recording.
+
+        Parameters
+        ----------
+        recording : its signals are the input.
+        """
+        return shown(recording, self.scan.over, rest=self.rest, judges=judges_samples(self.carry))
+
+    def _values(self, recording: Recording, signals: Mapping[str, Array]) -> dict[str, Array]:
         """Return all that the step reads over a recording, by port."""
         carry = self.begin(recording.x[0]).carry
-        return {**carry, **signals_of(recording, self.scan.over), **self.constants}
+        return {**carry, **signals, **self.constants}
 
 
-def signals_of(recording: Recording, over: Iterable[str]) -> dict[str, Array]:
-    """Return what a step reads of a recording sample by sample, by port.
+class Shown(NamedTuple):
+    """What a step is shown of a recording: its samples, and rests between its stretches.
+
+    signals : by port of `over`, (N, ...).   samples : N, rests included.
+    at : which of these each sample of the recording is (n,); None where there is no rest.
+    """
+
+    signals: dict[str, Array]
+    samples: int
+    at: NDArray[np.intp] | None
+
+    def place(self, k: int) -> int:
+        """Return which of what is shown a sample of the recording is.
+
+        Parameters
+        ----------
+        k : from 0 to n, that after the last.
+        """
+        if self.at is None:
+            return k
+        return int(self.at[k]) if k < self.at.size else self.samples
+
+    def of_recording(self, values: Array) -> Array:
+        """Return what was recorded at the samples of the recording, without rests.
+
+        Parameters
+        ----------
+        values : of all that was shown, (N, ...) or (N + 1, ...) with that after the last, or of
+            one instant.
+        """
+        if self.at is None:
+            return values
+        if len(values) == self.samples:
+            values = values[self.at]
+        elif len(values) == self.samples + 1:
+            values = values[np.append(self.at, self.samples)]
+        return values
+
+    def with_rests(self, values: Array) -> Array:
+        """Return values of the recording's samples with zeros at rests, (N, ...).
+
+        Parameters
+        ----------
+        values : (n, ...).
+        """
+        if self.at is None:
+            return values
+        padded = np.zeros((self.samples, *values.shape[1:]))
+        padded[self.at] = values
+        return padded
+
+
+def shown(recording: Recording, over: Iterable[str], *, rest: int, judges: bool) -> Shown:
+    """Return a recording as a step is shown it: between stretches it rests.
+
+    A rest is a sample that no gate believes, or one at standstill for a step without a gate, so
+    that no difference over the gap is ever taken for one over a sampling interval.
 
     Parameters
     ----------
-    over : ports that are read, of x (n, 2), u (n, 2), v_x (n,) and a_y (n,), which is NaN where it
-        was not logged.
+    recording : n samples.
+    over : ports that are read: x (N, 2), u (N, 2), v_x (N,), a_y (N,), NaN where there is none.
+    rest : samples of a rest.
+    judges : whether the step judges samples itself.
     """
-    a_y = np.full(len(recording), np.nan) if recording.a_y is None else recording.a_y
+    n, breaks = len(recording), np.array(recording.breaks, dtype=np.intp)
+    a_y = np.full(n, np.nan) if recording.a_y is None else recording.a_y
     signals = {"x": recording.x, "u": recording.u, "v_x": recording.v_x, "a_y": a_y}
-    return {port: signals[port] for port in over}
+    if not breaks.size:
+        return Shown({port: signals[port] for port in over}, n, None)
+    at = np.arange(n) + rest * np.searchsorted(breaks, np.arange(n), side="right")
+    first = np.repeat(breaks, rest)  # of the stretch that follows a rest
+    rows = np.insert(np.arange(n), first, first)
+    resting = np.insert(np.zeros(n, dtype=np.bool_), first, np.ones(first.size, dtype=np.bool_))
+    padded = {port: np.array(signal[rows]) for port, signal in signals.items()}
+    padded["v_x"][resting] = NOWHERE if judges else 0.0
+    padded["a_y"][resting] = np.nan
+    return Shown({port: padded[port] for port in over}, rows.size, at)
 
 
 # Rules of numbers that are taken over from elsewhere: a file, another controller.

@@ -10,6 +10,7 @@ them, and any other recording too. There are two measures, and they answer diffe
 """
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ from identifier.run import History
 from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from identifier.verdict import Verdict
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,7 +123,7 @@ def motion_error(
     force : lateral axle forces (n, 2) [N], frame of the body.
     recording : the motion.
     vehicle : mass, inertia and geometry.
-    counted : samples that count (n,); a window counts where all of its samples do.
+    counted : samples that count (n,); a window counts where all of its samples do, in one stretch.
     """
     n = round(WINDOW / recording.dt)
     if recording.t.size <= n:
@@ -136,6 +140,7 @@ def motion_error(
         return windows
 
     whole = np.lib.stride_tricks.sliding_window_view(counted, n + 1).all(axis=1)
+    whole &= recording.within_a_stretch(np.arange(whole.size), n)
     if not whole.any():
         return None
     a_y = (recording.v_y[n:] - recording.v_y[:-n]) / T + mean(recording.v_x * recording.r)
@@ -159,6 +164,7 @@ class Prediction:
 
     Parameters
     ----------
+    model : that predicted.
     recording : what was predicted.
     axle_force : forces of the frozen model (n, 2) [N].
     against_truth : error over the samples that count, against the true force; None without truth.
@@ -166,6 +172,7 @@ class Prediction:
     motion : what the forces miss of the measured motion; None where the recording is too short.
     """
 
+    model: TireModel
     recording: Recording
     axle_force: Array
     against_truth: AxleRmse | None
@@ -182,6 +189,12 @@ class Prediction:
             f"<Prediction of {name!r}: {error.front:.0f} / {error.rear:.0f} N rms missed, "
             f"{front:.1f} / {rear:.1f} % of the force, front / rear>"
         )
+
+    def verdict(self) -> "Verdict":
+        """Return whether the model gives back the drive's motion; computed at each call."""
+        from identifier.verdict import judge_prediction
+
+        return judge_prediction(self.model, self.recording)
 
     def motion_text(self) -> str:
         """Return what the forces explain of the motion, in a line; empty where nobody knows."""
@@ -253,7 +266,7 @@ def counted_samples(
 
 
 def beyond_known(model: TireModel, recording: Recording) -> tuple[float, float] | None:
-    """Return the share of the samples with more slip than the model knows; None if it cannot tell.
+    """Return the share of the samples with more slip than the model knows; None if nobody can tell.
 
     Parameters
     ----------
@@ -263,7 +276,9 @@ def beyond_known(model: TireModel, recording: Recording) -> tuple[float, float] 
     known = model.known_slip
     if known is None:
         return None
-    counted = counted_samples(recording, model.min_speed)
+    counted = recording.v_x >= model.min_speed
+    if not counted.any():
+        return None
     alpha = np.abs(recording.alpha(model.vehicle.l_f, model.vehicle.l_r)[counted])
     front, rear = np.mean(alpha > known, axis=0)
     return float(front), float(rear)
@@ -287,6 +302,7 @@ def predict(model: TireModel, recording: Recording, *, since: float | None = Non
     counted = counted_samples(recording, model.min_speed, since)
     truth = recording.axle_force
     return Prediction(
+        model=model,
         recording=recording,
         axle_force=force,
         against_truth=None if truth is None else axle_rms(force - truth, counted),

@@ -1,8 +1,8 @@
 """A method over a recording, with all outputs and states, and beside a car that drives."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -139,6 +139,28 @@ class History:
         from identifier.verdict import judge
 
         return judge(self, t)
+
+    def parts(self, recordings: Sequence[Recording]) -> "list[History]":
+        """Return the run over each of the recordings that the drive was joined of.
+
+        Parameters
+        ----------
+        recordings : in the order in which they were joined.
+        """
+        found, first = [], 0
+        for one in recordings:
+            end = first + len(one)
+            found.append(
+                replace(
+                    self,
+                    recording=one,
+                    axle_force=self.axle_force[first:end],
+                    state={name: values[first : end + 1] for name, values in self.state.items()},
+                    outputs={name: values[first:end] for name, values in self.outputs.items()},
+                )
+            )
+            first = end
+        return found
 
     def __repr__(self) -> str:
         diverged = "" if self.diverged_at is None else f", diverged at {self.diverged_at:g} s"

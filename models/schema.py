@@ -6,17 +6,16 @@ records that are made of them. A refusal is one line: file, place, rule, and the
 """
 
 import gzip
-import io
 import json
 import math
 import stat
 import tomllib
 import types
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import Any, NoReturn, Union, get_args, get_origin, get_type_hints
+from typing import Any, BinaryIO, NoReturn, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -29,6 +28,7 @@ from models.limits import limits as limits
 from models.limits import limits_text as limits_text
 
 CHUNK = 1 << 20  # bytes that are unpacked at a time
+SWELLS, SWOLLEN_FROM = 200, 1 << 28  # times that a log packs, judged beyond so many bytes
 SHOWN = 60  # characters of a value in a message
 LONGEST_NAME = 200  # characters
 
@@ -119,31 +119,45 @@ def read_bytes(path: Path, refusal: type[ValueError], *, limit: str = "document"
     return data
 
 
-def unpack(path: Path, data: bytes, refusal: type[ValueError], *, limit: str) -> bytes:
-    """Return what gzip data hold.
+def pieces(path: Path, refusal: type[ValueError], *, limit: str) -> Iterator[bytes]:
+    """Yield what a file holds piece by piece, unpacked where it is gzip by its first bytes.
 
     Parameters
     ----------
-    path : for messages.
-    data : of one or several gzip members.
+    path : a regular file.
     refusal : class of the error to raise.
-    limit : field of `InputLimits` that says how many megabytes they may become.
+    limit : field of `InputLimits` that says how many megabytes there may be, unpacked.
 
     Raises
     ------
     ValueError
-        Of that class, where they are damaged or become too many.
+        Of that class, where it is no such file, damaged, too large, or swells as no log does.
+    OSError
+        Where it cannot be read.
     """
-    parts, size = [], 0
-    try:
-        with gzip.GzipFile(fileobj=io.BytesIO(data)) as file:
-            while part := file.read(CHUNK):
-                parts.append(part)
-                size += len(part)
-                _require_size(path, refusal, size, limit)
-    except (OSError, EOFError, zlib.error) as error:
-        raise refusal(f"{path}: gzip data are damaged or cut off ({error})") from None
-    return b"".join(parts)
+    require_file(path, refusal, limit=limit)
+    with path.open("rb") as raw:
+        zipped = raw.read(2) == b"\x1f\x8b"
+        raw.seek(0)
+        file: BinaryIO = gzip.GzipFile(fileobj=raw) if zipped else raw  # type: ignore[assignment]
+        size = 0
+        while True:
+            try:
+                part = file.read(CHUNK)
+            except (OSError, EOFError, zlib.error) as error:
+                if not zipped:
+                    raise
+                raise refusal(f"{path}: gzip data are damaged or cut off ({error})") from None
+            if not part:
+                return
+            size += len(part)
+            _require_size(path, refusal, size, limit)
+            if zipped and size > SWOLLEN_FROM and size > SWELLS * raw.tell():
+                raise refusal(
+                    f"{path}: gzip data must be a log, they swell to {size / raw.tell():.0f} times "
+                    f"their size, above {SWELLS}; unpack the file first if it is one"
+                )
+            yield part
 
 
 def _require_size(path: Path, refusal: type[ValueError], size: int, limit: str) -> None:

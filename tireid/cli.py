@@ -14,11 +14,9 @@ from typing import NoReturn
 import tireid
 from models.limits import LimitError, limits_text
 from tireid.commands import COMMANDS, add_command
+from tireid.exit_codes import BAD_INPUT, INTERRUPTED, NOT_TOLD
 from tireid.progress import complain, flush_out, listen_to_library, unwritten
 
-BAD_INPUT = 2
-NOT_TOLD = 74  # EX_IOERR of sysexits.h: all was done, but standard output could not be written
-INTERRUPTED = 130
 LONGEST_LINE = 900  # characters of a message, command and option not counted
 
 
@@ -70,8 +68,8 @@ def build_parser(words: Sequence[str]) -> Parser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; return 0, 1 where a check fails, 2 where its input was bad, 74 where only
-    standard output could not be written.
+    """Run a command; return 0, 1 where a check fails, 2 where its input was bad, 3 where its answer
+    is not valid, 74 where only standard output could not be written.
 
     Parameters
     ----------

@@ -1,18 +1,19 @@
 """A verdict as commands tell it: lines, a table of what was learnt, the exit code, a section."""
 
 import argparse
-import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
 from codegen.escape import visible
+from identifier.methods import stored_verdict
 from identifier.verdict import Number, Verdict
+from tireid.exit_codes import DONE, NOT_VALID
 from tireid.output import text_table
 from tireid.progress import complain
 from tireid.report import Block, Headline, Paragraph, Section, Table, printed
 
-NOT_VALID = 3  # exit code; 0 is valid, 1 a check that failed, 2 bad input
-HEADER = ("", "front", "", "rear", "")
+HEADER = ("", "front", "is", "rear", "is")
 
 
 def add_accept(parser: argparse.ArgumentParser) -> None:
@@ -36,7 +37,7 @@ def exit_code(verdict: Verdict, options: argparse.Namespace) -> int:
     ----------
     options : with `accept`.
     """
-    return 0 if verdict.valid or options.accept else NOT_VALID
+    return DONE if verdict.valid or options.accept else NOT_VALID
 
 
 def number_cells(number: Number) -> tuple[str, str]:
@@ -46,8 +47,21 @@ def number_cells(number: Number) -> tuple[str, str]:
     ----------
     number : of a verdict.
     """
-    doubt = "" if number.sd is None else f" ± {number.sd:.2g}"
-    return f"{number.value:.4g}{doubt}", number.state
+    return with_doubt(number.value, number.sd), number.state
+
+
+def with_doubt(value: float, sd: float | None) -> str:
+    """Return a value to the digits that its standard deviation leaves, as in "0.0123 ± 0.0045".
+
+    Parameters
+    ----------
+    sd : two digits of it are told; None where it is not known.
+    """
+    if sd is None or not (math.isfinite(value) and math.isfinite(sd) and sd > 0.0):
+        return f"{value:.4g}"
+    digits = 1 - math.floor(math.log10(float(f"{sd:.1e}")))
+    places = max(digits, 0)
+    return f"{round(value, digits):.{places}f} ± {round(sd, digits):.{places}f}"
 
 
 def number_rows(verdict: Verdict) -> list[list[str]]:
@@ -100,11 +114,27 @@ def verdicts_text(verdicts: Mapping[str, Verdict]) -> str:
 
 def verdict_headline(verdict: Verdict) -> Headline:
     """Return the verdict as the first number of a report."""
-    against = sum(finding.refuses for finding in verdict.findings)
-    meaning = "the verdict on this answer: it gives back the motion that was measured"
-    if not verdict.valid:
-        meaning = f"the verdict on this answer: {against} finding{'s' * (against > 1)} against it"
-    return Headline("valid" if verdict.valid else "NOT VALID", meaning)
+    meaning = "it gives back the motion that was measured" if verdict.valid else verdict.against
+    return Headline(
+        "valid" if verdict.valid else "NOT VALID", f"the verdict on this answer: {meaning}"
+    )
+
+
+def verdicts_headline(verdicts: Mapping[str, Verdict]) -> list[Headline]:
+    """Return on how many recordings the default is valid, as a number of a report, if any.
+
+    Parameters
+    ----------
+    verdicts : on the default method, by the name of the recording that it learnt on.
+    """
+    if not verdicts:
+        return []
+    valid = sum(verdict.valid for verdict in verdicts.values())
+    return [
+        Headline(
+            f"{valid} of {len(verdicts)}", "recordings on which what the default learnt is valid"
+        )
+    ]
 
 
 def verdict_warnings(verdict: Verdict) -> list[str]:
@@ -113,18 +143,20 @@ def verdict_warnings(verdict: Verdict) -> list[str]:
 
 
 def verdict_section(verdict: Verdict) -> Section:
-    """Return the section of a report that holds a verdict."""
-    header = ["", "front", "is", "rear", "is"]
+    """Return the section of a report that holds a verdict; its findings are the warnings above."""
     blocks: list[Block] = [
         Paragraph(
             text="The frozen model is integrated over the drive and must give back the force that "
             "the motion shows, at each axle, where it learnt and where it did not. ± is one "
             "standard deviation."
         ),
-        *(Paragraph(text=printed(line)) for line in verdict.lines),
-        Table(caption="What was learnt, and what is worth it.", header=header,
-              rows=number_rows(verdict)),
-    ]  # fmt: skip
+        *(Paragraph(text=printed(line)) for line in (verdict.headline, *verdict.unseen)),
+        Table(
+            caption="What was learnt, and what is worth it.",
+            header=HEADER,
+            rows=number_rows(verdict),
+        ),
+    ]
     return Section(heading="Is it good?", blocks=blocks)
 
 
@@ -134,12 +166,13 @@ def warn_of_stored(path: Path | str) -> None:
     Parameters
     ----------
     path : of the file.
+
+    Raises
+    ------
+    FrozenModelError
+        Where the file is no such model; one line that names it.
     """
-    try:
-        data = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return  # who loads it says so
-    if isinstance(data, dict) and data.get("valid") is False:
+    if stored_verdict(path) is False:
         complain(f"warning: {path} was found not valid when it was learnt: see its summary.json")
 
 

@@ -26,8 +26,10 @@ from matplotlib.figure import Figure
 
 import tireid.cli
 import tireid.output
-from identifier.method import steady_stiffness
+from codegen.arrays import Array
 from identifier.methods import load_model
+from identifier.tire_model import TireModel
+from models.recordings import Recording
 from tireid.figures import style
 
 MEMORY = 3 << 30  # more than the warm process has [bytes]
@@ -240,6 +242,33 @@ def stiffness_shares(path: Path) -> list[float]:
 
 
 SPEED = 20.0  # m/s of an axle that is asked, where no drive is known
+SLIP = 0.02  # rad, below the peak of every tire
+SLIDE = 300  # samples of 10 ms: after them a lag of the force is over
+
+
+def steady_stiffness(model: TireModel, v_x: float) -> Array:
+    """Return the slope of both axle forces over slip between two steady slides, (2,) [N/rad].
+
+    Parameters
+    ----------
+    v_x : speed of the slides [m/s], without yawing or steering.
+    """
+    t, zeros = np.arange(SLIDE) / 100.0, np.zeros(SLIDE)
+    right, left = (
+        model.axle_force(
+            Recording(
+                name="a steady slide",
+                t=t,
+                v_x=np.full(SLIDE, v_x),
+                v_y=np.full(SLIDE, -v_x * np.tan(alpha)),
+                r=zeros,
+                delta_f=zeros,
+                delta_r=zeros,
+            )
+        )[-1]
+        for alpha in (-SLIP, SLIP)
+    )
+    return np.asarray((left - right) / (2.0 * SLIP))
 
 
 def only_compiler(

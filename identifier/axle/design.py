@@ -224,6 +224,7 @@ class AxleIdentifier(Method):
                 **self._rising(),
             },
             only_with_a_y=("bank",),
+            rest=self.plausibility.rest(self.dt),
         )
 
     def _within_bounds(self, W: Array, own: Array, P: Array) -> tuple[Array, Array]:
@@ -277,7 +278,7 @@ class AxleIdentifier(Method):
         )
 
     def reached(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Reached, ...]:
-        """Return grip, lag and offsets that rest at their bounds, to a hundredth of them.
+        """Return stiffness, grip, lag and offsets that rest at their bounds, to a hundredth.
 
         Parameters
         ----------
@@ -285,7 +286,8 @@ class AxleIdentifier(Method):
         state : W (2, n) and own (2, 3).
         """
         del vehicle
-        b, grip, own = self.bounds, state["W"].sum(axis=1), state["own"]
+        b, W, own = self.bounds, state["W"], state["own"]
+        grip, slope = W.sum(axis=1), (W / np.array(self.ladder)).sum(axis=1)
         elsewhere = "a sensor is off by more than that, or sits elsewhere than is told"
         late = "a sensor is late, or the tires are very soft"
         unseen = "no such curve was seen, or mass, signs or units are wrong"
@@ -296,12 +298,15 @@ class AxleIdentifier(Method):
             (abs(bias) > NEAR * b.v_y,
              Reached("rear", "bias of v_y", bias, "m/s", elsewhere, True)),
         ]  # fmt: skip
-        for axle, soft, level in zip(AXLES, own[:, 0], grip, strict=True):
+        for axle, soft, level, steep in zip(AXLES, own[:, 0], grip, slope, strict=True):
             listed += [
                 (soft > NEAR * b.compliance,  # none at all is a stiff tire
                  Reached(axle, "compliance", float(soft), "m per load", late, False)),
                 (not b.least_grip / NEAR <= level <= NEAR * b.most_grip,
                  Reached(axle, "grip", float(level), "static loads", unseen, False)),
+                (not b.least_stiffness / NEAR <= steep <= NEAR * b.most_stiffness,
+                 Reached(axle, "cornering stiffness", float(steep), "static loads/rad", unseen,
+                         True)),
             ]  # fmt: skip
         return tuple(one for rests, one in listed if rests)
 

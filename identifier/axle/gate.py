@@ -5,6 +5,7 @@ that the run restarts with the next good one. Learning waits `settle` seconds af
 after three bad samples in a row, and while v_y and r repeat to the last bit (a stuck sensor).
 """
 
+import math
 from dataclasses import astuple, dataclass, fields
 from typing import Any, NamedTuple
 
@@ -64,6 +65,15 @@ class Plausibility:
 
     def __post_init__(self) -> None:
         require_positive_fields(self)
+
+    def rest(self, dt: float) -> int:
+        """Return how many bad samples in a row end a run, so that the next good one begins anew.
+
+        Parameters
+        ----------
+        dt : sampling interval [s].
+        """
+        return math.floor(self.hold / dt) + 2
 
     def numbers(self) -> Array:
         """Return the fields in their order, (15,)."""

@@ -318,6 +318,7 @@ class AxleModel(TireModel):
                 "plausibility": self.plausibility.numbers(),
                 "roll": self.sway.numbers(),
             },
+            rest=self.plausibility.rest(dt),
         )
 
     def _run(self, recording: Recording) -> dict[str, Array]:

@@ -115,6 +115,7 @@ def identify_batch(
             impossible=[IMPOSSIBLE_FORCE * cars[i].weight for i in members],
             counts=counts,
             keep=kept,
+            rest=max(setups[i].rest for i in members),
             workers=workers,
         )
         for row, i in enumerate(members):
@@ -177,6 +178,7 @@ def replay_batch(
             recording,
             impossible=[np.inf] * len(setups),
             counts=counts,
+            rest=max(setup.rest for setup in setups.values()),
             workers=workers,
         )
         found |= dict(zip(setups, map(rmse, scores.squares), strict=True))

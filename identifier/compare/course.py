@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from codegen import BatchScan, Scan
 from codegen.arrays import Array
-from identifier.method import CannotFreezeError, Method, signals_of
+from identifier.method import CannotFreezeError, Method, shown
+from identifier.refused import judges_samples
 from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
 from identifier.run import identify
 from identifier.tire_model import TireModel
@@ -269,6 +270,7 @@ def run_scored(
     impossible: Sequence[float],
     counts: NDArray[np.bool_],
     keep: Sequence[int] = (),
+    rest: int = 1,
     workers: int | None = None,
 ) -> Scores:
     """Run a step over a recording with many sets of numbers.
@@ -281,28 +283,31 @@ def run_scored(
     impossible : for each run, a force that no tire makes [N].
     counts : samples that count in the error (n,).
     keep : samples whose values are recorded.
+    rest : samples that each run rests between stretches of the recording.
     workers : threads; None takes one for each processor.
     """
-    n = len(recording)
-    truth = np.zeros((n, 2)) if recording.axle_force is None else recording.axle_force
+    seen = shown(recording, scan.over, rest=rest, judges=judges_samples(values[0]))
+    truth = np.zeros((len(recording), 2)) if recording.axle_force is None else recording.axle_force
+    counted = counts.astype(np.float64)
     record = _scored_scan(scan)(
-        n,
+        seen.samples,
         {
             **{port: np.stack([one[port] for one in values]) for port in values[0]},
-            **signals_of(recording, scan.over),
-            "truth": truth,
-            "counts": counts.astype(np.float64),
+            **seen.signals,
+            "truth": seen.with_rests(truth),
+            "counts": seen.with_rests(counted),
             "impossible": np.array(impossible),
             "squares": np.zeros(2),
             "sane_samples": np.zeros(()),
             "sane": np.ones(()),
         },
-        keep=keep,
+        keep=[seen.place(k) for k in keep],
         workers=workers,
     )
+    sane = record["sane_samples_final"][:, 0].astype(np.int64)
     return Scores(
         squares=record["squares_final"] / counts.sum(),
-        sane_samples=record["sane_samples_final"][:, 0].astype(np.int64),
+        sane_samples=sane if seen.at is None else np.searchsorted(seen.at, sane),
         record=record,
     )
 
@@ -338,21 +343,20 @@ def step_times(
     recording : what is run over.
     repeats : turns; the shortest counts.
     """
-    n = len(_long(recording.v_x))
-    runs = {}
+    runs: dict[str, tuple[Scan, dict[str, Array], int]] = {}
     for name, method in methods.items():
         setup = method.setup(vehicle).begin(recording.x[0])
-        signals = signals_of(recording, setup.scan.over)
-        sampled = {port: _long(signal) for port, signal in signals.items()}
-        runs[name] = setup.scan, {**setup.carry, **sampled, **setup.constants}
+        sampled = {port: _long(signal) for port, signal in setup.shown(recording).signals.items()}
+        n = len(sampled["v_x"])
+        runs[name] = setup.scan, {**setup.carry, **sampled, **setup.constants}, n
         setup.scan(n, runs[name][1])  # compiled and warm
     shortest = dict.fromkeys(methods, math.inf)
     for _ in range(repeats):
-        for name, (scan, values) in runs.items():
+        for name, (scan, values, n) in runs.items():
             start = time.thread_time()
             scan(n, values, every=n)
-            shortest[name] = min(shortest[name], time.thread_time() - start)
-    return {name: duration / n for name, duration in shortest.items()}
+            shortest[name] = min(shortest[name], (time.thread_time() - start) / n)
+    return shortest
 
 
 def _long(signal: Array) -> Array:

@@ -85,7 +85,10 @@ def _earlier(name: str) -> Mend:
 
     def mend(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
         signal, k = getattr(recording, name), round(size / recording.dt)
-        later = np.concatenate([signal[k:], np.full(min(k, len(recording)), signal[-1])])
+        pieces = [signal[piece] for piece in recording.stretches]
+        later = np.concatenate(
+            [part for one in pieces for part in (one[k:], np.full(min(k, one.size), one[-1]))]
+        )
         changes: dict[str, Any] = {name: later}
         return Mended(replace(recording, **changes), vehicle)
 

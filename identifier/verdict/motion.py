@@ -44,12 +44,13 @@ class Windows:
 
         Parameters
         ----------
-        min_speed : a window counts where the car is never slower [m/s].
+        min_speed : a window counts where the car is never slower [m/s], in one stretch.
         """
         n = max(2, round(WINDOW / recording.dt))
         starts = np.arange(0, max(len(recording) - n, 0), max(1, n // 2))
         total = np.concatenate([[0], np.cumsum(recording.v_x < min_speed)])
         drives = total[starts + n + 1] == total[starts] if starts.size else starts > 0
+        drives &= recording.within_a_stretch(starts, n)
         return cls(starts=starts[drives], n=n, duration=n * recording.dt)
 
     def __len__(self) -> int:

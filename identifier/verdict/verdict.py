@@ -83,28 +83,26 @@ class Verdict:
         """Whether nothing was found that refuses the answer."""
         return not any(finding.refuses for finding in self.findings)
 
-    def valid_at(self, axle: Axle) -> bool:
-        """Return whether nothing refuses what was found of an axle.
-
-        Parameters
-        ----------
-        axle : "front" or "rear".
-        """
-        return not any(one.refuses and one.axle in (None, axle) for one in self.findings)
+    @property
+    def against(self) -> str:
+        """How many findings refuse the answer, in words: "1 finding against it"."""
+        count = sum(finding.refuses for finding in self.findings)
+        return f"{count} finding{'' if count == 1 else 's'} against it"
 
     @property
     def headline(self) -> str:
         """The verdict in one line."""
-        against = sum(finding.refuses for finding in self.findings)
-        if self.valid:
-            return "verdict: valid"
-        return f"verdict: NOT VALID, {against} finding{'s' if against > 1 else ''} against it"
+        return "verdict: valid" if self.valid else f"verdict: NOT VALID, {self.against}"
+
+    @property
+    def unseen(self) -> tuple[str, ...]:
+        """What nobody can see, a line each."""
+        return tuple(f"not seen: {text}" for text in UNSEEN)
 
     @property
     def lines(self) -> tuple[str, ...]:
         """Headline, a line for each finding, and what nobody can see."""
-        unseen = tuple(f"not seen: {text}" for text in UNSEEN)
-        return (self.headline, *(finding.line for finding in self.findings), *unseen)
+        return (self.headline, *(finding.line for finding in self.findings), *self.unseen)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the verdict as plain numbers and words, ready for JSON."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, Protocol
 
 import numpy as np
+from scipy.signal import lfilter
 
 from codegen.arrays import Array
 from models.recordings import Recording
@@ -296,11 +297,10 @@ class Lagging:
         ramp = (1.0 - keep) * self.time_constant / recording.dt  # lag of a straight line, T u_dot
 
         def low_passed(good: Array) -> Array:
-            y = good.copy()
-            for k in range(1, y.size):
-                rise = good[k] - good[k - 1]
-                y[k] = keep * y[k - 1] + (1.0 - keep) * good[k - 1] + (1.0 - ramp) * rise
-            return y
+            # y_k = keep y_(k-1) + (1 - keep) u_(k-1) + (1 - ramp) (u_k - u_(k-1)), from y_0 = u_0
+            b = [1.0 - ramp, ramp - keep]
+            y, _ = lfilter(b, [1.0, -keep], good, zi=[ramp * good[0]])
+            return np.asarray(y, dtype=np.float64)
 
         return _through(recording, self.channels, low_passed)
 

@@ -61,6 +61,8 @@ class Steering(NamedTuple):
 def windows(recording: Recording) -> Windows:
     """Average a recording over windows of 0.2 s in which the car moves forward all the time.
 
+    No window reaches from one stretch into the next.
+
     Moving: v_x above 0.5 m/s and above 30 % of its 95th percentile.
     """
     n, dt = len(recording), recording.dt
@@ -68,6 +70,7 @@ def windows(recording: Recording) -> Windows:
     start = np.arange(0, max(n - width, 0), max(round(STRIDE / dt), 1))
     slow = recording.v_x < max(SLOWEST, 0.3 * float(np.percentile(recording.v_x, 95)))
     start = start[_sums(slow.astype(np.float64), start, width) == 0.0]
+    start = start[recording.within_a_stretch(start, width)]
 
     def mean(signal: Array) -> Array:
         means: Array = _sums(signal, start, width) / width

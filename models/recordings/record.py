@@ -7,12 +7,15 @@ ISO axes: x forward, y left, z up; r and delta turn left when positive, forces p
 import csv
 import gzip
 import io
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from models.bicycle import measured_slip
@@ -20,7 +23,11 @@ from models.files import write_atomically
 from models.logs.log import RecordingError
 from models.rules import LARGEST_FORCE
 
+if TYPE_CHECKING:
+    from models.recordings.map import LogMap
+
 MINIMUM_SAMPLES = 10
+PAUSE = 1.0  # [s] between logs that are joined and whose clocks overlap
 JITTER = 0.02  # largest departure of a sample from the uniform grid, as a share of one step
 
 
@@ -39,12 +46,15 @@ LARGEST = {
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Recording:
-    """Signals of one run, all of the same length n, uniformly sampled and read-only.
+    """Signals of one drive, all of the same length n, uniformly sampled and read-only.
+
+    A drive may consist of stretches, where the log has gaps or there were several: time is uniform
+    in each, and nothing is ever differenced from one to the next.
 
     Parameters
     ----------
     name : "FILE:RUN", or "FILE" when the file has no run column.
-    t : time [s], shape (n,), uniform to 2 % of one step.
+    t : time [s], shape (n,), uniform to 2 % of one step in each stretch, and rising.
     v_x : forward speed at the center of gravity [m/s], shape (n,).
     v_y : lateral velocity at the center of gravity [m/s], positive to the left, shape (n,).
     r : yaw rate [rad/s], positive to the left, shape (n,).
@@ -55,12 +65,14 @@ class Recording:
         less g sin of its angle on one that falls to the left.
     axle_force : front and rear lateral axle force [N], positive to the left, shape (n, 2), or
         None when there is no truth.
+    breaks : index of the first sample of each stretch but the first, rising.
+    notes : what was taken or done in reading beyond the words of the file, one sentence each.
 
     Raises
     ------
     RecordingError
-        If lengths differ, a value is not finite or beyond `LARGEST`, time is not uniform, or
-        n < 10.
+        If lengths differ, a value is not finite or beyond `LARGEST`, time is not uniform, or a
+        stretch has fewer than 10 samples.
     """
 
     name: str
@@ -72,42 +84,55 @@ class Recording:
     delta_r: Array
     a_y: Array | None = None
     axle_force: Array | None = None
+    breaks: tuple[int, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         n = np.size(self.t)
-        if n < MINIMUM_SAMPLES:
-            raise RecordingError(
-                f"{self.name}: a recording needs at least {MINIMUM_SAMPLES} samples, it has {n}"
-            )
-        for field in fields(self)[1:]:
-            value = getattr(self, field.name)
+        for piece in self.stretches:
+            if min(piece.stop, n) - piece.start < MINIMUM_SAMPLES:
+                whole = "a recording" if not self.breaks else "each stretch of a recording"
+                raise RecordingError(
+                    f"{self.name}: {whole} needs at least {MINIMUM_SAMPLES} samples, it has "
+                    f"{max(min(piece.stop, n) - piece.start, 0)}"
+                )
+        for name in SIGNALS:
+            value = getattr(self, name)
             if value is None:
                 continue
             array = _read_only(value)
-            shape = (n, 2) if field.name == "axle_force" else (n,)
+            shape = (n, 2) if name == "axle_force" else (n,)
             if array.shape != shape:
                 raise RecordingError(
-                    f"{self.name}: {field.name} must have shape {shape}, it has {array.shape}"
+                    f"{self.name}: {name} must have shape {shape}, it has {array.shape}"
                 )
             bad = np.count_nonzero(~np.isfinite(array))
             if bad:
                 raise RecordingError(
-                    f"{self.name}: {field.name} must be finite, {bad} of its values are not"
+                    f"{self.name}: {name} must be finite, {bad} of its values are not"
                 )
             peak = float(np.abs(array).max())
-            if peak > LARGEST[field.name]:
+            if peak > LARGEST[name]:
                 raise RecordingError(
-                    f"{self.name}: {field.name} must be of a car, within +-"
-                    f"{LARGEST[field.name]:g}, its peak is {peak:.4g}"
+                    f"{self.name}: {name} must be of a car, within +-"
+                    f"{LARGEST[name]:g}, its peak is {peak:.4g}"
                 )
-            object.__setattr__(self, field.name, array)
-        step = (self.t[-1] - self.t[0]) / (n - 1)
-        off_grid = np.abs(self.t - self.t[0] - step * np.arange(n)).max()
-        if not (step > 0.0 and off_grid <= JITTER * step):
-            raise RecordingError(
-                f"{self.name}: t must rise in equal steps, mean step {step:.6g} s, "
-                f"largest departure {off_grid:.3g} s; read the log with read_recording"
-            )
+            object.__setattr__(self, name, array)
+        step = self._step
+        index = np.arange(n, dtype=np.float64)
+        for piece in self.stretches:
+            own = self.t[piece] - self.t[piece.start]
+            off_grid = float(np.abs(own - step * (index[piece] - piece.start)).max())
+            if not (step > 0.0 and off_grid <= JITTER * step):
+                raise RecordingError(
+                    f"{self.name}: t must rise in equal steps, mean step {step:.6g} s, "
+                    f"largest departure {off_grid:.3g} s; read the log with read_recording"
+                )
+            if piece.start and not self.t[piece.start] > self.t[piece.start - 1]:
+                raise RecordingError(
+                    f"{self.name}: t must rise from one stretch to the next, "
+                    f"{self.t[piece.start]:.9g} s comes after {self.t[piece.start - 1]:.9g} s"
+                )
 
     @classmethod
     def from_dataframe(
@@ -119,6 +144,7 @@ class Recording:
         dt: float = 0.01,
         check: bool = True,
         columns: Mapping[str, str] | None = None,
+        log_map: "LogMap | str | PathLike[str] | None" = None,
     ) -> "Recording":
         """Return one run of a data frame, checked and brought to a uniform time as a file is.
 
@@ -130,21 +156,43 @@ class Recording:
         run : which run of the column "run", where there are several.
         dt : sample time T_s to resample to [s].
         check : whether data that contradict physics are refused.
-        columns : by our name of a column, the name that it has in `data`, where they differ.
+        columns : by our name of a column, its name in `data` and, behind it, unit, factor, offset
+            or ratio, as of `read_recording`.
+        log_map : how the data are read, or the path of a log.toml; its repair is not applied.
 
         Raises
         ------
         RecordingError
             One line: name and run, column, rule, value, remedy.
         """
-        from models.recordings.reader import recording_from_table, table_of_arrays
+        from models.recordings.reader import map_of, recording_from_arrays, with_columns
 
-        table = table_of_arrays(name, data, columns or {})
-        return recording_from_table(name, name, table, run=run, dt=dt, check=check)
+        told = with_columns(map_of(log_map), columns or {})
+        return recording_from_arrays(name, data, told, run=run, dt=dt, check=check)
 
     def __len__(self) -> int:
         """Return the number of samples."""
         return int(self.t.size)
+
+    @property
+    def stretches(self) -> tuple[slice, ...]:
+        """Samples of each stretch: slices from one break to the next, one where there is none."""
+        return tuple(
+            slice(first, end) for first, end in pairwise((0, *self.breaks, int(np.size(self.t))))
+        )
+
+    def within_a_stretch(self, starts: NDArray[np.intp], n: int) -> NDArray[np.bool_]:
+        """Return whether samples from each start to n later lie in one stretch, (m,).
+
+        Parameters
+        ----------
+        starts : indices of first samples (m,).
+        n : steps from the first to the last sample.
+        """
+        breaks = np.array(self.breaks, dtype=np.intp)
+        first, last = (np.searchsorted(breaks, at, side="right") for at in (starts, starts + n))
+        inside: NDArray[np.bool_] = first == last
+        return inside
 
     @property
     def x(self) -> Array:
@@ -159,12 +207,17 @@ class Recording:
     @property
     def dt(self) -> float:
         """Sample time T_s [s], rounded to a nanosecond so that 100 Hz gives exactly 0.01."""
-        return round(float(self.t[-1] - self.t[0]) / (self.t.size - 1), 9)
+        return round(self._step, 9)
+
+    @property
+    def _step(self) -> float:
+        """Mean step of time within the stretches [s]."""
+        return self.duration / (self.t.size - 1 - len(self.breaks))
 
     @property
     def duration(self) -> float:
-        """Time from the first to the last sample [s]."""
-        return float(self.t[-1] - self.t[0])
+        """Time from the first to the last sample, without what lies between stretches [s]."""
+        return sum(float(self.t[piece.stop - 1] - self.t[piece.start]) for piece in self.stretches)
 
     def alpha(self, l_f: float, l_r: float) -> Array:
         """Slip angles of the axles in the paper's sign, the negative of ISO 8855.
@@ -206,19 +259,82 @@ class Recording:
                 f"samples, at least {MINIMUM_SAMPLES} are needed; the recording runs from "
                 f"{self.t[0]:g} to {self.t[-1]:g} s"
             )
-        cut = {
-            field.name: getattr(self, field.name)[keep]
-            for field in fields(self)[1:]
-            if getattr(self, field.name) is not None
+        return self.taken(np.flatnonzero(keep))
+
+    def taken(self, kept: NDArray[np.intp]) -> "Recording":
+        """Return some of the samples; where some are left out between, a stretch begins.
+
+        Parameters
+        ----------
+        kept : indices of samples, rising.
+
+        Raises
+        ------
+        RecordingError
+            Where fewer than 10 samples are left of a stretch.
+        """
+        stretch = np.searchsorted(np.array(self.breaks, dtype=np.intp), kept, side="right")
+        begins = (np.diff(stretch) > 0) | (np.diff(kept) > 1)
+        breaks = tuple(int(k) for k in np.flatnonzero(begins) + 1)
+        cut: dict[str, Any] = {
+            name: getattr(self, name)[kept] for name in SIGNALS if getattr(self, name) is not None
         }
-        return replace(self, **cut)
+        return replace(self, **cut, breaks=breaks)
 
     def __repr__(self) -> str:
         truth = "" if self.axle_force is None else ", with axle forces"
+        pieces = f" in {len(self.stretches)} stretches" if self.breaks else ""
         return (
-            f"<Recording {self.name!r}: {self.t.size} samples of {self.dt:g} s at "
+            f"<Recording {self.name!r}: {self.t.size} samples{pieces} of {self.dt:g} s at "
             f"{self.v_x.min():.3g} to {self.v_x.max():.3g} m/s{truth}>"
         )
+
+
+SIGNALS = ("t", "v_x", "v_y", "r", "delta_f", "delta_r", "a_y", "axle_force")
+
+
+def joined(recordings: Sequence[Recording], name: str | None = None) -> Recording:
+    """Return several recordings as one drive in stretches, in their order.
+
+    Each keeps its own time where it begins after the one before; else its time is moved to begin
+    `PAUSE` after it. Signals that one lacks are left out of all.
+
+    Parameters
+    ----------
+    recordings : sampled alike; at least one.
+    name : of the drive; None takes all their names.
+
+    Raises
+    ------
+    RecordingError
+        Where they are sampled at different intervals.
+    """
+    first = recordings[0]
+    name = " + ".join(one.name for one in recordings) if name is None else name
+    if len(recordings) == 1:
+        return replace(first, name=name)
+    t, breaks, notes = [np.asarray(first.t)], list(first.breaks), list(first.notes)
+    for one in recordings[1:]:
+        if abs(one.dt - first.dt) > JITTER * first.dt / len(one):
+            raise RecordingError(
+                f"{one.name} is sampled at {one.dt:g} s, {first.name} at {first.dt:g} s: logs "
+                "that are learnt on together must be brought to one interval"
+            )
+        n, end = sum(map(np.size, t)), float(t[-1][-1])
+        moved = 0.0 if one.t[0] > end + first.dt else end + PAUSE - float(one.t[0])
+        t.append(np.asarray(one.t) + moved if moved else np.asarray(one.t))
+        breaks += [n, *(n + k for k in one.breaks)]
+        notes += [note for note in one.notes if note not in notes]
+        if moved:
+            notes.append(f"the time of {one.name} is moved by {moved:.6g} s, to follow on")
+    signals: dict[str, Any] = {
+        name: np.concatenate([getattr(one, name) for one in recordings])
+        for name in SIGNALS[1:]
+        if all(getattr(one, name) is not None for one in recordings)
+    }
+    return Recording(
+        name=name, t=np.concatenate(t), **signals, breaks=tuple(breaks), notes=tuple(notes)
+    )
 
 
 def _read_only(value: object) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from models.logs.log import RecordingError
-from models.recordings.record import MINIMUM_SAMPLES, Recording
+from models.recordings.record import MINIMUM_SAMPLES, Recording, joined
 from models.schema import Table, shown
 from models.vehicle import Vehicle
 
@@ -104,6 +104,10 @@ class Repair:
         VehicleError
             Where the numbers of the car are those of no car.
         """
+        if recording.breaks:
+            parts = [recording.taken(np.arange(s.start, s.stop)) for s in recording.stretches]
+            mended = [self.apply(part, vehicle) for part in parts]
+            return joined([part for part, _ in mended], recording.name), mended[0][1]
         told = {name for name in TABLES if name != "vehicle" for name in getattr(self, name)}
         if self.acceleration_sensor_x:
             told.add("a_y")

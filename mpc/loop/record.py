@@ -109,15 +109,16 @@ class Drive:
         RecordingError
             Where the drive is too short to be one.
         """
-        zeros = np.zeros_like(self.t)
-        signals = {name: self.measured[name] for name in ("v_x", "v_y", "r", "a_y")}
         return Recording(
             name=self.name,
             t=self.t,
+            v_x=self.measured["v_x"],
+            v_y=self.measured["v_y"],
+            r=self.measured["r"],
             delta_f=self.measured["delta"],
-            delta_r=zeros,
+            delta_r=np.zeros_like(self.t),
+            a_y=self.measured["a_y"],
             axle_force=self.axle_force,
-            **signals,
         )
 
 

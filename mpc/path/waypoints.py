@@ -279,17 +279,17 @@ def _rows(file: Path) -> list[tuple[int, list[str]]]:
     if not file.exists():
         raise PathError(f"{file}: there is no such file")
     try:
-        text = read_text(file, PathError, limit="megabytes", encoding="utf-8-sig")
+        text = read_text(file, PathError, encoding="utf-8-sig")
     except OSError as error:
         raise PathError(f"{file}: cannot be read ({error.strerror})") from None
     reader = csv.reader(io.StringIO(text, newline=""))
-    rows, most = [], limits().samples
+    rows, most = [], limits().path
     try:
         for cells in reader:
             if any(map(str.strip, cells)):
                 rows.append((reader.line_num, cells))
             if len(rows) > most:
-                require_few(PathError, str(file), len(rows), "samples", "rows")
+                require_few(PathError, str(file), len(rows), "path", "rows")
     except csv.Error as error:
         raise PathError(f"{file}: line {reader.line_num} is not CSV ({error})") from None
     if not rows:

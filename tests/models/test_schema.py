@@ -14,13 +14,13 @@ from models.schema import (
     Table,
     limits,
     limits_text,
+    pieces,
     read_bytes,
     read_json,
     read_toml,
     require_few,
     require_name,
     shown,
-    unpack,
 )
 
 
@@ -76,11 +76,23 @@ def test_a_gzip_bomb_stops_at_the_limit(tmp_path, monkeypatch):
     monkeypatch.setenv(VARIABLE, "megabytes=3")
     bomb = gzip.compress(bytes(30_000_000))
     assert len(bomb) < 40_000
+    path = tmp_path / "b.gz"
+    path.write_bytes(bomb)
     with pytest.raises(RefusedError, match=r"megabytes must be at most 3, here are 3\.1"):
-        unpack(tmp_path / "b.gz", bomb, RefusedError, limit="megabytes")
-    parts = gzip.compress(b"a" * 1_000_000) + gzip.compress(b"b" * 1_900_000)
-    whole = unpack(tmp_path / "b.gz", parts, RefusedError, limit="megabytes")
+        list(pieces(path, RefusedError, limit="megabytes"))
+    path.write_bytes(gzip.compress(b"a" * 1_000_000) + gzip.compress(b"b" * 1_900_000))
+    whole = b"".join(pieces(path, RefusedError, limit="megabytes"))
     assert whole == b"a" * 1_000_000 + b"b" * 1_900_000
+
+
+def test_what_swells_as_no_log_does_is_refused_below_the_limit(tmp_path, monkeypatch):
+    monkeypatch.setattr("models.schema.SWOLLEN_FROM", 3_000_000)
+    path = tmp_path / "b.gz"
+    path.write_bytes(gzip.compress(bytes(30_000_000)))
+    with pytest.raises(RefusedError, match=r"they swell to \d+ times their size, above 200"):
+        list(pieces(path, RefusedError, limit="megabytes"))
+    path.write_bytes(gzip.compress(np.arange(1_000_000).tobytes()))
+    assert sum(map(len, pieces(path, RefusedError, limit="megabytes"))) == 8_000_000
 
 
 @pytest.mark.parametrize(
@@ -219,6 +231,6 @@ def test_a_count_that_is_no_number_is_too_many():
 
 
 def test_the_limits_that_hold_are_told(monkeypatch):
-    assert "samples=2e+06" in limits_text()
+    assert "samples=1e+08" in limits_text()
     monkeypatch.setenv(VARIABLE, "samples=7")
     assert "samples=7 " in limits_text()

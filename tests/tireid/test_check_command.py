@@ -118,7 +118,7 @@ def test_bad_input_is_one_line_and_exit_code_2(capsys, monkeypatch, tmp_path, wo
 
 def test_figures_and_a_recorded_run(capsys, logs, tmp_path):
     folder = tmp_path / "judged"
-    code, said = checked(capsys, "--paper", "--log", logs / "slalom.csv", "--out", folder)
+    code, said = checked(capsys, "--paper", "--along", logs / "slalom.csv", "--out", folder)
     assert code == 0
     margin = float(re.search(r"gain margin there ([\d.]+)", said.out).group(1))
     worst = certificate_of(PaperIdentifier.for_vehicle(sedan()), sedan())["gain_sampled"].margin

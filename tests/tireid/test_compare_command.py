@@ -258,8 +258,12 @@ def test_a_recording_that_teaches_nothing_right_makes_the_exit_code(logs, tmp_pa
     log = read_recording(logs / "slalom.csv")
     write_recording(replace(log, v_y=log.v_y + 0.6), tmp_path / "biased.csv")
     words = ["compare", str(tmp_path / "biased.csv"), "--vehicle", str(logs / "car.toml")]
-    words += ["--method", "linear", "--floor", "0", "--no-check"]
+    words += ["--floor", "0", "--no-check", "--method", "linear"]
+    assert main([*words, "--out", str(tmp_path / "another")]) == 0
+    assert "verdict" not in capsys.readouterr().out
+    words.append("axle")
     assert main([*words, "--out", str(tmp_path / "refused")]) == 3
+    assert "0 of 1" in (tmp_path / "refused" / "report.html").read_text(encoding="utf-8")
     assert "default learnt on biased: verdict: NOT VALID" in capsys.readouterr().out
     assert main([*words, "--accept", "--out", str(tmp_path / "accepted")]) == 0
     found = json.loads((tmp_path / "accepted" / "compare.json").read_text())["verdict"]

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.fuzz.server import SLIP, steady_stiffness
 from identifier.axle import AxleModel
-from identifier.method import SLIP, steady_stiffness
 from identifier.methods import METHODS, draws_weights, load_model, make_method
 from identifier.paper.design import PaperIdentifier, design_text
 from models.recordings import read_recording

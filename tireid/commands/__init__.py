@@ -14,6 +14,7 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "demo": "the whole story on the built-in car, with a report",
         "sample": "a log to learn from, driven by the built-in car, where there is none",
         "init": "a commented vehicle file to fill in",
+        "channels": "what a log holds, what its channels probably are, and a log.toml that says so",
         "paper": "Tables I and II of the paper, beside ours, over many seeds",
         "identify": "learn tire forces from a recording, freeze the weights and test them",
         "predict": "axle forces of a drive by a stored model, and what they miss",

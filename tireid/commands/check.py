@@ -40,6 +40,7 @@ from tireid.commands.certificate_table import (
 )
 from tireid.commands.options import (
     Chosen,
+    add_log_map,
     add_method,
     add_output,
     add_seed,
@@ -49,7 +50,9 @@ from tireid.commands.options import (
     read_log,
     read_vehicle,
     seed_of,
+    told_map,
 )
+from tireid.exit_codes import DONE, FAILS
 from tireid.figures import error_figure, locus_figure, save_figure
 from tireid.output import output_folder, require_free, write_json
 from tireid.progress import Progress, say, tell
@@ -109,7 +112,6 @@ def error_bounds(certificate: Certificate) -> dict[str, float]:
     return {title: known[name] for name, title in BOUNDS.items() if name in known}
 
 
-FAILS = 1
 CONDITIONS = {  # field of the declared driving, and the option that says otherwise
     "v_x": "speed",
     "slip": "slip",
@@ -120,7 +122,11 @@ CONDITIONS = {  # field of the declared driving, and the option that says otherw
     "noise_r": "noise_r",
     "noise_delta": "noise_delta",
 }
-OF_GAINS = (*CONDITIONS.values(), "log", "monte_carlo")  # options that ask about the paper's gains
+OF_GAINS = (
+    *CONDITIONS.values(),
+    "along",
+    "monte_carlo",
+)  # options that ask about the paper's gains
 TEXT, NUMBERS = "certificate.txt", "certificate.json"
 
 
@@ -152,7 +158,8 @@ def add_parser(commands: Any) -> None:
         parser.add_argument(
             f"--noise-{signal}", type=float, metavar=unit, help=f"largest error of {signal}"
         )
-    parser.add_argument("--log", metavar="LOG[:RUN]", help="judge the loop along a recording too")
+    parser.add_argument("--along", metavar="LOG[:RUN]", help="judge the loop along a recording too")
+    add_log_map(parser)
     parser.add_argument(
         "--monte-carlo",
         type=int,
@@ -230,7 +237,9 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
     if options.design is None:
         design = replace(design, driving=driving)
     certificate = certificate_of(design, vehicle, driving)
-    drive = None if options.log is None else read_log(options.log, vehicle, dt=design.dt)
+    drive = None
+    if options.along is not None:
+        drive = read_log(options.along, vehicle, told_map(options), dt=design.dt)
     _require_free(options)
     observed = _drive(options, vehicle, driving, design, certificate)
     rows = [] if observed is None else bound_rows(certificate, observed)
@@ -262,7 +271,7 @@ def _judge_gains(options: argparse.Namespace, vehicle: Vehicle, design: PaperIde
             write_atomically(options.tune, design_text(design))
     tell(json.dumps(numbers, indent=2) if options.json else text)
     _say_written(options)
-    return FAILS if certificate.verdict == "fail" or passed else 0
+    return FAILS if certificate.verdict == "fail" or passed else DONE
 
 
 def _with_estimates(text: str, vehicle: Vehicle) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from identifier.compare.study import run_comparison, step_lengths
 from identifier.method import Method
-from identifier.methods import METHODS
+from identifier.methods import DEFAULT, METHODS
 from identifier.own_network import FrozenMethod
 from identifier.paper.design import PaperIdentifier
 from identifier.verdict import Verdict
@@ -38,6 +38,7 @@ from tireid.commands.options import (
     read_log,
     read_vehicle,
     seed_of,
+    told_map,
 )
 from tireid.learning import identify
 from tireid.output import output_folder
@@ -143,7 +144,7 @@ def run(options: argparse.Namespace) -> int:
             others=others,
         )
         work.begin("step times, tables and figures")
-        verdicts = default_verdicts(recordings, vehicle)
+        verdicts = default_verdicts(recordings, vehicle) if DEFAULT in names else {}
         figures = write_comparison(folder, comparison, verdicts)
         rows = summary_rows(comparison)
         write_compare_report(
@@ -159,9 +160,10 @@ def run(options: argparse.Namespace) -> int:
         if len(comparison.names) ** 2 <= FEW_PAIRS:
             told.append(pair_tables(comparison))
     told += [vehicle.estimates] if vehicle.estimates else []
-    tell("\n".join([*told, verdicts_text(verdicts)]))
+    told += [verdicts_text(verdicts)] if verdicts else []
+    tell("\n".join(told))
     say(f"wrote {options.out}/ in {watch.seconds:.0f} s")
-    return max(exit_code(verdict, options) for verdict in verdicts.values())
+    return max((exit_code(verdict, options) for verdict in verdicts.values()), default=0)
 
 
 def default_verdicts(recordings: Sequence[Recording], vehicle: Vehicle) -> dict[str, Verdict]:
@@ -182,10 +184,8 @@ def _network(options: argparse.Namespace, vehicle: Vehicle) -> dict[str, Method]
 
 
 def _recordings(options: argparse.Namespace, vehicle: Vehicle, seed: int) -> list[Recording]:
-    recordings = [
-        read_log(log, vehicle, columns=options.columns, check=not options.no_check)
-        for log in options.logs
-    ]
+    told = told_map(options)
+    recordings = [read_log(log, vehicle, told, check=not options.no_check) for log in options.logs]
     if options.simulate or not options.logs:
         say(f"driving the plant of {vehicle.name} with noisy sensors")
         recordings += plant_recordings(vehicle, np.random.default_rng(seed))

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from identifier.paper_study import GAINS, NETWORK, STEPS, Study, run_study
 from identifier.tire_model import TireModel
+from identifier.verdict import Verdict
 from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import (
     HEADER,
@@ -73,6 +74,7 @@ REFERENCE = (
 
 def demo_report(
     story: Story,
+    verdict: Verdict,
     shipped: Shipped,
     study: Study,
     driven: dict[str, Driven],
@@ -85,6 +87,7 @@ def demo_report(
     Parameters
     ----------
     story : the noisy drives, learnt by both methods.
+    verdict : on what the default learnt.
     shipped : what was learnt, as a C package.
     study : the paper's study.
     driven : on what was learnt, by folder.
@@ -94,7 +97,6 @@ def demo_report(
     """
     learnt = story.default.learnt
     model, runs = learnt.freeze(FREEZE), [learnt, *story.default.others]
-    verdict = learnt.verdict(FREEZE)
     return Report(
         title=TITLE,
         summary=SUMMARY,
@@ -342,15 +344,17 @@ def run(options: argparse.Namespace) -> None:
         folders = {name: folder / name for name in ("identify", "paper_network", "paper")}
         for one in folders.values():
             one.mkdir()
+        parts = {"identify": story.default, "paper_network": story.paper}
+        verdicts = {name: part.learnt.verdict(FREEZE) for name, part in parts.items()}
         figures: dict[str, Mapping[str, Figure]] = {}
-        for name, part in (("identify", story.default), ("paper_network", story.paper)):
+        for name, part in parts.items():
             figures[name] = write_results(
                 folders[name],
                 part.law,
                 part.learnt,
                 part.others,
                 part.frozen,
-                part.learnt.verdict(FREEZE),
+                verdicts[name],
             )
         operation, drive = story.design.operation(story.car), story.paper.learnt.recording
         draw_check(
@@ -363,7 +367,9 @@ def run(options: argparse.Namespace) -> None:
         work.begin(DRIVING)
         driven = drive_story(story, folder)
         work.begin(REPORTING)
-        report = demo_report(story, shipped, study, driven, figures, folder, options.words)
+        report = demo_report(
+            story, verdicts["identify"], shipped, study, driven, figures, folder, options.words
+        )
         write_report(folder / REPORT, report)
         told = [
             *(table_text(maneuver, study) for maneuver in study.errors),

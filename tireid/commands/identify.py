@@ -21,7 +21,7 @@ from identifier.reproducibility import (
 from identifier.run import History
 from identifier.tire_model import TireModel
 from identifier.verdict import judge_prediction
-from models.recordings import Recording
+from models.recordings import Recording, joined
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import resumed_line, verdict_line
@@ -46,6 +46,7 @@ from tireid.commands.options import (
     read_log,
     read_vehicle,
     seed_of,
+    told_map,
 )
 from tireid.figures.style import paper_design
 from tireid.learning import identify
@@ -71,12 +72,15 @@ def add_parser(commands: Any) -> None:
         description="Learn axle forces over LOG sample by sample, freeze the weights, replay LOG "
         "and other recordings; write report.html, summary.json, weights.json, curves as CSV and "
         "figures.",
-        epilog="LOG is CSV, CSV.gz or Parquet with the columns t [s], vx, vy [m/s], r [rad/s], "
+        epilog="LOG is a log of any format with the columns t [s], vx, vy [m/s], r [rad/s], "
         "delta_f [rad] and, where known, delta_r [rad], ay [m/s2], Fyf, Fyr [N] (or Fyf_inv, "
-        "Fyr_inv: forces computed backwards from the motion), run; "
-        "x forward, y left, delta and r positive to the left.",
+        "Fyr_inv: forces computed backwards from the motion), run; x forward, y left, delta and r "
+        "positive to the left. Other names, units and signs are told by --columns or --log; tireid "
+        "channels LOG lists what is there. Several logs are learnt on as one drive, in order.",
     )
-    parser.add_argument("log", metavar="LOG", help="recording; LOG:RUN names one of its runs")
+    parser.add_argument(
+        "logs", nargs="+", metavar="LOG", help="recording; LOG:RUN names one of its runs"
+    )
     add_vehicle(parser, required=True)
     parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
     add_method(parser)
@@ -115,9 +119,12 @@ def run(options: argparse.Namespace) -> int:
     start = None if options.weights is None else load_model(options.weights)
     if options.weights is not None:
         warn_of_stored(options.weights)
-    recording = _read(options.log, options.run_name, vehicle, design, options)
+    if options.run_name is not None and len(options.logs) > 1:
+        raise ValueError("--run goes with one LOG: name runs as LOG:RUN")
+    logs = [_read(log, options.run_name, vehicle, design, options) for log in options.logs]
     others = [_read(log, None, vehicle, design, options) for log in options.replay]
-    _require_distinct([recording, *others])
+    _require_distinct([*logs, *others])
+    recording = joined(logs)
     network = network_model(options, vehicle, design.min_speed)
     freeze_times = sorted(set(options.freeze or [float(recording.t[-1])]))
     _require_inside(freeze_times, recording)
@@ -130,7 +137,8 @@ def run(options: argparse.Namespace) -> int:
         output_folder(options.out, force=options.force) as folder,
         Progress("identify", parts) as progress,
     ):
-        histories = []
+        histories: list[History] = []
+        pieces: list[History] = []
         for one in (recording, *others):
             histories.append(_learn(one, vehicle, law, design, start))
             progress.step(1 + len(others))
@@ -144,17 +152,18 @@ def run(options: argparse.Namespace) -> int:
             told = network_table(law, histories, replays)
         else:
             learnt = histories[0]
+            pieces = learnt.parts(logs) if len(logs) > 1 else []
             verdict = learnt.verdict(freeze_times[-1])
-            frozen = {t: _replays(t, learnt, histories) for t in freeze_times}
-            figures = write_results(folder, law, learnt, histories[1:], frozen, verdict)
+            frozen = {t: _replays(t, learnt, [*pieces, *histories[1:]]) for t in freeze_times}
+            figures = write_results(folder, law, learnt, histories[1:], frozen, verdict, pieces)
             by_key = {f"{freeze_key(t)} s": replays for t, replays in frozen.items()}
             closing = _closing_line(learnt, freeze_times[-1], vehicle, resumed=start is not None)
-            told = f"{error_table(histories, frozen)}\n{closing}"
+            told = f"{error_table([*histories, *pieces], frozen)}\n{closing}"
         parts_told = (told, vehicle.estimates, verdict_text(verdict))
         told = "\n".join(part for part in parts_told if part)
         model = network or histories[0].freeze(freeze_times[-1])
         write_identify_report(
-            folder, law, model, histories, by_key, figures, verdict, command=options.words
+            folder, law, model, histories, by_key, figures, verdict, pieces, command=options.words
         )
     tell(told)
     say(f"wrote {options.out}/")
@@ -204,8 +213,8 @@ def _read(
     recording = read_log(
         log,
         vehicle,
+        told_map(options),
         run_name=run_name,
-        columns=options.columns,
         check=not options.no_check,
         dt=design.dt,
     )
@@ -234,8 +243,8 @@ def _require_inside(freeze_times: list[float], recording: Recording) -> None:
             raise ValueError(f"--freeze {later} is given twice: the times differ too little")
 
 
-def _replays(t: float, learnt: History, histories: list[History]) -> dict[str, Replay]:
-    model, others = learnt.freeze(t), histories[1:]
+def _replays(t: float, learnt: History, others: list[History]) -> dict[str, Replay]:
+    model = learnt.freeze(t)
     return {learnt.recording.name: reproduce(learnt, t)} | {
         history.recording.name: replay(model, history) for history in others
     }

@@ -67,7 +67,8 @@ def summarize(
     learnt: History,
     others: Sequence[History],
     frozen: Mapping[float, Mapping[str, Replay]],
-    verdict: Verdict | None = None,
+    verdict: Verdict,
+    parts: Sequence[History] = (),
 ) -> dict[str, Any]:
     """Return what summary.json holds: errors by recording and freeze time, and all that went in.
 
@@ -83,9 +84,10 @@ def summarize(
     others : online runs of the same design over the other recordings.
     frozen : freeze time [s] to recording name to replay.
     verdict : on the model of the last freeze.
+    parts : of the online run, over each of several logs that were learnt on.
     """
     by_key = {freeze_key(t): replays for t, replays in frozen.items()}
-    return summarize_replays(law, [learnt, *others], by_key, verdict)
+    return summarize_replays(law, [learnt, *parts, *others], by_key, verdict)
 
 
 def summarize_replays(
@@ -142,7 +144,8 @@ def write_results(
     learnt: History,
     others: Sequence[History],
     frozen: Frozen,
-    verdict: Verdict | None = None,
+    verdict: Verdict,
+    parts: Sequence[History] = (),
 ) -> dict[str, Figure]:
     """Write everything that was learnt into a folder; return the figures by the name of their file.
 
@@ -154,10 +157,13 @@ def write_results(
     others : online runs of the same design over the recordings to predict.
     frozen : freeze time [s] to recording name to replay.
     verdict : on the model of the last freeze.
+    parts : of the online run, over each of several logs that were learnt on.
     """
     write_json(
         folder / "summary.json",
-        summarize(law=law, learnt=learnt, others=others, frozen=frozen, verdict=verdict),
+        summarize(
+            law=law, learnt=learnt, others=others, frozen=frozen, verdict=verdict, parts=parts
+        ),
     )
     for t in frozen:
         last, model = "" if t == max(frozen) else f"_{freeze_key(t)}s", learnt.freeze(t)

@@ -8,20 +8,17 @@ what is there is replaced, `--seed` chance, `--jobs` processes.
 import argparse
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from identifier.method import Method
 from identifier.methods import DEFAULT, METHODS, REFERENCE, draws_weights, make_method
 from identifier.own_network import OnnxModel
 from identifier.paper.design import read_design
 from identifier.paper.network import SIGNALS
-from models.recordings import (
-    Recording,
-    check_against_vehicle,
-    read_recording,
-    split_log_argument,
-)
+from models.recordings import LogMap, Recording, read_repaired, split_log_argument
+from models.recordings.reader import map_of, with_columns
 from models.schema import require_few
 from models.vehicle import Vehicle, sedan
 from tireid.progress import say
@@ -51,12 +48,26 @@ def add_vehicle(
 
 def read_vehicle(options: argparse.Namespace) -> Vehicle:
     """Return the car of --vehicle, the sedan without, and say what of it is estimated."""
-    if options.vehicle is None:
-        return sedan()
-    vehicle = Vehicle.from_toml(options.vehicle)
+    vehicle = sedan() if options.vehicle is None else Vehicle.from_toml(options.vehicle)
     if vehicle.estimates:
         say(f"{options.vehicle}: {vehicle.estimates}")
-    return vehicle
+    return repaired_vehicle(vehicle, options)
+
+
+def repaired_vehicle(vehicle: Vehicle, options: argparse.Namespace) -> Vehicle:
+    """Return a car with the numbers that the repair of --log tells of it, and say which.
+
+    Parameters
+    ----------
+    vehicle : as it was told.
+    """
+    path = getattr(options, "log_map", None)
+    numbers: dict[str, Any] = {} if path is None else dict(LogMap.from_toml(path).repair.vehicle)
+    if not numbers:
+        return vehicle
+    said = ", ".join(f"{name} = {value:.6g}" for name, value in numbers.items())
+    say(f"{path} repairs the car: {said}")
+    return replace(vehicle, **numbers)
 
 
 def add_output(parser: argparse.ArgumentParser, command: str | None) -> None:
@@ -220,42 +231,71 @@ def chosen_method(options: argparse.Namespace, vehicle: Vehicle, seed: int | Non
 
 
 def add_log_reading(parser: argparse.ArgumentParser) -> None:
-    """Add --columns and --no-check.
+    """Add --log, --columns and --no-check.
+
+    Parameters
+    ----------
+    parser : of a command that reads logs.
+    """
+    add_log_map(parser)
+    parser.add_argument(
+        "--no-check", action="store_true", help="accept a log that contradicts physics"
+    )
+
+
+def add_log_map(parser: argparse.ArgumentParser) -> None:
+    """Add --log and --columns: how a log is read.
 
     Parameters
     ----------
     parser : of a command that reads logs.
     """
     parser.add_argument(
+        "--log",
+        dest="log_map",
+        type=Path,
+        metavar="FILE",
+        help="log.toml, how the logs are read and repaired; tireid channels --write writes one",
+    )
+    parser.add_argument(
         "--columns",
         nargs="+",
         action="extend",
         default=[],
         metavar="NAME=COLUMN",
-        help="read column COLUMN of the logs as NAME, for example r=yaw_rate",
+        help="read column COLUMN of the logs as NAME, for example r=yaw_rate; behind it a unit, "
+        'factor, offset or steering ratio: "vy=Vel Lat [km/h]" "delta_f=SteerAngle [deg] /14.6"',
     )
-    parser.add_argument(
-        "--no-check", action="store_true", help="accept a log that contradicts physics"
-    )
+
+
+def told_map(options: argparse.Namespace) -> LogMap:
+    """Return how logs are read by --log and --columns, which come first.
+
+    Raises
+    ------
+    RecordingError
+        Where the file or a word is not right.
+    """
+    return with_columns(map_of(options.log_map), column_words(options.columns))
 
 
 def read_log(
     log: str,
     vehicle: Vehicle,
+    told: LogMap,
     *,
     run_name: str | None = None,
-    columns: Sequence[str] = (),
     check: bool = True,
     dt: float = 0.01,
 ) -> Recording:
-    """Read a recording and say what was read.
+    """Read a recording, repair it where the map says so, and say what was read and done.
 
     Parameters
     ----------
     log : path, or path:run.
-    vehicle : the car that is said to have driven.
+    vehicle : the car that is said to have driven, as the map repairs it.
+    told : how it is read.
     run_name : run of the file, if `log` does not name it.
-    columns : NAME=COLUMN, each a column of the file to be read as NAME.
     check : whether a log that contradicts physics or the vehicle is refused.
     dt : sampling interval that it is brought to [s].
 
@@ -267,21 +307,21 @@ def read_log(
     path, named = split_log_argument(log)
     if named is not None and run_name is not None and named != run_name:
         raise ValueError(f"{log} names the run {named}, --run names {run_name}: name one of them")
-    recording = read_recording(
-        path, run=run_name or named, dt=dt, check=check, columns=column_names(columns)
+    recording, _ = read_repaired(
+        path, vehicle, run=run_name or named, dt=dt, check=check, log_map=told
     )
-    if check:
-        check_against_vehicle(recording, vehicle)
     say(f"read {recording.name}: {recording.t.size} samples, {recording.duration:.1f} s")
+    for note in recording.notes:
+        say(f"{recording.name}: {note}")
     return recording
 
 
-def column_names(pairs: Sequence[str]) -> dict[str, str]:
-    """Return the columns of a file by the name that they are read as.
+def column_words(pairs: Sequence[str]) -> dict[str, str]:
+    """Return what is told of columns by the name that they are read as.
 
     Parameters
     ----------
-    pairs : NAME=COLUMN.
+    pairs : NAME=COLUMN, with what may stand behind it.
 
     Raises
     ------
@@ -293,6 +333,8 @@ def column_names(pairs: Sequence[str]) -> dict[str, str]:
         name, equals, column = pair.partition("=")
         if not (name and equals and column):
             raise ValueError(f"--columns wants NAME=COLUMN, not {pair!r}")
+        if name in columns:
+            raise ValueError(f"--columns tells {name} twice")
         columns[name] = column
     return columns
 

@@ -13,7 +13,7 @@ from identifier.method import vehicle_numbers
 from identifier.methods import load_model
 from identifier.reproducibility import Prediction, beyond_known
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict, judge_prediction
+from identifier.verdict import Verdict
 from tireid import __version__
 from tireid.commands import COMMANDS
 from tireid.commands.identify_results import error_cells
@@ -23,6 +23,8 @@ from tireid.commands.options import (
     add_vehicle,
     read_log,
     read_vehicle,
+    repaired_vehicle,
+    told_map,
 )
 from tireid.learning import replay
 from tireid.output import output_folder, text_table, write_csv, write_json
@@ -61,11 +63,12 @@ def run(options: argparse.Namespace) -> int:
     recording = read_log(
         options.log,
         model.vehicle,
+        told_map(options),
         run_name=options.run_name,
-        columns=options.columns,
         check=not options.no_check,
     )
-    prediction, verdict = replay(model, recording), judge_prediction(model, recording)
+    prediction = replay(model, recording)
+    verdict = prediction.verdict()
     with output_folder(options.out, force=options.force) as folder:
         write_csv(folder / "forces.csv", force_columns(model, prediction))
         write_json(folder / "summary.json", summary(model, prediction, verdict))
@@ -80,8 +83,9 @@ def _model(options: argparse.Namespace) -> TireModel:
     model = load_model(options.model)
     warn_of_stored(options.model)
     if options.vehicle is None:
-        return model
-    vehicle = read_vehicle(options)
+        vehicle = repaired_vehicle(model.vehicle, options)
+    else:
+        vehicle = read_vehicle(options)
     if vehicle == model.vehicle:
         return model
     if not model.scales_with_load:

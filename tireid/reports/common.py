@@ -79,6 +79,7 @@ def origin(
     recordings : that were read or driven.
     others : more lines, by their name with underscores for blanks.
     """
+    told = list(recordings)
     rows = [
         ["command", command],
         ["tireid", __version__],
@@ -91,8 +92,9 @@ def origin(
                 f"{one.name}: {len(one)} samples, {one.duration:.4g} s, hash "
                 f"{recording_digest(one)}",
             ]
-            for one in recordings
+            for one in told
         ),
+        *(["how it was read", f"{one.name}: {note}"] for one in told for note in one.notes),
         *([name.replace("_", " "), value] for name, value in others.items()),
     ]  # fmt: skip
     table = Table(

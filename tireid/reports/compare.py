@@ -11,7 +11,7 @@ from identifier.reproducibility import freeze_key
 from identifier.verdict import Verdict
 from tireid.report import Block, Headline, Report, Section, Table, write_report
 from tireid.reports.common import READ, REPORT, drawing, origin
-from tireid.verdicts import verdict_warnings
+from tireid.verdicts import verdict_warnings, verdicts_headline
 
 HINDSIGHT = (
     "The best design of a sweep is chosen with the recordings that it is judged on, for every "
@@ -65,7 +65,7 @@ def write_compare_report(
         title=f"Methods compared on {course.vehicle.name}",
         summary="Every method learns on each recording, is frozen at its end and asked about all "
         "of them.",
-        numbers=compare_headlines(comparison),
+        numbers=[*verdicts_headline(verdicts), *compare_headlines(comparison)],
         warnings=[
             *compare_warnings(comparison),
             *(

@@ -35,6 +35,7 @@ def write_identify_report(
     frozen: Mapping[str, Mapping[str, Replay]],
     figures: Mapping[str, Figure],
     verdict: Verdict,
+    parts: Sequence[History] = (),
     *,
     command: str,
 ) -> None:
@@ -48,13 +49,17 @@ def write_identify_report(
     frozen : by when it was frozen, replays by recording; the last is of the model.
     figures : by the name of their files.
     verdict : on the model.
+    parts : of the first run, over each of several logs that were learnt on.
     command : as it was typed.
     """
     learnt, last = runs[0], list(frozen.values())[-1]
     sections = [
         verdict_section(verdict),
         Section(heading="What was learnt", blocks=learnt_blocks(law, model, figures)),
-        Section(heading="How well it predicts", blocks=_errors(runs, frozen, figures)),
+        Section(
+            heading="How well it predicts",
+            blocks=_errors([runs[0], *parts, *runs[1:]], frozen, figures),
+        ),
         Section(
             heading="What went in",
             blocks=[

@@ -8,7 +8,7 @@ import pytest
 
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.method import FrozenModelError
-from identifier.methods import load_model
+from identifier.methods import load_model, stored_verdict
 from identifier.run import identify
 
 
@@ -146,6 +146,17 @@ def test_a_model_survives_its_file_bit_for_bit(car, drive, tmp_path):
     read = load_model(tmp_path / "weights.json")
     assert read.to_dict() == model.to_dict()
     np.testing.assert_array_equal(read.axle_force(recording), model.axle_force(recording))
+
+
+def test_a_stored_model_says_whether_it_was_found_valid(car, drive, tmp_path):
+    model = learnt(drive(n=600), car).freeze(6.0)
+    for valid in (True, False, None):
+        model.save(tmp_path / "weights.json", valid=valid)
+        assert stored_verdict(tmp_path / "weights.json") is valid
+    (tmp_path / "odd.json").write_text(json.dumps(model.to_dict() | {"valid": "maybe"}))
+    for read in (stored_verdict, load_model):
+        with pytest.raises(FrozenModelError, match=r"odd.json: valid must be true or false"):
+            read(tmp_path / "odd.json")
 
 
 @pytest.mark.parametrize(

@@ -136,6 +136,18 @@ def test_what_is_declared_holds_after_every_sample(fault, speed, car, drive):
     assert history.freeze(1e9).cornering_stiffness.min() >= 0.0
 
 
+@pytest.mark.parametrize("dt", [0.2, 0.3, 0.5])
+def test_what_is_declared_holds_of_coarse_samples_too(dt, car, drive):
+    """A sample is then longer than the memories of the filters."""
+    fine, design = drive(n=6000), AxleIdentifier.for_vehicle(car, dt=dt)
+    every = slice(None, None, round(dt / fine.dt))
+    names = ("t", "v_x", "v_y", "r", "delta_f", "delta_r")
+    coarse = replace(fine, axle_force=None, **{name: getattr(fine, name)[every] for name in names})
+    history = identify(coarse, car, design)
+    assert history.diverged_at is None
+    assert broken(design, car, history.state) == set()
+
+
 def test_a_dead_yaw_rate_sensor_leads_to_the_bounds_and_not_beyond(car, drive):
     """The bounds are at work: the drive ends at them, and a check of narrower ones rings."""
     design = AxleIdentifier.for_vehicle(car)

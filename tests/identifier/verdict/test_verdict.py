@@ -298,6 +298,14 @@ def test_numbers_at_their_bounds_are_told(clean):
         ("rear", "bias of v_y", True),
     ]
     assert all(isinstance(one, Reached) for one in reached)
+    slope = (state["W"][1] / np.array(design.ladder)).sum()
+    for bound in (design.bounds.least_stiffness, design.bounds.most_stiffness):
+        W = state["W"].copy()
+        W[1] *= bound / slope
+        steep = design.reached(clean.vehicle, {**state, "W": W})
+        assert ("rear", "cornering stiffness", True) in [
+            (one.axle, one.title, one.refuses) for one in steep
+        ]
 
 
 def test_a_prediction_has_a_verdict_of_its_own(clean, drive):

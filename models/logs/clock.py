@@ -1,0 +1,197 @@
+"""Channels of several rates on one uniform clock, without a look at later samples.
+
+The clock is that of the channel whose rate is nearest to the wanted one: its samples keep their
+values, and a channel that is sampled at the same instants keeps its own too. At an instant between
+its samples a slower channel goes on along its last two samples, by at most one of its intervals; a
+faster one is the mean since the instant before.
+
+A gap is where a channel has no sample for longer than `LONGEST_GAP`, or than 2.5 of its own
+intervals: a car can build up or lose all its lateral force meanwhile. It ends a stretch.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import Array
+from models.logs.log import Channel, RecordingError
+from models.logs.stamps import not_rising
+
+LONGEST_GAP = 0.1  # [s]
+GAP_INTERVALS = 2.5  # own intervals of a channel, more of which without a sample are a gap
+SLOWEST = 0.11  # [s]: longest typical interval of a channel, 10 Hz with jitter
+OWN_CLOCK = 0.4  # share of empty cells from which a channel is taken to be slower than its rows
+ON_STEP = 0.01  # share of a step within which an instant is that of a sample
+
+
+class Stretch(NamedTuple):
+    """Signals on one clock without a gap: t (n,) and by name (n,)."""
+
+    t: Array
+    signals: dict[str, Array]
+
+
+class Raw(NamedTuple):
+    """A signal in SI on the clock of its channel: t (n,), values (n,), and where they stand."""
+
+    t: Array
+    values: Array
+    place: str
+    rows: NDArray[np.int64]
+
+
+def without_empty(channel: Channel) -> Channel:
+    """Return a channel without the empty cells that a slower channel has in a table.
+
+    Where less than 40 % are empty they are holes in the data, which stay and are refused.
+
+    Parameters
+    ----------
+    channel : as it was logged.
+    """
+    kept = ~np.isnan(channel.values)
+    if not kept.any() or kept.mean() > 1.0 - OWN_CLOCK:
+        return channel
+    return Channel(
+        name=channel.name,
+        unit=channel.unit,
+        t=channel.t[kept],
+        values=channel.values[kept],
+        place=channel.place,
+        rows=channel.rows[kept],
+    )
+
+
+def gaps(t: Array, longest: float) -> NDArray[np.intp]:
+    """Return the index of each sample that comes after a gap.
+
+    Parameters
+    ----------
+    t : rising time stamps [s], (n,).
+    longest : time without a sample that is none yet [s].
+    """
+    steps = np.diff(t)
+    limit = max(longest * (1.0 + 1e-6), GAP_INTERVALS * float(np.median(steps)))
+    return np.flatnonzero(steps > limit) + 1
+
+
+def are_one_clock(raws: Sequence[Raw]) -> bool:
+    """Whether all signals are sampled at the same instants.
+
+    Parameters
+    ----------
+    raws : at least one.
+    """
+    first = raws[0].t
+    return all(raw.t is first or np.array_equal(raw.t, first) for raw in raws[1:])
+
+
+def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Stretch]:
+    """Return signals of several clocks on one, in the stretches in which all of them are there.
+
+    Parameters
+    ----------
+    raws : by signal; times rise.
+    dt : step of the clock [s].
+    longest : time without a sample that is no gap yet [s].
+    """
+    base = min(raws.values(), key=lambda raw: abs(np.log(_interval(raw.t) / dt)))
+    found = []
+    for begin, end in _covered([raw.t for raw in raws.values()], longest):
+        inside = base.t[(base.t >= begin - 1e-9) & (base.t <= end + 1e-9)]
+        if not inside.size:
+            continue
+        grid = inside[0] + dt * np.arange(int((end - inside[0]) / dt + 1e-6) + 1)
+        own = inside[: grid.size]
+        if own.size == grid.size and np.abs(own - grid).max() <= 1e-6 * dt:
+            grid = own  # its very numbers, where they are the clock
+        found.append(Stretch(grid, {name: sampled(raw, grid, dt) for name, raw in raws.items()}))
+    return found
+
+
+def _interval(t: Array) -> float:
+    return float(np.median(np.diff(t)))
+
+
+def _covered(times: Sequence[Array], longest: float) -> list[tuple[float, float]]:
+    """Return the spans of time in which every channel has samples: first and last instant.
+
+    A channel speaks for one interval after each of its samples, but not into a gap.
+    """
+    spans = [(-np.inf, np.inf)]
+    for t in times:
+        cuts = gaps(t, longest)
+        first = t[np.concatenate([[0], cuts])]
+        last = t[np.concatenate([cuts - 1, [t.size - 1]])] + (1.0 - ON_STEP) * _interval(t)
+        own = list(zip(first.tolist(), last.tolist(), strict=True))
+        spans = _intersection(spans, own)
+    return spans
+
+
+def _intersection(
+    one: list[tuple[float, float]], other: list[tuple[float, float]]
+) -> list[tuple[float, float]]:
+    """Return where both lists of rising spans hold."""
+    found, i, j = [], 0, 0
+    while i < len(one) and j < len(other):
+        begin, end = max(one[i][0], other[j][0]), min(one[i][1], other[j][1])
+        if begin < end:
+            found.append((begin, end))
+        if one[i][1] < other[j][1]:
+            i += 1
+        else:
+            j += 1
+    return found
+
+
+def sampled(raw: Raw, grid: Array, dt: float) -> Array:
+    """Return a signal at the instants of a clock, of samples that were there by then.
+
+    Parameters
+    ----------
+    raw : the signal; a sample lies at or before the first instant.
+    grid : instants [s], (m,).
+    dt : step of the clock [s].
+    """
+    t, values = raw.t, raw.values
+    last = np.searchsorted(t, grid + ON_STEP * dt, side="right") - 1
+    interval = _interval(t)
+    if interval < dt / 1.5:
+        return _mean_since(values, last, np.searchsorted(t, grid - dt + ON_STEP * dt, side="right"))
+    now = values[last]
+    ahead = np.maximum(grid - t[last], 0.0)
+    before = np.maximum(last - 1, 0)
+    step = t[last] - t[before]
+    whole = (last > 0) & (step <= GAP_INTERVALS * interval)
+    share = np.where(whole, np.minimum(ahead, step) / np.where(step > 0.0, step, 1.0), 0.0)
+    share[ahead <= ON_STEP * dt] = 0.0
+    extrapolated: Array = now + share * (now - values[before])
+    return np.where(share > 0.0, extrapolated, now)
+
+
+def _mean_since(values: Array, last: NDArray[np.intp], first: NDArray[np.intp]) -> Array:
+    """Return means of samples from first to last, at least the last one."""
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    first = np.minimum(first, last)
+    means: Array = (total[last + 1] - total[first]) / (last + 1 - first)
+    return means
+
+
+def require_rising(label: str, raw: Raw) -> None:
+    """Refuse time that does not rise.
+
+    Parameters
+    ----------
+    label : begins messages.
+    raw : the signal.
+
+    Raises
+    ------
+    RecordingError
+        Naming the place and both stamps.
+    """
+    wrong = np.flatnonzero(~(np.diff(raw.t) > 0.0))
+    if wrong.size:
+        raise RecordingError(f"{label}: t {not_rising(raw.t, raw.rows, raw.place)}")

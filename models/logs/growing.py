@@ -1,0 +1,68 @@
+"""Columns that grow while a log is read: in memory while they are short, then on disk.
+
+What is on disk is a temporary file without a name, mapped when it is complete: the system brings
+in what is read and drops it again, so that a log of a day needs no more memory than one of a lap.
+"""
+
+import tempfile
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+LONGEST_IN_MEMORY = 1 << 21  # numbers: 16 MB of a column of float64
+
+
+class Growing:
+    """A column of unknown length.
+
+    Parameters
+    ----------
+    dtype : of its numbers.
+    in_memory : how many it holds before it goes to disk.
+    """
+
+    def __init__(self, dtype: Any = np.float64, in_memory: int = LONGEST_IN_MEMORY) -> None:
+        self._dtype = np.dtype(dtype)
+        self._in_memory = in_memory
+        self._parts: list[NDArray[Any]] = []
+        self._file: IO[bytes] | None = None
+        self._size = 0
+
+    def __len__(self) -> int:
+        """Return how many numbers there are."""
+        return self._size
+
+    def extend(self, values: NDArray[Any]) -> None:
+        """Add numbers at the end.
+
+        Parameters
+        ----------
+        values : (n,), which are copied.
+
+        Raises
+        ------
+        OSError
+            Where the disk is full.
+        """
+        part = np.array(values, dtype=self._dtype)
+        self._size += part.size
+        self._parts.append(part)
+        if self._file is None and self._size > self._in_memory:
+            self._file = tempfile.TemporaryFile()  # noqa: SIM115 (the map of it outlives us)
+        if self._file is not None:
+            for one in self._parts:
+                self._file.write(one.data)
+            self._parts.clear()
+
+    def finished(self) -> NDArray[Any]:
+        """Return all numbers, (n,), read-only; nothing can be added then."""
+        if self._file is None:
+            whole = np.concatenate(self._parts) if self._parts else np.empty(0, self._dtype)
+            self._parts.clear()
+            whole.setflags(write=False)
+            return whole
+        with self._file as file:
+            file.flush()
+            # A plain array on the map, which keeps the file until the last view of it is gone.
+            return np.asarray(np.memmap(file, self._dtype, mode="r", shape=(self._size,)))

@@ -1,0 +1,116 @@
+"""Arrays in memory, as of a data frame, as a log."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import Array
+from models.logs.log import Channel, Listed, RecordingError
+
+TIMES = ("t", "time", "timestamp")  # what the clock is called
+RUN = "run"
+
+
+class ArrayLog:
+    """Columns of one length, of which one is the time.
+
+    Parameters
+    ----------
+    name : stands for the file in messages.
+    data : a data frame or a mapping, by column: what `data[column]` is has one axis.
+    clock : column that is the time; empty takes the one called t or time.
+
+    Raises
+    ------
+    RecordingError
+        Where there are no columns, their lengths differ, or none is the time.
+    """
+
+    def __init__(self, name: str, data: Any, clock: str = "") -> None:
+        found = getattr(data, "columns", data)  # of a data frame; a mapping yields its keys
+        try:
+            header = [str(column) for column in found]
+            arrays = dict(zip(header, (np.asarray(data[column]) for column in found), strict=True))
+        except (TypeError, KeyError, IndexError):
+            raise RecordingError(
+                f"{name}: a data frame or a mapping of arrays is needed, not {type(data).__name__}"
+            ) from None
+        self._name, self._arrays = name, arrays
+        lower = {column.lower(): column for column in reversed(header)}
+        named = next((lower[one] for one in TIMES if one in lower), None)
+        self._clock = clock or named
+        if self._clock not in arrays:
+            missing = f"{clock!r}" if clock else "t"
+            raise RecordingError(
+                f"{name}: column {missing} is missing, the time [s]; columns found: "
+                f"{', '.join(header)[:200]!r}"
+            )
+
+    @property
+    def path(self) -> Path:
+        """The name, in place of a file."""
+        return Path(self._name)
+
+    @property
+    def format(self) -> str:
+        """What it is."""
+        return "arrays"
+
+    def listed(self) -> tuple[Listed, ...]:
+        """Return the columns, but for the time and the runs; which are numeric shows in reading."""
+        t = self._arrays[str(self._clock)]
+        kept = [name for name in self._arrays if name not in (self._clock, RUN)]
+        return tuple(Listed(name=name, unit="", samples=t.size, rate=np.nan) for name in kept)
+
+    def runs(self) -> tuple[str, ...]:
+        """Return the words of the column run in their order."""
+        if RUN not in self._arrays:
+            return ()
+        return tuple(dict.fromkeys(str(word) for word in self._arrays[RUN].tolist()))
+
+    def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
+        """Return columns as channels.
+
+        Parameters
+        ----------
+        names : of the columns.
+        run : one of `runs`; None takes all rows.
+
+        Raises
+        ------
+        RecordingError
+            Where a column is not numeric, has not one axis, or another length.
+        """
+        clock = str(self._clock)
+        columns = {name: self._column(name) for name in (clock, *names)}
+        kept: NDArray[np.bool_] = np.ones(columns[clock].size, dtype=np.bool_)
+        sizes = {name: column.size for name, column in columns.items()}
+        if RUN in self._arrays:
+            sizes[RUN] = self._arrays[RUN].size
+        if len(set(sizes.values())) > 1:
+            raise RecordingError(f"{self._name}: columns must have one length, they have {sizes}")
+        if run is not None:
+            kept = np.array([str(word) == run for word in self._arrays[RUN].tolist()])
+        t, rows = columns[clock][kept], np.flatnonzero(kept)
+        return tuple(
+            Channel(name=name, unit="", t=t, values=columns[name][kept], place="index", rows=rows)
+            for name in names
+        )
+
+    def _column(self, name: str) -> Array:
+        value = self._arrays[name]
+        if value.ndim != 1:
+            raise RecordingError(
+                f"{self._name}: {name} must have one axis, its shape is {value.shape}"
+            )
+        try:
+            if value.dtype.kind in "MmSU":  # a time of the calendar, or words, is no number
+                raise TypeError
+            return value.astype(np.float64)
+        except (TypeError, ValueError):
+            raise RecordingError(
+                f"{self._name}: {name} must be numeric, its type is {value.dtype}"
+            ) from None

@@ -1,0 +1,424 @@
+"""Which channel of a log is probably which signal, by its name, its unit and what is in it.
+
+A name is cut into small words ("Car.YawRate" is car, yaw, rate) and set beside how loggers call
+things: MoTeC, AiM, VBOX, OxTS, Kistler, CarMaker, veDYNA, dSPACE, ROS messages, CAN databases, in
+English and German. The unit must be one of the signal's; the numbers must be those of a car. A
+proposal says how sure it is; of two that are equal none is taken.
+"""
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from models.logs.log import Channel, Listed, LogFile, RecordingError
+from models.logs.signals import BETA, COLUMNS, NEEDED, QUANTITIES, Signal
+from models.logs.units import ANGLE, FORCE, RATE, is_told, quantities, to_si
+
+SURE = 0.8  # confidence from which a proposal is used without being told to
+STANDARD, KNOWN, WORDS, VAGUE = 1.0, 0.95, 0.9, 0.82  # our own name, a logger's, its words, one
+NO_UNIT_LOSS = 0.25  # of confidence, where neither file nor name tells the unit
+STILL = 0.25  # of confidence that is left to a channel that never changes
+APART = 0.04  # of confidence: nearer ones are equal
+HAND = "steering wheel"  # an angle that wants a ratio
+LARGEST_ROAD = 1.2  # [rad]: an angle that goes further is that of a hand wheel
+LOOKED_AT = 20_000  # samples at most, in telling contents apart
+
+
+class Rule(NamedTuple):
+    """How a signal is called.
+
+    known : whole names, words joined.   words : sets of words that all occur; "a|b" is either.
+    vague : sets of words that may mean something else.   never : words that mean something else.
+    """
+
+    known: tuple[str, ...]
+    words: tuple[str, ...]
+    vague: tuple[str, ...]
+    never: tuple[str, ...]
+
+
+LONGITUDINAL = "long|longitudinal|fwd|forward|x|laengs|lon|lgt"
+LATERAL = "lat|lateral|y|quer|side"
+VELOCITY = "vel|velocity|v|speed|spd|geschwindigkeit|geschw"
+ACCELERATIONS = "acc|accel|acceleration|a|beschleunigung|beschl|gforce"
+YAW = "yaw|gier|psi"
+CHANGE = "rate|vel|velocity|speed|geschwindigkeit|dot|p|d"
+WHEELS = ("wheel", "wheels", "tire", "tyre", "rad", "reifen", "whl")
+CORNERS = ("fl", "fr", "rl", "rr", "vl", "vr", "hl", "hr", "lf", "rf", "lr")
+REFERENCE = ("cmd", "command", "target", "desired", "des", "ref", "request", "req", "limit", "max",
+             "min", "std", "stddev", "var", "cov", "covariance", "err", "error", "quality", "valid",
+             "status", "soll", "acc_cmd", "accuracy", "sigma", "bias", "offset", "dev")  # fmt: skip
+NOT_BODY = (*WHEELS, *CORNERS, *REFERENCE)
+RULES: Mapping[str, Rule] = {
+    "v_x": Rule(
+        ("vx", "velx", "xvel", "velocityx", "vxb", "vlon", "vlong", "vellong", "vellon", "velfwd",
+         "velforward", "longvel", "vlgt", "vlaengs", "vxcg", "vxcog",
+         "carvx", "vxcar", "vxref", "laengsgeschwindigkeit", "wheelbasedvehiclespeed"),
+        (f"{LONGITUDINAL};{VELOCITY}", "linear;x"),
+        ("speed|velocity|spd|geschwindigkeit|fahrgeschwindigkeit|vfzg|vehspd|vveh|v|vel|"
+         "speed2d|kmh|fahrzeuggeschwindigkeit|vehv|groundspeed|vehiclespeed",),
+        (*NOT_BODY, "y", "z", "angular", "yaw", "gier", "engine", "motor", "lateral", "lat", "wind",
+         "vert", "vertical", "accel", "acceleration", "acc", "steering", "steer", "east", "north",
+         "up", "down", "n", "e"),
+    ),
+    "v_y": Rule(
+        ("vy", "vely", "yvel", "velocityy", "vyb", "vlat", "vellat", "vellateral", "latvel",
+         "vquer", "vycg", "vycog", "carvy", "vycar"),
+        (f"{LATERAL};{VELOCITY}", "linear;y", "quergeschwindigkeit"),
+        (),
+        (*NOT_BODY, "x", "z", "angular", "yaw", "gier", "accel", "acceleration", "acc", "east",
+         "north", "up", "down", "vert", "vertical"),
+    ),
+    BETA: Rule(
+        ("beta", "sideslip", "sideslipangle", "bodyslip", "bodyslipangle", "schwimmwinkel",
+         "carsideslipangle", "slipangle", "anglebeta", "carbeta", "betacog", "driftangle"),
+        ("sideslip|schwimmwinkel|beta", "side|body|vehicle;slip;angle", "side;slip", "slip;angle",
+         "drift;angle"),
+        (),
+        (*NOT_BODY, "rate", "dot", "ratio", "longitudinal", "front", "rear", "brake"),
+    ),
+    "r": Rule(
+        ("r", "yawrate", "psip", "psidot", "dpsi", "gierrate", "giergeschwindigkeit", "gyroz",
+         "zgyro", "omegaz", "wz", "angratez", "ratez", "zrate", "caryawrate", "yawvel", "gz",
+         "wzb", "angularratez", "angvelz", "yawratecar", "headingrate", "turnrate"),
+        (f"{YAW};{CHANGE}", "angular|gyro|omega|rate|ang;z", "gierrate|giergeschwindigkeit|yawrate",
+         "heading|turn;rate", "rotation;rate;z"),
+        (),
+        (*NOT_BODY, "x", "y", "roll", "pitch", "linear", "acceleration", "accel", "acc", "moment",
+         "torque"),
+    ),
+    "delta_f": Rule(
+        ("deltaf", "deltafront", "roadwheelangle", "frontwheelangle", "frontsteer",
+         "frontsteerangle", "steerfront", "radlenkwinkel", "steeringtireangle", "radeinschlag",
+         "roadwheelsteerangle", "steeranglefront", "deltav", "frontsteeringangle"),
+        ("road|front;wheel;angle", "steering|steer;tire|tyre;angle", "front|f;steer|steering",
+         "drive;steering;angle", "road;steer|steering", "radlenkwinkel|radeinschlag",
+         "ackermann;steering;angle"),
+        ("delta",),
+        (*CORNERS, *REFERENCE, "torque", "moment", "rate", "speed", "velocity", "vel", "force",
+         "rear", "power", "dot", "mode", "assist"),
+    ),
+    HAND: Rule(
+        ("steeringwheelangle", "steeringwheel", "handwheel", "handwheelangle", "swa", "sasangle",
+         "lenkradwinkel", "lrw", "deltasw", "steerwhlang", "steeringwheelposition", "sas",
+         "steerwhlangle", "stwhlang", "deltah", "lenkradw"),
+        ("steer|steering|hand|stw|driv;wheel|whl;angle|ang|position|pos", "handwheel;angle|ang",
+         "lenkradwinkel|lenkrad", "sas;angle|ang", "steering;wheel"),
+        ("steer|steering|steerangle|steeringangle|lenkwinkel|steerang|lenkung|steeredangle",),
+        (*CORNERS, *REFERENCE, "torque", "moment", "rate", "speed", "velocity", "vel", "force",
+         "front", "rear", "road", "tire", "tyre", "power", "dot", "mode", "assist", "drive"),
+    ),
+    "delta_r": Rule(
+        ("deltar", "deltarear", "rearsteer", "rearsteerangle", "steerrear", "rearwheelangle",
+         "deltah", "hinterradlenkwinkel"),
+        ("rear|r;steer|steering", "rear;wheel;angle"),
+        (),
+        (*CORNERS, *REFERENCE, "torque", "moment", "rate", "speed", "velocity", "force", "front"),
+    ),
+    "a_y": Rule(
+        ("ay", "accy", "accely", "yaccel", "accelerationy", "latacc", "lataccel", "acclat",
+         "glat", "latg", "gforcelat", "querbeschleunigung", "aquer", "aqu", "bquer", "caray",
+         "lateralacceleration", "lateralacc", "accelerometery", "aycog", "aycg", "ayb"),
+        (f"{LATERAL};{ACCELERATIONS}|g", "linear;acceleration;y", "querbeschleunigung"),
+        (),
+        (*NOT_BODY, "x", "z", "angular", "yaw", "gier", "vel", "velocity", "speed", "gyro",
+         "twist", "magnetic"),
+    ),
+    "Fyf": Rule(
+        ("fyf", "fyfront", "fyfrontaxle", "fyfinv"),
+        ("fy|flat;front|f|va", "lateral|side;force;front"),
+        (),
+        (*REFERENCE, "rear", "r"),
+    ),
+    "Fyr": Rule(
+        ("fyr", "fyrear", "fyrearaxle", "fyrinv"),
+        ("fy|flat;rear|r|ha", "lateral|side;force;rear"),
+        (),
+        (*REFERENCE, "front", "f"),
+    ),
+}  # fmt: skip
+# A signal of several wheels: words of the name beside those of the corners.
+PER_WHEEL: Mapping[str, tuple[str, ...]] = {
+    "delta_f": ("steer|steering|delta|radlenkwinkel|rwa|toe", "steer|wheel;angle|ang"),
+    "Fyf": ("fy|flat", "lateral|side;force"),
+    "Fyr": ("fy|flat", "lateral|side;force"),
+}
+SIDES = {
+    "delta_f": (("fl", "fr"), ("lf", "rf"), ("vl", "vr")),
+    "Fyf": (("fl", "fr"), ("lf", "rf"), ("vl", "vr")),
+    "Fyr": (("rl", "rr"), ("lr", "rr"), ("hl", "hr")),
+}
+LONG_SIDES = (  # words of a corner, in either order, and what they are cut down to
+    (("front", "left"), "fl"),
+    (("front", "right"), "fr"),
+    (("rear", "left"), "rl"),
+    (("rear", "right"), "rr"),
+    (("vorne", "links"), "fl"),
+    (("vorne", "rechts"), "fr"),
+    (("hinten", "links"), "rl"),
+    (("hinten", "rechts"), "rr"),
+)
+UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ψ": "psi", "β": "beta",
+                         "δ": "delta", "ω": "omega"})  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Guess:
+    """A channel, or the channels of two wheels, that may be a signal.
+
+    Parameters
+    ----------
+    channel : names in the file.
+    confidence : from 0 to 1.
+    hand : whether it is the angle of the hand wheel, which wants a ratio.
+    unit : of the file, or what the numbers look like where it tells none.
+    why : in a few words.
+    """
+
+    channel: tuple[str, ...]
+    confidence: float
+    hand: bool = False
+    unit: str = ""
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proposal:
+    """What the channels of a log probably are.
+
+    Parameters
+    ----------
+    guesses : by signal, the best one.
+    rivals : by signal, all that are as good as the best, it included, where there are several.
+    """
+
+    guesses: Mapping[str, Guess] = field(default_factory=dict)
+    rivals: Mapping[str, tuple[Guess, ...]] = field(default_factory=dict)
+
+    def is_sure(self, name: str) -> bool:
+        """Whether a signal is found beyond doubt; an angle of the hand wheel wants its ratio.
+
+        Parameters
+        ----------
+        name : of the signal.
+        """
+        guess = self.guesses.get(name)
+        return (
+            guess is not None
+            and name not in self.rivals
+            and guess.confidence >= SURE
+            and not guess.hand
+        )
+
+    def unsure(self) -> tuple[str, ...]:
+        """Return the needed signals that are missing or not sure; beta stands in for v_y."""
+        wanted = [BETA if name == "v_y" and self.beta_stands_in else name for name in NEEDED]
+        return tuple(name for name in wanted if not self.is_sure(name))
+
+    @property
+    def beta_stands_in(self) -> bool:
+        """Whether v_y is made of the sideslip angle."""
+        return not self.is_sure("v_y") and self.is_sure(BETA)
+
+    def signals(self) -> dict[str, Signal]:
+        """Return how each signal that is sure is read; v_y is not made of beta where both are."""
+        kept = [name for name in QUANTITIES if self.is_sure(name)]
+        if "v_y" in kept and BETA in kept:
+            kept.remove(BETA)
+        forces = {"Fyf", "Fyr"}
+        if len(forces & set(kept)) == 1:
+            kept = [name for name in kept if name not in forces]
+        return {
+            name: Signal(channel=self.guesses[name].channel, unit=self.guesses[name].unit)
+            for name in kept
+        }
+
+
+def words_of(name: str) -> tuple[str, ...]:
+    """Return a name as small words: "Car.YawRate" is car, yaw, rate.
+
+    Parameters
+    ----------
+    name : as in the file.
+    """
+    plain = name.translate(UMLAUTS)
+    plain = re.sub(r"\[[^]]*\]|\([^)]*\)", " ", plain)  # a unit in brackets
+    plain = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", plain)
+    plain = re.sub(r"([A-Z]+)([A-Z][a-z])", r"\1 \2", plain)
+    return tuple(re.findall(r"[a-z]+|\d+", plain.lower().translate(UMLAUTS)))
+
+
+def _matches(group: str, words: frozenset[str]) -> bool:
+    """Return whether all parts of "a|b;c" occur."""
+    return all(words & set(part.split("|")) for part in group.split(";"))
+
+
+def name_confidence(signal: str, name: str) -> float:
+    """Return how sure a name alone says that a channel is a signal, 0 where it does not.
+
+    Parameters
+    ----------
+    signal : one of `RULES`.
+    name : of the channel.
+    """
+    ours = (COLUMNS.get(signal, signal), signal)
+    if name in ours:
+        return STANDARD
+    listed = words_of(name)
+    rule, words = RULES[signal], frozenset(listed)
+    ends = ["".join(listed[k:]) for k in range(len(listed))]
+    if set(rule.known) & set(ends[:1]):
+        return KNOWN
+    topic, _, message = name.partition(".") if name.startswith("/") else ("", "", name)
+    if (frozenset(words_of(message)) if topic else words) & set(rule.never):
+        return 0.0
+    if set(rule.known) & set(ends):
+        return WORDS
+    if any(_matches(group, words) for group in rule.words):
+        return WORDS
+    if set(ends) & {word for group in rule.vague for word in group.split("|")}:
+        return VAGUE
+    return 0.0
+
+
+def propose(log: LogFile, listed: Sequence[Listed], run: str | None = None) -> Proposal:
+    """Return what the channels of a log probably are.
+
+    Parameters
+    ----------
+    log : as a format reads it; numbers are read of the channels that are in question.
+    listed : its channels.
+    run : which of its runs is looked at; None the only one, or the first.
+    """
+    candidates = {name: _candidates(name, listed) for name in QUANTITIES}
+    asked = {name for found in candidates.values() for guess in found for name in guess.channel}
+    seen = _seen(log, [one.name for one in listed if one.name in asked], run)
+    candidates = {
+        name: [_looked(name, guess, seen) for guess in found] for name, found in candidates.items()
+    }
+    guesses: dict[str, Guess] = {}
+    rivals: dict[str, tuple[Guess, ...]] = {}
+    for name, found in candidates.items():
+        ranked = sorted((one for one in found if one.confidence > 0.0),
+                        key=lambda one: -one.confidence)  # fmt: skip
+        if not ranked:
+            continue
+        guesses[name] = ranked[0]
+        equal = tuple(one for one in ranked if one.confidence > ranked[0].confidence - APART)
+        if len(equal) > 1:
+            rivals[name] = equal
+    return Proposal(guesses=guesses, rivals=rivals)
+
+
+def _seen(log: LogFile, names: list[str], run: str | None) -> dict[str, Channel]:
+    """Return channels by name; without those that cannot be read."""
+    runs = log.runs()
+    chosen = run if run is not None or not runs else runs[0]
+    if not names:
+        return {}
+    try:
+        return dict(zip(names, log.read(names, chosen), strict=True))
+    except RecordingError:
+        if len(names) == 1:
+            return {}
+    return {key: one for name in names for key, one in _seen(log, [name], run).items()}
+
+
+def _candidates(signal: str, listed: Sequence[Listed]) -> list[Guess]:
+    """Return the channels whose names and units may be a signal."""
+    found = []
+    for one in listed:
+        by_name = name_confidence(signal, one.name)
+        by_hand = name_confidence(HAND, one.name) if signal == "delta_f" else 0.0
+        best = max(by_name, by_hand)
+        if best > 0.0:
+            found.append(
+                _with_unit(signal, one, Guess(
+                    channel=(one.name,), confidence=best, hand=by_hand > by_name
+                ))
+            )  # fmt: skip
+    if signal in PER_WHEEL and not any(one.confidence >= WORDS for one in found):
+        found += _pairs(signal, listed)
+    return found
+
+
+def _with_unit(signal: str, one: Listed, guess: Guess) -> Guess:
+    """Return a guess by what the unit says of it."""
+    quantity = QUANTITIES[signal]
+    if not is_told(one.unit):
+        if guess.confidence == STANDARD:  # names of ours are in SI, as the documents say
+            return guess
+        loss = guess.confidence - NO_UNIT_LOSS
+        return replace(guess, confidence=loss, why="no unit in the file")
+    told, unit = quantities(one.unit), one.unit.strip()
+    if quantity in told:
+        return replace(guess, unit=unit)
+    near = quantity == RATE and ANGLE in told  # as some databases have it
+    return replace(
+        guess,
+        confidence=0.5 * guess.confidence if near else 0.0,
+        why=f"its unit {unit} is none of a {quantity}",
+    )
+
+
+def _corner(words: tuple[str, ...]) -> tuple[str, frozenset[str]] | None:
+    """Return the corner of the car that a name speaks of, and its other words."""
+    rest = frozenset(words)
+    for pair, short in LONG_SIDES:
+        if rest >= set(pair):
+            return short, rest - set(pair)
+    corners = [word for word in words if word in CORNERS]
+    return (corners[-1], rest - {corners[-1]}) if corners else None
+
+
+def _pairs(signal: str, listed: Sequence[Listed]) -> list[Guess]:
+    """Return pairs of channels of the left and the right wheel of an axle."""
+    by_corner: dict[tuple[str, frozenset[str]], Listed] = {}
+    for one in listed:
+        found = _corner(words_of(one.name))
+        quantity = QUANTITIES[signal]
+        fits = not is_told(one.unit) or quantity in quantities(one.unit)
+        if found and fits and not found[1] & set(REFERENCE):
+            by_corner.setdefault(found, one)
+    pairs = []
+    for (corner, rest), left in by_corner.items():
+        for first, second in SIDES[signal]:
+            right = by_corner.get((second, rest))
+            named = any(_matches(group, rest) for group in PER_WHEEL[signal])
+            if corner == first and right is not None and named:
+                guess = Guess(channel=(left.name, right.name), confidence=WORDS)
+                why = "sum of two wheels" if QUANTITIES[signal] == FORCE else "mean of two wheels"
+                pairs.append(_said(_with_unit(signal, left, guess), why))
+    return pairs
+
+
+def _said(guess: Guess, why: str) -> Guess:
+    return replace(guess, why="; ".join(part for part in (why, guess.why) if part))
+
+
+def _looked(signal: str, guess: Guess, seen: Mapping[str, Channel]) -> Guess:
+    """Return a guess by what the numbers say of it."""
+    size = 0.0
+    for name in guess.channel:
+        if name not in seen:
+            return replace(guess, confidence=0.0)
+        values = seen[name].values
+        finite = values[np.isfinite(values)]
+        finite = finite[:: max(1, finite.size // LOOKED_AT)]
+        if not finite.size or (signal != "delta_r" and np.ptp(finite) == 0.0):
+            unlikely = STILL * guess.confidence if guess.confidence < STANDARD else STANDARD
+            return replace(_said(guess, "it never changes"), confidence=unlikely)
+        size = max(size, float(np.abs(finite).max()))
+    if QUANTITIES[signal] != ANGLE or guess.confidence == STANDARD:
+        return guess
+    if not guess.unit:
+        return _said(guess, f"goes to {size:.3g}")
+    largest = size * to_si(guess.unit, ANGLE, signal)
+    if signal != BETA and largest > LARGEST_ROAD and not guess.hand:
+        why = f"goes to {math.degrees(largest):.0f} deg, as a hand wheel does"
+        return replace(_said(guess, why), hand=True)
+    return guess

@@ -1,0 +1,217 @@
+"""Tables in Parquet files, read batch by batch; needs pyarrow."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.logs.log import RecordingError
+from models.logs.spelling import unit_in_name
+from models.logs.stamps import nanoseconds
+from models.logs.table import Cells, Gathered, Kind, TableLog, Words
+from models.schema import require_few, require_file, shown
+
+HEAD = 400  # rows that tell what columns are
+BATCH = 1 << 16  # rows that are read at once
+
+
+def open_parquet(path: Path) -> TableLog:
+    """Return the log in a Parquet file.
+
+    Parameters
+    ----------
+    path : of a file.
+
+    Raises
+    ------
+    RecordingError
+        Where pyarrow is missing, or the file is none or too large.
+    """
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        raise RecordingError(
+            f"{path}: reading Parquet needs pyarrow: pip install tireid[parquet]"
+        ) from None
+    require_file(path, RecordingError, limit="megabytes")
+    try:
+        with pyarrow.parquet.ParquetFile(path) as file:
+            about = file.metadata
+            require_few(RecordingError, str(path), about.num_columns, "columns", "columns")
+            require_few(RecordingError, str(path), about.num_rows, "samples", "rows")
+            size = sum(about.row_group(k).total_byte_size for k in range(about.num_row_groups))
+            require_few(RecordingError, str(path), size / 1e6, "megabytes", "megabytes")
+            table = ParquetTable(path=path, schema=file.schema_arrow, rows=about.num_rows)
+    except (pyarrow.ArrowException, OSError, UnicodeDecodeError) as error:
+        raise _not_parquet(path, error) from None
+    return TableLog(table=table)
+
+
+def _not_parquet(path: Path, error: Exception) -> RecordingError:
+    reason = (str(error).splitlines() or [type(error).__name__])[0]
+    return RecordingError(f"{path}: is not a Parquet file ({reason})")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParquetTable:
+    """A table in a Parquet file.
+
+    Parameters
+    ----------
+    path : the file.
+    schema : of its columns, as pyarrow gives it.
+    rows : how many it says to have.
+    """
+
+    path: Path
+    schema: Any
+    rows: int
+
+    format = "Parquet"
+    place = "row"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return tuple(self.schema.names)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of the columns: as their metadata say, or as in the names."""
+        return tuple(_unit(one) for one in self.schema)
+
+    @property
+    def numeric(self) -> tuple[bool, ...]:
+        """Which columns hold numbers."""
+        return tuple(_is_numeric(one.type) for one in self.schema)
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """How the file is written, for people."""
+        return ()
+
+    @cached_property
+    def _head(self) -> Any:
+        """The first rows of every column."""
+        return next(self._batches(None, HEAD), None)
+
+    def first_rows(self, column: int) -> list[str]:
+        """Return the first cells of a column as text."""
+        if self._head is None:
+            return []
+        return _as_text(self._head.column(column), self.schema.field(column).type)
+
+    def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
+        """Return columns.
+
+        Parameters
+        ----------
+        kinds : column from 0 -> how its cells are read.
+        run : a column and the word that it must have; other rows are left out.
+
+        Raises
+        ------
+        RecordingError
+            Where a column is not of its kind, or there is no row.
+        """
+        wanted = dict(kinds) | ({} if run is None else {run[0]: Kind.WORD})
+        for column, kind in wanted.items():
+            found = self.schema.field(column).type
+            if kind is Kind.NUMBER and not _is_numeric(found):
+                raise RecordingError(
+                    f"{self.path}: {self.names[column]} must be numeric, its type is {found}"
+                )
+        if self.rows == 0:
+            raise RecordingError(f"{self.path}: has columns but no row of data")
+        gathered = Gathered(self.path, wanted, self.names, "row", run)
+        order = list(wanted)
+        for batch in self._batches(order, BATCH):
+            rows = np.arange(1, batch.num_rows + 1) + len(gathered)
+            columns = {
+                column: self._column(column, wanted[column], batch.column(place), rows)
+                for place, column in enumerate(order)
+            }
+            gathered.extend(rows, columns)
+        return gathered.finished()
+
+    def _batches(self, columns: list[int] | None, size: int) -> Any:
+        """Yield batches of rows."""
+        import pyarrow
+        import pyarrow.parquet
+
+        names = self.names
+        try:
+            with pyarrow.parquet.ParquetFile(self.path) as file:
+                wanted = None if columns is None else [names[k] for k in columns]
+                for batch in file.iter_batches(batch_size=size, columns=wanted):
+                    if wanted is not None:
+                        batch = batch.select(wanted)
+                    yield batch
+        except (pyarrow.ArrowException, OSError, UnicodeDecodeError) as error:
+            raise _not_parquet(self.path, error) from None
+
+    def _column(self, column: int, kind: Kind, cells: Any, rows: Any) -> Any:
+        """Return the cells of a batch as their kind asks."""
+        import pyarrow
+
+        found = self.schema.field(column).type
+        if kind is Kind.NUMBER:
+            whole = cells.cast(pyarrow.int64()) if pyarrow.types.is_duration(found) else cells
+            values = whole.cast(pyarrow.float64(), safe=False)
+            return np.array(values.to_numpy(zero_copy_only=False), dtype=np.float64)
+        if kind is Kind.WORD:
+            return Words.of([str(cell) for cell in cells.to_pylist()])
+        instants = [nanoseconds(cell) for cell in _as_text(cells, found)]
+        if None in instants:
+            k = instants.index(None)
+            raise RecordingError(
+                f"{self.path}: {self.names[column]} must be a time, row {rows[k]} has "
+                f"{shown(_as_text(cells, found)[k])}"
+            )
+        return np.array(instants, dtype=np.int64)
+
+
+def _is_numeric(kind: Any) -> bool:
+    from pyarrow import types
+
+    return bool(
+        types.is_floating(kind)
+        or types.is_integer(kind)
+        or types.is_decimal(kind)
+        or types.is_duration(kind)
+    )
+
+
+def _is_text(kind: Any) -> bool:
+    from pyarrow import types
+
+    return bool(types.is_string(kind) or types.is_large_string(kind))
+
+
+def _as_text(cells: Any, kind: Any) -> list[str]:
+    """Return cells as text, "" where one is missing; dates with all their digits."""
+    from pyarrow import types
+
+    if types.is_timestamp(kind):
+        dates = cells.to_numpy(zero_copy_only=False)
+        return ["" if np.isnat(date) else str(date) for date in dates]
+    if types.is_duration(kind):
+        cells = cells.cast("int64")
+    if _is_numeric(kind) or _is_text(kind):
+        return ["" if cell is None else str(cell) for cell in cells.to_pylist()]
+    return ["?"] * len(cells)
+
+
+def _unit(field: Any) -> str:
+    """Return the unit of a column, by its metadata or its name."""
+    about = field.metadata or {}
+    for key in (b"unit", b"units", b"Unit", b"Units"):
+        if key in about:
+            return str(about[key].decode("utf-8", "replace"))
+    if str(field.type).startswith("duration"):
+        return str(field.type.unit)
+    return unit_in_name(field.name)

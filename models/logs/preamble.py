@@ -1,0 +1,444 @@
+"""How a text file is laid out, understood from its beginning.
+
+Loggers put sample rates, venues and comments before the table; name columns in a line, in a
+comment or in a section; put units in the names, in a line of their own or nowhere; and set cells
+apart by commas, semicolons, tabs, bars or blanks, with decimal points or commas. All that is told
+by the cells: whatever makes most of the last lines of the beginning numbers is how it was written,
+and upwards from there the first line that is not numbers is the header, or its units.
+"""
+
+import codecs
+import csv
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from models.logs.log import RecordingError
+from models.logs.spelling import is_unit, is_units_row, unit_in_name
+from models.schema import shown
+
+HEAD = 1 << 18  # bytes that are looked at
+TAIL = 40  # last lines of them that tell how cells are written
+BLANKS = " "  # the delimiter of columns that any number of blanks and tabs set apart
+DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks"}
+COMMENT = ("#", "%", "//")
+MISSING = ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "1.#qnan", "-1.#ind")
+CLEAR = 0.9  # share of cells that a way of reading must make numbers to be sure
+
+_DOT = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_COMMA = re.compile(r"[-+]?(?:\d+|\d*,\d+)(?:[eE][-+]?\d+)?")
+_POINTS = re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+(?:,\d*)?")  # 1.234.567,8
+_COMMAS = re.compile(r"[-+]?\d{1,3}(?:,\d{3})+(?:\.\d*)?")  # 1,234,567.8
+_INSTANT = re.compile(
+    r"(?:\d{4}-?\d\d-?\d\d|\d{1,2}[./]\d{1,2}[./]\d{4}|\d{4}/\d\d/\d\d)"
+    r"(?:[T ]\d\d:?\d\d(?::?\d\d(?:[.,]\d+)?)?(?: ?(?:Z|UTC|[-+]\d\d:?\d\d))?)?"
+    r"|(?:\d+:)?\d{1,2}:\d\d(?:[.,]\d+)?"
+)
+_CONTROLS = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layout:
+    """Where the table of a text file is, and how its cells are written.
+
+    Parameters
+    ----------
+    encoding : name of a Python codec; "utf-8" may turn out to be cp1252 further down.
+    delimiter : one character, " " for any number of blanks and tabs.
+    decimal : "." or ",".
+    thousands : what sets thousands apart in some cell, "" where nothing does.
+    names : of the columns, as in the file.
+    units : of the columns, "" where none is told.
+    first : line of the first row of data, from 1; one beyond the header where there is none.
+    again : lines of header and units, which may come again further down and are no data then.
+    numeric : which columns hold numbers, as far as the beginning tells.
+    rows : cells of the first rows of data.
+    words : what was detected, for people.
+    made_by : the logger or program whose format it is, "" where nothing tells.
+    """
+
+    encoding: str
+    delimiter: str
+    decimal: str
+    thousands: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    first: int
+    again: tuple[str, ...]
+    numeric: tuple[bool, ...]
+    rows: tuple[tuple[str, ...], ...]
+    words: tuple[str, ...]
+    made_by: str
+
+
+class _Line(NamedTuple):
+    """A line of the beginning: its number from 1, and its cells."""
+
+    number: int
+    text: str
+    cells: tuple[str, ...]
+
+
+class _Way(NamedTuple):
+    """A way of reading cells, and how well it goes: which share of them become numbers."""
+
+    delimiter: str
+    decimal: str
+    thousands: str
+    width: int
+    share: float
+
+
+def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
+    """Return the layout of a text file.
+
+    Parameters
+    ----------
+    path : for messages.
+    head : its first bytes, unpacked.
+    whole : whether they are all of it.
+
+    Raises
+    ------
+    RecordingError
+        Where it is binary, empty, or has no header.
+    """
+    encoding = _encoding(path, head)
+    text = _decoded(path, head, encoding)
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    if not whole and len(lines) > 1:
+        lines = lines[:-1]  # which is cut
+    elif not whole:
+        raise RecordingError(f"{path}: line 1 is longer than {HEAD} characters, no header is")
+    if not any(line.strip() for line in lines):
+        raise RecordingError(f"{path}: is empty")
+    section = _sections(lines)
+    if section is not None:
+        return _racelogic(path, lines, encoding, section)
+    filled = [line for line in lines if line.strip() and not line.lstrip().startswith(COMMENT)]
+    way = _way(filled[-TAIL:])
+    if way is None:
+        return _no_data(lines, encoding)
+    table = [_Line(k, line, _cells(line, way.delimiter)) for k, line in enumerate(lines, start=1)]
+    return _table(path, table, way, encoding)
+
+
+def numbers(cells: Sequence[str], way: tuple[str, str] = (".", "")) -> int:
+    """Return how many cells are numbers."""
+    return sum(_is_number(cell, *way) for cell in cells)
+
+
+def _encoding(path: Path, head: bytes) -> str:
+    """Return the codec of a text, by its mark or by its bytes."""
+    for mark, name in (
+        (codecs.BOM_UTF8, "utf-8-sig"),
+        (codecs.BOM_UTF32_LE, "utf-32"),
+        (codecs.BOM_UTF32_BE, "utf-32"),
+        (codecs.BOM_UTF16_LE, "utf-16"),
+        (codecs.BOM_UTF16_BE, "utf-16"),
+    ):
+        if head.startswith(mark):
+            return name
+    if b"\0" in head:
+        for start, name in ((1, "utf-16-le"), (0, "utf-16-be")):
+            if head[start::2].count(0) > 0.8 * len(head[start::2]) and not head[
+                1 - start :: 2
+            ].count(0):
+                return name
+        raise RecordingError(f"{path}: is a binary file (it has NUL bytes); no reader knows it")
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(head)
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8"
+
+
+def _decoded(path: Path, head: bytes, encoding: str) -> str:
+    """Return the beginning as text; its last character may be cut."""
+    try:
+        errors = "replace" if encoding == "cp1252" else "strict"  # five of its bytes are nothing
+        text = codecs.getincrementaldecoder(encoding)(errors).decode(head)
+    except UnicodeDecodeError as error:
+        raise RecordingError(
+            f"{path}: is not a text file in {encoding.upper()} (byte {error.start})"
+        ) from None
+    control = _CONTROLS.search(text.rstrip("\x1a"))  # which ends texts of DOS
+    if control:
+        raise RecordingError(
+            f"{path}: is not a text file (line {text.count(chr(10), 0, control.start()) + 1} has "
+            f"the character {ord(control[0]):#04x}), and no reader of binary files knows it"
+        )
+    return text
+
+
+def _cells(line: str, delimiter: str) -> tuple[str, ...]:
+    """Return the cells of one line."""
+    if delimiter == BLANKS:
+        line = " ".join(line.split())
+    try:
+        return tuple(cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), []))
+    except csv.Error:
+        return (line,)
+
+
+# Which way of reading makes numbers of the last lines.
+
+
+def _is_number(cell: str, decimal: str, thousands: str = "") -> bool:
+    """Return whether a cell is a number, a time, or nothing, in this way of writing."""
+    pattern = _DOT if decimal == "." else _COMMA
+    if pattern.fullmatch(cell) or _INSTANT.fullmatch(cell):
+        return True
+    if thousands:
+        return bool((_COMMAS if thousands == "," else _POINTS).fullmatch(cell))
+    return cell.lower() in ("nan", "inf", "-inf", "+inf", "infinity", "-infinity", "-nan")
+
+
+def _way(tail: list[str]) -> _Way | None:
+    """Return how cells are written; None where hardly any is a number in any way."""
+    best: _Way | None = None
+    for delimiter in DELIMITERS:
+        rows = [_cells(line, delimiter) for line in tail]
+        width, often = Counter(map(len, rows)).most_common(1)[0] if rows else (0, 0)
+        if width < 2:
+            continue
+        cells = [cell for row in rows if len(row) == width for cell in row if cell]
+        for decimal, thousands in ((".", ""), (",", ""), (".", ","), (",", ".")):
+            if thousands == delimiter and not any(thousands in cell for cell in cells):
+                continue
+            right = sum(_is_number(cell, decimal, thousands) for cell in cells)
+            share = right / max(len(cells), 1) * often / len(rows)
+            if share > 0.0 and (best is None or share > best.share + 1e-9):
+                best = _Way(delimiter, decimal, thousands, width, share)
+    return best if best is not None and best.share > 0.2 else None
+
+
+def _is_data(cells: Sequence[str], way: _Way) -> bool:
+    """Return whether a line is of numbers, at least half of its cells that are filled."""
+    filled = [cell for cell in cells if cell]
+    right = sum(_is_number(cell, way.decimal, way.thousands) for cell in filled)
+    return right > 0 and 2 * right >= len(filled) and not is_units_row(cells)
+
+
+# From the data upwards to header and units.
+
+
+def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
+    """Return the layout of a table whose cells are written this way."""
+    zone, first = _header_zone(path, lines, way)
+    names_line, units_line = _named(zone, way)
+    names = list(_uncommented(names_line, way))
+    units = list(_uncommented(units_line, way)) if units_line is not None else []
+    width = way.width
+    if len(names) == width - 1 and all(
+        len(line.cells) != width or not line.cells[-1] for line in lines[first:]
+    ):
+        names.append("")  # rows end in a delimiter
+    if way.delimiter == "," and len(names) * 2 in (width, width + 1):
+        raise RecordingError(
+            f"{path}: line {lines[first].number} has {width} cells, the header has {len(names)}: "
+            "decimal commas cannot be told from commas between cells; export with semicolons"
+        )
+    while len(names) > width and not names[-1] and len(names) > 1:
+        names.pop()  # the header alone ends in a delimiter
+    units = (units + [""] * len(names))[: len(names)]
+    units = [
+        unit.strip("[](){} ") or unit_in_name(name) for name, unit in zip(names, units, strict=True)
+    ]
+    again = (names_line.text,) if units_line is None else (names_line.text, units_line.text)
+    data = [line.cells for line in lines[first:] if len(line.cells) == len(names)]
+    made_by = _maker(lines[:first])
+    words = [
+        _encoding_word(encoding),
+        f"cells apart by {DELIMITERS[way.delimiter]} ({_sure(way.share)})",
+        "decimal comma" if way.decimal == "," else "decimal point",
+    ]
+    words += [f"thousands apart by {shown(way.thousands)}"] * bool(way.thousands)
+    words += [f"{made_by} export"] * bool(made_by)
+    words += [f"names in line {names_line.number}"]
+    words += [f"units in line {units_line.number}"] if units_line is not None else []
+    words += [] if units_line is not None or not any(units) else ["units in the names"]
+    return Layout(
+        encoding=encoding,
+        delimiter=way.delimiter,
+        decimal=way.decimal,
+        thousands=way.thousands,
+        names=tuple(names),
+        units=tuple(units),
+        first=lines[first].number,
+        again=again,
+        numeric=_numeric(data, len(names), way),
+        rows=tuple(data),
+        words=tuple(words),
+        made_by=made_by,
+    )
+
+
+def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line], int]:
+    """Return the lines above the data, the nearest first, and the index of the first data."""
+    above = [k for k, line in enumerate(lines) if line.text.strip()]
+    first = None
+    zone: list[int] = []
+    for place in range(len(above) - 1, -1, -1):
+        line = lines[above[place]]
+        if _is_data(line.cells, way) and not line.text.lstrip().startswith(COMMENT):
+            first = above[place]
+            continue
+        if first is None:
+            continue
+        higher = [lines[k] for k in above[max(0, place - 40) : place]]
+        alike = sum(len(one.cells) == way.width and _is_data(one.cells, way) for one in higher)
+        if alike >= 2 and way.width > 2:
+            continue  # a spoiled row, a comment, or the header once more: there is data above
+        zone = above[: place + 1][::-1]
+        break
+    if first is None:
+        first = above[-1]
+    if not zone:
+        raise RecordingError(
+            f"{path}: there is no header, line {lines[first].number} is data already; the first "
+            f"row must name the columns"
+        )
+    return [lines[k] for k in zone], first
+
+
+def _uncommented(line: _Line, way: _Way) -> tuple[str, ...]:
+    """Return the cells of a line that may be a comment."""
+    text = line.text.lstrip()
+    for mark in COMMENT:
+        if text.startswith(mark):
+            return _cells(text.lstrip("#%/").strip(), way.delimiter)
+    return line.cells
+
+
+def _named(zone: list[_Line], way: _Way) -> tuple[_Line, _Line | None]:
+    """Return the lines of names and of units, of those above the data, the nearest first."""
+    fitting = [line for line in zone[:6] if way.width - 1 <= len(_uncommented(line, way))]
+    if not fitting:
+        return zone[0], None  # of another width, which the first row of data will be told
+    units = next((line for line in fitting[:3] if is_units_row(_uncommented(line, way))), None)
+    if units is None or len(fitting) == 1:
+        return fitting[0], None
+    at = fitting.index(units)
+    if at + 1 < len(fitting) and units.number - fitting[at + 1].number <= 3:
+        return fitting[at + 1], units
+    return (fitting[at - 1], units) if at else (units, None)
+
+
+def _numeric(data: Sequence[Sequence[str]], width: int, way: _Way) -> tuple[bool, ...]:
+    """Return which columns hold numbers: those in which no cell, or few of them, are words."""
+    found = []
+    for column in range(width):
+        cells = [row[column] for row in data[:400]]
+        filled = [cell for cell in cells if cell.lower() not in MISSING]
+        right = sum(_is_number(cell, way.decimal, way.thousands) for cell in filled)
+        found.append(2 * right >= len(filled) and not _all_instants(filled))
+    return tuple(found)
+
+
+def _all_instants(cells: Sequence[str]) -> bool:
+    return bool(cells) and all(":" in cell or cell.count("-") == 2 for cell in cells)
+
+
+def _sure(share: float) -> str:
+    return "sure" if share > CLEAR else "likely" if share > 0.6 else "a guess"
+
+
+def _encoding_word(encoding: str) -> str:
+    return f"text in {encoding.removesuffix('-sig').upper()}"
+
+
+def _maker(lines: Sequence[_Line]) -> str:
+    """Return whose format a preamble is of."""
+    start = " ".join(line.text for line in lines[:8]).lower()
+    for words, maker in (
+        ("motec csv", "MoTeC i2"),
+        ("aim csv", "AiM Race Studio"),
+        ("carmaker", "IPG CarMaker"),
+        ("#infofile", "IPG CarMaker"),
+        ("2d datarecording", "2D"),
+        ("winarace", "2D"),
+        ("racelogic", "Racelogic"),
+    ):
+        if words in start:
+            return maker
+    return ""
+
+
+def _no_data(lines: list[str], encoding: str) -> Layout:
+    """Return the layout of a header without a row of data."""
+    number, text = next((k, line) for k, line in enumerate(lines, start=1) if line.strip())
+    delimiter = max(DELIMITERS, key=lambda one: text.count(one) if one != BLANKS else 0)
+    names = _cells(text, delimiter)
+    return Layout(
+        encoding=encoding,
+        delimiter=delimiter,
+        decimal=".",
+        thousands="",
+        names=names,
+        units=tuple(unit_in_name(name) for name in names),
+        first=number + 1,
+        again=(text,),
+        numeric=(True,) * len(names),
+        rows=(),
+        words=(_encoding_word(encoding), f"names in line {number}"),
+        made_by="",
+    )
+
+
+# Racelogic VBOX: [header], [column names], [data], each a section.
+
+
+def _sections(lines: list[str]) -> dict[str, int] | None:
+    """Return the line that begins each section, from 0; None where there is no [data]."""
+    found = {
+        line.strip().strip("[]").lower(): k
+        for k, line in enumerate(lines)
+        if re.fullmatch(r"\s*\[[\w ]+\]\s*", line)
+    }
+    return found if "data" in found and "column names" in found else None
+
+
+def _racelogic(path: Path, lines: list[str], encoding: str, at: dict[str, int]) -> Layout:
+    """Return the layout of a .vbo file."""
+    names = tuple(" ".join(lines[at["column names"] + 1 : at["data"]]).split())
+    if not names:
+        raise RecordingError(
+            f"{path}: [column names], line {at['column names'] + 1}, must be followed by the names"
+        )
+    units = [""] * len(names)
+    if "header" in at:  # the channels in the same order, some with their unit as last word
+        after = [k for k in at.values() if k > at["header"]]
+        titles = [one.strip() for one in lines[at["header"] + 1 : min(after)] if one.strip()]
+        if len(titles) == len(names):
+            units = [one.split()[-1] if is_unit(one.split()[-1]) else "" for one in titles]
+    known = {"time": "hhmmss", "velocity": "km/h", "lat": "min", "long": "min", "heading": "deg"}
+    units = [unit or known.get(name.lower(), "") for name, unit in zip(names, units, strict=True)]
+    units = [
+        "hhmmss" if name.lower() == "time" else u for name, u in zip(names, units, strict=True)
+    ]
+    first = at["data"] + 1
+    data = [cells for line in lines[first:] if len(cells := _cells(line, BLANKS)) == len(names)]
+    way = _way([line for line in lines[first:] if line.strip()][-TAIL:])
+    decimal = "." if way is None else way.decimal
+    return Layout(
+        encoding=encoding,
+        delimiter=BLANKS,
+        decimal=decimal,
+        thousands="",
+        names=names,
+        units=tuple(units),
+        first=first + 1,
+        again=(),
+        numeric=(True,) * len(names),
+        rows=tuple(data),
+        words=(
+            _encoding_word(encoding),
+            "Racelogic VBOX sections (sure)",
+            "decimal comma" if decimal == "," else "decimal point",
+        ),
+        made_by="Racelogic VBOX",
+    )

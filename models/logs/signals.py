@@ -1,0 +1,170 @@
+"""What a log must tell of a car, and how one of these signals is read from channels.
+
+SI, ISO axes: v_x, v_y [m/s], r [rad/s], angles of the road wheels δ_f, δ_r [rad], a_y [m/s²], axle
+forces [N]; sideslip β [rad] stands in for v_y = v_x tan β. Left is positive.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from codegen.arrays import Array
+from models.logs.log import RecordingError
+from models.logs.units import ACCELERATION, ANGLE, FORCE, RATE, SPEED
+from models.schema import shown
+
+BETA = "beta"
+NEEDED = ("v_x", "v_y", "r", "delta_f")  # beta may stand in for v_y
+QUANTITIES: Mapping[str, str] = MappingProxyType(
+    {
+        "v_x": SPEED,
+        "v_y": SPEED,
+        BETA: ANGLE,
+        "r": RATE,
+        "delta_f": ANGLE,
+        "delta_r": ANGLE,
+        "a_y": ACCELERATION,
+        "Fyf": FORCE,
+        "Fyr": FORCE,
+    }
+)
+COLUMNS = {"v_x": "vx", "v_y": "vy", "a_y": "ay"}  # what a column is called where it differs
+MEANINGS: Mapping[str, str] = MappingProxyType(
+    {
+        "v_x": "forward speed",
+        "v_y": "lateral velocity",
+        BETA: "sideslip angle",
+        "r": "yaw rate",
+        "delta_f": "front steering angle",
+        "delta_r": "rear steering angle",
+        "a_y": "lateral acceleration",
+        "Fyf": "front axle force",
+        "Fyr": "rear axle force",
+    }
+)
+LARGEST_RATIO = 1e3  # of hand wheel over road wheel, either way
+
+
+def signal_name(name: str) -> str | None:
+    """Return our name of a signal by its own or by that of its column; None where it has neither.
+
+    Parameters
+    ----------
+    name : for example "vy" or "v_y".
+    """
+    by_column = {column: ours for ours, column in COLUMNS.items()}
+    ours = by_column.get(name, name)
+    return ours if ours in QUANTITIES else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Signal:
+    """How a signal is read: of which channels, in which unit, and what is done to the numbers.
+
+    In SI it is (mean or sum of the channels) · factor - offset; by `ratio` or `table` the angle of
+    the road wheels, where that of the hand wheel was logged.
+
+    Parameters
+    ----------
+    channel : names in the file; of several, forces are added and anything else is averaged.
+    unit : as users write units; empty takes that of the file, SI where it tells none.
+    factor : the numbers are multiplied by it [-]; -1 turns a sign.
+    offset : what the channel shows at zero, in SI; it is taken off.
+    ratio : angle of the hand wheel over that of the road wheels [-], of steering.
+    table : pairs of angles of hand wheel and road wheels [rad], rising, in place of a ratio.
+
+    Raises
+    ------
+    RecordingError
+        Where a channel is missing or named twice, or a number impossible.
+    """
+
+    channel: tuple[str, ...]
+    unit: str = ""
+    factor: float = 1.0
+    offset: float = 0.0
+    ratio: float = 1.0
+    table: tuple[tuple[float, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.channel or not all(self.channel):
+            raise RecordingError("channel must name at least one channel of the log")
+        if len(set(self.channel)) < len(self.channel):
+            raise RecordingError(f"channel must name each once, not {', '.join(self.channel)}")
+        if not (math.isfinite(self.factor) and self.factor != 0.0):
+            raise RecordingError(f"factor must be finite and not zero, it is {self.factor}")
+        if not math.isfinite(self.offset):
+            raise RecordingError(f"offset must be finite, it is {self.offset}")
+        if not 1.0 / LARGEST_RATIO <= self.ratio <= LARGEST_RATIO:
+            raise RecordingError(
+                f"ratio must be hand wheel over road wheel, within {1.0 / LARGEST_RATIO:g} and "
+                f"{LARGEST_RATIO:g}, it is {self.ratio}"
+            )
+        if self.table and self.ratio != 1.0:
+            raise RecordingError("ratio and table say the same: give one of them")
+        if self.table:
+            hand, road = np.array(self.table).T
+            if len(self.table) < 2 or not ((np.diff(hand) > 0.0) & (np.diff(road) > 0.0)).all():
+                raise RecordingError(
+                    "table must hold at least two pairs [hand wheel, road wheel] in rad that rise, "
+                    f"not {shown(str(self.table))}"
+                )
+
+    def value(self, parts: Sequence[Array], quantity: str) -> Array:
+        """Return the signal of its channels.
+
+        Parameters
+        ----------
+        parts : each channel in SI, on one clock (n,).
+        quantity : what the signal is.
+        """
+        total: Array = parts[0] if len(parts) == 1 else np.sum(parts, axis=0)
+        if len(parts) > 1 and quantity != FORCE:
+            total = total / len(parts)
+        if self.factor != 1.0:
+            total = total * self.factor
+        if self.offset != 0.0:
+            total = total - self.offset
+        if self.table:
+            return self._by_table(total)
+        return total if self.ratio == 1.0 else total / self.ratio
+
+    def _by_table(self, angle: Array) -> Array:
+        """Return the angle of the road wheels; beyond the table its last slope goes on."""
+        hand, road = np.array(self.table).T
+        inside: Array = np.interp(angle, hand, road)
+        first, last = np.diff(road)[[0, -1]] / np.diff(hand)[[0, -1]]
+        below, above = np.minimum(angle - hand[0], 0.0), np.maximum(angle - hand[-1], 0.0)
+        road_wheel: Array = inside + first * below + last * above
+        return road_wheel
+
+
+def require_fitting(signals: Mapping[str, Signal], where: str) -> None:
+    """Refuse signals that are no signals of ours, or that contradict one another.
+
+    Parameters
+    ----------
+    signals : by our name.
+    where : begins the message.
+
+    Raises
+    ------
+    RecordingError
+        Where a name is unknown, beta stands beside v_y, a ratio is no angle's, or an axle has a
+        force and the other none.
+    """
+    for name, signal in signals.items():
+        if name not in QUANTITIES:
+            raise RecordingError(
+                f"{where}signals.{name} is unknown, known are {', '.join(QUANTITIES)}"
+            )
+        if (signal.table or signal.ratio != 1.0) and name not in ("delta_f", "delta_r"):
+            raise RecordingError(f"{where}signals.{name} can have no ratio or table: no steering")
+    if BETA in signals and "v_y" in signals:
+        raise RecordingError(f"{where}signals.beta stands in for v_y: give one of them")
+    if ("Fyf" in signals) != ("Fyr" in signals):
+        lonely = "Fyf" if "Fyf" in signals else "Fyr"
+        raise RecordingError(f"{where}{lonely} needs its partner, give both Fyf and Fyr or neither")

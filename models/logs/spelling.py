@@ -1,0 +1,78 @@
+"""Units in headers of text files: which words are units, and where a name holds one."""
+
+import re
+from collections.abc import Sequence
+
+_WORDS = frozenset((
+    "s", "sec", "secs", "seconds", "ms", "msec", "us", "µs", "ns", "min", "h", "hr", "m", "mm",
+    "cm", "km", "in", "ft", "mi", "m/s", "mps", "km/h", "km/hr", "kmh", "kph", "kmph", "mph",
+    "kn", "kt", "kts", "knots", "mm/s", "cm/s", "ft/s", "fps", "rad", "mrad", "rads", "deg",
+    "degs", "degree", "degrees", "°", "grad", "rad/s", "mrad/s", "deg/s", "°/s", "dps",
+    "degs/s", "rad/s2", "rad/s^2", "rad/s²", "deg/s2", "deg/s^2", "deg/s²", "m/s2", "m/s^2",
+    "m/s²", "m/s/s", "mm/s2", "g", "gn", "g0", "mg", "n", "nm", "n·m", "kgf", "kp", "lbf", "lb",
+    "lbs", "%", "-", "--", "1", "none", "hz", "khz", "rpm", "1/min", "u/min", "rev/min", "bar",
+    "mbar", "kpa", "pa", "hpa", "psi", "c", "°c", "degc", "f", "°f", "degf", "k", "v", "mv",
+    "volt", "volts", "a", "ma", "amp", "amps", "kg", "t", "l", "l/h", "w", "kw", "hp", "ratio",
+    "bool", "enum", "#", "count", "counts", "unitless", "rev", "1/s", "percent", "gear",
+    "hhmmss", "deg/sec", "m/sec", "rad/sec", "mm/sec",
+))  # fmt: skip
+_EMPTY = ("1", "-", "--", "none", "")
+_BRACKETS = re.compile(r".*?[\[({]\s*([^\])}]{0,24}?)\s*[\])}]\s*")
+_NUMBER = re.compile(r"[-+]?[\d.,]+(?:[eE][-+]?\d+)?")
+# What a name may end in after "_", as "speed_kmh"; "r", "f", "t" and "x" end names of signals.
+_ENDINGS = {
+    "kmh": "km/h", "km_h": "km/h", "kph": "km/h", "mph": "mph", "mps": "m/s", "m_s": "m/s",
+    "mps2": "m/s^2", "ms2": "m/s^2", "m_s2": "m/s^2", "deg": "deg", "rad": "rad", "degs": "deg/s",
+    "deg_s": "deg/s", "degps": "deg/s", "dps": "deg/s", "rads": "rad/s", "rad_s": "rad/s",
+    "radps": "rad/s", "g": "g", "s": "s", "sec": "s", "ms": "ms", "us": "us", "ns": "ns",
+    "N": "N", "kN": "kN",
+}  # fmt: skip
+
+
+def is_unit(word: str) -> bool:
+    """Return whether a word is a unit, or stands where one would.
+
+    Parameters
+    ----------
+    word : a cell, in brackets or not.
+    """
+    return word.strip().strip("[](){}").strip().lower() in _WORDS
+
+
+def is_units_row(cells: Sequence[str]) -> bool:
+    """Return whether cells are a row of units: all in brackets, or all known, and not all "1".
+
+    Parameters
+    ----------
+    cells : of a line.
+    """
+    filled = [cell.strip() for cell in cells if cell.strip()]
+    if not filled:
+        return False
+    if all(cell[0] in "[(" and cell[-1] in "])" for cell in filled):
+        return True
+    known = [cell for cell in filled if is_unit(cell)]
+    telling = [cell for cell in known if cell.lower() not in _EMPTY]
+    if any(_NUMBER.fullmatch(cell) and cell != "1" for cell in filled):
+        return False
+    return len(known) >= 0.8 * len(filled) and len(telling) > 0
+
+
+def unit_in_name(name: str) -> str:
+    """Return the unit that a name holds, as in "Speed [km/h]", "Speed:km/h" or "Speed_kmh".
+
+    Parameters
+    ----------
+    name : of a column, as in the file.
+    """
+    held = _BRACKETS.fullmatch(name)
+    if held and (is_unit(held[1]) or "[" in name):
+        return held[1]
+    for mark in (":", " / ", ", ", " in "):
+        _, found, unit = name.rpartition(mark)
+        if found and is_unit(unit) and unit.strip() not in _EMPTY:
+            return unit.strip()
+    for ending, unit in sorted(_ENDINGS.items(), key=lambda one: -len(one[0])):
+        if name.endswith("_" + ending):
+            return unit
+    return ""

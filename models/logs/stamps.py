@@ -1,0 +1,441 @@
+"""The clock of a table: which column it is, in which unit, and what is wrong with its stamps.
+
+Stamps that are rounded (ten samples of 0.01 s that share the stamp 0.1 s, 400 Hz in whole
+milliseconds) are put back on the even clock that they were taken from, where one explains every
+stamp; it is said. Stamps that fall are no rounding: a clock that starts again, or a mixed order.
+"""
+
+import datetime
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import Array
+from models.logs.growing import LONGEST_IN_MEMORY, Growing
+from models.logs.log import RecordingError
+from models.logs.spelling import unit_in_name
+
+MISSING = -(2**63)  # an instant that is not there, in ns
+DAY = 86400.0
+NAMES = (
+    "t", "time", "timestamp", "timestamps", "times", "zeit", "sec", "secs", "second", "seconds",
+    "elapsed", "elapsedtime", "sessiontime", "logtime", "systime", "epoch", "unixtime",
+    "unixepoch", "datetime", "stamp", "utc", "utctime", "timeutc", "gpstime", "timeofday",
+    "tod", "relativetime", "reltime", "testtime", "simtime", "rostime", "headerstamp",
+    "zeitstempel", "temps", "tiempo",
+)  # fmt: skip
+PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1.0 / 60.0, "h": 1.0 / 3600.0}
+_SPELT = {"sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "µs": "us",
+          "μs": "us", "usec": "us", "nsec": "ns", "hr": "h", "hours": "h", "minutes": "min",
+          "milliseconds": "ms", "microseconds": "us", "nanoseconds": "ns"}  # fmt: skip
+# Between 1980 and 2100 in each unit: a number so large counts from 1970.
+EPOCHS = {"s": (3e8, 4.2e9), "ms": (3e11, 4.2e12), "us": (3e14, 4.2e15), "ns": (3e17, 4.2e18)}
+FASTEST, SLOWEST = 1e-5, 0.11  # [s] between samples of a car's log
+TICKS = tuple(10.0**-k for k in range(10))  # [s]: what stamps may be rounded to
+WORTH = 0.05  # share of a step by which rounding must shift stamps to be taken out
+SHARED = 1.2  # samples that share a stamp, on average: with fewer they are doubled, not rounded
+
+_DATE = re.compile(
+    r"(?:(\d{4})[-/]?(\d\d)[-/]?(\d\d)|(\d{1,2})[./](\d{1,2})[./](\d{4}))(?:[T ]+(.+))?"
+)
+_TIME = re.compile(
+    r"(?:(\d+):)?(\d{1,2}):(\d\d)(?:[.,](\d+))?(?: ?(Z|UTC)| ?([-+])(\d\d):?(\d\d))?"
+)
+_SHORT = re.compile(r"(\d\d)(\d\d)(\d\d)(?:[.,](\d+))?Z?")
+
+
+class Clock(NamedTuple):
+    """The column that is the time.
+
+    column: from 0; name: as in the file; unit: of `PER_SECOND`, "hhmmss" or "instant"; epoch:
+    whether it counts from 1970; words: for people.
+    """
+
+    column: int
+    name: str
+    unit: str
+    epoch: bool
+    words: str
+
+
+class Stamps(NamedTuple):
+    """Time of each sample [s], (n,), and what was mended, one sentence each."""
+
+    t: Array
+    notes: tuple[str, ...]
+
+
+# Which column, in which unit.
+
+
+def find_clock(
+    names: Sequence[str], units: Sequence[str], heads: Mapping[int, Sequence[str]]
+) -> Clock | None:
+    """Return the column that is the time, by its name or else as the first that rises evenly.
+
+    Parameters
+    ----------
+    names, units : of the columns.
+    heads : column -> its first cells, with decimal points.
+    """
+    named = [k for k, name in enumerate(names) if _plain(name) in NAMES]
+    named.sort(key=lambda k: NAMES.index(_plain(names[k])))
+    for k in named:
+        clock = _clock(k, names[k], units[k], heads[k], by_name=True)
+        if clock is not None:
+            return clock
+    for k, name in enumerate(names):
+        if units[k] in ("", *PER_SECOND, *_SPELT):
+            clock = _clock(k, name, units[k], heads[k], by_name=False)
+            if clock is not None:
+                return clock
+    return None
+
+
+def _plain(name: str) -> str:
+    """Return a name in small letters without its unit and signs."""
+    unit = unit_in_name(name)
+    if unit and not name.endswith("_" + unit):
+        name = re.split(r"[\[({:,/]", name)[0]
+    elif unit:
+        name = name.removesuffix("_" + unit)
+    return re.sub(r"[^a-z]", "", name.lower())
+
+
+def _clock(
+    column: int, name: str, unit: str, cells: Sequence[str], *, by_name: bool
+) -> Clock | None:
+    """Return a column as the clock; None where its cells are no time that rises."""
+    filled = [cell for cell in cells if cell.strip()]
+    words = "by its name" if by_name else "as it rises evenly (likely)"
+    if unit == "hhmmss":
+        return Clock(column, name, "hhmmss", False, f"{name!r} as hhmmss ({words})")
+    values = [_number(cell) for cell in filled]
+    if any(value is None for value in values):
+        instants = [nanoseconds(cell) for cell in filled]
+        if not filled or any(one is None for one in instants):
+            return None
+        return Clock(column, name, "instant", False, f"{name!r} as date or time of day ({words})")
+    t = np.array(values, dtype=np.float64)
+    steps = np.diff(t)
+    if not by_name and not _rises_evenly(steps):
+        return None
+    told = _SPELT.get(unit.strip("[]() ").lower(), unit.strip("[]() ").lower())
+    found, epoch = _unit(t, told if told in PER_SECOND else "")
+    from_1970 = ", since 1970" if epoch else ""
+    sure = "" if told in PER_SECOND else ", by its steps"
+    return Clock(column, name, found, epoch, f"{name!r} in {found}{sure}{from_1970} ({words})")
+
+
+def _rises_evenly(steps: Array) -> bool:
+    """Return whether most steps are alike, and none falls."""
+    if steps.size < 3 or not (np.isfinite(steps).all() and (steps >= 0.0).all()):
+        return False
+    typical = float(np.median(steps))
+    return typical > 0.0 and bool((np.abs(steps - typical) <= 0.5 * typical).mean() > 0.9)
+
+
+def _unit(t: Array, told: str) -> tuple[str, bool]:
+    """Return the unit of times and whether they count from 1970, by what is told or by steps."""
+    finite = t[np.isfinite(t)]
+    largest = float(np.abs(finite).max()) if finite.size else 0.0
+    for unit, (low, high) in EPOCHS.items():
+        if low < largest < high and told in ("", unit) and _step(finite, unit) <= 10.0:
+            return unit, True
+    if told:
+        return told, False
+    for unit in ("s", "ms", "us", "ns"):
+        if 0.0 < _step(finite, unit) <= SLOWEST and (unit == "s" or _step(finite, unit) >= FASTEST):
+            return unit, False
+    return "s", False
+
+
+def _step(t: Array, unit: str) -> float:
+    """Return the mean step of times in a unit [s]; stamps may repeat."""
+    return float(t[-1] - t[0]) / max(t.size - 1, 1) / PER_SECOND[unit] if t.size else 0.0
+
+
+def _number(cell: str) -> float | None:
+    try:
+        return None if "_" in cell else float(cell)
+    except ValueError:
+        return None
+
+
+def nanoseconds(cell: str) -> int | None:
+    """Return a date and time (since 1970), or a time of day, in ns; None where it is neither.
+
+    Parameters
+    ----------
+    cell : ISO 8601, or with the day first, or hh:mm:ss, mm:ss; "" gives `MISSING`.
+    """
+    text = cell.strip()
+    if not text:
+        return MISSING
+    found = _DATE.fullmatch(text)
+    if found is None:
+        return _of_day(text)
+    if found[1]:
+        year, month, day = int(found[1]), int(found[2]), int(found[3])
+    else:
+        day, month, year = int(found[4]), int(found[5]), int(found[6])
+        if month > 12:
+            day, month = month, day
+    try:
+        days = datetime.date(year, month, day).toordinal() - _FIRST
+    except ValueError:
+        return None
+    time = _of_day(found[7]) if found[7] else 0
+    total = None if time is None else days * 86_400_000_000_000 + time
+    return total if total is not None and abs(total) < 2**62 else None
+
+
+_FIRST = datetime.date(1970, 1, 1).toordinal()
+
+
+def _of_day(text: str) -> int | None:
+    """Return a time of day [ns], less its time zone."""
+    found = _TIME.fullmatch(text)
+    if found is None:
+        short = _SHORT.fullmatch(text)
+        if short is None:
+            return None
+        hours, minutes, whole, part = short.groups()
+        zone = 0
+    else:
+        hours, minutes, whole, part = found[1], found[2], found[3], found[4]
+        zone = 0
+        if found[6]:
+            zone = (int(found[7]) * 60 + int(found[8])) * (-1 if found[6] == "-" else 1)
+    if len(hours or "") > 6 or int(minutes) > 59 or int(whole) > 60:
+        return None
+    seconds = int(hours or 0) * 3600 + (int(minutes) - zone) * 60 + int(whole)
+    return seconds * 1_000_000_000 + int((part or "0")[:9].ljust(9, "0"))
+
+
+# Seconds that rise.
+
+
+def seconds(
+    label: str, clock: Clock, values: NDArray[Any], rows: NDArray[np.int64], place: str
+) -> Stamps:
+    """Return stamps in seconds that rise, mended where they were rounded.
+
+    Times of the calendar count from the first stamp.
+
+    Parameters
+    ----------
+    label : file and run, for messages.
+    clock : the column they are of.
+    values : (n,) as in the file.
+    rows : (n,) where each is in the file.
+    place : what a row is called.
+
+    Raises
+    ------
+    RecordingError
+        Where a stamp is missing, or stamps fall or repeat and no even clock explains it.
+    """
+    if values.size == 0:
+        return Stamps(np.empty(0), ())
+    missing = _first(values, lambda part: part == MISSING if part.dtype.kind == "i" else
+                     ~np.isfinite(part))  # fmt: skip
+    if missing is not None:
+        raise RecordingError(
+            f"{label}: {clock.name} must be a time in every row, {place} {rows[missing]} has none"
+        )
+    t = _in_seconds(clock, values)
+    fall = _first_step(t, lambda step: step < 0.0)
+    if fall is not None and clock.unit in ("instant", "hhmmss"):
+        t = _past_midnight(t)
+        fall = _first_step(t, lambda step: step < 0.0)
+    repeat = None if fall is not None else _first_step(t, lambda step: step == 0.0)
+    even = None if fall is not None else even_clock(t)
+    if even is not None:
+        return Stamps(even.t, (f"{clock.name} {even.words}",))
+    if fall is not None or repeat is not None:
+        raise RecordingError(f"{label}: {clock.name} {not_rising(t, rows, place)}")
+    return Stamps(t, ())
+
+
+def _in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
+    """Return stamps in seconds; those of the calendar from the first on."""
+    first = values[0]
+    per_second = PER_SECOND.get(clock.unit, 1.0)
+    if clock.unit == "instant":
+        return _mapped(values, lambda part: (part - first) / 1e9)
+    if clock.unit == "hhmmss":
+        return _mapped(values, _of_digits)
+    if clock.epoch:  # float64 holds the seconds since 1970 to 0.24 us
+        return _mapped(values, lambda part: np.round((part - first) / per_second, 6))
+    return values if per_second == 1.0 else _mapped(values, lambda part: part / per_second)
+
+
+def _of_digits(values: Array) -> Array:
+    """Return hhmmss.ss in seconds."""
+    hours, rest = np.divmod(values, 10000.0)
+    minutes, whole = np.divmod(rest, 100.0)
+    return np.round(hours * 3600.0 + minutes * 60.0 + whole, 6)
+
+
+def _past_midnight(t: Array) -> Array:
+    """Return times of day that go on after midnight."""
+    steps = np.diff(t)
+    days = np.concatenate([[0.0], np.cumsum((steps < -0.9 * DAY) & (steps > -1.1 * DAY))])
+    later: Array = np.round(t + DAY * days, 6)
+    return later
+
+
+def _parts(size: int) -> list[slice]:
+    """Return slices of a long array, each with the first of the next."""
+    return [slice(k, k + LONGEST_IN_MEMORY + 1) for k in range(0, size, LONGEST_IN_MEMORY)]
+
+
+def _mapped(values: NDArray[Any], change: Callable[[NDArray[Any]], Array]) -> Array:
+    """Return an array changed part by part; what is long goes to disk."""
+    grown = Growing(np.float64)
+    for k in range(0, values.size, LONGEST_IN_MEMORY):
+        grown.extend(change(values[k : k + LONGEST_IN_MEMORY]))
+    return grown.finished()
+
+
+def _first(values: NDArray[Any], wrong: Callable[[NDArray[Any]], NDArray[Any]]) -> int | None:
+    """Return the first place where something is wrong."""
+    for part in _parts(values.size):
+        found = np.flatnonzero(wrong(values[part]))
+        if found.size:
+            return int(found[0] + part.start)
+    return None
+
+
+def _first_step(t: Array, wrong: Callable[[Array], NDArray[Any]]) -> int | None:
+    """Return the sample before the first step with which something is wrong."""
+    return _first(t, lambda part: wrong(np.diff(part)))
+
+
+# Rounded stamps of an even clock.
+
+
+class Even(NamedTuple):
+    """An even clock: time [s], (n,), and what was mended, after the name of the column."""
+
+    t: Array
+    words: str
+
+
+def even_clock(t: Array) -> Even | None:
+    """Return the even clock that stamps were rounded from; None where there is none, or no need.
+
+    Parameters
+    ----------
+    t : stamps [s] that never fall, (n,).
+    """
+    if t.size < 10 or not t[-1] > t[0]:
+        return None
+    head = t[:LONGEST_IN_MEMORY]
+    steps = np.diff(head)
+    moves = steps[steps > 0.0]
+    if moves.size < 3:
+        return None
+    shared = steps.size / moves.size
+    tick = _tick(head)
+    if tick is None or tick > 1.0:
+        return None
+    repeats = bool(moves.size < steps.size)
+    if repeats and shared < SHARED:
+        return None
+    if not repeats and (tick < WORTH * float(np.median(moves)) or np.ptp(moves) < 0.5 * tick):
+        return None
+    return _fitted(t, tick)
+
+
+def _tick(t: Array) -> float | None:
+    """Return what stamps are rounded to: the coarsest tick of which all are whole numbers [s]."""
+    some = t[: 1 << 17]
+    for tick in TICKS:
+        counts = some / tick
+        if np.abs(counts - np.rint(counts)).max() < 1e-4:
+            return tick
+    return None
+
+
+def _fitted(t: Array, tick: float) -> Even | None:
+    """Return the even clock of which every stamp is less than a tick away, lost samples aside."""
+    steps = np.diff(t)
+    usual = float(np.median(steps[steps > 0.0]))
+    cuts = np.flatnonzero(steps > max(2.5 * usual, usual + 1.5 * tick)) + 1
+    edges = np.concatenate([[0], cuts, [t.size]])
+    longest = int(np.argmax(np.diff(edges)))
+    dt = _even_step(t[edges[longest] : edges[longest + 1]], tick)
+    if dt is None:
+        return None
+    even, start, zero = np.empty(t.size), float(t[0]), math.nan
+    for first, end in pairwise(edges):
+        k = np.arange(end - first)
+        off = t[first:end] - dt * k
+        if np.ptp(off) > _slack(tick, t):
+            return None
+        middle = (off.max() + off.min()) / 2.0
+        zero = middle if math.isnan(zero) else zero
+        lost = round((middle - zero) / dt)  # whole steps: the clock went on meanwhile
+        even[first:end] = start + dt * (lost + k)
+    if not (np.diff(even) > 0.0).all():
+        return None
+    return Even(
+        even,
+        f"is rounded to {tick:g} s, its samples were put on the even clock of {dt:.9g} s that "
+        "explains every stamp",
+    )
+
+
+def _slack(tick: float, t: Array) -> float:
+    """Return how far stamps of an even clock may lie apart [s]: a tick, and what floats lose."""
+    return tick * (1.0 + 1e-6) + 4.0 * float(np.spacing(np.abs(t).max()))
+
+
+def _even_step(t: Array, tick: float) -> float | None:
+    """Return the step [s], the roundest that explains every stamp; None where none does."""
+    if t.size < 10:
+        return None
+    k = np.arange(t.size, dtype=np.float64)
+    centered = k - k.mean()
+    slope = float(centered @ (t - t.mean()) / (centered @ centered))
+    if not slope > 0.0:
+        return None
+    round_ones = [round(slope, digits) for digits in range(2, 8)]
+    rate = round(1.0 / slope)
+    for dt in (*round_ones, *([1.0 / rate] if rate else []), slope):
+        if dt > 0.0 and np.ptp(t - dt * k) <= _slack(tick, t):
+            return dt
+    return None
+
+
+def not_rising(t: Array, rows: NDArray[np.int64], place: str) -> str:
+    """Return the rule that stamps break which fall or repeat, with value and remedy.
+
+    Parameters
+    ----------
+    t : stamps [s], one of which is not above the one before, (n,).
+    rows : (n,) where each is in the file.
+    place : what a row is called.
+    """
+    k = _first_step(t, lambda step: ~(step > 0.0))
+    assert k is not None
+    said = f"must increase, {place} {rows[k + 1]} has {t[k + 1]:.9g} after {t[k]:.9g}; "
+    if t[k + 1] < t[k]:
+        if t[k + 1] - t[0] <= 0.5 * (t[k] - t[0]):
+            return said + "the clock starts again: several runs in one file need a column run"
+        return said + "samples are out of order: sort them by time, or cut the log there"
+    steps = np.diff(t[k : k + LONGEST_IN_MEMORY])
+    moves = int(np.count_nonzero(steps > 0.0))
+    if moves and steps.size / moves >= SHARED:
+        return said + (
+            f"stamps are rounded, {steps.size / moves:.3g} samples share one, and no even clock "
+            "explains them: export time with more digits"
+        )
+    return said + "a sample is there twice: cut one of them out"

@@ -1,0 +1,356 @@
+"""A log that is a table: one clock, one row per sample, whatever format holds it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import Array
+from models.logs.growing import Growing
+from models.logs.log import Channel, Listed, RecordingError
+from models.logs.stamps import Clock, Stamps, find_clock, seconds
+from models.schema import LONGEST_NAME, limits, require_few, shown
+
+RUN = "run"
+MOST_WORDS = 10_000  # names of runs in one log
+LISTED = 8  # names in a message
+
+
+class Kind(Enum):
+    """How the cells of a column are read."""
+
+    NUMBER = "number"  # float64, NaN where a cell is missing
+    WORD = "word"
+    INSTANT = "instant"  # a date, a time of day or both, in ns
+
+
+class Words(NamedTuple):
+    """A column of words: the distinct ones in their order, and which of them each row has.
+
+    names: of the words; codes: (n,) places among them.
+    """
+
+    names: list[str]
+    codes: NDArray[Any]
+
+    @classmethod
+    def of(cls, cells: Sequence[str]) -> "Words":
+        """Return the words of cells.
+
+        Parameters
+        ----------
+        cells : one per row.
+        """
+        codes: dict[str, int] = {}
+        coded = [codes.setdefault(cell, len(codes)) for cell in cells]
+        return cls(list(codes), np.array(coded, dtype=np.int32))
+
+
+class Cells(NamedTuple):
+    """Columns of a table.
+
+    columns: column from 0 -> (n,) float64, or int64 of nanoseconds; words: column -> its words;
+    rows: (n,) lines of a text or rows from 1, for messages.
+    """
+
+    columns: dict[int, NDArray[Any]]
+    words: dict[int, Words]
+    rows: NDArray[np.int64]
+
+
+class Table(Protocol):
+    """What a format that is a table answers; columns are named by their places from 0."""
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+
+    @property
+    def format(self) -> str:
+        """Its format as users call it."""
+
+    @property
+    def place(self) -> str:
+        """What a sample is in: "line" or "row"."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all columns as in the file; they may repeat."""
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Their units, "" where none is told."""
+
+    @property
+    def numeric(self) -> tuple[bool, ...]:
+        """Which of them hold numbers."""
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """How the file is written, for people."""
+
+    def first_rows(self, column: int) -> list[str]:
+        """Return the first cells of a column as text, "" where one is missing."""
+
+    def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
+        """Return columns, read as their kinds say; only the rows of a run where one is named."""
+
+
+class Gathered:
+    """Columns that are gathered block by block.
+
+    Parameters
+    ----------
+    path : for messages.
+    kinds : column from 0 -> how its cells are read.
+    names : of the columns.
+    place : what a row is called.
+    run : column and word of the rows to keep; None keeps all.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        kinds: Mapping[int, Kind],
+        names: Sequence[str],
+        place: str,
+        run: tuple[int, str] | None,
+    ) -> None:
+        self._path, self._kinds, self._names = path, kinds, names
+        self._place, self._run = place, run
+        self._rows = Growing(np.int64)
+        types = {Kind.NUMBER: np.float64, Kind.INSTANT: np.int64, Kind.WORD: np.int32}
+        self._columns = {column: Growing(types[kind]) for column, kind in kinds.items()}
+        self._codes: dict[int, dict[str, int]] = {
+            column: {} for column, kind in kinds.items() if kind is Kind.WORD
+        }
+        self._most = limits().samples
+        self._seen = 0
+
+    def __len__(self) -> int:
+        """Return how many rows came by, kept or not."""
+        return self._seen
+
+    def extend(self, rows: NDArray[np.int64], columns: Mapping[int, Any]) -> None:
+        """Add the rows of a block.
+
+        Parameters
+        ----------
+        rows : (n,) where they are in the file.
+        columns : column -> (n,) values, or `Words`.
+        """
+        self._seen += rows.size
+        if self._seen > self._most:
+            require_few(RecordingError, str(self._path), self._seen, "samples", "rows")
+        coded = {column: self._coded(column, columns[column], rows) for column in self._codes}
+        keep: Any = slice(None)
+        if self._run is not None:
+            column, word = self._run
+            keep = coded[column] == self._codes[column].get(word, -1)
+        self._rows.extend(rows[keep])
+        for column, kind in self._kinds.items():
+            values = coded[column] if kind is Kind.WORD else columns[column]
+            self._columns[column].extend(values[keep])
+
+    def _coded(self, column: int, words: Words, rows: NDArray[np.int64]) -> NDArray[np.int32]:
+        """Return the places of words among all that came by."""
+        codes = self._codes[column]
+        for k, word in enumerate(words.names):
+            if len(word) > LONGEST_NAME and len(word.strip()) > LONGEST_NAME:
+                row = rows[np.flatnonzero(words.codes == k)[0]]
+                raise RecordingError(
+                    f"{self._path}: {self._names[column]} must be at most {LONGEST_NAME} "
+                    f"characters, {self._place} {row} has {shown(word.strip())}"
+                )
+        new = [codes.setdefault(word.strip(), len(codes)) for word in words.names]
+        if len(codes) > MOST_WORDS:
+            raise RecordingError(
+                f"{self._path}: {self._names[column]} must name runs, it has more than "
+                f"{MOST_WORDS} different words"
+            )
+        coded: NDArray[np.int32] = np.array(new, dtype=np.int32)[words.codes]
+        return coded
+
+    def finished(self) -> Cells:
+        """Return all rows; nothing can be added then."""
+        found = {column: growing.finished() for column, growing in self._columns.items()}
+        words = {c: Words(list(codes), found.pop(c)) for c, codes in self._codes.items()}
+        return Cells(found, words, self._rows.finished())
+
+
+@dataclass(frozen=True, kw_only=True)
+class TableLog:
+    """A table as a log: which of its columns is the clock, and which names the runs.
+
+    Parameters
+    ----------
+    table : of any format.
+    """
+
+    table: Table
+    _noted: list[str] = field(default_factory=list, compare=False, repr=False)
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.table.path
+
+    @property
+    def format(self) -> str:
+        """Its format as users call it."""
+        return self.table.format
+
+    @property
+    def dialect(self) -> tuple[str, ...]:
+        """How the file is written, as it was detected, for people."""
+        clock = self.clock
+        return (*self.table.words, *((f"time is {clock.words}",) if clock is not None else ()))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was mended in what has been read so far, one sentence each."""
+        return tuple(dict.fromkeys(self._noted))
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of all columns, each once: the second "v" is "v (2)"."""
+        seen: dict[str, int] = {}
+        unique: list[str] = []
+        for k, name in enumerate(self.table.names):
+            name = name or f"column {k + 1}"
+            seen[name] = seen.get(name, 0) + 1
+            unique.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
+        return tuple(unique)
+
+    @cached_property
+    def clock(self) -> Clock | None:
+        """The column that is the time; None where no column can be."""
+        table = self.table
+        heads = {k: table.first_rows(k) for k in range(len(self.names))}
+        return find_clock(self.names, table.units, heads)
+
+    @cached_property
+    def _run_column(self) -> int | None:
+        return self.names.index(RUN) if RUN in self.names else None
+
+    def listed(self) -> tuple[Listed, ...]:
+        """Return the numeric columns in their order, but for the clock and the runs."""
+        clock = self.clock
+        t, rows = None, 0
+        if clock is not None:
+            runs = self.runs()
+            t = self._read({}, runs[0] if runs else None).t
+            rows = t.size
+        rate = _rate(t)
+        listed = []
+        for k, name in enumerate(self.names):
+            if not self.table.numeric[k] or k == self._run_column:
+                continue
+            if clock is not None and k == clock.column:
+                continue
+            cells = self.table.first_rows(k)
+            filled = sum(cell != "" for cell in cells) / max(len(cells), 1)
+            listed.append(
+                Listed(name=name, unit=self.table.units[k], samples=rows, rate=rate * filled)
+            )
+        return tuple(listed)
+
+    def runs(self) -> tuple[str, ...]:
+        """Return the words of the column "run" in their order; empty where there is none."""
+        if self._run_column is None:
+            return ()
+        return tuple(self.table.cells({self._run_column: Kind.WORD}).words[self._run_column].names)
+
+    def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
+        """Return columns as channels on the clock of the log.
+
+        Parameters
+        ----------
+        names : as listed.
+        run : one of `runs`; None where there are none.
+
+        Raises
+        ------
+        RecordingError
+            One line: file, column, rule, value, remedy.
+        """
+        places = [self._place(name) for name in names]
+        if self.clock is None:
+            raise RecordingError(
+                f"{self.path}: no column is a time that rises; columns found: {some(self.names)}"
+            )
+        stamps = self._read({k: Kind.NUMBER for k in places}, run)
+        return tuple(
+            Channel(
+                name=name,
+                unit=self.table.units[k],
+                t=stamps.t,
+                values=stamps.columns[k],
+                place=self.table.place,
+                rows=stamps.rows,
+            )
+            for name, k in zip(names, places, strict=True)
+        )
+
+    def _place(self, name: str) -> int:
+        if name not in self.names:
+            raise RecordingError(
+                f"{self.path}: there is no channel {shown(name)}, there are {some(self.names)}"
+            )
+        return self.names.index(name)
+
+    def _read(self, kinds: dict[int, Kind], run: str | None) -> "_Timed":
+        """Return columns with the time in seconds."""
+        clock = self.clock
+        assert clock is not None
+        place = self._one_run(run)
+        kind = Kind.INSTANT if clock.unit == "instant" else Kind.NUMBER
+        cells = self.table.cells({**kinds, clock.column: kind}, place)
+        label = str(self.path) if run is None else f"{self.path}:{run}"
+        stamps: Stamps = seconds(
+            label, clock, cells.columns[clock.column], cells.rows, self.table.place
+        )
+        self._noted.extend(stamps.notes)
+        return _Timed(stamps.t, cells.columns, cells.rows)
+
+    def _one_run(self, run: str | None) -> tuple[int, str] | None:
+        """Return column and word of a run."""
+        if run is None:
+            return None
+        if self._run_column is None:
+            raise RecordingError(
+                f"{self.path}: there is no column run, so no run {shown(run)}; leave it out"
+            )
+        return self._run_column, run
+
+
+class _Timed(NamedTuple):
+    """Columns with their time [s]."""
+
+    t: Array
+    columns: dict[int, NDArray[Any]]
+    rows: NDArray[np.int64]
+
+
+def _rate(t: Array | None) -> float:
+    """Return samples per second, NaN where there are none."""
+    if t is None or t.size < 2:
+        return float("nan")
+    step = float(np.median(np.diff(t[:100_000])))
+    return 1.0 / step if step > 0.0 else float("nan")
+
+
+def some(names: Sequence[str]) -> str:
+    """Return names, or the first of many.
+
+    Parameters
+    ----------
+    names : to be listed in a message.
+    """
+    listing = ", ".join(names[:LISTED]) + (f", ... ({len(names)})" if len(names) > LISTED else "")
+    return shown(listing) if len(listing) < 50 else repr(listing[:200])

@@ -1,0 +1,430 @@
+"""Tables in text files, read block by block: only the columns that are asked for are kept.
+
+A block is whole lines. pyarrow reads it where it is installed; a block in which it finds anything
+that is not plain (a blank line, a missing cell in a word, a wrong one) is read by Python instead,
+which decides, so that numbers and messages are the same without pyarrow.
+"""
+
+import codecs
+import csv
+import io
+import math
+import re
+from array import array
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.logs.log import RecordingError
+from models.logs.preamble import BLANKS, COMMENT, HEAD, MISSING, Layout, find_layout
+from models.logs.stamps import nanoseconds
+from models.logs.table import Cells, Gathered, Kind, TableLog, Words
+from models.schema import pieces, require_few, shown
+
+BLOCK = 1 << 22  # bytes of text that are read at once
+LARGEST_LINE = 1 << 23  # bytes: 10 000 columns of 800
+WORTH_ARROW = 1 << 22  # bytes of a file from which on importing pyarrow takes less than it saves
+_BLANK = re.compile(rb"[ \t]+")
+_MARGIN = re.compile(rb"^ | (?=\r?$)", re.MULTILINE)
+
+
+def open_text(path: Path) -> TableLog:
+    """Return the log in a text file of any dialect, its layout understood.
+
+    Parameters
+    ----------
+    path : of a file, packed by gzip or not.
+
+    Raises
+    ------
+    RecordingError
+        Where there is no table with a header in it.
+    """
+    head, whole = b"", True
+    for part in pieces(path, RecordingError, limit="megabytes"):
+        head += part
+        if len(head) > HEAD:
+            head, whole = head[:HEAD], False
+            break
+    layout = find_layout(path, head, whole)
+    require_few(RecordingError, str(path), len(layout.names), "columns", "columns")
+    return TableLog(table=TextTable(path=path, layout=layout))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TextTable:
+    """A table in a text file.
+
+    Parameters
+    ----------
+    path : the file.
+    layout : where it is, and how it is written.
+    arrow : whether pyarrow is used; None where it is installed and the file is large.
+    """
+
+    path: Path
+    layout: Layout
+    arrow: bool | None = None
+
+    @property
+    def format(self) -> str:
+        """The format as users call it."""
+        return "VBO" if self.layout.made_by == "Racelogic VBOX" else "CSV"
+
+    @property
+    def place(self) -> str:
+        """What a sample is in."""
+        return "line"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns as in the file."""
+        return self.layout.names
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of the columns, "" where none is told."""
+        return self.layout.units
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """How the file is written, for people."""
+        return self.layout.words
+
+    @property
+    def numeric(self) -> tuple[bool, ...]:
+        """Which columns hold numbers, by the first rows."""
+        return self.layout.numeric
+
+    def first_rows(self, column: int) -> list[str]:
+        """Return the first cells of a column, with decimal points, "" where one is missing.
+
+        Parameters
+        ----------
+        column : from 0.
+        """
+        layout = self.layout
+        cells = [row[column].replace(layout.thousands or "\0", "") for row in layout.rows]
+        if layout.decimal == ",":
+            cells = [cell.replace(",", ".") for cell in cells]
+        return ["" if cell.lower() in MISSING else cell for cell in cells]
+
+    def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
+        """Return columns.
+
+        Parameters
+        ----------
+        kinds : column from 0 -> how its cells are read.
+        run : a column and the word that it must have; other rows are left out.
+
+        Raises
+        ------
+        RecordingError
+            Where a cell is not what its kind asks for, a row is cut, or there is no row.
+        """
+        wanted = dict(kinds) | ({} if run is None else {run[0]: Kind.WORD})
+        gathered = Gathered(self.path, wanted, self.names, "line", run)
+        reader = _Python(self.path, self.layout, wanted)
+        fast = _arrow() if _use_arrow(self.arrow, self.path) else None
+        for line, block in _blocks(self.path, self.layout):
+            plain = fast is not None and reader.is_plain(block)
+            columns = _by_arrow(fast, self.layout, wanted, block) if plain else None
+            if columns is None:
+                rows, columns = reader.read(line, block)
+            else:
+                rows = np.arange(line, line + block.count(b"\n") + (not block.endswith(b"\n")))
+            gathered.extend(rows, columns)
+        if not reader.seen and not len(gathered):
+            raise RecordingError(f"{self.path}: there is a header but no row of data")
+        return gathered.finished()
+
+
+# From the bytes of a file to blocks of whole lines in UTF-8.
+
+
+def _blocks(path: Path, layout: Layout) -> Iterator[tuple[int, bytes]]:
+    """Yield the number of the first line of a block, and the block; from the first row of data."""
+    line, rest, begun = layout.first, b"", False
+    for text in _in_utf8(path, layout.encoding):
+        rest += text
+        if not begun:
+            *_, rest = split = rest.split(b"\n", layout.first - 1)
+            begun = True
+            if len(split) < layout.first:
+                return
+        if len(rest) < BLOCK:
+            continue
+        cut = _whole_lines(rest)
+        if cut == 0 and len(rest) > LARGEST_LINE:
+            raise RecordingError(
+                f"{path}: line {line} is longer than {LARGEST_LINE} bytes, or opens a quote that "
+                "is never closed"
+            )
+        if cut:
+            yield line, _plain(path, layout, line, rest[:cut])
+            line += rest.count(b"\n", 0, cut)
+            rest = rest[cut:]
+    if rest:
+        yield line, _plain(path, layout, line, rest)
+
+
+def _in_utf8(path: Path, encoding: str) -> Iterator[bytes]:
+    """Yield the text of a file in UTF-8, with line feeds where it has only carriage returns."""
+    decoder = codecs.getincrementaldecoder(encoding)("replace")
+    returns: bool | None = None
+    for part in pieces(path, RecordingError, limit="megabytes"):
+        if encoding not in ("utf-8", "utf-8-sig", "cp1252"):
+            part = decoder.decode(part).encode("utf-8", "replace")
+        if returns is None:
+            returns = b"\n" not in part and b"\r" in part
+        yield part.replace(b"\r", b"\n") if returns else part
+
+
+def _whole_lines(text: bytes) -> int:
+    """Return where the last whole line ends that does not end within quotes."""
+    cut = text.rfind(b"\n") + 1
+    while cut and b'"' in text and text.count(b'"', 0, cut) % 2:
+        cut = text.rfind(b"\n", 0, text.rfind(b'"', 0, cut)) + 1
+    return cut
+
+
+def _plain(path: Path, layout: Layout, line: int, block: bytes) -> bytes:
+    """Return a block in UTF-8 with single blanks, without NUL bytes."""
+    if b"\0" in block:
+        line += block.count(b"\n", 0, block.index(b"\0"))
+        raise RecordingError(
+            f"{path}: is a binary file or damaged (it has NUL bytes in line {line}); a log is text"
+        )
+    if not block.isascii():
+        try:
+            block.decode("utf-8")
+        except UnicodeDecodeError:
+            block = block.decode("cp1252", "replace").encode("utf-8")
+    if layout.delimiter == BLANKS:
+        block = _MARGIN.sub(b"", _BLANK.sub(b" ", block))
+    return block
+
+
+# Blocks read by Python, which decides what is a row and what is a number.
+
+
+class _Row(NamedTuple):
+    line: int
+    cells: list[str]
+
+
+class _Python:
+    """Reads blocks of one table.
+
+    Parameters
+    ----------
+    path : of the file, for messages.
+    layout : of the table.
+    wanted : column from 0 -> how its cells are read.
+    """
+
+    def __init__(self, path: Path, layout: Layout, wanted: Mapping[int, Kind]) -> None:
+        self._path, self._layout, self._wanted = path, layout, wanted
+        self._width = len(layout.names)
+        again = [_stripped(_split(one, layout.delimiter)) for one in layout.again]
+        self._again = [one for one in again if any(one)]
+        self._marks = [one.encode() for one in COMMENT]
+        self._marks += [text.strip().encode() for text in layout.again if text.strip()]
+        self.seen = 0
+
+    def is_plain(self, block: bytes) -> bool:
+        """Return whether no line of a block is a comment or the header once more."""
+        return not any(
+            mark in block and (block.startswith(mark) or b"\n" + mark in block)
+            for mark in self._marks
+        )
+
+    def read(self, line: int, block: bytes) -> tuple[NDArray[np.int64], dict[int, Any]]:
+        """Return the line of every row, and the columns that are wanted."""
+        text = block.decode("utf-8")
+        reader = csv.reader(io.StringIO(text, newline=""), delimiter=self._layout.delimiter)
+        rows, lines = [], []
+        try:
+            for cells in reader:
+                rows.append(cells)
+                lines.append(line + reader.line_num - 1)
+        except csv.Error as error:
+            number = line + reader.line_num - 1
+            raise RecordingError(f"{self._path}: line {number} is not CSV ({error})") from None
+        if not self.is_plain(block) or set(map(len, rows)) != {self._width}:
+            kept = [row for row in map(_Row, lines, rows) if self._is_row(row)]
+            lines = [row.line for row in kept]
+            rows = [row.cells for row in kept]
+        self.seen += len(rows)
+        columns = {
+            column: self._column(column, kind, [row[column] for row in rows], lines, "_" in text)
+            for column, kind in self._wanted.items()
+        }
+        return np.array(lines, dtype=np.int64), columns
+
+    def _is_row(self, row: _Row) -> bool:
+        """Return whether a line is a row of data: no comment, not blank, not the header again."""
+        cells = row.cells
+        if not any(cell.strip() for cell in cells):
+            if len(cells) == self._width:
+                return True
+            if len(cells) <= 1:
+                return False
+        elif cells[0].lstrip().startswith(COMMENT):
+            return False
+        if len(cells) == self._width + 1 and not cells[-1].strip():
+            cells.pop()  # a delimiter at the end
+        elif len(cells) == self._width - 1 and not self._layout.names[-1]:
+            cells.append("")  # no delimiter at the end, where others have one
+        if len(cells) != self._width:
+            raise RecordingError(
+                f"{self._path}: line {row.line} has {len(cells)} cells, the header has "
+                f"{self._width}; was the file cut off?"
+            )
+        return _stripped(cells) not in self._again
+
+    def _column(
+        self, column: int, kind: Kind, cells: list[str], lines: Sequence[int], marked: bool
+    ) -> Any:
+        """Return the cells of one column as numbers, words or instants."""
+        if kind is Kind.WORD:
+            return Words.of(cells)
+        if kind is Kind.INSTANT:
+            return self._each(column, cells, lines, nanoseconds, np.int64, "a time")
+        layout = self._layout
+        if not marked and not layout.thousands:
+            try:
+                if layout.decimal == ".":
+                    return np.array(array("d", map(float, cells)))
+                if not any("." in cell for cell in cells):
+                    return np.array(array("d", (float(c.replace(",", ".")) for c in cells)))
+            except ValueError:
+                pass
+
+        def number(cell: str) -> float | None:
+            return _float(cell, layout.decimal, layout.thousands)
+
+        return self._each(column, cells, lines, number, np.float64, "numeric")
+
+    def _each(
+        self,
+        column: int,
+        cells: list[str],
+        lines: Sequence[int],
+        read: Callable[[str], float | None],
+        dtype: Any,
+        what: str,
+    ) -> NDArray[Any]:
+        """Return what each cell is read as; refuse the first that cannot be."""
+        values = [read(cell) for cell in cells]
+        if None in values:
+            k = values.index(None)
+            comma = self._layout.decimal == "," and "." in cells[k]
+            raise RecordingError(
+                f"{self._path}: {self._layout.names[column]} must be {what}, line {lines[k]} has "
+                f"{shown(cells[k])}" + (" where others have decimal commas" if comma else "")
+            )
+        return np.array(values, dtype=dtype)
+
+
+def _split(line: str, delimiter: str) -> list[str]:
+    if delimiter == BLANKS:
+        line = " ".join(line.split())
+    return next(csv.reader([line], delimiter=delimiter), [])
+
+
+def _stripped(cells: Sequence[str]) -> list[str]:
+    return [cell.strip() for cell in cells]
+
+
+def _float(cell: str, decimal: str, thousands: str) -> float | None:
+    """Return a cell as a number, NaN where it is missing, None where it is neither."""
+    text = cell.strip()
+    if text.lower() in MISSING:
+        return math.nan
+    if "_" in text:  # which Python takes for a mark between digits
+        return None
+    if thousands and thousands in text:
+        whole = text.split(decimal)[0].lstrip("+-").split(thousands)
+        if not (1 <= len(whole[0]) <= 3 and all(len(part) == 3 for part in whole[1:])):
+            return None
+        text = text.replace(thousands, "")
+    if decimal == ",":
+        if "." in text:
+            return None
+        text = text.replace(",", ".")
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+# Blocks read by pyarrow.
+
+
+def _use_arrow(asked: bool | None, path: Path) -> bool:
+    return path.stat().st_size > WORTH_ARROW if asked is None else asked
+
+
+def _arrow() -> Any:
+    """Return pyarrow with its reader of CSV, None where it is not installed."""
+    try:
+        import pyarrow
+        import pyarrow.csv
+    except ImportError:
+        return None
+    return pyarrow
+
+
+def _by_arrow(
+    arrow: Any, layout: Layout, wanted: Mapping[int, Kind], block: bytes
+) -> dict[int, Any] | None:
+    """Return the columns that are wanted; None where anything in the block is not plain."""
+    if layout.thousands:
+        return None
+    kinds = {
+        str(column): arrow.float64() if kind is Kind.NUMBER else arrow.string()
+        for column, kind in wanted.items()
+    }
+    try:
+        table = arrow.csv.read_csv(
+            arrow.BufferReader(block),
+            arrow.csv.ReadOptions(
+                column_names=[str(k) for k in range(len(layout.names))], block_size=len(block) + 1
+            ),
+            arrow.csv.ParseOptions(
+                delimiter=layout.delimiter, newlines_in_values=b'"' in block, double_quote=True
+            ),
+            arrow.csv.ConvertOptions(
+                column_types=kinds,
+                include_columns=list(kinds),
+                null_values=_NULLS,
+                strings_can_be_null=False,
+                decimal_point=layout.decimal,
+            ),
+        )
+        if table.num_rows != block.count(b"\n") + (not block.endswith(b"\n")):
+            return None
+        columns: dict[int, Any] = {}
+        for column, kind in wanted.items():
+            found = table.column(str(column))
+            if kind is Kind.NUMBER:
+                columns[column] = np.asarray(found.to_numpy(), dtype=np.float64)
+            elif kind is Kind.WORD:
+                coded = found.combine_chunks().dictionary_encode()
+                columns[column] = Words(coded.dictionary.to_pylist(), coded.indices.to_numpy())
+            else:
+                instants = [nanoseconds(cell) for cell in found.to_pylist()]
+                if None in instants:
+                    return None
+                columns[column] = np.array(instants, dtype=np.int64)
+    except (arrow.ArrowException, UnicodeDecodeError):
+        return None
+    return columns
+
+
+_NULLS = ["", "nan", "NaN", "NAN", "NA", "N/A", "#N/A", "null", "NULL", "None", "-", "--", "---"]

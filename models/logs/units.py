@@ -1,0 +1,215 @@
+"""Units as loggers spell them, and what a number in them is in SI.
+
+A spelling may mean two things ("kN" is a force, "kn" a speed): the quantity that is wanted decides.
+"""
+
+import math
+import re
+
+from models.logs.log import RecordingError
+from models.schema import shown
+
+SPEED, ANGLE, RATE = "speed", "angle", "yaw rate"
+ACCELERATION, FORCE, TIME = "acceleration", "force", "time"
+SI = {SPEED: "m/s", ANGLE: "rad", RATE: "rad/s", ACCELERATION: "m/s^2", FORCE: "N", TIME: "s"}
+
+DEGREE, POUND, FOOT, MILE = math.pi / 180.0, 4.4482216152605, 0.3048, 1609.344
+G = 9.80665  # standard acceleration of free fall, by which "g" and "kgf" are defined [m/s^2]
+# By quantity, spelling -> factor to SI; spellings as `_plain` leaves them, in small letters.
+FACTORS = {
+    SPEED: {
+        "m/s": 1.0,
+        "mps": 1.0,
+        "km/h": 1.0 / 3.6,
+        "kmh": 1.0 / 3.6,
+        "kph": 1.0 / 3.6,
+        "kmph": 1.0 / 3.6,
+        "km/hr": 1.0 / 3.6,
+        "kilometers/hour": 1.0 / 3.6,
+        "mph": MILE / 3600.0,
+        "mi/h": MILE / 3600.0,
+        "miles/hour": MILE / 3600.0,
+        "kn": 1852.0 / 3600.0,
+        "kt": 1852.0 / 3600.0,
+        "kts": 1852.0 / 3600.0,
+        "knot": 1852.0 / 3600.0,
+        "knots": 1852.0 / 3600.0,
+        "mm/s": 1e-3,
+        "cm/s": 1e-2,
+        "ft/s": FOOT,
+        "fps": FOOT,
+    },
+    ANGLE: {"rad": 1.0, "mrad": 1e-3, "deg": DEGREE, "degs": DEGREE, "grad": DEGREE},
+    RATE: {
+        "rad/s": 1.0,
+        "rads": 1.0,
+        "1/s": 1.0,
+        "mrad/s": 1e-3,
+        "deg/s": DEGREE,
+        "degs/s": DEGREE,
+        "grad/s": DEGREE,
+        "dps": DEGREE,
+        "mdeg/s": 1e-3 * DEGREE,
+        "deg/h": DEGREE / 3600.0,
+    },
+    ACCELERATION: {
+        "m/s2": 1.0,
+        "m/s/s": 1.0,
+        "mps2": 1.0,
+        "mm/s2": 1e-3,
+        "cm/s2": 1e-2,
+        "ft/s2": FOOT,
+        "g": G,
+        "gn": G,
+        "g0": G,
+        "mg": 1e-3 * G,
+    },
+    FORCE: {
+        "n": 1.0,
+        "newton": 1.0,
+        "kn": 1e3,
+        "dan": 10.0,
+        "lbf": POUND,
+        "lb": POUND,
+        "lbs": POUND,
+        "kgf": G,
+        "kp": G,
+    },
+    TIME: {
+        "s": 1.0,
+        "second": 1.0,
+        "seconds": 1.0,
+        "ms": 1e-3,
+        "us": 1e-6,
+        "ns": 1e-9,
+        "min": 60.0,
+        "h": 3600.0,
+    },
+}
+OTHERS = {  # what else loggers log, so that an error can say what a unit is of
+    "length": ("m", "mm", "cm", "km", "ft", "in", "mi"),
+    "rate of turns": ("rpm", "1/min", "u/min", "rev/min"),
+    "torque": ("nm", "n*m", "lbft", "lb-ft", "ft-lb"),
+    "pressure": ("bar", "mbar", "kpa", "pa", "psi", "hpa"),
+    "temperature": ("c", "degc", "f", "degf", "k"),
+    "voltage": ("v", "mv", "volt"),
+    "current": ("a", "ma"),
+    "share": ("%", "percent", "ratio"),
+    "mass": ("kg", "t"),
+    "frequency": ("hz", "khz"),
+    "power": ("kw", "w", "hp"),
+}
+NO_UNIT = ("", "-", "none", "1", "unitless", "n/a", "si")
+_WORDS = (
+    ("²", "2"),
+    ("µ", "u"),
+    ("μ", "u"),
+    ("°", "deg"),
+    ("º", "deg"),
+    ("degrees", "deg"),
+    ("degree", "deg"),
+    ("radians", "rad"),
+    ("radian", "rad"),
+    ("meters", "m"),
+    ("metres", "m"),
+    ("**", "^"),
+    ("·", "*"),
+    ("⋅", "*"),
+    ("^", ""),
+    (" per ", "/"),
+    ("/seconds", "/s"),
+    ("/second", "/s"),
+    ("/sec", "/s"),
+)
+
+
+def _plain(unit: str) -> str:
+    """Return a spelling without brackets, blanks and exponents' signs, in small letters.
+
+    Parameters
+    ----------
+    unit : as written.
+    """
+    text = unit.strip().strip("[](){}").strip().lower()
+    for old, new in _WORDS:
+        text = text.replace(old, new)
+    text = re.sub(r"(?:[*. ]s|/s)-?([12])(?!\d)|(?<=[a-z])s-([12])$", _per_second, text)
+    return text.replace(" ", "")
+
+
+def _per_second(found: re.Match[str]) -> str:
+    """Return "/s" or "/s2" for what a spelling has as a negative or dotted power."""
+    power = found.group(1) or found.group(2)
+    return "/s2" if power == "2" else "/s"
+
+
+def quantities(unit: str) -> tuple[str, ...]:
+    """Return what a unit may be of; empty where it is of nothing a car's motion has.
+
+    Parameters
+    ----------
+    unit : as written.
+    """
+    plain = _plain(unit)
+    found = tuple(name for name, factors in FACTORS.items() if plain in factors)
+    if len(found) > 1 and plain == "kn":  # the letters' size tells, where it is as it should be
+        return (FORCE,) if "kN" in unit else (SPEED,) if "KN" not in unit else found
+    return found
+
+
+def is_told(unit: str) -> bool:
+    """Whether a unit is written at all; "-" and the like tell none.
+
+    Parameters
+    ----------
+    unit : as written.
+    """
+    return _plain(unit) not in NO_UNIT
+
+
+def to_si(unit: str, quantity: str, what: str) -> float:
+    """Return the factor to SI.
+
+    Parameters
+    ----------
+    unit : as written; where it tells none, SI is meant.
+    quantity : of the signal, one of `SI`.
+    what : begins the message: the file, the signal and its channel.
+
+    Raises
+    ------
+    RecordingError
+        Where the unit is of something else, or not known.
+    """
+    plain = _plain(unit)
+    if plain in NO_UNIT:
+        return 1.0
+    if plain in FACTORS[quantity]:
+        return FACTORS[quantity][plain]
+    known = ", ".join(dict.fromkeys(_typical(quantity)))
+    other = quantities(unit) or tuple(name for name, all_ in OTHERS.items() if plain in all_)
+    if other:
+        raise RecordingError(
+            f"{what} must be in a unit of {_named(quantity)} ({known}), {shown(unit.strip())} is "
+            f"one of {_named(other[0])}; another channel?"
+        )
+    raise RecordingError(
+        f"{what} has the unit {shown(unit.strip())}, which is not known; name one of "
+        f"{_named(quantity)}: {known}"
+    )
+
+
+def _typical(quantity: str) -> tuple[str, ...]:
+    return {
+        SPEED: ("m/s", "km/h", "mph", "knots"),
+        ANGLE: ("rad", "deg", "mrad"),
+        RATE: ("rad/s", "deg/s"),
+        ACCELERATION: ("m/s^2", "g"),
+        FORCE: ("N", "kN", "lbf"),
+        TIME: ("s", "ms", "us", "ns"),
+    }[quantity]
+
+
+def _named(quantity: str) -> str:
+    article = "an" if quantity[0] in "aeiou" else "a"
+    return f"{article} {quantity}"

@@ -1,0 +1,285 @@
+"""How a log is read: channels, units, axes, gaps, filter and repair, as log.toml holds them.
+
+[file]
+axes = "SAE"                    # y to the right, z down; ISO where nothing is said
+[signals.v_y]
+channel = "Vel Lat"
+unit = "km/h"                   # that of the file where nothing is said
+[signals.delta_f]
+channel = ["SteerFL", "SteerFR"]
+[repair.offset]
+r = 0.004
+"""
+
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from models.files import write_atomically
+from models.logs.clock import LONGEST_GAP
+from models.logs.log import RecordingError
+from models.logs.signals import BETA, NEEDED, QUANTITIES, Signal, require_fitting, signal_name
+from models.logs.units import to_si
+from models.recordings.repair import Repair
+from models.schema import Table, read_toml, shown
+
+AXES = {"ISO": 1.0, "SAE": -1.0}  # sign of everything but speed: y left and z up, or both turned
+TABLES = ("file", "clock", "filters", "signals", "repair")
+SIGNAL_KEYS = tuple(one.name for one in fields(Signal))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LogMap:
+    """How a log is read; what is not said is as the file and the standard names have it.
+
+    Parameters
+    ----------
+    signals : by our name (v_x, v_y or beta, r, delta_f, delta_r, a_y, Fyf, Fyr) how it is read.
+    axes : of the file: "ISO" (y to the left, z up) or "SAE" (y to the right, z down).
+    run : which of the file's runs; empty where there is one.
+    dbc : database of a CAN log, a path; empty where there is none.
+    clock : channel that is the time, where it is not what the format takes for it; empty else.
+    clock_unit : of that channel; empty takes that of the file, seconds where it tells none.
+    longest_gap : the log is cut where a channel has no sample for longer [s].
+    low_pass : cut-off of a low pass on all signals [Hz]; None filters nothing. All pass the same
+        one, of second order, which looks at no later sample: so none is late against another.
+    repair : what is taken out of the recording, and told of the car, after reading.
+
+    Raises
+    ------
+    RecordingError
+        Where a signal, word or number is none that can be.
+    """
+
+    signals: Mapping[str, Signal] = field(default_factory=dict)
+    axes: str = "ISO"
+    run: str = ""
+    dbc: str = ""
+    clock: str = ""
+    clock_unit: str = ""
+    longest_gap: float = LONGEST_GAP
+    low_pass: float | None = None
+    repair: Repair = field(default_factory=Repair)
+
+    def __post_init__(self) -> None:
+        require_fitting(self.signals, "")
+        if self.axes not in AXES:
+            raise RecordingError(f"axes must be one of {', '.join(AXES)}, not {shown(self.axes)}")
+        if not 0.0 < self.longest_gap < math.inf:
+            raise RecordingError(
+                f"longest_gap must be positive and finite, it is {self.longest_gap}"
+            )
+        if self.low_pass is not None and not 0.0 < self.low_pass < math.inf:
+            raise RecordingError(f"low_pass must be positive and finite, it is {self.low_pass}")
+        for name, signal in self.signals.items():
+            if signal.unit:
+                to_si(signal.unit, QUANTITIES[name], f"signals.{name}")
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every signal that is needed is told: then only what is told is read."""
+        told = {"v_y" if name == BETA else name for name in self.signals}
+        return set(NEEDED) <= told
+
+    def with_signals(self, signals: Mapping[str, Signal]) -> "LogMap":
+        """Return the map with some signals told otherwise; v_y and beta replace one another.
+
+        Parameters
+        ----------
+        signals : by our name.
+        """
+        merged = dict(self.signals)
+        for name in signals:
+            merged.pop({"v_y": BETA, BETA: "v_y"}.get(name, ""), None)
+        return replace(self, signals={**merged, **signals})
+
+    @classmethod
+    def from_toml(cls, path: str | PathLike[str]) -> "LogMap":
+        """Read a log.toml.
+
+        Parameters
+        ----------
+        path : of the file.
+
+        Raises
+        ------
+        RecordingError
+            One line that names the file, the key, the rule and the value.
+        """
+        data = read_toml(Path(path), RecordingError)
+        try:
+            return cls._of_table(Table(data, "", RecordingError))
+        except RecordingError as error:
+            raise RecordingError(f"{path}: {error}") from None
+
+    @classmethod
+    def _of_table(cls, table: Table) -> "LogMap":
+        table.only(*TABLES)
+        given: dict[str, Any] = {}
+        if "file" in table:
+            given |= _texts(table.table("file"), "axes", "run", "dbc")
+        if "clock" in table:
+            inner = table.table("clock")
+            inner.only("channel", "unit", "longest_gap")
+            names = {"channel": "clock", "unit": "clock_unit"}
+            given |= {ours: inner.text(key) for key, ours in names.items() if key in inner}
+            if "longest_gap" in inner:
+                given["longest_gap"] = inner.number("longest_gap")
+        if "filters" in table:
+            inner = table.table("filters")
+            inner.only("low_pass")
+            given["low_pass"] = inner.number("low_pass")
+        if "signals" in table:
+            inner = table.table("signals")
+            inner.only(*QUANTITIES)
+            given["signals"] = {key: _signal(inner.table(key), key) for key in inner.data}
+        if "repair" in table:
+            given["repair"] = Repair.of_table(table.table("repair"))
+        return cls(**given)
+
+    def toml(self) -> str:
+        """Return the text of the log.toml that `from_toml` reads back bit for bit."""
+        plain, blocks = LogMap(), []
+        for table, keys in (
+            ("file", {"axes": "axes", "run": "run", "dbc": "dbc"}),
+            ("clock", {"channel": "clock", "unit": "clock_unit", "longest_gap": "longest_gap"}),
+            ("filters", {"low_pass": "low_pass"}),
+        ):
+            told = {key: getattr(self, ours) for key, ours in keys.items()}
+            usual = {key: getattr(plain, ours) for key, ours in keys.items()}
+            blocks.append(_block(table, {k: v for k, v in told.items() if v != usual[k]}))
+        for name in QUANTITIES:
+            if name in self.signals:
+                blocks.append(_block(f"signals.{name}", _signal_numbers(self.signals[name])))
+        repair = self.repair.tables()
+        inner = {key: value for key, value in repair.items() if isinstance(value, dict)}
+        blocks.append(_block("repair", {k: v for k, v in repair.items() if k not in inner}))
+        blocks += [_block(f"repair.{key}", value) for key, value in inner.items()]
+        return "\n".join(block for block in blocks if block)
+
+    def to_toml(self, path: str | PathLike[str]) -> None:
+        """Write a log.toml; the file appears whole or not at all.
+
+        Parameters
+        ----------
+        path : of the file; what is there is replaced.
+        """
+        write_atomically(Path(path), self.toml())
+
+
+def _texts(table: Table, *keys: str) -> dict[str, str]:
+    table.only(*keys)
+    return {key: table.text(key) for key in keys if key in table}
+
+
+def _signal(table: Table, name: str) -> Signal:
+    """Return how a document says that a signal is read."""
+    table.only(*SIGNAL_KEYS)
+    given: dict[str, Any] = {}
+    if isinstance(table.value("channel"), str):
+        given["channel"] = (table.text("channel"),)
+    else:
+        given["channel"] = table.texts("channel")
+    if "unit" in table:
+        given["unit"] = table.text("unit")
+    for key in ("factor", "offset", "ratio"):
+        if key in table:
+            given[key] = table.number(key)
+    if "table" in table:
+        pairs = table.array("table")
+        if pairs.ndim != 2 or pairs.shape[1] != 2:
+            table.refuse("table", "must be pairs [hand wheel, road wheel] in rad")
+        given["table"] = tuple((float(hand), float(road)) for hand, road in pairs)
+    try:
+        return Signal(**given)
+    except RecordingError as error:
+        raise RecordingError(f"signals.{name}: {error}") from None
+
+
+def _signal_numbers(signal: Signal) -> dict[str, Any]:
+    """Return what is told of a signal, beyond what holds where nothing is."""
+    plain = Signal(channel=signal.channel)
+    told = {
+        key: getattr(signal, key)
+        for key in SIGNAL_KEYS[1:]
+        if getattr(signal, key) != getattr(plain, key)
+    }
+    channel = signal.channel[0] if len(signal.channel) == 1 else signal.channel
+    return {"channel": channel, **told}
+
+
+def _block(name: str, values: Mapping[str, Any]) -> str:
+    lines = [f"{key} = {_value(value)}" for key, value in values.items()]
+    return "".join(f"{line}\n" for line in (f"[{name}]", *lines)) if lines else ""
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, tuple):
+        return f"[{', '.join(_value(one) for one in value)}]"
+    return repr(float(value))
+
+
+# Signals as a command line tells them: NAME=CHANNEL [UNIT] /RATIO.
+
+
+def told_signals(pairs: Sequence[str]) -> dict[str, Signal]:
+    """Return signals as they are told on a command line.
+
+    "vy=Vel Lat [km/h]", "delta_f=SteerAngle [deg] /14.6", "r=Gyro Z *-1",
+    "delta_f=SteerFL+SteerFR": NAME=CHANNEL, and behind it a unit in brackets, a factor behind a
+    star, an offset in SI behind a minus, a ratio of the steering behind a slash.
+
+    Parameters
+    ----------
+    pairs : one word for each signal.
+
+    Raises
+    ------
+    RecordingError
+        Where a word is none of these.
+    """
+    found: dict[str, Signal] = {}
+    for pair in pairs:
+        name, equals, rest = (part.strip() for part in pair.partition("="))
+        ours = signal_name(name)
+        if not (name and equals and rest):
+            raise RecordingError(f'--columns wants "NAME=COLUMN [UNIT]", not {shown(pair)}')
+        if ours is None:
+            known = ", ".join(QUANTITIES)
+            raise RecordingError(f"{shown(name)} is no column of ours: {known}")
+        if ours in found:
+            raise RecordingError(f"--columns tells {name} twice")
+        found[ours] = _told(rest, pair)
+    require_fitting(found, "--columns: ")
+    return found
+
+
+_CHANGE = re.compile(r"\s+(?P<sign>[/*-])\s*(?P<number>[+-]?[\d.]+(?:e[+-]?\d+)?)$", re.IGNORECASE)
+_UNIT = re.compile(r"\s+\[(?P<unit>[^\[\]]*)\]$")
+
+
+def _told(text: str, pair: str) -> Signal:
+    """Return what stands behind the name in one word of a command line."""
+    given: dict[str, Any] = {}
+    keys = {"/": "ratio", "*": "factor", "-": "offset"}
+    while found := _CHANGE.search(text):
+        key, text = keys[found["sign"]], text[: found.start()]
+        if key in given:
+            raise RecordingError(f"--columns tells the {key} of {shown(pair)} twice")
+        try:
+            given[key] = float(found["number"])
+        except ValueError:
+            raise RecordingError(f"--columns: {shown(found['number'])} is no number") from None
+    if found := _UNIT.search(text):
+        given["unit"], text = found["unit"].strip(), text[: found.start()]
+    try:
+        return Signal(channel=tuple(part.strip() for part in text.split(" + ")), **given)
+    except RecordingError as error:
+        raise RecordingError(f"--columns {shown(pair)}: {error}") from None

@@ -1,0 +1,201 @@
+"""`tireid channels LOG [--write log.toml]`: what a log holds, and how it would be read."""
+
+import argparse
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from codegen.escape import visible
+from models.files import write_atomically
+from models.logs.door import open_log
+from models.logs.log import Channel, Listed, LogFile
+from models.logs.names import Proposal, propose
+from models.logs.signals import MEANINGS, NEEDED, Signal
+from models.recordings import split_log_argument
+from models.recordings.assembly import (
+    column_of,
+    column_word,
+    likely_signals,
+    likely_text,
+    missing_signals,
+    standard_signals,
+)
+from tireid.commands import COMMANDS
+from tireid.commands.options import add_force, add_log_map, told_map
+from tireid.exit_codes import DONE, FAILS
+from tireid.output import require_free, text_table
+from tireid.progress import say, tell
+
+MOST_NUMBERS = 5e7  # that are read to tell ranges; of a larger log only those of likely channels
+LONGEST_NAME = 48  # letters of a channel in the table
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : subparsers of `tireid`.
+    """
+    parser = commands.add_parser(
+        "channels",
+        help=COMMANDS["channels"],
+        description="List the channels of LOG with unit, rate, samples and range, and what each "
+        "probably is; say what is missing. --write FILE writes the log.toml by which every command "
+        "reads such logs (--log FILE). Exit code 1 where something is missing or not sure.",
+    )
+    parser.add_argument("log", metavar="LOG", help="a log; LOG:RUN names one of its runs")
+    parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
+    add_log_map(parser)
+    parser.add_argument("--write", type=Path, metavar="FILE", help="write the map, .toml")
+    add_force(parser)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command; return 1 where a signal that is needed is missing or not sure."""
+    path, named = split_log_argument(options.log)
+    told = told_map(options)
+    if options.write is not None:
+        if options.write.suffix.lower() != ".toml":
+            raise ValueError(f"{options.write}: the name must end in .toml")
+        require_free(options.write, force=options.force)
+    log = open_log(path)
+    chosen = _run_of(log, options.run_name or named or told.run)
+    listed = log.listed()
+    names = [one.name for one in listed]
+    proposal = propose(log, listed, chosen)
+    signals = likely_signals({**standard_signals(log, names), **told.signals}, proposal)
+    missing = missing_signals(signals)
+    tell("\n".join(_head(log, chosen)))
+    tell(channels_text(listed, _seen(log, listed, signals, chosen), signals, proposal))
+    tell(missing_text(options.log, missing, proposal))
+    if options.write is not None:
+        text = replace(told, signals=signals).toml()
+        write_atomically(options.write, text + unsure_toml(missing, proposal))
+        say(f"wrote {options.write}" + (": what is missing stands behind # in it" * bool(missing)))
+    return FAILS if missing else DONE
+
+
+def _run_of(log: LogFile, name: str) -> str | None:
+    names = log.runs()
+    if name and name not in names:
+        known = ", ".join(names) or "none apart"
+        raise ValueError(f"{log.path}: there is no run {name!r}, there are: {known}")
+    return name or (names[0] if names else None)
+
+
+def _head(log: LogFile, run: str | None) -> list[str]:
+    """Return what the file is, how it was understood, and its runs."""
+    runs = log.runs()
+    lines = [f"{log.path}: {log.format}", *(f"  {word}" for word in getattr(log, "dialect", ()))]
+    if len(runs) > 1:
+        some = ", ".join(runs[:12]) + (", ..." if len(runs) > 12 else "")
+        lines.append(f"  {len(runs)} runs: {some}; what follows is of {run}")
+    return lines
+
+
+def _seen(
+    log: LogFile, listed: Sequence[Listed], signals: Mapping[str, Signal], run: str | None
+) -> dict[str, Channel]:
+    """Return the channels whose ranges are told, by name."""
+    names = [one.name for one in listed]
+    if sum(one.samples for one in listed) > MOST_NUMBERS:
+        likely = {channel for signal in signals.values() for channel in signal.channel}
+        names = [name for name in names if name in likely]
+    return dict(zip(names, log.read(names, run), strict=True)) if names else {}
+
+
+def channels_text(
+    listed: Sequence[Listed],
+    seen: Mapping[str, Channel],
+    signals: Mapping[str, Signal],
+    proposal: Proposal,
+) -> str:
+    """Return the table of a log: channel, unit, rate, samples, range, and what it is taken for.
+
+    Parameters
+    ----------
+    listed : channels as the file lists them.
+    seen : those that were read, by name.
+    signals : how each signal would be read.
+    proposal : what the channels probably are.
+    """
+    rows = [["channel", "unit", "Hz", "samples", "from", "to", "is"]]
+    for one in listed:
+        channel = seen.get(one.name)
+        low = high = "?"
+        if channel is not None:
+            finite = channel.values[np.isfinite(channel.values)]
+            low, high = (f"{end:.4g}" for end in (finite.min(), finite.max())) if finite.size else (
+                "empty", "")  # fmt: skip
+        name = visible(one.name if len(one.name) <= LONGEST_NAME else f"{one.name[:44]}...")
+        rate = "?" if math.isnan(one.rate) else f"{one.rate:.4g}"
+        meant = _meaning(one.name, signals, proposal)
+        rows.append([name, visible(one.unit), rate, str(one.samples), low, high, meant])
+    return text_table(rows, "<<>>>><")
+
+
+def _meaning(channel: str, signals: Mapping[str, Signal], proposal: Proposal) -> str:
+    """Return what a channel is taken for, or may be."""
+    for name, signal in signals.items():
+        if channel in signal.channel:
+            guess = proposal.guesses.get(name)
+            sure = guess is not None and channel in guess.channel and guess.confidence < 1.0
+            told = f" ({guess.confidence:.0%})" if sure and guess is not None else ""
+            among = f", with {len(signal.channel) - 1} more" if len(signal.channel) > 1 else ""
+            return f"{column_of(name)}: {MEANINGS[name]}{told}{among}"
+    for name, guess in proposal.guesses.items():
+        for one in (guess, *proposal.rivals.get(name, ())):
+            if channel in one.channel and name not in signals:
+                hand = ", of the hand wheel: tell its ratio" if one.hand else ""
+                doubt = "; another is as likely" if name in proposal.rivals else ""
+                return f"perhaps {column_of(name)} ({one.confidence:.0%}){hand}{doubt}"
+    return ""
+
+
+def missing_text(log: str, missing: Sequence[str], proposal: Proposal) -> str:
+    """Return what is missing, and the words that would tell it.
+
+    Parameters
+    ----------
+    log : as it was typed.
+    missing : signals that are needed and not sure.
+    proposal : what the channels probably are.
+    """
+    if not missing:
+        return f"all that is needed is there: {', '.join(map(column_of, NEEDED))}"
+    lines = []
+    for name in missing:
+        likely = likely_text(name, proposal)
+        lines.append(
+            f"{column_of(name)} ({MEANINGS[name]}) is not sure: {likely}"
+            if likely
+            else f"{column_of(name)} ({MEANINGS[name]}) is missing"
+        )
+    words = [column_word(name, proposal) or f'"{column_of(name)}=CHANNEL"' for name in missing]
+    return "\n".join([*lines, f"tell it: tireid channels {log} --columns {' '.join(words)}"])
+
+
+def unsure_toml(missing: Sequence[str], proposal: Proposal) -> str:
+    """Return the tables of what is missing as comments, to be completed.
+
+    Parameters
+    ----------
+    missing : signals that are needed and not sure.
+    proposal : what the channels probably are.
+    """
+    blocks = []
+    for name in missing:
+        guess = proposal.guesses.get(name)
+        channel = "" if guess is None else " + ".join(guess.channel)
+        ratio = ["# ratio =   # of the steering: hand wheel over road wheels"]
+        wants_ratio = guess is not None and guess.hand
+        unit = "" if guess is None else guess.unit
+        blocks += ["", f"# [signals.{name}]", f"# channel = {channel!r}   # {MEANINGS[name]}"]
+        blocks += [f"# unit = {unit!r}", *(ratio if wants_ratio else [])]
+    return "".join(f"{line}\n" for line in blocks)
