@@ -21,6 +21,7 @@ from models.vehicle import GRAVITY, Vehicle
 WINDOW = 0.2  # [s]
 SLOWEST = 0.3  # of the 95th percentile of speed, below which a window does not count
 FEWEST, MOST = 20, 500  # windows: fewer say nothing, of more that many are taken all over the log
+PIECE, PIECES = 60.0, 10  # s, and how many of them are looked at of a drive of hours
 STIFFNESS = np.geomspace(1.0, 100.0, 28)  # c [1/rad]
 FRICTION = np.array([0.3, 0.5, 0.8, 1.2, 1.8, 3.0])  # μ [-]
 # A stiffness that is twice the told one costs as much as 14 % of what is left unexplained.
@@ -70,19 +71,50 @@ class Motion(NamedTuple):
     @classmethod
     def of(cls, recording: Recording) -> "Motion | None":
         """Return that of a recording, None where too little of it is driven."""
-        v_x, v_y, r = recording.v_x, recording.v_y, recording.r
-        speed = float(np.percentile(np.abs(v_x), 95))
-        fast = SLOWEST * speed
-        windows = driven_windows(recording, fast)
-        if len(windows) < FEWEST or fast == 0.0:
+        pieces = looked_at(recording)
+        speed = float(np.percentile(np.concatenate([np.abs(one.v_x) for one in pieces]), 95))
+        if speed == 0.0:
             return None
+        parts = [cls._of_piece(one, SLOWEST * speed) for one in pieces]
+        means, rates, shown = (np.concatenate([part[k] for part in parts], axis=1) for k in range(3))
+        m = means.shape[1]
+        some = np.arange(m) if m <= MOST else np.linspace(0, m - 1, MOST).astype(int)
+        if m < FEWEST:
+            return None
+        a_y = None if recording.a_y is None else shown[0, some]
+        return cls(*means[:, some], a_y, *rates[:, some], speed)
+
+    @staticmethod
+    def _of_piece(recording: Recording, fast: float) -> tuple[Array, Array, Array]:
+        """Return means, rates and what an accelerometer shows, a column each window."""
+        v_x, v_y, r, a_y = recording.v_x, recording.v_y, recording.r, recording.a_y
+        windows = driven_windows(recording, fast)
         over = np.where(np.abs(v_x) < fast, fast, v_x)
-        steering = recording.u
-        signals = np.column_stack([v_y, steering, v_x * r, r / over, v_y / over])
-        means = windows.mean(signals).T
+        signals = np.column_stack([v_y, recording.u, v_x * r, r / over, v_y / over])
         rates = windows.rate(np.column_stack([v_y, r, v_x * v_y])).T
-        a_y = None if recording.a_y is None else windows.mean(recording.a_y)
-        return cls(*means, a_y, *rates, speed)
+        shown = windows.mean(np.zeros_like(r) if a_y is None else a_y)[None]
+        return windows.mean(signals).T, rates, shown
+
+
+def looked_at(recording: Recording) -> tuple[Recording, ...]:
+    """Return the pieces of a drive that the screen looks at: all of a short one, some of a long.
+
+    Parameters
+    ----------
+    recording : of any length, of one stretch or several.
+    """
+    parts = [recording]
+    if recording.breaks:
+        parts = [recording.taken(np.arange(s.start, s.stop)) for s in recording.stretches]
+    n = round(PIECE / recording.dt)
+    total = sum(len(part) for part in parts)
+    if total <= PIECES * n:
+        return tuple(parts)
+    starts = [(part, k) for part in parts for k in range(0, max(len(part) - n, 0) + 1, n)]
+    some = np.unique(np.linspace(0, len(starts) - 1, PIECES).astype(int))
+    return tuple(
+        part.taken(np.arange(k, min(k + n, len(part)))) for part, k in (starts[j] for j in some)
+    )
 
 
 def driven_windows(recording: Recording, fast: float) -> Windows:
@@ -96,10 +128,7 @@ def driven_windows(recording: Recording, fast: float) -> Windows:
     starts = np.arange(0, max(len(recording) - n, 0), max(1, n // 2))
     total = np.concatenate([[0], np.cumsum(np.abs(recording.v_x) < fast)])
     drives = total[starts + n + 1] == total[starts] if starts.size else starts > 0
-    starts = starts[drives]
-    some = np.unique(np.linspace(0, max(starts.size - 1, 0), MOST).astype(int))
-    starts = starts[some] if starts.size > MOST else starts
-    return Windows(starts=starts, n=n, duration=n * recording.dt)
+    return Windows(starts=starts[drives], n=n, duration=n * recording.dt)
 
 
 def unexplained(motion: Motion, vehicle: Vehicle, reading: Reading) -> float:

@@ -28,13 +28,16 @@ FREEDOM = 0.5  # that a change must earn beside, whose factor is free
 FREE = ("steering", "other_car", "yaw_inertia")
 DEEPER = math.log(0.15)  # left of each equation, above which more changes are tried together
 KEPT = 8  # readings that are taken further
-MOST = 3  # changes at once
+MOST = 4  # changes at once
 STEERING = np.geomspace(1.0 / 2500.0, 4.0, 48)  # factors of the steering angle that are tried
 SAME_STEERING, SAME_SIZE, SAME_INERTIA = math.log(1.5), math.log(2.2), math.log(2.0)
 # within which nothing is gross
 SIZES = np.geomspace(1.0 / 32.0, 32.0, 41)
 INERTIAS = np.geomspace(1.0 / 16.0, 16.0, 17)
 STEEPNESS = 3.0  # of the confidence over what the next best reading leaves more
+
+
+PRICES = {"mph": 0.3, "mm/s": 0.3}  # of units that few loggers use
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,6 +51,7 @@ class Change:
     unit : in which they are logged, "" where that is right.
     factors : by field of a `Reading`, what takes it out.
     sideslip : whether v_y is the sideslip angle.
+    price : that it must earn beside that of every change, where it is less usual.
     """
 
     code: str
@@ -55,11 +59,15 @@ class Change:
     unit: str = ""
     factors: tuple[tuple[str, float], ...] = ()
     sideslip: bool = False
+    price: float = 0.0
 
     @property
     def fields(self) -> frozenset[str]:
-        """The fields of a reading that it changes, with what it does to them."""
-        kind = "sign" if self.code == "sign" else "size"
+        """The fields of a reading that it changes, with what it does to them.
+
+        Two changes of one thing exclude one another; a steering wheel may well be in degrees.
+        """
+        kind = {"sign": "sign", "steering": "ratio"}.get(self.code, "size")
         return frozenset(f"{name} {kind}" for name, _ in self.factors)
 
     def on(self, reading: Reading) -> Reading:
@@ -73,13 +81,15 @@ class Change:
         return reading._replace(**factors, sideslip=reading.sideslip or self.sideslip)
 
 
-def _changed(code: str, unit: str, factor: float, *channels: str) -> Change:
+def _changed(
+    code: str, unit: str, factor: float, *channels: str, price: float = 0.0
+) -> Change:
     factors = tuple((name.removesuffix("_f"), factor) for name in channels)
-    return Change(code=code, channels=channels, unit=unit, factors=factors)
+    return Change(code=code, channels=channels, unit=unit, factors=factors, price=price)
 
 
 def _unit(unit: str, factor: float, *channels: str) -> Change:
-    return _changed("unit", unit, factor, *channels)
+    return _changed("unit", unit, factor, *channels, price=PRICES.get(unit, 0.0))
 
 
 def _sign(*channels: str) -> Change:
@@ -92,6 +102,7 @@ CHANGES = (
     *(_unit(unit, factor, "v_x") for unit, factor in SPEEDS.items()),
     *(_unit(unit, factor, "v_y") for unit, factor in SPEEDS.items()),
     _unit("deg/s", DEGREE, "r"),
+    _unit("deg", DEGREE, "r", "delta_f"),
     *(
         Change(code="sideslip", channels=("v_y",), unit=unit, factors=(("v_y", one),), sideslip=True)
         for unit, one in {"rad": 1.0, "deg": DEGREE}.items()
@@ -122,7 +133,8 @@ class Explanation:
     def cost(self) -> float:
         """What it leaves and what its changes cost; a number that is free costs more."""
         free = sum(change.code in FREE for change in self.changes)
-        return self.left + GAIN * len(self.changes) + FREEDOM * free
+        prices = sum(GAIN + change.price for change in self.changes)
+        return self.left + prices + FREEDOM * free
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -183,7 +195,7 @@ def _longer(
     """Return an explanation with each change that it does not have yet."""
     taken = frozenset[str]().union(*(change.fields for change in one.changes))
     free = [change for change in changes if not change.fields & taken]
-    if "delta size" not in taken:
+    if "delta ratio" not in taken:
         free += _steerings(one, motion, vehicle)
     if "size size" not in taken and not one.changes:
         free += _scaled("other_car", "size", SIZES, SAME_SIZE, motion, vehicle)
@@ -200,11 +212,13 @@ def _longer(
 def _steerings(one: Explanation, motion: Motion, vehicle: Vehicle) -> list[Change]:
     """Return the factor of the steering angle that leaves least, where it is a gross one."""
 
+    told = one.reading.delta
     as_it_is = forces_and_slips(motion, vehicle, one.reading._replace(delta=0.0))
     rest = but_front_leaves(as_it_is, motion, vehicle, one.reading)
 
     def left(factor: float) -> float:
-        front = as_it_is.slip + np.stack([factor * motion.delta_f, 0.0 * motion.delta_f])
+        steering = told * factor * motion.delta_f
+        front = as_it_is.slip + np.stack([steering, 0.0 * steering])
         return rest + front_leaves(as_it_is._replace(slip=front), vehicle)
 
     tried = {float(factor): left(float(factor)) for factor in (*STEERING, *-STEERING)}

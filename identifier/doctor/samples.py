@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
+from identifier.doctor.consistency import looked_at
 from identifier.doctor.finding import Finding
 from models.recordings import Recording
 from models.recordings.repair import Repair
@@ -50,6 +51,15 @@ def sample_findings(recording: Recording) -> list[Finding]:
     ----------
     recording : as it was read.
     """
+    listed = [one for piece in looked_at(recording) for one in _piece_findings(piece)]
+    first: dict[tuple[str, str], Finding] = {}
+    for one in listed:
+        first.setdefault((one.code, one.channel), one)
+    return list(first.values())
+
+
+def _piece_findings(recording: Recording) -> list[Finding]:
+    """Return what is wrong with the samples of one stretch."""
     signals = channels(recording)
     found = [*_missing(recording, signals), *_copies(signals)]
     named = {one.channel for one in found}

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identifier.doctor.consistency import Motion, driven_windows
+from identifier.doctor.consistency import Motion, driven_windows, looked_at, PIECE
 from identifier.doctor.finding import Finding
 from identifier.doctor.readings import DEGREE, Change, Read, read
 from identifier.doctor.samples import sample_findings
@@ -73,7 +73,10 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
     if motion is None:
         return Screened(findings=(*samples, *told), repair=Repair(), blind="too little is driven")
     found = read(motion, vehicle)
-    gross = [reading_finding(change, found, vehicle) for change in found.best.changes]
+    gross = [
+        one for change in found.best.changes for one in reading_findings(change, found, vehicle)
+    ]
+    gross = one_steering(gross)
     repair = Repair()
     for one in gross:
         repair = repair if one.repair is None else repair.merged(one.repair)
@@ -83,7 +86,7 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
 
 
 def _throughout(finding: Finding, recording: Recording) -> bool:
-    return finding.size >= PERFECT * recording.duration
+    return finding.size >= PERFECT * min(recording.duration, PIECE - 2.0 * recording.dt)
 
 
 def quiet_finding(recording: Recording) -> Finding | None:
@@ -94,12 +97,12 @@ def quiet_finding(recording: Recording) -> Finding | None:
     recording : as it was read.
     """
     fast = max(float(np.percentile(np.abs(recording.v_x), 95)), 1e-9)
-    windows = driven_windows(recording, 0.3 * fast)
-    if len(windows) == 0:
-        peak = 0.0
-    else:
-        turn = np.abs(windows.mean(recording.v_x * recording.r))
-        peak = float(np.percentile(turn, 100.0 * (1.0 - LIVELY)))
+    turns = []
+    for piece in looked_at(recording):
+        windows = driven_windows(piece, 0.3 * fast)
+        if len(windows):
+            turns.append(np.abs(windows.mean(piece.v_x * piece.r)))
+    peak = float(np.percentile(np.concatenate(turns), 100.0 * (1.0 - LIVELY))) if turns else 0.0
     if peak >= QUIET:
         return None
     return Finding(
