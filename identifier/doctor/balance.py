@@ -1,0 +1,447 @@
+"""What the signals of a drive must agree on, whatever its tires are: residuals over faults.
+
+Kinematics, of a log with an accelerometer:  a_y = v̇_y + v_x r - g sin β.
+Dynamics, per axle in static axle loads:  dξ_i/dt + v_x r/g - sin β = h_i(α_i) cos δ_i, of an odd
+curve h_i = Σ_j w_j tanh(α/α_j) that nobody knows: the weights that fit best are taken for every
+size of the faults (variable projection).   ξ_i = v_y/g ± I_z r/(L F_z,i),
+α_i = δ_i - atan((v_y ± l_i r)/v_x).
+Both are asked in means over smooth windows ψ, ∫ψ ẋ dt = -∫ψ̇ x dt: no signal is differentiated.
+What a real car adds is estimated beside the faults and reported by nobody: the way it rolls before
+force follows slip, and the sway of its body, whose roll follows a_y, over the contact patches.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+from scipy.sparse import csr_array
+
+from codegen.arrays import Array
+from identifier.axle.curve import unit_matrix
+from identifier.verdict.motion import white_noise
+from models.recordings import Recording
+from models.vehicle import GRAVITY, Vehicle
+
+LADDER = (0.016, 0.032, 0.064, 0.128, 0.256)  # rad, slip scales of the curve
+RIDGE = 1e-3  # on its weights, over the mean power of its units
+# Of times in periods of the swings of the drive:
+WINDOW = 0.4  # length of ψ
+SMOOTHED = 0.05  # half the window by which every channel is smoothed alike
+SWAYED = 0.1  # half the window of what the roll of the body follows
+STEP = 0.015  # sampling interval after it
+FASTEST, SLOWEST = 4.0, 16.0  # periods of the swings that are believed, in sqrt(L/g)
+MARGIN = 0.8  # at both ends, what a delay may be, in sqrt(L/g)
+BRISK = 0.6  # speed in sqrt(g L) from which a window counts
+BANKS = 6  # cosines over the drive in which a bank may swing
+OVERLAP = 4  # windows that begin within the length of one
+WANDER = 0.03  # of a force: what no model of this size explains; of kinematics a third
+SMALL = 0.004  # static axle loads
+TYPICAL = 10.0  # slope of a curve [static axle loads per rad], for the noise that slip brings
+
+Sizes = Mapping[str, float]  # of faults, by key; what is not named is not there
+FRONT, REAR, KINEMATICS = range(3)
+STEERING = ("delta_f", "delta_r")
+RELAXATION = ("relaxation.front", "relaxation.rear")
+
+
+class Smooth(NamedTuple):
+    """A channel and its two first derivatives, (k,)."""
+
+    value: Array
+    slope: Array
+    bend: Array
+
+
+class Residual(NamedTuple):
+    """What the equations miss at some sizes of the faults.
+
+    parts : front, rear and, where a_y is there, kinematics, (m,) each, over what is allowed.
+    noise : mean square that white noise of the channels leaves in each.
+    """
+
+    parts: tuple[Array, ...]
+    noise: tuple[float, ...]
+
+
+class Car(NamedTuple):
+    """Geometry that holds if the told one is wrong: l_f and l_r [m], I_z/m [m²]."""
+
+    l_f: float
+    l_r: float
+    inertia: float
+
+    @classmethod
+    def of(cls, vehicle: Vehicle, sizes: Sizes) -> "Car":
+        """Return it.
+
+        Parameters
+        ----------
+        vehicle : as it was told.
+        sizes : of the faults.
+        """
+        back = sizes.get("center_of_gravity", 0.0)
+        per_mass = vehicle.yaw_inertia / vehicle.mass
+        return cls(
+            vehicle.l_f - back,
+            vehicle.l_r + back,
+            per_mass * math.exp(-sizes.get("yaw_inertia", 0.0)),
+        )
+
+
+class Balance:
+    """The equations of a drive, or of some stretches of it.
+
+    Parameters
+    ----------
+    stretches : of one drive, as it was logged, all of one sampling interval.
+    vehicle : as it was told.
+    """
+
+    def __init__(self, stretches: tuple[Recording, ...], vehicle: Vehicle) -> None:
+        self.vehicle = vehicle
+        dt = stretches[0].dt
+        self.period = swing(stretches, vehicle)
+        every = max(1, round(STEP * self.period / dt))
+        half = max(1, round(SMOOTHED * self.period / dt))
+        self.dt = every * dt
+        self.margin = round(MARGIN * vehicle.froude_time / self.dt) + 1
+        names = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")
+        self.names = [name for name in names if getattr(stretches[0], name) is not None]
+        smooth = {
+            name: [smoothed(getattr(one, name), half, dt, every) for one in stretches]
+            for name in self.names
+        }
+        self.white = {
+            name: float(np.median([white_noise(getattr(one, name)) for one in stretches]))
+            for name in self.names
+        }
+        sizes = [one.value.size for one in smooth["v_x"]]
+        ends = np.cumsum(sizes)
+        inside = [
+            np.arange(end - size + self.margin, end - self.margin)
+            for size, end in zip(sizes, ends, strict=True)
+        ]
+        self.at = np.concatenate(inside)
+        self.signals = {
+            name: Smooth(*(np.concatenate(one) for one in zip(*pieces, strict=True)))
+            for name, pieces in smooth.items()
+        }
+        clock = np.concatenate([one.t[::every] for one in stretches])[self.at]
+        share = (clock - clock[0]) / max(clock[-1] - clock[0], 1e-9)
+        self.banks = np.cos(math.pi * np.outer(share, np.arange(BANKS)))
+        sway = max(2, round(SWAYED * self.period / self.dt))
+        self._make_windows([one.size for one in inside], sway)
+        bell = np.hanning(2 * sway + 1)
+        self.jerk = np.gradient(np.pad(bell / bell.sum(), 1), self.dt)
+        self.jolt = np.gradient(np.pad(self.jerk, 1), self.dt)
+        self.norms = self._norms(half, every)
+        self.allowed, self.size = np.ones((len(self), 3)), np.ones(2)
+        if len(self):
+            self.allowed, self.size = self._allowed()
+
+    def __len__(self) -> int:
+        """Return how many windows there are."""
+        return int(self.starts.size)
+
+    @property
+    def has_accelerometer(self) -> bool:
+        """Whether kinematics can be asked."""
+        return "a_y" in self.names
+
+    @property
+    def independent(self) -> float:
+        """How many windows there are of which none overlaps another."""
+        return len(self) / OVERLAP
+
+    def _make_windows(self, lengths: list[int], sway: int) -> None:
+        """Place windows in which the car drives, and none across two stretches."""
+        length = max(6, round(WINDOW * self.period / self.dt))
+        stride = max(1, length // OVERLAP)
+        places, begin = [], 0
+        for n in lengths:
+            places.append(begin + np.arange(sway, max(n - sway - length, sway), stride))
+            begin += n
+        starts = np.concatenate(places)
+        slow = self.signals["v_x"].value[self.at] < BRISK * self.vehicle.froude_speed
+        total = np.concatenate([[0], np.cumsum(slow)])
+        self.starts = starts[total[starts + length] == total[starts]]
+        psi = np.hanning(length)  # zero at its ends, so that sums by parts are exact
+        self.psi = psi / psi.sum()
+        self.psi_dot = np.gradient(np.pad(self.psi, 1), self.dt)[1:-1]
+        self.mean, self.rate = self._matrix(self.psi), self._matrix(-self.psi_dot)
+
+    def _matrix(self, weights: Array) -> csr_array:
+        rows = np.repeat(np.arange(self.starts.size), weights.size)
+        columns = (self.starts[:, None] + np.arange(weights.size)).ravel()
+        values = np.tile(weights, self.starts.size)
+        return csr_array((values, (rows, columns)), shape=(self.starts.size, self.at.size))
+
+    def _norms(self, half: int, every: int) -> tuple[float, float]:
+        """Return the power that smoothing and ψ, or ψ̇, leave of white noise of every sample."""
+        bell = window(half)
+        powers = []
+        for kernel in (self.psi, self.psi_dot):
+            spread = np.zeros(every * (kernel.size - 1) + 1)
+            spread[::every] = kernel
+            whole = np.convolve(spread, bell)
+            powers.append(float(whole @ whole))
+        return powers[0], powers[1]
+
+    # The equations.
+
+    def channels(self, sizes: Sizes) -> dict[str, Array]:
+        """Return the channels without the faults, (n,) each.
+
+        Parameters
+        ----------
+        sizes : of the faults, by key.
+        """
+        get, out = sizes.get, {}
+        for name in self.names:
+            factor = math.exp(-get(f"factor.{name}", 0.0))
+            value, slope = self._later(self.signals[name], get(f"delay.{name}", 0.0))
+            signal = factor * (value + get(f"lag.{name}", 0.0) * slope)
+            out[name] = signal - get(f"offset.{name}", 0.0)
+        angle = get("velocity_sensor_angle", 0.0)
+        c, s = math.cos(angle), math.sin(angle)
+        v_x, v_y = out["v_x"], out["v_y"]
+        out["v_x"] = np.maximum(c * v_x - s * v_y, 0.3 * self.vehicle.froude_speed)
+        out["v_y"] = c * v_y + s * v_x - get("velocity_sensor_x", 0.0) * out["r"]
+        return out
+
+    def _later(self, signal: Smooth, delay: float) -> tuple[Array, Array]:
+        """Return value and slope of a channel at t + delay, by cubics between samples."""
+        most = self.margin - 1
+        ahead = min(max(delay / self.dt, -most), most - 1e-9)
+        k = math.floor(ahead)
+        f, a, b = ahead - k, self.at + k, self.at + k + 1
+        if f == 0.0:
+            return signal.value[a], signal.slope[a]
+        value, slope, bend, h = signal.value, signal.slope, signal.bend, self.dt
+        return (
+            cubic(value[a], value[b], slope[a], slope[b], f, h),
+            cubic(slope[a], slope[b], bend[a], bend[b], f, h),
+        )
+
+    def _bank(self, sizes: Sizes) -> Array:
+        """Return sin β (n,)."""
+        swings = np.array([sizes.get(f"bank.{k}", 0.0) for k in range(BANKS)])
+        return np.asarray(np.sin(self.banks @ swings), dtype=np.float64)
+
+    def _force(self, x: Mapping[str, Array], car: Car, bank: Array) -> Array:
+        """Return mean forces that the motion shows [static axle loads], (m, 2)."""
+        g = GRAVITY
+        rates = self.rate @ np.column_stack([x["v_y"], x["r"]])
+        lateral = rates[:, 0] / g + self.mean @ (x["v_x"] * x["r"] / g - bank)
+        yaw = car.inertia * rates[:, 1] / g
+        return np.column_stack([lateral + yaw / car.l_r, lateral - yaw / car.l_f])
+
+    def _slip(self, x: Mapping[str, Array], car: Car, sizes: Sizes) -> Array:
+        """Return slip angles as force follows them [rad], (n, 2)."""
+        v_x, v_y, r = x["v_x"], x["v_y"], x["r"]
+        a_y_dot = np.convolve(v_y, self.jolt, "same") + np.convolve(v_x * r, self.jerk, "same")
+        later = sizes.get("roll_delay", 0.0)
+        steps = np.arange(self.at.size) * self.dt
+        sideways = v_y + sizes.get("sway", 0.0) * np.interp(steps - later, steps, a_y_dot)
+        slip = np.column_stack(
+            [
+                x["delta_f"] - np.arctan((sideways + car.l_f * r) / v_x),
+                x["delta_r"] - np.arctan((sideways - car.l_r * r) / v_x),
+            ]
+        )
+        rolled = np.concatenate([[0.0], np.cumsum(0.5 * (v_x[1:] + v_x[:-1]) * self.dt)])
+        for i, name in enumerate(RELAXATION):
+            length = sizes.get(name, 0.0) * self.vehicle.wheelbase
+            slip[:, i] = np.interp(rolled - length, rolled, slip[:, i])
+        return slip
+
+    def residual(self, sizes: Sizes) -> Residual:
+        """Return what the equations miss.
+
+        Parameters
+        ----------
+        sizes : of the faults, by key.
+        """
+        x, car, bank = self.channels(sizes), Car.of(self.vehicle, sizes), self._bank(sizes)
+        force, slip = self._force(x, car, bank), self._slip(x, car, sizes)
+        v_x = self.mean @ x["v_x"]
+        scales = np.array(LADDER)
+        parts, noise = [], []
+        for i, steering in enumerate(STEERING):
+            units = unit_matrix(slip[:, i], LADDER) * np.cos(x[steering])[:, None]
+            basis = (self.mean @ units) / self.allowed[:, i : i + 1]
+            y = force[:, i] / self.allowed[:, i]
+            w = rising(basis, y)
+            # Over the size of the force: to shrink it, by a factor of r, explains nothing.
+            size = self.size[i] / max(math.sqrt(float(y @ y) / y.size), 1e-9)
+            parts.append((y - basis @ w) * size)
+            slope = (1.0 - unit_matrix(self.mean @ slip[:, i], LADDER) ** 2) @ (w / scales)
+            left = self._noise(i, sizes, car, v_x, slope) / self.allowed[:, i] ** 2
+            noise.append(float(np.mean(left)) * size**2)
+        if self.has_accelerometer:
+            parts.append(self._kinematics(x, bank, sizes) / self.allowed[:, KINEMATICS])
+            left = self._noise(KINEMATICS, sizes, car, v_x, v_x)
+            noise.append(float(np.mean(left / self.allowed[:, KINEMATICS] ** 2)))
+        return Residual(tuple(parts), tuple(noise))
+
+    def _kinematics(self, x: Mapping[str, Array], bank: Array, sizes: Sizes) -> Array:
+        g, ahead = GRAVITY, sizes.get("acceleration_sensor_x", 0.0)
+        rates = self.rate @ np.column_stack([x["v_y"], x["r"]])
+        means = self.mean @ (x["a_y"] - x["v_x"] * x["r"] + g * bank)
+        return np.asarray((means - rates[:, 0] - ahead * rates[:, 1]) / g, dtype=np.float64)
+
+    # Noise. Faults that merely make the noise smaller must not look true.
+
+    def _noise(self, part: int, sizes: Sizes, car: Car, v_x: Array, slope: Array) -> Array:
+        """Return the variance that white noise leaves in a part [weights²], (m,).
+
+        Slip is behind by the way of relaxation, ψ(t + τ) = ψ + τ ψ̇: then noise of slip and of
+        what is like a derivative have something in common.
+        """
+        get, g = sizes.get, GRAVITY
+        mean, rate = self.norms
+
+        def variance(name: str) -> float:
+            return float((self.white[name] * math.exp(-get(f"factor.{name}", 0.0))) ** 2)
+
+        v_y, r, ahead = variance("v_y"), variance("r"), get("velocity_sensor_x", 0.0)
+        if part == KINEMATICS:
+            yaw = get("acceleration_sensor_x", 0.0) - ahead
+            of_r = v_x**2 * mean + yaw**2 * rate
+            return np.asarray((v_y * rate + r * of_r + variance("a_y") * mean) / g**2)
+        arm = (car.l_f, -car.l_r)[part] - ahead
+        yaw = car.inertia / (car.l_r, -car.l_f)[part] - ahead
+        per_speed = slope / v_x
+        late = get(RELAXATION[part], 0.0) * self.vehicle.wheelbase / v_x
+        of_v_y = rate / g**2 + per_speed**2 * mean - 2.0 * late * per_speed * rate / g
+        of_r = rate * (yaw / g) ** 2 + (v_x / g + per_speed * arm) ** 2 * mean
+        of_r = of_r - 2.0 * late * per_speed * arm * yaw * rate / g
+        return np.asarray(v_y * of_v_y + r * of_r + variance(STEERING[part]) * slope**2 * mean)
+
+    def _allowed(self) -> tuple[Array, Array]:
+        """Return what may be missed, noise and a share of the force, (m, 3), and rms forces (2,)."""
+        x, car = self.channels({}), Car.of(self.vehicle, {})
+        force = self._force(x, car, np.zeros(self.at.size))
+        v_x = self.mean @ x["v_x"]
+        slope = np.full(len(self), TYPICAL)
+        parts = (FRONT, REAR, KINEMATICS) if self.has_accelerometer else (FRONT, REAR, REAR)
+        noise = np.column_stack([self._noise(i, {}, car, v_x, slope) for i in parts])
+        size = np.abs(force)
+        share = WANDER * np.column_stack([size, size.mean(axis=1) / 3.0])
+        allowed = np.sqrt(noise + share**2 + SMALL**2)
+        rms = np.sqrt(np.mean((force / allowed[:, :2]) ** 2, axis=0))
+        return allowed, rms
+
+
+def rising(basis: Array, y: Array) -> Array:
+    """Return weights of least squares, none negative: a curve that rises ever less (k,).
+
+    Without that an odd curve can pass through zero at some slip, and hide an offset of it.
+
+    Parameters
+    ----------
+    basis : (m, k).
+    y : (m,).
+    """
+    gram = basis.T @ basis
+    k = gram.shape[0]
+    R = np.linalg.cholesky(gram + (RIDGE * np.trace(gram) / k + 1e-12) * np.eye(k))
+    weights, _ = nnls(R.T, np.linalg.solve(R, basis.T @ y))
+    return np.asarray(weights, dtype=np.float64)
+
+
+# Signals.
+
+
+def window(half: int) -> Array:
+    """Return a Hann window of sum one, (2 half + 1,).
+
+    Parameters
+    ----------
+    half : samples on each side of its middle.
+    """
+    bell = np.hanning(2 * half + 3)[1:-1]
+    return np.asarray(bell / bell.sum(), dtype=np.float64)
+
+
+def smoothed(signal: Array, half: int, dt: float, every: int) -> Smooth:
+    """Return a channel without its fastest noise, and thinned.
+
+    Parameters
+    ----------
+    signal : samples (n,).
+    half : of the window.
+    dt : sampling interval [s].
+    every : which samples are kept.
+    """
+    padded = np.pad(signal, half, mode="reflect", reflect_type="odd")
+    value = np.convolve(padded, window(half), "valid")
+    slope = np.gradient(value, dt)
+    bend = np.gradient(slope, dt)
+    return Smooth(*(one[::every].copy() for one in (value, slope, bend)))
+
+
+def cubic(a: Array, b: Array, slope_a: Array, slope_b: Array, share: float, step: float) -> Array:
+    """Return Hermite's cubic between samples.
+
+    Parameters
+    ----------
+    a, b : values at both ends (n,).
+    slope_a, slope_b : slopes there (n,).
+    share : of the step that is gone.
+    step : from a to b.
+    """
+    f, e = share, 1.0 - share
+    inside: Array = (
+        e * e * (1.0 + 2.0 * f) * a
+        + f * f * (1.0 + 2.0 * e) * b
+        + step * f * e * (e * slope_a - f * slope_b)
+    )
+    return inside
+
+
+def swing(stretches: tuple[Recording, ...], vehicle: Vehicle) -> float:
+    """Return the period of the swings that move the car most [s], by the power of yaw rate.
+
+    Parameters
+    ----------
+    stretches : of the drive.
+    vehicle : the car, by whose size a period is believed.
+    """
+    time, dt = vehicle.froude_time, stretches[0].dt
+    half = max(1, round(0.3 * time / dt))
+    smooth = [smoothed(one.r - np.mean(one.r), half, dt, 1) for one in stretches]
+    turning = math.sqrt(sum(float(one.value @ one.value) for one in smooth))
+    changing = math.sqrt(sum(float(one.slope @ one.slope) for one in smooth))
+    period = 2.0 * math.pi * turning / max(changing, 1e-9)
+    return float(np.clip(period, FASTEST * time, SLOWEST * time))
+
+
+def stretches_of(
+    recording: Recording, vehicle: Vehicle, *, longest: float, pieces: int
+) -> tuple[Recording, ...]:
+    """Return the recording, or of a long one the liveliest stretch of each of its parts.
+
+    Parameters
+    ----------
+    recording : the drive.
+    vehicle : the car.
+    longest : that is looked at as a whole [s]; the stretches have it together.
+    pieces : how many stretches.
+    """
+    n, dt = len(recording), recording.dt
+    if recording.duration <= longest:
+        return (recording,)
+    length = int(longest / pieces / dt)
+    lively = np.where(recording.v_x > BRISK * vehicle.froude_speed, recording.r**2, 0.0)
+    total = np.concatenate([[0.0], np.cumsum(lively)])
+    bounds: NDArray[np.intp] = np.linspace(0, n, pieces + 1).astype(np.intp)
+    found = []
+    for first, last in zip(bounds[:-1], bounds[1:], strict=True):
+        starts = np.arange(first, last - length, max(1, length // 10))
+        best = int(starts[np.argmax(total[starts + length] - total[starts])])
+        found.append(recording.between(recording.t[best], recording.t[best + length]))
+    return tuple(found)

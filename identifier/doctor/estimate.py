@@ -1,0 +1,185 @@
+"""The faults of a log and of what is told of its car, estimated together, with no tire known.
+
+One fault after the other is taken in, the one that explains most, as long as it explains more than
+chance and the model do; then all of them are estimated together. Faults that explain nearly as
+much are named beside it: this drive cannot tell them apart.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from identifier.doctor.balance import BANKS, Balance, Sizes, stretches_of
+from identifier.doctor.finding import Finding
+from identifier.doctor.fit import Fit, Fitter
+from identifier.doctor.suspects import SUSPECTS, Suspect
+from models.recordings import Recording
+from models.vehicle import Vehicle
+
+LONGEST, PIECES = 120.0, 6  # s that are looked at, and from how many parts of a longer log
+FEWEST = 24  # windows, below which nothing is asked
+MOST = 4  # faults at once
+CHANCE = 6.0  # gain of J that a fault must bring
+TELLING = 2.5  # deviations, with the least size of the suspect in them, that it must have
+ALIKE = 3.0  # gain of J within which two faults cannot be told apart
+TEMPER = 2.0  # odds of e per this gain of J: the model is not exact
+BELIEVED = 5.0  # plausible sizes, beyond which nobody believes one
+
+
+class Candidate(NamedTuple):
+    """A suspect, its fit beside what is already there, and what it gains of J."""
+
+    suspect: Suspect
+    fit: Fit
+    gain: float
+
+
+class Found(NamedTuple):
+    """A fault that was taken in, and those that this drive cannot tell from it."""
+
+    suspect: Suspect
+    gain: float
+    alike: tuple[Candidate, ...]
+
+
+class Search:
+    """The search for what is wrong with one drive.
+
+    Parameters
+    ----------
+    balance : of the drive.
+    """
+
+    def __init__(self, balance: Balance) -> None:
+        self.balance, self.vehicle = balance, balance.vehicle
+        self.fitter = Fitter(balance)
+        self.suspects = [
+            one for one in SUSPECTS if balance.has_accelerometer or one.channel != "a_y"
+        ]
+        self.found: list[Found] = []
+        self.fit = self.fitter.fit((), {})
+
+    def keys(self, suspect: Suspect) -> list[str]:
+        """Return the keys of its sizes.
+
+        Parameters
+        ----------
+        suspect : of which a bank has several.
+        """
+        if suspect.code != "bank":
+            return [suspect.key]
+        return [f"bank.{k}" for k in range(BANKS if self.balance.has_accelerometer else 1)]
+
+    @property
+    def chosen(self) -> list[str]:
+        """Keys of what was taken in."""
+        return [key for one in self.found for key in self.keys(one.suspect)]
+
+    def size(self, suspect: Suspect, sizes: Sizes) -> float:
+        """Return the size of a suspect: of a bank, its rms over the drive.
+
+        Parameters
+        ----------
+        suspect : whose keys are among the sizes.
+        sizes : by key.
+        """
+        if suspect.code != "bank":
+            return sizes[suspect.key]
+        swings = np.array([sizes.get(f"bank.{k}", 0.0) for k in range(BANKS)])
+        angle = self.balance.banks @ swings
+        return math.copysign(math.sqrt(float(np.mean(angle**2))), float(np.mean(angle)))
+
+    def deviation(self, suspect: Suspect, fit: Fit) -> float:
+        """Return the standard deviation of a suspect's size, with what no model tells.
+
+        Parameters
+        ----------
+        suspect : whose keys are among those of the fit.
+        fit : with it.
+        """
+        least = suspect.least * suspect.scale(self.vehicle)
+        return math.hypot(fit.deviation(self.keys(suspect)[0]), least)
+
+    def candidates(self) -> list[Candidate]:
+        """Return the suspects beside what is there already, the one that gains most first."""
+        listed = []
+        for suspect in self.suspects:
+            keys = self.keys(suspect)
+            if keys[0] in self.chosen:
+                continue
+            fit = self.fitter.fit([*self.chosen, *keys], self.fit.sizes)
+            gain = self.fit.J - fit.J - 0.5 * (len(keys) - 1)
+            if self._believed(suspect, fit):
+                listed.append(Candidate(suspect, fit, gain))
+        return sorted(listed, key=lambda one: -one.gain)
+
+    def _believed(self, suspect: Suspect, fit: Fit) -> bool:
+        size = self.size(suspect, fit.sizes)
+        most = BELIEVED * suspect.plausible * suspect.scale(self.vehicle)
+        telling = abs(size) > TELLING * self.deviation(suspect, fit)
+        return abs(size) < most and telling and (suspect.signed or size > 0.0)
+
+    def run(self) -> None:
+        """Take in one fault after the other."""
+        while len(self.found) < MOST:
+            listed = self.candidates()
+            if not listed or listed[0].gain < CHANCE:
+                break
+            best, *rest = listed
+            alike = tuple(one for one in rest if one.gain > max(best.gain - ALIKE, 0.5 * best.gain))
+            self.found.append(Found(best.suspect, best.gain, alike))
+            self.fit = self.fitter.fit(self.chosen, best.fit.sizes)
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Return what was found: what explains most first, followed by what may be it instead."""
+        listed: list[Finding] = []
+        for one in self.found:
+            gains = [CHANCE, one.gain, *(other.gain for other in one.alike)]
+            odds = np.exp((np.array(gains) - one.gain) / TEMPER)
+            shares = odds / odds.sum()
+            names = [other.suspect for other in one.alike]
+            listed.append(self._finding(one.suspect, self.fit, float(shares[1]), names))
+            for other, share in zip(one.alike, shares[2:].tolist(), strict=True):
+                names = [one.suspect]
+                listed.append(self._finding(other.suspect, other.fit, share, names))
+        return tuple(listed)
+
+    def _finding(
+        self, suspect: Suspect, fit: Fit, confidence: float, alike: list[Suspect]
+    ) -> Finding:
+        size, deviation = self.size(suspect, fit.sizes), self.deviation(suspect, fit)
+        text = suspect.words(size, deviation)
+        if alike:
+            others = ", ".join(f"{one.code} {one.channel}".strip() for one in alike)
+            text += f"; this drive cannot tell it from: {others}"
+        factor = suspect.is_factor
+        repair = suspect.repair(size, self.vehicle)
+        return Finding(
+            code=suspect.code,
+            channel=suspect.channel,
+            size=math.exp(size) if factor else size,
+            deviation=math.exp(size) * deviation if factor else deviation,
+            unit=suspect.unit,
+            confidence=confidence,
+            text=text,
+            repair=repair,
+            sure=repair is not None and not alike and confidence > 0.95,
+        )
+
+
+def estimate(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
+    """Return the faults of a log and of what is told of its car, what explains most first.
+
+    Parameters
+    ----------
+    recording : as it was logged; of a long one lively stretches are looked at.
+    vehicle : as it was told; its cornering stiffnesses are not looked at.
+    """
+    stretches = stretches_of(recording, vehicle, longest=LONGEST, pieces=PIECES)
+    balance = Balance(stretches, vehicle)
+    if len(balance) < FEWEST:
+        return ()
+    search = Search(balance)
+    search.run()
+    return search.findings()

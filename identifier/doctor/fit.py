@@ -1,0 +1,158 @@
+"""Sizes of faults that fit best, by Gauss-Newton on the balance with what is believed beforehand.
+
+J(θ) = Σ_e n_e/2 ln S_e(θ) + Σ_j (θ_j - θ̄_j)²/(2 s_j²), with the mean square S_e of what equation e
+misses and the number n_e of its windows that do not overlap: its level is not known beforehand.
+From S_e the noise is taken off as far as it changes with θ: a factor that merely makes noise
+smaller, or a delay that lets the noise of two sides cancel, gains nothing by it.
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from codegen.arrays import Array
+from identifier.doctor.balance import Balance, Residual, Sizes
+from identifier.doctor.suspects import NUISANCES, SUSPECTS, grown
+
+FLOOR = 0.3  # of S: below it a residual tells nothing more
+STEP = 0.02  # of a standard deviation, for slopes
+ITERATIONS, CLOSE = 10, 0.01  # of J
+TRIES, DAMPED = 5, 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fit:
+    """Sizes that fit best.
+
+    Parameters
+    ----------
+    sizes : by key, those of the nuisances with them.
+    J : at them; smaller is better, by one for odds of e.
+    covariance : of the sizes in the order of their keys (k, k), of white residuals.
+    misses : mean square of each part.
+    """
+
+    sizes: Sizes
+    J: float
+    covariance: Array
+    misses: tuple[float, ...]
+
+    def deviation(self, key: str) -> float:
+        """Return the standard deviation of a size.
+
+        Parameters
+        ----------
+        key : of the size.
+        """
+        place = list(self.sizes).index(key)
+        return math.sqrt(max(float(self.covariance[place, place]), 0.0))
+
+
+class Fitter:
+    """What is believed of a car's faults, and the balance that judges them.
+
+    Parameters
+    ----------
+    balance : of the drive.
+    """
+
+    def __init__(self, balance: Balance) -> None:
+        self.balance = balance
+        self.mean: dict[str, float] = {}
+        self.sd: dict[str, float] = {}
+        for key, (mean, sd, grows) in NUISANCES.items():
+            scale = grown(grows, balance.vehicle)
+            self.mean[key], self.sd[key] = mean * scale, sd * scale
+        for one in SUSPECTS:
+            self.sd[one.key] = one.plausible * one.scale(balance.vehicle)
+        self.usual = balance.residual(self.mean).noise
+
+    def misses(self, found: Residual) -> list[float]:
+        """Return S of each part.
+
+        Parameters
+        ----------
+        found : the residual.
+        """
+        return [
+            max(float(part @ part) / part.size - noise + usual, 0.1 * usual) + FLOOR
+            for part, noise, usual in zip(found.parts, found.noise, self.usual, strict=True)
+        ]
+
+    def cost(self, found: Residual, sizes: Sizes) -> float:
+        """Return J.
+
+        Parameters
+        ----------
+        found : the residual at the sizes.
+        sizes : by key.
+        """
+        n = self.balance.independent
+        believed = sum(self._away(key, size) ** 2 for key, size in sizes.items())
+        return 0.5 * n * sum(map(math.log, self.misses(found))) + 0.5 * believed
+
+    def _away(self, key: str, size: float) -> float:
+        return (size - self.mean.get(key, 0.0)) / self._sd(key)
+
+    def _sd(self, key: str) -> float:
+        return self.sd["bank" if key.startswith("bank") else key]
+
+    def fit(self, keys: Iterable[str], start: Mapping[str, float]) -> Fit:
+        """Return the sizes that fit best, from a start on.
+
+        Parameters
+        ----------
+        keys : of the faults; the nuisances are always there.
+        start : sizes to begin with; what is not named begins as it is believed.
+        """
+        names = list(dict.fromkeys([*NUISANCES, *keys]))
+        sizes = {key: start.get(key, self.mean.get(key, 0.0)) for key in names}
+        sd = np.array([self._sd(key) for key in names])
+        found = self.balance.residual(sizes)
+        J, damping = self.cost(found, sizes), 0.0
+        H = np.eye(len(names))
+        for _ in range(ITERATIONS):
+            gradient, H = self._slopes(found, sizes, names, sd)
+            better = None
+            for _ in range(TRIES):
+                step = -np.linalg.solve(H + damping * np.diag(np.diag(H)), gradient) * sd
+                tried = {key: sizes[key] + d for key, d in zip(names, step.tolist(), strict=True)}
+                there = self.balance.residual(tried)
+                cost = self.cost(there, tried)
+                if cost < J:
+                    better = tried, there, cost
+                    break
+                damping = max(4.0 * damping, DAMPED)
+            if better is None:
+                break
+            gained = J - better[2]
+            sizes, found, J = better
+            damping = damping / 4.0 if damping > 0.2 * DAMPED else 0.0
+            if gained < CLOSE:
+                break
+        covariance = np.asarray(np.linalg.inv(H) * np.outer(sd, sd), dtype=np.float64)
+        return Fit(sizes=sizes, J=J, covariance=covariance, misses=tuple(self.misses(found)))
+
+    def _slopes(
+        self, found: Residual, sizes: Sizes, names: list[str], sd: Array
+    ) -> tuple[Array, Array]:
+        """Return gradient and curvature of J, per standard deviation of what is believed."""
+        n, misses = self.balance.independent, self.misses(found)
+        weight = [
+            math.sqrt(n / (part.size * S)) for part, S in zip(found.parts, misses, strict=True)
+        ]
+
+        def stacked(one: Residual) -> Array:
+            return np.concatenate([w * part for w, part in zip(weight, one.parts, strict=True)])
+
+        here = stacked(found)
+        slopes, noise = np.empty((here.size, len(names))), np.empty(len(names))
+        for k, key in enumerate(names):
+            there = self.balance.residual({**sizes, key: sizes[key] + STEP * float(sd[k])})
+            slopes[:, k] = (stacked(there) - here) / STEP
+            more = zip(there.noise, found.noise, misses, strict=True)
+            noise[k] = sum(0.5 * n / S * (b - a) for b, a, S in more) / STEP
+        away = np.array([self._away(key, sizes[key]) for key in names])
+        return slopes.T @ here - noise + away, slopes.T @ slopes + np.eye(len(names))

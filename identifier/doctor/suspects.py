@@ -1,0 +1,163 @@
+"""Which numbers may be wrong, how wrong they plausibly are, and what takes each of them out.
+
+Sizes are those of a sedan, 2.7 m between the axles; a car of another size has them by Froude's
+similarity: lengths with L, speeds with sqrt(g L), times with sqrt(L/g), angles as they are.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from models.recordings import Repair
+from models.vehicle import Vehicle
+
+SEDAN = 2.7  # m, wheelbase of whose size the numbers are
+DEGREE = math.degrees(1.0)
+POWERS: Mapping[str, float] = {"": 0.0, "length": 1.0, "speed": 0.5, "time": 0.5, "rate": -0.5}
+
+
+def grown(grows: str, vehicle: Vehicle) -> float:
+    """Return the size of something of a car over that of a sedan.
+
+    Parameters
+    ----------
+    grows : with what: one of `POWERS`, by powers of the wheelbase.
+    vehicle : the car.
+    """
+    return float((vehicle.wheelbase / SEDAN) ** POWERS[grows])
+
+
+class Suspect(NamedTuple):
+    """A number that may be wrong.
+
+    key : of its size in `balance.Sizes`.   code, channel, unit : as in `Finding`.
+    plausible : standard deviation of what is believed [SI], of a sedan.   least : what nobody need
+    mend, and what no model of this size tells from a tire.   grows : with the size of a car.
+    signed : whether it may be negative.   text : with {size} and {deviation} in `shown`.
+    shown : unit of the text.   per_unit : of the text per SI unit.
+    """
+
+    key: str
+    code: str
+    channel: str
+    unit: str
+    plausible: float
+    least: float
+    grows: str
+    signed: bool
+    text: str
+    shown: str
+    per_unit: float = 1.0
+
+    def scale(self, vehicle: Vehicle) -> float:
+        """Return what `plausible` and `least` are multiplied by for a car.
+
+        Parameters
+        ----------
+        vehicle : the car.
+        """
+        return grown(self.grows, vehicle)
+
+    @property
+    def is_factor(self) -> bool:
+        """Whether its size in `Sizes` is the logarithm of a factor."""
+        return self.code in ("factor", "yaw_inertia")
+
+    def repair(self, size: float, vehicle: Vehicle) -> Repair | None:
+        """Return what takes it out, None for what no repair does.
+
+        Parameters
+        ----------
+        size : as in `Sizes`.
+        vehicle : as it was told.
+        """
+        numbers: dict[str, Any] = {self.code: size}
+        match self.code:
+            case "bank":
+                return None
+            case "factor":
+                numbers = {"factor": {self.channel: math.exp(-size)}}
+            case "offset" | "delay" | "lag":
+                numbers = {self.code: {self.channel: size}}
+            case "yaw_inertia":
+                numbers = {"vehicle": {"yaw_inertia": vehicle.yaw_inertia * math.exp(-size)}}
+            case "center_of_gravity":
+                right = {"l_f": vehicle.l_f - size, "l_r": vehicle.l_r + size}
+                numbers = {"vehicle": right}
+        return Repair(**numbers)
+
+    def words(self, size: float, deviation: float) -> str:
+        """Return it in words.
+
+        Parameters
+        ----------
+        size, deviation : as in `Sizes`.
+        """
+        if self.is_factor:
+            size, deviation = math.exp(size), math.exp(size) * deviation
+        shown = f"{size * self.per_unit:.3g} ± {abs(deviation) * self.per_unit:.2g}{self.shown}"
+        return self.text.format(size=shown)
+
+
+def _channels() -> tuple[Suspect, ...]:
+    offsets = (
+        ("v_y", "m/s", 0.4, 0.02, "speed", "v_y reads {size} too much", " m/s", 1.0),
+        ("r", "rad/s", 0.03, 0.002, "rate", "the yaw rate reads {size} too much", " rad/s", 1.0),
+        ("a_y", "m/s^2", 0.7, 0.05, "", "the lateral acceleration reads {size} too much",
+         " m/s²", 1.0),
+        ("delta_f", "rad", 0.03, 0.0015, "", "the steering angle reads {size} too much",
+         "°", DEGREE),
+    )  # fmt: skip
+    found = [
+        Suspect(f"offset.{name}", "offset", name, unit, plausible, least, grows, True, text,
+                shown, per_unit)
+        for name, unit, plausible, least, grows, text, shown, per_unit in offsets
+    ]  # fmt: skip
+    words = {
+        "v_x": "v_x",
+        "v_y": "v_y",
+        "r": "the yaw rate",
+        "delta_f": "the steering angle",
+        "a_y": "the lateral acceleration",
+    }
+    for name in ("v_y", "r", "delta_f", "a_y"):
+        found.append(Suspect(
+            f"delay.{name}", "delay", name, "s", 0.12, 0.004, "time", True,
+            f"{words[name]} is {{size}} late against the other channels", " ms", 1e3,
+        ))  # fmt: skip
+        found.append(Suspect(
+            f"lag.{name}", "lag", name, "s", 0.15, 0.004, "time", False,
+            f"{words[name]} lags behind a low pass of {{size}}", " ms", 1e3,
+        ))  # fmt: skip
+    found += [
+        Suspect(f"factor.{name}", "factor", name, "", plausible, least, "", True,
+                f"{words[name]} reads {{size}} times too much", "")
+        for name, plausible, least in (
+            ("v_x", 0.15, 0.01), ("v_y", 0.2, 0.015), ("r", 0.15, 0.01), ("delta_f", 0.2, 0.012),
+            ("a_y", 0.15, 0.01),
+        )
+    ]  # fmt: skip
+    return tuple(found)
+
+
+SUSPECTS = (
+    *_channels(),
+    Suspect("velocity_sensor_angle", "velocity_sensor_angle", "v_y", "rad", 0.02, 0.0012, "", True,
+            "the velocity sensor is turned by {size} (+: to the left)", "°", DEGREE),
+    Suspect("velocity_sensor_x", "velocity_sensor_x", "v_y", "m", 0.8, 0.04, "length", True,
+            "the velocity is measured {size} ahead of the center of gravity", " m"),
+    Suspect("acceleration_sensor_x", "acceleration_sensor_x", "a_y", "m", 0.8, 0.04, "length",
+            True, "the acceleration is measured {size} ahead of the center of gravity", " m"),
+    Suspect("center_of_gravity", "center_of_gravity", "", "m", 0.2, 0.02, "length", True,
+            "the center of gravity is told {size} too far back (l_f and l_r)", " m"),
+    Suspect("yaw_inertia", "yaw_inertia", "", "", 0.5, 0.05, "", True,
+            "the yaw inertia is told {size} times too large", ""),
+    Suspect("bank", "bank", "", "rad", 0.03, 0.003, "", True,
+            "the road falls by {size} (+: to the left), or wind pushes so", "°", DEGREE),
+)  # fmt: skip
+NUISANCES = {  # mean, standard deviation, and what both grow with, of a sedan
+    "relaxation.front": (0.17, 0.08, ""),  # wheelbases
+    "relaxation.rear": (0.17, 0.08, ""),
+    "sway": (0.005, 0.004, "length"),  # m of contact patch per m/s² of acceleration
+    "roll_delay": (0.06, 0.05, "time"),  # s, of the roll behind the acceleration
+}
