@@ -5,15 +5,18 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from identifier.doctor.estimate import estimate
+from identifier.doctor.balance import Balance, stretches_of
+from identifier.doctor.estimate import FEWEST, LONGEST, PIECES, estimate
 from identifier.doctor.finding import Finding
+from identifier.doctor.fit import Fitter
 from identifier.doctor.screen import Screened, screen, steering_finding
 from models.recordings import Recording, RecordingError
 from models.recordings.repair import Repair
 from models.vehicle import Vehicle, VehicleError
 
 MATTERS = 0.5  # confidence, from which a finding is one
-STEERING = ("steering_ratio", "factor", "sign", "unit")  # codes of a gross steering finding
+RATIOS = ("steering_ratio", "factor")  # codes of gross findings whose factor is any number
+FACTOR, ROUNDS = "factor.delta_f", 2
 NEVER = (
     "mass: scales all forces alike and leaves the motion as it is; weigh the car",
     "the lateral axis mirrored throughout (y to the right, as in SAE or NED): all laws stay as "
@@ -118,41 +121,53 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
     vehicle : as it was told.
     """
     gross = screen(recording, vehicle)
-    fine: tuple[Finding, ...] = ()
-    found = gross.findings
     blind = gross.blind
+    found, fine = list(gross.findings), tuple[Finding, ...]()
     if not blind:
         try:
             drive, car = gross.repair.apply(recording, vehicle)
+            wheel = next((one for one in found if one.code in RATIOS and one.repair), None)
+            if wheel is not None:
+                exact = _exact_ratio(wheel, drive, car)
+                found[found.index(wheel)] = exact
+                drive, car = combined(found).apply(recording, vehicle)
             fine = estimate(drive, car)
         except (RecordingError, VehicleError) as error:
             blind = str(error)
-        found, fine = _one_steering(found, fine)
-    ranked = [*found, *fine]
+    ranked = sorted([*found, *fine], key=lambda one: not one.confidence >= MATTERS)
     return Diagnosis(
         name=recording.name,
-        findings=tuple(sorted(ranked, key=lambda one: not one.confidence >= MATTERS)),
+        findings=tuple(_told_once(ranked)),
         unseen=_unseen(recording, replace(gross, blind=blind)),
     )
 
 
-def _one_steering(
-    gross: tuple[Finding, ...], fine: tuple[Finding, ...]
-) -> tuple[tuple[Finding, ...], tuple[Finding, ...]]:
-    """Make one of a gross factor of the steering angle and a fine one that was found after it."""
-    coarse = next((one for one in gross if _is_steering(one)), None)
-    exact = next((one for one in fine if one.code == "factor" and one.channel == "delta_f"), None)
-    if coarse is None or exact is None or coarse.repair is None or not exact.size > 0.0:
-        return gross, fine
-    factor = coarse.repair.factor["delta_f"] / exact.size
-    one = steering_finding(factor, coarse.confidence, deviation=exact.deviation / exact.size)
-    return tuple(one if other is coarse else other for other in gross), tuple(
-        other for other in fine if other is not exact
-    )
+def _told_once(findings: list[Finding]) -> list[Finding]:
+    """Return findings without the second of one code and channel."""
+    kept: dict[tuple[str, str], Finding] = {}
+    for one in findings:
+        kept.setdefault((one.code, one.channel), one)
+    return list(kept.values())
 
 
-def _is_steering(one: Finding) -> bool:
-    return one.channel == "delta_f" and one.code in STEERING and one.repair is not None
+def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding:
+    """Return the ratio of a steering wheel as the drive says it, no stiffness believed.
+
+    Parameters
+    ----------
+    coarse : the finding, by which the drive is repaired.
+    drive, car : with it.
+    """
+    assert coarse.repair is not None
+    factor, deviation = coarse.repair.factor["delta_f"], math.nan
+    for _ in range(ROUNDS):
+        balance = Balance(stretches_of(drive, car, longest=LONGEST, pieces=PIECES), car)
+        if len(balance) < FEWEST:
+            return coarse
+        fit = Fitter(balance).fit([FACTOR], {})
+        by, deviation = math.exp(-fit.sizes[FACTOR]), fit.deviation(FACTOR)
+        drive, factor = Repair(factor={"delta_f": by}).apply(drive, car)[0], factor * by
+    return steering_finding(factor, coarse.confidence, deviation=deviation)
 
 
 def _unseen(recording: Recording, gross: Screened) -> tuple[str, ...]:

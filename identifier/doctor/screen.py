@@ -5,11 +5,11 @@ the car: by that reading of the log which leaves least unexplained.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identifier.doctor.consistency import Motion, driven_windows, looked_at, PIECE
+from identifier.doctor.consistency import PIECE, Motion, driven_windows, looked_at
 from identifier.doctor.finding import Finding
 from identifier.doctor.readings import DEGREE, Change, Read, read
 from identifier.doctor.samples import sample_findings
@@ -22,6 +22,7 @@ LIVELY = 0.005
 INERTIA = (0.5, 1.6)  # of I_z/(m l_f l_r); cars on the road have 0.9 to 1.1
 SMALL, SMALL_INERTIA = 1.0, 0.3  # [m] wheelbase, below which a model car may have as little
 SURE = 0.95
+SEVERAL = 3  # changes at once, beyond which nothing is sure
 WHEEL = (5.0, 30.0)  # ratios of a steering wheel to the road wheels
 NEAR = math.log(1.15)  # of a factor to that of a unit
 PERFECT = 0.999
@@ -148,6 +149,39 @@ def _unlike(vehicle: Vehicle) -> list[Finding]:
     ]
 
 
+def reading_findings(change: Change, found: Read, vehicle: Vehicle) -> list[Finding]:
+    """Return a change of the best reading as findings, of units one for each channel.
+
+    Parameters
+    ----------
+    change : of it.
+    found : with the next best.
+    vehicle : as it was told.
+    """
+    if change.code != "unit" or len(change.channels) == 1:
+        return [reading_finding(change, found, vehicle)]
+    parts = [
+        replace(change, channels=(name,), factors=(factor,))
+        for name, factor in zip(change.channels, change.factors, strict=True)
+    ]
+    return [reading_finding(part, found, vehicle) for part in parts]
+
+
+def one_steering(gross: list[Finding]) -> list[Finding]:
+    """Return findings with one of the steering angle where there were several: factors multiply.
+
+    Parameters
+    ----------
+    gross : of a reading.
+    """
+    of_steering = [one for one in gross if one.channel == "delta_f" and one.repair is not None]
+    if len(of_steering) < 2:
+        return gross
+    factor = math.prod(one.repair.factor["delta_f"] for one in of_steering if one.repair)
+    one = steering_finding(factor, of_steering[0].confidence)
+    return [one, *(other for other in gross if other not in of_steering)]
+
+
 def reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
     """Return a change of the best reading as a finding.
 
@@ -158,6 +192,8 @@ def reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
     vehicle : as it was told.
     """
     confidence = found.confidence
+    if len(found.best.changes) > SEVERAL:
+        confidence = min(confidence, SURE)  # so much that is wrong may be wrong otherwise
     factors = dict(change.factors)
     names = " and ".join(change.channels)
     doubt = "" if confidence > SURE else f"; or {words(found.other.changes)}"
@@ -183,6 +219,8 @@ def reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
     if change.code == "steering":
         return steering_finding(factors["delta"], confidence, doubt)
     factor = next(iter(factors.values()))
+    if change.channels == ("delta_f",):
+        return steering_finding(factor, confidence, doubt)
     if change.code == "sideslip":
         repair = Repair(factor={"v_y": factor}, sideslip=True)
         text = f"v_y is the sideslip angle in {change.unit}: take v_x tan of it{doubt}"
@@ -192,8 +230,8 @@ def reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
         text = f"{names} {verb} the wrong sign against the other channels: turn it{doubt}"
     else:
         repair = Repair(factor=dict.fromkeys(change.channels, factor))
-        verb = "is" if len(change.channels) == 1 else "are"
-        text = f"{names} {verb} in {change.unit}{doubt}"
+        unit = "deg/s" if change.unit == "deg" and change.channels == ("r",) else change.unit
+        text = f"{names} is in {unit}{doubt}"
     return Finding(
         code=change.code,
         channel=change.channels[0],
