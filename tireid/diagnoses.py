@@ -8,8 +8,15 @@ from pathlib import Path
 
 from identifier.doctor import Diagnosis, Finding
 from models.files import write_atomically
-from models.recordings import LogMap
+from models.recordings import (
+    LogMap,
+    Recording,
+    Repair,
+    check_against_vehicle,
+    check_physics,
+)
 from models.recordings.reader import repair_text
+from models.vehicle import Vehicle
 from tireid.output import text_table
 from tireid.report import Block, Paragraph, Section, Table, printed
 from tireid.verdicts import with_doubt
@@ -146,6 +153,47 @@ def diagnosis_section(
         blocks.append(Paragraph(text="Nothing was found."))
     blocks += [Paragraph(text=printed(f"Cannot be seen: {line}")) for line in diagnosis.unseen]
     return Section(heading=heading, blocks=[*blocks, *more])
+
+
+def doctor_text(diagnosis: Diagnosis, repair: Repair, path: Path | None) -> str:
+    """Return what was found, and what of it was taken out, as lines of text.
+
+    Parameters
+    ----------
+    diagnosis : of a log.
+    repair : that was applied.
+    path : of --repair, None where it was not asked for.
+    """
+    lines = [diagnosis_text(diagnosis, unseen=False)]
+    if repair:
+        lines.append(f"repaired, in what was learnt on and replayed: {repair_text(repair)}")
+    elif path is not None:
+        lines.append("nothing is sure enough to be repaired")
+    elif diagnosis.repair:
+        lines.append("what is sure is taken out with --repair")
+    return "\n".join(lines)
+
+
+def repaired(
+    recording: Recording, vehicle: Vehicle, repair: Repair
+) -> tuple[Recording, Vehicle]:
+    """Return a recording and its car without what a repair takes out, judged as when it is read.
+
+    Parameters
+    ----------
+    recording : as it was read.
+    vehicle : as it was told.
+    repair : of both.
+
+    Raises
+    ------
+    RecordingError
+        Where the repaired recording contradicts physics or the car.
+    """
+    mended, car = repair.apply(recording, vehicle)
+    check_physics(mended)
+    check_against_vehicle(mended, car)
+    return mended, car
 
 
 def write_repair(path: Path, told: LogMap, diagnosis: Diagnosis) -> LogMap:

@@ -38,6 +38,7 @@ STEEPNESS = 3.0  # of the confidence over what the next best reading leaves more
 
 
 PRICES = {"mph": 0.3, "mm/s": 0.3}  # of units that few loggers use
+ALONE = 0.8  # of a v_y that has another unit than v_x
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,7 +90,8 @@ def _changed(
 
 
 def _unit(unit: str, factor: float, *channels: str) -> Change:
-    return _changed("unit", unit, factor, *channels, price=PRICES.get(unit, 0.0))
+    alone = ALONE if channels == ("v_y",) else 0.0
+    return _changed("unit", unit, factor, *channels, price=PRICES.get(unit, 0.0) + alone)
 
 
 def _sign(*channels: str) -> Change:

@@ -25,6 +25,7 @@ FREEZE = 0.3  # [s] that a noisy channel repeats one number
 MOVES = 1.0  # [m/s^2] of v_x r, by which a car must move meanwhile
 ALTERNATE = -0.35  # correlation of neighboring second differences, below which they are noise
 REPEATED = 0.01  # share of repeated samples of a noisy channel
+ALIKE = math.log(1.6)  # of the times by which samples of two channels are late
 COARSE = 0.05  # quantum over the rms of a channel
 CERTAIN = 0.99
 
@@ -55,7 +56,22 @@ def sample_findings(recording: Recording) -> list[Finding]:
     first: dict[tuple[str, str], Finding] = {}
     for one in listed:
         first.setdefault((one.code, one.channel), one)
-    return list(first.values())
+    late = {one.channel: one.size for one in listed if one.code == "jitter"}
+    return [
+        one
+        for one in first.values()
+        if one.code != "jitter" or _is_late(one.channel, late, recording.dt)
+    ]
+
+
+def _is_late(name: str, late: Mapping[str, float], dt: float) -> bool:
+    """Whether noise that grows with the slope is that of late samples: of several, or by much."""
+    alike = [
+        other
+        for other, size in late.items()
+        if other != name and abs(math.log(size / late[name])) < ALIKE
+    ]
+    return late[name] > 2.0 * dt or (bool(alike) and late[name] > 0.7 * dt)
 
 
 def _piece_findings(recording: Recording) -> list[Finding]:

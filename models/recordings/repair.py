@@ -140,8 +140,22 @@ class Repair:
         kept = self._kept(recording)
         changes: dict[str, Any] = {name: signal[kept] for name, signal in signals.items()}
         repaired = replace(recording, **changes)
+        return repaired, self.on(vehicle)
+
+    def on(self, vehicle: Vehicle) -> Vehicle:
+        """Return the car with the numbers that are told in place of its own.
+
+        Parameters
+        ----------
+        vehicle : as it was told.
+
+        Raises
+        ------
+        VehicleError
+            Where these are the numbers of no car.
+        """
         numbers: dict[str, Any] = dict(self.vehicle)
-        return repaired, replace(vehicle, **numbers) if numbers else vehicle
+        return replace(vehicle, **numbers) if numbers else vehicle
 
     def _kept(self, recording: Recording) -> slice:
         """Return the samples at which every channel was measured."""
