@@ -174,9 +174,7 @@ def doctor_text(diagnosis: Diagnosis, repair: Repair, path: Path | None) -> str:
     return "\n".join(lines)
 
 
-def repaired(
-    recording: Recording, vehicle: Vehicle, repair: Repair
-) -> tuple[Recording, Vehicle]:
+def repaired(recording: Recording, vehicle: Vehicle, repair: Repair) -> tuple[Recording, Vehicle]:
     """Return a recording and its car without what a repair takes out, judged as when it is read.
 
     Parameters

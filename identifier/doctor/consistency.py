@@ -2,10 +2,11 @@
 
 φ = F/F_z [static axle loads], α [rad] its slip angle, rows front and rear. φ follows from v_x, v_y
 and r without any tire, and α from these, the steering and the lengths of the car: so whatever the
-tires are, φ must be a curve of α that rises and saturates, φ = c α / sqrt(1 + (c α/μ)^2) + const. A reading of
-the log (its units, its signs, the size of the car) is as good as little is left of φ; with an
-accelerometer also of a_y = dv_y/dt + v_x r. Means over windows are compared, so that nothing is
-differentiated, and shares of each equation's own variance, so that no unit favors itself.
+tires are, φ must be a curve of α that rises and saturates, c α / sqrt(1 + (c α/μ)^2) + const. A
+reading of the log (its units, its signs, the size of the car) is as good as little is left of φ;
+with an accelerometer also of a_y = dv_y/dt + v_x r. Means over windows are compared, so that
+nothing is differentiated, and shares of each equation's own variance, so that no unit favors
+itself.
 """
 
 import math
@@ -76,13 +77,29 @@ class Motion(NamedTuple):
         if speed == 0.0:
             return None
         parts = [cls._of_piece(one, SLOWEST * speed) for one in pieces]
-        means, rates, shown = (np.concatenate([part[k] for part in parts], axis=1) for k in range(3))
+        means, rates, shown = (
+            np.concatenate([part[k] for part in parts], axis=1) for k in range(3)
+        )
         m = means.shape[1]
         some = np.arange(m) if m <= MOST else np.linspace(0, m - 1, MOST).astype(int)
         if m < FEWEST:
             return None
         a_y = None if recording.a_y is None else shown[0, some]
-        return cls(*means[:, some], a_y, *rates[:, some], speed)
+        v_y, delta_f, delta_r, v_x_r, turn, sideslip = means[:, some]
+        v_y_dot, r_dot, v_x_v_y_dot = rates[:, some]
+        return cls(
+            v_y=v_y,
+            delta_f=delta_f,
+            delta_r=delta_r,
+            v_x_r=v_x_r,
+            turn=turn,
+            sideslip=sideslip,
+            a_y=a_y,
+            v_y_dot=v_y_dot,
+            r_dot=r_dot,
+            v_x_v_y_dot=v_x_v_y_dot,
+            speed=speed,
+        )
 
     @staticmethod
     def _of_piece(recording: Recording, fast: float) -> tuple[Array, Array, Array]:

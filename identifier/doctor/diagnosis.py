@@ -11,6 +11,7 @@ from identifier.doctor.finding import Finding
 from identifier.doctor.fit import Fitter
 from identifier.doctor.screen import Screened, screen, steering_finding
 from models.recordings import Recording, RecordingError
+from models.recordings.checks import physics_contradiction, vehicle_contradiction
 from models.recordings.repair import Repair
 from models.vehicle import Vehicle, VehicleError
 
@@ -131,6 +132,7 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
                 exact = _exact_ratio(wheel, drive, car)
                 found[found.index(wheel)] = exact
                 drive, car = combined(found).apply(recording, vehicle)
+            found += _contradictions(drive, car)
             fine = estimate(drive, car)
         except (RecordingError, VehicleError) as error:
             blind = str(error)
@@ -140,6 +142,12 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
         findings=tuple(_told_once(ranked)),
         unseen=_unseen(recording, replace(gross, blind=blind)),
     )
+
+
+def _contradictions(recording: Recording, vehicle: Vehicle) -> list[Finding]:
+    """Return the law that a log still breaks as it is read best, as one finding."""
+    said = physics_contradiction(recording) or vehicle_contradiction(recording, vehicle)
+    return [] if said is None else [Finding(code="contradiction", confidence=0.9, text=said)]
 
 
 def _told_once(findings: list[Finding]) -> list[Finding]:

@@ -82,9 +82,7 @@ class Change:
         return reading._replace(**factors, sideslip=reading.sideslip or self.sideslip)
 
 
-def _changed(
-    code: str, unit: str, factor: float, *channels: str, price: float = 0.0
-) -> Change:
+def _changed(code: str, unit: str, factor: float, *channels: str, price: float = 0.0) -> Change:
     factors = tuple((name.removesuffix("_f"), factor) for name in channels)
     return Change(code=code, channels=channels, unit=unit, factors=factors, price=price)
 
@@ -106,7 +104,9 @@ CHANGES = (
     _unit("deg/s", DEGREE, "r"),
     _unit("deg", DEGREE, "r", "delta_f"),
     *(
-        Change(code="sideslip", channels=("v_y",), unit=unit, factors=(("v_y", one),), sideslip=True)
+        Change(
+            code="sideslip", channels=("v_y",), unit=unit, factors=(("v_y", one),), sideslip=True
+        )
         for unit, one in {"rad": 1.0, "deg": DEGREE}.items()
     ),
     _unit("deg", DEGREE, "delta_f"),
@@ -213,7 +213,6 @@ def _longer(
 
 def _steerings(one: Explanation, motion: Motion, vehicle: Vehicle) -> list[Change]:
     """Return the factor of the steering angle that leaves least, where it is a gross one."""
-
     told = one.reading.delta
     as_it_is = forces_and_slips(motion, vehicle, one.reading._replace(delta=0.0))
     rest = but_front_leaves(as_it_is, motion, vehicle, one.reading)
@@ -231,7 +230,12 @@ def _steerings(one: Explanation, motion: Motion, vehicle: Vehicle) -> list[Chang
 
 
 def _scaled(
-    code: str, name: str, sizes: Array, same: float, motion: Motion, vehicle: Vehicle,
+    code: str,
+    name: str,
+    sizes: Array,
+    same: float,
+    motion: Motion,
+    vehicle: Vehicle,
     one: Explanation | None = None,
 ) -> list[Change]:
     """Return the factor of a number of the car that leaves least, where it is a gross one."""

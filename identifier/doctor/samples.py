@@ -102,8 +102,8 @@ def _missing(recording: Recording, signals: Mapping[str, Array]) -> Iterator[Fin
                 size=recording.duration,
                 unit="s",
                 confidence=CERTAIN,
-                text=f"{name} is {value:g} {UNITS[name]} throughout while the car moves: no sensor, "
-                "or it was not connected",
+                text=f"{name} is {value:g} {UNITS[name]} throughout while the car moves: "
+                "no sensor, or it was not connected",
             )
 
 
@@ -267,7 +267,10 @@ def _quantum(signal: Array) -> float | None:
         return None
     steps = np.diff(values)
     step = float(np.median(steps[steps < 1.5 * float(np.min(steps))]))
-    if not step > 1e-9 * float(np.abs(values).max()) or values.size > 0.5 * np.ptp(signal) / step + 2e3:
+    if (
+        not step > 1e-9 * float(np.abs(values).max())
+        or values.size > 0.5 * np.ptp(signal) / step + 2e3
+    ):
         return None
     count = steps / step
     on_grid = np.abs(count - np.round(count)) < 0.05

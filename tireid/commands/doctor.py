@@ -4,9 +4,8 @@ import argparse
 from typing import Any
 
 from identifier.doctor import Diagnosis, diagnose
-from models.recordings import Recording, Repair
+from models.recordings import Repair
 from models.recordings.reader import repair_text
-from models.vehicle import Vehicle
 from tireid import __version__
 from tireid.commands import COMMANDS
 from tireid.commands.options import (
@@ -76,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
             )
     tell(diagnosis_text(diagnosis))
     if options.repair is not None:
-        _tell_repair(options, recording, vehicle, repair, after)
+        _tell_repair(options, repair, after)
         if repair:
             write_repair(options.repair, told, diagnosis)
             say(f"wrote {options.repair}; read the log with --log {options.repair}")
@@ -88,8 +87,6 @@ def run(options: argparse.Namespace) -> int:
 
 def _tell_repair(
     options: argparse.Namespace,
-    recording: Recording,
-    vehicle: Vehicle,
     repair: Repair,
     after: Diagnosis | None,
 ) -> None:

@@ -133,7 +133,9 @@ def run(options: argparse.Namespace) -> int:
     diagnosis = diagnose(joined(logs), vehicle)
     repair = diagnosis.repair if options.repair is not None else Repair()
     if repair:
-        logs, others = ([repaired(one, vehicle, repair)[0] for one in some] for some in (logs, others))
+        logs, others = (
+            [repaired(one, vehicle, repair)[0] for one in some] for some in (logs, others)
+        )
         vehicle = repair.on(vehicle)
         law, design = chosen_method(options, vehicle, seed)
     recording = joined(logs)

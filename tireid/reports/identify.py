@@ -83,7 +83,11 @@ def write_identify_report(
         summary=f"{learnt.recording.duration:.4g} s of driving, learnt sample by sample from "
         "speed, lateral velocity, yaw rate and steering.",
         numbers=[verdict_headline(verdict), *identify_headlines(model, runs, last)],
-        warnings=[*verdict_warnings(verdict), *diagnosis_warnings(diagnosis), *identify_warnings(model, runs)],
+        warnings=[
+            *verdict_warnings(verdict),
+            *diagnosis_warnings(diagnosis),
+            *identify_warnings(model, runs),
+        ],
         sections=sections,
     )
     write_report(folder / REPORT, report)
