@@ -23,6 +23,7 @@ WINDOW = 0.2  # [s]
 SLOWEST = 0.3  # of the 95th percentile of speed, below which a window does not count
 FEWEST, MOST = 20, 500  # windows: fewer say nothing, of more that many are taken all over the log
 PIECE, PIECES = 60.0, 10  # s, and how many of them are looked at of a drive of hours
+SHORTEST = 200  # samples of such a piece
 STIFFNESS = np.geomspace(1.0, 100.0, 28)  # c [1/rad]
 FRICTION = np.array([0.3, 0.5, 0.8, 1.2, 1.8, 3.0])  # μ [-]
 # A stiffness that is twice the told one costs as much as 14 % of what is left unexplained.
@@ -123,7 +124,7 @@ def looked_at(recording: Recording) -> tuple[Recording, ...]:
     parts = [recording]
     if recording.breaks:
         parts = [recording.taken(np.arange(s.start, s.stop)) for s in recording.stretches]
-    n = round(PIECE / recording.dt)
+    n = max(round(PIECE / recording.dt), SHORTEST)
     total = sum(len(part) for part in parts)
     if total <= PIECES * n:
         return tuple(parts)

@@ -38,7 +38,7 @@ STEEPNESS = 3.0  # of the confidence over what the next best reading leaves more
 
 
 PRICES = {"mph": 0.3, "mm/s": 0.3}  # of units that few loggers use
-ALONE = 0.8  # of a v_y that has another unit than v_x
+ALONE, UNUSUAL = 0.8, 0.5  # of a v_y in another unit than v_x, and of one that is an angle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,7 +105,12 @@ CHANGES = (
     _unit("deg", DEGREE, "r", "delta_f"),
     *(
         Change(
-            code="sideslip", channels=("v_y",), unit=unit, factors=(("v_y", one),), sideslip=True
+            code="sideslip",
+            channels=("v_y",),
+            unit=unit,
+            factors=(("v_y", one),),
+            sideslip=True,
+            price=UNUSUAL,
         )
         for unit, one in {"rad": 1.0, "deg": DEGREE}.items()
     ),

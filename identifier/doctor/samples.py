@@ -22,7 +22,7 @@ UNITS = {"v_x": "m/s", "v_y": "m/s", "r": "rad/s", "delta_f": "rad", "delta_r": 
          "a_y": "m/s^2"}  # fmt: skip
 SPIKE = 12.0  # times the noise beyond its neighbors
 FREEZE = 0.3  # [s] that a noisy channel repeats one number
-MOVES = 1.0  # [m/s^2] of v_x r, by which a car must move meanwhile
+MOVES = 0.15  # of the range of v_x r, by which a car must move meanwhile, in any unit
 ALTERNATE = -0.35  # correlation of neighboring second differences, below which they are noise
 REPEATED = 0.01  # share of repeated samples of a noisy channel
 ALIKE = math.log(1.6)  # of the times by which samples of two channels are late
@@ -236,7 +236,8 @@ def _moves(name: str, recording: Recording, first: int, length: int) -> bool:
     if name == "r":
         turn = recording.delta_f * float(np.std(turn) / (np.std(recording.delta_f) + 1e-300))
     smooth = np.convolve(turn[here], np.ones(width) / width, "valid")
-    return bool(np.ptp(smooth) > MOVES)
+    usual = float(np.percentile(turn, 99) - np.percentile(turn, 1))
+    return bool(np.ptp(smooth) > MOVES * usual > 0.0)
 
 
 def _noise(signal: Array) -> float:

@@ -59,16 +59,16 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
         for one in samples
         if one.code == "copied" or (one.code == "frozen" and _throughout(one, recording))
     ]
-    quiet = quiet_finding(recording)
-    if quiet is not None:
-        return Screened(
-            findings=(quiet, *samples, *told), repair=Repair(), blind="the car hardly corners"
-        )
     if missing:
         return Screened(
             findings=(*samples, *told),
             repair=Repair(),
             blind=f"{' and '.join(missing)} was not measured",
+        )
+    quiet = quiet_finding(recording)
+    if quiet is not None:
+        return Screened(
+            findings=(quiet, *samples, *told), repair=Repair(), blind="the car hardly corners"
         )
     motion = Motion.of(recording)
     if motion is None:
