@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from identifier.axle import AxleIdentifier
+    from identifier.doctor import Diagnosis, diagnose
     from identifier.method import Method
     from identifier.methods import certify, make_method
     from identifier.paper.design import PaperIdentifier
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from identifier.run import History
     from identifier.tire_model import TireModel
     from identifier.verdict import Verdict
-    from models.recordings import LogMap, Recording, read_recording, read_repaired
+    from models.recordings import LogMap, Recording, Repair, read_recording, read_repaired
     from models.vehicle import Vehicle, sedan
     from mpc import path as paths
     from tireid.driving import drive, sample_recording
@@ -31,16 +32,19 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "AxleIdentifier": ("identifier.axle", "AxleIdentifier"),
+    "Diagnosis": ("identifier.doctor", "Diagnosis"),
     "History": ("identifier.run", "History"),
     "LogMap": ("models.recordings", "LogMap"),
     "Method": ("identifier.method", "Method"),
     "PaperIdentifier": ("identifier.paper.design", "PaperIdentifier"),
     "Prediction": ("identifier.reproducibility", "Prediction"),
     "Recording": ("models.recordings", "Recording"),
+    "Repair": ("models.recordings", "Repair"),
     "TireModel": ("identifier.tire_model", "TireModel"),
     "Vehicle": ("models.vehicle", "Vehicle"),
     "Verdict": ("identifier.verdict", "Verdict"),
     "certify": ("identifier.methods", "certify"),
+    "diagnose": ("identifier.doctor", "diagnose"),
     "drive": ("tireid.driving", "drive"),
     "export": ("tireid.exporting", "export"),
     "identify": ("tireid.learning", "identify"),
@@ -54,17 +58,20 @@ _HOMES = {
 }
 __all__ = [
     "AxleIdentifier",
+    "Diagnosis",
     "History",
     "LogMap",
     "Method",
     "PaperIdentifier",
     "Prediction",
     "Recording",
+    "Repair",
     "TireModel",
     "Vehicle",
     "Verdict",
     "__version__",
     "certify",
+    "diagnose",
     "drive",
     "export",
     "identify",

@@ -32,6 +32,7 @@ LARGEST_V_X_R = 60.0  # [m/s^2], 6 g: beyond downforce cars; 1 m/s^2 in degrees 
 SLOPE = (0.5, 2.0)  # a_y on v_x r is 1, with roll up to 1.2; km/h 0.28, g 0.10, degrees 0.017
 LONGEST_CERTAIN = 45.0  # [m]: effective wheelbase; a 1.5 m car in degrees reads 86
 LONGEST_WHEELBASE = 4.0  # [m], in judging a mass: so 64 kg at least, a kart with driver has 150
+DOCTOR = "tireid doctor LOG --vehicle FILE says what else may be wrong, and repairs it"
 LIGHTEST = 1.0  # [kg/m^3]: mass over wheelbase cubed is 17 to 300 for all cars; in kN 0.3 at most
 
 
@@ -47,46 +48,67 @@ def check_physics(recording: Recording) -> None:
     RecordingError
         Naming the column, the rule, the value and the remedy.
     """
-    _check_peaks(recording)
+    _refuse(recording, physics_contradiction(recording))
+
+
+def _refuse(recording: Recording, contradiction: str | None) -> None:
+    """Raise what contradicts, and say who finds out why."""
+    if contradiction is not None:
+        raise RecordingError(f"{recording.name}: {contradiction}; {DOCTOR}")
+
+
+def physics_contradiction(recording: Recording) -> str | None:
+    """Return how a recording contradicts the laws of motion: column, rule, value and remedy.
+
+    Parameters
+    ----------
+    recording : the recording to judge.
+
+    Returns
+    -------
+    str | None
+        One line about the first law that is broken, None where all hold.
+    """
     w = windows(recording)
-    if w.r.size * STRIDE < 2.0:
-        return
+    found = _check_peaks(recording)
+    if found is not None or w.r.size * STRIDE < 2.0:
+        return found
     turn = steering(w)
-    _check_lateral_acceleration(recording, w, turn)
-    _check_v_x_r(recording, w)
+    found = _check_lateral_acceleration(w, turn) or _check_v_x_r(w)
     if turn is not None:
-        _check_steering(recording, w, turn)
-        _check_lateral_velocity(recording, w, turn)
-    _check_forces(recording, w, turn)
+        found = found or _check_steering(recording, w, turn)
+        found = found or _check_lateral_velocity(recording, w, turn)
+    return found or _check_forces(w, turn)
 
 
-def _check_peaks(recording: Recording) -> None:
-    """Refuse steering beyond 1.2 rad, speeds beyond 110 m/s, and cars that drive backwards."""
+def _check_peaks(recording: Recording) -> str | None:
+    """Answer with steering beyond 1.2 rad, speeds beyond 110 m/s, and cars that drive backwards."""
     for column in ("delta_f", "delta_r"):
         largest = peak(getattr(recording, column))
         if largest > LARGEST_STEERING:
-            raise RecordingError(
-                f"{recording.name}: {column} must be the road-wheel angle in rad, below "
+            return (
+                f"{column} must be the road-wheel angle in rad, below "
                 f"{LARGEST_STEERING}, its peak is {largest:.4g}; degrees or a hand-wheel angle? "
                 "convert it (degrees: multiply by pi/180)"
             )
     fastest = peak(recording.v_x)
     if fastest > LARGEST_SPEED:
-        raise RecordingError(
-            f"{recording.name}: vx must be in m/s, below {LARGEST_SPEED:g}, its peak is "
+        return (
+            f"vx must be in m/s, below {LARGEST_SPEED:g}, its peak is "
             f"{fastest:.4g}; km/h? divide by 3.6"
         )
     some = recording.v_x[:: thinning(len(recording))]
     forward, backward = float(np.percentile(some, 95)), float(np.percentile(some, 5))
     if backward < -1.0 and forward < -0.3 * backward:
-        raise RecordingError(
-            f"{recording.name}: vx must point forward (ISO axes), 95 % of it lies below "
+        return (
+            f"vx must point forward (ISO axes), 95 % of it lies below "
             f"{forward:.4g} m/s; change the sign of vx (and of vy, if the axes are turned about z)"
         )
+    return None
 
 
-def _check_lateral_acceleration(recording: Recording, w: Windows, turn: Steering | None) -> None:
-    """Refuse a_y that is not v̇_y + v_x r; the two slopes and the steering tell who is wrong.
+def _check_lateral_acceleration(w: Windows, turn: Steering | None) -> str | None:
+    """Answer with a_y that is not v̇_y + v_x r; the two slopes and the steering tell who is wrong.
 
     Regressors: v_x r, v̇_y, ṙ (a sensor off the center of gravity) and, where v_x r varies by half
     its mean, 1 (bias, bank). Needs std(v_x r) >= 0.3 m/s^2, or a steady turn of 1.5 m/s^2, three
@@ -94,13 +116,13 @@ def _check_lateral_acceleration(recording: Recording, w: Windows, turn: Steering
     large a slope must also explain half of a_y, which vibration does not.
     """
     if w.a_y is None:
-        return
+        return None
     X = np.column_stack([w.v_x_r, w.v_y_dot, w.r_dot])
     mean, spread = abs(float(np.mean(w.v_x_r))), float(np.std(w.v_x_r))
     if spread >= max(0.3, 0.5 * mean):
         X = np.column_stack([X, np.ones(w.r.size)])
     elif mean < 1.5:
-        return
+        return None
     fit = least_squares(X, w.a_y)
     slope, error = fit.theta[0], 4.0 * fit.error[0]
     dot, dot_error = fit.theta[1], 4.0 * fit.error[1]
@@ -110,20 +132,16 @@ def _check_lateral_acceleration(recording: Recording, w: Windows, turn: Steering
         if dot_error < 0.6 and abs(dot) > dot_error:
             r_is_wrong = dot > 0.0
         if r_is_wrong:
-            raise RecordingError(
-                f"{recording.name}: r contradicts ay: ay {law}; r must be positive to the left, "
-                "change its sign"
-            )
-        raise RecordingError(
-            f"{recording.name}: ay {law}; change the sign of ay (positive to the left)"
-        )
+            return f"r contradicts ay: ay {law}; r must be positive to the left, change its sign"
+        return f"ay {law}; change the sign of ay (positive to the left)"
     if slope + error < SLOPE[0] or (slope - error > SLOPE[1] and fit.r_squared > 0.5):
-        raise RecordingError(f"{recording.name}: {_blame(slope, law)}")
+        return _blame(slope, law)
     if _turned(dot, dot_error, w) and slope - error > 0.0:
-        raise RecordingError(
-            f"{recording.name}: vy contradicts ay: ay must be v̇_y + v_x r, its slope on v̇_y is "
+        return (
+            f"vy contradicts ay: ay must be v̇_y + v_x r, its slope on v̇_y is "
             f"{dot:.3g} instead of 1; vy must be positive to the left, change its sign"
         )
+    return None
 
 
 def _turned(dot: float, dot_error: float, w: Windows) -> bool:
@@ -143,18 +161,19 @@ def _blame(slope: float, law: str) -> str:
     return f"ay {law}; check its axis, unit and time stamps, or leave the column ay out"
 
 
-def _check_v_x_r(recording: Recording, w: Windows) -> None:
-    """Refuse a centripetal acceleration |v_x r| above 60 m/s^2 in 5 % of the moving windows."""
+def _check_v_x_r(w: Windows) -> str | None:
+    """Answer with a centripetal acceleration above 60 m/s^2 in 5 % of the moving windows."""
     peak = float(np.percentile(np.abs(w.v_x_r), 95))
     if peak > LARGEST_V_X_R:
-        raise RecordingError(
-            f"{recording.name}: r must be in rad/s, |v_x r| below {LARGEST_V_X_R:g} m/s^2, it is "
+        return (
+            f"r must be in rad/s, |v_x r| below {LARGEST_V_X_R:g} m/s^2, it is "
             f"{peak:.4g}; degrees per second? multiply r by pi/180"
         )
+    return None
 
 
-def _check_steering(recording: Recording, w: Windows, turn: Steering) -> None:
-    """Refuse steering that turns the wrong way or an effective wheelbase out of all cars.
+def _check_steering(recording: Recording, w: Windows, turn: Steering) -> str | None:
+    """Answer with steering that turns the wrong way or an effective wheelbase out of all cars.
 
     Upper bound 7.5 m + 0.03 v_x^2 (a bus, with three times a sedan's understeer) where small
     steering says the same as large, since a car that slides over its front wheels reads long;
@@ -163,12 +182,12 @@ def _check_steering(recording: Recording, w: Windows, turn: Steering) -> None:
     column = _larger_steering(recording)
     L, correlation = turn
     if correlation < -0.5:
-        raise RecordingError(
-            f"{recording.name}: {column} must turn the car to the left (r > 0) when positive, its "
+        return (
+            f"{column} must turn the car to the left (r > 0) when positive, its "
             f"correlation with r is {correlation:.2f}; change the sign of {column} (or of r)"
         )
     if correlation < 0.7:
-        return
+        return None
     v = float(np.sqrt(np.mean(w.v_x**2)))
     small = onset(w)
     same = small is not None and small.correlation > 0.7 and small.wheelbase > 0.7 * L
@@ -176,20 +195,21 @@ def _check_steering(recording: Recording, w: Windows, turn: Steering) -> None:
     longest = 7.5 + 0.03 * v**2
     too_long = longest < L and (same or (L > LONGEST_CERTAIN and not plows))
     if too_long:
-        raise RecordingError(
-            f"{recording.name}: {column} must be in rad, the effective wheelbase v_x delta/r is "
+        return (
+            f"{column} must be in rad, the effective wheelbase v_x delta/r is "
             f"{L:.4g} m, above {min(longest, L):.3g}; degrees? multiply {column} by pi/180"
         )
     shortest = min(max(0.015 * v, 0.03), 0.12)
     if shortest > L:
-        raise RecordingError(
-            f"{recording.name}: r must be in rad/s, the effective wheelbase v_x delta/r is "
+        return (
+            f"r must be in rad/s, the effective wheelbase v_x delta/r is "
             f"{L:.3g} m, below {shortest:.2g}; degrees per second? multiply r by pi/180"
         )
+    return None
 
 
-def _check_lateral_velocity(recording: Recording, w: Windows, turn: Steering) -> None:
-    """Refuse a center of rotation behind the rear axle: its tires would push outward.
+def _check_lateral_velocity(recording: Recording, w: Windows, turn: Steering) -> str | None:
+    """Answer with a center of rotation behind the rear axle: its tires would push outward.
 
     v_y/r is the distance from the center of gravity back to where lateral velocity vanishes,
     at most l_r, about half the wheelbase; alarm at 0.9 effective wheelbases.
@@ -199,53 +219,55 @@ def _check_lateral_velocity(recording: Recording, w: Windows, turn: Steering) ->
     rear_steers = peak(recording.delta_r) > 0.1 * peak(recording.delta_f)
     clear = turn.correlation > 0.7 and correlation > 0.7 and not rear_steers
     if clear and behind > 0.9 * turn.wheelbase:
-        raise RecordingError(
-            f"{recording.name}: vy must be positive to the left at the center of gravity, "
+        return (
+            f"vy must be positive to the left at the center of gravity, "
             f"vy/r is {behind:.3g} m, behind the rear axle (effective wheelbase "
             f"{turn.wheelbase:.3g} m); change the sign of vy or move it to the center of gravity"
         )
+    return None
 
 
-def _check_forces(recording: Recording, w: Windows, turn: Steering | None) -> None:
-    """Refuse axle forces that push against the acceleration, are swapped, or are in kN.
+def _check_forces(w: Windows, turn: Steering | None) -> str | None:
+    """Answer with axle forces that push against the acceleration, are swapped, or are in kN.
 
     Needs rms(v̇_y + v_x r) >= 0.3 m/s^2. Signs: correlation below -0.5. Unit: the mass that the
     summed force implies, over the cube of the effective wheelbase.
     """
     a = w.v_x_r + w.v_y_dot
     if w.force is None or np.sqrt(np.mean(a**2)) < 0.3:
-        return
+        return None
     for column, force in zip(("Fyf", "Fyr"), w.force.T, strict=True):
         together = correlation(force, a)
         if together < -0.5:
-            raise RecordingError(
-                f"{recording.name}: {column} must push to the left when positive (ISO axes), its "
+            return (
+                f"{column} must push to the left when positive (ISO axes), its "
                 f"correlation with v̇_y + v_x r is {together:.2f}; change the sign of {column}"
             )
     yaw = least_squares(w.force, w.r_dot)
     if yaw.r_squared > 0.5 and yaw.theta[0] < -8 * yaw.error[0] and yaw.theta[1] > 8 * yaw.error[1]:
-        raise RecordingError(
-            f"{recording.name}: Fyf must turn the car to the left and Fyr to the right, ṙ says "
+        return (
+            "Fyf must turn the car to the left and Fyr to the right, ṙ says "
             "the opposite; swap the columns Fyf and Fyr"
         )
     total = w.force.sum(axis=1)
     if turn is None or turn.correlation < 0.7 or correlation(total, a) < 0.7:
-        return
+        return None
     fit = least_squares(np.column_stack([w.v_x_r, w.v_y_dot, w.r_dot]), total)
     dot, dot_error = fit.theta[1] / fit.theta[0], 4.0 * fit.error[1] / fit.theta[0]
     if fit.theta[0] > 4.0 * fit.error[0] and _turned(dot, dot_error, w):
-        raise RecordingError(
-            f"{recording.name}: vy contradicts Fyf + Fyr, which must be mass times v̇_y + v_x r, "
+        return (
+            f"vy contradicts Fyf + Fyr, which must be mass times v̇_y + v_x r, "
             f"the two slopes have the ratio {dot:.3g} instead of 1; change the sign of vy"
         )
     small = onset(w)
     L = turn.wheelbase if small is None else min(turn.wheelbase, small.wheelbase)
     mass = float(total @ a) / float(a @ a)
     if mass < LIGHTEST * min(L, LONGEST_WHEELBASE) ** 3:
-        raise RecordingError(
-            f"{recording.name}: Fyf and Fyr must be in N, they imply a mass of {mass:.3g} kg on "
+        return (
+            f"Fyf and Fyr must be in N, they imply a mass of {mass:.3g} kg on "
             f"an effective wheelbase of {L:.3g} m; kN? multiply by 1000"
         )
+    return None
 
 
 def _larger_steering(recording: Recording) -> str:
@@ -296,75 +318,97 @@ def check_against_vehicle(recording: Recording, vehicle: Axles) -> None:
     RecordingError
         Naming the column, the rule, the value and the remedy.
     """
+    _refuse(recording, vehicle_contradiction(recording, vehicle))
+
+
+def vehicle_contradiction(recording: Recording, vehicle: Axles) -> str | None:
+    """Return how a recording contradicts a vehicle, by the rules of `check_against_vehicle`.
+
+    Parameters
+    ----------
+    recording : the recording to judge.
+    vehicle : anything with l_f and l_r [m] and mass [kg].
+
+    Returns
+    -------
+    str | None
+        One line about the first rule that is broken, None where all hold.
+    """
     w = windows(recording)
     a = w.v_x_r + w.v_y_dot
     if w.r.size * STRIDE < 2.0 or np.sqrt(np.mean(a**2)) < 0.3:
-        return
+        return None
     l_f, l_r = vehicle.l_f, vehicle.l_r
     motion = {"v_x": w.v_x, "v_y": w.v_y, "r": w.r}
     slip = measured_slip(l_f, l_r, **motion, delta_f=w.delta_f, delta_r=w.delta_r)
     alpha_f, alpha_r = slip.T
     typical = float(np.median(np.abs(alpha_r)))
     if typical > LARGEST_SLIP:
-        raise RecordingError(
-            f"{recording.name}: vy and r must be in m/s and rad/s, the median rear slip angle is "
+        return (
+            f"vy and r must be in m/s and rad/s, the median rear slip angle is "
             f"{typical:.3g} rad, above {LARGEST_SLIP}; check units, and l_r = {l_r:g} m"
         )
     turn, small = steering(w), onset(w)
+    other = ""
     if turn is not None and turn.correlation > 0.7:
         L = turn.wheelbase if small is None else min(turn.wheelbase, small.wheelbase)
         v = float(np.sqrt(np.mean(w.v_x**2)))
         lowest, highest = (l_f + l_r) / 3.0, 3.0 * (l_f + l_r) + 0.03 * v**2
         if not lowest < L < highest:
-            raise RecordingError(
-                f"{recording.name}: delta_f, r and vx must fit the wheelbase {l_f + l_r:.3g} m, "
+            return (
+                f"delta_f, r and vx must fit the wheelbase {l_f + l_r:.3g} m, "
                 f"v_x delta/r is {L:.3g} m, outside {lowest:.3g} to {highest:.3g}; check their "
                 "units, or name the right vehicle"
             )
+        if 3.0 * (l_f + l_r) < L:  # understeer may do it, the file of a smaller car does
+            other = (
+                f", or name the right vehicle: v_x delta/r is {L:.3g} m, the wheelbase of this "
+                f"one {l_f + l_r:.3g} m"
+            )
     rear = a if w.force is None else w.force[:, 1]
     if w.force is None:
-        _check_rear_rises(recording, alpha_r, w, l_r)
-    else:
-        _check_rises(recording, alpha_r, rear, "Fyr")
-    if w.force is not None:
-        _check_rises(recording, alpha_f, w.force[:, 0], "Fyf")
-        _check_mass(recording, w.force.sum(axis=1), a, vehicle.mass)
+        return _check_rear_rises(alpha_r, w, l_r, other)
+    found = _check_rises(alpha_r, rear, "Fyr", other)
+    found = found or _check_rises(alpha_f, w.force[:, 0], "Fyf", other)
+    return found or _check_mass(w.force.sum(axis=1), a, vehicle.mass)
 
 
-def _check_mass(recording: Recording, force: Array, a: Array, mass: float) -> None:
-    """Refuse a vehicle whose mass is far from the one that the forces accelerate."""
+def _check_mass(force: Array, a: Array, mass: float) -> str | None:
+    """Answer with a vehicle whose mass is far from the one that the forces accelerate."""
     moved = float(force @ a / (a @ a))
     if correlation(force, a) > 0.8 and not mass / 3.0 < moved < 3.0 * mass:
-        raise RecordingError(
-            f"{recording.name}: Fyf + Fyr must accelerate the vehicle of {mass:.4g} kg, they "
+        return (
+            f"Fyf + Fyr must accelerate the vehicle of {mass:.4g} kg, they "
             f"move {moved:.4g} kg; check the unit of mass, or name the right vehicle"
         )
+    return None
 
 
 RISES = "must rise with its slip angle (paper's sign, alpha = delta - atan2(v_y +- l r, v_x))"
 
 
-def _check_rises(recording: Recording, alpha: Array, force: Array, column: str) -> None:
-    """Refuse a force that falls with the slip angle that makes it."""
+def _check_rises(alpha: Array, force: Array, column: str, other: str) -> str | None:
+    """Answer with a force that falls with the slip angle that makes it."""
     together = correlation(alpha, force)
     if together < -0.3 and np.sqrt(np.mean(alpha**2)) > 0.003:
-        raise RecordingError(
-            f"{recording.name}: {column} {RISES}, their correlation is {together:.2f}; change the "
-            f"sign of {column} or of vy"
+        return (
+            f"{column} {RISES}, their correlation is {together:.2f}; change the sign of {column} "
+            f"or of vy{other}"
         )
+    return None
 
 
-def _check_rear_rises(recording: Recording, alpha: Array, w: Windows, l_r: float) -> None:
-    """Refuse a lateral acceleration that falls with the slip of the rear: by v_y or by the car.
+def _check_rear_rises(alpha: Array, w: Windows, l_r: float, other: str) -> str | None:
+    """Answer with a lateral acceleration that falls with the slip of the rear: by v_y or the car.
 
     Where an accelerometer has the slope 1 on v̇_y the sign of v_y is right, and the car is wrong.
     """
     a = w.v_x_r + w.v_y_dot
     together = correlation(alpha, a)
     if not (together < -0.3 and np.sqrt(np.mean(alpha**2)) > 0.003):
-        return
+        return None
     car = f"name the right vehicle, of which l_r = {l_r:g} m is told"
-    remedy = f"change the sign of vy, or {car}"
+    remedy = f"change the sign of vy{other or f', or {car}'}"
     if w.a_y is not None:
         fit = least_squares(np.column_stack([w.v_x_r, w.v_y_dot, w.r_dot]), w.a_y)
         slope, error = fit.theta[1], 4.0 * fit.error[1]
@@ -372,7 +416,4 @@ def _check_rear_rises(recording: Recording, alpha: Array, w: Windows, l_r: float
             remedy = f"vy has the sign of ay: {car}, or move vy to the center of gravity"
         elif slope < -0.3 < -error:
             remedy = "change the sign of vy"
-    raise RecordingError(
-        f"{recording.name}: lateral acceleration {RISES}, their correlation is {together:.2f}; "
-        f"{remedy}"
-    )
+    return f"lateral acceleration {RISES}, their correlation is {together:.2f}; {remedy}"

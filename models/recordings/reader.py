@@ -93,7 +93,8 @@ def read_repaired(
         One line: file and run, column, rule, value, remedy.
     """
     told = map_of(log_map)
-    recording = read_recording(path, run, dt, check=check, columns=columns, log_map=told)
+    judged = check and not told.repair
+    recording = read_recording(path, run, dt, check=judged, columns=columns, log_map=told)
     if told.repair:
         recording, vehicle = told.repair.apply(recording, vehicle)
         note = f"repaired by the map: {repair_text(told.repair)}"

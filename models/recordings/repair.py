@@ -49,6 +49,7 @@ class Repair:
     velocity_sensor_x : how far ahead of the center of gravity v_y is measured [m].
     velocity_sensor_angle : by which that sensor is turned to the left [rad].
     acceleration_sensor_x : how far ahead of the center of gravity a_y is measured [m].
+    sideslip : whether what is logged as v_y is, with its factor, the sideslip angle [rad].
     vehicle : numbers of the car in place of the told ones, by their names in `Vehicle`.
 
     Raises
@@ -65,6 +66,7 @@ class Repair:
     velocity_sensor_x: float = 0.0
     velocity_sensor_angle: float = 0.0
     acceleration_sensor_x: float = 0.0
+    sideslip: bool = False
     vehicle: Mapping[str, float] = field(default_factory=nothing)
 
     def __post_init__(self) -> None:
@@ -116,6 +118,9 @@ class Repair:
                 signals[name] = signal * self.factor.get(name, 1.0) - self.offset.get(name, 0.0)
             elif name in told:
                 raise RecordingError(f"{recording.name}: has no {name} that could be repaired")
+        if self.sideslip:
+            angle = recording.v_y * self.factor.get("v_y", 1.0)
+            signals["v_y"] = signals["v_x"] * np.tan(angle) - self.offset.get("v_y", 0.0)
         for name, delay in self.delay.items():
             signals[name] = np.interp(recording.t + delay, recording.t, signals[name])
         width = round(SMOOTHED * vehicle.froude_time / recording.dt)
@@ -135,8 +140,22 @@ class Repair:
         kept = self._kept(recording)
         changes: dict[str, Any] = {name: signal[kept] for name, signal in signals.items()}
         repaired = replace(recording, **changes)
+        return repaired, self.on(vehicle)
+
+    def on(self, vehicle: Vehicle) -> Vehicle:
+        """Return the car with the numbers that are told in place of its own.
+
+        Parameters
+        ----------
+        vehicle : as it was told.
+
+        Raises
+        ------
+        VehicleError
+            Where these are the numbers of no car.
+        """
         numbers: dict[str, Any] = dict(self.vehicle)
-        return repaired, replace(vehicle, **numbers) if numbers else vehicle
+        return replace(vehicle, **numbers) if numbers else vehicle
 
     def _kept(self, recording: Recording) -> slice:
         """Return the samples at which every channel was measured."""
@@ -167,13 +186,19 @@ class Repair:
         for key, value in other.factor.items():
             factor[key] = factor.get(key, 1.0) * value
         places = {name: getattr(self, name) + getattr(other, name) for name in SCALARS}
-        return Repair(factor=factor, vehicle={**self.vehicle, **other.vehicle}, **sums, **places)
+        return Repair(
+            factor=factor,
+            sideslip=self.sideslip or other.sideslip,
+            vehicle={**self.vehicle, **other.vehicle},
+            **sums,
+            **places,
+        )
 
     def tables(self) -> dict[str, Any]:
         """Return it as a document holds it: only what repairs something, tables after numbers."""
         numbers = {name: value for name in SCALARS if (value := getattr(self, name))}
         tables = {name: dict(value) for name in TABLES if (value := getattr(self, name))}
-        return {**numbers, **tables}
+        return {**numbers, **({"sideslip": True} if self.sideslip else {}), **tables}
 
     @classmethod
     def of_table(cls, table: Table) -> "Repair":
@@ -188,8 +213,12 @@ class Repair:
         ValueError
             Of the table's class for a key or type that is not known; `RecordingError` for a value.
         """
-        table.only(*SCALARS, *TABLES)
+        table.only(*SCALARS, "sideslip", *TABLES)
         given: dict[str, Any] = {name: table.number(name) for name in SCALARS if name in table}
+        if "sideslip" in table:
+            given["sideslip"] = table.value("sideslip")
+            if not isinstance(given["sideslip"], bool):
+                table.refuse("sideslip", "must be true or false")
         for name in TABLES:
             if name in table:
                 inner = table.table(name)
@@ -198,7 +227,7 @@ class Repair:
 
 
 TABLES = ("factor", "offset", "delay", "lag", "vehicle")
-SCALARS = tuple(one.name for one in fields(Repair) if one.name not in TABLES)
+SCALARS = tuple(one.name for one in fields(Repair) if one.name not in (*TABLES, "sideslip"))
 
 
 def _require_finite(name: str, value: float) -> None:

@@ -15,6 +15,7 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "sample": "a log to learn from, driven by the built-in car, where there is none",
         "init": "a commented vehicle file to fill in",
         "channels": "what a log holds, what its channels probably are, and a log.toml that says so",
+        "doctor": "what is wrong with a log or with its car's file, and a log.toml that mends it",
         "paper": "Tables I and II of the paper, beside ours, over many seeds",
         "identify": "learn tire forces from a recording, freeze the weights and test them",
         "predict": "axle forces of a drive by a stored model, and what they miss",

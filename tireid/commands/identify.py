@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from codegen.escape import visible
+from identifier.doctor import diagnose
 from identifier.method import CannotFreezeError, Method
 from identifier.methods import load_model
 from identifier.paper.network import Weights
@@ -20,7 +21,7 @@ from identifier.reproducibility import (
 )
 from identifier.run import History
 from identifier.verdict import judge_prediction
-from models.recordings import Recording, joined
+from models.recordings import Recording, Repair, joined
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import resumed_line, verdict_line
@@ -47,9 +48,10 @@ from tireid.commands.options import (
     seed_of,
     told_map,
 )
+from tireid.diagnoses import add_repair, doctor_text, repaired, write_repair
 from tireid.figures.style import paper_design
 from tireid.learning import identify
-from tireid.output import output_folder, text_table
+from tireid.output import output_folder, require_free, text_table, write_json
 from tireid.progress import Progress, say, tell
 from tireid.reports.identify import write_identify_report
 from tireid.verdicts import add_accept, exit_code, verdict_text, warn_of_stored
@@ -100,6 +102,7 @@ def add_parser(commands: Any) -> None:
         help="recordings to predict",
     )
     add_log_reading(parser)
+    add_repair(parser, "learn on what is left, and write it to")
     add_weights(parser, "begin learning with it")
     add_seed(parser, "the initial weights of the paper's network")
     add_network_arguments(parser, "freeze nothing, judge this network instead")
@@ -120,9 +123,20 @@ def run(options: argparse.Namespace) -> int:
         warn_of_stored(options.weights)
     if options.run_name is not None and len(options.logs) > 1:
         raise ValueError("--run goes with one LOG: name runs as LOG:RUN")
+    if options.repair is not None:
+        require_free(options.repair, force=options.force)
     logs = [_read(log, options.run_name, vehicle, design, options) for log in options.logs]
     others = [_read(log, None, vehicle, design, options) for log in options.replay]
     _require_distinct([*logs, *others])
+    say("the doctor looks at the log")
+    diagnosis = diagnose(joined(logs), vehicle)
+    repair = diagnosis.repair if options.repair is not None else Repair()
+    if repair:
+        logs, others = (
+            [repaired(one, vehicle, repair)[0] for one in some] for some in (logs, others)
+        )
+        vehicle = repair.on(vehicle)
+        law, design = chosen_method(options, vehicle, seed)
     recording = joined(logs)
     network = network_model(options, vehicle, design.min_speed)
     freeze_times = sorted(set(options.freeze or [float(recording.t[-1])]))
@@ -172,12 +186,26 @@ def run(options: argparse.Namespace) -> int:
             by_key = {f"{freeze_key(t)} s": replays for t, replays in frozen.items()}
             closing = _closing_line(learnt, freeze_times[-1], vehicle, resumed=start is not None)
             told = f"{error_table([*histories, *pieces], frozen)}\n{closing}"
-        parts_told = (told, vehicle.estimates, verdict_text(verdict))
+        doctor = doctor_text(diagnosis, repair, options.repair)
+        parts_told = (told, vehicle.estimates, doctor, verdict_text(verdict))
         told = "\n".join(part for part in parts_told if part)
         model = network or histories[0].freeze(freeze_times[-1])
+        write_json(folder / "doctor.json", {**diagnosis.to_dict(), "applied": repair.tables()})
         write_identify_report(
-            folder, law, model, histories, by_key, figures, verdict, pieces, command=options.words
+            folder,
+            law,
+            model,
+            histories,
+            by_key,
+            figures,
+            verdict,
+            pieces,
+            diagnosis=diagnosis,
+            command=options.words,
         )
+    if repair:
+        write_repair(options.repair, told_map(options), diagnosis)
+        say(f"wrote {options.repair}")
     tell(told)
     say(f"wrote {options.out}/")
     return exit_code(verdict, options)
@@ -216,7 +244,7 @@ def _read(
         vehicle,
         told_map(options),
         run_name=run_name,
-        check=not options.no_check,
+        check=not options.no_check and options.repair is None,  # else once it is repaired
         dt=design.dt,
     )
     counted_samples(recording, design.min_speed)  # refuses a car that never drives

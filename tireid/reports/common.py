@@ -28,6 +28,8 @@ READ = {
     "friction, a shift an offset of steering or lateral velocity; shaded slip is not known.",
     "learnt": "Each number comes to rest once it was excited; steps late in the drive are a "
     "friction or a sensor that changed.",
+    "doctor": "Points of a good log lie on one rising curve, each axle on its own; a cloud, a loop "
+    "or a falling curve is no tire, whatever its numbers.",
     "inputs": "Is the log what you think it is: signs, gaps, noise?",
     "replay": "A drive that was not learnt; the residual is what the frozen model misses.",
     "error": "It shrinks at first and then stays at the size of the noise.",

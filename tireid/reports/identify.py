@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from identifier.doctor import Diagnosis
 from identifier.reproducibility import (
     AxleRmse,
     Replay,
@@ -18,6 +19,7 @@ from identifier.run import History
 from identifier.tire_model import TireModel
 from identifier.verdict import Verdict
 from models.files import digest
+from tireid.diagnoses import diagnosis_section, diagnosis_warnings
 from tireid.report import Block, Headline, Paragraph, Report, Section, Table, write_report
 from tireid.reports.common import READ, REPORT, drawing, origin
 from tireid.verdicts import verdict_headline, verdict_section, verdict_warnings
@@ -37,6 +39,7 @@ def write_identify_report(
     verdict: Verdict,
     parts: Sequence[History] = (),
     *,
+    diagnosis: Diagnosis,
     command: str,
 ) -> None:
     """Write the report of what was learnt, or of a network that was judged.
@@ -50,6 +53,7 @@ def write_identify_report(
     figures : by the name of their files.
     verdict : on the model.
     parts : of the first run, over each of several logs that were learnt on.
+    diagnosis : of what was learnt on, as it was read.
     command : as it was typed.
     """
     learnt, last = runs[0], list(frozen.values())[-1]
@@ -66,6 +70,7 @@ def write_identify_report(
                 drawing(figures["inputs"], f"Signals of {learnt.recording.name}.", READ["inputs"])
             ],
         ),
+        diagnosis_section(diagnosis),
         origin(
             command,
             learnt.vehicle,
@@ -78,7 +83,11 @@ def write_identify_report(
         summary=f"{learnt.recording.duration:.4g} s of driving, learnt sample by sample from "
         "speed, lateral velocity, yaw rate and steering.",
         numbers=[verdict_headline(verdict), *identify_headlines(model, runs, last)],
-        warnings=[*verdict_warnings(verdict), *identify_warnings(model, runs)],
+        warnings=[
+            *verdict_warnings(verdict),
+            *diagnosis_warnings(diagnosis),
+            *identify_warnings(model, runs),
+        ],
         sections=sections,
     )
     write_report(folder / REPORT, report)

@@ -1,0 +1,250 @@
+"""How well a log reads as the motion of one car: what two tire curves leave unexplained.
+
+φ = F/F_z [static axle loads], α [rad] its slip angle, rows front and rear. φ follows from v_x, v_y
+and r without any tire, and α from these, the steering and the lengths of the car: so whatever the
+tires are, φ must be a curve of α that rises and saturates, c α / sqrt(1 + (c α/μ)^2) + const. A
+reading of the log (its units, its signs, the size of the car) is as good as little is left of φ;
+with an accelerometer also of a_y = dv_y/dt + v_x r. Means over windows are compared, so that
+nothing is differentiated, and shares of each equation's own variance, so that no unit favors
+itself.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from codegen.arrays import Array
+from identifier.verdict.motion import Windows
+from models.recordings import Recording
+from models.vehicle import GRAVITY, Vehicle
+
+WINDOW = 0.2  # [s]
+SLOWEST = 0.3  # of the 95th percentile of speed, below which a window does not count
+FEWEST, MOST = 20, 500  # windows: fewer say nothing, of more that many are taken all over the log
+PIECE, PIECES = 60.0, 10  # s, and how many of them are looked at of a drive of hours
+SHORTEST = 200  # samples of such a piece
+STIFFNESS = np.geomspace(1.0, 100.0, 28)  # c [1/rad]
+FRICTION = np.array([0.3, 0.5, 0.8, 1.2, 1.8, 3.0])  # μ [-]
+# A stiffness that is twice the told one costs as much as 14 % of what is left unexplained.
+DISBELIEF = 0.3  # per square of the logarithm of c over the told one
+FAST = 6.0  # sqrt(g L), 30 m/s for a sedan; what is faster costs as much per square of a logarithm
+EXACT = 0.003  # share of the variance of φ, below which less that is left says nothing more
+ROLLING = (0.85, 1.25)  # slope of a_y on dv_y/dt + v_x r, with the roll of the body
+
+
+class Reading(NamedTuple):
+    """What logged values must be multiplied by to be SI and ISO, and the size of the car.
+
+    sideslip: v_y is the sideslip angle, its factor makes it rad.   size: lengths of the car over
+    the told ones, and so the root of its yaw inertia over its mass.   inertia: yaw inertia over
+    what it then is.
+    """
+
+    v_x: float = 1.0
+    v_y: float = 1.0
+    r: float = 1.0
+    delta: float = 1.0
+    a_y: float = 1.0
+    sideslip: bool = False
+    size: float = 1.0
+    inertia: float = 1.0
+
+
+class Motion(NamedTuple):
+    """Means of a log as it is written over the windows in which the car drives, each (m,).
+
+    v_y, delta_f, delta_r, v_x_r = v_x r, turn = r/v_x, sideslip = v_y/v_x, a_y or None; rates of
+    change v_y_dot, r_dot, and that of v_x v_y; speed: 95th percentile of |v_x|, one number.
+    """
+
+    v_y: Array
+    delta_f: Array
+    delta_r: Array
+    v_x_r: Array
+    turn: Array
+    sideslip: Array
+    a_y: Array | None
+    v_y_dot: Array
+    r_dot: Array
+    v_x_v_y_dot: Array
+    speed: float
+
+    @classmethod
+    def of(cls, recording: Recording) -> "Motion | None":
+        """Return that of a recording, None where too little of it is driven."""
+        pieces = looked_at(recording)
+        speed = float(np.percentile(np.concatenate([np.abs(one.v_x) for one in pieces]), 95))
+        if speed == 0.0:
+            return None
+        parts = [cls._of_piece(one, SLOWEST * speed) for one in pieces]
+        means, rates, shown = (
+            np.concatenate([part[k] for part in parts], axis=1) for k in range(3)
+        )
+        m = means.shape[1]
+        some = np.arange(m) if m <= MOST else np.linspace(0, m - 1, MOST).astype(int)
+        if m < FEWEST:
+            return None
+        a_y = None if recording.a_y is None else shown[0, some]
+        v_y, delta_f, delta_r, v_x_r, turn, sideslip = means[:, some]
+        v_y_dot, r_dot, v_x_v_y_dot = rates[:, some]
+        return cls(
+            v_y=v_y,
+            delta_f=delta_f,
+            delta_r=delta_r,
+            v_x_r=v_x_r,
+            turn=turn,
+            sideslip=sideslip,
+            a_y=a_y,
+            v_y_dot=v_y_dot,
+            r_dot=r_dot,
+            v_x_v_y_dot=v_x_v_y_dot,
+            speed=speed,
+        )
+
+    @staticmethod
+    def _of_piece(recording: Recording, fast: float) -> tuple[Array, Array, Array]:
+        """Return means, rates and what an accelerometer shows, a column each window."""
+        v_x, v_y, r, a_y = recording.v_x, recording.v_y, recording.r, recording.a_y
+        windows = driven_windows(recording, fast)
+        over = np.where(np.abs(v_x) < fast, fast, v_x)
+        signals = np.column_stack([v_y, recording.u, v_x * r, r / over, v_y / over])
+        rates = windows.rate(np.column_stack([v_y, r, v_x * v_y])).T
+        shown = windows.mean(np.zeros_like(r) if a_y is None else a_y)[None]
+        return windows.mean(signals).T, rates, shown
+
+
+def looked_at(recording: Recording) -> tuple[Recording, ...]:
+    """Return the pieces of a drive that the screen looks at: all of a short one, some of a long.
+
+    Parameters
+    ----------
+    recording : of any length, of one stretch or several.
+    """
+    parts = [recording]
+    if recording.breaks:
+        parts = [recording.taken(np.arange(s.start, s.stop)) for s in recording.stretches]
+    n = max(round(PIECE / recording.dt), SHORTEST)
+    total = sum(len(part) for part in parts)
+    if total <= PIECES * n:
+        return tuple(parts)
+    starts = [(part, k) for part in parts for k in range(0, max(len(part) - n, 0) + 1, n)]
+    some = np.unique(np.linspace(0, len(starts) - 1, PIECES).astype(int))
+    return tuple(
+        part.taken(np.arange(k, min(k + n, len(part)))) for part, k in (starts[j] for j in some)
+    )
+
+
+def driven_windows(recording: Recording, fast: float) -> Windows:
+    """Return the windows in which a car is never slower than a speed, forward or backward.
+
+    Parameters
+    ----------
+    fast : that speed, in the unit of the log.
+    """
+    n = max(2, round(WINDOW / recording.dt))
+    starts = np.arange(0, max(len(recording) - n, 0), max(1, n // 2))
+    total = np.concatenate([[0], np.cumsum(np.abs(recording.v_x) < fast)])
+    drives = total[starts + n + 1] == total[starts] if starts.size else starts > 0
+    return Windows(starts=starts[drives], n=n, duration=n * recording.dt)
+
+
+def unexplained(motion: Motion, vehicle: Vehicle, reading: Reading) -> float:
+    """Return what a reading leaves unexplained: the sum of the logarithms of each equation's share.
+
+    Parameters
+    ----------
+    motion : of the log.
+    vehicle : as it was told.
+    reading : of the log and of the car.
+    """
+    one = forces_and_slips(motion, vehicle, reading)
+    return front_leaves(one, vehicle) + but_front_leaves(one, motion, vehicle, reading)
+
+
+def front_leaves(one: "AxleMotion", vehicle: Vehicle) -> float:
+    """Return what is left of the front axle, the only equation that the steering is in.
+
+    Parameters
+    ----------
+    one : of a reading.
+    vehicle : as it was told.
+    """
+    told = vehicle.cornering_stiffness_front / vehicle.axle_loads[0]
+    return _curve_leaves(one.force[0], one.slip[0], told)
+
+
+def but_front_leaves(
+    one: "AxleMotion", motion: Motion, vehicle: Vehicle, reading: Reading
+) -> float:
+    """Return what is left of all other equations.
+
+    Parameters
+    ----------
+    one : of the reading.
+    motion : of the log.
+    vehicle : as it was told.
+    reading : of the log and of the car.
+    """
+    froude = abs(reading.v_x) * motion.speed / (math.sqrt(reading.size) * vehicle.froude_speed)
+    told = vehicle.cornering_stiffness_rear / vehicle.axle_loads[1]
+    total = max(math.log(froude / FAST), 0.0) ** 2
+    total += _curve_leaves(one.force[1], one.slip[1], told)
+    if motion.a_y is not None:
+        total += _accelerometer_leaves(reading.a_y * motion.a_y, one.acceleration)
+    return total
+
+
+class AxleMotion(NamedTuple):
+    """φ and α, rows front and rear (2, m); dv_y/dt + v_x r [m/s^2] (m,)."""
+
+    force: Array
+    slip: Array
+    acceleration: Array
+
+
+def forces_and_slips(motion: Motion, vehicle: Vehicle, reading: Reading) -> AxleMotion:
+    """Return forces over loads and slip angles of the axles as a reading has them.
+
+    Parameters
+    ----------
+    motion : of the log.
+    vehicle : as it was told.
+    reading : of the log and of the car.
+    """
+    k_x, k_y, k_r = reading.v_x, reading.v_y, reading.r
+    l_f, l_r = reading.size * vehicle.l_f, reading.size * vehicle.l_r
+    inertia = reading.inertia * reading.size**2 * vehicle.yaw_inertia / vehicle.mass  # [m^2]
+    if reading.sideslip:
+        v_y_dot, sideslip = k_y * k_x * motion.v_x_v_y_dot, k_y * motion.v_y
+    else:
+        v_y_dot, sideslip = k_y * motion.v_y_dot, k_y / k_x * motion.sideslip
+    acceleration = v_y_dot + k_x * k_r * motion.v_x_r
+    yaw, turn = inertia * k_r * motion.r_dot, k_r / k_x * motion.turn
+    force = np.stack([acceleration + yaw / l_r, acceleration - yaw / l_f]) / GRAVITY
+    front = reading.delta * motion.delta_f - sideslip - l_f * turn
+    rear = motion.delta_r - sideslip + l_r * turn
+    return AxleMotion(force, np.stack([front, rear]), acceleration)
+
+
+def _curve_leaves(force: Array, slip: Array, told: float) -> float:
+    """Return the logarithm of the share of a force that no curve of its slip explains."""
+    disbelief = DISBELIEF * np.log(STIFFNESS / told) ** 2
+    linear = STIFFNESS[:, None] * slip
+    force = force - force.mean()
+    size = float(force @ force) + 1e-12
+    least = math.inf
+    for friction in FRICTION:
+        curve = linear / np.sqrt(1.0 + (linear / friction) ** 2)
+        curve -= curve.mean(axis=1, keepdims=True)
+        left = np.sum((force - curve) ** 2, axis=1) / size
+        least = min(least, float(np.min(np.log(np.minimum(left, 1.0) + EXACT) + disbelief)))
+    return least
+
+
+def _accelerometer_leaves(a_y: Array, acceleration: Array) -> float:
+    """Return the logarithm of the share of a_y that the motion does not explain."""
+    shown, moved = a_y - a_y.mean(), acceleration - acceleration.mean()
+    slope = float(np.clip(shown @ moved / (moved @ moved + 1e-12), *ROLLING))
+    left = float(np.sum((shown - slope * moved) ** 2)) / (float(shown @ shown) + 1e-12)
+    return math.log(min(left, 1.0) + EXACT)

@@ -1,0 +1,193 @@
+"""What the doctor says of a log and of its car: findings in order, a repair, and what is unseen."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from identifier.doctor.balance import Balance, stretches_of
+from identifier.doctor.estimate import FEWEST, LONGEST, PIECES, estimate
+from identifier.doctor.finding import Finding
+from identifier.doctor.fit import Fitter
+from identifier.doctor.screen import Screened, screen, steering_finding
+from models.recordings import Recording, RecordingError
+from models.recordings.checks import physics_contradiction, vehicle_contradiction
+from models.recordings.repair import Repair
+from models.vehicle import Vehicle, VehicleError
+
+MATTERS = 0.5  # confidence, from which a finding is one
+RATIOS = ("steering_ratio", "factor")  # codes of gross findings whose factor is any number
+FACTOR, ROUNDS = "factor.delta_f", 2
+NEVER = (
+    "mass: scales all forces alike and leaves the motion as it is; weigh the car",
+    "the lateral axis mirrored throughout (y to the right, as in SAE or NED): all laws stay as "
+    "they are; look at one left turn",
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Diagnosis:
+    """What is wrong with a log or with what is told of its car, and what takes it out.
+
+    Parameters
+    ----------
+    name : of the recording.
+    findings : those that matter most first.
+    unseen : what this log cannot tell, and why, a line each.
+    """
+
+    name: str
+    findings: tuple[Finding, ...]
+    unseen: tuple[str, ...]
+
+    @property
+    def healthy(self) -> bool:
+        """Whether nothing was found that matters."""
+        return not any(one.confidence >= MATTERS for one in self.findings)
+
+    @property
+    def repair(self) -> Repair:
+        """What takes out all that is sure."""
+        return combined(one for one in self.findings if one.sure)
+
+    def summary(self) -> str:
+        """Return the findings and what is unseen as lines of text."""
+        lines = [f"{one.text} ({_certainty(one)})" for one in self.findings]
+        found = lines or ["nothing found"]
+        return "\n".join([f"{self.name}:", *found, *(f"cannot be seen: {s}" for s in self.unseen)])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain numbers and words, ready for JSON; None is what is not known."""
+        return {
+            "recording": self.name,
+            "healthy": self.healthy,
+            "findings": [finding_dict(one) for one in self.findings],
+            "unseen": list(self.unseen),
+            "repair": self.repair.tables(),
+        }
+
+    def __repr__(self) -> str:
+        codes = ", ".join(f"{one.code} {one.channel}".strip() for one in self.findings)
+        return f"<Diagnosis of {self.name!r}: {codes or 'nothing found'}>"
+
+
+def _certainty(one: Finding) -> str:
+    return "sure" if one.sure else f"confidence {100.0 * one.confidence:.0f} %"
+
+
+def finding_dict(one: Finding) -> dict[str, Any]:
+    """Return a finding as plain numbers and words, ready for JSON.
+
+    Parameters
+    ----------
+    one : of a diagnosis.
+    """
+
+    def number(value: float) -> float | None:
+        return value if math.isfinite(value) else None
+
+    return {
+        "code": one.code,
+        "channel": one.channel,
+        "size": number(one.size),
+        "deviation": number(one.deviation),
+        "unit": one.unit,
+        "confidence": one.confidence,
+        "text": one.text,
+        "sure": one.sure,
+        "repair": None if one.repair is None else one.repair.tables(),
+    }
+
+
+def combined(findings: Iterable[Finding]) -> Repair:
+    """Return the repair of several findings, gross ones before those that were asked after them.
+
+    Parameters
+    ----------
+    findings : with or without a repair.
+    """
+    repair = Repair()
+    for one in findings:
+        if one.repair is not None:
+            repair = repair.merged(one.repair)
+    return repair
+
+
+def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
+    """Return what is wrong with a log or with what is told of its car, from the log alone.
+
+    Parameters
+    ----------
+    recording : as it was read; its axle forces are not looked at.
+    vehicle : as it was told.
+    """
+    gross = screen(recording, vehicle)
+    blind = gross.blind
+    found, fine = list(gross.findings), tuple[Finding, ...]()
+    if not blind:
+        try:
+            drive, car = gross.repair.apply(recording, vehicle)
+            wheel = next((one for one in found if one.code in RATIOS and one.repair), None)
+            if wheel is not None:
+                exact = _exact_ratio(wheel, drive, car)
+                found[found.index(wheel)] = exact
+                drive, car = combined(found).apply(recording, vehicle)
+            found += _contradictions(drive, car)
+            fine = estimate(drive, car)
+        except (RecordingError, VehicleError) as error:
+            blind = str(error)
+    ranked = sorted([*found, *fine], key=lambda one: not one.confidence >= MATTERS)
+    return Diagnosis(
+        name=recording.name,
+        findings=tuple(_told_once(ranked)),
+        unseen=_unseen(recording, replace(gross, blind=blind)),
+    )
+
+
+def _contradictions(recording: Recording, vehicle: Vehicle) -> list[Finding]:
+    """Return the law that a log still breaks as it is read best, as one finding."""
+    said = physics_contradiction(recording) or vehicle_contradiction(recording, vehicle)
+    return [] if said is None else [Finding(code="contradiction", confidence=0.9, text=said)]
+
+
+def _told_once(findings: list[Finding]) -> list[Finding]:
+    """Return findings without the second of one code and channel."""
+    kept: dict[tuple[str, str], Finding] = {}
+    for one in findings:
+        kept.setdefault((one.code, one.channel), one)
+    return list(kept.values())
+
+
+def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding:
+    """Return the ratio of a steering wheel as the drive says it, no stiffness believed.
+
+    Parameters
+    ----------
+    coarse : the finding, by which the drive is repaired.
+    drive, car : with it.
+    """
+    assert coarse.repair is not None
+    factor, deviation = coarse.repair.factor["delta_f"], math.nan
+    for _ in range(ROUNDS):
+        balance = Balance(stretches_of(drive, car, longest=LONGEST, pieces=PIECES), car)
+        if len(balance) < FEWEST:
+            return coarse
+        fit = Fitter(balance).fit([FACTOR], {})
+        by, deviation = math.exp(-fit.sizes[FACTOR]), fit.deviation(FACTOR)
+        drive, factor = Repair(factor={"delta_f": by}).apply(drive, car)[0], factor * by
+    return steering_finding(factor, coarse.confidence, deviation=deviation)
+
+
+def _unseen(recording: Recording, gross: Screened) -> tuple[str, ...]:
+    """Return what this log cannot tell, a line each."""
+    lines = list(NEVER)
+    if gross.blind:
+        lines.append(
+            f"offsets, delays, lever arms, scales, center of gravity, inertia: {gross.blind}"
+        )
+        return tuple(lines)
+    if recording.a_y is None:
+        lines.append(
+            "bank of the road, and units of speed against one another: there is no a_y in the log"
+        )
+    return tuple(lines)

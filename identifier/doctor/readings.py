@@ -1,0 +1,266 @@
+"""Which reading of a log makes it the motion of the told car: units, signs, wheel angles, size.
+
+What may be wrong grossly is a short list of changes; each is tried, alone and then together, and
+that reading is taken which leaves least unexplained, where every change must earn its place. Two
+readings that leave the same cannot be told apart, and the confidence says so.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from codegen.arrays import Array
+from identifier.doctor.consistency import (
+    Motion,
+    Reading,
+    but_front_leaves,
+    forces_and_slips,
+    front_leaves,
+    unexplained,
+)
+from models.vehicle import GRAVITY, Vehicle
+
+DEGREE, KMH, MPH, MILLI = math.pi / 180.0, 1.0 / 3.6, 0.44704, 1e-3
+GAIN = 1.1  # that a change must earn: less than it is left by a third in a sum of logarithms
+FREEDOM = 0.5  # that a change must earn beside, whose factor is free
+FREE = ("steering", "other_car", "yaw_inertia")
+DEEPER = math.log(0.15)  # left of each equation, above which more changes are tried together
+KEPT = 8  # readings that are taken further
+MOST = 4  # changes at once
+STEERING = np.geomspace(1.0 / 2500.0, 4.0, 48)  # factors of the steering angle that are tried
+SAME_STEERING, SAME_SIZE, SAME_INERTIA = math.log(1.5), math.log(2.2), math.log(2.0)
+# within which nothing is gross
+SIZES = np.geomspace(1.0 / 32.0, 32.0, 41)
+INERTIAS = np.geomspace(1.0 / 16.0, 16.0, 17)
+STEEPNESS = 3.0  # of the confidence over what the next best reading leaves more
+
+
+PRICES = {"mph": 0.3, "mm/s": 0.3}  # of units that few loggers use
+ALONE, UNUSUAL = 0.8, 0.5  # of a v_y in another unit than v_x, and of one that is an angle
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """One thing that may be wrong with a log, or with what is told of its car.
+
+    Parameters
+    ----------
+    code : for machines: "unit", "sign", "sideslip", or one of `FREE`.
+    channels : concerned; none where it is the car.
+    unit : in which they are logged, "" where that is right.
+    factors : by field of a `Reading`, what takes it out.
+    sideslip : whether v_y is the sideslip angle.
+    price : that it must earn beside that of every change, where it is less usual.
+    """
+
+    code: str
+    channels: tuple[str, ...] = ()
+    unit: str = ""
+    factors: tuple[tuple[str, float], ...] = ()
+    sideslip: bool = False
+    price: float = 0.0
+
+    @property
+    def fields(self) -> frozenset[str]:
+        """The fields of a reading that it changes, with what it does to them.
+
+        Two changes of one thing exclude one another; a steering wheel may well be in degrees.
+        """
+        kind = {"sign": "sign", "steering": "ratio"}.get(self.code, "size")
+        return frozenset(f"{name} {kind}" for name, _ in self.factors)
+
+    def on(self, reading: Reading) -> Reading:
+        """Return a reading with this change.
+
+        Parameters
+        ----------
+        reading : without it.
+        """
+        factors = {name: getattr(reading, name) * factor for name, factor in self.factors}
+        return reading._replace(**factors, sideslip=reading.sideslip or self.sideslip)
+
+
+def _changed(code: str, unit: str, factor: float, *channels: str, price: float = 0.0) -> Change:
+    factors = tuple((name.removesuffix("_f"), factor) for name in channels)
+    return Change(code=code, channels=channels, unit=unit, factors=factors, price=price)
+
+
+def _unit(unit: str, factor: float, *channels: str) -> Change:
+    alone = ALONE if channels == ("v_y",) else 0.0
+    return _changed("unit", unit, factor, *channels, price=PRICES.get(unit, 0.0) + alone)
+
+
+def _sign(*channels: str) -> Change:
+    return _changed("sign", "", -1.0, *channels)
+
+
+SPEEDS = {"km/h": KMH, "mph": MPH, "mm/s": MILLI}
+CHANGES = (
+    *(_unit(unit, factor, "v_x", "v_y") for unit, factor in SPEEDS.items()),
+    *(_unit(unit, factor, "v_x") for unit, factor in SPEEDS.items()),
+    *(_unit(unit, factor, "v_y") for unit, factor in SPEEDS.items()),
+    _unit("deg/s", DEGREE, "r"),
+    _unit("deg", DEGREE, "r", "delta_f"),
+    *(
+        Change(
+            code="sideslip",
+            channels=("v_y",),
+            unit=unit,
+            factors=(("v_y", one),),
+            sideslip=True,
+            price=UNUSUAL,
+        )
+        for unit, one in {"rad": 1.0, "deg": DEGREE}.items()
+    ),
+    _unit("deg", DEGREE, "delta_f"),
+    *(_sign(name) for name in ("v_y", "r", "v_x", "delta_f")),
+    _sign("v_x", "v_y"),
+)
+ON_ACCELEROMETER = (_unit("g", GRAVITY, "a_y"), _sign("a_y"), _sign("v_y", "a_y"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Explanation:
+    """A reading of a log, the changes that make it, and what it leaves.
+
+    Parameters
+    ----------
+    changes : in the order in which they were found.
+    reading : with all of them.
+    left : what it leaves unexplained, as `unexplained` returns it.
+    """
+
+    changes: tuple[Change, ...]
+    reading: Reading
+    left: float
+
+    @property
+    def cost(self) -> float:
+        """What it leaves and what its changes cost; a number that is free costs more."""
+        free = sum(change.code in FREE for change in self.changes)
+        prices = sum(GAIN + change.price for change in self.changes)
+        return self.left + prices + FREEDOM * free
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Read:
+    """How a log is best read, and what else it could be.
+
+    Parameters
+    ----------
+    best : the reading that is taken.
+    other : the next best, None where nothing comes near.
+    """
+
+    best: Explanation
+    other: Explanation
+
+    @property
+    def confidence(self) -> float:
+        """From a half, where the next best reading is as good, to 1."""
+        return 1.0 / (1.0 + math.exp(-STEEPNESS * (self.other.cost - self.best.cost)))
+
+
+def read(motion: Motion, vehicle: Vehicle) -> Read:
+    """Return how a log is best read as the motion of a car.
+
+    Parameters
+    ----------
+    motion : of the log.
+    vehicle : as it was told.
+    """
+    changes = CHANGES + (ON_ACCELEROMETER if motion.a_y is not None else ())
+    as_told = Explanation(
+        changes=(), reading=Reading(), left=unexplained(motion, vehicle, Reading())
+    )
+    found, best = [as_told], as_told
+    equations = 2 if motion.a_y is None else 3
+    beam = [as_told]
+    for _ in range(MOST):
+        longer = [new for one in beam for new in _longer(one, changes, motion, vehicle)]
+        found += longer
+        before, best = best, min(found, key=lambda one: one.cost)
+        if best is before and (len(beam) > 1 or best.left < equations * DEEPER):
+            break
+        good = best is not before and best.left < equations * DEEPER
+        beam = [best] if good else sorted(longer, key=lambda one: one.cost)[:KEPT]
+    best, *others = sorted(found, key=lambda one: (one.cost, len(one.changes)))
+    other = next((one for one in others if _means_else(one, best)), others[-1])
+    return Read(best=best, other=other)
+
+
+def _means_else(one: Explanation, best: Explanation) -> bool:
+    """Whether an explanation is not the best one with something more."""
+    return not set(best.changes) < set(one.changes)
+
+
+def _longer(
+    one: Explanation, changes: Sequence[Change], motion: Motion, vehicle: Vehicle
+) -> list[Explanation]:
+    """Return an explanation with each change that it does not have yet."""
+    taken = frozenset[str]().union(*(change.fields for change in one.changes))
+    free = [change for change in changes if not change.fields & taken]
+    if "delta ratio" not in taken:
+        free += _steerings(one, motion, vehicle)
+    if "size size" not in taken and not one.changes:
+        free += _scaled("other_car", "size", SIZES, SAME_SIZE, motion, vehicle)
+    if "inertia size" not in taken:
+        free += _scaled("yaw_inertia", "inertia", INERTIAS, SAME_INERTIA, motion, vehicle, one)
+    longer = []
+    for change in free:
+        reading = change.on(one.reading)
+        left = unexplained(motion, vehicle, reading)
+        longer.append(Explanation(changes=(*one.changes, change), reading=reading, left=left))
+    return longer
+
+
+def _steerings(one: Explanation, motion: Motion, vehicle: Vehicle) -> list[Change]:
+    """Return the factor of the steering angle that leaves least, where it is a gross one."""
+    told = one.reading.delta
+    as_it_is = forces_and_slips(motion, vehicle, one.reading._replace(delta=0.0))
+    rest = but_front_leaves(as_it_is, motion, vehicle, one.reading)
+
+    def left(factor: float) -> float:
+        steering = told * factor * motion.delta_f
+        front = as_it_is.slip + np.stack([steering, 0.0 * steering])
+        return rest + front_leaves(as_it_is._replace(slip=front), vehicle)
+
+    tried = {float(factor): left(float(factor)) for factor in (*STEERING, *-STEERING)}
+    factor = _refined(min(tried, key=lambda one: tried[one]), left)
+    if factor > 0.0 and abs(math.log(factor)) < SAME_STEERING:
+        return []
+    return [Change(code="steering", channels=("delta_f",), factors=(("delta", factor),))]
+
+
+def _scaled(
+    code: str,
+    name: str,
+    sizes: Array,
+    same: float,
+    motion: Motion,
+    vehicle: Vehicle,
+    one: Explanation | None = None,
+) -> list[Change]:
+    """Return the factor of a number of the car that leaves least, where it is a gross one."""
+    before = Reading() if one is None else one.reading
+
+    def left(size: float) -> float:
+        return unexplained(motion, vehicle, before._replace(**{name: size}))  # type: ignore[arg-type]
+
+    size = min(map(float, sizes), key=left)
+    if abs(math.log(size)) < same:
+        return []
+    return [Change(code=code, factors=((name, size),))]
+
+
+def _refined(factor: float, left: Callable[[float], float]) -> float:
+    """Return a factor nearer to the least, by golden sections of its logarithm."""
+    step, golden = math.log(STEERING[1] / STEERING[0]), 0.5 * (math.sqrt(5.0) - 1.0)
+    low, high = factor * math.exp(-step), factor * math.exp(step)
+    for _ in range(12):
+        span = math.log(high / low)
+        a, b = high * math.exp(-golden * span), low * math.exp(golden * span)
+        low, high = (low, b) if left(a) < left(b) else (a, high)
+    return math.copysign(math.sqrt(abs(low * high)), factor)

@@ -1,0 +1,456 @@
+"""What is wrong with the samples of a channel, before any physics: frozen, held, lost, copied.
+
+Every rule compares a channel with its own noise or with the other channels; none knows a car.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import Array
+from identifier.doctor.consistency import looked_at
+from identifier.doctor.finding import Finding
+from models.recordings import Recording
+from models.recordings.repair import Repair
+
+LATERAL = ("v_y", "r", "delta_f", "a_y")
+CHANNELS = ("v_x", *LATERAL, "delta_r")
+UNITS = {"v_x": "m/s", "v_y": "m/s", "r": "rad/s", "delta_f": "rad", "delta_r": "rad",
+         "a_y": "m/s^2"}  # fmt: skip
+SPIKE = 12.0  # times the noise beyond its neighbors
+FREEZE = 0.3  # [s] that a noisy channel repeats one number
+MOVES = 0.15  # of the range of v_x r, by which a car must move meanwhile, in any unit
+ALTERNATE = -0.35  # correlation of neighboring second differences, below which they are noise
+REPEATED = 0.01  # share of repeated samples of a noisy channel
+ALIKE = math.log(1.6)  # of the times by which samples of two channels are late
+COARSE = 0.05  # quantum over the rms of a channel
+CERTAIN = 0.99
+
+
+class Runs(NamedTuple):
+    """Stretches of equal neighbors of a channel: index of the first sample, and length, (k,)."""
+
+    first: NDArray[np.intp]
+    length: NDArray[np.intp]
+
+
+def channels(recording: Recording) -> Mapping[str, Array]:
+    """Return the signals that a recording has, by name; a rear axle that never steers is none."""
+    found = {name: getattr(recording, name) for name in CHANNELS}
+    if not recording.delta_r.any():
+        del found["delta_r"]
+    return {name: signal for name, signal in found.items() if signal is not None}
+
+
+def sample_findings(recording: Recording) -> list[Finding]:
+    """Return what is wrong with the samples of a log.
+
+    Parameters
+    ----------
+    recording : as it was read.
+    """
+    listed = [one for piece in looked_at(recording) for one in _piece_findings(piece)]
+    first: dict[tuple[str, str], Finding] = {}
+    for one in listed:
+        first.setdefault((one.code, one.channel), one)
+    late = {one.channel: one.size for one in listed if one.code == "jitter"}
+    return [
+        one
+        for one in first.values()
+        if one.code != "jitter" or _is_late(one.channel, late, recording.dt)
+    ]
+
+
+def _is_late(name: str, late: Mapping[str, float], dt: float) -> bool:
+    """Whether noise that grows with the slope is that of late samples: of several, or by much."""
+    alike = [
+        other
+        for other, size in late.items()
+        if other != name and abs(math.log(size / late[name])) < ALIKE
+    ]
+    return late[name] > 2.0 * dt or (bool(alike) and late[name] > 0.7 * dt)
+
+
+def _piece_findings(recording: Recording) -> list[Finding]:
+    """Return what is wrong with the samples of one stretch."""
+    signals = channels(recording)
+    found = [*_missing(recording, signals), *_copies(signals)]
+    named = {one.channel for one in found}
+    jump = clock_jump(recording, signals)
+    if jump is not None:
+        found.append(jump)
+    for name, signal in signals.items():
+        if name not in named:
+            found += _channel(name, signal, recording, jump is not None)
+    return found
+
+
+def _missing(recording: Recording, signals: Mapping[str, Array]) -> Iterator[Finding]:
+    """Channels that never change while others do."""
+    moves = {name: bool(np.ptp(signals[name]) > 0.0) for name in LATERAL if name in signals}
+    if sum(moves.values()) < 2:
+        return
+    for name, does in moves.items():
+        if not does:
+            value = float(signals[name][0])
+            yield Finding(
+                code="frozen",
+                channel=name,
+                size=recording.duration,
+                unit="s",
+                confidence=CERTAIN,
+                text=f"{name} is {value:g} {UNITS[name]} throughout while the car moves: "
+                "no sensor, or it was not connected",
+            )
+
+
+def _copies(signals: Mapping[str, Array]) -> Iterator[Finding]:
+    """Channels that are another channel, or computed from it."""
+    moving = {name: signal for name, signal in signals.items() if np.ptp(signal) > 0.0}
+    names = list(moving)
+    for k, one in enumerate(names):
+        for other in names[k + 1 :]:
+            a, b = moving[one], moving[other]
+            ratio = float(a @ b) / float(a @ a)
+            size = float(np.sqrt(b @ b))
+            if float(np.sqrt(np.sum((b - ratio * a) ** 2))) > 1e-7 * size:
+                continue
+            what = "is a copy of" if abs(ratio - 1.0) < 1e-7 else f"is {ratio:.4g} times"
+            yield Finding(
+                code="copied",
+                channel=other,
+                size=ratio,
+                confidence=CERTAIN,
+                text=f"{other} {what} {one}, sample by sample: it was computed or mapped, not "
+                "measured",
+            )
+
+
+def _channel(name: str, signal: Array, recording: Recording, jumps: bool) -> Iterator[Finding]:
+    """What is wrong with one channel that moves."""
+    dt = recording.dt
+    noise = _noise(signal)
+    quantum = _quantum(signal)
+    runs = _runs(signal)
+    if quantum is not None and quantum > COARSE * float(np.std(signal)):
+        yield Finding(
+            code="quantized",
+            channel=name,
+            size=quantum,
+            unit=UNITS[name],
+            confidence=CERTAIN,
+            text=f"{name} comes in steps of {quantum:.3g} {UNITS[name]}: a coarse sensor, or too "
+            "few digits were written",
+        )
+    lost = _lost(signal, noise)
+    if lost.size:
+        yield Finding(
+            code="dropout",
+            channel=name,
+            size=float(lost.size),
+            confidence=CERTAIN,
+            text=f"{name} drops to 0 for {lost.size} of {signal.size} samples, first at "
+            f"{recording.t[lost[0]]:.4g} s: a lost sensor; leave these samples out of the log",
+        )
+        return
+    stairs = _stairs(runs, signal.size, quantum)
+    if stairs is not None:
+        delay = 0.5 * (stairs - 1) * dt
+        yield Finding(
+            code="held",
+            channel=name,
+            size=stairs * dt,
+            unit="s",
+            confidence=CERTAIN,
+            text=f"{name} has a new value every {1e3 * stairs * dt:.3g} ms only and repeats it in "
+            f"between: so it is {1e3 * delay:.3g} ms late in the mean",
+            repair=Repair(delay={name: delay}),
+        )
+    elif quantum is None and (noise > 0.0 or name in ("v_y", "r", "a_y")):
+        yield from _repeats(name, runs, noise > 0.0, recording)
+    spikes = _spikes(signal, noise) if not jumps else np.empty(0)
+    if 3 <= spikes.size <= 0.1 * signal.size:
+        yield Finding(
+            code="spikes",
+            channel=name,
+            size=float(spikes.size),
+            confidence=0.9,
+            text=f"{name} has {spikes.size} samples far off their neighbors, first at "
+            f"{recording.t[int(spikes[0])]:.4g} s",
+        )
+    late = _jitter(signal, dt)
+    if late is not None and stairs is None:
+        size, z = late
+        yield Finding(
+            code="jitter",
+            channel=name,
+            size=size,
+            deviation=size / z,
+            unit="s",
+            confidence=0.9,
+            text=f"samples of {name} are up to {1e3 * size:.2g} ms late at random: stamped where "
+            "they arrive, not where they are taken",
+        )
+
+
+def _repeats(name: str, runs: Runs, noisy: bool, recording: Recording) -> Iterator[Finding]:
+    """A channel that holds one number: for long, or again and again, as noise never does."""
+    n = len(recording)
+    longest = int(np.argmax(runs.length))
+    length = int(runs.length[longest])
+    repeats = runs.length > 1
+    share = float(np.sum(runs.length - 1)) / n
+    again = int(np.count_nonzero(repeats))
+    if noisy and share > REPEATED and again >= 5:
+        typical = float(np.median(runs.length[repeats])) * recording.dt
+        yield Finding(
+            code="held",
+            channel=name,
+            size=typical,
+            unit="s",
+            confidence=0.95,
+            text=f"{name} holds its last value {again} times, typically for {1e3 * typical:.3g} ms "
+            f"({100.0 * share:.2g} % of the log): samples were lost on the way and repeated",
+        )
+    elif length * recording.dt >= FREEZE and _moves(name, recording, runs.first[longest], length):
+        first = float(recording.t[runs.first[longest]])
+        yield Finding(
+            code="frozen",
+            channel=name,
+            size=length * recording.dt,
+            unit="s",
+            confidence=0.95,
+            text=f"{name} does not change from {first:.4g} s on for {length * recording.dt:.3g} s: "
+            "frozen; cut the log there",
+        )
+
+
+def _moves(name: str, recording: Recording, first: int, length: int) -> bool:
+    """Whether the car changes its turn over a stretch, by the channels that are not judged."""
+    width = max(1, round(0.2 / recording.dt))
+    here = slice(max(first - width, 0), first + length + width)
+    turn = recording.v_x * recording.r
+    if name == "r":
+        turn = recording.delta_f * float(np.std(turn) / (np.std(recording.delta_f) + 1e-300))
+    smooth = np.convolve(turn[here], np.ones(width) / width, "valid")
+    usual = float(np.percentile(turn, 99) - np.percentile(turn, 1))
+    return bool(np.ptp(smooth) > MOVES * usual > 0.0)
+
+
+def _noise(signal: Array) -> float:
+    """Return the standard deviation of white noise where a channel moves, 0 where it is smooth.
+
+    Second differences of noise alternate, neighbors correlate by -2/3; those of a motion do not.
+    """
+    bend = np.diff(signal, 2)
+    moving = np.flatnonzero((bend[1:] != 0.0) & (bend[:-1] != 0.0))
+    if moving.size < 0.05 * bend.size or moving.size < 20:
+        return 0.0
+    a, b = bend[moving], bend[moving + 1]
+    cut = 6.0 * float(np.median(np.abs(a)))
+    kept = (np.abs(a) < cut) & (np.abs(b) < cut)
+    together = float(a[kept] @ b[kept]) / (float(np.sum(a[kept] ** 2)) + 1e-300)
+    return float(np.median(np.abs(a))) / (0.6745 * math.sqrt(6.0)) if together < ALTERNATE else 0.0
+
+
+def _runs(signal: Array) -> Runs:
+    starts = np.flatnonzero(np.concatenate([[True], np.diff(signal) != 0.0]))
+    return Runs(starts, np.diff(np.append(starts, signal.size)))
+
+
+def _quantum(signal: Array) -> float | None:
+    """Return the step of which all values are multiples, None where there is none."""
+    values = np.unique(signal)
+    if values.size < 3:
+        return None
+    steps = np.diff(values)
+    step = float(np.median(steps[steps < 1.5 * float(np.min(steps))]))
+    if (
+        not step > 1e-9 * float(np.abs(values).max())
+        or values.size > 0.5 * np.ptp(signal) / step + 2e3
+    ):
+        return None
+    count = steps / step
+    on_grid = np.abs(count - np.round(count)) < 0.05
+    few = values.size < 0.5 * signal.size
+    return step if few and bool(np.mean(on_grid) > 0.99) else None
+
+
+def _stairs(runs: Runs, n: int, quantum: float | None) -> int | None:
+    """Return how many samples each value of a slow channel lasts, None where it is not slow."""
+    inner = runs.length[1:-1]
+    if inner.size < 10:
+        return None
+    typical = int(np.median(inner))
+    same = np.abs(inner - typical) <= max(1, round(0.1 * typical))
+    regular = float(np.sum(inner[same])) > (0.7 if quantum is None else 0.9) * n
+    return typical if typical >= 2 and regular and np.mean(inner >= 2) > 0.8 else None
+
+
+def _lost(signal: Array, noise: float) -> NDArray[np.intp]:
+    """Return the samples that are exactly zero far from what stands before and after them."""
+    zero = signal == 0.0
+    if not zero.any() or zero.mean() > 0.3:
+        return np.empty(0, dtype=np.intp)
+    kept = np.flatnonzero(~zero)
+    between = np.interp(np.arange(signal.size), kept, signal[kept])
+    step = float(np.percentile(np.abs(np.diff(signal[kept])), 90))
+    far = zero & (np.abs(between) > 10.0 * max(noise, step))
+    edges = np.flatnonzero(np.diff(far.astype(int)) == 1)
+    found: NDArray[np.intp] = np.flatnonzero(far)
+    return found if edges.size >= 1 and found.size >= 2 else np.empty(0, dtype=np.intp)
+
+
+def _spikes(signal: Array, noise: float) -> NDArray[np.intp]:
+    """Return single samples far off both neighbors, which agree with each other."""
+    if not noise > 0.0 or signal.size < 8:
+        return np.empty(0, dtype=np.intp)
+    off = signal[2:-2] - np.median(
+        np.stack([signal[:-4], signal[1:-3], signal[3:-1], signal[4:]]), axis=0
+    )
+    around = np.ptp(np.stack([signal[:-4], signal[1:-3], signal[3:-1], signal[4:]]), axis=0)
+    size = np.percentile(signal, 99) - np.percentile(signal, 1)
+    far = np.abs(off) > np.maximum(SPIKE * noise, np.maximum(0.05 * size, 3.0 * around))
+    found: NDArray[np.intp] = np.flatnonzero(far) + 2
+    return found
+
+
+def _jitter(signal: Array, dt: float) -> tuple[float, float] | None:
+    """Return how late samples are at most, and how sure: noise that grows with the slope.
+
+    Samples late by u, uniform from 0 to J, are off by slope times u: third differences then have
+    the variance 20 (σ^2 + J^2 slope^2/12).
+    """
+    if signal.size < 200:
+        return None
+    bend = np.diff(signal, 3)
+    width = max(3, round(0.05 / dt))
+    smooth = np.convolve(signal, np.ones(width) / width, "same")
+    slope = np.gradient(smooth, dt)[1:-2]
+    inner = slice(width, -width)
+    y, x = (bend[inner] ** 2) / 20.0, slope[inner] ** 2
+    y = np.minimum(y, 25.0 * float(np.median(y)) / 0.455)
+    size_x, size_y = float(np.mean(x)), float(np.mean(y))
+    if not (size_x > 0.0 and size_y > 0.0):
+        return None
+    x, y = x / size_x, y / size_y
+    X = np.column_stack([np.ones(x.size), x])
+    weight = 1.0 / _two_step(X, y)
+    normal = X.T @ (weight[:, None] ** 2 * X)
+    try:
+        theta = np.linalg.solve(normal, X.T @ (weight**2 * y))
+        deviation = math.sqrt(float(np.linalg.inv(normal)[1, 1]) * 2.0 * 1.8)
+    except np.linalg.LinAlgError:
+        return None
+    if theta[1] <= 0.0:
+        return None
+    z = float(theta[1]) / max(deviation, 1e-300)
+    size = math.sqrt(12.0 * float(theta[1]) * size_y / size_x)
+    grows = theta[1] * float(np.percentile(x, 90)) > 0.5 * max(float(theta[0]), 0.0)
+    return (size, 2.0 * z) if z > 8.0 and grows and size > 0.3 * dt else None
+
+
+def _two_step(X: Array, y: Array) -> Array:
+    """Return the variance that a first fit says each sample has."""
+    theta, *_ = np.linalg.lstsq(X, y, rcond=None)
+    floor = 0.1 * float(np.mean(y))
+    variance: Array = np.maximum(X @ theta, floor)
+    return variance
+
+
+# The clock.
+
+BLOCK = 5  # samples in a row that were logged before, of all channels
+SMOOTH = ("v_y", "r", "v_x")  # that no car can change at once, as it can its steering
+SIDE = 12  # samples on each side of a jump
+JUMP, ALSO = 6.0, 2.5  # of the usual disagreement of both sides: in two channels, in a third
+
+
+def clock_jump(recording: Recording, signals: Mapping[str, Array]) -> Finding | None:
+    """Return where the clock jumped, None where it did not.
+
+    Parameters
+    ----------
+    recording : the log.
+    signals : its channels by name.
+    """
+    moving = {name: signal for name, signal in signals.items() if np.ptp(signal) > 0.0}
+    again = _logged_again(moving)
+    if again is not None:
+        at, back = again
+        size = -back * recording.dt
+        text = f"{-size:.3g} s before {recording.t[at]:.4g} s are logged twice"
+        return _jump(recording, at, size, 0.0, CERTAIN, text)
+    found = _torn(moving, recording.dt)
+    if found is None:
+        return None
+    at, size, deviation = found
+    text = f"all channels jump at once at {recording.t[at]:.4g} s: time is missing or logged twice"
+    return _jump(recording, at, size, deviation, 0.95, text)
+
+
+def _jump(
+    recording: Recording, at: int, size: float, deviation: float, confidence: float, text: str
+) -> Finding:
+    return Finding(
+        code="clock",
+        size=size,
+        deviation=deviation,
+        unit="s",
+        confidence=confidence,
+        text=f"the clock jumps: {text}; cut the log into runs there ({recording.t[at]:.4g} s)",
+    )
+
+
+def _logged_again(moving: Mapping[str, Array]) -> tuple[int, int] | None:
+    """Return where samples begin that were logged before, and how many samples before."""
+    if len(moving) < 3:
+        return None
+    table = np.column_stack(list(moving.values()))
+    _, code = np.unique(table, axis=0, return_inverse=True)
+    code = code.reshape(-1)
+    order = np.argsort(code, kind="stable")
+    same = np.flatnonzero(np.diff(code[order]) == 0)
+    back = order[same + 1] - order[same]
+    lags, count = np.unique(back[back > BLOCK], return_counts=True)
+    for lag in lags[count >= BLOCK]:
+        late = np.sort(order[same + 1][back == lag])
+        block = late[: np.count_nonzero(np.diff(late) == 1) + 1]
+        if np.all(np.ptp(table[block], axis=0) > 0.0) and block.size >= BLOCK:
+            return int(late[0]), int(lag)
+    return None
+
+
+def _torn(moving: Mapping[str, Array], dt: float) -> tuple[int, float, float] | None:
+    """Return where both sides of an instant disagree in several channels, and by what time."""
+    names = [name for name in moving if moving[name].size > 20 * SIDE]
+    if len(names) < 3 or not set(names) & set(SMOOTH):
+        return None
+    k = np.arange(SIDE) + 0.5
+    V = np.vander(k, 3, increasing=True)
+    weights = np.linalg.pinv(V)[0]  # of a parabola's value between both sides
+    slopes = np.linalg.pinv(V)[1]
+    score, torn, rate = [], [], []
+    for name in names:
+        signal = moving[name]
+        windows = np.lib.stride_tricks.sliding_window_view(signal, SIDE)
+        right, left = windows[SIDE:] @ weights, windows[:-SIDE] @ weights[::-1]
+        jump = right - left
+        usual = np.median(np.abs(jump)) / 0.6745
+        busy = np.convolve(np.abs(jump), np.ones(8 * SIDE) / (8 * SIDE), "same")
+        score.append(np.abs(jump) / np.maximum(np.maximum(usual, 0.8 * busy), 1e-300))
+        torn.append(jump)
+        rate.append(0.5 * (windows[SIDE:] @ slopes - windows[:-SIDE] @ slopes[::-1]) / dt)
+    table = np.sort(np.stack(score), axis=0)
+    at = int(np.argmax(table[-2]))
+    smooth = max(score[names.index(name)][at] for name in names if name in SMOOTH)
+    if table[-2, at] < JUMP or table[-3, at] < ALSO or smooth < JUMP:
+        return None
+    jumps, rates = np.stack(torn)[:, at], np.stack(rate)[:, at]
+    scale = np.array([np.std(moving[name]) for name in names])
+    a, b = rates / scale, jumps / scale
+    size = float(a @ b / (a @ a + 1e-300))
+    return at + SIDE, size, 0.5 * abs(size)

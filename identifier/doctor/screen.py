@@ -1,0 +1,318 @@
+"""What is grossly wrong with a log or with its car, to be seen before anything is estimated.
+
+First the samples themselves, then whether there is anything to learn from, then units, signs and
+the car: by that reading of the log which leaves least unexplained.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identifier.doctor.consistency import PIECE, Motion, driven_windows, looked_at
+from identifier.doctor.finding import Finding
+from identifier.doctor.readings import DEGREE, Change, Read, read
+from identifier.doctor.samples import sample_findings
+from models.recordings import Recording
+from models.recordings.repair import Repair
+from models.vehicle import Vehicle
+
+QUIET = 0.8  # [m/s^2] of v_x r, which a drive must exceed in `LIVELY` of its windows
+LIVELY = 0.005
+INERTIA = (0.5, 1.6)  # of I_z/(m l_f l_r); cars on the road have 0.9 to 1.1
+SMALL, SMALL_INERTIA = 1.0, 0.3  # [m] wheelbase, below which a model car may have as little
+SURE = 0.95
+SEVERAL = 3  # changes at once, beyond which nothing is sure
+WHEEL = (5.0, 30.0)  # ratios of a steering wheel to the road wheels
+NEAR = math.log(1.15)  # of a factor to that of a unit
+PERFECT = 0.999
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Screened:
+    """What is grossly wrong.
+
+    Parameters
+    ----------
+    findings : the most certain first.
+    repair : of what is read otherwise than it was told, sure or not, to go on with.
+    blind : why nothing finer can be asked, "" where it can.
+    """
+
+    findings: tuple[Finding, ...]
+    repair: Repair
+    blind: str = ""
+
+
+def screen(recording: Recording, vehicle: Vehicle) -> Screened:
+    """Return what is grossly wrong with a log or with what is told of its car.
+
+    Parameters
+    ----------
+    recording : as it was read.
+    vehicle : as it was told.
+    """
+    samples = sample_findings(recording)
+    told = [*_unlike(vehicle), *_few(recording)]
+    missing = [
+        one.channel
+        for one in samples
+        if one.code == "copied" or (one.code == "frozen" and _throughout(one, recording))
+    ]
+    if missing:
+        return Screened(
+            findings=(*samples, *told),
+            repair=Repair(),
+            blind=f"{' and '.join(missing)} was not measured",
+        )
+    quiet = quiet_finding(recording)
+    if quiet is not None:
+        return Screened(
+            findings=(quiet, *samples, *told), repair=Repair(), blind="the car hardly corners"
+        )
+    motion = Motion.of(recording)
+    if motion is None:
+        return Screened(findings=(*samples, *told), repair=Repair(), blind="too little is driven")
+    found = read(motion, vehicle)
+    gross = [
+        one for change in found.best.changes for one in reading_findings(change, found, vehicle)
+    ]
+    gross = one_steering(gross)
+    repair = Repair()
+    for one in gross:
+        repair = repair if one.repair is None else repair.merged(one.repair)
+    other = any(change.code == "other_car" for change in found.best.changes)
+    blind = "the car is another one" if other else ""
+    return Screened(findings=(*gross, *samples, *told), repair=repair, blind=blind)
+
+
+def _throughout(finding: Finding, recording: Recording) -> bool:
+    return finding.size >= PERFECT * min(recording.duration, PIECE - 2.0 * recording.dt)
+
+
+def quiet_finding(recording: Recording) -> Finding | None:
+    """Return that a drive has no corners, None where it has.
+
+    Parameters
+    ----------
+    recording : as it was read.
+    """
+    fast = max(float(np.percentile(np.abs(recording.v_x), 95)), 1e-9)
+    turns = []
+    for piece in looked_at(recording):
+        windows = driven_windows(piece, 0.3 * fast)
+        if len(windows):
+            turns.append(np.abs(windows.mean(piece.v_x * piece.r)))
+    peak = float(np.percentile(np.concatenate(turns), 100.0 * (1.0 - LIVELY))) if turns else 0.0
+    if peak >= QUIET:
+        return None
+    return Finding(
+        code="straight",
+        size=peak,
+        unit="m/s^2",
+        confidence=0.99,
+        text=f"the car hardly corners: v_x r reaches {peak:.2g} m/s² of the {QUIET:g} that are "
+        "needed; drive a lane change or a slalom",
+    )
+
+
+def _few(recording: Recording) -> list[Finding]:
+    """A sampling interval that is that of a clock in ms."""
+    if recording.dt < 1.0:
+        return []
+    return [
+        Finding(
+            code="clock_unit",
+            size=1e3,
+            confidence=0.95,
+            text=f"samples are {recording.dt:g} s apart: a clock in ms? divide t by 1000",
+        )
+    ]
+
+
+def _unlike(vehicle: Vehicle) -> list[Finding]:
+    """A yaw inertia that no car of that mass and those lengths has."""
+    similar = vehicle.mass * vehicle.l_f * vehicle.l_r
+    ratio = vehicle.yaw_inertia / similar
+    least = SMALL_INERTIA if vehicle.wheelbase < SMALL else INERTIA[0]
+    if least <= ratio <= INERTIA[1]:
+        return []
+    return [
+        Finding(
+            code="yaw_inertia",
+            size=ratio,
+            confidence=0.8,
+            text=f"the told yaw inertia is {ratio:.2g} times m l_f l_r, of cars {least:g} to "
+            f"{INERTIA[1]:g}: {similar:.4g} kg m² would be usual",
+            repair=Repair(vehicle={"yaw_inertia": similar}),
+        )
+    ]
+
+
+def reading_findings(change: Change, found: Read, vehicle: Vehicle) -> list[Finding]:
+    """Return a change of the best reading as findings, of units one for each channel.
+
+    Parameters
+    ----------
+    change : of it.
+    found : with the next best.
+    vehicle : as it was told.
+    """
+    if change.code != "unit" or len(change.channels) == 1:
+        return [reading_finding(change, found, vehicle)]
+    parts = [
+        replace(change, channels=(name,), factors=(factor,))
+        for name, factor in zip(change.channels, change.factors, strict=True)
+    ]
+    return [reading_finding(part, found, vehicle) for part in parts]
+
+
+def one_steering(gross: list[Finding]) -> list[Finding]:
+    """Return findings with one of the steering angle where there were several: factors multiply.
+
+    Parameters
+    ----------
+    gross : of a reading.
+    """
+    of_steering = [one for one in gross if one.channel == "delta_f" and one.repair is not None]
+    if len(of_steering) < 2:
+        return gross
+    factor = math.prod(one.repair.factor["delta_f"] for one in of_steering if one.repair)
+    one = steering_finding(factor, of_steering[0].confidence)
+    return [one, *(other for other in gross if other not in of_steering)]
+
+
+def reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
+    """Return a change of the best reading as a finding.
+
+    Parameters
+    ----------
+    change : of it.
+    found : with the next best.
+    vehicle : as it was told.
+    """
+    confidence = found.confidence
+    if len(found.best.changes) > SEVERAL:
+        confidence = min(confidence, SURE)  # so much that is wrong may be wrong otherwise
+    factors = dict(change.factors)
+    names = " and ".join(change.channels)
+    doubt = "" if confidence > SURE else f"; or {words(found.other.changes)}"
+    if change.code == "other_car":
+        size = factors["size"]
+        return Finding(
+            code="other_car",
+            size=1.0 / size,
+            confidence=confidence,
+            text=f"this is the motion of a car with about {size * vehicle.wheelbase:.2g} m between "
+            f"the axles, the told one has {vehicle.wheelbase:.3g} m: name the right vehicle file"
+            f"{doubt}",
+        )
+    if change.code == "yaw_inertia":
+        factor = factors["inertia"]
+        return Finding(
+            code="yaw_inertia",
+            size=1.0 / factor,
+            confidence=confidence,
+            text=f"the told yaw inertia is about {1.0 / factor:.2g} times too large{doubt}",
+            repair=Repair(vehicle={"yaw_inertia": factor * vehicle.yaw_inertia}),
+        )
+    if change.code == "steering":
+        return steering_finding(factors["delta"], confidence, doubt)
+    factor = next(iter(factors.values()))
+    if change.channels == ("delta_f",):
+        return steering_finding(factor, confidence, doubt)
+    if change.code == "sideslip":
+        repair = Repair(factor={"v_y": factor}, sideslip=True)
+        text = f"v_y is the sideslip angle in {change.unit}: take v_x tan of it{doubt}"
+    elif change.code == "sign":
+        repair = Repair(factor=dict.fromkeys(change.channels, -1.0))
+        verb = "has" if len(change.channels) == 1 else "have"
+        text = f"{names} {verb} the wrong sign against the other channels: turn it{doubt}"
+    else:
+        repair = Repair(factor=dict.fromkeys(change.channels, factor))
+        unit = "deg/s" if change.unit == "deg" and change.channels == ("r",) else change.unit
+        text = f"{names} is in {unit}{doubt}"
+    return Finding(
+        code=change.code,
+        channel=change.channels[0],
+        size=1.0 / factor,
+        confidence=confidence,
+        text=text,
+        repair=repair,
+        sure=confidence > SURE,
+    )
+
+
+def steering_finding(
+    factor: float, confidence: float, doubt: str = "", deviation: float = math.nan
+) -> Finding:
+    """Return what a steering angle is that must be multiplied by a factor.
+
+    Parameters
+    ----------
+    factor : to the road-wheel angle in rad.
+    confidence : in it.
+    doubt : what else it may be, in words.
+    deviation : of the factor over the factor, NaN where nobody knows it.
+    """
+    size, turned = 1.0 / abs(factor), ", positive to the right" if factor < 0.0 else ""
+    off = "" if math.isnan(deviation) else f" ± {size * deviation:.2g}"
+    if abs(math.log(size)) < NEAR:
+        code, text, size = "sign", f"delta_f has the wrong sign{doubt}", -1.0
+        factor = -1.0
+    elif abs(math.log(size * DEGREE)) < NEAR:
+        code, text = "unit", f"delta_f is in degrees{turned}{doubt}"
+        factor = math.copysign(DEGREE, factor)
+        size = 1.0 / factor
+    elif WHEEL[0] < size < WHEEL[1]:
+        code = "steering_ratio"
+        text = (
+            f"delta_f is the angle of the steering wheel in rad, {size:.3g}{off} times that of the "
+            f"road wheels{turned}{doubt}"
+        )
+    elif WHEEL[0] < size * DEGREE < WHEEL[1]:
+        code, size = "steering_ratio", size * DEGREE
+        off = "" if math.isnan(deviation) else f" ± {size * deviation:.2g}"
+        text = (
+            f"delta_f is the angle of the steering wheel in degrees, {size:.3g}{off} times that "
+            f"of the road wheels{turned}{doubt}"
+        )
+    else:
+        code = "factor"
+        text = f"delta_f reads {size:.3g}{off} times too much{turned}{doubt}"
+    return Finding(
+        code=code,
+        channel="delta_f",
+        size=size,
+        deviation=size * deviation,
+        confidence=confidence,
+        text=text,
+        repair=Repair(factor={"delta_f": factor}),
+        sure=confidence > SURE and code != "factor",
+    )
+
+
+def words(changes: tuple[Change, ...]) -> str:
+    """Return changes in words.
+
+    Parameters
+    ----------
+    changes : of a reading; none is a log that is right.
+    """
+    said = []
+    for change in changes:
+        names = " and ".join(change.channels)
+        match change.code:
+            case "sign":
+                said.append(f"{names} turned")
+            case "sideslip":
+                said.append(f"the sideslip angle in {change.unit} as v_y")
+            case "steering":
+                said.append("another steering angle")
+            case "other_car":
+                said.append("another car")
+            case "yaw_inertia":
+                said.append("another yaw inertia")
+            case _:
+                said.append(f"{names} in {change.unit}")
+    return " with ".join(said) or "nothing of the kind"

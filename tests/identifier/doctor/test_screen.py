@@ -1,0 +1,244 @@
+"""The screen rings on each gross fault that is planted, and is silent on what is right."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.fault_cases import StraightOnly
+from benchmarks.random_cars import CLASSES, good_sensors, random_car, random_drive
+from benchmarks.recorded_cars import CARMAKER, DART
+from identifier.doctor.consistency import PIECE, PIECES, Motion, Reading, looked_at, unexplained
+from identifier.doctor.samples import sample_findings
+from identifier.doctor.screen import screen, steering_finding
+from models.faults import ClockJump, Held, Jitter, Mirrored, SensorFault, Together, WrongUnit
+from models.maneuvers import RandomSteer
+from models.plant import Plant
+from models.recordings import joined, read_recording, runs
+from models.vehicle import sedan
+
+DEGREES = 180.0 / np.pi
+RECORDED = {"carmaker.csv.gz": CARMAKER, "dart.csv.gz": DART, "dart_imu.csv.gz": DART}
+
+
+def scaled(channel, size):
+    return SensorFault(channel=channel, kind="scaled", size=size)
+
+
+def in_sideslip(recording, per_rad=1.0):
+    return replace(recording, v_y=per_rad * np.arctan(recording.v_y / recording.v_x))
+
+
+@pytest.fixture(scope="module", params=CLASSES)
+def driven(request):
+    """A random car of a class as it is told, and its drive by good sensors."""
+    rng = np.random.default_rng(41)
+    drive = random_drive(random_car(request.param, rng), rng)
+    return drive.car.told, drive.log(rng)
+
+
+@pytest.fixture(scope="module")
+def one():
+    rng = np.random.default_rng(42)
+    drive = random_drive(random_car("sedan", rng), rng)
+    return drive.car.told, drive.log(rng)
+
+
+def named(recording, car):
+    return [f"{one.code} {one.channel}".strip() for one in screen(recording, car).findings]
+
+
+GROSS = {
+    "v_y flipped": (SensorFault(channel="v_y", kind="flipped"), "sign v_y"),
+    "r flipped": (SensorFault(channel="r", kind="flipped"), "sign r"),
+    "steering flipped": (SensorFault(channel="delta_f", kind="flipped"), "sign delta_f"),
+    "v_x flipped": (SensorFault(channel="v_x", kind="flipped"), "sign v_x"),
+    "a_y flipped": (SensorFault(channel="a_y", kind="flipped"), "sign a_y"),
+    "r and steering mirrored": (Mirrored(channels=("r", "delta_f")), "sign v_y"),
+    "v_y and a_y mirrored": (Mirrored(channels=("v_y", "a_y")), "sign v_y"),
+    "r in degrees": (WrongUnit(channel="r", unit="deg"), "unit r"),
+    "steering in degrees": (WrongUnit(channel="delta_f", unit="deg"), "unit delta_f"),
+    "v_x in km/h": (WrongUnit(channel="v_x", unit="km/h"), "unit v_x"),
+    "v_x in mph": (scaled("v_x", 1.0 / 0.44704), "unit v_x"),
+    "speeds in mm/s": (Together(faults=(scaled("v_x", 400.0), scaled("v_y", 400.0))), None),
+    "a_y in g": (WrongUnit(channel="a_y", unit="g"), "unit a_y"),
+}
+
+
+def test_a_drive_that_is_right_is_left_alone(driven):
+    car, log = driven
+    found = screen(log, car)
+    assert found.findings == ()
+    assert not found.repair and not found.blind
+    assert screen(replace(log, a_y=None), car).findings == ()
+
+
+@pytest.mark.parametrize("case", [case for case, (_, want) in GROSS.items() if want])
+def test_every_gross_fault_is_the_first_that_is_named(driven, case):
+    car, log = driven
+    fault, want = GROSS[case]
+    assert named(fault.apply(log), car)[0] == want
+
+
+@pytest.mark.parametrize("case", ["r flipped", "r in degrees", "v_x flipped", "a_y in g"])
+def test_a_repair_of_a_gross_fault_gives_the_drive_back(driven, case):
+    car, log = driven
+    broken = GROSS[case][0].apply(log)
+    found = screen(broken, car)
+    assert found.findings[0].sure
+    mended, told = found.repair.apply(broken, car)
+    assert told == car
+    for name in ("v_x", "v_y", "r", "delta_f", "a_y"):
+        np.testing.assert_allclose(getattr(mended, name), getattr(log, name), atol=1e-9)
+
+
+def test_speeds_in_kmh_and_angles_in_degrees_with_a_steering_wheel_are_all_found(one):
+    car, log = one
+    faults = [scaled("v_x", 3.6), scaled("v_y", 3.6), scaled("r", DEGREES)]
+    broken = Together(faults=(*faults, scaled("delta_f", -15.0 * DEGREES))).apply(log)
+    assert set(named(broken, car)) == {
+        *("unit v_x", "unit v_y", "unit r", "steering_ratio delta_f"),
+    }
+
+
+@pytest.mark.parametrize("per_rad", [1.0, DEGREES])
+def test_sideslip_in_place_of_v_y_is_read_as_such(one, per_rad):
+    """At nearly one speed km/h come to the same as degrees, which is as good a repair."""
+    car, log = one
+    log = replace(log, v_x=log.v_x * np.linspace(0.9, 1.1, len(log)))  # a speed that tells
+    found = screen(in_sideslip(log, per_rad), car)
+    assert found.findings[0].channel == "v_y"
+    mended, _ = found.repair.apply(in_sideslip(log, per_rad), car)
+    np.testing.assert_allclose(mended.v_y, log.v_y, atol=0.25 * np.std(log.v_y))
+
+
+def test_another_car_and_its_size_are_told(driven):
+    car, log = driven
+    other = DART if car.mass > 100.0 else replace(sedan(), chassis=None)
+    found = screen(log, other)
+    assert found.findings[0].code == "other_car"
+    told = found.findings[0].size * car.wheelbase / other.wheelbase
+    assert abs(np.log(told)) < np.log(2.0)
+    assert found.blind
+    assert not found.findings[0].sure
+
+
+def test_an_inertia_that_no_car_has_is_told_without_a_log(one):
+    car, log = one
+    for factor in (0.3, 4.0):
+        wrong = replace(car, yaw_inertia=factor * car.mass * car.l_f * car.l_r)
+        assert "yaw_inertia" in named(log, wrong)
+
+
+def test_a_factor_of_the_steering_is_what_it_most_likely_is():
+    assert steering_finding(-1.1, 1.0).code == "sign"
+    assert steering_finding(1.05 / DEGREES, 1.0).code == "unit"
+    wheel = steering_finding(-1.0 / 14.6, 1.0)
+    assert (wheel.code, wheel.size) == ("steering_ratio", pytest.approx(14.6))
+    assert "positive to the right" in wheel.text
+    wheel = steering_finding(1.0 / (14.6 * DEGREES), 1.0, deviation=0.01)
+    assert (wheel.code, wheel.size) == ("steering_ratio", pytest.approx(14.6))
+    assert wheel.deviation == pytest.approx(0.146)
+    assert "degrees" in wheel.text
+    other = steering_finding(0.5, 1.0)
+    assert (other.code, other.sure) == ("factor", False)
+
+
+def test_a_straight_drive_is_told_to_hold_nothing(one):
+    car, log = one
+    straight = StraightOnly(sensors=good_sensors(car)).apply(log)
+    assert named(straight, car)[0] == "straight"
+    assert "corners" in screen(straight, car).blind
+
+
+@pytest.mark.parametrize("channel", ["v_y", "r", "delta_f"])
+def test_a_channel_that_shows_nothing_is_named_and_ends_the_search(one, channel):
+    car, log = one
+    broken = SensorFault(channel=channel, kind="zero").apply(log)
+    assert named(broken, car)[0] == f"frozen {channel}"
+    assert channel in screen(broken, car).blind
+
+
+SAMPLES = {
+    "stuck": (SensorFault(channel="r", kind="stuck", start=12.0, duration=2.0), "frozen", "r"),
+    "held": (Held(channels=("v_y",), every=0.5, lasts=0.1), "held", "v_y"),
+    "stairs": (Held(channels=("v_y",), every=0.1, lasts=0.1), "held", "v_y"),
+    "spikes": (SensorFault(channel="r", kind="spiking", size=0.3), "spikes", "r"),
+    "gap": (ClockJump(at=14.0, size=1.0), "clock", ""),
+    "twice": (ClockJump(at=14.0, size=-1.0), "clock", ""),
+    "late": (Jitter(size=0.06), "jitter", "r"),
+}
+
+
+@pytest.mark.parametrize("case", SAMPLES)
+def test_what_is_wrong_with_samples_is_named(one, case):
+    _, log = one
+    fault, code, channel = SAMPLES[case]
+    assert (code, channel) in [(f.code, f.channel) for f in sample_findings(fault.apply(log))]
+
+
+def test_stairs_are_as_long_as_they_are_and_late_by_half(one):
+    _, log = one
+    found = sample_findings(SAMPLES["stairs"][0].apply(log))
+    (stairs,) = [f for f in found if f.code == "held"]
+    assert stairs.size == pytest.approx(0.1)
+    assert stairs.repair is not None
+    assert stairs.repair.delay == {"v_y": pytest.approx(0.045)}
+
+
+def test_lost_samples_a_coarse_sensor_and_copies_are_named(one):
+    _, log = one
+    v_y = log.v_y.copy()
+    at = np.flatnonzero(np.abs(v_y) > 0.5 * np.abs(v_y).max())[::40]
+    v_y[at], v_y[at + 1] = 0.0, 0.0
+    (lost,) = sample_findings(replace(log, v_y=v_y))
+    assert (lost.code, lost.channel) == ("dropout", "v_y")
+    step = 0.15 * np.std(log.r)
+    (coarse,) = sample_findings(replace(log, r=step * np.round(log.r / step)))
+    assert (coarse.code, coarse.size) == ("quantized", pytest.approx(step))
+    (copied,) = sample_findings(replace(log, v_y=1.2 * log.r))
+    assert copied.code == "copied"
+
+
+def test_a_slow_sampling_interval_is_a_clock_in_ms(one):
+    car, log = one
+    found = screen(replace(log, t=1e3 * log.t), car)
+    assert "clock_unit" in [f.code for f in found.findings]
+
+
+def test_smooth_drives_without_noise_are_left_alone():
+    """Of a simulator: channels that rest before the corners, no noise, a constant speed."""
+    for seed in range(2):
+        steering = RandomSteer(
+            amplitude=0.06, frequency=0.6, seed=seed, onset=5.0, rate_limit=0.8, duration=24.0
+        )
+        log = Plant(sedan()).simulate(steering, speed=20.0, name="smooth").recording()
+        assert screen(log, sedan()).findings == ()
+
+
+def test_gaps_are_no_jumps_and_of_a_long_log_some_pieces_are_looked_at(one):
+    car, log = one
+    late = replace(log, t=log.t + 100.0)
+    two = joined([log, late])
+    assert screen(two, car).findings == ()
+    long = joined([replace(log, t=log.t + 100.0 * k) for k in range(20)])
+    pieces = looked_at(long)
+    assert sum(one.duration for one in pieces) <= PIECE * PIECES
+    assert screen(long, car).findings == ()
+
+
+def test_the_right_reading_leaves_least_and_a_standing_car_is_no_motion(one):
+    car, log = one
+    motion = Motion.of(log)
+    right = unexplained(motion, car, Reading())
+    for wrong in (Reading(r=-1.0), Reading(v_x=3.6), Reading(delta=15.0), Reading(size=8.0)):
+        assert unexplained(motion, car, wrong) > right + 1.0
+    assert Motion.of(replace(log, v_x=np.zeros(len(log)))) is None
+
+
+@pytest.mark.parametrize("file", RECORDED)
+def test_recorded_drives_are_left_alone(shared_data, file):
+    for run in runs(shared_data / file):
+        log = read_recording(shared_data / file, run)
+        sure = [f.text for f in screen(log, RECORDED[file]).findings if f.sure]
+        assert sure == [], run

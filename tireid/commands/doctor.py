@@ -1,0 +1,115 @@
+"""`tireid doctor LOG --vehicle FILE`: what is wrong with a log, and a log.toml that mends it."""
+
+import argparse
+from typing import Any
+
+from identifier.doctor import Diagnosis, diagnose
+from models.recordings import Repair
+from models.recordings.reader import repair_text
+from tireid import __version__
+from tireid.commands import COMMANDS
+from tireid.commands.options import (
+    add_log_map,
+    add_output,
+    add_vehicle,
+    read_log,
+    read_vehicle,
+    told_map,
+)
+from tireid.diagnoses import add_repair, diagnosis_text, write_repair
+from tireid.exit_codes import DONE, NOT_VALID
+from tireid.figures.doctor import draw_diagnosis
+from tireid.figures.style import save_figure
+from tireid.output import output_folder, require_free, write_json
+from tireid.progress import say, tell
+from tireid.reports.doctor import write_doctor_report
+from tireid.verdicts import add_accept
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : subparsers of `tireid`.
+    """
+    parser = commands.add_parser(
+        "doctor",
+        help=COMMANDS["doctor"],
+        description="Find what is wrong with LOG, or with what --vehicle says of its car, in the "
+        "log alone: units, signs, steering-wheel angle, offsets, delays, sensors that sit or look "
+        "elsewhere, frozen or lost samples, another car. Exit code 3 where something was found "
+        "that matters. --repair writes the log.toml with which other commands read it as it should "
+        "be (--log FILE).",
+    )
+    parser.add_argument("log", metavar="LOG", help="recording; LOG:RUN names one of its runs")
+    add_vehicle(parser, required=True)
+    parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
+    add_log_map(parser)
+    add_repair(parser, "and write it to")
+    add_accept(parser)
+    add_output(parser, None)
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command; return 3 where something was found that matters."""
+    if options.repair is not None:
+        if options.repair.suffix.lower() != ".toml":
+            raise ValueError(f"{options.repair}: the name must end in .toml")
+        require_free(options.repair, force=options.force)
+    vehicle, told = read_vehicle(options), told_map(options)
+    recording = read_log(options.log, vehicle, told, run_name=options.run_name, check=False)
+    say("the doctor looks at it")
+    diagnosis = diagnose(recording, vehicle)
+    repair = diagnosis.repair if options.repair is not None else Repair()
+    repaired, car = repair.apply(recording, vehicle) if repair else (recording, vehicle)
+    after = diagnose(repaired, car) if repair else None
+    if options.out is not None:
+        with output_folder(options.out, force=options.force) as folder:
+            figure = draw_diagnosis(recording, vehicle, repaired, car)
+            save_figure(figure, folder / "slip.png")
+            write_json(folder / "summary.json", summary(diagnosis, repair, after))
+            write_doctor_report(
+                folder, recording, vehicle, diagnosis, after, figure, command=options.words
+            )
+    tell(diagnosis_text(diagnosis))
+    if options.repair is not None:
+        _tell_repair(options, repair, after)
+        if repair:
+            write_repair(options.repair, told, diagnosis)
+            say(f"wrote {options.repair}; read the log with --log {options.repair}")
+    if options.out is not None:
+        say(f"wrote {options.out}/")
+    left = diagnosis if after is None else after
+    return DONE if left.healthy or options.accept else NOT_VALID
+
+
+def _tell_repair(
+    options: argparse.Namespace,
+    repair: Repair,
+    after: Diagnosis | None,
+) -> None:
+    """Say what the repair is, and what is left after it."""
+    if after is None:
+        tell(f"nothing is sure enough to be repaired: {options.repair} is not written")
+        return
+    tell(f"repaired: {repair_text(repair)}")
+    tell(f"after the repair, {diagnosis_text(after, unseen=False)}")
+
+
+def summary(diagnosis: Diagnosis, repair: Repair, after: Diagnosis | None) -> dict[str, Any]:
+    """Return what summary.json holds.
+
+    Parameters
+    ----------
+    diagnosis : of the log as it was read.
+    repair : that was applied.
+    after : diagnosis of the repaired log, None where nothing was repaired.
+    """
+    return {
+        **diagnosis.to_dict(),
+        "applied": repair.tables(),
+        "after": None if after is None else after.to_dict(),
+        "version": __version__,
+    }

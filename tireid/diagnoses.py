@@ -1,0 +1,208 @@
+"""A diagnosis as commands tell it: a table, lines, a section of a report, and the repair's file."""
+
+import argparse
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from identifier.doctor import Diagnosis, Finding
+from models.files import write_atomically
+from models.recordings import (
+    LogMap,
+    Recording,
+    Repair,
+    check_against_vehicle,
+    check_physics,
+)
+from models.recordings.reader import repair_text
+from models.vehicle import Vehicle
+from tireid.output import text_table
+from tireid.report import Block, Paragraph, Section, Table, printed
+from tireid.verdicts import with_doubt
+
+HEADER = ("found", "size", "confidence", "repair")
+NAMES = {  # of findings by their code, where the code is not the word
+    "acceleration_sensor_x": "accelerometer ahead of the c.g.",
+    "center_of_gravity": "center of gravity told too far back",
+    "clock": "clock jumps",
+    "clock_unit": "clock in ms",
+    "copied": "computed, not measured",
+    "dropout": "drops to zero",
+    "factor": "scaled",
+    "frozen": "frozen",
+    "held": "repeats old values",
+    "jitter": "samples late at random",
+    "lag": "low-passed",
+    "other_car": "another car",
+    "sideslip": "sideslip angle",
+    "sign": "wrong sign",
+    "steering_ratio": "angle of the steering wheel, ratio",
+    "straight": "hardly any corner",
+    "unit": "wrong unit",
+    "velocity_sensor_angle": "velocity sensor turned",
+    "velocity_sensor_x": "velocity sensor ahead of the c.g.",
+    "yaw_inertia": "yaw inertia told, times the right one",
+}
+
+
+def add_repair(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add --repair.
+
+    Parameters
+    ----------
+    parser : of a command.
+    what : is done with the repair, for the help.
+    """
+    parser.add_argument(
+        "--repair",
+        nargs="?",
+        const=Path("log.toml"),
+        type=Path,
+        metavar="FILE",
+        help=f"take out what is sure, {what} FILE (log.toml)",
+    )
+
+
+def finding_rows(diagnosis: Diagnosis) -> list[list[str]]:
+    """Return what was found as rows: what, size, confidence, repair.
+
+    Parameters
+    ----------
+    diagnosis : of a log.
+    """
+    return [
+        [
+            " ".join(word for word in (one.channel, NAMES.get(one.code, one.code)) if word),
+            size_text(one),
+            f"{100.0 * min(one.confidence, 0.99):.0f} %" + (", sure" if one.sure else ""),
+            "none" if one.repair is None else repair_text(one.repair),
+        ]
+        for one in diagnosis.findings
+    ]
+
+
+def size_text(finding: Finding) -> str:
+    """Return the size of a finding to the digits that its deviation leaves, with its unit.
+
+    Parameters
+    ----------
+    finding : with or without a size.
+    """
+    if math.isnan(finding.size):
+        return ""
+    scale, unit = {"s": (1e3, "ms"), "rad": (math.degrees(1.0), "deg")}.get(
+        finding.unit, (1.0, finding.unit)
+    )
+    if finding.unit == "s" and abs(finding.size) >= 1.0:
+        scale, unit = 1.0, "s"
+    doubt = None if math.isnan(finding.deviation) else scale * finding.deviation
+    return f"{with_doubt(scale * finding.size, doubt)} {unit}".strip()
+
+
+def diagnosis_text(diagnosis: Diagnosis, *, unseen: bool = True) -> str:
+    """Return a diagnosis as lines of text.
+
+    Parameters
+    ----------
+    diagnosis : of a log.
+    unseen : whether what the log cannot tell stands below.
+    """
+    if not diagnosis.findings:
+        lines = ["doctor: nothing found"]
+    else:
+        count = len(diagnosis.findings)
+        lines = [f"doctor: {count} finding{'s' * (count > 1)}"]
+        lines.append(text_table([list(HEADER), *finding_rows(diagnosis)], "<<<<"))
+        lines += [one.text for one in diagnosis.findings]
+    if unseen:
+        lines += [f"cannot be seen: {line}" for line in diagnosis.unseen]
+    return "\n".join(lines)
+
+
+def diagnosis_warnings(diagnosis: Diagnosis) -> list[str]:
+    """Return what was found as warnings of a report.
+
+    Parameters
+    ----------
+    diagnosis : of a log.
+    """
+    return [printed(f"the log: {one.text}") for one in diagnosis.findings]
+
+
+def diagnosis_section(
+    diagnosis: Diagnosis, more: Sequence[Block] = (), heading: str = "Is the log right?"
+) -> Section:
+    """Return the section of a report that holds a diagnosis.
+
+    Parameters
+    ----------
+    diagnosis : of a log.
+    more : blocks that follow.
+    heading : of the section.
+    """
+    rows = finding_rows(diagnosis)
+    blocks: list[Block] = [
+        Paragraph(text="What is wrong with the log, or with what is told of its car, asked of the "
+                  "log alone. ± is one standard deviation.")
+    ]  # fmt: skip
+    if rows:
+        blocks.append(Table(caption="What was found.", header=list(HEADER), rows=rows))
+        blocks += [Paragraph(text=printed(one.text)) for one in diagnosis.findings]
+    else:
+        blocks.append(Paragraph(text="Nothing was found."))
+    blocks += [Paragraph(text=printed(f"Cannot be seen: {line}")) for line in diagnosis.unseen]
+    return Section(heading=heading, blocks=[*blocks, *more])
+
+
+def doctor_text(diagnosis: Diagnosis, repair: Repair, path: Path | None) -> str:
+    """Return what was found, and what of it was taken out, as lines of text.
+
+    Parameters
+    ----------
+    diagnosis : of a log.
+    repair : that was applied.
+    path : of --repair, None where it was not asked for.
+    """
+    lines = [diagnosis_text(diagnosis, unseen=False)]
+    if repair:
+        lines.append(f"repaired, in what was learnt on and replayed: {repair_text(repair)}")
+    elif path is not None:
+        lines.append("nothing is sure enough to be repaired")
+    elif diagnosis.repair:
+        lines.append("what is sure is taken out with --repair")
+    return "\n".join(lines)
+
+
+def repaired(recording: Recording, vehicle: Vehicle, repair: Repair) -> tuple[Recording, Vehicle]:
+    """Return a recording and its car without what a repair takes out, judged as when it is read.
+
+    Parameters
+    ----------
+    recording : as it was read.
+    vehicle : as it was told.
+    repair : of both.
+
+    Raises
+    ------
+    RecordingError
+        Where the repaired recording contradicts physics or the car.
+    """
+    mended, car = repair.apply(recording, vehicle)
+    check_physics(mended)
+    check_against_vehicle(mended, car)
+    return mended, car
+
+
+def write_repair(path: Path, told: LogMap, diagnosis: Diagnosis) -> LogMap:
+    """Write how a log is read with what is sure taken out of it, and return it.
+
+    Parameters
+    ----------
+    path : of the log.toml.
+    told : how the log was read.
+    diagnosis : of what was read so.
+    """
+    repaired = replace(told, repair=told.repair.merged(diagnosis.repair))
+    write_atomically(path, repaired.toml())
+    return repaired
