@@ -1,0 +1,116 @@
+"""A diagnosis: what comes first, what is sure, what is unseen, and a repair that mends the log."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tireid
+from benchmarks.random_cars import random_car, random_drive
+from identifier.axle import AxleIdentifier
+from identifier.doctor import Finding, diagnose
+from identifier.doctor.diagnosis import Diagnosis, combined
+from identifier.run import identify
+from models.faults import SensorFault, Together, WrongUnit
+from models.recordings import Repair
+from models.vehicle import sedan
+
+
+@pytest.fixture(scope="module")
+def driven():
+    rng = np.random.default_rng(43)
+    drive = random_drive(random_car("sedan", rng), rng)
+    return drive.car.told, drive.log(rng)
+
+
+@pytest.fixture(scope="module")
+def ratio(driven):
+    """The same drive with the steering-wheel angle in degrees, 14.6 times that of the wheels."""
+    car, log = driven
+    wheel = SensorFault(channel="delta_f", kind="scaled", size=14.6)
+    return car, Together(faults=(wheel, WrongUnit(channel="delta_f", unit="deg"))).apply(log)
+
+
+@pytest.fixture(scope="module")
+def found(ratio):
+    car, log = ratio
+    return diagnose(log, car)
+
+
+def test_a_right_log_is_healthy_and_what_it_cannot_tell_is_said(driven):
+    car, log = driven
+    fine = diagnose(log, car)
+    assert fine.healthy
+    assert fine.findings == () and not fine.repair
+    assert fine.unseen[0].startswith("mass")
+    assert any("mirrored" in line for line in fine.unseen)
+    assert "nothing found" in fine.summary()
+    assert not any("a_y" in line for line in fine.unseen)
+    bare = diagnose(replace(log, a_y=None), car)
+    assert any("no a_y" in line for line in bare.unseen)
+
+
+def test_the_ratio_of_the_steering_wheel_is_within_its_doubt(found):
+    first = found.findings[0]
+    assert (first.code, first.channel, first.sure) == ("steering_ratio", "delta_f", True)
+    assert first.size == pytest.approx(14.6, rel=0.05)
+    assert abs(first.size - 14.6) < 3.0 * first.deviation
+    assert not found.healthy
+
+
+def test_what_is_sure_mends_the_log_as_well_as_the_right_one(driven, ratio, found):
+    car, log = driven
+    mended, told = found.repair.apply(ratio[1], car)
+    design = AxleIdentifier.for_vehicle(car)
+    errors = []
+    for one in (log, mended):
+        history = identify(one, car, design)
+        model = history.freeze(float(one.t[-1]))
+        errors.append(float(np.sqrt(np.mean((model.axle_force(log) - log.axle_force) ** 2))))
+    assert told == car
+    assert errors[1] < 1.2 * errors[0]
+    assert diagnose(mended, told).healthy
+
+
+def test_a_diagnosis_is_ready_for_json_and_short_to_print(found):
+    data = json.loads(json.dumps(found.to_dict()))
+    assert data["findings"][0]["repair"] == data["repair"]
+    assert repr(found).startswith("<Diagnosis of 'sedan, straight': steering_ratio delta_f")
+    assert "cannot be seen: mass" in found.summary()
+
+
+def test_gross_repairs_come_before_fine_ones_and_only_sure_ones_are_taken():
+    findings = (
+        Finding(
+            code="unit", channel="r", confidence=1.0, repair=Repair(factor={"r": 0.5}), sure=True
+        ),
+        Finding(
+            code="factor", channel="r", confidence=1.0, repair=Repair(factor={"r": 1.1}), sure=True
+        ),
+        Finding(code="offset", channel="r", confidence=0.6, repair=Repair(offset={"r": 0.1})),
+    )
+    whole = Diagnosis(name="log", findings=findings, unseen=())
+    assert whole.repair == Repair(factor={"r": 0.55})
+    assert combined(findings).offset == {"r": 0.1}
+
+
+def test_nothing_is_looked_for_where_nothing_was_driven(driven):
+    _, log = driven
+    standing = replace(log, v_x=0.0 * log.v_x, v_y=0.0 * log.v_y, r=0.0 * log.r)
+    found = diagnose(standing, sedan())
+    assert not found.healthy
+    assert any(line.startswith("offsets, delays") for line in found.unseen)
+
+
+def test_a_law_that_no_reading_mends_is_told_as_it_is(driven):
+    car, log = driven
+    noise = np.random.default_rng(0).normal(size=len(log))
+    found = diagnose(replace(log, a_y=3.0 * np.cumsum(noise) / 30.0), car)
+    assert not found.healthy
+
+
+def test_the_interface_has_the_doctor():
+    assert tireid.diagnose is diagnose
+    assert tireid.Diagnosis is Diagnosis
+    assert tireid.Repair is Repair

@@ -1,0 +1,109 @@
+"""`tireid doctor` as a user meets it: a faulty log goes to a valid verdict without an editor."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.doctor import Finding
+from models.recordings import LogMap, read_recording, write_recording
+from tests.pages import faults_of
+from tireid.cli import main
+from tireid.diagnoses import size_text
+
+RATIO = 14.6
+
+
+@pytest.fixture(scope="module")
+def clinic(tmp_path_factory):
+    """A car's file, a good log, and one in km/h and degrees, with the steering wheel's angle."""
+    folder = tmp_path_factory.mktemp("clinic")
+    assert main(["init", str(folder / "car.toml")]) == 0
+    assert main(["sample", str(folder / "good.csv")]) == 0
+    good = read_recording(folder / "good.csv")
+    bad = replace(
+        good,
+        v_x=3.6 * good.v_x,
+        v_y=3.6 * good.v_y,
+        r=np.degrees(good.r),
+        delta_f=-RATIO * np.degrees(good.delta_f),
+        axle_force=None,
+    )
+    write_recording(bad, folder / "bad.csv")
+    return folder
+
+
+def doctor(clinic, log, *words):
+    return main(
+        ["doctor", str(clinic / log), "--vehicle", str(clinic / "car.toml"), *map(str, words)]
+    )
+
+
+def test_a_good_log_ends_with_0_and_says_what_it_cannot_tell(clinic, capsys):
+    assert doctor(clinic, "good.csv") == 0
+    told = capsys.readouterr().out
+    assert "doctor: nothing found" in told
+    assert "cannot be seen: mass" in told
+
+
+def test_a_faulty_log_ends_with_3_and_each_fault_has_a_line(clinic, capsys):
+    assert doctor(clinic, "bad.csv") == 3
+    told = capsys.readouterr().out
+    for text in ("r is in deg/s", "v_x is in km/h", "v_y is in km/h", "steering wheel in degrees"):
+        assert text in told
+    assert doctor(clinic, "bad.csv", "--accept") == 0
+
+
+def test_repaired_by_the_doctor_the_log_is_learnt_and_valid(clinic, tmp_path, capsys):
+    log_map, out = tmp_path / "log.toml", tmp_path / "out"
+    assert doctor(clinic, "bad.csv", "--repair", log_map, "--out", out) == 0
+    assert "after the repair, doctor: nothing found" in capsys.readouterr().out
+    repair = LogMap.from_toml(log_map).repair
+    assert repair.factor["v_x"] == pytest.approx(1.0 / 3.6)
+    assert -np.radians(1.0) / repair.factor["delta_f"] == pytest.approx(RATIO, rel=0.03)
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["applied"] == repair.tables()
+    assert summary["after"]["healthy"] and not summary["healthy"]
+    assert faults_of((out / "report.html").read_text(encoding="utf-8")) == []
+    assert (out / "slip.png").read_bytes().startswith(b"\x89PNG")
+    words = ["identify", str(clinic / "bad.csv"), "--vehicle", str(clinic / "car.toml")]
+    learnt = tmp_path / "learnt"
+    assert main([*words, "--log", str(log_map), "--out", str(learnt)]) == 0
+    assert "verdict: valid" in capsys.readouterr().out
+
+
+def test_identify_refuses_a_faulty_log_and_names_the_doctor(clinic, tmp_path, capsys):
+    words = ["identify", str(clinic / "bad.csv"), "--vehicle", str(clinic / "car.toml")]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 2
+    assert "tireid doctor LOG" in capsys.readouterr().err
+
+
+def test_identify_repairs_what_is_sure_and_says_so(clinic, tmp_path, capsys):
+    out, log_map = tmp_path / "out", tmp_path / "log.toml"
+    words = ["identify", str(clinic / "bad.csv"), "--vehicle", str(clinic / "car.toml")]
+    assert main([*words, "--repair", str(log_map), "--out", str(out)]) == 0
+    told = capsys.readouterr().out
+    assert "repaired, in what was learnt on and replayed: factor.r" in told
+    assert "verdict: valid" in told
+    found = json.loads((out / "doctor.json").read_text())
+    assert found["applied"] == LogMap.from_toml(log_map).repair.tables()
+    assert "Is the log right?" in (out / "report.html").read_text(encoding="utf-8")
+
+
+def test_nothing_sure_writes_nothing_and_what_is_there_stays(clinic, tmp_path, capsys):
+    assert doctor(clinic, "good.csv", "--repair", tmp_path / "log.toml") == 0
+    assert "nothing is sure enough" in capsys.readouterr().out
+    assert not (tmp_path / "log.toml").exists()
+    (tmp_path / "mine.toml").write_text("mine")
+    assert doctor(clinic, "bad.csv", "--repair", tmp_path / "mine.toml") == 2
+    assert (tmp_path / "mine.toml").read_text() == "mine"
+    assert doctor(clinic, "bad.csv", "--repair", tmp_path / "log.txt") == 2
+
+
+def test_sizes_have_the_digits_that_their_deviations_leave():
+    delay = Finding(code="delay", channel="r", size=0.09123, deviation=0.0021, unit="s")
+    assert size_text(delay) == "91.2 ± 2.1 ms"
+    angle = Finding(code="offset", channel="delta_f", size=np.radians(1.0), unit="rad")
+    assert size_text(angle) == "1 deg"
+    assert size_text(Finding(code="straight")) == ""
