@@ -26,6 +26,7 @@ from models.logs.clock import (
 from models.logs.log import Channel, Listed, LogFile, RecordingError
 from models.logs.names import Proposal, propose
 from models.logs.signals import BETA, COLUMNS, NEEDED, QUANTITIES, Signal, require_fitting
+from models.logs.spelling import without_unit
 from models.logs.units import SI, TIME, is_told, to_si
 from models.recordings.map import AXES, LogMap
 from models.recordings.record import (
@@ -88,11 +89,16 @@ def chosen_signals(
     names = [one.name for one in listed]
     for name, signal in log_map.signals.items():
         for channel in signal.channel:
-            if channel not in names:
+            if _full(channel, names) not in names:
                 raise RecordingError(
                     f"{log.path}: there is no column {shown(channel)} to read as "
                     f"{column_of(name)}; {_listing(names)}"
                 )
+    signals = {
+        name: replace(signal, channel=tuple(_full(one, names) for one in signal.channel))
+        for name, signal in log_map.signals.items()
+    }
+    log_map = replace(log_map, signals=signals)
     if log_map.is_complete:
         return Reading(dict(log_map.signals), ())
     told = _beside(standard_signals(log, names), log_map.signals)
@@ -106,6 +112,12 @@ def chosen_signals(
         raise RecordingError(missing_text(log, missing, proposal, names))
     taken = [name for name in found if name not in told]
     return Reading(found, tuple(_taken_text(name, found[name]) for name in taken))
+
+
+def _full(channel: str, names: Sequence[str]) -> str:
+    """Return a channel's name as in the file, where it is told without the unit that ends it."""
+    found = [name for name in names if without_unit(name) == channel]
+    return found[0] if channel not in names and len(found) == 1 else channel
 
 
 def likely_signals(told: Mapping[str, Signal], proposal: Proposal) -> dict[str, Signal]:
@@ -299,7 +311,7 @@ def _wants_clock(log: LogFile, listed: Sequence[Listed], clock: str) -> bool:
     """Return whether the time is another channel than the one that the format takes for it."""
     names = [one.name for one in listed]
     own = getattr(getattr(log, "clock", None), "name", clock)
-    if clock and clock not in names and clock != own:
+    if clock and clock not in names and clock not in (own, without_unit(own)):
         raise RecordingError(
             f"{log.path}: there is no column {shown(clock)} to read as t; {_listing(names)}"
         )
