@@ -75,6 +75,9 @@ def unit_in_name(name: str) -> str:
     return ""
 
 
+_UNIT_BEHIND = re.compile(r"\s*[\[(][^\[\]()]*[\])]$")
+
+
 def without_unit(name: str) -> str:
     """Return a name without the unit in brackets that it ends in: "Speed" of "Speed [km/h]".
 
@@ -82,5 +85,4 @@ def without_unit(name: str) -> str:
     ----------
     name : of a column, as in the file.
     """
-    bare, bracket, _ = name.rpartition("[")
-    return bare.strip() if bracket and name.endswith("]") else name
+    return _UNIT_BEHIND.sub("", name)

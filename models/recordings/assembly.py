@@ -87,21 +87,10 @@ def chosen_signals(
         Where a signal that is needed is neither told nor there beyond doubt.
     """
     names = [one.name for one in listed]
-    for name, signal in log_map.signals.items():
-        for channel in signal.channel:
-            if _full(channel, names) not in names:
-                raise RecordingError(
-                    f"{log.path}: there is no column {shown(channel)} to read as "
-                    f"{column_of(name)}; {_listing(names)}"
-                )
-    signals = {
-        name: replace(signal, channel=tuple(_full(one, names) for one in signal.channel))
-        for name, signal in log_map.signals.items()
-    }
-    log_map = replace(log_map, signals=signals)
+    by_map = as_listed(log, log_map.signals, names)
     if log_map.is_complete:
-        return Reading(dict(log_map.signals), ())
-    told = _beside(standard_signals(log, names), log_map.signals)
+        return Reading(by_map, ())
+    told = _beside(standard_signals(log, names), by_map)
     missing = missing_signals(told)
     if not missing:
         return Reading(told, ())
@@ -114,10 +103,40 @@ def chosen_signals(
     return Reading(found, tuple(_taken_text(name, found[name]) for name in taken))
 
 
-def _full(channel: str, names: Sequence[str]) -> str:
-    """Return a channel's name as in the file, where it is told without the unit that ends it."""
-    found = [name for name in names if without_unit(name) == channel]
-    return found[0] if channel not in names and len(found) == 1 else channel
+def as_listed(
+    log: LogFile, signals: Mapping[str, Signal], names: Sequence[str]
+) -> dict[str, Signal]:
+    """Return signals with the names of their channels as the log lists them.
+
+    A channel that is listed with its unit, "Vel Lat [km/h]", may be told without.
+
+    Parameters
+    ----------
+    log : for messages.
+    signals : by our name.
+    names : of the channels.
+
+    Raises
+    ------
+    RecordingError
+        Where there is no such channel, or several.
+    """
+    bare: dict[str, list[str]] = {}
+    for one in names:
+        bare.setdefault(without_unit(one), []).append(one)
+    found = {}
+    for name, signal in signals.items():
+        channels = []
+        for channel in signal.channel:
+            likely = [channel] if channel in names else bare.get(channel, [])
+            if len(likely) != 1:
+                raise RecordingError(
+                    f"{log.path}: there is no column {shown(channel)} to read as "
+                    f"{column_of(name)}; {_listing(likely or names)}"
+                )
+            channels += likely
+        found[name] = replace(signal, channel=tuple(channels))
+    return found
 
 
 def likely_signals(told: Mapping[str, Signal], proposal: Proposal) -> dict[str, Signal]:
@@ -191,14 +210,15 @@ def missing_signals(signals: Mapping[str, Signal]) -> list[str]:
     return [name for name in NEEDED if name not in there]
 
 
-def _listing(names: list[str]) -> str:
+def _listing(names: Sequence[str]) -> str:
     listing = ", ".join(names[:SOME]) + (", ..." if len(names) > SOME else "")
     return f"columns found: {listing[:200]!r}"
 
 
 def _taken_text(name: str, signal: Signal) -> str:
+    channels = [without_unit(one) for one in signal.channel]
     unit = f" [{signal.unit}]" if signal.unit else ""
-    return f"{column_of(name)} is taken from {' + '.join(signal.channel)}{unit}, by its name"
+    return f"{column_of(name)} is taken from {' + '.join(channels)}{unit}, by its name"
 
 
 def missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: list[str]) -> str:
@@ -253,7 +273,8 @@ def column_word(name: str, proposal: Proposal) -> str:
     if guess is None:
         return ""
     unit, ratio = guess.unit or SI[QUANTITIES[name]], " /RATIO" if guess.hand else ""
-    return f'"{column_of(name)}={" + ".join(guess.channel)} [{unit}]{ratio}"'
+    channels = " + ".join(without_unit(one) for one in guess.channel)
+    return f'"{column_of(name)}={channels} [{unit}]{ratio}"'
 
 
 def recording_of(

@@ -105,7 +105,7 @@ class Repair:
             Where the numbers of the car are those of no car.
         """
         if recording.breaks:
-            parts = [recording.taken(np.arange(s.start, s.stop)) for s in recording.stretches]
+            parts = [recording.taken(piece) for piece in recording.stretches]
             mended = [self.apply(part, vehicle) for part in parts]
             return joined([part for part, _ in mended], recording.name), mended[0][1]
         told = {name for name in TABLES if name != "vehicle" for name in getattr(self, name)}
