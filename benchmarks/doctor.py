@@ -34,7 +34,7 @@ from identifier.doctor import Finding, estimate
 from models.recordings import Recording, read_recording, runs
 from models.vehicle import Vehicle
 
-CARS = 6  # of each class; on half of their drives a lane change, on half a slalom
+CARS = 3  # of each class; on half of their drives a lane change, on half a slalom
 CLEAN = 25  # drives of each class without a fault
 NAMED = 2  # first or second
 SURE = 0.5  # confidence from which a finding on a clean log is an alarm
