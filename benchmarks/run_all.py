@@ -30,6 +30,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "several_rates": [],
     "fault_table": ["{out}"],
     "verdicts": [],
+    "doctor": [],
     "plant_against_commonroad": ["{out}"],
     "paper_gains": [],
     "stability_formulas": [],
