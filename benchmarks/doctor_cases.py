@@ -19,7 +19,6 @@ from models.faults import (
     SensorElsewhere,
     SensorFault,
     ShiftedCenter,
-    SwappedAxles,
     WrongNumber,
 )
 from models.vehicle import Vehicle
@@ -90,11 +89,6 @@ def _center(vehicle: Vehicle, size: float) -> Planted:
     return Planted(Case(told=told), "center_of_gravity", "", size * vehicle.wheelbase)
 
 
-def _swapped(vehicle: Vehicle, _: float) -> Planted:
-    apart = vehicle.l_r - vehicle.l_f  # by how much l_f is then told too long
-    return Planted(Case(told=SwappedAxles()), "center_of_gravity", "", apart)
-
-
 def _inertia(_: Vehicle, size: float) -> Planted:
     told = WrongNumber(field="yaw_inertia", factor=math.exp(size))
     return Planted(Case(told=told), "yaw_inertia", "", math.exp(size))
@@ -128,8 +122,7 @@ KINDS: Mapping[str, tuple[Plant, float, float, bool]] = {
     "accelerometer": (
         _elsewhere("accelerometer", "acceleration_sensor_x", "a_y"), 0.2, 1.5, True,
     ),
-    "center of gravity": (_center, 0.05, 0.12, True),
-    "swapped": (_swapped, 1.0, 1.0, False),
+    "center of gravity": (_center, 0.08, 0.15, True),
     "yaw inertia": (_inertia, 0.4, 2.0, True),
     "bank": (_bank, 1.0 * DEGREE, 4.0 * DEGREE, True),
 }  # fmt: skip

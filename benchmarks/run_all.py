@@ -21,6 +21,7 @@ APART = ("mutants", "fuzz", "fuzz_c")  # have targets of make of their own: they
 BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "front_door": [],
     "speed": [],
+    "long_logs": ["--long"],
     "recorded_cars": [],
     "learn_and_extrapolate": [],
     "sensor_faults": [],

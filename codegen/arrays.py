@@ -7,7 +7,7 @@ not grow with the recording. Up to `LONG` samples there is one block, and all is
 
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 
 import numpy as np
@@ -42,6 +42,20 @@ def thinning(n: int) -> int:
     n : samples.
     """
     return -(-n // LONG)
+
+
+def by_blocks(n: int, at: Callable[[slice], Array]) -> Array:
+    """Return an array of n numbers that is computed block by block, on disk where it is large.
+
+    Parameters
+    ----------
+    n : numbers.
+    at : returns those of a part.
+    """
+    found = large((n,))
+    for part in blocks(n):
+        found[part] = at(part)
+    return found
 
 
 def large(shape: tuple[int, ...]) -> Array:

@@ -24,17 +24,19 @@ from codegen.arrays import Array
 from identifier.axle.curve import unit_matrix
 from identifier.verdict.motion import white_noise
 from models.recordings import Recording
+from models.recordings.repair import CHANNELS
 from models.vehicle import GRAVITY, Vehicle
 
 LADDER = (0.016, 0.032, 0.064, 0.128, 0.256)  # rad, slip scales of the curve
 RIDGE = 1e-3  # on its weights, over the mean power of its units
-# Of times in periods of the swings of the drive:
-WINDOW = 0.4  # length of ψ
-SMOOTHED = 0.05  # half the window by which every channel is smoothed alike
-SWAYED = 0.1  # half the window of what the roll of the body follows
-STEP = 0.015  # sampling interval after it
+# Of times in lengths of ψ:
+SMOOTHED = 0.125  # half the window by which every channel is smoothed alike
+SWAYED = 0.25  # half the window of what the roll of the body follows
+STEP = 0.0375  # sampling interval after it
+LONG, SHORT = 0.4, 0.1  # lengths of ψ, in periods of the swings of the drive
+QUIET = 0.3  # noise over what no model explains, for which ψ is as long as it must be
 FASTEST, SLOWEST = 4.0, 16.0  # periods of the swings that are believed, in sqrt(L/g)
-MARGIN = 0.8  # at both ends, what a delay may be, in sqrt(L/g)
+MARGIN = 0.4  # s at both ends, what a delay may be
 BRISK = 0.6  # speed in sqrt(g L) from which a window counts
 BANKS = 6  # cosines over the drive in which a bank may swing
 OVERLAP = 4  # windows that begin within the length of one
@@ -104,19 +106,19 @@ class Balance:
     def __init__(self, stretches: tuple[Recording, ...], vehicle: Vehicle) -> None:
         self.vehicle = vehicle
         dt = stretches[0].dt
-        self.period = swing(stretches, vehicle)
-        every = max(1, round(STEP * self.period / dt))
-        half = max(1, round(SMOOTHED * self.period / dt))
-        self.dt = every * dt
-        self.margin = round(MARGIN * vehicle.froude_time / self.dt) + 1
-        names = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")
-        self.names = [name for name in names if getattr(stretches[0], name) is not None]
-        smooth = {
-            name: [smoothed(getattr(one, name), half, dt, every) for one in stretches]
-            for name in self.names
-        }
         self.white = {
             name: float(np.median([white_noise(getattr(one, name)) for one in stretches]))
+            for name in CHANNELS
+            if getattr(stretches[0], name) is not None
+        }
+        self.names = list(self.white)
+        self.length = window_length(stretches, vehicle, self.white)
+        every = max(1, round(STEP * self.length / dt))
+        half = max(1, round(SMOOTHED * self.length / dt))
+        self.dt = every * dt
+        self.margin = round(MARGIN / self.dt) + 1
+        smooth = {
+            name: [smoothed(getattr(one, name), half, dt, every) for one in stretches]
             for name in self.names
         }
         sizes = [one.value.size for one in smooth["v_x"]]
@@ -136,7 +138,7 @@ class Balance:
         clock = np.concatenate([one.t[::every] for one in stretches])[self.at]
         share = (clock - clock[0]) / max(clock[-1] - clock[0], 1e-9)
         self.banks = np.cos(math.pi * np.outer(share, np.arange(BANKS)))
-        sway = max(2, round(SWAYED * self.period / self.dt))
+        sway = max(2, round(SWAYED * self.length / self.dt))
         self._make_windows([one.size for one in inside], sway)
         bell = np.hanning(2 * sway + 1)
         self.jerk = np.gradient(np.pad(bell / bell.sum(), 1), self.dt)
@@ -162,7 +164,7 @@ class Balance:
 
     def _make_windows(self, lengths: list[int], sway: int) -> None:
         """Place windows in which the car drives, and none across two stretches."""
-        length = max(6, round(WINDOW * self.period / self.dt))
+        length = max(6, round(self.length / self.dt))
         stride = max(1, length // OVERLAP)
         places, begin = [], 0
         for n in lengths:
@@ -412,13 +414,18 @@ def cubic(a: Array, b: Array, slope_a: Array, slope_b: Array, share: float, step
     return inside
 
 
-def swing(stretches: tuple[Recording, ...], vehicle: Vehicle) -> float:
-    """Return the period of the swings that move the car most [s], by the power of yaw rate.
+def window_length(
+    stretches: tuple[Recording, ...], vehicle: Vehicle, white: Mapping[str, float]
+) -> float:
+    """Return how long ψ is [s]: short against the swings of the drive, but not full of noise.
+
+    White noise s of every sample leaves s² dt ∫ψ̇² = s² dt 2π²/T³ of a derivative.
 
     Parameters
     ----------
     stretches : of the drive.
     vehicle : the car, by whose size a period is believed.
+    white : noise of the channels.
     """
     time, dt = vehicle.froude_time, stretches[0].dt
     half = max(1, round(0.3 * time / dt))
@@ -426,7 +433,13 @@ def swing(stretches: tuple[Recording, ...], vehicle: Vehicle) -> float:
     turning = math.sqrt(sum(float(one.value @ one.value) for one in smooth))
     changing = math.sqrt(sum(float(one.slope @ one.slope) for one in smooth))
     period = 2.0 * math.pi * turning / max(changing, 1e-9)
-    return float(np.clip(period, FASTEST * time, SLOWEST * time))
+    period = float(np.clip(period, FASTEST * time, SLOWEST * time))
+    sideways = np.concatenate([one.v_x * one.r for one in stretches]) / GRAVITY
+    wanted = QUIET * math.hypot(SMALL, WANDER * math.sqrt(float(np.mean(sideways**2))))
+    arm = vehicle.yaw_inertia / vehicle.mass / min(vehicle.l_f, vehicle.l_r)
+    noise = math.hypot(white["v_y"], arm * white["r"]) / GRAVITY
+    quiet = float(np.cbrt(2.0 * math.pi**2 * dt * (noise / wanted) ** 2))
+    return min(max(quiet, SHORT * period), LONG * period)
 
 
 def stretches_of(

@@ -17,12 +17,13 @@ from identifier.doctor.suspects import SUSPECTS, Suspect
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
-LONGEST, PIECES = 120.0, 6  # s that are looked at, and from how many parts of a longer log
+LONGEST, PIECES = 60.0, 4  # s that are looked at, and from how many parts of a longer log
 FEWEST = 24  # windows, below which nothing is asked
 MOST = 4  # faults at once
 CHANCE = 6.0  # gain of J that a fault must bring
 TELLING = 2.5  # deviations, with the least size of the suspect in them, that it must have
 ALIKE = 3.0  # gain of J within which two faults cannot be told apart
+LATE_ALIKE = 0.8  # of the gain, from which a delay and a low pass of a channel cannot be
 LIKELY, HOPELESS = 8, 0.5  # suspects that are looked at closely, from this share of CHANCE on
 AWRY = 9.0  # mean square of a part, from which straight lines promise nothing: all are looked at
 TEMPER = 2.0  # odds of e per this gain of J: the model is not exact
@@ -170,13 +171,16 @@ class Search:
     def findings(self) -> tuple[Finding, ...]:
         """Return what was found: what explains most first, followed by what may be it instead."""
         listed: list[Finding] = []
+        taken = {one.suspect.key for one in self.found}
         for one in self.found:
-            gains = [CHANCE, one.gain, *(other.gain for other in one.alike)]
+            alike = [other for other in one.alike if other.suspect.key not in taken]
+            taken |= {other.suspect.key for other in alike}
+            gains = [CHANCE, one.gain, *(other.gain for other in alike)]
             odds = np.exp((np.array(gains) - one.gain) / TEMPER)
             shares = odds / odds.sum()
-            names = [other.suspect for other in one.alike]
+            names = [other.suspect for other in alike]
             listed.append(self._finding(one.suspect, self.fit, float(shares[1]), names))
-            for other, share in zip(one.alike, shares[2:].tolist(), strict=True):
+            for other, share in zip(alike, shares[2:].tolist(), strict=True):
                 names = [one.suspect]
                 listed.append(self._finding(other.suspect, other.fit, share, names))
         return tuple(listed)
@@ -202,6 +206,17 @@ class Search:
             repair=repair,
             sure=repair is not None and not alike and confidence > 0.95,
         )
+
+
+def _alike(best: Candidate, other: Candidate) -> bool:
+    """Return whether a drive cannot tell two faults apart.
+
+    A delay and a low pass differ by the noise, of which nobody knows on which side it came in.
+    """
+    both = {best.suspect.code, other.suspect.code} == {"delay", "lag"}
+    if both and best.suspect.channel == other.suspect.channel:
+        return other.gain > LATE_ALIKE * best.gain
+    return other.gain > max(best.gain - ALIKE, 0.5 * best.gain)
 
 
 def estimate(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:

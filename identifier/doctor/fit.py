@@ -16,7 +16,7 @@ from codegen.arrays import Array
 from identifier.doctor.balance import Balance, Residual, Sizes
 from identifier.doctor.suspects import NUISANCES, SUSPECTS, grown
 
-FLOOR = 0.3  # of S: below it a residual tells nothing more
+FLOOR = (0.6, 0.6, 0.3)  # of S of each part: below it a residual tells nothing more
 ODD = 4.0  # S from which what is left is no noise: windows that miss it are not independent
 STEP = 0.02  # of a standard deviation, for slopes
 ITERATIONS, CLOSE = 10, 0.01  # of J
@@ -80,8 +80,10 @@ class Fitter:
         found : the residual.
         """
         return [
-            max(float(part @ part) / part.size - noise + usual, 0.1 * usual) + FLOOR
-            for part, noise, usual in zip(found.parts, found.noise, self.usual, strict=True)
+            max(float(part @ part) / part.size - noise + usual, 0.1 * usual) + floor
+            for part, noise, usual, floor in zip(
+                found.parts, found.noise, self.usual, FLOOR[: len(found.parts)], strict=True
+            )
         ]
 
     def cost(self, found: Residual, sizes: Sizes) -> float:

@@ -1,7 +1,8 @@
 """Which numbers may be wrong, how wrong they plausibly are, and what takes each of them out.
 
 Sizes are those of a sedan, 2.7 m between the axles; a car of another size has them by Froude's
-similarity: lengths with L, speeds with sqrt(g L), times with sqrt(L/g), angles as they are.
+similarity: lengths with L, speeds with sqrt(g L), angles as they are. Delays and lags are of
+devices, not of cars.
 """
 
 import math
@@ -123,15 +124,15 @@ def _channels() -> tuple[Suspect, ...]:
     }
     for name in ("v_y", "r", "delta_f", "a_y"):
         found.append(Suspect(
-            f"delay.{name}", "delay", name, "s", 0.12, 0.004, "time", True,
+            f"delay.{name}", "delay", name, "s", 0.12, 0.004, "", True,
             f"{words[name]} is {{size}} late against the other channels", " ms", 1e3,
         ))  # fmt: skip
         found.append(Suspect(
-            f"lag.{name}", "lag", name, "s", 0.15, 0.004, "time", False,
+            f"lag.{name}", "lag", name, "s", 0.15, 0.004, "", False,
             f"{words[name]} lags behind a low pass of {{size}}", " ms", 1e3,
         ))  # fmt: skip
     found.append(Suspect(
-        "delay.r+a_y", "delay", "r+a_y", "s", 0.12, 0.004, "time", True,
+        "delay.r+a_y", "delay", "r+a_y", "s", 0.12, 0.004, "", True,
         "the yaw rate and the lateral acceleration, of one device, are {size} late", " ms", 1e3,
     ))  # fmt: skip
     found += [
@@ -153,7 +154,7 @@ SUSPECTS = (
             "the velocity is measured {size} ahead of the center of gravity", " m"),
     Suspect("acceleration_sensor_x", "acceleration_sensor_x", "a_y", "m", 0.8, 0.04, "length",
             True, "the acceleration is measured {size} ahead of the center of gravity", " m"),
-    Suspect("center_of_gravity", "center_of_gravity", "", "m", 0.2, 0.04, "length", True,
+    Suspect("center_of_gravity", "center_of_gravity", "", "m", 0.2, 0.06, "length", True,
             "the center of gravity is told {size} too far back (l_f and l_r)", " m"),
     Suspect("yaw_inertia", "yaw_inertia", "", "", 0.5, 0.08, "", True,
             "the yaw inertia is told {size} times too large", ""),

@@ -244,8 +244,9 @@ def _opened(path: Path) -> Iterator[Any]:
     plugin = _plugin(path)
     reader = need(path, "rosbags.rosbag2.reader", "ROS 2 bags", "ros")
     with bounded(path):
-        bag = reader.Reader.STORAGE_PLUGINS[plugin](path)
-        bag.open()
+        storage = reader.Reader.STORAGE_PLUGINS[plugin]
+        bag = storage(path)
+        storage.open(bag)
         try:
             yield bag
         finally:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import Array
+from codegen.arrays import LONG, Array, by_blocks
 from models.logs.log import Channel, RecordingError
 from models.logs.stamps import not_rising
 
@@ -114,7 +114,8 @@ def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Str
 
 
 def _interval(t: Array) -> float:
-    return float(np.median(np.diff(t)))
+    """Return the typical time between samples [s], of the first ones of a long channel."""
+    return float(np.median(np.diff(t[: LONG + 1])))
 
 
 def _covered(times: Sequence[Array], longest: float) -> list[tuple[float, float]]:
@@ -157,27 +158,29 @@ def sampled(raw: Raw, grid: Array, dt: float) -> Array:
     grid : instants [s], (m,).
     dt : step of the clock [s].
     """
-    t, values = raw.t, raw.values
-    last = np.searchsorted(t, grid + ON_STEP * dt, side="right") - 1
-    interval = _interval(t)
+    interval = _interval(raw.t)
+    return by_blocks(grid.size, lambda part: _sampled(raw, grid[part], dt, interval))
+
+
+def _sampled(raw: Raw, grid: Array, dt: float, interval: float) -> Array:
+    """Return the same at some instants, of a signal with a typical interval [s]."""
+    last = np.searchsorted(raw.t, grid + ON_STEP * dt, side="right") - 1
     if interval < dt / 1.5:
-        return _mean_since(values, last, np.searchsorted(t, grid - dt + ON_STEP * dt, side="right"))
-    now = values[last]
-    ahead = np.maximum(grid - t[last], 0.0)
+        first = np.searchsorted(raw.t, grid - dt + ON_STEP * dt, side="right")
+        return _mean_since(raw.values, last, np.minimum(first, last))
     before = np.maximum(last - 1, 0)
-    step = t[last] - t[before]
-    whole = (last > 0) & (step <= GAP_INTERVALS * interval)
-    share = np.where(whole, np.minimum(ahead, step) / np.where(step > 0.0, step, 1.0), 0.0)
-    share[ahead <= ON_STEP * dt] = 0.0
-    extrapolated: Array = now + share * (now - values[before])
-    return np.where(share > 0.0, extrapolated, now)
+    now, step = raw.values[last], raw.t[last] - raw.t[before]
+    ahead = np.maximum(grid - raw.t[last], 0.0)
+    goes_on = (last > 0) & (step <= GAP_INTERVALS * interval) & (ahead > ON_STEP * dt)
+    share = np.minimum(ahead, step) / np.where(step > 0.0, step, 1.0)
+    return np.where(goes_on, now + share * (now - raw.values[before]), now)
 
 
 def _mean_since(values: Array, last: NDArray[np.intp], first: NDArray[np.intp]) -> Array:
-    """Return means of samples from first to last, at least the last one."""
-    total = np.concatenate([[0.0], np.cumsum(values)])
-    first = np.minimum(first, last)
-    means: Array = (total[last + 1] - total[first]) / (last + 1 - first)
+    """Return means of samples from first to last."""
+    begin = int(first[0])
+    total = np.concatenate([[0.0], np.cumsum(values[begin : int(last[-1]) + 1])])
+    means: Array = (total[last + 1 - begin] - total[first - begin]) / (last + 1 - first)
     return means
 
 

@@ -107,7 +107,7 @@ RULES: Mapping[str, Rule] = {
          "lenkradwinkel", "lrw", "deltasw", "steerwhlang", "steeringwheelposition", "sas",
          "steerwhlangle", "stwhlang", "deltah", "lenkradw"),
         ("steer|steering|hand|stw|driv;wheel|whl;angle|ang|position|pos", "handwheel;angle|ang",
-         "lenkradwinkel|lenkrad", "sas;angle|ang", "steering;wheel"),
+         "lenkradwinkel|lenkrad", "sas|lws;angle|ang|winkel", "steering;wheel"),
         ("steer|steering|steerangle|steeringangle|lenkwinkel|steerang|lenkung|steeredangle",),
         (*CORNERS, *REFERENCE, "torque", "moment", "rate", "speed", "velocity", "vel", "force",
          "front", "rear", "road", "tire", "tyre", "power", "dot", "mode", "assist", "drive"),
@@ -273,8 +273,8 @@ def name_confidence(signal: str, name: str) -> float:
     ends = ["".join(listed[k:]) for k in range(len(listed))]
     if set(rule.known) & set(ends[:1]):
         return KNOWN
-    topic, _, message = name.partition(".") if name.startswith("/") else ("", "", name)
-    if (frozenset(words_of(message)) if topic else words) & set(rule.never):
+    field = name.rpartition("/")[2] if name.startswith("/") else name  # behind a topic
+    if frozenset(words_of(field)) & set(rule.never):
         return 0.0
     if set(rule.known) & set(ends):
         return WORDS

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from models.logs.arrow import doubles, whole_numbers
 from models.logs.log import RecordingError
 from models.logs.spelling import unit_in_name
-from models.logs.stamps import nanoseconds
+from models.logs.stamps import MISSING, nanoseconds
 from models.logs.table import Cells, Gathered, Kind, TableLog, Words
 from models.schema import require_few, require_file, shown
 
@@ -156,11 +157,17 @@ class ParquetTable:
 
         found = self.schema.field(column).type
         if kind is Kind.NUMBER:
-            whole = cells.cast(pyarrow.int64()) if pyarrow.types.is_duration(found) else cells
-            values = whole.cast(pyarrow.float64(), safe=False)
-            return np.array(values.to_numpy(zero_copy_only=False), dtype=np.float64)
+            return doubles(cells)
         if kind is Kind.WORD:
             return Words.of([str(cell) for cell in cells.to_pylist()])
+        if pyarrow.types.is_timestamp(found):
+            try:
+                return whole_numbers(cells, MISSING)
+            except pyarrow.ArrowInvalid:
+                raise RecordingError(
+                    f"{self.path}: {self.names[column]} must be of the years 1678 to 2262, "
+                    f"rows from {rows[0]} on are not"
+                ) from None
         instants = [nanoseconds(cell) for cell in _as_text(cells, found)]
         if None in instants:
             k = instants.index(None)
@@ -190,10 +197,14 @@ def _is_text(kind: Any) -> bool:
 
 def _as_text(cells: Any, kind: Any) -> list[str]:
     """Return cells as text, "" where one is missing; dates with all their digits."""
+    import pyarrow
     from pyarrow import types
 
     if types.is_timestamp(kind):
-        dates = cells.to_numpy(zero_copy_only=False)
+        try:
+            dates = whole_numbers(cells, MISSING).view("datetime64[ns]")
+        except pyarrow.ArrowInvalid:
+            return ["?"] * len(cells)
         return ["" if np.isnat(date) else str(date) for date in dates]
     if types.is_duration(kind):
         cells = cells.cast("int64")

@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from codegen.arrays import Array
+from codegen.arrays import Array, by_blocks
 from models.logs.log import RecordingError
 from models.logs.units import ACCELERATION, ANGLE, FORCE, RATE, SPEED
 from models.schema import shown
@@ -121,6 +121,15 @@ class Signal:
         parts : each channel in SI, on one clock (n,).
         quantity : what the signal is.
         """
+        plain = Signal(channel=self.channel[:1], unit=self.unit)
+        if len(parts) == 1 and self == plain:
+            return parts[0]
+        return by_blocks(
+            parts[0].size, lambda part: self._value([one[part] for one in parts], quantity)
+        )
+
+    def _value(self, parts: Sequence[Array], quantity: str) -> Array:
+        """Return the signal of some samples of its channels."""
         total: Array = parts[0] if len(parts) == 1 else np.sum(parts, axis=0)
         if len(parts) > 1 and quantity != FORCE:
             total = total / len(parts)

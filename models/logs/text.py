@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from models.logs.arrow import doubles, whole_numbers
 from models.logs.log import RecordingError
 from models.logs.preamble import BLANKS, COMMENT, HEAD, MISSING, Layout, cells_of, find_layout
 from models.logs.stamps import nanoseconds
@@ -415,12 +416,13 @@ def _by_arrow(
             return None
         columns: dict[int, Any] = {}
         for column, kind in wanted.items():
-            found = table.column(str(column))
+            found = arrow.concat_arrays(table.column(str(column)).chunks)
             if kind is Kind.NUMBER:
-                columns[column] = np.asarray(found.to_numpy(), dtype=np.float64)
+                columns[column] = doubles(found)
             elif kind is Kind.WORD:
-                coded = found.combine_chunks().dictionary_encode()
-                columns[column] = Words(coded.dictionary.to_pylist(), coded.indices.to_numpy())
+                coded = found.dictionary_encode()
+                codes = whole_numbers(coded.indices, -1)
+                columns[column] = Words(coded.dictionary.to_pylist(), codes)
             else:
                 instants = [nanoseconds(cell) for cell in found.to_pylist()]
                 if None in instants:

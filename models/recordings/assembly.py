@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import butter, lfilter, lfilter_zi
 
-from codegen.arrays import Array
+from codegen.arrays import Array, by_blocks
 from models.logs.clock import (
     SLOWEST,
     Raw,
@@ -28,7 +28,14 @@ from models.logs.names import Proposal, propose
 from models.logs.signals import BETA, COLUMNS, NEEDED, QUANTITIES, Signal, require_fitting
 from models.logs.units import SI, TIME, is_told, to_si
 from models.recordings.map import AXES, LogMap
-from models.recordings.record import LARGEST, MINIMUM_SAMPLES, Recording, joined, resample
+from models.recordings.record import (
+    LARGEST,
+    MINIMUM_SAMPLES,
+    Recording,
+    joined,
+    resample,
+    side_by_side,
+)
 from models.schema import require_few, shown
 
 INVERSE = {"Fyf_inv": "Fyf", "Fyr_inv": "Fyr"}  # computed backwards from the motion
@@ -338,10 +345,23 @@ def _channels(
             what += "" if name == column_of(ours) else f" (channel {name!r})"
             factor = to_si(unit, QUANTITIES[ours], what)
             _require_finite(label, column_of(ours), channel)
-            values = channel.values if factor == 1.0 else channel.values * factor
+            values = scaled(channel.values, factor)
             _require_of_a_car(label, ours, values, channel)
             found[ours].append(Raw(channel.t, values, channel.place, channel.rows))
     return found
+
+
+def scaled(values: Array, factor: float) -> Array:
+    """Return values times a factor; themselves where it is one.
+
+    Parameters
+    ----------
+    values : (n,).
+    factor : of all of them.
+    """
+    if factor == 1.0:
+        return values
+    return by_blocks(values.size, lambda part: values[part] * factor)
 
 
 def _timed(label: str, channel: Channel, clock: Channel, stamps: Array) -> Channel:
@@ -472,21 +492,25 @@ def _recording(name: str, stretch: Stretch, log_map: LogMap, dt: float) -> Recor
     """Return one stretch as a recording, in ISO axes, filtered where the map says so."""
     t, sign = stretch.t, AXES[log_map.axes]
     signals = {
-        key: values if key == "v_x" or sign > 0.0 else -values
+        key: values if key == "v_x" else scaled(values, sign)
         for key, values in stretch.signals.items()
     }
     if log_map.low_pass is not None:
         signals = {key: _low_pass(one, log_map.low_pass, dt) for key, one in signals.items()}
-    v_y = signals["v_x"] * np.tan(signals[BETA]) if BETA in signals else signals["v_y"]
-    force = np.column_stack([signals["Fyf"], signals["Fyr"]]) if "Fyf" in signals else None
+    if BETA in signals:
+        v_x, beta = signals["v_x"], signals[BETA]
+        signals["v_y"] = by_blocks(t.size, lambda part: v_x[part] * np.tan(beta[part]))
+    force = side_by_side(signals["Fyf"], signals["Fyr"]) if "Fyf" in signals else None
+    for values in (t, *signals.values()):  # kept as they are, not copied
+        values.setflags(write=False)
     return Recording(
         name=name,
         t=t,
         v_x=signals["v_x"],
-        v_y=v_y,
+        v_y=signals["v_y"],
         r=signals["r"],
         delta_f=signals["delta_f"],
-        delta_r=signals.get("delta_r", np.zeros(t.size)),
+        delta_r=signals["delta_r"] if "delta_r" in signals else np.zeros(t.size),
         a_y=signals.get("a_y"),
         axle_force=force,
     )

@@ -201,12 +201,12 @@ class Recording:
     @property
     def x(self) -> Array:
         """State [v_y, r] [m/s, rad/s], shape (n, 2)."""
-        return _side_by_side(self.v_y, self.r)
+        return side_by_side(self.v_y, self.r)
 
     @property
     def u(self) -> Array:
         """Steering [delta_f, delta_r] [rad], shape (n, 2)."""
-        return _side_by_side(self.delta_f, self.delta_r)
+        return side_by_side(self.delta_f, self.delta_r)
 
     @property
     def dt(self) -> float:
@@ -268,23 +268,26 @@ class Recording:
                 f"samples, at least {MINIMUM_SAMPLES} are needed; the recording runs from "
                 f"{self.t[0]:g} to {self.t[-1]:g} s"
             )
-        return self.taken(np.arange(keep.start, keep.stop))
+        return self.taken(keep)
 
-    def taken(self, kept: NDArray[np.intp]) -> "Recording":
+    def taken(self, kept: slice | NDArray[np.intp]) -> "Recording":
         """Return some of the samples; where some are left out between, a stretch begins.
 
         Parameters
         ----------
-        kept : indices of samples, rising.
+        kept : samples: a slice of them, which is not copied, or their indices, rising.
 
         Raises
         ------
         RecordingError
             Where fewer than 10 samples are left of a stretch.
         """
-        stretch = np.searchsorted(np.array(self.breaks, dtype=np.intp), kept, side="right")
-        begins = (np.diff(stretch) > 0) | (np.diff(kept) > 1)
-        breaks = tuple(int(k) for k in np.flatnonzero(begins) + 1)
+        if isinstance(kept, slice):
+            breaks = tuple(k - kept.start for k in self.breaks if kept.start < k < kept.stop)
+        else:
+            stretch = np.searchsorted(np.array(self.breaks, dtype=np.intp), kept, side="right")
+            begins = (np.diff(stretch) > 0) | (np.diff(kept) > 1)
+            breaks = tuple(int(k) for k in np.flatnonzero(begins) + 1)
         cut: dict[str, Any] = {
             name: getattr(self, name)[kept] for name in SIGNALS if getattr(self, name) is not None
         }
@@ -377,8 +380,13 @@ def _read_only(value: object) -> Array:
     return array
 
 
-def _side_by_side(first: Array, second: Array) -> Array:
-    """Return two signals as columns that nobody may write, (n, 2)."""
+def side_by_side(first: Array, second: Array) -> Array:
+    """Return two signals as columns that nobody may write, (n, 2).
+
+    Parameters
+    ----------
+    first, second : signals (n,).
+    """
     both = large((first.size, 2))
     both[:, 0], both[:, 1] = first, second
     both.setflags(write=False)

@@ -7,26 +7,27 @@ from models.logs.log import Channel, Listed
 from models.logs.names import HAND, RULES, SURE, Guess, name_confidence, propose, words_of
 
 CALLED = {
-    "v_x": ["vx", "VelForward", "Vel_Longitudinal", "Car.vx", "/odom.twist.twist.linear.x", "v_lon",
+    "v_x": ["vx", "VelForward", "Vel_Longitudinal", "Car.vx", "/odom/twist.twist.linear.x", "v_lon",
             "Velocity_X", "WheelBasedVehicleSpeed", "Längsgeschwindigkeit", "Ground Speed",
-            "/vehicle/status/velocity_status.longitudinal_velocity"],
-    "v_y": ["vy", "Vel Lat", "LatVel", "VelLateral", "Car.vy", "/odom.twist.twist.linear.y",
+            "/vehicle/status/velocity_status/longitudinal_velocity"],
+    "v_y": ["vy", "Vel Lat", "LatVel", "VelLateral", "Car.vy", "/odom/twist.twist.linear.y",
             "v_lat", "Quergeschwindigkeit", "lateral_velocity", "Correvit_vQuer"],
     "beta": ["beta", "Schwimmwinkel", "Slip_Angle", "SideSlipAngle", "Car.SideSlipAngle"],
     "r": ["r", "Car.YawRate", "Yaw_Rate", "Gyro Z", "AngRateZ", "Gierrate", "Giergeschwindigkeit",
-          "/imu.angular_velocity.z", "psi_dot", "YAW_RATE", "ESP_YawRate", "Gyro Yaw Velocity"],
-    "delta_f": ["delta_f", "RoadWheelAngle", "/ackermann_cmd.drive.steering_angle",
-                "/vehicle/status/steering_status.steering_tire_angle", "Radlenkwinkel"],
+          "/imu/angular_velocity.z", "psi_dot", "YAW_RATE", "ESP_YawRate", "Gyro Yaw Velocity"],
+    "delta_f": ["delta_f", "RoadWheelAngle", "/ackermann_cmd/drive.steering_angle",
+                "/vehicle/status/steering_status/steering_tire_angle", "Radlenkwinkel"],
     HAND: ["Steering Angle", "SteerAngle", "Steered Angle", "SWA", "Steering_Wheel_Angle",
-           "Lenkradwinkel", "SAS_Angle", "Steer.WhlAng", "HandwheelAngle"],
+           "Lenkradwinkel", "SAS_Angle", "LWS_Angle", "Steer.WhlAng", "HandwheelAngle"],
     "a_y": ["ay", "G Force Lat", "LateralAcc", "GPS LatAcc", "Acc_Y", "Querbeschleunigung",
-            "Car.ay", "/imu.linear_acceleration.y", "AccelLateral", "Accel Y"],
+            "Car.ay", "/imu/linear_acceleration.y", "AccelLateral", "Accel Y"],
     "delta_r": ["delta_r", "RearSteerAngle"],
     "Fyf": ["Fyf", "Fy_front"],
     "Fyr": ["Fyr", "Fy_rear"],
 }  # fmt: skip
 NO_SIGNAL = ["Engine RPM", "Wheel Speed FL", "Brake Pressure", "Yaw Rate Target", "Roll Rate",
-             "Steering Wheel Torque", "Throttle", "/imu.orientation.z", "Longitudinal Acceleration",
+             "Steering Wheel Torque", "Throttle", "/imu/orientation.z", "/odom/twist.covariance[0]",
+             "Longitudinal Acceleration",
              "Fuel Level", "Gear", "GPS Latitude", "Steering Wheel Speed", "vy_std"]  # fmt: skip
 
 

@@ -88,6 +88,33 @@ def test_pyarrow_reads_what_is_plain_itself(tmp_path, monkeypatch):
         outcome(path, False)
 
 
+def test_reading_imports_no_pandas(tmp_path):
+    (tmp_path / "log.csv").write_text(plain())
+    table = pyarrow.table({"t": DT * np.arange(50), "v": [None, *range(49)]})
+    pyarrow.parquet.write_table(table, tmp_path / "log.parquet")
+    script = """
+import sys
+from dataclasses import replace
+from models.logs.door import open_log
+from models.logs.table import TableLog
+text, parquet = map(open_log, sys.argv[1:])
+for log in (TableLog(table=replace(text.table, arrow=True)), parquet):
+    log.read([one.name for one in log.listed()])
+print("pyarrow" in sys.modules, "pandas" in sys.modules)
+"""
+    paths = [str(tmp_path / "log.csv"), str(tmp_path / "log.parquet")]
+    ran = subprocess.run([sys.executable, "-c", script, *paths], capture_output=True, text=True)
+    assert ran.stdout == "True False\n", ran.stderr
+
+
+def test_parquet_of_times_before_all_clocks_is_refused(tmp_path):
+    path = tmp_path / "log.parquet"
+    dates = np.array(["0001-01-01T00:00:00"] * 30, dtype="datetime64[s]")
+    pyarrow.parquet.write_table(pyarrow.table({"time": dates, "v": np.ones(30)}), path)
+    with pytest.raises(RecordingError, match="no column is a time that rises"):
+        open_log(path).read(["v"])
+
+
 def test_without_pyarrow_a_text_is_read_all_the_same(tmp_path, monkeypatch):
     path = tmp_path / "log.csv"
     path.write_text(plain())

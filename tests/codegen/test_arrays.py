@@ -1,0 +1,47 @@
+"""Blocks of long recordings, and arrays that lie on disk."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from codegen import arrays
+from codegen.arrays import LONG, blocks, large, thinning
+
+
+@pytest.mark.parametrize("n", [1, 59_999, LONG, LONG + 1, 1_000_000])
+def test_blocks_cover_all_samples_once(n):
+    parts = list(blocks(n))
+    assert [part.start for part in parts] == [0, *(part.stop for part in parts[:-1])]
+    assert parts[-1].stop == n
+    assert (len(parts) == 1) == (n <= LONG)
+
+
+def test_blocks_overlap_as_far_as_there_are_samples():
+    parts = list(blocks(LONG + 1, overlap=3))
+    assert all(one.stop - other.start == 3 for one, other in pairwise(parts))
+    assert parts[-1].stop == LONG + 1
+
+
+@pytest.mark.parametrize("n", [1, LONG, LONG + 1, 10 * LONG])
+def test_thinned_samples_are_at_most_those_of_a_short_recording(n):
+    assert LONG / 2 < len(range(0, n, thinning(n))) <= LONG or n <= LONG
+    assert (thinning(n) == 1) == (n <= LONG)
+
+
+def test_a_large_array_lies_on_disk_and_a_small_one_in_memory(monkeypatch):
+    monkeypatch.setattr(arrays, "IN_MEMORY", 800)
+    small, big = large((100,)), large((101, 3))
+    assert small.base is None
+    assert isinstance(big.base, np.memmap)
+    big[:] = np.arange(303.0).reshape(101, 3)
+    np.testing.assert_array_equal(big.ravel(), np.arange(303.0))
+
+
+def test_a_large_array_is_in_memory_where_the_disk_is_full(monkeypatch):
+    def full(*_):
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(arrays, "IN_MEMORY", 800)
+    monkeypatch.setattr(arrays.os, "posix_fallocate", full, raising=False)
+    assert large((101,)).base is None

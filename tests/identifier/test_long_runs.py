@@ -1,0 +1,219 @@
+"""Long recordings: block by block the bits of one piece, and memory that does not grow with them.
+
+What is long is made short here: a few hundred samples are a block.
+"""
+
+import tracemalloc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from codegen import arrays
+from identifier.axle import AxleIdentifier
+from identifier.methods import make_method
+from identifier.reproducibility import beyond_known, predict, reproduce
+from identifier.run import Recalled, identify, learn
+from models.recordings import Recording, check_against_vehicle, evidence, portion
+from models.recordings.checks import check_physics
+from tests.identifier.conftest import CAR, drive
+
+N = 1500
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """A drive, with an accelerometer and a gap in it."""
+    recording = drive(n=N)
+    a_y = np.gradient(recording.v_y, 0.01) + recording.v_x * recording.r
+    gone = np.r_[0:700, 760:N]
+    return replace(recording, a_y=a_y).taken(gone)
+
+
+@pytest.fixture
+def in_blocks(monkeypatch):
+    monkeypatch.setattr(arrays, "LONG", 400)
+    monkeypatch.setattr(arrays, "BLOCK", 128)
+    monkeypatch.setattr(arrays, "IN_MEMORY", 8 * 100)
+
+
+def tiled(recording, times):
+    """The drive over and over: its signals jump where it begins anew, its time does not."""
+    n = times * len(recording)
+    signals = ("v_x", "v_y", "r", "delta_f", "delta_r")
+    return Recording(
+        name="long",
+        t=0.01 * np.arange(n),
+        axle_force=np.tile(recording.axle_force, (times, 1)),
+        **{name: np.tile(getattr(recording, name), times) for name in signals},
+    )
+
+
+@pytest.mark.parametrize("method", ["axle", "integral", "kreisselmeier", "magic_formula_ekf"])
+def test_a_run_in_blocks_has_the_bits_of_one_in_a_piece(whole, method, request):
+    design = make_method(method, CAR)
+    piece = identify(whole, CAR, design)
+    request.getfixturevalue("in_blocks")
+    blocks = identify(whole, CAR, design)
+    assert isinstance(blocks.state, Recalled)
+    assert not isinstance(piece.state, Recalled)
+    np.testing.assert_array_equal(piece.axle_force, blocks.axle_force)
+    assert list(piece.state) == list(blocks.state)
+    for kind in ("state", "outputs"):
+        for port, values in getattr(piece, kind).items():
+            np.testing.assert_array_equal(values, getattr(blocks, kind)[port], err_msg=port)
+    for one, other in zip(piece.tracks, blocks.tracks, strict=True):
+        np.testing.assert_array_equal(one.values, other.values)
+
+
+def test_a_freeze_within_a_block_or_at_its_ends_is_that_of_one_piece(whole, request):
+    design = AxleIdentifier.for_vehicle(CAR)
+    piece = identify(whole, CAR, design)
+    model = piece.freeze(7.0)
+    request.getfixturevalue("in_blocks")
+    blocks = identify(whole, CAR, design)
+    for index in (0, 1, 127, 128, 129, 699, 700, 701, len(whole) - 2, len(whole) - 1):
+        t = float(whole.t[index])
+        expected, found = piece.state_at(t), blocks.state_at(t)
+        for port, value in expected.items():
+            np.testing.assert_array_equal(value, found[port], err_msg=f"{port} at {index}")
+    assert blocks.freeze(7.0).to_dict() == model.to_dict()
+    assert learn(whole, CAR, design, t=7.0).to_dict() == model.to_dict()
+    np.testing.assert_array_equal(model.axle_force(whole), piece.freeze(7.0).axle_force(whole))
+
+
+def test_only_blocks_that_are_asked_for_are_computed_again(whole, in_blocks):
+    blocks = identify(whole, CAR, AxleIdentifier.for_vehicle(CAR))
+    asked = np.array([130, 1000])
+    parts = [block.part for block in blocks.blocks(asked)]
+    assert len(parts) == 2
+    assert all(part.start <= k < part.stop for part, k in zip(parts, asked, strict=True))
+
+
+def test_errors_over_blocks_are_those_over_the_whole(whole, request):
+    design = AxleIdentifier.for_vehicle(CAR)
+    run = identify(whole, CAR, design)
+    piece, t = reproduce(run, 9.0), 9.0
+    asked, known = predict(run.freeze(t), whole), beyond_known(run.freeze(t), whole)
+    request.getfixturevalue("in_blocks")
+    blocks, again = reproduce(run, t), predict(run.freeze(t), whole)
+    sides, others = piece.reproduction, blocks.reproduction
+    for one, other in (
+        (piece.against_truth, blocks.against_truth),
+        (sides.past_against_online, others.past_against_online),
+        (sides.after_against_truth, others.after_against_truth),
+    ):
+        assert (other.front, other.rear) == pytest.approx((one.front, one.rear), rel=1e-12)
+    assert again.motion.explained == pytest.approx(asked.motion.explained, rel=1e-12)
+    assert beyond_known(run.freeze(t), whole) == known
+
+
+def test_a_law_that_diverges_is_noticed_in_the_block_where_it_does(whole, in_blocks):
+    run = identify(whole, CAR, AxleIdentifier.for_vehicle(CAR))
+    assert run.diverged_at is None
+    force = np.array(run.axle_force)
+    force[903:, 1] = np.nan
+    assert replace(run, axle_force=force).diverged_at == whole.t[903]
+
+
+# Verdicts on long drives: by a portion.
+
+
+@pytest.fixture
+def short_portions(monkeypatch, in_blocks):
+    monkeypatch.setattr(portion, "LONG", 4000)
+    monkeypatch.setattr(portion, "STRETCH", 500)
+    monkeypatch.setattr(portion, "STEP", 125)
+
+
+@pytest.fixture(scope="module")
+def long_drive():
+    """A slalom of fifteen seconds sixteen times, slower in between."""
+    return tiled(drive(n=N), 16)
+
+
+def noisy(recording, rng):
+    return replace(recording, v_y=recording.v_y + 0.005 * rng.standard_normal(len(recording)))
+
+
+def test_a_portion_is_bounded_spread_and_at_rest_where_it_is_joined(long_drive, short_portions):
+    asked = portion.portion(long_drive)
+    assert len(asked.recording) == asked.samples.size <= 4000
+    thirds = np.histogram(asked.samples, 4, (0, len(long_drive)))[0]
+    assert thirds.min() >= 900
+    ends = [piece.stop - 1 for piece in asked.recording.stretches]
+    assert len(ends) == 8
+    assert not asked.recording.v_x[ends].any()
+    moving = asked.recording.v_x > 0.0
+    np.testing.assert_array_equal(asked.recording.r[moving], long_drive.r[asked.samples][moving])
+
+
+def test_a_portion_takes_where_the_car_is_turned_and_not_where_a_sensor_breaks(
+    long_drive, short_portions
+):
+    straight = np.ones(len(long_drive), dtype=bool)
+    straight[9000:9600] = False
+    r = np.where(straight, 0.0, long_drive.r)
+    r[[8500, 11000]] = 5000.0
+    samples = portion.portion(replace(long_drive, r=r)).samples
+    assert np.isin(np.arange(9000, 9600), samples).sum() > 400  # of a stretch of 500
+
+
+def test_half_of_a_portion_lies_before_the_freeze(long_drive, short_portions):
+    asked = portion.portion(long_drive, 6000)
+    assert asked.place(6000) == pytest.approx(2000, abs=500)
+
+
+def test_a_short_recording_is_its_own_portion(whole):
+    assert portion.portion(whole).recording is whole
+
+
+def test_the_verdict_on_a_long_drive_says_that_a_portion_was_asked(long_drive, short_portions, rng):
+    verdict = identify(noisy(long_drive, rng), CAR, AxleIdentifier.for_vehicle(CAR)).verdict()
+    assert [one.code for one in verdict.findings if one.code == "portion"]
+    assert verdict.valid, verdict.findings
+
+
+def test_the_verdict_on_a_long_drive_finds_a_sensor_that_is_off(long_drive, short_portions, rng):
+    moved = replace(long_drive, v_y=long_drive.v_y - 0.8 * long_drive.r)
+    verdict = identify(noisy(moved, rng), CAR, AxleIdentifier.for_vehicle(CAR)).verdict()
+    assert not verdict.valid
+
+
+# Memory.
+
+
+def peak_of(recording):
+    """Return the most memory that learning, judging and replaying take beside the recording."""
+    tracemalloc.start()
+    try:
+        check_physics(recording)
+        check_against_vehicle(recording, CAR)
+        run = identify(recording, CAR, AxleIdentifier.for_vehicle(CAR))
+        run.verdict()
+        reproduce(run, float(recording.t[-1]))
+        beyond_known(run.freeze(), recording)
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.fixture
+def lengths(long_drive, short_portions, monkeypatch):
+    """A long drive and one that is four times as long, after all is compiled and imported."""
+    monkeypatch.setattr(arrays, "LONG", 4000)
+    monkeypatch.setattr(arrays, "BLOCK", 2000)
+    monkeypatch.setattr(evidence, "LONG", 4000)
+    peak_of(long_drive)
+    return long_drive, tiled(long_drive, 4)
+
+
+def test_memory_does_not_grow_with_the_recording(lengths):
+    short, long = map(peak_of, lengths)
+    assert long < 1.2 * short
+
+
+def test_memory_that_grows_would_be_noticed(lengths, monkeypatch):
+    short = peak_of(lengths[0])
+    monkeypatch.setattr(arrays, "IN_MEMORY", 1e12)
+    assert peak_of(lengths[1]) > 1.2 * short
