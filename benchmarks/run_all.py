@@ -29,6 +29,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "noisy_runs": [],
     "several_rates": [],
     "fault_table": ["{out}"],
+    "doctor_gross": [],
     "verdicts": [],
     "doctor": [],
     "plant_against_commonroad": ["{out}"],

@@ -1,8 +1,10 @@
 """Learning from a recording and asking what was learnt about another, as commands and users do."""
 
+import logging
 from collections.abc import Callable
 
 from identifier.axle import AxleIdentifier
+from identifier.doctor import diagnose
 from identifier.method import Method
 from identifier.reproducibility import Prediction, counted_samples, freeze_key, predict
 from identifier.run import DivergedError, History
@@ -10,6 +12,8 @@ from identifier.run import identify as run_over
 from identifier.tire_model import TireModel
 from models.recordings import Recording, check_against_vehicle
 from models.vehicle import Vehicle
+
+log = logging.getLogger("tireid.doctor")
 
 
 def identify(
@@ -23,13 +27,16 @@ def identify(
 ) -> History:
     """Learn the tires of a car from a drive, sample by sample.
 
+    What the doctor finds wrong with the drive or the car is logged as warnings of "tireid.doctor";
+    nothing is repaired: `diagnose` returns the same with its repair.
+
     Parameters
     ----------
     recording : what was driven; its axle forces are not looked at.
     vehicle : the car that drove.
     method : the identifier; None takes `AxleIdentifier.for_vehicle` at the recording's interval.
     start : model to go on learning from; None begins afresh.
-    check : whether a recording that this vehicle cannot have driven is refused.
+    check : whether what this vehicle cannot have driven is refused, and the doctor asked.
     progress : called now and then with the share that is done, 0 to 1.
 
     Raises
@@ -46,6 +53,8 @@ def identify(
     design = AxleIdentifier.for_vehicle(vehicle, dt=recording.dt) if method is None else method
     if check:
         check_against_vehicle(recording, vehicle)
+        for finding in diagnose(recording, vehicle).findings:
+            log.warning("%s: %s", recording.name, finding.text)
     counted_samples(recording, design.min_speed)  # refuses a car that never drives
     history = run_over(recording, vehicle, design, start, progress=progress)
     if history.diverged_at is not None:

@@ -1,7 +1,6 @@
 """What the doctor says of a log and of its car: findings in order, a repair, and what is unseen."""
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,7 +8,7 @@ from identifier.doctor.balance import Balance, stretches_of
 from identifier.doctor.estimate import FEWEST, LONGEST, PIECES, estimate
 from identifier.doctor.finding import Finding
 from identifier.doctor.fit import Fitter
-from identifier.doctor.screen import Screened, screen, steering_finding
+from identifier.doctor.screen import NEAR, Screened, combined, screen, steering_finding
 from models.recordings import Recording, RecordingError
 from models.recordings.checks import physics_contradiction, vehicle_contradiction
 from models.recordings.repair import Repair
@@ -99,20 +98,6 @@ def finding_dict(one: Finding) -> dict[str, Any]:
     }
 
 
-def combined(findings: Iterable[Finding]) -> Repair:
-    """Return the repair of several findings, gross ones before those that were asked after them.
-
-    Parameters
-    ----------
-    findings : with or without a repair.
-    """
-    repair = Repair()
-    for one in findings:
-        if one.repair is not None:
-            repair = repair.merged(one.repair)
-    return repair
-
-
 def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
     """Return what is wrong with a log or with what is told of its car, from the log alone.
 
@@ -130,7 +115,8 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
             wheel = next((one for one in found if one.code in RATIOS and one.repair), None)
             if wheel is not None:
                 exact = _exact_ratio(wheel, drive, car)
-                found[found.index(wheel)] = exact
+                k = found.index(wheel)
+                found[k : k + 1] = [] if exact is None else [exact]
                 drive, car = combined(found).apply(recording, vehicle)
             found += _contradictions(drive, car)
             fine = estimate(drive, car)
@@ -146,7 +132,8 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
 
 def _contradictions(recording: Recording, vehicle: Vehicle) -> list[Finding]:
     """Return the law that a log still breaks as it is read best, as one finding."""
-    said = physics_contradiction(recording) or vehicle_contradiction(recording, vehicle)
+    blind = replace(recording, axle_force=None)
+    said = physics_contradiction(blind) or vehicle_contradiction(blind, vehicle)
     return [] if said is None else [Finding(code="contradiction", confidence=0.9, text=said)]
 
 
@@ -158,8 +145,10 @@ def _told_once(findings: list[Finding]) -> list[Finding]:
     return list(kept.values())
 
 
-def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding:
+def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding | None:
     """Return the ratio of a steering wheel as the drive says it, no stiffness believed.
+
+    None where the drive says that the steering is right.
 
     Parameters
     ----------
@@ -175,6 +164,8 @@ def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding:
         fit = Fitter(balance).fit([FACTOR], {})
         by, deviation = math.exp(-fit.sizes[FACTOR]), fit.deviation(FACTOR)
         drive, factor = Repair(factor={"delta_f": by}).apply(drive, car)[0], factor * by
+    if abs(math.log(abs(factor))) < NEAR and factor > 0.0:
+        return None
     return steering_finding(factor, coarse.confidence, deviation=deviation)
 
 

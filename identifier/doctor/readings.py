@@ -28,9 +28,10 @@ FREEDOM = 0.5  # that a change must earn beside, whose factor is free
 FREE = ("steering", "other_car", "yaw_inertia")
 DEEPER = math.log(0.15)  # left of each equation, above which more changes are tried together
 KEPT = 8  # readings that are taken further
+JUDGED = 10  # of the best, by laws that need no vehicle
 MOST = 4  # changes at once
 STEERING = np.geomspace(1.0 / 2500.0, 4.0, 48)  # factors of the steering angle that are tried
-SAME_STEERING, SAME_SIZE, SAME_INERTIA = math.log(1.5), math.log(2.2), math.log(2.0)
+SAME_STEERING, SAME_SIZE, SAME_INERTIA = math.log(2.5), math.log(2.2), math.log(2.0)
 # within which nothing is gross
 SIZES = np.geomspace(1.0 / 32.0, 32.0, 41)
 INERTIAS = np.geomspace(1.0 / 16.0, 16.0, 17)
@@ -163,13 +164,15 @@ class Read:
         return 1.0 / (1.0 + math.exp(-STEEPNESS * (self.other.cost - self.best.cost)))
 
 
-def read(motion: Motion, vehicle: Vehicle) -> Read:
+def read(motion: Motion, vehicle: Vehicle, possible: Callable[[tuple[Change, ...]], bool]) -> Read:
     """Return how a log is best read as the motion of a car.
 
     Parameters
     ----------
     motion : of the log.
     vehicle : as it was told.
+    possible : whether the log breaks no law with some changes; of the best readings those that do
+        are left out, unless all do.
     """
     changes = CHANGES + (ON_ACCELEROMETER if motion.a_y is not None else ())
     as_told = Explanation(
@@ -186,8 +189,11 @@ def read(motion: Motion, vehicle: Vehicle) -> Read:
             break
         good = best is not before and best.left < equations * DEEPER
         beam = [best] if good else sorted(longer, key=lambda one: one.cost)[:KEPT]
-    best, *others = sorted(found, key=lambda one: (one.cost, len(one.changes)))
-    other = next((one for one in others if _means_else(one, best)), others[-1])
+    ranked = sorted(found, key=lambda one: (one.cost, len(one.changes)))
+    lawful = [one for one in ranked[:JUDGED] if possible(one.changes)]
+    best, *others = lawful + [one for one in ranked if one not in lawful] if lawful else ranked
+    others = [one for one in others if one.cost >= best.cost]
+    other = next((one for one in others if _means_else(one, best)), ranked[-1])
     return Read(best=best, other=other)
 
 

@@ -230,8 +230,8 @@ def _repeats(name: str, runs: Runs, noisy: bool, recording: Recording) -> Iterat
 
 def _moves(name: str, recording: Recording, first: int, length: int) -> bool:
     """Whether the car changes its turn over a stretch, by the channels that are not judged."""
-    width = max(1, round(0.2 / recording.dt))
-    here = slice(max(first - width, 0), first + length + width)
+    width = max(1, min(round(0.2 / recording.dt), length // 2))
+    here = slice(first, first + length)
     turn = recording.v_x * recording.r
     if name == "r":
         turn = recording.delta_f * float(np.std(turn) / (np.std(recording.delta_f) + 1e-300))

@@ -5,6 +5,7 @@ the car: by that reading of the log which leaves least unexplained.
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +14,8 @@ from identifier.doctor.consistency import PIECE, Motion, driven_windows, looked_
 from identifier.doctor.finding import Finding
 from identifier.doctor.readings import DEGREE, Change, Read, read
 from identifier.doctor.samples import sample_findings
-from models.recordings import Recording
+from models.recordings import Recording, RecordingError
+from models.recordings.checks import physics_contradiction
 from models.recordings.repair import Repair
 from models.vehicle import Vehicle
 
@@ -73,17 +75,55 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
     motion = Motion.of(recording)
     if motion is None:
         return Screened(findings=(*samples, *told), repair=Repair(), blind="too little is driven")
-    found = read(motion, vehicle)
+    some = looked_at(recording)[0]
+
+    def possible(changes: tuple[Change, ...]) -> bool:
+        try:
+            read_so, _ = repair_of(changes).apply(some, vehicle)
+        except RecordingError:  # beyond what a car does
+            return False
+        return physics_contradiction(read_so) is None
+
+    found = read(motion, vehicle, possible)
     gross = [
         one for change in found.best.changes for one in reading_findings(change, found, vehicle)
     ]
     gross = one_steering(gross)
-    repair = Repair()
-    for one in gross:
-        repair = repair if one.repair is None else repair.merged(one.repair)
+    repair = combined(gross)
     other = any(change.code == "other_car" for change in found.best.changes)
     blind = "the car is another one" if other else ""
     return Screened(findings=(*gross, *samples, *told), repair=repair, blind=blind)
+
+
+def repair_of(changes: tuple[Change, ...]) -> Repair:
+    """Return what takes changes out of a log; of the car nothing is changed.
+
+    Parameters
+    ----------
+    changes : of a reading.
+    """
+    repair = Repair()
+    for change in changes:
+        if change.channels:
+            factors = {
+                name: factor
+                for name, (_, factor) in zip(change.channels, change.factors, strict=True)
+            }
+            repair = repair.merged(Repair(factor=factors, sideslip=change.sideslip))
+    return repair
+
+
+def combined(findings: Iterable[Finding]) -> Repair:
+    """Return the repair of several findings, gross ones before those that were asked after them.
+
+    Parameters
+    ----------
+    findings : with or without a repair.
+    """
+    repair = Repair()
+    for one in findings:
+        repair = repair if one.repair is None else repair.merged(one.repair)
+    return repair
 
 
 def _throughout(finding: Finding, recording: Recording) -> bool:

@@ -77,10 +77,10 @@ def test_an_option_takes_the_same_in_every_command():
 def test_folders_are_named_by_out_and_nothing_is_replaced_without_force():
     options = options_of()
     for name, action in options["--out"].items():
-        assert action.default == (None if name == "check" else Path(f"tireid-{name}"))
+        assert action.default == (None if name in ("check", "doctor") else Path(f"tireid-{name}"))
         assert not action.required
         assert name in options["--force"]
-    assert set(COMMANDS) - set(options["--out"]) == {"init", "sample"}  # their argument is a file
+    assert set(COMMANDS) - set(options["--out"]) == {"channels", "init", "sample"}  # one file each
 
 
 def test_what_learns_is_named_alike_wherever_one_method_learns():

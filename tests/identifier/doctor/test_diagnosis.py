@@ -10,7 +10,8 @@ import tireid
 from benchmarks.random_cars import random_car, random_drive
 from identifier.axle import AxleIdentifier
 from identifier.doctor import Finding, diagnose
-from identifier.doctor.diagnosis import Diagnosis, combined
+from identifier.doctor.diagnosis import Diagnosis
+from identifier.doctor.screen import combined
 from identifier.run import identify
 from models.faults import SensorFault, Together, WrongUnit
 from models.recordings import Repair
