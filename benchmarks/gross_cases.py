@@ -61,12 +61,12 @@ def _scaled(channel: str, size: float) -> SensorFault:
     return SensorFault(channel=channel, kind="scaled", size=size)
 
 
-def _of_one(kind: str, code: str, **more: float) -> Draw:
+def _of_one(kind: str, code: str) -> Draw:
     """A fault of a kind of v_y, r or the steering, drawn."""
 
     def draw(_: Vehicle, rng: np.random.Generator) -> Gross:
         channel = str(rng.choice(["v_y", "r", "delta_f"]))
-        return Gross(Case(SensorFault(channel=channel, kind=kind, **more)), ((code, channel),))
+        return Gross(Case(SensorFault(channel=channel, kind=kind)), ((code, channel),))
 
     return draw
 
