@@ -16,7 +16,7 @@ from models.logs.log import Channel, Listed, LogFile
 from models.logs.names import Proposal, propose
 from models.logs.signals import MEANINGS, NEEDED, Signal
 from models.recordings import split_log_argument
-from models.recordings.assembly import (
+from models.recordings.choice import (
     as_listed,
     column_of,
     column_word,
