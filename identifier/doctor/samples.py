@@ -380,6 +380,7 @@ def _two_step(X: Array, y: Array) -> Array:
 # The clock.
 
 BLOCK = 5  # samples in a row that were logged before, of all channels
+SHORTEST = 4.0  # samples that a jump has at least
 SMOOTH = ("v_y", "r", "v_x")  # that no car can change at once, as it can its steering
 SIDE = 12  # samples on each side of a jump
 JUMP, ALSO = 5.5, 2.5  # of the usual disagreement of both sides: in two channels, in a third
@@ -469,4 +470,6 @@ def _torn(moving: Mapping[str, Array], dt: float) -> tuple[int, float, float] | 
     scale = np.array([np.std(moving[name]) for name in names])
     a, b = rates / scale, jumps / scale
     size = float(a @ b / (a @ a + 1e-300))
+    if abs(size) < SHORTEST * dt:
+        return None  # that is a late sample, not another time
     return at + SIDE, size, 0.5 * abs(size)
