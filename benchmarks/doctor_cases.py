@@ -122,7 +122,7 @@ KINDS: Mapping[str, tuple[Plant, float, float, bool]] = {
     "accelerometer": (
         _elsewhere("accelerometer", "acceleration_sensor_x", "a_y"), 0.2, 1.5, True,
     ),
-    "center of gravity": (_center, 0.08, 0.15, True),
+    "center of gravity": (_center, 0.12, 0.2, True),
     "yaw inertia": (_inertia, 0.4, 2.0, True),
     "bank": (_bank, 1.0 * DEGREE, 4.0 * DEGREE, True),
 }  # fmt: skip

@@ -31,6 +31,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "fault_table": ["{out}"],
     "doctor_gross": [],
     "verdicts": [],
+    "doctor": [],
     "plant_against_commonroad": ["{out}"],
     "paper_gains": [],
     "stability_formulas": [],

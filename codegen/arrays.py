@@ -75,3 +75,18 @@ def large(shape: tuple[int, ...]) -> Array:
                 os.posix_fallocate(file.fileno(), 0, size)
             return np.asarray(np.memmap(file, np.float64, "w+", shape=shape))
     return np.empty(shape)
+
+
+def filled(n: int, compute: Callable[[slice], Array]) -> Array:
+    """Return values of samples, computed block by block; nobody may write them, (n,).
+
+    Parameters
+    ----------
+    n : samples.
+    compute : returns the values of a part of them (k,).
+    """
+    values = large((n,))
+    for part in blocks(n):
+        values[part] = compute(part)
+    values.setflags(write=False)
+    return values

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
+from scipy.signal import lfilter
 from scipy.sparse import csr_array
 
 from codegen.arrays import Array
@@ -214,8 +215,13 @@ class Balance:
                 delay += get("delay.r+a_y", 0.0)
             if delay:
                 value, slope = self._later(self.signals[name], delay)
-            signal = factor * (value + get(f"lag.{name}", 0.0) * slope)
-            out[name] = signal - get(f"offset.{name}", 0.0)
+            lag = get(f"lag.{name}", 0.0)
+            if name != "v_y" or lag < 0.0:
+                value = value + lag * slope
+            out[name] = factor * value - get(f"offset.{name}", 0.0)
+        # The noise of v_y counts most: where v_y lags, the others are made to lag, not it to lead.
+        if (lag := get("lag.v_y", 0.0)) > 0.0:
+            out = {name: x if name == "v_y" else self._lagged(x, lag) for name, x in out.items()}
         angle = get("velocity_sensor_angle", 0.0)
         c, s = math.cos(angle), math.sin(angle)
         v_x, v_y = out["v_x"], out["v_y"]
@@ -234,6 +240,13 @@ class Balance:
             cubic(value[a], value[b], slope[a], slope[b], f, h),
             cubic(slope[a], slope[b], bend[a], bend[b], f, h),
         )
+
+    def _lagged(self, signal: Array, lag: float) -> Array:
+        """Return a channel behind a low pass that began at rest."""
+        keep = math.exp(-self.dt / lag)
+        ramp = 1.0 - (1.0 - keep) * lag / self.dt  # exact for straight lines between samples
+        rest = lfilter([ramp, 1.0 - keep - ramp], [1.0, -keep], signal - signal[0])
+        return np.asarray(rest + signal[0], dtype=np.float64)
 
     def _bank(self, sizes: Sizes) -> Array:
         """Return sin β (n,)."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from identifier.doctor.balance import BANKS, Balance, Sizes, stretches_of
 from identifier.doctor.finding import Finding
-from identifier.doctor.fit import Fit, Fitter
+from identifier.doctor.fit import Fit, Fitter, Outlook
 from identifier.doctor.suspects import SUSPECTS, Suspect
 from models.recordings import Recording
 from models.vehicle import Vehicle
@@ -27,6 +27,7 @@ LATE_ALIKE = 0.8  # of the gain, from which a delay and a low pass of a channel 
 LIKELY, HOPELESS = 8, 0.5  # suspects that are looked at closely, from this share of CHANCE on
 AWRY = 9.0  # mean square of a part, from which straight lines promise nothing: all are looked at
 TEMPER = 2.0  # odds of e per this gain of J: the model is not exact
+UNSEEN = 0.6  # of what is believed beforehand is left by a drive that tells next to nothing
 BELIEVED = 3.5  # plausible sizes, beyond which nobody believes one
 
 
@@ -104,21 +105,40 @@ class Search:
         least = suspect.least * suspect.scale(self.vehicle)
         return math.hypot(fit.deviation(self.keys(suspect)[0]), least)
 
+    def outlook(self) -> tuple[list[Suspect], dict[str, Outlook]]:
+        """Return the suspects that were not taken in, and what each promises, by its key."""
+        chosen = self.chosen
+        left = [one for one in self.suspects if self.keys(one)[0] not in chosen]
+        return left, self.fitter.outlook(self.fit, {one.key: self.keys(one) for one in left})
+
+    def unseen(self) -> tuple[str, ...]:
+        """Return what this drive tells next to nothing of, beside what was found, a line each."""
+        left, outlook = self.outlook()
+        lines = []
+        for one in left:
+            unknown = outlook[one.key].left
+            if unknown > UNSEEN:
+                plausible = unknown * one.plausible * one.scale(self.vehicle)
+                least = f"{plausible * one.per_unit:.2g}{one.shown}"
+                if one.is_factor:
+                    least = f"a factor of {math.exp(plausible):.2g}"
+                name = f"{one.code.replace('_', ' ')} {one.channel}".strip()
+                lines.append(f"{name}: {least} would not be seen on this drive")
+        return tuple(lines)
+
     def candidates(self) -> list[Candidate]:
         """Return the suspects beside what is there already, the one that gains most first."""
-        left = {
-            one: self.keys(one) for one in self.suspects if self.keys(one)[0] not in self.chosen
-        }
-        promised = self.fitter.promises(self.fit, {one.key: keys for one, keys in left.items()})
-        likely = sorted(left, key=lambda one: -promised[one.key])
+        left, outlook = self.outlook()
+        likely = sorted(left, key=lambda one: -outlook[one.key].gain)
         awry = max(self.fit.misses) > AWRY
         if not awry:
-            likely = [one for one in likely[:LIKELY] if promised[one.key] > HOPELESS * CHANCE]
+            likely = likely[:LIKELY]
+            likely = [one for one in likely if outlook[one.key].gain > HOPELESS * CHANCE]
         listed = []
         for suspect in likely:
-            keys, start = left[suspect], self.fit.sizes
+            start = self.fit.sizes
             if awry:
-                start = self.fitter.best_start(start, keys[0])
+                start = self.fitter.best_start(start, self.keys(suspect)[0])
             listed.append(self._candidate(suspect, start))
         listed = [one for one in listed if self._believed(one.suspect, one.fit)]
         return sorted(listed, key=lambda one: -one.gain)
@@ -219,8 +239,15 @@ def _alike(best: Candidate, other: Candidate) -> bool:
     return other.gain > max(best.gain - ALIKE, 0.5 * best.gain)
 
 
-def estimate(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
-    """Return the faults of a log and of what is told of its car, what explains most first.
+class Examination(NamedTuple):
+    """What was found in a log, what explains most first, and what it cannot tell, a line each."""
+
+    findings: tuple[Finding, ...]
+    unseen: tuple[str, ...]
+
+
+def examine(recording: Recording, vehicle: Vehicle) -> Examination:
+    """Return the faults of a log and of what is told of its car, and what this drive cannot tell.
 
     Parameters
     ----------
@@ -230,7 +257,18 @@ def estimate(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
     stretches = stretches_of(recording, vehicle, longest=LONGEST, pieces=PIECES)
     balance = Balance(stretches, vehicle)
     if len(balance) < FEWEST:
-        return ()
+        return Examination((), ("sizes of faults: the car hardly drives, or not fast enough",))
     search = Search(balance)
     search.run()
-    return search.findings()
+    return Examination(search.findings(), search.unseen())
+
+
+def estimate(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:
+    """Return the faults of a log and of what is told of its car, what explains most first.
+
+    Parameters
+    ----------
+    recording : as it was logged; of a long one lively stretches are looked at.
+    vehicle : as it was told; its cornering stiffnesses are not looked at.
+    """
+    return examine(recording, vehicle).findings

@@ -9,6 +9,7 @@ smaller, or a delay that lets the noise of two sides cancel, gains nothing by it
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from codegen.arrays import Array
 from identifier.doctor.balance import Balance, Residual, Sizes
 from identifier.doctor.suspects import NUISANCES, SUSPECTS, grown
 
-FLOOR = (0.6, 0.6, 0.3)  # of S of each part: below it a residual tells nothing more
+FLOOR = (0.4, 0.4, 0.3)  # of S of each part: below it a residual tells nothing more
 ODD = 4.0  # S from which what is left is no noise: windows that miss it are not independent
 STEP = 0.02  # of a standard deviation, for slopes
 ITERATIONS, CLOSE = 10, 0.01  # of J
@@ -50,6 +51,16 @@ class Fit:
         """
         place = list(self.sizes).index(key)
         return math.sqrt(max(float(self.covariance[place, place]), 0.0))
+
+
+class Outlook(NamedTuple):
+    """What a suspect promises.
+
+    gain : of J.   left : of the standard deviation of what is believed of its size [-].
+    """
+
+    gain: float
+    left: float
 
 
 class Fitter:
@@ -175,8 +186,8 @@ class Fitter:
         tried = [{**sizes, key: times * self._sd(key)} for times in TRIED]
         return min(tried, key=lambda one: self.cost(self.balance.residual(one), one))
 
-    def promises(self, fit: Fit, suspects: Mapping[str, list[str]]) -> dict[str, float]:
-        """Return what each suspect would gain of J if all were straight lines.
+    def outlook(self, fit: Fit, suspects: Mapping[str, list[str]]) -> dict[str, Outlook]:
+        """Return what each suspect promises beside a fit, if all were straight lines.
 
         Parameters
         ----------
@@ -191,13 +202,18 @@ class Fitter:
         sd = np.array([self._sd(key) for key in names])
         gradient, H = self._slopes(self.balance.residual(sizes), sizes, names, sd)
 
-        def drop(keys: list[str]) -> float:
+        def solved(keys: list[str]) -> tuple[float, float]:
             at = [names.index(key) for key in keys]
-            g = gradient[at]
-            return 0.5 * float(g @ np.linalg.solve(H[np.ix_(at, at)], g))
+            g, inverse = gradient[at], np.linalg.inv(H[np.ix_(at, at)])
+            return 0.5 * float(g @ inverse @ g), math.sqrt(float(inverse[len(here), len(here)]))
 
-        without = drop(here)
-        return {name: drop([*here, *keys]) - without for name, keys in suspects.items()}
+        at = [names.index(key) for key in here]
+        without = 0.5 * float(gradient[at] @ np.linalg.solve(H[np.ix_(at, at)], gradient[at]))
+        found = {}
+        for name, keys in suspects.items():
+            gain, left = solved([*here, *keys])
+            found[name] = Outlook(gain - without, left)
+        return found
 
     def _slopes(
         self, found: Residual, sizes: Sizes, names: list[str], sd: Array

@@ -154,7 +154,7 @@ SUSPECTS = (
             "the velocity is measured {size} ahead of the center of gravity", " m"),
     Suspect("acceleration_sensor_x", "acceleration_sensor_x", "a_y", "m", 0.8, 0.04, "length",
             True, "the acceleration is measured {size} ahead of the center of gravity", " m"),
-    Suspect("center_of_gravity", "center_of_gravity", "", "m", 0.2, 0.06, "length", True,
+    Suspect("center_of_gravity", "center_of_gravity", "", "m", 0.2, 0.1, "length", True,
             "the center of gravity is told {size} too far back (l_f and l_r)", " m"),
     Suspect("yaw_inertia", "yaw_inertia", "", "", 0.5, 0.08, "", True,
             "the yaw inertia is told {size} times too large", ""),

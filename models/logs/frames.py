@@ -21,10 +21,10 @@ from models.limits import limits
 from models.logs.foreign import need
 from models.logs.growing import Growing
 from models.logs.log import RecordingError
+from models.logs.mdf_blocks import MAGIC, opened
 from models.schema import require_few
 
 BLF = b"LOGG"
-MDF = (b"MDF     ", b"UnFinMF ")
 ASC = re.compile(
     rb"\s*(?://[^\n]*\n\s*)*date\s[^\n]*\n\s*(?://[^\n]*\n\s*)*base\s+(?:hex|dec)\b", re.I
 )
@@ -105,7 +105,7 @@ def kind_of(head: bytes) -> str:
     """
     if head.startswith(BLF):
         return "BLF"
-    if head[:8] in MDF:
+    if head[:8] in MAGIC:
         return "MDF4"
     texts = {"ASC": ASC, "candump": CANDUMP, "TRC": TRC}
     return next((name for name, pattern in texts.items() if pattern.match(head)), "")
@@ -209,10 +209,9 @@ def _require_whole_blf(path: Path) -> None:
 
 def _of_mdf(path: Path, known: Mapping[int, int]) -> Log:
     """Read the frames of the buses that an MDF4 file logs."""
-    asammdf = need(path, "asammdf", "CAN frames of MDF", "mdf")
     found: dict[Key, list[Frames]] = {}
     others: Counter[str] = Counter()
-    with asammdf.MDF(path, process_bus_logging=False) as file:
+    with opened(path, "CAN frames of MDF") as file:
         if str(file.version) < "4":
             raise RecordingError(f"{path}: an MDF3 file holds no frames; leave the DBC out")
         for number, group in enumerate(file.groups):

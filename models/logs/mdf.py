@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from codegen.arrays import Array
 from models.logs.foreign import (
     chosen,
-    need,
     noted,
     one_line,
     require_room,
@@ -27,9 +26,9 @@ from models.logs.foreign import (
 )
 from models.logs.growing import Growing
 from models.logs.log import Channel, Listed, RecordingError
-from models.schema import LONGEST_NAME, require_few
+from models.logs.mdf_blocks import MAGIC, opened
+from models.schema import LONGEST_NAME
 
-MAGIC = (b"MDF     ", b"UnFinMF ")
 NUMERIC_4, NUMERIC_3 = frozenset(range(6)), frozenset((0, 1, 2, 3, *range(9, 17)))
 WORDS_4, WORDS_3 = frozenset((7, 8, 9, 10, 11)), frozenset((11, 12))
 FORMULA_4, FORMULA_3 = 3, 10  # kinds of conversion
@@ -106,10 +105,9 @@ class MdfFile:
         asked = chosen(self.path, names, known, run)
         values: dict[_Place, Array] = {}
         clocks: dict[int, tuple[Array, NDArray[np.int64]]] = {}
-        with one_line(self.path, "an MDF file"), _opened(self.path) as file:
+        with one_line(self.path, "an MDF file"), opened(self.path, "MDF") as file:
             for some in _portions(asked):
                 group = some[0][1].group
-                _require_blocks(self.path, file, group)
                 for (listed, place), (t, numbers) in zip(
                     some, _read(self.path, file, some), strict=True
                 ):
@@ -194,13 +192,8 @@ def open_(path: Path) -> MdfFile:
     RecordingError
         One line, where it is no such file or holds no numeric channel.
     """
-    with one_line(path, "an MDF file"), _opened(path) as file:
+    with one_line(path, "an MDF file"), opened(path, "MDF") as file:
         return _list(path, file)
-
-
-def _opened(path: Path) -> Any:
-    asammdf = need(path, "asammdf", "MDF", "mdf")
-    return asammdf.MDF(path, process_bus_logging=False)
 
 
 class _Found:
@@ -240,8 +233,6 @@ class _Found:
 def _list(path: Path, file: Any) -> MdfFile:
     """List the channels of an open file."""
     is_4 = str(file.version) >= "4"
-    count = sum(len(group.channels) for group in file.groups)
-    require_few(RecordingError, str(path), count, "columns", "channels")
     found = _Found()
     for number in range(len(file.groups)):
         found.group(file, number, is_4)
@@ -324,10 +315,3 @@ def _numbers(path: Path, name: str, samples: Any) -> Array:
     if values.ndim != 1 or values.dtype.kind not in "fiub":
         raise RecordingError(f"{path}: {name} must be numeric, its samples are {values.dtype}")
     return values.astype(np.float64)
-
-
-def _require_blocks(path: Path, file: Any, number: int) -> None:
-    """Refuse a group with a block that unpacks to more than is allowed."""
-    for block in file.groups[number].get_data_blocks():
-        size = int(block.original_size or 0) / 1e6
-        require_few(RecordingError, str(path), size, "block", "megabytes of a block")

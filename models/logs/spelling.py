@@ -3,21 +3,14 @@
 import re
 from collections.abc import Sequence
 
+from models.logs.units import is_known
 from models.schema import LONGEST_NAME
 
-_WORDS = frozenset((
-    "s", "sec", "secs", "seconds", "ms", "msec", "us", "µs", "ns", "min", "h", "hr", "m", "mm",
-    "cm", "km", "in", "ft", "mi", "m/s", "mps", "km/h", "km/hr", "kmh", "kph", "kmph", "mph",
-    "kn", "kt", "kts", "knots", "mm/s", "cm/s", "ft/s", "fps", "rad", "mrad", "rads", "deg",
-    "degs", "degree", "degrees", "°", "grad", "rad/s", "mrad/s", "deg/s", "°/s", "dps",
-    "degs/s", "rad/s2", "rad/s^2", "rad/s²", "deg/s2", "deg/s^2", "deg/s²", "m/s2", "m/s^2",
-    "m/s²", "m/s/s", "mm/s2", "g", "gn", "g0", "mg", "n", "nm", "n·m", "kgf", "kp", "lbf", "lb",
-    "lbs", "%", "-", "--", "1", "none", "hz", "khz", "rpm", "1/min", "u/min", "rev/min", "bar",
-    "mbar", "kpa", "pa", "hpa", "psi", "c", "°c", "degc", "f", "°f", "degf", "k", "v", "mv",
-    "volt", "volts", "a", "ma", "amp", "amps", "kg", "t", "l", "l/h", "w", "kw", "hp", "ratio",
-    "bool", "enum", "#", "count", "counts", "unitless", "rev", "1/s", "percent", "gear",
-    "hhmmss", "deg/sec", "m/sec", "rad/sec", "mm/sec",
-))  # fmt: skip
+_OTHERS = (
+    "sec", "secs", "msec", "usec", "hhmmss", "rad/s2", "rad/s^2", "rad/s²", "deg/s2", "deg/s^2",
+    "deg/s²", "°/s²", "volts", "amp", "amps", "bool", "enum", "#", "count", "counts", "gear", "rev",
+    "1/s", "l", "l/h",
+)  # fmt: skip
 _EMPTY = ("1", "-", "--", "none", "")
 _BRACKETS = re.compile(r".*?[\[({]\s*([^\])}]{0,24}?)\s*[\])}]\s*")
 _NUMBER = re.compile(r"[-+]?[\d.,]+(?:[eE][-+]?\d+)?")
@@ -38,7 +31,7 @@ def is_unit(word: str) -> bool:
     ----------
     word : a cell, in brackets or not.
     """
-    return word.strip().strip("[](){}").strip().lower() in _WORDS
+    return is_known(word) or word.strip("[](){} ").lower() in _OTHERS
 
 
 def is_units_row(cells: Sequence[str]) -> bool:
@@ -53,10 +46,10 @@ def is_units_row(cells: Sequence[str]) -> bool:
         return False
     if all(cell[0] in "[(" and cell[-1] in "])" for cell in filled):
         return True
-    known = [cell for cell in filled if is_unit(cell)]
-    telling = [cell for cell in known if cell.lower() not in _EMPTY]
     if any(_NUMBER.fullmatch(cell) and cell != "1" for cell in filled):
         return False
+    known = [cell for cell in filled if is_unit(cell)]
+    telling = [cell for cell in known if cell.lower() not in _EMPTY]
     return len(known) >= 0.8 * len(filled) and len(telling) > 0
 
 
@@ -80,3 +73,16 @@ def unit_in_name(name: str) -> str:
         if name.endswith("_" + ending):
             return unit
     return ""
+
+
+_UNIT_BEHIND = re.compile(r"\s*[\[(][^\[\]()]*[\])]$")
+
+
+def without_unit(name: str) -> str:
+    """Return a name without the unit in brackets that it ends in: "Speed" of "Speed [km/h]".
+
+    Parameters
+    ----------
+    name : of a column, as in the file.
+    """
+    return _UNIT_BEHIND.sub("", name)

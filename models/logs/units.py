@@ -159,6 +159,19 @@ def quantities(unit: str) -> tuple[str, ...]:
     return found
 
 
+def is_known(unit: str) -> bool:
+    """Return whether a spelling is a unit of anything that cars log, or stands for none.
+
+    Parameters
+    ----------
+    unit : as written.
+    """
+    plain = _plain(unit)
+    return plain in NO_UNIT or any(
+        plain in known for known in (*FACTORS.values(), *OTHERS.values())
+    )
+
+
 def is_told(unit: str) -> bool:
     """Whether a unit is written at all; "-" and the like tell none.
 

@@ -8,11 +8,12 @@ low pass, its delay, its offset, its factor. It is taken out backwards. Conventi
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from codegen.arrays import Array
+from codegen.arrays import Array, filled
 from models.logs.log import RecordingError
 from models.recordings.record import MINIMUM_SAMPLES, Recording, joined
 from models.schema import Table, shown
@@ -104,36 +105,42 @@ class Repair:
         VehicleError
             Where the numbers of the car are those of no car.
         """
-        if recording.breaks:
-            parts = [recording.taken(np.arange(s.start, s.stop)) for s in recording.stretches]
-            mended = [self.apply(part, vehicle) for part in parts]
-            return joined([part for part, _ in mended], recording.name), mended[0][1]
         told = {name for name in TABLES if name != "vehicle" for name in getattr(self, name)}
         if self.acceleration_sensor_x:
             told.add("a_y")
-        signals: dict[str, Array] = {}
         for name in CHANNELS:
-            signal: Array | None = getattr(recording, name)
-            if signal is not None:
-                signals[name] = signal * self.factor.get(name, 1.0) - self.offset.get(name, 0.0)
-            elif name in told:
+            if name in told and getattr(recording, name) is None:
                 raise RecordingError(f"{recording.name}: has no {name} that could be repaired")
+        if not (told or self.sideslip or self.velocity_sensor_angle or self.velocity_sensor_x):
+            return recording, self.on(vehicle)
+        if recording.breaks:
+            parts = [recording.taken(piece) for piece in recording.stretches]
+            mended = [self.apply(part, vehicle) for part in parts]
+            return joined([part for part, _ in mended], recording.name), mended[0][1]
+        n, t = len(recording), recording.t
+        signals: dict[str, Array] = {
+            name: filled(n, partial(self._scaled, recording, name))
+            for name in CHANNELS
+            if getattr(recording, name) is not None
+        }
         if self.sideslip:
-            angle = recording.v_y * self.factor.get("v_y", 1.0)
-            signals["v_y"] = signals["v_x"] * np.tan(angle) - self.offset.get("v_y", 0.0)
+            factor, offset, speed = *self._scale("v_y"), signals["v_x"]
+            angle = recording.v_y
+            signals["v_y"] = filled(n, lambda k: speed[k] * np.tan(angle[k] * factor) - offset)
         for name, delay in self.delay.items():
-            signals[name] = np.interp(recording.t + delay, recording.t, signals[name])
+            late = signals[name]
+            signals[name] = filled(n, partial(_earlier, t, late, delay))
         width = round(SMOOTHED * vehicle.froude_time / recording.dt)
         for name, lag in self.lag.items():
             signals[name] = without_low_pass(signals[name], lag, recording.dt, width)
         c, s = math.cos(self.velocity_sensor_angle), math.sin(self.velocity_sensor_angle)
         v_x, v_y, r = signals["v_x"], signals["v_y"], signals["r"]
-        signals["v_x"] = c * v_x - s * v_y
-        signals["v_y"] = c * v_y + s * v_x - self.velocity_sensor_x * r
+        x = self.velocity_sensor_x
+        signals["v_x"] = filled(n, lambda k: c * v_x[k] - s * v_y[k])
+        signals["v_y"] = filled(n, lambda k: c * v_y[k] + s * v_x[k] - x * r[k])
         if self.acceleration_sensor_x:
-            signals["a_y"] = signals["a_y"] - self.acceleration_sensor_x * np.gradient(
-                r, recording.dt
-            )
+            ahead, a_y = self.acceleration_sensor_x, signals["a_y"]
+            signals["a_y"] = filled(n, lambda k: a_y[k] - ahead * _rate(r, k, recording.dt))
         signals["t"] = recording.t
         if recording.axle_force is not None:
             signals["axle_force"] = recording.axle_force
@@ -141,6 +148,14 @@ class Repair:
         changes: dict[str, Any] = {name: signal[kept] for name, signal in signals.items()}
         repaired = replace(recording, **changes)
         return repaired, self.on(vehicle)
+
+    def _scale(self, name: str) -> tuple[float, float]:
+        return self.factor.get(name, 1.0), self.offset.get(name, 0.0)
+
+    def _scaled(self, recording: Recording, name: str, part: slice) -> Array:
+        factor, offset = self._scale(name)
+        signal: Array = getattr(recording, name)[part] * factor - offset
+        return signal
 
     def on(self, vehicle: Vehicle) -> Vehicle:
         """Return the car with the numbers that are told in place of its own.
@@ -237,6 +252,18 @@ def _require_finite(name: str, value: float) -> None:
 
 def _added(one: Mapping[str, float], other: Mapping[str, float]) -> dict[str, float]:
     return {key: one.get(key, 0.0) + other.get(key, 0.0) for key in {**one, **other}}
+
+
+def _earlier(t: Array, signal: Array, delay: float, part: slice) -> Array:
+    """Return samples of a signal a delay earlier."""
+    return np.interp(t[part] + delay, t, signal)
+
+
+def _rate(signal: Array, part: slice, dt: float) -> Array:
+    """Return the rate of change of samples of a signal, by central differences."""
+    first = max(part.start - 1, 0)
+    rate: Array = np.gradient(signal[first : part.stop + 1], dt)
+    return rate[part.start - first :][: part.stop - part.start]
 
 
 def without_low_pass(signal: Array, lag: float, dt: float, width: int) -> Array:

@@ -225,3 +225,19 @@ def test_what_cannot_be_applied_is_refused(drive):
         Repair(vehicle={"mass": 1e-9}).apply(drive, CAR)
     with pytest.raises(RecordingError, match=r"repair\.lags"):
         Repair.of_table(Table({"lags": {}}, "", RecordingError, "repair."))
+
+
+@pytest.mark.parametrize("name", REPAIRS)
+def test_a_repair_in_blocks_has_the_bits_of_one_in_a_piece(drive, name, monkeypatch):
+    fault, repair = REPAIRS[name]
+    del fault
+    piece, _ = repair.apply(drive, CAR)
+    monkeypatch.setattr("codegen.arrays.LONG", 500)
+    monkeypatch.setattr("codegen.arrays.BLOCK", 111)
+    blocks, _ = repair.apply(drive, CAR)
+    for channel in ("t", "v_x", "v_y", "r", "delta_f", "delta_r", "a_y", "axle_force"):
+        np.testing.assert_array_equal(getattr(piece, channel), getattr(blocks, channel))
+
+
+def test_nothing_to_repair_leaves_the_recording_itself(drive):
+    assert Repair(vehicle={"mass": 1400.0}).apply(drive, CAR)[0] is drive

@@ -214,3 +214,21 @@ def test_a_map_that_is_there_is_not_replaced(folder, tmp_path, capsys):
     assert main(words) == 2
     assert main([*words, "--force"]) == 0
     assert "[signals.v_x]" in (tmp_path / "log.toml").read_text()
+
+
+def test_a_unit_in_the_header_is_a_unit_and_need_not_be_told(log, tmp_path):
+    header = "Time [s],Ground Speed [km/h],Vel Lat [km/h],Yaw Rate [deg/s],RoadWheelAngle [deg]"
+    degrees = np.degrees([log.r, log.delta_f])
+    table = np.column_stack([log.t, 3.6 * log.v_x, 3.6 * log.v_y, *degrees])
+    path = tmp_path / "log.csv"
+    np.savetxt(path, table, fmt="%.12g", delimiter=",", header=header, comments="")
+    got = read_recording(path)
+    for name in ("v_x", "v_y", "r", "delta_f"):
+        assert np.allclose(getattr(got, name), getattr(log, name), atol=1e-9)
+    assert "vy is taken from Vel Lat [km/h], by its name" in got.notes
+    told = read_recording(path, columns={"vy": "Vel Lat [km/h] *1", "r": "Yaw Rate"})
+    assert np.array_equal(told.v_y, got.v_y) and np.array_equal(told.r, got.r)
+    in_ms = read_recording(path, columns={"vy": "Vel Lat [m/s]"}, check=False)
+    assert np.allclose(in_ms.v_y, 3.6 * got.v_y)  # what is told holds
+    with pytest.raises(RecordingError, match="must be in a unit of a speed"):
+        read_recording(path, columns={"vy": "Yaw Rate"})

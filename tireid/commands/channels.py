@@ -16,7 +16,8 @@ from models.logs.log import Channel, Listed, LogFile
 from models.logs.names import Proposal, propose
 from models.logs.signals import MEANINGS, NEEDED, Signal
 from models.recordings import split_log_argument
-from models.recordings.assembly import (
+from models.recordings.choice import (
+    as_listed,
     column_of,
     column_word,
     likely_signals,
@@ -69,10 +70,12 @@ def run(options: argparse.Namespace) -> int:
     listed = log.listed()
     names = [one.name for one in listed]
     proposal = propose(log, listed, chosen)
-    signals = likely_signals({**standard_signals(log, names), **told.signals}, proposal)
+    by_map = as_listed(log, told.signals, names)
+    signals = likely_signals({**standard_signals(log, names), **by_map}, proposal)
     missing = missing_signals(signals)
     tell("\n".join(_head(log, chosen)))
-    tell(channels_text(listed, _seen(log, listed, signals, chosen), signals, proposal))
+    seen = _seen(log, listed, signals, chosen)
+    tell(channels_text(listed, seen, signals, proposal, frozenset(told.signals)))
     tell(missing_text(options.log, missing, proposal))
     if options.write is not None:
         text = replace(told, signals=signals).toml()
@@ -116,6 +119,7 @@ def channels_text(
     seen: Mapping[str, Channel],
     signals: Mapping[str, Signal],
     proposal: Proposal,
+    told: frozenset[str] = frozenset(),
 ) -> str:
     """Return the table of a log: channel, unit, rate, samples, range, and what it is taken for.
 
@@ -125,6 +129,7 @@ def channels_text(
     seen : those that were read, by name.
     signals : how each signal would be read.
     proposal : what the channels probably are.
+    told : names of the signals that nobody had to guess.
     """
     rows = [["channel", "unit", "Hz", "samples", "from", "to", "is"]]
     for one in listed:
@@ -136,18 +141,20 @@ def channels_text(
                 "empty", "")  # fmt: skip
         name = visible(one.name if len(one.name) <= LONGEST_NAME else f"{one.name[:44]}...")
         rate = "?" if math.isnan(one.rate) else f"{one.rate:.4g}"
-        meant = _meaning(one.name, signals, proposal)
+        meant = _meaning(one.name, signals, proposal, told)
         rows.append([name, visible(one.unit), rate, str(one.samples), low, high, meant])
     return text_table(rows, "<<>>>><")
 
 
-def _meaning(channel: str, signals: Mapping[str, Signal], proposal: Proposal) -> str:
+def _meaning(
+    channel: str, signals: Mapping[str, Signal], proposal: Proposal, known: frozenset[str]
+) -> str:
     """Return what a channel is taken for, or may be."""
     for name, signal in signals.items():
         if channel in signal.channel:
             guess = proposal.guesses.get(name)
-            sure = guess is not None and channel in guess.channel and guess.confidence < 1.0
-            told = f" ({guess.confidence:.0%})" if sure and guess is not None else ""
+            guessed = name not in known and guess is not None and guess.confidence < 1.0
+            told = f" ({guess.confidence:.0%})" if guessed and guess is not None else ""
             among = f", with {len(signal.channel) - 1} more" if len(signal.channel) > 1 else ""
             return f"{column_of(name)}: {MEANINGS[name]}{told}{among}"
     for name, guess in proposal.guesses.items():

@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from codegen.arrays import Array
+from codegen.arrays import Array, blocks
 from codegen.escape import visible
 from identifier.method import vehicle_numbers
 from identifier.methods import load_model
 from identifier.reproducibility import Prediction, beyond_known
 from identifier.tire_model import TireModel
 from identifier.verdict import Verdict
+from models.recordings.record import ALL
 from tireid import __version__
 from tireid.commands import COMMANDS
 from tireid.commands.identify_results import error_cells
@@ -27,7 +28,7 @@ from tireid.commands.options import (
     told_map,
 )
 from tireid.learning import replay
-from tireid.output import output_folder, text_table, write_csv, write_json
+from tireid.output import output_folder, text_table, write_json, write_long_csv
 from tireid.progress import say, tell
 from tireid.verdicts import add_accept, exit_code, verdict_text, warn_of_stored
 
@@ -70,7 +71,10 @@ def run(options: argparse.Namespace) -> int:
     prediction = replay(model, recording)
     verdict = prediction.verdict()
     with output_folder(options.out, force=options.force) as folder:
-        write_csv(folder / "forces.csv", force_columns(model, prediction))
+        parts = blocks(len(recording))
+        write_long_csv(
+            folder / "forces.csv", (force_columns(model, prediction, part) for part in parts)
+        )
         write_json(folder / "summary.json", summary(model, prediction, verdict))
         told = prediction_text(model, prediction)
     tell(f"{told}\n{verdict_text(verdict, numbers=False)}")
@@ -98,21 +102,22 @@ def _model(options: argparse.Namespace) -> TireModel:
     return model.mounted_on(vehicle)
 
 
-def force_columns(model: TireModel, prediction: Prediction) -> dict[str, Array]:
+def force_columns(model: TireModel, prediction: Prediction, part: slice = ALL) -> dict[str, Array]:
     """Return the columns of forces.csv: time, slip angles, predicted and true forces.
 
     Parameters
     ----------
     model : that predicted.
     prediction : of a recording.
+    part : samples that are asked for.
     """
     recording, car = prediction.recording, model.vehicle
-    alpha = recording.alpha(car.l_f, car.l_r)
-    columns = {"t_s": recording.t, "alpha_f_rad": alpha[:, 0], "alpha_r_rad": alpha[:, 1]}
+    alpha = recording.alpha(car.l_f, car.l_r, part)
+    columns = {"t_s": recording.t[part], "alpha_f_rad": alpha[:, 0], "alpha_r_rad": alpha[:, 1]}
     forces = {"predicted": prediction.axle_force, "true": recording.axle_force}
     for name, force in forces.items():
         if force is not None:
-            columns |= {f"Fyf_{name}_N": force[:, 0], f"Fyr_{name}_N": force[:, 1]}
+            columns |= {f"Fyf_{name}_N": force[part, 0], f"Fyr_{name}_N": force[part, 1]}
     return columns
 
 

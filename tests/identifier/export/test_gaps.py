@@ -1,6 +1,7 @@
 """Refused samples in the shipped C: the same rule as beside a car in Python, and its status."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from identifier.export.compiled import CompiledPackage, Status, samples_of
 from identifier.export.package import build_package
 from identifier.methods import make_method
 from identifier.refused import STALE_TIME
-from identifier.run import OnlineIdentifier
+from identifier.run import OnlineIdentifier, identify
 from models.vehicle import sedan
 
 CAR = sedan()
@@ -114,3 +115,13 @@ def test_frozen_weights_hold_through_a_gap(law, shipped, rows):
     run.run_samples(rows[300:])
     for name, value in run.weights.items():
         np.testing.assert_array_equal(value, before[name])
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_drive_in_stretches_gives_the_forces_of_the_same_run_in_python(law, shipped, slalom):
+    drive = replace(slalom, a_y=None).taken(np.r_[:900, 1100:2000])
+    shipped[law].init()
+    run = shipped[law].run(drive)
+    told = identify(drive, CAR, make_method(law, CAR))
+    assert np.abs(run.axle_force - told.axle_force).max() < 1e-6
+    assert run.status.shape == (len(drive),) and (run.status == Status.OK).all()

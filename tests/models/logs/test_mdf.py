@@ -196,3 +196,40 @@ def test_a_block_that_inflates_beyond_the_limit_is_refused(tmp_path, monkeypatch
     path = write(tmp_path / "log.mf4", ("g", [signal("a", np.zeros(200_000), np.arange(2e5))]))
     monkeypatch.setenv("TIREID_LIMITS", "block=1.7")
     assert "megabytes of a block must be at most 1.7" in refusal(path)
+
+
+def altered(tmp_path, change):
+    """A file whose first channel's block is changed by (data, its address)."""
+    path = write(tmp_path / "log.mf4", ("g", [signal("a", A, T), signal("b", A, T)]), compression=0)
+    with asammdf.MDF(path) as file:
+        group = file.groups[0]
+        places = group.channels[1].address, group.channel_group.address
+    data = bytearray(path.read_bytes())
+    change(data, *places)
+    path.write_bytes(data)
+    return refusal(path)
+
+
+def put(data, place, number, size):
+    data[place : place + size] = number.to_bytes(size, "little")
+
+
+def test_lists_of_channels_that_run_in_a_circle_are_refused(tmp_path):
+    text = altered(tmp_path, lambda data, channel, _: put(data, channel + 24, channel, 8))
+    assert "its blocks run in a circle" in text
+
+
+def test_a_channel_beyond_its_record_is_refused(tmp_path):
+    def move(data, channel, _):
+        put(data, channel + 24 + 8 * 8 + 4, 10_000, 4)  # its byte in the record
+
+    assert "a channel lies beyond its record of 24 bytes" in altered(tmp_path, move)
+
+
+def test_records_that_are_not_there_are_refused(tmp_path):
+    def add(data, _, group):
+        put(data, group + 24 + 6 * 8 + 8, 601, 8)  # how many there are
+
+    assert "is a cut off MDF file, it holds 14400 bytes of 601 records of 24" in altered(
+        tmp_path, add
+    )

@@ -1,0 +1,252 @@
+"""Which channels of a log become which signals: told, by standard names, or beyond doubt.
+
+What is told by a map holds; then the standard names; then what the names of the channels propose,
+where every signal that is needed is sure. What was proposed is said in the recording's notes; where
+something is not sure, the error says what it may be, and the word that tells it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from models.logs.log import Listed, LogFile, RecordingError
+from models.logs.names import Proposal, propose
+from models.logs.signals import BETA, COLUMNS, NEEDED, QUANTITIES, Signal, require_fitting
+from models.logs.spelling import without_unit
+from models.logs.units import SI
+from models.recordings.map import LogMap
+from models.schema import shown
+
+INVERSE = {"Fyf_inv": "Fyf", "Fyr_inv": "Fyr"}  # computed backwards from the motion
+SOME = 12  # names in a message
+
+
+class Reading(NamedTuple):
+    """How the signals of a log are read, and what of it nobody told."""
+
+    signals: dict[str, Signal]
+    notes: tuple[str, ...]
+
+
+def column_of(name: str) -> str:
+    """Return what a signal is called where columns are told.
+
+    Parameters
+    ----------
+    name : ours.
+    """
+    return COLUMNS.get(name, name)
+
+
+def chosen_signals(
+    log: LogFile, listed: Sequence[Listed], log_map: LogMap, run: str | None
+) -> Reading:
+    """Return how each signal is read.
+
+    Parameters
+    ----------
+    log : as a format reads it.
+    listed : its channels.
+    log_map : what is told.
+    run : of the log.
+
+    Raises
+    ------
+    RecordingError
+        Where a signal that is needed is neither told nor there beyond doubt.
+    """
+    names = [one.name for one in listed]
+    by_map = as_listed(log, log_map.signals, names)
+    if log_map.is_complete:
+        return Reading(by_map, ())
+    told = _beside(standard_signals(log, names), by_map)
+    missing = missing_signals(told)
+    if not missing:
+        return Reading(told, ())
+    _refuse_words(log, names, missing, run)
+    proposal = propose(log, listed, run)
+    found = likely_signals(told, proposal)
+    if missing := missing_signals(found):
+        raise RecordingError(missing_text(log, missing, proposal, names))
+    taken = [name for name in found if name not in told]
+    return Reading(found, tuple(_taken_text(name, found[name]) for name in taken))
+
+
+def as_listed(
+    log: LogFile, signals: Mapping[str, Signal], names: Sequence[str]
+) -> dict[str, Signal]:
+    """Return signals with the names of their channels as the log lists them.
+
+    A channel that is listed with its unit, "Vel Lat [km/h]", may be told without.
+
+    Parameters
+    ----------
+    log : for messages.
+    signals : by our name.
+    names : of the channels.
+
+    Raises
+    ------
+    RecordingError
+        Where there is no such channel, or several.
+    """
+    bare: dict[str, list[str]] = {}
+    for one in names:
+        bare.setdefault(without_unit(one), []).append(one)
+    found = {}
+    for name, signal in signals.items():
+        channels = []
+        for channel in signal.channel:
+            likely = [channel] if channel in names else bare.get(channel, [])
+            if len(likely) != 1:
+                raise RecordingError(
+                    f"{log.path}: there is no column {shown(channel)} to read as "
+                    f"{column_of(name)}; {listing(likely or names)}"
+                )
+            channels += likely
+        found[name] = replace(signal, channel=tuple(channels))
+    return found
+
+
+def likely_signals(told: Mapping[str, Signal], proposal: Proposal) -> dict[str, Signal]:
+    """Return what is told, and what a proposal is sure of beside it, in the order of signals.
+
+    Parameters
+    ----------
+    told : by our name.
+    proposal : of the same log.
+    """
+    sure = {name: one for name, one in proposal.signals().items() if name not in told}
+    found = _beside(sure, told)
+    if ("Fyf" in found) != ("Fyr" in found):
+        found = {name: one for name, one in found.items() if name not in ("Fyf", "Fyr")}
+    return {name: found[name] for name in QUANTITIES if name in found}
+
+
+def _refuse_words(log: LogFile, names: list[str], missing: list[str], run: str | None) -> None:
+    """Refuse columns of standard names that are there and not numeric, with their first word."""
+    unlisted = set(getattr(log, "names", ())) - set(names)
+    for column in map(column_of, missing):
+        if column in unlisted:
+            log.read([column], run)
+            raise RecordingError(f"{log.path}: {column} must be numeric, its cells are words")
+
+
+def standard_signals(log: LogFile, names: list[str]) -> dict[str, Signal]:
+    """Return the signals that bear the standard names of columns.
+
+    Parameters
+    ----------
+    log : for messages.
+    names : of the channels.
+
+    Raises
+    ------
+    RecordingError
+        Where a name is there twice, or one axle alone has a force.
+    """
+    found = {}
+    for name in QUANTITIES:
+        column = column_of(name)
+        if f"{column} (2)" in names:
+            raise RecordingError(f"{log.path}: column {column} appears more than once")
+        if column in names and name != BETA:
+            found[name] = Signal(channel=(column,))
+    if not {"Fyf", "Fyr"} & set(names) and set(INVERSE) <= set(names):
+        found |= {ours: Signal(channel=(name,)) for name, ours in INVERSE.items()}
+    require_fitting(found, f"{log.path}: ")
+    return found
+
+
+def _beside(more: Mapping[str, Signal], told: Mapping[str, Signal]) -> dict[str, Signal]:
+    """Return signals that are told, and more where they are not; beta and v_y exclude another."""
+    instead = {"v_y": BETA, BETA: "v_y"}
+    kept = {name: one for name, one in more.items() if instead.get(name) not in told}
+    found = {**kept, **told}
+    if "v_y" in found:
+        found.pop(BETA, None)
+    return found
+
+
+def missing_signals(signals: Mapping[str, Signal]) -> list[str]:
+    """Return the needed signals that are not there; beta stands in for v_y.
+
+    Parameters
+    ----------
+    signals : by our name.
+    """
+    there = {"v_y" if name == BETA else name for name in signals}
+    return [name for name in NEEDED if name not in there]
+
+
+def listing(names: Sequence[str]) -> str:
+    """Return what channels there are, the first of many.
+
+    Parameters
+    ----------
+    names : of the channels.
+    """
+    listing = ", ".join(names[:SOME]) + (", ..." if len(names) > SOME else "")
+    return f"columns found: {listing[:200]!r}"
+
+
+def _taken_text(name: str, signal: Signal) -> str:
+    channels = [without_unit(one) for one in signal.channel]
+    unit = f" [{signal.unit}]" if signal.unit else ""
+    return f"{column_of(name)} is taken from {' + '.join(channels)}{unit}, by its name"
+
+
+def missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: list[str]) -> str:
+    """Return the error of a log in which not every signal is found: what may be it, what to do.
+
+    Parameters
+    ----------
+    log : that was looked at.
+    missing : signals that are needed.
+    proposal : what the channels probably are.
+    names : of the channels.
+    """
+    parts = [said for name in missing if (said := likely_text(name, proposal))]
+    words = [word for name in missing if (word := column_word(name, proposal))]
+    columns = ", ".join(column_of(name) for name in missing)
+    said = f"{log.path}: column {columns} is missing; "
+    if parts:
+        said += f"did you mean {', '.join(parts)}? tell it by --columns {' '.join(words)}; "
+    else:
+        said += f"tireid channels {log.path} lists what is there; "
+    return said + listing(names)
+
+
+def likely_text(name: str, proposal: Proposal) -> str:
+    """Return which channels may be a signal, in words; empty where none may.
+
+    Parameters
+    ----------
+    name : of the signal.
+    proposal : what the channels probably are.
+    """
+    guess, rivals = proposal.guesses.get(name), proposal.rivals.get(name, ())
+    if rivals:
+        listed = " or ".join(repr(" + ".join(one.channel)) for one in rivals[:3])
+        return f"{listed} for {column_of(name)}, equally"
+    if guess is None:
+        return ""
+    why = f" ({guess.why})" if guess.why else ""
+    hand = " of the hand wheel" if guess.hand else ""
+    return f"{' + '.join(guess.channel)!r}{hand} for {column_of(name)}{why}"
+
+
+def column_word(name: str, proposal: Proposal) -> str:
+    """Return the word of --columns that would tell a signal; empty where no channel may be it.
+
+    Parameters
+    ----------
+    name : of the signal.
+    proposal : what the channels probably are.
+    """
+    guess = proposal.guesses.get(name)
+    if guess is None:
+        return ""
+    unit, ratio = guess.unit or SI[QUANTITIES[name]], " /RATIO" if guess.hand else ""
+    channels = " + ".join(without_unit(one) for one in guess.channel)
+    return f'"{column_of(name)}={channels} [{unit}]{ratio}"'

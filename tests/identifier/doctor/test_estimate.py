@@ -1,0 +1,236 @@
+"""Planted faults are found with their sizes, none on a clean drive, and what is unseen is said."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.doctor_cases import KINDS, planted
+from benchmarks.everyday_drives import drawn_everyday
+from identifier.doctor import Finding, estimate, examine
+from identifier.doctor.balance import Balance, cubic, smoothed, stretches_of, window_length
+from identifier.doctor.fit import Fitter
+from identifier.doctor.suspects import SUSPECTS
+from models.faults import Late, Misaligned, SensorFault, Together
+from models.recordings import Repair
+from models.vehicle import GRAVITY
+
+# Kinds whose sizes this drive tells well, and how well: of the size, or where "" absolutely.
+SIZED = {
+    "offset v_y": 0.02,
+    "offset r": 0.002,
+    "offset a_y": 0.05,
+    "offset delta_f": 0.001,
+    "factor v_x": 0.01,
+    "factor r": 0.01,
+    "factor delta_f": 0.05,
+    "delay r": 0.002,
+    "delay delta_f": 0.012,
+    "delay a_y": 0.002,
+    "misaligned": 0.0017,
+    "velocity sensor": 0.1,
+    "accelerometer": 0.1,
+    "bank": 0.005,
+}
+
+
+@pytest.fixture(scope="module")
+def driven():
+    """A minute of a sedan with a slalom in it: the car as told, a log, and the exact drive."""
+    drive = drawn_everyday("sedan", "slalom", 1)
+    log = drive.log(np.random.default_rng([1, 1]))
+    return drive.car.told, replace(log, axle_force=None), drive.exact
+
+
+def test_nothing_is_found_on_a_clean_drive_and_little_is_unseen(driven):
+    car, log, _ = driven
+    said = examine(log, car)
+    assert said.findings == ()
+    assert said.unseen == ()
+
+
+@pytest.mark.parametrize("kind", SIZED)
+def test_a_planted_fault_is_named_first_or_second_with_its_size(driven, kind):
+    car, log, _ = driven
+    fault = planted(kind, car, np.random.default_rng(5))
+    found = estimate(fault.case.log(log), fault.case.car(car))[:2]
+    right = [
+        one for one in found if one.code == fault.code and fault.channel in one.channel.split("+")
+    ]
+    assert right, f"{fault.case}: {[one.text for one in found]}"
+    assert abs(right[0].size - fault.size) < SIZED[kind]
+    assert right[0].confidence > 0.2
+    assert (right[0].repair is None) == (kind == "bank")
+
+
+def test_every_kind_of_fault_has_a_suspect():
+    codes = {(one.code, one.channel) for one in SUSPECTS}
+    car = drawn_everyday("sedan", "slalom", 1).car.told
+    for kind in KINDS:
+        fault = planted(kind, car, np.random.default_rng(0))
+        assert (fault.code, fault.channel) in codes
+
+
+def test_a_repair_of_what_was_found_leaves_a_log_in_which_nothing_is_found(driven):
+    car, log, _ = driven
+    late = Late(channels=("r",), delay=0.08).apply(log)
+    (found, *_) = estimate(late, car)
+    assert (found.code, found.channel) == ("delay", "r")
+    repaired, same = found.repair.apply(late, car)
+    assert not [one for one in estimate(repaired, same) if one.confidence > 0.5]
+
+
+def test_two_faults_at_once_are_both_found(driven):
+    car, log, _ = driven
+    faults = Together(
+        faults=(
+            Late(channels=("a_y",), delay=0.06),
+            SensorFault(channel="delta_f", kind="biased", size=0.02),
+        )
+    )
+    codes = {(one.code, one.channel): one.size for one in estimate(faults.apply(log), car)}
+    assert codes["delay", "a_y"] == pytest.approx(0.06, abs=0.003)
+    assert codes["offset", "delta_f"] == pytest.approx(0.02, abs=0.002)
+
+
+def test_an_inertial_unit_that_is_late_is_one_fault(driven):
+    car, log, _ = driven
+    found = estimate(Late(channels=("r", "a_y"), delay=0.09).apply(log), car)
+    one = next(one for one in found if one.code == "delay")
+    assert one.channel == "r+a_y"
+    assert one.size == pytest.approx(0.09, abs=0.005)
+    assert one.repair == Repair(delay={"r": one.size, "a_y": one.size})
+
+
+def test_what_is_alike_at_constant_speed_is_named_beside_it(driven):
+    """v_y off by 1.7 % of the speed: a bias, or a sensor that is turned."""
+    car, log, _ = driven
+    slow = replace(log, v_x=np.full(len(log), float(np.median(log.v_x))))
+    turned = Misaligned(angle=0.03).apply(replace(log, v_x=slow.v_x, a_y=None))
+    codes = [(one.code, one.channel) for one in estimate(turned, car)[:2]]
+    assert set(codes) == {("velocity_sensor_angle", "v_y"), ("offset", "v_y")}
+    first = estimate(turned, car)[0]
+    assert not first.sure
+    assert "cannot tell it from" in first.text
+
+
+def test_what_a_straight_drive_cannot_tell_is_said(driven):
+    car, log, _ = driven
+    names = ("v_y", "r", "delta_f", "a_y")
+    straight = replace(log, **{name: 0.003 * getattr(log, name) for name in names})
+    said = examine(straight, car)
+    assert said.findings == ()
+    assert any(line.startswith("yaw inertia") for line in said.unseen)
+    assert any(line.startswith("center of gravity") for line in said.unseen)
+
+
+def test_a_drive_that_never_drives_is_not_asked(driven):
+    car, log, _ = driven
+    said = examine(replace(log, v_x=0.01 * log.v_x), car)
+    assert said.findings == ()
+    assert "hardly drives" in said.unseen[0]
+
+
+# The equations, by other roads.
+
+
+def test_kinematics_hold_exactly_on_an_exact_drive(driven):
+    car, _, exact = driven
+    balance = Balance((exact,), car)
+    x = balance.channels({})
+    missed = balance._kinematics(x, np.zeros(x["v_y"].size), {}) * GRAVITY
+    assert np.sqrt(np.mean(missed**2)) < 2e-3 * np.sqrt(np.mean(exact.a_y**2))
+    wrong = balance._kinematics(x, np.zeros(x["v_y"].size), {"acceleration_sensor_x": 0.5})
+    assert np.sqrt(np.mean((wrong * GRAVITY) ** 2)) > 0.02
+
+
+def test_windows_differentiate_without_a_bias(driven):
+    car, log, _ = driven
+    balance = Balance((log,), car)
+    t = balance.dt * np.arange(balance.at.size)
+    line = balance.rate @ (3.0 + 2.0 * t)
+    np.testing.assert_allclose(line, 2.0, rtol=1e-9)
+    np.testing.assert_allclose(balance.mean @ np.full(t.size, 5.0), 5.0, rtol=1e-9)
+
+
+def test_noise_is_what_noise_alone_leaves(driven):
+    """Monte Carlo: a straight drive of noise alone, its windows' variance beside the formula."""
+    car, log, _ = driven
+    rng = np.random.default_rng(3)
+    n = len(log)
+    noise = {"v_y": 0.03, "r": 0.003, "a_y": 0.02}
+    alone = replace(
+        log,
+        v_x=np.full(n, 20.0),
+        delta_f=np.zeros(n),
+        **{name: rng.normal(0.0, size, n) for name, size in noise.items()},
+    )
+    balance = Balance((alone,), car)
+    x = balance.channels({})
+    missed = balance._kinematics(x, np.zeros(balance.at.size), {})
+    speed = np.full(len(balance), 20.0)
+    told = balance._noise(2, {}, None, speed, speed)
+    assert np.var(missed) == pytest.approx(np.mean(told), rel=0.25)
+
+
+def test_a_factor_that_only_shrinks_the_noise_gains_nothing(driven):
+    car, log, _ = driven
+    fitter = Fitter(Balance((log,), car))
+    clean = fitter.fit((), {})
+    for key in ("factor.v_y", "factor.r", "delay.v_y"):
+        assert clean.J - fitter.fit((key,), clean.sizes).J < 3.0
+
+
+def test_a_channel_is_read_between_its_samples():
+    dt = 0.02
+    t = dt * np.arange(200)
+    smooth = smoothed(np.sin(3.0 * t), 1, dt, 1)
+    a, b = slice(50, 100), slice(51, 101)
+    between = cubic(smooth.value[a], smooth.value[b], smooth.slope[a], smooth.slope[b], 0.3, dt)
+    np.testing.assert_allclose(between, np.sin(3.0 * (t[a] + 0.3 * dt)), atol=2e-3)
+
+
+def test_windows_are_longer_where_there_is_more_noise(driven):
+    car, log, exact = driven
+    quiet = Balance((exact,), car).white
+    loud = {name: 3.0 * size for name, size in Balance((log,), car).white.items()}
+    assert window_length((exact,), car, quiet) < window_length((log,), car, loud)
+
+
+def test_a_long_log_is_looked_at_where_it_is_lively(driven):
+    car, log, _ = driven
+    n = 10 * len(log)
+    longer = replace(
+        log,
+        t=log.dt * np.arange(n),
+        **{
+            name: np.tile(getattr(log, name), 10)
+            for name in ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")
+        },
+    )
+    parts = stretches_of(longer, car, longest=60.0, pieces=4)
+    assert len(parts) == 4
+    assert sum(part.duration for part in parts) == pytest.approx(60.0, abs=0.1)
+    turning = math.sqrt(sum(np.mean(part.r**2) for part in parts) / 4.0)
+    assert turning > math.sqrt(np.mean(log.r**2))
+    assert stretches_of(log, car, longest=61.0, pieces=4) == (log,)
+
+
+@pytest.mark.parametrize("suspect", SUSPECTS, ids=lambda one: one.key)
+def test_a_suspect_repairs_what_it_says(suspect, driven):
+    car, log, _ = driven
+    size = 0.5 * suspect.plausible
+    repair = suspect.repair(size, car)
+    assert (repair is None) == (suspect.code == "bank")
+    if repair is not None:
+        assert repair
+        repair.apply(log, car)
+    assert "±" in suspect.words(size, 0.1 * size)
+
+
+def test_a_finding_that_is_sure_has_a_repair():
+    with pytest.raises(ValueError, match="must have a repair"):
+        Finding(code="delay", confidence=1.0, sure=True)
+    with pytest.raises(ValueError, match="between 0 and 1"):
+        Finding(code="delay", confidence=1.2)
