@@ -69,13 +69,12 @@ def sample_findings(recording: Recording) -> list[Finding]:
 
 
 def _is_late(name: str, late: Mapping[str, float], dt: float) -> bool:
-    """Whether noise that grows with the slope is that of late samples: of several, or by much."""
-    alike = [
-        other
-        for other, size in late.items()
-        if other != name and abs(math.log(size / late[name])) < ALIKE
-    ]
-    return late[name] > 2.0 * dt or (bool(alike) and late[name] > 0.7 * dt)
+    """Whether noise that grows with the slope is that of late samples: r has it, and others alike.
+
+    Noise of v_y alone may well grow with the slip, and that of a camera with the speed.
+    """
+    alike = [one for one, size in late.items() if abs(math.log(size / late[name])) < ALIKE]
+    return "r" in alike and len(alike) > 1 and late[name] > 0.7 * dt
 
 
 def _piece_findings(recording: Recording) -> list[Finding]:
