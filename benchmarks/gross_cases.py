@@ -47,6 +47,29 @@ class Sideslip:
         return replace(recording, v_y=self.per_rad * np.arctan2(recording.v_y, recording.v_x))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JumpInTurn:
+    """A jump of the clock while the car changes its turn most: elsewhere it does no harm.
+
+    Parameters
+    ----------
+    size : of the jump [s]; negative where samples are logged twice.
+    """
+
+    size: float
+
+    def apply(self, recording: Recording) -> Recording:
+        """Return the recording with the jump.
+
+        Parameters
+        ----------
+        recording : the drive without it.
+        """
+        smooth = np.convolve(recording.r, np.ones(20) / 20.0, "same")
+        at = float(recording.t[np.argmax(np.abs(np.gradient(smooth)))])
+        return ClockJump(at=at, size=self.size).apply(recording)
+
+
 class Gross(NamedTuple):
     """A fault, and what findings are right: code and channel, "" for any."""
 
@@ -152,7 +175,7 @@ def _late(vehicle: Vehicle, rng: np.random.Generator) -> Gross:
 def _jump(sign: float) -> Draw:
     def draw(_: Vehicle, rng: np.random.Generator) -> Gross:
         size = sign * math.exp(rng.uniform(math.log(0.3), math.log(2.0)))
-        return Gross(Case(ClockJump(at=rng.uniform(10.0, 45.0), size=size)), (("clock", ""),))
+        return Gross(Case(JumpInTurn(size=size)), (("clock", ""),))
 
     return draw
 

@@ -16,7 +16,7 @@ from models.vehicle import Vehicle, VehicleError
 
 MATTERS = 0.5  # confidence, from which a finding is one
 RATIOS = ("steering_ratio", "factor")  # codes of gross findings whose factor is any number
-FACTOR, ROUNDS = "factor.delta_f", 2
+FACTOR, ROUNDS = "factor.delta_f", 4
 NEVER = (
     "mass: scales all forces alike and leaves the motion as it is; weigh the car",
     "the lateral axis mirrored throughout (y to the right, as in SAE or NED): all laws stay as "

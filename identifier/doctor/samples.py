@@ -25,6 +25,7 @@ FREEZE = 0.3  # [s] that a noisy channel repeats one number
 MOVES = 0.15  # of the range of v_x r, by which a car must move meanwhile, in any unit
 ALTERNATE = -0.35  # correlation of neighboring second differences, below which they are noise
 REPEATED = 0.01  # share of repeated samples of a noisy channel
+OUTLIER = 16.0  # times the variance that is expected of a difference, and not more
 ALIKE = math.log(1.6)  # of the times by which samples of two channels are late
 COARSE = 0.05  # quantum over the rms of a channel
 CERTAIN = 0.99
@@ -57,21 +58,23 @@ def sample_findings(recording: Recording) -> list[Finding]:
     for one in listed:
         first.setdefault((one.code, one.channel), one)
     late = {one.channel: one.size for one in listed if one.code == "jitter"}
+    several = len(late) > 1  # all channels are torn then, at every sample
+    late = {name: size for name, size in late.items() if _is_late(name, late, recording.dt)}
     return [
         one
         for one in first.values()
-        if one.code != "jitter" or _is_late(one.channel, late, recording.dt)
+        if (one.code != "jitter" or one.channel in late)
+        and not (several and one.code == "clock" and one.confidence < CERTAIN)
     ]
 
 
 def _is_late(name: str, late: Mapping[str, float], dt: float) -> bool:
-    """Whether noise that grows with the slope is that of late samples: of several, or by much."""
-    alike = [
-        other
-        for other, size in late.items()
-        if other != name and abs(math.log(size / late[name])) < ALIKE
-    ]
-    return late[name] > 2.0 * dt or (bool(alike) and late[name] > 0.7 * dt)
+    """Whether noise that grows with the slope is that of late samples: r has it, and others alike.
+
+    Noise of v_y alone may well grow with the slip, and that of a camera with the speed.
+    """
+    alike = [one for one, size in late.items() if abs(math.log(size / late[name])) < ALIKE]
+    return "r" in alike and len(alike) > 1 and late[name] > 0.7 * dt
 
 
 def _piece_findings(recording: Recording) -> list[Finding]:
@@ -215,7 +218,9 @@ def _repeats(name: str, runs: Runs, noisy: bool, recording: Recording) -> Iterat
             text=f"{name} holds its last value {again} times, typically for {1e3 * typical:.3g} ms "
             f"({100.0 * share:.2g} % of the log): samples were lost on the way and repeated",
         )
-    elif length * recording.dt >= FREEZE and _moves(name, recording, runs.first[longest], length):
+    elif length * recording.dt >= FREEZE and _runs_on(
+        name, noisy, recording, int(runs.first[longest]), length
+    ):
         first = float(recording.t[runs.first[longest]])
         yield Finding(
             code="frozen",
@@ -226,6 +231,16 @@ def _repeats(name: str, runs: Runs, noisy: bool, recording: Recording) -> Iterat
             text=f"{name} does not change from {first:.4g} s on for {length * recording.dt:.3g} s: "
             "frozen; cut the log there",
         )
+
+
+def _runs_on(name: str, noisy: bool, recording: Recording, first: int, length: int) -> bool:
+    """Whether the drive goes on while a channel stands still: it moves, or another one does."""
+    here = slice(first, first + length)
+    if np.mean(np.abs(recording.v_x[here])) < 0.3 * float(np.percentile(np.abs(recording.v_x), 95)):
+        return False
+    others = [getattr(recording, one) for one in ("v_y", "r", "delta_f", "v_x") if one != name]
+    alive = sum(bool(np.ptp(one[here]) > 0.0) for one in others)
+    return (noisy and alive >= 2) or _moves(name, recording, first, length)
 
 
 def _moves(name: str, recording: Recording, first: int, length: int) -> bool:
@@ -332,12 +347,12 @@ def _jitter(signal: Array, dt: float) -> tuple[float, float] | None:
     slope = np.gradient(smooth, dt)[1:-2]
     inner = slice(width, -width)
     y, x = (bend[inner] ** 2) / 20.0, slope[inner] ** 2
-    y = np.minimum(y, 25.0 * float(np.median(y)) / 0.455)
     size_x, size_y = float(np.mean(x)), float(np.mean(y))
     if not (size_x > 0.0 and size_y > 0.0):
         return None
     x, y = x / size_x, y / size_y
     X = np.column_stack([np.ones(x.size), x])
+    y = np.minimum(y, OUTLIER * _two_step(X, y))
     weight = 1.0 / _two_step(X, y)
     normal = X.T @ (weight[:, None] ** 2 * X)
     try:
@@ -364,9 +379,10 @@ def _two_step(X: Array, y: Array) -> Array:
 # The clock.
 
 BLOCK = 5  # samples in a row that were logged before, of all channels
+SHORTEST = 4.0  # samples that a jump has at least
 SMOOTH = ("v_y", "r", "v_x")  # that no car can change at once, as it can its steering
 SIDE = 12  # samples on each side of a jump
-JUMP, ALSO = 6.0, 2.5  # of the usual disagreement of both sides: in two channels, in a third
+JUMP, ALSO = 5.5, 2.5  # of the usual disagreement of both sides: in two channels, in a third
 
 
 def clock_jump(recording: Recording, signals: Mapping[str, Array]) -> Finding | None:
@@ -453,4 +469,6 @@ def _torn(moving: Mapping[str, Array], dt: float) -> tuple[int, float, float] | 
     scale = np.array([np.std(moving[name]) for name in names])
     a, b = rates / scale, jumps / scale
     size = float(a @ b / (a @ a + 1e-300))
+    if abs(size) < SHORTEST * dt:
+        return None  # that is a late sample, not another time
     return at + SIDE, size, 0.5 * abs(size)

@@ -136,12 +136,12 @@ def test_what_the_doctor_finds_is_logged_and_a_right_log_is_silent(log, car, cap
 
     ti.identify(log, car)
     assert [one for one in caplog.records if one.name == "tireid.doctor"] == []
-    wrong = replace(log, delta_f=15.0 * log.delta_f)
-    found = ti.diagnose(wrong, car)
-    ti.identify(wrong, car)
+    wrong = replace(car, yaw_inertia=3.0 * car.mass * car.l_f * car.l_r)
+    found = ti.diagnose(log, wrong)
+    ti.identify(log, wrong)
     told = [one.getMessage() for one in caplog.records if one.name == "tireid.doctor"]
     assert told == [f"{log.name}: {one.text}" for one in found.findings]
-    assert "steering wheel" in told[0]
+    assert "yaw inertia" in "".join(told)
 
 
 def columns_of(log):

