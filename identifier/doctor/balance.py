@@ -35,9 +35,10 @@ SMOOTHED = 0.125  # half the window by which every channel is smoothed alike
 SWAYED = 0.25  # half the window of what the roll of the body follows
 STEP = 0.0375  # sampling interval after it
 LONG, SHORT = 0.4, 0.1  # lengths of ψ, in periods of the swings of the drive
-QUIET = 0.3  # noise over what no model explains, for which ψ is as long as it must be
+QUIET = 0.1  # noise over what no model explains, for which ψ is as long as it must be
 FASTEST, SLOWEST = 4.0, 16.0  # periods of the swings that are believed, in sqrt(L/g)
 MARGIN = 0.4  # s at both ends, what a delay may be
+LEAST = 2.0  # s, below which a stretch between two gaps is not looked at
 BRISK = 0.6  # speed in sqrt(g L) from which a window counts
 BANKS = 6  # cosines over the drive in which a bank may swing
 OVERLAP = 4  # windows that begin within the length of one
@@ -469,14 +470,27 @@ def stretches_of(
     """
     n, dt = len(recording), recording.dt
     if recording.duration <= longest:
-        return (recording,)
+        return _unbroken(recording)
     length = int(longest / pieces / dt)
     lively = np.where(recording.v_x > BRISK * vehicle.froude_speed, recording.r**2, 0.0)
     total = np.concatenate([[0.0], np.cumsum(lively)])
     bounds: NDArray[np.intp] = np.linspace(0, n, pieces + 1).astype(np.intp)
-    found = []
+    found: list[Recording] = []
     for first, last in pairwise(bounds):
         starts = np.arange(first, last - length, max(1, length // 10))
         best = int(starts[np.argmax(total[starts + length] - total[starts])])
-        found.append(recording.between(recording.t[best], recording.t[best + length]))
+        found += _unbroken(recording, slice(best, best + length))
     return tuple(found)
+
+
+def _unbroken(recording: Recording, part: slice = slice(None)) -> tuple[Recording, ...]:
+    """Return the stretches of a part of a recording that no gap breaks, the longest at least."""
+    first, end, _ = part.indices(len(recording))
+    edges = [first, *(k for k in recording.breaks if first < k < end), end]
+    pieces = sorted((slice(a, b) for a, b in pairwise(edges)), key=lambda one: one.start - one.stop)
+    least = int(LEAST / recording.dt)
+    kept = [one for one in pieces if one.stop - one.start >= least] or pieces[:1]
+    kept.sort(key=lambda one: one.start)
+    if kept == [slice(0, len(recording))]:
+        return (recording,)
+    return tuple(recording.taken(one) for one in kept)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from identifier.doctor.balance import Balance, stretches_of
-from identifier.doctor.estimate import FEWEST, LONGEST, PIECES, estimate
+from identifier.doctor.estimate import FEWEST, LONGEST, PIECES, Examination, examine
 from identifier.doctor.finding import Finding
 from identifier.doctor.fit import Fitter
 from identifier.doctor.screen import NEAR, Screened, combined, screen, steering_finding
@@ -108,7 +108,7 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
     """
     gross = screen(recording, vehicle)
     blind = gross.blind
-    found, fine = list(gross.findings), tuple[Finding, ...]()
+    found, fine = list(gross.findings), Examination((), ())
     if not blind:
         try:
             drive, car = gross.repair.apply(recording, vehicle)
@@ -119,14 +119,14 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
                 found[k : k + 1] = [] if exact is None else [exact]
                 drive, car = combined(found).apply(recording, vehicle)
             found += _contradictions(drive, car)
-            fine = estimate(drive, car)
+            fine = examine(drive, car)
         except (RecordingError, VehicleError) as error:
             blind = str(error)
-    ranked = sorted([*found, *fine], key=lambda one: not one.confidence >= MATTERS)
+    ranked = sorted([*found, *fine.findings], key=lambda one: not one.confidence >= MATTERS)
     return Diagnosis(
         name=recording.name,
         findings=tuple(_told_once(ranked)),
-        unseen=_unseen(recording, replace(gross, blind=blind)),
+        unseen=(*_unseen(recording, replace(gross, blind=blind)), *fine.unseen),
     )
 
 

@@ -20,7 +20,7 @@ from models.vehicle import Vehicle
 LONGEST, PIECES = 60.0, 4  # s that are looked at, and from how many parts of a longer log
 FEWEST = 24  # windows, below which nothing is asked
 MOST = 4  # faults at once
-CHANCE = 6.0  # gain of J that a fault must bring
+CHANCE = 4.5  # gain of J that a fault must bring
 TELLING = 2.5  # deviations, with the least size of the suspect in them, that it must have
 ALIKE = 3.0  # gain of J within which two faults cannot be told apart
 LATE_ALIKE = 0.8  # of the gain, from which a delay and a low pass of a channel cannot be

@@ -131,7 +131,10 @@ class Fitter:
         ----------
         misses : S of each part with that fault.
         """
-        self.trust = tuple(1.0 / (1.0 + S / ODD) for S in misses)
+        left = (
+            S - noise - floor for S, noise, floor in zip(misses, self.usual, FLOOR, strict=False)
+        )
+        self.trust = tuple(1.0 / (1.0 + max(one, 0.0) / ODD) for one in left)
 
     def _away(self, key: str, size: float) -> float:
         return (size - self.mean.get(key, 0.0)) / self._sd(key)

@@ -217,6 +217,20 @@ def test_a_long_log_is_looked_at_where_it_is_lively(driven):
     assert stretches_of(log, car, longest=61.0, pieces=4) == (log,)
 
 
+def test_nothing_is_made_of_the_jump_over_a_gap(driven):
+    car, log, _ = driven
+    n = len(log)
+    kept = np.r_[0 : n // 3, n // 3 + 700 : n // 3 + 750, n // 2 : n]
+    broken = log.taken(kept)
+    assert len(broken.breaks) == 2
+    parts = stretches_of(broken, car, longest=61.0, pieces=4)
+    assert [len(part) for part in parts] == [n // 3, n - n // 2]  # half a second is left out
+    assert not any(part.breaks for part in parts)
+    assert estimate(broken, car) == ()
+    late = Late(channels=("r",), delay=0.08).apply(log).taken(kept)
+    assert estimate(late, car)[0].size == pytest.approx(0.08, abs=0.003)
+
+
 @pytest.mark.parametrize("suspect", SUSPECTS, ids=lambda one: one.key)
 def test_a_suspect_repairs_what_it_says(suspect, driven):
     car, log, _ = driven
