@@ -30,7 +30,7 @@ from benchmarks.random_cars import CLASSES, FIRST_SEED
 from benchmarks.recorded_cars import CARMAKER, DART, DATA
 from benchmarks.targets import Targets, keeps, show
 from codegen.arrays import Array
-from identifier.doctor import Finding, estimate
+from identifier.doctor import Finding
 from models.recordings import Recording, read_recording, runs
 from models.vehicle import Vehicle
 
@@ -111,7 +111,7 @@ def of_car(job: tuple[str, int]) -> list[Outcome]:
     for k, name in enumerate(KINDS):
         fault = planted(name, told, np.random.default_rng([seed, k, 7]))
         bad, car = blind(fault.case.log(log)), fault.case.car(told)
-        listed = estimate(bad, car)
+        listed = ti.diagnose(bad, car).findings
         ranks = [i for i, one in enumerate(listed, start=1) if is_right(one, fault)]
         rank, error, sigmas, force = ranks[0] if ranks else 0, np.nan, np.nan, None
         if rank:
@@ -138,7 +138,9 @@ def clean_car(job: tuple[str, int]) -> tuple[str, ...]:
     seed = FIRST_SEED + 500 + number
     drive = drawn_everyday(kind, MANEUVERS[number % len(MANEUVERS)], seed)
     log = blind(drive.log(np.random.default_rng([seed, 1])))
-    return tuple(one.text for one in estimate(log, drive.car.told) if one.confidence >= SURE)
+    return tuple(
+        one.text for one in ti.diagnose(log, drive.car.told).findings if one.confidence >= SURE
+    )
 
 
 def of_recordings() -> dict[str, tuple[Finding, ...]]:
@@ -148,10 +150,10 @@ def of_recordings() -> dict[str, tuple[Finding, ...]]:
         path = DATA / f"{file}.csv.gz"
         for run in runs(path):
             recording = read_recording(path, run=run, check=False)
-            found[f"{file}/{run}"] = estimate(blind(recording), car)
+            found[f"{file}/{run}"] = ti.diagnose(blind(recording), car).findings
             if file == "dart_imu":
                 unit = with_inertial_unit(recording, run)
-                found[f"imu/{run}"] = estimate(blind(unit), car)
+                found[f"imu/{run}"] = ti.diagnose(blind(unit), car).findings
     return found
 
 
@@ -262,6 +264,10 @@ def _recordings(targets: Targets) -> None:
     for name, listed in found.items():
         said = ", ".join(f"{one.code} {one.channel} {one.size:.3g}" for one in listed)
         show(name, said or "nothing")
+    as_logged = {name: listed for name, listed in found.items() if name not in imu}
+    loud = sum(any(one.confidence >= SURE for one in listed) for listed in as_logged.values())
+    targets.record("recordings", len(as_logged))
+    targets.at_most("recordings as they are with an alarm", loud, 0, "", "alarms/recordings")
     late = {
         name: [one.size for one in listed if one.code == "delay" and "r" in one.channel.split("+")]
         for name, listed in imu.items()
