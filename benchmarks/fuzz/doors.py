@@ -27,7 +27,7 @@ class Door(NamedTuple):
 
 def _files(words: str) -> tuple[str, ...]:
     """Return the words that name files of the seeds; a car brings its tire."""
-    endings = (".csv", ".csv.gz", ".parquet", ".toml", ".json", ".onnx")
+    endings = (".csv", ".csv.gz", ".parquet", ".mat", ".toml", ".json", ".onnx")
     found = [word for word in words.split() if word.endswith(endings) and word != "out.toml"]
     return tuple(found) + (("sedan.tir",) if "sedan.toml" in found else ())
 
@@ -43,6 +43,7 @@ def _door(name: str, share: float, words: str, mutated: str = "") -> Door:
 
 
 IDENTIFY = "identify log.csv --vehicle car.toml --out out"
+LOGGER = IDENTIFY.replace("log.csv", "logger.csv")
 COMPARE = "compare log.csv --vehicle car.toml --floor 0 --jobs 1 --out out --method"
 PREDICT = "predict --out out"
 FILTER = "--method magic_formula_ekf"
@@ -61,9 +62,17 @@ DOORS = (
     _door(
         "check log",
         3,
-        "check --design integral.toml --vehicle car.toml --log log.csv",
+        "check --design integral.toml --vehicle car.toml --along log.csv",
         "log.csv car.toml",
     ),
+    # logs as loggers write them, and their map
+    _door("channels csv", 6, "channels logger.csv", "logger.csv"),
+    _door("channels parquet", 2, "channels log.parquet", "log.parquet"),
+    _door("channels mat", 4, "channels log.mat", "log.mat"),
+    _door("identify mat", 3, IDENTIFY.replace("log.csv", "log.mat"), "log.mat"),
+    _door("identify logger", 6, f"{LOGGER} --log log.toml", "logger.csv log.toml"),
+    _door("doctor csv", 4, "doctor log.csv --vehicle car.toml", "log.csv"),
+    _door("doctor car", 2, "doctor log.csv --vehicle car.toml --repair out.toml", "car.toml"),
     # cars
     _door("identify car", 8, IDENTIFY.replace("car.toml", "sedan.toml"), "sedan.toml"),
     _door("check car", 6, "check --paper --vehicle sedan.toml", "sedan.toml"),
@@ -127,5 +136,7 @@ DOORS = (
     ),
     _door("words of predict", 3, f"{PREDICT} axle.json log.csv --columns r=r --vehicle car.toml"),
     _door("words of init", 2, "init out.toml"),
+    _door("words of channels", 3, "channels log.csv --columns r=r --write out.toml"),
+    _door("words of doctor", 2, "doctor log.csv --vehicle car.toml --columns r=r"),
     _door("words of paper", 0.5, "paper --seeds 0 --out out"),
 )

@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy.io
 
+from codegen.arrays import Array
 from identifier.export.onnx import export_onnx
 from identifier.methods import make_method
 from identifier.own_network import OnnxModel
@@ -52,6 +54,10 @@ def write_seeds(folder: Path, needed: Collection[str]) -> Mapping[str, bytes]:
             design_text(PaperIdentifier.for_vehicle(car, law=law)), encoding="utf-8"
         )
     _write_path(folder / "path.csv")
+    _write_logger(recording, folder / "logger.csv")
+    (folder / "log.toml").write_text(LOG_MAP, encoding="utf-8")
+    if "log.mat" in needed:
+        scipy.io.savemat(folder / "log.mat", _columns(recording))
     if "log.parquet" in needed:
         _write_parquet(recording, folder / "log.parquet")
     for name, law in FROZEN.items():
@@ -89,12 +95,10 @@ def _learnt(law: str, recording: Recording, car: Vehicle) -> TireModel:
     return history.freeze(float(recording.t[-1]))
 
 
-def _write_parquet(recording: Recording, path: Path) -> None:
-    import pyarrow
-    import pyarrow.parquet
-
+def _columns(recording: Recording) -> dict[str, Array]:
+    """Return the columns of a log by their standard names."""
     assert recording.axle_force is not None
-    columns = {
+    return {
         "t": recording.t,
         "vx": recording.v_x,
         "vy": recording.v_y,
@@ -103,7 +107,38 @@ def _write_parquet(recording: Recording, path: Path) -> None:
         "Fyf": recording.axle_force[:, 0],
         "Fyr": recording.axle_force[:, 1],
     }
-    pyarrow.parquet.write_table(pyarrow.table(columns), path)
+
+
+def _write_parquet(recording: Recording, path: Path) -> None:
+    import pyarrow
+    import pyarrow.parquet
+
+    pyarrow.parquet.write_table(pyarrow.table(_columns(recording)), path)
+
+
+LOG_MAP = """[signals.delta_f]
+channel = "Lenkradwinkel"
+ratio = 14.0
+
+[repair.offset]
+v_y = 0.01
+"""
+
+
+def _write_logger(recording: Recording, path: Path) -> None:
+    """Write a text log with a preamble, a row of units, semicolons and decimal commas."""
+    columns = {
+        ("Zeit", "s"): recording.t,
+        ("Geschwindigkeit", "km/h"): 3.6 * recording.v_x,
+        ("Quergeschwindigkeit", "m/s"): recording.v_y,
+        ("Gierrate", "deg/s"): np.degrees(recording.r),
+        ("Lenkradwinkel", "deg"): 14.0 * np.degrees(recording.delta_f),
+    }
+    rows = [f"{value:.5f}" for value in np.column_stack(list(columns.values())).ravel()]
+    cells = np.reshape([value.replace(".", ",") for value in rows], (-1, len(columns)))
+    lines = ["Fahrzeug;Limousine", ";".join(name for name, _ in columns)]
+    lines += [";".join(unit for _, unit in columns), *(";".join(row) for row in cells)]
+    path.write_text("\n".join(lines) + "\n", encoding="cp1252")
 
 
 def _plain_car(car: Vehicle) -> str:

@@ -224,7 +224,8 @@ class Search:
             confidence=confidence,
             text=text,
             repair=repair,
-            sure=repair is not None and not alike and confidence > 0.95,
+            # Numbers of the car can be measured; a drive is no reason to overrule who did.
+            sure=repair is not None and not repair.vehicle and not alike and confidence > 0.95,
         )
 
 

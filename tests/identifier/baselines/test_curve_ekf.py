@@ -63,7 +63,7 @@ def test_with_a_lag_they_agree_from_the_slip_on_that_was_carried(make, car, driv
         frozen = history.freeze(0.01 * k)
         setup, rest = frozen.setup(0.01), history.recording.between(0.01 * k - 1e-6, 99.0)
         carried = {name: history.state[name][k] for name in LAG_PORTS}
-        force = setup._replace(carry=carried).run(rest)["axle_force"]
+        force = setup._replace(carry=carried).output(rest, "axle_force")
         np.testing.assert_allclose(force[0], history.axle_force[k], rtol=1e-9)
         whole = frozen.axle_force(history.recording)[k]  # the past had other parameters
         np.testing.assert_allclose(whole, force[0], atol=0.01 * np.abs(whole).max())
