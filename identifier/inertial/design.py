@@ -12,11 +12,11 @@ from codegen.arrays import Array
 from identifier.axle.car import car_numbers
 from identifier.axle.covariance import packed, triangle
 from identifier.axle.curve import EDGES, LADDER, doublings
+from identifier.axle.design import AxleIdentifier
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.learning import Bounds
-from identifier.axle.design import AxleIdentifier
 from identifier.axle.model import AxleModel
-from identifier.axle.prior import Prior, friction_direction
+from identifier.axle.prior import Prior
 from identifier.axle.slip import SHORTEST, Sway
 from identifier.certificate import Certificate
 from identifier.driving import Driving
@@ -27,7 +27,7 @@ from identifier.method import OTHER_STRUCTURE, Method, Port, Reached, Setup, Tra
 from identifier.tire_model import AXLES, TireModel
 from identifier.tuning import Range, ranges_around
 from models.rules import require_within
-from models.vehicle import GRAVITY, Vehicle
+from models.vehicle import Vehicle
 
 NEAR = 0.99  # of a bound, from which on a number rests at it
 LARGEST_ROLL = 0.5  # rad per g: softer, and a car falls over
@@ -182,7 +182,7 @@ class InertialIdentifier(Method):
         """
         n = len(self.ladder)
         W, own = self.prior.means(vehicle, self.ladder)
-        P = self.prior.covariance(vehicle, self.ladder)
+        P = prior_P = self.prior.covariance(vehicle, self.ladder)
         excitation = np.zeros((2, 1 + len(EDGES)))
         sensors = np.array([0.0, self.beliefs.roll, 0.0, 0.0, 0.0])
         if start is not None:
@@ -219,7 +219,7 @@ class InertialIdentifier(Method):
                 "learning_speed": np.array(self.plausibility.learning_speed),
                 "limits": self._limits(),
                 "bounds": axle._bound_numbers(),
-                "friction_direction": friction_direction(self.ladder),
+                "metric": np.array([one[np.triu_indices(n)] for one in prior_P[:, :n, :n]]),
                 **axle._rising(),
             },
         )
@@ -274,7 +274,7 @@ class InertialIdentifier(Method):
         unseen = "no such curve was seen, or mass, signs or units are wrong"
         listed = [
             (abs(zero) > NEAR * b.steering,
-             Reached("front", "zero of the steering", zero, "rad", "a sensor is off by more", True)),
+             Reached("front", "zero of the steering", zero, "rad", "a sensor is off", True)),
         ]  # fmt: skip
         slope = (W / np.array(self.ladder)).sum(axis=1)
         for axle, level, steep in zip(AXLES, W.sum(axis=1), slope, strict=True):

@@ -1,4 +1,4 @@
-"""The covariance of z as factors P = U D U', through a step of the motion and through a measurement.
+"""The covariance of z as factors P = U D U', through a step and through a measurement.
 
 z = [m; θ]: m moves by m⁺ = A m + B θ + w, θ stays. Because θ stands last, its factors stay as they
 are: U_mθ⁺ = A U_mθ + B U_θθ, and only the block of m is factored anew, by weighted Gram-Schmidt on
@@ -33,8 +33,7 @@ def propagated(factors: Factors, F: Any, Q: list[Any]) -> Factors:
 
     noisy = [i for i in range(m) if Q[i] is not None]
     rows = [
-        [*(times(i, k) for k in range(m)), *(ca.SX(float(i == j)) for j in noisy)]
-        for i in range(m)
+        [*(times(i, k) for k in range(m)), *(ca.SX(float(i == j)) for j in noisy)] for i in range(m)
     ]
     weights = [*D[:m], *(Q[i] for i in noisy)]
     after = {

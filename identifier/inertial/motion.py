@@ -1,16 +1,16 @@
 """The car between two samples, and what its sensors should show: all that the filter predicts.
 
-z = [v_y, r, x_f, x_r, e_f, e_r, p, p'; w_f, w_r, s_f, s_r, b, ρ, δ₀, b_r, κ]: first what moves, then
-what is learnt. v_y [m/s], r [rad/s]; x lagged slip [rad]; e what the curves miss of a force [static
-axle loads]; p sine of the bank, positive where it falls to the left, p' its rate [1/s]; w weights
-of the units, n each, s compliances [m]; b bias of the accelerometer [g], ρ roll of the body [rad
-per g], δ₀ zero of the steering [rad], b_r bias of the gyro [rad/s], κ excess of 1/I_z [-].
+z = [v_y, r, x_f, x_r, e_f, e_r, p, p'; w_f, w_r, s_f, s_r, b, ρ, δ₀, b_r, κ]: what moves, then what
+is learnt. v_y [m/s], r [rad/s]; x lagged slip [rad]; e what the curves miss of a force [static axle
+loads]; p sine of the bank, positive where it falls to the left, p' its rate [1/s]; w weights of the
+units, n each, s compliances [m]; b bias of the accelerometer [g], ρ roll of the body [rad per g],
+δ₀ zero of the steering [rad], b_r bias of the gyro [rad/s], κ excess of 1/I_z [-].
 
-f = φ(x) cos δ + e,   dv_y/dt = g Σ share f - v_x r + g p,   I_z dr/dt = (1 + κ) (l_f F_f - l_r F_r),
-dx/dt = v_x/σ (α - x),   σ = s C(x),   α = δ + δ₀ - atan((v_y ± l r)/v_x).
-Shown: r + b_r,  and  a_y = g Σ share f + ρ ä + g b + x_s dr/dt - y_s r², ä the motion of the rolling
-body, driven by the same forces. A bank is in the first equation and not in the last: an
-accelerometer feels what tires push.
+f = φ(x) cos δ + e,   dx/dt = v_x/σ (α - x),   σ = s C(x),   α = δ + δ₀ - atan((v_y ± l r)/v_x),
+dv_y/dt = g Σ share f - v_x r + g p,   dr/dt = (1 + κ)/I_z (l_f F_f - l_r F_r).
+Shown: r + b_r,  and  a_y = g Σ share f + ρ ä + g b + x_s dr/dt - y_s r²: ä [m/s²] is what the body
+rolls by, driven by the same forces, x_s and y_s where the accelerometer sits. A bank is in the
+equation of v_y and not in a_y: an accelerometer feels what tires push.
 Everything is taken at the middle of the step: where forces and v_x r are half a sample apart, their
 difference is no v_y.
 """
@@ -207,9 +207,7 @@ def predicted(
     r = z.r + (m11 * b - m21 * a) * per
     alpha = slip_angle(car, now, v_y, r, z.steering)
     slip = e * z.slip + (mean - e) * was + (1 - mean) * alpha
-    bank_rate = z.bank_rate - dt * (
-        laws.bank_damping * z.bank_rate + laws.bank_stiffness * z.bank
-    )
+    bank_rate = z.bank_rate - dt * (laws.bank_damping * z.bank_rate + laws.bank_stiffness * z.bank)
     rolling, rate = tilt
     rate = (rate + dt * laws.roll_stiffness * (ca.dot(push, force) - rolling)) / (
         1 + dt * laws.roll_damping + dt**2 * laws.roll_stiffness

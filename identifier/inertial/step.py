@@ -16,7 +16,6 @@ from identifier.axle.car import Car, axle_port, larger, named_port, smaller, wit
 from identifier.axle.covariance import (
     Factors,
     factors_of,
-    inflated,
     row_of,
     triangle,
 )
@@ -151,12 +150,13 @@ def build_step(steps: tuple[int, ...]) -> ca.Function:
     ports["limits"], limits = named_port(LearntLimits, "limits")
     ports["bounds"], bounds = named_port(BoundNumbers, "bounds")
     ports["rising"] = ca.SX.sym("rising", n)
-    ports["friction_direction"] = ca.SX.sym("friction_direction", n, n)
+    ports["metric"] = ca.SX.sym("metric", 2, len(triangle(n)))
 
     seen = ca.vertcat(0, ports["x"][1])  # v_y is not looked at
     gated = gate(ports["plausibility"], dt, last, seen, ports["u"], ports["v_x"])
     runs = ca.logic_and(gated.on, gated.v_x >= slowest)
-    noise = _noise(ports, trust, gated, last)
+    goes_on = ca.logic_and(runs, ports["running"][0] > 0.5)
+    noise = _noise(ports, trust, gated, goes_on)
     z = ca.vertcat(
         ports["motion"], ports["W"][0, :].T, ports["W"][1, :].T, ports["own"], ports["sensors"]
     )
@@ -180,25 +180,19 @@ def build_step(steps: tuple[int, ...]) -> ca.Function:
     )
     fast = ports["running"][1]
     fast = fast + trust.alarm_gain * (smaller(surprise, MOST_SURPRISE) - fast)
-    alarm = within(fast * trust.per_alarm - 1, 0, 1)
-    along = ports["friction_direction"]
-    direction = [
-        *[ca.SX(0)] * MOVING,
-        *ca.vertsplit(along @ ca.vertcat(*corrected[MOVING : MOVING + n])),
-        *ca.vertsplit(along @ ca.vertcat(*corrected[MOVING + n : MOVING + 2 * n])),
-    ]
-    factors = inflated(factors, direction, alarm * trust.inflation)
-    corrected = _bounded(ports, corrected, factors, bounds, limits, n)
+    alarm = goes_on * within(fast * trust.per_alarm - 1, 0, 1)
+    factors = _loosened(factors, corrected, alarm * trust.inflation, n)
+    corrected = _bounded(ports, corrected, bounds, limits, n)
 
-    sane = ca.fabs(corrected[0]) < MOST_SLIDING * now.v_x
-    goes_on = ca.logic_and(ca.logic_and(runs, ports["running"][0] > 0.5), sane)
-    afresh, afresh_factors = _afresh(ports, trust, car, gated, now, z)
+    sane = ca.fabs(corrected[0]) < MOST_SLIDING * now.v_x  # else it begins anew, a sample later
+    begun, begun_factors = _afresh(ports, trust, car, gated, now, factors)
     kept = [
-        ca.if_else(goes_on, a, b) for a, b in zip(corrected, ca.vertsplit(afresh), strict=True)
+        *(ca.if_else(goes_on, a, b) for a, b in zip(corrected[:MOVING], begun, strict=True)),
+        *corrected[MOVING:],  # which are not moved unless the filter goes on
     ]
     after = [
-        ca.if_else(goes_on, a, b)
-        for a, b in zip(row_of(factors), row_of(afresh_factors), strict=True)
+        a if a is b else ca.if_else(goes_on, a, b)
+        for a, b in zip(row_of(factors), row_of(begun_factors), strict=True)
     ]
     told = unknowns(ca.vertcat(*kept), n)
     tilt = ca.if_else(
@@ -216,7 +210,7 @@ def build_step(steps: tuple[int, ...]) -> ca.Function:
         "gate": gated.state,
         "body": tilt,
         "heard": noise.heard,
-        "running": ca.vertcat(ca.if_else(runs, 1, 0), ca.if_else(goes_on, fast, 1)),
+        "running": ca.vertcat(ca.logic_and(runs, sane), ca.if_else(goes_on, fast, 1)),
         "excitation": excited(
             ports["excitation"],
             size_of_slip,
@@ -241,7 +235,7 @@ def build_step(steps: tuple[int, ...]) -> ca.Function:
     )
 
 
-def _noise(ports: dict[str, Any], trust: TrustNumbers, gated: Gate, last: GateState) -> Noise:
+def _noise(ports: dict[str, Any], trust: TrustNumbers, gated: Gate, goes_on: Any) -> Noise:
     """Return what is new of r and a_y, and how noisy they are.
 
     A sensor that is slower than the log repeats its number: that is no news. Second differences of
@@ -250,18 +244,16 @@ def _noise(ports: dict[str, Any], trust: TrustNumbers, gated: Gate, last: GateSt
     heard, a_y = ports["heard"], ports["a_y"]
     there = ca.logic_and(a_y == a_y, ca.fabs(a_y) < trust.surge)  # NaN is not NaN
     newest = [gated.r, ca.if_else(there, a_y, heard[1])]
-    begun = ports["running"][0] > 0.5
     fresh, variance, state = [], [], []
     for i, y in enumerate(newest):
-        news = y != heard[i]
+        news = ca.logic_and(y != heard[i], goes_on)
         second = y - 2 * heard[i] + heard[2 + i]
         old = heard[4 + i]
         shows = smaller(second**2 / 6, MOST_NOISE * old + LEAST)
-        learns = ca.logic_and(news, begun)
-        variance.append(ca.if_else(learns, old + trust.noise_gain * (shows - old), old))
+        variance.append(ca.if_else(news, old + trust.noise_gain * (shows - old), old))
         fresh.append(news)
-        state.append((y, ca.if_else(begun, ca.if_else(news, heard[i], heard[2 + i]), y)))
-    del last
+        before = ca.if_else(news, heard[i], heard[2 + i])
+        state.append((y, ca.if_else(goes_on, before, y)))
     now, before = zip(*state, strict=True)
     return Noise(fresh, variance, ca.vertcat(*now, *before, *variance))
 
@@ -296,7 +288,9 @@ def _corrected(
     y = ca.vertcat(expected.r, expected.a_y)
     y, H = ca.substitute([y, ca.jacobian(y, symbol)], [symbol, tilt], [z, ahead.tilt])
     rate = ahead.force_rate
-    turn = ca.dot(ca.fabs(car.arm) / ((car.arm[0] - car.arm[1]) * car.inertia), expected.curve.force)
+    turn = ca.dot(
+        ca.fabs(car.arm) / ((car.arm[0] - car.arm[1]) * car.inertia), expected.curve.force
+    )
     turn = ca.substitute(turn, symbol, z)
     late = (turn, GRAVITY * ca.dot(car.share, rate))
     kept, surprises = ca.vertsplit(z), []
@@ -317,10 +311,16 @@ def _corrected(
     return kept, factors, (surprises[0] + surprises[1]) / 2
 
 
+def _loosened(factors: Factors, z: list[Any], amount: Any, n: int) -> Factors:
+    """Return the factors where the road may be another one: each weight may change by its share."""
+    U, D = factors
+    of_curves = range(MOVING, MOVING + 2 * n)
+    return Factors(U, [d + amount * z[i] ** 2 if i in of_curves else d for i, d in enumerate(D)])
+
+
 def _bounded(
     ports: dict[str, Any],
     z: list[Any],
-    factors: Factors,
     bounds: BoundNumbers,
     limits: LearntLimits,
     n: int,
@@ -328,8 +328,8 @@ def _bounded(
     """Return z with what is learnt within its bounds."""
     kept = list(z)
     slope = ca.vertsplit(ports["rising"])
-    for first in (MOVING, MOVING + n):
-        P = {(i, j): entry(factors, first + i, first + j) for i, j in triangle(n)}
+    for axle, first in enumerate((MOVING, MOVING + n)):
+        P = dict(zip(triangle(n), ca.horzsplit(ports["metric"][axle, :]), strict=True))
         theta = [*z[first : first + n], 0, 0, 0]
         kept[first : first + n] = bounded(bounds, theta, P, offset=0, slope=slope)[:n]
     at = MOVING + 2 * n
@@ -341,20 +341,20 @@ def _bounded(
 
 
 def _afresh(
-    ports: dict[str, Any], trust: TrustNumbers, car: Car, gated: Gate, now: Sample, z: Any
-) -> tuple[Any, Factors]:
-    """Return z and factors of a filter that begins: the rear wheels roll where they point."""
-    q = z.numel()
+    ports: dict[str, Any],
+    trust: TrustNumbers,
+    car: Car,
+    gated: Gate,
+    now: Sample,
+    factors: Factors,
+) -> tuple[list[Any], Factors]:
+    """Return what moves, and factors, of a filter that begins: the rear wheels roll along."""
     sensors = ports["sensors"]
     r = gated.r - sensors[3]
-    v_y = gated.v_x * ca.tan(gated.delta[1]) - car.arm[1] * r
+    v_y = gated.v_x * gated.delta[1] - car.arm[1] * r
     alpha = gated.delta + ca.vertcat(sensors[2], 0) - ca.atan((v_y + car.arm * r) * (1 / now.v_x))
-    U, D = factors_of(ca.horzsplit(ports["UD"]), q)
     slip = trust.v_y / now.v_x**2
     missed = trust.error**2
-    start = [trust.v_y, trust.r, slip, slip, missed, missed, trust.bank, trust.bank_rate]
-    fresh = {(i, j): ca.SX(0) if i < MOVING else value for (i, j), value in U.items()}
-    return (
-        ca.vertcat(v_y, r, alpha, 0, 0, 0, 0, z[MOVING:]),
-        Factors(fresh, [*start, *D[MOVING:]]),
-    )
+    D = [trust.v_y, trust.r, slip, slip, missed, missed, trust.bank, trust.bank_rate]
+    U = {(i, j): ca.SX(0) if i < MOVING else value for (i, j), value in factors.U.items()}
+    return [v_y, r, *ca.vertsplit(alpha), *[ca.SX(0)] * 4], Factors(U, [*D, *factors.D[MOVING:]])
