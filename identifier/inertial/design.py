@@ -192,8 +192,7 @@ class InertialIdentifier(Method):
         size_ratio = math.sqrt(vehicle.wheelbase / 2.7)
         trust = self.trust.numbers(self.dt, vehicle.wheelbase, vehicle.froude_time)
         known = self.beliefs.covariance(n, P[:, : n + 1, : n + 1], size_ratio)
-        whole = np.eye(size(n)) * 1e-6
-        whole[MOVING:, MOVING:] = known
+        rest = len(triangle(size(n))) - len(triangle(size(n) - MOVING))
         axle = AxleIdentifier.for_vehicle(vehicle, dt=self.dt)
         return Setup(
             scan=_scan(doublings(self.ladder)),
@@ -202,7 +201,8 @@ class InertialIdentifier(Method):
                 "W": W,
                 "own": own[:, 0],
                 "sensors": sensors,
-                "UD": packed(whole[None]),
+                "UD": packed(known[None]),
+                "motion_UD": np.zeros(rest),  # begins with the first sample
                 "gate": np.zeros(len(GateState._fields)),
                 "body": np.zeros(2),
                 "heard": np.concatenate([np.zeros(4), trust[-2:]]),
@@ -292,18 +292,19 @@ class InertialIdentifier(Method):
 
         Parameters
         ----------
-        state : W (2, n), own (2,), sensors (5,), UD (1, q (q + 1)/2) and excitation (2, 9).
+        state : W (2, n), own (2,), sensors (5,), UD of both and excitation (2, 9).
         """
         n = len(self.ladder)
         prior = self.prior.covariance(vehicle, self.ladder)
         zero = float(np.ravel(state["sensors"])[SENSORS.index("steering")])
         own = np.zeros((2, 3))
         own[:, 0], own[0, 2] = np.ravel(state["own"]), zero
-        P, at, after = _covariance(state["UD"], size(n)), places(n), prior.copy()
+        P, at, after = _covariance(state["UD"], size(n) - MOVING), places(n), prior.copy()
         for i, (W, s) in enumerate((("W", "compliance"), ("W_rear", "compliance_rear"))):
-            rows = [*range(at[W], at[W] + n), at[s]]
+            rows = np.array([*range(at[W], at[W] + n), at[s]]) - MOVING
             after[i, : n + 1, : n + 1] = P[np.ix_(rows, rows)]
-        after[0, n + 2, n + 2] = P[at["steering"], at["steering"]]
+        zero_at = at["steering"] - MOVING
+        after[0, n + 2, n + 2] = P[zero_at, zero_at]
         return AxleModel(
             vehicle=vehicle,
             ladder=self.ladder,

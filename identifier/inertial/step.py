@@ -3,7 +3,8 @@
 An extended Kalman filter of everything at once: what moves and what is learnt, whose errors are
 correlated, so that v_y is corrected by what the curves are found to be and the other way round.
 Carried: motion (8,), W (2, n), own (2,) the compliances, sensors (5,) and UD the factors of the
-covariance of all of them, in the order of `identifier.inertial.motion`; gate as of the axle
+covariance of what is learnt, motion_UD those of what moves, in the order of
+`identifier.inertial.motion`; gate as of the axle
 identifier; body (2,), heard (6,), running (2,), excitation (2, 9).
 Sampled: x = [v_y, r], of which v_y is not read; u, v_x, a_y, NaN where there is none.
 """
@@ -40,13 +41,15 @@ from models.vehicle import GRAVITY
 
 OVER = ("x", "u", "v_x", "a_y")
 LEARNT = ("W", "own", "sensors")
-CARRY = ("motion", *LEARNT, "UD", "gate", "body", "heard", "running", "excitation")
+CARRY = ("motion", *LEARNT, "UD", "motion_UD", "gate", "body", "heard", "running", "excitation")
 OUTPUTS = ("axle_force", "v_y", "v_y_sd", "side_slip_observable")
 LOAD = "static axle loads"
 SENSORS = ("bias", "roll", "steering", "gyro", "inertia")
 MOST_SLIDING = 0.7  # |v_y|/v_x from which the filter begins anew
 MOST_NOISE = 9.0  # of the noise that is held for true, what one sample may show
 MOST_SURPRISE = 25.0  # one outlier alone is no alarm
+STIFFNESS = 2.0  # static loads/rad, the least that a corner is begun with
+DOUBTED = 0.7  # of the slip that a corner is begun with
 LEAST = 1e-12  # variance that is divided by
 
 PORTS = (
@@ -69,11 +72,12 @@ PORTS = (
     ),
     Port(
         "UD",
-        "of motion, W, own, sensors",
-        "covariance U D U' of motion, W, own and sensors: D, and U above it, by rows",
+        "of W, own, sensors",
+        "covariance U D U' of W, own and sensors: D, and U above it, by rows",
         learnt=True,
         rule=FACTORS,
     ),
+    Port("motion_UD", "of motion", "the rows of D and U that belong to motion, which stand first"),
     Port(
         "gate",
         "SI",
@@ -134,7 +138,8 @@ def build_step(steps: tuple[int, ...]) -> ca.Function:
         "W": ca.SX.sym("W", 2, n),
         "own": ca.SX.sym("own", 2),
         "sensors": ca.SX.sym("sensors", len(SENSORS)),
-        "UD": ca.SX.sym("UD", 1, len(triangle(q))),
+        "UD": ca.SX.sym("UD", 1, len(triangle(q - MOVING))),
+        "motion_UD": ca.SX.sym("motion_UD", 1, len(triangle(q)) - len(triangle(q - MOVING))),
     }
     ports["gate"], last = named_port(GateState, "gate")
     ports |= {name: ca.SX.sym(name, k) for name, k in (("body", 2), ("heard", 6), ("running", 2))}
@@ -180,7 +185,7 @@ def build_step(steps: tuple[int, ...]) -> ca.Function:
     )
     fast = ports["running"][1]
     fast = fast + trust.alarm_gain * (smaller(surprise, MOST_SURPRISE) - fast)
-    alarm = goes_on * within(fast * trust.per_alarm - 1, 0, 1)
+    alarm = goes_on * gated.learns * within(fast * trust.per_alarm - 1, 0, 1)
     factors = _loosened(factors, corrected, alarm * trust.inflation, n)
     corrected = _bounded(ports, corrected, bounds, limits, n)
 
@@ -194,19 +199,21 @@ def build_step(steps: tuple[int, ...]) -> ca.Function:
         a if a is b else ca.if_else(goes_on, a, b)
         for a, b in zip(row_of(factors), row_of(begun_factors), strict=True)
     ]
+    moving = ports["motion_UD"].numel()
     told = unknowns(ca.vertcat(*kept), n)
     tilt = ca.if_else(
         goes_on, ca.vertcat(ahead.tilt, ahead.tilt_rate), ca.vertcat(gated.v_x * told.r, 0)
     )
     seen_now = shown(car, laws, told, tilt[0], now, scales, steps)
-    variance = ca.if_else(runs, larger(entry(factors_of(after, q), 0, 0), 0), trust.v_y)
+    variance = larger(entry(factors_of(after, q), 0, 0), 0)
     size_of_slip = larger(ca.fabs(told.slip), ca.fabs(ahead.alpha))
     next_state = {
         "motion": ca.vertcat(*kept[:MOVING]),
         "W": told.W,
         "own": told.compliance,
         "sensors": ca.vertcat(*kept[-len(SENSORS) :]),
-        "UD": ca.horzcat(*after),
+        "UD": ca.horzcat(*after[moving:]),
+        "motion_UD": ca.horzcat(*after[:moving]),
         "gate": gated.state,
         "body": tilt,
         "heard": noise.heard,
@@ -244,9 +251,10 @@ def _noise(ports: dict[str, Any], trust: TrustNumbers, gated: Gate, goes_on: Any
     heard, a_y = ports["heard"], ports["a_y"]
     there = ca.logic_and(a_y == a_y, ca.fabs(a_y) < trust.surge)  # NaN is not NaN
     newest = [gated.r, ca.if_else(there, a_y, heard[1])]
+    good = gated.state[GateState._fields.index("bad")] == 0
     fresh, variance, state = [], [], []
     for i, y in enumerate(newest):
-        news = ca.logic_and(y != heard[i], goes_on)
+        news = ca.logic_and(ca.logic_and(y != heard[i], goes_on), good)
         second = y - 2 * heard[i] + heard[2 + i]
         old = heard[4 + i]
         shows = smaller(second**2 / 6, MOST_NOISE * old + LEAST)
@@ -266,7 +274,9 @@ def _propagated(
     missed = trust.error + trust.relative_error * ca.fabs(ahead.curve.force)
     e_f, e_r = ca.vertsplit(missed**2 * trust.renewed)
     Q = [None, trust.r_walk, None, None, e_f, e_r, None, trust.bank_walk]
-    return propagated(factors_of(ca.horzsplit(ports["UD"]), q), F, Q)
+    return propagated(
+        factors_of([*ca.horzsplit(ports["motion_UD"]), *ca.horzsplit(ports["UD"])], q), F, Q
+    )
 
 
 def _corrected(
@@ -348,13 +358,16 @@ def _afresh(
     now: Sample,
     factors: Factors,
 ) -> tuple[list[Any], Factors]:
-    """Return what moves, and factors, of a filter that begins: the rear wheels roll along."""
+    """Return what moves, and factors, of a filter that begins: in a steady corner."""
     sensors = ports["sensors"]
     r = gated.r - sensors[3]
-    v_y = gated.v_x * gated.delta[1] - car.arm[1] * r
+    stiffness = larger(ca.dot(ports["W"][1, :], ports["scales"]), STIFFNESS)
+    lean = smaller(ca.fabs(gated.v_x * r) / GRAVITY, 1) / stiffness * ca.sign(r)
+    v_y = gated.v_x * (gated.delta[1] - lean) - car.arm[1] * r
     alpha = gated.delta + ca.vertcat(sensors[2], 0) - ca.atan((v_y + car.arm * r) * (1 / now.v_x))
-    slip = trust.v_y / now.v_x**2
+    unsure = trust.v_y + (DOUBTED * gated.v_x * lean) ** 2
+    slip = unsure / now.v_x**2
     missed = trust.error**2
-    D = [trust.v_y, trust.r, slip, slip, missed, missed, trust.bank, trust.bank_rate]
+    D = [unsure, trust.r, slip, slip, missed, missed, trust.bank, trust.bank_rate]
     U = {(i, j): ca.SX(0) if i < MOVING else value for (i, j), value in factors.U.items()}
     return [v_y, r, *ca.vertsplit(alpha), *[ca.SX(0)] * 4], Factors(U, [*D, *factors.D[MOVING:]])
