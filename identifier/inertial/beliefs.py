@@ -83,6 +83,7 @@ class Trust:
     bank_time : in which a road banks [s].
     jerk : what pushes the yaw rate beside tires, as a random walk [(g/L)^(3/4)].
     r_error, a_y_error : what no noise explains of the yaw rate [rad/s] and of a_y [m/s²].
+    a_y_share : of a_y, what no noise explains of it beside that [-].
     r_noise, a_y_noise : first guess of the noise [rad/s], [m/s²], which is learnt from the signals.
     noise_samples : over which it is learnt [samples].
     lateness : by which the channels may differ in time [s].
@@ -108,10 +109,11 @@ class Trust:
     bank_time: float = 3.0
     jerk: float = 0.03
     r_error: float = 0.009
-    a_y_error: float = 0.4
-    r_noise: float = 0.005
-    a_y_noise: float = 0.2
-    noise_samples: float = 50.0
+    a_y_error: float = 0.2
+    a_y_share: float = 0.05
+    r_noise: float = 0.03
+    a_y_noise: float = 2.0
+    noise_samples: float = 100.0
     lateness: float = 0.015
     clip: float = 4.0
     alarm: float = 4.0
@@ -125,7 +127,7 @@ class Trust:
         require_positive_fields(self)
 
     def numbers(self, dt: float, wheelbase: float, froude_time: float) -> Array:
-        """Return the numbers of `TrustNumbers`, (21,).
+        """Return the numbers of `TrustNumbers`, (22,).
 
         Parameters
         ----------
@@ -149,6 +151,7 @@ class Trust:
                 (self.jerk / froude_time**1.5) ** 2 * dt,
                 (self.r_error / scale) ** 2,
                 self.a_y_error**2,
+                self.a_y_share**2,
                 1.0 / self.noise_samples,
                 self.lateness,
                 self.clip,
@@ -181,6 +184,7 @@ class TrustNumbers(NamedTuple):
     r_walk: Any
     r_error: Any
     a_y_error: Any
+    a_y_share: Any
     noise_gain: Any
     lateness: Any
     clip: Any

@@ -115,7 +115,6 @@ class InertialIdentifier(Method):
         return cls(
             prior=Prior(
                 friction=0.85,
-                sd_stiffness=0.3,
                 sd_shape=0.08,
                 compliance=0.025 * L,
                 sd_compliance=0.02 * L,

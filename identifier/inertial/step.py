@@ -304,7 +304,8 @@ def _corrected(
     turn = ca.substitute(turn, symbol, z)
     late = (turn, GRAVITY * ca.dot(car.share, rate))
     kept, surprises = ca.vertsplit(z), []
-    for i, error in enumerate((trust.r_error, trust.a_y_error)):
+    floors = (trust.r_error, trust.a_y_error + trust.a_y_share * ahead.tilt**2)
+    for i, error in enumerate(floors):
         drift = sum(
             H[i, j] * (kept[j] - z[j]) for j in range(len(kept)) if H.has_nz(i, j) and i > 0
         )
