@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.random_cars import (
     CLASSES,
@@ -29,7 +30,7 @@ from benchmarks.random_cars import (
     random_car,
     random_steering,
 )
-from benchmarks.recorded_cars import CARMAKER, DATA
+from benchmarks.recorded_cars import CARMAKER, DART, DATA
 from benchmarks.targets import Targets, keeps
 from codegen.arrays import Array
 from identifier.axle import AxleIdentifier
@@ -44,6 +45,8 @@ CARS = 200
 DRAWS = 60  # of a drive of one car, before another is drawn
 BANKS = (0.0, 2.0, 6.0)  # degrees
 SIGMAS = 2.0
+LATE = 6  # samples by which fresh numbers of the 1:10 car's own sensors are late
+BRISK = 1.0  # m/s, above which its side slip is judged
 CARMAKER_RUNS = ("slalom1_14_5ms", "experiment2_40kmh")
 
 
@@ -157,7 +160,7 @@ class SideSlip:
 
 
 def side_slip(
-    history: History, exact: Recording, where: Array | None = None, slowest: float = 0.3
+    history: History, exact: Recording, where: NDArray[np.bool_] | None = None, slowest: float = 0.3
 ) -> SideSlip:
     """Return how well v_y was told.
 
@@ -171,7 +174,7 @@ def side_slip(
     design = history.design
     assert isinstance(design, InertialIdentifier)
     runs = history.state["running"].reshape(-1, 2)[1:, 0] > 0.5
-    on = runs if where is None else runs & (where > 0)
+    on = runs if where is None else runs & where
     v_x = np.maximum(exact.v_x, slowest)[on]
     error = (history.outputs["v_y"].ravel() - exact.v_y)[on]
     sd = history.outputs["v_y_sd"].ravel()[on]
@@ -293,6 +296,74 @@ def carmaker(targets: Targets) -> None:
             targets.at_most(f"learnt on {learnt}, asked {asked}", ratio, 1.3, "-", key=key)
 
 
+def _own_sensors() -> dict[str, tuple[Recording, Recording]]:
+    """Return what the 1:10 car's own sensors and Vicon show of each run, by its name."""
+    table = np.genfromtxt(
+        DATA / "dart_imu.csv.gz", delimiter=",", names=True, dtype=None, encoding="utf-8"
+    )
+    found = {}
+    for name in dict.fromkeys(table["run"]):
+        run = table[table["run"] == name]
+        late = {key: np.append(run[key][LATE:], np.full(LATE, run[key][-1])) for key in OWN}
+        vicon = Recording(
+            name=str(name),
+            t=run["t"] - run["t"][0],
+            v_x=run["vx"],
+            v_y=run["vy"],
+            r=run["r"],
+            delta_f=run["delta_f"],
+            delta_r=np.zeros(len(run)),
+            a_y=run["ay"],
+            axle_force=np.column_stack((run["Fyf_inv"], run["Fyr_inv"])),
+        )
+        own = replace(
+            vicon, v_x=late["vx_encoder"], r=late["r_imu"], a_y=late["ay_imu"], axle_force=None
+        )
+        found[str(name)] = (own, vicon)
+    return found
+
+
+OWN = ("vx_encoder", "r_imu", "ay_imu")
+
+
+def dart(targets: Targets) -> None:
+    """Judge the real 1:10 car with its own sensors, which learn alone.
+
+    Parameters
+    ----------
+    targets : collects what is missed.
+    """
+    print("Real 1:10 car, encoder, IMU and steering: side slip above 1 m/s, frozen on other runs")
+    runs = _own_sensors()
+    ratios = []
+    for name, (own, vicon) in runs.items():
+        history = without_v_y(own, DART, (0.0, 0.0))
+        told = side_slip(history, vicon, vicon.v_x > BRISK)
+        given = learn(vicon, DART, AxleIdentifier.for_vehicle(DART))
+        models = (history.freeze(), given)
+        without, with_v_y = (
+            float(np.mean([frozen_error(m, v) for other, (_, v) in runs.items() if other != name]))
+            for m in models
+        )
+        ratios.append(without / with_v_y)
+        print(
+            f"  {name:24} {told.rms:.2f} of {told.true:.2f} deg, {100 * told.within:.0f} % within "
+            f"two sigma, frozen {100 * without:.0f} %, with Vicon {100 * with_v_y:.0f} %"
+        )
+        for key, value, unit in (
+            ("rms", told.rms, "deg"),
+            ("true", told.true, "deg"),
+            ("within", 100.0 * told.within, "%"),
+            ("force", 100.0 * without, "%"),
+            ("force_with_vicon", 100.0 * with_v_y, "%"),
+        ):
+            targets.record(f"dart/{name}/{key}", value, unit)
+    median = float(np.median(ratios))
+    targets.at_most(
+        "force over learning from Vicon, median of runs", median, 1.3, "-", key="dart/force"
+    )
+
+
 def main() -> int:
     """Print every table; return the exit code."""
     keep = keeps()
@@ -303,6 +374,7 @@ def main() -> int:
     random_drives(targets, options.cars)
     if DATA.is_dir():
         carmaker(targets)
+        dart(targets)
     else:
         print(f"recorded cars: skipped, there is no {DATA}")
     return targets.finish(keep=keep and options.cars == CARS)

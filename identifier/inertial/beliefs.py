@@ -88,7 +88,8 @@ class Trust:
     noise_samples : over which it is learnt [samples].
     lateness : by which the channels may differ in time [s].
     clip : standard deviations from which an innovation counts no more.
-    alarm : mean of ν²/S from which the road is taken for another one [-].
+    alarm : mean square of what curves miss, over its deviation, from which the road is taken for
+        another one [-]; from twice it on in full.
     alarm_time : of that mean [s].
     step, step_time : change of ln μ that may happen in that time then [-], [s].
     surge : largest acceleration [m/s²].
@@ -116,9 +117,9 @@ class Trust:
     noise_samples: float = 100.0
     lateness: float = 0.015
     clip: float = 4.0
-    alarm: float = 4.0
+    alarm: float = 0.4
     alarm_time: float = 0.2
-    step: float = 0.5
+    step: float = 0.7
     step_time: float = 0.3
     surge: float = 98.0
     observable: float = 0.01

@@ -205,7 +205,7 @@ class InertialIdentifier(Method):
                 "gate": np.zeros(len(GateState._fields)),
                 "body": np.zeros(2),
                 "heard": np.concatenate([np.zeros(4), trust[-2:]]),
-                "running": np.array([0.0, 1.0]),
+                "running": np.zeros(2),
                 "excitation": excitation,
             },
             constants={

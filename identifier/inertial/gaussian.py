@@ -59,8 +59,8 @@ def measured(
     R: Any,
     clip: Any,
     counts: Any,
-) -> tuple[list[Any], Factors, Any]:
-    """Return z, its factors, and ν²/S, after one number is measured.
+) -> tuple[list[Any], Factors]:
+    """Return z and its factors after one number is measured.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def measured(
     share = ca.if_else(surprise > clip**2, clip / ca.sqrt(surprise), 1)
     gain = counts * share * innovation * per_S
     moved = [one + along * gain for one, along in zip(z, direction.v, strict=True)]
-    return moved, updated(factors, direction, counts * (1 / R)), counts * surprise
+    return moved, updated(factors, direction, counts * (1 / R))
 
 
 def entry(factors: Factors, i: int, k: int) -> Any:

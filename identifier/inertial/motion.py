@@ -252,5 +252,5 @@ def shown(
     force = at.force * cosine(now.delta) + z.error
     turn, _ = _arms(car)
     a_y = GRAVITY * (ca.dot(car.share, force) + z.bias) + z.roll * tilt
-    a_y += laws.ahead * ca.dot(turn, force) - laws.aside * z.r**2
+    a_y += laws.ahead * (1 + z.inertia) * ca.dot(turn, force) - laws.aside * z.r**2
     return Shown(z.r + z.gyro, a_y, force, at)

@@ -47,7 +47,7 @@ LOAD = "static axle loads"
 SENSORS = ("bias", "roll", "steering", "gyro", "inertia")
 MOST_SLIDING = 0.7  # |v_y|/v_x from which the filter begins anew
 MOST_NOISE = 9.0  # of the noise that is held for true, what one sample may show
-MOST_SURPRISE = 25.0  # one outlier alone is no alarm
+MOST_MISSED = 25.0  # one outlier alone is no alarm
 STIFFNESS = 2.0  # static loads/rad, the least that a corner is begun with
 DOUBTED = 0.7  # of the slip that a corner is begun with
 LEAST = 1e-12  # variance that is divided by
@@ -90,7 +90,11 @@ PORTS = (
         "rad/s, m/s^2; squares",
         "newest r and a_y, those before, and variances of their noise",
     ),
-    Port("running", "-", "1 while the filter runs; mean of squared innovations over theirs"),
+    Port(
+        "running",
+        "-",
+        "1 while the filter runs; mean square of the missed force over its deviation",
+    ),
     Port(
         "excitation",
         "rad; s",
@@ -180,11 +184,12 @@ def build_step(steps: tuple[int, ...]) -> ca.Function:
     )
     factors = _propagated(ports, trust, ahead, z, q)
     ahead_z = ca.vertcat(ahead.moving, z[MOVING:])
-    corrected, factors, surprise = _corrected(
+    corrected, factors = _corrected(
         (car, laws, trust), ahead, ahead_z, factors, noise, now, scales, steps
     )
+    missed = smaller((ca.vertcat(*corrected[4:6]) / _missed(trust, ahead)) ** 2, MOST_MISSED)
     fast = ports["running"][1]
-    fast = fast + trust.alarm_gain * (smaller(surprise, MOST_SURPRISE) - fast)
+    fast = fast + trust.alarm_gain * ((missed[0] + missed[1]) / 2 - fast)
     alarm = goes_on * gated.learns * within(fast * trust.per_alarm - 1, 0, 1)
     factors = _loosened(factors, corrected, alarm * trust.inflation, n)
     corrected = _bounded(ports, corrected, bounds, limits, n)
@@ -217,7 +222,7 @@ def build_step(steps: tuple[int, ...]) -> ca.Function:
         "gate": gated.state,
         "body": tilt,
         "heard": noise.heard,
-        "running": ca.vertcat(ca.logic_and(runs, sane), ca.if_else(goes_on, fast, 1)),
+        "running": ca.vertcat(ca.logic_and(runs, sane), ca.if_else(goes_on, fast, 0)),
         "excitation": excited(
             ports["excitation"],
             size_of_slip,
@@ -266,13 +271,17 @@ def _noise(ports: dict[str, Any], trust: TrustNumbers, gated: Gate, goes_on: Any
     return Noise(fresh, variance, ca.vertcat(*now, *before, *variance))
 
 
+def _missed(trust: TrustNumbers, ahead: Predicted) -> Any:
+    """Return the standard deviation of what curves miss of a force (2,) [static axle loads]."""
+    return trust.error + trust.relative_error * ca.fabs(ahead.curve.force)
+
+
 def _propagated(
     ports: dict[str, Any], trust: TrustNumbers, ahead: Predicted, z: Any, q: int
 ) -> Factors:
     """Return the factors of the covariance a step later."""
     F = ca.jacobian(ahead.moving, z)
-    missed = trust.error + trust.relative_error * ca.fabs(ahead.curve.force)
-    e_f, e_r = ca.vertsplit(missed**2 * trust.renewed)
+    e_f, e_r = ca.vertsplit(_missed(trust, ahead) ** 2 * trust.renewed)
     Q = [None, trust.r_walk, None, None, e_f, e_r, None, trust.bank_walk]
     return propagated(
         factors_of([*ca.horzsplit(ports["motion_UD"]), *ca.horzsplit(ports["UD"])], q), F, Q
@@ -288,8 +297,8 @@ def _corrected(
     now: Sample,
     scales: Any,
     steps: tuple[int, ...],
-) -> tuple[list[Any], Factors, Any]:
-    """Return z and its factors after r and a_y of the sample, and the mean of ν²/S."""
+) -> tuple[list[Any], Factors]:
+    """Return z and its factors after r and a_y of the sample."""
     car, laws, trust = told
     n = len(steps) + 1
     symbol = ca.SX.sym("z", z.numel())
@@ -303,13 +312,13 @@ def _corrected(
     )
     turn = ca.substitute(turn, symbol, z)
     late = (turn, GRAVITY * ca.dot(car.share, rate))
-    kept, surprises = ca.vertsplit(z), []
+    kept = ca.vertsplit(z)
     floors = (trust.r_error, trust.a_y_error + trust.a_y_share * ahead.tilt**2)
     for i, error in enumerate(floors):
         drift = sum(
             H[i, j] * (kept[j] - z[j]) for j in range(len(kept)) if H.has_nz(i, j) and i > 0
         )
-        kept, factors, surprise = measured(
+        kept, factors = measured(
             kept,
             factors,
             H[i, :],
@@ -318,8 +327,7 @@ def _corrected(
             clip=trust.clip,
             counts=noise.fresh[i],
         )
-        surprises.append(ca.if_else(noise.fresh[i], surprise, 1))
-    return kept, factors, (surprises[0] + surprises[1]) / 2
+    return kept, factors
 
 
 def _loosened(factors: Factors, z: list[Any], amount: Any, n: int) -> Factors:
