@@ -17,7 +17,7 @@ from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.learning import Bounds
 from identifier.axle.model import AxleModel
 from identifier.axle.prior import Prior
-from identifier.axle.slip import SHORTEST, Sway
+from identifier.axle.slip import FASTEST, SHORTEST, Sway
 from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.inertial.beliefs import Beliefs, Trust
@@ -225,7 +225,7 @@ class InertialIdentifier(Method):
 
     def _laws(self, vehicle: Vehicle) -> Array:
         """Return the numbers of `Laws`."""
-        omega = self.roll_frequency / vehicle.froude_time
+        omega = self._sway(vehicle).frequency
         time = self.trust.bank_time
         return np.array(
             [
@@ -234,9 +234,15 @@ class InertialIdentifier(Method):
                 2.0 / time,
                 omega**2,
                 2.0 * self.roll_damping * omega,
+                self.prior.sway_share * omega**-2,
                 *self.sensor_position,
             ]
         )
+
+    def _sway(self, vehicle: Vehicle) -> Sway:
+        """Return the roll of a body of this size."""
+        omega = min(self.roll_frequency / vehicle.froude_time, 0.6 * FASTEST)
+        return Sway(frequency=omega, damping=self.roll_damping)
 
     def _limits(self) -> Array:
         """Return the numbers of `LearntLimits`."""
@@ -298,6 +304,7 @@ class InertialIdentifier(Method):
         zero = float(np.ravel(state["sensors"])[SENSORS.index("steering")])
         own = np.zeros((2, 3))
         own[:, 0], own[0, 2] = np.ravel(state["own"]), zero
+        own[:, 1] = self.prior.sway_share
         P, at, after = _covariance(state["UD"], size(n) - MOVING), places(n), prior.copy()
         for i, (W, s) in enumerate((("W", "compliance"), ("W_rear", "compliance_rear"))):
             rows = np.array([*range(at[W], at[W] + n), at[s]]) - MOVING
@@ -307,7 +314,7 @@ class InertialIdentifier(Method):
         return AxleModel(
             vehicle=vehicle,
             ladder=self.ladder,
-            sway=Sway.for_vehicle(vehicle),
+            sway=self._sway(vehicle),
             plausibility=self.plausibility,
             W=state["W"].copy(),
             own=own,

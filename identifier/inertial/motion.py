@@ -6,7 +6,8 @@ loads]; p sine of the bank, positive where it falls to the left, p' its rate [1/
 units, n each, s compliances [m]; b bias of the accelerometer [g], ρ roll of the body [rad per g],
 δ₀ zero of the steering [rad], b_r bias of the gyro [rad/s], κ excess of 1/I_z [-].
 
-f = φ(x) cos δ + e,   dx/dt = v_x/σ (α - x),   σ = s C(x),   α = δ + δ₀ - atan((v_y ± l r)/v_x),
+f = φ(x) cos δ + e,   dx/dt = v_x/σ (α - x),   σ = s C(x),
+α = δ + δ₀ - atan((v_y ± l r)/v_x) - k ä'/(ω² v_x), the last by the sway of the body, k told,
 dv_y/dt = g Σ share f - v_x r + g p,   dr/dt = (1 + κ)/I_z (l_f F_f - l_r F_r).
 Shown: r + b_r,  and  a_y = g Σ share f + ρ ä + g b + x_s dr/dt - y_s r²: ä [m/s²] is what the body
 rolls by, driven by the same forces, x_s and y_s where the accelerometer sits. A bank is in the
@@ -98,8 +99,9 @@ class Sample(NamedTuple):
 
 class Laws(NamedTuple):
     """What the motion obeys beside the car: decay of e over a step [-], stiffness and damping of
-    the bank [1/s²], [1/s]; stiffness and damping of the roll [1/s²], [1/s]; place of the
-    accelerometer before and left of the center of gravity [m].
+    the bank [1/s²], [1/s]; stiffness and damping of the roll [1/s²], [1/s]; share of its rate that
+    moves the contact patches, over the stiffness [s²]; place of the accelerometer before and left
+    of the center of gravity [m].
     """
 
     forgets: Any
@@ -107,6 +109,7 @@ class Laws(NamedTuple):
     bank_damping: Any
     roll_stiffness: Any
     roll_damping: Any
+    sway: Any
     ahead: Any
     aside: Any
 
@@ -189,8 +192,9 @@ def predicted(
     length = v_x * dt * (1 / sigma)
     e = ca.exp(-length)
     mean = (1 - e) * (1 / length)
-    was = slip_angle(car, before, z.v_y, z.r, z.steering)
-    held = slip_angle(car, now, z.v_y, z.r, z.steering)  # where v_y and r stayed as they are
+    sway = -laws.sway * tilt[1] * (1 / v_x)
+    was = slip_angle(car, before, z.v_y, z.r, z.steering) + sway
+    held = slip_angle(car, now, z.v_y, z.r, z.steering) + sway  # where v_y and r stayed as they are
     slip = e * z.slip + (mean - e) * was + (1 - mean) * held
     cos_delta = cosine(now.delta)
     force = (at.force + at.slope * (slip - z.slip) / 2) * cos_delta + z.error
@@ -205,7 +209,7 @@ def predicted(
     per = dt / (m11 * m22 - m12 * m21)
     v_y = z.v_y + (m22 * a - m12 * b) * per
     r = z.r + (m11 * b - m21 * a) * per
-    alpha = slip_angle(car, now, v_y, r, z.steering)
+    alpha = slip_angle(car, now, v_y, r, z.steering) + sway
     slip = e * z.slip + (mean - e) * was + (1 - mean) * alpha
     bank_rate = z.bank_rate - dt * (laws.bank_damping * z.bank_rate + laws.bank_stiffness * z.bank)
     rolling, rate = tilt

@@ -23,6 +23,7 @@ G, CAR, N = 9.81, sedan(), len(LADDER)
 STEPS = doublings(LADDER)
 SCALES = ca.SX(ca.DM(1.0 / np.array(LADDER)[None]))
 LAWS = {"bank_stiffness": 0.2, "bank_damping": 0.9, "roll_stiffness": 60.0, "roll_damping": 4.0}
+SWAY = 0.2 / LAWS["roll_stiffness"]  # s^2
 V_X, TURN = 20.0, 0.3  # m/s, rad/s of steering
 
 
@@ -45,7 +46,7 @@ def car():
 def laws(dt):
     """The error of the forces stays as it is, the accelerometer sits 0.4 m ahead and 0.2 aside."""
     del dt
-    return Laws(forgets=1.0, ahead=0.4, aside=0.2, **LAWS)
+    return Laws(forgets=1.0, sway=SWAY, ahead=0.4, aside=0.2, **LAWS)
 
 
 def stepped(z, tilt, t, dt):
@@ -77,6 +78,7 @@ def by_hand(z, tilt, t):
             -np.arctan((v_y - CAR.l_r * r) / V_X),
         ]
     )
+    alpha -= SWAY * tilt[1] / V_X
     force, slip_rate = np.zeros(2), np.zeros(2)
     for i, (x, W, s) in enumerate(((x_f, "W", "compliance"), (x_r, "W_rear", "compliance_rear"))):
         phi, slope = curve(x, z[at[W] : at[W] + N])

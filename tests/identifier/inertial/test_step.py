@@ -34,6 +34,7 @@ def compiled_model():
         bank_damping=2 / t.bank_time,
         roll_stiffness=omega**2,
         roll_damping=2 * METHOD.roll_damping * omega,
+        sway=METHOD.prior.sway_share / omega**2,
         ahead=0.3,
         aside=-0.1,
     )
