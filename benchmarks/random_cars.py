@@ -382,7 +382,7 @@ def random_drive(
     vehicle = car.vehicle
     for _ in range(DRAWS):
         speed = rng.uniform(2.6, 4.5) * vehicle.froude_speed
-        maneuver = _steering(car, speed, begin.lead, rng)
+        maneuver = random_steering(car, speed, begin.lead, rng)
         if maneuver is None:
             continue
         try:
@@ -400,10 +400,18 @@ def random_drive(
     raise PlantError(f"{DRAWS} drives of a {car.kind} did not excite both axles without a spin")
 
 
-def _steering(
+def random_steering(
     car: RandomCar, speed: float, lead: float, rng: np.random.Generator
 ) -> RandomSteer | None:
-    """Swings up to the grip, or None where the car would be unstable at that speed."""
+    """Return swings up to the grip, or None where the car would be unstable at that speed.
+
+    Parameters
+    ----------
+    car : that drives.
+    speed : in the corners [m/s].
+    lead : straight road before them [s].
+    rng : source of the swings.
+    """
     b, L = car.vehicle.bicycle, car.vehicle.wheelbase
     understeer = b.m * (b.l_r * b.C_r - b.l_f * b.C_f) / (b.C_f * b.C_r * L)  # rad s^2/m
     if L + 1.3**2 * understeer * speed**2 <= 0.0:

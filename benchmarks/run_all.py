@@ -26,6 +26,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "learn_and_extrapolate": [],
     "sensor_faults": [],
     "beginnings": [],
+    "inertial": [],
     "noisy_runs": [],
     "several_rates": [],
     "fault_table": ["{out}"],

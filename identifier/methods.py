@@ -22,6 +22,7 @@ from identifier.baselines import (
 from identifier.baselines.curves import CurveModel
 from identifier.certificate import Certificate
 from identifier.driving import Driving
+from identifier.inertial import InertialIdentifier
 from identifier.method import FORMAT, FrozenModelError, Method, require_alive
 from identifier.own_network import OnnxModel
 from identifier.paper.design import VARIANTS, PaperIdentifier
@@ -55,6 +56,7 @@ def _seedless(factory: Callable[[Vehicle], Method]) -> Factory:
 
 METHODS: Mapping[str, Factory] = {
     DEFAULT: _seedless(AxleIdentifier.for_vehicle),
+    "inertial": _seedless(InertialIdentifier.for_vehicle),
     **{law: _regression(law) for law in REGRESSIONS},
     **{law: _paper(law) for law in VARIANTS},
     "linear": _seedless(LinearBaseline.for_vehicle),

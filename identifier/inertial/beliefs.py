@@ -1,0 +1,198 @@
+"""What is believed before the car drives, and how far motion, road and sensors are trusted.
+
+Numbers of one `Beliefs` and one `Trust` hold for every car: what belongs to its size scales by
+Froude's rule when they become the inputs of the compiled step.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from codegen.arrays import Array
+from identifier.inertial.motion import MOVING, places, size
+from models.rules import require_positive_fields
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Beliefs:
+    """Means and standard deviations of what is learnt beside the curves, before the first sample.
+
+    Parameters
+    ----------
+    bias : of the accelerometer [g].
+    roll, sd_roll : of the body, outwards, as the accelerometer feels it [rad per g]; 0 and nearly 0
+        for an acceleration in the plane of the road.
+    steering : of the zero of the front steering [rad].
+    gyro : bias of the yaw rate, in a car with a wheelbase of 2.7 m [rad/s].
+    inertia : of 1/I_z [-].
+
+    Raises
+    ------
+    ValueError
+        Where a number is not positive.
+    """
+
+    bias: float = 0.015
+    roll: float = 0.06
+    sd_roll: float = 0.04
+    steering: float = 0.005
+    gyro: float = 0.002
+    inertia: float = 0.03
+
+    def __post_init__(self) -> None:
+        require_positive_fields(self)
+
+    def covariance(self, n: int, curves: Array, scale: float) -> Array:
+        """Return the covariance of what is learnt, (2 n + 7, 2 n + 7).
+
+        Parameters
+        ----------
+        n : number of units.
+        curves : of weights and compliance of both axles, (2, n + 1, n + 1).
+        scale : root of the wheelbase over 2.7 m [-].
+        """
+        P = np.zeros((size(n) - MOVING, size(n) - MOVING))
+        at = {name: place - MOVING for name, place in places(n).items()}
+        for i, (W, s) in enumerate((("W", "compliance"), ("W_rear", "compliance_rear"))):
+            rows = [*range(at[W], at[W] + n), at[s]]
+            P[np.ix_(rows, rows)] = curves[i]
+        for name, sd in (
+            ("bias", self.bias),
+            ("roll", self.sd_roll),
+            ("steering", self.steering),
+            ("gyro", self.gyro / scale),
+            ("inertia", self.inertia),
+        ):
+            P[at[name], at[name]] = sd**2
+        return P
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trust:
+    """How far motion, road and sensors are trusted; sensors as of a car with a wheelbase of 2.7 m.
+
+    Parameters
+    ----------
+    v_y : of v_y at the first sample and below the lowest speed of learning [sqrt(g L)].
+    r : of the yaw rate then [rad/s].
+    error, relative_error : what curves miss of a force [static axle loads], [-].
+    correlation_time : of that [s].
+    bank : sine of the bank of a road [-].
+    bank_time : in which a road banks [s].
+    jerk : what pushes the yaw rate beside tires, as a random walk [(g/L)^(3/4)].
+    r_error, a_y_error : what no noise explains of the yaw rate [rad/s] and of a_y [m/s²].
+    a_y_share : of a_y, what no noise explains of it beside that [-].
+    r_noise, a_y_noise : first guess of the noise [rad/s], [m/s²], which is learnt from the signals.
+    noise_samples : over which it is learnt [samples].
+    lateness : by which the channels may differ in time [s].
+    clip : standard deviations from which an innovation counts no more.
+    alarm : mean square of what curves miss, over its deviation, from which the road is taken for
+        another one [-]; from twice it on in full.
+    alarm_time : of that mean [s].
+    step, step_time : change of ln μ that may happen in that time then [-], [s].
+    surge : largest acceleration [m/s²].
+    observable : largest standard deviation of side slip that is told for observed [rad].
+
+    Raises
+    ------
+    ValueError
+        Where a number is not positive.
+    """
+
+    v_y: float = 0.017
+    r: float = 0.01
+    error: float = 0.01
+    relative_error: float = 0.08
+    correlation_time: float = 0.06
+    bank: float = 0.04
+    bank_time: float = 3.0
+    jerk: float = 0.03
+    r_error: float = 0.009
+    a_y_error: float = 0.2
+    a_y_share: float = 0.05
+    r_noise: float = 0.03
+    a_y_noise: float = 2.0
+    noise_samples: float = 100.0
+    lateness: float = 0.015
+    clip: float = 4.0
+    alarm: float = 0.4
+    alarm_time: float = 0.2
+    step: float = 0.7
+    step_time: float = 0.3
+    surge: float = 98.0
+    observable: float = 0.01
+
+    def __post_init__(self) -> None:
+        require_positive_fields(self)
+
+    def numbers(self, dt: float, wheelbase: float, froude_time: float) -> Array:
+        """Return the numbers of `TrustNumbers`, (22,).
+
+        Parameters
+        ----------
+        dt : sampling interval [s].
+        wheelbase : L [m].
+        froude_time : sqrt(L/g) [s].
+        """
+        scale = math.sqrt(wheelbase / 2.7)
+        speed = wheelbase / froude_time
+        kept = math.exp(-dt / self.correlation_time)
+        return np.array(
+            [
+                (self.v_y * speed) ** 2,
+                (self.r / scale) ** 2,
+                self.error,
+                self.relative_error,
+                1.0 - kept**2,
+                self.bank**2,
+                (self.bank / self.bank_time) ** 2,
+                4.0 * self.bank**2 * dt / self.bank_time**3,
+                (self.jerk / froude_time**1.5) ** 2 * dt,
+                (self.r_error / scale) ** 2,
+                self.a_y_error**2,
+                self.a_y_share**2,
+                1.0 / self.noise_samples,
+                self.lateness,
+                self.clip,
+                1.0 / self.alarm,
+                min(dt / self.alarm_time, 1.0),
+                dt * self.step**2 / self.step_time,
+                self.surge,
+                self.observable**2,
+                (self.r_noise / scale) ** 2,
+                self.a_y_noise**2,
+            ]
+        )
+
+
+class TrustNumbers(NamedTuple):
+    """Variances of v_y, r, bank and its rate at a start; what curves miss and what it gains in a
+    step; variances that bank rate and r gain in one; of r and a_y beside their noise; gain of the
+    noise; lateness; clip; 1/alarm and its gain; what an alarm adds; surge; variance of side slip
+    that is observed; variances of r and a_y at first.
+    """
+
+    v_y: Any
+    r: Any
+    error: Any
+    relative_error: Any
+    renewed: Any
+    bank: Any
+    bank_rate: Any
+    bank_walk: Any
+    r_walk: Any
+    r_error: Any
+    a_y_error: Any
+    a_y_share: Any
+    noise_gain: Any
+    lateness: Any
+    clip: Any
+    per_alarm: Any
+    alarm_gain: Any
+    inflation: Any
+    surge: Any
+    observable: Any
+    r_noise: Any
+    a_y_noise: Any

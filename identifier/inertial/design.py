@@ -1,0 +1,339 @@
+"""The inertial identifier as a method: everything that is chosen before the car drives."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+
+import numpy as np
+
+from codegen import Scan
+from codegen.arrays import Array
+from identifier.axle.car import car_numbers
+from identifier.axle.covariance import packed, triangle
+from identifier.axle.curve import EDGES, LADDER, doublings
+from identifier.axle.design import AxleIdentifier
+from identifier.axle.gate import GateState, Plausibility
+from identifier.axle.learning import Bounds
+from identifier.axle.model import AxleModel
+from identifier.axle.prior import Prior
+from identifier.axle.slip import FASTEST, SHORTEST, Sway
+from identifier.certificate import Certificate
+from identifier.driving import Driving
+from identifier.inertial.beliefs import Beliefs, Trust
+from identifier.inertial.motion import MOVING, places, size
+from identifier.inertial.step import CARRY, OVER, PORTS, SENSORS, build_step
+from identifier.method import OTHER_STRUCTURE, Method, Port, Reached, Setup, Track, resumed
+from identifier.tire_model import AXLES, TireModel
+from identifier.tuning import Range, ranges_around
+from models.rules import require_within
+from models.vehicle import Vehicle
+
+NEAR = 0.99  # of a bound, from which on a number rests at it
+LARGEST_ROLL = 0.5  # rad per g: softer, and a car falls over
+MOST = {"bias": 0.1, "roll": 0.3, "steering": 0.03, "gyro": 0.1, "inertia": 0.4}
+
+# What a search may vary of it, and what the number is multiplied and divided by.
+TUNED: Mapping[str, float] = {
+    "beliefs.roll": 3.0,
+    "beliefs.sd_roll": 3.0,
+    "trust.error": 3.0,
+    "trust.relative_error": 3.0,
+    "trust.correlation_time": 3.0,
+    "trust.bank": 3.0,
+    "trust.bank_time": 2.0,
+    "trust.jerk": 3.0,
+    "trust.r_error": 3.0,
+    "trust.a_y_error": 3.0,
+    "trust.lateness": 3.0,
+    "prior.sd_shape": 2.0,
+    "prior.sd_stiffness": 2.0,
+    "prior.sd_friction": 2.0,
+    "prior.compliance": 3.0,
+    "prior.sd_compliance": 3.0,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InertialIdentifier(Method):
+    """Axle curves and lateral velocity by one Kalman filter, from r, a_y, v_x and steering alone.
+
+    A recording's v_y is not read. What is learnt freezes to the same kind of model as that of the
+    axle identifier.
+
+    Parameters
+    ----------
+    prior : of curves and compliance, as of the axle identifier.
+    plausibility : which samples are believed, and the lowest speeds.
+    bounds : limits of curves and compliance.
+    beliefs : of sensors and inertia before the first sample.
+    trust : how far motion, road and sensors are trusted.
+    roll_frequency, roll_damping : of the body in a_y [sqrt(g/L)], [-].
+    sensor_position : of the accelerometer, before and left of the center of gravity [m].
+    ladder : slip scales of the units [rad], rising by powers of two.
+    dt : sampling interval T_s [s].
+
+    Raises
+    ------
+    ValueError
+        Where the ladder does not rise by powers of two, or a number is none of a car.
+    """
+
+    prior: Prior
+    plausibility: Plausibility
+    bounds: Bounds
+    beliefs: Beliefs = field(default_factory=Beliefs)
+    trust: Trust = field(default_factory=Trust)
+    roll_frequency: float = 6.0
+    roll_damping: float = 0.3
+    sensor_position: tuple[float, float] = (0.0, 0.0)
+    ladder: tuple[float, ...] = LADDER
+    dt: float = 0.01
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "ladder", tuple(self.ladder))  # a list would not hash
+        object.__setattr__(self, "sensor_position", tuple(self.sensor_position))
+        doublings(self.ladder)
+        if not 0.0 < self.dt < math.inf:
+            raise ValueError(f"dt must be positive, it is {self.dt}")
+        require_within(ValueError, 0.5, 100.0, roll_frequency=self.roll_frequency)
+        require_within(ValueError, 0.01, 10.0, roll_damping=self.roll_damping)
+        ahead, aside = self.sensor_position
+        require_within(ValueError, -20.0, 20.0, ahead=ahead, aside=aside)
+
+    @classmethod
+    def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> "InertialIdentifier":
+        """Return the design for a car: lengths scale with L, speeds with sqrt(g L) (Froude).
+
+        Parameters
+        ----------
+        vehicle : only its wheelbase is used here; its cornering stiffness enters the prior.
+        dt : sampling interval [s].
+        """
+        like = AxleIdentifier.for_vehicle(vehicle, dt=dt)
+        L, U = vehicle.wheelbase, vehicle.froude_speed
+        return cls(
+            prior=Prior(
+                friction=0.85,
+                sd_shape=0.08,
+                compliance=0.025 * L,
+                sd_compliance=0.02 * L,
+                sd_v_y=0.01 * U,
+            ),
+            plausibility=like.plausibility,
+            bounds=like.bounds,
+            dt=dt,
+        )
+
+    @property
+    def min_speed(self) -> float:
+        """Below this speed [m/s] forces read zero; learning rests below `learning_speed`."""
+        return self.plausibility.min_speed
+
+    @property
+    def remark(self) -> str:
+        """Say what it does without."""
+        return "without v_y, which it tells"
+
+    @property
+    def tunables(self) -> Mapping[str, Range]:
+        """What a search may vary, around the numbers that it has."""
+        return ranges_around(self, TUNED)
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """Outputs and state of its step, axle_force first."""
+        return PORTS
+
+    def certify(self, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
+        """Return what is proven of it: the boxes of what is learnt hold after every sample.
+
+        Parameters
+        ----------
+        vehicle : not looked at: the boxes are in static axle loads.
+        driving : not looked at: the boxes hold whatever is measured.
+        """
+        del vehicle, driving
+        b = self.bounds
+        return Certificate(
+            held={
+                "grip_static_axle_loads": [b.least_grip, b.most_grip],
+                "weight_static_axle_loads": [-b.weight, b.weight],
+                "stiffness_static_axle_loads_rad": [b.least_stiffness, b.most_stiffness],
+                "compliance_m": [0.0, b.compliance],
+                "roll_rad_per_g": [0.0, MOST["roll"]],
+                "steering_offset_rad": [-b.steering, b.steering],
+            }
+        )
+
+    def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
+        """Return what a run needs.
+
+        Parameters
+        ----------
+        vehicle : the car, as far as the identifier knows it.
+        start : stored weights to begin with, which know how sure they are; None takes the prior.
+
+        Raises
+        ------
+        ValueError
+            Where stored weights are those of another structure.
+        """
+        n = len(self.ladder)
+        W, own = self.prior.means(vehicle, self.ladder)
+        P = prior_P = self.prior.covariance(vehicle, self.ladder)
+        excitation = np.zeros((2, 1 + len(EDGES)))
+        sensors = np.array([0.0, self.beliefs.roll, 0.0, 0.0, 0.0])
+        if start is not None:
+            stored = resumed(start, AxleModel, OTHER_STRUCTURE, ladder=self.ladder)
+            W, own, P, excitation = stored.W, stored.own, stored.covariance, stored.excitation
+            sensors[SENSORS.index("steering")] = own[0, 2]
+        size_ratio = math.sqrt(vehicle.wheelbase / 2.7)
+        trust = self.trust.numbers(self.dt, vehicle.wheelbase, vehicle.froude_time)
+        known = self.beliefs.covariance(n, P[:, : n + 1, : n + 1], size_ratio)
+        rest = len(triangle(size(n))) - len(triangle(size(n) - MOVING))
+        axle = AxleIdentifier.for_vehicle(vehicle, dt=self.dt)
+        return Setup(
+            scan=_scan(doublings(self.ladder)),
+            carry={
+                "motion": np.zeros(MOVING),
+                "W": W,
+                "own": own[:, 0],
+                "sensors": sensors,
+                "UD": packed(known[None]),
+                "motion_UD": np.zeros(rest),  # begins with the first sample
+                "gate": np.zeros(len(GateState._fields)),
+                "body": np.zeros(2),
+                "heard": np.concatenate([np.zeros(4), trust[-2:]]),
+                "running": np.zeros(2),
+                "excitation": excitation,
+            },
+            constants={
+                "dt": np.array(self.dt),
+                "car": car_numbers(vehicle),
+                "scales": 1.0 / np.array(self.ladder)[None],
+                "plausibility": self.plausibility.numbers(),
+                "laws": self._laws(vehicle),
+                "trust": trust,
+                "learning_speed": np.array(self.plausibility.learning_speed),
+                "limits": self._limits(),
+                "bounds": axle._bound_numbers(),
+                "metric": np.array([one[np.triu_indices(n)] for one in prior_P[:, :n, :n]]),
+                **axle._rising(),
+            },
+        )
+
+    def _laws(self, vehicle: Vehicle) -> Array:
+        """Return the numbers of `Laws`."""
+        omega = self._sway(vehicle).frequency
+        time = self.trust.bank_time
+        return np.array(
+            [
+                math.exp(-self.dt / self.trust.correlation_time),
+                time**-2,
+                2.0 / time,
+                omega**2,
+                2.0 * self.roll_damping * omega,
+                self.prior.sway_share * omega**-2,
+                *self.sensor_position,
+            ]
+        )
+
+    def _sway(self, vehicle: Vehicle) -> Sway:
+        """Return the roll of a body of this size."""
+        omega = min(self.roll_frequency / vehicle.froude_time, 0.6 * FASTEST)
+        return Sway(frequency=omega, damping=self.roll_damping)
+
+    def _limits(self) -> Array:
+        """Return the numbers of `LearntLimits`."""
+        most = MOST | {"steering": self.bounds.steering}
+        return np.array([self.bounds.compliance, *(most[name] for name in SENSORS)])
+
+    def tracks(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Track, ...]:
+        """Return cornering stiffness, relaxation length, and the force that curves saturate at.
+
+        Parameters
+        ----------
+        state : W (k, 2, n) and own (k, 2) at each of k instants.
+        """
+        W, compliance = state["W"], state["own"].reshape(-1, 2)
+        slope = (W / np.array(self.ladder)).sum(axis=2)
+        lag = compliance * np.maximum(slope, 0.0) + SHORTEST * vehicle.wheelbase
+        return (
+            Track("cornering stiffness", "N/rad", slope * np.array(vehicle.axle_loads)),
+            Track("relaxation length", "m", lag),
+            Track("force at saturation", "static load", W.sum(axis=2)),
+        )
+
+    def reached(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Reached, ...]:
+        """Return stiffness, grip and zero of the steering that rest at their bounds.
+
+        Parameters
+        ----------
+        vehicle : not looked at: the bounds are in static axle loads.
+        state : W (2, n) and sensors (5,).
+        """
+        del vehicle
+        b, W = self.bounds, state["W"]
+        zero = float(np.ravel(state["sensors"])[SENSORS.index("steering")])
+        unseen = "no such curve was seen, or mass, signs or units are wrong"
+        listed = [
+            (abs(zero) > NEAR * b.steering,
+             Reached("front", "zero of the steering", zero, "rad", "a sensor is off", True)),
+        ]  # fmt: skip
+        slope = (W / np.array(self.ladder)).sum(axis=1)
+        for axle, level, steep in zip(AXLES, W.sum(axis=1), slope, strict=True):
+            listed += [
+                (not b.least_grip / NEAR <= level <= NEAR * b.most_grip,
+                 Reached(axle, "grip", float(level), "static loads", unseen, False)),
+                (not b.least_stiffness / NEAR <= steep <= NEAR * b.most_stiffness,
+                 Reached(axle, "cornering stiffness", float(steep), "static loads/rad", unseen,
+                         True)),
+            ]  # fmt: skip
+        return tuple(one for rests, one in listed if rests)
+
+    def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> AxleModel:
+        """Return the model with the carried weights.
+
+        Parameters
+        ----------
+        state : W (2, n), own (2,), sensors (5,), UD of both and excitation (2, 9).
+        """
+        n = len(self.ladder)
+        prior = self.prior.covariance(vehicle, self.ladder)
+        zero = float(np.ravel(state["sensors"])[SENSORS.index("steering")])
+        own = np.zeros((2, 3))
+        own[:, 0], own[0, 2] = np.ravel(state["own"]), zero
+        own[:, 1] = self.prior.sway_share
+        P, at, after = _covariance(state["UD"], size(n) - MOVING), places(n), prior.copy()
+        for i, (W, s) in enumerate((("W", "compliance"), ("W_rear", "compliance_rear"))):
+            rows = np.array([*range(at[W], at[W] + n), at[s]]) - MOVING
+            after[i, : n + 1, : n + 1] = P[np.ix_(rows, rows)]
+        zero_at = at["steering"] - MOVING
+        after[0, n + 2, n + 2] = P[zero_at, zero_at]
+        return AxleModel(
+            vehicle=vehicle,
+            ladder=self.ladder,
+            sway=self._sway(vehicle),
+            plausibility=self.plausibility,
+            W=state["W"].copy(),
+            own=own,
+            covariance=after,
+            prior_covariance=prior,
+            excitation=state["excitation"].copy(),
+        )
+
+
+def _covariance(row: Array, q: int) -> Array:
+    """Return P (q, q) of a row of factors."""
+    F = np.zeros((q, q))
+    F[tuple(np.array(triangle(q)).T)] = np.ravel(row)
+    D = np.diag(F).copy()
+    np.fill_diagonal(F, 1.0)
+    P: Array = (F * D) @ F.T
+    return 0.5 * (P + P.T)
+
+
+@cache
+def _scan(steps: tuple[int, ...]) -> Scan:
+    return Scan(build_step(steps), carry=CARRY, over=OVER)

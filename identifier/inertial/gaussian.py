@@ -1,0 +1,96 @@
+"""The covariance of z as factors P = U D U', through a step and through a measurement.
+
+z = [m; θ]: m moves by m⁺ = A m + B θ + w, θ stays. Because θ stands last, its factors stay as they
+are: U_mθ⁺ = A U_mθ + B U_θθ, and only the block of m is factored anew, by weighted Gram-Schmidt on
+the rows of [A U_mm, I] with the weights [D_m, Q] (C. L. Thornton; G. J. Bierman, Factorization
+Methods for Discrete Sequential Estimation, 1977, chapter 7.4). P stays positive semidefinite in any
+precision.
+"""
+
+from typing import Any
+
+import casadi as ca
+
+from identifier.axle.covariance import TINY, Factors, excited, updated
+
+
+def propagated(factors: Factors, F: Any, Q: list[Any]) -> Factors:
+    """Return the factors after m⁺ = F z + w.
+
+    Parameters
+    ----------
+    factors : of z, q entries.
+    F : Jacobian of what moves (m, q), sparse.
+    Q : variances of w, m entries; None where there is none.
+    """
+    U, D = factors
+    q, m = len(D), len(Q)
+
+    def times(i: int, k: int) -> Any:
+        """Row i of F U in column k."""
+        terms = [F[i, j] * U[j, k] for j in range(min(k, q)) if F.has_nz(i, j)]
+        return sum(terms, start=F[i, k] if F.has_nz(i, k) else ca.SX(0))
+
+    noisy = [i for i in range(m) if Q[i] is not None]
+    rows = [
+        [*(times(i, k) for k in range(m)), *(ca.SX(float(i == j)) for j in noisy)] for i in range(m)
+    ]
+    weights = [*D[:m], *(Q[i] for i in noisy)]
+    after = {
+        (i, k): times(i, k) if i < m else U[i, k] for i in range(q) for k in range(max(i + 1, m), q)
+    }
+    diagonal: list[Any] = [*D]
+    for j in reversed(range(m)):
+        weighted = [a * d for a, d in zip(rows[j], weights, strict=True)]
+        diagonal[j] = sum(a * b for a, b in zip(rows[j], weighted, strict=True))
+        per = 1 / (diagonal[j] + TINY)
+        for i in range(j):
+            after[i, j] = per * sum(a * b for a, b in zip(rows[i], weighted, strict=True))
+            rows[i] = [a - after[i, j] * b for a, b in zip(rows[i], rows[j], strict=True)]
+    return Factors(after, diagonal)
+
+
+def measured(
+    z: list[Any],
+    factors: Factors,
+    h: Any,
+    *,
+    innovation: Any,
+    R: Any,
+    clip: Any,
+    counts: Any,
+) -> tuple[list[Any], Factors]:
+    """Return z and its factors after one number is measured.
+
+    Parameters
+    ----------
+    z : before, q entries.
+    factors : of its covariance.
+    h : gradient of what is measured, (1, q), sparse.
+    innovation : ν, measured less expected.
+    R : variance of the measurement, positive.
+    clip : standard deviations from which an innovation counts no more than at them.
+    counts : 1 where there is a measurement, else 0.
+    """
+    row = [h[0, j] if h.has_nz(0, j) else ca.SX(0) for j in range(len(z))]
+    direction = excited(factors, row, 0)
+    per_S = 1 / (direction.a + R)
+    surprise = innovation**2 * per_S
+    share = ca.if_else(surprise > clip**2, clip / ca.sqrt(surprise), 1)
+    gain = counts * share * innovation * per_S
+    moved = [one + along * gain for one, along in zip(z, direction.v, strict=True)]
+    return moved, updated(factors, direction, counts * (1 / R))
+
+
+def entry(factors: Factors, i: int, k: int) -> Any:
+    """Return P at row i and column k.
+
+    Parameters
+    ----------
+    factors : P = U D U'.
+    i, k : place, from 0.
+    """
+    U, D = factors
+    i, k = min(i, k), max(i, k)
+    first = D[k] if i == k else U[i, k] * D[k]
+    return first + sum(U[i, j] * D[j] * U[k, j] for j in range(k + 1, len(D)))

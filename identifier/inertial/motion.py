@@ -1,0 +1,260 @@
+"""The car between two samples, and what its sensors should show: all that the filter predicts.
+
+z = [v_y, r, x_f, x_r, e_f, e_r, p, p'; w_f, w_r, s_f, s_r, b, ρ, δ₀, b_r, κ]: what moves, then what
+is learnt. v_y [m/s], r [rad/s]; x lagged slip [rad]; e what the curves miss of a force [static axle
+loads]; p sine of the bank, positive where it falls to the left, p' its rate [1/s]; w weights of the
+units, n each, s compliances [m]; b bias of the accelerometer [g], ρ roll of the body [rad per g],
+δ₀ zero of the steering [rad], b_r bias of the gyro [rad/s], κ excess of 1/I_z [-].
+
+f = φ(x) cos δ + e,   dx/dt = v_x/σ (α - x),   σ = s C(x),
+α = δ + δ₀ - atan((v_y ± l r)/v_x) - k ä'/(ω² v_x), the last by the sway of the body, k told,
+dv_y/dt = g Σ share f - v_x r + g p,   dr/dt = (1 + κ)/I_z (l_f F_f - l_r F_r).
+Shown: r + b_r,  and  a_y = g Σ share f + ρ ä + g b + x_s dr/dt - y_s r²: ä [m/s²] is what the body
+rolls by, driven by the same forces, x_s and y_s where the accelerometer sits. A bank is in the
+equation of v_y and not in a_y: an accelerometer feels what tires push.
+Everything is taken at the middle of the step: where forces and v_x r are half a sample apart, their
+difference is no v_y.
+"""
+
+from typing import Any, NamedTuple
+
+import casadi as ca
+
+from identifier.axle.car import Car, larger
+from identifier.axle.curve import Curve, curve
+from identifier.axle.slip import SHORTEST
+from models.vehicle import GRAVITY
+
+MOVING = 8  # entries of z before those that are learnt
+FIRST_COS = 24  # of the series of cos δ, 2e-5 off at 0.5 rad
+
+
+class Unknowns(NamedTuple):
+    """z by name: symbols or expressions; slip, error and compliance (2,), W (2, n)."""
+
+    v_y: Any
+    r: Any
+    slip: Any
+    error: Any
+    bank: Any
+    bank_rate: Any
+    W: Any
+    compliance: Any
+    bias: Any
+    roll: Any
+    steering: Any
+    gyro: Any
+    inertia: Any
+
+
+def size(n: int) -> int:
+    """Return how many entries z has for n units."""
+    return MOVING + 2 * n + 7
+
+
+def places(n: int) -> dict[str, int]:
+    """Return where in z each learnt number stands, by name; of W and compliance the first.
+
+    Parameters
+    ----------
+    n : number of units.
+    """
+    rest = MOVING + 2 * n
+    names = ("compliance", "compliance_rear", "bias", "roll", "steering", "gyro", "inertia")
+    return {"W": MOVING, "W_rear": MOVING + n} | {name: rest + i for i, name in enumerate(names)}
+
+
+def unknowns(z: Any, n: int) -> Unknowns:
+    """Return z by name.
+
+    Parameters
+    ----------
+    z : as above.
+    n : number of units.
+    """
+    m, k = MOVING, MOVING + 2 * n
+    return Unknowns(
+        v_y=z[0],
+        r=z[1],
+        slip=z[2:4],
+        error=z[4:6],
+        bank=z[6],
+        bank_rate=z[7],
+        W=ca.vertcat(z[m : m + n].T, z[m + n : k].T),
+        compliance=z[k : k + 2],
+        bias=z[k + 2],
+        roll=z[k + 3],
+        steering=z[k + 4],
+        gyro=z[k + 5],
+        inertia=z[k + 6],
+    )
+
+
+class Sample(NamedTuple):
+    """v_x [m/s] and δ (2,) [rad] at a sample."""
+
+    v_x: Any
+    delta: Any
+
+
+class Laws(NamedTuple):
+    """What the motion obeys beside the car: decay of e over a step [-], stiffness and damping of
+    the bank [1/s²], [1/s]; stiffness and damping of the roll [1/s²], [1/s]; share of its rate that
+    moves the contact patches, over the stiffness [s²]; place of the accelerometer before and left
+    of the center of gravity [m].
+    """
+
+    forgets: Any
+    bank_stiffness: Any
+    bank_damping: Any
+    roll_stiffness: Any
+    roll_damping: Any
+    sway: Any
+    ahead: Any
+    aside: Any
+
+
+class Predicted(NamedTuple):
+    """After a step: what moves (8,) of z, the slip α (2,) [rad] and the rolling body.
+
+    tilt, tilt_rate : ä [m/s²] and its rate [m/s³].   curve : at the slip before the step.
+    force_rate : of the lagged slip times the slope of the curve [1/s], (2,).
+    """
+
+    moving: Any
+    alpha: Any
+    tilt: Any
+    tilt_rate: Any
+    curve: Curve
+    force_rate: Any
+
+
+def _arms(car: Car) -> tuple[Any, Any]:
+    """Return what forces give of dr/dt [rad/s² per load], (2,), and the signed arms (2,) [m]."""
+    wheelbase = car.arm[0] - car.arm[1]
+    return ca.fabs(car.arm) / (wheelbase * car.inertia), car.arm
+
+
+def cosine(delta: Any) -> Any:
+    """Return cos δ, without a call.
+
+    Parameters
+    ----------
+    delta : steering [rad].
+    """
+    return 1 - delta**2 / 2 + delta**4 / FIRST_COS
+
+
+def slip_angle(car: Car, at: Sample, v_y: Any, r: Any, steering: Any) -> Any:
+    """Return α [rad], (2,).
+
+    Parameters
+    ----------
+    at : speed and steering.
+    v_y : [m/s].
+    r : yaw rate [rad/s].
+    steering : δ₀ [rad].
+    """
+    return at.delta + ca.vertcat(steering, 0) - ca.atan((v_y + car.arm * r) * (1 / at.v_x))
+
+
+def predicted(
+    car: Car,
+    laws: Laws,
+    dt: Any,
+    z: Unknowns,
+    tilt: tuple[Any, Any],
+    before: Sample,
+    now: Sample,
+    scales: Any,
+    steps: tuple[int, ...],
+) -> Predicted:
+    """Return the state a step later, linearly implicit in v_y and r: stable for any stiff tire.
+
+    Slip is exact for α linear over the step (first-order hold), forces and motion meet in the
+    middle of it.
+
+    Parameters
+    ----------
+    car : in units of its loads.
+    laws : of the rest.
+    dt : sampling interval [s].
+    z : before the step.
+    tilt : ä and its rate, before the step.
+    before : the sample before.
+    now : the sample to which the step leads.
+    scales : 1/α_j of the units [1/rad], (1, n).
+    steps : doublings between the units.
+    """
+    v_x = (before.v_x + now.v_x) / 2
+    at = curve(z.slip, z.W, scales, steps)
+    sigma = larger(z.compliance, 0) * at.carcass_slope + SHORTEST * (car.arm[0] - car.arm[1])
+    length = v_x * dt * (1 / sigma)
+    e = ca.exp(-length)
+    mean = (1 - e) * (1 / length)
+    sway = -laws.sway * tilt[1] * (1 / v_x)
+    was = slip_angle(car, before, z.v_y, z.r, z.steering) + sway
+    held = slip_angle(car, now, z.v_y, z.r, z.steering) + sway  # where v_y and r stayed as they are
+    slip = e * z.slip + (mean - e) * was + (1 - mean) * held
+    cos_delta = cosine(now.delta)
+    force = (at.force + at.slope * (slip - z.slip) / 2) * cos_delta + z.error
+    turn, arm = _arms(car)
+    turn = turn * (1 + z.inertia)
+    push = GRAVITY * car.share
+    pull = at.slope * cos_delta * (1 - mean) * (dt / (2 * v_x))  # force lost per change of v_y
+    a = ca.dot(push, force) - v_x * z.r + GRAVITY * z.bank
+    b = ca.dot(turn, force)
+    m11, m12 = 1 + ca.dot(push, pull), ca.dot(push * arm, pull) + dt * v_x / 2
+    m21, m22 = ca.dot(turn, pull), 1 + ca.dot(turn * arm, pull)
+    per = dt / (m11 * m22 - m12 * m21)
+    v_y = z.v_y + (m22 * a - m12 * b) * per
+    r = z.r + (m11 * b - m21 * a) * per
+    alpha = slip_angle(car, now, v_y, r, z.steering) + sway
+    slip = e * z.slip + (mean - e) * was + (1 - mean) * alpha
+    bank_rate = z.bank_rate - dt * (laws.bank_damping * z.bank_rate + laws.bank_stiffness * z.bank)
+    rolling, rate = tilt
+    rate = (rate + dt * laws.roll_stiffness * (ca.dot(push, force) - rolling)) / (
+        1 + dt * laws.roll_damping + dt**2 * laws.roll_stiffness
+    )
+    return Predicted(
+        moving=ca.vertcat(
+            v_y, r, slip, laws.forgets * z.error, z.bank + dt * z.bank_rate, bank_rate
+        ),
+        alpha=alpha,
+        tilt=rolling + dt * rate,
+        tilt_rate=rate,
+        curve=at,
+        force_rate=at.slope * (slip - z.slip) / dt,
+    )
+
+
+class Shown(NamedTuple):
+    """What gyro and accelerometer should show [rad/s], [m/s²]; forces (2,) [static axle loads]."""
+
+    r: Any
+    a_y: Any
+    force: Any
+    curve: Curve
+
+
+def shown(
+    car: Car, laws: Laws, z: Unknowns, tilt: Any, now: Sample, scales: Any, steps: tuple[int, ...]
+) -> Shown:
+    """Return what the sensors should show of a state.
+
+    Parameters
+    ----------
+    car : in units of its loads.
+    laws : of which the place of the accelerometer is read.
+    z : at the sample.
+    tilt : ä of the rolling body [m/s²].
+    now : the sample.
+    scales : 1/α_j of the units [1/rad], (1, n).
+    steps : doublings between the units.
+    """
+    at = curve(z.slip, z.W, scales, steps)
+    force = at.force * cosine(now.delta) + z.error
+    turn, _ = _arms(car)
+    a_y = GRAVITY * (ca.dot(car.share, force) + z.bias) + z.roll * tilt
+    a_y += laws.ahead * (1 + z.inertia) * ca.dot(turn, force) - laws.aside * z.r**2
+    return Shown(z.r + z.gyro, a_y, force, at)

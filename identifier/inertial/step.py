@@ -1,0 +1,382 @@
+"""The step of the inertial identifier: one casadi.Function that is simulation, test and C source.
+
+An extended Kalman filter of everything at once: what moves and what is learnt, whose errors are
+correlated, so that v_y is corrected by what the curves are found to be and the other way round.
+Carried: motion (8,), W (2, n), own (2,) the compliances, sensors (5,) and UD the factors of the
+covariance of what is learnt, motion_UD those of what moves, in the order of
+`identifier.inertial.motion`; gate as of the axle
+identifier; body (2,), heard (6,), running (2,), excitation (2, 9).
+Sampled: x = [v_y, r], of which v_y is not read; u, v_x, a_y, NaN where there is none.
+"""
+
+from typing import Any, NamedTuple
+
+import casadi as ca
+
+from identifier.axle.car import Car, axle_port, larger, named_port, smaller, within
+from identifier.axle.covariance import (
+    Factors,
+    factors_of,
+    row_of,
+    triangle,
+)
+from identifier.axle.curve import EDGES, excited
+from identifier.axle.gate import Gate, GateState, gate
+from identifier.axle.learning import BoundNumbers, bounded
+from identifier.axle.step import PLAUSIBILITY
+from identifier.inertial.beliefs import TrustNumbers
+from identifier.inertial.gaussian import entry, measured, propagated
+from identifier.inertial.motion import (
+    MOVING,
+    Laws,
+    Predicted,
+    Sample,
+    predicted,
+    shown,
+    size,
+    unknowns,
+)
+from identifier.method import AXLE_FORCE, FACTORS, NOT_NEGATIVE, Port
+from models.vehicle import GRAVITY
+
+OVER = ("x", "u", "v_x", "a_y")
+LEARNT = ("W", "own", "sensors")
+CARRY = ("motion", *LEARNT, "UD", "motion_UD", "gate", "body", "heard", "running", "excitation")
+OUTPUTS = ("axle_force", "v_y", "v_y_sd", "side_slip_observable")
+LOAD = "static axle loads"
+SENSORS = ("bias", "roll", "steering", "gyro", "inertia")
+MOST_SLIDING = 0.7  # |v_y|/v_x from which the filter begins anew
+MOST_NOISE = 9.0  # of the noise that is held for true, what one sample may show
+MOST_MISSED = 25.0  # one outlier alone is no alarm
+STIFFNESS = 2.0  # static loads/rad, the least that a corner is begun with
+DOUBTED = 0.7  # of the slip that a corner is begun with
+LEAST = 1e-12  # variance that is divided by
+
+PORTS = (
+    AXLE_FORCE,
+    Port("v_y", "m/s", "lateral velocity at the center of gravity, positive to the left"),
+    Port("v_y_sd", "m/s", "standard deviation of v_y"),
+    Port("side_slip_observable", "-", "1 where side slip is known well enough now, else 0"),
+    Port(
+        "motion",
+        "m/s; rad/s; rad; static axle loads; -; 1/s",
+        "v_y, r, lagged slip and missed force front and rear, sine of the bank and its rate",
+    ),
+    Port("W", LOAD, "weights of the units, rows front and rear", learnt=True),
+    Port("own", "m per load", "compliance, front and rear", learnt=True),
+    Port(
+        "sensors",
+        "g; rad per g; rad; rad/s; -",
+        "bias of a_y, roll of the body, zero of the steering, bias of r, excess of 1/I_z",
+        learnt=True,
+    ),
+    Port(
+        "UD",
+        "of W, own, sensors",
+        "covariance U D U' of W, own and sensors: D, and U above it, by rows",
+        learnt=True,
+        rule=FACTORS,
+    ),
+    Port("motion_UD", "of motion", "the rows of D and U that belong to motion, which stand first"),
+    Port(
+        "gate",
+        "SI",
+        "last good v_x, v_y, r, delta_f, delta_r; on; time of steady learning; bad and stuck "
+        "samples in a row",
+    ),
+    Port("body", "m/s^2; m/s^3", "motion of the rolling body and its rate"),
+    Port(
+        "heard",
+        "rad/s, m/s^2; squares",
+        "newest r and a_y, those before, and variances of their noise",
+    ),
+    Port(
+        "running",
+        "-",
+        "1 while the filter runs; mean square of the missed force over its deviation",
+    ),
+    Port(
+        "excitation",
+        "rad; s",
+        "largest slip, then time of learning above each edge, per axle",
+        learnt=True,
+        rule=NOT_NEGATIVE,
+    ),
+)
+
+
+class LearntLimits(NamedTuple):
+    """Of compliance [m], bias [g], roll [rad per g], steering [rad], gyro [rad/s], inertia [-]."""
+
+    compliance: Any
+    bias: Any
+    roll: Any
+    steering: Any
+    gyro: Any
+    inertia: Any
+
+
+class Noise(NamedTuple):
+    """What the channels tell of themselves: which are fresh, variances of noise, what is carried.
+
+    fresh : 1 where a number is there and not the one of the sample before, (2,).
+    variance : of noise [rad²/s², m²/s⁴], (2,).   heard : next state (6,).
+    """
+
+    fresh: list[Any]
+    variance: list[Any]
+    heard: Any
+
+
+def build_step(steps: tuple[int, ...]) -> ca.Function:
+    """Return the step; every number stays an input of it.
+
+    Parameters
+    ----------
+    steps : doublings between the units.
+    """
+    n = len(steps) + 1
+    q = size(n)
+    ports: dict[str, Any] = {
+        "motion": ca.SX.sym("motion", MOVING),
+        "W": ca.SX.sym("W", 2, n),
+        "own": ca.SX.sym("own", 2),
+        "sensors": ca.SX.sym("sensors", len(SENSORS)),
+        "UD": ca.SX.sym("UD", 1, len(triangle(q - MOVING))),
+        "motion_UD": ca.SX.sym("motion_UD", 1, len(triangle(q)) - len(triangle(q - MOVING))),
+    }
+    ports["gate"], last = named_port(GateState, "gate")
+    ports |= {name: ca.SX.sym(name, k) for name, k in (("body", 2), ("heard", 6), ("running", 2))}
+    ports["excitation"] = ca.SX.sym("excitation", 2, 1 + len(EDGES))
+    ports |= {name: ca.SX.sym(name, k) for name, k in (("x", 2), ("u", 2), ("v_x", 1), ("a_y", 1))}
+    ports["dt"] = dt = ca.SX.sym("dt")
+    ports["car"], car = axle_port(Car, "car")
+    ports["scales"] = scales = ca.SX.sym("scales", 1, n)
+    ports["plausibility"] = ca.SX.sym("plausibility", PLAUSIBILITY)
+    ports["laws"], laws = named_port(Laws, "laws")
+    ports["trust"], trust = named_port(TrustNumbers, "trust")
+    ports["learning_speed"] = slowest = ca.SX.sym("learning_speed")
+    ports["limits"], limits = named_port(LearntLimits, "limits")
+    ports["bounds"], bounds = named_port(BoundNumbers, "bounds")
+    ports["rising"] = ca.SX.sym("rising", n)
+    ports["metric"] = ca.SX.sym("metric", 2, len(triangle(n)))
+
+    seen = ca.vertcat(0, ports["x"][1])  # v_y is not looked at
+    gated = gate(ports["plausibility"], dt, last, seen, ports["u"], ports["v_x"])
+    runs = ca.logic_and(gated.on, gated.v_x >= slowest)
+    goes_on = ca.logic_and(runs, ports["running"][0] > 0.5)
+    noise = _noise(ports, trust, gated, goes_on)
+    z = ca.vertcat(
+        ports["motion"], ports["W"][0, :].T, ports["W"][1, :].T, ports["own"], ports["sensors"]
+    )
+    now = Sample(larger(gated.v_x, slowest), gated.delta)
+    before = Sample(larger(last.v_x, slowest), ca.vertcat(last.delta_f, last.delta_r))
+    ahead = predicted(
+        car,
+        laws,
+        dt,
+        unknowns(z, n),
+        (ports["body"][0], ports["body"][1]),
+        before,
+        now,
+        scales,
+        steps,
+    )
+    factors = _propagated(ports, trust, ahead, z, q)
+    ahead_z = ca.vertcat(ahead.moving, z[MOVING:])
+    corrected, factors = _corrected(
+        (car, laws, trust), ahead, ahead_z, factors, noise, now, scales, steps
+    )
+    missed = smaller((ca.vertcat(*corrected[4:6]) / _missed(trust, ahead)) ** 2, MOST_MISSED)
+    fast = ports["running"][1]
+    fast = fast + trust.alarm_gain * ((missed[0] + missed[1]) / 2 - fast)
+    alarm = goes_on * gated.learns * within(fast * trust.per_alarm - 1, 0, 1)
+    factors = _loosened(factors, corrected, alarm * trust.inflation, n)
+    corrected = _bounded(ports, corrected, bounds, limits, n)
+
+    sane = ca.fabs(corrected[0]) < MOST_SLIDING * now.v_x  # else it begins anew, a sample later
+    begun, begun_factors = _afresh(ports, trust, car, gated, now, factors)
+    kept = [
+        *(ca.if_else(goes_on, a, b) for a, b in zip(corrected[:MOVING], begun, strict=True)),
+        *corrected[MOVING:],  # which are not moved unless the filter goes on
+    ]
+    after = [
+        a if a is b else ca.if_else(goes_on, a, b)
+        for a, b in zip(row_of(factors), row_of(begun_factors), strict=True)
+    ]
+    moving = ports["motion_UD"].numel()
+    told = unknowns(ca.vertcat(*kept), n)
+    tilt = ca.if_else(
+        goes_on, ca.vertcat(ahead.tilt, ahead.tilt_rate), ca.vertcat(gated.v_x * told.r, 0)
+    )
+    seen_now = shown(car, laws, told, tilt[0], now, scales, steps)
+    variance = larger(entry(factors_of(after, q), 0, 0), 0)
+    size_of_slip = larger(ca.fabs(told.slip), ca.fabs(ahead.alpha))
+    next_state = {
+        "motion": ca.vertcat(*kept[:MOVING]),
+        "W": told.W,
+        "own": told.compliance,
+        "sensors": ca.vertcat(*kept[-len(SENSORS) :]),
+        "UD": ca.horzcat(*after[moving:]),
+        "motion_UD": ca.horzcat(*after[:moving]),
+        "gate": gated.state,
+        "body": tilt,
+        "heard": noise.heard,
+        "running": ca.vertcat(ca.logic_and(runs, sane), ca.if_else(goes_on, fast, 0)),
+        "excitation": excited(
+            ports["excitation"],
+            size_of_slip,
+            dt=dt,
+            samples=10,
+            learns=ca.logic_and(goes_on, gated.learns) * ca.SX.ones(2),
+        ),
+    }
+    return ca.Function(
+        "_".join(["inertial_step", *map(str, steps)]),
+        list(ports.values()),
+        [
+            *(ca.densify(next_state[name]) for name in CARRY),
+            ca.if_else(gated.on, seen_now.force * car.load, 0),
+            ca.if_else(gated.on, told.v_y, 0),
+            ca.sqrt(variance),
+            ca.logic_and(runs, variance < trust.observable * now.v_x**2),
+        ],
+        list(ports),
+        [*(f"{name}_next" for name in CARRY), *OUTPUTS],
+        {"cse": True},
+    )
+
+
+def _noise(ports: dict[str, Any], trust: TrustNumbers, gated: Gate, goes_on: Any) -> Noise:
+    """Return what is new of r and a_y, and how noisy they are.
+
+    A sensor that is slower than the log repeats its number: that is no news. Second differences of
+    news show noise and next to nothing of a car: their mean square is six variances.
+    """
+    heard, a_y = ports["heard"], ports["a_y"]
+    there = ca.logic_and(a_y == a_y, ca.fabs(a_y) < trust.surge)  # NaN is not NaN
+    newest = [gated.r, ca.if_else(there, a_y, heard[1])]
+    good = gated.state[GateState._fields.index("bad")] == 0
+    fresh, variance, state = [], [], []
+    for i, y in enumerate(newest):
+        news = ca.logic_and(ca.logic_and(y != heard[i], goes_on), good)
+        second = y - 2 * heard[i] + heard[2 + i]
+        old = heard[4 + i]
+        shows = smaller(second**2 / 6, MOST_NOISE * old + LEAST)
+        variance.append(ca.if_else(news, old + trust.noise_gain * (shows - old), old))
+        fresh.append(news)
+        before = ca.if_else(news, heard[i], heard[2 + i])
+        state.append((y, ca.if_else(goes_on, before, y)))
+    now, before = zip(*state, strict=True)
+    return Noise(fresh, variance, ca.vertcat(*now, *before, *variance))
+
+
+def _missed(trust: TrustNumbers, ahead: Predicted) -> Any:
+    """Return the standard deviation of what curves miss of a force (2,) [static axle loads]."""
+    return trust.error + trust.relative_error * ca.fabs(ahead.curve.force)
+
+
+def _propagated(
+    ports: dict[str, Any], trust: TrustNumbers, ahead: Predicted, z: Any, q: int
+) -> Factors:
+    """Return the factors of the covariance a step later."""
+    F = ca.jacobian(ahead.moving, z)
+    e_f, e_r = ca.vertsplit(_missed(trust, ahead) ** 2 * trust.renewed)
+    Q = [None, trust.r_walk, None, None, e_f, e_r, None, trust.bank_walk]
+    return propagated(
+        factors_of([*ca.horzsplit(ports["motion_UD"]), *ca.horzsplit(ports["UD"])], q), F, Q
+    )
+
+
+def _corrected(
+    told: tuple[Car, Laws, TrustNumbers],
+    ahead: Predicted,
+    z: Any,
+    factors: Factors,
+    noise: Noise,
+    now: Sample,
+    scales: Any,
+    steps: tuple[int, ...],
+) -> tuple[list[Any], Factors]:
+    """Return z and its factors after r and a_y of the sample."""
+    car, laws, trust = told
+    n = len(steps) + 1
+    symbol = ca.SX.sym("z", z.numel())
+    tilt = ca.SX.sym("tilt")
+    expected = shown(car, laws, unknowns(symbol, n), tilt, now, scales, steps)
+    y = ca.vertcat(expected.r, expected.a_y)
+    y, H = ca.substitute([y, ca.jacobian(y, symbol)], [symbol, tilt], [z, ahead.tilt])
+    rate = ahead.force_rate
+    turn = ca.dot(
+        ca.fabs(car.arm) / ((car.arm[0] - car.arm[1]) * car.inertia), expected.curve.force
+    )
+    turn = ca.substitute(turn, symbol, z)
+    late = (turn, GRAVITY * ca.dot(car.share, rate))
+    kept = ca.vertsplit(z)
+    floors = (trust.r_error, trust.a_y_error + trust.a_y_share * ahead.tilt**2)
+    for i, error in enumerate(floors):
+        drift = sum(
+            H[i, j] * (kept[j] - z[j]) for j in range(len(kept)) if H.has_nz(i, j) and i > 0
+        )
+        kept, factors = measured(
+            kept,
+            factors,
+            H[i, :],
+            innovation=noise.heard[i] - y[i] - drift,
+            R=error + noise.variance[i] + (trust.lateness * late[i]) ** 2,
+            clip=trust.clip,
+            counts=noise.fresh[i],
+        )
+    return kept, factors
+
+
+def _loosened(factors: Factors, z: list[Any], amount: Any, n: int) -> Factors:
+    """Return the factors where the road may be another one: each weight may change by its share."""
+    U, D = factors
+    of_curves = range(MOVING, MOVING + 2 * n)
+    return Factors(U, [d + amount * z[i] ** 2 if i in of_curves else d for i, d in enumerate(D)])
+
+
+def _bounded(
+    ports: dict[str, Any],
+    z: list[Any],
+    bounds: BoundNumbers,
+    limits: LearntLimits,
+    n: int,
+) -> list[Any]:
+    """Return z with what is learnt within its bounds."""
+    kept = list(z)
+    slope = ca.vertsplit(ports["rising"])
+    for axle, first in enumerate((MOVING, MOVING + n)):
+        P = dict(zip(triangle(n), ca.horzsplit(ports["metric"][axle, :]), strict=True))
+        theta = [*z[first : first + n], 0, 0, 0]
+        kept[first : first + n] = bounded(bounds, theta, P, offset=0, slope=slope)[:n]
+    at = MOVING + 2 * n
+    for i in (at, at + 1):
+        kept[i] = within(z[i], 0, limits.compliance)
+    for i, (name, most) in enumerate(zip(SENSORS, limits[1:], strict=True), start=at + 2):
+        kept[i] = within(z[i], 0 if name == "roll" else -most, most)
+    return kept
+
+
+def _afresh(
+    ports: dict[str, Any],
+    trust: TrustNumbers,
+    car: Car,
+    gated: Gate,
+    now: Sample,
+    factors: Factors,
+) -> tuple[list[Any], Factors]:
+    """Return what moves, and factors, of a filter that begins: in a steady corner."""
+    sensors = ports["sensors"]
+    r = gated.r - sensors[3]
+    stiffness = larger(ca.dot(ports["W"][1, :], ports["scales"]), STIFFNESS)
+    lean = smaller(ca.fabs(gated.v_x * r) / GRAVITY, 1) / stiffness * ca.sign(r)
+    v_y = gated.v_x * (gated.delta[1] - lean) - car.arm[1] * r
+    alpha = gated.delta + ca.vertcat(sensors[2], 0) - ca.atan((v_y + car.arm * r) * (1 / now.v_x))
+    unsure = trust.v_y + (DOUBTED * gated.v_x * lean) ** 2
+    slip = unsure / now.v_x**2
+    missed = trust.error**2
+    D = [unsure, trust.r, slip, slip, missed, missed, trust.bank, trust.bank_rate]
+    U = {(i, j): ca.SX(0) if i < MOVING else value for (i, j), value in factors.U.items()}
+    return [v_y, r, *ca.vertsplit(alpha), *[ca.SX(0)] * 4], Factors(U, [*D, *factors.D[MOVING:]])

@@ -1,0 +1,110 @@
+"""Factors of the covariance against dense matrices of numpy."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from identifier.axle.covariance import factors_of, packed, row_of, triangle
+from identifier.inertial.gaussian import entry, measured, propagated
+
+Q, MOVES = 6, 3
+
+
+@pytest.fixture
+def P(rng):
+    A = rng.normal(size=(Q, Q))
+    return A @ A.T
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(4)
+
+
+def evaluate(row, P, extra=()):
+    """Numbers of an expression of factors, at the factors of P."""
+    make, symbols, values = row, ca.SX.sym("UD", len(triangle(Q))), packed(P[None])[0]
+    return np.array(ca.Function("f", [symbols], [make(ca.vertsplit(symbols))])(values)).squeeze()
+
+
+def dense(row):
+    F = np.zeros((Q, Q))
+    F[tuple(np.array(triangle(Q)).T)] = row
+    D = np.diag(F).copy()
+    np.fill_diagonal(F, 1.0)
+    return (F * D) @ F.T
+
+
+def test_a_step_gives_f_p_f_plus_q(P, rng):
+    F = rng.normal(size=(MOVES, Q))
+    F[1, 2] = F[2, 4] = 0.0
+    whole = np.vstack([F, np.hstack([np.zeros((Q - MOVES, MOVES)), np.eye(Q - MOVES)])])
+    noise = np.array([0.0, 0.4, 1.3])
+
+    def after(symbols):
+        sparse = ca.sparsify(ca.SX(ca.DM(F)))
+        stepped = propagated(factors_of(symbols, Q), sparse, [None, *map(ca.SX, noise[1:])])
+        return ca.vertcat(*row_of(stepped))
+
+    expected = whole @ P @ whole.T + np.diag([*noise, 0, 0, 0])
+    np.testing.assert_allclose(dense(evaluate(after, P)), expected, rtol=1e-10, atol=1e-10)
+
+
+def test_what_is_learnt_keeps_the_bits_of_its_factors_over_a_step(P, rng):
+    F = ca.SX(ca.DM(rng.normal(size=(MOVES, Q))))
+
+    def after(symbols):
+        stepped = propagated(factors_of(symbols, Q), F, [None, ca.SX(1), None])
+        return ca.vertcat(*row_of(stepped))
+
+    learnt = [place for place, (i, _) in enumerate(triangle(Q)) if i >= MOVES]
+    np.testing.assert_array_equal(evaluate(after, P)[learnt], packed(P[None])[0][learnt])
+
+
+def corrected(P, h, *, innovation=0.7, R=0.3, clip=100.0, counts=1):
+    """z and P after a measurement that begins at z = 0."""
+
+    def after(symbols):
+        z, factors = measured(
+            [ca.SX(0)] * Q,
+            factors_of(symbols, Q),
+            ca.sparsify(ca.SX(ca.DM(h[None]))),
+            innovation=innovation,
+            R=R,
+            clip=clip,
+            counts=counts,
+        )
+        return ca.vertcat(*z, *row_of(factors))
+
+    found = evaluate(after, P)
+    return found[:Q], dense(found[Q:])
+
+
+def test_a_measurement_is_that_of_the_textbook(P, rng):
+    h = rng.normal(size=Q)
+    h[2] = 0.0
+    z, after = corrected(P, h)
+    S = h @ P @ h + 0.3
+    np.testing.assert_allclose(z, P @ h / S * 0.7, rtol=1e-10)
+    np.testing.assert_allclose(after, P - np.outer(P @ h, h @ P) / S, rtol=1e-8, atol=1e-10)
+
+
+def test_a_surprise_moves_no_further_than_the_clip(P, rng):
+    h = rng.normal(size=Q)
+    S = h @ P @ h + 0.3
+    far, _ = corrected(P, h, innovation=50 * np.sqrt(S), clip=4.0)
+    np.testing.assert_allclose(far, 4 * P @ h / np.sqrt(S), rtol=1e-10)
+
+
+def test_without_a_measurement_every_bit_stays(P, rng):
+    z, after = corrected(P, rng.normal(size=Q), innovation=5.0, counts=0)
+    assert not z.any()
+    np.testing.assert_array_equal(after, dense(packed(P[None])[0]))
+
+
+def test_entries_are_those_of_the_product(P):
+    def some(symbols):
+        factors = factors_of(symbols, Q)
+        return ca.vertcat(entry(factors, 0, 0), entry(factors, 1, 4), entry(factors, 4, 1))
+
+    np.testing.assert_allclose(evaluate(some, P), [P[0, 0], P[1, 4], P[1, 4]], rtol=1e-10)

@@ -1,0 +1,206 @@
+"""The inertial identifier over drives of the plant: what it tells, learns, ignores and refuses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.axle import AxleIdentifier, AxleModel
+from identifier.inertial import InertialIdentifier
+from identifier.methods import make_method
+from identifier.run import OnlineIdentifier, identify, learn
+from models.friction import Friction, FrictionChange
+from models.maneuvers import RandomSteer
+from models.plant import Plant
+from models.sensors import Sensor, Sensors
+from models.vehicle import GRAVITY, sedan
+
+CAR = sedan()
+METHOD = InertialIdentifier.for_vehicle(CAR)
+NOISE = Sensors(
+    v_x=Sensor(noise=0.03), r=Sensor(noise=0.003), delta=Sensor(noise=5e-4), v_y=Sensor(noise=0.0)
+)
+
+
+def drive_of(seed=3, bank=0.0, friction=None, duration=40.0):
+    maneuver = RandomSteer(
+        amplitude=np.radians(4.5),
+        frequency=0.5,
+        seed=seed,
+        onset=5.0,
+        rate_limit=1.0,
+        duration=duration - 0.01,
+    )
+    return Plant(CAR).simulate(maneuver, speed=20.0, bank=bank, friction=friction)
+
+
+def as_shown(run, seed=1, bias=0.1):
+    """What a body-fixed accelerometer and noisy sensors show; v_y is left out."""
+    rng, exact = np.random.default_rng(seed), run.recording()
+    felt = exact.a_y + GRAVITY * np.sin(run.roll) + bias + 0.15 * rng.normal(size=len(exact))
+    shown = NOISE.apply(exact, rng)
+    return replace(shown, a_y=felt, v_y=np.zeros(len(exact)), axle_force=None)
+
+
+@pytest.fixture(scope="module")
+def banked():
+    """A drive on a road that banks by up to 4 degrees, as the plant ran it."""
+    return drive_of(bank=lambda t: np.radians(4.0) * np.sin(2 * np.pi * t / 25.0))
+
+
+@pytest.fixture(scope="module")
+def history(banked):
+    return identify(as_shown(banked), CAR, METHOD)
+
+
+def errors(history, run):
+    runs = history.state["running"].reshape(-1, 2)[1:, 0] > 0.5
+    error = history.outputs["v_y"].ravel() - run.v_y
+    return error[runs], history.outputs["v_y_sd"].ravel()[runs], runs
+
+
+def degrees(error, speed=20.0):
+    return float(np.degrees(np.sqrt(np.mean(error**2)) / speed))
+
+
+def test_side_slip_is_told_on_a_banked_road_with_an_honest_deviation(history, banked):
+    error, sd, runs = errors(history, banked)
+    assert runs.mean() > 0.99
+    assert degrees(error) < 0.2 * degrees(banked.v_y) + 0.05
+    assert np.mean(np.abs(error) < 2 * sd) > 0.9
+    assert degrees(sd) < 4 * degrees(error)  # and not honest by knowing nothing
+
+
+def test_the_bank_of_the_road_and_the_roll_of_the_body_are_told_apart(history, banked):
+    late = slice(1500, None)
+    bank = history.state["motion"].reshape(-1, 8)[1:, 6]
+    truth = np.radians(4.0) * np.sin(2 * np.pi * banked.t / 25.0)
+    assert np.std((bank - truth)[late]) < 0.3 * np.std(truth[late])
+    gradient = np.polyfit(banked.a_y, GRAVITY * banked.roll, 1)[0]
+    assert history.state["sensors"][-1].ravel()[1] == pytest.approx(gradient, rel=0.4)
+
+
+def test_what_is_learnt_is_nearly_as_good_as_with_a_sensor_of_v_y(history, banked):
+    exact = banked.recording()
+    given = learn(replace(as_shown(banked), v_y=exact.v_y), CAR, AxleIdentifier.for_vehicle(CAR))
+    without, truth = history.freeze(), exact.axle_force
+    error = [np.sqrt(((m.predict(exact) - truth) ** 2).mean()) for m in (without, given)]
+    assert error[0] < 1.3 * error[1]
+
+
+def test_it_freezes_to_the_kind_of_model_that_an_axle_identifier_learns(history, tmp_path):
+    model = history.freeze()
+    assert isinstance(model, AxleModel)
+    model.save(tmp_path / "weights.json")
+    again = AxleModel.load(tmp_path / "weights.json")
+    np.testing.assert_array_equal(again.W, model.W)
+    alpha = np.array([0.01, 0.03, 0.06])
+    assert (model.relative_sd(alpha) < 0.7).all()  # and knows that it learnt
+
+
+def test_no_bit_of_v_y_is_read(banked, history):
+    told = identify(replace(as_shown(banked), v_y=banked.v_y), CAR, METHOD)
+    for name, values in history.outputs.items():
+        np.testing.assert_array_equal(told.outputs[name], values)
+
+
+def test_what_is_told_for_observed_is_so_and_nothing_is_where_nothing_is_known(history, banked):
+    error, _, runs = errors(history, banked)
+    seen = history.outputs["side_slip_observable"].ravel()[runs] > 0.5
+    assert np.mean(np.abs(error[seen]) / 20.0 < 2 * METHOD.trust.observable) > 0.97
+    slow = as_shown(banked)
+    parked = identify(replace(slow, v_x=np.full(len(slow), 0.5)), CAR, METHOD)
+    assert not parked.outputs["side_slip_observable"].any()
+    assert np.isfinite(parked.outputs["v_y"]).all()
+
+
+def test_an_accelerometer_of_the_other_sign_is_noticed(banked):
+    """Forces that contradict the yaw rate are no curve of a tire."""
+    shown = as_shown(banked)
+    assert alarms(identify(replace(shown, a_y=-shown.a_y), CAR, METHOD)).any()
+
+
+def test_a_gap_of_the_accelerometer_widens_what_is_not_known(banked):
+    a_y = as_shown(banked).a_y.copy()
+    online = [OnlineIdentifier(METHOD, CAR, 0.01) for _ in range(2)]
+    shown = as_shown(banked)
+    for k in range(1600):
+        for one, gone in zip(online, (False, k >= 1300), strict=True):
+            one.update(shown.x[k], shown.u[k], shown.v_x[k], None if gone else a_y[k])
+    whole, gap = (one.outputs["v_y_sd"].item() for one in online)
+    assert gap > 1.1 * whole
+    assert gap < 1.0
+
+
+def test_a_channel_that_repeats_its_numbers_counts_them_once(banked):
+    """A sensor of 20 Hz in a log of 100 Hz has a fifth of the news."""
+    shown = as_shown(banked)
+    held = 5 * (np.arange(len(shown)) // 5)
+    slow = replace(shown, r=shown.r[held], a_y=shown.a_y[held])
+    error, sd, _ = errors(identify(slow, CAR, METHOD), banked)
+    fast = errors(identify(shown, CAR, METHOD), banked)
+    assert np.median(sd) > 1.05 * np.median(fast[1])
+    assert np.mean(np.abs(error) < 2 * sd) > 0.8
+
+
+def alarms(history):
+    fast = history.state["running"].reshape(-1, 2)[1:, 1]
+    return fast > METHOD.trust.alarm
+
+
+def test_half_the_grip_is_noticed_within_half_a_second_of_sliding_and_learnt():
+    change = FrictionChange(scale=0.5, at_time=20.0)
+    run = drive_of(friction=Friction(changes=(change,)), duration=45.0)
+    history = identify(as_shown(run), CAR, METHOD)
+    after = run.t > 20.0
+    slides = run.t[after & (np.abs(run.a_y) > 0.95 * np.abs(run.a_y[after]).max())][0]
+    assert run.t[alarms(history)][0] < slides + 0.5
+    at = [np.searchsorted(run.t, t) for t in (19.9, 44.9)]
+    grip = [history.state["W"][k].sum(axis=1).mean() for k in at]
+    assert grip[1] < 0.8 * grip[0]
+    error, sd, _ = errors(history, run)
+    assert degrees(error[2500:]) < 0.3
+    assert np.mean(np.abs(error[2000:]) < 2 * sd[2000:]) > 0.9
+
+
+def test_nothing_is_noticed_on_a_road_that_stays_as_it_is(history):
+    assert not alarms(history).any()
+
+
+def test_a_stored_model_is_gone_on_from(history, banked):
+    shown = as_shown(banked)
+    again = identify(shown, CAR, METHOD, start=history.freeze())
+    np.testing.assert_array_equal(again.state["W"][0], history.state["W"][-1])
+    first = slice(500, 1000)
+    sd = [one.outputs["v_y_sd"].ravel()[first].mean() for one in (again, history)]
+    assert sd[0] < sd[1]
+
+
+def test_a_model_of_another_structure_is_refused(history):
+    other = replace(METHOD, ladder=(0.032, 0.128))
+    with pytest.raises(ValueError, match="another structure"):
+        other.setup(CAR, history.freeze())
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("dt", 0.0), ("roll_frequency", -1.0), ("roll_damping", 0.0), ("ladder", (0.03, 0.05))],
+)
+def test_a_number_that_no_car_has_is_refused(name, value):
+    with pytest.raises(ValueError, match=r"ladder|dt|roll"):
+        replace(METHOD, **{name: value})
+
+
+def test_bounds_hold_whatever_is_measured(banked):
+    rng, shown = np.random.default_rng(0), as_shown(banked)
+    wild = replace(shown, a_y=shown.a_y + 30 * rng.normal(size=len(shown)))
+    state = identify(wild, CAR, make_method("inertial", CAR)).state
+    b = METHOD.bounds
+    grip = state["W"].sum(axis=2)
+    slope = (state["W"] / np.array(METHOD.ladder)).sum(axis=2)
+    assert b.least_grip <= grip.min()
+    assert grip.max() <= b.most_grip
+    assert b.least_stiffness <= slope.min()
+    assert slope.max() <= b.most_stiffness
+    assert (state["own"] >= 0).all()
+    assert (state["own"] <= b.compliance).all()

@@ -1,0 +1,186 @@
+"""The compiled step against a textbook filter: dense covariance, Jacobians by differences."""
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from identifier.axle.car import Car, car_numbers
+from identifier.axle.curve import doublings
+from identifier.inertial import InertialIdentifier
+from identifier.inertial.motion import MOVING, Laws, Sample, predicted, shown, size, unknowns
+from identifier.run import identify
+from models.maneuvers import Slalom
+from models.plant import Plant
+from models.vehicle import sedan
+
+G, CAR, DT = 9.81, sedan(), 0.01
+METHOD = replace(InertialIdentifier.for_vehicle(CAR), sensor_position=(0.3, -0.1))
+N = len(METHOD.ladder)
+Q = size(N)
+LOAD = CAR.weight * np.array([CAR.l_r, CAR.l_f]) / CAR.wheelbase
+
+
+def compiled_model():
+    """Motion and sensors as functions of numbers; they have tests of their own."""
+    steps = doublings(METHOD.ladder)
+    scales = ca.SX(ca.DM(1 / np.array(METHOD.ladder)[None]))
+    car = Car(*ca.horzsplit(ca.SX(ca.DM(car_numbers(CAR)))))
+    omega, t = METHOD.roll_frequency * np.sqrt(G / CAR.wheelbase), METHOD.trust
+    laws = Laws(
+        forgets=np.exp(-DT / t.correlation_time),
+        bank_stiffness=t.bank_time**-2,
+        bank_damping=2 / t.bank_time,
+        roll_stiffness=omega**2,
+        roll_damping=2 * METHOD.roll_damping * omega,
+        sway=METHOD.prior.sway_share / omega**2,
+        ahead=0.3,
+        aside=-0.1,
+    )
+    z, tilt = ca.SX.sym("z", Q), ca.SX.sym("tilt", 2)
+    old, new = ca.SX.sym("old", 3), ca.SX.sym("new", 3)
+    before, now = Sample(old[0], old[1:]), Sample(new[0], new[1:])
+    a = predicted(car, laws, DT, unknowns(z, N), (tilt[0], tilt[1]), before, now, scales, steps)
+    moved = ca.vertcat(a.moving, z[MOVING:])
+    step = ca.Function(
+        "step",
+        [z, tilt, old, new],
+        [moved, ca.vertcat(a.tilt, a.tilt_rate), a.curve.force, a.force_rate],
+    )
+    seen = shown(car, laws, unknowns(z, N), tilt[0], now, scales, steps)
+    look = ca.Function("look", [z, tilt, new], [ca.vertcat(seen.r, seen.a_y), seen.curve.force])
+
+    def numbers(f):
+        return lambda *given: [np.array(one).ravel() for one in f.call([ca.DM(x) for x in given])]
+
+    return numbers(step), numbers(look)
+
+
+def by_differences(f, z):
+    columns = []
+    for j in range(z.size):
+        h = np.zeros(z.size)
+        h[j] = 1e-6
+        columns.append((f(z + h) - f(z - h)) / 2e-6)
+    return np.column_stack(columns)
+
+
+class ByHand:
+    """The filter with plain matrices."""
+
+    def __init__(self):
+        self.step, self.look = compiled_model()
+        W, own = METHOD.prior.means(CAR, METHOD.ladder)
+        self.z = np.concatenate([np.zeros(MOVING), *W, own[:, 0], np.zeros(5)])
+        self.z[-4] = METHOD.beliefs.roll
+        curves = METHOD.prior.covariance(CAR, METHOD.ladder)
+        scale = np.sqrt(CAR.wheelbase / 2.7)
+        self.P = np.zeros((Q, Q))
+        for i in (0, 1):
+            rows = [*range(8 + N * i, 8 + N * i + N), 8 + 2 * N + i]
+            self.P[np.ix_(rows, rows)] = curves[i, : N + 1, : N + 1]
+        b = METHOD.beliefs
+        sds = [b.bias, b.sd_roll, b.steering, b.gyro / scale, b.inertia]
+        self.P[-5:, -5:] = np.diag(sds) ** 2
+        self.scale, self.running, self.fast = scale, False, 0.0
+        self.noise = np.array([METHOD.trust.r_noise / scale, METHOD.trust.a_y_noise]) ** 2
+        self.clock = 0.0
+
+    def begin(self, sample, r, a_y):
+        """Start in a steady corner, on a linear tire."""
+        t, v_x, delta = METHOD.trust, sample[0], sample[1:]
+        C = (self.z[8 + N : 8 + 2 * N] / np.array(METHOD.ladder)).sum()
+        lean = np.sign(r) * min(abs(v_x * r) / G, 1) / C
+        v_y = v_x * (delta[1] - lean) + CAR.l_r * r
+        arm = np.array([CAR.l_f, -CAR.l_r])
+        self.z[:MOVING] = [v_y, r, *(delta - np.arctan((v_y + arm * r) / v_x)), 0, 0, 0, 0]
+        unsure = (t.v_y * np.sqrt(G * CAR.wheelbase)) ** 2 + (0.7 * v_x * lean) ** 2
+        self.P[:MOVING], self.P[:, :MOVING] = 0, 0
+        sd = [t.r / self.scale, *[np.sqrt(unsure) / v_x] * 2, t.error, t.error]
+        sd += [t.bank, t.bank / t.bank_time]
+        self.P[range(MOVING), range(MOVING)] = [unsure, *np.array(sd) ** 2]
+        self.tilt = np.array([v_x * r, 0.0])
+        self.heard = [np.array([r, a_y])] * 2
+
+    def go_on(self, before, sample, y):
+        t, z = METHOD.trust, self.z
+        F = by_differences(lambda z: self.step(z, self.tilt, before, sample)[0], z)
+        ahead, tilt, force, rate = self.step(z, self.tilt, before, sample)
+        missed = t.error + t.relative_error * np.abs(force)
+        noise = np.zeros(Q)
+        natural = np.sqrt(CAR.wheelbase / G)
+        noise[1] = (t.jerk / natural**1.5) ** 2 * DT
+        noise[4:6] = missed**2 * (1 - np.exp(-2 * DT / t.correlation_time))
+        noise[7] = 4 * t.bank**2 * DT / t.bank_time**3
+        P = F @ self.P @ F.T + np.diag(noise)
+        second = y - 2 * self.heard[0] + self.heard[1]
+        shows = np.minimum(second**2 / 6, 9 * self.noise + 1e-12)
+        self.noise = self.noise + (shows - self.noise) / t.noise_samples
+        self.heard = [y, self.heard[0]]
+        H = by_differences(lambda z: self.look(z, tilt, sample)[0], ahead)
+        expected, static = self.look(ahead, tilt, sample)
+        turn = np.array([CAR.l_f, -CAR.l_r]) * LOAD / CAR.yaw_inertia @ static
+        late = np.array([turn, G * LOAD / CAR.weight @ rate])
+        floor = np.array([(t.r_error / self.scale) ** 2, t.a_y_error**2])
+        floor[1] += (t.a_y_share * tilt[0]) ** 2
+        R = floor + self.noise + (t.lateness * late) ** 2
+        z = ahead
+        for i in (0, 1):
+            nu = y[i] - expected[i] - H[i] @ (z - ahead)
+            S = H[i] @ P @ H[i] + R[i]
+            nu = np.clip(nu, -t.clip * np.sqrt(S), t.clip * np.sqrt(S))
+            K = P @ H[i] / S
+            z, P = z + K * nu, P - np.outer(K, H[i] @ P)
+        q = np.minimum((z[4:6] / missed) ** 2, 25).mean()
+        self.fast += DT / t.alarm_time * (q - self.fast)
+        assert self.fast < t.alarm  # else the covariance would be opened, which this leaves out
+        self.z, self.P, self.tilt = z, P, tilt
+
+    def take(self, before, sample, r, a_y):
+        if self.running:
+            self.go_on(before, sample, np.array([r, a_y]))
+        else:
+            self.begin(sample, r, a_y)
+        self.running = True
+        return self.z[0], np.sqrt(self.P[0, 0])
+
+
+@pytest.fixture(scope="module")
+def runs():
+    maneuver = Slalom(
+        amplitude=np.radians(3.0), frequency=0.6, onset=0.5, rate_limit=1.0, duration=3.99
+    )
+    recording = Plant(CAR).simulate(maneuver, speed=20.0).recording()
+    rng = np.random.default_rng(2)
+    noisy = replace(
+        recording,
+        r=recording.r + 0.003 * rng.normal(size=len(recording)),
+        a_y=recording.a_y + 0.1 * rng.normal(size=len(recording)),
+    )
+    hand, told, before = ByHand(), [], None
+    for k in range(len(noisy)):
+        sample = np.array([noisy.v_x[k], noisy.delta_f[k], noisy.delta_r[k]])
+        told.append(hand.take(before, sample, noisy.r[k], noisy.a_y[k]))
+        before = sample
+    return np.array(told), hand, identify(noisy, CAR, METHOD)
+
+
+def test_lateral_velocity_and_its_deviation_are_those_of_the_textbook(runs):
+    told, _, history = runs
+    assert np.abs(told[:, 0]).max() > 0.1
+    np.testing.assert_allclose(history.outputs["v_y"].ravel(), told[:, 0], atol=2e-6)
+    np.testing.assert_allclose(history.outputs["v_y_sd"].ravel(), told[:, 1], rtol=2e-4)
+
+
+def test_what_is_learnt_is_that_of_the_textbook(runs):
+    _, hand, history = runs
+    last = {name: np.asarray(value[-1]).ravel() for name, value in history.state.items()}
+    learnt = np.concatenate([last[name] for name in ("motion", "W", "own", "sensors")])
+    np.testing.assert_allclose(learnt, hand.z, rtol=1e-4, atol=1e-6)
+    assert np.abs(hand.z[8:] - ByHand().z[8:]).max() > 0.02  # something was
+    axis = history.freeze().covariance[1]
+    rows = [*range(8 + N, 8 + 2 * N), 9 + 2 * N]
+    np.testing.assert_allclose(
+        axis[: N + 1, : N + 1], hand.P[np.ix_(rows, rows)], rtol=2e-3, atol=1e-7
+    )
