@@ -39,7 +39,7 @@ STEEPNESS = 3.0  # of the confidence over what the next best reading leaves more
 
 
 PRICES = {"mph": 0.3, "mm/s": 0.3}  # of units that few loggers use
-ALONE, UNUSUAL = 1.8, 1.0  # of a v_y in another unit than v_x, and of one that is an angle
+ALONE, UNUSUAL = 2.8, 2.0  # of a v_y in another unit than v_x, and of one that is an angle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
