@@ -224,7 +224,8 @@ def _sizes(outcomes: list[Outcome], targets: Targets) -> None:
             ]
         if errors:
             high = float(np.percentile(errors, 95.0))
-            targets.at_most(f"{label}: 95 % of errors within", high, limit, "", f"size/{code}")
+            key = "size/" + code.replace(" ", "_")
+            targets.at_most(f"{label}: 95 % of errors within", high, limit, "", key)
     sigmas = [abs(one.sigmas) for one in outcomes if one.rank and one.fault.startswith("offset")]
     within = 100.0 * float(np.mean(np.array(sigmas) <= 2.0))
     targets.at_least("offsets within their 2 sigma", within, 95.0, "%", "size/offset")

@@ -39,7 +39,7 @@ STEEPNESS = 3.0  # of the confidence over what the next best reading leaves more
 
 
 PRICES = {"mph": 0.3, "mm/s": 0.3}  # of units that few loggers use
-ALONE, UNUSUAL = 2.8, 2.0  # of a v_y in another unit than v_x, and of one that is an angle
+ALONE, UNUSUAL = 2.8, 2.0  # of a v_y in another unit than v_x, and of one that is an angle in deg
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,9 +111,9 @@ CHANGES = (
             unit=unit,
             factors=(("v_y", one),),
             sideslip=True,
-            price=UNUSUAL,
+            price=price,
         )
-        for unit, one in {"rad": 1.0, "deg": DEGREE}.items()
+        for unit, one, price in (("rad", 1.0, 0.0), ("deg", DEGREE, UNUSUAL))
     ),
     _unit("deg", DEGREE, "delta_f"),
     *(_sign(name) for name in ("v_y", "r", "v_x", "delta_f")),

@@ -8,6 +8,7 @@ import numpy as np
 
 from codegen.escape import visible
 from identifier.doctor import diagnose
+from identifier.inertial import InertialIdentifier
 from identifier.method import CannotFreezeError, Method
 from identifier.methods import load_model
 from identifier.paper.network import Weights
@@ -248,6 +249,8 @@ def _read(
         dt=design.dt,
     )
     counted_samples(recording, design.min_speed)  # refuses a car that never drives
+    if isinstance(design, InertialIdentifier) and recording.a_y is None:
+        raise ValueError(f"{recording.name}: there is no ay: inertial learns from it and yaw rate")
     return recording
 
 
