@@ -124,7 +124,7 @@ def main() -> int:
             write_log(log, base, duration)
             words = ["identify", str(log), "--vehicle", str(car), "--out", str(out), "--force"]
             took = run(words)
-            held[duration], key = took.held, f"{duration} h"
+            held[duration], key = took.held, f"{duration}_h"
             size = log.stat().st_size / 1e6
             show(f"{duration} h", f"{size:.0f} MB, read in {took.reading:.1f} s")
             label = f"{duration} h of log to the report"
