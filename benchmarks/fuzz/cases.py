@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from benchmarks.fuzz.doors import DOORS, WORDS, Door
 from benchmarks.fuzz.networks import onnx_mutated
-from benchmarks.fuzz.raw import other_kind
+from benchmarks.fuzz.raw import bytes_mutated, other_kind
 from benchmarks.fuzz.tables import csv_mutated, gz_mutated, parquet_mutated, tir_mutated
 from benchmarks.fuzz.trees import json_mutated, toml_mutated
 from benchmarks.fuzz.words import words_mutated
@@ -18,6 +18,7 @@ MUTATORS: Mapping[str, Callable[[random.Random, bytes], bytes]] = {
     "csv": csv_mutated,
     "gz": gz_mutated,
     "parquet": parquet_mutated,
+    "mat": bytes_mutated,
     "toml": toml_mutated,
     "json": json_mutated,
     "tir": tir_mutated,
