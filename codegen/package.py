@@ -25,6 +25,7 @@ from codegen.graph import graph_of
 from codegen.template import Values, Words, filled
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,30}")
+TAKEN = ("null", "jac", "hess")  # names that CasADi gives no function
 CMAKE = Path(__file__).with_name("package_cmake.txt")
 
 
@@ -48,6 +49,10 @@ def check_name(name: str, ending: str = "") -> None:
     if not NAME.fullmatch(name.removesuffix(ending)):
         raise PackageNameError(
             f"name must be lower-case letters, digits and _, at most 31, not {name!r}"
+        )
+    if name in TAKEN or "__" in name:
+        raise PackageNameError(
+            f"name must be none of {', '.join(TAKEN)} and hold no __, it is {name!r}"
         )
 
 

@@ -20,6 +20,7 @@ NAME = re.compile(r"""^\s*"?name"?\s*[=:]\s*"([^"\n]{2,})"\s*,?\s*$""", re.MULTI
 CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 GOOD, BAD, NOT_VALID = (0, 1), 2, 3
 CODES = (*GOOD, BAD, 74)
+DOCTOR = "doctor"  # which says by exit code 3 that a log is not right
 JUDGES = ("identify", "predict", "compare")  # commands that say by exit code 3 that it is not valid
 DEAD = 0.02  # of the stiffness of the linear tire
 LONGEST_LINE = 1000  # letters that say what is wrong
@@ -109,7 +110,8 @@ def _ending(words: Sequence[str], ended: Ended) -> list[Finding]:
         stuck = FRAME.findall(ended.trace)
         where = ":".join(stuck[0]) if stuck else "?"
         return [Finding("crash", f"{where} signal {-ended.code}", ended.trace[:2000])]
-    if ended.code == NOT_VALID and words[0] in JUDGES and "NOT VALID" in ended.out:
+    said = "finding" if words[0] == DOCTOR else "NOT VALID"
+    if ended.code == NOT_VALID and words[0] in (*JUDGES, DOCTOR) and said in ended.out:
         return []
     if ended.code not in CODES:
         return [Finding("exit code", str(ended.code), ended.err[-500:])]

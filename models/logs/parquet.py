@@ -143,9 +143,12 @@ class ParquetTable:
         import pyarrow.parquet
 
         names = self.names
+        wanted = [names[k] for k in columns]
+        for name in wanted:
+            if names.count(name) > 1:
+                raise RecordingError(f"{self.path}: column {name} appears more than once")
         try:
             with pyarrow.parquet.ParquetFile(self.path) as file:
-                wanted = [names[k] for k in columns]
                 for batch in file.iter_batches(batch_size=size, columns=wanted):
                     yield batch.select(wanted)
         except (pyarrow.ArrowException, OSError, UnicodeDecodeError) as error:

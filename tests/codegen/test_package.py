@@ -58,7 +58,10 @@ def test_files_get_the_name_that_their_text_gets(tmp_path):
     assert list(c_files(tmp_path, {"tireid_mpc.h": "."}, {"tireid_mpc": "far"})) == ["far.h"]
 
 
-@pytest.mark.parametrize("name", ["Upper", "1st", "with-dash", "", "a" * 32, "a\n", "x y", "@a@"])
+NONE = ["Upper", "1st", "with-dash", "", "a" * 32, "a\n", "x y", "@a@", "null", "jac", "a__b"]
+
+
+@pytest.mark.parametrize("name", NONE)
 def test_a_name_that_is_none_of_c_is_refused(name):
     with pytest.raises(PackageNameError, match="name must be"):
         check_name(name)

@@ -115,6 +115,14 @@ def test_parquet_of_times_before_all_clocks_is_refused(tmp_path):
         open_log(path).read(["v"])
 
 
+def test_parquet_with_a_column_twice_is_refused(tmp_path):
+    t, path = np.arange(20.0) / 100.0, tmp_path / "log.parquet"
+    table = pyarrow.table([t, t, t], names=["t", "vx", "vx"])
+    pyarrow.parquet.write_table(table, path)
+    with pytest.raises(RecordingError, match=r"log.parquet: column vx appears more than once"):
+        open_log(path).read(["vx"])
+
+
 def test_without_pyarrow_a_text_is_read_all_the_same(tmp_path, monkeypatch):
     path = tmp_path / "log.csv"
     path.write_text(plain())
