@@ -11,7 +11,8 @@ from identifier.axle import AxleIdentifier
 from models.recordings import Recording
 from models.vehicle import sedan
 from tireid.figures import thinned
-from tireid.figures.thinned import cloud, shown, shown_of_run
+from tireid.figures.forces import inputs_figure
+from tireid.figures.thinned import cloud, drawn_times, shown, shown_of_run
 from tireid.learning import identify
 from tireid.output import write_csv, write_long_csv
 from tireid.reports.common import recording_digest
@@ -49,6 +50,27 @@ def test_a_window_of_a_long_recording_is_drawn_within_its_ends(signal):
     few, many = (shown(t, (10.0, end), signal.__getitem__) for end in (20.0, 3010.0))
     np.testing.assert_array_equal(few, np.arange(1000, 2001))
     assert (many[0], many[-1]) == (1000, 301_000)
+
+
+def test_no_line_is_drawn_over_a_gap(signal):
+    t = np.delete(0.01 * np.arange(400), slice(200, 250))
+    zeros = np.zeros(t.size)
+    log = Recording(
+        name="gap", t=t, v_x=zeros + 20.0, v_y=signal[: t.size], r=zeros, delta_f=zeros,
+        delta_r=zeros, breaks=(200,),
+    )  # fmt: skip
+    told = drawn_times(log, t)
+    assert np.flatnonzero(np.isnan(told)).tolist() == [200]
+    np.testing.assert_array_equal(np.delete(told, 200), np.delete(t, 200))
+    some = np.array([10, 150, 220, 300])  # of a long log: its first sample there may not be drawn
+    np.testing.assert_array_equal(np.isnan(drawn_times(log, t[some])), [False, False, True, False])
+    for axes in inputs_figure(log).axes:
+        line = axes.lines[0].get_xydata()
+        assert not np.isfinite(line).all(axis=1)[200]
+        assert np.isfinite(np.delete(line, 200, axis=0)).all()
+    np.testing.assert_array_equal(
+        drawn_times(replace(log, t=0.01 * np.arange(350), breaks=()), t), t
+    )
 
 
 def test_a_cloud_shows_what_is_outermost_and_every_place_that_is_hit(rng):

@@ -37,7 +37,7 @@ from tireid.figures.style import (
     styled,
     time_window,
 )
-from tireid.figures.thinned import Signal, shown
+from tireid.figures.thinned import Signal, drawn_times, shown
 
 
 @styled
@@ -79,7 +79,7 @@ def force_figure(
     ends = time_window(recording.t, window)
     curves = [history.axle_force, *(replay.axle_force for replay in replays.values())]
     part = shown(recording.t, ends, *_with_residuals(curves, truth))
-    t, online = recording.t[part], history.axle_force[part]
+    t, online = drawn_times(recording, recording.t[part]), history.axle_force[part]
     reference = online if truth is None else truth[part]
     unit = force_unit_of(reference)
     frozen = {at: replay.axle_force[part] / unit.newtons for at, replay in replays.items()}
@@ -198,7 +198,7 @@ def prediction_figure(
     if truth is None and online is not None:
         curve, known = ONLINE, online.axle_force
     part = shown(recording.t, ends, *_with_residuals([replay.axle_force], known))
-    t = recording.t[part]
+    t = drawn_times(recording, recording.t[part])
     reference = replay.axle_force[part] if known is None else known[part]
     unit = force_unit_of(reference)
     frozen = replay.axle_force[part] / unit.newtons
@@ -258,7 +258,7 @@ def side_by_side_figure(replays: Mapping[str, Replay]) -> Figure:
     if truth is None or any(other.name != recording.name for other in recordings):
         raise ValueError("replays of one recording with true forces are needed")
     unit = force_unit_of(truth)
-    t = recording.t
+    t = drawn_times(recording, recording.t)
     drawn = [replay.axle_force / unit.newtons for replay in replays.values()]
     limits = force_range(truth / unit.newtons, *drawn)
     missed = {name: (r.axle_force - truth) / unit.newtons for name, r in replays.items()}
@@ -303,6 +303,7 @@ def inputs_figure(recording: Recording, *, window: Window = None) -> Figure:
     logged = [recording.v_x, recording.delta_f, recording.delta_r, recording.v_y, recording.r]
     logged += [] if recording.a_y is None else [recording.a_y]
     part = shown(recording.t, ends, *(signal.__getitem__ for signal in logged))
+    t = drawn_times(recording, recording.t[part])
     signals = {
         "$v_x$ [m/s]": recording.v_x[part],
         "steering [deg]": np.rad2deg(recording.delta_f[part]),
@@ -316,7 +317,7 @@ def inputs_figure(recording: Recording, *, window: Window = None) -> Figure:
     panels = figure.subplots(len(signals), 1, sharex=True)
     panels[0].set_xlim(ends)
     for axes, (label, values) in zip(panels, signals.items(), strict=True):
-        axes.plot(recording.t[part], values, color=BLUE, linewidth=0.9, label=label)
+        axes.plot(t, values, color=BLUE, linewidth=0.9, label=label)
         axes.set_ylabel(label)
         span = float(np.ptp(values))
         middle = float(values.min()) + span / 2
@@ -326,7 +327,7 @@ def inputs_figure(recording: Recording, *, window: Window = None) -> Figure:
         steering = panels[1]
         steering.lines[0].set_label(r"front $\delta_f$")
         steering.plot(
-            recording.t[part],
+            t,
             np.rad2deg(recording.delta_r[part]),
             color=ORANGE,
             linewidth=0.9,

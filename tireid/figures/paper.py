@@ -69,9 +69,7 @@ def error_figure(
     recording = history.recording
     ends = time_window(recording.t, window)
     # A root of squares would overflow where a law diverges; hypot does not.
-    t, (norm,) = shown_of_run(
-        history, ends, lambda stretch: [np.hypot(*stretch.outputs["xi_tilde"].T)]
-    )
+    t, (norm,) = shown_of_run(history, ends, lambda block: [np.hypot(*block.outputs["xi_tilde"].T)])
     known = {name: bound for name, bound in (bounds or {}).items() if np.isfinite(bound)}
     drawn = norm[np.isfinite(norm) & (norm > 0.0) & (norm < 1e12)]
     typical, peak = (float(np.median(drawn)), float(drawn.max())) if drawn.size else (1.0, 1.0)
@@ -138,9 +136,7 @@ def weights_figure(
     """
     recording, design = history.recording, paper_design(history)
     ends = time_window(recording.t, window)
-    t, (W, V) = shown_of_run(
-        history, ends, lambda stretch: [stretch.before["W"], stretch.before["V"]]
-    )
+    t, (W, V) = shown_of_run(history, ends, lambda block: [block.before["W"], block.before["V"]])
 
     figure = new_figure(PAGE, 4.2)
     upper, lower = figure.subplots(2, 1, sharex=True)

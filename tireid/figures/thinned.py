@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from codegen.arrays import LONG, Array, blocks
 from identifier.method import Block
 from identifier.run import History
+from models.recordings import Recording
 
 COLUMNS = 1500  # of pixels, more than any panel has
 CELLS = (400, 240)  # of a cloud, across and up: a dot covers several
@@ -46,6 +47,19 @@ def shown(t: Array, ends: tuple[float, float], *signals: Signal) -> Samples:
     return np.unique(np.concatenate(found))
 
 
+def drawn_times(recording: Recording, t: Array) -> Array:
+    """Return times as a line is drawn over them: none where a stretch begins, so that it has a gap.
+
+    Parameters
+    ----------
+    recording : in stretches, or in one.
+    t : times of some of its samples, rising (k,) [s].
+    """
+    begins = recording.t[list(recording.breaks)]
+    stretch = np.searchsorted(begins, t, side="right")
+    return np.where(np.diff(stretch, prepend=stretch[:1]) > 0, np.nan, t)
+
+
 def farthest(signals: Iterable[Array], width: int) -> NDArray[np.intp]:
     """Return the samples that are lowest or highest among `width` neighbors, rising.
 
@@ -72,6 +86,8 @@ def shown_of_run(
 ) -> tuple[Array, list[Array]]:
     """Return times and values of what a run recorded, as they are drawn: (k,) and (k, ...) each.
 
+    Times are those of `drawn_times`.
+
     Parameters
     ----------
     history : the run.
@@ -91,7 +107,7 @@ def shown_of_run(
         times.append(here[part])
         values.append([one[part] for one in told])
     joined = [np.concatenate(one) for one in zip(*values, strict=True)]
-    return np.concatenate(times), joined
+    return drawn_times(history.recording, np.concatenate(times)), joined
 
 
 def cloud(n: int, slips: Signal, heights: Sequence[Signal], counts: Signal) -> Samples:
