@@ -13,8 +13,7 @@ from typing import NoReturn
 
 import tireid
 from models.limits import LimitError, limits_text
-from tireid.commands import COMMANDS, add_command
-from tireid.exit_codes import BAD_INPUT, INTERRUPTED, NOT_TOLD
+from tireid.commands import BAD_INPUT, COMMANDS, DONE, INTERRUPTED, NOT_TOLD, add_command
 from tireid.progress import complain, flush_out, listen_to_library, unwritten
 
 LONGEST_LINE = 900  # characters of a message, command and option not counted
@@ -103,7 +102,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         complain(f"tireid {options.command}: error: {one_line(error)}")
         return BAD_INPUT
     flush_out()
-    return NOT_TOLD if unwritten() and status == 0 else status
+    return NOT_TOLD if unwritten() and status == DONE else status
 
 
 def _expected_errors() -> tuple[type[Exception], ...]:

@@ -1,6 +1,5 @@
 """A verdict as commands tell it: lines, a table of what was learnt, the exit code, a section."""
 
-import argparse
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -8,36 +7,11 @@ from pathlib import Path
 from codegen.escape import visible
 from identifier.methods import stored_verdict
 from identifier.verdict import Number, Verdict
-from tireid.exit_codes import DONE, NOT_VALID
 from tireid.output import text_table
 from tireid.progress import complain
 from tireid.report import Block, Headline, Paragraph, Section, Table, printed
 
 HEADER = ("", "front", "is", "rear", "is")
-
-
-def add_accept(parser: argparse.ArgumentParser) -> None:
-    """Add the option that takes an answer as it is.
-
-    Parameters
-    ----------
-    parser : of a command that ends with a verdict.
-    """
-    parser.add_argument(
-        "--accept",
-        action="store_true",
-        help=f"exit with 0 where the verdict is not valid, in place of {NOT_VALID}",
-    )
-
-
-def exit_code(verdict: Verdict, options: argparse.Namespace) -> int:
-    """Return the exit code that a verdict makes.
-
-    Parameters
-    ----------
-    options : with `accept`.
-    """
-    return DONE if verdict.valid or options.accept else NOT_VALID
 
 
 def number_cells(number: Number) -> tuple[str, str]:

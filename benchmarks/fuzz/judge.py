@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from benchmarks.fuzz.server import CRASHED, Ended
+from tireid.commands import BAD_INPUT, DONE, FAILS, NOT_TOLD, NOT_VALID
 
 PACKAGES = "codegen|models|identifier|mpc|tireid"
 FRAME = re.compile(rf'File ".*?((?:{PACKAGES})/[\w/]+\.py)", line (\d+)')
@@ -18,8 +19,8 @@ NUMBER = re.compile(r"(?<![\w.:/-])[-+]?(?:nan|inf(?:inity)?)(?![\w.:/-])", re.I
 NO_LIMIT = re.compile(r"\binf\b")  # as certificates say that there is none
 NAME = re.compile(r"""^\s*"?name"?\s*[=:]\s*"([^"\n]{2,})"\s*,?\s*$""", re.MULTILINE)
 CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f]")
-GOOD, BAD, NOT_VALID = (0, 1), 2, 3
-CODES = (*GOOD, BAD, 74)
+GOOD = (DONE, FAILS)
+CODES = (*GOOD, BAD_INPUT, NOT_TOLD)
 DOCTOR = "doctor"  # which says by exit code 3 that a log is not right
 JUDGES = ("identify", "predict", "compare")  # commands that say by exit code 3 that it is not valid
 DEAD = 0.02  # of the stiffness of the linear tire
@@ -143,7 +144,7 @@ def _left(folder: Path, before: Mapping[str, str], ended: Ended) -> list[Finding
     )
     found = [Finding("left behind", "scratch", ", ".join(scratch))] if scratch else []
     new = sorted(set(files_of(folder)) - set(before))
-    if ended.code == BAD and new and not scratch:
+    if ended.code == BAD_INPUT and new and not scratch:
         found.append(
             Finding("written and failed", new[0], f"{', '.join(new[:9])}; {ended.err[-300:]}")
         )
@@ -158,7 +159,7 @@ def _output(words: Sequence[str], ended: Ended) -> list[Finding]:
             around = text[max(control.start() - 60, 0) : control.end() + 60]
             found.append(Finding("control character", f"{name}, {words[0]}", repr(around)))
     lines = [line for line in ended.err.splitlines() if not line.startswith("  ")]
-    if ended.code == BAD and "--debug" not in words:
+    if ended.code == BAD_INPUT and "--debug" not in words:
         good = len(lines) == 1 and "error: " in lines[0] and len(lines[0]) <= LONGEST_LINE
     else:
         good = not lines or "--debug" in words

@@ -25,9 +25,8 @@ from models.recordings.choice import (
     missing_signals,
     standard_signals,
 )
-from tireid.commands import COMMANDS
+from tireid.commands import COMMANDS, DONE, FAILS
 from tireid.commands.options import add_force, add_log_map, told_map
-from tireid.exit_codes import DONE, FAILS
 from tireid.output import require_free, text_table
 from tireid.progress import say, tell
 

@@ -28,7 +28,7 @@ from models.files import write_atomically
 from models.recordings import Recording
 from models.schema import require_few
 from models.vehicle import Vehicle
-from tireid.commands import COMMANDS
+from tireid.commands import COMMANDS, DONE, FAILS
 from tireid.commands.certificate_table import (
     bound_rows,
     certificate_of,
@@ -52,7 +52,6 @@ from tireid.commands.options import (
     seed_of,
     told_map,
 )
-from tireid.exit_codes import DONE, FAILS
 from tireid.figures import error_figure, locus_figure, save_figure
 from tireid.output import output_folder, require_free, write_json
 from tireid.progress import Progress, say, tell

@@ -17,7 +17,7 @@ from models.recordings import Recording
 from models.schema import require_few
 from models.vehicle import Vehicle
 from tireid.cluster import cluster
-from tireid.commands import COMMANDS
+from tireid.commands import COMMANDS, DONE
 from tireid.commands.compare_results import (
     comparison_text,
     pair_tables,
@@ -27,12 +27,14 @@ from tireid.commands.compare_results import (
 )
 from tireid.commands.demo_story import plant_recordings
 from tireid.commands.options import (
+    add_accept,
     add_jobs,
     add_log_reading,
     add_network_arguments,
     add_output,
     add_seed,
     add_vehicle,
+    exit_code,
     jobs_of,
     network_model,
     read_log,
@@ -44,7 +46,7 @@ from tireid.learning import identify
 from tireid.output import output_folder
 from tireid.progress import Progress, Stopwatch, say, tell
 from tireid.reports.compare import write_compare_report
-from tireid.verdicts import add_accept, exit_code, verdicts_text
+from tireid.verdicts import verdicts_text
 
 FEW_PAIRS = 4  # of recordings learnt on and replayed, all of which are printed
 
@@ -163,7 +165,7 @@ def run(options: argparse.Namespace) -> int:
     told += [verdicts_text(verdicts)] if verdicts else []
     tell("\n".join(told))
     say(f"wrote {options.out}/ in {watch.seconds:.0f} s")
-    return max((exit_code(verdict, options) for verdict in verdicts.values()), default=0)
+    return max((exit_code(verdict, options) for verdict in verdicts.values()), default=DONE)
 
 
 def default_verdicts(recordings: Sequence[Recording], vehicle: Vehicle) -> dict[str, Verdict]:

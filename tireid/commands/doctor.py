@@ -7,8 +7,9 @@ from identifier.doctor import Diagnosis, diagnose
 from models.recordings import Repair
 from models.recordings.reader import repair_text
 from tireid import __version__
-from tireid.commands import COMMANDS
+from tireid.commands import COMMANDS, DONE, NOT_VALID
 from tireid.commands.options import (
+    add_accept,
     add_log_map,
     add_output,
     add_vehicle,
@@ -17,13 +18,11 @@ from tireid.commands.options import (
     told_map,
 )
 from tireid.diagnoses import add_repair, diagnosis_text, write_repair
-from tireid.exit_codes import DONE, NOT_VALID
 from tireid.figures.doctor import draw_diagnosis
 from tireid.figures.style import save_figure
 from tireid.output import output_folder, require_free, write_json
 from tireid.progress import say, tell
 from tireid.reports.doctor import write_doctor_report
-from tireid.verdicts import add_accept
 
 
 def add_parser(commands: Any) -> None:

@@ -35,6 +35,7 @@ from tireid.commands.identify_results import (
     write_results,
 )
 from tireid.commands.options import (
+    add_accept,
     add_log_reading,
     add_method,
     add_network_arguments,
@@ -43,6 +44,7 @@ from tireid.commands.options import (
     add_vehicle,
     add_weights,
     chosen_method,
+    exit_code,
     network_model,
     read_log,
     read_vehicle,
@@ -55,7 +57,7 @@ from tireid.learning import identify
 from tireid.output import output_folder, require_free, text_table, write_json
 from tireid.progress import Progress, say, tell
 from tireid.reports.identify import write_identify_report
-from tireid.verdicts import add_accept, exit_code, verdict_text, warn_of_stored
+from tireid.verdicts import verdict_text, warn_of_stored
 
 LEARNING, JUDGING, DRAWING = "learning", "replays and verdict", "curves and figures"
 OWN_PAST = "  its past, against online"

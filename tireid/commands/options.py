@@ -17,10 +17,12 @@ from identifier.methods import DEFAULT, METHODS, REFERENCE, draws_weights, make_
 from identifier.own_network import OnnxModel
 from identifier.paper.design import read_design
 from identifier.paper.network import SIGNALS
+from identifier.verdict import Verdict
 from models.recordings import LogMap, Recording, read_repaired, split_log_argument
 from models.recordings.reader import map_of, with_columns
 from models.schema import require_few
 from models.vehicle import Vehicle, sedan
+from tireid.commands import DONE, NOT_VALID
 from tireid.progress import say
 
 RENAMED = {  # options that had another word in some command
@@ -92,6 +94,30 @@ def add_force(parser: argparse.ArgumentParser) -> None:
     parser : of a command.
     """
     parser.add_argument("--force", action="store_true", help="replace what is there")
+
+
+def add_accept(parser: argparse.ArgumentParser) -> None:
+    """Add the option that takes an answer as it is.
+
+    Parameters
+    ----------
+    parser : of a command that ends with a verdict.
+    """
+    parser.add_argument(
+        "--accept",
+        action="store_true",
+        help=f"exit with 0 where the verdict is not valid, in place of {NOT_VALID}",
+    )
+
+
+def exit_code(verdict: Verdict, options: argparse.Namespace) -> int:
+    """Return the exit code that a verdict makes.
+
+    Parameters
+    ----------
+    options : with `accept`.
+    """
+    return DONE if verdict.valid or options.accept else NOT_VALID
 
 
 def add_weights(parser: argparse.ArgumentParser, what: str) -> None:

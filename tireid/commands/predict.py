@@ -19,9 +19,11 @@ from tireid import __version__
 from tireid.commands import COMMANDS
 from tireid.commands.identify_results import error_cells
 from tireid.commands.options import (
+    add_accept,
     add_log_reading,
     add_output,
     add_vehicle,
+    exit_code,
     read_log,
     read_vehicle,
     repaired_vehicle,
@@ -30,7 +32,7 @@ from tireid.commands.options import (
 from tireid.learning import replay
 from tireid.output import output_folder, text_table, write_json, write_long_csv
 from tireid.progress import say, tell
-from tireid.verdicts import add_accept, exit_code, verdict_text, warn_of_stored
+from tireid.verdicts import verdict_text, warn_of_stored
 
 
 def add_parser(commands: Any) -> None:
