@@ -7,14 +7,13 @@ counts from the first message that is read of any topic.
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import Array
 from models.logs.bounded import METADATA, bounded
 from models.logs.cdr import (
     CdrError,
@@ -26,10 +25,10 @@ from models.logs.cdr import (
     layout_of,
     numbers,
 )
-from models.logs.foreign import chosen, need, noted, one_line, seconds_of, unique
+from models.logs.foreign import need, one_line
+from models.logs.grouped import GroupedLog, Samples, noted
 from models.logs.growing import Growing
-from models.logs.log import Channel, Listed, RecordingError
-from models.logs.stamps import Stamps
+from models.logs.log import Listed, RecordingError
 from models.schema import require_few
 
 SQLITE, MCAP, ROS1 = b"SQLite format 3\x00", b"\x89MCAP0\r\n", b"#ROSBAG"
@@ -99,77 +98,7 @@ class _Topic(NamedTuple):
     zero: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BagFile:
-    """A bag, as `LogFile` says.
-
-    Parameters
-    ----------
-    path : of the file or folder.
-    format : "ROS 2 bag" or "MCAP".
-    channels : as listed.
-    places : topic and field of the channels.
-    said : what is left out or taken for granted.
-    """
-
-    path: Path
-    format: str
-    channels: tuple[Listed, ...]
-    places: tuple[tuple[_Topic, Field], ...]
-    said: tuple[str, ...]
-    _mended: list[str] = field(default_factory=list, compare=False, repr=False)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What is left out or taken for granted, and what was mended in what has been read."""
-        return (*self.said, *dict.fromkeys(self._mended))
-
-    def listed(self) -> tuple[Listed, ...]:
-        """Return the numbers of all messages that have a definition."""
-        return self.channels
-
-    def runs(self) -> tuple[str, ...]:
-        """Return no names: a bag is one run."""
-        return ()
-
-    def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
-        """Return channels in the order of their names.
-
-        Parameters
-        ----------
-        names : as listed.
-        run : None.
-        """
-        known = {
-            one.name: (one, place) for one, place in zip(self.channels, self.places, strict=True)
-        }
-        asked = chosen(self.path, names, known, run)
-        fields: dict[_Topic, list[Field]] = {}
-        for _, (topic, one) in asked:
-            fields.setdefault(topic, []).append(one)
-        with one_line(self.path, "a ROS 2 bag"), _opened(self.path) as bag:
-            definitions, _ = _definitions(self.path, bag)
-            readings = {
-                topic.name: _Reading(self.path, definitions, topic, some)
-                for topic, some in fields.items()
-            }
-            for name, received, raw in _messages(bag, list(fields)):
-                readings[name].add(received, raw)
-            read = {name: reading.finish() for name, reading in readings.items()}
-        rows = {name: np.arange(1, stamps.t.size + 1) for name, (stamps, _) in read.items()}
-        for stamps, _ in read.values():
-            self._mended.extend(stamps.notes)
-        return tuple(
-            Channel(
-                name=listed.name,
-                unit=listed.unit,
-                t=read[topic.name][0].t,
-                values=read[topic.name][1][field.path],
-                place="message",
-                rows=rows[topic.name],
-            )
-            for listed, (topic, field) in asked
-        )
+_Place = tuple[_Topic, Field]  # where a channel is
 
 
 def recognizes(head: bytes, path: Path) -> bool:
@@ -185,7 +114,7 @@ def recognizes(head: bytes, path: Path) -> bool:
     return head.startswith((SQLITE, MCAP, ROS1))
 
 
-def open_(path: Path) -> BagFile:
+def open_(path: Path) -> GroupedLog[_Place]:
     """List the channels of a bag.
 
     Parameters
@@ -200,29 +129,40 @@ def open_(path: Path) -> BagFile:
     with one_line(path, "a ROS 2 bag"), _opened(path) as bag:
         definitions, undefined = _definitions(path, bag)
         topics, skipped = _topics(bag, definitions)
-        said = _said(topics, {**undefined, **skipped})
         seconds = (bag.metadata.end_time - bag.metadata.start_time) / NS
-    found = [(topic, field) for topic in topics for field in topic.fields]
-    if not found:
-        why = "".join(f"; {one}" for one in said)
-        raise RecordingError(f"{path}: holds no message with numbers{why}")
-    require_few(RecordingError, str(path), len(found), "columns", "channels")
-    names = unique((topic.kind, f"{topic.name}/{field.path}") for topic, field in found)
-    return BagFile(
-        path=path,
-        format="ROS 2 bag" if _plugin(path) != ".mcap" else "MCAP",
-        channels=tuple(
-            Listed(
-                name=name,
-                unit=_unit(field),
-                samples=topic.messages,
-                rate=(topic.messages - 1) / seconds if seconds > 0.0 else float("nan"),
-            )
-            for name, (topic, field) in zip(names, found, strict=True)
-        ),
-        places=tuple(found),
-        said=said,
+    found = []
+    for topic in topics:
+        rate = (topic.messages - 1) / seconds if seconds > 0.0 else float("nan")
+        for field in topic.fields:
+            name = f"{topic.name}/{field.path}"
+            listed = Listed(name=name, unit=_unit(field), samples=topic.messages, rate=rate)
+            found.append((topic.kind, listed, (topic, field)))
+    return GroupedLog.of(
+        path,
+        "ROS 2 bag" if _plugin(path) != ".mcap" else "MCAP",
+        "a ROS 2 bag",
+        "message",
+        found,
+        _said(topics, {**undefined, **skipped}),
+        partial(_samples, path, definitions),
+        missing="message with numbers",
     )
+
+
+def _samples(
+    path: Path, definitions: Definitions, asked: Sequence[tuple[Listed, _Place]]
+) -> list[Samples]:
+    """Read fields of messages, topic by topic."""
+    fields: dict[_Topic, dict[str, Field]] = {}
+    for listed, (topic, field) in asked:
+        fields.setdefault(topic, {})[listed.name] = field
+    readings = {
+        topic.name: _Reading(path, definitions, topic, some) for topic, some in fields.items()
+    }
+    with _opened(path) as bag:
+        for name, received, raw in _messages(bag, list(fields)):
+            readings[name].add(received, raw)
+    return [reading.finish() for reading in readings.values()]
 
 
 def _plugin(path: Path) -> str:
@@ -361,18 +301,18 @@ class _Reading:
     path : of the bag.
     definitions : by name of a type.
     topic : that is read.
-    fields : of its messages that are kept.
+    fields : of its messages that are kept, by the names of their channels.
     """
 
     def __init__(
-        self, path: Path, definitions: Definitions, topic: _Topic, fields: Sequence[Field]
+        self, path: Path, definitions: Definitions, topic: _Topic, fields: Mapping[str, Field]
     ) -> None:
         self.path, self.definitions, self.topic, self.fields = path, definitions, topic, fields
         self.times: list[int] = []
         self.raws: list[bytes] = []
         self.layouts: dict[int, list[Layout]] = {}
         self.clock = Growing(np.int64)
-        self.parts = {one.path: Growing() for one in fields}
+        self.parts = {name: Growing() for name in fields}
 
     def add(self, time: int, raw: bytes) -> None:
         """Take the next message."""
@@ -385,10 +325,10 @@ class _Reading:
         """Read the messages that were taken."""
         raws, stamp = self.raws, self.topic.stamp
         ns = np.array(self.times, dtype=np.int64)
-        values = {one.path: np.empty(len(raws)) for one in self.fields}
+        values = {name: np.empty(len(raws)) for name in self.fields}
         for layout, which, rows in _grouped(self.definitions, self.topic.kind, raws, self.layouts):
-            for one in self.fields:
-                values[one.path][which] = numbers(layout, rows, one)
+            for name, one in self.fields.items():
+                values[name][which] = numbers(layout, rows, one)
             if stamp is not None:
                 ns[which] = _stamps(layout, rows, stamp)
         self.clock.extend(ns)
@@ -399,8 +339,8 @@ class _Reading:
         )
         self.times, self.raws = [], []
 
-    def finish(self) -> tuple[Stamps, Mapping[str, Array]]:
-        """Return the times of the messages and the numbers by the path of their field."""
+    def finish(self) -> Samples:
+        """Return the times of the messages and their numbers."""
         if self.raws:
             self._read()
         if len(self.clock) != self.topic.messages:
@@ -409,8 +349,8 @@ class _Reading:
                 f"{len(self.clock)}; was the bag cut off?"
             )
         t = (self.clock.finished() - self.topic.zero) / NS
-        stamps = seconds_of(self.path, self.topic.name, t, "message")
-        return stamps, {name: one.finished() for name, one in self.parts.items()}
+        values = {name: one.finished() for name, one in self.parts.items()}
+        return Samples(self.topic.name, t, values)
 
 
 def _grouped(

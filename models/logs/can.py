@@ -5,20 +5,21 @@ values that the DBC names as not available or invalid are NaN.
 """
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import Array
-from models.logs.foreign import chosen, need, one_line, seconds_of, typical_rate, unique
-from models.logs.frames import EXTENDED, TOGETHER, Frames, gather, kind_of
-from models.logs.growing import Growing
-from models.logs.log import Channel, Listed, RecordingError
-from models.schema import LONGEST_NAME, read_bytes, require_few
+from codegen.arrays import Array, blocks, filled
+from models.logs.foreign import need, one_line
+from models.logs.frames import EXTENDED, Frames, gather, kind_of
+from models.logs.grouped import GroupedLog, Samples
+from models.logs.log import Listed, RecordingError
+from models.logs.stamps import typical_rate
+from models.schema import LONGEST_NAME, read_bytes
 
 PROBED = 200  # frames that a rate is taken from
 # Names that a DBC gives to values that are no numbers.
@@ -32,79 +33,53 @@ NO_NUMBER = re.compile(
 Selectors = tuple[tuple[Any, tuple[int, ...]], ...]
 
 
-class _Place(NamedTuple):
-    """Where a channel is: frames, signal of the DBC, and what says in which of them it is sent."""
-
-    frames: Frames
-    signal: Any
-    selectors: Selectors
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CanFile:
-    """A log of frames and what they hold, as `LogFile` says.
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
+class _Group:
+    """Signals that are sent together: they share a clock.
 
     Parameters
     ----------
-    path : of the file.
-    format : "CAN ASC", "CAN BLF", "CAN candump", "CAN TRC" or "CAN MDF4".
-    channels : as listed.
-    places : of the channels.
-    said : what is left out.
+    name : of their frame.
+    t : when they were sent [s], (n,).
+    data : of the frames of one identifier on one bus, (m, bytes).
+    sent : which of the frames hold the signals, (n,); None where all do.
     """
 
-    path: Path
-    format: str
-    channels: tuple[Listed, ...]
-    places: tuple[_Place, ...]
-    said: tuple[str, ...]
-    _mended: list[str] = field(default_factory=list, compare=False, repr=False)
+    name: str
+    t: Array
+    data: NDArray[np.uint8]
+    sent: NDArray[np.intp] | None
 
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """How many frames are left out, and what was mended in what has been read."""
-        return (*self.said, *dict.fromkeys(self._mended))
-
-    def listed(self) -> tuple[Listed, ...]:
-        """Return the signals that the DBC tells of the frames in the log."""
-        return self.channels
-
-    def runs(self) -> tuple[str, ...]:
-        """Return no names: a log is one run."""
-        return ()
-
-    def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
-        """Return channels in the order of their names.
+    def values(self, signal: Any) -> Array:
+        """Return a signal in its unit, (n,).
 
         Parameters
         ----------
-        names : as listed.
-        run : None.
+        signal : of the DBC.
         """
-        known = {
-            one.name: (one, place) for one, place in zip(self.channels, self.places, strict=True)
-        }
-        result = []
-        with one_line(self.path, "a CAN log"):
-            for listed, (frames, signal, selectors) in chosen(self.path, names, known, run):
-                sent = _sent(frames, selectors)
-                stamps = seconds_of(self.path, listed.name, frames.t[sent], "message")
-                self._mended.extend(stamps.notes)
-                values = Growing()
-                for k in range(0, sent.size, TOGETHER):
-                    some = slice(k, k + TOGETHER)
-                    values.extend(values_of(frames.data[some][sent[some]], signal))
-                result.append(
-                    Channel(
-                        name=listed.name,
-                        unit=listed.unit,
-                        t=stamps.t,
-                        values=values.finished(),
-                        place="message",
-                        rows=np.arange(1, len(values) + 1),
-                    )
-                )
-        return tuple(result)
+        data, sent = self.data, self.sent
+        return filled(
+            self.t.size,
+            lambda part: values_of(data[part if sent is None else sent[part]], signal),
+        )
+
+
+class _Place(NamedTuple):
+    """Where a channel is: with which others it is sent, and the signal of the DBC."""
+
+    group: _Group
+    signal: Any
+
+
+def _samples(asked: Sequence[tuple[Listed, _Place]]) -> list[Samples]:
+    """Read signals, frame by frame."""
+    groups: dict[_Group, dict[str, Any]] = {}
+    for listed, place in asked:
+        groups.setdefault(place.group, {})[listed.name] = place.signal
+    return [
+        Samples(group.name, group.t, {name: group.values(one) for name, one in signals.items()})
+        for group, signals in groups.items()
+    ]
 
 
 def recognizes(head: bytes, path: Path) -> bool:
@@ -118,7 +93,7 @@ def recognizes(head: bytes, path: Path) -> bool:
     return path.is_file() and kind_of(head) not in ("", "MDF4")
 
 
-def open_(path: Path, dbc: Path | None = None) -> CanFile:
+def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
     """Read the frames of a log that a DBC knows and list their signals.
 
     Parameters
@@ -143,38 +118,45 @@ def open_(path: Path, dbc: Path | None = None) -> CanFile:
         if not kind:
             raise RecordingError(f"{path}: is no CAN log: neither ASC, BLF, candump, TRC nor MDF4")
         log = gather(path, kind, {key: one.length for key, one in messages.items()})
-        found: list[tuple[str, Listed, _Place]] = []
-        for (bus, identifier), frames in log.frames.items():
-            message = messages[identifier]
-            for signal in message.signals:
-                place = _Place(frames, signal, _selectors(message, signal))
-                sent = _sent(frames, place.selectors)
-                if sent.any():
-                    listed = Listed(
-                        name=f"{message.name}.{signal.name}",
-                        unit=(signal.unit or "").strip()[:LONGEST_NAME],
-                        samples=int(sent.sum()),
-                        rate=typical_rate(frames.t[sent][:PROBED]),
-                    )
-                    found.append((f"bus {bus}", listed, place))
+        found = [
+            (f"bus {bus}", listed, place)
+            for (bus, identifier), frames in log.frames.items()
+            for listed, place in _channels(messages[identifier], frames)
+        ]
     said = tuple(
         f"{count} {what} frames are not read" for what, count in log.others.items() if count
     )
-    if not found:
-        why = "".join(f"; {one}" for one in said)
-        raise RecordingError(f"{path}: holds no frame that {dbc} knows{why}")
-    require_few(RecordingError, str(path), len(found), "columns", "channels")
-    names = unique((bus, listed.name) for bus, listed, _ in found)
-    return CanFile(
-        path=path,
-        format=log.format,
-        channels=tuple(
-            Listed(name=name, unit=one.unit, samples=one.samples, rate=one.rate)
-            for name, (_, one, _) in zip(names, found, strict=True)
-        ),
-        places=tuple(place for _, _, place in found),
-        said=said,
+    return GroupedLog.of(
+        path,
+        log.format,
+        "a CAN log",
+        "message",
+        found,
+        said,
+        _samples,
+        missing=f"frame that {dbc} knows",
     )
+
+
+def _channels(message: Any, frames: Frames) -> Iterator[tuple[Listed, _Place]]:
+    """Yield the signals that are sent in the frames of a message."""
+    groups: dict[tuple[tuple[str, tuple[int, ...]], ...], _Group] = {}
+    for signal in message.signals:
+        selectors = _selectors(message, signal)
+        key = tuple((one.name, ids) for one, ids in selectors)
+        if key not in groups:
+            sent = _sent(frames, selectors)
+            t = frames.t if sent is None else frames.t[sent]
+            groups[key] = _Group(name=message.name, t=t, data=frames.data, sent=sent)
+        group = groups[key]
+        if group.t.size:
+            listed = Listed(
+                name=f"{message.name}.{signal.name}",
+                unit=(signal.unit or "").strip()[:LONGEST_NAME],
+                samples=group.t.size,
+                rate=typical_rate(group.t[:PROBED]),
+            )
+            yield listed, _Place(group, signal)
 
 
 def _read_dbc(path: Path) -> dict[int, Any]:
@@ -208,14 +190,15 @@ def _selectors(message: Any, signal: Any) -> Selectors:
     return tuple(result)
 
 
-def _sent(frames: Frames, selectors: Selectors) -> NDArray[np.bool_]:
-    """Return which frames hold a signal: of multiplexed ones not all do."""
+def _sent(frames: Frames, selectors: Selectors) -> NDArray[np.intp] | None:
+    """Return which frames hold a signal, None where all do: of multiplexed ones not all do."""
+    if not selectors:
+        return None
     sent = np.ones(frames.t.size, dtype=bool)
     for selector, ids in selectors:
-        for k in range(0, sent.size, TOGETHER):
-            some = slice(k, k + TOGETHER)
-            sent[some] &= np.isin(raw_values(frames.data[some], selector), ids)
-    return sent
+        for part in blocks(sent.size):
+            sent[part] &= np.isin(raw_values(frames.data[part], selector), ids)
+    return np.flatnonzero(sent)
 
 
 def values_of(data: NDArray[np.uint8], signal: Any) -> Array:

@@ -21,7 +21,7 @@ from models.limits import limits
 from models.logs.foreign import need
 from models.logs.growing import Growing
 from models.logs.log import RecordingError
-from models.logs.mdf_blocks import MAGIC, opened
+from models.logs.mdf_blocks import BUS_EVENT, MAGIC, opened
 from models.schema import require_few
 
 BLF = b"LOGG"
@@ -37,7 +37,6 @@ EXTENDED = 1 << 31  # marks an identifier of 29 bits
 IDENTIFIER = (1 << 29) - 1
 EPOCH = 1e8  # s: stamps above are of the calendar, which doubles hold to less than a microsecond
 MICROSECONDS = 1e6
-BUS_EVENT = 1 << 1  # flag of a group of an MDF file
 INFLATION = 1032  # most bytes that deflate makes of one
 OBJECT = struct.Struct("<4sHHII")  # of BLF: mark, size and version of the header, size, type
 CONTAINER, DEFLATED = 10, 2

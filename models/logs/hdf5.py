@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from codegen.arrays import Array
-from models.logs.foreign import need, require_room
+from models.logs.foreign import need
+from models.logs.grouped import require_room
 from models.logs.log import RecordingError
 from models.logs.tree import Leaf, Tree, Unread
 from models.schema import require_few

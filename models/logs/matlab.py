@@ -1,25 +1,18 @@
 """MATLAB files: version 5 to 7 as they are, 7.3 (which is HDF5) and other HDF5 files by h5py."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from models.logs import hdf5, mat5
-from models.logs.foreign import (
-    chosen,
-    noted,
-    one_line,
-    require_room,
-    seconds_of,
-    typical_rate,
-)
-from models.logs.log import Channel, Listed, RecordingError
-from models.logs.stamps import PER_SECOND, find_clock
+from models.logs.foreign import one_line
+from models.logs.grouped import GroupedLog, Samples, noted, require_room
+from models.logs.log import Listed, RecordingError
+from models.logs.stamps import PER_SECOND, find_clock, typical_rate
 from models.logs.tree import HEAD, Clock, Signal, line_of, signals_of, times_of
 
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -44,79 +37,6 @@ class _Time(NamedTuple):
     rate: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MatlabFile:
-    """A MATLAB or HDF5 file, as `LogFile` says.
-
-    Parameters
-    ----------
-    path : of the file.
-    format : "MATLAB", "MATLAB 7.3" or "HDF5".
-    channels : as listed.
-    signals : where they are.
-    times : how each of their clocks is read.
-    said : what is left out.
-    """
-
-    path: Path
-    format: str
-    channels: tuple[Listed, ...]
-    signals: tuple[Signal, ...]
-    times: dict[Clock, _Time]
-    said: tuple[str, ...]
-    _mended: list[str] = field(default_factory=list, compare=False, repr=False)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What is left out, and what was mended in what has been read."""
-        return (*self.said, *dict.fromkeys(self._mended))
-
-    def listed(self) -> tuple[Listed, ...]:
-        """Return the vectors that have a clock."""
-        return self.channels
-
-    def runs(self) -> tuple[str, ...]:
-        """Return no names: runs that a file holds apart are channels with clocks of their own."""
-        return ()
-
-    def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
-        """Return channels in the order of their names.
-
-        Parameters
-        ----------
-        names : as listed.
-        run : None.
-        """
-        known = {signal.name: signal for signal in self.signals}
-        asked = chosen(self.path, names, known, run)
-        clocks: dict[Clock, tuple[Array, NDArray[np.int64]]] = {}
-        result: dict[str, Channel] = {}
-        with one_line(self.path, f"a {self.format} file"):
-            # Signals of one matrix are read together, and the matrix is not kept.
-            leaves = {id(signal.leaf): signal.leaf for signal in asked}
-            for leaf in leaves.values():
-                require_room(self.path, max(leaf.shape), 8 * min(leaf.shape))
-                values = leaf.load()
-                for signal in asked:
-                    if signal.leaf is not leaf:
-                        continue
-                    if signal.clock not in clocks:
-                        t = _seconds(times_of(signal.clock), self.times[signal.clock])
-                        stamps = seconds_of(self.path, signal.clock.name, t, "sample")
-                        self._mended.extend(stamps.notes)
-                        clocks[signal.clock] = stamps.t, np.arange(1, t.size + 1)
-                    t, rows = clocks[signal.clock]
-                    result[signal.name] = Channel(
-                        name=signal.name,
-                        unit=signal.unit,
-                        t=t,
-                        values=line_of(values, signal),
-                        place="sample",
-                        rows=rows,
-                    )
-        return tuple(result[signal.name] for signal in asked)
-
-
 def recognizes(head: bytes, path: Path) -> bool:
     """Whether a file is of this format.
 
@@ -136,7 +56,7 @@ def _is_mat5(head: bytes) -> bool:
     return head[:6] == b"MATLAB" and head[126:128] in MAT5_ORDERS
 
 
-def open_(path: Path) -> MatlabFile:
+def open_(path: Path) -> GroupedLog[Signal]:
     """List the channels of a file.
 
     Parameters
@@ -166,21 +86,47 @@ def open_(path: Path) -> MatlabFile:
             *noted("not read", found.unread),
             *noted("there is no vector t or time of the same length for", found.clockless),
         )
-        if not found.signals:
-            why = "; ".join(said) or "there is no vector of numbers"
-            raise RecordingError(f"{path}: holds no signal with a time; {why}; {REMEDY}")
         times = _times(found.signals)
-    return MatlabFile(
-        path=path,
-        format=format,
-        channels=tuple(
-            Listed(name=one.name, unit=one.unit, samples=one.samples, rate=times[one.clock].rate)
+    return GroupedLog.of(
+        path,
+        format,
+        f"a {format} file",
+        "sample",
+        [
+            (
+                one.clock.name.rpartition(".")[0] or "top",
+                Listed(
+                    name=one.name, unit=one.unit, samples=one.samples, rate=times[one.clock].rate
+                ),
+                one,
+            )
             for one in found.signals
-        ),
-        signals=found.signals,
-        times=times,
-        said=said,
+        ],
+        said,
+        partial(_samples, path, times),
+        missing="signal with a time",
+        remedy=REMEDY if said else f"there is no vector of numbers; {REMEDY}",
     )
+
+
+def _samples(
+    path: Path, times: Mapping[Clock, _Time], asked: Sequence[tuple[Listed, Signal]]
+) -> list[Samples]:
+    """Read signals; those of one matrix together, and the matrix is not kept."""
+    together: dict[int, list[tuple[Listed, Signal]]] = {}
+    for one in asked:
+        together.setdefault(id(one[1].leaf), []).append(one)
+    found: dict[Clock, dict[str, Array]] = {}
+    for some in together.values():
+        leaf = some[0][1].leaf
+        require_room(path, max(leaf.shape), 8 * min(leaf.shape))
+        values = leaf.load()
+        for listed, signal in some:
+            found.setdefault(signal.clock, {})[listed.name] = line_of(values, signal)
+    return [
+        Samples(clock.name, _seconds(times_of(clock), times[clock]), values)
+        for clock, values in found.items()
+    ]
 
 
 def _times(signals: Sequence[Signal]) -> dict[Clock, _Time]:

@@ -6,27 +6,19 @@ numbers, as "not available", these samples are NaN. So are samples that the logg
 """
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from codegen.arrays import Array
-from models.logs.foreign import (
-    chosen,
-    noted,
-    one_line,
-    require_room,
-    seconds_of,
-    typical_rate,
-    unique,
-)
-from models.logs.growing import Growing
-from models.logs.log import Channel, Listed, RecordingError
-from models.logs.mdf_blocks import MAGIC, opened
+from codegen.arrays import Array, filled
+from models.logs.foreign import one_line
+from models.logs.grouped import GroupedLog, Samples, noted, require_room
+from models.logs.log import Listed, RecordingError
+from models.logs.mdf_blocks import BUS_EVENT, MAGIC, opened
+from models.logs.stamps import typical_rate
 from models.schema import LONGEST_NAME
 
 NUMERIC_4, NUMERIC_3 = frozenset(range(6)), frozenset((0, 1, 2, 3, *range(9, 17)))
@@ -38,7 +30,6 @@ FORMULA = re.compile(
     r"|exp|log|log10|abs|sqrt|pow)\b)*"
 )
 VALUES, TIME = (0, 6), 1  # types of a channel, of what a master counts
-BUS_EVENT = 1 << 1  # flag of a channel group that holds frames of a bus
 # Why a channel is not listed, by its kind.
 REASONS = {
     "word": "enumerations and texts are no signals",
@@ -58,87 +49,30 @@ class _Place(NamedTuple):
     channel: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MdfFile:
-    """A measurement file, as `LogFile` says.
-
-    Parameters
-    ----------
-    path : of the file.
-    format : "MDF3" or "MDF4".
-    channels : as listed.
-    places : of the channels.
-    said : what is left out.
-    """
-
-    path: Path
-    format: str
-    channels: tuple[Listed, ...]
-    places: tuple[_Place, ...]
-    said: tuple[str, ...]
-    _mended: list[str] = field(default_factory=list, compare=False, repr=False)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What is left out, and what was mended in what has been read."""
-        return (*self.said, *dict.fromkeys(self._mended))
-
-    def listed(self) -> tuple[Listed, ...]:
-        """Return the numeric channels."""
-        return self.channels
-
-    def runs(self) -> tuple[str, ...]:
-        """Return no names: a measurement is one run."""
-        return ()
-
-    def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
-        """Return channels in the order of their names.
-
-        Parameters
-        ----------
-        names : as listed.
-        run : None.
-        """
-        known = {
-            one.name: (one, place) for one, place in zip(self.channels, self.places, strict=True)
-        }
-        asked = chosen(self.path, names, known, run)
-        values: dict[_Place, Array] = {}
-        clocks: dict[int, tuple[Array, NDArray[np.int64]]] = {}
-        with one_line(self.path, "an MDF file"), opened(self.path, "MDF") as file:
-            for some in _portions(asked):
-                group = some[0][1].group
-                for (listed, place), (t, numbers) in zip(
-                    some, _read(self.path, file, some), strict=True
-                ):
-                    if group not in clocks:
-                        stamps = seconds_of(self.path, listed.name, t, "sample")
-                        self._mended.extend(stamps.notes)
-                        clocks[group] = _kept(stamps.t), np.arange(1, t.size + 1)
-                    values[place] = _kept(numbers)
-        return tuple(
-            Channel(
-                name=listed.name,
-                unit=listed.unit,
-                t=clocks[place.group][0],
-                values=values[place],
-                place="sample",
-                rows=clocks[place.group][1],
-            )
-            for listed, place in asked
-        )
-
-
 _Asked = tuple[Listed, _Place]
 
 
-def _portions(asked: Sequence[_Asked]) -> Iterator[list[_Asked]]:
-    """Yield channels that are read together: of one group, and few enough for the memory."""
-    for group in dict.fromkeys(place.group for _, place in asked):
-        mine = [one for one in asked if one[1].group == group]
-        several = max(1, TOGETHER // max(mine[0][0].samples, 1))
-        for k in range(0, len(mine), several):
-            yield mine[k : k + several]
+def _samples(path: Path, asked: Sequence[_Asked]) -> list[Samples]:
+    """Read channels group by group."""
+    groups: dict[int, list[_Asked]] = {}
+    for one in asked:
+        groups.setdefault(one[1].group, []).append(one)
+    with opened(path, "MDF") as file:
+        return [_of_group(path, file, mine) for mine in groups.values()]
+
+
+def _of_group(path: Path, file: Any, mine: Sequence[_Asked]) -> Samples:
+    """Read channels of one group, as many at a time as the memory takes."""
+    several = max(1, TOGETHER // max(mine[0][0].samples, 1))
+    t: Array | None = None
+    values: dict[str, Array] = {}
+    for k in range(0, len(mine), several):
+        some = mine[k : k + several]
+        for (listed, _), (times, numbers) in zip(some, _read(path, file, some), strict=True):
+            t = times if t is None else t
+            values[listed.name] = _kept(numbers)
+    assert t is not None
+    return Samples(mine[0][0].name, _kept(t), values)
 
 
 def _read(path: Path, file: Any, some: Sequence[_Asked]) -> list[tuple[Array, Array]]:
@@ -164,9 +98,7 @@ def _read(path: Path, file: Any, some: Sequence[_Asked]) -> list[tuple[Array, Ar
 
 def _kept(values: Array) -> Array:
     """Return numbers as they are kept: on disk where they are many."""
-    grown = Growing()
-    grown.extend(values)
-    return grown.finished()
+    return filled(values.size, lambda part: values[part])
 
 
 def recognizes(head: bytes, path: Path) -> bool:
@@ -180,7 +112,7 @@ def recognizes(head: bytes, path: Path) -> bool:
     return path.is_file() and head[:8] in MAGIC
 
 
-def open_(path: Path) -> MdfFile:
+def open_(path: Path) -> GroupedLog[_Place]:
     """List the channels of a file.
 
     Parameters
@@ -230,7 +162,7 @@ class _Found:
             self.channels.append((name, listed, _Place(number, index)))
 
 
-def _list(path: Path, file: Any) -> MdfFile:
+def _list(path: Path, file: Any) -> GroupedLog[_Place]:
     """List the channels of an open file."""
     is_4 = str(file.version) >= "4"
     found = _Found()
@@ -239,18 +171,15 @@ def _list(path: Path, file: Any) -> MdfFile:
     said = tuple(
         note for kind, reason in REASONS.items() for note in noted(reason, found.others[kind])
     )
-    if not found.channels:
-        why = "".join(f"; {one}" for one in said)
-        raise RecordingError(f"{path}: holds no numeric channel with a time{why}")
-    names = unique((group, one.name) for group, one, _ in found.channels)
-    return MdfFile(
-        path=path,
-        format="MDF4" if is_4 else "MDF3",
-        channels=tuple(
-            replace(one, name=name) for name, (_, one, _) in zip(names, found.channels, strict=True)
-        ),
-        places=tuple(place for _, _, place in found.channels),
-        said=said,
+    return GroupedLog.of(
+        path,
+        "MDF4" if is_4 else "MDF3",
+        "an MDF file",
+        "sample",
+        found.channels,
+        said,
+        partial(_samples, path),
+        missing="numeric channel with a time",
     )
 
 

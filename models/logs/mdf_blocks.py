@@ -18,7 +18,7 @@ from models.schema import require_few
 
 MAGIC = (b"MDF     ", b"UnFinMF ")
 MOST_BLOCKS = 1_000_000  # of data
-DATA_BITS = 64 * 8  # of a channel, at most
+BUS_EVENT = 1 << 1  # flag of a group of channels that holds frames of a bus
 
 
 class _Form(NamedTuple):

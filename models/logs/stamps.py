@@ -39,6 +39,7 @@ FASTEST, SLOWEST = 1e-5, 0.11  # [s] between samples of a car's log
 COARSEST = 1.0  # between stamps without a unit: more than that are no seconds
 TICKS = tuple(10.0**-k for k in range(10))  # [s]: what stamps may be rounded to
 WORTH = 0.05  # share of a step by which rounding must shift stamps to be taken out
+MOST_STEPS = 100_000  # samples that a rate is taken from
 SHARED = 1.2  # samples that share a stamp, on average: with fewer they are doubled, not rounded
 
 _DATE = re.compile(
@@ -295,6 +296,18 @@ def seconds(
     if fall is not None or repeat is not None:
         raise RecordingError(f"{label}: {clock.name} {not_rising(t, rows, place)}")
     return Stamps(t, ())
+
+
+def typical_rate(t: Array) -> float:
+    """Return the samples per second [Hz] of times, by the first of many; NaN of fewer than two.
+
+    Parameters
+    ----------
+    t : times [s], (n,).
+    """
+    steps = np.diff(t[:MOST_STEPS])
+    step = float(np.median(steps)) if steps.size else 0.0
+    return 1.0 / step if step > 0.0 else math.nan
 
 
 def _in_seconds(clock: Clock, values: NDArray[Any]) -> Array:

@@ -1,5 +1,6 @@
 """A log that is a table: one clock, one row per sample, whatever format holds it."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -10,10 +11,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import Array
 from models.logs.growing import Growing
 from models.logs.log import Channel, Listed, RecordingError
-from models.logs.stamps import Clock, find_clock, seconds, told_clock
+from models.logs.stamps import Clock, find_clock, seconds, told_clock, typical_rate
 from models.schema import LONGEST_NAME, limits, require_few, shown
 
 RUN = "run"
@@ -258,7 +258,7 @@ class TableLog:
             for words in cells.words.values():  # each run has a clock of its own
                 stamps, rows = stamps[words.codes == 0], rows[words.codes == 0]
             t = seconds(str(self.path), clock, stamps, rows, self.table.place).t
-        rate = _rate(t)
+        rate = math.nan if t is None else typical_rate(t)
         listed = []
         for k, name in enumerate(self.names):
             if not self.table.numeric[k] or k == self._run_column:
@@ -350,14 +350,6 @@ class TableLog:
 def _kind(clock: Clock) -> Kind:
     """Return how the cells of a clock are read."""
     return Kind.INSTANT if clock.unit == "instant" else Kind.NUMBER
-
-
-def _rate(t: Array | None) -> float:
-    """Return samples per second, NaN where there are none."""
-    if t is None or t.size < 2:
-        return float("nan")
-    step = float(np.median(np.diff(t[:100_000])))
-    return 1.0 / step if step > 0.0 else float("nan")
 
 
 def some(names: Sequence[str]) -> str:

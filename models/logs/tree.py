@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from models.logs.foreign import unique
 from models.logs.stamps import NAMES
 
 # Of a variable: a name that a clock has, and the unit that may follow it.
@@ -97,7 +96,7 @@ class Found(NamedTuple):
 
 
 def signals_of(tree: Mapping[str, Tree]) -> Found:
-    """Return the channels of a tree, in its order.
+    """Return the channels of a tree, in its order; their names may repeat.
 
     Parameters
     ----------
@@ -105,14 +104,7 @@ def signals_of(tree: Mapping[str, Tree]) -> Found:
     """
     walk = _Walk()
     walk.struct(dict(tree), "", ())
-    names = unique(
-        (signal.clock.name.rpartition(".")[0] or "top", signal.name) for signal in walk.signals
-    )
-    return Found(
-        tuple(one._replace(name=name) for one, name in zip(walk.signals, names, strict=True)),
-        tuple(walk.clockless),
-        tuple(walk.unread),
-    )
+    return Found(tuple(walk.signals), tuple(walk.clockless), tuple(walk.unread))
 
 
 def times_of(clock: Clock) -> Array:

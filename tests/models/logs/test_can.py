@@ -149,6 +149,14 @@ def test_a_dbc_tells_the_signals_their_units_and_which_frames_hold_them(ending, 
     assert np.allclose(second.t, 0.02 * k[1::2] + 0.002, rtol=0, atol=1e-9)
 
 
+def test_signals_of_one_frame_share_its_times_and_multiplexed_ones_have_theirs(tmp_path):
+    log = open_log(car_log(tmp_path / "log.blf"), dbc(tmp_path))
+    names = ["Steering.Angle", "Steering.Rate", "Muxed.Page", "Muxed.First", "Muxed.Second"]
+    angle, rate, page, first, second = log.read(names)
+    assert angle.t is rate.t and angle.rows is rate.rows
+    assert len({id(one.t) for one in (angle, page, first, second)}) == 4
+
+
 def test_values_that_the_dbc_names_as_no_number_are_nan(tmp_path):
     raw = [5, 32767, 32766, 1, -5]
     messages = [(k * 0.01, 100, struct.pack("<h", one) + bytes(6), {}) for k, one in enumerate(raw)]

@@ -1,0 +1,257 @@
+"""A log of channels, each group of them on its own clock: what measurement files, buses, bags are.
+
+A format lists its channels with where each is in the file, and reads those that are asked for,
+group by group; the clock of a group is judged and mended once, and its channels share it.
+"""
+
+import difflib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Generic, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import Array
+from models.logs.foreign import one_line
+from models.logs.log import Channel, Listed, RecordingError
+from models.logs.stamps import Clock, Stamps, seconds
+from models.schema import require_few, shown
+
+MOST_NOTED = 5  # names that a note lists
+
+P = TypeVar("P")
+T = TypeVar("T")
+
+
+class Samples(NamedTuple):
+    """What was asked for on one clock.
+
+    clock: its name, for messages; t: times as in the file [s], (n,); values: by name as listed,
+    (n,).
+    """
+
+    clock: str
+    t: Array
+    values: Mapping[str, Array]
+
+
+@dataclass(frozen=True, kw_only=True)
+class GroupedLog(Generic[P]):
+    """A log of groups of channels, as `LogFile` says.
+
+    Parameters
+    ----------
+    path : of the file.
+    format : as users call it.
+    what : that the file is read as, with its article.
+    place : what a sample is in the file: "message" or "sample".
+    channels : as listed, each with where the format finds it.
+    said : what is left out or taken for granted.
+    samples : reads channels; a list, so that a file is not open any more when it is returned.
+    """
+
+    path: Path
+    format: str
+    what: str
+    place: str
+    channels: tuple[tuple[Listed, P], ...]
+    said: tuple[str, ...]
+    samples: Callable[[Sequence[tuple[Listed, P]]], list[Samples]]
+    _mended: list[str] = field(default_factory=list, compare=False, repr=False)
+
+    @classmethod
+    def of(
+        cls,
+        path: Path,
+        format: str,
+        what: str,
+        place: str,
+        found: Sequence[tuple[str, Listed, P]],
+        said: tuple[str, ...],
+        samples: Callable[[Sequence[tuple[Listed, P]]], list[Samples]],
+        *,
+        missing: str,
+        remedy: str = "",
+    ) -> "GroupedLog[P]":
+        """Return the log of channels whose names may repeat.
+
+        Parameters
+        ----------
+        path, format, what, place : as of the class.
+        found : channels: the group of each, it, and where it is.
+        said, samples : as of the class.
+        missing : what the file does not hold where there are none, for the message.
+        remedy : ends that message.
+
+        Raises
+        ------
+        RecordingError
+            Where there is no channel, or too many.
+        """
+        if not found:
+            why = "".join(f"; {one}" for one in (*said, remedy) if one)
+            raise RecordingError(f"{path}: holds no {missing}{why}")
+        require_few(RecordingError, str(path), len(found), "columns", "channels")
+        names = unique((group, listed.name) for group, listed, _ in found)
+        return cls(
+            path=path,
+            format=format,
+            what=what,
+            place=place,
+            channels=tuple(
+                (replace(listed, name=name), where)
+                for name, (_, listed, where) in zip(names, found, strict=True)
+            ),
+            said=said,
+            samples=samples,
+        )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is left out or taken for granted, and what was mended in what has been read."""
+        return (*self.said, *dict.fromkeys(self._mended))
+
+    def listed(self) -> tuple[Listed, ...]:
+        """Return the numeric channels that have a clock."""
+        return tuple(listed for listed, _ in self.channels)
+
+    def runs(self) -> tuple[str, ...]:
+        """Return no names: such a log is one run."""
+        return ()
+
+    def read(self, names: Sequence[str], run: str | None = None) -> tuple[Channel, ...]:
+        """Return channels in the order of their names; those of one clock share its times.
+
+        Parameters
+        ----------
+        names : as listed.
+        run : None.
+
+        Raises
+        ------
+        RecordingError
+            One line: file, channel, rule, value, remedy.
+        """
+        asked = chosen(self.path, names, {one[0].name: one for one in self.channels}, run)
+        found: dict[str, tuple[Array, Array, NDArray[np.int64]]] = {}
+        with one_line(self.path, self.what):
+            for clock, t, values in self.samples(asked):
+                stamps = seconds_of(self.path, clock, t, self.place)
+                self._mended.extend(stamps.notes)
+                rows = np.arange(1, t.size + 1)
+                found |= {name: (stamps.t, some, rows) for name, some in values.items()}
+        result = []
+        for listed, _ in asked:
+            t, values_of, rows = found[listed.name]
+            result.append(
+                Channel(
+                    name=listed.name,
+                    unit=listed.unit,
+                    t=t,
+                    values=values_of,
+                    place=self.place,
+                    rows=rows,
+                )
+            )
+        return tuple(result)
+
+
+def chosen(path: Path, names: Sequence[str], known: Mapping[str, T], run: str | None) -> list[T]:
+    """Return what is known by names, of a file that holds no runs apart.
+
+    Parameters
+    ----------
+    path : of the file.
+    names : asked for.
+    known : by name as listed.
+    run : asked for.
+
+    Raises
+    ------
+    RecordingError
+        Where a name is not listed, or a run is asked for.
+    """
+    if run is not None:
+        raise RecordingError(f"{path}: holds one run without a name, so no run {shown(run)}")
+    for name in names:
+        if name not in known:
+            similar = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+            raise RecordingError(
+                f"{path}: there is no channel {shown(name)}"
+                + (f"; did you mean {shown(similar[0])}?" if similar else "")
+            )
+    return [known[name] for name in names]
+
+
+def seconds_of(path: Path, clock: str, t: Array, place: str) -> Stamps:
+    """Return times that rise, as `stamps.seconds` mends them where they were rounded.
+
+    Parameters
+    ----------
+    path : of the file.
+    clock : whose times they are.
+    t : times [s], (n,).
+    place : what a sample is in the file.
+
+    Raises
+    ------
+    RecordingError
+        One line, where they are not finite or do not rise.
+    """
+    told = Clock(0, f"the clock of {clock}", "s", False, "")
+    return seconds(str(path), told, t, np.arange(1, t.size + 1), place)
+
+
+def unique(names: Iterable[tuple[str, str]]) -> list[str]:
+    """Return names; what several share gets the name of its group before it, then a number behind.
+
+    Parameters
+    ----------
+    names : group and name of each.
+    """
+    pairs = list(names)
+    count: dict[str, int] = {}
+    for _, name in pairs:
+        count[name] = count.get(name, 0) + 1
+    result: list[str] = []
+    taken: set[str] = set()
+    last: dict[str, int] = {}
+    for group, name in pairs:
+        full = name if count[name] == 1 else f"{group}/{name}"
+        number = last.get(full, 1)
+        while (one := full if number == 1 else f"{full} ({number})") in taken:
+            number += 1
+        last[full] = number
+        taken.add(one)
+        result.append(one)
+    return result
+
+
+def noted(what: str, names: Sequence[str]) -> tuple[str, ...]:
+    """Return a note of names, none where there are none.
+
+    Parameters
+    ----------
+    what : they are, with the reason.
+    names : all of them; the first few are listed.
+    """
+    if not names:
+        return ()
+    some = ", ".join(names[:MOST_NOTED])
+    more = f", ... ({len(names)})" if len(names) > MOST_NOTED else ""
+    return (f"{what}: {some}{more}",)
+
+
+def require_room(path: Path, samples: float, width: float) -> None:
+    """Refuse what is read whole where it is too large.
+
+    Parameters
+    ----------
+    path : of the file.
+    samples : of a channel.
+    width : bytes that each of them takes.
+    """
+    require_few(RecordingError, str(path), samples, "samples", "samples of a channel")
+    require_few(RecordingError, str(path), samples * width / 1e6, "block", "megabytes of a block")
