@@ -1,10 +1,115 @@
-"""Arrays of pyarrow as arrays of NumPy, by their buffers: its own way there imports pandas."""
+"""What pyarrow does for us: blocks of text to columns, its arrays to arrays of NumPy.
 
+It is an extra, imported where it is worth the time. Its arrays are read by their buffers: its own
+way from them to NumPy imports pandas.
+"""
+
+import importlib
 import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from models.logs.preamble import Layout
+from models.logs.stamps import nanoseconds
+from models.logs.table import Kind, Words
+
+WORTH = 1 << 22  # bytes of a text from which on importing pyarrow takes less than it saves
+ODD_NAN = re.compile(rb"(?i)nan\(")  # a number to pyarrow alone
+NULLS = ["", "nan", "NaN", "NAN", "NA", "N/A", "#N/A", "null", "NULL", "None", "-", "--", "---"]
+
+
+def is_installed() -> bool:
+    """Whether pyarrow is there, with its reader of text."""
+    try:
+        importlib.import_module("pyarrow.csv")
+    except ImportError:
+        return False
+    return True
+
+
+def is_used(path: Path) -> bool:
+    """Whether a text is long enough to import pyarrow for it.
+
+    Parameters
+    ----------
+    path : of the file.
+    """
+    return path.stat().st_size > WORTH
+
+
+def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict[int, Any] | None:
+    """Return columns of a text; None where anything in it is not plain, which Python decides on.
+
+    Parameters
+    ----------
+    block : whole lines in UTF-8.
+    layout : of the table.
+    wanted : column from 0 -> how its cells are read.
+    """
+    import pyarrow
+    import pyarrow.csv
+
+    if layout.thousands or not wanted:
+        return None
+    kinds = {
+        str(column): pyarrow.float64() if kind is Kind.NUMBER else pyarrow.string()
+        for column, kind in wanted.items()
+    }
+    try:
+        table = pyarrow.csv.read_csv(
+            pyarrow.BufferReader(block),
+            pyarrow.csv.ReadOptions(
+                column_names=[str(k) for k in range(len(layout.names))], block_size=len(block) + 1
+            ),
+            pyarrow.csv.ParseOptions(
+                delimiter=layout.delimiter, newlines_in_values=b'"' in block, double_quote=True
+            ),
+            pyarrow.csv.ConvertOptions(
+                column_types=kinds,
+                include_columns=list(kinds),
+                null_values=NULLS,
+                strings_can_be_null=False,
+                decimal_point=layout.decimal,
+            ),
+        )
+        if table.num_rows != block.count(b"\n") + (not block.endswith(b"\n")):
+            return None
+        columns: dict[int, Any] = {}
+        for column, kind in wanted.items():
+            found = pyarrow.concat_arrays(table.column(str(column)).chunks)
+            if kind is Kind.NUMBER:
+                columns[column] = doubles(found)
+            elif kind is Kind.WORD:
+                columns[column] = words(found)
+            else:
+                instants = [nanoseconds(cell) for cell in found.to_pylist()]
+                if None in instants:
+                    return None
+                columns[column] = np.array(instants, dtype=np.int64)
+    except (pyarrow.ArrowException, UnicodeDecodeError):
+        return None
+    return columns
+
+
+def words(cells: Any) -> Words:
+    """Return cells of any type as words, "" where one is missing.
+
+    Parameters
+    ----------
+    cells : array of pyarrow, (n,).
+    """
+    import pyarrow
+
+    if pyarrow.types.is_dictionary(cells.type):
+        cells = cells.dictionary_decode()
+    coded = cells.dictionary_encode(null_encoding="encode")
+    names = ["" if one is None else str(one) for one in coded.dictionary.to_pylist()]
+    return Words(names, whole_numbers(coded.indices, 0))
 
 
 def doubles(cells: Any) -> NDArray[np.float64]:

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from models.logs.arrow import doubles, whole_numbers
+from models.logs.arrow import doubles, whole_numbers, words
 from models.logs.log import RecordingError
 from models.logs.spelling import unit_in_name
 from models.logs.stamps import MISSING, nanoseconds
-from models.logs.table import Cells, Gathered, Kind, TableLog, Words
+from models.logs.table import Cells, Gathered, Kind, TableLog
 from models.schema import require_few, require_file, shown
 
 HEAD = 400  # rows that tell what columns are
@@ -162,7 +162,7 @@ class ParquetTable:
         if kind is Kind.NUMBER:
             return doubles(cells)
         if kind is Kind.WORD:
-            return Words.of([str(cell) for cell in cells.to_pylist()])
+            return words(cells)
         if pyarrow.types.is_timestamp(found):
             try:
                 return whole_numbers(cells, MISSING)

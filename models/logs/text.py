@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from models.logs.arrow import doubles, whole_numbers
+from models.logs import arrow
 from models.logs.log import RecordingError
 from models.logs.preamble import BLANKS, COMMENT, HEAD, MISSING, Layout, cells_of, find_layout
 from models.logs.stamps import nanoseconds
@@ -29,8 +29,6 @@ from models.schema import pieces, require_few, shown
 BLOCK, SMALL_BLOCK = 1 << 22, 1 << 19  # bytes of text that are read at once: pyarrow, Python
 QUOTES = 8  # that may stand before the end of a block and not close
 LARGEST_LINE = 1 << 23  # bytes: 10 000 columns of 800
-WORTH_ARROW = 1 << 22  # bytes of a file from which on importing pyarrow takes less than it saves
-_ODD_NAN = re.compile(rb"(?i)nan\(")  # a number to pyarrow alone
 _BLANK = re.compile(rb"[ \t]+")
 _MARGIN = re.compile(rb"^ | $", re.MULTILINE)
 
@@ -132,10 +130,11 @@ class TextTable:
         wanted = dict(kinds) | ({} if run is None else {run[0]: Kind.WORD})
         gathered = Gathered(self.path, wanted, self.names, "line", run)
         reader = _Python(self.path, self.layout, wanted)
-        fast = _arrow() if _use_arrow(self.arrow, self.path) else None
+        fast = arrow.is_used(self.path) if self.arrow is None else self.arrow
+        fast = fast and arrow.is_installed()
         for line, block in _blocks(self.path, self.layout, BLOCK if fast else SMALL_BLOCK):
-            plain = fast is not None and reader.is_plain(block)
-            columns = _by_arrow(fast, self.layout, wanted, block) if plain else None
+            plain = fast and reader.is_plain(block)
+            columns = arrow.columns_of(block, self.layout, wanted) if plain else None
             if columns is None:
                 rows, columns = reader.read(line, block)
             else:
@@ -247,7 +246,7 @@ class _Python:
 
     def is_plain(self, block: bytes) -> bool:
         """Return whether no line of a block is a comment or the header once more."""
-        if b"(" in block and _ODD_NAN.search(block):
+        if b"(" in block and arrow.ODD_NAN.search(block):
             return False
         return not any(
             mark in block and (block.startswith(mark) or b"\n" + mark in block)
@@ -366,71 +365,3 @@ def _float(cell: str, decimal: str, thousands: str) -> float | None:
         return float(text)
     except ValueError:
         return None
-
-
-# Blocks read by pyarrow.
-
-
-def _use_arrow(asked: bool | None, path: Path) -> bool:
-    return path.stat().st_size > WORTH_ARROW if asked is None else asked
-
-
-def _arrow() -> Any:
-    """Return pyarrow with its reader of CSV, None where it is not installed."""
-    try:
-        import pyarrow
-        import pyarrow.csv
-    except ImportError:
-        return None
-    return pyarrow
-
-
-def _by_arrow(
-    arrow: Any, layout: Layout, wanted: Mapping[int, Kind], block: bytes
-) -> dict[int, Any] | None:
-    """Return the columns that are wanted; None where anything in the block is not plain."""
-    if layout.thousands or not wanted:
-        return None
-    kinds = {
-        str(column): arrow.float64() if kind is Kind.NUMBER else arrow.string()
-        for column, kind in wanted.items()
-    }
-    try:
-        table = arrow.csv.read_csv(
-            arrow.BufferReader(block),
-            arrow.csv.ReadOptions(
-                column_names=[str(k) for k in range(len(layout.names))], block_size=len(block) + 1
-            ),
-            arrow.csv.ParseOptions(
-                delimiter=layout.delimiter, newlines_in_values=b'"' in block, double_quote=True
-            ),
-            arrow.csv.ConvertOptions(
-                column_types=kinds,
-                include_columns=list(kinds),
-                null_values=_NULLS,
-                strings_can_be_null=False,
-                decimal_point=layout.decimal,
-            ),
-        )
-        if table.num_rows != block.count(b"\n") + (not block.endswith(b"\n")):
-            return None
-        columns: dict[int, Any] = {}
-        for column, kind in wanted.items():
-            found = arrow.concat_arrays(table.column(str(column)).chunks)
-            if kind is Kind.NUMBER:
-                columns[column] = doubles(found)
-            elif kind is Kind.WORD:
-                coded = found.dictionary_encode()
-                codes = whole_numbers(coded.indices, -1)
-                columns[column] = Words(coded.dictionary.to_pylist(), codes)
-            else:
-                instants = [nanoseconds(cell) for cell in found.to_pylist()]
-                if None in instants:
-                    return None
-                columns[column] = np.array(instants, dtype=np.int64)
-    except (arrow.ArrowException, UnicodeDecodeError):
-        return None
-    return columns
-
-
-_NULLS = ["", "nan", "NaN", "NAN", "NA", "N/A", "#N/A", "null", "NULL", "None", "-", "--", "---"]

@@ -123,6 +123,28 @@ def test_parquet_with_a_column_twice_is_refused(tmp_path):
         open_log(path).read(["vx"])
 
 
+@pytest.mark.parametrize("categories", [False, True])
+def test_an_empty_run_cell_is_a_run_without_a_name_in_every_table(tmp_path, categories):
+    t = np.tile(np.arange(20.0) / 100.0, 2)
+    cells = pyarrow.array(["lap"] * 20 + [None] * 20)
+    columns = {"t": t, "vx": t, "run": cells.dictionary_encode() if categories else cells}
+    pyarrow.parquet.write_table(pyarrow.table(columns), tmp_path / "log.parquet")
+    rows = zip(t.tolist(), t.tolist(), ["lap"] * 20 + [""] * 20, strict=True)
+    text = "t,vx,run\n" + "".join(f"{a!r},{b!r},{c}\n" for a, b, c in rows)
+    (tmp_path / "log.csv").write_text(text)
+    for name in ("log.csv", "log.parquet"):
+        log = open_log(tmp_path / name)
+        assert log.runs() == ("lap", "")
+        assert np.array_equal(log.read(["vx"], "")[0].values, t[20:])
+
+
+def test_runs_that_are_numbers_are_named_as_they_are_written(tmp_path):
+    t = np.arange(20.0) / 100.0
+    table = pyarrow.table({"t": t, "vx": t, "run": np.repeat([1.0, 2.5], 10)})
+    pyarrow.parquet.write_table(table, tmp_path / "log.parquet")
+    assert open_log(tmp_path / "log.parquet").runs() == ("1.0", "2.5")
+
+
 def test_without_pyarrow_a_text_is_read_all_the_same(tmp_path, monkeypatch):
     path = tmp_path / "log.csv"
     path.write_text(plain())
