@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -198,13 +198,26 @@ class History:
             if isinstance(state, Recalled) and isinstance(outputs, Recalled):
                 state, outputs = state.of(first, end), outputs.of(first, end)
             else:
-                state = {name: values[first : end + 1] for name, values in state.items()}
+                state = self._carried(first, end)
                 outputs = {name: values[first:end] for name, values in outputs.items()}
             force = self.axle_force[first:end]
             found.append(
                 replace(self, recording=one, axle_force=force, state=state, outputs=outputs)
             )
             first = end
+        return found
+
+    def _carried(self, first: int, end: int) -> dict[str, Array]:
+        """Return the carried values in effect at the samples of a part, and after its last."""
+        found = {name: values[first : end + 1] for name, values in self.state.items()}
+        if end in self.recording.breaks:  # at sample `end` there are those after the rest
+            setup = self.design.setup(self.vehicle, self.start)
+            carry = {name: values[-2] for name, values in found.items()}
+            (block,) = setup.run(self.recording, [slice(end - 1, end)], carry)
+            found = {
+                name: np.concatenate([values[:-1], block.state[name][-1:]])
+                for name, values in found.items()
+            }
         return found
 
     def __repr__(self) -> str:
@@ -215,12 +228,17 @@ class History:
 # A run over a long recording: of the way there only where each block began is kept.
 
 
-class LongRun(NamedTuple):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LongRun:
     """A run that is computed again, block by block, or a part of it.
 
-    setup : of the run.   recording : what it ran over.   begins : values carried into each block,
-    by port.   last : after the last sample.   first, end : samples of the part, from first to
-    before end.
+    Parameters
+    ----------
+    setup : of the run.
+    recording : what it ran over.
+    begins : values carried into each block, by port.
+    last : values carried after the last sample of the recording, by port.
+    first, end : samples of the part, from first to before end.
     """
 
     setup: Setup
@@ -261,15 +279,16 @@ class LongRun(NamedTuple):
 
         Parameters
         ----------
-        index : of the sample, counted from the first of the part.
+        index : of the sample, counted from the first of the part; as many as there are is the end.
         """
-        sample = self.first + index
-        for part, begin in zip(blocks(len(self.recording)), self.begins, strict=True):
-            if part.start <= sample < part.stop:
-                until = [slice(part.start, sample + 1)]
-                (block,) = self.setup.run(self.recording, until, begin)
-                return {port: values[-2] for port, values in block.state.items()}
-        return dict(self.last)
+        sample, after = self.first + index, int(index == len(self))
+        if sample == len(self.recording):
+            return dict(self.last)
+        taken = sample - after  # after the last: no rest before the sample that follows
+        whole = zip(blocks(len(self.recording)), self.begins, strict=True)
+        part, begin = next(one for one in whole if one[0].start <= taken < one[0].stop)
+        (block,) = self.setup.run(self.recording, [slice(part.start, taken + 1)], begin)
+        return {port: values[after - 2] for port, values in block.state.items()}
 
 
 def _holds(part: slice, samples: NDArray[np.intp] | None) -> bool:
@@ -311,7 +330,7 @@ class Recalled(Mapping[str, Array]):
         ----------
         first, end : of the whole run.
         """
-        return Recalled(self.run._replace(first=first, end=end), self._kind, self._ports)
+        return Recalled(replace(self.run, first=first, end=end), self._kind, self._ports)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._ports)
@@ -389,7 +408,14 @@ def identify(
         if progress is not None:
             progress(block.part.stop / len(recording))
     if len(begins) > 1:
-        run = LongRun(setup, recording, tuple(begins), following, 0, len(recording))
+        run = LongRun(
+            setup=setup,
+            recording=recording,
+            begins=tuple(begins),
+            last=following,
+            first=0,
+            end=len(recording),
+        )
         state = Recalled(run, "state", tuple(state))
         outputs = Recalled(run, "outputs", tuple(outputs))
     return History(

@@ -16,6 +16,7 @@ from identifier.reproducibility import beyond_known, predict, reproduce
 from identifier.run import Recalled, identify, learn
 from models.recordings import Recording, check_against_vehicle, evidence, portion
 from models.recordings.checks import check_physics
+from models.recordings.record import joined
 from tests.identifier.conftest import CAR, drive
 
 N = 1500
@@ -80,6 +81,36 @@ def test_a_freeze_within_a_block_or_at_its_ends_is_that_of_one_piece(whole, requ
     assert blocks.freeze(7.0).to_dict() == model.to_dict()
     assert learn(whole, CAR, design, t=7.0).to_dict() == model.to_dict()
     np.testing.assert_array_equal(model.axle_force(whole), piece.freeze(7.0).axle_force(whole))
+
+
+@pytest.mark.parametrize("method", ["axle", "integral"])
+def test_the_parts_of_a_run_over_two_logs_are_those_of_one_in_a_piece(whole, method, request):
+    logs = [whole.between(0.0, 6.5), whole.between(8.0, 11.0), whole.between(11.5, 15.0)]
+    drive, design = joined(logs), make_method(method, CAR)
+    pieces = identify(drive, CAR, design).parts(logs)
+    frozen = [one.freeze().to_dict() for one in pieces]
+    request.getfixturevalue("in_blocks")
+    blocks = identify(drive, CAR, design).parts(logs)
+    for one, other, log in zip(pieces, blocks, logs, strict=True):
+        assert isinstance(other.state, Recalled) and not isinstance(one.state, Recalled)
+        np.testing.assert_array_equal(one.axle_force, other.axle_force)
+        for kind in ("state", "outputs"):
+            for port, values in getattr(one, kind).items():
+                np.testing.assert_array_equal(values, getattr(other, kind)[port], err_msg=port)
+        for run in (one, other):  # after the last sample, not after the rest before the next log
+            for port, value in run.state_at(float(log.t[-1])).items():
+                np.testing.assert_array_equal(value, one.state[port][-1], err_msg=port)
+    assert [one.freeze().to_dict() for one in blocks] == frozen
+
+
+@pytest.mark.parametrize("method", ["axle", "integral"])
+def test_the_first_of_two_logs_ends_as_if_it_were_alone(whole, method):
+    logs = [whole.between(0.0, 6.5), whole.between(8.0, 11.0)]
+    design = make_method(method, CAR)
+    first, _ = identify(joined(logs), CAR, design).parts(logs)
+    alone = identify(logs[0], CAR, design)
+    for port, values in alone.state.items():
+        np.testing.assert_array_equal(values, first.state[port], err_msg=port)
 
 
 def test_only_blocks_that_are_asked_for_are_computed_again(whole, in_blocks):
