@@ -67,7 +67,8 @@ class Setup(NamedTuple):
     takes its x and returns the carried values that begin with it, by port.
     Carried ports of `only_with_a_y` change no other one, and no output, where a_y is never there.
     Between stretches of a drive the step is shown `rest` samples, after which it begins anew with
-    what it has learnt (`identifier.refused`).
+    what it has learnt (`identifier.refused`): a step that judges samples itself as many as end a
+    run of it, `ends_run`, every other one.
     """
 
     scan: Scan
@@ -75,7 +76,22 @@ class Setup(NamedTuple):
     constants: Mapping[str, Array]
     observe: Callable[[Array], Mapping[str, Array]] | None = None
     only_with_a_y: tuple[str, ...] = ()
-    rest: int = 1
+    ends_run: int | None = None
+
+    @property
+    def rest(self) -> int:
+        """Samples that the step is shown between stretches of a drive.
+
+        Raises
+        ------
+        ValueError
+            Where the step judges samples and `ends_run` is not told.
+        """
+        if not judges_samples(self.carry):
+            return 1
+        if self.ends_run is None:
+            raise ValueError("a step that judges samples must tell how many end a run: ends_run")
+        return self.ends_run
 
     def begin(self, x: Array) -> "Setup":
         """Return the setup whose observers begin at a measurement.

@@ -224,7 +224,7 @@ class AxleIdentifier(Method):
                 **self._rising(),
             },
             only_with_a_y=("bank",),
-            rest=self.plausibility.rest(self.dt),
+            ends_run=self.plausibility.rest(self.dt),
         )
 
     def _within_bounds(self, W: Array, own: Array, P: Array) -> tuple[Array, Array]:

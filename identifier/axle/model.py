@@ -320,7 +320,7 @@ class AxleModel(TireModel):
                 "plausibility": self.plausibility.numbers(),
                 "roll": self.sway.numbers(),
             },
-            rest=self.plausibility.rest(dt),
+            ends_run=self.plausibility.rest(dt),
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -221,6 +221,7 @@ class InertialIdentifier(Method):
                 "metric": np.array([one[np.triu_indices(n)] for one in prior_P[:, :n, :n]]),
                 **axle._rising(),
             },
+            ends_run=self.plausibility.rest(self.dt),
         )
 
     def _laws(self, vehicle: Vehicle) -> Array:

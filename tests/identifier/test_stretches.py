@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import tireid as ti
+from identifier.axle.gate import GateState
 from identifier.compare.batch import identify_batch, replay_batch
 from identifier.methods import METHODS, make_method
+from identifier.refused import GATE
 from identifier.reproducibility import counted_samples, motion_error, predict
 from identifier.run import identify, learn
 from identifier.verdict.motion import Windows
@@ -95,6 +97,23 @@ def test_what_is_learnt_stays_over_a_gap_and_the_rest_begins_anew(name, log, cut
     lost = identify(glued(cut), CAR, method)
     if run.state:  # else it has no memory
         assert not np.array_equal(lost.axle_force[k + 1 :], run.axle_force[k + 1 :])
+
+
+@pytest.mark.parametrize("name", sorted(METHODS))
+def test_a_gate_is_off_at_each_break(name, log, cut) -> None:
+    whole, run = (identify(one, CAR, make_method(name, CAR)) for one in (log, cut))
+    if GATE in run.state:
+        on, k = GateState._fields.index("on"), cut.breaks[0]
+        assert run.state[GATE][k, on] == 0.0 and run.state[GATE][k - 1, on] == 1.0
+        assert whole.state[GATE][k, on] == 1.0
+
+
+@pytest.mark.parametrize("name", ["axle", "inertial"])
+def test_a_step_that_judges_samples_must_tell_how_it_rests(name) -> None:
+    setup = make_method(name, CAR).setup(CAR)
+    assert setup.rest > 1
+    with pytest.raises(ValueError, match="ends_run"):
+        setup._replace(ends_run=None).rest
 
 
 def test_after_a_gap_a_frozen_model_starts_as_at_the_beginning(log, cut) -> None:
