@@ -8,6 +8,7 @@ import pytest
 
 from benchmarks.fuzz.server import SLIP, steady_stiffness
 from identifier.axle import AxleModel
+from identifier.method import CannotFreezeError
 from identifier.methods import METHODS, draws_weights, load_model, make_method
 from identifier.paper.design import PaperIdentifier, design_text
 from models.recordings import read_recording
@@ -479,6 +480,34 @@ def test_a_recorded_car_is_identified_by_every_law(shared_data, tmp_path, name, 
     assert online["rear"] < missed[1]
     (frozen,) = summary["rmse_N"]["frozen"].values()
     assert set(frozen) == {"carmaker:slalom1_14_5ms", "carmaker:experiment2_40kmh"}
+
+
+def freezes(name):
+    """Whether what a method learns is a model."""
+    car, method = sedan(), make_method(name, sedan())
+    try:
+        method.frozen(car, method.setup(car).carry)
+    except CannotFreezeError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize("name", [name for name in METHODS if freezes(name)])
+def test_every_method_with_a_model_writes_all_of_its_files(logs, tmp_path, name, undrawn):
+    words = ["identify", str(logs / "slalom.csv"), "--vehicle", str(logs / "car.toml")]
+    words += ["--replay", str(logs / "quick.csv"), "--method", name, "--accept"]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 0
+    told = np.genfromtxt(tmp_path / "out" / "weights.csv", delimiter=",", names=True)
+    model = load_model(tmp_path / "out" / "weights.json")
+    for port in ("W", "V", "own"):
+        values = getattr(model, port, getattr(getattr(model, "weights", None), port, None))
+        columns = [one for one in told.dtype.names if one.split("_")[0] == port]
+        if name != "inertial" or port != "own":  # whose two compliances stand in a larger table
+            assert len(columns) == np.size(values) * (values is not None)
+        else:
+            assert columns == ["own_1", "own_2"]
+            assert [told[one][-1] for one in columns] == pytest.approx(model.own[:, 0], rel=1e-3)
+    assert (tmp_path / "out" / "report.html").stat().st_size > 1000
 
 
 def verdict_of(out):

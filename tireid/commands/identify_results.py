@@ -247,8 +247,8 @@ def _weight_columns(learnt: History, block: Block) -> dict[str, Array]:
     weights = {"t_s": learnt.recording.t[block.part][rows]}
     for matrix in [name for name in WEIGHTS if name in block.state]:
         values = block.before[matrix][rows]
-        for i, j in np.ndindex(values.shape[1:]):
-            weights[f"{matrix}_{i + 1}_{j + 1}"] = values[:, i, j]
+        for place in np.ndindex(values.shape[1:]):
+            weights["_".join([matrix, *(str(k + 1) for k in place)])] = values[:, *place]
     return weights
 
 
