@@ -15,7 +15,14 @@ from identifier.axle.car import car_numbers
 from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
 from identifier.axle.gate import GateState, Plausibility
-from identifier.axle.learning import BoundNumbers, Bounds, ChangeDetector, Regression, bounded
+from identifier.axle.learning import (
+    BoundNumbers,
+    Bounds,
+    ChangeDetector,
+    Regression,
+    bounded,
+    rising_shares,
+)
 from identifier.axle.model import AxleModel
 from identifier.axle.prior import Prior, friction_direction
 from identifier.axle.slip import SHORTEST, SensitivityState, Sway, SwayState
@@ -218,7 +225,7 @@ class AxleIdentifier(Method):
                 "change": self.change.numbers(self.dt),
                 "watching": self.watch.numbers(self.dt),
                 "road": self.road.numbers(self.dt),
-                "bounds": self._bound_numbers(),
+                "bounds": self.bounds.of_ladder(self.ladder, self.rising_until),
                 "friction_direction": friction_direction(self.ladder),
                 "per_variance": widest,
                 **self._rising(),
@@ -231,7 +238,7 @@ class AxleIdentifier(Method):
         """Return what is begun with, within bounds: a file or a prior may lie outside."""
         n = len(self.ladder)
         slope = self._rising().get("rising")
-        numbers = self._bound_numbers()
+        numbers = self.bounds.of_ladder(self.ladder, self.rising_until)
         row = np.zeros(n) if slope is None else slope
         project = _projection(n, slope is not None)
         kept = np.vstack(
@@ -244,22 +251,11 @@ class AxleIdentifier(Method):
         )
         return kept[:, :n], kept[:, n:]
 
-    def _bound_numbers(self) -> Array:
-        """Return the numbers of `BoundNumbers` for this ladder."""
-        slopes = float(self._slopes().sum())
-        return self.bounds.numbers(len(self.ladder), slopes, self.rising_until)
-
     def _rising(self) -> dict[str, Array]:
-        """Return the derivatives of the units where curves shall not fall, over their sum."""
+        """Return what the step needs of the slip until which curves shall not fall."""
         if self.rising_until is None:
             return {}
-        slopes = self._slopes()
-        return {"rising": slopes / slopes.sum()}
-
-    def _slopes(self) -> Array:
-        """Return the derivatives of the units where the slope of curves is bounded (n,) [1/rad]."""
-        scales, slip = np.array(self.ladder), self.rising_until or 0.0
-        return np.asarray(1.0 / (scales * np.cosh(slip / scales) ** 2), dtype=np.float64)
+        return {"rising": rising_shares(self.ladder, self.rising_until)}
 
     def tracks(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Track, ...]:
         """Return cornering stiffness, relaxation length, and the force that curves saturate at.

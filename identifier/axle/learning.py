@@ -399,6 +399,46 @@ class Bounds:
             ]
         )
 
+    def of_ladder(self, ladder: tuple[float, ...], rising_until: float | None) -> Array:
+        """Return the numbers of `BoundNumbers` for a ladder, (12,).
+
+        Parameters
+        ----------
+        ladder : slip scales of the units [rad].
+        rising_until : as of `numbers`.
+
+        Raises
+        ------
+        ValueError
+            As `numbers` does.
+        """
+        slopes = unit_slopes(ladder, rising_until or 0.0)
+        return self.numbers(len(ladder), float(slopes.sum()), rising_until)
+
+
+def unit_slopes(ladder: tuple[float, ...], slip: float) -> Array:
+    """Return the derivatives of the units at a slip, (n,) [1/rad].
+
+    Parameters
+    ----------
+    ladder : slip scales of the units [rad].
+    slip : [rad].
+    """
+    scales = np.array(ladder)
+    return np.asarray(1.0 / (scales * np.cosh(slip / scales) ** 2), dtype=np.float64)
+
+
+def rising_shares(ladder: tuple[float, ...], slip: float) -> Array:
+    """Return the derivatives of the units at a slip over their sum, (n,), as `bounded` wants them.
+
+    Parameters
+    ----------
+    ladder : slip scales of the units [rad].
+    slip : until which curves shall not fall [rad].
+    """
+    slopes = unit_slopes(ladder, slip)
+    return np.asarray(slopes / slopes.sum(), dtype=np.float64)
+
 
 def _inward(limit: float) -> float:
     """Return the largest float that is not above a limit."""

@@ -14,7 +14,7 @@ from identifier.axle.covariance import packed, triangle
 from identifier.axle.curve import EDGES, LADDER, doublings
 from identifier.axle.design import AxleIdentifier
 from identifier.axle.gate import GateState, Plausibility
-from identifier.axle.learning import Bounds
+from identifier.axle.learning import Bounds, rising_shares
 from identifier.axle.model import AxleModel
 from identifier.axle.prior import Prior
 from identifier.axle.slip import FASTEST, SHORTEST, Sway
@@ -30,7 +30,7 @@ from models.rules import require_within
 from models.vehicle import Vehicle
 
 NEAR = 0.99  # of a bound, from which on a number rests at it
-LARGEST_ROLL = 0.5  # rad per g: softer, and a car falls over
+RISING_UNTIL = 0.0  # rad, the slip at which force curves shall not fall: the cornering stiffness
 MOST = {"bias": 0.1, "roll": 0.3, "steering": 0.03, "gyro": 0.1, "inertia": 0.4}
 
 # What a search may vary of it, and what the number is multiplied and divided by.
@@ -192,7 +192,6 @@ class InertialIdentifier(Method):
         trust = self.trust.numbers(self.dt, vehicle.wheelbase, vehicle.froude_time)
         known = self.beliefs.covariance(n, P[:, : n + 1, : n + 1], size_ratio)
         rest = len(triangle(size(n))) - len(triangle(size(n) - MOVING))
-        axle = AxleIdentifier.for_vehicle(vehicle, dt=self.dt)
         return Setup(
             scan=_scan(doublings(self.ladder)),
             carry={
@@ -217,9 +216,9 @@ class InertialIdentifier(Method):
                 "trust": trust,
                 "learning_speed": np.array(self.plausibility.learning_speed),
                 "limits": self._limits(),
-                "bounds": axle._bound_numbers(),
+                "bounds": self.bounds.of_ladder(self.ladder, RISING_UNTIL),
                 "metric": np.array([one[np.triu_indices(n)] for one in prior_P[:, :n, :n]]),
-                **axle._rising(),
+                "rising": rising_shares(self.ladder, RISING_UNTIL),
             },
             ends_run=self.plausibility.rest(self.dt),
         )

@@ -113,7 +113,7 @@ def test_a_step_that_judges_samples_must_tell_how_it_rests(name) -> None:
     setup = make_method(name, CAR).setup(CAR)
     assert setup.rest > 1
     with pytest.raises(ValueError, match="ends_run"):
-        setup._replace(ends_run=None).rest
+        _ = setup._replace(ends_run=None).rest
 
 
 def test_after_a_gap_a_frozen_model_starts_as_at_the_beginning(log, cut) -> None:

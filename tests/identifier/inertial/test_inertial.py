@@ -98,6 +98,25 @@ def test_it_freezes_to_the_kind_of_model_that_an_axle_identifier_learns(history,
     assert (model.relative_sd(alpha) < 0.7).all()  # and knows that it learnt
 
 
+def test_its_own_bounds_hold_and_its_own_ladder_is_used(banked):
+    shown = as_shown(banked)
+    tight = replace(METHOD.bounds, most_grip=0.7, most_stiffness=9.0)
+    kept = identify(shown, CAR, replace(METHOD, bounds=tight)).state["W"]
+    free = identify(shown, CAR, METHOD).state["W"]
+    slope = [(W[1:] / np.array(METHOD.ladder)).sum(axis=2).max() for W in (kept, free)]
+    grip = [W[1:].sum(axis=2).max() for W in (kept, free)]
+    assert grip[0] <= 0.7 < grip[1] and slope[0] <= 9.0 < slope[1]
+    ladder = (0.02, 0.08, 0.32)
+    other = learn(shown, CAR, replace(METHOD, ladder=ladder))
+    assert other.ladder == ladder and other.W.shape == (2, 3)
+    exact, truth = banked.recording(), banked.recording().axle_force
+    error = [
+        np.sqrt(((m.predict(exact) - truth) ** 2).mean())
+        for m in (other, learn(shown, CAR, METHOD))
+    ]
+    assert error[0] < 2.0 * error[1]
+
+
 def test_no_bit_of_v_y_is_read(banked, history):
     told = identify(replace(as_shown(banked), v_y=banked.v_y), CAR, METHOD)
     for name, values in history.outputs.items():
