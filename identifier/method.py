@@ -369,6 +369,11 @@ class Method(ABC):
     judged_by = ""  # what gives the certificate, where a package cannot hold it
 
     @property
+    def needs_a_y(self) -> bool:
+        """Whether it learns nothing from a recording without an accelerometer."""
+        return False
+
+    @property
     def remark(self) -> str:
         """What a table of methods must say of it beside its name; empty: nothing."""
         return ""

@@ -13,7 +13,7 @@ from codegen.arrays import Array, blocks, large
 from identifier.method import AXLE_FORCE, Block, Method, Setup, Track
 from identifier.refused import NOWHERE, STALE_TIME, SampleLimits, judges_samples, stale_samples
 from identifier.tire_model import TireModel
-from models.recordings import Recording
+from models.recordings import Recording, RecordingError
 from models.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -353,8 +353,8 @@ def without_force(outputs: Mapping[str, Array]) -> dict[str, Array]:
 # Running a method over a recording, in compiled code.
 
 
-def check_sampling(recording: Recording, design: Method) -> None:
-    """Refuse a recording that is not sampled at the design's interval.
+def check_recording(recording: Recording, design: Method) -> None:
+    """Refuse a recording that a method cannot run over.
 
     Parameters
     ----------
@@ -363,11 +363,17 @@ def check_sampling(recording: Recording, design: Method) -> None:
     Raises
     ------
     ValueError
-        Where the two differ.
+        Where it is not sampled at the design's interval.
+    RecordingError
+        Where the method needs a_y and the recording has none.
     """
     if abs(recording.dt - design.dt) > 1e-6 * design.dt:
         raise ValueError(
             f"{recording.name} is sampled at {recording.dt:g} s, the design at {design.dt:g} s"
+        )
+    if design.needs_a_y and recording.a_y is None:
+        raise RecordingError(
+            f"{recording.name}: there is no ay, from which {type(design).__name__} learns"
         )
 
 
@@ -393,8 +399,10 @@ def identify(
     ------
     ValueError
         Where recording and design differ in their sampling interval.
+    RecordingError
+        Where the method needs a_y and the recording has none.
     """
-    check_sampling(recording, design)
+    check_recording(recording, design)
     setup = design.setup(vehicle, start)
     force, begins, parts = large((len(recording), 2)), [], blocks(len(recording))
     state: Mapping[str, Array] = {}
@@ -451,8 +459,10 @@ def learn(
         Where the method estimates a signal, not a model.
     ValueError
         Where the recording begins after that time, or is not sampled at the design's interval.
+    RecordingError
+        Where the method needs a_y and the recording has none.
     """
-    check_sampling(recording, design)
+    check_recording(recording, design)
     n = len(recording) if t is None else state_index(recording, t)
     state = design.setup(vehicle, start).last(recording, n)
     if not all(np.isfinite(value).all() for value in state.values()):

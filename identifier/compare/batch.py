@@ -15,7 +15,7 @@ from codegen.arrays import Array
 from identifier.compare.course import INFINITE, Course, Scores, Trial, rmse, run_scored
 from identifier.method import CannotFreezeError, Method, Setup
 from identifier.reproducibility import AxleRmse, counted_samples
-from identifier.run import IMPOSSIBLE_FORCE, DivergedError, check_sampling, state_index
+from identifier.run import IMPOSSIBLE_FORCE, DivergedError, check_recording, state_index
 from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle
@@ -95,7 +95,7 @@ def identify_batch(
     if len(cars) != len(designs):
         raise ValueError(f"{len(designs)} designs need as many vehicles, there are {len(cars)}")
     for design in designs:
-        check_sampling(recording, design)
+        check_recording(recording, design)
     slowest = max((design.min_speed for design in designs), default=0.0)
     counts = counted_samples(recording, slowest if min_speed is None else min_speed)
     instants = {np.inf: len(recording)} | {t: state_index(recording, t) for t in freeze_times}

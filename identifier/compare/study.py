@@ -1,7 +1,7 @@
 """What `tireid compare` finds out: every method on every recording, its time, its sweep."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from codegen import cache_folder
 from identifier.compare.course import Course, Shares, Trial, cross_replay, shares, step_times
@@ -29,6 +29,7 @@ class Comparison:
         recording, on every recording.
     step_times : by method, time of one compiled step [s]; REFERENCE is always among them.
     sweeps : by method, its random designs; empty without a sweep.
+    left_out : by method that was asked for and is not compared, why.
     """
 
     course: Course
@@ -37,6 +38,7 @@ class Comparison:
     floors: Mapping[str, Frozen]
     step_times: Mapping[str, float]
     sweeps: Mapping[str, tuple[Candidate, ...]]
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def names(self) -> list[str]:
@@ -92,6 +94,21 @@ def step_lengths(
     return lengths
 
 
+def cannot_learn(
+    names: Sequence[str], vehicle: Vehicle, recordings: Sequence[Recording]
+) -> dict[str, str]:
+    """Return by method why it cannot learn on all of the recordings; without those that can.
+
+    Parameters
+    ----------
+    names : of methods.
+    recordings : that are compared on.
+    """
+    lacking = [recording.name for recording in recordings if recording.a_y is None]
+    why = f"left out, it learns from ay and {', '.join(lacking)} has none"
+    return {name: why for name in names if lacking and make_method(name, vehicle).needs_a_y}
+
+
 def run_comparison(
     names: Sequence[str],
     vehicle: Vehicle,
@@ -105,6 +122,7 @@ def run_comparison(
     note: Callable[[str], None] | None = None,
     elsewhere: Map | None = None,
     others: Mapping[str, Method] | None = None,
+    left_out: Mapping[str, str] | None = None,
 ) -> Comparison:
     """Run every method over every recording.
 
@@ -120,11 +138,13 @@ def run_comparison(
     note : told how far a sweep has come, now and then; None tells it to `progress`.
     elsewhere : does the sweep in place of processes of this machine, as a cluster's map does.
     others : further methods by name, which have neither sweep nor floor.
+    left_out : by method that was asked for beside these, why it is not compared.
 
     Raises
     ------
     ValueError
-        Where a method is unknown or the recordings cannot be compared on.
+        Where a method is unknown or the recordings cannot be compared on; a RecordingError where
+        one cannot learn on them, as `cannot_learn` tells.
     """
     methods: dict[str, Method] = {name: make_method(name, vehicle, seed) for name in names}
     methods |= others or {}
@@ -158,7 +178,13 @@ def run_comparison(
             folder=cache_folder() / "sweeps",
         )
     return Comparison(
-        course=course, seed=seed, trials=trials, floors=floors, step_times=times, sweeps=sweeps
+        course=course,
+        seed=seed,
+        trials=trials,
+        floors=floors,
+        step_times=times,
+        sweeps=sweeps,
+        left_out=left_out or {},
     )
 
 

@@ -97,10 +97,10 @@ def specialize(
     ValueError
         Where stored weights are those of another structure, or the method cannot go without a_y.
     """
+    if method.needs_a_y:
+        raise ValueError(f"{type(method).__name__} cannot be exported yet: it needs a_y")
     setup = method.setup(vehicle, start)
     step = setup.scan.step
-    if "a_y" in setup.scan.over and not setup.only_with_a_y:
-        raise ValueError(f"{type(method).__name__} cannot be exported yet: it needs a_y")
     carry = {port: one for port, one in setup.carry.items() if port not in setup.only_with_a_y}
     parts = _specialized(setup, list(carry), name)
     return SpecializedStep(

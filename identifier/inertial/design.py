@@ -131,6 +131,11 @@ class InertialIdentifier(Method):
         return self.plausibility.min_speed
 
     @property
+    def needs_a_y(self) -> bool:
+        """Whether it learns nothing from a recording without an accelerometer: so it is."""
+        return True
+
+    @property
     def remark(self) -> str:
         """Say what it does without."""
         return "without v_y, which it tells"

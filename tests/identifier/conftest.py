@@ -52,6 +52,11 @@ def drive(n=1500, dt=0.01, speed=20.0, amplitude=0.06, scale=1.0):
     )
 
 
+def felt(recording):
+    """The drive with what an accelerometer feels of its forces."""
+    return replace(recording, a_y=recording.axle_force.sum(axis=1) / CAR.mass)
+
+
 @pytest.fixture(name="car")
 def the_car():
     return CAR

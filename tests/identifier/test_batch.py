@@ -14,6 +14,7 @@ from identifier.paper.design import PaperIdentifier
 from identifier.paper.network import NetworkModel
 from identifier.reproducibility import axle_rms, counted_samples
 from identifier.run import DivergedError, identify
+from tests.identifier.conftest import felt
 
 FREEZE = (4.0, 12.345)
 QUICK = [name for name in METHODS if name != "concurrent"]  # which takes long to compile
@@ -61,7 +62,7 @@ def test_another_gain_set_is_noticed(car, drive):
 
 
 def test_every_method_has_the_bits_of_its_run_alone(car, drive):
-    recording = drive(n=400)
+    recording = felt(drive(n=400))
     designs = [make_method(name, car, seed) for seed in (1, 2) for name in QUICK]
     runs = identify_batch(recording, car, designs, freeze_times=(2.0,))
     for design, run in zip(designs, runs, strict=True):
@@ -142,7 +143,7 @@ def test_what_was_not_kept_cannot_be_frozen(car, drive):
 
 
 def test_models_of_every_kind_replay_as_they_do_alone(car, drive):
-    learnt, other = drive(n=400), at_rest_for_a_while(drive(n=400, amplitude=0.04))
+    learnt, other = felt(drive(n=400)), at_rest_for_a_while(drive(n=400, amplitude=0.04))
     models = []
     methods = [make_method(name, car, seed) for seed in (1, 2) for name in QUICK]
     for run in identify_batch(learnt, car, methods):
@@ -160,7 +161,7 @@ def test_models_of_every_kind_replay_as_they_do_alone(car, drive):
 
 
 def test_many_methods_are_judged_as_each_alone(car, drive):
-    slow, quick = drive(n=400), replace(drive(n=400, amplitude=0.09), name="quick")
+    slow, quick = felt(drive(n=400)), replace(felt(drive(n=400, amplitude=0.09)), name="quick")
     course = Course(vehicle=car, recordings=(slow, quick), min_speed=1.0)
     wild = replace(
         PaperIdentifier.for_vehicle(car),

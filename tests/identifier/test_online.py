@@ -10,16 +10,18 @@ from identifier.axle import AxleIdentifier
 from identifier.method import CannotFreezeError
 from identifier.methods import METHODS, make_method
 from identifier.run import DivergedError, OnlineIdentifier, identify
+from tests.identifier.conftest import felt
 
 
 def driven(identifier, recording):
-    samples = zip(recording.x, recording.u, recording.v_x, strict=True)
+    a_y = [None] * len(recording) if recording.a_y is None else recording.a_y
+    samples = zip(recording.x, recording.u, recording.v_x, a_y, strict=True)
     return np.array([identifier.update(*sample) for sample in samples])
 
 
 @pytest.mark.parametrize("name", METHODS)
 def test_every_method_learns_the_same_bits_as_over_the_recording(name, car, drive):
-    recording, method = drive(n=300), make_method(name, car)
+    recording, method = felt(drive(n=300)), make_method(name, car)
     history = identify(recording, car, method)
     online = OnlineIdentifier(method, car, recording.dt)
     np.testing.assert_array_equal(driven(online, recording), history.axle_force)

@@ -114,6 +114,32 @@ def test_the_table_says_which_baselines_know_lag_and_offsets(words, tmp_path, ca
         assert "linear: " not in text, "it has neither, and says nothing"
 
 
+def without_a_y(log, target):
+    write_recording(replace(read_recording(log), a_y=None), target)
+    return str(target)
+
+
+def test_a_method_that_needs_an_accelerometer_is_left_out_where_a_log_has_none(
+    words, logs, tmp_path, capsys, undrawn
+):
+    out, quick = tmp_path / "out", without_a_y(logs / "quick.csv", tmp_path / "blind.csv")
+    words = [words[0], words[1], quick, *words[3:], "--floor", "0"]
+    assert main([*words, "--method", "inertial", "linear", "--out", str(out)]) == 0
+    why = "inertial: left out, it learns from ay and blind has none"
+    for text in ((out / "tables.txt").read_text(), (out / "report.html").read_text()):
+        assert why in text
+    told = capsys.readouterr()
+    assert why in told.out and why in told.err
+    numbers = json.loads((out / "compare.json").read_text())
+    assert list(numbers["methods"]) == ["linear"] and list(numbers["left_out"]) == ["inertial"]
+    assert main([*words, "--method", "inertial", "--out", str(tmp_path / "other")]) == 2
+    assert "blind has none" in capsys.readouterr().err
+
+
+def test_no_method_is_left_out_where_all_logs_have_what_it_needs(numbers):
+    assert numbers["left_out"] == {}
+
+
 def test_times_are_over_that_of_the_integral_law(numbers):
     methods = numbers["methods"]
     assert methods["integral"]["step_ratio"] == 1.0

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from identifier.compare.study import run_comparison, step_lengths
+from identifier.compare.study import cannot_learn, run_comparison, step_lengths
 from identifier.method import Method
 from identifier.methods import DEFAULT, METHODS
 from identifier.own_network import FrozenMethod
 from identifier.paper.design import PaperIdentifier
 from identifier.verdict import Verdict
-from models.recordings import Recording
+from models.recordings import Recording, RecordingError
 from models.schema import require_few
 from models.vehicle import Vehicle
 from tireid.cluster import cluster
@@ -125,6 +125,12 @@ def run(options: argparse.Namespace) -> int:
         Progress("compare", parts, long=True) as work,
     ):
         recordings = _recordings(options, vehicle, seed)
+        left_out = cannot_learn(names, vehicle, recordings)
+        for name, why in left_out.items():
+            say(f"{name}: {why}")
+        names = [name for name in names if name not in left_out]
+        if not names:
+            raise RecordingError("no method is left to compare: " + next(iter(left_out.values())))
         lengths = step_lengths(
             names,
             len(recordings),
@@ -144,6 +150,7 @@ def run(options: argparse.Namespace) -> int:
             note=say,
             elsewhere=elsewhere,
             others=others,
+            left_out=left_out,
         )
         work.begin("step times, tables and figures")
         verdicts = default_verdicts(recordings, vehicle) if DEFAULT in names else {}

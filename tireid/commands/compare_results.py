@@ -2,7 +2,8 @@
 
 compare.json: recordings (samples, duration, rms_force_N); methods: by name online_N by recording,
 frozen_N by recording learnt on and recording replayed (null: a signal, no model), diverged_at_s by
-recording, percent (means of both axles: online, in_sample, other), step_s and step_ratio; floors:
+recording, percent (means of both axles: online, in_sample, other), step_s and step_ratio;
+left_out: by name why a method is not compared; floors:
 by network frozen_N and percent; sweep: by method designs, diverged, default, best, front, trials.
 verdict: by recording, of the default learnt there (valid, findings, numbers, measures).
 Errors are {"front", "rear"} in N; null stands for what diverged or is not there.
@@ -77,6 +78,8 @@ def remarks(comparison: Comparison) -> list[str]:
         if name in METHODS:
             method = make_method(name, comparison.course.vehicle, comparison.seed)
             told.setdefault(method.remark, []).append(name)
+    for name, why in comparison.left_out.items():
+        told.setdefault(why, []).append(name)
     return [f"{', '.join(names)}: {remark}" for remark, names in told.items() if remark]
 
 
@@ -253,6 +256,7 @@ def comparison_numbers(comparison: Comparison) -> dict[str, Any]:
             for recording in course.recordings
         },
         "methods": {name: _method_numbers(comparison, name) for name in comparison.trials},
+        "left_out": dict(comparison.left_out),
         "floors": {
             name: {
                 "frozen_N": _pairs(frozen),

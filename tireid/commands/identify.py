@@ -8,7 +8,6 @@ import numpy as np
 
 from codegen.escape import visible
 from identifier.doctor import diagnose
-from identifier.inertial import InertialIdentifier
 from identifier.method import CannotFreezeError, Method
 from identifier.methods import load_model
 from identifier.paper.network import Weights
@@ -20,7 +19,7 @@ from identifier.reproducibility import (
     replay,
     reproduce,
 )
-from identifier.run import History
+from identifier.run import History, check_recording
 from identifier.verdict import judge_prediction
 from models.recordings import Recording, Repair, joined
 from models.vehicle import Vehicle
@@ -251,8 +250,7 @@ def _read(
         dt=design.dt,
     )
     counted_samples(recording, design.min_speed)  # refuses a car that never drives
-    if isinstance(design, InertialIdentifier) and recording.a_y is None:
-        raise ValueError(f"{recording.name}: there is no ay: inertial learns from it and yaw rate")
+    check_recording(recording, design)
     return recording
 
 

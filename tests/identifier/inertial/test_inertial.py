@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from identifier.axle import AxleIdentifier, AxleModel
+from identifier.compare.batch import identify_batch
 from identifier.inertial import InertialIdentifier
 from identifier.methods import make_method
 from identifier.run import OnlineIdentifier, identify, learn
 from models.friction import Friction, FrictionChange
 from models.maneuvers import RandomSteer
 from models.plant import Plant
+from models.recordings import RecordingError
 from models.sensors import Sensor, Sensors
 from models.vehicle import GRAVITY, sedan
 
@@ -115,6 +117,15 @@ def test_its_own_bounds_hold_and_its_own_ladder_is_used(banked):
         for m in (other, learn(shown, CAR, METHOD))
     ]
     assert error[0] < 2.0 * error[1]
+
+
+def test_a_recording_without_an_accelerometer_is_refused_before_it_is_learnt_on(banked):
+    blind = replace(as_shown(banked), a_y=None)
+    for run in (identify, learn, lambda *told: identify_batch(*told[:2], [told[2]])):
+        with pytest.raises(RecordingError, match="no ay, from which InertialIdentifier learns"):
+            run(blind, CAR, METHOD)
+    assert not AxleIdentifier.for_vehicle(CAR).needs_a_y
+    identify(blind.between(0.0, 5.0), CAR, AxleIdentifier.for_vehicle(CAR))
 
 
 def test_no_bit_of_v_y_is_read(banked, history):
