@@ -79,7 +79,7 @@ class StraightOnly:
         s, force, a_y = STRAIGHT, recording.axle_force, recording.a_y
         straight = replace(
             recording,
-            v_y=s * recording.v_y,
+            v_y=s * recording.needed("v_y"),
             r=s * recording.r,
             delta_f=s * recording.delta_f,
             delta_r=s * recording.delta_r,

@@ -44,7 +44,8 @@ class Sideslip:
         ----------
         recording : the drive without it.
         """
-        return replace(recording, v_y=self.per_rad * np.arctan2(recording.v_y, recording.v_x))
+        angle = np.arctan2(recording.needed("v_y"), recording.v_x)
+        return replace(recording, v_y=self.per_rad * angle)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -129,7 +129,7 @@ def _driven(car: RandomCar, rng: np.random.Generator) -> Drive | None:
     shown = replace(
         exact,
         v_x=exact.v_x * (1 + rng.normal(0, 0.005)) + 0.03 * size * rng.normal(size=n),
-        v_y=exact.v_y + 0.03 * size * rng.normal(size=n),  # for learning with v_y alone
+        v_y=exact.needed("v_y") + 0.03 * size * rng.normal(size=n),  # for learning with v_y alone
         r=np.interp(t - late_r, t, exact.r) + bias_r + 0.003 / size * rng.normal(size=n),
         a_y=np.interp(t - late_a, t, felt) + bias_a + rng.uniform(0.05, 0.3) * rng.normal(size=n),
         delta_f=exact.delta_f - zero + 5e-4 * rng.normal(size=n),
@@ -176,14 +176,14 @@ def side_slip(
     runs = history.state["running"].reshape(-1, 2)[1:, 0] > 0.5
     on = runs if where is None else runs & where
     v_x = np.maximum(exact.v_x, slowest)[on]
-    error = (history.outputs["v_y"].ravel() - exact.v_y)[on]
+    error = (history.outputs["v_y"].ravel() - exact.needed("v_y"))[on]
     sd = history.outputs["v_y_sd"].ravel()[on]
     seen = history.outputs["side_slip_observable"].ravel()[on] > 0.5
     beta = error / v_x
     promised = SIGMAS * design.trust.observable
     return SideSlip(
         rms=float(np.degrees(np.sqrt(np.mean(beta**2)))),
-        true=float(np.degrees(np.std(exact.v_y[on] / v_x))),
+        true=float(np.degrees(np.std(exact.needed("v_y")[on] / v_x))),
         largest=float(np.degrees(np.abs(beta).max())),
         within=float(np.mean(np.abs(error) < SIGMAS * sd)),
         observed=float(seen.mean()),

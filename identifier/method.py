@@ -4,6 +4,7 @@ The laws of the paper, the better laws and the baselines run, are recorded, froz
 the same code; they differ in the `Method` that is handed over.
 """
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, is_dataclass
@@ -167,7 +168,8 @@ class Setup(NamedTuple):
         ----------
         recording : its first sample is looked at.
         """
-        return dict(self.begin(np.array([recording.v_y[0], recording.r[0]])).carry)
+        v_y = math.nan if recording.v_y is None else recording.v_y[0]
+        return dict(self.begin(np.array([v_y, recording.r[0]])).carry)
 
     def shown(self, recording: Recording, part: slice = ALL) -> "Shown":
         """Return what the step is shown of a recording.
@@ -257,18 +259,23 @@ def shown(
     Parameters
     ----------
     recording : its samples.
-    over : ports that are read: x (N, 2), u (N, 2), v_x (N,), a_y (N,), NaN where there is none.
+    over : ports that are read: x (N, 2), u (N, 2), v_x (N,), a_y (N,); v_y and a_y are NaN where
+        there is none.
     rest : samples of a rest.
     judges : whether the step judges samples itself.
     part : samples that are shown; a stretch that begins with the first of them has its rest.
     """
     first, last, _ = part.indices(len(recording))
-    v_x, a_y, n = recording.v_x[part], recording.a_y, last - first
+    v_x, n = recording.v_x[part], last - first
+    v_y, a_y = (
+        np.full(n, np.nan) if signal is None else signal[part]
+        for signal in (recording.v_y, recording.a_y)
+    )
     signals = {
-        "x": np.column_stack([recording.v_y[part], recording.r[part]]),
+        "x": np.column_stack([v_y, recording.r[part]]),
         "u": np.column_stack([recording.delta_f[part], recording.delta_r[part]]),
         "v_x": v_x,
-        "a_y": np.full(n, np.nan) if a_y is None else a_y[part],
+        "a_y": a_y,
     }
     breaks = np.array([k - first for k in recording.breaks if first <= k < last], dtype=np.intp)
     if not breaks.size:
@@ -369,6 +376,11 @@ class Method(ABC):
     judged_by = ""  # what gives the certificate, where a package cannot hold it
 
     @property
+    def needs_v_y(self) -> bool:
+        """Whether it learns nothing from a recording without a lateral velocity; else tells it."""
+        return True
+
+    @property
     def needs_a_y(self) -> bool:
         """Whether it learns nothing from a recording without an accelerometer."""
         return False
@@ -445,6 +457,18 @@ class Method(ABC):
         """Return what a banked road pushed to the left by the accelerometer, (n,) [weights].
 
         What learning did not take for a force of the tires; None where a method takes all for one.
+
+        Parameters
+        ----------
+        state : carried values by port at n + 1 instants, of a run.
+        """
+        del state
+        return None
+
+    def beside_force(self, state: Mapping[str, Array]) -> Array | None:
+        """Return what an accelerometer showed beside the forces of the tires, (n,) [weights].
+
+        Bias, and the roll of the body, as far as they were found; None where a method finds none.
 
         Parameters
         ----------

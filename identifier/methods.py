@@ -35,6 +35,7 @@ from models.vehicle import Vehicle
 Factory = Callable[[Vehicle, int], Method]
 REGRESSIONS = ("kreisselmeier", "kreisselmeier_newton", "rls", "concurrent")
 DEFAULT = "axle"
+WITHOUT_V_Y = "inertial"  # the default where a log has no lateral velocity
 REFERENCE = "integral"  # the paper's law, which times are compared with
 
 
@@ -56,7 +57,7 @@ def _seedless(factory: Callable[[Vehicle], Method]) -> Factory:
 
 METHODS: Mapping[str, Factory] = {
     DEFAULT: _seedless(AxleIdentifier.for_vehicle),
-    "inertial": _seedless(InertialIdentifier.for_vehicle),
+    WITHOUT_V_Y: _seedless(InertialIdentifier.for_vehicle),
     **{law: _regression(law) for law in REGRESSIONS},
     **{law: _paper(law) for law in VARIANTS},
     "linear": _seedless(LinearBaseline.for_vehicle),

@@ -9,6 +9,7 @@ them, and any other recording too. There are two measures, and they answer diffe
   It asks whether what they say is right.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -153,8 +154,8 @@ def motion_error(
         some = slice(part.start, part.stop + n)
         whole = np.lib.stride_tricks.sliding_window_view(counted[some], n + 1).all(axis=1)
         whole &= recording.within_a_stretch(part.start + np.arange(whole.size), n)
-        F, v_y, r = force[some], recording.v_y[some], recording.r[some]
-        a_y = (v_y[n:] - v_y[:-n]) / T + mean(recording.v_x[some] * r)
+        F, r = force[some], recording.r[some]
+        a_y = _mean_acceleration(recording, some, n, mean)
         r_dot = (r[n:] - r[:-n]) / T
         lateral, yaw = mean((F[:, 0] + F[:, 1]) / m), mean((l_f * F[:, 0] - l_r * F[:, 1]) / I_z)
         with np.errstate(over="ignore", invalid="ignore"):
@@ -166,6 +167,20 @@ def motion_error(
     return MotionError(
         lateral=missed_lateral, yaw=missed_yaw, lateral_rms=lateral_rms, yaw_rms=yaw_rms
     )
+
+
+def _mean_acceleration(
+    recording: Recording, some: slice, n: int, mean: Callable[[Array], Array]
+) -> Array:
+    """Return the lateral acceleration over windows of n steps: without a v_y by accelerometer."""
+    v_y = recording.logged_v_y
+    if v_y is None:
+        return mean(recording.needed("a_y")[some])
+    change = v_y[some][n:] - v_y[some][:-n]
+    acceleration: Array = change / (n * recording.dt) + mean(
+        recording.v_x[some] * recording.r[some]
+    )
+    return acceleration
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)

@@ -55,7 +55,7 @@ class History:
     ----------
     vehicle : the car, as far as the method knew it.
     design : the method that ran.
-    recording : what it ran over.
+    recording : what it ran over, with the v_y that the method told where there was none.
     axle_force : forces that were identified online (n, 2) [N].
     state : by port, the carried values in effect at each sample and after the last (n + 1, ...).
     outputs : by port, the other outputs of the step at each sample (n, ...).
@@ -194,6 +194,9 @@ class History:
         found, first = [], 0
         for one in recordings:
             end = first + len(one)
+            if one.v_y is None:
+                told = self.recording.needed("v_y")[first:end]
+                one = replace(one, v_y=told, estimated=("v_y",))
             state, outputs = self.state, self.outputs
             if isinstance(state, Recalled) and isinstance(outputs, Recalled):
                 state, outputs = state.of(first, end), outputs.of(first, end)
@@ -365,16 +368,18 @@ def check_recording(recording: Recording, design: Method) -> None:
     ValueError
         Where it is not sampled at the design's interval.
     RecordingError
-        Where the method needs a_y and the recording has none.
+        Where the method needs v_y or a_y and the recording has none.
     """
     if abs(recording.dt - design.dt) > 1e-6 * design.dt:
         raise ValueError(
             f"{recording.name} is sampled at {recording.dt:g} s, the design at {design.dt:g} s"
         )
-    if design.needs_a_y and recording.a_y is None:
-        raise RecordingError(
-            f"{recording.name}: there is no ay, from which {type(design).__name__} learns"
-        )
+    for name in ("v_y", "a_y"):
+        if getattr(design, f"needs_{name}") and getattr(recording, name) is None:
+            raise RecordingError(
+                f"{recording.name}: there is no {name.replace('_', '')}, from which "
+                f"{type(design).__name__} learns"
+            )
 
 
 def identify(
@@ -400,16 +405,20 @@ def identify(
     ValueError
         Where recording and design differ in their sampling interval.
     RecordingError
-        Where the method needs a_y and the recording has none.
+        Where the method needs v_y or a_y and the recording has none.
     """
+    recording = recording.as_logged()
     check_recording(recording, design)
     setup = design.setup(vehicle, start)
+    v_y = None if recording.v_y is not None else large((len(recording),))
     force, begins, parts = large((len(recording), 2)), [], blocks(len(recording))
     state: Mapping[str, Array] = {}
     outputs: Mapping[str, Array] = {}
     following: Mapping[str, Array] = setup.begun(recording)
     for block in setup.run(recording, parts):
         force[block.part] = block.outputs["axle_force"]
+        if v_y is not None:
+            v_y[block.part] = block.outputs["v_y"].ravel()
         state, outputs = block.state, without_force(block.outputs)
         begins.append(following)
         following = {port: values[-1].copy() for port, values in state.items()}
@@ -426,6 +435,9 @@ def identify(
         )
         state = Recalled(run, "state", tuple(state))
         outputs = Recalled(run, "outputs", tuple(outputs))
+    if v_y is not None and np.isfinite(v_y).all():
+        v_y.setflags(write=False)
+        recording = replace(recording, v_y=v_y, estimated=("v_y",))
     return History(
         vehicle=vehicle,
         design=design,
@@ -460,8 +472,9 @@ def learn(
     ValueError
         Where the recording begins after that time, or is not sampled at the design's interval.
     RecordingError
-        Where the method needs a_y and the recording has none.
+        Where the method needs v_y or a_y and the recording has none.
     """
+    recording = recording.as_logged()
     check_recording(recording, design)
     n = len(recording) if t is None else state_index(recording, t)
     state = design.setup(vehicle, start).last(recording, n)

@@ -103,7 +103,7 @@ class Sensors:
         return replace(
             recording,
             v_x=self.v_x.measure(t, recording.v_x, rng),
-            v_y=self.v_y.measure(t, recording.v_y, rng),
+            v_y=None if recording.v_y is None else self.v_y.measure(t, recording.v_y, rng),
             r=self.r.measure(t, recording.r, rng),
             delta_f=self.delta.measure(t, recording.delta_f, rng),
             delta_r=self.delta.measure(t, rear, rng) if np.any(rear != 0.0) else rear,

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 from identifier.axle import AxleIdentifier
 from identifier.doctor import diagnose
+from identifier.inertial import InertialIdentifier
 from identifier.method import Method
 from identifier.reproducibility import Prediction, counted_samples, freeze_key, predict
 from identifier.run import DivergedError, History
@@ -34,7 +35,8 @@ def identify(
     ----------
     recording : what was driven; its axle forces are not looked at.
     vehicle : the car that drove.
-    method : the identifier; None takes `AxleIdentifier.for_vehicle` at the recording's interval.
+    method : the identifier; None takes `AxleIdentifier.for_vehicle` at the recording's interval, or
+        `InertialIdentifier.for_vehicle`, which estimates v_y, where the recording has none.
     start : model to go on learning from; None begins afresh.
     check : whether what this vehicle cannot have driven is refused, and the doctor asked.
     progress : called now and then with the share that is done, 0 to 1.
@@ -50,7 +52,8 @@ def identify(
     ValueError
         Where recording and method differ in their sampling interval.
     """
-    design = AxleIdentifier.for_vehicle(vehicle, dt=recording.dt) if method is None else method
+    usual = InertialIdentifier if recording.logged_v_y is None else AxleIdentifier
+    design = usual.for_vehicle(vehicle, dt=recording.dt) if method is None else method
     if check:
         check_against_vehicle(recording, vehicle)
         for finding in diagnose(recording, vehicle).findings:

@@ -101,7 +101,7 @@ def _columns(recording: Recording) -> dict[str, Array]:
     return {
         "t": recording.t,
         "vx": recording.v_x,
-        "vy": recording.v_y,
+        "vy": recording.needed("v_y"),
         "r": recording.r,
         "delta_f": recording.delta_f,
         "Fyf": recording.axle_force[:, 0],
@@ -130,7 +130,7 @@ def _write_logger(recording: Recording, path: Path) -> None:
     columns = {
         ("Zeit", "s"): recording.t,
         ("Geschwindigkeit", "km/h"): 3.6 * recording.v_x,
-        ("Quergeschwindigkeit", "m/s"): recording.v_y,
+        ("Quergeschwindigkeit", "m/s"): recording.needed("v_y"),
         ("Gierrate", "deg/s"): np.degrees(recording.r),
         ("Lenkradwinkel", "deg"): 14.0 * np.degrees(recording.delta_f),
     }

@@ -105,7 +105,7 @@ class Motion(NamedTuple):
     @staticmethod
     def _of_piece(recording: Recording, fast: float) -> tuple[Array, Array, Array]:
         """Return means, rates and what an accelerometer shows, a column each window."""
-        v_x, v_y, r, a_y = recording.v_x, recording.v_y, recording.r, recording.a_y
+        v_x, v_y, r, a_y = recording.v_x, recording.needed("v_y"), recording.r, recording.a_y
         windows = driven_windows(recording, fast)
         over = np.where(np.abs(v_x) < fast, fast, v_x)
         signals = np.column_stack([v_y, recording.u, v_x * r, r / over, v_y / over])

@@ -17,6 +17,7 @@ from models.vehicle import Vehicle, VehicleError
 MATTERS = 0.5  # confidence, from which a finding is one
 RATIOS = ("steering_ratio", "factor")  # codes of gross findings whose factor is any number
 FACTOR, ROUNDS = "factor.delta_f", 4
+WITHOUT_V_Y = "all but what contradicts physics or the car: the log has no lateral velocity"
 NEVER = (
     "mass: scales all forces alike and leaves the motion as it is; weigh the car",
     "the lateral axis mirrored throughout (y to the right, as in SAE or NED): all laws stay as "
@@ -106,6 +107,9 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
     recording : as it was read; its axle forces are not looked at.
     vehicle : as it was told.
     """
+    if recording.logged_v_y is None:
+        contradicts = tuple(_contradictions(recording, vehicle))
+        return Diagnosis(name=recording.name, findings=contradicts, unseen=(WITHOUT_V_Y, *NEVER))
     gross = screen(recording, vehicle)
     blind = gross.blind
     found, fine = list(gross.findings), Examination((), ())

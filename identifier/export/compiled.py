@@ -284,5 +284,12 @@ class CompiledPackage:
 
 def samples_of(recording: Recording) -> Array:
     """Return a recording as samples (n, 5) in the order of the inputs."""
-    columns = (recording.v_x, recording.v_y, recording.r, recording.delta_f, recording.delta_r)
+    v_y = recording.v_y
+    columns = (
+        recording.v_x,
+        np.full(len(recording), np.nan) if v_y is None else v_y,
+        recording.r,
+        recording.delta_f,
+        recording.delta_r,
+    )
     return np.column_stack(columns)

@@ -27,7 +27,7 @@ from identifier.method import OTHER_STRUCTURE, Method, Port, Reached, Setup, Tra
 from identifier.tire_model import AXLES, TireModel
 from identifier.tuning import Range, ranges_around
 from models.rules import require_within
-from models.vehicle import Vehicle
+from models.vehicle import GRAVITY, Vehicle
 
 NEAR = 0.99  # of a bound, from which on a number rests at it
 RISING_UNTIL = 0.0  # rad, the slip at which force curves shall not fall: the cornering stiffness
@@ -129,6 +129,11 @@ class InertialIdentifier(Method):
     def min_speed(self) -> float:
         """Below this speed [m/s] forces read zero; learning rests below `learning_speed`."""
         return self.plausibility.min_speed
+
+    @property
+    def needs_v_y(self) -> bool:
+        """Whether it learns nothing without a lateral velocity, which it tells: no."""
+        return False
 
     @property
     def needs_a_y(self) -> bool:
@@ -296,6 +301,19 @@ class InertialIdentifier(Method):
                          True)),
             ]  # fmt: skip
         return tuple(one for rests, one in listed if rests)
+
+    def beside_force(self, state: Mapping[str, Array]) -> Array:
+        """Return bias and roll in what the accelerometer showed, (n,) [weights].
+
+        Parameters
+        ----------
+        state : sensors (n + 1, 5) and body (n + 1, 2).
+        """
+        sensors = state["sensors"].reshape(-1, len(SENSORS))[1:]
+        tilt = state["body"].reshape(-1, 2)[1:, 0]
+        bias, roll = (sensors[:, SENSORS.index(name)] for name in ("bias", "roll"))
+        beside: Array = bias + roll * tilt / GRAVITY
+        return beside
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> AxleModel:
         """Return the model with the carried weights.

@@ -70,7 +70,7 @@ def judge(history: History, t: float | None = None) -> Verdict:
     if drive is None:
         return _too_short(model)
     drive = drive._replace(
-        center=None if drive.notes else _center(drive, taught, road),
+        center=None if drive.notes or _without_v_y(asked) else _center(drive, taught, road),
         elsewhere=_elsewhere(taught, drive, history.vehicle),
         apart=_apart(history.axle_force[asked.samples], history.vehicle, drive.found),
         learns=True,
@@ -94,11 +94,18 @@ def _road_felt(history: History, asked: Portion) -> Array | None:
         first, last = np.searchsorted(asked.samples, [block.part.start, block.part.stop])
         mine = asked.samples[first:last] - block.part.start
         around = slice(mine[0], mine[-1] + 2)
-        push = history.design.road_push({port: v[around] for port, v in block.state.items()})
+        state = {port: v[around] for port, v in block.state.items()}
+        design = history.design
+        push = design.beside_force(state) if _without_v_y(asked) else design.road_push(state)
         if push is None:
             return None
         pushes.append(push[mine - mine[0]])
     return np.concatenate(pushes)
+
+
+def _without_v_y(asked: Portion) -> bool:
+    """Return whether no sensor showed v_y: then the motion is what the accelerometer shows."""
+    return asked.recording.logged_v_y is None
 
 
 def judge_prediction(model: TireModel, recording: Recording) -> Verdict:
@@ -169,7 +176,7 @@ def _looked_at(
             notes = (_stretch(found, rest, clock[asked.samples], first, last),)
             found = rest
     listed: tuple[Suspect, ...] = ()
-    if not (found.missed <= MOST_MISSED).all():
+    if not ((found.missed <= MOST_MISSED).all() or _without_v_y(asked)):
         listed = suspects(_ask(tires, found.windows, road), recording, model.vehicle)
     return Drive(model=model, recording=recording, found=found, suspects=listed, notes=notes)
 

@@ -87,15 +87,18 @@ def measured_force(
 
     Parameters
     ----------
-    recording : v_x, v_y and r.
+    recording : v_x, v_y and r; where no v_y was logged, a_y and r.
     vehicle : mass, inertia and geometry.
     windows : of the recording.
-    road : what a banked road pushes to the left at each sample, taken off [weights], (n,); None
-        where nobody knows of one.
+    road : what a banked road pushes to the left at each sample, taken off [weights], (n,); without
+        v_y what the accelerometer shows beside forces; None where nobody knows of it.
     """
     car = Car(*car_numbers(vehicle).T)
-    impulse = axle_impulse(car, recording.v_y[:, None], recording.r[:, None])
-    sideways = recording.v_x * recording.r / GRAVITY - (0.0 if road is None else road)
+    v_y = recording.logged_v_y
+    still = np.zeros(len(recording)) if v_y is None else v_y
+    impulse = axle_impulse(car, still[:, None], recording.r[:, None])
+    sideways = recording.needed("a_y") if v_y is None else recording.v_x * recording.r
+    sideways = sideways / GRAVITY - (0.0 if road is None else road)
     force: Array = windows.rate(impulse) + windows.mean(sideways)[:, None]
     return force
 
@@ -136,8 +139,13 @@ def noise_variance(recording: Recording, vehicle: Vehicle, windows: Windows) -> 
     windows : of the recording.
     """
     inertia = car_numbers(vehicle)[:, 2]
-    lateral = white_noise(recording.v_y) / GRAVITY
-    variance: Array = 2.0 * (lateral**2 + (inertia * white_noise(recording.r)) ** 2)
+    v_y, turning = recording.logged_v_y, (inertia * white_noise(recording.r)) ** 2
+    if v_y is None:
+        felt = (white_noise(recording.needed("a_y")) / GRAVITY) ** 2 / windows.n
+        without: Array = 2.0 * turning / windows.duration**2 + felt
+        return without
+    lateral = white_noise(v_y) / GRAVITY
+    variance: Array = 2.0 * (lateral**2 + turning)
     return variance / windows.duration**2
 
 

@@ -99,6 +99,8 @@ def _cause(drive: Drive) -> str:
         if suspect.share >= TELLING:
             share = PERCENT * min(suspect.share, 1.0)
             return f"likely cause: {suspect.text} (that would explain {share:.0f} % of it)"
+    if drive.recording.logged_v_y is None:
+        return "without a measured v_y nobody can tell which fault or road does it"
     return (
         "no single fault of a sensor or of the vehicle file explains it: a road that changes, "
         "tires that change, or several faults"
@@ -228,9 +230,11 @@ def _apart(drive: Drive) -> Iterator[Finding]:
 
 def _v_y_stuck(drive: Drive) -> Iterator[Finding]:
     recording, windows = drive.recording, drive.found.windows
-    brisk = windows.starts
+    v_y, brisk = recording.logged_v_y, windows.starts
+    if v_y is None:
+        return
     moves = float(np.std(recording.r[brisk] * recording.v_x[brisk])) > LEAST_FORCE * GRAVITY
-    if moves and not float(np.ptp(recording.v_y[brisk])) > 0.0:
+    if moves and not float(np.ptp(v_y[brisk])) > 0.0:
         yield Finding(
             "v_y_stuck",
             None,
@@ -252,7 +256,7 @@ def _car(drive: Drive) -> Iterator[Finding]:
             False,
         )
     yield from _center(drive)
-    if drive.recording.a_y is not None:
+    if drive.recording.a_y is not None and drive.recording.logged_v_y is not None:
         yield from _a_y(drive, vehicle, found)
 
 

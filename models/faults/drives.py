@@ -51,7 +51,7 @@ class Misaligned:
     def apply(self, recording: Recording) -> Recording:
         """Return the recording with the velocity in the axes of the sensor."""
         c, s = math.cos(self.angle), math.sin(self.angle)
-        v_x, v_y = recording.v_x, recording.v_y
+        v_x, v_y = recording.v_x, recording.needed("v_y")
         return replace(recording, v_x=c * v_x + s * v_y, v_y=c * v_y - s * v_x)
 
 
@@ -90,7 +90,8 @@ class SensorElsewhere:
         """Return the recording with the signals of that place."""
         x, y, r = self.x, self.y, recording.r
         if self.sensor == "velocity":
-            return replace(recording, v_x=recording.v_x - y * r, v_y=recording.v_y + x * r)
+            v_y = recording.needed("v_y") + x * r
+            return replace(recording, v_x=recording.v_x - y * r, v_y=v_y)
         r_dot = np.gradient(r, recording.dt)
         return replace(recording, a_y=channel_of(recording, "a_y") + x * r_dot - y * r**2)
 
@@ -152,7 +153,8 @@ class Bank:
         v_x = recording.v_x
         moving = np.clip(v_x / slow, 0.0, 1.0)
         turn = moving * GRAVITY * np.sin(self.angle_at(recording.t)) / np.maximum(v_x, slow)
-        on_bank = replace(recording, v_y=recording.v_y + l_r * turn, r=recording.r + turn)
+        v_y = recording.needed("v_y") + l_r * turn
+        on_bank = replace(recording, v_y=v_y, r=recording.r + turn)
         lost = recording.alpha(l_f, l_r) - on_bank.alpha(l_f, l_r)
         return replace(on_bank, delta_f=recording.delta_f + lost[:, 0])
 

@@ -17,7 +17,7 @@ from models.logs.units import ACCELERATION, ANGLE, FORCE, RATE, SPEED
 from models.schema import shown
 
 BETA = "beta"
-NEEDED = ("v_x", "v_y", "r", "delta_f")  # beta may stand in for v_y
+NEEDED = ("v_x", "v_y", "r", "delta_f")  # beta may stand in for v_y, or a_y, less surely
 QUANTITIES: Mapping[str, str] = MappingProxyType(
     {
         "v_x": SPEED,

@@ -309,7 +309,7 @@ def _recording(name: str, stretch: Stretch, log_map: LogMap, dt: float) -> Recor
         name=name,
         t=t,
         v_x=signals["v_x"],
-        v_y=signals["v_y"],
+        v_y=signals.get("v_y"),
         r=signals["r"],
         delta_f=signals["delta_f"],
         delta_r=signals["delta_r"] if "delta_r" in signals else np.zeros(t.size),

@@ -16,6 +16,7 @@ from models.bicycle import measured_slip
 from models.logs.log import RecordingError
 from models.recordings.evidence import (
     STRIDE,
+    Fit,
     Steering,
     Windows,
     correlation,
@@ -110,14 +111,14 @@ def _check_peaks(recording: Recording) -> str | None:
 def _check_lateral_acceleration(w: Windows, turn: Steering | None) -> str | None:
     """Answer with a_y that is not v̇_y + v_x r; the two slopes and the steering tell who is wrong.
 
-    Regressors: v_x r, v̇_y, ṙ (a sensor off the center of gravity) and, where v_x r varies by half
-    its mean, 1 (bias, bank). Needs std(v_x r) >= 0.3 m/s^2, or a steady turn of 1.5 m/s^2, three
-    times a usual bias. A slope is judged when it is four standard errors outside its bound; too
-    large a slope must also explain half of a_y, which vibration does not.
+    Regressors: v_x r, v̇_y where v_y was measured, ṙ (a sensor off the center of gravity) and,
+    where v_x r varies by half its mean, 1 (bias, bank). Needs std(v_x r) >= 0.3 m/s^2, or a steady
+    turn of 1.5 m/s^2, three times a usual bias. A slope is judged when it is four standard errors
+    outside its bound; too large a slope must also explain half of a_y, which vibration does not.
     """
     if w.a_y is None:
         return None
-    X = np.column_stack([w.v_x_r, w.v_y_dot, w.r_dot])
+    X = _kinematics(w)
     mean, spread = abs(float(np.mean(w.v_x_r))), float(np.std(w.v_x_r))
     if spread >= max(0.3, 0.5 * mean):
         X = np.column_stack([X, np.ones(w.r.size)])
@@ -125,7 +126,7 @@ def _check_lateral_acceleration(w: Windows, turn: Steering | None) -> str | None
         return None
     fit = least_squares(X, w.a_y)
     slope, error = fit.theta[0], 4.0 * fit.error[0]
-    dot, dot_error = fit.theta[1], 4.0 * fit.error[1]
+    dot, dot_error = _of_v_y(fit, w)
     law = f"must be v̇_y + v_x r (ISO axes), its slope on v_x r is {slope:.3g} instead of 1"
     if slope + error < 0.0:
         r_is_wrong = turn is not None and turn.correlation < -0.5
@@ -144,9 +145,20 @@ def _check_lateral_acceleration(w: Windows, turn: Steering | None) -> str | None
     return None
 
 
+def _kinematics(w: Windows) -> Array:
+    """Return v_x r, v̇_y where there is one, and ṙ (k, 2 or 3)."""
+    return np.column_stack([one for one in (w.v_x_r, w.v_y_dot, w.r_dot) if one is not None])
+
+
+def _of_v_y(fit: Fit, w: Windows) -> tuple[float, float]:
+    """Return the slope on v̇_y and four standard errors of it: 1 ± infinity where there is none."""
+    return (1.0, np.inf) if w.v_y_dot is None else (fit.theta[1], 4.0 * fit.error[1])
+
+
 def _turned(dot: float, dot_error: float, w: Windows) -> bool:
     """Whether a slope on v̇_y is the -1 of a wrong sign, and v̇_y moves enough to say so."""
-    return -2.5 < dot < -0.3 and dot + dot_error < 0.0 and float(np.std(w.v_y_dot)) >= 0.003
+    moves = w.v_y_dot is not None and float(np.std(w.v_y_dot)) >= 0.003
+    return moves and -2.5 < dot < -0.3 and dot + dot_error < 0.0
 
 
 def _blame(slope: float, law: str) -> str:
@@ -214,6 +226,8 @@ def _check_lateral_velocity(recording: Recording, w: Windows, turn: Steering) ->
     v_y/r is the distance from the center of gravity back to where lateral velocity vanishes,
     at most l_r, about half the wheelbase; alarm at 0.9 effective wheelbases.
     """
+    if w.v_y is None:
+        return None
     behind = float(w.v_y @ w.r) / float(w.r @ w.r)
     correlation = behind * float(np.sqrt(np.mean(w.r**2) / (np.mean(w.v_y**2) + 1e-300)))
     rear_steers = peak(recording.delta_r) > 0.1 * peak(recording.delta_f)
@@ -233,7 +247,7 @@ def _check_forces(w: Windows, turn: Steering | None) -> str | None:
     Needs rms(v̇_y + v_x r) >= 0.3 m/s^2. Signs: correlation below -0.5. Unit: the mass that the
     summed force implies, over the cube of the effective wheelbase.
     """
-    a = w.v_x_r + w.v_y_dot
+    a = w.acceleration
     if w.force is None or np.sqrt(np.mean(a**2)) < 0.3:
         return None
     for column, force in zip(("Fyf", "Fyr"), w.force.T, strict=True):
@@ -252,8 +266,8 @@ def _check_forces(w: Windows, turn: Steering | None) -> str | None:
     total = w.force.sum(axis=1)
     if turn is None or turn.correlation < 0.7 or correlation(total, a) < 0.7:
         return None
-    fit = least_squares(np.column_stack([w.v_x_r, w.v_y_dot, w.r_dot]), total)
-    dot, dot_error = fit.theta[1] / fit.theta[0], 4.0 * fit.error[1] / fit.theta[0]
+    fit = least_squares(_kinematics(w), total)
+    dot, dot_error = (one / fit.theta[0] for one in _of_v_y(fit, w))
     if fit.theta[0] > 4.0 * fit.error[0] and _turned(dot, dot_error, w):
         return (
             f"vy contradicts Fyf + Fyr, which must be mass times v̇_y + v_x r, "
@@ -335,19 +349,20 @@ def vehicle_contradiction(recording: Recording, vehicle: Axles) -> str | None:
         One line about the first rule that is broken, None where all hold.
     """
     w = windows(recording)
-    a = w.v_x_r + w.v_y_dot
+    a = w.acceleration
     if w.r.size * STRIDE < 2.0 or np.sqrt(np.mean(a**2)) < 0.3:
         return None
     l_f, l_r = vehicle.l_f, vehicle.l_r
-    motion = {"v_x": w.v_x, "v_y": w.v_y, "r": w.r}
-    slip = measured_slip(l_f, l_r, **motion, delta_f=w.delta_f, delta_r=w.delta_r)
-    alpha_f, alpha_r = slip.T
-    typical = float(np.median(np.abs(alpha_r)))
-    if typical > LARGEST_SLIP:
-        return (
-            f"vy and r must be in m/s and rad/s, the median rear slip angle is "
-            f"{typical:.3g} rad, above {LARGEST_SLIP}; check units, and l_r = {l_r:g} m"
-        )
+    slip = None
+    if w.v_y is not None:
+        motion = {"v_x": w.v_x, "v_y": w.v_y, "r": w.r}
+        slip = measured_slip(l_f, l_r, **motion, delta_f=w.delta_f, delta_r=w.delta_r)
+        typical = float(np.median(np.abs(slip[:, 1])))
+        if typical > LARGEST_SLIP:
+            return (
+                f"vy and r must be in m/s and rad/s, the median rear slip angle is "
+                f"{typical:.3g} rad, above {LARGEST_SLIP}; check units, and l_r = {l_r:g} m"
+            )
     turn, small = steering(w), onset(w)
     other = ""
     if turn is not None and turn.correlation > 0.7:
@@ -365,11 +380,12 @@ def vehicle_contradiction(recording: Recording, vehicle: Axles) -> str | None:
                 f", or name the right vehicle: v_x delta/r is {L:.3g} m, the wheelbase of this "
                 f"one {l_f + l_r:.3g} m"
             )
-    rear = a if w.force is None else w.force[:, 1]
     if w.force is None:
-        return _check_rear_rises(alpha_r, w, l_r, other)
-    found = _check_rises(alpha_r, rear, "Fyr", other)
-    found = found or _check_rises(alpha_f, w.force[:, 0], "Fyf", other)
+        return None if slip is None else _check_rear_rises(slip[:, 1], w, l_r, other)
+    found = None
+    if slip is not None:
+        found = _check_rises(slip[:, 1], w.force[:, 1], "Fyr", other)
+        found = found or _check_rises(slip[:, 0], w.force[:, 0], "Fyf", other)
     return found or _check_mass(w.force.sum(axis=1), a, vehicle.mass)
 
 
@@ -403,15 +419,14 @@ def _check_rear_rises(alpha: Array, w: Windows, l_r: float, other: str) -> str |
 
     Where an accelerometer has the slope 1 on v̇_y the sign of v_y is right, and the car is wrong.
     """
-    a = w.v_x_r + w.v_y_dot
+    a = w.acceleration
     together = correlation(alpha, a)
     if not (together < -0.3 and np.sqrt(np.mean(alpha**2)) > 0.003):
         return None
     car = f"name the right vehicle, of which l_r = {l_r:g} m is told"
     remedy = f"change the sign of vy{other or f', or {car}'}"
     if w.a_y is not None:
-        fit = least_squares(np.column_stack([w.v_x_r, w.v_y_dot, w.r_dot]), w.a_y)
-        slope, error = fit.theta[1], 4.0 * fit.error[1]
+        slope, error = _of_v_y(least_squares(_kinematics(w), w.a_y), w)
         if slope > 0.3 > error:
             remedy = f"vy has the sign of ay: {car}, or move vy to the center of gravity"
         elif slope < -0.3 < -error:

@@ -66,10 +66,11 @@ def chosen_signals(
     _refuse_words(log, names, missing, run)
     proposal = propose(log, listed, run)
     found = likely_signals(told, proposal)
-    if missing := missing_signals(found):
+    missing = missing_signals(found)
+    if missing and not (missing == ["v_y"] and "a_y" in found):
         raise RecordingError(missing_text(log, missing, proposal, names))
-    taken = [name for name in found if name not in told]
-    return Reading(found, tuple(_taken_text(name, found[name]) for name in taken))
+    notes = [_taken_text(name, found[name]) for name in found if name not in told]
+    return Reading(found, (*notes, *([_without_v_y_text(proposal)] if missing else [])))
 
 
 def as_listed(
@@ -169,7 +170,9 @@ def _beside(more: Mapping[str, Signal], told: Mapping[str, Signal]) -> dict[str,
 
 
 def missing_signals(signals: Mapping[str, Signal]) -> list[str]:
-    """Return the needed signals that are not there; beta stands in for v_y.
+    """Return the wanted signals that are not there; beta stands in for v_y.
+
+    A log without v_y that has a_y is read all the same.
 
     Parameters
     ----------
@@ -196,6 +199,13 @@ def _taken_text(name: str, signal: Signal) -> str:
     return f"{column_of(name)} is taken from {' + '.join(channels)}{unit}, by its name"
 
 
+def _without_v_y_text(proposal: Proposal) -> str:
+    """Return what is said of a log that has no lateral velocity."""
+    likely = likely_text("v_y", proposal)
+    may = f"; if {likely} is one, tell it by --columns {column_word('v_y', proposal)}"
+    return f"no lateral velocity is read: vy is to be estimated{may if likely else ''}"
+
+
 def missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: list[str]) -> str:
     """Return the error of a log in which not every signal is found: what may be it, what to do.
 
@@ -209,7 +219,8 @@ def missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: li
     parts = [said for name in missing if (said := likely_text(name, proposal))]
     words = [word for name in missing if (word := column_word(name, proposal))]
     columns = ", ".join(column_of(name) for name in missing)
-    said = f"{log.path}: column {columns} is missing; "
+    instead = " (or ay, from which it is estimated)" if "v_y" in missing else ""
+    said = f"{log.path}: column {columns}{instead} is missing; "
     if parts:
         said += f"did you mean {', '.join(parts)}? tell it by --columns {' '.join(words)}; "
     else:

@@ -23,16 +23,16 @@ class Windows(NamedTuple):
     """Window means of the moving part of a recording, each of shape (k,).
 
     v_x [m/s], v_y [m/s], r [rad/s], delta_f and delta_r [rad]; v_y_dot [m/s^2] and r_dot [rad/s^2]
-    are differences over the window; v_x_r = mean(v_x r) [m/s^2]; a_y [m/s^2] and force
-    (k, 2) [N] may be None.
+    are differences over the window; v_x_r = mean(v_x r) [m/s^2]; v_y and v_y_dot, a_y [m/s^2] and
+    force (k, 2) [N] may be None.
     """
 
     v_x: Array
-    v_y: Array
+    v_y: Array | None
     r: Array
     delta_f: Array
     delta_r: Array
-    v_y_dot: Array
+    v_y_dot: Array | None
     r_dot: Array
     v_x_r: Array
     a_y: Array | None
@@ -42,6 +42,13 @@ class Windows(NamedTuple):
     def delta(self) -> Array:
         """Steering that turns the car, delta_f - delta_r [rad]."""
         return self.delta_f - self.delta_r
+
+    @property
+    def acceleration(self) -> Array:
+        """v̇_y + v_x r [m/s^2]; without a v_y what the accelerometer shows, or v_x r alone."""
+        if self.v_y_dot is not None:
+            return self.v_x_r + self.v_y_dot
+        return self.v_x_r if self.a_y is None else self.a_y
 
 
 class Fit(NamedTuple):
@@ -82,14 +89,14 @@ def windows(recording: Recording) -> Windows:
         slopes: Array = (signal[start + width] - signal[start]) / (width * dt)
         return slopes
 
-    force = recording.axle_force
+    v_y, force = recording.logged_v_y, recording.axle_force
     return Windows(
         v_x=mean(recording.v_x),
-        v_y=mean(recording.v_y),
+        v_y=None if v_y is None else mean(v_y),
         r=mean(recording.r),
         delta_f=mean(recording.delta_f),
         delta_r=mean(recording.delta_r),
-        v_y_dot=slope(recording.v_y),
+        v_y_dot=None if v_y is None else slope(v_y),
         r_dot=slope(recording.r),
         v_x_r=mean(recording.v_x, recording.r),
         a_y=None if recording.a_y is None else mean(recording.a_y),
@@ -156,8 +163,9 @@ def onset(w: Windows) -> Steering | None:
 
 def _wheelbase(w: Windows, keep: NDArray[np.bool_]) -> Steering | None:
     """Return the effective wheelbase over some of the windows, None without excitation."""
-    tail_out = (w.v_y * w.r < 0.0) & (np.abs(w.v_y) > TAIL_OUT * w.v_x)
-    keep = keep & ~tail_out
+    if w.v_y is not None:
+        tail_out = (w.v_y * w.r < 0.0) & (np.abs(w.v_y) > TAIL_OUT * w.v_x)
+        keep = keep & ~tail_out
     r, kinematic = w.r[keep], (w.v_x * w.delta)[keep]
     if r.size * STRIDE < 2.0 or not np.sqrt(np.mean(r**2)) >= 0.05:
         return None

@@ -33,6 +33,10 @@ JITTER = 0.02  # largest departure of a sample from the uniform grid, as a share
 
 
 ALL = slice(None)
+MISSING = {
+    "v_y": "so slip angles are not known; tireid identify --method inertial estimates it",
+    "a_y": "which is needed where vy is not measured",
+}
 
 # Beyond these, in SI, a number is no signal of a car whatever its unit: degrees, g and km/h fit.
 LARGEST = {
@@ -62,7 +66,8 @@ class Recording:
     name : "FILE:RUN", or "FILE" when the file has no run column.
     t : time [s], shape (n,), uniform to 2 % of one step in each stretch, and rising.
     v_x : forward speed at the center of gravity [m/s], shape (n,).
-    v_y : lateral velocity at the center of gravity [m/s], positive to the left, shape (n,).
+    v_y : lateral velocity at the center of gravity [m/s], positive to the left, shape (n,), or
+        None when it was not logged.
     r : yaw rate [rad/s], positive to the left, shape (n,).
     delta_f : front road-wheel angle [rad], positive to the left, shape (n,).
     delta_r : rear road-wheel angle [rad], positive to the left, shape (n,).
@@ -73,6 +78,8 @@ class Recording:
         None when there is no truth.
     breaks : index of the first sample of each stretch but the first, rising.
     notes : what was taken or done in reading beyond the words of the file, one sentence each.
+    estimated : names of signals that no sensor showed but a method told: of v_y only. No method
+        is shown them.
 
     Raises
     ------
@@ -84,7 +91,7 @@ class Recording:
     name: str
     t: Array
     v_x: Array
-    v_y: Array
+    v_y: Array | None = None
     r: Array
     delta_f: Array
     delta_r: Array
@@ -92,9 +99,12 @@ class Recording:
     axle_force: Array | None = None
     breaks: tuple[int, ...] = ()
     notes: tuple[str, ...] = ()
+    estimated: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         n = np.size(self.t)
+        if not set(self.estimated) <= {"v_y"}:
+            raise RecordingError(f"{self.name}: estimated may name v_y, not {self.estimated}")
         for piece in self.stretches:
             if min(piece.stop, n) - piece.start < MINIMUM_SAMPLES:
                 whole = "a recording" if not self.breaks else "each stretch of a recording"
@@ -200,8 +210,36 @@ class Recording:
 
     @property
     def x(self) -> Array:
-        """State [v_y, r] [m/s, rad/s], shape (n, 2)."""
-        return side_by_side(self.v_y, self.r)
+        """State [v_y, r] [m/s, rad/s], shape (n, 2); it needs a v_y."""
+        return side_by_side(self.needed("v_y"), self.r)
+
+    @property
+    def logged_v_y(self) -> Array | None:
+        """Lateral velocity that a sensor showed [m/s], (n,); None where there was none."""
+        return None if "v_y" in self.estimated else self.v_y
+
+    def as_logged(self) -> "Recording":
+        """Return it without signals that were estimated, as methods are shown it."""
+        return replace(self, v_y=self.logged_v_y, estimated=()) if self.estimated else self
+
+    def needed(self, name: str) -> Array:
+        """Return a signal that a recording may lack.
+
+        Parameters
+        ----------
+        name : "v_y" [m/s] or "a_y" [m/s²].
+
+        Raises
+        ------
+        RecordingError
+            Where it was not logged.
+        """
+        signal: Array | None = getattr(self, name)
+        if signal is None:
+            raise RecordingError(
+                f"{self.name}: there is no {name.replace('_', '')}, {MISSING[name]}"
+            )
+        return signal
 
     @property
     def u(self) -> Array:
@@ -240,7 +278,7 @@ class Recording:
             [alpha_f, alpha_r] [rad], shape (n, 2).
         """
         names = ("v_x", "v_y", "r", "delta_f", "delta_r")
-        slip: Array = measured_slip(l_f, l_r, **{name: getattr(self, name)[part] for name in names})
+        slip: Array = measured_slip(l_f, l_r, **{name: self.needed(name)[part] for name in names})
         slip.setflags(write=False)
         return slip
 
@@ -360,7 +398,19 @@ def joined(recordings: Sequence[Recording], name: str | None = None) -> Recordin
         for name in SIGNALS[1:]
         if all(getattr(one, name) is not None for one in recordings)
     }
-    return Recording(name=name, t=t, **signals, breaks=tuple(breaks), notes=tuple(notes))
+    for missing in ("v_y", "a_y"):
+        without = [one.name for one in recordings if getattr(one, missing) is None]
+        if missing not in signals and len(without) < len(recordings):
+            column = missing.replace("_", "")
+            notes.append(f"{column} is left out, {', '.join(without)} has none")
+    return Recording(
+        name=name,
+        t=t,
+        **signals,
+        breaks=tuple(breaks),
+        notes=tuple(notes),
+        estimated=tuple(sorted({signal for one in recordings for signal in one.estimated})),
+    )
 
 
 def _in_a_row(signals: Sequence[Array]) -> Array:
@@ -428,16 +478,16 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
     path = Path(path)
     if not path.name.lower().endswith((".csv", ".csv.gz")):
         raise RecordingError(f"{path}: the name must end in .csv or .csv.gz")
-    columns = {
+    signals = {
         "t": recording.t,
         "vx": recording.v_x,
-        "vy": recording.v_y,
+        "vy": recording.logged_v_y,
         "r": recording.r,
         "delta_f": recording.delta_f,
         "delta_r": recording.delta_r,
+        "ay": recording.a_y,
     }
-    if recording.a_y is not None:
-        columns["ay"] = recording.a_y
+    columns = {name: signal for name, signal in signals.items() if signal is not None}
     if recording.axle_force is not None:
         columns["Fyf"], columns["Fyr"] = recording.axle_force.T
     text = io.StringIO(newline="")

@@ -108,10 +108,13 @@ class Repair:
         told = {name for name in TABLES if name != "vehicle" for name in getattr(self, name)}
         if self.acceleration_sensor_x:
             told.add("a_y")
+        turned = self.velocity_sensor_angle or self.velocity_sensor_x
+        if self.sideslip or turned:
+            told.add("v_y")
         for name in CHANNELS:
             if name in told and getattr(recording, name) is None:
                 raise RecordingError(f"{recording.name}: has no {name} that could be repaired")
-        if not (told or self.sideslip or self.velocity_sensor_angle or self.velocity_sensor_x):
+        if not told:
             return recording, self.on(vehicle)
         if recording.breaks:
             parts = [recording.taken(piece) for piece in recording.stretches]
@@ -125,7 +128,7 @@ class Repair:
         }
         if self.sideslip:
             factor, offset, speed = *self._scale("v_y"), signals["v_x"]
-            angle = recording.v_y
+            angle = recording.needed("v_y")
             signals["v_y"] = filled(n, lambda k: speed[k] * np.tan(angle[k] * factor) - offset)
         for name, delay in self.delay.items():
             late = signals[name]
@@ -133,11 +136,12 @@ class Repair:
         width = round(SMOOTHED * vehicle.froude_time / recording.dt)
         for name, lag in self.lag.items():
             signals[name] = without_low_pass(signals[name], lag, recording.dt, width)
-        c, s = math.cos(self.velocity_sensor_angle), math.sin(self.velocity_sensor_angle)
-        v_x, v_y, r = signals["v_x"], signals["v_y"], signals["r"]
-        x = self.velocity_sensor_x
-        signals["v_x"] = filled(n, lambda k: c * v_x[k] - s * v_y[k])
-        signals["v_y"] = filled(n, lambda k: c * v_y[k] + s * v_x[k] - x * r[k])
+        r = signals["r"]
+        if turned:
+            c, s = math.cos(self.velocity_sensor_angle), math.sin(self.velocity_sensor_angle)
+            v_x, v_y, x = signals["v_x"], signals["v_y"], self.velocity_sensor_x
+            signals["v_x"] = filled(n, lambda k: c * v_x[k] - s * v_y[k])
+            signals["v_y"] = filled(n, lambda k: c * v_y[k] + s * v_x[k] - x * r[k])
         if self.acceleration_sensor_x:
             ahead, a_y = self.acceleration_sensor_x, signals["a_y"]
             signals["a_y"] = filled(n, lambda k: a_y[k] - ahead * _rate(r, k, recording.dt))

@@ -130,6 +130,12 @@ def run(options: argparse.Namespace) -> int:
     logs = [_read(log, options.run_name, vehicle, design, options) for log in options.logs]
     others = [_read(log, None, vehicle, design, options) for log in options.replay]
     _require_distinct([*logs, *others])
+    without_v_y = any(one.v_y is None for one in (*logs, *others))
+    if without_v_y:
+        law, design = chosen_method(options, vehicle, seed, without_v_y=True)
+        say(f"a log has no lateral velocity: {law} learns, and estimates it")
+    for one in (*logs, *others):
+        check_recording(one, design)
     say("the doctor looks at the log")
     diagnosis = diagnose(joined(logs), vehicle)
     repair = diagnosis.repair if options.repair is not None else Repair()
@@ -138,7 +144,7 @@ def run(options: argparse.Namespace) -> int:
             [repaired(one, vehicle, repair)[0] for one in some] for some in (logs, others)
         )
         vehicle = repair.on(vehicle)
-        law, design = chosen_method(options, vehicle, seed)
+        law, design = chosen_method(options, vehicle, seed, without_v_y=without_v_y)
     recording = joined(logs)
     network = network_model(options, vehicle, design.min_speed)
     freeze_times = sorted(set(options.freeze or [float(recording.t[-1])]))
@@ -250,7 +256,6 @@ def _read(
         dt=design.dt,
     )
     counted_samples(recording, design.min_speed)  # refuses a car that never drives
-    check_recording(recording, design)
     return recording
 
 

@@ -285,7 +285,7 @@ def _force_columns(
     columns = {
         "t_s": recording.t[part],
         "v_x_m_s": recording.v_x[part],
-        "v_y_m_s": recording.v_y[part],
+        "v_y_m_s": recording.needed("v_y")[part],
         "r_rad_s": recording.r[part],
         "delta_f_rad": recording.delta_f[part],
         "delta_r_rad": recording.delta_r[part],

@@ -13,7 +13,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from identifier.method import Method
-from identifier.methods import DEFAULT, METHODS, REFERENCE, draws_weights, make_method
+from identifier.methods import (
+    DEFAULT,
+    METHODS,
+    REFERENCE,
+    WITHOUT_V_Y,
+    draws_weights,
+    make_method,
+)
 from identifier.own_network import OnnxModel
 from identifier.paper.design import read_design
 from identifier.paper.network import SIGNALS
@@ -229,12 +236,19 @@ def method_is_given(options: argparse.Namespace) -> bool:
     return bool(given)
 
 
-def chosen_method(options: argparse.Namespace, vehicle: Vehicle, seed: int | None = None) -> Chosen:
+def chosen_method(
+    options: argparse.Namespace,
+    vehicle: Vehicle,
+    seed: int | None = None,
+    *,
+    without_v_y: bool = False,
+) -> Chosen:
     """Return what --method, --paper or --design say, the default where none is given.
 
     Parameters
     ----------
     seed : of initial weights; None where nobody asks for one.
+    without_v_y : whether a log has no lateral velocity, which changes the default.
 
     Raises
     ------
@@ -247,7 +261,8 @@ def chosen_method(options: argparse.Namespace, vehicle: Vehicle, seed: int | Non
             raise ValueError(f"--seed goes with a method: that of {options.design} stands in it")
         design = read_design(options.design)
         return Chosen(design.law, design)
-    name = options.method or (REFERENCE if options.paper else DEFAULT)
+    usual = WITHOUT_V_Y if without_v_y else DEFAULT
+    name = options.method or (REFERENCE if options.paper else usual)
     if seed is not None and not draws_weights(name):
         raise ValueError(f"--seed is of random initial weights, and {name} begins with none")
     return Chosen(name, make_method(name, vehicle, seed or 0))

@@ -300,16 +300,18 @@ def inputs_figure(recording: Recording, *, window: Window = None) -> Figure:
         Where the window holds no sample.
     """
     ends = time_window(recording.t, window)
-    logged = [recording.v_x, recording.delta_f, recording.delta_r, recording.v_y, recording.r]
-    logged += [] if recording.a_y is None else [recording.a_y]
+    logged = [recording.v_x, recording.delta_f, recording.delta_r, recording.r]
+    logged += [one for one in (recording.v_y, recording.a_y) if one is not None]
     part = shown(recording.t, ends, *(signal.__getitem__ for signal in logged))
     t = drawn_times(recording, recording.t[part])
     signals = {
         "$v_x$ [m/s]": recording.v_x[part],
         "steering [deg]": np.rad2deg(recording.delta_f[part]),
-        "$v_y$ [m/s]": recording.v_y[part],
-        "$r$ [deg/s]": np.rad2deg(recording.r[part]),
     }
+    if recording.v_y is not None:
+        told = ", estimated" if recording.estimated else ""
+        signals[f"$v_y$ [m/s]{told}"] = recording.v_y[part]
+    signals["$r$ [deg/s]"] = np.rad2deg(recording.r[part])
     if recording.a_y is not None:
         signals["$a_y$ [m/s²]"] = recording.a_y[part]
 

@@ -67,7 +67,7 @@ def recording_digest(recording: Recording) -> str:
 
     Of more than `LONG` samples bytes are counted, of fewer their decimals.
     """
-    signals = (recording.t, recording.v_x, recording.v_y, recording.r)
+    signals = (recording.t, recording.v_x, recording.logged_v_y, recording.r)
     steering = (recording.delta_f, recording.delta_r)
     truth = (recording.a_y, recording.axle_force)
     parts = [part for part in (*signals, *steering, *truth) if part is not None]
