@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from identifier.doctor import Diagnosis, Finding
+from identifier.doctor.diagnosis import WITHOUT_V_Y
 from models.files import write_atomically
 from models.recordings import (
     LogMap,
@@ -165,6 +166,8 @@ def doctor_text(diagnosis: Diagnosis, repair: Repair, path: Path | None) -> str:
     path : of --repair, None where it was not asked for.
     """
     lines = [diagnosis_text(diagnosis, unseen=False)]
+    if diagnosis.unseen[:1] == (WITHOUT_V_Y,):
+        lines.append(f"cannot be seen: {WITHOUT_V_Y}")
     if repair:
         lines.append(f"repaired, in what was learnt on and replayed: {repair_text(repair)}")
     elif path is not None:

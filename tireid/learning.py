@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Callable
 
-from identifier.axle import AxleIdentifier
+from identifier.axle import AxleIdentifier, AxleModel
 from identifier.doctor import diagnose
 from identifier.inertial import InertialIdentifier
 from identifier.method import Method
@@ -73,7 +73,8 @@ def replay(tire: TireModel, recording: Recording, *, since: float | None = None)
     Parameters
     ----------
     tire : what was learnt.
-    recording : another drive; samples below the model's minimum speed do not count.
+    recording : another drive; samples below the model's minimum speed do not count. Where it has
+        no v_y, the inertial identifier estimates it, beginning with `tire`.
     since : samples before this time [s] do not count; None counts all.
 
     Raises
@@ -81,4 +82,24 @@ def replay(tire: TireModel, recording: Recording, *, since: float | None = None)
     NeverDrivesError
         Where no sample counts.
     """
-    return predict(tire, recording, since=since)
+    return predict(tire, with_v_y(recording, tire), since=since)
+
+
+def with_v_y(recording: Recording, tire: TireModel) -> Recording:
+    """Return a drive with its v_y, or with that which the inertial identifier estimates.
+
+    Parameters
+    ----------
+    recording : with or without.
+    tire : where it can go on learning from it, it begins with it.
+
+    Raises
+    ------
+    RecordingError
+        Where there is no a_y to estimate from.
+    """
+    if recording.v_y is not None:
+        return recording
+    design = InertialIdentifier.for_vehicle(tire.vehicle, dt=recording.dt)
+    start = tire if isinstance(tire, AxleModel) and tire.ladder == design.ladder else None
+    return run_over(recording, tire.vehicle, design, start).recording

@@ -104,15 +104,9 @@ def cannot_learn(
     names : of methods.
     recordings : that are compared on.
     """
-    found: dict[str, str] = {}
-    for signal in ("v_y", "a_y"):
-        lacking = [one.name for one in recordings if getattr(one, signal) is None]
-        column = signal.replace("_", "")
-        why = f"left out, it learns from {column} and {', '.join(lacking)} has none"
-        for name in names:
-            if lacking and getattr(make_method(name, vehicle), f"needs_{signal}"):
-                found.setdefault(name, why)
-    return found
+    lacking = [recording.name for recording in recordings if recording.a_y is None]
+    why = f"left out, it learns from ay and {', '.join(lacking)} has none"
+    return {name: why for name in names if lacking and make_method(name, vehicle).needs_a_y}
 
 
 def run_comparison(

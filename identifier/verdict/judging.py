@@ -26,7 +26,7 @@ from identifier.verdict.motion import (
     noise_variance,
 )
 from identifier.verdict.rules import MOST_MISSED, PERCENT, Drive, findings
-from identifier.verdict.verdict import Finding, Number, Verdict
+from identifier.verdict.verdict import WITHOUT_V_Y, Finding, Number, Verdict
 from models.recordings import Recording
 from models.recordings.portion import Portion, portion
 from models.vehicle import Vehicle
@@ -146,7 +146,7 @@ def _asked_of(asked: Portion, whole: Recording) -> list[Finding]:
 
 def _road_driven(recording: Recording, vehicle: Vehicle) -> Array | None:
     """Return what the default takes a banked road to push, by the accelerometer (n,) [weights]."""
-    if recording.a_y is None:
+    if recording.a_y is None or recording.logged_v_y is None:
         return None
     design: Method = AxleIdentifier.for_vehicle(vehicle, dt=recording.dt)
     return design.road_push(identify(recording, vehicle, design).state)
@@ -243,7 +243,8 @@ def _verdict(drive: Drive, listed: list[Finding]) -> Verdict:
         )
         for one in model.estimates()
     )
-    return Verdict(findings=tuple(listed), numbers=numbers, measures=measures)
+    blind = WITHOUT_V_Y if recording.logged_v_y is None else ()
+    return Verdict(findings=tuple(listed), numbers=numbers, measures=measures, blind=blind)
 
 
 def _doubt(one: Estimate, missed: float) -> float | None:

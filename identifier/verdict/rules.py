@@ -25,6 +25,7 @@ FAR_FROM_TOLD = 3.0  # ratio of learnt to told stiffness, or told to learnt
 STIFFENS = 1.6  # secant at the known slip over slope at zero: no tire stiffens with slip
 INERTIA = (0.3, 2.0)  # I_z/(m l_f l_r): two points on the axles have 1
 MOST_A_Y = 0.25  # share of the recorded a_y that v_y, r and v_x do not give
+TURNING_SLOPE = (0.9, 1.2)  # of a_y on v_x r, without their means: v̇_y, which is left out, is small
 A_Y_SLOPE = (0.87, 1.2)  # of the recorded a_y on theirs: a body that rolls reads up to 1.15
 CENTER = (-0.065, 0.12)  # of the wheelbase: where right cars seem to have their center of gravity,
 # forward and back of the told one; the body rolls, which looks like a center farther back
@@ -256,7 +257,9 @@ def _car(drive: Drive) -> Iterator[Finding]:
             False,
         )
     yield from _center(drive)
-    if drive.recording.a_y is not None and drive.recording.logged_v_y is not None:
+    if drive.recording.logged_v_y is None:
+        yield from _turning(drive.recording, found)
+    elif drive.recording.a_y is not None:
         yield from _a_y(drive, vehicle, found)
 
 
@@ -275,6 +278,26 @@ def _center(drive: Drive) -> Iterator[Finding]:
             None,
             f"{suspect.text}: that would explain {share:.0f} % of what is missed; are l_f and l_r "
             "swapped? A v_y that is late or measured elsewhere looks alike",
+            True,
+        )
+
+
+def _turning(recording: Recording, found: Evidence) -> Iterator[Finding]:
+    """Without a v_y: a_y and v_x r are the same but for v̇_y, bank and roll."""
+    felt, turning = (
+        found.windows.mean(one) for one in (recording.needed("a_y"), recording.v_x * recording.r)
+    )
+    felt, turning = felt - felt.mean(), turning - turning.mean()
+    power = float(np.mean(turning**2))
+    if not power > (LEAST_FORCE * GRAVITY) ** 2:
+        return
+    slope = float(np.mean(felt * turning)) / power
+    if not TURNING_SLOPE[0] <= slope <= TURNING_SLOPE[1]:
+        yield Finding(
+            "a_y_disagrees",
+            None,
+            f"the recorded a_y is {slope:.2g} times v_x r ({TURNING_SLOPE[0]:g} to "
+            f"{TURNING_SLOPE[1]:g} with the roll of a body): a scale of v_x, r or a_y, or a delay",
             True,
         )
 

@@ -19,6 +19,13 @@ UNSEEN = (
 )
 
 
+WITHOUT_V_Y = (
+    "without a measured v_y: l_f and l_r swapped; measure them",
+    "without a measured v_y: a scale of the steering, or one of v_x, r or a_y below a fifth, and "
+    "delays of a_y or r below 0.1 s: calibrate and align the channels",
+)
+
+
 class Finding(NamedTuple):
     """What speaks against an answer.
 
@@ -72,11 +79,13 @@ class Verdict:
     findings : those that refuse first.
     numbers : what was learnt, each with its doubt.
     measures : what was measured on the way, by name, front and rear or one value.
+    blind : what more nobody can see of this drive.
     """
 
     findings: tuple[Finding, ...]
     numbers: tuple[Number, ...]
     measures: Mapping[str, tuple[float, ...] | float | None]
+    blind: tuple[str, ...] = ()
 
     @property
     def valid(self) -> bool:
@@ -97,7 +106,7 @@ class Verdict:
     @property
     def unseen(self) -> tuple[str, ...]:
         """What nobody can see, a line each."""
-        return tuple(f"not seen: {text}" for text in UNSEEN)
+        return tuple(f"not seen: {text}" for text in (*UNSEEN, *self.blind))
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -111,7 +120,7 @@ class Verdict:
             "findings": [finding._asdict() for finding in self.findings],
             "numbers": [number._asdict() | {"state": number.state} for number in self.numbers],
             "measures": dict(self.measures),
-            "unseen": list(UNSEEN),
+            "unseen": [*UNSEEN, *self.blind],
         }
 
     def __repr__(self) -> str:

@@ -67,7 +67,7 @@ def chosen_signals(
     proposal = propose(log, listed, run)
     found = likely_signals(told, proposal)
     missing = missing_signals(found)
-    if missing and not (missing == ["v_y"] and "a_y" in found):
+    if missing and not goes_without(missing, found):
         raise RecordingError(missing_text(log, missing, proposal, names))
     notes = [_taken_text(name, found[name]) for name in found if name not in told]
     return Reading(found, (*notes, *([_without_v_y_text(proposal)] if missing else [])))
@@ -172,7 +172,7 @@ def _beside(more: Mapping[str, Signal], told: Mapping[str, Signal]) -> dict[str,
 def missing_signals(signals: Mapping[str, Signal]) -> list[str]:
     """Return the wanted signals that are not there; beta stands in for v_y.
 
-    A log without v_y that has a_y is read all the same.
+    A log without v_y that has a_y is read all the same, `goes_without`.
 
     Parameters
     ----------
@@ -199,6 +199,17 @@ def _taken_text(name: str, signal: Signal) -> str:
     return f"{column_of(name)} is taken from {' + '.join(channels)}{unit}, by its name"
 
 
+def goes_without(missing: Sequence[str], signals: Mapping[str, Signal]) -> bool:
+    """Return whether all that is missing is v_y, which is estimated where there is a_y.
+
+    Parameters
+    ----------
+    missing : signals that are wanted.
+    signals : those that are there.
+    """
+    return list(missing) == ["v_y"] and "a_y" in signals
+
+
 def _without_v_y_text(proposal: Proposal) -> str:
     """Return what is said of a log that has no lateral velocity."""
     likely = likely_text("v_y", proposal)
@@ -219,7 +230,7 @@ def missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: li
     parts = [said for name in missing if (said := likely_text(name, proposal))]
     words = [word for name in missing if (word := column_word(name, proposal))]
     columns = ", ".join(column_of(name) for name in missing)
-    instead = " (or ay, from which it is estimated)" if "v_y" in missing else ""
+    instead = " (or ay, from which it is estimated)" if missing == ["v_y"] else ""
     said = f"{log.path}: column {columns}{instead} is missing; "
     if parts:
         said += f"did you mean {', '.join(parts)}? tell it by --columns {' '.join(words)}; "

@@ -125,6 +125,8 @@ def run(options: argparse.Namespace) -> int:
         Progress("compare", parts, long=True) as work,
     ):
         recordings = _recordings(options, vehicle, seed)
+        for recording in recordings:
+            recording.needed("v_y")  # of the slip at which every method is asked
         left_out = cannot_learn(names, vehicle, recordings)
         for name, why in left_out.items():
             say(f"{name}: {why}")

@@ -237,10 +237,23 @@ def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool)
     if model.known_slip is None:
         return "frozen; `tireid compare` sets it beside the other methods"
     known = np.degrees(model.known_slip)
-    return (
+    return _side_slip_line(learnt) + (
         f"known to {known[0]:.1f} / {known[1]:.1f} deg of slip (front / rear)\n"
         f"certificate: {certificate.verdict}; grip, cornering stiffness, weights, offsets and "
         "covariance stay in their boxes by construction (summary.json lists them)"
+    )
+
+
+def _side_slip_line(learnt: History) -> str:
+    """Return how well a run knew side slip, where it told it; else nothing."""
+    if "v_y_sd" not in learnt.outputs:
+        return ""
+    moves = learnt.recording.v_x >= learnt.design.min_speed
+    sd = learnt.outputs["v_y_sd"].ravel()[moves] / learnt.recording.v_x[moves]
+    seen = 100.0 * float(np.mean(learnt.outputs["side_slip_observable"].ravel()[moves]))
+    median = float(np.degrees(np.median(sd)))
+    return (
+        f"side slip was told to ± {median:.2g} deg (median), observable {seen:.0f} % of the time\n"
     )
 
 

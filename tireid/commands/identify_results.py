@@ -136,6 +136,11 @@ def summarize_replays(
 Frozen = Mapping[float, Mapping[str, Replay]]
 OBSERVED = "xi_tilde"  # the output of a method that learns from the error of an observer
 WRITING = 0.6  # share of the time of curves and figures that a long recording's curves take
+TOLD = {  # columns of forces.csv by the outputs of methods that estimate v_y
+    "v_y_told_m_s": "v_y",
+    "v_y_sd_m_s": "v_y_sd",
+    "side_slip_observable": "side_slip_observable",
+}
 WEIGHTS = ("W", "V", "own")  # carried matrices that are the learnt model, by whatever method
 
 
@@ -267,10 +272,15 @@ def write_forces(
     progress : called now and then with the share that is done, 0 to 1.
     """
     n = len(history.recording)
+    told = {
+        column: history.outputs[port].ravel()
+        for column, port in TOLD.items()
+        if port in history.outputs
+    }
 
     def parts() -> Iterator[dict[str, Array]]:
         for part in blocks(n):
-            yield _force_columns(history, replays, part)
+            yield _force_columns(history, replays, told, part)
             if progress is not None:
                 progress(part.stop / n)
 
@@ -278,7 +288,7 @@ def write_forces(
 
 
 def _force_columns(
-    history: History, replays: Mapping[str, Replay], part: slice
+    history: History, replays: Mapping[str, Replay], told: Mapping[str, Array], part: slice
 ) -> dict[str, Array]:
     recording, car = history.recording, history.vehicle
     alpha = recording.alpha(car.l_f, car.l_r, part)
@@ -292,6 +302,7 @@ def _force_columns(
         "alpha_f_rad": alpha[:, 0],
         "alpha_r_rad": alpha[:, 1],
     }
+    columns |= {name: values[part] for name, values in told.items()}
     curves = {"online": history.axle_force}
     curves |= {label: replay.axle_force for label, replay in replays.items()}
     if recording.axle_force is not None:

@@ -71,6 +71,9 @@ def run(options: argparse.Namespace) -> int:
         check=not options.no_check,
     )
     prediction = replay(model, recording)
+    recording = prediction.recording
+    if recording.estimated:
+        say(f"{recording.name}: vy is estimated by inertial, which begins with the model")
     verdict = prediction.verdict()
     with output_folder(options.out, force=options.force) as folder:
         parts = blocks(len(recording))

@@ -1,0 +1,188 @@
+"""Logs of an IMU, wheel speed and steering alone: read, learnt on, judged and predicted."""
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tireid as ti
+from identifier.axle import AxleIdentifier
+from identifier.inertial import InertialIdentifier
+from models.maneuvers import RandomSteer
+from models.plant import Plant
+from models.recordings import Recording, RecordingError, read_recording, write_recording
+from models.recordings.record import joined
+from tireid.cli import main
+
+CAR = ti.sedan()
+
+
+def driven(seed, duration=24.0):
+    maneuver = RandomSteer(
+        amplitude=np.radians(4.0),
+        frequency=0.5,
+        seed=seed,
+        onset=1.0,
+        rate_limit=1.0,
+        duration=duration - 0.01,
+    )
+    return Plant(CAR).simulate(maneuver, speed=20.0, name=f"drive{seed}").recording()
+
+
+def as_logged(exact, seed=1):
+    """The drive as noisy inertial sensors show it, without v_y and without truth."""
+    rng, n = np.random.default_rng(seed), len(exact)
+    return replace(
+        exact,
+        v_y=None,
+        r=exact.r + 0.002 * rng.normal(size=n),
+        a_y=exact.a_y + 0.05 + 0.1 * rng.normal(size=n),
+        axle_force=None,
+    )
+
+
+@pytest.fixture(scope="module")
+def exact():
+    return driven(3)
+
+
+@pytest.fixture(scope="module")
+def history(exact):
+    return ti.identify(as_logged(exact), CAR)
+
+
+@pytest.fixture
+def log(exact, tmp_path):
+    write_recording(as_logged(exact), tmp_path / "imu.csv")
+    CAR.to_toml(tmp_path / "car.toml")
+    return tmp_path / "imu.csv"
+
+
+def missed(model, exact):
+    away = model.predict(exact) - exact.axle_force
+    return np.sqrt((away**2).mean(axis=0) / (exact.axle_force**2).mean(axis=0))
+
+
+def test_a_log_without_v_y_is_learnt_on_by_the_inertial_identifier(history, exact):
+    assert isinstance(history.design, InertialIdentifier)
+    assert (missed(history.freeze(), exact) < 0.08).all()
+    away = np.degrees((history.recording.v_y - exact.v_y)[500:] / 20.0)
+    assert np.sqrt(np.mean(away**2)) < 0.25
+
+
+def test_what_was_estimated_is_said_to_be_and_never_shown_to_a_method(history, exact):
+    told = history.recording
+    assert told.estimated == ("v_y",)
+    assert told.logged_v_y is None
+    again = ti.identify(told, CAR)
+    np.testing.assert_array_equal(again.recording.v_y, told.v_y)
+    with pytest.raises(RecordingError, match="there is no vy, from which AxleIdentifier learns"):
+        ti.identify(told, CAR, AxleIdentifier.for_vehicle(CAR))
+
+
+def test_a_right_answer_is_valid_and_says_what_it_cannot_see(history):
+    verdict = history.verdict()
+    assert verdict.valid
+    assert "l_f and l_r swapped" in " ".join(verdict.lines)
+    assert any("l_f and l_r swapped" in line for line in verdict.to_dict()["unseen"])
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor", "code"),
+    [("a_y", 1.6, "a_y_disagrees"), ("v_x", 1.25, "a_y_disagrees"), ("r", 1.25, "force_missed")],
+)
+def test_a_channel_that_is_scaled_is_not_valid(exact, channel, factor, code):
+    log = as_logged(exact)
+    wrong = replace(log, **{channel: factor * getattr(log, channel)})
+    verdict = ti.identify(wrong, CAR, check=False).verdict()
+    assert not verdict.valid
+    assert code in [one.code for one in verdict.findings]
+
+
+def test_a_car_with_three_times_the_inertia_is_not_valid(exact):
+    heavy = replace(CAR, yaw_inertia=3.0 * CAR.yaw_inertia)
+    assert not ti.identify(as_logged(exact), heavy, check=False).verdict().valid
+
+
+def test_a_model_says_the_forces_of_a_drive_without_v_y(history):
+    other = driven(8)
+    prediction = ti.replay(history.freeze(), replace(as_logged(other), axle_force=other.axle_force))
+    assert prediction.recording.estimated == ("v_y",)
+    assert prediction.against_truth.both < 0.1 * prediction.true_force.both
+    assert prediction.verdict().valid
+
+
+def test_the_motion_is_judged_by_the_accelerometer_where_no_v_y_was_measured(history):
+    wrong = replace(history.recording, a_y=-history.recording.a_y)
+    prediction = ti.replay(history.freeze(), wrong)
+    assert not prediction.verdict().valid
+    assert prediction.motion.explained[0] < 0.0
+
+
+def test_several_logs_of_which_one_has_no_v_y_are_a_drive_without(exact):
+    both = joined([exact, as_logged(exact)])
+    assert both.v_y is None
+    assert "vy is left out, drive3 has none" in both.notes
+    parts = ti.identify(both, CAR).parts([exact, as_logged(exact)])
+    assert [one.recording.estimated for one in parts] == [(), ("v_y",)]
+
+
+def test_without_v_y_there_are_no_slip_angles(exact):
+    with pytest.raises(RecordingError, match=r"there is no vy, so slip angles are not known"):
+        as_logged(exact).alpha(CAR.l_f, CAR.l_r)
+    with pytest.raises(RecordingError, match="estimated may name v_y"):
+        replace(exact, estimated=("r",))
+
+
+def test_a_frame_without_vy_is_taken_where_ay_is_there(exact):
+    columns = {"t": exact.t, "vx": exact.v_x, "r": exact.r, "delta_f": exact.delta_f}
+    told = Recording.from_dataframe(columns | {"ay": exact.a_y})
+    assert told.v_y is None
+    assert "no lateral velocity is read" in " ".join(told.notes)
+    with pytest.raises(RecordingError, match=r"column vy \(or ay, from which it is estimated\)"):
+        Recording.from_dataframe(columns)
+
+
+def test_a_log_that_contradicts_itself_without_v_y_is_refused(exact):
+    columns = {"t": exact.t, "vx": exact.v_x, "r": exact.r, "delta_f": exact.delta_f}
+    with pytest.raises(RecordingError, match="change the sign of ay"):
+        Recording.from_dataframe(columns | {"ay": -exact.a_y})
+    with pytest.raises(RecordingError, match="delta_f must be in rad"):
+        Recording.from_dataframe(columns | {"ay": exact.a_y, "delta_f": 10 * exact.delta_f})
+
+
+def test_a_written_recording_leaves_out_what_was_estimated(history, tmp_path):
+    write_recording(history.recording, tmp_path / "log.csv")
+    assert read_recording(tmp_path / "log.csv").v_y is None
+
+
+def test_the_command_learns_and_tells_side_slip_with_its_deviation(log, exact, tmp_path, capsys):
+    words = ["identify", str(log), "--vehicle", str(tmp_path / "car.toml")]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr()
+    assert "inertial learns, and estimates it" in said.err
+    assert "side slip was told to ±" in said.out
+    assert "the log has no lateral velocity" in said.out
+    with (tmp_path / "out" / "forces.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    told, sd = (np.array([float(row[c]) for row in rows]) for c in ("v_y_told_m_s", "v_y_sd_m_s"))
+    assert np.mean(np.abs(told - exact.v_y) < 2.0 * sd) > 0.8
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["law"] == "inertial"
+
+
+def test_the_doctor_and_channels_say_what_they_cannot_see_of_it(log, tmp_path, capsys):
+    assert main(["doctor", str(log), "--vehicle", str(tmp_path / "car.toml")]) == 0
+    assert "the log has no lateral velocity" in capsys.readouterr().out
+    assert main(["channels", str(log)]) == 0
+    assert "without vy, identify estimates it" in capsys.readouterr().out
+
+
+def test_a_method_that_needs_v_y_is_refused_in_one_line(log, tmp_path, capsys):
+    words = ["identify", str(log), "--vehicle", str(tmp_path / "car.toml"), "--method", "axle"]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert "there is no vy, from which AxleIdentifier learns" in said
+    assert not (tmp_path / "out").exists()
