@@ -1,7 +1,8 @@
 """Tables in Parquet files, read batch by batch; needs pyarrow."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -74,17 +75,17 @@ class ParquetTable:
     format = "Parquet"
     place = "row"
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the columns."""
         return tuple(self.schema.names)
 
-    @property
+    @cached_property
     def units(self) -> tuple[str, ...]:
         """Units of the columns: as their metadata say, or as in the names."""
         return tuple(_unit(one) for one in self.schema)
 
-    @property
+    @cached_property
     def numeric(self) -> tuple[bool, ...]:
         """Which columns hold numbers."""
         return tuple(_is_numeric(one.type) for one in self.schema)
@@ -101,8 +102,16 @@ class ParquetTable:
         ----------
         column : from 0.
         """
-        head = next(self._batches([column], HEAD), None)
-        return [] if head is None else _as_text(head.column(0), self.schema.field(column).type)
+        if column not in self._head:
+            return ["?"] * min(self.rows, HEAD)
+        return _as_text(self._head[column], self.schema.field(column).type)
+
+    @cached_property
+    def _head(self) -> dict[int, Any]:
+        """The first rows of the columns that may be read, which all are looked at."""
+        columns = [k for k, one in enumerate(self.schema) if _is_read(one.type)]
+        first = next(self._batches(columns, HEAD), [])
+        return dict(zip(columns, first, strict=False))
 
     def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
         """Return columns.
@@ -119,40 +128,49 @@ class ParquetTable:
         """
         wanted = dict(kinds) | ({} if run is None else {run[0]: Kind.WORD})
         for column, kind in wanted.items():
-            found = self.schema.field(column).type
+            name, found = self.names[column], self.schema.field(column).type
+            if self.names.count(name) > 1:
+                raise RecordingError(f"{self.path}: column {name} appears more than once")
             if kind is Kind.NUMBER and not _is_numeric(found):
-                raise RecordingError(
-                    f"{self.path}: {self.names[column]} must be numeric, its type is {found}"
-                )
+                raise RecordingError(f"{self.path}: {name} must be numeric, its type is {found}")
         if self.rows == 0:
             raise RecordingError(f"{self.path}: has columns but no row of data")
         gathered = Gathered(self.path, wanted, self.names, "row", run)
         order = list(wanted)
         for batch in self._batches(order, BATCH):
-            rows = np.arange(1, batch.num_rows + 1) + len(gathered)
+            rows = np.arange(1, len(batch[0]) + 1) + len(gathered)
             columns = {
-                column: self._column(column, wanted[column], batch.column(place), rows)
-                for place, column in enumerate(order)
+                column: self._column(column, wanted[column], cells, rows)
+                for column, cells in zip(order, batch, strict=True)
             }
             gathered.extend(rows, columns)
         return gathered.finished()
 
-    def _batches(self, columns: list[int], size: int) -> Any:
-        """Yield batches of rows."""
+    def _batches(self, columns: Sequence[int], size: int) -> Iterator[list[Any]]:
+        """Yield the cells of columns, some rows at a time; names may repeat, places do not."""
         import pyarrow
         import pyarrow.parquet
 
-        names = self.names
-        wanted = [names[k] for k in columns]
-        for name in wanted:
-            if names.count(name) > 1:
-                raise RecordingError(f"{self.path}: column {name} appears more than once")
+        names = list(dict.fromkeys(self.names[k] for k in columns))
         try:
             with pyarrow.parquet.ParquetFile(self.path) as file:
-                for batch in file.iter_batches(batch_size=size, columns=wanted):
-                    yield batch.select(wanted)
+                for batch in file.iter_batches(batch_size=size, columns=names):
+                    places: dict[str, list[int]] = {}
+                    for place, name in enumerate(batch.schema.names):
+                        places.setdefault(name, []).append(place)
+                    yield [batch.column(places[self.names[k]][self._which[k]]) for k in columns]
         except (pyarrow.ArrowException, OSError, UnicodeDecodeError) as error:
             raise _not_parquet(self.path, error) from None
+
+    @cached_property
+    def _which(self) -> tuple[int, ...]:
+        """How many columns of the same name stand before each."""
+        seen: dict[str, int] = {}
+        result = []
+        for name in self.names:
+            result.append(seen.get(name, 0))
+            seen[name] = result[-1] + 1
+        return tuple(result)
 
     def _column(self, column: int, kind: Kind, cells: Any, rows: Any) -> Any:
         """Return the cells of a batch as their kind asks."""
@@ -190,6 +208,13 @@ def _is_numeric(kind: Any) -> bool:
         or types.is_decimal(kind)
         or types.is_duration(kind)
     )
+
+
+def _is_read(kind: Any) -> bool:
+    """Return whether cells of a type are read at all; others, as lists and bytes, are not."""
+    from pyarrow import types
+
+    return _is_numeric(kind) or _is_text(kind) or bool(types.is_timestamp(kind))
 
 
 def _is_text(kind: Any) -> bool:

@@ -22,6 +22,7 @@ _ENDINGS = {
     "radps": "rad/s", "g": "g", "s": "s", "sec": "s", "ms": "ms", "us": "us", "ns": "ns",
     "N": "N", "kN": "kN",
 }  # fmt: skip
+_LONGEST_FIRST = sorted(_ENDINGS.items(), key=lambda one: -len(one[0]))
 
 
 def is_unit(word: str) -> bool:
@@ -69,7 +70,7 @@ def unit_in_name(name: str) -> str:
         _, found, unit = name.rpartition(mark)
         if found and is_unit(unit) and unit.strip() not in _EMPTY:
             return unit.strip()
-    for ending, unit in sorted(_ENDINGS.items(), key=lambda one: -len(one[0])):
+    for ending, unit in _LONGEST_FIRST:
         if name.endswith("_" + ending):
             return unit
     return ""

@@ -123,6 +123,33 @@ def test_parquet_with_a_column_twice_is_refused(tmp_path):
         open_log(path).read(["vx"])
 
 
+def test_a_column_of_parquet_that_stands_twice_is_listed_as_in_a_text(tmp_path):
+    t = np.arange(50.0) / 100.0
+    holed = pyarrow.array([None if k % 2 else float(k) for k in range(50)])
+    table = pyarrow.table([t, t, pyarrow.array([[1]] * 50), t, holed], names=["t", *"vawv"])
+    pyarrow.parquet.write_table(table, tmp_path / "log.parquet")
+    log = open_log(tmp_path / "log.parquet")
+    assert [(one.name, round(one.rate)) for one in log.listed()] == [
+        ("v", 100),
+        ("w", 100),
+        ("v (2)", 50),
+    ]
+    assert np.array_equal(log.read(["w"])[0].values, t)
+
+
+def test_listing_parquet_reads_the_first_rows_of_all_columns_at_once(tmp_path, monkeypatch):
+    t = np.arange(50.0) / 100.0
+    table = pyarrow.table({f"s{k}": t for k in range(100)} | {"t": t})
+    pyarrow.parquet.write_table(table, tmp_path / "log.parquet")
+    opened = []
+    real = pyarrow.parquet.ParquetFile
+    monkeypatch.setattr(
+        "pyarrow.parquet.ParquetFile", lambda path: opened.append(path) or real(path)
+    )
+    assert len(open_log(tmp_path / "log.parquet").listed()) == 100
+    assert len(opened) <= 3  # its schema, its first rows, its clock
+
+
 @pytest.mark.parametrize("categories", [False, True])
 def test_an_empty_run_cell_is_a_run_without_a_name_in_every_table(tmp_path, categories):
     t = np.tile(np.arange(20.0) / 100.0, 2)
