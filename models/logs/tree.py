@@ -135,12 +135,13 @@ class _Walk:
         """Collect the channels of a struct; clocks: of the structs around it, the nearest first."""
         clocks = (*_clocks_of(node, path), *clocks)
         own = [clock.leaf for clock in clocks]
+        columns = _columns(node)
         data = _pick(node, DATA)
         if any(data is leaf for leaf in own):
             return
         if isinstance(data, Leaf) and (clocks or _text(node, UNIT)) and not _several(node):
             label = _text(node, NAME) or path
-            self.leaf(data, label, _unit(node), clocks, _columns(node))
+            self.leaf(data, label, _unit(node), clocks, columns)
             return
         units = _pick(node, UNIT)
         known = units if isinstance(units, dict) else {}
@@ -149,9 +150,8 @@ class _Walk:
             if isinstance(child, Leaf):
                 if not any(child is leaf for leaf in own):
                     unit = known.get(key)
-                    self.leaf(
-                        child, name, unit if isinstance(unit, str) else "", clocks, _columns(node)
-                    )
+                    unit = unit if isinstance(unit, str) else ""
+                    self.leaf(child, name, unit, clocks, columns)
             else:
                 self.other(child, name, clocks)
 

@@ -10,6 +10,7 @@ import scipy.io
 
 from models.logs.door import open_log
 from models.logs.log import RecordingError
+from models.logs.tree import Leaf, _Walk
 from tests.models.logs.drive_in_every_format import write_mat73
 
 T = np.arange(300) / 100
@@ -288,3 +289,21 @@ def test_other_hdf5_files_are_read_as_they_are(tmp_path):
     assert log.format == "HDF5"
     assert np.array_equal(log.read(["drive.v"])[0].values, A)
     assert np.array_equal(log.read(["drive.m(:,2)"])[0].values, B)
+
+
+def test_a_struct_of_many_vectors_is_gone_through_a_few_times():
+    """Not once for each of them: of twice as many vectors it would take four times as long."""
+    touched = 0
+
+    class Counted(dict):
+        def items(self):
+            nonlocal touched
+            touched += len(self)
+            return super().items()
+
+    node = Counted(t=Leaf(shape=(300, 1), load=lambda: T[:, None]))
+    node.update({f"v{k}": Leaf(shape=(300, 1), load=lambda: A[:, None]) for k in range(500)})
+    walk = _Walk()
+    walk.struct(node, "", ())
+    assert len(walk.signals) == 500
+    assert touched < 20 * len(node)
