@@ -26,7 +26,8 @@ NULLS = ["", "nan", "NaN", "NAN", "NA", "N/A", "#N/A", "null", "NULL", "None", "
 def is_installed() -> bool:
     """Whether pyarrow is there, with its reader of text."""
     try:
-        importlib.import_module("pyarrow.csv")
+        for name in ("pyarrow", "pyarrow.csv"):
+            importlib.import_module(name)
     except ImportError:
         return False
     return True

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from models.logs.foreign import one_line
-from models.logs.log import Channel, Listed, RecordingError
-from models.logs.stamps import Clock, Stamps, seconds
+from models.logs.log import Channel, Clock, Heading, Listed, RecordingError
+from models.logs.stamps import Stamps, seconds
 from models.schema import require_few, shown
 
 MOST_NOTED = 5  # names that a note lists
@@ -112,6 +112,25 @@ class GroupedLog(Generic[P]):
     def notes(self) -> tuple[str, ...]:
         """What is left out or taken for granted, and what was mended in what has been read."""
         return (*self.said, *dict.fromkeys(self._mended))
+
+    @property
+    def dialect(self) -> tuple[str, ...]:
+        """Nothing: such a file is written in one way."""
+        return ()
+
+    @property
+    def clock(self) -> Clock | None:
+        """None: each group has its own."""
+        return None
+
+    @property
+    def unlisted(self) -> tuple[str, ...]:
+        """Nothing: what is left out, the notes say."""
+        return ()
+
+    def headings(self) -> tuple[Heading, ...]:
+        """Return names and units of the channels."""
+        return tuple(Heading(listed.name, listed.unit) for listed, _ in self.channels)
 
     def listed(self) -> tuple[Listed, ...]:
         """Return the numeric channels that have a clock."""

@@ -7,7 +7,7 @@ from which sensor) is told by a map, and only then a `Recording` in SI is made o
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,27 @@ from codegen.arrays import Array
 
 class RecordingError(ValueError):
     """A log or a recording breaks a rule; one line: file or name, column, rule, value, remedy."""
+
+
+class Heading(NamedTuple):
+    """What a channel is called, and the unit that the file tells of it, "" where it tells none."""
+
+    name: str
+    unit: str
+
+
+class Clock(NamedTuple):
+    """The column that is the time.
+
+    column: from 0; name: as in the file; unit: of `PER_SECOND`, "hhmmss" or "instant"; epoch:
+    whether it counts from 1970; words: for people.
+    """
+
+    column: int
+    name: str
+    unit: str
+    epoch: bool
+    words: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,6 +89,21 @@ class LogFile(Protocol):
     @property
     def format(self) -> str:
         """Its format as users call it, for example "CSV" or "MDF4"."""
+
+    @property
+    def dialect(self) -> tuple[str, ...]:
+        """How the file is written, as it was detected, for people; empty where nothing was."""
+
+    @property
+    def clock(self) -> Clock | None:
+        """The column that is the time of all channels; None where the format has no such one."""
+
+    @property
+    def unlisted(self) -> tuple[str, ...]:
+        """Names of what stands in the file as a channel does and is none, as columns of words."""
+
+    def headings(self) -> tuple[Heading, ...]:
+        """Return names and units of the channels that are listed; the samples are not looked at."""
 
     def listed(self) -> tuple[Listed, ...]:
         """Return the numeric channels in the order of the file, but for the clock."""

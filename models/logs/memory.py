@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from models.logs.log import Channel, Listed, RecordingError
+from models.logs.log import Channel, Clock, Heading, Listed, RecordingError
 
 TIMES = ("t", "time", "timestamp")  # what the clock is called
 RUN = "run"
@@ -64,11 +64,32 @@ class ArrayLog:
         """What was taken for granted: nothing."""
         return ()
 
-    def listed(self) -> tuple[Listed, ...]:
+    @property
+    def dialect(self) -> tuple[str, ...]:
+        """Nothing: arrays are written in one way."""
+        return ()
+
+    @property
+    def clock(self) -> Clock | None:
+        """None: the time is in seconds, so that there is nothing to be said of it."""
+        return None
+
+    @property
+    def unlisted(self) -> tuple[str, ...]:
+        """Nothing: words show in reading."""
+        return ()
+
+    def headings(self) -> tuple[Heading, ...]:
         """Return the columns, but for the time and the runs; which are numeric shows in reading."""
-        t = self._arrays[str(self._clock)]
-        kept = [name for name in self._arrays if name not in (self._clock, RUN)]
-        return tuple(Listed(name=name, unit="", samples=t.size, rate=np.nan) for name in kept)
+        return tuple(Heading(name, "") for name in self._arrays if name not in (self._clock, RUN))
+
+    def listed(self) -> tuple[Listed, ...]:
+        """Return the columns of `headings`, with how many samples there are."""
+        size = self._arrays[str(self._clock)].size
+        return tuple(
+            Listed(name=one.name, unit=one.unit, samples=size, rate=np.nan)
+            for one in self.headings()
+        )
 
     def runs(self) -> tuple[str, ...]:
         """Return the words of the column run in their order."""

@@ -14,8 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models.logs.log import Channel, Listed, LogFile, RecordingError
+from models.logs.log import Channel, Heading, LogFile, RecordingError
 from models.logs.signals import BETA, COLUMNS, NEEDED, QUANTITIES, Signal
+from models.logs.stamps import typical_rate
 from models.logs.units import ANGLE, FORCE, RATE, is_told, quantities, to_si
 
 SURE = 0.8  # confidence from which a proposal is used without being told to
@@ -285,18 +286,18 @@ def name_confidence(signal: str, name: str) -> float:
     return 0.0
 
 
-def propose(log: LogFile, listed: Sequence[Listed], run: str | None = None) -> Proposal:
+def propose(log: LogFile, headings: Sequence[Heading], run: str | None = None) -> Proposal:
     """Return what the channels of a log probably are.
 
     Parameters
     ----------
     log : as a format reads it; numbers are read of the channels that are in question.
-    listed : its channels.
+    headings : of its channels.
     run : which of its runs is looked at; None the only one, or the first.
     """
-    candidates = {name: _candidates(name, listed) for name in QUANTITIES}
+    candidates = {name: _candidates(name, headings) for name in QUANTITIES}
     asked = {name for found in candidates.values() for guess in found for name in guess.channel}
-    seen = _seen(log, [one.name for one in listed if one.name in asked], run)
+    seen = _seen(log, [one.name for one in headings if one.name in asked], run)
     candidates = {
         name: [_looked(name, guess, seen) for guess in found] for name, found in candidates.items()
     }
@@ -308,10 +309,17 @@ def propose(log: LogFile, listed: Sequence[Listed], run: str | None = None) -> P
         if not ranked:
             continue
         guesses[name] = ranked[0]
-        equal = tuple(one for one in ranked if one.confidence > ranked[0].confidence - APART)
+        equal = [one for one in ranked if one.confidence > ranked[0].confidence - APART]
         if len(equal) > 1:
-            rivals[name] = equal
+            equal.sort(key=lambda one: -_rate(seen[one.channel[0]]))
+            guesses[name], rivals[name] = equal[0], tuple(equal)
     return Proposal(guesses=guesses, rivals=rivals)
+
+
+def _rate(channel: Channel) -> float:
+    """Return the samples per second [Hz], so roughly that jitter does not matter; 0 of too few."""
+    rate = typical_rate(channel.t)
+    return 0.0 if math.isnan(rate) else float(f"{rate:.1g}")
 
 
 def _seen(log: LogFile, names: list[str], run: str | None) -> dict[str, Channel]:
@@ -328,7 +336,7 @@ def _seen(log: LogFile, names: list[str], run: str | None) -> dict[str, Channel]
     return {key: one for name in names for key, one in _seen(log, [name], run).items()}
 
 
-def _candidates(signal: str, listed: Sequence[Listed]) -> list[Guess]:
+def _candidates(signal: str, listed: Sequence[Heading]) -> list[Guess]:
     """Return the channels whose names and units may be a signal."""
     found = []
     for one in listed:
@@ -346,7 +354,7 @@ def _candidates(signal: str, listed: Sequence[Listed]) -> list[Guess]:
     return found
 
 
-def _with_unit(signal: str, one: Listed, guess: Guess) -> Guess:
+def _with_unit(signal: str, one: Heading, guess: Guess) -> Guess:
     """Return a guess by what the unit says of it."""
     quantity = QUANTITIES[signal]
     if not is_told(one.unit):
@@ -375,9 +383,9 @@ def _corner(words: tuple[str, ...]) -> tuple[str, frozenset[str]] | None:
     return (corners[-1], rest - {corners[-1]}) if corners else None
 
 
-def _pairs(signal: str, listed: Sequence[Listed]) -> list[Guess]:
+def _pairs(signal: str, listed: Sequence[Heading]) -> list[Guess]:
     """Return pairs of channels of the left and the right wheel of an axle."""
-    by_corner: dict[tuple[str, frozenset[str]], Listed] = {}
+    by_corner: dict[tuple[str, frozenset[str]], Heading] = {}
     for one in listed:
         found = _corner(words_of(one.name))
         quantity = QUANTITIES[signal]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from models.logs.growing import LONGEST_IN_MEMORY, Growing
-from models.logs.log import RecordingError
+from models.logs.log import Clock, RecordingError
 from models.logs.spelling import unit_in_name
 
 MISSING = -(2**63)  # an instant that is not there, in ns
@@ -49,20 +49,6 @@ _TIME = re.compile(
     r"(?:(\d+):)?(\d{1,2}):(\d\d)(?:[.,](\d+))?(?: ?(Z|UTC)| ?([-+])(\d\d):?(\d\d))?"
 )
 _SHORT = re.compile(r"(\d\d)(\d\d)(\d\d)(?:[.,](\d+))?Z?")
-
-
-class Clock(NamedTuple):
-    """The column that is the time.
-
-    column: from 0; name: as in the file; unit: of `PER_SECOND`, "hhmmss" or "instant"; epoch:
-    whether it counts from 1970; words: for people.
-    """
-
-    column: int
-    name: str
-    unit: str
-    epoch: bool
-    words: str
 
 
 class Stamps(NamedTuple):

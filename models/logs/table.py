@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.logs.growing import Growing
-from models.logs.log import Channel, Listed, RecordingError
-from models.logs.stamps import Clock, find_clock, seconds, told_clock, typical_rate
+from models.logs.log import Channel, Clock, Heading, Listed, RecordingError
+from models.logs.stamps import find_clock, seconds, told_clock, typical_rate
 from models.schema import LONGEST_NAME, limits, require_few, shown
 
 RUN = "run"
@@ -248,8 +248,28 @@ class TableLog:
     def _run_column(self) -> int | None:
         return self.names.index(RUN) if RUN in self.names else None
 
+    @cached_property
+    def _channels(self) -> tuple[int, ...]:
+        """Which columns are channels: the numeric ones, but for the clock and the runs."""
+        other = (None if self.clock is None else self.clock.column, self._run_column)
+        return tuple(k for k, is_one in enumerate(self.table.numeric) if is_one and k not in other)
+
+    @property
+    def unlisted(self) -> tuple[str, ...]:
+        """Names of the columns that are no channels."""
+        return tuple(name for k, name in enumerate(self.names) if k not in set(self._channels))
+
+    def headings(self) -> tuple[Heading, ...]:
+        """Return names and units of the numeric columns, but for the clock and the runs."""
+        units = self.table.units
+        return tuple(Heading(self.names[k], units[k]) for k in self._channels)
+
     def listed(self) -> tuple[Listed, ...]:
         """Return the numeric columns in their order, but for the clock and the runs."""
+        return self._listed
+
+    @cached_property
+    def _listed(self) -> tuple[Listed, ...]:
         clock, t = self.clock, None
         kinds = {} if self._run_column is None else {self._run_column: Kind.WORD}
         cells = self.table.cells(kinds | ({} if clock is None else {clock.column: _kind(clock)}))
@@ -260,16 +280,15 @@ class TableLog:
             t = seconds(str(self.path), clock, stamps, rows, self.table.place).t
         rate = math.nan if t is None else typical_rate(t)
         listed = []
-        for k, name in enumerate(self.names):
-            if not self.table.numeric[k] or k == self._run_column:
-                continue
-            if clock is not None and k == clock.column:
-                continue
+        for k, heading in zip(self._channels, self.headings(), strict=True):
             head = self.table.first_rows(k)
             filled = sum(cell != "" for cell in head) / max(len(head), 1)
             listed.append(
                 Listed(
-                    name=name, unit=self.table.units[k], samples=cells.rows.size, rate=rate * filled
+                    name=heading.name,
+                    unit=heading.unit,
+                    samples=cells.rows.size,
+                    rate=rate * filled,
                 )
             )
         return tuple(listed)

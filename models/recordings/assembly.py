@@ -19,7 +19,7 @@ from models.logs.clock import (
     require_rising,
     without_empty,
 )
-from models.logs.log import Channel, Listed, LogFile, RecordingError
+from models.logs.log import Channel, Heading, LogFile, RecordingError
 from models.logs.signals import BETA, QUANTITIES, Signal
 from models.logs.spelling import without_unit
 from models.logs.units import TIME, is_told, to_si
@@ -73,9 +73,9 @@ def recording_of(
         raise RecordingError(f"{log.path}: the sample time dt must be positive, it is {dt}")
     run = _one_run(log, run or log_map.run or None)
     label = str(log.path) if run is None else f"{log.path}:{run}"
-    listed = log.listed()
-    reading = chosen_signals(log, listed, log_map, run)
-    wants_clock = _wants_clock(log, listed, log_map.clock)
+    headings = log.headings()
+    reading = chosen_signals(log, headings, log_map, run)
+    wants_clock = _wants_clock(log, headings, log_map.clock)
     parts = _channels(log, label, reading.signals, log_map if wants_clock else None, run)
     stretches = _stretches(label, reading.signals, parts, log_map, dt)
     notes = (*_notes(log), *reading.notes, *_gap_notes(stretches.kept))
@@ -92,15 +92,15 @@ def recording_of(
 
 def _notes(log: LogFile) -> tuple[str, ...]:
     """Return what a format says of what it took or mended."""
-    clock = getattr(log, "clock", None)
+    clock = log.clock
     said = () if clock is None or clock.unit == "s" else (f"time is {clock.words}",)
     return (*said, *log.notes)
 
 
-def _wants_clock(log: LogFile, listed: Sequence[Listed], clock: str) -> bool:
+def _wants_clock(log: LogFile, headings: Sequence[Heading], clock: str) -> bool:
     """Return whether the time is another channel than the one that the format takes for it."""
-    names = [one.name for one in listed]
-    own = getattr(getattr(log, "clock", None), "name", clock)
+    names = [one.name for one in headings]
+    own = clock if log.clock is None else log.clock.name
     if clock and clock not in names and clock not in (own, without_unit(own)):
         raise RecordingError(
             f"{log.path}: there is no column {shown(clock)} to read as t; {listing(names)}"

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from models.logs.log import Listed, LogFile, RecordingError
+from models.logs.log import Heading, LogFile, RecordingError
 from models.logs.names import Proposal, propose
 from models.logs.signals import BETA, COLUMNS, NEEDED, QUANTITIES, Signal, require_fitting
 from models.logs.spelling import without_unit
@@ -39,14 +39,14 @@ def column_of(name: str) -> str:
 
 
 def chosen_signals(
-    log: LogFile, listed: Sequence[Listed], log_map: LogMap, run: str | None
+    log: LogFile, headings: Sequence[Heading], log_map: LogMap, run: str | None
 ) -> Reading:
     """Return how each signal is read.
 
     Parameters
     ----------
     log : as a format reads it.
-    listed : its channels.
+    headings : of its channels.
     log_map : what is told.
     run : of the log.
 
@@ -55,7 +55,7 @@ def chosen_signals(
     RecordingError
         Where a signal that is needed is neither told nor there beyond doubt.
     """
-    names = [one.name for one in listed]
+    names = [one.name for one in headings]
     by_map = as_listed(log, log_map.signals, names)
     if log_map.is_complete:
         return Reading(by_map, ())
@@ -63,8 +63,8 @@ def chosen_signals(
     missing = missing_signals(told)
     if not missing:
         return Reading(told, ())
-    _refuse_words(log, names, missing, run)
-    proposal = propose(log, listed, run)
+    _refuse_words(log, missing, run)
+    proposal = propose(log, headings, run)
     found = likely_signals(told, proposal)
     missing = missing_signals(found)
     if missing and not goes_without(missing, found):
@@ -124,9 +124,9 @@ def likely_signals(told: Mapping[str, Signal], proposal: Proposal) -> dict[str, 
     return {name: found[name] for name in QUANTITIES if name in found}
 
 
-def _refuse_words(log: LogFile, names: list[str], missing: list[str], run: str | None) -> None:
+def _refuse_words(log: LogFile, missing: list[str], run: str | None) -> None:
     """Refuse columns of standard names that are there and not numeric, with their first word."""
-    unlisted = set(getattr(log, "names", ())) - set(names)
+    unlisted = set(log.unlisted)
     for column in map(column_of, missing):
         if column in unlisted:
             log.read([column], run)

@@ -10,6 +10,8 @@ import pyarrow
 import pyarrow.parquet
 import pytest
 
+from models.logs.door import open_log
+from models.logs.text import TextTable
 from models.recordings import RecordingError, read_recording, runs, split_log_argument
 
 HEADER = "t,vx,vy,r,delta_f"
@@ -67,6 +69,30 @@ def test_runs_are_listed_chosen_and_named(tmp_path: Path) -> None:
     plain = write(tmp_path / "plain.csv", HEADER, rows())
     assert runs(plain) == []
     assert "no column run" in refusal(plain, "a")
+
+
+@pytest.mark.parametrize("with_runs", [False, True])
+def test_a_text_of_standard_names_is_gone_through_no_more_often_than_needed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, with_runs: bool
+) -> None:
+    """Once for its columns, and once before for the names of its runs."""
+    passes = []
+    real = TextTable.cells
+
+    def counted(self: TextTable, kinds, run=None):  # type: ignore[no-untyped-def]
+        passes.append(kinds)
+        return real(self, kinds, run)
+
+    monkeypatch.setattr(TextTable, "cells", counted)
+    ending = ",a" if with_runs else ""
+    header = HEADER + (",run" if with_runs else "")
+    path = write(tmp_path / "log.csv", header, [line + ending for line in rows()])
+    read_recording(path, check=False)
+    assert len(passes) == 1 + with_runs
+    log = open_log(path)
+    passes.clear()
+    assert log.listed() == log.listed()
+    assert len(passes) == 1
 
 
 def test_parquet_gives_the_same_as_csv(tmp_path: Path) -> None:

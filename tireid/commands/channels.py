@@ -69,7 +69,7 @@ def run(options: argparse.Namespace) -> int:
     chosen = _run_of(log, options.run_name or named or told.run)
     listed = log.listed()
     names = [one.name for one in listed]
-    proposal = propose(log, listed, chosen)
+    proposal = propose(log, log.headings(), chosen)
     by_map = as_listed(log, told.signals, names)
     signals = likely_signals({**standard_signals(log, names), **by_map}, proposal)
     missing = missing_signals(signals)
@@ -98,7 +98,7 @@ def _run_of(log: LogFile, name: str) -> str | None:
 def _head(log: LogFile, run: str | None) -> list[str]:
     """Return what the file is, how it was understood, and its runs."""
     runs = log.runs()
-    lines = [f"{log.path}: {log.format}", *(f"  {word}" for word in getattr(log, "dialect", ()))]
+    lines = [f"{log.path}: {log.format}", *(f"  {word}" for word in log.dialect)]
     lines += [f"  {note}" for note in log.notes]
     if len(runs) > 1:
         some = ", ".join(runs[:12]) + (", ..." if len(runs) > 12 else "")

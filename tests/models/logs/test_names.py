@@ -1,5 +1,7 @@
 """What a channel is called by which logger, and what is proposed of it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -106,6 +108,21 @@ def test_of_two_that_are_equal_none_is_taken() -> None:
     assert {one.channel[0] for one in found.rivals["v_x"]} == {"GPS Speed", "Ground Speed"}
     better = proposed(("GPS Speed", "km/h", WAVE), ("Velocity Forward", "km/h", WAVE))
     assert better.is_sure("v_x") and better.guesses["v_x"].channel == ("Velocity Forward",)
+
+
+def test_of_two_that_are_equal_the_one_with_more_samples_per_second_is_named_first() -> None:
+    class Rates(Log):
+        def read(self, names, run=None):
+            steps = {"Ground Speed": 0.01, "GPS Speed": 0.1}
+            found = super().read(names, run)
+            return tuple(replace(one, t=100 * steps[one.name] * one.t) for one in found)
+
+    for order in (("GPS Speed", "Ground Speed"), ("Ground Speed", "GPS Speed")):
+        log = Rates(*((name, "km/h", WAVE) for name in order))
+        found = propose(log, log.listed())
+        assert not found.is_sure("v_x")
+        assert [one.channel[0] for one in found.rivals["v_x"]] == ["Ground Speed", "GPS Speed"]
+        assert found.guesses["v_x"].channel == ("Ground Speed",)
 
 
 def test_a_unit_of_something_else_takes_a_channel_out() -> None:
