@@ -40,6 +40,7 @@ MICROSECONDS = 1e6
 INFLATION = 1032  # most bytes that deflate makes of one
 OBJECT = struct.Struct("<4sHHII")  # of BLF: mark, size and version of the header, size, type
 CONTAINER, DEFLATED = 10, 2
+METHOD = struct.Struct("<H14x")  # of a container, before its data
 FILE_SIZE = struct.Struct("<Q")  # of BLF, at byte 16 of its header
 
 Key = tuple[str, int]  # bus, identifier with EXTENDED
@@ -197,10 +198,13 @@ def _require_whole_blf(path: Path) -> None:
                 return  # the reader says so
             body = length - OBJECT.size
             if kind == CONTAINER and body * INFLATION > most:
-                data = file.read(body)[16:]
-                inflated = len(zlib.decompressobj().decompress(data, int(most) + 1))
+                data = file.read(body)
+                size_of = len(data) - METHOD.size
+                if size_of > 0 and METHOD.unpack_from(data)[0] == DEFLATED:
+                    unpacked = zlib.decompressobj().decompress(data[METHOD.size :], int(most) + 1)
+                    size_of = len(unpacked)
                 require_few(
-                    RecordingError, str(path), inflated / 1e6, "block", "megabytes of a block"
+                    RecordingError, str(path), size_of / 1e6, "block", "megabytes of a block"
                 )
                 body = 0
             file.seek(body + length % 4, 1)

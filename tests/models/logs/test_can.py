@@ -244,6 +244,23 @@ def test_a_container_that_inflates_beyond_the_limit_is_refused(tmp_path, monkeyp
     assert "megabytes of a block must be at most 0.1" in refusal(path, dbc(tmp_path))
 
 
+@pytest.mark.parametrize("level", [0, 6])
+def test_containers_may_be_compressed_or_not(level, tmp_path, monkeypatch):
+    path = tmp_path / "log.blf"
+    with can.BLFWriter(path, compression_level=level) as log:
+        for k in range(2000):
+            data = steering(k % 100)
+            one = can.Message(
+                timestamp=0.01 * k, arbitration_id=100, is_extended_id=False, data=data
+            )
+            log.on_message_received(one)
+    monkeypatch.setenv("TIREID_LIMITS", "block=1")
+    (angle,) = open_log(path, dbc(tmp_path)).read(["Steering.Angle"])
+    assert angle.values.size == 2000
+    monkeypatch.setenv("TIREID_LIMITS", "block=0.05")
+    assert "megabytes of a block must be at most 0.05" in refusal(path, dbc(tmp_path))
+
+
 def test_a_signal_beyond_its_frame_is_refused(tmp_path):
     text = 'VERSION ""\n\nBU_: Car\n\nBO_ 100 F: 2 Car\n SG_ V : 8|16@1- (1,0) [0|0] "" Car\n'
     path = write(tmp_path / "log.blf", [(0.01 * k, 100, bytes(2), {}) for k in range(20)])
