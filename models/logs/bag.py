@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from models.logs.bounded import METADATA, bounded
+from models.logs.bounded import bounded
 from models.logs.cdr import (
     CdrError,
     Definitions,
@@ -29,9 +29,9 @@ from models.logs.foreign import need, one_line
 from models.logs.grouped import GroupedLog, Samples, noted
 from models.logs.growing import Growing
 from models.logs.log import Listed, RecordingError
+from models.logs.magic import MCAP, ROS1, SQLITE
 from models.schema import require_few
 
-SQLITE, MCAP, ROS1 = b"SQLite format 3\x00", b"\x89MCAP0\r\n", b"#ROSBAG"
 NS = 1e9  # in a second
 OTHER_CLOCK = 3600  # seconds between stamps and the bag's own time, above which these differ
 TOGETHER = 2048  # messages that are read at a time
@@ -99,19 +99,6 @@ class _Topic(NamedTuple):
 
 
 _Place = tuple[_Topic, Field]  # where a channel is
-
-
-def recognizes(head: bytes, path: Path) -> bool:
-    """Whether a file or folder is of this format.
-
-    Parameters
-    ----------
-    head : its first bytes, none of a folder.
-    path : of the file or folder.
-    """
-    if path.is_dir():
-        return (path / METADATA).is_file()
-    return head.startswith((SQLITE, MCAP, ROS1))
 
 
 def open_(path: Path) -> GroupedLog[_Place]:

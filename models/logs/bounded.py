@@ -14,10 +14,10 @@ from typing import Any
 from models.limits import limits
 from models.logs.foreign import need
 from models.logs.log import RecordingError
+from models.logs.magic import BAG_METADATA
 from models.schema import CHUNK, read_text, require_few
 
 Unpack = Callable[[bytes, int], bytes]
-METADATA = "metadata.yaml"
 DEEP = re.compile(r"(?:[-?:]\s+){16}")  # lists in lists on one line
 
 
@@ -42,7 +42,7 @@ def bounded(path: Path) -> Iterator[None]:
     lz4 = need(path, "lz4.frame", "ROS 2 bags", "ros")
     zstd = mcap.zstd
     if path.is_dir():
-        _require_shallow(path / METADATA)
+        _require_shallow(path / BAG_METADATA)
         for one in sorted(path.glob("*.zstd")):
             _require_small(one, zstd)
 

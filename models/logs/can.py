@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array, blocks, filled
 from models.logs.foreign import need, one_line
-from models.logs.frames import EXTENDED, Frames, gather, kind_of
+from models.logs.frames import EXTENDED, Frames, gather
 from models.logs.grouped import GroupedLog, Samples
 from models.logs.log import Listed, RecordingError
+from models.logs.magic import HEAD, frames_in
 from models.logs.stamps import typical_rate
 from models.schema import LONGEST_NAME, read_bytes
 
@@ -82,17 +83,6 @@ def _samples(asked: Sequence[tuple[Listed, _Place]]) -> list[Samples]:
     ]
 
 
-def recognizes(head: bytes, path: Path) -> bool:
-    """Whether a file is a log of frames alone; an MDF file is where a DBC is given with it.
-
-    Parameters
-    ----------
-    head : its first bytes.
-    path : of the file.
-    """
-    return path.is_file() and kind_of(head) not in ("", "MDF4")
-
-
 def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
     """Read the frames of a log that a DBC knows and list their signals.
 
@@ -114,7 +104,7 @@ def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
     messages = _read_dbc(dbc)
     with one_line(path, "a CAN log"):
         with path.open("rb") as file:
-            kind = kind_of(file.read(4096))
+            kind = frames_in(file.read(HEAD))
         if not kind:
             raise RecordingError(f"{path}: is no CAN log: neither ASC, BLF, candump, TRC nor MDF4")
         log = gather(path, kind, {key: one.length for key, one in messages.items()})

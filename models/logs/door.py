@@ -1,51 +1,30 @@
 """The door that every log comes in by: its first bytes tell the format, not its name.
 
-A format is a line here: how its first bytes look, and the function that opens it, imported only
-when such a file comes, so that the libraries it needs stay optional.
+A format is a line here, the function that opens it; it is imported only when such a file comes, so
+that the libraries it needs stay optional. How its first bytes look is told in `magic`.
 """
 
 import zlib
-from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import NamedTuple
 
 from models.logs.log import LogFile, RecordingError
+from models.logs.magic import GZIP, HEAD, format_of
 
 # Endings of names that logs have; "LOG:RUN" is split after one, and a recording's name lacks it.
+TEXTS = (".csv", ".txt", ".dat", ".asc", ".tsv", ".vbo", ".log")  # which gzip may pack
 ENDINGS = (
-    ".csv", ".csv.gz", ".parquet", ".txt", ".txt.gz", ".dat", ".dat.gz", ".asc", ".tsv", ".vbo",
-    ".mat", ".h5", ".hdf5", ".mf4", ".mdf", ".mcap", ".db3", ".bag", ".blf", ".trc", ".log",
+    *TEXTS, *(ending + ".gz" for ending in TEXTS), ".parquet", ".mat", ".h5", ".hdf5", ".mf4",
+    ".mdf", ".mcap", ".db3", ".bag", ".blf", ".trc",
 )  # fmt: skip
-HEAD = 1 << 12  # bytes that tell the format
-
-
-class Format(NamedTuple):
-    """A format that is no text.
-
-    is_it: whether a file is of it, by path and first bytes, unpacked; opener: "module:function".
-    """
-
-    is_it: Callable[[Path, bytes], bool]
-    opener: str
-
-
-def _of(module: str) -> Format:
-    """Return the format of a module that knows its files: it has `recognizes` and `open_`."""
-    return Format(
-        lambda path, head: bool(import_module(module).recognizes(head, path)), module + ":open_"
-    )
-
-
-FORMATS: tuple[Format, ...] = (
-    Format(
-        lambda path, head: head[:4] == b"PAR1" or path.suffix.lower() == ".parquet",
-        "models.logs.parquet:open_parquet",
-    ),
-    *(_of("models.logs." + name) for name in ("mdf", "matlab", "bag", "can")),
-)
-CAN = "models.logs.can:open_"
-TEXT = "models.logs.text:open_text"
+OPENERS = {
+    "parquet": "models.logs.parquet:open_parquet",
+    "mdf": "models.logs.mdf:open_",
+    "matlab": "models.logs.matlab:open_",
+    "bag": "models.logs.bag:open_",
+    "can": "models.logs.can:open_",
+    "text": "models.logs.text:open_text",
+}
 
 
 def open_log(path: str | Path, dbc: str | Path | None = None) -> LogFile:
@@ -66,11 +45,16 @@ def open_log(path: str | Path, dbc: str | Path | None = None) -> LogFile:
         raise RecordingError(f"{path}: there is no such file")
     try:
         head = _head(path)
-        opener = next((one.opener for one in FORMATS if one.is_it(path, head)), TEXT)
-        if path.is_dir() and opener == TEXT:
+        packed = head.startswith(GZIP)
+        format = format_of(path, _unpacked(head) if packed else head)
+        if path.is_dir() and format == "text":
             raise RecordingError(f"{path}: there is no such file, it is a folder")
         told = () if dbc is None else (Path(dbc),)
-        module, _, function = (CAN if told else opener).partition(":")
+        if packed and (told or format != "text"):
+            raise RecordingError(
+                f"{path}: is packed by gzip, which only tables in text may be; unpack it first"
+            )
+        module, _, function = OPENERS["can" if told else format].partition(":")
         opened: LogFile = getattr(import_module(module), function)(path, *told)
         return opened
     except OSError as error:
@@ -78,14 +62,16 @@ def open_log(path: str | Path, dbc: str | Path | None = None) -> LogFile:
 
 
 def _head(path: Path) -> bytes:
-    """Return the first bytes of a regular file, unpacked; of anything else nothing."""
+    """Return the first bytes of a regular file, of anything else nothing."""
     if not path.is_file():
         return b""
     with path.open("rb") as file:
-        head = file.read(HEAD)
-    if head[:2] == b"\x1f\x8b":
-        try:
-            return zlib.decompressobj(wbits=31).decompress(head, HEAD)
-        except zlib.error:
-            return b""  # damaged, which the reader of text says
-    return head
+        return file.read(HEAD)
+
+
+def _unpacked(head: bytes) -> bytes:
+    """Return the first bytes of what is packed; nothing of what is damaged, which is said later."""
+    try:
+        return zlib.decompressobj(wbits=31).decompress(head, HEAD)
+    except zlib.error:
+        return b""

@@ -4,7 +4,6 @@ Frames are gathered by bus and identifier, times beside bytes; what is no data f
 database, is counted.
 """
 
-import re
 import struct
 import zlib
 from array import array
@@ -21,15 +20,9 @@ from models.limits import limits
 from models.logs.foreign import need
 from models.logs.growing import Growing
 from models.logs.log import RecordingError
-from models.logs.mdf_blocks import BUS_EVENT, MAGIC, opened
+from models.logs.mdf_blocks import BUS_EVENT, opened
 from models.schema import require_few
 
-BLF = b"LOGG"
-ASC = re.compile(
-    rb"\s*(?://[^\n]*\n\s*)*date\s[^\n]*\n\s*(?://[^\n]*\n\s*)*base\s+(?:hex|dec)\b", re.I
-)
-CANDUMP = re.compile(rb"\s*\(\d+\.\d+\)\s+\S+\s+[0-9A-Fa-f]+#")
-TRC = re.compile(rb"\s*;\$FILEVERSION=")
 FRAME = "CAN_DataFrame"  # of MDF
 TOGETHER = 1 << 16  # frames that are stored at a time
 SHORT = 0x7FF  # largest identifier of 11 bits
@@ -96,28 +89,13 @@ class Log(NamedTuple):
     others: Counter[str]
 
 
-def kind_of(head: bytes) -> str:
-    """Return which log of frames a file is, "" for none.
-
-    Parameters
-    ----------
-    head : its first bytes.
-    """
-    if head.startswith(BLF):
-        return "BLF"
-    if head[:8] in MAGIC:
-        return "MDF4"
-    texts = {"ASC": ASC, "candump": CANDUMP, "TRC": TRC}
-    return next((name for name, pattern in texts.items() if pattern.match(head)), "")
-
-
 def gather(path: Path, kind: str, known: Mapping[int, int]) -> Log:
     """Read the frames of a log.
 
     Parameters
     ----------
     path : of the file.
-    kind : as `kind_of` names it.
+    kind : as `magic.frames_in` names it.
     known : by identifier, with `EXTENDED`, how many bytes its frames have.
 
     Raises

@@ -12,12 +12,11 @@ from models.logs import hdf5, mat5
 from models.logs.foreign import one_line
 from models.logs.grouped import GroupedLog, Samples, noted, require_room
 from models.logs.log import Listed, RecordingError
+from models.logs.magic import HEAD as HEAD_OF_FILE
+from models.logs.magic import MATLAB, is_hdf5, is_mat5
 from models.logs.stamps import PER_SECOND, find_clock, typical_rate
 from models.logs.tree import HEAD, Clock, Signal, line_of, signals_of, times_of
 
-HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
-HDF5_PLACES = (0, 512)  # MATLAB puts a header before
-MAT5_ORDERS = (b"IM", b"MI")
 REMEDY = (
     "save vectors and their time, for example s = struct('t', x.Time, 'v', x.Data); "
     "save('log.mat', '-struct', 's')"
@@ -37,25 +36,6 @@ class _Time(NamedTuple):
     rate: float
 
 
-def recognizes(head: bytes, path: Path) -> bool:
-    """Whether a file is of this format.
-
-    Parameters
-    ----------
-    head : its first bytes, at least 520.
-    path : of the file.
-    """
-    return path.is_file() and (_is_hdf5(head) or _is_mat5(head))
-
-
-def _is_hdf5(head: bytes) -> bool:
-    return any(head[k : k + 8] == HDF5_MAGIC for k in HDF5_PLACES)
-
-
-def _is_mat5(head: bytes) -> bool:
-    return head[:6] == b"MATLAB" and head[126:128] in MAT5_ORDERS
-
-
 def open_(path: Path) -> GroupedLog[Signal]:
     """List the channels of a file.
 
@@ -70,11 +50,11 @@ def open_(path: Path) -> GroupedLog[Signal]:
     """
     with one_line(path, "a MATLAB file"):
         with path.open("rb") as file:
-            head = file.read(520)
-        if _is_hdf5(head):
-            format = "MATLAB 7.3" if head[:6] == b"MATLAB" else "HDF5"
+            head = file.read(HEAD_OF_FILE)
+        if is_hdf5(head):
+            format = "MATLAB 7.3" if head.startswith(MATLAB) else "HDF5"
             found = signals_of(hdf5.read_tree(path))
-        elif _is_mat5(head):
+        elif is_mat5(head):
             format = "MATLAB"
             found = signals_of(mat5.read_tree(path))
         else:

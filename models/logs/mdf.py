@@ -17,7 +17,7 @@ from codegen.arrays import Array, filled
 from models.logs.foreign import one_line
 from models.logs.grouped import GroupedLog, Samples, noted, require_room
 from models.logs.log import Listed, RecordingError
-from models.logs.mdf_blocks import BUS_EVENT, MAGIC, opened
+from models.logs.mdf_blocks import BUS_EVENT, opened
 from models.logs.stamps import typical_rate
 from models.schema import LONGEST_NAME
 
@@ -99,17 +99,6 @@ def _read(path: Path, file: Any, some: Sequence[_Asked]) -> list[tuple[Array, Ar
 def _kept(values: Array) -> Array:
     """Return numbers as they are kept: on disk where they are many."""
     return filled(values.size, lambda part: values[part])
-
-
-def recognizes(head: bytes, path: Path) -> bool:
-    """Whether a file is of this format.
-
-    Parameters
-    ----------
-    head : its first bytes.
-    path : of the file.
-    """
-    return path.is_file() and head[:8] in MAGIC
 
 
 def open_(path: Path) -> GroupedLog[_Place]:

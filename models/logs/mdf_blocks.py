@@ -16,7 +16,6 @@ from models.logs.foreign import need
 from models.logs.log import RecordingError
 from models.schema import require_few
 
-MAGIC = (b"MDF     ", b"UnFinMF ")
 MOST_BLOCKS = 1_000_000  # of data
 BUS_EVENT = 1 << 1  # flag of a group of channels that holds frames of a bus
 

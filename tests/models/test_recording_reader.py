@@ -268,6 +268,10 @@ def test_a_log_argument_is_split_at_the_right_colon(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert split_log_argument("a/log.csv.gz:lap:2") == (Path("a/log.csv.gz"), "lap:2")
+    for ending in ("tsv", "vbo", "asc", "dat", "txt", "log"):
+        path = write(tmp_path / f"packed.{ending}.gz", HEADER, rows())
+        assert split_log_argument(f"{path}:lap") == (path, "lap")
+        assert read_recording(path).name == "packed"
     assert split_log_argument("log.csv") == (Path("log.csv"), None)
     assert split_log_argument("C:\\logs\\log.csv") == (Path("C:\\logs\\log.csv"), None)
     assert split_log_argument("C:/log.parquet:a") == (Path("C:/log.parquet"), "a")

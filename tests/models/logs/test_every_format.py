@@ -1,9 +1,12 @@
 """One drive through every format: the same doubles, the same clock; what is wrong is one line."""
 
 import builtins
+import gzip
 import importlib
 import random
 import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -116,6 +119,28 @@ def test_no_library_of_an_extra_is_imported_for_a_text(tmp_path, drive, monkeypa
 
     monkeypatch.setattr(builtins, "__import__", watched)
     assert open_log(written.path).read(["r"])[0].values.size == 300
+
+
+def test_a_text_is_told_without_importing_the_readers_of_other_formats(tmp_path, drive):
+    written = write("CSV", tmp_path, *drive)
+    script = "import sys; from models.logs.door import open_log; open_log(sys.argv[1]).listed();"
+    script += "print(*sorted(name for name in sys.modules if name.startswith('models.logs.')))"
+    ran = subprocess.run(
+        [sys.executable, "-c", script, str(written.path)], capture_output=True, text=True
+    )
+    imported = {name.rpartition(".")[2] for name in ran.stdout.split()}
+    assert {"text", "magic"} <= imported, ran.stderr
+    assert not imported & {"parquet", "mdf", "matlab", "bag", "can", "frames", "grouped"}
+
+
+@pytest.mark.parametrize("format", [name for name in FORMATS if name not in ("CSV", "ROS 2 bag")])
+def test_only_tables_in_text_may_be_packed(format, tmp_path, drive):
+    written = write(format, tmp_path, *drive)
+    packed = written.path.with_name(f"{written.path.name}.gz")
+    packed.write_bytes(gzip.compress(written.path.read_bytes()))
+    assert refusal(packed, written.dbc) == (
+        f"{packed}: is packed by gzip, which only tables in text may be; unpack it first"
+    )
 
 
 @pytest.mark.parametrize("format", BINARY)

@@ -1,0 +1,79 @@
+"""The first bytes by which a file tells its format, whatever its name; no library is needed for it.
+
+What is told here is which reader is asked; it judges the rest of the file.
+"""
+
+import re
+from pathlib import Path
+
+HEAD = 1 << 12  # bytes that tell a format
+GZIP = b"\x1f\x8b"
+PARQUET = b"PAR1"
+MDF = (b"MDF     ", b"UnFinMF ")
+HDF5, HDF5_PLACES = b"\x89HDF\r\n\x1a\n", (0, 512)  # MATLAB puts a header before
+MATLAB, MATLAB_ORDERS = b"MATLAB", (b"IM", b"MI")
+SQLITE, MCAP, ROS1 = b"SQLite format 3\x00", b"\x89MCAP0\r\n", b"#ROSBAG"
+BAG_METADATA = "metadata.yaml"  # in the folder of a bag
+BLF = b"LOGG"
+FRAMES_IN_TEXT = {
+    "ASC": re.compile(
+        rb"\s*(?://[^\n]*\n\s*)*date\s[^\n]*\n\s*(?://[^\n]*\n\s*)*base\s+(?:hex|dec)\b", re.I
+    ),
+    "candump": re.compile(rb"\s*\(\d+\.\d+\)\s+\S+\s+[0-9A-Fa-f]+#"),
+    "TRC": re.compile(rb"\s*;\$FILEVERSION="),
+}
+
+
+def is_hdf5(head: bytes) -> bool:
+    """Whether a file is HDF5, as MATLAB 7.3 writes it or others do.
+
+    Parameters
+    ----------
+    head : its first bytes.
+    """
+    return any(head[k : k + len(HDF5)] == HDF5 for k in HDF5_PLACES)
+
+
+def is_mat5(head: bytes) -> bool:
+    """Whether a file is one of MATLAB 5 to 7.
+
+    Parameters
+    ----------
+    head : its first bytes.
+    """
+    return head.startswith(MATLAB) and head[126:128] in MATLAB_ORDERS
+
+
+def frames_in(head: bytes) -> str:
+    """Return which log of frames a file is, "" for none; an MDF file may hold some.
+
+    Parameters
+    ----------
+    head : its first bytes.
+    """
+    if head.startswith(BLF):
+        return "BLF"
+    if head.startswith(MDF):
+        return "MDF4"
+    return next((name for name, form in FRAMES_IN_TEXT.items() if form.match(head)), "")
+
+
+def format_of(path: Path, head: bytes) -> str:
+    """Return the reader of a file or folder: "parquet", "mdf", "matlab", "bag", "can" or "text".
+
+    Parameters
+    ----------
+    path : of the file or folder.
+    head : its first bytes, unpacked; none of a folder.
+    """
+    if path.is_dir():
+        return "bag" if (path / BAG_METADATA).is_file() else "text"
+    if head.startswith(PARQUET) or path.suffix.lower() == ".parquet":
+        return "parquet"
+    if head.startswith(MDF):
+        return "mdf"
+    if is_hdf5(head) or is_mat5(head):
+        return "matlab"
+    if head.startswith((SQLITE, MCAP, ROS1)):
+        return "bag"
+    return "can" if frames_in(head) else "text"
