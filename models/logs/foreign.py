@@ -54,6 +54,8 @@ def need(path: Path, module: str, format: str, extra: str) -> Any:
 def one_line(path: Path, format: str) -> Iterator[None]:
     """Let a library read a file: what it raises is a refusal, what it warns of is not said.
 
+    What is no fault of the file is no refusal of it: MemoryError stays what it is.
+
     Parameters
     ----------
     path : of the file.
@@ -67,7 +69,7 @@ def one_line(path: Path, format: str) -> Iterator[None]:
     with _quiet():
         try:
             yield
-        except RecordingError:
+        except (RecordingError, MemoryError):  # which says nothing of the file
             raise
         except Exception as error:  # libraries raise anything of a file that is not theirs
             reason = _reason(error)

@@ -5,12 +5,31 @@ in what is read and drops it again, so that a log of a day needs no more memory 
 """
 
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from models.logs.log import RecordingError
+
 LONGEST_IN_MEMORY = 1 << 20  # numbers: 8 MB of a column of float64
+
+
+@contextmanager
+def _told(file: IO[bytes] | None) -> Iterator[None]:
+    """Say of a disk that is full that it is, whatever log is being read; the file goes."""
+    try:
+        yield
+    except OSError as error:
+        with suppress(OSError):
+            if file is not None:
+                file.close()
+        raise RecordingError(
+            f"{tempfile.gettempdir()}: takes no more of a log that is too long for memory "
+            f"({error.strerror or error}); name a folder with room by TMPDIR"
+        ) from None
 
 
 class Growing:
@@ -42,18 +61,21 @@ class Growing:
 
         Raises
         ------
-        OSError
-            Where the disk is full.
+        RecordingError
+            Where the folder for temporary files has no room, or may not be written to.
         """
         part = np.array(values, dtype=self._dtype)
         self._size += part.size
         self._parts.append(part)
-        if self._file is None and self._size > self._in_memory:
-            self._file = tempfile.TemporaryFile()  # noqa: SIM115 (the map of it outlives us)
-        if self._file is not None:
+        if self._file is None and self._size <= self._in_memory:
+            return
+        if self._file is None:
+            with _told(None):
+                self._file = tempfile.TemporaryFile()  # noqa: SIM115 (the map of it outlives us)
+        with _told(self._file):
             for one in self._parts:
                 self._file.write(one.data)
-            self._parts.clear()
+        self._parts.clear()
 
     def finished(self) -> NDArray[Any]:
         """Return all numbers, (n,), read-only; nothing can be added then."""
@@ -62,7 +84,7 @@ class Growing:
             self._parts.clear()
             whole.setflags(write=False)
             return whole
-        with self._file as file:
+        with _told(self._file), self._file as file:
             file.flush()
             # A plain array on the map, which keeps the file until the last view of it is gone.
             return np.asarray(np.memmap(file, self._dtype, mode="r", shape=(self._size,)))

@@ -4,6 +4,7 @@ import random
 import subprocess
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +14,12 @@ import pytest
 
 from models.logs import text
 from models.logs.door import open_log
+from models.logs.foreign import one_line
 from models.logs.growing import Growing
 from models.logs.log import RecordingError
 from models.logs.table import TableLog
 from models.recordings import read_recording
+from tests.models.logs.drive_in_every_format import write
 from tests.models.logs.loggers import DIALECTS, DT, drive, plain
 
 # What is put in the place of a cell, or anywhere.
@@ -209,6 +212,33 @@ def test_a_column_that_grows_goes_to_disk_and_comes_back(tmp_path, monkeypatch):
     assert not a.flags.writeable
     assert not b.flags.writeable
     assert list(tmp_path.iterdir()) == [], "its file has no name that could be left behind"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a disk that is always full")
+@pytest.mark.parametrize("ending", ["csv", "mcap"])
+def test_a_full_disk_is_no_fault_of_the_log(tmp_path, monkeypatch, ending):
+    t = DT * np.arange(50)
+    written = write(
+        {"csv": "CSV", "mcap": "MCAP"}[ending],
+        tmp_path,
+        t,
+        {name: t for name in ("v_x", "v_y", "r", "delta_f", "a_y")},
+    )
+    log = open_log(written.path)
+    monkeypatch.setattr("models.logs.growing.LONGEST_IN_MEMORY", 10)
+    monkeypatch.setattr("tempfile.TemporaryFile", partial(Path("/dev/full").open, "w+b", 0))
+    with pytest.raises(RecordingError) as caught:
+        log.read([written.names["v_x"]])
+    said = str(caught.value)
+    assert "takes no more of a log that is too long for memory (No space left on device)" in said
+    assert "damaged" not in said and str(written.path) not in said
+
+
+def test_too_little_memory_is_no_fault_of_the_log(tmp_path, monkeypatch):
+    t = DT * np.arange(50)
+    pyarrow.parquet.write_table(pyarrow.table({"t": t, "v": t}), tmp_path / "log.parquet")
+    with pytest.raises(MemoryError), one_line(tmp_path / "log.parquet", "a Parquet file"):
+        raise MemoryError
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="counts the pages of Linux")
