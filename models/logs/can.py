@@ -22,7 +22,8 @@ from models.logs.magic import HEAD, frames_in
 from models.logs.stamps import typical_rate
 from models.schema import LONGEST_NAME, read_bytes
 
-PROBED = 200  # frames that a rate is taken from
+FLOATS = (16, 32, 64)  # bits of a signal that is a float
+LONGEST_SIGNAL = 64  # bits
 # Names that a DBC gives to values that are no numbers.
 NO_NUMBER = re.compile(
     r"\b(?:sna|snv|invalid|ung(?:ue|ü)ltig|not[ _]?(?:avail\w*|valid)|unavailable|undefined|error"
@@ -66,16 +67,32 @@ class _Group:
 
 
 class _Place(NamedTuple):
-    """Where a channel is: with which others it is sent, and the signal of the DBC."""
+    """Where a channel is: with which others it is sent, and the signal of the DBC.
+
+    fault: why it cannot be read as the DBC tells it, "" where it can.
+    """
 
     group: _Group
     signal: Any
+    fault: str
+
+
+class _Dbc(NamedTuple):
+    """What a DBC tells: messages by identifier, with `EXTENDED`; what is wrong, by their signals.
+
+    faults: by names of frame and signal, a line each.
+    """
+
+    messages: dict[int, Any]
+    faults: dict[tuple[str, str], str]
 
 
 def _samples(asked: Sequence[tuple[Listed, _Place]]) -> list[Samples]:
     """Read signals, frame by frame."""
     groups: dict[_Group, dict[str, Any]] = {}
     for listed, place in asked:
+        if place.fault:
+            raise RecordingError(place.fault)
         groups.setdefault(place.group, {})[listed.name] = place.signal
     return [
         Samples(group.name, group.t, {name: group.values(one) for name, one in signals.items()})
@@ -101,17 +118,17 @@ def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
             f"{path}: holds frames of a bus; give the DBC file that tells their signals, in the "
             '[file] of log.toml: dbc = "car.dbc"'
         )
-    messages = _read_dbc(dbc)
+    told = _read_dbc(dbc)
     with one_line(path, "a CAN log"):
         with path.open("rb") as file:
             kind = frames_in(file.read(HEAD))
         if not kind:
             raise RecordingError(f"{path}: is no CAN log: neither ASC, BLF, candump, TRC nor MDF4")
-        log = gather(path, kind, {key: one.length for key, one in messages.items()})
+        log = gather(path, kind, {key: one.length for key, one in told.messages.items()})
         found = [
             (f"bus {bus}", listed, place)
             for (bus, identifier), frames in log.frames.items()
-            for listed, place in _channels(messages[identifier], frames)
+            for listed, place in _channels(told, identifier, frames)
         ]
     said = tuple(
         f"{count} {what} frames are not read" for what, count in log.others.items() if count
@@ -128,12 +145,16 @@ def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
     )
 
 
-def _channels(message: Any, frames: Frames) -> Iterator[tuple[Listed, _Place]]:
+def _channels(told: _Dbc, identifier: int, frames: Frames) -> Iterator[tuple[Listed, _Place]]:
     """Yield the signals that are sent in the frames of a message."""
+    message = told.messages[identifier]
     groups: dict[tuple[tuple[str, tuple[int, ...]], ...], _Group] = {}
     for signal in message.signals:
         selectors = _selectors(message, signal)
         key = tuple((one.name, ids) for one, ids in selectors)
+        faults = [told.faults.get((message.name, one.name), "") for one, _ in selectors]
+        if any(faults):
+            raise RecordingError(next(filter(None, faults)))
         if key not in groups:
             sent = _sent(frames, selectors)
             t = frames.t if sent is None else frames.t[sent]
@@ -144,13 +165,13 @@ def _channels(message: Any, frames: Frames) -> Iterator[tuple[Listed, _Place]]:
                 name=f"{message.name}.{signal.name}",
                 unit=(signal.unit or "").strip()[:LONGEST_NAME],
                 samples=group.t.size,
-                rate=typical_rate(group.t[:PROBED]),
+                rate=typical_rate(group.t),
             )
-            yield listed, _Place(group, signal)
+            yield listed, _Place(group, signal, told.faults.get((message.name, signal.name), ""))
 
 
-def _read_dbc(path: Path) -> dict[int, Any]:
-    """Return the messages of a DBC by their identifier, with `EXTENDED`."""
+def _read_dbc(path: Path) -> _Dbc:
+    """Return the messages of a DBC and what is wrong with their signals."""
     with one_line(path, "a DBC file"):
         raw = read_bytes(path, RecordingError)
         try:
@@ -166,7 +187,36 @@ def _read_dbc(path: Path) -> dict[int, Any]:
         }
     if not messages:
         raise RecordingError(f"{path}: is not a DBC file with messages and signals")
-    return messages
+    faults = {
+        (message.name, signal.name): f"{path}: frame {message.name}: signal {signal.name} {fault}"
+        for message in messages.values()
+        for signal in message.signals
+        if (fault := _fault(message, signal))
+    }
+    return _Dbc(messages, faults)
+
+
+def _fault(message: Any, signal: Any) -> str:
+    """Return the rule that a signal breaks, with the value; "" where it breaks none."""
+    sizes = FLOATS if signal.is_float else range(1, LONGEST_SIGNAL + 1)
+    if signal.length not in sizes:
+        allowed = "16, 32 or 64" if signal.is_float else f"1 to {LONGEST_SIGNAL}"
+        return f"must have {allowed} bits, it has {signal.length}"
+    _, end = _bytes_of(signal)
+    return "" if end <= message.length else f"lies beyond its frame of {message.length} bytes"
+
+
+def _bytes_of(signal: Any) -> tuple[int, int]:
+    """Return the first byte of a frame that a signal lies in, and the one behind its last."""
+    first = _first_bit(signal)
+    return first // 8, (first + signal.length - 1) // 8 + 1
+
+
+def _first_bit(signal: Any) -> int:
+    """Return the bit that a signal begins at, counted in the order of its bytes."""
+    # Motorola numbers the bits of a byte downwards, and a signal by its highest bit.
+    start = int(signal.start)
+    return start if signal.byte_order == "little_endian" else 8 * (start // 8) + 7 - start % 8
 
 
 def _selectors(message: Any, signal: Any) -> Selectors:
@@ -218,14 +268,10 @@ def raw_values(data: NDArray[np.uint8], signal: Any) -> NDArray[Any]:
     Parameters
     ----------
     data : of the frames, (n, bytes).
-    signal : of the DBC.
+    signal : of the DBC, that lies in them.
     """
     length, little = signal.length, signal.byte_order == "little_endian"
-    # Motorola numbers the bits of a byte downwards, and a signal by its highest bit.
-    first = signal.start if little else 8 * (signal.start // 8) + 7 - signal.start % 8
-    begin, end = first // 8, (first + length - 1) // 8 + 1
-    if end > data.shape[1]:
-        raise RecordingError(f"signal {signal.name} lies beyond its frame of {data.shape[1]} bytes")
+    first, (begin, end) = _first_bit(signal), _bytes_of(signal)
     order: Literal["little", "big"] = "little" if little else "big"
     bits = np.unpackbits(data[:, begin:end], axis=1, bitorder=order)
     bits = bits[:, first - 8 * begin : first - 8 * begin + length]

@@ -261,7 +261,22 @@ def test_containers_may_be_compressed_or_not(level, tmp_path, monkeypatch):
     assert "megabytes of a block must be at most 0.05" in refusal(path, dbc(tmp_path))
 
 
-def test_a_signal_beyond_its_frame_is_refused(tmp_path):
-    text = 'VERSION ""\n\nBU_: Car\n\nBO_ 100 F: 2 Car\n SG_ V : 8|16@1- (1,0) [0|0] "" Car\n'
+@pytest.mark.parametrize(
+    ("place", "fault"),
+    [
+        ("8|16@1-", "lies beyond its frame of 2 bytes"),
+        ("0|72@1-", "must have 1 to 64 bits, it has 72"),
+        ("0|8@1-", "must have 16, 32 or 64 bits, it has 8"),
+    ],
+)
+@pytest.mark.parametrize("selects", [False, True])
+def test_a_fault_of_the_dbc_is_told_of_the_dbc(place, fault, selects, tmp_path):
+    text = 'VERSION ""\n\nBU_: Car\n\nBO_ 100 F: 2 Car\n'
+    text += f' SG_ V {"M " * selects}: {place} (1,0) [0|0] "" Car\n'
+    text += f' SG_ W {"m0 " * selects}: 0|8@1- (1,0) [0|0] "" Car\n'
+    text += "\nSIG_VALTYPE_ 100 V : 2;\n" if "16, 32" in fault else ""
+    base = dbc(tmp_path, text)
     path = write(tmp_path / "log.blf", [(0.01 * k, 100, bytes(2), {}) for k in range(20)])
-    assert "lies beyond its frame of 2 bytes" in refusal(path, dbc(tmp_path, text))
+    assert refusal(path, base) == f"{base}: frame F: signal V {fault}"
+    if not selects:
+        assert open_log(path, base).read(["F.W"])[0].values.size == 20
