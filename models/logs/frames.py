@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import Array
+from codegen.arrays import Array, filled
 from models.limits import limits
 from models.logs.foreign import need
 from models.logs.growing import Growing
@@ -134,10 +134,7 @@ def gather(path: Path, kind: str, known: Mapping[int, int]) -> Log:
 
 def _since(t: Array, first: float) -> Array:
     """Return times of the calendar since the first; a double tells them to the microsecond."""
-    grown = Growing()
-    for k in range(0, t.size, TOGETHER):
-        grown.extend(np.round((t[k : k + TOGETHER] - first) * MICROSECONDS) / MICROSECONDS)
-    return grown.finished()
+    return filled(t.size, lambda part: np.round((t[part] - first) * MICROSECONDS) / MICROSECONDS)
 
 
 def _messages(path: Path, kind: str) -> Iterator[Any]:

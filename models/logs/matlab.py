@@ -14,8 +14,9 @@ from models.logs.grouped import GroupedLog, Samples, noted, require_room
 from models.logs.log import Listed, RecordingError
 from models.logs.magic import HEAD as HEAD_OF_FILE
 from models.logs.magic import MATLAB, is_hdf5, is_mat5
-from models.logs.stamps import PER_SECOND, find_clock, typical_rate
+from models.logs.stamps import find_clock, typical_rate
 from models.logs.tree import HEAD, Clock, Signal, line_of, signals_of, times_of
+from models.logs.units import PER_SECOND
 
 REMEDY = (
     "save vectors and their time, for example s = struct('t', x.Time, 'v', x.Data); "

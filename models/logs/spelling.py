@@ -7,7 +7,7 @@ from models.logs.units import is_known
 from models.schema import LONGEST_NAME
 
 _OTHERS = (
-    "sec", "secs", "msec", "usec", "hhmmss", "rad/s2", "rad/s^2", "rad/s²", "deg/s2", "deg/s^2",
+    "hhmmss", "rad/s2", "rad/s^2", "rad/s²", "deg/s2", "deg/s^2",
     "deg/s²", "°/s²", "volts", "amp", "amps", "bool", "enum", "#", "count", "counts", "gear", "rev",
     "1/s", "l", "l/h",
 )  # fmt: skip

@@ -15,10 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import Array
-from models.logs.growing import LONGEST_IN_MEMORY, Growing
+from codegen.arrays import Array, blocks, filled
+from models.logs.growing import LONGEST_IN_MEMORY
 from models.logs.log import Clock, RecordingError
 from models.logs.spelling import unit_in_name
+from models.logs.units import PER_SECOND, time_unit
 
 MISSING = -(2**63)  # an instant that is not there, in ns
 DAY = 86400.0
@@ -29,10 +30,6 @@ NAMES = (
     "tod", "relativetime", "reltime", "testtime", "simtime", "rostime", "headerstamp",
     "zeitstempel", "temps", "tiempo",
 )  # fmt: skip
-PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1.0 / 60.0, "h": 1.0 / 3600.0}
-_SPELT = {"sec": "s", "secs": "s", "second": "s", "seconds": "s", "msec": "ms", "µs": "us",
-          "μs": "us", "usec": "us", "nsec": "ns", "hr": "h", "hours": "h", "minutes": "min",
-          "milliseconds": "ms", "microseconds": "us", "nanoseconds": "ns"}  # fmt: skip
 # Between 1980 and 2100 in each unit: a number so large counts from 1970.
 EPOCHS = {"s": (3e8, 4.2e9), "ms": (3e11, 4.2e12), "us": (3e14, 4.2e15), "ns": (3e17, 4.2e18)}
 FASTEST, SLOWEST = 1e-5, 0.11  # [s] between samples of a car's log
@@ -77,7 +74,7 @@ def find_clock(
         if (clock := _clock(k, names[k], units[k], head(k), _rises)) is not None:
             return clock
     for k, name in enumerate(names):
-        if k in named or units[k] not in ("", *PER_SECOND, *_SPELT):
+        if k in named or (units[k] and not time_unit(units[k])):
             continue
         if (clock := _clock(k, name, units[k], head(k), _rises_evenly)) is not None:
             return clock
@@ -131,8 +128,7 @@ def _clock(
         return Clock(column, name, kind, False, f"{name!r} as date or time of day, {words}")
     if kind == "hhmmss":
         return Clock(column, name, kind, False, f"{name!r} as hhmmss, {words}")
-    told = _SPELT.get(unit.strip("[]() ").lower(), unit.strip("[]() ").lower())
-    told = told if told in PER_SECOND else ""
+    told = time_unit(unit)
     found, epoch = _unit(t, told)
     since = " since 1970" if epoch else ""
     guessed = "" if told else ", a unit that its steps tell (likely)"
@@ -301,11 +297,13 @@ def _in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
     first = values[0]
     per_second = PER_SECOND.get(clock.unit, 1.0)
     if clock.unit == "instant":
-        return _mapped(values, lambda part: (part - first) / 1e9)
+        return filled(values.size, lambda part: (values[part] - first) / 1e9)
     if clock.unit == "hhmmss":
         start = float(_of_digits(values[:1])[0])
-        return _mapped(values, lambda part: np.round(_of_digits(part) - start, 6))
-    return values if per_second == 1.0 else _mapped(values, lambda part: part / per_second)
+        return filled(values.size, lambda part: np.round(_of_digits(values[part]) - start, 6))
+    if per_second == 1.0:
+        return values
+    return filled(values.size, lambda part: values[part] / per_second)
 
 
 def _of_digits(values: Array) -> Array:
@@ -324,22 +322,9 @@ def _past_midnight(t: Array) -> Array:
     return later
 
 
-def _parts(size: int) -> list[slice]:
-    """Return slices of a long array, each with the first of the next."""
-    return [slice(k, k + LONGEST_IN_MEMORY + 1) for k in range(0, size, LONGEST_IN_MEMORY)]
-
-
-def _mapped(values: NDArray[Any], change: Callable[[NDArray[Any]], Array]) -> Array:
-    """Return an array changed part by part; what is long goes to disk."""
-    grown = Growing(np.float64)
-    for k in range(0, values.size, LONGEST_IN_MEMORY):
-        grown.extend(change(values[k : k + LONGEST_IN_MEMORY]))
-    return grown.finished()
-
-
 def _first(values: NDArray[Any], wrong: Callable[[NDArray[Any]], NDArray[Any]]) -> int | None:
     """Return the first place where something is wrong."""
-    for part in _parts(values.size):
+    for part in blocks(values.size, overlap=1):
         found = np.flatnonzero(wrong(values[part]))
         if found.size:
             return int(found[0] + part.start)

@@ -15,6 +15,19 @@ SI = {SPEED: "m/s", ANGLE: "rad", RATE: "rad/s", ACCELERATION: "m/s^2", FORCE: "
 
 DEGREE, POUND, FOOT, MILE = math.pi / 180.0, 4.4482216152605, 0.3048, 1609.344
 G = 9.80665  # standard acceleration of free fall, by which "g" and "kgf" are defined [m/s^2]
+PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1.0 / 60.0, "h": 1.0 / 3600.0}
+_TIMES = {  # by spelling
+    spelling: unit
+    for unit, words in {
+        "s": "sec secs second seconds",
+        "ms": "msec msecs millisecond milliseconds",
+        "us": "usec usecs microsecond microseconds",
+        "ns": "nsec nsecs nanosecond nanoseconds",
+        "min": "mins minute minutes",
+        "h": "hr hrs hour hours",
+    }.items()
+    for spelling in (unit, *words.split())
+}
 # By quantity, spelling -> factor to SI; spellings as `_plain` leaves them, in small letters.
 FACTORS = {
     SPEED: {
@@ -74,16 +87,7 @@ FACTORS = {
         "kgf": G,
         "kp": G,
     },
-    TIME: {
-        "s": 1.0,
-        "second": 1.0,
-        "seconds": 1.0,
-        "ms": 1e-3,
-        "us": 1e-6,
-        "ns": 1e-9,
-        "min": 60.0,
-        "h": 3600.0,
-    },
+    TIME: {spelling: 1.0 / PER_SECOND[unit] for spelling, unit in _TIMES.items()},
 }
 OTHERS = {  # what else loggers log, so that an error can say what a unit is of
     "length": ("m", "mm", "cm", "km", "ft", "in", "mi"),
@@ -170,6 +174,16 @@ def is_known(unit: str) -> bool:
     return plain in NO_UNIT or any(
         plain in known for known in (*FACTORS.values(), *OTHERS.values())
     )
+
+
+def time_unit(unit: str) -> str:
+    """Return the unit of time, one of `PER_SECOND`, that a spelling is; "" where it is none.
+
+    Parameters
+    ----------
+    unit : as written.
+    """
+    return _TIMES.get(_plain(unit), "")
 
 
 def is_told(unit: str) -> bool:

@@ -341,3 +341,16 @@ def test_folders_pipes_and_nothing_are_refused(tmp_path):
         open_log(tmp_path)
     with pytest.raises(RecordingError, match="a device, pipe or socket"):
         open_log("/dev/zero")
+
+
+@pytest.mark.parametrize("unit", ["sec", "s", "msec", "Milliseconds", "usec", "µs"])
+def test_a_clock_that_a_map_names_knows_the_units_that_a_clock_of_the_file_knows(tmp_path, unit):
+    per_second = {"m": 1e3, "u": 1e6, "µ": 1e6}.get(unit[0].lower(), 1.0)
+    rows = [f"{k / 100:.2f},{k / 100 * per_second!r},20,0,0,0" for k in range(60)]
+    text = "\n".join([f"Ta [s],Tb [{unit}],vx,vy,r,delta_f", *rows])
+    path = written(tmp_path, text)
+    named = read_recording(path, check=False, columns={"t": f"Tb [{unit}]"})
+    np.testing.assert_allclose(named.t, np.arange(60) / 100, rtol=0, atol=1e-9)
+    lines = [row.partition(",")[2] for row in rows]
+    alone = written(tmp_path, "\n".join([f"Time [{unit}],vx,vy,r,delta_f", *lines]), "one.csv")
+    np.testing.assert_allclose(read_recording(alone, check=False).t, named.t, rtol=0, atol=1e-9)
