@@ -8,6 +8,7 @@ counts from the first message that is read of any topic.
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -30,10 +31,12 @@ from models.logs.grouped import GroupedLog, Samples, noted
 from models.logs.growing import Growing
 from models.logs.log import Listed, RecordingError
 from models.logs.magic import MCAP, ROS1, SQLITE
+from models.logs.stamps import typical_rate
 from models.schema import require_few
 
 NS = 1e9  # in a second
 OTHER_CLOCK = 3600  # seconds between stamps and the bag's own time, above which these differ
+PROBED = 20  # messages that a rate is taken from
 TOGETHER = 2048  # messages that are read at a time
 STAMPS = ("header.stamp.", "stamp.")
 TIME = ("sec", "nanosec")
@@ -115,14 +118,14 @@ def open_(path: Path) -> GroupedLog[_Place]:
     """
     with one_line(path, "a ROS 2 bag"), _opened(path) as bag:
         definitions, undefined = _definitions(path, bag)
-        topics, skipped = _topics(bag, definitions)
-        seconds = (bag.metadata.end_time - bag.metadata.start_time) / NS
+        topics, rates, skipped = _topics(bag, definitions)
     found = []
     for topic in topics:
-        rate = (topic.messages - 1) / seconds if seconds > 0.0 else float("nan")
         for field in topic.fields:
             name = f"{topic.name}/{field.path}"
-            listed = Listed(name=name, unit=_unit(field), samples=topic.messages, rate=rate)
+            listed = Listed(
+                name=name, unit=_unit(field), samples=topic.messages, rate=rates[topic.name]
+            )
             found.append((topic.kind, listed, (topic, field)))
     return GroupedLog.of(
         path,
@@ -203,8 +206,11 @@ def _definitions(path: Path, bag: Any) -> tuple[Definitions, dict[str, str]]:
     return result, bad
 
 
-def _topics(bag: Any, definitions: Definitions) -> tuple[list[_Topic], dict[str, str]]:
-    """Return the topics with numbers, and why others have none."""
+def _topics(
+    bag: Any, definitions: Definitions
+) -> tuple[list[_Topic], dict[str, float], dict[str, str]]:
+    """Return the topics with numbers, by name their rates [Hz], and why others have none."""
+    rates: dict[str, float] = {}
     counts: dict[tuple[str, str], int] = {}
     skipped: dict[str, str] = {}
     for connection in bag.connections:
@@ -227,14 +233,14 @@ def _topics(bag: Any, definitions: Definitions) -> tuple[list[_Topic], dict[str,
             if not kept:
                 continue
             topic = _Topic(name, kind, count, kept, stamp, 0)
-            first, stamped = _first(bag, definitions, topic)
+            first, stamped, rates[name] = _first(bag, definitions, topic)
         except CdrError as error:
             skipped[name] = str(error)
             continue
         if stamped is None:
             topic = topic._replace(stamp=None)
         found.append((topic._replace(zero=first if stamped is None else stamped), first))
-    return _with_zero(found), skipped
+    return _with_zero(found), rates, skipped
 
 
 def _has_time(fields: Sequence[Field], stamp: str) -> bool:
@@ -261,15 +267,28 @@ def _with_zero(found: list[tuple[_Topic, int]]) -> list[_Topic]:
     ]
 
 
-def _first(bag: Any, definitions: Definitions, topic: _Topic) -> tuple[int, int | None]:
-    """Return when the first message of a topic was received, and its stamp if it has one [ns]."""
-    for _, received, raw in _messages(bag, [topic]):
-        layout = layout_of(definitions, topic.kind, raw)
-        if topic.stamp is None:
-            return received, None
-        stamp = int(_stamps(layout, _rows([raw]), topic.stamp)[0])
-        return received, stamp or None
-    raise CdrError("it holds no message")
+def _first(bag: Any, definitions: Definitions, topic: _Topic) -> tuple[int, int | None, float]:
+    """Return when the first message was received, its stamp if it has one [ns], and the rate [Hz].
+
+    The rate is that of the first messages: a topic may be silent for most of a bag.
+    """
+    received: list[int] = []
+    stamps: list[int] = []
+    for _, time, raw in islice(_messages(bag, [topic]), PROBED):
+        try:
+            layout = layout_of(definitions, topic.kind, raw)
+        except CdrError:
+            if not received:
+                raise
+            break  # which is told where it is read
+        received.append(time)
+        if topic.stamp is not None:
+            stamps.append(int(_stamps(layout, _rows([raw]), topic.stamp)[0]))
+    if not received:
+        raise CdrError("it holds no message")
+    first = stamps[0] if stamps else 0
+    times = np.array(stamps if first else received, dtype=np.int64)
+    return received[0], first or None, typical_rate((times - times[0]) / NS)
 
 
 def _messages(bag: Any, topics: Sequence[_Topic]) -> Iterator[tuple[str, int, bytes]]:

@@ -375,6 +375,19 @@ def test_a_database_of_something_else_is_refused(tmp_path):
     assert "is not a ROS 2 bag" in refusal(path)
 
 
+@pytest.mark.parametrize("storage", STORAGES)
+def test_the_rate_of_a_topic_is_that_of_its_messages_however_long_the_bag_is(tmp_path, storage):
+    store = store_of()
+    topics = car_topics(store, 400)
+    for name, step in (("/twist", 4), ("/plain", 5), ("/velocity", 1)):
+        kind, messages = topics[name]
+        topics[name] = kind, messages[: 100 if step > 1 else None : step]
+    few = {name: topics[name] for name in ("/twist", "/plain", "/velocity")}
+    listed = open_log(write(tmp_path / "bag", store, few, storage)).listed()
+    rates = {one.name.split("/")[1]: one.rate for one in listed}
+    assert rates == pytest.approx({"twist": 25.0, "plain": 20.0, "velocity": 100.0})
+
+
 def test_a_bag_of_ros_1_is_refused_with_what_converts_it(tmp_path):
     path = tmp_path / "log.bag"
     path.write_bytes(b"#ROSBAG V2.0\n" + b"\0" * 100)
