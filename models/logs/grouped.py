@@ -4,7 +4,6 @@ A format lists its channels with where each is in the file, and reads those that
 group by group; the clock of a group is judged and mended once, and its channels share it.
 """
 
-import difflib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,14 +14,22 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from models.logs.foreign import one_line
-from models.logs.log import Channel, Clock, Heading, Listed, RecordingError
+from models.logs.log import (
+    Channel,
+    Clock,
+    Heading,
+    Listed,
+    RecordingError,
+    chosen,
+    one_run,
+    some,
+)
 from models.logs.stamps import Stamps, seconds
-from models.schema import require_few, shown
+from models.schema import require_few
 
 MOST_NOTED = 5  # names that a note lists
 
 P = TypeVar("P")
-T = TypeVar("T")
 
 
 class Samples(NamedTuple):
@@ -153,14 +160,15 @@ class GroupedLog(Generic[P]):
         RecordingError
             One line: file, channel, rule, value, remedy.
         """
-        asked = chosen(self.path, names, {one[0].name: one for one in self.channels}, run)
+        one_run(self.path, self.runs(), run)
+        asked = chosen(self.path, names, {one[0].name: one for one in self.channels})
         found: dict[str, tuple[Array, Array, NDArray[np.int64]]] = {}
         with one_line(self.path, self.what):
             for clock, t, values in self.samples(asked):
                 stamps = seconds_of(self.path, clock, t, self.place)
                 self._mended.extend(stamps.notes)
                 rows = np.arange(1, t.size + 1)
-                found |= {name: (stamps.t, some, rows) for name, some in values.items()}
+                found |= {name: (stamps.t, one, rows) for name, one in values.items()}
         result = []
         for listed, _ in asked:
             t, values_of, rows = found[listed.name]
@@ -175,33 +183,6 @@ class GroupedLog(Generic[P]):
                 )
             )
         return tuple(result)
-
-
-def chosen(path: Path, names: Sequence[str], known: Mapping[str, T], run: str | None) -> list[T]:
-    """Return what is known by names, of a file that holds no runs apart.
-
-    Parameters
-    ----------
-    path : of the file.
-    names : asked for.
-    known : by name as listed.
-    run : asked for.
-
-    Raises
-    ------
-    RecordingError
-        Where a name is not listed, or a run is asked for.
-    """
-    if run is not None:
-        raise RecordingError(f"{path}: holds one run without a name, so no run {shown(run)}")
-    for name in names:
-        if name not in known:
-            similar = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-            raise RecordingError(
-                f"{path}: there is no channel {shown(name)}"
-                + (f"; did you mean {shown(similar[0])}?" if similar else "")
-            )
-    return [known[name] for name in names]
 
 
 def seconds_of(path: Path, clock: str, t: Array, place: str) -> Stamps:
@@ -258,9 +239,7 @@ def noted(what: str, names: Sequence[str]) -> tuple[str, ...]:
     """
     if not names:
         return ()
-    some = ", ".join(names[:MOST_NOTED])
-    more = f", ... ({len(names)})" if len(names) > MOST_NOTED else ""
-    return (f"{what}: {some}{more}",)
+    return (f"{what}: {some(names, MOST_NOTED)}",)
 
 
 def require_room(path: Path, samples: float, width: float) -> None:

@@ -4,15 +4,23 @@ A format reads a file and gives a `LogFile`; what the channels mean (which is v_
 from which sensor) is told by a map, and only then a `Recording` in SI is made of them.
 """
 
-from collections.abc import Sequence
+import difflib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
+from codegen.escape import visible
+from models.schema import shown
+
+SOME = 12  # names in a message
+LONGEST = 200  # characters of them
+
+T = TypeVar("T")
 
 
 class RecordingError(ValueError):
@@ -128,3 +136,66 @@ class LogFile(Protocol):
         RecordingError
             One line: file, channel, rule, value, remedy.
         """
+
+
+def chosen(path: Path, names: Sequence[str], known: Mapping[str, T]) -> list[T]:
+    """Return what is known by names.
+
+    Parameters
+    ----------
+    path : of the file.
+    names : asked for.
+    known : by name as listed.
+
+    Raises
+    ------
+    RecordingError
+        Where a name is not there: the nearest one, or some that are.
+    """
+    for name in names:
+        if name not in known:
+            similar = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+            there = f"; did you mean {shown(similar[0])}?" if similar else ""
+            there = there or f", there are '{some(list(known))}'"
+            raise RecordingError(f"{path}: there is no channel {shown(name)}{there}")
+    return [known[name] for name in names]
+
+
+def one_run(path: Path, runs: Sequence[str], run: str | None) -> str | None:
+    """Return the run that is read: the one that is asked for, or the only one; None of none.
+
+    Parameters
+    ----------
+    path : of the file.
+    runs : that it holds apart.
+    run : asked for.
+
+    Raises
+    ------
+    RecordingError
+        Where it is not there, or none of several is asked for.
+    """
+    if not runs:
+        if run is not None:
+            raise RecordingError(
+                f"{path}: holds one run without a name, so no run {shown(run)}; leave it out"
+            )
+        return None
+    if run is None and len(runs) > 1:
+        raise RecordingError(f"{path}: name one of its runs: {some(runs)}")
+    if run is not None and run not in runs:
+        raise RecordingError(f"{path}: there is no run {shown(run)}, the runs are: {some(runs)}")
+    return runs[0] if run is None else run
+
+
+def some(names: Sequence[str], most: int = SOME) -> str:
+    """Return names for a message, the first of many, on one line.
+
+    Parameters
+    ----------
+    names : of channels or runs.
+    most : that are listed.
+    """
+    listing = visible(", ".join(names[:most]))
+    cut = len(names) > most or len(listing) > LONGEST
+    return listing[:LONGEST] + (f", ... ({len(names)})" if cut else "")

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from models.logs.log import Channel, Clock, Heading, Listed, RecordingError
+from models.logs.log import Channel, Clock, Heading, Listed, RecordingError, chosen, one_run, some
 
 TIMES = ("t", "time", "timestamp")  # what the clock is called
 RUN = "run"
@@ -46,7 +46,7 @@ class ArrayLog:
             missing = f"{clock!r}" if clock else "t"
             raise RecordingError(
                 f"{name}: column {missing} is missing, the time [s]; columns found: "
-                f"{', '.join(header)[:200]!r}"
+                f"'{some(header)}'"
             )
 
     @property
@@ -103,13 +103,15 @@ class ArrayLog:
         Parameters
         ----------
         names : of the columns.
-        run : one of `runs`; None takes all rows.
+        run : one of `runs`; None where there are none, or one.
 
         Raises
         ------
         RecordingError
-            Where a column is not numeric, has not one axis, or another length.
+            Where a column or run is not there, is not numeric, has not one axis, or another length.
         """
+        run = one_run(self.path, self.runs(), run)
+        chosen(self.path, names, self._arrays)
         clock = str(self._clock)
         columns = {name: self._column(name) for name in (clock, *names)}
         kept: NDArray[np.bool_] = np.ones(columns[clock].size, dtype=np.bool_)

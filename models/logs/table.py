@@ -12,13 +12,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.logs.growing import Growing
-from models.logs.log import Channel, Clock, Heading, Listed, RecordingError
+from models.logs.log import (
+    Channel,
+    Clock,
+    Heading,
+    Listed,
+    RecordingError,
+    chosen,
+    one_run,
+    some,
+)
 from models.logs.stamps import find_clock, seconds, told_clock, typical_rate
 from models.schema import LONGEST_NAME, limits, require_few, shown
 
 RUN = "run"
 MOST_WORDS = 10_000  # names of runs in one log
-LISTED = 8  # names in a message
 
 
 class Kind(Enum):
@@ -235,7 +243,7 @@ class TableLog:
         table = self.table
         if not self.clock_name:
             return find_clock(self.names, table.units, table.first_rows)
-        column = self._place(self.clock_name)
+        (column,) = chosen(self.path, [self.clock_name], self._places)
         told = told_clock(column, self.clock_name, table.units[column], table.first_rows(column))
         if told is None:
             raise RecordingError(
@@ -316,10 +324,10 @@ class TableLog:
         RecordingError
             One line: file, column, rule, value, remedy.
         """
-        places, clock = [self._place(name) for name in names], self.clock
+        places, clock = chosen(self.path, names, self._places), self.clock
         if clock is None:
             raise RecordingError(
-                f"{self.path}: no column is a time that rises; columns found: {some(self.names)}"
+                f"{self.path}: no column is a time that rises; columns found: '{some(self.names)}'"
             )
         kinds = {clock.column: _kind(clock)}
         timed = clock.column in places and _kind(clock) is Kind.NUMBER  # asked for as it stands
@@ -340,43 +348,18 @@ class TableLog:
             for name, k in zip(names, places, strict=True)
         )
 
-    def _place(self, name: str) -> int:
-        if name not in self.names:
-            raise RecordingError(
-                f"{self.path}: there is no channel {shown(name)}, there are {some(self.names)}"
-            )
-        return self.names.index(name)
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        return {name: k for k, name in enumerate(self.names)}
 
     def _one_run(self, run: str | None) -> tuple[int, str] | None:
         """Return column and word of a run."""
-        if self._run_column is None:
-            if run is None:
-                return None
-            raise RecordingError(
-                f"{self.path}: there is no column run, so no run {shown(run)}; leave it out"
-            )
-        if run is None and len(self.runs()) == 1:
+        found = one_run(self.path, self.runs(), run)
+        if self._run_column is None or found is None or (run is None and len(self.runs()) == 1):
             return None
-        if run is None:
-            raise RecordingError(f"{self.path}: name one of its runs: {some(self.runs())}")
-        if run not in self.runs():
-            raise RecordingError(
-                f"{self.path}: there is no run {shown(run)}, the runs are: {some(self.runs())}"
-            )
-        return self._run_column, run
+        return self._run_column, found
 
 
 def _kind(clock: Clock) -> Kind:
     """Return how the cells of a clock are read."""
     return Kind.INSTANT if clock.unit == "instant" else Kind.NUMBER
-
-
-def some(names: Sequence[str]) -> str:
-    """Return names, or the first of many.
-
-    Parameters
-    ----------
-    names : to be listed in a message.
-    """
-    listing = ", ".join(names[:LISTED]) + (f", ... ({len(names)})" if len(names) > LISTED else "")
-    return shown(listing) if len(listing) < 50 else repr(listing[:200])

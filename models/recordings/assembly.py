@@ -19,7 +19,7 @@ from models.logs.clock import (
     require_rising,
     without_empty,
 )
-from models.logs.log import Channel, Heading, LogFile, RecordingError
+from models.logs.log import Channel, Heading, LogFile, RecordingError, one_run
 from models.logs.signals import BETA, QUANTITIES, Signal
 from models.logs.spelling import without_unit
 from models.logs.units import TIME, is_told, to_si
@@ -71,7 +71,7 @@ def recording_of(
     """
     if not (np.isfinite(dt) and dt > 0.0):
         raise RecordingError(f"{log.path}: the sample time dt must be positive, it is {dt}")
-    run = _one_run(log, run or log_map.run or None)
+    run = one_run(log.path, log.runs(), run or log_map.run or None)
     label = str(log.path) if run is None else f"{log.path}:{run}"
     headings = log.headings()
     reading = chosen_signals(log, headings, log_map, run)
@@ -106,23 +106,6 @@ def _wants_clock(log: LogFile, headings: Sequence[Heading], clock: str) -> bool:
             f"{log.path}: there is no column {shown(clock)} to read as t; {listing(names)}"
         )
     return clock in names
-
-
-def _one_run(log: LogFile, run: str | None) -> str | None:
-    """Return the run that is read, None where a log has none."""
-    names = log.runs()
-    if not names:
-        if run is not None:
-            raise RecordingError(
-                f"{log.path}: there is no column run, so no run {run!r}; leave it out"
-            )
-        return None
-    some = ", ".join(names[:30]) + (f", ... ({len(names)})" if len(names) > 30 else "")
-    if run is None and len(names) > 1:
-        raise RecordingError(f"{log.path}: name one of its runs: {some}")
-    if run is not None and run not in names:
-        raise RecordingError(f"{log.path}: there is no run {shown(run)}, the runs are: {some}")
-    return names[0] if run is None else run
 
 
 def _channels(

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from models.logs.log import Heading, LogFile, RecordingError
+from models.logs.log import Heading, LogFile, RecordingError, some
 from models.logs.names import Proposal, propose
 from models.logs.signals import BETA, COLUMNS, NEEDED, QUANTITIES, Signal, require_fitting
 from models.logs.spelling import without_unit
@@ -18,7 +18,6 @@ from models.recordings.map import LogMap
 from models.schema import shown
 
 INVERSE = {"Fyf_inv": "Fyf", "Fyr_inv": "Fyr"}  # computed backwards from the motion
-SOME = 12  # names in a message
 
 
 class Reading(NamedTuple):
@@ -189,8 +188,7 @@ def listing(names: Sequence[str]) -> str:
     ----------
     names : of the channels.
     """
-    listing = ", ".join(names[:SOME]) + (", ..." if len(names) > SOME else "")
-    return f"columns found: {listing[:200]!r}"
+    return f"columns found: '{some(names)}'"
 
 
 def _taken_text(name: str, signal: Signal) -> str:

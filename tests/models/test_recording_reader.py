@@ -68,7 +68,7 @@ def test_runs_are_listed_chosen_and_named(tmp_path: Path) -> None:
     assert read_recording(single).name == "one:only"
     plain = write(tmp_path / "plain.csv", HEADER, rows())
     assert runs(plain) == []
-    assert "no column run" in refusal(plain, "a")
+    assert "holds one run without a name, so no run 'a'; leave it out" in refusal(plain, "a")
 
 
 @pytest.mark.parametrize("with_runs", [False, True])

@@ -357,7 +357,7 @@ def test_recordings_whose_files_would_be_the_same_are_refused(logs, tmp_path, ca
     [
         (["--freeze", "4", "4.00000000000001"], "--freeze 4 is given twice"),
         (["--freeze", "99"], "--freeze 99 is outside the recording: slalom lasts from 0 to 8 s"),
-        (["--run", "lap"], "no column run"),
+        (["--run", "lap"], "holds one run without a name, so no run 'lap'"),
         (["--replay", "nowhere.csv"], "nowhere.csv: there is no such file"),
         (["--columns", "yaw_rate"], "--columns wants NAME=COLUMN"),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),

@@ -12,7 +12,7 @@ import numpy as np
 from codegen.escape import visible
 from models.files import write_atomically
 from models.logs.door import open_log
-from models.logs.log import Channel, Listed, LogFile
+from models.logs.log import Channel, Listed, LogFile, one_run, some
 from models.logs.names import Proposal, propose
 from models.logs.signals import MEANINGS, NEEDED, Signal
 from models.recordings import split_log_argument
@@ -89,10 +89,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _run_of(log: LogFile, name: str) -> str | None:
     names = log.runs()
-    if name and name not in names:
-        known = ", ".join(names) or "none apart"
-        raise ValueError(f"{log.path}: there is no run {name!r}, there are: {known}")
-    return name or (names[0] if names else None)
+    return one_run(log.path, names if name else names[:1], name or None)
 
 
 def _head(log: LogFile, run: str | None) -> list[str]:
@@ -101,8 +98,7 @@ def _head(log: LogFile, run: str | None) -> list[str]:
     lines = [f"{log.path}: {log.format}", *(f"  {word}" for word in log.dialect)]
     lines += [f"  {note}" for note in log.notes]
     if len(runs) > 1:
-        some = ", ".join(runs[:12]) + (", ..." if len(runs) > 12 else "")
-        lines.append(f"  {len(runs)} runs: {some}; what follows is of {run}")
+        lines.append(f"  {len(runs)} runs: {some(runs)}; what follows is of {run}")
     return lines
 
 

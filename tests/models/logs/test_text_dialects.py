@@ -118,11 +118,11 @@ def test_one_run_of_several_is_read_alone(tmp_path):
     assert log.runs() == ("a", "b")
     assert [one.samples for one in log.listed()] == [120] * 4
     assert [one.rate for one in log.listed()] == pytest.approx([100.0] * 4)
-    with pytest.raises(RecordingError, match="name one of its runs: 'a, b'"):
+    with pytest.raises(RecordingError, match="name one of its runs: a, b"):
         log.read(["vy [m/s]"])
-    with pytest.raises(RecordingError, match="there is no run 'c', the runs are: 'a, b'"):
+    with pytest.raises(RecordingError, match="there is no run 'c', the runs are: a, b"):
         log.read(["vy [m/s]"], run="c")
-    with pytest.raises(RecordingError, match="there is no column run, so no run 'a'"):
+    with pytest.raises(RecordingError, match="holds one run without a name, so no run 'a'; leave"):
         open_log(written(tmp_path, plain(), "plain.csv")).read(["vy [m/s]"], run="a")
     (channel,) = log.read(["Speed [km/h]"], run="b")
     np.testing.assert_array_equal(channel.values, drive().speed[50:])
