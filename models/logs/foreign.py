@@ -40,11 +40,12 @@ def need(path: Path, module: str, format: str, extra: str) -> Any:
     RecordingError
         Where it is not installed: how to install it.
     """
+    library = module.partition(".")[0]
     try:
         with _quiet():
+            importlib.import_module(library)
             return importlib.import_module(module)
     except ImportError:
-        library = module.partition(".")[0]
         raise RecordingError(
             f"{path}: reading {format} needs {library}: pip install tireid[{extra}]"
         ) from None

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from models.logs.arrow import doubles, whole_numbers, words
+from models.logs.foreign import need, one_line
 from models.logs.log import RecordingError
 from models.logs.spelling import unit_in_name
 from models.logs.stamps import MISSING, nanoseconds
@@ -16,6 +17,7 @@ from models.logs.table import Cells, Gathered, Kind, TableLog
 from models.schema import require_few, require_file, shown
 
 HEAD = 400  # rows that tell what columns are
+WHAT = "a Parquet file"  # that a file is read as
 BATCH = 1 << 16  # rows that are read at once
 
 
@@ -31,30 +33,16 @@ def open_parquet(path: Path) -> TableLog:
     RecordingError
         Where pyarrow is missing, or the file is none or too large.
     """
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError:
-        raise RecordingError(
-            f"{path}: reading Parquet needs pyarrow: pip install tireid[parquet]"
-        ) from None
+    parquet = need(path, "pyarrow.parquet", "Parquet", "parquet")
     require_file(path, RecordingError, limit="megabytes")
-    try:
-        with pyarrow.parquet.ParquetFile(path) as file:
-            about = file.metadata
-            require_few(RecordingError, str(path), about.num_columns, "columns", "columns")
-            require_few(RecordingError, str(path), about.num_rows, "samples", "rows")
-            size = sum(about.row_group(k).total_byte_size for k in range(about.num_row_groups))
-            require_few(RecordingError, str(path), size / 1e6, "megabytes", "megabytes")
-            table = ParquetTable(path=path, schema=file.schema_arrow, rows=about.num_rows)
-    except (pyarrow.ArrowException, OSError, UnicodeDecodeError) as error:
-        raise _not_parquet(path, error) from None
-    return TableLog(table=table)
-
-
-def _not_parquet(path: Path, error: Exception) -> RecordingError:
-    reason = (str(error).splitlines() or [type(error).__name__])[0]
-    return RecordingError(f"{path}: is not a Parquet file ({reason})")
+    with one_line(path, WHAT), parquet.ParquetFile(path) as file:
+        about = file.metadata
+        require_few(RecordingError, str(path), about.num_columns, "columns", "columns")
+        require_few(RecordingError, str(path), about.num_rows, "samples", "rows")
+        size = sum(about.row_group(k).total_byte_size for k in range(about.num_row_groups))
+        require_few(RecordingError, str(path), size / 1e6, "megabytes", "megabytes")
+        table = ParquetTable(path=path, schema=file.schema_arrow, rows=about.num_rows)
+        return TableLog(table=table)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,9 +90,10 @@ class ParquetTable:
         ----------
         column : from 0.
         """
-        if column not in self._head:
-            return ["?"] * min(self.rows, HEAD)
-        return _as_text(self._head[column], self.schema.field(column).type)
+        with one_line(self.path, WHAT):
+            if column not in self._head:
+                return ["?"] * min(self.rows, HEAD)
+            return _as_text(self._head[column], self.schema.field(column).type)
 
     @cached_property
     def _head(self) -> dict[int, Any]:
@@ -137,30 +126,26 @@ class ParquetTable:
             raise RecordingError(f"{self.path}: has columns but no row of data")
         gathered = Gathered(self.path, wanted, self.names, "row", run)
         order = list(wanted)
-        for batch in self._batches(order, BATCH):
-            rows = np.arange(1, len(batch[0]) + 1) + len(gathered)
-            columns = {
-                column: self._column(column, wanted[column], cells, rows)
-                for column, cells in zip(order, batch, strict=True)
-            }
-            gathered.extend(rows, columns)
+        with one_line(self.path, WHAT):
+            for batch in self._batches(order, BATCH):
+                rows = np.arange(1, len(batch[0]) + 1) + len(gathered)
+                columns = {
+                    column: self._column(column, wanted[column], cells, rows)
+                    for column, cells in zip(order, batch, strict=True)
+                }
+                gathered.extend(rows, columns)
         return gathered.finished()
 
     def _batches(self, columns: Sequence[int], size: int) -> Iterator[list[Any]]:
         """Yield the cells of columns, some rows at a time; names may repeat, places do not."""
-        import pyarrow
-        import pyarrow.parquet
-
         names = list(dict.fromkeys(self.names[k] for k in columns))
-        try:
-            with pyarrow.parquet.ParquetFile(self.path) as file:
-                for batch in file.iter_batches(batch_size=size, columns=names):
-                    places: dict[str, list[int]] = {}
-                    for place, name in enumerate(batch.schema.names):
-                        places.setdefault(name, []).append(place)
-                    yield [batch.column(places[self.names[k]][self._which[k]]) for k in columns]
-        except (pyarrow.ArrowException, OSError, UnicodeDecodeError) as error:
-            raise _not_parquet(self.path, error) from None
+        parquet = need(self.path, "pyarrow.parquet", "Parquet", "parquet")
+        with parquet.ParquetFile(self.path) as file:
+            for batch in file.iter_batches(batch_size=size, columns=names):
+                places: dict[str, list[int]] = {}
+                for place, name in enumerate(batch.schema.names):
+                    places.setdefault(name, []).append(place)
+                yield [batch.column(places[self.names[k]][self._which[k]]) for k in columns]
 
     @cached_property
     def _which(self) -> tuple[int, ...]:

@@ -250,7 +250,12 @@ def _parquet(folder: Path, t: np.ndarray, columns: Columns) -> Written:
     import pyarrow.parquet
 
     path = folder / "drive.parquet"
-    pyarrow.parquet.write_table(pyarrow.table({"t": t, **columns}), path)
+    fields = [
+        pyarrow.field(name, pyarrow.float64(), metadata={"unit": UNITS.get(name, "s")})
+        for name in ("t", *columns)
+    ]
+    table = pyarrow.table([t, *columns.values()], schema=pyarrow.schema(fields))
+    pyarrow.parquet.write_table(table, path)
     return Written(path, None, _same(columns))
 
 

@@ -17,8 +17,9 @@ from models.logs.memory import ArrayLog
 from tests.models.logs.conftest import assert_equal
 from tests.models.logs.drive_in_every_format import FORMATS, UNITS, write
 
-BINARY = [name for name in FORMATS if name not in ("CSV", "Parquet")]
+BINARY = [name for name in FORMATS if name != "CSV"]
 EXTRAS = {
+    "Parquet": "parquet",
     "MATLAB 7.3": "mat",
     "MDF4": "mdf",
     "MDF3": "mdf",
@@ -31,6 +32,7 @@ EXTRAS = {
     "CAN TRC": "can",
     "CAN MDF4": "can",
 }
+LIBRARIES = ("pyarrow", "h5py", "asammdf", "rosbags", "can", "cantools")
 
 
 def refusal(path, dbc=None):
@@ -101,7 +103,7 @@ def test_a_missing_library_is_named_with_the_pip_line(format, tmp_path, drive, m
     real = importlib.import_module
 
     def without(name, package=None):
-        if name.partition(".")[0] in ("h5py", "asammdf", "rosbags", "can", "cantools"):
+        if name.partition(".")[0] in LIBRARIES:
             raise ImportError(name)
         return real(name, package)
 
@@ -136,7 +138,7 @@ def test_no_library_of_an_extra_is_imported_for_a_text(tmp_path, drive, monkeypa
     real = builtins.__import__
 
     def watched(name, *rest, **more):
-        assert name.partition(".")[0] not in ("h5py", "asammdf", "rosbags", "can", "cantools")
+        assert name.partition(".")[0] not in LIBRARIES
         return real(name, *rest, **more)
 
     monkeypatch.setattr(builtins, "__import__", watched)
