@@ -206,6 +206,6 @@ def write_repair(path: Path, told: LogMap, diagnosis: Diagnosis) -> LogMap:
     told : how the log was read.
     diagnosis : of what was read so.
     """
-    repaired = replace(told, repair=told.repair.merged(diagnosis.repair))
+    repaired = replace(told, repair=told.repair.then(diagnosis.repair))
     write_atomically(path, repaired.toml())
     return repaired

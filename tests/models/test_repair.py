@@ -196,6 +196,73 @@ def test_repairs_that_were_estimated_together_merge():
     assert one.merged(Repair()) == one == Repair().merged(one)
 
 
+IN_SEQUENCE = {
+    "offset, then factor": (Repair(offset={"r": 0.1}), Repair(factor={"r": 0.5})),
+    "factors and offsets": (
+        Repair(factor={"v_y": 2.0, "r": 3.0}, offset={"v_y": 0.3, "a_y": 1.0}),
+        Repair(factor={"v_y": -0.4, "v_x": 0.4}, offset={"v_y": -0.2, "v_x": 0.5, "r": 0.1}),
+    ),
+    "a turn, then offsets": (
+        Repair(velocity_sensor_angle=0.2, offset={"v_x": 0.5}),
+        Repair(offset={"v_x": 0.7, "v_y": 0.4}, velocity_sensor_angle=-0.1),
+    ),
+    "a turn, then a sign": (
+        Repair(velocity_sensor_angle=0.2),
+        Repair(factor={"v_y": -1.0}, offset={"v_y": 0.4}),
+    ),
+    "a place, then factors": (
+        Repair(velocity_sensor_x=0.5, acceleration_sensor_x=0.3),
+        Repair(
+            factor={"r": 2.0, "v_y": 0.5, "a_y": -1.0},
+            offset={"r": 0.1},
+            velocity_sensor_x=0.2,
+            acceleration_sensor_x=0.1,
+        ),
+    ),
+    "a turned sensor ahead, then an offset": (
+        Repair(velocity_sensor_x=0.5, velocity_sensor_angle=0.1),
+        Repair(offset={"r": 0.1, "v_y": 0.2}, velocity_sensor_x=0.3),
+    ),
+    "a sideslip angle, then an offset": (
+        Repair(sideslip=True, factor={"v_y": 0.01}, offset={"v_y": 0.2}),
+        Repair(offset={"v_y": 0.1}),
+    ),
+    "numbers of the car": (
+        Repair(vehicle={"mass": 1400.0, "l_f": 1.3}),
+        Repair(vehicle={"l_f": 1.2}),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", IN_SEQUENCE)
+def test_two_repairs_in_sequence_are_one(drive, name):
+    one, other = IN_SEQUENCE[name]
+    at_once, car = one.then(other).apply(drive, CAR)
+    in_sequence, its_car = other.apply(*one.apply(drive, CAR))
+    assert max(apart(at_once, in_sequence).values()) < 1e-12
+    assert car == its_car
+
+
+@pytest.mark.parametrize("name", [name for name in IN_SEQUENCE if "car" not in name])
+def test_two_repairs_in_sequence_are_not_the_last_alone(drive, name):
+    one, other = IN_SEQUENCE[name]
+    alone, _ = other.apply(drive, CAR)
+    in_sequence, _ = other.apply(*one.apply(drive, CAR))
+    assert max(apart(alone, in_sequence).values()) > 0.02
+
+
+def test_delays_and_lags_in_sequence_add(drive):
+    one, other = Repair(delay={"r": 0.02}, lag={"v_y": 0.1}), Repair(delay={"r": 0.03})
+    assert one.then(other) == Repair(delay={"r": 0.05}, lag={"v_y": 0.1})
+    assert one.then(Repair()) == one == Repair().then(one)
+
+
+def test_an_angle_of_which_something_was_taken_off_is_refused():
+    for one in (Repair(offset={"v_y": 0.1}), Repair(sideslip=True)):
+        with pytest.raises(RecordingError, match="sideslip angle"):
+            one.then(Repair(sideslip=True))
+
+
 @pytest.mark.parametrize(
     ("made", "words"),
     [
