@@ -18,7 +18,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
-from scipy.signal import lfilter
 from scipy.sparse import csr_array
 
 from codegen.arrays import Array
@@ -26,6 +25,7 @@ from identifier.axle.curve import unit_matrix
 from identifier.verdict.motion import white_noise
 from models.recordings import Recording
 from models.recordings.repair import CHANNELS
+from models.smoothing import low_passed, smoothed, window
 from models.vehicle import GRAVITY, Vehicle
 
 LADDER = (0.016, 0.032, 0.064, 0.128, 0.256)  # rad, slip scales of the curve
@@ -120,7 +120,7 @@ class Balance:
         self.dt = every * dt
         self.margin = round(MARGIN / self.dt) + 1
         smooth = {
-            name: [smoothed(getattr(one, name), half, dt, every) for one in stretches]
+            name: [thinned(getattr(one, name), half, dt, every) for one in stretches]
             for name in self.names
         }
         sizes = [one.value.size for one in smooth["v_x"]]
@@ -222,7 +222,9 @@ class Balance:
             out[name] = factor * value - get(f"offset.{name}", 0.0)
         # The noise of v_y counts most: where v_y lags, the others are made to lag, not it to lead.
         if (lag := get("lag.v_y", 0.0)) > 0.0:
-            out = {name: x if name == "v_y" else self._lagged(x, lag) for name, x in out.items()}
+            out = {
+                name: x if name == "v_y" else low_passed(x, lag, self.dt) for name, x in out.items()
+            }
         angle = get("velocity_sensor_angle", 0.0)
         c, s = math.cos(angle), math.sin(angle)
         v_x, v_y = out["v_x"], out["v_y"]
@@ -241,13 +243,6 @@ class Balance:
             cubic(value[a], value[b], slope[a], slope[b], f, h),
             cubic(slope[a], slope[b], bend[a], bend[b], f, h),
         )
-
-    def _lagged(self, signal: Array, lag: float) -> Array:
-        """Return a channel behind a low pass that began at rest."""
-        keep = math.exp(-self.dt / lag)
-        ramp = 1.0 - (1.0 - keep) * lag / self.dt  # exact for straight lines between samples
-        rest = lfilter([ramp, 1.0 - keep - ramp], [1.0, -keep], signal - signal[0])
-        return np.asarray(rest + signal[0], dtype=np.float64)
 
     def _bank(self, sizes: Sizes) -> Array:
         """Return sin β (n,)."""
@@ -381,18 +376,7 @@ def rising(basis: Array, y: Array) -> Array:
 # Signals.
 
 
-def window(half: int) -> Array:
-    """Return a Hann window of sum one, (2 half + 1,).
-
-    Parameters
-    ----------
-    half : samples on each side of its middle.
-    """
-    bell = np.hanning(2 * half + 3)[1:-1]
-    return np.asarray(bell / bell.sum(), dtype=np.float64)
-
-
-def smoothed(signal: Array, half: int, dt: float, every: int) -> Smooth:
+def thinned(signal: Array, half: int, dt: float, every: int) -> Smooth:
     """Return a channel without its fastest noise, and thinned.
 
     Parameters
@@ -402,8 +386,7 @@ def smoothed(signal: Array, half: int, dt: float, every: int) -> Smooth:
     dt : sampling interval [s].
     every : which samples are kept.
     """
-    padded = np.pad(signal, half, mode="reflect", reflect_type="odd")
-    value = np.convolve(padded, window(half), "valid")
+    value = smoothed(signal, half)
     slope = np.gradient(value, dt)
     bend = np.gradient(slope, dt)
     return Smooth(*(one[::every].copy() for one in (value, slope, bend)))
@@ -443,7 +426,7 @@ def window_length(
     """
     time, dt = vehicle.froude_time, stretches[0].dt
     half = max(1, round(0.3 * time / dt))
-    smooth = [smoothed(one.r - np.mean(one.r), half, dt, 1) for one in stretches]
+    smooth = [thinned(one.r - np.mean(one.r), half, dt, 1) for one in stretches]
     turning = math.sqrt(sum(float(one.value @ one.value) for one in smooth))
     changing = math.sqrt(sum(float(one.slope @ one.slope) for one in smooth))
     period = 2.0 * math.pi * turning / max(changing, 1e-9)

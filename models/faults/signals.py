@@ -9,11 +9,11 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.signal import lfilter
 
 from codegen.arrays import Array
 from models.recordings import Recording
 from models.rules import require_positive
+from models.smoothing import low_passed
 from models.vehicle import GRAVITY
 
 CHANNELS = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")
@@ -293,16 +293,8 @@ class Lagging:
 
     def apply(self, recording: Recording) -> Recording:
         """Return the recording with these channels behind the low pass."""
-        keep = math.exp(-recording.dt / self.time_constant)
-        ramp = (1.0 - keep) * self.time_constant / recording.dt  # lag of a straight line, T u_dot
-
-        def low_passed(good: Array) -> Array:
-            # y_k = keep y_(k-1) + (1 - keep) u_(k-1) + (1 - ramp) (u_k - u_(k-1)), from y_0 = u_0
-            b = [1.0 - ramp, ramp - keep]
-            y, _ = lfilter(b, [1.0, -keep], good, zi=[ramp * good[0]])
-            return np.asarray(y, dtype=np.float64)
-
-        return _through(recording, self.channels, low_passed)
+        lag, dt = self.time_constant, recording.dt
+        return _through(recording, self.channels, lambda good: low_passed(good, lag, dt))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,6 +17,7 @@ from codegen.arrays import Array, filled
 from models.logs.log import RecordingError
 from models.recordings.record import MINIMUM_SAMPLES, Recording, joined
 from models.schema import Table, shown
+from models.smoothing import without_low_pass
 from models.vehicle import Vehicle
 
 CHANNELS = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")
@@ -313,21 +314,3 @@ def _rate(signal: Array, part: slice, dt: float) -> Array:
     first = max(part.start - 1, 0)
     rate: Array = np.gradient(signal[first : part.stop + 1], dt)
     return rate[part.start - first :][: part.stop - part.start]
-
-
-def without_low_pass(signal: Array, lag: float, dt: float, width: int) -> Array:
-    """Return what went into a low pass, u = y + T ẏ, of y smoothed by a window without phase.
-
-    Parameters
-    ----------
-    signal : y, what came out (n,).
-    lag : time constant T of the low pass [s].
-    dt : sampling interval [s].
-    width : samples on each side of the Hann window that takes noise off first; 0 for none.
-    """
-    if width > 0:
-        window = np.hanning(2 * width + 3)[1:-1]
-        padded = np.pad(signal, width, mode="reflect", reflect_type="odd")
-        signal = np.convolve(padded, window / window.sum(), "valid")
-    source: Array = signal + lag * np.gradient(signal, dt)
-    return source

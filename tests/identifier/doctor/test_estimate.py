@@ -9,7 +9,7 @@ import pytest
 from benchmarks.doctor_cases import KINDS, planted
 from benchmarks.everyday_drives import drawn_everyday
 from identifier.doctor import Finding, estimate, examine
-from identifier.doctor.balance import Balance, cubic, smoothed, stretches_of, window_length
+from identifier.doctor.balance import Balance, cubic, stretches_of, thinned, window_length
 from identifier.doctor.fit import Fitter
 from identifier.doctor.suspects import SUSPECTS
 from models.faults import Late, Misaligned, SensorFault, Together
@@ -185,7 +185,7 @@ def test_a_factor_that_only_shrinks_the_noise_gains_nothing(driven):
 def test_a_channel_is_read_between_its_samples():
     dt = 0.02
     t = dt * np.arange(200)
-    smooth = smoothed(np.sin(3.0 * t), 1, dt, 1)
+    smooth = thinned(np.sin(3.0 * t), 1, dt, 1)
     a, b = slice(50, 100), slice(51, 101)
     between = cubic(smooth.value[a], smooth.value[b], smooth.slope[a], smooth.slope[b], 0.3, dt)
     np.testing.assert_allclose(between, np.sin(3.0 * (t[a] + 0.3 * dt)), atol=2e-3)
