@@ -14,7 +14,7 @@ from models.recordings.checks import check_against_vehicle, check_physics
 from models.recordings.map import LogMap, told_signals
 from models.recordings.record import Recording
 from models.recordings.repair import Repair
-from models.vehicle import Vehicle
+from models.vehicle import Vehicle, sedan
 
 NO_NAMES: Mapping[str, str] = {}
 DT = 0.01  # [s], the sample time of every method
@@ -45,7 +45,7 @@ def read_recording(
     run : name of the run; may be left out when the file has only one.
     dt : sample time T_s of the result [s].
     check : whether to judge signs, axes and units by physics; turn it off for a log that is right
-        and refused all the same.
+        and refused all the same. Where the map holds a repair, what it leaves is judged.
     columns : by our name of a column, its name in this file and, where it wants them, unit,
         factor, offset and ratio: {"vy": "Vel Lat [km/h]", "delta_f": "SteerAngle [deg] /14.6"}.
     log_map : how the log is read, or the path of a log.toml; its repair is not applied here, since
@@ -172,13 +172,18 @@ def _judged(
     log: LogFile, name: str, told: LogMap, *, run: str | None, dt: float, check: bool
 ) -> Recording:
     recording = recording_of(log, name, told, run=run, dt=dt)
-    if check and not told.repair:  # which is judged when it is repaired
+    if check:
         try:
-            check_physics(recording)
+            check_physics(_without_faults(recording, told.repair))
         except RecordingError as error:
             label = f"{log.path}{recording.name.removeprefix(name)}"
             raise RecordingError(label + str(error).removeprefix(recording.name)) from None
     return recording
+
+
+def _without_faults(recording: Recording, repair: Repair) -> Recording:
+    """Return a recording repaired, to be judged; of the car only its size counts, for noise."""
+    return replace(repair, vehicle={}).apply(recording, sedan())[0] if repair else recording
 
 
 def runs(path: str | Path) -> list[str]:

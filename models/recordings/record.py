@@ -169,7 +169,7 @@ class Recording:
         name : of the recording, in place of a file's.
         run : which run of the column "run", where there are several.
         dt : sample time T_s to resample to [s].
-        check : whether data that contradict physics are refused.
+        check : whether data that contradict physics, once they are repaired, are refused.
         columns : by our name of a column, its name in `data` and, behind it, unit, factor, offset
             or ratio, as of `read_recording`.
         log_map : how the data are read, or the path of a log.toml; its repair is not applied.

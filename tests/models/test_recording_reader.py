@@ -12,7 +12,16 @@ import pytest
 
 from models.logs.door import open_log
 from models.logs.text import TextTable
-from models.recordings import RecordingError, read_recording, runs, split_log_argument
+from models.recordings import (
+    LogMap,
+    Recording,
+    RecordingError,
+    Repair,
+    read_recording,
+    runs,
+    split_log_argument,
+    write_recording,
+)
 
 HEADER = "t,vx,vy,r,delta_f"
 
@@ -308,3 +317,44 @@ def test_inverse_forces_stand_in_where_none_were_measured(tmp_path):
     both = [row + ",5,6" for row in rows]
     log.write_text("\n".join(["t,vx,vy,r,delta_f,Fyf_inv,Fyr_inv,Fyf,Fyr", *both]))
     np.testing.assert_array_equal(read_recording(log).axle_force[0], [5.0, 6.0])
+
+
+@pytest.fixture(scope="module")
+def mirrored(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A log whose accelerometer shows the other sign."""
+    t = 0.01 * np.arange(1000)
+    r = 0.3 * np.sin(2.0 * t)
+    drive = Recording(
+        name="mirrored",
+        t=t,
+        v_x=np.full(t.size, 20.0),
+        v_y=0.0 * t,
+        r=r,
+        delta_f=2.7 / 20.0 * r,
+        delta_r=0.0 * t,
+        a_y=-20.0 * r,
+    )
+    return write_recording(drive, tmp_path_factory.mktemp("logs") / "mirrored.csv")
+
+
+RIGHT = LogMap(repair=Repair(factor={"a_y": -1.0}, vehicle={"mass": 1400.0}))
+STILL_WRONG = LogMap(repair=Repair(offset={"r": 0.001}))
+
+
+def test_a_map_with_a_repair_is_judged_by_what_the_repair_leaves(mirrored: Path) -> None:
+    with pytest.raises(RecordingError, match="ay "):
+        read_recording(mirrored)
+    with pytest.raises(RecordingError, match=f"^{mirrored}: "):
+        read_recording(mirrored, log_map=STILL_WRONG)
+    recording = read_recording(mirrored, log_map=RIGHT)
+    assert recording.a_y is not None
+    np.testing.assert_array_equal(recording.a_y, -20.0 * recording.r)  # as it was logged
+
+
+def test_a_data_frame_with_a_repair_is_judged_by_what_the_repair_leaves(mirrored: Path) -> None:
+    log = read_recording(mirrored, check=False)
+    names = {"t": "t", "vx": "v_x", "vy": "v_y", "r": "r", "delta_f": "delta_f", "ay": "a_y"}
+    data = {column: getattr(log, name) for column, name in names.items()}
+    with pytest.raises(RecordingError, match="ay "):
+        Recording.from_dataframe(data, log_map=STILL_WRONG)
+    assert len(Recording.from_dataframe(data, log_map=RIGHT)) == len(log)
