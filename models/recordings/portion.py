@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import LONG, Array, blocks
-from models.recordings.record import MINIMUM_SAMPLES, Recording
+from models.recordings.record import Recording
 from models.vehicle import GRAVITY
 
 STRETCH = 2000  # samples of one, 20 s at 100 Hz
@@ -58,21 +58,12 @@ def portion(recording: Recording, middle: int | None = None) -> Portion:
     else:
         begins = _hardest(power, 0, middle, count // 2) + _hardest(power, middle, n, count // 2)
     samples = np.unique(np.add.outer(begins, np.arange(STRETCH)))
-    samples = samples[samples < n]
-    samples = _without_scraps(samples, recording)
+    samples = recording.without_scraps(samples[samples < n])
     taken = recording.taken(samples)
     ends = np.array([piece.stop for piece in taken.stretches])
     v_x = taken.v_x.copy()
     v_x[np.maximum(ends[:, None] - 1 - np.arange(round(REST / recording.dt)), 0)] = 0.0
     return Portion(replace(taken, v_x=v_x), samples)
-
-
-def _without_scraps(samples: NDArray[np.intp], recording: Recording) -> NDArray[np.intp]:
-    """Return the samples but for those of stretches that are too short to be any."""
-    own = np.searchsorted(np.array(recording.breaks, dtype=np.intp), samples, side="right")
-    begins = np.flatnonzero((np.diff(own) > 0) | (np.diff(samples) > 1)) + 1
-    lengths = np.diff([0, *begins, samples.size])
-    return samples[np.repeat(lengths >= MINIMUM_SAMPLES, lengths)]
 
 
 def _power(recording: Recording) -> Array:

@@ -283,7 +283,7 @@ class Recording:
         return slip
 
     def between(self, t0: float, t1: float) -> "Recording":
-        """Return the part with t0 <= t <= t1.
+        """Return the part with t0 <= t <= t1; what it leaves of a stretch as of `taken`.
 
         Parameters
         ----------
@@ -311,25 +311,62 @@ class Recording:
     def taken(self, kept: slice | NDArray[np.intp]) -> "Recording":
         """Return some of the samples; where some are left out between, a stretch begins.
 
+        What is left of a stretch is left out too where it has fewer than 10 samples, and a note
+        says so.
+
         Parameters
         ----------
-        kept : samples: a slice of them, which is not copied, or their indices, rising.
+        kept : consecutive samples as a slice, which is not copied, or indices that rise.
 
         Raises
         ------
         RecordingError
-            Where fewer than 10 samples are left of a stretch.
+            Where no stretch of 10 samples is left.
         """
-        if isinstance(kept, slice):
-            breaks = tuple(k - kept.start for k in self.breaks if kept.start < k < kept.stop)
-        else:
-            stretch = np.searchsorted(np.array(self.breaks, dtype=np.intp), kept, side="right")
-            begins = (np.diff(stretch) > 0) | (np.diff(kept) > 1)
-            breaks = tuple(int(k) for k in np.flatnonzero(begins) + 1)
+        pieces = self._pieces(kept)
+        whole = [piece for piece in pieces if piece.stop - piece.start >= MINIMUM_SAMPLES]
+        if not whole:
+            raise RecordingError(
+                f"{self.name}: each stretch of a recording needs at least {MINIMUM_SAMPLES} "
+                f"samples, of {len(self)} samples none is left that has them"
+            )
+        scraps = len(pieces) - len(whole)
+        if isinstance(kept, slice):  # what is cut off short lies at its ends
+            first = kept.indices(len(self))[0]
+            kept = slice(first + whole[0].start, first + whole[-1].stop)
+        elif scraps:
+            kept = np.concatenate([kept[piece] for piece in whole])
+        ends = np.cumsum([piece.stop - piece.start for piece in whole])
         cut: dict[str, Any] = {
             name: getattr(self, name)[kept] for name in SIGNALS if getattr(self, name) is not None
         }
-        return replace(self, **cut, breaks=breaks)
+        notes = self.notes
+        if scraps:
+            several = "es" if scraps > 1 else ""
+            notes += (f"left out: {scraps} stretch{several} of under {MINIMUM_SAMPLES} samples",)
+        return replace(self, **cut, breaks=tuple(int(k) for k in ends[:-1]), notes=notes)
+
+    def without_scraps(self, samples: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Return samples but for those of stretches that `taken` would leave out.
+
+        Parameters
+        ----------
+        samples : indices, rising.
+        """
+        pieces = self._pieces(samples)
+        lengths = np.array([piece.stop - piece.start for piece in pieces], dtype=np.intp)
+        return samples[np.repeat(lengths >= MINIMUM_SAMPLES, lengths)]
+
+    def _pieces(self, kept: slice | NDArray[np.intp]) -> list[slice]:
+        """Return the stretches that samples make, counted from the first of them."""
+        if isinstance(kept, slice):
+            first, end, _ = kept.indices(len(self))
+            n, begins = max(end - first, 0), [k - first for k in self.breaks if first < k < end]
+        else:
+            stretch = np.searchsorted(np.array(self.breaks, dtype=np.intp), kept, side="right")
+            new = (np.diff(stretch) > 0) | (np.diff(kept) > 1)
+            n, begins = kept.size, (np.flatnonzero(new) + 1).tolist()
+        return [slice(a, b) for a, b in pairwise((0, *begins, n))]
 
     def __repr__(self) -> str:
         truth = "" if self.axle_force is None else ", with axle forces"

@@ -73,6 +73,58 @@ def test_a_slice_keeps_both_ends_and_its_clock() -> None:
         recording().between(5.0, 6.0)
 
 
+def in_three() -> Recording:
+    """Samples 0 to 39, 40 to 69 and 70 to 99, each a second after those before."""
+    t = 0.01 * np.arange(N)
+    t[40:] += 1.0
+    t[70:] += 1.0
+    return recording(t=t, breaks=(40, 70))
+
+
+LEFT_OUT = "left out: 1 stretch of under 10 samples"
+
+
+def test_all_or_an_open_part_of_a_drive_in_stretches_may_be_taken() -> None:
+    made = in_three()
+    assert made.taken(slice(None)).breaks == (40, 70)
+    assert made.taken(slice(20, None)).breaks == (20, 50)
+    assert made.taken(slice(None, 60)).breaks == (40,)
+    assert made.taken(slice(-30, None)).breaks == ()
+    np.testing.assert_array_equal(made.taken(slice(None, 60)).t, made.t[:60])
+
+
+@pytest.mark.parametrize(
+    ("kept", "expected", "breaks"),
+    [
+        (slice(35, 100), slice(40, 100), (30,)),
+        (slice(0, 75), slice(0, 70), (40,)),
+        (slice(61, 79), None, ()),
+        (np.r_[0:20, 25:30, 30:60], np.r_[0:20, 25:60], (20, 35)),
+        (np.r_[0:5, 10:40, 70:100], np.r_[10:40, 70:100], (30,)),
+        (np.r_[0:9, 50:59], None, ()),
+    ],
+)
+def test_scraps_of_stretches_are_left_out_and_told(
+    kept: slice | np.ndarray, expected: slice | np.ndarray | None, breaks: tuple[int, ...]
+) -> None:
+    made = in_three()
+    if expected is None:
+        with pytest.raises(RecordingError, match="at least 10 samples"):
+            made.taken(kept)
+        return
+    part = made.taken(kept)
+    np.testing.assert_array_equal(part.t, made.t[expected])
+    assert part.breaks == breaks
+    scraps = part.t.size < made.t[kept].size
+    assert part.notes == ((LEFT_OUT,) if scraps else ())
+
+
+def test_a_time_that_cuts_a_stretch_short_leaves_it_out() -> None:
+    part = in_three().between(0.35, 99.0)
+    assert part.t[0] == pytest.approx(1.4)
+    assert part.notes == (LEFT_OUT,)
+
+
 def test_an_axle_that_rolls_without_slip_has_no_slip_angle() -> None:
     """On a circle of radius R about a point in line with the rear axle both slips vanish."""
     l_f, l_r, R, v = 1.2, 1.5, 30.0, 5.0
