@@ -338,7 +338,9 @@ class Recording:
             kept = np.concatenate([kept[piece] for piece in whole])
         ends = np.cumsum([piece.stop - piece.start for piece in whole])
         cut: dict[str, Any] = {
-            name: getattr(self, name)[kept] for name in SIGNALS if getattr(self, name) is not None
+            name: signal[kept] if isinstance(kept, slice) else _rows(signal, kept)
+            for name in SIGNALS
+            if (signal := getattr(self, name)) is not None
         }
         notes = self.notes
         if scraps:
@@ -456,6 +458,15 @@ def _in_a_row(signals: Sequence[Array]) -> Array:
     np.concatenate(signals, out=row)
     row.setflags(write=False)
     return row
+
+
+def _rows(signal: Array, kept: NDArray[np.intp]) -> Array:
+    """Return some samples of a signal, as what nobody may write."""
+    rows = large((kept.size, *signal.shape[1:]))
+    for part in blocks(kept.size):
+        rows[part] = signal[kept[part]]
+    rows.setflags(write=False)
+    return rows
 
 
 def _read_only(value: object) -> Array:

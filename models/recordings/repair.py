@@ -6,16 +6,16 @@ low pass, its delay, its offset, its factor. It is taken out backwards. Conventi
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from codegen.arrays import Array, filled
+from codegen.arrays import Array, blocks, filled, large
 from models.logs.log import RecordingError
-from models.recordings.record import MINIMUM_SAMPLES, Recording, joined
+from models.recordings.record import MINIMUM_SAMPLES, Recording
 from models.schema import Table, shown
 from models.smoothing import without_low_pass
 from models.vehicle import Vehicle
@@ -117,10 +117,6 @@ class Repair:
                 raise RecordingError(f"{recording.name}: has no {name} that could be repaired")
         if not told:
             return recording, self.on(vehicle)
-        if recording.breaks:
-            parts = [recording.taken(piece) for piece in recording.stretches]
-            mended = [self.apply(part, vehicle) for part in parts]
-            return joined([part for part, _ in mended], recording.name), mended[0][1]
         n, t = len(recording), recording.t
         signals: dict[str, Array] = {
             name: filled(n, partial(self._scaled, recording, name))
@@ -133,10 +129,13 @@ class Repair:
             signals["v_y"] = filled(n, lambda k: speed[k] * np.tan(angle[k] * factor) - offset)
         for name, delay in self.delay.items():
             late = signals[name]
-            signals[name] = filled(n, partial(_earlier, t, late, delay))
+            signals[name] = _by_stretches(recording, partial(_earlier, t, late, delay))
         width = round(SMOOTHED * vehicle.froude_time / recording.dt)
         for name, lag in self.lag.items():
-            signals[name] = without_low_pass(signals[name], lag, recording.dt, width)
+            low = signals[name]
+            signals[name] = large((n,))
+            for piece in recording.stretches:
+                signals[name][piece] = without_low_pass(low[piece], lag, recording.dt, width)
         r = signals["r"]
         if turned:
             c, s = math.cos(self.velocity_sensor_angle), math.sin(self.velocity_sensor_angle)
@@ -145,14 +144,11 @@ class Repair:
             signals["v_y"] = filled(n, lambda k: c * v_y[k] + s * v_x[k] - x * r[k])
         if self.acceleration_sensor_x:
             ahead, a_y = self.acceleration_sensor_x, signals["a_y"]
-            signals["a_y"] = filled(n, lambda k: a_y[k] - ahead * _rate(r, k, recording.dt))
-        signals["t"] = recording.t
-        if recording.axle_force is not None:
-            signals["axle_force"] = recording.axle_force
-        kept = self._kept(recording)
-        changes: dict[str, Any] = {name: signal[kept] for name, signal in signals.items()}
-        repaired = replace(recording, **changes)
-        return repaired, self.on(vehicle)
+            signals["a_y"] = _by_stretches(
+                recording, lambda whole, k: a_y[k] - ahead * _rate(r, whole, k, recording.dt)
+            )
+        changes: dict[str, Any] = dict(signals)
+        return self._measured(replace(recording, **changes)), self.on(vehicle)
 
     def _scale(self, name: str) -> tuple[float, float]:
         return self.factor.get(name, 1.0), self.offset.get(name, 0.0)
@@ -177,17 +173,28 @@ class Repair:
         numbers: dict[str, Any] = dict(self.vehicle)
         return replace(vehicle, **numbers) if numbers else vehicle
 
-    def _kept(self, recording: Recording) -> slice:
+    def _measured(self, repaired: Recording) -> Recording:
         """Return the samples at which every channel was measured."""
         late = max(0.0, *self.delay.values(), 0.0)
         early = max(0.0, *(-delay for delay in self.delay.values()), 0.0)
-        first, last = (math.ceil(time / recording.dt - 1e-6) for time in (early, late))
-        if len(recording) - first - last < MINIMUM_SAMPLES:
+        first, last = (math.ceil(time / repaired.dt - 1e-6) for time in (early, late))
+        if not (first or last):
+            return repaired
+        stretches = [slice(one.start + first, one.stop - last) for one in repaired.stretches]
+        kept = [one for one in stretches if one.stop - one.start >= MINIMUM_SAMPLES]
+        if not kept:
+            whole = "any stretch of its" if repaired.breaks else "its"
             raise RecordingError(
-                f"{recording.name}: delays of {1e3 * late:g} and {1e3 * early:g} ms leave nothing "
-                f"of its {recording.duration:g} s"
+                f"{repaired.name}: delays of {1e3 * late:g} and {1e3 * early:g} ms leave nothing "
+                f"of {whole} {repaired.duration:g} s"
             )
-        return slice(first, len(recording) - last)
+        if not repaired.breaks:
+            return repaired.taken(kept[0])
+        left = repaired.taken(np.concatenate([np.arange(one.start, one.stop) for one in kept]))
+        if lost := len(stretches) - len(kept):
+            note = f"left out: {lost} stretch{'es' * (lost > 1)} of which delays leave nothing"
+            left = replace(left, notes=(*left.notes, note))
+        return left
 
     def merged(self, other: "Repair") -> "Repair":
         """Return what both take out, as of numbers that were estimated together.
@@ -304,13 +311,26 @@ def _added(one: Mapping[str, float], other: Mapping[str, float]) -> dict[str, fl
     return {key: one.get(key, 0.0) + other.get(key, 0.0) for key in {**one, **other}}
 
 
-def _earlier(t: Array, signal: Array, delay: float, part: slice) -> Array:
-    """Return samples of a signal a delay earlier."""
-    return np.interp(t[part] + delay, t, signal)
+def _by_stretches(recording: Recording, compute: Callable[[slice, slice], Array]) -> Array:
+    """Return values of samples that are computed of their stretch alone, block by block (n,).
+
+    compute : returns the values of a part (k,) of a stretch, told both.
+    """
+    values = large((len(recording),))
+    for whole in recording.stretches:
+        for part in blocks(whole.stop, whole.start):
+            values[part] = compute(whole, part)
+    values.setflags(write=False)
+    return values
 
 
-def _rate(signal: Array, part: slice, dt: float) -> Array:
-    """Return the rate of change of samples of a signal, by central differences."""
-    first = max(part.start - 1, 0)
-    rate: Array = np.gradient(signal[first : part.stop + 1], dt)
+def _earlier(t: Array, signal: Array, delay: float, whole: slice, part: slice) -> Array:
+    """Return samples of a part of a stretch of a signal a delay earlier."""
+    return np.interp(t[part] + delay, t[whole], signal[whole])
+
+
+def _rate(signal: Array, whole: slice, part: slice, dt: float) -> Array:
+    """Return the rate of change over a part of a stretch of a signal, by central differences."""
+    first, end = max(part.start - 1, whole.start), min(part.stop + 1, whole.stop)
+    rate: Array = np.gradient(signal[first:end], dt)
     return rate[part.start - first :][: part.stop - part.start]
