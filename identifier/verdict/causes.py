@@ -12,14 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from models.faults import (
-    Misaligned,
-    SensorElsewhere,
-    SensorFault,
-    ShiftedCenter,
-    WrongNumber,
-)
-from models.recordings import Recording
+from models.recordings import Recording, Repair
 from models.vehicle import Vehicle
 
 TELLING = 0.3  # share of what is missed (squared) that a cause must explain to be named
@@ -63,21 +56,29 @@ class Cause(NamedTuple):
         return {"": 1.0, "length": vehicle.wheelbase, "speed": vehicle.froude_speed}[self.scale]
 
 
-def _ahead(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
-    return Mended(SensorElsewhere(sensor="velocity", x=-size).apply(recording), vehicle)
+def _by(repair: Callable[[Vehicle, float], Repair]) -> Mend:
+    """Return what takes out a fault of a size by a repair of it."""
 
+    def mend(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
+        return Mended(*repair(vehicle, size).apply(recording, vehicle))
 
-def _turned(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
-    return Mended(Misaligned(angle=-size).apply(recording), vehicle)
+    return mend
 
 
 def _off(name: str) -> Mend:
-    def mend(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
-        return Mended(
-            SensorFault(channel=name, kind="biased", size=-size).apply(recording), vehicle
-        )
+    return _by(lambda _, size: Repair(offset={name: size}))
 
-    return mend
+
+def _scaled(name: str) -> Mend:
+    return _by(lambda _, size: Repair(factor={name: 1.0 / (1.0 + size)}))
+
+
+def _inertia(vehicle: Vehicle, size: float) -> Repair:
+    return Repair(vehicle={"yaw_inertia": math.exp(-size) * vehicle.yaw_inertia})
+
+
+def _center(vehicle: Vehicle, size: float) -> Repair:
+    return Repair(vehicle={"l_f": vehicle.l_f + size, "l_r": vehicle.l_r - size})
 
 
 def _earlier(name: str) -> Mend:
@@ -95,23 +96,6 @@ def _earlier(name: str) -> Mend:
     return mend
 
 
-def _scaled(name: str) -> Mend:
-    def mend(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
-        fault = SensorFault(channel=name, kind="scaled", size=1.0 / (1.0 + size))
-        return Mended(fault.apply(recording), vehicle)
-
-    return mend
-
-
-def _inertia(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
-    told = WrongNumber(field="yaw_inertia", factor=math.exp(-size))
-    return Mended(recording, told.tell(vehicle))
-
-
-def _center(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
-    return Mended(recording, ShiftedCenter(share=size / vehicle.wheelbase).tell(vehicle))
-
-
 def _bank(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
     return Mended(recording, vehicle, size)
 
@@ -119,11 +103,12 @@ def _bank(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
 DEGREE, MILLI = math.degrees(1.0), 1e3
 CAUSES = (
     Cause("sensor_ahead", "v_y is measured {size:+.2g} m from the center of gravity (+: ahead)",
-          1.0, 0.1, 0.8, True, "length", _ahead),
+          1.0, 0.1, 0.8, True, "length",
+          _by(lambda _, size: Repair(velocity_sensor_x=size))),
     Cause("v_y_bias", "v_y reads {size:+.2g} m/s too much", 1.0, 0.02, 0.4, True, "speed",
           _off("v_y")),
     Cause("mount", "the velocity sensor is turned by {size:+.2g} degrees (+: to the left)", DEGREE,
-          0.008, 0.1, True, "", _turned),
+          0.008, 0.1, True, "", _by(lambda _, size: Repair(velocity_sensor_angle=size))),
     Cause("steering_zero", "the zero of the steering is off by {size:+.2g} degrees", DEGREE,
           0.008, 0.1, True, "", _off("delta_f")),
     Cause("steering_late", "the steering angle is {size:.0f} ms late against the motion", MILLI,
@@ -133,9 +118,9 @@ CAUSES = (
     Cause("v_y_late", "v_y is {size:.0f} ms late (filtered?)", MILLI,
           0.03, 0.4, False, "", _earlier("v_y")),
     Cause("yaw_inertia", "the told yaw inertia is about {factor:.2g} times the true one", 1.0,
-          0.5, 4.0, True, "", _inertia),
+          0.5, 4.0, True, "", _by(_inertia)),
     Cause("center_of_gravity", "the center of gravity is {size:+.2g} m farther back than told "
-          "(l_f and l_r)", 1.0, 0.06, 0.3, True, "length", _center),
+          "(l_f and l_r)", 1.0, 0.06, 0.3, True, "length", _by(_center)),
     Cause("bank", "the road falls by {size:+.2g} degrees (+: to the left), or wind pushes so",
           DEGREE, 0.02, 0.2, True, "", _bank),
     Cause("v_y_scale", "v_y is scaled by {size:+.0f} %", 100.0,
