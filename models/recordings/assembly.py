@@ -81,7 +81,7 @@ def recording_of(
     notes = (*_notes(log), *reading.notes, *_gap_notes(stretches.kept))
     if stretches.short:
         several = "es" if stretches.short > 1 else ""
-        notes += (f"left out: {stretches.short} stretch{several} of less than {SHORTEST:g} s",)
+        notes += (f"left out: {stretches.short} stretch{several} of less than {_shortest(dt):g} s",)
     recordings = [
         _recording(name if run is None else f"{name}:{run}", one, log_map, dt)
         for one in stretches.kept
@@ -231,7 +231,7 @@ def _stretches(
             f"{label}: at no time are all channels sampled: they must overlap in time"
         )
     longest = max(found, key=lambda one: one.t.size)
-    kept = [one for one in found if one.t.size * dt >= SHORTEST] or [longest]
+    kept = [one for one in found if one.t.size * dt >= _shortest(dt)] or [longest]
     if longest.t.size < MINIMUM_SAMPLES:
         t = longest.t
         raise RecordingError(
@@ -239,6 +239,11 @@ def _stretches(
             f"{dt:g} s are needed"
         )
     return Stretches(kept, len(found) - len(kept))
+
+
+def _shortest(dt: float) -> float:
+    """Return how long a stretch must be [s]: to teach something, and to be a recording."""
+    return max(SHORTEST, MINIMUM_SAMPLES * dt)
 
 
 def _judge_time(label: str, raw: Raw) -> None:

@@ -358,3 +358,13 @@ def test_a_data_frame_with_a_repair_is_judged_by_what_the_repair_leaves(mirrored
     with pytest.raises(RecordingError, match="ay "):
         Recording.from_dataframe(data, log_map=STILL_WRONG)
     assert len(Recording.from_dataframe(data, log_map=RIGHT)) == len(log)
+
+
+def test_at_a_coarse_interval_a_stretch_of_too_few_samples_is_left_out(tmp_path: Path) -> None:
+    lines = rows(40, dt=0.05) + rows(200, dt=0.05, start=10.0)  # 2 s and 10 s
+    path = write(tmp_path / "coarse.csv", "t,vx,vy,r,delta_f", lines)
+    fine = read_recording(path, dt=0.05)
+    assert len(fine.stretches) == 2 and not any("left out" in note for note in fine.notes)
+    coarse = read_recording(path, dt=0.25)
+    assert coarse.breaks == () and len(coarse) >= 40
+    assert coarse.notes[-1:] == ("left out: 1 stretch of less than 2.5 s",)
