@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Any
 
 
-def write_atomically(path: str | PathLike[str], content: str | bytes) -> None:
+def write_atomically(path: str | PathLike[str], content: str | bytes | Iterable[bytes]) -> None:
     """Write a file; whoever reads it meanwhile, or after a failure, sees the old one whole.
 
     Parameters
     ----------
     path : the file; where it is a link, what it points to.
-    content : text, written in UTF-8 with line ends as they are, or bytes.
+    content : text, written in UTF-8 with line ends as they are, or bytes, also one part
+        after the other.
 
     Raises
     ------
@@ -23,10 +24,11 @@ def write_atomically(path: str | PathLike[str], content: str | bytes) -> None:
         Where the file cannot be written; nothing is left behind.
     """
     target = Path(path).resolve()
-    data = content.encode("utf-8") if isinstance(content, str) else content
+    whole = content.encode("utf-8") if isinstance(content, str) else content
     with tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as scratch:
         part = Path(scratch) / target.name  # in the same folder, thus on the same disk
-        part.write_bytes(data)
+        with part.open("wb") as file:
+            file.writelines([whole] if isinstance(whole, bytes) else whole)
         part.replace(target)
 
 

@@ -5,10 +5,10 @@ ISO axes: x forward, y left, z up; r and delta turn left when positive, forces p
 """
 
 import csv
-import gzip
 import io
 import math
-from collections.abc import Mapping, Sequence
+import zlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from os import PathLike
@@ -499,14 +499,17 @@ def _off_grid(t: Array, step: float) -> float:
     )
 
 
-# Write a recording as a CSV that `read_recording` reads back bit for bit.
+# Write a recording as a CSV.
 
 
 def write_recording(recording: Recording, path: str | Path) -> Path:
     """Write t [s], vx, vy [m/s], r [rad/s], delta_f, delta_r [rad], ay [m/s^2], Fyf, Fyr [N].
 
     Columns that the recording lacks are left out. Numbers are the shortest that read back the
-    same. The file appears whole or not at all; an existing one is replaced.
+    same: `read_recording` gives the recording back bit for bit at its own interval, a drive in
+    stretches where each lasts a second and time leaps by more than 0.1 s between them. Over a
+    shorter gap a reader draws a line, unless its map tells a shorter `longest_gap`, and shorter
+    stretches it leaves out. The file appears whole or not at all; an existing one is replaced.
 
     Parameters
     ----------
@@ -538,15 +541,29 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
     columns = {name: signal for name, signal in signals.items() if signal is not None}
     if recording.axle_force is not None:
         columns["Fyf"], columns["Fyr"] = recording.axle_force.T
+    text = _csv(columns)
+    write_atomically(path, _packed(text) if path.name.lower().endswith(".gz") else text)
+    return path
+
+
+def _csv(columns: Mapping[str, Array]) -> Iterator[bytes]:
+    """Yield a table as CSV, block by block."""
     text = io.StringIO(newline="")
     table = csv.writer(text, lineterminator="\n")
     table.writerow(columns)
-    table.writerows(np.column_stack(list(columns.values())).tolist())
-    data = text.getvalue().encode()
-    if path.name.lower().endswith(".gz"):
-        data = gzip.compress(data, mtime=0)  # without a time stamp: same recording, same bytes
-    write_atomically(path, data)
-    return path
+    for part in blocks(len(columns["t"])):
+        table.writerows(np.column_stack([one[part] for one in columns.values()]).tolist())
+        yield text.getvalue().encode()
+        text.seek(0)
+        text.truncate()
+
+
+def _packed(parts: Iterable[bytes]) -> Iterator[bytes]:
+    """Yield bytes as gzip packs them, without a time stamp: same recording, same bytes."""
+    packing = zlib.compressobj(9, zlib.DEFLATED, 16 + zlib.MAX_WBITS)
+    for part in parts:
+        yield packing.compress(part)
+    yield packing.flush()
 
 
 # Bring the columns of a log to a uniform grid.

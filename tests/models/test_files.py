@@ -1,6 +1,7 @@
 """One way to write a file: whole, or as it was before."""
 
 from dataclasses import replace
+from io import FileIO
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,10 @@ from models.vehicle import sedan
 def test_text_and_bytes_arrive_as_they_are(tmp_path):
     write_atomically(tmp_path / "text", "ä\nb\r\n")
     write_atomically(str(tmp_path / "bytes"), b"\x00\xff")
+    write_atomically(tmp_path / "parts", iter([b"a", b"", b"\x00"]))
     assert (tmp_path / "text").read_bytes() == "ä\nb\r\n".encode()
     assert (tmp_path / "bytes").read_bytes() == b"\x00\xff"
+    assert (tmp_path / "parts").read_bytes() == b"a\x00"
 
 
 def test_a_file_has_the_permissions_of_any_new_file(tmp_path):
@@ -43,7 +46,13 @@ def save_vehicle(path, version):
 def save_in_place(path, version):
     with path.open("w") as file:
         file.write(f"version {version}")
-        Path(file.name).write_bytes(b"")  # what a full disk would do
+
+
+class FullDisk(FileIO):
+    """A file on a disk without room."""
+
+    def write(self, _):
+        raise OSError("disk full")
 
 
 def require_old_or_new(monkeypatch, path, save):
@@ -54,9 +63,14 @@ def require_old_or_new(monkeypatch, path, save):
     def fail(*_):
         raise OSError("disk full")
 
-    for step in ("write_bytes", "replace"):
+    opened = Path.open
+
+    def full(path, mode="r", *rest, **more):
+        return FullDisk(path, "w") if "w" in mode else opened(path, mode, *rest, **more)
+
+    for step, broken_step in (("open", full), ("replace", fail)):
         with monkeypatch.context() as broken:
-            broken.setattr(Path, step, fail)
+            broken.setattr(Path, step, broken_step)
             with pytest.raises(OSError, match="disk full"):
                 save(path, 2)
         assert path.read_bytes() == first

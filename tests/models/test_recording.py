@@ -1,5 +1,7 @@
 """The recording itself: shape rules, slices, slip angles, and what is written reads back."""
 
+import gzip
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.recordings import Recording, RecordingError, read_recording, write_recording
+from models.recordings import (
+    LogMap,
+    Recording,
+    RecordingError,
+    read_recording,
+    write_recording,
+)
 
 N = 100
 
@@ -180,3 +188,41 @@ def test_writing_leaves_one_file_and_refuses_other_endings(tmp_path: Path) -> No
     assert [p.name for p in tmp_path.iterdir()] == ["a.csv.gz"]
     with pytest.raises(RecordingError, match=r"must end in \.csv"):
         write_recording(recording(), tmp_path / "a.mat")
+
+
+@pytest.mark.parametrize("gap", [0.105, 0.05])
+def test_stretches_are_read_back_where_gaps_are_long_or_the_map_says_so(
+    tmp_path: Path, gap: float
+) -> None:
+    t = 0.01 * np.arange(300)
+    t[150:] += gap
+    columns = ("v_x", "v_y", "r", "delta_f", "delta_r")
+    rng = np.random.default_rng(2)
+    signals = {name: rng.normal(size=t.size) for name in columns}
+    made = Recording(name="gap", t=t, **signals, breaks=(150,))
+    path = write_recording(made, tmp_path / "gap.csv")
+    again = read_recording(path, check=False, log_map=LogMap(longest_gap=0.02))
+    for name in ("t", *columns):
+        assert np.array_equal(getattr(again, name), getattr(made, name))
+    assert again.breaks == made.breaks
+    bridged = read_recording(path, check=False)
+    assert bridged.breaks == (made.breaks if gap > 0.1 else ())
+
+
+@pytest.mark.parametrize("ending", [".csv", ".csv.gz"])
+def test_a_long_recording_is_written_by_blocks_with_the_bytes_of_one_piece(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str
+) -> None:
+    n = 20_000
+    rng = np.random.default_rng(3)
+    signals = {k: rng.normal(size=n) for k in ("v_x", "v_y", "r", "delta_f", "delta_r")}
+    made = Recording(name="long", t=0.01 * np.arange(n), **signals)
+    piece = write_recording(made, tmp_path / f"piece{ending}").read_bytes()
+    monkeypatch.setattr("codegen.arrays.LONG", 1000)
+    monkeypatch.setattr("codegen.arrays.BLOCK", 500)
+    tracemalloc.start()
+    path = write_recording(made, tmp_path / f"blocks{ending}")
+    held = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert path.read_bytes() == piece
+    assert held < 0.5 * len(gzip.decompress(piece) if ending.endswith("gz") else piece)
