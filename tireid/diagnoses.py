@@ -8,7 +8,6 @@ from pathlib import Path
 
 from identifier.doctor import Diagnosis, Finding
 from identifier.doctor.diagnosis import WITHOUT_V_Y
-from models.files import write_atomically
 from models.recordings import (
     LogMap,
     Recording,
@@ -207,5 +206,5 @@ def write_repair(path: Path, told: LogMap, diagnosis: Diagnosis) -> LogMap:
     diagnosis : of what was read so.
     """
     repaired = replace(told, repair=told.repair.then(diagnosis.repair))
-    write_atomically(path, repaired.toml())
+    repaired.to_toml(path)
     return repaired

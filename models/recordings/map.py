@@ -144,8 +144,16 @@ class LogMap:
             given["repair"] = Repair.of_table(table.table("repair"))
         return cls(**given)
 
-    def toml(self) -> str:
-        """Return the text of the log.toml that `from_toml` reads back bit for bit."""
+    def toml(self, folder: str | PathLike[str] | None = None) -> str:
+        """Return the text of the log.toml that `from_toml` reads back bit for bit.
+
+        Parameters
+        ----------
+        folder : where the log.toml shall lie: a DBC file in it, or below, is named from there, any
+            other by its whole path. None names it as it is told.
+        """
+        if self.dbc and folder is not None:
+            return replace(self, dbc=_named_from(Path(self.dbc), Path(folder))).toml()
         plain, blocks = LogMap(), []
         for table, keys in (
             ("file", {"axes": "axes", "run": "run", "dbc": "dbc"}),
@@ -171,7 +179,16 @@ class LogMap:
         ----------
         path : of the file; what is there is replaced.
         """
-        write_atomically(Path(path), self.toml())
+        write_atomically(path, self.toml(Path(path).parent))
+
+
+def _named_from(file: Path, folder: Path) -> str:
+    """Return how a file that is there is named in one of a folder; the name itself of another."""
+    if not file.is_file():
+        return str(file)
+    whole = file.resolve()
+    below = whole.is_relative_to(folder.resolve())
+    return whole.relative_to(folder.resolve()).as_posix() if below else str(whole)
 
 
 def _texts(table: Table, *keys: str) -> dict[str, str]:

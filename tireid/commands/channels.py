@@ -81,7 +81,7 @@ def run(options: argparse.Namespace) -> int:
         tell(f"{column_of('a_y')} is there: without vy, identify estimates it")
     tell(missing_text(options.log, missing, proposal))
     if options.write is not None:
-        text = replace(told, signals=signals).toml()
+        text = replace(told, signals=signals).toml(options.write.parent)
         write_atomically(options.write, text + unsure_toml(missing, proposal))
         say(f"wrote {options.write}" + (": what is missing stands behind # in it" * bool(missing)))
     return FAILS if missing and not goes else DONE
