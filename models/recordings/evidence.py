@@ -1,7 +1,8 @@
 """What a recording says about itself, in window means that noise and lag do not upset.
 
-Over a window of length T the lateral kinematics hold exactly without differentiating a signal:
-mean(a_y) = (v_y(t + T) - v_y(t))/T + mean(v_x r).
+Over a window of length T the lateral kinematics hold without differentiating a signal:
+mean(a_y) = (v_y(t + T) - v_y(t))/T + mean(v_x r). A mean is that of the samples from t to before
+t + T, so it lies half a step early: of what a signal changes over a window it misses dt/(2 T).
 """
 
 from collections.abc import Callable

@@ -254,8 +254,9 @@ def told_signals(pairs: Sequence[str]) -> dict[str, Signal]:
     """Return signals as they are told on a command line.
 
     "vy=Vel Lat [km/h]", "delta_f=SteerAngle [deg] /14.6", "r=Gyro Z *-1",
-    "delta_f=SteerFL+SteerFR": NAME=CHANNEL, and behind it a unit in brackets, a factor behind a
-    star, an offset in SI behind a minus, a ratio of the steering behind a slash.
+    "delta_f=SteerFL + SteerFR": NAME=CHANNEL, and behind it a unit in brackets, a factor behind a
+    star, an offset in SI behind a minus, a ratio of the steering behind a slash. Of several
+    channels, with blanks about each plus, the mean is taken, of forces the sum.
 
     Parameters
     ----------

@@ -150,6 +150,7 @@ def test_what_is_no_map_is_refused_in_one_line(tmp_path: Path, text: str, rule: 
         ("r=Gyro Z [deg/s] *-1", "r", Signal(channel=("Gyro Z",), unit="deg/s", factor=-1.0)),
         ("ay=a *2 -0.3", "a_y", Signal(channel=("a",), factor=2.0, offset=0.3)),
         ("delta_f=FL + FR", "delta_f", Signal(channel=("FL", "FR"))),
+        ("delta_f=FL+FR", "delta_f", Signal(channel=("FL+FR",))),
         ("r=/imu.angular_velocity.z", "r", Signal(channel=("/imu.angular_velocity.z",))),
         ("beta=Slip-Angle", "beta", Signal(channel=("Slip-Angle",))),
     ],
