@@ -33,8 +33,9 @@ from benchmarks.random_cars import (
     random_beginning,
 )
 from benchmarks.targets import Targets, keeps, show
-from models.faults import CHANNELS, FaultError
+from models.faults import FaultError
 from models.recordings import Recording
+from models.recordings.record import CHANNELS
 from models.sensors import Sensors
 
 RUNS, DRIVES = 20_000, 40  # drives are shared by runs

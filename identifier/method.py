@@ -24,7 +24,7 @@ from models.recordings import Recording
 from models.recordings.record import ALL
 from models.rules import LARGEST_FORCE
 from models.schema import Table
-from models.vehicle import Vehicle
+from models.vehicle import BICYCLE, Vehicle
 
 
 class CannotFreezeError(ValueError):
@@ -538,15 +538,7 @@ PROBE = 0.02  # rad, a slip at which every tire pushes back
 WIDE = 0.3  # rad, beyond the slip of every tire's peak
 LARGEST_MIN_SPEED = 50.0  # m/s: above it, a car would have forces on motorways only
 
-VEHICLE_KEYS = (
-    "name",
-    "mass",
-    "yaw_inertia",
-    "l_f",
-    "l_r",
-    "cornering_stiffness_front",
-    "cornering_stiffness_rear",
-)
+VEHICLE_KEYS = ("name", *BICYCLE)
 
 
 def vehicle_numbers(vehicle: Vehicle) -> dict[str, Any]:

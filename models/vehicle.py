@@ -227,6 +227,16 @@ def _require_size(mass: float, l_f: float, l_r: float) -> None:
     require_within(VehicleError, 1e-3, 30.0, l_f=l_f, l_r=l_r)
 
 
+BICYCLE = (
+    "mass",
+    "yaw_inertia",
+    "l_f",
+    "l_r",
+    "cornering_stiffness_front",
+    "cornering_stiffness_rear",
+)  # the six numbers of the linear bicycle, of a `Vehicle`
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Vehicle:
     """A car; `chassis` may be None where only the linear bicycle is needed.

@@ -24,7 +24,7 @@ from codegen.arrays import Array
 from identifier.axle.curve import unit_matrix
 from identifier.verdict.motion import white_noise
 from models.recordings import Recording
-from models.recordings.repair import CHANNELS
+from models.recordings.record import CHANNELS
 from models.smoothing import low_passed, smoothed, window
 from models.vehicle import GRAVITY, Vehicle
 

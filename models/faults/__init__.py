@@ -17,7 +17,6 @@ from models.faults.drives import (
     WrongNumber,
 )
 from models.faults.signals import (
-    CHANNELS,
     KINDS,
     SIZED,
     UNITS,
@@ -34,7 +33,6 @@ from models.faults.signals import (
 )
 
 __all__ = [
-    "CHANNELS",
     "KINDS",
     "SIZED",
     "UNITS",

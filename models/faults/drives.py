@@ -10,13 +10,13 @@ import numpy as np
 
 from codegen.arrays import Array
 from models.faults.signals import (
-    CHANNELS,
     Fault,
     FaultError,
     channel_of,
     require_finite,
 )
 from models.recordings import Recording
+from models.recordings.record import CHANNELS
 from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
 

@@ -12,11 +12,11 @@ import numpy as np
 
 from codegen.arrays import Array
 from models.recordings import Recording
+from models.recordings.record import CHANNELS
 from models.rules import require_positive
 from models.smoothing import low_passed
 from models.vehicle import GRAVITY
 
-CHANNELS = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")
 # How often a wrong unit fits into the right one: what is logged is the SI value times it.
 UNITS: Mapping[str, float] = {"deg": 180.0 / math.pi, "km/h": 3.6, "g": 1.0 / GRAVITY}
 

@@ -5,7 +5,7 @@ forces [N]; sideslip β [rad] stands in for v_y = v_x tan β. Left is positive.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -17,6 +17,7 @@ from models.logs.units import ACCELERATION, ANGLE, FORCE, RATE, SPEED
 from models.schema import shown
 
 BETA = "beta"
+INSTEAD = {"v_y": BETA, BETA: "v_y"}  # one of them is read, never both
 NEEDED = ("v_x", "v_y", "r", "delta_f")  # beta may stand in for v_y, or a_y, less surely
 QUANTITIES: Mapping[str, str] = MappingProxyType(
     {
@@ -46,6 +47,16 @@ MEANINGS: Mapping[str, str] = MappingProxyType(
     }
 )
 LARGEST_RATIO = 1e3  # of hand wheel over road wheel, either way
+
+
+def told_by(signals: Iterable[str]) -> set[str]:
+    """Return what signals tell, by name; beta tells v_y.
+
+    Parameters
+    ----------
+    signals : our names.
+    """
+    return {"v_y" if name == BETA else name for name in signals}
 
 
 def signal_name(name: str) -> str | None:

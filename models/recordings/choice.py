@@ -11,7 +11,16 @@ from typing import NamedTuple
 
 from models.logs.log import Heading, LogFile, RecordingError, some
 from models.logs.names import Proposal, propose
-from models.logs.signals import BETA, COLUMNS, NEEDED, QUANTITIES, Signal, require_fitting
+from models.logs.signals import (
+    BETA,
+    COLUMNS,
+    INSTEAD,
+    NEEDED,
+    QUANTITIES,
+    Signal,
+    require_fitting,
+    told_by,
+)
 from models.logs.spelling import without_unit
 from models.logs.units import SI
 from models.recordings.map import LogMap
@@ -160,8 +169,7 @@ def standard_signals(log: LogFile, names: list[str]) -> dict[str, Signal]:
 
 def _beside(more: Mapping[str, Signal], told: Mapping[str, Signal]) -> dict[str, Signal]:
     """Return signals that are told, and more where they are not; beta and v_y exclude another."""
-    instead = {"v_y": BETA, BETA: "v_y"}
-    kept = {name: one for name, one in more.items() if instead.get(name) not in told}
+    kept = {name: one for name, one in more.items() if INSTEAD.get(name) not in told}
     found = {**kept, **told}
     if "v_y" in found:
         found.pop(BETA, None)
@@ -177,7 +185,7 @@ def missing_signals(signals: Mapping[str, Signal]) -> list[str]:
     ----------
     signals : by our name.
     """
-    there = {"v_y" if name == BETA else name for name in signals}
+    there = told_by(signals)
     return [name for name in NEEDED if name not in there]
 
 

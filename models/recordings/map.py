@@ -23,7 +23,15 @@ from typing import Any
 from models.files import write_atomically
 from models.logs.clock import LONGEST_GAP
 from models.logs.log import RecordingError
-from models.logs.signals import BETA, NEEDED, QUANTITIES, Signal, require_fitting, signal_name
+from models.logs.signals import (
+    INSTEAD,
+    NEEDED,
+    QUANTITIES,
+    Signal,
+    require_fitting,
+    signal_name,
+    told_by,
+)
 from models.logs.units import to_si
 from models.recordings.repair import Repair
 from models.schema import Table, read_toml, shown
@@ -83,8 +91,7 @@ class LogMap:
     @property
     def is_complete(self) -> bool:
         """Whether every signal that is needed is told: then only what is told is read."""
-        told = {"v_y" if name == BETA else name for name in self.signals}
-        return set(NEEDED) <= told
+        return set(NEEDED) <= told_by(self.signals)
 
     def with_signals(self, signals: Mapping[str, Signal]) -> "LogMap":
         """Return the map with some signals told otherwise; v_y and beta replace one another.
@@ -95,7 +102,7 @@ class LogMap:
         """
         merged = dict(self.signals)
         for name in signals:
-            merged.pop({"v_y": BETA, BETA: "v_y"}.get(name, ""), None)
+            merged.pop(INSTEAD.get(name, ""), None)
         return replace(self, signals={**merged, **signals})
 
     @classmethod

@@ -389,7 +389,8 @@ def peak(signal: Array) -> float:
     return max(abs(float(signal.min())), abs(float(signal.max())))
 
 
-SIGNALS = ("t", "v_x", "v_y", "r", "delta_f", "delta_r", "a_y", "axle_force")
+CHANNELS = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")  # what sensors show
+SIGNALS = ("t", *CHANNELS, "axle_force")
 
 
 def joined(recordings: Sequence[Recording], name: str | None = None) -> Recording:

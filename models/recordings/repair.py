@@ -15,26 +15,12 @@ import numpy as np
 
 from codegen.arrays import Array, blocks, filled, large
 from models.logs.log import RecordingError
-from models.recordings.record import MINIMUM_SAMPLES, Recording
+from models.recordings.record import CHANNELS, MINIMUM_SAMPLES, Recording
 from models.schema import Table, shown
 from models.smoothing import without_low_pass
-from models.vehicle import Vehicle
+from models.vehicle import BICYCLE, Vehicle
 
-CHANNELS = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")
-NUMBERS = (
-    "mass",
-    "yaw_inertia",
-    "l_f",
-    "l_r",
-    "cornering_stiffness_front",
-    "cornering_stiffness_rear",
-)  # of a `Vehicle`
 SMOOTHED = 0.08  # half the width of the window before a low pass is inverted, over sqrt(L/g)
-
-
-def nothing() -> Mapping[str, float]:
-    """Return no number at all."""
-    return {}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,19 +47,19 @@ class Repair:
         zero, a lag that is not positive, or a number of a car that is not.
     """
 
-    factor: Mapping[str, float] = field(default_factory=nothing)
-    offset: Mapping[str, float] = field(default_factory=nothing)
-    delay: Mapping[str, float] = field(default_factory=nothing)
-    lag: Mapping[str, float] = field(default_factory=nothing)
+    factor: Mapping[str, float] = field(default_factory=dict)
+    offset: Mapping[str, float] = field(default_factory=dict)
+    delay: Mapping[str, float] = field(default_factory=dict)
+    lag: Mapping[str, float] = field(default_factory=dict)
     velocity_sensor_x: float = 0.0
     velocity_sensor_angle: float = 0.0
     acceleration_sensor_x: float = 0.0
     sideslip: bool = False
-    vehicle: Mapping[str, float] = field(default_factory=nothing)
+    vehicle: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in TABLES:
-            known = NUMBERS if name == "vehicle" else CHANNELS
+            known = BICYCLE if name == "vehicle" else CHANNELS
             for key, value in getattr(self, name).items():
                 if key not in known:
                     raise RecordingError(

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from models.faults import (
-    CHANNELS,
     AnotherCar,
     Bank,
     ClockJump,
@@ -30,6 +29,7 @@ from models.faults import (
 from models.maneuvers import RandomSteer, StepSteer
 from models.plant import Plant
 from models.recordings import Recording
+from models.recordings.record import CHANNELS
 from models.tires import DugoffTire, FialaTire
 from models.vehicle import GRAVITY, sedan
 
