@@ -44,20 +44,6 @@ def thinning(n: int) -> int:
     return -(-n // LONG)
 
 
-def by_blocks(n: int, at: Callable[[slice], Array]) -> Array:
-    """Return an array of n numbers that is computed block by block, on disk where it is large.
-
-    Parameters
-    ----------
-    n : numbers.
-    at : returns those of a part.
-    """
-    found = large((n,))
-    for part in blocks(n):
-        found[part] = at(part)
-    return found
-
-
 def large(shape: tuple[int, ...]) -> Array:
     """Return an array to be filled: in memory, or in a file without a name where it is large.
 
@@ -78,7 +64,9 @@ def large(shape: tuple[int, ...]) -> Array:
 
 
 def filled(n: int, compute: Callable[[slice], Array]) -> Array:
-    """Return values of samples, computed block by block; nobody may write them, (n,).
+    """Return values of samples, computed block by block, on disk where they are many (n,).
+
+    Nobody may write them.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import LONG, Array, by_blocks
+from codegen.arrays import LONG, Array, filled
 from models.logs.log import Channel, RecordingError
 from models.logs.stamps import not_rising
 
@@ -159,7 +159,7 @@ def sampled(raw: Raw, grid: Array, dt: float) -> Array:
     dt : step of the clock [s].
     """
     interval = _interval(raw.t)
-    return by_blocks(grid.size, lambda part: _sampled(raw, grid[part], dt, interval))
+    return filled(grid.size, lambda part: _sampled(raw, grid[part], dt, interval))
 
 
 def _sampled(raw: Raw, grid: Array, dt: float, interval: float) -> Array:

@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from codegen.arrays import Array, by_blocks
+from codegen.arrays import Array, filled
 from models.logs.log import RecordingError
 from models.logs.units import ACCELERATION, ANGLE, FORCE, RATE, SPEED
 from models.schema import shown
@@ -135,7 +135,7 @@ class Signal:
         plain = Signal(channel=self.channel[:1], unit=self.unit)
         if len(parts) == 1 and self == plain:
             return parts[0]
-        return by_blocks(
+        return filled(
             parts[0].size, lambda part: self._value([one[part] for one in parts], quantity)
         )
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import butter, lfilter, lfilter_zi
 
-from codegen.arrays import Array, by_blocks
+from codegen.arrays import Array, filled
 from models.logs.clock import (
     SLOWEST,
     Raw,
@@ -146,7 +146,7 @@ def scaled(values: Array, factor: float) -> Array:
     """
     if factor == 1.0:
         return values
-    return by_blocks(values.size, lambda part: values[part] * factor)
+    return filled(values.size, lambda part: values[part] * factor)
 
 
 def _timed(label: str, channel: Channel, clock: Channel, stamps: Array) -> Channel:
@@ -289,7 +289,7 @@ def _recording(name: str, stretch: Stretch, log_map: LogMap, dt: float) -> Recor
         signals = {key: _low_pass(one, log_map.low_pass, dt) for key, one in signals.items()}
     if BETA in signals:
         v_x, beta = signals["v_x"], signals[BETA]
-        signals["v_y"] = by_blocks(t.size, lambda part: v_x[part] * np.tan(beta[part]))
+        signals["v_y"] = filled(t.size, lambda part: v_x[part] * np.tan(beta[part]))
     force = side_by_side(signals["Fyf"], signals["Fyr"]) if "Fyf" in signals else None
     for values in (t, *signals.values()):  # kept as they are, not copied
         values.setflags(write=False)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from codegen import arrays
-from codegen.arrays import LONG, blocks, large, thinning
+from codegen.arrays import LONG, blocks, filled, large, thinning
 
 
 @pytest.mark.parametrize("n", [1, 59_999, LONG, LONG + 1, 1_000_000])
@@ -15,6 +15,26 @@ def test_blocks_cover_all_samples_once(n):
     assert [part.start for part in parts] == [0, *(part.stop for part in parts[:-1])]
     assert parts[-1].stop == n
     assert (len(parts) == 1) == (n <= LONG)
+
+
+def test_blocks_from_a_sample_on_cover_what_follows_once(monkeypatch):
+    monkeypatch.setattr(arrays, "LONG", 30)
+    monkeypatch.setattr(arrays, "BLOCK", 10)
+    assert list(blocks(47, 33)) == [slice(33, 43), slice(43, 47)]
+    assert list(blocks(25, 20)) == [slice(20, 25)]
+    assert list(blocks(20, 20)) == []
+
+
+@pytest.mark.parametrize("long", [1000, 20])
+def test_values_are_filled_part_by_part_and_nobody_may_write_them(monkeypatch, long):
+    monkeypatch.setattr(arrays, "LONG", long)
+    monkeypatch.setattr(arrays, "BLOCK", 7)
+    parts = []
+    values = filled(45, lambda part: parts.append(part) or np.arange(45.0)[part] ** 2)
+    np.testing.assert_array_equal(values, np.arange(45.0) ** 2)
+    assert len(parts) == (1 if long > 45 else 7)
+    with pytest.raises(ValueError, match="read-only"):
+        values[0] = 1.0
 
 
 def test_blocks_overlap_as_far_as_there_are_samples():
