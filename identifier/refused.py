@@ -9,8 +9,11 @@ the gap is ever taken for one over a sampling interval. From `STALE_TIME` on for
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from models.vehicle import GRAVITY, Vehicle
 
@@ -80,3 +83,31 @@ def stale_samples(stale_time: float, dt: float) -> int:
     dt : sampling interval [s].
     """
     return max(1, int(stale_time / dt + 0.5))
+
+
+class Rests(NamedTuple):
+    """Samples with rests between stretches, N of them.
+
+    rows : of the recording that each is, at rests the one that follows, (N,).
+    resting : whether it is a rest (N,).   at : which of them each sample is (n,).
+    """
+
+    rows: NDArray[np.intp]
+    resting: NDArray[np.bool_]
+    at: NDArray[np.intp]
+
+
+def with_rests(n: int, breaks: Sequence[int], rest: int) -> Rests:
+    """Return n samples with rests before each stretch but the first.
+
+    Parameters
+    ----------
+    n : samples.
+    breaks : samples with which stretches begin, rising.
+    rest : samples of a rest.
+    """
+    begins = np.repeat(np.asarray(breaks, dtype=np.intp), rest)
+    samples = np.arange(n)
+    resting = np.insert(np.zeros(n, dtype=np.bool_), begins, np.ones(begins.size, dtype=np.bool_))
+    at = np.flatnonzero(~resting)
+    return Rests(np.insert(samples, begins, begins), resting, at)

@@ -15,7 +15,7 @@ from codegen.arrays import Array
 from codegen.package import NAME, c_files, one_file
 from identifier.export.c_source import ORDER, PREFIX, C
 from identifier.export.package import FORMAT, Package
-from identifier.refused import STALE_TIME, stale_samples
+from identifier.refused import STALE_TIME, stale_samples, with_rests
 from models.recordings import Recording
 from models.schema import Table, read_json, read_text, shown
 
@@ -196,13 +196,11 @@ class CompiledPackage:
             raise ValueError(
                 f"{recording.name} is sampled at {recording.dt:g} s, the package at {self.dt:g} s"
             )
-        rows, breaks = samples_of(recording), recording.breaks
-        if not breaks:
-            return self.run_samples(rows)
         missing = stale_samples(STALE_TIME, self.dt)
-        ran = self.run_samples(np.insert(rows, np.repeat(breaks, missing), np.nan, axis=0))
-        at = np.arange(len(rows))
-        at += missing * np.searchsorted(np.array(breaks), at, side="right")
+        rows, resting, at = with_rests(len(recording), recording.breaks, missing)
+        samples = samples_of(recording)[rows]
+        samples[resting] = np.nan
+        ran = self.run_samples(samples)
         outputs = {name: values[at] for name, values in ran.outputs.items()}
         return ShippedRun(ran.axle_force[at], outputs, ran.status[at])
 
