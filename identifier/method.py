@@ -17,7 +17,7 @@ from codegen import Scan
 from codegen.arrays import Array, blocks, large
 from identifier.certificate import Certificate
 from identifier.driving import Driving
-from identifier.refused import NOWHERE, judges_samples
+from identifier.refused import NOWHERE, judges_samples, with_rests
 from identifier.tire_model import Axle, TireModel
 from identifier.tuning import Range, with_numbers
 from models.recordings import Recording
@@ -277,13 +277,10 @@ def shown(
         "v_x": v_x,
         "a_y": a_y,
     }
-    breaks = np.array([k - first for k in recording.breaks if first <= k < last], dtype=np.intp)
-    if not breaks.size:
+    breaks = [k - first for k in recording.breaks if first <= k < last]
+    if not breaks:
         return Shown({port: signals[port] for port in over}, n, None)
-    at = np.arange(n) + rest * np.searchsorted(breaks, np.arange(n), side="right")
-    begins = np.repeat(breaks, rest)  # first sample of the stretch that follows a rest
-    rows = np.insert(np.arange(n), begins, begins)
-    resting = np.insert(np.zeros(n, dtype=np.bool_), begins, np.ones(begins.size, dtype=np.bool_))
+    rows, resting, at = with_rests(n, breaks, rest)
     padded = {port: np.array(signal[rows]) for port, signal in signals.items()}
     padded["v_x"][resting] = NOWHERE if judges else 0.0
     padded["a_y"][resting] = np.nan
@@ -345,12 +342,12 @@ class Track(NamedTuple):
 
 
 class Reached(NamedTuple):
-    """A learnt number at its bound: of which axle, what, how much, and what that means.
+    """A learnt number at its bound: of which axle (None: the car), what, how much, what that means.
 
     refuses : whether an answer that rests on it is not valid.
     """
 
-    axle: Axle
+    axle: Axle | None
     title: str
     value: float
     unit: str

@@ -49,11 +49,11 @@ def triangle(q: int) -> list[tuple[int, int]]:
 
 
 def packed(P: Array) -> Array:
-    """Return factors (2, q (q + 1)/2) of positive definite P: D on the diagonal, U above it.
+    """Return factors (k, q (q + 1)/2) of positive definite P: D on the diagonal, U above it.
 
     Parameters
     ----------
-    P : symmetric matrices (2, q, q).
+    P : symmetric matrices (k, q, q).
     """
     return np.array([_factored(one)[tuple(np.array(triangle(len(one))).T)] for one in P])
 
@@ -69,14 +69,14 @@ def _factored(P: Array) -> Array:
 
 
 def unpacked(packed: Array, q: int) -> Array:
-    """Return P (2, q, q) of factors (2, q (q + 1)/2).
+    """Return P (k, q, q) of factors (k, q (q + 1)/2).
 
     Parameters
     ----------
-    packed : D on the diagonal, U above it, by rows, (2, q (q + 1)/2).
+    packed : D on the diagonal, U above it, by rows, (k, q (q + 1)/2).
     q : size of the matrices.
     """
-    F = np.zeros((2, q, q))
+    F = np.zeros((len(packed), q, q))
     F[:, *np.array(triangle(q)).T] = packed
     D = np.einsum("aii->ai", F).copy()
     np.einsum("aii->ai", F)[:] = 1.0
@@ -131,6 +131,18 @@ def row_of(factors: Factors) -> list[Any]:
     return [D[i] if i == j else U[i, j] for i, j in triangle(len(D))]
 
 
+def entry(factors: Factors, i: int, k: int) -> Any:
+    """Return P = U D U' at row i and column k.
+
+    Parameters
+    ----------
+    i, k : place, from 0, i <= k.
+    """
+    U, D = factors
+    first = D[k] if i == k else U[i, k] * D[k]
+    return first + sum(U[i, j] * D[j] * U[k, j] for j in range(k + 1, len(D)))
+
+
 def spread(factors: Factors, n: int) -> Spread:
     """Return P = U D U' in the block of the weights, and its variances.
 
@@ -138,17 +150,10 @@ def spread(factors: Factors, n: int) -> Spread:
     ----------
     n : number of weights, which stand first.
     """
-    U, D = factors
-    q = len(D)
-    UD = {(i, j): value * D[j] for (i, j), value in U.items()}
-
-    def entry(i: int, k: int) -> Any:
-        first = D[k] if i == k else UD[i, k]
-        return first + sum(UD[i, j] * U[k, j] for j in range(k + 1, q))
-
-    weights = {(i, k): entry(i, k) for i, k in triangle(n)}
+    weights = {(i, k): entry(factors, i, k) for i, k in triangle(n)}
     trace = sum(weights[i, i] for i in range(n))
-    return Spread(weights, trace, [entry(i, i) for i in range(n, q)])
+    others = [entry(factors, i, i) for i in range(n, len(factors.D))]
+    return Spread(weights, trace, others)
 
 
 def width(trace: Any, others: list[Any], limits: list[Any]) -> Any:

@@ -393,9 +393,9 @@ class Bounds:
                 1.0 / (center - flattest),
                 1.0 / (steepest - center),
                 1.0 / radius,
-                _inward(self.compliance),
-                _inward(self.steering),
-                _inward(self.v_y),
+                inward(self.compliance),
+                inward(self.steering),
+                inward(self.v_y),
             ]
         )
 
@@ -440,8 +440,13 @@ def rising_shares(ladder: tuple[float, ...], slip: float) -> Array:
     return np.asarray(slopes / slopes.sum(), dtype=np.float64)
 
 
-def _inward(limit: float) -> float:
-    """Return the largest float that is not above a limit."""
+def inward(limit: float) -> float:
+    """Return the largest float that is not above a limit.
+
+    Parameters
+    ----------
+    limit : positive.
+    """
     nearest = np.float32(limit)
     return float(nearest if float(nearest) <= limit else np.nextafter(nearest, np.float32(0)))
 

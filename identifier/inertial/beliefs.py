@@ -44,20 +44,16 @@ class Beliefs:
     def __post_init__(self) -> None:
         require_positive_fields(self)
 
-    def covariance(self, n: int, curves: Array, scale: float) -> Array:
-        """Return the covariance of what is learnt, (2 n + 7, 2 n + 7).
+    def covariance(self, n: int, scale: float) -> Array:
+        """Return the covariance of what is learnt, (2 n + 7, 2 n + 7); zero where it is of curves.
 
         Parameters
         ----------
         n : number of units.
-        curves : of weights and compliance of both axles, (2, n + 1, n + 1).
         scale : root of the wheelbase over 2.7 m [-].
         """
         P = np.zeros((size(n) - MOVING, size(n) - MOVING))
         at = {name: place - MOVING for name, place in places(n).items()}
-        for i, (W, s) in enumerate((("W", "compliance"), ("W_rear", "compliance_rear"))):
-            rows = [*range(at[W], at[W] + n), at[s]]
-            P[np.ix_(rows, rows)] = curves[i]
         for name, sd in (
             ("bias", self.bias),
             ("roll", self.sd_roll),

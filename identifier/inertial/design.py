@@ -10,18 +10,18 @@ import numpy as np
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.axle.car import car_numbers
-from identifier.axle.covariance import packed, triangle
+from identifier.axle.covariance import packed, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
 from identifier.axle.design import AxleIdentifier
 from identifier.axle.gate import GateState, Plausibility
-from identifier.axle.learning import Bounds, rising_shares
+from identifier.axle.learning import Bounds, inward, rising_shares
 from identifier.axle.model import AxleModel
 from identifier.axle.prior import Prior
 from identifier.axle.slip import FASTEST, SHORTEST, Sway
 from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.inertial.beliefs import Beliefs, Trust
-from identifier.inertial.motion import MOVING, places, size
+from identifier.inertial.motion import MOVING, of_axles, size
 from identifier.inertial.step import CARRY, OVER, PORTS, SENSORS, build_step
 from identifier.method import OTHER_STRUCTURE, Method, Port, Reached, Setup, Track, resumed
 from identifier.tire_model import AXLES, TireModel
@@ -31,7 +31,15 @@ from models.vehicle import GRAVITY, Vehicle
 
 NEAR = 0.99  # of a bound, from which on a number rests at it
 RISING_UNTIL = 0.0  # rad, the slip at which force curves shall not fall: the cornering stiffness
-MOST = {"bias": 0.1, "roll": 0.3, "steering": 0.03, "gyro": 0.1, "inertia": 0.4}
+MOST = {"bias": 0.1, "roll": 0.3, "gyro": 0.1, "inertia": 0.4}  # and the steering's, in Bounds
+
+# Title, unit and meaning of what rests at `MOST`, and whether that refuses an answer.
+AT_MOST: Mapping[str, tuple[str, str, str, bool]] = {
+    "bias": ("bias of a_y", "g", "the accelerometer is mounted askew, or not in its unit", True),
+    "roll": ("roll of the body", "rad/g", "no body rolls so far: a_y has another scale", False),
+    "gyro": ("bias of the yaw rate", "rad/s", "the gyro is off, or not in its unit", True),
+    "inertia": ("excess of 1/I_z", "-", "the told yaw inertia is far off", False),
+}
 
 # What a search may vary of it, and what the number is multiplied and divided by.
 TUNED: Mapping[str, float] = {
@@ -173,6 +181,9 @@ class InertialIdentifier(Method):
                 "compliance_m": [0.0, b.compliance],
                 "roll_rad_per_g": [0.0, MOST["roll"]],
                 "steering_offset_rad": [-b.steering, b.steering],
+                "a_y_offset_g": [-MOST["bias"], MOST["bias"]],
+                "yaw_rate_offset_rad_s": [-MOST["gyro"], MOST["gyro"]],
+                "inverse_yaw_inertia_over_told": [1.0 - MOST["inertia"], 1.0 + MOST["inertia"]],
             }
         )
 
@@ -191,7 +202,7 @@ class InertialIdentifier(Method):
         """
         n = len(self.ladder)
         W, own = self.prior.means(vehicle, self.ladder)
-        P = prior_P = self.prior.covariance(vehicle, self.ladder)
+        P = prior_P = self._prior_covariance(vehicle)
         excitation = np.zeros((2, 1 + len(EDGES)))
         sensors = np.array([0.0, self.beliefs.roll, 0.0, 0.0, 0.0])
         if start is not None:
@@ -200,7 +211,9 @@ class InertialIdentifier(Method):
             sensors[SENSORS.index("steering")] = own[0, 2]
         size_ratio = math.sqrt(vehicle.wheelbase / 2.7)
         trust = self.trust.numbers(self.dt, vehicle.wheelbase, vehicle.froude_time)
-        known = self.beliefs.covariance(n, P[:, : n + 1, : n + 1], size_ratio)
+        known = self.beliefs.covariance(n, size_ratio)
+        for one, own_places, rows in zip(P, _own_places(n), of_axles(n), strict=True):
+            known[np.ix_(rows, rows)] = one[np.ix_(own_places, own_places)]
         rest = len(triangle(size(n))) - len(triangle(size(n) - MOVING))
         return Setup(
             scan=_scan(doublings(self.ladder)),
@@ -257,7 +270,14 @@ class InertialIdentifier(Method):
     def _limits(self) -> Array:
         """Return the numbers of `LearntLimits`."""
         most = MOST | {"steering": self.bounds.steering}
-        return np.array([self.bounds.compliance, *(most[name] for name in SENSORS)])
+        limits = [self.bounds.compliance, *(most[name] for name in SENSORS)]
+        return np.array([inward(limit) for limit in limits])
+
+    def _prior_covariance(self, vehicle: Vehicle) -> Array:
+        """Return the covariance of both axles before the first sample, (2, n + 3, n + 3)."""
+        P = self.prior.covariance(vehicle, self.ladder)
+        P[0, -1, -1] = self.beliefs.steering**2
+        return P
 
     def tracks(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Track, ...]:
         """Return cornering stiffness, relaxation length, and the force that curves saturate at.
@@ -276,24 +296,32 @@ class InertialIdentifier(Method):
         )
 
     def reached(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Reached, ...]:
-        """Return stiffness, grip and zero of the steering that rest at their bounds.
+        """Return what rests at its bounds, to a hundredth: of curves, lags, sensors and inertia.
 
         Parameters
         ----------
         vehicle : not looked at: the bounds are in static axle loads.
-        state : W (2, n) and sensors (5,).
+        state : W (2, n), own (2,) and sensors (5,).
         """
         del vehicle
-        b, W = self.bounds, state["W"]
-        zero = float(np.ravel(state["sensors"])[SENSORS.index("steering")])
+        b, W, own = self.bounds, state["W"], np.ravel(state["own"])
+        shown = dict(zip(SENSORS, map(float, np.ravel(state["sensors"])), strict=True))
+        zero = shown["steering"]
         unseen = "no such curve was seen, or mass, signs or units are wrong"
+        late = "a sensor is late, or the tires are very soft"
         listed = [
             (abs(zero) > NEAR * b.steering,
              Reached("front", "zero of the steering", zero, "rad", "a sensor is off", True)),
         ]  # fmt: skip
+        for name, (title, unit, meaning, refuses) in AT_MOST.items():
+            value = shown[name]  # no roll at all is an acceleration in the plane of the road
+            rests = abs(value) > NEAR * MOST[name]
+            listed.append((rests, Reached(None, title, value, unit, meaning, refuses)))
         slope = (W / np.array(self.ladder)).sum(axis=1)
-        for axle, level, steep in zip(AXLES, W.sum(axis=1), slope, strict=True):
+        for axle, soft, level, steep in zip(AXLES, own, W.sum(axis=1), slope, strict=True):
             listed += [
+                (bool(soft > NEAR * b.compliance),  # none at all is a stiff tire
+                 Reached(axle, "compliance", float(soft), "m per load", late, False)),
                 (not b.least_grip / NEAR <= level <= NEAR * b.most_grip,
                  Reached(axle, "grip", float(level), "static loads", unseen, False)),
                 (not b.least_stiffness / NEAR <= steep <= NEAR * b.most_stiffness,
@@ -323,17 +351,15 @@ class InertialIdentifier(Method):
         state : W (2, n), own (2,), sensors (5,), UD of both and excitation (2, 9).
         """
         n = len(self.ladder)
-        prior = self.prior.covariance(vehicle, self.ladder)
+        prior = self._prior_covariance(vehicle)
         zero = float(np.ravel(state["sensors"])[SENSORS.index("steering")])
         own = np.zeros((2, 3))
         own[:, 0], own[0, 2] = np.ravel(state["own"]), zero
         own[:, 1] = self.prior.sway_share
-        P, at, after = _covariance(state["UD"], size(n) - MOVING), places(n), prior.copy()
-        for i, (W, s) in enumerate((("W", "compliance"), ("W_rear", "compliance_rear"))):
-            rows = np.array([*range(at[W], at[W] + n), at[s]]) - MOVING
-            after[i, : n + 1, : n + 1] = P[np.ix_(rows, rows)]
-        zero_at = at["steering"] - MOVING
-        after[0, n + 2, n + 2] = P[zero_at, zero_at]
+        (P,) = unpacked(state["UD"].reshape(1, -1), size(n) - MOVING)
+        after = prior.copy()
+        for one, own_places, rows in zip(after, _own_places(n), of_axles(n), strict=True):
+            one[np.ix_(own_places, own_places)] = P[np.ix_(rows, rows)]
         return AxleModel(
             vehicle=vehicle,
             ladder=self.ladder,
@@ -347,14 +373,9 @@ class InertialIdentifier(Method):
         )
 
 
-def _covariance(row: Array, q: int) -> Array:
-    """Return P (q, q) of a row of factors."""
-    F = np.zeros((q, q))
-    F[tuple(np.array(triangle(q)).T)] = np.ravel(row)
-    D = np.diag(F).copy()
-    np.fill_diagonal(F, 1.0)
-    P: Array = (F * D) @ F.T
-    return 0.5 * (P + P.T)
+def _own_places(n: int) -> tuple[list[int], list[int]]:
+    """Return where among [W, own] of an axle's model stands what `of_axles` lists of it."""
+    return [*range(n + 1), n + 2], [*range(n + 1)]
 
 
 @cache

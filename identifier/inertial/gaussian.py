@@ -80,17 +80,3 @@ def measured(
     gain = counts * share * innovation * per_S
     moved = [one + along * gain for one, along in zip(z, direction.v, strict=True)]
     return moved, updated(factors, direction, counts * (1 / R))
-
-
-def entry(factors: Factors, i: int, k: int) -> Any:
-    """Return P at row i and column k.
-
-    Parameters
-    ----------
-    factors : P = U D U'.
-    i, k : place, from 0.
-    """
-    U, D = factors
-    i, k = min(i, k), max(i, k)
-    first = D[k] if i == k else U[i, k] * D[k]
-    return first + sum(U[i, j] * D[j] * U[k, j] for j in range(k + 1, len(D)))

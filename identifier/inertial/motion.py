@@ -64,6 +64,20 @@ def places(n: int) -> dict[str, int]:
     return {"W": MOVING, "W_rear": MOVING + n} | {name: rest + i for i, name in enumerate(names)}
 
 
+def of_axles(n: int) -> tuple[list[int], list[int]]:
+    """Return where among what is learnt the numbers of each axle's model stand, front and rear.
+
+    Weights and compliance, then the zero of the steering in front.
+
+    Parameters
+    ----------
+    n : number of units.
+    """
+    at = {name: place - MOVING for name, place in places(n).items()}
+    front, rear = (list(range(at[W], at[W] + n)) for W in ("W", "W_rear"))
+    return [*front, at["compliance"], at["steering"]], [*rear, at["compliance_rear"]]
+
+
 def unknowns(z: Any, n: int) -> Unknowns:
     """Return z by name.
 
@@ -129,10 +143,10 @@ class Predicted(NamedTuple):
     force_rate: Any
 
 
-def _arms(car: Car) -> tuple[Any, Any]:
-    """Return what forces give of dr/dt [rad/s² per load], (2,), and the signed arms (2,) [m]."""
+def turning(car: Car) -> Any:
+    """Return what forces give of dr/dt [rad/s² per load], (2,)."""
     wheelbase = car.arm[0] - car.arm[1]
-    return ca.fabs(car.arm) / (wheelbase * car.inertia), car.arm
+    return ca.fabs(car.arm) / (wheelbase * car.inertia)
 
 
 def cosine(delta: Any) -> Any:
@@ -198,8 +212,7 @@ def predicted(
     slip = e * z.slip + (mean - e) * was + (1 - mean) * held
     cos_delta = cosine(now.delta)
     force = (at.force + at.slope * (slip - z.slip) / 2) * cos_delta + z.error
-    turn, arm = _arms(car)
-    turn = turn * (1 + z.inertia)
+    arm, turn = car.arm, turning(car) * (1 + z.inertia)
     push = GRAVITY * car.share
     pull = at.slope * cos_delta * (1 - mean) * (dt / (2 * v_x))  # force lost per change of v_y
     a = ca.dot(push, force) - v_x * z.r + GRAVITY * z.bank
@@ -254,7 +267,6 @@ def shown(
     """
     at = curve(z.slip, z.W, scales, steps)
     force = at.force * cosine(now.delta) + z.error
-    turn, _ = _arms(car)
     a_y = GRAVITY * (ca.dot(car.share, force) + z.bias) + z.roll * tilt
-    a_y += laws.ahead * (1 + z.inertia) * ca.dot(turn, force) - laws.aside * z.r**2
+    a_y += laws.ahead * (1 + z.inertia) * ca.dot(turning(car), force) - laws.aside * z.r**2
     return Shown(z.r + z.gyro, a_y, force, at)

@@ -14,18 +14,13 @@ from typing import Any, NamedTuple
 import casadi as ca
 
 from identifier.axle.car import Car, axle_port, larger, named_port, smaller, within
-from identifier.axle.covariance import (
-    Factors,
-    factors_of,
-    row_of,
-    triangle,
-)
+from identifier.axle.covariance import Factors, entry, factors_of, row_of, triangle
 from identifier.axle.curve import EDGES, excited
 from identifier.axle.gate import Gate, GateState, gate
 from identifier.axle.learning import BoundNumbers, bounded
 from identifier.axle.step import PLAUSIBILITY
 from identifier.inertial.beliefs import TrustNumbers
-from identifier.inertial.gaussian import entry, measured, propagated
+from identifier.inertial.gaussian import measured, propagated
 from identifier.inertial.motion import (
     MOVING,
     Laws,
@@ -34,6 +29,8 @@ from identifier.inertial.motion import (
     predicted,
     shown,
     size,
+    slip_angle,
+    turning,
     unknowns,
 )
 from identifier.method import AXLE_FORCE, FACTORS, NOT_NEGATIVE, Port
@@ -307,10 +304,7 @@ def _corrected(
     y = ca.vertcat(expected.r, expected.a_y)
     y, H = ca.substitute([y, ca.jacobian(y, symbol)], [symbol, tilt], [z, ahead.tilt])
     rate = ahead.force_rate
-    turn = ca.dot(
-        ca.fabs(car.arm) / ((car.arm[0] - car.arm[1]) * car.inertia), expected.curve.force
-    )
-    turn = ca.substitute(turn, symbol, z)
+    turn = ca.substitute(ca.dot(turning(car), expected.curve.force), symbol, z)
     late = (turn, GRAVITY * ca.dot(car.share, rate))
     kept = ca.vertsplit(z)
     floors = (trust.r_error, trust.a_y_error + trust.a_y_share * ahead.tilt**2)
@@ -369,11 +363,12 @@ def _afresh(
 ) -> tuple[list[Any], Factors]:
     """Return what moves, and factors, of a filter that begins: in a steady corner."""
     sensors = ports["sensors"]
-    r = gated.r - sensors[3]
+    zero, bias = (sensors[SENSORS.index(name)] for name in ("steering", "gyro"))
+    r = gated.r - bias
     stiffness = larger(ca.dot(ports["W"][1, :], ports["scales"]), STIFFNESS)
     lean = smaller(ca.fabs(gated.v_x * r) / GRAVITY, 1) / stiffness * ca.sign(r)
     v_y = gated.v_x * (gated.delta[1] - lean) - car.arm[1] * r
-    alpha = gated.delta + ca.vertcat(sensors[2], 0) - ca.atan((v_y + car.arm * r) * (1 / now.v_x))
+    alpha = slip_angle(car, now, v_y, r, zero)
     unsure = trust.v_y + (DOUBTED * gated.v_x * lean) ** 2
     slip = unsure / now.v_x**2
     missed = trust.error**2

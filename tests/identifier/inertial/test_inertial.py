@@ -206,6 +206,37 @@ def test_a_stored_model_is_gone_on_from(history, banked):
     assert sd[0] < sd[1]
 
 
+def test_how_sure_a_stored_zero_of_the_steering_is_stays_known(history):
+    """What was learnt goes on as one number does: the same covariance, and not the first guess."""
+    stored = history.freeze()
+    again = METHOD.frozen(CAR, METHOD.setup(CAR, stored).carry)
+    np.testing.assert_allclose(again.covariance, stored.covariance, rtol=1e-9, atol=1e-15)
+    sd = np.sqrt(stored.covariance[0, -1, -1])
+    assert sd < 0.5 * METHOD.beliefs.steering
+    assert stored.prior_covariance[0, -1, -1] == METHOD.beliefs.steering**2
+
+
+def test_numbers_at_their_bounds_are_told(history):
+    state = history.state_at(history.recording.t[-1])
+    assert METHOD.reached(CAR, state) == ()
+    held = METHOD.certify(CAR).held
+    for name, most, refuses in (
+        ("a_y_offset_g", 0, True),
+        ("roll_rad_per_g", 1, False),
+        ("steering_offset_rad", 2, True),
+        ("yaw_rate_offset_rad_s", 3, True),
+        ("inverse_yaw_inertia_over_told", 4, False),
+    ):
+        sensors = state["sensors"].ravel().copy()
+        sensors[most] = held[name][1] - (most == 4)
+        (one,) = METHOD.reached(CAR, {**state, "sensors": sensors})
+        assert one.refuses is refuses
+        assert one.axle == ("front" if most == 2 else None)
+    own = np.array([0.0, held["compliance_m"][1]])
+    (soft,) = METHOD.reached(CAR, {**state, "own": own})
+    assert (soft.axle, soft.title, soft.refuses) == ("rear", "compliance", False)
+
+
 def test_a_model_of_another_structure_is_refused(history):
     other = replace(METHOD, ladder=(0.032, 0.128))
     with pytest.raises(ValueError, match="another structure"):
@@ -232,5 +263,14 @@ def test_bounds_hold_whatever_is_measured(banked):
     assert grip.max() <= b.most_grip
     assert b.least_stiffness <= slope.min()
     assert slope.max() <= b.most_stiffness
-    assert (state["own"] >= 0).all()
-    assert (state["own"] <= b.compliance).all()
+    held, sensors = METHOD.certify(CAR).held, state["sensors"].reshape(-1, 5).T
+    for name, values in (
+        ("compliance_m", state["own"]),
+        ("a_y_offset_g", sensors[0]),
+        ("roll_rad_per_g", sensors[1]),
+        ("steering_offset_rad", sensors[2]),
+        ("yaw_rate_offset_rad_s", sensors[3]),
+        ("inverse_yaw_inertia_over_told", 1 + sensors[4]),
+    ):
+        assert held[name][0] <= values.min()
+        assert values.max() <= held[name][1]
