@@ -460,7 +460,7 @@ def stretches_of(
     bounds: NDArray[np.intp] = np.linspace(0, n, pieces + 1).astype(np.intp)
     found: list[Recording] = []
     for first, last in pairwise(bounds):
-        starts = np.arange(first, last - length, max(1, length // 10))
+        starts = np.arange(first, last - length + 1, max(1, length // 10))
         best = int(starts[np.argmax(total[starts + length] - total[starts])])
         found += _unbroken(recording, slice(best, best + length))
     return tuple(found)

@@ -217,6 +217,21 @@ def test_a_long_log_is_looked_at_where_it_is_lively(driven):
     assert stretches_of(log, car, longest=61.0, pieces=4) == (log,)
 
 
+@pytest.mark.parametrize("n", range(6000, 6006))
+def test_a_log_that_is_hardly_longer_than_what_is_looked_at_is_cut_all_the_same(driven, n):
+    """A minute at 100 Hz and some samples: parts then are as long as what is taken of them."""
+    car, log, _ = driven
+    fine = np.linspace(0.0, 59.0, n)
+    names = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")
+    signals = {name: np.interp(fine, log.t, getattr(log, name)) for name in names}
+    minute = replace(log, t=0.01 * np.arange(n), **signals)
+    parts = stretches_of(minute, car, longest=60.0, pieces=4)
+    if minute.duration <= 60.0:
+        assert parts == (minute,)
+    else:
+        assert [len(part) for part in parts] == [1500] * 4
+
+
 def test_nothing_is_made_of_the_jump_over_a_gap(driven):
     car, log, _ = driven
     n = len(log)
