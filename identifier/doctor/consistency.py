@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.verdict.motion import Windows
+from identifier.verdict.motion import Windows, white_noise
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 
@@ -30,6 +30,7 @@ FRICTION = np.array([0.3, 0.5, 0.8, 1.2, 1.8, 3.0])  # μ [-]
 DISBELIEF = 0.3  # per square of the logarithm of c over the told one
 FAST = 6.0  # sqrt(g L), 30 m/s for a sedan; what is faster costs as much per square of a logarithm
 EXACT = 0.003  # share of the variance of φ, below which less that is left says nothing more
+CLEAR = 2.5  # times its noise that a channel must swing for its unit to be told
 ROLLING = (0.85, 1.25)  # slope of a_y on dv_y/dt + v_x r, with the roll of the body
 
 
@@ -55,7 +56,8 @@ class Motion(NamedTuple):
     """Means of a log as it is written over the windows in which the car drives, each (m,).
 
     v_y, delta_f, delta_r, v_x_r = v_x r, turn = r/v_x, sideslip = v_y/v_x, a_y or None; rates of
-    change v_y_dot, r_dot, and that of v_x v_y; speed: 95th percentile of |v_x|, one number.
+    change v_y_dot, r_dot, and that of v_x v_y; speed: 95th percentile of |v_x|, one number;
+    hidden: channels whose swings do not stand out of their noise.
     """
 
     v_y: Array
@@ -69,6 +71,7 @@ class Motion(NamedTuple):
     r_dot: Array
     v_x_v_y_dot: Array
     speed: float
+    hidden: frozenset[str] = frozenset()
 
     @classmethod
     def of(cls, recording: Recording) -> "Motion | None":
@@ -100,6 +103,7 @@ class Motion(NamedTuple):
             r_dot=r_dot,
             v_x_v_y_dot=v_x_v_y_dot,
             speed=speed,
+            hidden=_hidden(pieces, SLOWEST * speed),
         )
 
     @staticmethod
@@ -112,6 +116,19 @@ class Motion(NamedTuple):
         rates = windows.rate(np.column_stack([v_y, r, v_x * v_y])).T
         shown = windows.mean(np.zeros_like(r) if a_y is None else a_y)[None]
         return windows.mean(signals).T, rates, shown
+
+
+def _hidden(pieces: tuple[Recording, ...], fast: float) -> frozenset[str]:
+    """Return the channels whose means over driven windows swing little more than their noise."""
+    found = set()
+    for name in ("v_y", "r", "delta_f", "a_y"):
+        if getattr(pieces[0], name) is None:
+            continue
+        means = [driven_windows(one, fast).mean(getattr(one, name)) for one in pieces]
+        noise = float(np.median([white_noise(getattr(one, name)) for one in pieces]))
+        if float(np.std(np.concatenate(means))) < CLEAR * noise:
+            found.add(name)
+    return frozenset(found)
 
 
 def looked_at(recording: Recording) -> tuple[Recording, ...]:
@@ -133,6 +150,18 @@ def looked_at(recording: Recording) -> tuple[Recording, ...]:
     return tuple(
         part.taken(np.arange(k, min(k + n, len(part)))) for part, k in (starts[j] for j in some)
     )
+
+
+def driven_pieces(recording: Recording) -> tuple[Recording, ...]:
+    """Return the pieces that are looked at in which the car drives, all where it never does.
+
+    Parameters
+    ----------
+    recording : of any length.
+    """
+    pieces = looked_at(recording)
+    speed = float(np.percentile(np.concatenate([np.abs(one.v_x) for one in pieces]), 95))
+    return tuple(one for one in pieces if len(driven_windows(one, SLOWEST * speed))) or pieces
 
 
 def driven_windows(recording: Recording, fast: float) -> Windows:

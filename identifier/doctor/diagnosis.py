@@ -8,13 +8,20 @@ from identifier.doctor.balance import Balance, stretches_of
 from identifier.doctor.estimate import FEWEST, LONGEST, PIECES, Examination, examine
 from identifier.doctor.finding import Finding
 from identifier.doctor.fit import Fitter
-from identifier.doctor.screen import NEAR, Screened, combined, screen, steering_finding
+from identifier.doctor.screen import (
+    NEAR,
+    Screened,
+    before_sizes,
+    combined,
+    doubted,
+    screen,
+    steering_finding,
+)
 from models.recordings import Recording, RecordingError
 from models.recordings.checks import physics_contradiction, vehicle_contradiction
 from models.recordings.repair import Repair
 from models.vehicle import Vehicle, VehicleError
 
-MATTERS = 0.5  # confidence, from which a finding is one
 RATIOS = ("steering_ratio", "factor")  # codes of gross findings whose factor is any number
 FACTOR, ROUNDS = "factor.delta_f", 4
 WITHOUT_V_Y = "all but what contradicts physics or the car: the log has no lateral velocity"
@@ -42,8 +49,8 @@ class Diagnosis:
 
     @property
     def healthy(self) -> bool:
-        """Whether nothing was found that matters."""
-        return not any(one.confidence >= MATTERS for one in self.findings)
+        """Whether nothing was found that matters, be it clear or not which of several it is."""
+        return not any(one.matters for one in self.findings)
 
     @property
     def repair(self) -> Repair:
@@ -61,7 +68,7 @@ class Diagnosis:
         return {
             "recording": self.name,
             "healthy": self.healthy,
-            "findings": [finding_dict(one) for one in self.findings],
+            "findings": [one.to_dict() for one in self.findings],
             "unseen": list(self.unseen),
             "repair": self.repair.tables(),
         }
@@ -73,30 +80,6 @@ class Diagnosis:
 
 def _certainty(one: Finding) -> str:
     return "sure" if one.sure else f"confidence {100.0 * one.confidence:.0f} %"
-
-
-def finding_dict(one: Finding) -> dict[str, Any]:
-    """Return a finding as plain numbers and words, ready for JSON.
-
-    Parameters
-    ----------
-    one : of a diagnosis.
-    """
-
-    def number(value: float) -> float | None:
-        return value if math.isfinite(value) else None
-
-    return {
-        "code": one.code,
-        "channel": one.channel,
-        "size": number(one.size),
-        "deviation": number(one.deviation),
-        "unit": one.unit,
-        "confidence": one.confidence,
-        "text": one.text,
-        "sure": one.sure,
-        "repair": None if one.repair is None else one.repair.tables(),
-    }
 
 
 def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
@@ -121,12 +104,13 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
                 exact = _exact_ratio(wheel, drive, car)
                 k = found.index(wheel)
                 found[k : k + 1] = [] if exact is None else [exact]
-                drive, car = combined(found).apply(recording, vehicle)
+                drive, car = before_sizes(found).apply(recording, vehicle)
             found += _contradictions(drive, car)
             fine = examine(drive, car)
         except (RecordingError, VehicleError) as error:
             blind = str(error)
-    ranked = sorted([*found, *fine.findings], key=lambda one: not one.confidence >= MATTERS)
+    sizes = doubted(fine.findings, found)
+    ranked = sorted([*found, *sizes], key=lambda one: not one.matters)
     return Diagnosis(
         name=recording.name,
         findings=tuple(_told_once(ranked)),
@@ -170,12 +154,13 @@ def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding | N
         drive, factor = Repair(factor={"delta_f": by}).apply(drive, car)[0], factor * by
     if abs(math.log(abs(factor))) < NEAR and factor > 0.0:
         return None
-    return steering_finding(factor, coarse.confidence, deviation=deviation)
+    exact = steering_finding(factor, coarse.confidence, deviation=deviation)
+    return replace(exact, sure=exact.sure and coarse.sure)
 
 
 def _unseen(recording: Recording, gross: Screened) -> tuple[str, ...]:
     """Return what this log cannot tell, a line each."""
-    lines = list(NEVER)
+    lines = [*NEVER, *gross.unseen]
     if gross.blind:
         lines.append(
             f"offsets, delays, lever arms, scales, center of gravity, inertia: {gross.blind}"

@@ -6,6 +6,7 @@ much are named beside it: this drive cannot tell them apart.
 """
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -23,11 +24,12 @@ MOST = 4  # faults at once
 CHANCE = 4.5  # gain of J that a fault must bring
 TELLING = 2.5  # deviations, with the least size of the suspect in them, that it must have
 ALIKE = 3.0  # gain of J within which two faults cannot be told apart
-LATE_ALIKE = 0.8  # of the gain, from which a delay and a low pass of a channel cannot be
 LIKELY, HOPELESS = 8, 0.5  # suspects that are looked at closely, from this share of CHANCE on
 AWRY = 9.0  # mean square of a part, from which straight lines promise nothing: all are looked at
 TEMPER = 2.0  # odds of e per this gain of J: the model is not exact
 UNSEEN = 0.6  # of what is believed beforehand is left by a drive that tells next to nothing
+SURE = 0.95  # confidence, from which a fault of which no other is like is taken out unasked
+STAYS = 2.0  # deviations by which what is sure may move where the rest is left out
 BELIEVED = 3.5  # plausible sizes, beyond which nobody believes one
 
 
@@ -190,7 +192,8 @@ class Search:
 
     def findings(self) -> tuple[Finding, ...]:
         """Return what was found: what explains most first, followed by what may be it instead."""
-        listed: list[Finding] = []
+        listed: list[tuple[Suspect, Finding]] = []
+        clear: list[Suspect] = []
         taken = {one.suspect.key for one in self.found}
         for one in self.found:
             alike = [other for other in one.alike if other.suspect.key not in taken]
@@ -198,15 +201,45 @@ class Search:
             gains = [CHANCE, one.gain, *(other.gain for other in alike)]
             odds = np.exp((np.array(gains) - one.gain) / TEMPER)
             shares = odds / odds.sum()
+            group = float(1.0 - shares[0])
             names = [other.suspect for other in alike]
-            listed.append(self._finding(one.suspect, self.fit, float(shares[1]), names))
+            first = self._finding(one.suspect, self.fit, float(shares[1]), group, names)
+            listed.append((one.suspect, first))
+            # Numbers of the car can be measured; a drive is no reason to overrule who did.
+            of_car = first.repair is not None and first.repair.vehicle
+            if not alike and not of_car and first.confidence > SURE:
+                clear.append(one.suspect)
             for other, share in zip(alike, shares[2:].tolist(), strict=True):
-                names = [one.suspect]
-                listed.append(self._finding(other.suspect, other.fit, share, names))
-        return tuple(listed)
+                second = self._finding(other.suspect, other.fit, share, group, [one.suspect])
+                listed.append((other.suspect, second))
+        stands = self._standing(clear)
+        return tuple(
+            replace(one, sure=one.repair is not None and suspect.key in stands)
+            for suspect, one in listed
+        )
+
+    def _standing(self, clear: list[Suspect]) -> set[str]:
+        """Return the keys of those whose sizes stay where all that is in doubt is left out.
+
+        Only what is sure is taken out of a log, so it must hold without the rest.
+        """
+        keys = [key for suspect in clear for key in self.keys(suspect)]
+        if set(keys) == set(self.chosen):
+            return {suspect.key for suspect in clear}
+        alone = self.fitter.fit(keys, self.fit.sizes)
+        moved = {
+            one.key: abs(self.size(one, alone.sizes) - self.size(one, self.fit.sizes))
+            for one in clear
+        }
+        return {one.key for one in clear if moved[one.key] < STAYS * self.deviation(one, self.fit)}
 
     def _finding(
-        self, suspect: Suspect, fit: Fit, confidence: float, alike: list[Suspect]
+        self,
+        suspect: Suspect,
+        fit: Fit,
+        confidence: float,
+        group: float,
+        alike: list[Suspect],
     ) -> Finding:
         size, deviation = self.size(suspect, fit.sizes), self.deviation(suspect, fit)
         text = suspect.words(size, deviation)
@@ -214,7 +247,6 @@ class Search:
             others = ", ".join(f"{one.code} {one.channel}".strip() for one in alike)
             text += f"; this drive cannot tell it from: {others}"
         factor = suspect.is_factor
-        repair = suspect.repair(size, self.vehicle)
         return Finding(
             code=suspect.code,
             channel=suspect.channel,
@@ -222,22 +254,10 @@ class Search:
             deviation=math.exp(size) * deviation if factor else deviation,
             unit=suspect.unit,
             confidence=confidence,
+            group=group,
             text=text,
-            repair=repair,
-            # Numbers of the car can be measured; a drive is no reason to overrule who did.
-            sure=repair is not None and not repair.vehicle and not alike and confidence > 0.95,
+            repair=suspect.repair(size, self.vehicle),
         )
-
-
-def _alike(best: Candidate, other: Candidate) -> bool:
-    """Return whether a drive cannot tell two faults apart.
-
-    A delay and a low pass differ by the noise, of which nobody knows on which side it came in.
-    """
-    both = {best.suspect.code, other.suspect.code} == {"delay", "lag"}
-    if both and best.suspect.channel == other.suspect.channel:
-        return other.gain > LATE_ALIKE * best.gain
-    return other.gain > max(best.gain - ALIKE, 0.5 * best.gain)
 
 
 class Examination(NamedTuple):

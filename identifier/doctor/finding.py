@@ -2,8 +2,11 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from models.recordings.repair import Repair
+
+MATTERS = 0.5  # confidence that something is wrong, from which it is told as such
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,7 +21,9 @@ class Finding:
         right value [-].
     deviation : standard deviation of the size, NaN where nobody knows it.
     unit : of both, "" for a pure number.
-    confidence : from 0 to 1.
+    confidence : that it is this, from 0 to 1.
+    group : confidence that it is this or one of those that cannot be told from it; 0 where there
+        are none.
     text : one line for people: what, how much, and what else it may be.
     repair : what takes it out, None where nothing can.
     sure : whether the repair may be applied without being asked.
@@ -27,6 +32,11 @@ class Finding:
     ------
     ValueError
         For a confidence beyond 0 to 1, or what is sure and has no repair.
+
+    Notes
+    -----
+    Whether something is wrong and which of several things it is are two questions: `alarm` and
+    `matters` answer the first.
     """
 
     code: str
@@ -35,12 +45,43 @@ class Finding:
     deviation: float = math.nan
     unit: str = ""
     confidence: float = 0.0
+    group: float = 0.0
     text: str = ""
     repair: Repair | None = None
     sure: bool = False
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.confidence <= 1.0:
-            raise ValueError(f"confidence must lie between 0 and 1, it is {self.confidence}")
+        for name in ("confidence", "group"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise ValueError(f"{name} must lie between 0 and 1, it is {getattr(self, name)}")
         if self.sure and self.repair is None:
             raise ValueError(f"{self.code}: what is sure must have a repair")
+
+    @property
+    def alarm(self) -> float:
+        """Confidence that something is wrong, be it this or what cannot be told from it."""
+        return max(self.confidence, self.group)
+
+    @property
+    def matters(self) -> bool:
+        """Whether it is more likely than not that something is wrong."""
+        return self.alarm >= MATTERS
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain numbers and words, ready for JSON; None is what is not known."""
+
+        def number(value: float) -> float | None:
+            return value if math.isfinite(value) else None
+
+        return {
+            "code": self.code,
+            "channel": self.channel,
+            "size": number(self.size),
+            "deviation": number(self.deviation),
+            "unit": self.unit,
+            "confidence": self.confidence,
+            "alarm": self.alarm,
+            "text": self.text,
+            "sure": self.sure,
+            "repair": None if self.repair is None else self.repair.tables(),
+        }

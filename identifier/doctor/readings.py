@@ -72,6 +72,15 @@ class Change:
         kind = {"sign": "sign", "steering": "ratio"}.get(self.code, "size")
         return frozenset(f"{name} {kind}" for name, _ in self.factors)
 
+    def shows_in(self, motion: Motion) -> bool:
+        """Return whether a log can tell it: what is hidden in noise has no unit of its own.
+
+        Parameters
+        ----------
+        motion : of the log.
+        """
+        return self.code not in ("unit", "sideslip") or not motion.hidden >= {*self.channels}
+
     def on(self, reading: Reading) -> Reading:
         """Return a reading with this change.
 
@@ -175,6 +184,7 @@ def read(motion: Motion, vehicle: Vehicle, possible: Callable[[tuple[Change, ...
         are left out, unless all do.
     """
     changes = CHANGES + (ON_ACCELEROMETER if motion.a_y is not None else ())
+    changes = tuple(one for one in changes if one.shows_in(motion))
     as_told = Explanation(
         changes=(), reading=Reading(), left=unexplained(motion, vehicle, Reading())
     )

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.doctor.consistency import looked_at
+from identifier.doctor.consistency import driven_pieces
 from identifier.doctor.finding import Finding
 from models.recordings import Recording
 from models.recordings.repair import Repair
@@ -53,7 +53,8 @@ def sample_findings(recording: Recording) -> list[Finding]:
     ----------
     recording : as it was read.
     """
-    listed = [one for piece in looked_at(recording) for one in _piece_findings(piece)]
+    pieces = driven_pieces(recording)
+    listed = [*_missing(pieces), *(one for piece in pieces for one in _piece_findings(piece))]
     first: dict[tuple[str, str], Finding] = {}
     for one in listed:
         first.setdefault((one.code, one.channel), one)
@@ -80,8 +81,8 @@ def _is_late(name: str, late: Mapping[str, float], dt: float) -> bool:
 def _piece_findings(recording: Recording) -> list[Finding]:
     """Return what is wrong with the samples of one stretch."""
     signals = channels(recording)
-    found = [*_missing(recording, signals), *_copies(signals)]
-    named = {one.channel for one in found}
+    found = list(_copies(signals))
+    named = {one.channel for one in found} | set(_still(signals))
     jump = clock_jump(recording, signals)
     if jump is not None:
         found.append(jump)
@@ -91,23 +92,40 @@ def _piece_findings(recording: Recording) -> list[Finding]:
     return found
 
 
-def _missing(recording: Recording, signals: Mapping[str, Array]) -> Iterator[Finding]:
-    """Channels that never change while others do."""
+def _still(signals: Mapping[str, Array]) -> tuple[str, ...]:
+    """Return the channels that never change while two others do."""
     moves = {name: bool(np.ptp(signals[name]) > 0.0) for name in LATERAL if name in signals}
-    if sum(moves.values()) < 2:
-        return
-    for name, does in moves.items():
-        if not does:
-            value = float(signals[name][0])
-            yield Finding(
-                code="frozen",
-                channel=name,
-                size=recording.duration,
-                unit="s",
-                confidence=CERTAIN,
-                text=f"{name} is {value:g} {UNITS[name]} throughout while the car moves: "
-                "no sensor, or it was not connected",
-            )
+    return (
+        tuple(name for name, does in moves.items() if not does) if sum(moves.values()) > 1 else ()
+    )
+
+
+def _missing(pieces: tuple[Recording, ...]) -> Iterator[Finding]:
+    """Channels that stand still throughout, or in whole pieces of a long drive."""
+    still = [set(_still(channels(piece))) for piece in pieces]
+    for name in LATERAL:
+        there = [piece for piece, names in zip(pieces, still, strict=True) if name in names]
+        if len(there) < len(pieces):  # a straight road may well leave a coarse channel alone
+            usual = _swing(np.concatenate([_turning(name, piece) for piece in pieces]))
+            there = [piece for piece in there if _moves(name, piece, 0, len(piece), usual)]
+        if not there:
+            continue
+        length = sum(one.duration for one in there)
+        value = f"{float(getattr(there[0], name)[0]):g} {UNITS[name]}"
+        text = (
+            f"{name} is {value} throughout while the car moves: no sensor, or it was not connected"
+            if len(there) == len(pieces)
+            else f"{name} does not change from {float(there[0].t[0]):.4g} s on for "
+            f"{there[0].duration:.3g} s: frozen; cut the log there"
+        )
+        yield Finding(
+            code="frozen",
+            channel=name,
+            size=length,
+            unit="s",
+            confidence=CERTAIN,
+            text=text,
+        )
 
 
 def _copies(signals: Mapping[str, Array]) -> Iterator[Finding]:
@@ -240,19 +258,25 @@ def _runs_on(name: str, noisy: bool, recording: Recording, first: int, length: i
         return False
     others = [getattr(recording, one) for one in ("v_y", "r", "delta_f", "v_x") if one != name]
     alive = sum(bool(np.ptp(one[here]) > 0.0) for one in others)
-    return (noisy and alive >= 2) or _moves(name, recording, first, length)
+    usual = _swing(_turning(name, recording))
+    return (noisy and alive >= 2) or _moves(name, recording, first, length, usual)
 
 
-def _moves(name: str, recording: Recording, first: int, length: int) -> bool:
+def _moves(name: str, recording: Recording, first: int, length: int, usual: float) -> bool:
     """Whether the car changes its turn over a stretch, by the channels that are not judged."""
     width = max(1, min(round(0.2 / recording.dt), length // 2))
-    here = slice(first, first + length)
-    turn = recording.v_x * recording.r
-    if name == "r":
-        turn = recording.delta_f * float(np.std(turn) / (np.std(recording.delta_f) + 1e-300))
-    smooth = np.convolve(turn[here], np.ones(width) / width, "valid")
-    usual = float(np.percentile(turn, 99) - np.percentile(turn, 1))
+    turn = _turning(name, recording)[first : first + length]
+    smooth = np.convolve(turn, np.ones(width) / width, "valid")
     return bool(np.ptp(smooth) > MOVES * usual > 0.0)
+
+
+def _turning(name: str, recording: Recording) -> Array:
+    """Return what tells how a car turns, other than the channel that is judged."""
+    return recording.delta_f if name == "r" else recording.v_x * recording.r
+
+
+def _swing(signal: Array) -> float:
+    return float(np.percentile(signal, 99) - np.percentile(signal, 1))
 
 
 def _noise(signal: Array) -> float:

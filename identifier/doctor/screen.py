@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identifier.doctor.consistency import PIECE, Motion, driven_windows, looked_at
+from identifier.doctor.consistency import Motion, driven_pieces, driven_windows, looked_at
 from identifier.doctor.finding import Finding
 from identifier.doctor.readings import DEGREE, Change, Read, read
 from identifier.doctor.samples import sample_findings
@@ -28,6 +28,7 @@ SEVERAL = 3  # changes at once, beyond which nothing is sure
 WHEEL = (5.0, 30.0)  # ratios of a steering wheel to the road wheels
 NEAR = math.log(1.15)  # of a factor to that of a unit
 PERFECT = 0.999
+SLOW = 1.0  # s between samples, from which a clock is in ms
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,13 +38,16 @@ class Screened:
     Parameters
     ----------
     findings : the most certain first.
-    repair : of what is read otherwise than it was told, sure or not, to go on with.
+    repair : of samples and of what is read otherwise than it was told, sure or not, to go on with;
+        of no number of the car.
     blind : why nothing finer can be asked, "" where it can.
+    unseen : what gross faults this log cannot tell, a line each.
     """
 
     findings: tuple[Finding, ...]
     repair: Repair
     blind: str = ""
+    unseen: tuple[str, ...] = ()
 
 
 def screen(recording: Recording, vehicle: Vehicle) -> Screened:
@@ -54,8 +58,11 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
     recording : as it was read.
     vehicle : as it was told.
     """
+    clock = clock_findings(recording)
+    if clock:
+        return Screened(findings=clock, repair=Repair(), blind="the clock is not in s")
     samples = sample_findings(recording)
-    told = [*_unlike(vehicle), *_few(recording)]
+    told = unlike(vehicle)
     missing = [
         one.channel
         for one in samples
@@ -72,10 +79,11 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
         return Screened(
             findings=(quiet, *samples, *told), repair=Repair(), blind="the car hardly corners"
         )
-    motion = Motion.of(recording)
+    mended, _ = before_sizes(samples).apply(recording, vehicle)
+    motion = Motion.of(mended)
     if motion is None:
         return Screened(findings=(*samples, *told), repair=Repair(), blind="too little is driven")
-    some = looked_at(recording)[0]
+    some = looked_at(mended)[0]
 
     def possible(changes: tuple[Change, ...]) -> bool:
         try:
@@ -89,10 +97,17 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
         one for change in found.best.changes for one in reading_findings(change, found, vehicle)
     ]
     gross = one_steering(gross)
-    repair = combined(gross)
+    gross = doubted(gross, gross)  # a reading is judged as a whole
     other = any(change.code == "other_car" for change in found.best.changes)
-    blind = "the car is another one" if other else ""
-    return Screened(findings=(*gross, *samples, *told), repair=repair, blind=blind)
+    return Screened(
+        findings=(*gross, *samples, *told),
+        repair=before_sizes((*samples, *gross)),
+        blind="the car is another one" if other else "",
+        unseen=tuple(
+            f"unit of {name}: it hardly swings more than its noise on this drive"
+            for name in sorted(motion.hidden)
+        ),
+    )
 
 
 def repair_of(changes: tuple[Change, ...]) -> Repair:
@@ -126,8 +141,33 @@ def combined(findings: Iterable[Finding]) -> Repair:
     return repair
 
 
+def before_sizes(findings: Iterable[Finding]) -> Repair:
+    """Return what is taken out of a log before sizes are asked, sure or not.
+
+    That is what is found of its samples and how it is read. Numbers of the car stay as told.
+
+    Parameters
+    ----------
+    findings : of samples and of the reading.
+    """
+    return replace(combined(findings), vehicle={})
+
+
+def doubted(later: Iterable[Finding], earlier: Iterable[Finding]) -> list[Finding]:
+    """Return findings, none of them sure where one that they stand on is not.
+
+    Parameters
+    ----------
+    later : that were asked of a log and a car as the earlier ones say they are.
+    earlier : all of them; those without a repair say nothing that is taken out.
+    """
+    firm = all(one.sure for one in earlier if one.repair is not None)
+    return [replace(one, sure=one.sure and firm) for one in later]
+
+
 def _throughout(finding: Finding, recording: Recording) -> bool:
-    return finding.size >= PERFECT * min(recording.duration, PIECE - 2.0 * recording.dt)
+    """Whether a channel stands still in all that is driven."""
+    return finding.size >= PERFECT * sum(one.duration for one in driven_pieces(recording))
 
 
 def quiet_finding(recording: Recording) -> Finding | None:
@@ -156,22 +196,32 @@ def quiet_finding(recording: Recording) -> Finding | None:
     )
 
 
-def _few(recording: Recording) -> list[Finding]:
-    """A sampling interval that is that of a clock in ms."""
-    if recording.dt < 1.0:
-        return []
-    return [
+def clock_findings(recording: Recording) -> tuple[Finding, ...]:
+    """Return a sampling interval that is that of a clock in ms; nothing else can be asked then.
+
+    Parameters
+    ----------
+    recording : as it was read.
+    """
+    if recording.dt < SLOW:
+        return ()
+    return (
         Finding(
             code="clock_unit",
             size=1e3,
             confidence=0.95,
             text=f"samples are {recording.dt:g} s apart: a clock in ms? divide t by 1000",
-        )
-    ]
+        ),
+    )
 
 
-def _unlike(vehicle: Vehicle) -> list[Finding]:
-    """A yaw inertia that no car of that mass and those lengths has."""
+def unlike(vehicle: Vehicle) -> list[Finding]:
+    """Return a yaw inertia that no car of that mass and those lengths has.
+
+    Parameters
+    ----------
+    vehicle : as it was told.
+    """
     similar = vehicle.mass * vehicle.l_f * vehicle.l_r
     ratio = vehicle.yaw_inertia / similar
     least = SMALL_INERTIA if vehicle.wheelbase < SMALL else INERTIA[0]

@@ -13,7 +13,7 @@ from identifier.doctor import Finding, diagnose
 from identifier.doctor.diagnosis import Diagnosis
 from identifier.doctor.screen import combined
 from identifier.run import identify
-from models.faults import SensorFault, Together, WrongUnit
+from models.faults import Late, SensorFault, Together, WrongUnit
 from models.recordings import Repair
 from models.vehicle import sedan
 
@@ -94,6 +94,31 @@ def test_gross_repairs_come_before_fine_ones_and_only_sure_ones_are_taken():
     whole = Diagnosis(name="log", findings=findings, unseen=())
     assert whole.repair == Repair(factor={"r": 0.55})
     assert combined(findings).offset == {"r": 0.1}
+
+
+def test_whether_something_is_wrong_is_one_question_and_which_of_several_another():
+    one, other = (
+        Finding(code=code, channel="v_y", confidence=0.45, group=0.9) for code in ("lag", "delay")
+    )
+    alone = Finding(code="lag", channel="v_y", confidence=0.45, group=0.45)
+    assert one.alarm == 0.9 and one.matters
+    assert not Diagnosis(name="log", findings=(one, other), unseen=()).healthy
+    assert Diagnosis(name="log", findings=(alone,), unseen=()).healthy
+    assert one.to_dict()["alarm"] == 0.9
+    assert Finding(code="straight", confidence=0.99).alarm == 0.99
+
+
+def test_nothing_fine_is_sure_on_a_reading_that_is_not(driven):
+    car, log = driven
+    late = Late(channels=("r",), delay=0.08).apply(log)
+    on_its_own = diagnose(late, car).findings[0]
+    assert (on_its_own.code, on_its_own.channel, on_its_own.sure) == ("delay", "r", True)
+    wheel = SensorFault(channel="delta_f", kind="scaled", size=3.0).apply(late)
+    found = {(one.code, one.channel): one for one in diagnose(wheel, car).findings}
+    assert not found["factor", "delta_f"].sure
+    assert found["delay", "r"].size == pytest.approx(0.08, abs=0.01)
+    assert not found["delay", "r"].sure
+    assert not diagnose(wheel, car).repair
 
 
 def test_nothing_is_looked_for_where_nothing_was_driven(driven):

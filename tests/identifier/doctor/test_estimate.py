@@ -115,6 +115,31 @@ def test_what_is_alike_at_constant_speed_is_named_beside_it(driven):
     assert "cannot tell it from" in first.text
 
 
+def test_a_size_that_rests_on_a_number_of_the_car_is_not_sure(driven):
+    """Without the center of gravity, which nobody takes out, the steering's factor is another."""
+    car, log, _ = driven
+    rng = np.random.default_rng(5)
+    center = planted("center of gravity", car, rng)
+    steering = planted("factor delta_f", car, np.random.default_rng(6))
+    bad, told = steering.case.log(log), center.case.car(car)
+    found = {one.code: one for one in estimate(bad, told)}
+    assert found["factor"].confidence > 0.95
+    assert not found["factor"].sure and not found["center_of_gravity"].sure
+    balance = Balance((bad,), told)
+    alone = Fitter(balance).fit(["factor.delta_f"], {})
+    moved = abs(alone.sizes["factor.delta_f"] - math.log(found["factor"].size))
+    assert moved > 2.0 * alone.deviation("factor.delta_f")
+    assert estimate(bad, car)[0].sure
+
+
+def test_a_size_that_stands_on_its_own_is_sure_beside_a_number_of_the_car(driven):
+    car, log, _ = driven
+    inertia = planted("yaw inertia", car, np.random.default_rng(5))
+    late = Late(channels=("r",), delay=0.08).apply(log)
+    found = {one.code: one for one in estimate(late, inertia.case.car(car))}
+    assert found["delay"].sure and not found["yaw_inertia"].sure
+
+
 def test_what_a_straight_drive_cannot_tell_is_said(driven):
     car, log, _ = driven
     names = ("v_y", "r", "delta_f", "a_y")

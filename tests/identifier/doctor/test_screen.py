@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.doctor_gross import drawn
 from benchmarks.fault_cases import StraightOnly
 from benchmarks.random_cars import CLASSES, good_sensors, random_car, random_drive
 from benchmarks.recorded_cars import CARMAKER, DART
@@ -60,7 +61,6 @@ GROSS = {
     "steering in degrees": (WrongUnit(channel="delta_f", unit="deg"), "unit delta_f"),
     "v_x in km/h": (WrongUnit(channel="v_x", unit="km/h"), "unit v_x"),
     "v_x in mph": (scaled("v_x", 1.0 / 0.44704), "unit v_x"),
-    "speeds in mm/s": (Together(faults=(scaled("v_x", 400.0), scaled("v_y", 400.0))), None),
     "a_y in g": (WrongUnit(channel="a_y", unit="g"), "unit a_y"),
 }
 
@@ -73,7 +73,25 @@ def test_a_drive_that_is_right_is_left_alone(driven):
     assert screen(replace(log, a_y=None), car).findings == ()
 
 
-@pytest.mark.parametrize("case", [case for case, (_, want) in GROSS.items() if want])
+@pytest.mark.parametrize(
+    ("kind", "seed", "half"),
+    [("compact", 502, 0), ("compact", 506, 0), ("sedan", 502, 0), ("sedan", 508, 1)],
+)
+def test_a_v_y_that_hardly_stands_out_of_its_noise_has_no_unit_of_its_own(kind, seed, half):
+    """Half a minute of gentle bends: read in mm/s, or as an angle, v_y would be next to nothing."""
+    log, car = drawn(kind, seed)
+    n = len(log) // 2
+    calm = log.taken(slice(half * n, (half + 1) * n))
+    found = screen(calm, car)
+    assert found.findings == ()
+    assert "v_y" in Motion.of(calm).hidden
+    assert any(line.startswith("unit of v_y") for line in found.unseen)
+    lively = log.taken(slice((1 - half) * n, (2 - half) * n))
+    assert Motion.of(lively).hidden == frozenset()
+    assert screen(scaled("v_x", 3.6).apply(calm), car).findings[0].code == "unit"
+
+
+@pytest.mark.parametrize("case", GROSS)
 def test_every_gross_fault_is_the_first_that_is_named(driven, case):
     car, log = driven
     fault, want = GROSS[case]
@@ -99,6 +117,14 @@ def test_speeds_in_kmh_and_angles_in_degrees_with_a_steering_wheel_are_all_found
     assert set(named(broken, car)) == {
         *("unit v_x", "unit v_y", "unit r", "steering_ratio delta_f"),
     }
+
+
+def test_speeds_in_mm_per_s_are_read_as_such():
+    """Of a small car: those of others are beyond what a log may hold."""
+    rng = np.random.default_rng(41)
+    drive = random_drive(random_car("tenth", rng), rng)
+    millimeters = Together(faults=(scaled("v_x", 1e3), scaled("v_y", 1e3)))
+    assert named(millimeters.apply(drive.log(rng)), drive.car.told) == ["unit v_x", "unit v_y"]
 
 
 @pytest.mark.parametrize("per_rad", [1.0, DEGREES])
@@ -200,10 +226,13 @@ def test_lost_samples_a_coarse_sensor_and_copies_are_named(one):
     assert copied.code == "copied"
 
 
-def test_a_slow_sampling_interval_is_a_clock_in_ms(one):
+def test_a_slow_sampling_interval_is_a_clock_in_ms_and_nothing_else_is_asked(one):
     car, log = one
-    found = screen(replace(log, t=1e3 * log.t), car)
-    assert "clock_unit" in [f.code for f in found.findings]
+    for broken in (log, replace(log, r=-log.r)):
+        found = screen(replace(broken, t=1e3 * log.t), car)
+        assert [f.code for f in found.findings] == ["clock_unit"]
+        assert not found.repair
+        assert "clock" in found.blind
 
 
 def test_smooth_drives_without_noise_are_left_alone():
@@ -234,6 +263,58 @@ def test_the_right_reading_leaves_least_and_a_standing_car_is_no_motion(one):
     for wrong in (Reading(r=-1.0), Reading(v_x=3.6), Reading(delta=15.0), Reading(size=8.0)):
         assert unexplained(motion, car, wrong) > right + 1.0
     assert Motion.of(replace(log, v_x=np.zeros(len(log)))) is None
+
+
+@pytest.fixture(scope="module")
+def long(one):
+    """The same drive twenty times, with pauses between: more than is looked at."""
+    car, log = one
+    return car, joined([replace(log, t=log.t + 100.0 * k) for k in range(20)])
+
+
+def part_of(recording, **signals):
+    """The recording with other values in its first stretch."""
+    changed = {name: getattr(recording, name).copy() for name in signals}
+    for name, value in signals.items():
+        changed[name][recording.stretches[0]] = value
+    return replace(recording, **changed)
+
+
+def test_a_while_of_standing_does_not_end_the_search_in_a_long_log(long):
+    car, log = long
+    standing = part_of(log, v_x=0.0, v_y=0.0, r=0.0)
+    assert screen(standing, car).findings == ()
+    assert named(scaled("r", DEGREES).apply(standing), car) == ["unit r"]
+
+
+def test_a_channel_that_rests_for_a_while_is_told_and_the_rest_is_asked(long):
+    car, log = long
+    broken = part_of(log, v_y=0.0)
+    found = screen(scaled("r", DEGREES).apply(broken), car)
+    first, frozen = found.findings
+    assert (first.code, first.channel) == ("unit", "r")
+    assert (frozen.code, frozen.channel) == ("frozen", "v_y")
+    assert frozen.size == pytest.approx(np.ptp(log.t[log.stretches[0]]), abs=0.05)
+    assert not found.blind
+
+
+def test_what_is_late_by_its_samples_is_mended_first_and_no_number_of_the_car_is(one):
+    car, log = one
+    heavy = replace(car, yaw_inertia=4.0 * car.mass * car.l_f * car.l_r)
+    found = screen(SAMPLES["stairs"][0].apply(log), heavy)
+    assert found.repair.delay == {"v_y": pytest.approx(0.045)}
+    assert any(one.repair.vehicle for one in found.findings if one.repair is not None)
+    assert found.repair.vehicle == {}
+
+
+def test_of_a_reading_nothing_is_sure_where_one_part_is_not(one):
+    """Degrees in r, and three times the steering angle, of which no unit is."""
+    car, log = one
+    broken = Together(faults=(scaled("r", DEGREES), scaled("delta_f", 3.0))).apply(log)
+    found = screen(broken, car).findings
+    assert {"unit r", "factor delta_f"} == {f"{one.code} {one.channel}" for one in found}
+    assert not any(one.sure for one in found)
+    assert screen(scaled("r", DEGREES).apply(log), car).findings[0].sure
 
 
 @pytest.mark.parametrize("file", RECORDED)
