@@ -8,15 +8,8 @@ from pathlib import Path
 
 from identifier.doctor import Diagnosis, Finding
 from identifier.doctor.diagnosis import WITHOUT_V_Y
-from models.recordings import (
-    LogMap,
-    Recording,
-    Repair,
-    check_against_vehicle,
-    check_physics,
-)
+from models.recordings import LogMap, Repair
 from models.recordings.reader import repair_text
-from models.vehicle import Vehicle
 from tireid.output import text_table
 from tireid.report import Block, Paragraph, Section, Table, printed
 from tireid.verdicts import with_doubt
@@ -174,26 +167,6 @@ def doctor_text(diagnosis: Diagnosis, repair: Repair, path: Path | None) -> str:
     elif diagnosis.repair:
         lines.append("what is sure is taken out with --repair")
     return "\n".join(lines)
-
-
-def repaired(recording: Recording, vehicle: Vehicle, repair: Repair) -> tuple[Recording, Vehicle]:
-    """Return a recording and its car without what a repair takes out, judged as when it is read.
-
-    Parameters
-    ----------
-    recording : as it was read.
-    vehicle : as it was told.
-    repair : of both.
-
-    Raises
-    ------
-    RecordingError
-        Where the repaired recording contradicts physics or the car.
-    """
-    mended, car = repair.apply(recording, vehicle)
-    check_physics(mended)
-    check_against_vehicle(mended, car)
-    return mended, car
 
 
 def write_repair(path: Path, told: LogMap, diagnosis: Diagnosis) -> LogMap:

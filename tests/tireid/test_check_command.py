@@ -218,3 +218,17 @@ def test_the_default_of_keep_is_not_the_leakage_that_forgets(capsys, tmp_path):
     design = design_for(sedan(), natural_driving(sedan()))
     kept = with_keeping(design, design.operation(sedan()), DEFAULT_KEEPING)
     assert read_design(path) == kept
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--log", "drive.csv"], "wants a log.toml"),
+        (["--columns", "r=yaw"], "--columns says how a drive is read: give one by --along LOG"),
+        (["--dbc", "car.dbc"], "--dbc says how a drive is read"),
+    ],
+)
+def test_words_about_a_drive_want_a_drive(capsys, words, said):
+    code, told = checked(capsys, *words)
+    assert code == 2
+    assert said in told.err

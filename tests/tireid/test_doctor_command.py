@@ -91,6 +91,14 @@ def test_identify_repairs_what_is_sure_and_says_so(clinic, tmp_path, capsys):
     assert "Is the log right?" in (out / "report.html").read_text(encoding="utf-8")
 
 
+def test_with_repair_a_log_that_no_repair_mends_is_refused_all_the_same(clinic, tmp_path, capsys):
+    words = ["identify", clinic / "good.csv", "--vehicle", clinic / "car.toml", "--repair"]
+    words += [tmp_path / "log.toml", "--replay", clinic / "bad.csv", "--out", tmp_path / "out"]
+    assert main([str(word) for word in words]) == 2
+    assert "bad: " in capsys.readouterr().err.splitlines()[-1]
+    assert not (tmp_path / "out").exists()
+
+
 def test_nothing_sure_writes_nothing_and_what_is_there_stays(clinic, tmp_path, capsys):
     assert doctor(clinic, "good.csv", "--repair", tmp_path / "log.toml") == 0
     assert "nothing is sure enough" in capsys.readouterr().out

@@ -16,13 +16,13 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "init": "a commented vehicle file to fill in",
         "channels": "what a log holds, what its channels probably are, and a log.toml that says so",
         "doctor": "what is wrong with a log or with its car's file, and a log.toml that mends it",
-        "paper": "Tables I and II of the paper, beside ours, over many seeds",
         "identify": "learn tire forces from a recording, freeze the weights and test them",
         "predict": "axle forces of a drive by a stored model, and what they miss",
         "compare": "learn, freeze and replay with every method, side by side",
         "check": "certificate of a design: margins, bounds, advice; or a design from a bandwidth",
         "export": "the identifier as clean C for a microcontroller, as FMU and ONNX for simulators",
         "drive": "steer a car along a path at the limit of grip, on the tires that were learnt",
+        "paper": "Tables I and II of the paper, beside ours, over many seeds",
     }
 )
 

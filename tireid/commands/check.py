@@ -187,6 +187,7 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; return 0, or 1 where the design fails."""
     _require_sense(options)
+    _require_drive(options)
     vehicle = read_vehicle(options)
     name, method = _method(options, vehicle)
     if isinstance(method, PaperIdentifier):
@@ -201,6 +202,14 @@ def run(options: argparse.Namespace) -> int:
     tell(json.dumps(numbers, indent=2) if options.json else text)
     _say_written(options)
     return 0
+
+
+def _require_drive(options: argparse.Namespace) -> None:
+    """Refuse to be told how a log is read where none is."""
+    told = {"--columns": options.columns, "--dbc": options.dbc}
+    for option, value in told.items():
+        if value and options.along is None:
+            raise ValueError(f"{option} says how a drive is read: give one by --along LOG")
 
 
 def _method(options: argparse.Namespace, vehicle: Vehicle) -> Chosen:

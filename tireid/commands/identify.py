@@ -21,7 +21,13 @@ from identifier.reproducibility import (
 )
 from identifier.run import History, check_recording
 from identifier.verdict import judge_prediction
-from models.recordings import Recording, Repair, joined
+from models.recordings import (
+    Recording,
+    Repair,
+    check_against_vehicle,
+    check_physics,
+    joined,
+)
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import resumed_line, verdict_line
@@ -50,7 +56,7 @@ from tireid.commands.options import (
     seed_of,
     told_map,
 )
-from tireid.diagnoses import add_repair, doctor_text, repaired, write_repair
+from tireid.diagnoses import add_repair, doctor_text, write_repair
 from tireid.figures.style import paper_design
 from tireid.learning import identify
 from tireid.output import output_folder, require_free, text_table, write_json
@@ -140,11 +146,13 @@ def run(options: argparse.Namespace) -> int:
     diagnosis = diagnose(joined(logs), vehicle)
     repair = diagnosis.repair if options.repair is not None else Repair()
     if repair:
-        logs, others = (
-            [repaired(one, vehicle, repair)[0] for one in some] for some in (logs, others)
-        )
+        logs, others = ([repair.apply(one, vehicle)[0] for one in some] for some in (logs, others))
         vehicle = repair.on(vehicle)
         law, design = chosen_method(options, vehicle, seed, without_v_y=without_v_y)
+    if options.repair is not None and not options.no_check:
+        for one in (*logs, *others):
+            check_physics(one)
+            check_against_vehicle(one, vehicle)
     recording = joined(logs)
     network = network_model(options, vehicle, design.min_speed)
     freeze_times = sorted(set(options.freeze or [float(recording.t[-1])]))

@@ -70,7 +70,7 @@ def repaired_vehicle(vehicle: Vehicle, options: argparse.Namespace) -> Vehicle:
     ----------
     vehicle : as it was told.
     """
-    path = getattr(options, "log_map", None)
+    path = _map_path(options)
     numbers: dict[str, Any] = {} if path is None else dict(LogMap.from_toml(path).repair.vehicle)
     if not numbers:
         return vehicle
@@ -314,6 +314,17 @@ def add_log_map(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _map_path(options: argparse.Namespace) -> Path | None:
+    """Return the file of --log, which a log itself is not."""
+    path: Path | None = getattr(options, "log_map", None)
+    if path is not None and path.suffix.lower() != ".toml":
+        raise ValueError(
+            f"--log {path}: wants a log.toml that says how logs are read, by its ending; a log "
+            "itself stands behind the command (check: behind --along)"
+        )
+    return path
+
+
 def told_map(options: argparse.Namespace) -> LogMap:
     """Return how logs are read by --log, and by --columns and --dbc, which come first.
 
@@ -322,7 +333,7 @@ def told_map(options: argparse.Namespace) -> LogMap:
     RecordingError
         Where the file or a word is not right.
     """
-    told = with_columns(map_of(options.log_map), column_words(options.columns))
+    told = with_columns(map_of(_map_path(options)), column_words(options.columns))
     return told if options.dbc is None else replace(told, dbc=options.dbc)
 
 

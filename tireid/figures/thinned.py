@@ -95,15 +95,15 @@ def shown_of_run(
     tell : returns what is drawn of a block, one value a sample.
     """
     t = history.recording.t
-    width = 1 if len(t) <= LONG else -(-len(t) // COLUMNS)
+    n = int(np.searchsorted(t, ends[1], side="right") - np.searchsorted(t, ends[0], side="left"))
+    width = 1 if n <= LONG else -(-n // COLUMNS)
     times, values = [], []
     for block in history.blocks():
         told, here = tell(block), t[block.part]
         part: Samples = (here >= ends[0]) & (here <= ends[1])
-        if width > 1:
+        if width > 1 and part.any():
             part = np.flatnonzero(part)
-            inside = [one[part].reshape(len(part), -1) for one in told]
-            part = part[farthest(inside, width)] if len(part) else part
+            part = part[farthest([one[part] for one in told], width)]
         times.append(here[part])
         values.append([one[part] for one in told])
     joined = [np.concatenate(one) for one in zip(*values, strict=True)]
