@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from codegen.arrays import LONG, Array, filled
 from models.logs.log import Channel, RecordingError
-from models.logs.stamps import not_rising
+from models.logs.stamps import CALENDAR, not_rising, since
 
 LONGEST_GAP = 0.1  # [s]
 GAP_INTERVALS = 2.5  # own intervals of a channel, more of which without a sample are a gap
@@ -93,12 +93,19 @@ def are_one_clock(raws: Sequence[Raw]) -> bool:
 def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Stretch]:
     """Return signals of several clocks on one, in the stretches in which all of them are there.
 
+    Clocks of the calendar are compared since their first instant, to the microsecond.
+
     Parameters
     ----------
     raws : by signal; times rise.
     dt : step of the clock [s].
     longest : time without a sample that is no gap yet [s].
     """
+    zero = min(float(raw.t[0]) for raw in raws.values())
+    if zero > CALENDAR:
+        times = {id(raw.t): since(raw.t, zero) for raw in raws.values()}
+        near = {name: raw._replace(t=times[id(raw.t)]) for name, raw in raws.items()}
+        return [_later(one, zero) for one in on_one_clock(near, dt, longest)]
     base = min(raws.values(), key=lambda raw: abs(np.log(_interval(raw.t) / dt)))
     found = []
     for begin, end in _covered([raw.t for raw in raws.values()], longest):
@@ -111,6 +118,11 @@ def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Str
             grid = own  # its very numbers, where they are the clock
         found.append(Stretch(grid, {name: sampled(raw, grid, dt) for name, raw in raws.items()}))
     return found
+
+
+def _later(stretch: Stretch, zero: float) -> Stretch:
+    t = stretch.t
+    return stretch._replace(t=by_blocks(t.size, lambda part: t[part] + zero))
 
 
 def _interval(t: Array) -> float:

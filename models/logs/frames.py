@@ -15,12 +15,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import Array, filled
+from codegen.arrays import Array
 from models.limits import limits
 from models.logs.foreign import need
 from models.logs.growing import Growing
 from models.logs.log import RecordingError
 from models.logs.mdf_blocks import BUS_EVENT, opened
+from models.logs.stamps import CALENDAR, since
 from models.schema import require_few
 
 FRAME = "CAN_DataFrame"  # of MDF
@@ -28,8 +29,6 @@ TOGETHER = 1 << 16  # frames that are stored at a time
 SHORT = 0x7FF  # largest identifier of 11 bits
 EXTENDED = 1 << 31  # marks an identifier of 29 bits
 IDENTIFIER = (1 << 29) - 1
-EPOCH = 1e8  # s: stamps above are of the calendar, which doubles hold to less than a microsecond
-MICROSECONDS = 1e6
 INFLATION = 1032  # most bytes that deflate makes of one
 OBJECT = struct.Struct("<4sHHII")  # of BLF: mark, size and version of the header, size, type
 CONTAINER, DEFLATED = 10, 2
@@ -126,15 +125,10 @@ def gather(path: Path, kind: str, known: Mapping[int, int]) -> Log:
                 require_few(RecordingError, str(path), count, "samples", "frames")
     frames = {key: one.finished() for key, one in found.items()}
     first = min((float(kept.t.min()) for kept in frames.values()), default=0.0)
-    if first > EPOCH:
+    if first > CALENDAR:
         for key, kept in frames.items():
-            frames[key] = kept._replace(t=_since(kept.t, first))
+            frames[key] = kept._replace(t=since(kept.t, first))
     return Log(f"CAN {kind}", frames, others)
-
-
-def _since(t: Array, first: float) -> Array:
-    """Return times of the calendar since the first; a double tells them to the microsecond."""
-    return filled(t.size, lambda part: np.round((t[part] - first) * MICROSECONDS) / MICROSECONDS)
 
 
 def _messages(path: Path, kind: str) -> Iterator[Any]:

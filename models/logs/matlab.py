@@ -5,8 +5,6 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from codegen.arrays import Array
 from models.logs import hdf5, mat5
 from models.logs.foreign import one_line
@@ -27,13 +25,10 @@ REMEDY = (
 class _Time(NamedTuple):
     """How a clock is read.
 
-    per_second: of its unit; epoch: whether it counts from 1970; zero: what is taken off [s];
-    rate: typical [Hz].
+    per_second: of its unit; rate: typical [Hz].
     """
 
     per_second: float
-    epoch: bool
-    zero: float
     rate: float
 
 
@@ -111,23 +106,16 @@ def _samples(
 
 
 def _times(signals: Sequence[Signal]) -> dict[Clock, _Time]:
-    """Return how the clocks are read; those of the calendar count from the first of all."""
+    """Return how the clocks are read; those of the calendar keep their seconds since 1970."""
     result: dict[Clock, _Time] = {}
-    first: list[float] = []
     for clock in dict.fromkeys(signal.clock for signal in signals):
         t = times_of(clock)
         cells = [repr(one) for one in t[:HEAD].tolist()]
         known = find_clock(["t"], [clock.unit], {0: cells}.__getitem__)
         per_second = PER_SECOND[known.unit] if known is not None else 1.0
-        epoch = known is not None and known.epoch
-        if epoch:
-            first.append(float(t[0]) / per_second)
-        result[clock] = _Time(per_second, epoch, 0.0, typical_rate(t / per_second))
-    zero = min(first, default=0.0)
-    return {clock: one._replace(zero=zero) if one.epoch else one for clock, one in result.items()}
+        result[clock] = _Time(per_second, typical_rate(t / per_second))
+    return result
 
 
 def _seconds(t: Array, time: _Time) -> Array:
-    if time.epoch:  # a double holds the seconds since 1970 to 0.24 us
-        return np.round(t / time.per_second - time.zero, 6)
     return t / time.per_second if time.per_second != 1.0 else t

@@ -32,6 +32,8 @@ NAMES = (
 )  # fmt: skip
 # Between 1980 and 2100 in each unit: a number so large counts from 1970.
 EPOCHS = {"s": (3e8, 4.2e9), "ms": (3e11, 4.2e12), "us": (3e14, 4.2e15), "ns": (3e17, 4.2e18)}
+CALENDAR = 1e8  # [s]: times above count from 1970
+MICROSECONDS = 1e6
 FASTEST, SLOWEST = 1e-5, 0.11  # [s] between samples of a car's log
 COARSEST = 1.0  # between stamps without a unit: more than that are no seconds
 TICKS = tuple(10.0**-k for k in range(10))  # [s]: what stamps may be rounded to
@@ -243,7 +245,8 @@ def seconds(
 ) -> Stamps:
     """Return stamps in seconds that rise, mended where they were rounded.
 
-    Times of the calendar count from the first stamp.
+    Dates and times of day count from the first of them; numbers stay as they stand, in seconds,
+    those since 1970 too.
 
     Parameters
     ----------
@@ -290,6 +293,17 @@ def typical_rate(t: Array) -> float:
     steps = np.diff(t[:MOST_STEPS])
     step = float(np.median(steps)) if steps.size else 0.0
     return 1.0 / step if step > 0.0 else math.nan
+
+
+def since(t: Array, first: float) -> Array:
+    """Return times of the calendar since an instant, (n,); doubles hold them to the microsecond.
+
+    Parameters
+    ----------
+    t : times since 1970 [s], (n,).
+    first : instant since 1970 [s].
+    """
+    return filled(t.size, lambda part: np.round((t[part] - first) * MICROSECONDS) / MICROSECONDS)
 
 
 def _in_seconds(clock: Clock, values: NDArray[Any]) -> Array:

@@ -100,6 +100,19 @@ def test_a_gap_of_any_channel_ends_a_stretch_of_all() -> None:
         assert np.allclose(one.signals["v_y"], wave(one.t), atol=1e-9)
 
 
+def test_clocks_of_the_calendar_are_compared_to_the_microsecond() -> None:
+    t, slow, late = DT * np.arange(1000), 0.003 + 0.1 * np.arange(100), 1.7e9
+    hole = (t < 3.0) | (t >= 5.0)
+    channels = {"r": (t, wave(t)), "v_y": (t[hole], wave(t[hole])), "v_x": (slow, wave(slow))}
+    near = on_one_clock({k: raw(t, v) for k, (t, v) in channels.items()}, DT, LONGEST_GAP)
+    far = on_one_clock({k: raw(t + late, v) for k, (t, v) in channels.items()}, DT, LONGEST_GAP)
+    assert len(near) == len(far) == 2
+    for one, other in zip(near, far, strict=True):
+        assert np.abs(other.t - late - one.t).max() < 3e-7
+        for name, values in one.signals.items():
+            assert np.allclose(other.signals[name], values, rtol=0, atol=1e-12)
+
+
 def test_channels_that_never_overlap_have_no_stretch() -> None:
     t = DT * np.arange(100)
     assert on_one_clock({"a": raw(t, t), "b": raw(t + 5.0, t)}, DT, LONGEST_GAP) == []

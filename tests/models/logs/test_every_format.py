@@ -246,6 +246,14 @@ def test_a_clock_that_does_not_rise_is_refused(format, clock, tmp_path, drive):
     assert "clock of" in refusal(written.path, written.dbc)
 
 
+@pytest.mark.parametrize("format", ["CSV", "Parquet", "MATLAB", "MATLAB 7.3"])
+def test_a_clock_of_numbers_that_counts_since_1970_keeps_them(format, tmp_path, drive):
+    t, columns = drive
+    written = write(format, tmp_path, 1.7e9 + t, columns)
+    first, *_ = open_log(written.path).read(list(written.names.values()))
+    assert np.array_equal(first.t, 1.7e9 + t)
+
+
 def test_messages_that_were_stamped_out_of_order_are_refused(tmp_path, drive):
     t, columns = drive
     written = write("MCAP", tmp_path, np.concatenate([t[:100], t[:200]]), columns)
