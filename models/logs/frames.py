@@ -15,16 +15,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import Array
+from codegen.arrays import Array, blocks, filled
 from models.limits import limits
 from models.logs.foreign import need
 from models.logs.growing import Growing
 from models.logs.log import RecordingError
-from models.logs.mdf_blocks import BUS_EVENT, opened
+from models.logs.mdf_blocks import is_bus, opened
 from models.logs.stamps import CALENDAR, since
 from models.schema import require_few
 
 FRAME = "CAN_DataFrame"  # of MDF
+NO_DATA = ("CAN_RemoteFrame", "CAN_ErrorFrame")
 TOGETHER = 1 << 16  # frames that are stored at a time
 SHORT = 0x7FF  # largest identifier of 11 bits
 EXTENDED = 1 << 31  # marks an identifier of 29 bits
@@ -69,15 +70,40 @@ class _Gathered:
         if len(self._times) == TOGETHER:
             self._store()
 
+    def extend(self, times: Array, data: NDArray[np.uint8]) -> None:
+        """Take the next frames.
+
+        Parameters
+        ----------
+        times : (n,) [s].
+        data : (n, bytes).
+        """
+        self._t.extend(times)
+        self._data.extend(data[:, : self.width].reshape(-1))
+
     def _store(self) -> None:
-        self._t.extend(np.frombuffer(self._times, np.float64))
-        self._data.extend(np.frombuffer(self._bytes, np.uint8))
-        self._times, self._bytes = array("d"), bytearray()
+        if self._times:
+            times, data = np.frombuffer(self._times), np.frombuffer(self._bytes, np.uint8)
+            self.extend(times, data.reshape(-1, self.width))
+            self._times, self._bytes = array("d"), bytearray()
 
     def finished(self) -> Frames:
         """Return all of them."""
         self._store()
         return Frames(self._t.finished(), self._data.finished().reshape(-1, self.width))
+
+
+def _in_order(frames: Frames) -> Frames:
+    """Return frames in the order of their times: groups of a file follow one another."""
+    t, data = frames
+    if all(np.all(np.diff(t[part]) >= 0.0) for part in blocks(t.size, overlap=1)):
+        return frames
+    order = np.argsort(t, kind="stable")
+    sorted_data = Growing(np.uint8)
+    for part in blocks(t.size):
+        sorted_data.extend(data[order[part]].reshape(-1))
+    times = filled(t.size, lambda part: t[order[part]])
+    return Frames(times, sorted_data.finished().reshape(-1, data.shape[1]))
 
 
 class Log(NamedTuple):
@@ -181,7 +207,7 @@ def _require_whole_blf(path: Path) -> None:
 
 def _of_mdf(path: Path, known: Mapping[int, int]) -> Log:
     """Read the frames of the buses that an MDF4 file logs."""
-    found: dict[Key, list[Frames]] = {}
+    found: dict[Key, _Gathered] = {}
     others: Counter[str] = Counter()
     with opened(path, "CAN frames of MDF") as file:
         if str(file.version) < "4":
@@ -189,18 +215,30 @@ def _of_mdf(path: Path, known: Mapping[int, int]) -> Log:
         for number, group in enumerate(file.groups):
             samples = int(group.channel_group.cycles_nr)
             require_few(RecordingError, str(path), samples, "samples", "frames")
-            if not int(group.channel_group.flags) & BUS_EVENT:
+            if not is_bus(group):
+                continue
+            if not _has_data(group):
+                others[_what(group)] += samples
                 continue
             for first in range(0, samples, TOGETHER):
                 part = _of_group(file, number, first, min(TOGETHER, samples - first))
-                if part is not None:
-                    _sort(part, known, found, others)
-    frames = {}
-    for key, parts in found.items():
-        t, data = (np.concatenate(some) for some in zip(*parts, strict=True))
-        order = np.argsort(t, kind="stable")  # groups follow one another
-        frames[key] = Frames(t[order], data[order])
-    return Log("CAN MDF4", frames, others)
+                _sort(part, known, found, others)
+    return Log("CAN MDF4", {key: _in_order(one.finished()) for key, one in found.items()}, others)
+
+
+def _names(group: Any) -> set[str]:
+    return {channel.name for channel in group.channels}
+
+
+def _has_data(group: Any) -> bool:
+    """Whether a group holds data frames of a CAN bus."""
+    return {f"{FRAME}.ID", f"{FRAME}.DataBytes"} <= _names(group)
+
+
+def _what(group: Any) -> str:
+    """Return what the frames of a group are, that are no data frames."""
+    kinds = {name.partition(".")[0] for name in _names(group)}
+    return "error and remote" if kinds & set(NO_DATA) else "other"
 
 
 class _Part(NamedTuple):
@@ -213,9 +251,9 @@ class _Part(NamedTuple):
     data: NDArray[np.uint8]
 
 
-def _of_group(file: Any, number: int, first: int, count: int) -> _Part | None:
-    """Return some frames of a group; None where it holds others than data frames."""
-    names = {channel.name for channel in file.groups[number].channels}
+def _of_group(file: Any, number: int, first: int, count: int) -> _Part:
+    """Return some data frames of a group."""
+    names = _names(file.groups[number])
 
     def signal(name: str) -> Any:
         full = f"{FRAME}.{name}"
@@ -235,8 +273,6 @@ def _of_group(file: Any, number: int, first: int, count: int) -> _Part | None:
         return np.broadcast_to(otherwise, count) if found is None else found.samples.astype(int)
 
     identifiers, data = signal("ID"), signal("DataBytes")
-    if identifiers is None or data is None:
-        return None
     bytes_ = np.asarray(data.samples, dtype=np.uint8).reshape(count, -1)
     raw = identifiers.samples.astype(np.int64)
     ids = raw & IDENTIFIER
@@ -251,7 +287,7 @@ def _of_group(file: Any, number: int, first: int, count: int) -> _Part | None:
 
 
 def _sort(
-    part: _Part, known: Mapping[int, int], found: dict[Key, list[Frames]], others: Counter[str]
+    part: _Part, known: Mapping[int, int], found: dict[Key, _Gathered], others: Counter[str]
 ) -> None:
     """Add frames to those of their bus and identifier."""
     for identifier in np.unique(part.ids).tolist():
@@ -264,5 +300,5 @@ def _sort(
         others["cut short"] += int(mine.sum() - whole.sum())
         for bus in np.unique(part.buses[whole]).tolist():
             which = whole & (part.buses == bus)
-            frames = Frames(part.t[which], part.data[which, :width])
-            found.setdefault((str(bus), identifier), []).append(frames)
+            frames = found.setdefault((str(bus), identifier), _Gathered(width))
+            frames.extend(part.t[which], part.data[which])

@@ -17,7 +17,7 @@ from codegen.arrays import Array, filled
 from models.logs.foreign import one_line
 from models.logs.grouped import GroupedLog, Samples, noted, require_room
 from models.logs.log import Listed, RecordingError
-from models.logs.mdf_blocks import BUS_EVENT, opened
+from models.logs.mdf_blocks import is_bus, opened
 from models.logs.stamps import typical_rate
 from models.schema import LONGEST_NAME
 
@@ -130,7 +130,7 @@ class _Found:
         about = group.channel_group
         samples, master = int(about.cycles_nr), file.masters_db.get(number)
         name = _group_name(group, number)
-        if is_4 and int(about.flags) & BUS_EVENT:
+        if is_4 and is_bus(group):
             self.others["frames"].append(name)
             return
         clock = master is not None and _tells_time(group.channels[master], is_4)

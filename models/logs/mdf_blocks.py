@@ -20,6 +20,16 @@ MOST_BLOCKS = 1_000_000  # of data
 BUS_EVENT = 1 << 1  # flag of a group of channels that holds frames of a bus
 
 
+def is_bus(group: Any) -> bool:
+    """Whether a group of channels of an MDF4 file holds frames of a bus.
+
+    Parameters
+    ----------
+    group : as asammdf gives it.
+    """
+    return bool(int(group.channel_group.flags) & BUS_EVENT)
+
+
 class _Form(NamedTuple):
     """Where blocks of a version refer to others: the first group, the next of a kind, the first in.
 

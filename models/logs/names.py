@@ -52,7 +52,7 @@ WHEELS = ("wheel", "wheels", "tire", "tyre", "rad", "reifen", "whl")
 CORNERS = ("fl", "fr", "rl", "rr", "vl", "vr", "hl", "hr", "lf", "rf", "lr")
 REFERENCE = ("cmd", "command", "target", "desired", "des", "ref", "request", "req", "limit", "max",
              "min", "std", "stddev", "var", "cov", "covariance", "err", "error", "quality", "valid",
-             "status", "soll", "acc_cmd", "accuracy", "sigma", "bias", "offset", "dev")  # fmt: skip
+             "status", "soll", "accuracy", "sigma", "bias", "offset", "dev")  # fmt: skip
 NOT_BODY = (*WHEELS, *CORNERS, *REFERENCE)
 RULES: Mapping[str, Rule] = {
     "v_x": Rule(

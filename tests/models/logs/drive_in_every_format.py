@@ -192,9 +192,9 @@ def write_can(path: Path, t: np.ndarray, columns: Columns) -> Path:
     return path
 
 
-def write_mdf_bus(path: Path, t: np.ndarray, columns: Columns) -> Path:
-    """The same frames as MDF4 that logs a bus. The DBC: `DBC`."""
-    from asammdf import MDF, Signal, Source
+def write_mdf_bus(path: Path, t: np.ndarray, columns: Columns, apart: bool = False) -> Path:
+    """The same frames as MDF4 that logs a bus; apart: later ones first, and remote frames."""
+    from asammdf import MDF, Source
 
     order = [name for name in UNITS if name in columns]
     count = t.size * len(order)
@@ -207,16 +207,33 @@ def write_mdf_bus(path: Path, t: np.ndarray, columns: Columns) -> Path:
     frames["CAN_DataFrame.DLC"] = frames["CAN_DataFrame.DataLength"] = 8
     values = np.column_stack([columns[one] for one in order]).reshape(-1)
     frames["CAN_DataFrame.DataBytes"] = values.view("u1").reshape(count, 8)
+    stamps = np.repeat(t, len(order))
     bus = Source(name="CAN", path="CAN", comment="", source_type=2, bus_type=2)
+    half = count // 2
+    parts = [slice(half, None), slice(0, half)] if apart else [slice(None)]
     with MDF(version="4.10") as file:
-        signal = Signal(frames, np.repeat(t, len(order)), name="CAN_DataFrame", source=bus)
-        file.append(signal, acq_source=bus, common_timebase=True)
-        file.groups[0].channel_group.flags |= 2 | 4
-        for channel in file.groups[0].channels:
-            channel.flags |= 1 << 10
+        for part in parts:
+            _append(file, frames[part], stamps[part], "CAN_DataFrame", bus)
+        if apart:
+            for name, size in (("CAN_RemoteFrame", 7), ("CAN_ErrorFrame", 4), ("LIN_Frame", 3)):
+                no_data = np.zeros(
+                    size, dtype=[(f"{name}.BusChannel", "u1"), (f"{name}.ID", "<u4")]
+                )
+                _append(file, no_data, t[:size], name, bus)
         file.save(path, overwrite=True)
     path.with_suffix(".dbc").write_text(DBC)
     return path
+
+
+def _append(file, frames: np.ndarray, t: np.ndarray, name: str, bus) -> None:
+    """One group of frames of a bus."""
+    from asammdf import Signal
+
+    file.append(Signal(frames, t, name=name, source=bus), acq_source=bus, common_timebase=True)
+    group = file.groups[-1]
+    group.channel_group.flags |= 2 | 4
+    for channel in group.channels:
+        channel.flags |= 1 << 10
 
 
 class Written(NamedTuple):

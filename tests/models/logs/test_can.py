@@ -194,6 +194,34 @@ def test_frames_of_a_bus_in_mdf_are_told_apart_from_channels(tmp_path, drive):
     assert open_log(path, path.with_suffix(".dbc")).format == "CAN MDF4"
 
 
+def test_frames_of_several_groups_are_in_order_and_those_without_data_counted(tmp_path, drive):
+    t, columns = drive
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        path = write_mdf_bus(tmp_path / "log.mf4", t, columns, apart=True)
+    log = open_log(path, path.with_suffix(".dbc"))
+    (r,) = log.read(["Frame_r.r"])
+    assert np.array_equal(r.t, t) and np.array_equal(r.values, columns["r"])
+    assert set(log.notes) == {
+        "11 error and remote frames are not read",
+        "3 other frames are not read",
+    }
+
+
+def test_frames_of_a_bus_in_mdf_lie_on_disk_where_they_are_many(tmp_path, drive, monkeypatch):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        path = write_mdf_bus(tmp_path / "log.mf4", *drive)
+    monkeypatch.setattr("models.logs.growing.LONGEST_IN_MEMORY", 200)
+    log = open_log(path, path.with_suffix(".dbc"))
+    for _, (group, _, _) in log.channels:
+        for kept in (group.t, group.data):
+            while not isinstance(kept, np.memmap) and kept.base is not None:
+                kept = kept.base
+            assert isinstance(kept, np.memmap)
+    assert np.array_equal(log.read(["Frame_r.r"])[0].values, drive[1]["r"])
+
+
 def test_a_log_of_frames_without_dbc_asks_for_one(tmp_path, drive):
     path = write_can(tmp_path / "log.asc", *drive)
     assert "give the DBC file that tells their signals, in the [file] of log.toml" in refusal(path)
