@@ -35,7 +35,7 @@ def is_hdf5(head: bytes) -> bool:
 
 
 def is_mat5(head: bytes) -> bool:
-    """Whether a file is one of MATLAB 5 to 7.
+    """Whether a file begins as one of MATLAB 5 to 7; those of 7.3 do too, and are HDF5.
 
     Parameters
     ----------

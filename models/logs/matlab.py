@@ -44,20 +44,18 @@ def open_(path: Path) -> GroupedLog[Signal]:
     RecordingError
         One line, where it is no such file or holds no vector with a time.
     """
-    with one_line(path, "a MATLAB file"):
-        with path.open("rb") as file:
-            head = file.read(HEAD_OF_FILE)
-        if is_hdf5(head):
-            format = "MATLAB 7.3" if head.startswith(MATLAB) else "HDF5"
-            found = signals_of(hdf5.read_tree(path))
-        elif is_mat5(head):
-            format = "MATLAB"
-            found = signals_of(mat5.read_tree(path))
-        else:
-            raise RecordingError(
-                f"{path}: is not a MATLAB file of version 5, 6, 7 or 7.3; save it with "
-                "save(..., '-v7')"
-            )
+    with path.open("rb") as file:
+        head = file.read(HEAD_OF_FILE)
+    if not (is_hdf5(head) or is_mat5(head)):
+        raise RecordingError(
+            f"{path}: is not a MATLAB file of version 5, 6, 7 or 7.3; save it with save(..., '-v7')"
+        )
+    of_matlab = head.startswith(MATLAB)
+    format = "MATLAB" if not is_hdf5(head) else "MATLAB 7.3" if of_matlab else "HDF5"
+    what = f"{'an' if format == 'HDF5' else 'a'} {format} file"
+    with one_line(path, what):
+        read_tree = mat5.read_tree if format == "MATLAB" else hdf5.read_tree
+        found = signals_of(read_tree(path))
         said = (
             *noted("not read", found.unread),
             *noted("there is no vector t or time of the same length for", found.clockless),
@@ -66,7 +64,7 @@ def open_(path: Path) -> GroupedLog[Signal]:
     return GroupedLog.of(
         path,
         format,
-        f"a {format} file",
+        what,
         "sample",
         [
             (

@@ -291,6 +291,15 @@ def test_other_hdf5_files_are_read_as_they_are(tmp_path):
     assert np.array_equal(log.read(["drive.m(:,2)"])[0].values, B)
 
 
+def test_damaged_files_are_called_by_their_format(tmp_path):
+    other, ours = tmp_path / "log.h5", write_mat73(tmp_path / "log.mat", {"t": T, "v": A})
+    with h5py.File(other, "w") as file:
+        file["t"], file["v"] = T, A
+    for path, what in ((other, "an HDF5 file"), (ours, "a MATLAB 7.3 file")):
+        path.write_bytes(path.read_bytes()[:1000])
+        assert f"is not {what}, or is damaged or cut off" in refusal(path)
+
+
 def test_a_struct_of_many_vectors_is_gone_through_a_few_times():
     """Not once for each of them: of twice as many vectors it would take four times as long."""
     touched = 0
