@@ -13,16 +13,15 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+LOWEST = runpy.run_path(str(ROOT / ".ci" / "lowest.py"))
 LOCKS = {"requirements.lock": [], "requirements-test.lock": ["test"]}
 ENTRY = re.compile(r"^([a-z0-9._-]+)==(\S+)", re.M)
 
 
 def wanted(extras):
     """Names and lowest versions that the project asks for."""
-    texts = [*PROJECT["dependencies"]]
-    texts += [text for extra in extras for text in PROJECT["optional-dependencies"][extra]]
-    others = [text for text in texts if not text.startswith(f"{PROJECT['name']}[")]
-    return [re.fullmatch(r"([\w.-]+)>=([\d.]+)", text).groups() for text in others]
+    texts = LOWEST["requirements"](PROJECT, list(extras))
+    return [re.fullmatch(r"([\w.-]+)>=([\d.]+)", text).groups() for text in texts]
 
 
 def number(version):
@@ -80,8 +79,19 @@ def test_the_parts_list_holds_the_lock():
 
 
 def test_a_dependency_without_a_lower_bound_is_refused():
-    lowest = runpy.run_path(str(ROOT / ".ci" / "lowest.py"))["lowest"]
+    lowest = LOWEST["lowest"]
     assert lowest(PROJECT, ["onnx"])[0] == "casadi==3.8.2"
     assert lowest(PROJECT, [])[0] == "casadi==3.7.0"
     with pytest.raises(SystemExit, match="no lower bound"):
         lowest({"dependencies": ["numpy"], "optional-dependencies": {}}, [])
+
+
+def test_an_extra_that_names_others_asks_for_all_of_theirs():
+    optional = {"a": ["one>=1"], "b": ["car[a,c]", "two>=2"], "c": ["car[b]", "one>=1", "x[y]>=3"]}
+    project = {"name": "car", "dependencies": ["zero>=0"], "optional-dependencies": optional}
+    found = LOWEST["requirements"](project, ["b"])
+    assert sorted(found) == ["one>=1", "one>=1", "two>=2", "x[y]>=3", "zero>=0"]
+    asked = {name for name, _ in wanted(["test"])}
+    for extra in ("parquet", "mat", "mdf", "ros", "can", "fmu", "onnx", "cluster", "commonroad"):
+        assert {name for name, _ in wanted([extra])} <= asked
+    assert LOWEST["lowest"](PROJECT, ["logs"])[0] == "casadi==3.7.0"
