@@ -123,9 +123,7 @@ class Setup(NamedTuple):
         """
         following = self.begun(recording) if carry is None else dict(carry)
         for part in blocks(len(recording)) if parts is None else parts:
-            shown = self.shown(recording, part)
-            record = self.scan(shown.samples, {**following, **shown.signals, **self.constants})
-            following = {port: record[f"{port}_final"] for port in self.scan.carry}
+            shown, record, following = self._over(recording, part, following)
             yield Block(
                 part=part,
                 state={port: shown.of_recording(record[f"{port}_all"]) for port in self.scan.carry},
@@ -155,11 +153,21 @@ class Setup(NamedTuple):
         """
         following = self.begun(recording)
         for part in blocks(n):
-            shown = self.shown(recording, part)
-            values = {**following, **shown.signals, **self.constants}
-            record = self.scan(shown.samples, values, every=shown.samples)
-            following = {port: record[f"{port}_final"] for port in self.scan.carry}
-        return {port: np.asarray(value) for port, value in following.items()}
+            _, _, following = self._over(recording, part, following, whole=False)
+        return following
+
+    def _over(
+        self, recording: Recording, part: slice, carry: Mapping[str, Array], *, whole: bool = True
+    ) -> tuple["Shown", dict[str, Array], dict[str, Array]]:
+        """Return what is shown of a part, what is recorded of it, and what is carried after it.
+
+        whole : whether all samples are recorded, or the last alone.
+        """
+        shown = self.shown(recording, part)
+        values = {**carry, **shown.signals, **self.constants}
+        record = self.scan(shown.samples, values, every=1 if whole else shown.samples)
+        after = {port: np.asarray(record[f"{port}_final"]) for port in self.scan.carry}
+        return shown, record, after
 
     def begun(self, recording: Recording) -> dict[str, Array]:
         """Return what is carried into the first sample of a recording, by port.
