@@ -52,7 +52,7 @@ class AxleRmse:
 def axle_rms(
     force: Array, where: NDArray[np.bool_] | None = None, reference: Array | None = None
 ) -> AxleRmse:
-    """Return the root mean square of axle forces, or of their errors.
+    """Return the root mean square of axle forces, or of their errors; NaN of no samples.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def axle_rms(
         kept = away if where is None else away[where[part]]
         with np.errstate(over="ignore", invalid="ignore"):  # a diverged law: infinite
             squares, count = squares + np.sum(kept**2, axis=0), count + len(kept)
-            front, rear = np.sqrt(squares / count) if count else (np.nan, np.nan)
+    front, rear = np.sqrt(squares / count) if count else (np.nan, np.nan)
     return AxleRmse(front=float(front), rear=float(rear))
 
 

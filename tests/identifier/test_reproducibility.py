@@ -209,3 +209,11 @@ def test_both_axles_together_is_the_rms_of_all_samples():
     force = np.array([[3.0, 0.0], [-3.0, 4.0]])
     assert axle_rms(force).both == pytest.approx(np.sqrt(np.mean(force**2)))
     assert AxleRmse(front=3.0, rear=4.0).both == pytest.approx(np.sqrt(12.5))
+
+
+def test_no_samples_have_no_size():
+    force = np.ones((4, 2))
+    for none in (axle_rms(force[:0]), axle_rms(force, np.zeros(4, dtype=bool))):
+        assert np.isnan([none.front, none.rear, none.both]).all()
+    some = axle_rms(force, np.array([True, False, True, False]), -force)
+    assert (some.front, some.rear) == (2.0, 2.0)
