@@ -117,6 +117,8 @@ class History:
             yield from self.state.run.blocks(samples)
             return
         for part in blocks(len(self.recording)):
+            if not _holds(part, samples):
+                continue
             around = slice(part.start, part.stop + 1)
             yield Block(
                 part=part,

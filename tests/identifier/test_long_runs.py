@@ -121,6 +121,19 @@ def test_only_blocks_that_are_asked_for_are_computed_again(whole, in_blocks):
     assert all(part.start <= k < part.stop for part, k in zip(parts, asked, strict=True))
 
 
+def test_only_blocks_that_are_asked_for_are_given_of_a_run_in_memory(whole, request):
+    piece = identify(whole, CAR, AxleIdentifier.for_vehicle(CAR))
+    request.getfixturevalue("in_blocks")
+    asked = np.array([130, 1000])
+    given = list(piece.blocks(asked))
+    assert len(given) == 2 and not isinstance(piece.state, Recalled)
+    for block, k in zip(given, asked, strict=True):
+        assert block.part.start <= k < block.part.stop
+        for port, values in piece.state.items():
+            np.testing.assert_array_equal(block.state[port][k - block.part.start], values[k])
+    assert list(piece.blocks(asked[:0])) == []
+
+
 def test_errors_over_blocks_are_those_over_the_whole(whole, request):
     design = AxleIdentifier.for_vehicle(CAR)
     run = identify(whole, CAR, design)
