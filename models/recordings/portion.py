@@ -11,8 +11,9 @@ from codegen.arrays import LONG, Array, blocks
 from models.recordings.record import Recording
 from models.vehicle import GRAVITY
 
-STRETCH = 2000  # samples of one, 20 s at 100 Hz
-STEP = 500  # samples between the beginnings that a stretch may have
+STRETCH = 20.0  # s of one, where a quarter of the samples are enough for that
+STEPS = 4  # beginnings that a stretch may have in the time of one
+FEWEST = 4  # stretches, so that there are some on both sides of a middle
 REST = 0.6  # s that the car stands at the end of a stretch: a delay of that leaves the next alone
 HARDEST = 2.0 * GRAVITY  # m/s² that count: what is beyond is a sensor, not a drive
 
@@ -51,13 +52,15 @@ def portion(recording: Recording, middle: int | None = None) -> Portion:
     n = len(recording)
     if n <= LONG:
         return Portion(recording, np.arange(n))
-    power = _power(recording)
-    count = LONG // STRETCH
+    step = min(round(STRETCH / recording.dt), LONG // FEWEST) // STEPS
+    power = _power(recording, step)
+    count = LONG // (STEPS * step)
     if middle is None or not 0 < middle < n:
-        begins = _hardest(power, 0, n, count)
+        sides = [(0, n, count)]
     else:
-        begins = _hardest(power, 0, middle, count // 2) + _hardest(power, middle, n, count // 2)
-    samples = np.unique(np.add.outer(begins, np.arange(STRETCH)))
+        sides = [(0, middle, count // 2), (middle, n, count // 2)]
+    begins = [begin for side in sides for begin in _hardest(power, step, *side)]
+    samples = np.unique(np.add.outer(begins, np.arange(STEPS * step)))
     samples = recording.without_scraps(samples[samples < n])
     taken = recording.taken(samples)
     ends = np.array([piece.stop for piece in taken.stretches])
@@ -66,23 +69,23 @@ def portion(recording: Recording, middle: int | None = None) -> Portion:
     return Portion(replace(taken, v_x=v_x), samples)
 
 
-def _power(recording: Recording) -> Array:
-    """Return the sum of (v_x r)² over each `STEP` samples."""
+def _power(recording: Recording, step: int) -> Array:
+    """Return the sum of (v_x r)² over each `step` samples."""
     n = len(recording)
-    power = np.zeros(-(-n // STEP))
+    power = np.zeros(-(-n // step))
     for part in blocks(n):
         turning = np.clip(recording.v_x[part] * recording.r[part], -HARDEST, HARDEST) ** 2
-        np.add.at(power, np.arange(part.start, part.stop) // STEP, turning)
+        np.add.at(power, np.arange(part.start, part.stop) // step, turning)
     return power
 
 
-def _hardest(power: Array, first: int, last: int, count: int) -> list[int]:
+def _hardest(power: Array, step: int, first: int, last: int, count: int) -> list[int]:
     """Return where the hardest stretch begins of each of `count` parts of samples."""
-    width = STRETCH // STEP
-    if last - first <= count * STRETCH:
-        return list(range(first, last, STRETCH))
+    length = STEPS * step
+    if last - first <= count * length:
+        return list(range(first, last, length))
     begins = []
-    for low, high in pairwise(np.linspace(first, last, count + 1).astype(int) // STEP):
-        turned = np.convolve(power[low:high], np.ones(width), mode="valid")  # each beginning's
-        begins.append(STEP * (low + (int(np.argmax(turned)) if high - low >= width else 0)))
+    for low, high in pairwise(np.linspace(first, last, count + 1).astype(int) // step):
+        turned = np.convolve(power[low:high], np.ones(STEPS), mode="valid")  # each beginning's
+        begins.append(step * (int(low) + int(np.argmax(turned))))
     return begins

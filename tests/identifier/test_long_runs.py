@@ -166,8 +166,7 @@ def test_a_law_that_diverges_is_noticed_in_the_block_where_it_does(whole, in_blo
 @pytest.fixture
 def short_portions(monkeypatch, in_blocks):
     monkeypatch.setattr(portion, "LONG", 4000)
-    monkeypatch.setattr(portion, "STRETCH", 500)
-    monkeypatch.setattr(portion, "STEP", 125)
+    monkeypatch.setattr(portion, "STRETCH", 5.0)
 
 
 @pytest.fixture(scope="module")
@@ -201,6 +200,16 @@ def test_a_portion_takes_where_the_car_is_turned_and_not_where_a_sensor_breaks(
     r[[8500, 11000]] = 5000.0
     samples = portion.portion(replace(long_drive, r=r)).samples
     assert np.isin(np.arange(9000, 9600), samples).sum() > 400  # of a stretch of 500
+
+
+@pytest.mark.parametrize(("dt", "lasts"), [(0.01, 5.0), (0.02, 5.0), (0.00625, 5.0), (0.001, 1.0)])
+def test_stretches_of_a_portion_last_as_long_at_every_rate(long_drive, short_portions, dt, lasts):
+    same = replace(long_drive, t=dt * np.arange(len(long_drive)))
+    asked = portion.portion(same, 12_000)
+    pieces = asked.recording.stretches
+    assert len(pieces) >= 4 and len(asked.recording) <= 4000
+    shortest = min(piece.stop - piece.start for piece in pieces)
+    assert shortest * dt == pytest.approx(lasts, rel=0.01)
 
 
 def test_half_of_a_portion_lies_before_the_freeze(long_drive, short_portions):
