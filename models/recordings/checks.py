@@ -175,11 +175,11 @@ def _blame(slope: float, law: str) -> str:
 
 def _check_v_x_r(w: Windows) -> str | None:
     """Answer with a centripetal acceleration above 60 m/s^2 in 5 % of the moving windows."""
-    peak = float(np.percentile(np.abs(w.v_x_r), 95))
-    if peak > LARGEST_V_X_R:
+    largest = float(np.percentile(np.abs(w.v_x_r), 95))
+    if largest > LARGEST_V_X_R:
         return (
             f"r must be in rad/s, |v_x r| below {LARGEST_V_X_R:g} m/s^2, it is "
-            f"{peak:.4g}; degrees per second? multiply r by pi/180"
+            f"{largest:.4g}; degrees per second? multiply r by pi/180"
         )
     return None
 
@@ -192,13 +192,13 @@ def _check_steering(recording: Recording, w: Windows, turn: Steering) -> str | N
     lower bound 0.03 m (half a 1:43 car) rising to 0.12 m at 8 m/s (a sedan in degrees/s 0.05).
     """
     column = _larger_steering(recording)
-    L, correlation = turn
-    if correlation < -0.5:
+    L = turn.wheelbase
+    if turn.correlation < -0.5:
         return (
             f"{column} must turn the car to the left (r > 0) when positive, its "
-            f"correlation with r is {correlation:.2f}; change the sign of {column} (or of r)"
+            f"correlation with r is {turn.correlation:.2f}; change the sign of {column} (or of r)"
         )
-    if correlation < 0.7:
+    if turn.correlation < 0.7:
         return None
     v = float(np.sqrt(np.mean(w.v_x**2)))
     small = onset(w)
@@ -229,9 +229,9 @@ def _check_lateral_velocity(recording: Recording, w: Windows, turn: Steering) ->
     if w.v_y is None:
         return None
     behind = float(w.v_y @ w.r) / float(w.r @ w.r)
-    correlation = behind * float(np.sqrt(np.mean(w.r**2) / (np.mean(w.v_y**2) + 1e-300)))
+    alike = behind * float(np.sqrt(np.mean(w.r**2) / (np.mean(w.v_y**2) + 1e-300)))
     rear_steers = peak(recording.delta_r) > 0.1 * peak(recording.delta_f)
-    clear = turn.correlation > 0.7 and correlation > 0.7 and not rear_steers
+    clear = turn.correlation > 0.7 and alike > 0.7 and not rear_steers
     if clear and behind > 0.9 * turn.wheelbase:
         return (
             f"vy must be positive to the left at the center of gravity, "
