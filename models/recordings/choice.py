@@ -69,16 +69,15 @@ def chosen_signals(
         return Reading(by_map, ())
     told = _beside(standard_signals(log, names), by_map)
     missing = missing_signals(told)
-    if not missing:
+    if has_v_y(told) and not missing:
         return Reading(told, ())
-    _refuse_words(log, missing, run)
+    _refuse_words(log, missing if has_v_y(told) else ["v_y", *missing], run)
     proposal = propose(log, headings, run)
     found = likely_signals(told, proposal)
-    missing = missing_signals(found)
-    if missing and not goes_without(missing, found):
+    if missing := missing_signals(found):
         raise RecordingError(missing_text(log, missing, proposal, names))
     notes = [_taken_text(name, found[name]) for name in found if name not in told]
-    return Reading(found, (*notes, *([_without_v_y_text(proposal)] if missing else [])))
+    return Reading(found, (*notes, *([] if has_v_y(found) else [_without_v_y_text(proposal)])))
 
 
 def as_listed(
@@ -176,16 +175,24 @@ def _beside(more: Mapping[str, Signal], told: Mapping[str, Signal]) -> dict[str,
     return found
 
 
-def missing_signals(signals: Mapping[str, Signal]) -> list[str]:
-    """Return the wanted signals that are not there; beta stands in for v_y.
-
-    A log without v_y that has a_y is read all the same, `goes_without`.
+def has_v_y(signals: Mapping[str, Signal]) -> bool:
+    """Return whether a lateral velocity is read, or the sideslip angle in its place.
 
     Parameters
     ----------
     signals : by our name.
     """
-    there = told_by(signals)
+    return "v_y" in told_by(signals)
+
+
+def missing_signals(signals: Mapping[str, Signal]) -> list[str]:
+    """Return the needed signals that are not there; without v_y it is estimated from a_y.
+
+    Parameters
+    ----------
+    signals : by our name.
+    """
+    there = {*signals, *(["v_y"] if has_v_y(signals) or "a_y" in signals else [])}
     return [name for name in NEEDED if name not in there]
 
 
@@ -203,17 +210,6 @@ def _taken_text(name: str, signal: Signal) -> str:
     channels = [without_unit(one) for one in signal.channel]
     unit = f" [{signal.unit}]" if signal.unit else ""
     return f"{column_of(name)} is taken from {' + '.join(channels)}{unit}, by its name"
-
-
-def goes_without(missing: Sequence[str], signals: Mapping[str, Signal]) -> bool:
-    """Return whether all that is missing is v_y, which is estimated where there is a_y.
-
-    Parameters
-    ----------
-    missing : signals that are wanted.
-    signals : those that are there.
-    """
-    return list(missing) == ["v_y"] and "a_y" in signals
 
 
 def _without_v_y_text(proposal: Proposal) -> str:

@@ -91,7 +91,7 @@ def test_a_right_answer_is_valid_and_says_what_it_cannot_see(history):
 
 @pytest.mark.parametrize(
     ("channel", "factor", "code"),
-    [("a_y", 1.6, "a_y_disagrees"), ("v_x", 1.25, "a_y_disagrees"), ("r", 1.25, "force_missed")],
+    [("a_y", 1.6, "a_y_disagrees"), ("v_x", 1.25, "force_missed"), ("r", 1.25, "force_missed")],
 )
 def test_a_channel_that_is_scaled_is_not_valid(exact, channel, factor, code):
     log = as_logged(exact)

@@ -20,7 +20,7 @@ from models.recordings.choice import (
     as_listed,
     column_of,
     column_word,
-    goes_without,
+    has_v_y,
     likely_signals,
     likely_text,
     missing_signals,
@@ -76,15 +76,14 @@ def run(options: argparse.Namespace) -> int:
     tell("\n".join(_head(log, chosen)))
     seen = _seen(log, listed, signals, chosen)
     tell(channels_text(listed, seen, signals, proposal, frozenset(told.signals)))
-    goes = goes_without(missing, signals)
-    if goes:
+    if not has_v_y(signals) and not missing:
         tell(f"{column_of('a_y')} is there: without vy, identify estimates it")
     tell(missing_text(options.log, missing, proposal))
     if options.write is not None:
         text = replace(told, signals=signals).toml(options.write.parent)
         write_atomically(options.write, text + unsure_toml(missing, proposal))
         say(f"wrote {options.write}" + (": what is missing stands behind # in it" * bool(missing)))
-    return FAILS if missing and not goes else DONE
+    return FAILS if missing else DONE
 
 
 def _run_of(log: LogFile, name: str) -> str | None:
