@@ -122,7 +122,7 @@ def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Str
 
 def _later(stretch: Stretch, zero: float) -> Stretch:
     t = stretch.t
-    return stretch._replace(t=by_blocks(t.size, lambda part: t[part] + zero))
+    return stretch._replace(t=filled(t.size, lambda part: t[part] + zero))
 
 
 def _interval(t: Array) -> float:
