@@ -4,11 +4,13 @@ Such a library is imported when a file of its format is opened. It is given byte
 have written, raises what it likes, warns and logs; a user sees the file and the rule.
 """
 
+import errno
 import gc
 import importlib
 import io
 import logging
 import sys
+import tempfile
 import traceback
 import warnings
 from collections.abc import Iterator
@@ -22,6 +24,7 @@ from models.logs.log import RecordingError
 from models.schema import shown
 
 LONGEST_REASON = 160  # characters
+FULL = (errno.ENOSPC, errno.EDQUOT)
 LOGGERS = ("asammdf", "can", "cantools", "canmatrix", "h5py", "rosbags")
 
 
@@ -55,7 +58,8 @@ def need(path: Path, module: str, format: str, extra: str) -> Any:
 def one_line(path: Path, format: str) -> Iterator[None]:
     """Let a library read a file: what it raises is a refusal, what it warns of is not said.
 
-    What is no fault of the file is no refusal of it: MemoryError stays what it is.
+    What is no fault of the file is not told of it: a full disk is said to be full, and MemoryError
+    stays what it is.
 
     Parameters
     ----------
@@ -79,6 +83,11 @@ def one_line(path: Path, format: str) -> Iterator[None]:
                 raise RecordingError(f"{path}: there is no such file") from None
             if isinstance(error, PermissionError):
                 raise RecordingError(f"{path}: may not be read") from None
+            if isinstance(error, OSError) and error.errno in FULL:
+                raise RecordingError(
+                    f"{path}: cannot be unpacked, there is no room in {tempfile.gettempdir()}; "
+                    "name a folder with room by TMPDIR"
+                ) from None
             raise RecordingError(
                 f"{path}: is not {format}, or is damaged or cut off ({reason})"
             ) from None

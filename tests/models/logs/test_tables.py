@@ -1,5 +1,6 @@
 """Tables are read the same with and without pyarrow, and long ones do not fill memory."""
 
+import errno
 import random
 import subprocess
 import sys
@@ -234,11 +235,13 @@ def test_a_full_disk_is_no_fault_of_the_log(tmp_path, monkeypatch, ending):
     assert "damaged" not in said and str(written.path) not in said
 
 
-def test_too_little_memory_is_no_fault_of_the_log(tmp_path, monkeypatch):
-    t = DT * np.arange(50)
-    pyarrow.parquet.write_table(pyarrow.table({"t": t, "v": t}), tmp_path / "log.parquet")
+def test_too_little_memory_or_room_to_unpack_is_no_fault_of_the_log(tmp_path):
     with pytest.raises(MemoryError), one_line(tmp_path / "log.parquet", "a Parquet file"):
         raise MemoryError
+    full = OSError(errno.ENOSPC, "No space left on device")
+    with pytest.raises(RecordingError) as caught, one_line(tmp_path / "log", "a ROS 2 bag"):
+        raise full
+    assert "there is no room in" in str(caught.value) and "damaged" not in str(caught.value)
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="counts the pages of Linux")
