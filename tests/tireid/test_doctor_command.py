@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.doctor import Finding
-from models.recordings import LogMap, read_recording, write_recording
+from identifier.doctor import Diagnosis, Finding
+from models.recordings import LogMap, Repair, read_recording, write_recording
 from tests.pages import faults_of
 from tireid.cli import main
-from tireid.diagnoses import size_text
+from tireid.diagnoses import size_text, write_repair
 
 RATIO = 14.6
 
@@ -107,6 +107,19 @@ def test_nothing_sure_writes_nothing_and_what_is_there_stays(clinic, tmp_path, c
     assert doctor(clinic, "bad.csv", "--repair", tmp_path / "mine.toml") == 2
     assert (tmp_path / "mine.toml").read_text() == "mine"
     assert doctor(clinic, "bad.csv", "--repair", tmp_path / "log.txt") == 2
+
+
+def test_what_is_found_in_a_log_that_its_map_repairs_is_taken_out_after_that(tmp_path):
+    told = LogMap(repair=Repair(offset={"r": 0.1}, vehicle={"mass": 1500.0}))
+    halved = Finding(
+        code="factor", channel="r", confidence=1.0, repair=Repair(factor={"r": 0.5}), sure=True
+    )
+    diagnosis = Diagnosis(name="log", findings=(halved,), unseen=())
+    written = write_repair(tmp_path / "log.toml", told, diagnosis)
+    assert LogMap.from_toml(tmp_path / "log.toml") == written
+    assert written.repair == Repair(
+        factor={"r": 0.5}, offset={"r": 0.05}, vehicle={"mass": 1500.0}
+    )  # (r - 0.1) / 2
 
 
 def test_sizes_have_the_digits_that_their_deviations_leave():
