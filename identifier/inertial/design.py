@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from codegen import Scan
 from codegen.arrays import Array
@@ -20,9 +21,9 @@ from identifier.axle.prior import Prior
 from identifier.axle.slip import FASTEST, SHORTEST, Sway
 from identifier.certificate import Certificate
 from identifier.driving import Driving
-from identifier.inertial.beliefs import Beliefs, Trust
-from identifier.inertial.motion import MOVING, of_axles, size
-from identifier.inertial.step import CARRY, OVER, PORTS, SENSORS, build_step
+from identifier.inertial.beliefs import Beliefs, Trust, TrustNumbers
+from identifier.inertial.motion import MOVING, SENSORS, of_axles, size
+from identifier.inertial.step import CARRY, OVER, PORTS, build_step, heard_size
 from identifier.method import OTHER_STRUCTURE, Method, Port, Reached, Setup, Track, resumed
 from identifier.tire_model import AXLES, TireModel
 from identifier.tuning import Range, ranges_around
@@ -31,7 +32,8 @@ from models.vehicle import GRAVITY, Vehicle
 
 NEAR = 0.99  # of a bound, from which on a number rests at it
 RISING_UNTIL = 0.0  # rad, the slip at which force curves shall not fall: the cornering stiffness
-MOST = {"bias": 0.1, "roll": 0.3, "gyro": 0.1, "inertia": 0.4}  # and the steering's, in Bounds
+MOST = {"bias": 0.1, "roll": 0.3, "gyro": 0.1, "inertia": 0.4}  # others are in `Bounds`
+LATEST = 0.25  # s, by which a measured v_y may be late
 
 # Title, unit and meaning of what rests at `MOST`, and whether that refuses an answer.
 AT_MOST: Mapping[str, tuple[str, str, str, bool]] = {
@@ -66,8 +68,9 @@ TUNED: Mapping[str, float] = {
 class InertialIdentifier(Method):
     """Axle curves and lateral velocity by one Kalman filter, from r, a_y, v_x and steering alone.
 
-    A recording's v_y is not read. What is learnt freezes to the same kind of model as that of the
-    axle identifier.
+    A v_y that is measured is one more measurement, believed as far as its noise and bias allow:
+    numbers that repeat or are missing are none. What is learnt freezes to the same kind of model as
+    that of the axle identifier.
 
     Parameters
     ----------
@@ -78,6 +81,8 @@ class InertialIdentifier(Method):
     trust : how far motion, road and sensors are trusted.
     roll_frequency, roll_damping : of the body in a_y [sqrt(g/L)], [-].
     sensor_position : of the accelerometer, before and left of the center of gravity [m].
+    reads_v_y : whether a measured v_y is looked at, where there is one.
+    v_y_delay : by which it is late [s], 0 to 0.25.
     ladder : slip scales of the units [rad], rising by powers of two.
     dt : sampling interval T_s [s].
 
@@ -95,6 +100,8 @@ class InertialIdentifier(Method):
     roll_frequency: float = 6.0
     roll_damping: float = 0.3
     sensor_position: tuple[float, float] = (0.0, 0.0)
+    reads_v_y: bool = True
+    v_y_delay: float = 0.0
     ladder: tuple[float, ...] = LADDER
     dt: float = 0.01
 
@@ -108,6 +115,7 @@ class InertialIdentifier(Method):
         require_within(ValueError, 0.01, 10.0, roll_damping=self.roll_damping)
         ahead, aside = self.sensor_position
         require_within(ValueError, -20.0, 20.0, ahead=ahead, aside=aside)
+        require_within(ValueError, 0.0, LATEST, v_y_delay=self.v_y_delay)
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> "InertialIdentifier":
@@ -151,7 +159,7 @@ class InertialIdentifier(Method):
     @property
     def remark(self) -> str:
         """Say what it does without."""
-        return "without v_y, which it tells"
+        return "" if self.reads_v_y else "without v_y, which it tells"
 
     @property
     def tunables(self) -> Mapping[str, Range]:
@@ -181,6 +189,7 @@ class InertialIdentifier(Method):
                 "compliance_m": [0.0, b.compliance],
                 "roll_rad_per_g": [0.0, MOST["roll"]],
                 "steering_offset_rad": [-b.steering, b.steering],
+                "v_y_offset_m_s": [-b.v_y, b.v_y],
                 "a_y_offset_g": [-MOST["bias"], MOST["bias"]],
                 "yaw_rate_offset_rad_s": [-MOST["gyro"], MOST["gyro"]],
                 "inverse_yaw_inertia_over_told": [1.0 - MOST["inertia"], 1.0 + MOST["inertia"]],
@@ -204,19 +213,27 @@ class InertialIdentifier(Method):
         W, own = self.prior.means(vehicle, self.ladder)
         P = prior_P = self._prior_covariance(vehicle)
         excitation = np.zeros((2, 1 + len(EDGES)))
-        sensors = np.array([0.0, self.beliefs.roll, 0.0, 0.0, 0.0])
+        sensors = np.zeros(len(SENSORS))
+        sensors[SENSORS.index("roll")] = self.beliefs.roll
         if start is not None:
             stored = resumed(start, AxleModel, OTHER_STRUCTURE, ladder=self.ladder)
             W, own, P, excitation = stored.W, stored.own, stored.covariance, stored.excitation
-            sensors[SENSORS.index("steering")] = own[0, 2]
+            sensors[[SENSORS.index("steering"), SENSORS.index("v_y_bias")]] = own[:, 2]
         size_ratio = math.sqrt(vehicle.wheelbase / 2.7)
-        trust = self.trust.numbers(self.dt, vehicle.wheelbase, vehicle.froude_time)
+        trust = self.trust.numbers(
+            self.dt, vehicle.wheelbase, vehicle.froude_time, self.prior.sd_v_y
+        )
         known = self.beliefs.covariance(n, size_ratio)
-        for one, own_places, rows in zip(P, _own_places(n), of_axles(n), strict=True):
-            known[np.ix_(rows, rows)] = one[np.ix_(own_places, own_places)]
+        for one, rows in zip(P, of_axles(n), strict=True):
+            known[np.ix_(rows, rows)] = one[_learnt_of_axle(n)]
+        if self._delay is None:
+            known[-1, :-1] = known[:-1, -1] = 0.0
+        first = TrustNumbers(*trust)
+        heard_v_y = np.zeros(heard_size(self._delay))
+        heard_v_y[2] = first.v_y_noise
         rest = len(triangle(size(n))) - len(triangle(size(n) - MOVING))
         return Setup(
-            scan=_scan(doublings(self.ladder)),
+            scan=_scan(doublings(self.ladder), self._delay),
             carry={
                 "motion": np.zeros(MOVING),
                 "W": W,
@@ -226,7 +243,8 @@ class InertialIdentifier(Method):
                 "motion_UD": np.zeros(rest),  # begins with the first sample
                 "gate": np.zeros(len(GateState._fields)),
                 "body": np.zeros(2),
-                "heard": np.concatenate([np.zeros(4), trust[-2:]]),
+                "heard": np.concatenate([np.zeros(4), [first.r_noise, first.a_y_noise]]),
+                "heard_v_y": heard_v_y,
                 "running": np.zeros(2),
                 "excitation": excitation,
             },
@@ -267,9 +285,14 @@ class InertialIdentifier(Method):
         omega = min(self.roll_frequency / vehicle.froude_time, 0.6 * FASTEST)
         return Sway(frequency=omega, damping=self.roll_damping)
 
+    @property
+    def _delay(self) -> int | None:
+        """Samples by which a measured v_y is late; None where it is not looked at."""
+        return round(self.v_y_delay / self.dt) if self.reads_v_y else None
+
     def _limits(self) -> Array:
         """Return the numbers of `LearntLimits`."""
-        most = MOST | {"steering": self.bounds.steering}
+        most = MOST | {"steering": self.bounds.steering, "v_y_bias": self.bounds.v_y}
         limits = [self.bounds.compliance, *(most[name] for name in SENSORS)]
         return np.array([inward(limit) for limit in limits])
 
@@ -306,12 +329,14 @@ class InertialIdentifier(Method):
         del vehicle
         b, W, own = self.bounds, state["W"], np.ravel(state["own"])
         shown = dict(zip(SENSORS, map(float, np.ravel(state["sensors"])), strict=True))
-        zero = shown["steering"]
+        zero, bias = shown["steering"], shown["v_y_bias"]
         unseen = "no such curve was seen, or mass, signs or units are wrong"
         late = "a sensor is late, or the tires are very soft"
         listed = [
             (abs(zero) > NEAR * b.steering,
              Reached("front", "zero of the steering", zero, "rad", "a sensor is off", True)),
+            (abs(bias) > NEAR * b.v_y,
+             Reached(None, "bias of v_y", bias, "m/s", "its sensor is off", False)),
         ]  # fmt: skip
         for name, (title, unit, meaning, refuses) in AT_MOST.items():
             value = shown[name]  # no roll at all is an acceleration in the plane of the road
@@ -352,14 +377,14 @@ class InertialIdentifier(Method):
         """
         n = len(self.ladder)
         prior = self._prior_covariance(vehicle)
-        zero = float(np.ravel(state["sensors"])[SENSORS.index("steering")])
+        zeros = np.ravel(state["sensors"])[[SENSORS.index("steering"), SENSORS.index("v_y_bias")]]
         own = np.zeros((2, 3))
-        own[:, 0], own[0, 2] = np.ravel(state["own"]), zero
+        own[:, 0], own[:, 2] = np.ravel(state["own"]), zeros
         own[:, 1] = self.prior.sway_share
         (P,) = unpacked(state["UD"].reshape(1, -1), size(n) - MOVING)
         after = prior.copy()
-        for one, own_places, rows in zip(after, _own_places(n), of_axles(n), strict=True):
-            one[np.ix_(own_places, own_places)] = P[np.ix_(rows, rows)]
+        for one, rows in zip(after, of_axles(n), strict=True):
+            one[_learnt_of_axle(n)] = P[np.ix_(rows, rows)]
         return AxleModel(
             vehicle=vehicle,
             ladder=self.ladder,
@@ -373,11 +398,12 @@ class InertialIdentifier(Method):
         )
 
 
-def _own_places(n: int) -> tuple[list[int], list[int]]:
-    """Return where among [W, own] of an axle's model stands what `of_axles` lists of it."""
-    return [*range(n + 1), n + 2], [*range(n + 1)]
+def _learnt_of_axle(n: int) -> tuple[NDArray[np.intp], ...]:
+    """Return where in the covariance of [W, own] of an axle stands what `of_axles` lists of it."""
+    places = [*range(n + 1), n + 2]
+    return np.ix_(places, places)
 
 
 @cache
-def _scan(steps: tuple[int, ...]) -> Scan:
-    return Scan(build_step(steps), carry=CARRY, over=OVER)
+def _scan(steps: tuple[int, ...], delay: int | None) -> Scan:
+    return Scan(build_step(steps, delay), carry=CARRY, over=OVER)

@@ -1,17 +1,19 @@
 """The car between two samples, and what its sensors should show: all that the filter predicts.
 
-z = [v_y, r, x_f, x_r, e_f, e_r, p, p'; w_f, w_r, s_f, s_r, b, ρ, δ₀, b_r, κ]: what moves, then what
-is learnt. v_y [m/s], r [rad/s]; x lagged slip [rad]; e what the curves miss of a force [static axle
-loads]; p sine of the bank, positive where it falls to the left, p' its rate [1/s]; w weights of the
-units, n each, s compliances [m]; b bias of the accelerometer [g], ρ roll of the body [rad per g],
-δ₀ zero of the steering [rad], b_r bias of the gyro [rad/s], κ excess of 1/I_z [-].
+z = [v_y, r, x_f, x_r, e_f, e_r, p, p'; w_f, w_r, s_f, s_r, b, ρ, δ₀, b_r, κ, o]: what moves, then
+what is learnt. v_y [m/s], r [rad/s]; x lagged slip [rad]; e what the curves miss of a force [static
+axle loads]; p sine of the bank, positive where it falls to the left, p' its rate [1/s]; w weights
+of the units, n each, s compliances [m]; b bias of the accelerometer [g], ρ roll of the body [rad
+per g], δ₀ zero of the steering [rad], b_r bias of the gyro [rad/s], κ excess of 1/I_z [-], o bias
+of a sensor of v_y [m/s].
 
 f = φ(x) cos δ + e,   dx/dt = v_x/σ (α - x),   σ = s C(x),
 α = δ + δ₀ - atan((v_y ± l r)/v_x) - k ä'/(ω² v_x), the last by the sway of the body, k told,
 dv_y/dt = g Σ share f - v_x r + g p,   dr/dt = (1 + κ)/I_z (l_f F_f - l_r F_r).
-Shown: r + b_r,  and  a_y = g Σ share f + ρ ä + g b + x_s dr/dt - y_s r²: ä [m/s²] is what the body
-rolls by, driven by the same forces, x_s and y_s where the accelerometer sits. A bank is in the
-equation of v_y and not in a_y: an accelerometer feels what tires push.
+Shown: r + b_r,  a_y = g Σ share f + ρ ä + g b + x_s dr/dt - y_s r²,  and  v_y + o  where that is
+measured: ä [m/s²] is what the body rolls by, driven by the same forces, x_s and y_s where the
+accelerometer sits. A bank is in the equation of v_y and not in a_y: an accelerometer feels what
+tires push.
 Everything is taken at the middle of the step: where forces and v_x r are half a sample apart, their
 difference is no v_y.
 """
@@ -26,6 +28,7 @@ from identifier.axle.slip import SHORTEST
 from models.vehicle import GRAVITY
 
 MOVING = 8  # entries of z before those that are learnt
+SENSORS = ("bias", "roll", "steering", "gyro", "inertia", "v_y_bias")  # the last of these
 FIRST_COS = 24  # of the series of cos δ, 2e-5 off at 0.5 rad
 
 
@@ -45,11 +48,12 @@ class Unknowns(NamedTuple):
     steering: Any
     gyro: Any
     inertia: Any
+    v_y_bias: Any
 
 
 def size(n: int) -> int:
     """Return how many entries z has for n units."""
-    return MOVING + 2 * n + 7
+    return MOVING + 2 * n + 8
 
 
 def places(n: int) -> dict[str, int]:
@@ -60,14 +64,14 @@ def places(n: int) -> dict[str, int]:
     n : number of units.
     """
     rest = MOVING + 2 * n
-    names = ("compliance", "compliance_rear", "bias", "roll", "steering", "gyro", "inertia")
+    names = ("compliance", "compliance_rear", *SENSORS)
     return {"W": MOVING, "W_rear": MOVING + n} | {name: rest + i for i, name in enumerate(names)}
 
 
 def of_axles(n: int) -> tuple[list[int], list[int]]:
     """Return where among what is learnt the numbers of each axle's model stand, front and rear.
 
-    Weights and compliance, then the zero of the steering in front.
+    Weights and compliance, then the zero of the steering in front and the bias of v_y at the rear.
 
     Parameters
     ----------
@@ -75,7 +79,10 @@ def of_axles(n: int) -> tuple[list[int], list[int]]:
     """
     at = {name: place - MOVING for name, place in places(n).items()}
     front, rear = (list(range(at[W], at[W] + n)) for W in ("W", "W_rear"))
-    return [*front, at["compliance"], at["steering"]], [*rear, at["compliance_rear"]]
+    return (
+        [*front, at["compliance"], at["steering"]],
+        [*rear, at["compliance_rear"], at["v_y_bias"]],
+    )
 
 
 def unknowns(z: Any, n: int) -> Unknowns:
@@ -101,6 +108,7 @@ def unknowns(z: Any, n: int) -> Unknowns:
         steering=z[k + 4],
         gyro=z[k + 5],
         inertia=z[k + 6],
+        v_y_bias=z[k + 7],
     )
 
 

@@ -9,6 +9,7 @@ identifier; body (2,), heard (6,), running (2,), excitation (2, 9).
 Sampled: x = [v_y, r], of which v_y is not read; u, v_x, a_y, NaN where there is none.
 """
 
+from dataclasses import fields
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -16,13 +17,14 @@ import casadi as ca
 from identifier.axle.car import Car, axle_port, larger, named_port, smaller, within
 from identifier.axle.covariance import Factors, entry, factors_of, row_of, triangle
 from identifier.axle.curve import EDGES, excited
-from identifier.axle.gate import Gate, GateState, gate
+from identifier.axle.gate import Gate, GateState, Plausibility, gate
 from identifier.axle.learning import BoundNumbers, bounded
 from identifier.axle.step import PLAUSIBILITY
 from identifier.inertial.beliefs import TrustNumbers
 from identifier.inertial.gaussian import measured, propagated
 from identifier.inertial.motion import (
     MOVING,
+    SENSORS,
     Laws,
     Predicted,
     Sample,
@@ -38,10 +40,12 @@ from models.vehicle import GRAVITY
 
 OVER = ("x", "u", "v_x", "a_y")
 LEARNT = ("W", "own", "sensors")
-CARRY = ("motion", *LEARNT, "UD", "motion_UD", "gate", "body", "heard", "running", "excitation")
+KEPT = ("UD", "motion_UD", "gate", "body", "heard", "heard_v_y", "running", "excitation")
+CARRY = ("motion", *LEARNT, *KEPT)
 OUTPUTS = ("axle_force", "v_y", "v_y_sd", "side_slip_observable")
 LOAD = "static axle loads"
-SENSORS = ("bias", "roll", "steering", "gyro", "inertia")
+FIRST_CHANGE = 5  # of what is carried of a measured v_y, where its changes begin
+MOST_COUNTED = 1000  # samples
 MOST_SLIDING = 0.7  # |v_y|/v_x from which the filter begins anew
 MOST_NOISE = 9.0  # of the noise that is held for true, what one sample may show
 MOST_MISSED = 25.0  # one outlier alone is no alarm
@@ -63,8 +67,9 @@ PORTS = (
     Port("own", "m per load", "compliance, front and rear", learnt=True),
     Port(
         "sensors",
-        "g; rad per g; rad; rad/s; -",
-        "bias of a_y, roll of the body, zero of the steering, bias of r, excess of 1/I_z",
+        "g; rad per g; rad; rad/s; -; m/s",
+        "bias of a_y, roll of the body, zero of the steering, bias of r, excess of 1/I_z, bias of "
+        "a measured v_y",
         learnt=True,
     ),
     Port(
@@ -88,6 +93,12 @@ PORTS = (
         "newest r and a_y, those before, and variances of their noise",
     ),
     Port(
+        "heard_v_y",
+        "m/s; (m/s)^2; -; m/s",
+        "newest measured v_y and its innovation, variance of its noise, samples since the filter "
+        "began and numbers that were taken, changes of v_y in the last samples, newest first",
+    ),
+    Port(
         "running",
         "-",
         "1 while the filter runs; mean square of the missed force over its deviation",
@@ -103,7 +114,9 @@ PORTS = (
 
 
 class LearntLimits(NamedTuple):
-    """Of compliance [m], bias [g], roll [rad per g], steering [rad], gyro [rad/s], inertia [-]."""
+    """Of compliance [m], bias [g], roll [rad per g], steering [rad], gyro [rad/s], inertia [-] and
+    bias of v_y [m/s].
+    """
 
     compliance: Any
     bias: Any
@@ -111,6 +124,7 @@ class LearntLimits(NamedTuple):
     steering: Any
     gyro: Any
     inertia: Any
+    v_y_bias: Any
 
 
 class Noise(NamedTuple):
@@ -125,12 +139,20 @@ class Noise(NamedTuple):
     heard: Any
 
 
-def build_step(steps: tuple[int, ...]) -> ca.Function:
+class Change(NamedTuple):
+    """Of v_y in the step [m/s], and its gradient in z (1, q)."""
+
+    v_y: Any
+    gradient: Any
+
+
+def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
     """Return the step; every number stays an input of it.
 
     Parameters
     ----------
     steps : doublings between the units.
+    delay : samples by which a measured v_y is late; None does not look at it.
     """
     n = len(steps) + 1
     q = size(n)
@@ -143,7 +165,8 @@ def build_step(steps: tuple[int, ...]) -> ca.Function:
         "motion_UD": ca.SX.sym("motion_UD", 1, len(triangle(q)) - len(triangle(q - MOVING))),
     }
     ports["gate"], last = named_port(GateState, "gate")
-    ports |= {name: ca.SX.sym(name, k) for name, k in (("body", 2), ("heard", 6), ("running", 2))}
+    sizes = {"body": 2, "heard": 6, "heard_v_y": heard_size(delay), "running": 2}
+    ports |= {name: ca.SX.sym(name, k) for name, k in sizes.items()}
     ports["excitation"] = ca.SX.sym("excitation", 2, 1 + len(EDGES))
     ports |= {name: ca.SX.sym(name, k) for name, k in (("x", 2), ("u", 2), ("v_x", 1), ("a_y", 1))}
     ports["dt"] = dt = ca.SX.sym("dt")
@@ -158,7 +181,7 @@ def build_step(steps: tuple[int, ...]) -> ca.Function:
     ports["rising"] = ca.SX.sym("rising", n)
     ports["metric"] = ca.SX.sym("metric", 2, len(triangle(n)))
 
-    seen = ca.vertcat(0, ports["x"][1])  # v_y is not looked at
+    seen = ca.vertcat(0, ports["x"][1])  # a missing v_y speaks against no sample
     gated = gate(ports["plausibility"], dt, last, seen, ports["u"], ports["v_x"])
     runs = ca.logic_and(gated.on, gated.v_x >= slowest)
     goes_on = ca.logic_and(runs, ports["running"][0] > 0.5)
@@ -179,11 +202,21 @@ def build_step(steps: tuple[int, ...]) -> ca.Function:
         scales,
         steps,
     )
-    factors = _propagated(ports, trust, ahead, z, q)
+    known = factors_of([*ca.horzsplit(ports["motion_UD"]), *ca.horzsplit(ports["UD"])], q)
+    if delay is None:  # nothing depends on the bias of a sensor that is not looked at
+        known.U.update({(i, q - 1): ca.SX(0) for i in range(q - 1)})
+    F = ca.jacobian(ahead.moving, z)
+    factors = propagated(known, F, _process_noise(trust, ahead))
     ahead_z = ca.vertcat(ahead.moving, z[MOVING:])
     corrected, factors = _corrected(
         (car, laws, trust), ahead, ahead_z, factors, noise, now, scales, steps
     )
+    heard_v_y = ports["heard_v_y"]
+    if delay is not None:
+        change = Change(ahead.moving[0] - z[0], F[0, :] - ca.SX.eye(q)[0, :])
+        corrected, factors, heard_v_y = _lateral(
+            ports, trust, delay, (corrected, factors), gated, goes_on, change
+        )
     missed = smaller((ca.vertcat(*corrected[4:6]) / _missed(trust, ahead)) ** 2, MOST_MISSED)
     fast = ports["running"][1]
     fast = fast + trust.alarm_gain * ((missed[0] + missed[1]) / 2 - fast)
@@ -219,6 +252,7 @@ def build_step(steps: tuple[int, ...]) -> ca.Function:
         "gate": gated.state,
         "body": tilt,
         "heard": noise.heard,
+        "heard_v_y": heard_v_y,
         "running": ca.vertcat(ca.logic_and(runs, sane), ca.if_else(goes_on, fast, 0)),
         "excitation": excited(
             ports["excitation"],
@@ -253,10 +287,9 @@ def _noise(ports: dict[str, Any], trust: TrustNumbers, gated: Gate, goes_on: Any
     heard, a_y = ports["heard"], ports["a_y"]
     there = ca.logic_and(a_y == a_y, ca.fabs(a_y) < trust.surge)  # NaN is not NaN
     newest = [gated.r, ca.if_else(there, a_y, heard[1])]
-    good = gated.state[GateState._fields.index("bad")] == 0
     fresh, variance, state = [], [], []
     for i, y in enumerate(newest):
-        news = ca.logic_and(ca.logic_and(y != heard[i], goes_on), good)
+        news = ca.logic_and(ca.logic_and(y != heard[i], goes_on), _is_good(gated))
         second = y - 2 * heard[i] + heard[2 + i]
         old = heard[4 + i]
         shows = smaller(second**2 / 6, MOST_NOISE * old + LEAST)
@@ -273,16 +306,10 @@ def _missed(trust: TrustNumbers, ahead: Predicted) -> Any:
     return trust.error + trust.relative_error * ca.fabs(ahead.curve.force)
 
 
-def _propagated(
-    ports: dict[str, Any], trust: TrustNumbers, ahead: Predicted, z: Any, q: int
-) -> Factors:
-    """Return the factors of the covariance a step later."""
-    F = ca.jacobian(ahead.moving, z)
+def _process_noise(trust: TrustNumbers, ahead: Predicted) -> list[Any]:
+    """Return what a step adds to the variances of what moves, None where nothing."""
     e_f, e_r = ca.vertsplit(_missed(trust, ahead) ** 2 * trust.renewed)
-    Q = [None, trust.r_walk, None, None, e_f, e_r, None, trust.bank_walk]
-    return propagated(
-        factors_of([*ca.horzsplit(ports["motion_UD"]), *ca.horzsplit(ports["UD"])], q), F, Q
-    )
+    return [None, trust.r_walk, None, None, e_f, e_r, None, trust.bank_walk]
 
 
 def _corrected(
@@ -322,6 +349,78 @@ def _corrected(
             counts=noise.fresh[i],
         )
     return kept, factors
+
+
+def heard_size(delay: int | None) -> int:
+    """Return how many numbers are carried of a measured v_y.
+
+    Parameters
+    ----------
+    delay : as of `build_step`.
+    """
+    return FIRST_CHANGE + max((delay or 0) - 1, 0)
+
+
+def _is_good(gated: Gate) -> Any:
+    """Return whether the gate goes on with this sample, and not with one before."""
+    return gated.state[GateState._fields.index("bad")] == 0
+
+
+def _plausible(ports: dict[str, Any], gated: Gate, v_y: Any) -> Any:
+    """Return whether a number is a lateral velocity that a car may have, which NaN is not."""
+    names = (field.name for field in fields(Plausibility))
+    at = dict(zip(names, ca.vertsplit(ports["plausibility"]), strict=True))
+    return ca.fabs(v_y) < at["max_sideslip"] * larger(gated.v_x, at["slow"])
+
+
+def _lateral(
+    ports: dict[str, Any],
+    trust: TrustNumbers,
+    late: int,
+    before: tuple[list[Any], Factors],
+    gated: Gate,
+    goes_on: Any,
+    change: Change,
+) -> tuple[list[Any], Factors, Any]:
+    """Return z, its factors and what is carried of v_y, after that is measured.
+
+    Where it is late, it shows v_y of now less its changes since, as they were predicted: what is
+    unsure of them is taken for as large as that of the newest one. Differences of innovations
+    show the noise, from one number to the next.
+    """
+    z, factors = before
+    last, newest, old, age, count, *changes = ca.vertsplit(ports["heard_v_y"])
+    changes = [ca.if_else(goes_on, change.v_y, 0), *changes]
+    y, learns = ports["x"][0], ca.logic_and(goes_on, _is_good(gated))
+    y = ca.if_else(ca.logic_and(_is_good(gated), _plausible(ports, gated, y)), y, last)
+    fresh = ca.logic_and(learns, ca.logic_and(y != last, age + 1 >= late))
+    innovation = y - (z[0] - sum(changes[:late])) - z[-1]
+    known = smaller(count + 2, 1 / trust.noise_gain)
+    shows = smaller((innovation - newest) ** 2 / 2, MOST_NOISE * old + LEAST)
+    variance = ca.if_else(fresh, old + (shows - old) / known, old)
+    h = -late * change.gradient
+    h[0] += 1
+    h[-1] += 1
+    U, D = factors
+    unsure = smaller(D[-1] + learns * trust.v_y_walk, larger(D[-1], trust.v_y_bias))
+    z, factors = measured(
+        z,
+        Factors(U, [*D[:-1], unsure]),
+        h,
+        innovation=innovation,
+        R=trust.v_y_error + variance + (trust.lateness * change.v_y / ports["dt"]) ** 2,
+        clip=trust.clip,
+        counts=fresh,
+    )
+    heard = [
+        y,
+        ca.if_else(fresh, innovation, newest),
+        variance,
+        goes_on * smaller(age + 1, MOST_COUNTED),
+        smaller(count + fresh, MOST_COUNTED),
+        *changes[: max(late - 1, 0)],
+    ]
+    return z, factors, ca.vertcat(*heard)
 
 
 def _loosened(factors: Factors, z: list[Any], amount: Any, n: int) -> Factors:

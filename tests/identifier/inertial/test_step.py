@@ -67,13 +67,14 @@ def by_differences(f, z):
 
 
 class ByHand:
-    """The filter with plain matrices."""
+    """The filter with plain matrices; `late` samples of a measured v_y, None does not read it."""
 
-    def __init__(self):
+    def __init__(self, late=None):
+        self.late = late
         self.step, self.look = compiled_model()
         W, own = METHOD.prior.means(CAR, METHOD.ladder)
-        self.z = np.concatenate([np.zeros(MOVING), *W, own[:, 0], np.zeros(5)])
-        self.z[-4] = METHOD.beliefs.roll
+        self.z = np.concatenate([np.zeros(MOVING), *W, own[:, 0], np.zeros(6)])
+        self.z[-5] = METHOD.beliefs.roll
         curves = METHOD.prior.covariance(CAR, METHOD.ladder)
         scale = np.sqrt(CAR.wheelbase / 2.7)
         self.P = np.zeros((Q, Q))
@@ -81,8 +82,11 @@ class ByHand:
             rows = [*range(8 + N * i, 8 + N * i + N), 8 + 2 * N + i]
             self.P[np.ix_(rows, rows)] = curves[i, : N + 1, : N + 1]
         b = METHOD.beliefs
-        sds = [b.bias, b.sd_roll, b.steering, b.gyro / scale, b.inertia]
-        self.P[-5:, -5:] = np.diag(sds) ** 2
+        sds = [b.bias, b.sd_roll, b.steering, b.gyro / scale, b.inertia, METHOD.prior.sd_v_y]
+        self.P[-6:, -6:] = np.diag(sds) ** 2
+        self.speed = np.sqrt(G * CAR.wheelbase)
+        self.lateral = [0.0, 0.0, (METHOD.trust.v_y_noise * self.speed) ** 2, 0]
+        self.changes = []
         self.scale, self.running, self.fast = scale, False, 0.0
         self.noise = np.array([METHOD.trust.r_noise / scale, METHOD.trust.a_y_noise]) ** 2
         self.clock = 0.0
@@ -103,7 +107,28 @@ class ByHand:
         self.tilt = np.array([v_x * r, 0.0])
         self.heard = [np.array([r, a_y])] * 2
 
-    def go_on(self, before, sample, y):
+    def lateral_velocity(self, z, P, v_y, gradient):
+        """A number that is new says what v_y was: that of now less what it has changed by since."""
+        t, (last, newest, noise, count) = METHOD.trust, self.lateral
+        most = METHOD.prior.sd_v_y**2
+        grown = min(P[-1, -1] + most * DT / t.v_y_time, max(P[-1, -1], most)) - P[-1, -1]
+        u = P[:, -1] / P[-1, -1]  # others owe to the bias what they are correlated with it
+        P = P + grown * np.outer(u, u)
+        if v_y == last:
+            return z, P
+        since = self.changes[-self.late :] if self.late else [0.0]
+        nu = v_y - (z[0] - sum(since)) - z[-1]
+        shows = min((nu - newest) ** 2 / 2, 9 * noise + 1e-12)
+        noise = noise + (shows - noise) / min(count + 2, t.noise_samples)
+        self.lateral = [v_y, nu, noise, count + 1]
+        h = np.eye(Q)[0] + np.eye(Q)[-1] - self.late * gradient
+        R = (t.v_y_error * self.speed) ** 2 + noise + (t.lateness * self.changes[-1] / DT) ** 2
+        S = h @ P @ h + R
+        nu = np.clip(nu, -t.clip * np.sqrt(S), t.clip * np.sqrt(S))
+        K = P @ h / S
+        return z + K * nu, P - np.outer(K, h @ P)
+
+    def go_on(self, before, sample, y, v_y):
         t, z = METHOD.trust, self.z
         F = by_differences(lambda z: self.step(z, self.tilt, before, sample)[0], z)
         ahead, tilt, force, rate = self.step(z, self.tilt, before, sample)
@@ -125,6 +150,8 @@ class ByHand:
         floor = np.array([(t.r_error / self.scale) ** 2, t.a_y_error**2])
         floor[1] += (t.a_y_share * tilt[0]) ** 2
         R = floor + self.noise + (t.lateness * late) ** 2
+        gradient = F[0] - np.eye(Q)[0]
+        self.changes.append(ahead[0] - z[0])
         z = ahead
         for i in (0, 1):
             nu = y[i] - expected[i] - H[i] @ (z - ahead)
@@ -132,22 +159,27 @@ class ByHand:
             nu = np.clip(nu, -t.clip * np.sqrt(S), t.clip * np.sqrt(S))
             K = P @ H[i] / S
             z, P = z + K * nu, P - np.outer(K, H[i] @ P)
+        if self.late is not None and len(self.changes) >= self.late:
+            z, P = self.lateral_velocity(z, P, v_y, gradient)
         q = np.minimum((z[4:6] / missed) ** 2, 25).mean()
         self.fast += DT / t.alarm_time * (q - self.fast)
         assert self.fast < t.alarm  # else the covariance would be opened, which this leaves out
         self.z, self.P, self.tilt = z, P, tilt
 
-    def take(self, before, sample, r, a_y):
+    def take(self, before, sample, r, a_y, v_y):
         if self.running:
-            self.go_on(before, sample, np.array([r, a_y]))
+            self.go_on(before, sample, np.array([r, a_y]), v_y)
         else:
             self.begin(sample, r, a_y)
+            self.lateral[0] = v_y
         self.running = True
         return self.z[0], np.sqrt(self.P[0, 0])
 
 
-@pytest.fixture(scope="module")
-def runs():
+@pytest.fixture(scope="module", params=[None, 0, 12])
+def runs(request):
+    """Without v_y, with one that is in time, and with one that repeats its numbers and is late."""
+    late = request.param
     maneuver = Slalom(
         amplitude=np.radians(3.0), frequency=0.6, onset=0.5, rate_limit=1.0, duration=3.99
     )
@@ -158,12 +190,18 @@ def runs():
         r=recording.r + 0.003 * rng.normal(size=len(recording)),
         a_y=recording.a_y + 0.1 * rng.normal(size=len(recording)),
     )
-    hand, told, before = ByHand(), [], None
+    if late:
+        held = np.maximum(5 * (np.arange(len(noisy)) // 5) - late, 0)
+        noisy = replace(noisy, v_y=noisy.v_y[held])
+    if late is not None:
+        noisy = replace(noisy, v_y=noisy.v_y + 0.03 + 1e-3 * np.sin(97.0 * noisy.v_y))
+    method = replace(METHOD, reads_v_y=late is not None, v_y_delay=DT * (late or 0))
+    hand, told, before = ByHand(late), [], None
     for k in range(len(noisy)):
         sample = np.array([noisy.v_x[k], noisy.delta_f[k], noisy.delta_r[k]])
-        told.append(hand.take(before, sample, noisy.r[k], noisy.a_y[k]))
+        told.append(hand.take(before, sample, noisy.r[k], noisy.a_y[k], noisy.v_y[k]))
         before = sample
-    return np.array(told), hand, identify(noisy, CAR, METHOD)
+    return np.array(told), hand, identify(noisy, CAR, method)
 
 
 def test_lateral_velocity_and_its_deviation_are_those_of_the_textbook(runs):
