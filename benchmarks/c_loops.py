@@ -22,17 +22,20 @@ Loop = Callable[[Array], Array]
 HAND_WRITTEN = Path(__file__).with_name("hand_written_step.c")
 
 PACKAGE_LOOP = """
+#include <string.h>
 #include "tireid.h"
+#define WIDTH ((int)(sizeof(tireid_input) / sizeof(tireid_real)))
 void run(long n, const double *s, double *force)
 {
     tireid_state state;
     tireid_params params;
     tireid_default_params(&params);
     tireid_init(&state);
-    for (long k = 0; k < n; ++k, s += 5) {
-        const tireid_input in = { (tireid_real)s[0], (tireid_real)s[1], (tireid_real)s[2],
-                                  (tireid_real)s[3], (tireid_real)s[4] };
-        tireid_real now[2];
+    for (long k = 0; k < n; ++k, s += WIDTH) {
+        tireid_real sample[WIDTH], now[2];
+        tireid_input in;
+        for (int i = 0; i < WIDTH; ++i) sample[i] = (tireid_real)s[i];
+        memcpy(&in, sample, sizeof in);
         tireid_step(&state, &params, &in);
         tireid_get_forces(&state, now);
         force[2 * k] = (double)now[0];
@@ -68,7 +71,7 @@ def release_flags(package: Package) -> tuple[str, ...]:
 
 
 def package_loop(package: Package, *, single: bool, flags: Sequence[str]) -> Loop:
-    """Return a package as a loop over samples (n, 5) that gives forces (n, 2) [N]."""
+    """Return a package as a loop over samples (n, k) that gives forces (n, 2) [N]."""
     name = package.specialized.name
     files = {p: t for p, t in package.files.items() if p.startswith(("include/", "src/"))}
     define = f"-D{name.upper()}_SINGLE={int(single)}"

@@ -183,9 +183,10 @@ def rows(table: Array) -> str:
 
     Parameters
     ----------
-    table : (n, m).
+    table : (n, m); NaN is the NAN of <math.h>.
     """
-    return "".join(f"    {{ {', '.join(repr(float(v)) for v in row)} }},\n" for row in table)
+    text = "".join(f"    {{ {', '.join(repr(float(v)) for v in row)} }},\n" for row in table)
+    return text.replace("nan", "(double)NAN")
 
 
 # Generated equations.

@@ -1,11 +1,13 @@
 """Samples that are refused, and the gap in time that they leave: one rule for Python, C and FMU.
 
 A sample is refused where a number is not finite or beyond what any car reaches (`SampleLimits`). It
-counts as time. A method that judges samples itself, whose step carries a gate, is shown a sample
-at `NOWHERE` in its place, which no gate believes: it holds its last one for a moment, then rests.
-The others rest at the first sample after the gap, once, before they take it: observers take the
-measurement and filters begin anew, as at a start, and what was learnt stays. So no difference over
-the gap is ever taken for one over a sampling interval. From `STALE_TIME` on forces read zero.
+counts as time. No sample is refused for a_y, nor for v_y where the method tells it itself: a v_y
+that no car reaches is taken for NaN there, as without a sensor. A method that judges samples
+itself, whose step carries a gate, is shown a sample at `NOWHERE` in place of one that is refused,
+which no gate believes: it holds its last one for a moment, then rests. The others rest at the first
+sample after the gap, once, before they take it: observers take the measurement and filters begin
+anew, as at a start, and what was learnt stays. So no difference over the gap is ever taken for one
+over a sampling interval. From `STALE_TIME` on forces read zero.
 """
 
 import math
@@ -44,7 +46,16 @@ class SampleLimits(NamedTuple):
             force=WEIGHTS * vehicle.weight,
         )
 
-    def accept(self, v_x: float, v_y: float, r: float, delta_f: float, delta_r: float) -> bool:
+    def accept(
+        self,
+        v_x: float,
+        v_y: float,
+        r: float,
+        delta_f: float,
+        delta_r: float,
+        *,
+        needs_v_y: bool = True,
+    ) -> bool:
         """Return whether a sample holds numbers within them; NaN is not.
 
         Parameters
@@ -54,14 +65,24 @@ class SampleLimits(NamedTuple):
         r : yaw rate [rad/s].
         delta_f : steering in front [rad].
         delta_r : steering at the rear [rad].
+        needs_v_y : False accepts any v_y, of which `possible` is what is left.
         """
         return (
             abs(v_x) <= self.speed
-            and abs(v_y) <= self.speed
+            and (abs(v_y) <= self.speed or not needs_v_y)
             and abs(r) <= self.yaw_rate
             and abs(delta_f) <= self.steering
             and abs(delta_r) <= self.steering
         )
+
+    def possible(self, v_y: float) -> float:
+        """Return a lateral velocity that a car may have [m/s], NaN in place of any other number.
+
+        Parameters
+        ----------
+        v_y : as it was measured [m/s].
+        """
+        return v_y if abs(v_y) <= self.speed else math.nan
 
 
 def judges_samples(carry: Mapping[str, Any]) -> bool:

@@ -553,7 +553,7 @@ class OnlineIdentifier:
 
         Parameters
         ----------
-        x : [v_y, r] (2,) [m/s, rad/s].
+        x : [v_y, r] (2,) [m/s, rad/s]; v_y NaN where there is none, if the method tells it itself.
         u : [δ_f, δ_r] (2,), angles of the road wheels [rad].
         v_x : longitudinal speed [m/s].
         a_y : of an accelerometer at the center of gravity, positive to the left [m/s²]; None, or a
@@ -566,10 +566,12 @@ class OnlineIdentifier:
         """
         (v_y, r), (delta_f, delta_r) = x, u
         felt = math.nan if a_y is None else float(a_y)
-        if not self.limits.accept(v_x, v_y, r, delta_f, delta_r):
+        needs_v_y = self.method.needs_v_y
+        if not self.limits.accept(v_x, v_y, r, delta_f, delta_r, needs_v_y=needs_v_y):
             return self._refused()
+        v_y = self.limits.possible(v_y)
         if self._stepper is None:
-            self._begun(x)
+            self._begun(np.array([v_y, r]))
         elif self.counts.missed and not self._judges:
             self._take((v_y, r), (delta_f, delta_r), 0.0)  # a rest, so that the step begins anew
         self._take((v_y, r), (delta_f, delta_r), v_x, felt)
@@ -595,7 +597,8 @@ class OnlineIdentifier:
         self.counts.refused += 1
         self.counts.missed += 1
         if self._stepper is not None and self._judges:
-            self._take((0.0, 0.0), (0.0, 0.0), NOWHERE)
+            v_y = 0.0 if self.method.needs_v_y else math.nan
+            self._take((v_y, 0.0), (0.0, 0.0), NOWHERE)
         if self.stale:
             self._force = np.zeros(2)
         return self._force.copy()

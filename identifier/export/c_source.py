@@ -129,6 +129,11 @@ def _switches(specialized: SpecializedStep) -> dict[str, tuple[object, str]]:
             int(specialized.parts.where_false is not None),
             "equations at rest are others than those of driving",
         ),
+        "READS_A_Y": (int(specialized.reads_a_y), "a_y is an input, NaN where there is none"),
+        "TELLS_V_Y": (
+            int(specialized.tells_v_y),
+            "v_y is an output; as an input it may be NaN",
+        ),
         "RESTS_FIRST": (
             int(specialized.rests_first),
             "the first sample of all is one to rest at before it is taken",
@@ -165,11 +170,8 @@ def _weights_and_others(specialized: SpecializedStep) -> tuple[list[Member], lis
 
 
 def _inputs(specialized: SpecializedStep) -> str:
-    real = f"{specialized.name}_real"
-    return "".join(
-        f"    {real} {port.name}; /* {port.description} [{port.unit}] */\n"
-        for port in specialized.inputs
-    )
+    members = [Member(port, (1, 1), False) for port in specialized.inputs]
+    return _declarations(members, specialized.name)
 
 
 def _declarations(members: Sequence[Member], name: str) -> str:

@@ -2,7 +2,8 @@
 
 import ctypes
 import json
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping
 from enum import IntEnum
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,6 +16,7 @@ from codegen.arrays import Array
 from codegen.package import NAME, c_files, one_file
 from identifier.export.c_source import ORDER, PREFIX, C
 from identifier.export.package import FORMAT, Package
+from identifier.export.specialize import INPUTS
 from identifier.refused import STALE_TIME, stale_samples, with_rests
 from models.recordings import Recording
 from models.schema import Table, read_json, read_text, shown
@@ -49,7 +51,7 @@ class ShippedRun(NamedTuple):
 
 
 class CompiledPackage:
-    """One instance of the shipped C.
+    """One instance of the shipped C; attributes name, single, dt, inputs.
 
     Parameters
     ----------
@@ -80,6 +82,7 @@ class CompiledPackage:
             raise PackageFileError(f"the name of a package is no name in C: {shown(self.name)}")
         self.single = table.text("precision") == "float" if single is None else single
         self.dt = table.number("sample_time_s")
+        self.inputs = tuple(one.text("name") for one in table.tables("inputs"))
         self._outputs = {one.text("name"): one.whole("size") for one in table.tables("outputs")}
         learnt = [one for one in table.tables("carried") if one.value("learnt")]
         self._weights = {one.text("name"): one.wholes("shape") for one in learnt}
@@ -163,7 +166,13 @@ class CompiledPackage:
         return self._instance.raw
 
     def step(
-        self, v_x: float, v_y: float, r: float, delta_f: float, delta_r: float = 0.0
+        self,
+        v_x: float,
+        v_y: float,
+        r: float,
+        delta_f: float,
+        delta_r: float = 0.0,
+        a_y: float = math.nan,
     ) -> tuple[Status, Array]:
         """Take one sample; return its status and the axle forces (2,) [N].
 
@@ -174,8 +183,10 @@ class CompiledPackage:
         r : yaw rate [rad/s].
         delta_f : steering in front [rad].
         delta_r : steering at the rear [rad].
+        a_y : of an accelerometer [m/s²], NaN where there is none; not read where it is no input.
         """
-        run = self.run_samples(np.array([[v_x, v_y, r, delta_f, delta_r]]))
+        sample = [v_x, v_y, r, delta_f, delta_r, a_y]
+        run = self.run_samples(np.array([sample[: len(self.inputs)]]))
         return Status(int(run.status[0])), run.axle_force[0]
 
     def run(self, recording: Recording) -> ShippedRun:
@@ -198,7 +209,7 @@ class CompiledPackage:
             )
         missing = stale_samples(STALE_TIME, self.dt)
         rows, resting, at = with_rests(len(recording), recording.breaks, missing)
-        samples = samples_of(recording)[rows]
+        samples = samples_of(recording, self.inputs)[rows]
         samples[resting] = np.nan
         ran = self.run_samples(samples)
         outputs = {name: values[at] for name, values in ran.outputs.items()}
@@ -209,7 +220,7 @@ class CompiledPackage:
 
         Parameters
         ----------
-        samples : (n, 5): v_x, v_y, r, delta_f, delta_r, SI.
+        samples : (n, k): v_x, v_y, r, delta_f, delta_r and, where it is one of `inputs`, a_y, SI.
 
         Raises
         ------
@@ -217,8 +228,9 @@ class CompiledPackage:
             Where the shape is another.
         """
         rows = np.ascontiguousarray(samples, dtype=np.float64)
-        if rows.ndim != 2 or rows.shape[1] != 5:
-            raise ValueError(f"samples must have shape (n, 5), not {rows.shape}")
+        if rows.ndim != 2 or rows.shape[1] != len(self.inputs):
+            wanted = len(self.inputs)
+            raise ValueError(f"samples must have shape (n, {wanted}), not {rows.shape}")
         told = np.empty((len(rows), sum(self._outputs.values())))
         status = np.empty(len(rows), dtype=np.int32)
         pointers = (ctypes.c_void_p(array.ctypes.data) for array in (rows, told, status))
@@ -280,14 +292,17 @@ class CompiledPackage:
         self._call("instance_adapt")(self._instance, int(adapts))
 
 
-def samples_of(recording: Recording) -> Array:
-    """Return a recording as samples (n, 5) in the order of the inputs."""
-    v_y = recording.v_y
-    columns = (
-        recording.v_x,
-        np.full(len(recording), np.nan) if v_y is None else v_y,
-        recording.r,
-        recording.delta_f,
-        recording.delta_r,
-    )
-    return np.column_stack(columns)
+EVERY_STEP = tuple(port.name for port in INPUTS)  # has these inputs
+
+
+def samples_of(recording: Recording, inputs: Iterable[str] = EVERY_STEP) -> Array:
+    """Return a recording as samples (n, k) in the order of the inputs; NaN where it lacks one.
+
+    Parameters
+    ----------
+    recording : n samples.
+    inputs : names of the inputs.
+    """
+    absent, logged = np.full(len(recording), np.nan), recording.as_logged()
+    signals = (getattr(logged, name) for name in inputs)
+    return np.column_stack([absent if signal is None else signal for signal in signals])

@@ -22,7 +22,7 @@ from codegen.package import (
 from codegen.template import Values, Words, filled
 from identifier.export.c_source import PREFIX, PROGRAMS, C, c_sources
 from identifier.export.layout import Member, carried_members, output_members, rules
-from identifier.export.specialize import Signal, SpecializedStep, specialize
+from identifier.export.specialize import ACCELERATION, Signal, SpecializedStep, specialize
 from identifier.method import Method, vehicle_numbers
 from identifier.refused import NOWHERE, STALE_TIME, stale_samples
 from identifier.tire_model import TireModel
@@ -133,14 +133,16 @@ REST = 10  # samples at rest, and some as long in between
 
 
 class Vectors(NamedTuple):
-    """Samples (n, 5) in the order of the inputs, SI, and axle forces (n, 2) [N]."""
+    """Samples (n, k) in the order of the inputs, SI, and axle forces (n, 2) [N]."""
 
     samples: Array
     force: Array
 
 
 def synthetic_samples(specialized: SpecializedStep, n: int = SAMPLES) -> Array:
-    """Return a start from rest and turns to both sides, (n, 5); arithmetic only, no noise.
+    """Return a start from rest and turns to both sides, (n, k); arithmetic only, no noise.
+
+    Where v_y is told it is measured at the end alone; a_y is that of the motion, with a gap.
 
     Parameters
     ----------
@@ -154,7 +156,12 @@ def synthetic_samples(specialized: SpecializedStep, n: int = SAMPLES) -> Array:
     v_y = 0.03 * v_x * slow
     r = 0.4 * specialized.min_speed * wave * np.minimum(k / n, 0.5)
     delta_f, delta_r = 0.05 * wave, 0.005 * slow
-    return np.column_stack([v_x, v_y, r, delta_f, delta_r])
+    a_y = np.gradient(v_y, specialized.dt) + v_x * r
+    a_y[5 * n // 8 : 6 * n // 8] = np.nan
+    measured = v_y if not specialized.tells_v_y else np.where(k < 7 * n // 8, np.nan, v_y)
+    return np.column_stack(
+        [v_x, measured, r, delta_f, delta_r, *[a_y] * specialized.reads_a_y],
+    )
 
 
 def _triangle(phase: Array) -> Array:
@@ -171,31 +178,38 @@ def run_in_virtual_machine(
 
     Parameters
     ----------
-    samples : (n, 5) in the order of the inputs.
+    samples : (n, k) in the order of the inputs.
     """
+    limits, method = specialized.limits, specialized.method
     carry = [ca.DM(value) for value in specialized.carry.values()]
     n, size = len(carry), sum(port.size for port in specialized.outputs)
     told, now, missed, started = [], np.zeros(size), 0, False
 
     def step(sample: Array) -> tuple[list[ca.DM], Array]:
-        v_x, v_y, r, delta_f, delta_r = sample
+        v_x, v_y, r, delta_f, delta_r, *a_y = sample
         results = list(
-            specialized.function(*carry, ca.DM([v_y, r]), ca.DM([delta_f, delta_r]), v_x)
+            specialized.function(
+                *carry, ca.DM([limits.possible(v_y), r]), ca.DM([delta_f, delta_r]), v_x, *a_y
+            )
         )
         flat = [np.array(value).ravel(order="F") for value in results[n:]]
         return results[:n], np.concatenate(flat)
 
+    absent = np.array([port == ACCELERATION for port in specialized.inputs])
+    nowhere = np.where(absent, np.nan, 0.0)
+    nowhere[:2] = NOWHERE, np.nan if specialized.tells_v_y else 0.0
     for sample in samples:
-        if specialized.limits.accept(*sample):
+        if limits.accept(*sample[:5], needs_v_y=method.needs_v_y):
             anew = specialized.believed is None and missed > 0
             if anew if started else specialized.rests_first:
-                carry, _ = step(np.array([0.0, *sample[1:]]))
+                rest = np.where(absent, np.nan, sample)
+                carry, _ = step(np.array([0.0, *rest[1:]]))
             carry, now = step(sample)
             missed, started = 0, True
         else:
             missed += 1
             if specialized.believed is not None and started:
-                carry, now = step(np.array([NOWHERE, 0.0, 0.0, 0.0, 0.0]))
+                carry, now = step(nowhere)
             if missed >= stale_samples(STALE_TIME, specialized.dt):
                 now = np.zeros(size)
         told.append(now)
@@ -213,15 +227,17 @@ def vectors_header(specialized: SpecializedStep, found: Vectors) -> str:
     """Return the vectors as a C header."""
     double, single = tolerances(specialized)
     kept = rules([member for member in carried_members(specialized) if member.learnt])
+    names = ", ".join(port.name for port in specialized.inputs)
+    size = len(specialized.inputs)
     negative = [f"#define VECTOR_NOT_NEGATIVE {rule.first}U /* a weight */\n" for rule in kept]
     return header(
         f"{specialized.name}_vectors.h",
-        "Generated. Samples v_x, v_y, r, delta_f, delta_r [SI] and forces front, rear [N].",
+        f"Generated. Samples {names} [SI] and forces front, rear [N].",
         [
             f"#define VECTORS {len(found.samples)}\n"
             f"#define VECTOR_TOLERANCE_DOUBLE {double} /* N */\n"
             f"#define VECTOR_TOLERANCE_SINGLE {single} /* N */\n" + "".join(negative[:1]),
-            f"static const double vector_input[VECTORS][5] = {{\n{rows(found.samples)}}};\n",
+            f"static const double vector_input[VECTORS][{size}] = {{\n{rows(found.samples)}}};\n",
             f"static const double vector_force[VECTORS][2] = {{\n{rows(found.force)}}};\n",
         ],
     )
@@ -246,6 +262,7 @@ def build_package(
     *,
     name: str = "tireid",
     single: bool = False,
+    with_a_y: bool = False,
 ) -> Package:
     """Return the package of a method for a car; the same input gives the same bytes.
 
@@ -255,6 +272,7 @@ def build_package(
     start : weights to begin with; None begins with those of the method.
     name : beginning of every symbol and file name.
     single : whether float is the default precision.
+    with_a_y : whether a_y is an input of a method that goes without it as well.
 
     Raises
     ------
@@ -263,10 +281,10 @@ def build_package(
     UnknownOperationError
         Where the method needs an operation that has no plain C.
     ValueError
-        Where stored weights are those of another structure.
+        Where stored weights are those of another structure, or the method has no use for a_y.
     """
     check_name(name)
-    specialized = specialize(method, vehicle, start, name)
+    specialized = specialize(method, vehicle, start, name, with_a_y=with_a_y)
     content = ingredients(specialized, single=single)
     about = summary(specialized, content)
     files = c_sources(specialized, single=single, about=about)

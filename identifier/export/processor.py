@@ -109,7 +109,7 @@ def replay_on(
     processor : one of `PROCESSORS`.
     name : of the package.
     files : its texts by path.
-    samples : (n, 5) in the order of the inputs, SI.
+    samples : (n, k) in the order of the inputs, SI.
     single : whether to compute in float.
     corrected : whether sums of doubles that are computed in software are those of `soft_add.c`, for
         comparisons, and not those of libgcc, for costs.
@@ -158,7 +158,7 @@ def replay_here(
     ----------
     name : of the package.
     files : its texts by path.
-    samples : (n, 5) in the order of the inputs, SI.
+    samples : (n, k) in the order of the inputs, SI.
     single : whether to compute in float.
     flags : of the compiler.
 

@@ -2,7 +2,8 @@
 
 Gains, T_s, vehicle and K⁻¹ become literals, so that only signals and the state are left:
 (state, x = [v_y, r], u = [δ_f, δ_r], v_x) -> (state next, axle_force [N], other outputs), SI.
-There is no a_y among them: a method that could use one goes without, as where none is logged.
+Last of them is a_y, for a method that needs it; one that can use it takes it where it is asked to,
+and else goes without, as where none is logged.
 """
 
 from collections.abc import Mapping
@@ -36,7 +37,12 @@ INPUTS = (
     Signal("delta_f", "rad", "road-wheel steering angle in front, left positive"),
     Signal("delta_r", "rad", "road-wheel steering angle at the rear, left positive"),
 )
-SAMPLED = ("x", "u", "v_x")
+ACCELERATION = Signal(
+    "a_y",
+    "m/s^2",
+    "lateral acceleration that an accelerometer shows, left positive; NaN where there is none",
+)
+SAMPLED = ("x", "u", "v_x", "a_y")
 
 
 class SpecializedStep(NamedTuple):
@@ -44,12 +50,13 @@ class SpecializedStep(NamedTuple):
 
     name : C identifier, prefix of everything that is exported.
     method, vehicle : what it was made from.
-    function : SX function of the carried ports, then x (2,), u (2,), v_x; returns `p_next` of each
-        carried port `p`, then the outputs, axle_force (2,) [N] first.
+    function : SX function of the carried ports, then x (2,), u (2,), v_x, and a_y where it is an
+        input; returns `p_next` of each carried port `p`, then the outputs, axle_force (2,) [N]
+        first.
     parts : the same function in the parts that C is written from.
     carry : value of each carried port at the start, in the port's matrix shape.
     learnt : carried ports that hold their values while adaptation is off; empty: it cannot be.
-    inputs : the five scalars v_x, v_y, r, delta_f, delta_r.
+    inputs : the scalars v_x, v_y, r, delta_f, delta_r, and a_y where it is one.
     outputs : axle_force and what else the step tells.
     state : units of the carried ports.
     dt : sampling interval [s].   min_speed : [m/s], below it forces read zero.
@@ -76,13 +83,28 @@ class SpecializedStep(NamedTuple):
     believed: str | None
     limits: SampleLimits
 
+    @property
+    def reads_a_y(self) -> bool:
+        """Whether a_y is an input."""
+        return ACCELERATION in self.inputs
+
+    @property
+    def tells_v_y(self) -> bool:
+        """Whether v_y is an output, so that NaN is one as an input."""
+        return not self.method.needs_v_y
+
 
 def _described(port: Port, size: int) -> Signal:
     return Signal(port.name, port.unit, port.words, size, port.rule)
 
 
 def specialize(
-    method: Method, vehicle: Vehicle, start: TireModel | None = None, name: str = "tireid"
+    method: Method,
+    vehicle: Vehicle,
+    start: TireModel | None = None,
+    name: str = "tireid",
+    *,
+    with_a_y: bool = False,
 ) -> SpecializedStep:
     """Return the step of a method for a car, ready to be exported.
 
@@ -91,18 +113,20 @@ def specialize(
     method : the method, with its numbers.
     start : weights to begin with; None begins with those of the method.
     name : C identifier.
+    with_a_y : whether a_y is an input of a method that goes without it as well.
 
     Raises
     ------
     ValueError
-        Where stored weights are those of another structure, or the method cannot go without a_y.
+        Where stored weights are those of another structure, or the method has no use for a_y.
     """
-    if method.needs_a_y:
-        raise ValueError(f"{type(method).__name__} cannot be exported yet: it needs a_y")
     setup = method.setup(vehicle, start)
-    step = setup.scan.step
-    carry = {port: one for port, one in setup.carry.items() if port not in setup.only_with_a_y}
-    parts = _specialized(setup, list(carry), name)
+    if with_a_y and "a_y" not in setup.scan.over:
+        raise ValueError(f"{type(method).__name__} has no use for a_y")
+    with_a_y = with_a_y or method.needs_a_y
+    step, left_out = setup.scan.step, () if with_a_y else setup.only_with_a_y
+    carry = {port: one for port, one in setup.carry.items() if port not in left_out}
+    parts = _specialized(setup, list(carry), name, with_a_y=with_a_y)
     return SpecializedStep(
         name=name,
         method=method,
@@ -111,7 +135,7 @@ def specialize(
         parts=parts,
         carry={port: _matrix(value, step.size_in(port)) for port, value in carry.items()},
         learnt=tuple(port for port in carry if method.port(port).learnt),
-        inputs=INPUTS,
+        inputs=(*_measured(method), *[ACCELERATION] * with_a_y),
         outputs=tuple(
             _described(method.port(port), step.numel_out(port)) for port in _outputs(setup)
         ),
@@ -124,16 +148,28 @@ def specialize(
     )
 
 
+def _measured(method: Method) -> tuple[Signal, ...]:
+    """Return the inputs that every step has; v_y may be missing where the method tells it."""
+    if method.needs_v_y:
+        return INPUTS
+    absent = "; NaN where there is none"
+    return tuple(
+        port._replace(description=port.description + absent) if port.name == "v_y" else port
+        for port in INPUTS
+    )
+
+
 def _outputs(setup: Setup) -> list[str]:
     """Return the outputs of a step beside its state, forces first."""
     return sorted(setup.scan.outputs, key=lambda port: port != "axle_force")
 
 
-def _specialized(setup: Setup, carry: list[str], name: str) -> Tuned:
+def _specialized(setup: Setup, carry: list[str], name: str, *, with_a_y: bool) -> Tuned:
     step = setup.scan.step
+    sampled_ports = SAMPLED if with_a_y else SAMPLED[:-1]
     ports = {port: ca.SX.sym(port, *step.size_in(port)) for port in carry}
-    ports |= {"x": ca.SX.sym("x", 2), "u": ca.SX.sym("u", 2), "v_x": ca.SX.sym("v_x")}
-    signals: dict[str, ca.SX] = {**ports, "a_y": ca.SX(np.nan)}
+    ports |= {port: ca.SX.sym(port, 2 if port in ("x", "u") else 1) for port in sampled_ports}
+    signals: dict[str, ca.SX] = {"a_y": ca.SX(np.nan), **ports}
     sampled = {port: signals[port] for port in (*carry, *setup.scan.over)}
     rest = {port: value for port, value in setup.carry.items() if port not in carry}
     constants = {
@@ -150,7 +186,7 @@ def _specialized(setup: Setup, carry: list[str], name: str) -> Tuned:
         wanted,
         {"cse": True},
     )
-    return tuned(literal, sampled=SAMPLED)
+    return tuned(literal, sampled=sampled_ports)
 
 
 def _matrix(value: Array, size: tuple[int, int]) -> Array:

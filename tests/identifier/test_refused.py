@@ -110,22 +110,41 @@ def test_no_channel_without_a_number_changes_what_was_learnt(channel, broken, sl
     assert np.abs(force).max() > 100.0
 
 
-def test_no_input_brings_a_number_into_the_axle_identifier_that_is_none():
+def test_no_sample_is_refused_for_a_lateral_velocity_that_the_method_tells(slalom):
+    """What no car can have is as if there were no sensor, to the bit; NaN is none."""
+    method, rows, found = make_method("inertial", CAR), rows_of(slalom)[:900], []
+    for absent in (*BROKEN, 1.001 * SampleLimits.of(CAR).speed):
+        rows[200:800, 1] = absent
+        forces, online = driven(method, rows, slalom.a_y[:900])
+        assert (online.counts.samples, online.counts.refused) == (900, 0)
+        found.append((forces, online.outputs["v_y"], *online.state().values()))
+    for one in found[1:]:
+        for value, expected in zip(one, found[0], strict=True):
+            np.testing.assert_array_equal(value, expected)
+    assert np.isfinite(found[0][0]).all()
+    paper, refused = make_method("integral", CAR), rows_of(slalom)[:300]
+    refused[200:250, 1] = np.nan
+    assert driven(paper, refused)[1].counts.refused == 50
+
+
+@pytest.mark.parametrize("name", ["axle", "inertial"])
+def test_no_input_brings_a_number_into_a_step_that_is_none(name):
     """The step alone, without the door before it: every channel and all of them, in any state."""
-    specialized, rng = specialize(AxleIdentifier.for_vehicle(CAR), CAR), np.random.default_rng(3)
+    specialized, rng = specialize(make_method(name, CAR), CAR), np.random.default_rng(3)
     n, gate = len(specialized.carry), list(specialized.carry).index("gate")
     carry = [ca.DM(value) for value in specialized.carry.values()]
     states = [carry]
-    for v_x, v_y, r, delta_f, delta_r in synthetic_samples(specialized, 400):
-        carry = list(specialized.function(*carry, [v_y, r], [delta_f, delta_r], v_x))[:n]
+    for v_x, v_y, r, delta_f, delta_r, *a_y in synthetic_samples(specialized, 400):
+        carry = list(specialized.function(*carry, [v_y, r], [delta_f, delta_r], v_x, *a_y))[:n]
         if rng.random() < 0.1:
             states += [carry, [*carry[:gate], np.array(carry[gate]), *carry[gate + 1 :]]]
             states[-1][gate][5] = 0.0  # just switched off: whatever comes first is near
-    channels = [*((k,) for k in range(5)), tuple(range(5)), *itertools.combinations(range(5), 2)]
+    k = len(specialized.inputs)
+    channels = [*((i,) for i in range(k)), tuple(range(k)), *itertools.combinations(range(k), 2)]
     for state, which, broken in itertools.product(states, channels, BROKEN):
-        sample = np.array([20.0, 0.1, 0.1, 0.01, 0.0])
+        sample = np.array([20.0, 0.1, 0.1, 0.01, 0.0, 2.0])
         sample[list(which)] = broken
-        told = specialized.function(*state, sample[1:3], sample[3:], sample[0])
+        told = specialized.function(*state, sample[1:3], sample[3:5], sample[0], *sample[5:k])
         for port, value in zip([*specialized.carry, "axle_force"], told, strict=False):
             assert np.abs(np.array(value)).max() < 1e9, (port, which, broken)  # NaN is not
 

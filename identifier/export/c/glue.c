@@ -32,18 +32,22 @@ void tireid_instance_reset(tireid_instance *it)
     (void)tireid_reset(&it->state);
 }
 
-/* Samples are rows of v_x, v_y, r, delta_f, delta_r; outputs rows of all numbers of tireid_output. */
+/* Samples are rows of all numbers of tireid_input, outputs rows of those of tireid_output. */
 void tireid_instance_run(
     tireid_instance *it, long n, const double *samples, double *output, int *status)
 {
+    tireid_real sample[sizeof(tireid_input) / sizeof(tireid_real)];
     tireid_real numbers[sizeof(tireid_output) / sizeof(tireid_real)];
+    const size_t width = sizeof sample / sizeof sample[0];
     const size_t size = sizeof numbers / sizeof numbers[0];
     long k;
     size_t i;
     for (k = 0; k < n; k++) {
-        const double *s = &samples[5 * k];
-        const tireid_input input = { (tireid_real)s[0], (tireid_real)s[1], (tireid_real)s[2],
-            (tireid_real)s[3], (tireid_real)s[4] };
+        tireid_input input;
+        for (i = 0; i < width; i++) {
+            sample[i] = (tireid_real)samples[((size_t)k * width) + i];
+        }
+        (void)memcpy(&input, sample, sizeof input);
         status[k] = (int)tireid_step(&it->state, &it->params, &input);
         (void)memcpy(numbers, &it->state.output, sizeof numbers);
         for (i = 0; i < size; i++) {

@@ -3,8 +3,10 @@
  *     tireid_example log.csv > forces.csv
  *
  * The log is CSV with a header and, in any order, the columns t [s], vx, vy [m/s], r [rad/s],
- * delta_f [rad] and, where there is one, delta_r [rad]; one row each TIREID_SAMPLE_TIME.
+ * delta_f [rad], where the step reads it ay [m/s^2] and, where there is one, delta_r [rad]; one row
+ * each TIREID_SAMPLE_TIME. Where v_y is told, vy may be left out, and v_y stands beside the forces.
  */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,9 +15,23 @@
 
 #define LINE 4096
 #define COLUMNS 64
-#define SIGNALS 6
 
-static const char *const names[SIGNALS] = { "t", "vx", "vy", "r", "delta_f", "delta_r" };
+enum { T, V_X, V_Y, R, DELTA_F, DELTA_R, A_Y, SIGNALS };
+
+typedef struct {
+    const char *name;
+    bool needed;
+} signal;
+
+static const signal signals[SIGNALS] = {
+    { "t", true },
+    { "vx", true },
+    { "vy", !TIREID_TELLS_V_Y },
+    { "r", true },
+    { "delta_f", true },
+    { "delta_r", false },
+    { "ay", TIREID_READS_A_Y },
+};
 
 /* Cut a line at its commas; return the number of pieces. */
 static int split(char *line, char *piece[COLUMNS])
@@ -45,22 +61,22 @@ static int find_columns(char *header, int column[SIGNALS])
     for (i = 0; i < SIGNALS; i++) {
         column[i] = -1;
         for (k = 0; k < count; k++) {
-            if (strcmp(piece[k], names[i]) == 0) {
+            if (strcmp(piece[k], signals[i].name) == 0) {
                 column[i] = k;
             }
         }
-        if ((i < (SIGNALS - 1)) && (column[i] < 0)) {
-            fprintf(stderr, "tireid_example: the log has no column %s\n", names[i]);
+        if (signals[i].needed && (column[i] < 0)) {
+            fprintf(stderr, "tireid_example: the log has no column %s\n", signals[i].name);
             return 0;
         }
     }
     return 1;
 }
 
-/* Read a number; a column that the log has not is zero, a cell without a number is NaN. */
-static double number(char *piece[COLUMNS], int count, int column)
+/* Read a number; in place of a column that the log has not another, a cell without one is NaN. */
+static double number(char *piece[COLUMNS], int count, int column, double absent)
 {
-    double value = 0.0;
+    double value = absent;
     if (column >= 0) {
         char *end = NULL;
         value = strtod((column < count) ? piece[column] : "", &end);
@@ -70,6 +86,16 @@ static double number(char *piece[COLUMNS], int count, int column)
     }
     return value;
 }
+
+#if TIREID_TELLS_V_Y
+static void print_side_slip(const tireid_state *state)
+{
+    tireid_output output;
+    (void)tireid_get_output(state, &output);
+    printf("%.9g,%.9g,%d,", (double)output.v_y, (double)output.v_y_sd,
+        (output.side_slip_observable > 0) ? 1 : 0);
+}
+#endif
 
 int main(int argc, char *argv[])
 {
@@ -93,22 +119,29 @@ int main(int argc, char *argv[])
     }
     (void)tireid_default_params(&params);
     (void)tireid_init(&state);
-    printf("t,Fyf,Fyr,status\n");
+    printf("t,Fyf,Fyr,%sstatus\n", TIREID_TELLS_V_Y ? "vy,vy_sd,side_slip_observable," : "");
     while (fgets(line, LINE, log) != NULL) {
         char *piece[COLUMNS];
         const int count = split(line, piece);
         tireid_input input;
         tireid_real force[2];
         tireid_status status;
-        input.v_x = (tireid_real)number(piece, count, column[1]);
-        input.v_y = (tireid_real)number(piece, count, column[2]);
-        input.r = (tireid_real)number(piece, count, column[3]);
-        input.delta_f = (tireid_real)number(piece, count, column[4]);
-        input.delta_r = (tireid_real)number(piece, count, column[5]);
+        input.v_x = (tireid_real)number(piece, count, column[V_X], 0.0);
+        input.v_y = (tireid_real)number(piece, count, column[V_Y], (double)NAN);
+        input.r = (tireid_real)number(piece, count, column[R], 0.0);
+        input.delta_f = (tireid_real)number(piece, count, column[DELTA_F], 0.0);
+        input.delta_r = (tireid_real)number(piece, count, column[DELTA_R], 0.0);
+#if TIREID_READS_A_Y
+        input.a_y = (tireid_real)number(piece, count, column[A_Y], (double)NAN);
+#endif
         status = tireid_step(&state, &params, &input);
         (void)tireid_get_forces(&state, force);
-        printf("%.6f,%.9g,%.9g,%d\n", number(piece, count, column[0]), (double)force[0],
-            (double)force[1], (int)status);
+        printf("%.6f,%.9g,%.9g,", number(piece, count, column[T], 0.0), (double)force[0],
+            (double)force[1]);
+#if TIREID_TELLS_V_Y
+        print_side_slip(&state);
+#endif
+        printf("%d\n", (int)status);
     }
     (void)fclose(log);
     fprintf(stderr, "%s; faults: %lu\n", tireid_version(), (unsigned long)state.faults);

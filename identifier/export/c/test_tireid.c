@@ -24,12 +24,13 @@ static void check(int holds, const char *rule)
 
 static tireid_input sample(int k)
 {
+    tireid_real number[sizeof(tireid_input) / sizeof(tireid_real)] = { 0 };
     tireid_input input;
-    input.v_x = (tireid_real)vector_input[k][0];
-    input.v_y = (tireid_real)vector_input[k][1];
-    input.r = (tireid_real)vector_input[k][2];
-    input.delta_f = (tireid_real)vector_input[k][3];
-    input.delta_r = (tireid_real)vector_input[k][4];
+    size_t i;
+    for (i = 0; i < (sizeof number / sizeof number[0]); i++) {
+        number[i] = (tireid_real)vector_input[k][i];
+    }
+    (void)memcpy(&input, number, sizeof input);
     return input;
 }
 
@@ -60,15 +61,47 @@ static void refuse(
     check(tireid_step(state, params, input) == (lasts ? TIREID_STALE : TIREID_BAD_INPUT), rule);
 }
 
+/* Signals that need not be there. */
+static void test_absent(tireid_state *state, const tireid_params *params)
+{
+    const tireid_state before = *state;
+    tireid_input input = sample(VECTORS - 1);
+    const tireid_real zero = 0;
+#if TIREID_TELLS_V_Y
+    tireid_state without;
+    input.v_y = zero / zero;
+    check(tireid_step(state, params, &input) <= TIREID_IMPLAUSIBLE, "v_y may be NaN");
+    without = *state;
+    *state = before;
+    input.v_y = params->max_speed * 2;
+    check(tireid_step(state, params, &input) <= TIREID_IMPLAUSIBLE, "v_y is not refused");
+    check(memcmp(state, &without, sizeof without) == 0, "a v_y that no car has is none");
+    *state = before;
+#else
+    input.v_y = zero / zero;
+    refuse(state, params, &input, "v_y must be a number");
+    *state = before;
+#endif
+#if TIREID_READS_A_Y
+    input = sample(VECTORS - 1);
+    input.a_y = zero / zero;
+    check(tireid_step(state, params, &input) <= TIREID_IMPLAUSIBLE, "a_y may be NaN");
+    input.a_y = (tireid_real)1.0 / zero;
+    check(tireid_step(state, params, &input) <= TIREID_IMPLAUSIBLE, "a_y is not refused");
+    *state = before;
+#endif
+}
+
 static void test_guards(tireid_state *state, const tireid_params *params)
 {
     const tireid_state before = *state;
     tireid_input input = sample(VECTORS - 1);
     tireid_real force[2];
     const tireid_real zero = 0;
-    input.v_y = zero / zero;
+    test_absent(state, params);
+    input.delta_f = zero / zero;
     refuse(state, params, &input, "NaN is refused");
-    input.v_y = (tireid_real)1.0 / zero;
+    input.delta_f = (tireid_real)1.0 / zero;
     refuse(state, params, &input, "infinity is refused");
     input = sample(VECTORS - 1);
     input.r = params->max_yaw_rate * 2;

@@ -6,6 +6,13 @@
 #include "tireid_equations.h"
 #include "tireid_tables.h"
 
+#if TIREID_READS_A_Y || TIREID_TELLS_V_Y
+#include <math.h>
+
+/* Of a signal that is not measured. */
+static const tireid_real tireid_absent = (tireid_real)NAN;
+#endif
+
 /* The numbers of a structure that holds numbers and nothing else. */
 static const tireid_real *tireid_numbers(const void *structure)
 {
@@ -55,11 +62,26 @@ static bool tireid_finite(tireid_real x)
 
 static bool tireid_accepts(const tireid_params *params, const tireid_input *in)
 {
-    return tireid_within(in->v_x, params->max_speed) && tireid_within(in->v_y, params->max_speed)
+    return tireid_within(in->v_x, params->max_speed)
+#if !TIREID_TELLS_V_Y
+        && tireid_within(in->v_y, params->max_speed)
+#endif
         && tireid_within(in->r, params->max_yaw_rate)
         && tireid_within(in->delta_f, params->max_steering)
         && tireid_within(in->delta_r, params->max_steering);
 }
+
+#if TIREID_TELLS_V_Y
+/* A sample whose v_y no car has is one without v_y. */
+static tireid_input tireid_possible(const tireid_params *params, const tireid_input *in)
+{
+    tireid_input possible = *in;
+    if (!tireid_within(in->v_y, params->max_speed)) {
+        possible.v_y = tireid_absent;
+    }
+    return possible;
+}
+#endif
 
 /* Whether a result is finite, as a whole, with forces that a car may have. */
 static bool tireid_believes(
@@ -128,8 +150,12 @@ tireid_status tireid_reset(tireid_state *state)
 /* Whether a step went on with this sample, and not with the last one that it believed. */
 static bool tireid_believed(const tireid_values *next, const tireid_input *in)
 {
-    return (next->gate[0] == in->v_x) && (next->gate[1] == in->v_y) && (next->gate[2] == in->r)
-        && (next->gate[3] == in->delta_f) && (next->gate[4] == in->delta_r);
+    return (next->gate[0] == in->v_x)
+#if !TIREID_TELLS_V_Y
+        && (next->gate[1] == in->v_y)
+#endif
+        && (next->gate[2] == in->r) && (next->gate[3] == in->delta_f)
+        && (next->gate[4] == in->delta_r);
 }
 #endif
 
@@ -178,8 +204,19 @@ static tireid_status tireid_advance(
 static void tireid_pass(tireid_state *state, const tireid_params *params)
 {
     if (state->started != 0U) {
-        const tireid_input nowhere = { (tireid_real)TIREID_NOWHERE, TIREID_C(0.0), TIREID_C(0.0),
-            TIREID_C(0.0), TIREID_C(0.0) };
+        tireid_input nowhere;
+        nowhere.v_x = (tireid_real)TIREID_NOWHERE;
+#if TIREID_TELLS_V_Y
+        nowhere.v_y = tireid_absent;
+#else
+        nowhere.v_y = TIREID_C(0.0);
+#endif
+        nowhere.r = TIREID_C(0.0);
+        nowhere.delta_f = TIREID_C(0.0);
+        nowhere.delta_r = TIREID_C(0.0);
+#if TIREID_READS_A_Y
+        nowhere.a_y = tireid_absent;
+#endif
         (void)tireid_advance(state, params, &nowhere);
     }
 }
@@ -192,6 +229,9 @@ static void tireid_begin(
     tireid_output out;
     tireid_input rest = *input;
     rest.v_x = TIREID_C(0.0);
+#if TIREID_READS_A_Y
+    rest.a_y = tireid_absent;
+#endif
 #if TIREID_DECIDES
     tireid_elsewhere(&state->values, &rest, &next, &out);
 #else
@@ -234,12 +274,18 @@ tireid_status tireid_step(
     } else {
         status = TIREID_BAD_INPUT;
         if (tireid_accepts(params, input)) {
+#if TIREID_TELLS_V_Y
+            const tireid_input possible = tireid_possible(params, input);
+            const tireid_input *const sample = &possible;
+#else
+            const tireid_input *const sample = input;
+#endif
 #if !TIREID_JUDGES
             if (tireid_is_new(state)) {
-                tireid_begin(state, params, input);
+                tireid_begin(state, params, sample);
             }
 #endif
-            status = tireid_advance(state, params, input);
+            status = tireid_advance(state, params, sample);
         }
         if (status < TIREID_BAD_INPUT) {
             state->missed = 0U;

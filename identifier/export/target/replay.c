@@ -4,8 +4,10 @@
 
 #define SPOT 16U /* the stack is looked at each so many steps */
 
+#define INPUTS (sizeof(tireid_input) / sizeof(tireid_real))
+
 typedef struct {
-    double value[5];
+    double value[INPUTS];
 } sample;
 
 extern const sample recorded_samples[];
@@ -38,6 +40,20 @@ static void print(const char *key, uint64_t number)
     machine_print(text);
 }
 
+/* A sample in the precision of the package. */
+static tireid_input input_of(const sample *at)
+{
+    union {
+        tireid_real number[INPUTS];
+        tireid_input input;
+    } both;
+    uint32_t i;
+    for (i = 0U; i < INPUTS; i++) {
+        both.number[i] = (tireid_real)at->value[i];
+    }
+    return both.input;
+}
+
 int main(void)
 {
     tireid_params params;
@@ -52,15 +68,10 @@ int main(void)
     (void)tireid_init(&state);
     machine_start_clock();
     for (at = recorded_samples; at != recorded_end; at++) {
-        tireid_input input;
+        const tireid_input input = input_of(at);
         uint32_t code; /* an enum has not the same size everywhere */
         uint32_t before;
         uint32_t spent;
-        input.v_x = (tireid_real)at->value[0];
-        input.v_y = (tireid_real)at->value[1];
-        input.r = (tireid_real)at->value[2];
-        input.delta_f = (tireid_real)at->value[3];
-        input.delta_r = (tireid_real)at->value[4];
         if ((steps % SPOT) == 0U) {
             machine_paint_stack();
         }

@@ -1,4 +1,4 @@
-/* A recording as it is on disk: rows of v_x, v_y, r, delta_f, delta_r in double. */
+/* A recording as it is on disk: rows of the inputs in double. */
     .section .rodata
     .balign 8
     .global recorded_samples

@@ -1,4 +1,4 @@
-"""Packages of the paper's identifier and of the default method, and 45 s of driving."""
+"""Packages of the paper's identifier, the default method and the inertial one; 45 s of driving."""
 
 import shutil
 import subprocess
@@ -23,13 +23,16 @@ STRICT = [
     "-Wdouble-promotion",
     "-Werror",
 ]
+TWO = ("integral", "axle")
+BANKED = "axle, with a_y"
 
 
 @pytest.fixture(scope="session")
 def packages():
-    """By law: the paper's network, and the method that tireid learns by."""
+    """By law: the paper's network; what tireid learns by, without and with a_y; without v_y."""
     car = sedan()
-    return {law: build_package(make_method(law, car), car) for law in ("integral", "axle")}
+    found = {law: build_package(make_method(law, car), car) for law in (*TWO, "inertial")}
+    return found | {BANKED: build_package(make_method("axle", car), car, with_a_y=True)}
 
 
 @pytest.fixture(scope="session")
@@ -44,10 +47,29 @@ def slalom():
 @pytest.fixture(scope="session")
 def samples(slalom):
     """The slalom as rows, with a halt and a fault in between."""
-    rows = samples_of(slalom)
+    return with_faults(samples_of(slalom), at=1)
+
+
+def with_faults(rows, at):
     rows[2000:2020, 0] = 0.3
-    rows[2500, 1] = np.nan
+    rows[2500, at] = np.nan
     return rows
+
+
+@pytest.fixture(scope="session")
+def drives(packages, slalom, samples):
+    """By law, the slalom as rows of its inputs, with a halt and a fault, a_y and v_y in parts."""
+    found = {law: samples for law in TWO}
+    for law in (BANKED, "inertial"):
+        specialized = packages[law].specialized
+        rows = samples_of(slalom, [port.name for port in specialized.inputs])
+        rows = with_faults(rows, at=2)
+        rows[1500:1700:2, 5], rows[2200:2400, 5], rows[2700:2710, 5] = np.nan, np.inf, 1e30
+        if specialized.tells_v_y:
+            rows[:2600, 1] = np.nan
+            rows[2800:2900, 1], rows[2900:3000, 1], rows[3000:, 1] = 1e4, -np.inf, np.nan
+        found[law] = rows[1400:3100]
+    return found
 
 
 def put(folder, files):

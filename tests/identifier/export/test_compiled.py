@@ -18,12 +18,13 @@ from identifier.methods import make_method
 from identifier.run import identify
 from identifier.stability.gain_design import with_keeping
 from models.vehicle import sedan
+from tests.identifier.export.conftest import BANKED
 
 CAR = sedan()
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
 
 
-@pytest.mark.parametrize("law", ["integral", "axle"])
+@pytest.mark.parametrize("law", ["integral", "axle", "inertial"])
 def test_a_log_through_the_shipped_c_is_the_method_in_python(law, packages, slalom):
     expected = identify(slalom, CAR, make_method(law, CAR)).axle_force
     run = CompiledPackage.of(packages[law]).run(slalom)
@@ -100,6 +101,53 @@ def test_the_default_goes_on_with_the_last_sample_that_it_believes(packages):
         status, force = run.step(20.0, 100.0, 0.1, 0.01)
     assert (status, *force) == (Status.IMPLAUSIBLE, 0.0, 0.0)
     assert run.faults == 27
+
+
+def test_a_lateral_velocity_that_no_car_has_is_none_where_it_is_told(packages, slalom):
+    """NaN, infinite or beyond the limit: not refused, and to the bit as without a sensor."""
+    run = CompiledPackage.of(packages["inertial"])
+    rows = samples_of(slalom, run.inputs)[:800]
+    speed = packages["inertial"].specialized.limits.speed
+    found = []
+    for absent in (np.nan, np.inf, -np.inf, 1.001 * speed, -1e30):
+        rows[100:700, 1] = absent
+        run.init()
+        told = run.run_samples(rows)
+        assert (told.status == Status.OK).all()
+        found.append((*told.outputs.values(), np.frombuffer(run.state, dtype=np.uint8)))
+    for one in found[1:]:
+        for values, expected in zip(one, found[0], strict=True):
+            np.testing.assert_array_equal(values, expected)
+    assert np.ptp(found[0][1]) > 0.1  # m/s
+
+
+@pytest.mark.parametrize("law", [BANKED, "inertial"])
+def test_no_sample_is_refused_for_an_accelerometer(law, packages, slalom):
+    run = CompiledPackage.of(packages[law])
+    rows = samples_of(slalom, run.inputs)[:1000]
+    clean = run.run_samples(rows).axle_force
+    for bad in (np.nan, np.inf, -np.inf, 1e300):
+        rows[300:400, 5] = bad
+        run.init()
+        told = run.run_samples(rows)
+        assert (told.status == Status.OK).all()
+        for name, value in run.weights.items():
+            assert np.isfinite(value).all(), name
+        force = np.sqrt(np.mean((told.axle_force - clean)[500:] ** 2))
+        assert force < 0.05 * np.sqrt(np.mean(clean[500:] ** 2))
+
+
+def test_a_sample_of_its_own_takes_a_y_last(packages, slalom):
+    one, all_at_once = (CompiledPackage.of(packages["inertial"]) for _ in range(2))
+    rows = samples_of(slalom, one.inputs)[:300]
+    forces = np.array([one.step(*row)[1] for row in rows])
+    np.testing.assert_array_equal(forces, all_at_once.run_samples(rows).axle_force)
+    blind = CompiledPackage.of(packages["inertial"])
+    without = np.array([blind.step(*row[:5])[1] for row in rows])
+    assert np.abs(without - forces).max() > 10.0
+    deaf = [CompiledPackage.of(packages["axle"]).step(20.0, 0.1, 0.1, 0.01, 0.0, a) for a in (0, 9)]
+    assert deaf[0][0] == deaf[1][0] == Status.OK
+    np.testing.assert_array_equal(deaf[0][1], deaf[1][1])
 
 
 def test_weights_that_do_not_fit_are_refused(packages):
@@ -236,8 +284,9 @@ def test_a_recording_of_another_interval_is_refused(packages, drive):
 
 
 def test_samples_of_another_shape_are_refused(packages):
-    with pytest.raises(ValueError, match=r"\(n, 5\)"):
-        CompiledPackage.of(packages["integral"]).run_samples(np.zeros((3, 4)))
+    for law, columns in (("integral", 5), ("inertial", 6)):
+        with pytest.raises(ValueError, match=rf"\(n, {columns}\)"):
+            CompiledPackage.of(packages[law]).run_samples(np.zeros((3, columns - 1)))
 
 
 def test_an_input_on_its_limit_is_taken_and_one_beyond_is_not(packages):

@@ -13,23 +13,36 @@ from identifier.methods import make_method
 from identifier.refused import STALE_TIME
 from identifier.run import OnlineIdentifier, identify
 from models.vehicle import sedan
+from tests.identifier.export.conftest import BANKED
 
 CAR = sedan()
-LAWS = ("axle", "integral", "rls", "stiffness_rls", "eso")
+LAWS = ("axle", "integral", "rls", "stiffness_rls", "eso", BANKED, "inertial")
+SIDE_SLIP = ("v_y", "v_y_sd", "side_slip_observable")
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
 
 
 @pytest.fixture(scope="module")
 def shipped(packages):
     """By law, what a package is computed with; each test begins anew."""
-    others = {law: build_package(make_method(law, CAR), CAR) for law in LAWS[2:]}
+    others = {law: build_package(make_method(law, CAR), CAR) for law in LAWS[2:5]}
     return {law: CompiledPackage.of(one) for law, one in {**packages, **others}.items()}
+
+
+def method_of(law):
+    return make_method("axle" if law == BANKED else law, CAR)
+
+
+def driven(slalom, package):
+    return samples_of(slalom, package.inputs)[:1500]
 
 
 @pytest.fixture
 def rows(slalom):
     """15 s of a slalom with gaps of 0.03 to 2 s, in one channel each, in all, and of each kind."""
-    rows = samples_of(slalom)[:1500]
+    return with_gaps(samples_of(slalom)[:1500])
+
+
+def with_gaps(rows):
     rows[300:303, 1] = np.nan
     rows[400:420, 2] = np.inf
     rows[500:550, 0] = np.nan
@@ -40,22 +53,27 @@ def rows(slalom):
 
 
 def in_python(law, rows):
-    online = OnlineIdentifier(make_method(law, CAR), CAR, 0.01)
-    forces, stale = [], []
+    online = OnlineIdentifier(method_of(law), CAR, 0.01)
+    told = []
     for row in rows:
-        forces.append(online.update(row[1:3], row[3:], row[0]))
-        stale.append(online.stale)
-    return np.array(forces), np.array(stale), online
+        force = online.update(row[1:3], row[3:5], row[0], *row[5:])
+        others = [value for port, value in online.outputs.items() if port in SIDE_SLIP]
+        told.append(np.concatenate([[online.stale], force, *others]))
+    return np.array(told), online
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_gaps_are_met_as_beside_a_car_in_python(law, shipped, rows):
-    shipped[law].init()
-    run = shipped[law].run_samples(rows)
-    forces, stale, online = in_python(law, rows)
-    assert np.abs(run.axle_force - forces).max() < 1e-6
-    np.testing.assert_array_equal(run.status == Status.STALE, stale)
-    refused = ~(np.abs(rows) < 1e3).all(axis=1)
+def test_gaps_are_met_as_beside_a_car_in_python(law, shipped, slalom):
+    package, rows = shipped[law], with_gaps(driven(slalom, shipped[law]))
+    package.init()
+    run = package.run_samples(rows)
+    told, online = in_python(law, rows)
+    assert np.abs(run.axle_force - told[:, 1:3]).max() < 1e-6
+    for port, value in zip(SIDE_SLIP, told[:, 3:].T, strict=False):
+        assert np.abs(run.outputs[port].ravel() - value).max() < 1e-9
+    np.testing.assert_array_equal(run.status == Status.STALE, told[:, 0] > 0)
+    read = [0, 2, 3, 4] if law == "inertial" else slice(5)  # whose v_y may be missing
+    refused = ~(np.abs(rows[:, read]) < 1e3).all(axis=1)
     np.testing.assert_array_equal(np.isin(run.status, [Status.BAD_INPUT, Status.STALE]), refused)
     assert shipped[law].faults >= refused.sum() == online.counts.refused
     for name, value in shipped[law].weights.items():
@@ -69,7 +87,7 @@ def test_gaps_are_met_as_beside_a_car_in_python(law, shipped, rows):
 @pytest.mark.parametrize("channel", range(5))
 @pytest.mark.parametrize("gap", [20, 50, 200])
 def test_every_channel_heals(law, channel, gap, shipped, slalom):
-    rows = samples_of(slalom)[:1500]
+    rows = driven(slalom, shipped[law])
     shipped[law].init()
     clean = shipped[law].run_samples(rows).axle_force
     rows[800 : 800 + gap, channel] = np.nan
@@ -105,9 +123,9 @@ def test_a_result_that_is_refused_is_a_gap_too(packages, slalom):
     assert (run.axle_force[long] == 0.0).all()
 
 
-@pytest.mark.parametrize("law", ["axle", "integral"])
-def test_frozen_weights_hold_through_a_gap(law, shipped, rows):
-    run = shipped[law]
+@pytest.mark.parametrize("law", ["axle", "integral", "inertial"])
+def test_frozen_weights_hold_through_a_gap(law, shipped, slalom):
+    run, rows = shipped[law], with_gaps(driven(slalom, shipped[law]))
     run.init()
     run.run_samples(rows[:300])
     run.set_adaptation(False)
@@ -119,9 +137,10 @@ def test_frozen_weights_hold_through_a_gap(law, shipped, rows):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_a_drive_in_stretches_gives_the_forces_of_the_same_run_in_python(law, shipped, slalom):
-    drive = replace(slalom, a_y=None).taken(np.r_[:900, 1100:2000])
+    drive = slalom if "a_y" in shipped[law].inputs else replace(slalom, a_y=None)
+    drive = drive.taken(np.r_[:900, 1100:2000])
     shipped[law].init()
     run = shipped[law].run(drive)
-    told = identify(drive, CAR, make_method(law, CAR))
+    told = identify(drive, CAR, method_of(law))
     assert np.abs(run.axle_force - told.axle_force).max() < 1e-6
     assert run.status.shape == (len(drive),) and (run.status == Status.OK).all()

@@ -13,16 +13,17 @@ from identifier.export.compiled import CompiledPackage
 from identifier.export.package import build_package, readme
 from identifier.methods import METHODS, make_method
 from identifier.paper.network import Network
+from identifier.run import identify
 from models.recordings import write_recording
 from models.vehicle import sedan
-from tests.identifier.export.conftest import STRICT
+from tests.identifier.export.conftest import BANKED, STRICT
 
 CAR = sedan()
 MISRA_FINDINGS = 2  # may only become fewer: one operator ##, one macro for users alone
 ALLOWED = {"sqrt", "sqrtf", "floor", "floorf", "memcpy", "memset"}
 
 
-@pytest.mark.parametrize("law", ["integral", "axle", "stiffness_rls"])
+@pytest.mark.parametrize("law", ["integral", "axle", "stiffness_rls", "inertial"])
 def test_every_number_of_the_weights_is_looked_at_before_they_are_taken(law):
     """The structure is read as one array: not one number less, and the last one too."""
     run = CompiledPackage.of(build_package(make_method(law, CAR), CAR))
@@ -37,7 +38,7 @@ def test_every_number_of_the_weights_is_looked_at_before_they_are_taken(law):
                     run.set_weights(spoilt)
 
 
-@pytest.mark.parametrize("law", ["integral", "axle"])
+@pytest.mark.parametrize("law", ["integral", "axle", BANKED, "inertial"])
 @pytest.mark.parametrize("single", [0, 1])
 def test_no_compiler_has_anything_to_say(law, single, compiler, packages, write, run):
     folder = write(packages[law])
@@ -58,7 +59,7 @@ def test_the_warnings_are_on(compiler, packages, write, run):
     assert answer.returncode != 0
 
 
-@pytest.mark.parametrize("law", ["integral", "axle", "rls", "magic_formula_ekf"])
+@pytest.mark.parametrize("law", ["integral", "axle", "rls", "magic_formula_ekf", "inertial"])
 def test_symbols_begin_with_the_name_and_nothing_is_called_but_roots_and_copies(
     law, compiler, write, run
 ):
@@ -84,8 +85,9 @@ def test_fast_math_is_refused(compiler, packages, write, run):
         assert "guards against NaN" in answer.stderr
 
 
-def test_misra_findings_do_not_grow(packages, write, run):
-    folder = write(packages["integral"])
+@pytest.mark.parametrize("law", ["integral", "inertial"])
+def test_misra_findings_do_not_grow(law, packages, write, run):
+    folder = write(packages[law])
     answer = run(
         *["cppcheck", "--addon=misra", "--std=c99", "-DTIREID_SINGLE=1", "-Iinclude", "-Isrc"],
         "src/tireid.c",
@@ -106,8 +108,10 @@ def test_the_same_input_gives_the_same_bytes(law):
 
 
 def test_everything_that_goes_in_changes_the_hash():
-    design = make_method("integral", CAR)
+    design, axle = make_method("integral", CAR), make_method("axle", CAR)
     packages = [
+        build_package(axle, CAR),
+        build_package(axle, CAR, with_a_y=True),
         build_package(design, CAR),
         build_package(design, CAR, single=True),
         build_package(design, CAR, name="other"),
@@ -210,7 +214,7 @@ def test_the_self_test_sees_a_wrong_vector(packages, write, run, compiler):
     assert "FAILED: forces are those of the vectors" in answer.stdout
 
 
-@pytest.mark.parametrize("law", [law for law in METHODS if law not in ("linear", "inertial")])
+@pytest.mark.parametrize("law", [law for law in METHODS if law != "linear"])
 def test_every_method_passes_its_own_test_without_a_warning(law, write, run):
     folder = write(build_package(make_method(law, CAR), CAR))
     sources = ["src/tireid.c", "src/tireid_equations.c", "tests/test_tireid.c"]
@@ -230,11 +234,49 @@ def test_a_cell_without_a_number_is_a_fault_in_the_example(packages, write, run)
     folder = write(packages["integral"])
     log = folder / "log.csv"
     log.write_text("t,r,vx,delta_f,vy\n0,0.1,20,0.02,0.1\n0.01,,20,0.02,0.1\n0.02,0.1,20\n")
-    sources = ["src/tireid.c", "src/tireid_equations.c", "examples/main.c"]
-    run("gcc", "-std=c99", "-Iinclude", *sources, "-lm", "-o", "example", cwd=folder)
-    answer = run(str(folder / "example"), str(log))
+    answer = example(folder, run, log)
     assert [line.split(",")[-1] for line in answer.stdout.splitlines()[1:]] == ["0", "3", "3"]
     assert "faults: 2" in answer.stderr
+
+
+def example(folder, run, log):
+    """What the example prints, one row a sample."""
+    sources = ["src/tireid.c", "src/tireid_equations.c", "examples/main.c"]
+    run("gcc", "-std=c99", "-Iinclude", *sources, "-lm", "-o", "example", cwd=folder)
+    return run(str(folder / "example"), str(log))
+
+
+def test_the_example_tells_side_slip_from_a_log_without_a_lateral_velocity(
+    packages, write, run, slalom
+):
+    folder = write(packages["inertial"])
+    log = folder / "log.csv"
+    names = {"t": "t", "ay": "a_y", "vx": "v_x", "r": "r", "delta_f": "delta_f"}
+    table = np.column_stack([getattr(slalom, signal) for signal in names.values()])
+    np.savetxt(log, table, delimiter=",", header=",".join(names), comments="")
+    told = example(folder, run, log).stdout.splitlines()
+    assert told[0] == "t,Fyf,Fyr,vy,vy_sd,side_slip_observable,status"
+    rows = np.loadtxt(told[1:], delimiter=",")
+    expected = identify(slalom, CAR, make_method("inertial", CAR))
+    for column, port in enumerate(("v_y", "v_y_sd", "side_slip_observable"), start=3):
+        np.testing.assert_allclose(rows[:, column], expected.outputs[port].ravel(), atol=1e-8)
+    assert (rows[:, -1] == 0).all() and rows[2000:, 5].mean() > 0.5
+
+
+@pytest.mark.parametrize(
+    ("law", "columns", "missing"),
+    [
+        ("axle", "t,vx,r,delta_f,ay", "vy"),
+        ("inertial", "t,vx,r,delta_f", "ay"),
+        (BANKED, "t,vx,vy,r,delta_f", "ay"),
+    ],
+)
+def test_the_example_says_which_column_is_missing(law, columns, missing, packages, write, run):
+    folder = write(packages[law])
+    (folder / "log.csv").write_text(f"{columns}\n")
+    answer = example(folder, run, folder / "log.csv")
+    assert answer.returncode == 2
+    assert answer.stderr == f"tireid_example: the log has no column {missing}\n"
 
 
 def test_a_project_of_its_own_can_use_the_package(packages, write, run):

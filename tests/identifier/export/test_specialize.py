@@ -19,28 +19,60 @@ CAR = sedan()
 
 
 def run_folded(specialized: SpecializedStep, recording):
-    scan = Scan(specialized.function, carry=tuple(specialized.carry), over=("x", "u", "v_x"))
+    over = ("x", "u", "v_x", *["a_y"] * specialized.reads_a_y)
+    scan = Scan(specialized.function, carry=tuple(specialized.carry), over=over)
     carry = dict(specialized.carry)
     if specialized.rests_first:
         names = list(carry)
         rested = specialized.function(*carry.values(), recording.x[0], recording.u[0], 0.0)
         carry = dict(zip(names, map(np.array, rested[: len(names)]), strict=True))
-    signals = {"x": recording.x, "u": recording.u, "v_x": recording.v_x}
+    signals = {port: getattr(recording, port) for port in over}
     return scan(recording.t.size, {**carry, **signals})["axle_force"]
 
 
-@pytest.mark.parametrize("law", [law for law in METHODS if law not in ("concurrent", "inertial")])
+@pytest.mark.parametrize("law", [law for law in METHODS if law != "concurrent"])
 def test_the_folded_step_is_the_method_up_to_rounding(law, slalom):
     method = make_method(law, CAR)
     specialized = specialize(method, CAR)
-    expected = identify(slalom, CAR, method).axle_force
+    shown = slalom if specialized.reads_a_y else replace(slalom, a_y=None)
+    expected = identify(shown, CAR, method).axle_force
     error = np.abs(run_folded(specialized, slalom) - expected).max()
     assert error <= 1e-6  # N, of 5000; the tires' own sin, cos and exp are far from exact
 
 
-def test_a_method_that_needs_an_accelerometer_is_not_exported_without_one():
-    with pytest.raises(ValueError, match="InertialIdentifier cannot be exported yet: it needs a_y"):
-        specialize(make_method("inertial", CAR), CAR)
+def test_a_y_is_an_input_of_methods_that_need_it_and_of_others_where_it_is_asked_for():
+    inputs = [port.name for port in specialize(make_method("axle", CAR), CAR).inputs]
+    assert inputs == ["v_x", "v_y", "r", "delta_f", "delta_r"]
+    for specialized in (
+        specialize(make_method("inertial", CAR), CAR),
+        specialize(make_method("axle", CAR), CAR, with_a_y=True),
+    ):
+        assert [port.name for port in specialized.inputs] == [*inputs, "a_y"]
+        assert specialized.inputs[-1].unit == "m/s^2"
+    for law in ("integral", "stiffness_rls"):
+        with pytest.raises(ValueError, match="has no use for a_y"):
+            specialize(make_method(law, CAR), CAR, with_a_y=True)
+
+
+def test_a_method_that_tells_v_y_says_so_of_its_inputs():
+    """v_y stays an input: where it is measured, it may be given."""
+    told, given = (specialize(make_method(law, CAR), CAR) for law in ("inertial", "axle"))
+    assert told.tells_v_y and not given.tells_v_y
+    assert "NaN where there is none" in told.inputs[1].description
+    assert "NaN" not in given.inputs[1].description
+    names = [port.name for port in told.outputs]
+    assert names == ["axle_force", "v_y", "v_y_sd", "side_slip_observable"]
+
+
+def test_a_banked_road_is_told_apart_where_a_y_is_an_input(slalom):
+    """As the method does in Python; and the accelerometer makes a difference."""
+    felt = replace(slalom, a_y=slalom.axle_force.sum(axis=1) / CAR.mass - 0.5)
+    method = make_method("axle", CAR)
+    told, untold = (specialize(method, CAR, with_a_y=with_a_y) for with_a_y in (True, False))
+    assert "bank" in told.carry and "bank" not in untold.carry
+    force = run_folded(told, felt)
+    assert np.abs(force - identify(felt, CAR, method).axle_force).max() <= 1e-6
+    assert np.abs(force - run_folded(untold, felt)).max() > 1.0
 
 
 def test_a_forgotten_constant_would_be_noticed(slalom):
@@ -74,7 +106,7 @@ def test_what_is_learnt_is_told_apart_from_filters():
     assert specialize(make_method("eso", CAR), CAR).learnt == ()
 
 
-@pytest.mark.parametrize("law", ["integral", "axle", "rls", "eso", "ekf_force"])
+@pytest.mark.parametrize("law", ["integral", "axle", "rls", "eso", "ekf_force", "inertial"])
 def test_every_port_has_a_unit_and_words(law):
     specialized = specialize(make_method(law, CAR), CAR)
     assert [signal.name for signal in specialized.state] == list(specialized.carry)
