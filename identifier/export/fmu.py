@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import tempfile
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Literal, NamedTuple
 from xml.etree.ElementTree import Element, indent, tostring
@@ -129,8 +129,10 @@ UNITS: Mapping[str, Mapping[str, int]] = {
     "m/s": {"m": 1, "s": -1},
     "rad": {"rad": 1},
     "rad/s": {"rad": 1, "s": -1},
+    "m/s^2": {"m": 1, "s": -2},
     "N": {"kg": 1, "m": 1, "s": -2},
 }
+INPUT_REFERENCES = {"v_x": 1, "v_y": 2, "r": 3, "delta_f": 4, "delta_r": 5, "a_y": 13}
 DEGREES = 57.29577951308232  # of a radian: display units of angles
 
 Kind = Literal["real", "integer", "boolean"]
@@ -154,10 +156,20 @@ class Variable(NamedTuple):
 
 
 def variables(specialized: SpecializedStep) -> tuple[Variable, ...]:
-    """Return the variables of a step."""
+    """Return the variables of a step; an input that may be missing is NaN until it is set."""
+    absent = ("a_y", *["v_y"] * specialized.tells_v_y)
     inputs = (
-        Variable(1 + i, port.name, "real", "input", "continuous", "0", port.unit, port.description)
-        for i, port in enumerate(specialized.inputs)
+        Variable(
+            INPUT_REFERENCES[port.name],
+            port.name,
+            "real",
+            "input",
+            "continuous",
+            "NaN" if port.name in absent else "0",
+            port.unit,
+            port.description,
+        )
+        for port in specialized.inputs
     )
     side = "left positive, frame of the body"
     learnt = ", ".join(specialized.learnt) or "nothing: this method has no memory of the tire"
@@ -194,7 +206,21 @@ def variables(specialized: SpecializedStep) -> tuple[Variable, ...]:
             specialized.min_speed,
             "below it forces are zero, learning rests",
         ),
+        *(_side_slip(specialized) if specialized.tells_v_y else ()),
     )
+
+
+def _side_slip(specialized: SpecializedStep) -> Iterator[Variable]:
+    """Yield the outputs of a step that tells v_y; one of the inputs has that name already."""
+    names: Mapping[str, tuple[int, str, Kind]] = {
+        "v_y": (14, "v_y_estimate", "real"),
+        "v_y_sd": (15, "v_y_sd", "real"),
+        "side_slip_observable": (16, "side_slip_observable", "boolean"),
+    }
+    ports = {port.name: port for port in specialized.outputs}
+    for name, (reference, shown, kind) in names.items():
+        unit = ports[name].unit if kind == "real" else ""
+        yield _output(reference, shown, kind, unit, ports[name].description)
 
 
 def _output(reference: int, name: str, kind: Kind, unit: str, description: str) -> Variable:
@@ -282,7 +308,7 @@ def description_2(specialized: SpecializedStep, token: str, sources: Sequence[st
             },
             element("SourceFiles", {}, *(element("File", {"name": name}) for name in sources)),
         ),
-        _units(),
+        _units(table),
         _experiment(specialized),
         element("ModelVariables", {}, *(_variable_2(variable) for variable in table)),
         element(
@@ -328,7 +354,7 @@ def description_3(specialized: SpecializedStep, token: str) -> str:
                 "canHandleVariableCommunicationStepSize": True,
             },
         ),
-        _units(),
+        _units(table),
         _experiment(specialized),
         element("ModelVariables", {}, time, *(_variable_3(variable) for variable in table)),
         element(
@@ -372,10 +398,13 @@ def _sentence(specialized: SpecializedStep) -> str:
     )
 
 
-def _units() -> Element:
+def _units(table: Sequence[Variable]) -> Element:
+    used = {variable.unit for variable in table}
     angle = {"rad": ("deg", DEGREES), "rad/s": ("deg/s", DEGREES)}
     units = []
     for name, base in UNITS.items():
+        if name not in used:
+            continue
         children = [element("BaseUnit", dict(base))]
         if name in angle:
             shown, factor = angle[name]
@@ -442,9 +471,10 @@ OF_VERSION: Mapping[Version, tuple[str, ...]] = {
 def export_fmu(specialized: SpecializedStep, path: Path, version: Version = 2) -> None:
     """Write an FMU for Co-Simulation; the same step gives the same bytes.
 
-    Inputs v_x, v_y, r, delta_f, delta_r and outputs F_yf, F_yr, SI. Samples are taken at multiples
-    of the step's interval after the start, whatever the communication step; a step from t to t + h
-    takes those in [t, t + h).
+    Inputs v_x, v_y, r, delta_f, delta_r and outputs F_yf, F_yr, SI; beside them a_y where the step
+    reads it, and v_y_estimate, v_y_sd and side_slip_observable where it tells v_y. Samples are
+    taken at multiples of the step's interval after the start, whatever the communication step; a
+    step from t to t + h takes those in [t, t + h).
 
     Parameters
     ----------

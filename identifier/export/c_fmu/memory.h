@@ -12,7 +12,7 @@
 
 enum { INPUTS = 5, FORCES = 2 };
 
-/* Value references; the order of the inputs is that of the array. */
+/* Value references; the order of the inputs is that of the array, in which a_y is the last. */
 enum {
   VR_TIME = 0,
   VR_INPUT = 1,
@@ -21,14 +21,18 @@ enum {
   VR_SAMPLES = 9,
   VR_ADAPTATION = 10,
   VR_SAMPLE_TIME = 11,
-  VR_MIN_SPEED = 12
+  VR_MIN_SPEED = 12,
+  VR_A_Y = 13,
+  VR_V_Y = 14, /* that is told */
+  VR_V_Y_SD = 15,
+  VR_OBSERVABLE = 16
 };
 
 /* Plain numbers: a copy of this is a saved state. */
 typedef struct {
   double time;
   double start_time;
-  double input[INPUTS]; /* v_x, v_y, r, delta_f, delta_r */
+  double input[INPUTS + 1]; /* v_x, v_y, r, delta_f, delta_r, a_y */
   int64_t samples;
   int32_t status; /* of the component's last step */
   MODEL(params) params;

@@ -1,0 +1,126 @@
+"""The FMU of a method that tells v_y: a_y goes in, v_y, its deviation and a flag come out."""
+
+import numpy as np
+import pytest
+
+from identifier.export import fmu as binaries
+from identifier.export.compiled import samples_of
+from identifier.export.fmu import export_fmu, fmu_text
+from identifier.export.package import run_in_virtual_machine
+from identifier.export.specialize import specialize
+from identifier.methods import make_method
+from identifier.run import identify
+from models.vehicle import sedan
+
+fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")
+validation = pytest.importorskip("fmpy.validation")
+if not binaries.targets():
+    pytest.skip("needs a C compiler on Linux x86-64", allow_module_level=True)
+
+CAR = sedan()
+TOLD = ("v_y_estimate", "v_y_sd", "side_slip_observable")
+REFERENCES = {"v_x": 1, "v_y": 2, "r": 3, "delta_f": 4, "delta_r": 5, "a_y": 13}
+
+
+@pytest.fixture(scope="module")
+def step():
+    return specialize(make_method("inertial", CAR), CAR)
+
+
+@pytest.fixture(scope="module")
+def paths(step, tmp_path_factory):
+    """By version; Linux only, for speed."""
+    folder = tmp_path_factory.mktemp("fmu")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(binaries, "MINGW", "no-such-compiler")
+        for version in (2, 3):
+            export_fmu(step, folder / f"{version}.fmu", version)
+    return {version: folder / f"{version}.fmu" for version in (2, 3)}
+
+
+def simulated(path, drive, names):
+    """Outputs after each sample of a drive, of which the FMU is given some signals."""
+    table = np.zeros(len(drive), dtype=[(name, float) for name in ("time", *names)])
+    table["time"] = drive.t
+    for name in names:
+        table[name] = getattr(drive, name)
+    told = fmpy.simulate_fmu(
+        str(path),
+        stop_time=0.01 * len(drive),
+        step_size=0.01,
+        output_interval=0.01,
+        input=table,
+        output=["F_yf", "F_yr", *TOLD, "status"],
+    )
+    return {name: told[name][1:] for name in told.dtype.names}  # a step ends with its outputs
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_fmpy_finds_nothing_to_complain_about_and_all_has_units(paths, version):
+    assert validation.validate_fmu(str(paths[version])) == []
+    about = {v.name: v for v in fmpy.read_model_description(str(paths[version])).modelVariables}
+    units = [about[name].unit for name in ("a_y", *TOLD)]
+    assert units == ["m/s^2", "m/s", "m/s", None]
+    assert [about[name].type for name in TOLD] == [about["F_yf"].type] * 2 + ["Boolean"]
+    assert [about[name].start for name in ("v_x", "v_y", "a_y")] == ["0", "NaN", "NaN"]
+    references = [variable.valueReference for variable in about.values()]
+    assert len(set(references)) == len(references)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_side_slip_is_told_without_a_lateral_velocity(paths, version, slalom):
+    """An input that is not connected is no number, so that nothing is measured by it."""
+    drive = slalom.taken(np.arange(1500))
+    told = simulated(paths[version], drive, ("v_x", "r", "delta_f", "delta_r", "a_y"))
+    assert (told["status"] == 0).all()
+    history = identify(drive, CAR, make_method("inertial", CAR))
+    for name, port in zip(TOLD, ("v_y", "v_y_sd", "side_slip_observable"), strict=True):
+        expected = history.outputs[port].ravel()
+        np.testing.assert_allclose(told[name], expected, atol=1e-6)  # FMPy interpolates inputs
+    assert 0.2 < told["side_slip_observable"].mean() < 1.0
+
+
+def set_inputs(slave, values):
+    put = getattr(slave, "setFloat64", None) or slave.setReal
+    put([REFERENCES[name] for name in values], list(values.values()))
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_what_is_told_is_to_the_last_bit_what_the_step_tells(paths, version, step, slalom):
+    """With holes in a_y, a v_y that comes and goes, and samples that are refused."""
+    rows = samples_of(slalom, [port.name for port in step.inputs])[:600]
+    rows[:300, 1], rows[400:450, 1], rows[450:, 1] = np.nan, 1e9, np.nan
+    rows[200:260, 5], rows[350:360, 2], rows[500:560, 0] = np.nan, np.nan, np.inf
+    expected, _ = run_in_virtual_machine(step, rows)
+    about = fmpy.read_model_description(str(paths[version]))
+    kind = fmpy.fmi2.FMU2Slave if version == 2 else fmpy.fmi3.FMU3Slave
+    slave = kind(
+        guid=about.guid,
+        unzipDirectory=fmpy.extract(str(paths[version])),
+        modelIdentifier="tireid",
+        instanceName="one",
+    )
+    slave.instantiate()
+    slave.enterInitializationMode()
+    slave.exitInitializationMode()
+    read = slave.getReal if version == 2 else slave.getFloat64
+    told = np.empty_like(expected)
+    for k, row in enumerate(rows):
+        set_inputs(slave, dict(zip(REFERENCES, row, strict=True)))
+        slave.doStep(0.01 * k, 0.01)
+        told[k] = [*read([6, 7, 14, 15]), *slave.getBoolean([16])]
+    assert read([13]) == [rows[-1, 5]]
+    slave.reset()
+    assert np.isnan(read([2, 13])).all()
+    slave.freeInstance()
+    np.testing.assert_array_equal(told, expected)
+    assert np.ptp(told[:, 2]) > 0.1
+
+
+def test_an_fmu_has_a_y_where_its_step_reads_it_and_no_side_slip_where_it_tells_none():
+    axle = make_method("axle", CAR)
+    for with_a_y in (False, True):
+        text = fmu_text(specialize(axle, CAR, with_a_y=with_a_y), 2)["modelDescription.xml"]
+        assert ('name="a_y"' in text) == with_a_y
+        assert ('name="m/s^2"' in text) == with_a_y
+        assert not any(name in text for name in TOLD)
