@@ -14,9 +14,13 @@ from identifier.axle.model import AxleModel
 from identifier.baselines import (
     ExtendedStateObserver,
     ForceEkf,
+    HorizonEstimator,
     LinearBaseline,
     StiffnessRls,
+    Washout,
     dugoff_ekf,
+    joint_ekf,
+    linear_kf,
     magic_formula_ekf,
 )
 from identifier.baselines.curves import CurveModel
@@ -66,6 +70,10 @@ METHODS: Mapping[str, Factory] = {
     "dugoff_ekf": _seedless(dugoff_ekf),
     "eso": _seedless(ExtendedStateObserver.for_vehicle),
     "ekf_force": _seedless(ForceEkf.for_vehicle),
+    "linear_kf": _seedless(linear_kf),
+    "joint_ekf": _seedless(joint_ekf),
+    "washout": _seedless(Washout.for_vehicle),
+    "mhe": _seedless(HorizonEstimator.for_vehicle),
 }
 
 

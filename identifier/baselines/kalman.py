@@ -107,10 +107,7 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
     rate = motion_rate(p, v_mean, x, tire.force(p, known, theta, slip, u_mean))
     if tire.lag is not None:
         rate = ca.vertcat(rate, v_mean / tire.lag(known, theta) * (alpha - slip))
-    implicit = ca.inv_minor(
-        ca.SX.eye(2 + lags) - dt / 2 * ca.jacobian(rate, estimate)[:, : 2 + lags]
-    )
-    ahead = ca.vertcat(moved + dt * implicit @ rate, theta)
+    ahead = ca.vertcat(midpoint(estimate, rate, dt), theta)
     F = ca.jacobian(ahead, estimate)
     Q = ca.diag(ca.vertcat(noise[2:4], ca.SX(lags, 1), walk) ** 2 * dt)
     R = ca.diag(noise[:2] ** 2)
@@ -153,6 +150,20 @@ def build_step(name: str, tire: FilteredTire) -> ca.Function:
         [*(f"{port}_next" for port in tire.carry), "axle_force"],
         {"cse": True},
     )
+
+
+def midpoint(estimate: Any, rate: Any, dt: Any) -> Any:
+    """Return what moves of an estimate a step later, by the linearly implicit midpoint rule.
+
+    Parameters
+    ----------
+    estimate : symbols; what moves comes first.
+    rate : of what moves (n,).
+    dt : sampling interval [s].
+    """
+    n = rate.numel()
+    implicit = ca.inv_minor(ca.SX.eye(n) - dt / 2 * ca.jacobian(rate, estimate)[:, :n])
+    return estimate[:n] + dt * implicit @ rate
 
 
 def correct(

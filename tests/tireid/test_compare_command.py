@@ -299,7 +299,7 @@ def test_a_recording_that_teaches_nothing_right_makes_the_exit_code(logs, tmp_pa
 def test_the_registry_has_every_name_that_is_promised():
     promised = "linear eso ekf_force stiffness_rls magic_formula_ekf dugoff_ekf instantaneous "
     promised += "integral instantaneous_scaled pi_lead kreisselmeier kreisselmeier_newton rls "
-    promised += "concurrent axle inertial"
+    promised += "concurrent axle inertial linear_kf joint_ekf washout mhe"
     assert set(METHODS) == set(promised.split())
 
 

@@ -1,0 +1,173 @@
+"""v_y by integration of a_y - v_x r where it moves fast, by the linear model where it is slow.
+
+dv/dt = a_y - v_x r + ω (v_s - v): v is the integral washed out by s/(s + ω), and v_s passed through
+ω/(s + ω), where v_s is v_y of a steady turn on the linear rear tire (`steady_v_y`). Solved exactly
+for rates that hold over a step. A complementary filter; what bank and bias do to it is 1/ω of them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Self
+
+import casadi as ca
+import numpy as np
+
+from codegen import Scan
+from codegen.arrays import Array
+from identifier.baselines.curves import CURVES
+from identifier.baselines.without_v_y import (
+    OVER,
+    V_Y,
+    heard_ports,
+    refuse_freeze,
+    refuse_start,
+    steady_v_y,
+)
+from identifier.method import AXLE_FORCE, Method, Port, Setup
+from identifier.tire_model import TireModel
+from identifier.tuning import Range, around
+from models.rules import require_positive
+from models.vehicle import Vehicle
+
+CARRY = ("washed", "rate", "running")
+PORTS = (
+    AXLE_FORCE,
+    V_Y,
+    Port("washed", "m/s", "v_y of the filter"),
+    Port("rate", "m/s^2", "a_y - v_x r of the last sample"),
+    Port("running", "-", "1 after a sample in motion"),
+)
+
+
+def build_step() -> ca.Function:
+    """Return the step; cutoff, vehicle and sampling stay inputs of it.
+
+    Carried: washed, rate, running. Constant: cutoff ω [1/s]. Where a_y is not there, v_y follows
+    the steady turn alone. The forces are those of the linear tires of the vehicle at that v_y.
+    """
+    heard = heard_ports()
+    s, washed, rate, running = heard.sample, *(ca.SX.sym(name) for name in CARRY)
+    p, dt, cutoff = s.parameters, s.sampling[0], ca.SX.sym("cutoff")
+    steady = steady_v_y(p, s.speed, heard.r, s.u)
+    now = heard.hears * (heard.a_y - s.v_x * heard.r)
+    keep = ca.exp(-cutoff * dt)
+    moved = keep * washed + (1 - keep) * (steady + (rate + now) / (2 * cutoff))
+    v_y = ca.if_else(ca.logic_and(s.moving, running > 0.5), moved, steady)
+    linear = CURVES["linear"]
+    alpha = linear.slip(p, s.speed, ca.vertcat(v_y, heard.r), s.u)
+    force = linear.force(ca.vertcat(p.C_f, p.C_r), None, alpha, s.u)
+    return ca.Function(
+        "washout",
+        [washed, rate, running, *heard.ports, cutoff],
+        [
+            v_y,
+            now,
+            ca.if_else(s.moving, 1, 0),
+            ca.if_else(s.moving, force, 0),
+            ca.if_else(s.moving, v_y, 0),
+        ],
+        [*CARRY, *OVER, "vehicle", "sampling", "cutoff"],
+        [*(f"{port}_next" for port in CARRY), "axle_force", "v_y"],
+    )
+
+
+@cache
+def _scan() -> Scan:
+    return Scan(build_step(), carry=CARRY, over=OVER)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Washout(Method):
+    """Lateral velocity by integration, with what is slow taken from the linear tires.
+
+    Parameters
+    ----------
+    cutoff : ω, below which the linear model counts [1/s].
+    dt : sampling interval [s].
+    min_speed : below this speed [m/s] forces and v_y read zero.
+
+    Raises
+    ------
+    ValueError
+        Where a number is not positive.
+    """
+
+    cutoff: float
+    dt: float = 0.01
+    min_speed: float = 1.0
+
+    def __post_init__(self) -> None:
+        require_positive(ValueError, cutoff=self.cutoff, dt=self.dt, min_speed=self.min_speed)
+
+    @classmethod
+    def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> Self:
+        """Return the filter for a car: ω = 8 sqrt(g/L), 15 1/s for a sedan.
+
+        Chosen on random cars of our plant, whose roads bank and whose sensors are biased: a higher
+        one errs less there by a tenth at most, and is the linear model alone.
+
+        Parameters
+        ----------
+        dt : sampling interval [s].
+        """
+        return cls(cutoff=8.0 / vehicle.froude_time, dt=dt, min_speed=vehicle.lowest_speed)
+
+    @property
+    def needs_a_y(self) -> bool:
+        """Whether it tells nothing from a recording without an accelerometer: so it is."""
+        return True
+
+    @property
+    def tunables(self) -> Mapping[str, Range]:
+        """What a search may vary, around the numbers that it has."""
+        return {"cutoff": around(self.cutoff, 10.0)}
+
+    @property
+    def ports(self) -> tuple[Port, ...]:
+        """Outputs and state of its step, axle_force first."""
+        return PORTS
+
+    @property
+    def remark(self) -> str:
+        """Say what it does without, and what it stands on."""
+        return "without v_y, which it tells, by integration above the vehicle's linear tires"
+
+    def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
+        """Return what a run needs.
+
+        Parameters
+        ----------
+        vehicle : the car; the stiffness of its rear axle is used.
+        start : None; no tire is learnt.
+
+        Raises
+        ------
+        ValueError
+            Where a stored model is given.
+        """
+        refuse_start(start)
+        return Setup(
+            scan=_scan(),
+            carry={name: np.zeros(1) for name in CARRY},
+            constants={
+                "cutoff": np.array(self.cutoff),
+                "vehicle": np.array(vehicle.bicycle),
+                "sampling": np.array([self.dt, self.min_speed]),
+            },
+        )
+
+    def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> TireModel:
+        """Refuse: there is no model.
+
+        Parameters
+        ----------
+        state : of the run.
+
+        Raises
+        ------
+        CannotFreezeError
+            Always.
+        """
+        del vehicle
+        refuse_freeze(state)
