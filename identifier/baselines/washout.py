@@ -43,14 +43,14 @@ PORTS = (
 def build_step() -> ca.Function:
     """Return the step; cutoff, vehicle and sampling stay inputs of it.
 
-    Carried: washed, rate, running. Constant: cutoff ω [1/s]. Where a_y is not there, v_y follows
-    the steady turn alone. The forces are those of the linear tires of the vehicle at that v_y.
+    Carried: washed, rate, running. Constant: cutoff ω [1/s]. Where a_y is not there, the
+    last rate holds. The forces are those of the linear tires of the vehicle at that v_y.
     """
     heard = heard_ports()
     s, washed, rate, running = heard.sample, *(ca.SX.sym(name) for name in CARRY)
     p, dt, cutoff = s.parameters, s.sampling[0], ca.SX.sym("cutoff")
     steady = steady_v_y(p, s.speed, heard.r, s.u)
-    now = heard.hears * (heard.a_y - s.v_x * heard.r)
+    now = ca.if_else(heard.hears, heard.a_y - s.v_x * heard.r, rate)
     keep = ca.exp(-cutoff * dt)
     moved = keep * washed + (1 - keep) * (steady + (rate + now) / (2 * cutoff))
     v_y = ca.if_else(ca.logic_and(s.moving, running > 0.5), moved, steady)

@@ -21,13 +21,14 @@ from models.bicycle import BicycleParameters
 OVER = ("x", "u", "v_x", "a_y")  # of x the yaw rate alone
 V_Y = Port("v_y", "m/s", "lateral velocity at the center of gravity, positive to the left")
 V_Y_SD = Port("v_y_sd", "m/s", "standard deviation of v_y")
+MOST_FELT = 98.0  # m/s²: no car feels more
 MOST_SLIDING = 0.7  # |v_y|/v_x beyond which an estimate is none
 
 
 class Heard(NamedTuple):
     """A sample without v_y: the ports of it, and a_y [m/s²], 0 where there is none.
 
-    hears : whether a_y is there.   a_y_port : the port itself, NaN where there is none.
+    hears : whether a_y is there, and one of a car.   a_y_port : the port itself, as it is.
     """
 
     sample: Sample
@@ -50,7 +51,7 @@ class Heard(NamedTuple):
 def heard_ports() -> Heard:
     """Return fresh symbols."""
     a_y = ca.SX.sym("a_y")
-    hears = a_y == a_y  # NaN is not NaN
+    hears = ca.fabs(a_y) < MOST_FELT  # NaN is not
     return Heard(sample_ports(), ca.if_else(hears, a_y, 0), hears, a_y)
 
 

@@ -9,7 +9,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -229,12 +229,13 @@ def scored(step: ca.Function) -> ca.Function:
 
     Parameters
     ----------
-    step : SX function with an output axle_force (2,) [N].
+    step : with an output axle_force (2,) [N].
     """
-    inputs = [ca.SX.sym(step.name_in(i), step.sparsity_in(i)) for i in range(step.n_in())]
+    kind: Any = ca.SX if step.is_a("SXFunction") else ca.MX  # a step of calls stays one
+    inputs = [kind.sym(step.name_in(i), step.sparsity_in(i)) for i in range(step.n_in())]
     outputs = step.call(inputs)
-    squares, samples, sane = ca.SX.sym("squares", 2), ca.SX.sym("samples"), ca.SX.sym("sane")
-    truth, counts, impossible = ca.SX.sym("truth", 2), ca.SX.sym("counts"), ca.SX.sym("impossible")
+    squares, samples, sane = kind.sym("squares", 2), kind.sym("samples"), kind.sym("sane")
+    truth, counts, impossible = kind.sym("truth", 2), kind.sym("counts"), kind.sym("impossible")
     force = outputs[step.index_out("axle_force")]
     possible = ca.logic_and(ca.fabs(force[0]) < impossible, ca.fabs(force[1]) < impossible)
     sane_next = ca.logic_and(sane, possible)
