@@ -340,6 +340,11 @@ class HorizonEstimator(Method):
         return cls(filter=joint_ekf(vehicle, dt=dt), window=window)
 
     @property
+    def needs_v_y(self) -> bool:
+        """Whether it needs a lateral velocity: it tells one."""
+        return False
+
+    @property
     def needs_a_y(self) -> bool:
         """Whether it learns nothing from a recording without an accelerometer: so it is."""
         return True

@@ -247,6 +247,11 @@ class SlipFilter(Method):
         )
 
     @property
+    def needs_v_y(self) -> bool:
+        """Whether it needs a lateral velocity: it tells one."""
+        return False
+
+    @property
     def needs_a_y(self) -> bool:
         """Whether it learns nothing from a recording without an accelerometer: so it is."""
         return True

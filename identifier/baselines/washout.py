@@ -114,6 +114,11 @@ class Washout(Method):
         return cls(cutoff=8.0 / vehicle.froude_time, dt=dt, min_speed=vehicle.lowest_speed)
 
     @property
+    def needs_v_y(self) -> bool:
+        """Whether it needs a lateral velocity: it tells one."""
+        return False
+
+    @property
     def needs_a_y(self) -> bool:
         """Whether it tells nothing from a recording without an accelerometer: so it is."""
         return True

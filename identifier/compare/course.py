@@ -7,7 +7,7 @@ axles together, in percent.
 import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -20,7 +20,7 @@ from codegen.arrays import Array
 from identifier.method import CannotFreezeError, Method, shown
 from identifier.refused import judges_samples
 from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
-from identifier.run import identify
+from identifier.run import History, identify
 from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle
@@ -109,11 +109,14 @@ class Trial:
     frozen : by recording learnt on and recording replayed, error of the frozen model [N]; lacks
         what diverged; None for a method that estimates a signal.
     diverged_at : by recording on which the method diverged, when [s].
+    side_slip : by recording, what was told of lateral velocity; empty for a method that reads it,
+        and of a batch, which records none.
     """
 
     online: Mapping[str, AxleRmse]
     frozen: Mapping[str, Mapping[str, AxleRmse]] | None
     diverged_at: Mapping[str, float]
+    side_slip: Mapping[str, "SideSlip"] = field(default_factory=dict, compare=False)
 
 
 class Shares(NamedTuple):
@@ -130,10 +133,13 @@ class Shares(NamedTuple):
 def cross_replay(method: Method, course: Course) -> Trial:
     """Learn on each recording afresh, freeze at its end and replay on all."""
     online, frozen, diverged_at, freezes = {}, {}, {}, True
+    told: dict[str, SideSlip] = {}
     for recording in course.recordings:
         history = identify(recording, course.vehicle, method)
         end = float(recording.t[-1])
         online[recording.name] = course.error(recording, history.axle_force)
+        found = side_slip(history, course.min_speed)
+        told |= {} if found is None else {recording.name: found}
         if history.diverged_at is not None:
             diverged_at[recording.name] = history.diverged_at
             continue
@@ -143,7 +149,63 @@ def cross_replay(method: Method, course: Course) -> Trial:
             freezes = False
         except ValueError:  # the last update left weights that are not finite
             diverged_at[recording.name] = end
-    return Trial(online=online, frozen=frozen if freezes else None, diverged_at=diverged_at)
+    return Trial(
+        online=online,
+        frozen=frozen if freezes else None,
+        diverged_at=diverged_at,
+        side_slip=told,
+    )
+
+
+SIGMAS = 2.0  # of what a method says it knows v_y to: 95 % of honest errors lie within
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SideSlip:
+    """What a method told of lateral velocity over a recording, and how far it was off.
+
+    Parameters
+    ----------
+    v_y : told at each sample (n,) [m/s].
+    v_y_sd : how well the method says it knows it (n,) [m/s]; None where it does not say.
+    rms : of the error of side slip, from the first sample at a speed that counts [deg], infinite
+        where not finite; None where the recording has no v_y.
+    within : share of those errors of v_y within two standard deviations [%], or None.
+    """
+
+    v_y: Array
+    v_y_sd: Array | None
+    rms: float | None
+    within: float | None
+
+
+def side_slip(history: History, min_speed: float) -> SideSlip | None:
+    """Return what a run told of lateral velocity; None of a method that reads it.
+
+    Parameters
+    ----------
+    history : of a method.
+    min_speed : samples below this speed [m/s] do not count.
+    """
+    if "v_y" not in history.outputs:
+        return None
+    recording, outputs = history.recording, history.outputs
+    v_y = outputs["v_y"].ravel()
+    sd = outputs["v_y_sd"].ravel() if "v_y_sd" in outputs else None
+    truth = recording.logged_v_y
+    if truth is None:
+        return SideSlip(v_y=v_y, v_y_sd=sd, rms=None, within=None)
+    counts = counted_samples(recording, min_speed)
+    v_x, missed = recording.v_x[counts], (v_y - truth)[counts]
+    slip = np.degrees(np.arctan2(v_y[counts], v_x) - np.arctan2(truth[counts], v_x))
+    rms = float(np.sqrt(np.mean(slip**2)))
+    within = None if sd is None else 100.0 * np.mean(np.abs(missed) <= SIGMAS * sd[counts])
+    return SideSlip(
+        v_y=v_y,
+        v_y_sd=sd,
+        rms=rms if np.isfinite(rms) else np.inf,
+        within=None if within is None else float(within),
+    )
 
 
 def shares(trial: Trial, course: Course) -> Shares:

@@ -63,8 +63,9 @@ def add_parser(commands: Any) -> None:
         help=COMMANDS["compare"],
         description="Learn on each recording, freeze at its end and replay on all of them, with "
         "every method; write report.html, compare.json, compare.csv, tables.txt and figures. "
-        "Recordings need the true forces. Without a LOG the plant of the car drives slaloms, a "
-        "step steer and a lane change with noisy sensors.",
+        "Methods that estimate lateral velocity are judged on side slip too. Recordings need the "
+        "true forces. Without a LOG the plant of the car drives slaloms, a step steer and a lane "
+        "change with noisy sensors.",
         epilog=f"methods: {', '.join(METHODS)}",
     )
     parser.add_argument("logs", nargs="*", metavar="LOG[:RUN]", help="recordings with true forces")

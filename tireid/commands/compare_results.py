@@ -2,9 +2,10 @@
 
 compare.json: recordings (samples, duration, rms_force_N); methods: by name online_N by recording,
 frozen_N by recording learnt on and recording replayed (null: a signal, no model), diverged_at_s by
-recording, percent (means of both axles: online, in_sample, other), step_s and step_ratio;
-left_out: by name why a method is not compared; floors:
-by network frozen_N and percent; sweep: by method designs, diverged, default, best, front, trials.
+recording, percent (means of both axles: online, in_sample, other), side_slip by recording of
+methods that estimate v_y (rms_deg, within_two_sigma_percent), step_s and step_ratio; left_out: by
+name why a method is not compared; floors: by network frozen_N and percent; sweep: by method
+designs, diverged, default, best, front, trials.
 verdict: by recording, of the default learnt there (valid, findings, numbers, measures).
 Errors are {"front", "rear"} in N; null stands for what diverged or is not there.
 """
@@ -26,7 +27,13 @@ from identifier.methods import METHODS, make_method
 from identifier.reproducibility import AxleRmse
 from identifier.verdict import Verdict
 from tireid import __version__
-from tireid.figures import matrix_figure, methods_figure, pareto_figure, save_figure
+from tireid.figures import (
+    matrix_figure,
+    methods_figure,
+    pareto_figure,
+    save_figure,
+    side_slip_figure,
+)
 from tireid.output import text_table, write_json
 from tireid.progress import say
 from tireid.reports.compare import HINDSIGHT
@@ -41,17 +48,33 @@ def summary_rows(comparison: Comparison) -> list[list[str]]:
     ----------
     comparison : the methods; the first row is the header.
     """
-    lines = [["method", "online", "frozen, where learnt", "frozen, elsewhere", "step"]]
+    lines = [["method", "online", "frozen, where learnt", "frozen, elsewhere", *SLIP, "step"]]
     for name in ranking(comparison):
         trial = comparison.trials[name]
         online = [(rec, error) for rec, error in trial.online.items()]
         time = f"{1e9 * comparison.step_times[name]:.0f} ns x{comparison.time_ratio(name):.2f}"
         cells = ["diverged" if trial.diverged_at else _mean(comparison, online)]
-        lines.append([name, *cells, *_frozen_cells(comparison, trial), time])
+        told = _slip_cells(trial)
+        lines.append([name, *cells, *_frozen_cells(comparison, trial), *told, time])
     for name, frozen in comparison.floors.items():
         cells = [_mean(comparison, pairs) for pairs in where_learnt_and_elsewhere(frozen)]
-        lines.append([f"floor, {name}", "", *cells, ""])
+        lines.append([f"floor, {name}", "", *cells, *[""] * len(SLIP), ""])
     return lines
+
+
+SLIP = ("side slip [deg]", "within 2 sigma")  # columns of methods that estimate v_y
+NOT_TOLD = "-"
+
+
+def _slip_cells(trial: Trial) -> list[str]:
+    """Return the mean error of side slip and the mean share within two sigma, as text."""
+    told = trial.side_slip.values()
+    errors = [one.rms for one in told if one.rms is not None]
+    shares = [one.within for one in told if one.within is not None]
+    return [
+        f"{np.mean(errors):.3f}" if errors else NOT_TOLD,
+        f"{np.mean(shares):.0f} %" if shares else NOT_TOLD,
+    ]
 
 
 def summary_table(comparison: Comparison) -> str:
@@ -222,6 +245,9 @@ def write_comparison(
         figures["matrix"] = matrix_figure(comparison)
     if comparison.sweeps:
         figures["pareto"] = pareto_figure(comparison)
+    if any(trial.side_slip for trial in comparison.trials.values()):
+        told = {name: trial.side_slip for name, trial in comparison.trials.items()}
+        figures["side_slip"] = side_slip_figure(comparison.course.recordings, told)
     for name, figure in figures.items():
         save_figure(figure, folder / f"{name}.png")
     return figures
@@ -284,6 +310,10 @@ def _method_numbers(comparison: Comparison, name: str) -> dict[str, Any]:
         "frozen_N": None if trial.frozen is None else _pairs(trial.frozen),
         "diverged_at_s": dict(trial.diverged_at),
         "percent": _percent(comparison.shares(name)),
+        "side_slip": {
+            recording: {"rms_deg": _finite(one.rms), "within_two_sigma_percent": one.within}
+            for recording, one in trial.side_slip.items()
+        },
         "step_s": comparison.step_times[name],
         "step_ratio": comparison.time_ratio(name),
     }

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from codegen.arrays import Array, blocks, thinning
+from identifier.compare.course import side_slip
 from identifier.method import Block, Method, vehicle_numbers
 from identifier.methods import certify
 from identifier.own_network import OnnxModel
@@ -34,6 +35,7 @@ from tireid.figures import (
     learnt_axles_figure,
     prediction_figure,
     save_figure,
+    side_slip_figure,
     slip_figure,
     weights_figure,
 )
@@ -353,6 +355,9 @@ def _draw(
     if OBSERVED in learnt.outputs:
         figures["error"] = error_figure(learnt, freeze_times=list(frozen))
         figures["weights"] = weights_figure(learnt, list(frozen))
+    told = side_slip(learnt, learnt.design.min_speed)
+    if told is not None:
+        figures["side_slip"] = side_slip_figure([learnt.recording], {"estimate": {name: told}})
     if learnt.tracks_over(next(learnt.blocks())):
         figures["learnt"] = learnt_axles_figure(learnt, list(frozen))
     for other in others:

@@ -15,6 +15,7 @@ from tireid.figures.forces import (
 )
 from tireid.figures.paper import comparison_figure, error_figure, locus_figure, weights_figure
 from tireid.figures.scheme import scheme_figure
+from tireid.figures.side_slip import side_slip_figure
 from tireid.figures.style import figure_png, figure_svg, save_figure
 from tireid.figures.tires import (
     TireCurve,
@@ -47,6 +48,7 @@ __all__ = [
     "save_figure",
     "scheme_figure",
     "side_by_side_figure",
+    "side_slip_figure",
     "slip_figure",
     "weights_figure",
 ]

@@ -45,6 +45,7 @@ def write_compare_report(
     captions = {
         "methods": "Errors of every method.",
         "matrix": "Learnt on one recording, asked about another.",
+        "side_slip": "Side slip as methods without a lateral velocity told it.",
         "pareto": "Random designs of every method.",
     }
     blocks: list[Block] = [

@@ -173,6 +173,7 @@ def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> 
         drawing(figures["slip"], "Axle force over slip angle: drive and curve.", READ["slip"]),
     ]
     for name, caption in (
+        ("side_slip", "Side slip as it was estimated."),
         ("learnt", "What was learnt over time."),
         ("error", "Norm of the observer's error."),
         ("weights", "Weights of the network."),

@@ -1,0 +1,128 @@
+"""Side slip over time: what was recorded, and what was estimated without it, with its band."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from codegen.arrays import Array
+from identifier.compare.course import SIGMAS, SideSlip
+from models.recordings import Recording
+from tireid.figures.compare import method_label, short_names
+from tireid.figures.style import (
+    AMBER,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PAGE,
+    PURPLE,
+    SKY,
+    TRUTH,
+    label_time,
+    legend_above,
+    new_figure,
+    note,
+    styled,
+)
+from tireid.figures.thinned import Signal, drawn_times, shown
+
+FIRST = "inertial"  # which has the band where several tell v_y
+MOST = 4  # recordings that are drawn
+OTHERS = (ORANGE, GREEN, PURPLE, AMBER, SKY, GREY)
+COLUMNS = 5  # entries of a row of the legend
+BAND = "within 2 standard deviations"
+BEYOND = 1.6  # times what was recorded, or estimated first: an axis reaches no farther
+
+
+@styled
+def side_slip_figure(
+    recordings: Sequence[Recording], told: Mapping[str, Mapping[str, SideSlip]]
+) -> Figure:
+    """Draw side slip and what estimates miss of it; the band is of the inertial identifier.
+
+    Without a recorded v_y there is an estimate with its band, and nothing is missed. A band is
+    drawn of the inertial identifier, of the first method with one where it is not there.
+
+    Parameters
+    ----------
+    recordings : that the methods ran over; the first few are drawn.
+    told : by method, by recording, what it told.
+
+    Raises
+    ------
+    ValueError
+        Where no method told a lateral velocity.
+    """
+    drawn = list(recordings)[:MOST]
+    told = {name: by_name for name, by_name in told.items() if by_name}
+    if not told:
+        raise ValueError("no method told a lateral velocity")
+    with_band = [
+        name
+        for name, by_name in told.items()
+        if any(one.v_y_sd is not None for one in by_name.values())
+    ]
+    first = FIRST if FIRST in told else next(iter(with_band), next(iter(told)))
+    known = [recording.logged_v_y is not None for recording in drawn]
+    ratios = [ratio for one in known for ratio in ([1.5, 0.9] if one else [1.5])]
+    figure = new_figure(PAGE, 0.7 + sum(ratios))
+    panels = iter(figure.subplots(len(ratios), 1, squeeze=False, height_ratios=ratios)[:, 0])
+    names = short_names([recording.name for recording in recordings])
+    for recording, has_truth in zip(drawn, known, strict=True):
+        here = {name: by_name[recording.name] for name, by_name in told.items()}
+        upper = next(panels)
+        upper.set_title(names[recording.name])
+        _draw(upper, next(panels) if has_truth else None, recording, here, first)
+    figure.align_ylabels()
+    legend_above(figure, columns=COLUMNS)
+    return figure
+
+
+def _draw(
+    upper: Axes,
+    lower: Axes | None,
+    recording: Recording,
+    told: Mapping[str, SideSlip],
+    first: str,
+) -> None:
+    """Draw the side slip of a recording, and below it the errors of the estimates."""
+    v_x, truth, ends = recording.v_x, recording.logged_v_y, (recording.t[0], recording.t[-1])
+    signals: list[Signal] = [one.v_y.__getitem__ for one in told.values()]
+    part = shown(recording.t, ends, *signals)
+    t, at = drawn_times(recording, recording.t[part]), v_x[part]
+    slips = {name: _degrees(one.v_y[part], at) for name, one in told.items()}
+    exact = None if truth is None else _degrees(truth[part], at)
+    reach = float(np.abs(slips[first] if exact is None else exact).max())
+    limit = BEYOND * max(reach, 0.1)
+    band = told[first].v_y_sd
+    if band is not None:
+        low, high = (
+            np.clip(_degrees(told[first].v_y[part] + side * SIGMAS * band[part], at), -limit, limit)
+            for side in (-1.0, 1.0)
+        )
+        upper.fill_between(t, low, high, color=BLUE, alpha=0.2, linewidth=0.0, label=BAND)
+    if exact is not None:
+        upper.plot(t, exact, **{**TRUTH, "label": "recorded"})
+    colors = dict(zip((name for name in told if name != first), OTHERS * len(told), strict=False))
+    errors = {}
+    for name in (*colors, first):  # the first lies above the others
+        look: dict[str, Any] = {"color": colors.get(name, BLUE), "linewidth": 0.9}
+        upper.plot(t, np.clip(slips[name], -limit, limit), **look, label=method_label(name))
+        if lower is not None and exact is not None:
+            errors[name] = slips[name] - exact
+            lower.plot(t, np.clip(errors[name], -limit, limit), **look, rasterized=True)
+    upper.set(xlim=ends, ylim=(-limit, limit), ylabel="side slip [deg]")
+    if told[first].rms is not None:
+        note(upper, f"RMSE {told[first].rms:.2g} deg")
+    if lower is not None:
+        lower.axhline(0.0, color=GREY, linewidth=0.6)
+        lower.set(xlim=ends, ylabel="error [deg]")
+    label_time(upper if lower is None else lower, recording.t)
+
+
+def _degrees(v_y: Array, v_x: Array) -> Array:
+    """Return side slip [deg], zero at standstill."""
+    return np.degrees(np.where(v_x > 0.0, np.arctan2(v_y, np.maximum(v_x, 1e-9)), 0.0))
