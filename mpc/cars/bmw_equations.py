@@ -200,6 +200,7 @@ class MultiBody:
             delta=float(x[STEERING]),
             a_x=float(x_dot[V_X]) - v_y * r,
             a_y=a_y,
+            roll=float(x[ROLL]),
             axle_force=axle_force(self.vehicle, a_y, float(x_dot[YAW_RATE])),
             inner=inner,
         )
@@ -267,6 +268,7 @@ class Drift:
             delta=delta,
             a_x=v_dot * c - v_y * beta_dot - r * v_y,
             a_y=a_y,
+            roll=0.0,  # a single track has none
             axle_force=axle_force(self.vehicle, a_y, r_dot),
             inner=inner,
         )

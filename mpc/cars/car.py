@@ -34,6 +34,8 @@ class CarState(NamedTuple):
     """Acceleration of the center of gravity along the body [m/s^2]."""
     a_y: float
     """Acceleration of the center of gravity to the left, dv_y/dt + v_x r [m/s^2]."""
+    roll: float
+    """Angle of the body against the road, positive where its right side dips [rad]."""
     axle_force: Array
     """Side force of the front and the rear axle, frame of the body, (2,) [N]."""
     inner: Any
@@ -139,7 +141,7 @@ class DoubleTrackCar:
         return self._state(self._plant.step(state.inner, np.array([command, 0.0]), v_ref))
 
     def _state(self, plant: PlantState) -> CarState:
-        v_x, v_y, r, _, _, X, Y, psi = (float(value) for value in plant.x[:8])
+        v_x, v_y, r, roll, _, X, Y, psi = (float(value) for value in plant.x[:8])
         a_x, a_y = (float(value) for value in plant.acceleration)
         return CarState(
             t=plant.steps * self._plant.dt,
@@ -152,6 +154,7 @@ class DoubleTrackCar:
             delta=float(plant.x[12]),
             a_x=a_x,
             a_y=a_y,
+            roll=roll,
             axle_force=plant.axle_force,
             inner=plant,
         )

@@ -1,7 +1,8 @@
 """Driving a car along a path with a tracker, and what came of it."""
 
 from mpc.loop.drive import COMPLETED, LearningTires, PathTracker, drive
-from mpc.loop.record import Drive, Plan, Scores, scores
+from mpc.loop.lateral import LateralVelocity, Localization, TellsLateral, Told
+from mpc.loop.record import Drive, Plan, Scores, ToldScores, scores, told_scores
 from mpc.loop.sensing import (
     CarSensors,
     FaultySensors,
@@ -10,6 +11,7 @@ from mpc.loop.sensing import (
     Preview,
     SpeedProfile,
     cornering_limit,
+    imu_and_localization,
     inertial_unit,
 )
 
@@ -18,7 +20,9 @@ __all__ = [
     "CarSensors",
     "Drive",
     "FaultySensors",
+    "LateralVelocity",
     "LearningTires",
+    "Localization",
     "Measured",
     "Measures",
     "PathTracker",
@@ -26,8 +30,13 @@ __all__ = [
     "Preview",
     "Scores",
     "SpeedProfile",
+    "TellsLateral",
+    "Told",
+    "ToldScores",
     "cornering_limit",
     "drive",
+    "imu_and_localization",
     "inertial_unit",
     "scores",
+    "told_scores",
 ]

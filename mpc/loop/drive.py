@@ -14,6 +14,7 @@ import numpy as np
 from codegen.arrays import Array
 from models.sensors import is_shown
 from mpc.cars import Car, CarState
+from mpc.loop.lateral import TellsLateral
 from mpc.loop.record import Drive, Recorder
 from mpc.loop.sensing import CarSensors, Measured, Measures, SpeedProfile
 from mpc.path.path import Path, Projection
@@ -83,6 +84,7 @@ def drive(
     delay: int = 1,
     rng: np.random.Generator,
     learner: LearningTires | None = None,
+    lateral: TellsLateral | None = None,
     laps: float = 1.0,
     time_limit: float = 300.0,
     widest: float = 2.0,
@@ -103,6 +105,8 @@ def drive(
     delay : periods from a measurement until what follows from it acts.
     rng : source of the noise.
     learner : what may change the tracker's tire on the way.
+    lateral : tells v_y, and a_y in the plane of the road, in place of the sensors; None takes what
+        they show.
     laps : how often to drive a closed path; an open one is driven once.
     time_limit : after which the drive is given up [s].
     widest : deviation at which the car has left the path [m].
@@ -134,7 +138,10 @@ def drive(
     place = Place(state.X, state.Y, state.psi, state.v_x, 0.0, 0.0, (0.0,) * len(GUIDES))
     ending = ""
     while not ending:
-        measured = sensors.measure(state, rng)
+        shown = measured = sensors.measure(state, rng)
+        told = None if lateral is None else lateral.tell(shown)
+        if told is not None:
+            measured = told.in_place_of(shown)
         place = _located(measured, place, car.period)
         for channel in place.just_lost(car.period):
             record.note(state.t, f"{channel} shows no number: dead reckoning")
@@ -157,7 +164,7 @@ def drive(
         if record.plan_is_due:
             there = profile.ahead(projected.s, place.v_x, tracker.plan_times, car.speed_gain)
             record.plan(command, there.s)
-        record.add(state, here, measured, v_ref, command)
+        record.add(state, here, shown, v_ref, command, told)
         waiting.append(command.steering)
         try:
             state = car.step(state, waiting.popleft(), v_ref)

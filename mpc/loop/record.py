@@ -1,7 +1,7 @@
 """What a drive was: all signals over time, what the tracker planned, and how it ended."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +11,7 @@ from codegen.arrays import Array
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from mpc.cars import CarState
+from mpc.loop.lateral import Told
 from mpc.loop.sensing import Measured
 from mpc.path.path import Path, Projection
 from mpc.realtime.instance import Command, Status
@@ -60,7 +61,9 @@ class Drive:
     v_ref : wanted speed [m/s], (n,).
     command : steering angle decided on at this period, which acts `delay` periods later [rad],
         (n,).
-    measured : what the sensors said, by the names of `Measured`, (n,) each.
+    measured : what the sensors said, by the names of `Measured`, (n,) each; v_y is not among them
+        where nothing measures it.
+    told : v_y in its place, by the names of `Told`, (n,) each; empty where sensors show it.
     status : of the tracker, by its number, (n,).
     solve_time : of the tracker [s], (n,).
     plans : some of the tracker's plans.
@@ -91,6 +94,7 @@ class Drive:
     v_ref: Array
     command: Array
     measured: Mapping[str, Array]
+    told: Mapping[str, Array] = field(default_factory=dict)
     status: NDArray[np.int64]
     solve_time: Array
     plans: tuple[Plan, ...]
@@ -104,6 +108,8 @@ class Drive:
     def recording(self) -> Recording:
         """Return what an identifier would read of it: measured signals, axle forces as truth.
 
+        Where nothing measures v_y, it is what was told.
+
         Raises
         ------
         RecordingError
@@ -113,7 +119,7 @@ class Drive:
             name=self.name,
             t=self.t,
             v_x=self.measured["v_x"],
-            v_y=self.measured["v_y"],
+            v_y=self.measured["v_y"] if "v_y" in self.measured else self.told["v_y"],
             r=self.measured["r"],
             delta_f=self.measured["delta"],
             delta_r=np.zeros_like(self.t),
@@ -139,6 +145,7 @@ class Recorder:
         self._plan_every = plan_every
         self._cars: list[CarState] = []
         self._measured: list[Measured] = []
+        self._told: list[Told] = []
         self._others: list[tuple[float, ...]] = []
         self._plans: list[Plan] = []
         self._notes: list[tuple[float, str]] = []
@@ -177,6 +184,7 @@ class Recorder:
         measured: Measured,
         v_ref: float,
         command: Command,
+        told: Told | None = None,
     ) -> None:
         """Keep a period.
 
@@ -186,7 +194,10 @@ class Recorder:
         measured : what the sensors said.
         v_ref : wanted speed [m/s].
         command : of the tracker.
+        told : of v_y, where nothing measures it.
         """
+        if told is not None:
+            self._told.append(told)
         self._cars.append(state)
         self._measured.append(measured)
         e_psi = here.heading_error(state.psi)
@@ -219,7 +230,11 @@ class Recorder:
         ending : why the drive ended.
         """
         s, e_y, e_psi, kappa, v_ref, steering, solve_time, status = np.array(self._others).T
-        samples = np.array(self._measured).T
+        measured = dict(zip(Measured._fields, np.array(self._measured).T, strict=True))
+        told: dict[str, Array] = {}
+        if self._told:
+            told = dict(zip(Told._fields, np.array(self._told).T, strict=True))
+            del measured["v_y"]
         return Drive(
             name=name,
             vehicle=vehicle,
@@ -233,7 +248,8 @@ class Recorder:
             kappa=kappa,
             v_ref=v_ref,
             command=steering,
-            measured=dict(zip(Measured._fields, samples, strict=True)),
+            measured=measured,
+            told=told,
             status=status.astype(np.int64),
             solve_time=solve_time,
             plans=tuple(self._plans),
@@ -284,4 +300,46 @@ def scores(drive: Drive) -> Scores:
             "p99": float(np.percentile(solve_ms, 99.0)),
             "max": float(solve_ms.max()),
         },
+    )
+
+
+# How right it was, where v_y was told.
+
+
+class ToldScores(NamedTuple):
+    """Errors of the lateral velocity that was told, against the truth."""
+
+    rms_error_m_s: float
+    """Root mean square of the error of v_y [m/s]."""
+    rms_error_deg: float
+    """The same of side slip [degrees]."""
+    rms_deg: float
+    """Root mean square of the true side slip [degrees]."""
+    within_two_sd: float
+    """Share of the samples whose error lies within two standard deviations."""
+    inertial_rms_error_m_s: float
+    """Root mean square of the error of the identifier alone, without position [m/s]."""
+
+
+def told_scores(drive: Drive) -> ToldScores | None:
+    """Return how right the v_y was that was told over a drive; None where sensors showed it.
+
+    Parameters
+    ----------
+    drive : where nothing was told at a sample, it does not count.
+    """
+    if not drive.told:
+        return None
+
+    def rms(values: Array) -> float:
+        return float(np.sqrt(np.nanmean(values**2)))
+
+    error, sd = drive.told["v_y"] - drive.v_y, drive.told["v_y_sd"]
+    known = np.isfinite(error)
+    return ToldScores(
+        rms_error_m_s=rms(error),
+        rms_error_deg=float(np.rad2deg(rms(error / drive.v_x))),
+        rms_deg=float(np.rad2deg(rms(np.arctan2(drive.v_y, drive.v_x)))),
+        within_two_sd=float(np.mean(np.abs(error[known]) <= 2.0 * sd[known])),
+        inertial_rms_error_m_s=rms(drive.told["inertial_v_y"] - drive.v_y),
     )

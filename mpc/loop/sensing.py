@@ -1,7 +1,8 @@
 """What a driving car measures of itself, sample by sample, and sees of the path before it."""
 
+import math
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import NamedTuple, Protocol, cast
 
@@ -15,7 +16,7 @@ from models.maneuvers import SlowlyIncreasingSteer
 from models.plant import Plant
 from models.sensors import Sensor, SensorError
 from models.tires import Tire
-from models.vehicle import Vehicle
+from models.vehicle import GRAVITY, Vehicle
 from mpc.cars.car import CarState
 from mpc.path.path import Path
 
@@ -23,7 +24,7 @@ EXACT = Sensor()
 
 
 class Measured(NamedTuple):
-    """One sample, SI."""
+    """One sample, SI; NaN where there is no such sensor."""
 
     t: float
     X: float
@@ -34,6 +35,9 @@ class Measured(NamedTuple):
     r: float
     delta: float
     a_y: float
+
+
+CHANNELS = Measured._fields[1:]
 
 
 class Measures(Protocol):
@@ -56,10 +60,12 @@ class CarSensors:
     ----------
     X, Y : position [m].
     psi : heading [rad].
-    v_x, v_y : speed over ground [m/s].
+    v_x, v_y : speed over ground [m/s]; v_y None where nothing measures it.
     r : yaw rate [rad/s].
     delta : angle of the front road wheels [rad].
     a_y : lateral acceleration [m/s^2].
+    body_fixed : whether the accelerometer rolls with the body and feels gravity then; else a_y is
+        in the plane of the road.
 
     Raises
     ------
@@ -71,16 +77,21 @@ class CarSensors:
     Y: Sensor = EXACT
     psi: Sensor = EXACT
     v_x: Sensor = EXACT
-    v_y: Sensor = EXACT
+    v_y: Sensor | None = EXACT
     r: Sensor = EXACT
     delta: Sensor = EXACT
     a_y: Sensor = EXACT
+    body_fixed: bool = False
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            delay = getattr(self, field.name).delay
-            if delay != 0.0:
-                raise SensorError(f"{field.name}: a delay belongs to the loop, not to its sensors")
+        for name in self.channels:
+            if getattr(self, name).delay != 0.0:
+                raise SensorError(f"{name}: a delay belongs to the loop, not to its sensors")
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """What there is a sensor for, in the order of `Measured`."""
+        return tuple(name for name in CHANNELS if getattr(self, name) is not None)
 
     def measure(self, state: CarState, rng: np.random.Generator) -> Measured:
         """Return what is measured at one instant.
@@ -89,11 +100,17 @@ class CarSensors:
         ----------
         rng : source of the noise; drawn from even without noise, so that channels stay in step.
         """
-        noise = rng.standard_normal(len(fields(self)))
+        noise = rng.standard_normal(len(CHANNELS))
         values = []
-        for field, draw in zip(fields(self), noise, strict=True):
-            sensor: Sensor = getattr(self, field.name)
-            value = getattr(state, field.name) + sensor.bias + sensor.noise * float(draw)
+        for name, draw in zip(CHANNELS, noise, strict=True):
+            sensor: Sensor | None = getattr(self, name)
+            if sensor is None:
+                values.append(math.nan)
+                continue
+            value = getattr(state, name)
+            if name == "a_y" and self.body_fixed:
+                value = value * math.cos(state.roll) + GRAVITY * math.sin(state.roll)
+            value = value + sensor.bias + sensor.noise * float(draw)
             if sensor.resolution > 0.0:
                 value = sensor.resolution * round(value / sensor.resolution)
             values.append(value)
@@ -118,6 +135,33 @@ def inertial_unit() -> CarSensors:
     )
 
 
+BIAS_A_Y, BIAS_R = 0.05, 0.001  # m/s², rad/s: standard deviations from one unit to the next
+
+
+def imu_and_localization(rng: np.random.Generator | None) -> CarSensors:
+    """Return the sensors of a car without v_y: inertial unit, wheel speed, steering, localization.
+
+    As noisy as those of `inertial_unit`: position 2 cm, heading 0.002 rad, wheel speed 0.03 m/s,
+    yaw rate 0.003 rad/s, acceleration 0.1 m/s², steering 0.5 mrad, new at every sample. Yaw rate
+    and acceleration are biased, and the accelerometer is fixed to the body and rolls with it.
+
+    Parameters
+    ----------
+    rng : draws the biases, of 0.001 rad/s and 0.05 m/s² standard deviation; None takes sensors
+        without noise and bias.
+    """
+    if rng is None:
+        return CarSensors(v_y=None, body_fixed=True)
+    same, (bias_r, bias_a_y) = inertial_unit(), rng.normal(0.0, [BIAS_R, BIAS_A_Y])
+    return replace(
+        same,
+        v_y=None,
+        r=replace(same.r, bias=float(bias_r)),
+        a_y=replace(same.a_y, bias=float(bias_a_y)),
+        body_fixed=True,
+    )
+
+
 class FaultySensors:
     """Sensors of which some channels break for some time; a stuck one shows its last good value.
 
@@ -134,8 +178,8 @@ class FaultySensors:
 
     def __init__(self, sensors: CarSensors, faults: Sequence[SensorFault]) -> None:
         for fault in faults:
-            if fault.channel not in Measured._fields[1:]:
-                channels = ", ".join(Measured._fields[1:])
+            if fault.channel not in sensors.channels:
+                channels = ", ".join(sensors.channels)
                 raise FaultError(f"channel must be one of {channels}, it is {fault.channel!r}")
         self._sensors, self._faults = sensors, tuple(faults)
         self._good: Measured | None = None

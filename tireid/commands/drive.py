@@ -28,7 +28,17 @@ from tireid.commands.options import (
     add_weights,
 )
 from tireid.driving.learn import DURATION
-from tireid.driving.runs import FROZEN, ORACLE, TIRES, Conditions, require_compiler, run_drive
+from tireid.driving.runs import (
+    FROZEN,
+    FULL,
+    IMU,
+    ORACLE,
+    SENSORS,
+    TIRES,
+    Conditions,
+    require_compiler,
+    run_drive,
+)
 from tireid.driving.setup import PERIOD, PLANTS
 from tireid.output import output_folder
 from tireid.progress import say, tell
@@ -49,6 +59,7 @@ def headline(conditions: Conditions) -> str:
     share = "" if wish is None else f", {100.0 * wish:.0f} % of a grip of {setup.grip:.1f} m/s²"
     drops = "".join(f", {mu:g} from {s:g} m on" for s, mu in setup.drops)
     noise = "sensor noise" if conditions.noise else "no noise"
+    noise += ", no v_y" if conditions.kind == IMU else ""
     noise += "".join(f", {fault}" for fault in conditions.faults)
     return (
         f"{setup.path.name} at {speed}{share}; friction {setup.mu:g}{drops}; "
@@ -91,6 +102,7 @@ def inputs_of(
         "delay_ms": 1e3 * PERIOD * conditions.delay,
         "period_ms": 1e3 * PERIOD,
         "noise": conditions.noise,
+        **({"sensors": conditions.kind} if conditions.kind != FULL else {}),
         "faults": [_finite(asdict(fault)) for fault in conditions.faults],
         "seed": conditions.seed,
     }
@@ -190,6 +202,16 @@ def add_parser(commands: Any) -> None:
         action=argparse.BooleanOptionalAction,
         default=True,
         help="of the sensors (on)",
+    )
+    parser.add_argument(
+        "--sensors",
+        choices=SENSORS,
+        default=FULL,
+        metavar="NAME",
+        help="full: v_y is measured; imu: yaw rate and a_y of an inertial unit on the body (0.003 "
+        "rad/s and 0.1 m/s² of noise, biases of 0.001 and 0.05), wheel speed (0.03 m/s), steering, "
+        "position (2 cm) and heading (0.1 degrees) of a localization, and no v_y: an identifier "
+        "that learns while it drives tells it (%(default)s)",
     )
     parser.add_argument(
         "--fault",

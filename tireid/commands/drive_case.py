@@ -13,11 +13,11 @@ from identifier.tire_model import TireModel
 from models.faults import SIZED, FaultError, SensorFault
 from models.schema import require_few
 from models.vehicle import Vehicle, sedan
-from mpc.loop import CarSensors, FaultySensors
+from mpc.loop import CarSensors, FaultySensors, imu_and_localization
 from mpc.path import BUILT_IN, Path
 from tireid.commands.options import chosen_method, network_model, read_vehicle, seed_of
 from tireid.driving.learn import learning_drive
-from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, Conditions
+from tireid.driving.runs import FROZEN, FULL, IMU, LEARNING, LINEAR, ORACLE, Conditions
 from tireid.driving.setup import PERIOD, Setup, SpeedWish, require_friction
 from tireid.learning import identify
 from tireid.progress import Progress
@@ -86,12 +86,13 @@ def parse_drop(text: str) -> tuple[float, float]:
     return s, require_friction("--mu-drop", mu)
 
 
-def parse_fault(text: str) -> SensorFault:
+def parse_fault(text: str, kind: str = FULL) -> SensorFault:
     """Return what --fault says of a sensor.
 
     Parameters
     ----------
     text : CHANNEL:KIND:START:DURATION[:SIZE], such as v_y:biased:3:inf:0.5.
+    kind : of the sensors, of `SENSORS`.
 
     Raises
     ------
@@ -100,7 +101,7 @@ def parse_fault(text: str) -> SensorFault:
     """
     words = text.split(":")
     try:
-        channel, kind, *numbers = words
+        channel, how, *numbers = words
         start, duration, *size = map(float, numbers)
         (most,) = size or [0.0]
     except ValueError:
@@ -108,12 +109,13 @@ def parse_fault(text: str) -> SensorFault:
             f"--fault wants CHANNEL:KIND:START:DURATION[:SIZE], times in s, not {text!r}"
         ) from None
     try:
-        fault = SensorFault(channel=channel, kind=kind, start=start, duration=duration, size=most)
-        FaultySensors(CarSensors(), [fault])  # refuses what is no channel
+        fault = SensorFault(channel=channel, kind=how, start=start, duration=duration, size=most)
+        sensors = imu_and_localization(None) if kind == IMU else CarSensors()
+        FaultySensors(sensors, [fault])  # refuses what is no channel
     except FaultError as error:
         raise ValueError(f"--fault {text}: {error}") from None
-    if kind in SIZED and not size:
-        raise ValueError(f"--fault {text}: {kind} needs a size")
+    if how in SIZED and not size:
+        raise ValueError(f"--fault {text}: {how} needs a size")
     return fault
 
 
@@ -165,7 +167,8 @@ def conditions_of(options: argparse.Namespace) -> Conditions:
         noise=options.noise,
         seed=seed_of(options),
         laps=options.laps,
-        faults=tuple(parse_fault(text) for text in options.fault),
+        faults=tuple(parse_fault(text, options.sensors) for text in options.fault),
+        kind=options.sensors,
     )
 
 
@@ -287,6 +290,7 @@ def frozen_tires(
             np.random.default_rng([conditions.seed, 1]),
             grip=setup.grip,
             seed=conditions.seed,
+            lateral=conditions.lateral(),
             progress=progress,
         )
     history = identify(recording, setup.vehicle, method, check=False)

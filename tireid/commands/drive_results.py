@@ -12,7 +12,7 @@ from codegen.arrays import Array
 from identifier.tire_model import TireModel
 from models.faults import SensorFault
 from models.files import digest
-from mpc.loop import Drive
+from mpc.loop import Drive, told_scores
 from mpc.tires import CurveFitError, prediction_tire
 from tireid import __version__
 from tireid.animation import write_film
@@ -22,6 +22,7 @@ from tireid.driving.setup import Setup
 from tireid.figures import (
     axle_slip,
     drive_errors_figure,
+    drive_lateral_figure,
     drive_path_figure,
     drive_solve_figure,
     drive_steering_figure,
@@ -79,6 +80,8 @@ def write_drives(
         "tires": drive_tires_figure(first.drive, curves),
         "solve_times": drive_solve_figure(first.drive),
     }
+    if first.drive.told:
+        figures["lateral"] = drive_lateral_figure(first.drive)
     for name, figure in figures.items():
         save_figure(figure, folder / f"{name}.png")
     if film != NO_FILM:
@@ -115,7 +118,19 @@ def summarize_drives(runs: Sequence[Run], inputs: Mapping[str, Any]) -> dict[str
 
 def _scores(run: Run) -> dict[str, Any]:
     notes = [{"t_s": t, "note": text} for t, text in run.drive.notes]
-    return {**run.scores.to_dict(), "ending": run.drive.ending, "notes": notes}
+    told = told_scores(run.drive)
+    lateral = {} if told is None else {"lateral_velocity": told._asdict()}
+    return {**run.scores.to_dict(), **lateral, "ending": run.drive.ending, "notes": notes}
+
+
+COLUMNS_TOLD = {
+    "v_y": "v_y_told_m_s",
+    "v_y_sd": "v_y_told_sd_m_s",
+    "observable": "side_slip_observable",
+    "a_y": "a_y_level_m_s2",
+    "inertial_v_y": "v_y_inertial_m_s",
+    "inertial_v_y_sd": "v_y_inertial_sd_m_s",
+}
 
 
 def drive_columns(drive: Drive) -> dict[str, Array]:
@@ -151,6 +166,7 @@ def drive_columns(drive: Drive) -> dict[str, Array]:
         "status": drive.status.astype(np.float64),
         "solve_time_s": drive.solve_time,
         **measured,
+        **{COLUMNS_TOLD[name]: values for name, values in drive.told.items()},
     }
 
 
@@ -203,9 +219,26 @@ def drive_table(runs: Sequence[Run]) -> str:
         off = [f"{score.rms_e_y_m:.3f} m", f"{score.peak_e_y_m:.3f} m"]
         rows.append([run.label, *off, _completed(run), failures, f"{times} ms"])
     lines = [text_table(rows, "<>><>>")]
+    lines += [f"{run.label}: {told_words(run)}" for run in runs if run.drive.told]
     for run in runs:
         lines += [f"{run.label} at {t:.2f} s: {note}" for t, note in run.drive.notes]
     return "\n".join(lines)
+
+
+def told_words(run: Run) -> str:
+    """Return how right the v_y was that was told, in one line.
+
+    Parameters
+    ----------
+    run : of a car whose v_y was told.
+    """
+    told = told_scores(run.drive)
+    assert told is not None
+    return (
+        f"v_y told to {told.rms_error_m_s:.3f} m/s, side slip to {told.rms_error_deg:.2f} of "
+        f"{told.rms_deg:.2f} degrees rms; {100.0 * told.within_two_sd:.0f} % of the errors within "
+        f"two standard deviations"
+    )
 
 
 def _completed(run: Run) -> str:

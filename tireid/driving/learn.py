@@ -9,7 +9,7 @@ from models.maneuvers import RandomSteer
 from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
 from mpc.cars import Car, DoubleTrackCar
-from mpc.loop import CarSensors, Measured, cornering_limit, inertial_unit
+from mpc.loop import CarSensors, Measured, TellsLateral, cornering_limit, inertial_unit
 from tireid.driving.setup import PERIOD
 from tireid.progress import Progress
 
@@ -33,6 +33,7 @@ def learning_drive(
     *,
     grip: float,
     seed: int,
+    lateral: TellsLateral | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Recording:
     """Drive a car without a path and return what its sensors saw; a car that spins or tips ends it.
@@ -43,6 +44,8 @@ def learning_drive(
     rng : of their noise.
     grip : largest lateral acceleration [m/s²], which sizes the steering.
     seed : of the steering.
+    lateral : tells v_y, and a_y in the plane of the road, in place of the sensors; None takes what
+        they show.
     progress : called with the share of the time.
     """
     # Angle of a bend at that acceleration, and the slip that the front axle needs beyond it.
@@ -59,7 +62,10 @@ def learning_drive(
     steering = maneuver.steering(t)[:, 0] * np.minimum(GENTLE + t / GROWS, 1.0)
     state, samples, forces = car.start(SPEED), [], []
     for k, angle in enumerate(steering):
-        samples.append(sensors.measure(state, rng))
+        measured = sensors.measure(state, rng)
+        if lateral is not None:
+            measured = lateral.tell(measured).in_place_of(measured)
+        samples.append(measured)
         forces.append(state.axle_force)
         state = car.step(state, float(angle), SPEED)
         if abs(state.v_y) > SPUN * state.v_x or abs(state.a_y) > TIPS * grip:

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 
 from codegen import find_compiler
+from identifier.axle import AxleModel
+from identifier.inertial import InertialIdentifier
 from identifier.methods import continuing
 from identifier.run import OnlineIdentifier
 from identifier.tire_model import TireModel
@@ -19,10 +21,12 @@ from mpc.loop import (
     CarSensors,
     Drive,
     FaultySensors,
+    LateralVelocity,
     LearningTires,
     Measured,
     Measures,
     Scores,
+    imu_and_localization,
     inertial_unit,
     scores,
 )
@@ -81,6 +85,19 @@ def friction_now(friction: Friction, measured: Measured) -> float:
     return mu
 
 
+def lateral_velocity(vehicle: Vehicle, learnt: TireModel | None = None) -> LateralVelocity:
+    """Return what tells v_y where no sensor shows it, and learns the tires for it.
+
+    Parameters
+    ----------
+    vehicle : the car.
+    learnt : what it begins with, where these are curves of axles; else it begins afresh.
+    """
+    method = InertialIdentifier.for_vehicle(vehicle, dt=PERIOD)
+    start = learnt if isinstance(learnt, AxleModel) else None
+    return LateralVelocity(OnlineIdentifier(method, vehicle, PERIOD, start))
+
+
 def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
     """Return what goes on learning while the tracker drives, and hands over what is fit.
 
@@ -102,6 +119,7 @@ def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
 
 
 LINEAR, FROZEN, ORACLE, LEARNING = TIRES = ("linear", "frozen", "oracle", "learning")
+FULL, IMU = SENSORS = ("full", "imu")
 WIDEST = 2.0  # deviation at which a car is off the path [m]
 PLAN_EVERY = 4  # periods between two plans that are kept: half a frame of the film
 
@@ -118,6 +136,7 @@ class Conditions:
     seed : of the noise.
     laps : of a closed path.
     faults : of the sensors, while the path is driven.
+    kind : of the sensors, of `SENSORS`; imu measures no v_y.
     """
 
     setup: Setup
@@ -126,11 +145,25 @@ class Conditions:
     seed: int
     laps: float
     faults: tuple[SensorFault, ...] = ()
+    kind: str = FULL
 
     @property
     def sensors(self) -> CarSensors:
-        """The sensors of the car, in order."""
+        """The sensors of the car, in order; those of one seed are the same unit."""
+        if self.kind == IMU:
+            return imu_and_localization(
+                np.random.default_rng([self.seed, 3]) if self.noise else None
+            )
         return inertial_unit() if self.noise else CarSensors()
+
+    def lateral(self, learnt: TireModel | None = None) -> LateralVelocity | None:
+        """Return what tells v_y on a drive, None where a sensor shows it.
+
+        Parameters
+        ----------
+        learnt : what is known of the tires before.
+        """
+        return None if self.kind == FULL else lateral_velocity(self.setup.vehicle, learnt)
 
     @property
     def driving_sensors(self) -> Measures:
@@ -248,6 +281,7 @@ def run_drive(
             delay=conditions.delay,
             rng=np.random.default_rng([conditions.seed, 2]),
             learner=witness or learner,
+            lateral=conditions.lateral(learnt),
             laps=conditions.laps,
             widest=WIDEST,
             plan_every=PLAN_EVERY,
@@ -286,6 +320,7 @@ def drive(
     delay: float = 0.02,
     learning: bool = False,
     noise: bool = True,
+    sensors: str = FULL,
     laps: float = 1.0,
     seed: int = 0,
 ) -> Run:
@@ -303,6 +338,8 @@ def drive(
     delay : from a measurement until its command acts, a multiple of 0.01 s [s].
     learning : go on learning from the tire while driving, and hand over what is fit.
     noise : whether sensors are noisy.
+    sensors : full, or imu: gyro, accelerometer, wheel speed, steering and a localization of
+        position and heading, but no v_y, which an inertial identifier tells.
     laps : of a closed path.
     seed : of the noise.
 
@@ -325,6 +362,8 @@ def drive(
     for name, value in (("share", share), ("laps", laps), ("speed", speed)):
         if value is not None and not value > 0.0:
             raise ValueError(f"{name} must be positive, it is {value:g}")
+    if sensors not in SENSORS:
+        raise ValueError(f"sensors must be one of {', '.join(SENSORS)}, not {sensors!r}")
     if laps != 1.0 and not path.closed:
         raise ValueError(f"laps are of a closed path, {path.name} is not")
     if learning and tire is None:
@@ -338,6 +377,8 @@ def drive(
         drops=(),
         wish=SpeedWish(share if speed is None else None, speed),
     )
-    conditions = Conditions(setup=setup, delay=round(periods), noise=noise, seed=seed, laps=laps)
+    conditions = Conditions(
+        setup=setup, delay=round(periods), noise=noise, seed=seed, laps=laps, kind=sensors
+    )
     label = LINEAR if tire is None else LEARNING if learning else FROZEN
     return run_drive(label, conditions, tire)

@@ -13,6 +13,7 @@ from tireid.figures.forces import (
     prediction_figure,
     side_by_side_figure,
 )
+from tireid.figures.lateral import drive_lateral_figure
 from tireid.figures.paper import comparison_figure, error_figure, locus_figure, weights_figure
 from tireid.figures.scheme import scheme_figure
 from tireid.figures.side_slip import side_slip_figure
@@ -30,6 +31,7 @@ __all__ = [
     "axle_slip",
     "comparison_figure",
     "drive_errors_figure",
+    "drive_lateral_figure",
     "drive_path_figure",
     "drive_solve_figure",
     "drive_steering_figure",

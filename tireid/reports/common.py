@@ -43,6 +43,8 @@ READ = {
     "steering": "A command at its limit is a car that has no more to give.",
     "tires": "The cloud is what the tires did; a tracker is right where its curve passes through "
     "it. Below, what each curve misses of the true one.",
+    "lateral": "What is told lies on the truth, its error within the band; the identifier alone "
+    "knows of no position, and strays where the friction is another than it has learnt.",
     "solve_times": "All steps must end within the period, far to the left of it.",
     "methods": "Left is better; a line runs from the best recording to the worst.",
     "matrix": "Off the diagonal is what counts: learnt on one drive, asked about another.",

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from models.files import digest
 from mpc.handover.rules import Verdict
+from mpc.loop import told_scores
 from tireid.driving.runs import Run
 from tireid.driving.setup import PERIOD
 from tireid.report import Block, Headline, Picture, Report, Section, Table, printed, write_report
@@ -79,6 +80,14 @@ def drive_headlines(runs: Sequence[Run]) -> list[Headline]:
         Headline(f"{run.scores.rms_e_y_m:.3f} m", f"rms deviation, {run.label}{_end(run)}")
         for run in runs[1:]
     ]
+    told = told_scores(runs[0].drive)
+    if told is not None:
+        numbers.append(
+            Headline(
+                f"{told.rms_error_deg:.2f}°",
+                f"rms error of the side slip that was told, of {told.rms_deg:.2f}°",
+            )
+        )
     median, p99 = first.solve_ms["median"], first.solve_ms["p99"]
     numbers.append(Headline(f"{median:.2g} / {p99:.2g} ms", "a step: median / 99 of 100"))
     return numbers
@@ -173,6 +182,9 @@ def known_blocks(runs: Sequence[Run], figures: Mapping[str, Figure]) -> list[Blo
     """
     caption = "Forces of the first drive, and what trackers believed of the tires."
     blocks: list[Block] = [drawing(figures["tires"], caption, READ["tires"])]
+    if "lateral" in figures:
+        caption = "Lateral velocity, which nothing measured: the truth, and what was told."
+        blocks.append(drawing(figures["lateral"], caption, READ["lateral"]))
     notes = [[run.label, f"{t:.2f}", printed(text)] for run in runs for t, text in run.drive.notes]
     if notes:
         header = ["tires", "time [s]", "what"]

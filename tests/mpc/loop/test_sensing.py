@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from models.sensors import Sensor
-from mpc.loop import CarSensors
+from mpc.loop import CarSensors, Measured
 
-NAMES = list(CarSensors.__dataclass_fields__)
+NAMES = list(Measured._fields[1:])
 STATE = SimpleNamespace(t=1.5, **{name: 0.37 * (k + 1) for k, name in enumerate(NAMES)})
 
 

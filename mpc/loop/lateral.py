@@ -1,0 +1,248 @@
+"""The lateral velocity of a car that nothing measures it of: told online, with its uncertainty.
+
+Two that err differently are one: an inertial identifier, which knows what tires do, and position,
+which knows where the car came to. A Kalman filter of what the dead reckoned place misses:
+    p' = w + v_x n_ψ,   w' = -b - ρ ä + n_a,   b' = -b/T + n_b,   ρ' = 0
+p [m] across the body, w [m/s] of v_y, which goes on by a - v_x r with a = a_y - b - ρ ä: b [m/s²]
+bias of the accelerometer, and of the road where it is banked, ρ [rad/g] roll of the body, and ä
+[m/s²] what the body rolls by: a by the second order of its springs and dampers.
+Measured: the position gives p, the identifier's v_y gives w with the deviation that it tells.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from codegen.arrays import Array
+from identifier.inertial import InertialIdentifier
+from identifier.run import OnlineIdentifier
+from models.rules import require_positive_fields
+from models.sensors import is_shown
+from mpc.loop.sensing import Measured
+
+UNKNOWN = 1.0  # m/s: standard deviation of v_y where nothing is known
+
+
+class Told(NamedTuple):
+    """What is told of a sample; NaN where nothing is known.
+
+    v_y, v_y_sd : lateral velocity and its standard deviation [m/s].   observable : 1 where side
+    slip is known well enough, else 0.   a_y : acceleration of the center of gravity in the plane of
+    the road, without what is believed of bias and roll [m/s²].   inertial_v_y, inertial_v_y_sd : of
+    the identifier alone, which knows of no position [m/s].
+    """
+
+    v_y: float
+    v_y_sd: float
+    observable: float
+    a_y: float
+    inertial_v_y: float
+    inertial_v_y_sd: float
+
+    def in_place_of(self, measured: Measured) -> Measured:
+        """Return a sample with what is told of v_y and a_y in it."""
+        return measured._replace(v_y=self.v_y, a_y=self.a_y)
+
+
+class TellsLateral(Protocol):
+    """What a loop asks for lateral velocity where no sensor shows it."""
+
+    def tell(self, measured: Measured) -> Told:
+        """Take a sample; return what it tells.
+
+        Parameters
+        ----------
+        measured : by the sensors; v_y is not read.
+        """
+
+
+class Body(NamedTuple):
+    """A body that rolls under lateral acceleration: natural frequency [rad/s], damping [-]."""
+
+    frequency: float
+    damping: float
+
+    def step(self, rolls: tuple[float, float], level: float, dt: float) -> tuple[float, float]:
+        """Return what it rolls by and the rate of that a sample later, implicit.
+
+        Parameters
+        ----------
+        rolls : before.
+        level : acceleration in the plane of the road [m/s²].
+        dt : sampling interval [s].
+        """
+        now, rate = rolls
+        stiff = dt * self.frequency**2
+        rate = (rate + stiff * (level - now)) / (
+            1.0 + 2.0 * self.damping * self.frequency * dt + dt * stiff
+        )
+        return now + dt * rate, rate
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Localization:
+    """How far position, heading and acceleration are trusted.
+
+    Parameters
+    ----------
+    position : standard deviation [m].
+    heading : standard deviation [rad].
+    acceleration : of a_y - v_x r, sample by sample [m/s²].
+    bias : of the accelerometer and the road's bank [m/s²].
+    bias_time : in which that changes [s].
+    roll, sd_roll : of the body, outwards, as the accelerometer feels it, and its deviation [rad/g].
+    correlation_time : for which the identifier errs alike [s].
+    clip : standard deviations from which an innovation counts no more.
+    lost : rate at which v_y may change where no acceleration is shown [m/s²].
+    observable : largest standard deviation of side slip that is told for observed [rad].
+
+    Raises
+    ------
+    ValueError
+        Where a number is not positive.
+    """
+
+    position: float = 0.025
+    heading: float = 0.002
+    acceleration: float = 0.25
+    bias: float = 0.15
+    bias_time: float = 10.0
+    roll: float = 0.06
+    sd_roll: float = 0.04
+    correlation_time: float = 0.2
+    clip: float = 3.0
+    lost: float = 5.0
+    observable: float = 0.01
+
+    def __post_init__(self) -> None:
+        require_positive_fields(self)
+
+
+class LateralVelocity:
+    """Lateral velocity by an identifier from yaw rate, accelerometer, speed and steering.
+
+    Position and heading correct it, where they are shown.
+
+    Parameters
+    ----------
+    identifier : of a method that tells v_y; it is told every sample here, and learns.
+    localization : how far position and heading are trusted; None takes the default.
+
+    Raises
+    ------
+    ValueError
+        Where the method does not tell v_y.
+    """
+
+    def __init__(
+        self, identifier: OnlineIdentifier, localization: Localization | None = None
+    ) -> None:
+        method = identifier.method
+        if not isinstance(method, InertialIdentifier):
+            raise ValueError(f"{type(method).__name__} tells no v_y")
+        self.identifier, self.trust = identifier, localization or Localization()
+        self._dt = method.dt
+        self._body = Body(
+            frequency=method.roll_frequency / identifier.vehicle.froude_time,
+            damping=method.roll_damping,
+        )
+        self._rolls = (0.0, 0.0)  # ä and its rate [m/s²], [m/s³]
+        self._place: Array | None = None  # X, Y [m], dead reckoned
+        self._v_y, self._bias, self._roll = math.nan, 0.0, self.trust.roll
+        self._P = np.diag([0.0, UNKNOWN**2, self.trust.bias**2, self.trust.sd_roll**2])
+        self._last: tuple[Array, float] | None = None  # (X', Y') and a_y - v_x r, a sample ago
+
+    def tell(self, measured: Measured) -> Told:
+        """Take a sample; return what it tells.
+
+        Parameters
+        ----------
+        measured : by the sensors; v_y is not read.
+        """
+        m, identifier, dt = measured, self.identifier, self._dt
+        identifier.update(np.array([0.0, m.r]), np.array([m.delta, 0.0]), m.v_x, m.a_y)
+        found = identifier.outputs
+        silent = not found or identifier.stale or identifier.diverged
+        v_y, sd = (math.nan if silent else float(found[k].item()) for k in ("v_y", "v_y_sd"))
+        if math.isnan(self._v_y):
+            self._v_y, self._P[1, 1] = (0.0, UNKNOWN**2) if silent else (v_y, sd**2)
+        felt = m.a_y - self._bias
+        if is_shown("a_y", m.a_y):
+            level = felt - self._roll * self._rolls[0]
+            self._rolls = self._body.step(self._rolls, level, dt)
+        level = felt - self._roll * self._rolls[0]
+        self._go_on(m, level)
+        if self._place is not None:
+            residual = _in_the_body(np.array([m.X, m.Y]) - self._place, m.psi)
+            moved = self._correct(0, residual[1], self.trust.position**2)
+            self._place += _in_the_world(residual * [2.0 * dt, 0.0] + [0.0, moved], m.psi)
+        if math.isfinite(v_y):
+            alike = 2.0 * self.trust.correlation_time / dt
+            self._correct(1, v_y - self._v_y, sd**2, alike)
+        deviation = math.sqrt(self._P[1, 1])
+        observable = float(deviation < self.trust.observable * m.v_x)
+        return Told(self._v_y, deviation, observable, level, v_y, sd)
+
+    def _go_on(self, m: Measured, level: float) -> None:
+        """Move place and velocity by a sample of an acceleration in the plane of the road."""
+        trust, dt = self.trust, self._dt
+        felt = all(is_shown(name, getattr(m, name)) for name in ("v_x", "r", "a_y"))
+        slides = level - m.v_x * m.r if felt else 0.0
+        velocity, before = self._last if self._last is not None else (np.zeros(2), slides)
+        self._v_y += 0.5 * dt * (before + slides)
+        kept = math.exp(-dt / trust.bias_time)
+        self._bias *= kept
+        error = dt * (trust.acceleration if felt else trust.lost)
+        F = np.eye(4)
+        F[0, 1], F[2, 2] = dt, kept
+        if felt:
+            F[1, 2], F[1, 3] = -dt, -dt * self._rolls[0]
+        turned = m.v_x * trust.heading * dt if is_shown("v_x", m.v_x) else 0.0
+        Q = np.diag([turned**2, error**2, trust.bias**2 * (1.0 - kept**2), 0.0])
+        self._P = F @ self._P @ F.T + Q
+        now = np.zeros(2)
+        if not all(is_shown(name, getattr(m, name)) for name in ("X", "Y", "psi", "v_x")):
+            self._place = None
+        else:
+            now = _in_the_world(np.array([m.v_x, self._v_y]), m.psi)
+            if self._place is None:
+                self._place = np.array([m.X, m.Y])
+                self._P[0, :] = self._P[:, 0] = 0.0
+                self._P[0, 0] = trust.position**2
+            else:
+                self._place = self._place + 0.5 * dt * (velocity + now)
+        self._last = now, slides
+
+    def _correct(self, i: int, innovation: float, variance: float, alike: float = 1.0) -> float:
+        """Correct by a measurement of p (0) or w (1); return the correction of p [m].
+
+        Parameters
+        ----------
+        i : of what is measured.
+        innovation : measured less predicted.
+        variance : of the measurement.
+        alike : samples that err alike.
+        """
+        P = self._P
+        most = self.trust.clip * math.sqrt(P[i, i] + variance)
+        gain = P[:, i] / (P[i, i] + alike * variance)
+        moved = gain * min(max(innovation, -most), most)
+        self._P = P - np.outer(gain, P[i])
+        self._v_y += float(moved[1])
+        self._bias += float(moved[2])
+        self._roll = max(self._roll + float(moved[3]), 0.0)
+        return float(moved[0])
+
+
+def _in_the_body(way: Array, psi: float) -> Array:
+    """Return a vector of the ground along and across the body."""
+    c, s = math.cos(psi), math.sin(psi)
+    return np.array([way[0] * c + way[1] * s, way[1] * c - way[0] * s])
+
+
+def _in_the_world(way: Array, psi: float) -> Array:
+    """Return a vector along and across the body on the ground."""
+    c, s = math.cos(psi), math.sin(psi)
+    return np.array([way[0] * c - way[1] * s, way[0] * s + way[1] * c])
