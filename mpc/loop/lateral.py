@@ -6,7 +6,8 @@ which knows where the car came to. A Kalman filter of what the dead reckoned pla
 p [m] across the body, w [m/s] of v_y, which goes on by a - v_x r with a = a_y - b - ρ ä: b [m/s²]
 bias of the accelerometer, and of the road where it is banked, ρ [rad/g] roll of the body, and ä
 [m/s²] what the body rolls by: a by the second order of its springs and dampers.
-Measured: the position gives p, the identifier's v_y gives w with the deviation that it tells.
+Measured: the position gives p, the identifier's v_y gives w with the deviation that it tells, or
+that it turns out to have: on a friction that it has not learnt it is off by more than it knows.
 """
 
 import math
@@ -152,6 +153,7 @@ class LateralVelocity:
         self._place: Array | None = None  # X, Y [m], dead reckoned
         self._v_y, self._bias, self._roll = math.nan, 0.0, self.trust.roll
         self._P = np.diag([0.0, UNKNOWN**2, self.trust.bias**2, self.trust.sd_roll**2])
+        self._surprise = 1.0  # mean square of the identifier's errors over what it tells of them
         self._last: tuple[Array, float] | None = None  # (X', Y') and a_y - v_x r, a sample ago
 
     def tell(self, measured: Measured) -> Told:
@@ -179,11 +181,17 @@ class LateralVelocity:
             moved = self._correct(0, residual[1], self.trust.position**2)
             self._place += _in_the_world(residual * [2.0 * dt, 0.0] + [0.0, moved], m.psi)
         if math.isfinite(v_y):
-            alike = 2.0 * self.trust.correlation_time / dt
-            self._correct(1, v_y - self._v_y, sd**2, alike)
+            self._listen(v_y, sd)
         deviation = math.sqrt(self._P[1, 1])
         observable = float(deviation < self.trust.observable * m.v_x)
         return Told(self._v_y, deviation, observable, level, v_y, sd)
+
+    def _listen(self, v_y: float, sd: float) -> None:
+        """Correct by the identifier's v_y [m/s], as far as it has been as right as it says."""
+        time, innovation = self.trust.correlation_time, v_y - self._v_y
+        surprise = innovation**2 / (self._P[1, 1] + sd**2)
+        self._surprise += min(self._dt / time, 1.0) * (surprise - self._surprise)
+        self._correct(1, innovation, sd**2 * max(self._surprise, 1.0), 2.0 * time / self._dt)
 
     def _go_on(self, m: Measured, level: float) -> None:
         """Move place and velocity by a sample of an acceleration in the plane of the road."""
