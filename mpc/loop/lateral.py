@@ -154,7 +154,7 @@ class LateralVelocity:
         self._v_y, self._bias, self._roll = math.nan, 0.0, self.trust.roll
         self._P = np.diag([0.0, UNKNOWN**2, self.trust.bias**2, self.trust.sd_roll**2])
         self._surprise = 1.0  # mean square of the identifier's errors over what it tells of them
-        self._last: tuple[Array, float] | None = None  # (X', Y') and a_y - v_x r, a sample ago
+        self._last: tuple[Measured, float] | None = None  # a sample ago, and a + b - v_x r of it
 
     def tell(self, measured: Measured) -> Told:
         """Take a sample; return what it tells.
@@ -197,9 +197,11 @@ class LateralVelocity:
         """Move place and velocity by a sample of an acceleration in the plane of the road."""
         trust, dt = self.trust, self._dt
         felt = all(is_shown(name, getattr(m, name)) for name in ("v_x", "r", "a_y"))
-        slides = level - m.v_x * m.r if felt else 0.0
-        velocity, before = self._last if self._last is not None else (np.zeros(2), slides)
-        self._v_y += 0.5 * dt * (before + slides)
+        slides = level + self._bias - m.v_x * m.r if felt else 0.0
+        last, before = self._last if self._last is not None else (m, slides)
+        then = self._v_y
+        self._v_y += dt * (0.5 * (before + slides) - self._bias)
+        self._last = m, slides
         kept = math.exp(-dt / trust.bias_time)
         self._bias *= kept
         error = dt * (trust.acceleration if felt else trust.lost)
@@ -210,18 +212,16 @@ class LateralVelocity:
         turned = m.v_x * trust.heading * dt if is_shown("v_x", m.v_x) else 0.0
         Q = np.diag([turned**2, error**2, trust.bias**2 * (1.0 - kept**2), 0.0])
         self._P = F @ self._P @ F.T + Q
-        now = np.zeros(2)
         if not all(is_shown(name, getattr(m, name)) for name in ("X", "Y", "psi", "v_x")):
             self._place = None
+        elif self._place is None:
+            self._place = np.array([m.X, m.Y])
+            self._P[0, :] = self._P[:, 0] = 0.0
+            self._P[0, 0] = trust.position**2
         else:
-            now = _in_the_world(np.array([m.v_x, self._v_y]), m.psi)
-            if self._place is None:
-                self._place = np.array([m.X, m.Y])
-                self._P[0, :] = self._P[:, 0] = 0.0
-                self._P[0, 0] = trust.position**2
-            else:
-                self._place = self._place + 0.5 * dt * (velocity + now)
-        self._last = now, slides
+            velocity = _in_the_world(np.array([last.v_x, then]), last.psi)
+            velocity += _in_the_world(np.array([m.v_x, self._v_y]), m.psi)
+            self._place = self._place + 0.5 * dt * velocity
 
     def _correct(self, i: int, innovation: float, variance: float, alike: float = 1.0) -> float:
         """Correct by a measurement of p (0) or w (1); return the correction of p [m].

@@ -1,0 +1,337 @@
+"""The v_y of a car that nothing measures it of: told, with a band that holds what it says."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.axle import AxleIdentifier
+from identifier.inertial import InertialIdentifier
+from identifier.run import OnlineIdentifier, identify
+from models.faults import FaultError, SensorFault
+from models.friction import Friction, FrictionChange
+from models.recordings import Recording
+from models.vehicle import GRAVITY, sedan
+from mpc.cars import DoubleTrackCar
+from mpc.cars.car import CarState
+from mpc.handover import Learner, Supervisor
+from mpc.loop import (
+    CarSensors,
+    FaultySensors,
+    LateralVelocity,
+    Localization,
+    Measured,
+    Told,
+    drive,
+    imu_and_localization,
+    told_scores,
+)
+from mpc.loop.lateral import Body
+from mpc.path import Path, iso_3888_1
+from mpc.realtime import Tracker
+from mpc.tires import prediction_tire
+from tests.mpc.loop.test_drive import Driver
+
+CAR, DT = sedan(), 0.01
+SPEED = 20.0
+
+
+def states(duration=12.0, friction=None, amplitude=0.06):
+    """A car on a field, steered left and right, up to 7 m/s² and more."""
+    car = DoubleTrackCar(CAR, friction=friction)
+    state = car.start(SPEED)
+    for k in range(round(duration / DT)):
+        yield state
+        angle = amplitude * math.sin(2.0 * math.pi * 0.35 * k * DT) * min(0.3 * k * DT, 1.0)
+        state = car.step(state, angle, SPEED)
+
+
+def lateral(localization=None, start=None):
+    method = InertialIdentifier.for_vehicle(CAR, dt=DT)
+    return LateralVelocity(OnlineIdentifier(method, CAR, DT, start), localization)
+
+
+def told_over(driven, *faults, seed=0, localization=None):
+    """What was told of a drive, by name, with the errors of v_y and the times."""
+    rng = np.random.default_rng(seed)
+    sensors = FaultySensors(imu_and_localization(np.random.default_rng([seed, 9])), faults)
+    teller = lateral(localization)
+    rows = np.array([teller.tell(sensors.measure(state, rng)) for state in driven])
+    found = dict(zip(Told._fields, rows.T, strict=True))
+    t, v_y, a_y = np.array([(state.t, state.v_y, state.a_y) for state in driven]).T
+    errors = {"error": found["v_y"] - v_y, "inertial": found["inertial_v_y"] - v_y}
+    return {**found, **errors, "leveled": found["a_y"] - a_y, "t": t, "true_a_y": a_y}
+
+
+@pytest.fixture(scope="module")
+def swings():
+    return list(states())
+
+
+@pytest.fixture(scope="module")
+def told(swings):
+    return told_over(swings)
+
+
+# The sensors.
+
+
+def test_nothing_measures_v_y_and_every_other_channel_is_there(swings, rng):
+    shown = imu_and_localization(rng).measure(swings[50], rng)
+    assert math.isnan(shown.v_y)
+    assert np.isfinite([getattr(shown, name) for name in Measured._fields if name != "v_y"]).all()
+
+
+def test_an_accelerometer_on_the_body_feels_what_it_leans(rng):
+    """Gravity along an axis that leans by φ, from a rotation of both vectors."""
+    roll, a_y = 0.07, 5.0
+    state = CarState(0, 0, 0, 0, SPEED, 0.1, 0.2, 0.01, 0.0, a_y, roll, np.zeros(2), None)
+    left = np.array([math.cos(roll), math.sin(roll)])  # of the body, to the left and up
+    felt = left @ np.array([a_y, GRAVITY])  # what is pushed against: the road holds the car up
+    assert imu_and_localization(None).measure(state, rng).a_y == pytest.approx(felt, rel=1e-12)
+    assert CarSensors().measure(state, rng).a_y == a_y
+
+
+def test_the_body_leans_out_of_a_bend(swings):
+    roll, a_y = (np.array([getattr(one, name) for one in swings]) for name in ("roll", "a_y"))
+    gradient = np.polyfit(a_y / GRAVITY, roll, 1)[0]
+    assert 0.05 < gradient < 0.15  # rad/g
+
+
+def test_a_unit_is_biased_as_its_seed_says():
+    units = [imu_and_localization(np.random.default_rng(seed)) for seed in range(400)]
+    again = imu_and_localization(np.random.default_rng(0))
+    assert again == units[0] != units[1]
+    assert np.std([unit.r.bias for unit in units]) == pytest.approx(0.001, rel=0.15)
+    assert np.std([unit.a_y.bias for unit in units]) == pytest.approx(0.05, rel=0.15)
+
+
+def test_a_sensor_that_is_not_there_cannot_break():
+    fault = SensorFault(channel="v_y", kind="zero", start=1.0, duration=1.0)
+    FaultySensors(CarSensors(), [fault])
+    with pytest.raises(FaultError, match="channel must be one of X, Y, psi, v_x, r, delta, a_y"):
+        FaultySensors(imu_and_localization(None), [fault])
+
+
+# What is told.
+
+
+def test_v_y_is_told_and_its_band_holds_the_errors(told):
+    assert np.sqrt(np.mean(told["error"] ** 2)) < 0.035  # the optical sensor has 0.03 m/s of noise
+    within = np.abs(told["error"]) < 2.0 * told["v_y_sd"]
+    assert within.mean() > 0.93
+    assert told["v_y_sd"][200:].max() < 0.08
+    assert told["observable"][200:].all()
+
+
+def test_the_acceleration_is_told_in_the_plane_of_the_road(told):
+    late = slice(400, None)
+    assert np.std(told["leveled"][late]) < 0.14  # of which noise is 0.10
+    assert abs(np.mean(told["leveled"][late])) < 0.03
+    gradient = np.polyfit(told["true_a_y"][late], told["a_y"][late], 1)[0]
+    assert gradient == pytest.approx(1.0, abs=0.015)
+
+
+def test_where_the_friction_is_another_the_position_keeps_it_right():
+    """The identifier says less of its error than there is; without a position that is all."""
+    road = Friction(changes=(FrictionChange(scale=0.5, at_time=6.0),))
+    driven = list(states(10.0, road, amplitude=0.05))
+    found = told_over(driven)
+    blind = told_over(driven, localization=Localization(position=1e3, heading=1.0))
+    after = slice(600, None)
+    worst = np.abs(found["error"][after]).max()
+    assert np.mean(np.abs(found["error"][after]) < 2.0 * found["v_y_sd"][after]) > 0.9
+    assert np.abs(found["inertial"][after]).max() > 3.0 * worst
+    assert np.abs(blind["error"][after]).max() > 1.5 * worst
+
+
+@pytest.mark.parametrize("channel", ["X", "psi", "v_x", "r", "delta", "a_y"])
+def test_a_lost_channel_widens_the_band_and_is_driven_through(swings, channel, told):
+    fault = SensorFault(channel=channel, kind="lost", start=4.0, duration=0.5)
+    found = told_over(swings, fault)
+    lost = fault.active(found["t"])
+    assert np.isfinite(found["v_y"]).all() and np.isfinite(found["v_y_sd"]).all()
+    assert found["v_y_sd"][lost][-1] >= told["v_y_sd"][lost][-1]
+    assert np.abs(found["error"]).max() < 0.6
+    assert np.mean(np.abs(found["error"]) < 3.0 * found["v_y_sd"]) > 0.9
+    assert np.abs(found["error"][-200:]).max() < 0.12
+
+
+def test_a_method_that_asks_for_v_y_tells_none():
+    with pytest.raises(ValueError, match="AxleIdentifier tells no v_y"):
+        LateralVelocity(OnlineIdentifier(AxleIdentifier.for_vehicle(CAR), CAR, DT))
+
+
+def test_numbers_of_trust_must_be_positive():
+    with pytest.raises(ValueError, match="clip must be positive"):
+        Localization(clip=0.0)
+
+
+def test_a_body_rolls_as_its_equation_says():
+    """Against the closed form of a step, of second order."""
+    body, a = Body(frequency=11.0, damping=0.3), 4.0
+    now, dt, times = (0.0, 0.0), 1e-4, np.arange(1, 8001) * 1e-4
+    rolled = []
+    for _ in times:
+        now = body.step(now, a, dt)
+        rolled.append(now[0])
+    w, z = 11.0, 0.3
+    wd = w * math.sqrt(1.0 - z**2)
+    free = np.cos(wd * times) + z * w / wd * np.sin(wd * times)
+    np.testing.assert_allclose(rolled, a * (1.0 - np.exp(-z * w * times) * free), atol=0.01)
+
+
+def test_it_is_what_all_measurements_at_once_say(monkeypatch, rng):
+    """On a straight, without the identifier: the Gaussian mean and variance from one big matrix."""
+    monkeypatch.setattr(OnlineIdentifier, "outputs", property(lambda self: {}))
+    trust = Localization(clip=1e6, roll=1e-9, sd_roll=1e-9)
+    teller, n = lateral(trust), 60
+    y = 0.02 * rng.standard_normal(n) + 0.3 * DT * np.arange(n)
+    for k in range(n):
+        told = teller.tell(Measured(k * DT, SPEED * k * DT, y[k], 0, SPEED, math.nan, 0, 0, 0))
+    # x = [p, w, b], as the file says; the first sample is where the place begins.
+    kept = math.exp(-DT / trust.bias_time)
+    F = np.array([[1.0, DT, 0.0], [0.0, 1.0, -DT], [0.0, 0.0, kept]])
+    across, change = (SPEED * trust.heading * DT) ** 2, (trust.acceleration * DT) ** 2
+    Q = np.diag([across, change, trust.bias**2 * (1.0 - kept**2)])
+    begun = np.diag([0.0, 1.0, trust.bias**2])
+    begun = F @ begun @ F.T + Q
+    begun[0, :] = begun[:, 0] = 0.0
+    begun[0, 0] = trust.position**2
+    powers = [np.linalg.matrix_power(F, k) for k in range(n)]
+    spread = [begun]
+    for _ in range(n - 1):
+        spread.append(F @ spread[-1] @ F.T + Q)
+    joint = np.empty((n, n, 3, 3))
+    for i in range(n):
+        for j in range(i + 1):
+            joint[i, j] = powers[i - j] @ spread[j]
+            joint[j, i] = joint[i, j].T
+    S = joint[:, :, 0, 0] + trust.position**2 * np.eye(n)
+    with_w = joint[n - 1, :, 1, 0]  # of w at the end with each p
+    assert told.v_y == pytest.approx(with_w @ np.linalg.solve(S, y - y[0]), rel=1e-3)
+    variance = joint[n - 1, n - 1, 1, 1] - with_w @ np.linalg.solve(S, with_w)
+    assert told.v_y_sd == pytest.approx(math.sqrt(variance), rel=1e-3)
+
+
+# In the loop.
+
+
+def test_the_tracker_steers_on_what_is_told_and_the_record_says_so():
+    path = Path.from_waypoints([0, 30, 60, 90], [0, 0, 2, 2], name="bump")
+    driver = Driver()
+    run = drive(
+        path,
+        DoubleTrackCar(CAR),
+        driver,
+        speed=15.0,
+        sensors=imu_and_localization(np.random.default_rng(3)),
+        rng=np.random.default_rng(1),
+        lateral=lateral(),
+    )
+    assert run.completed
+    assert [m.v_y for m in driver.seen] == run.told["v_y"].tolist()
+    assert "v_y" not in run.measured
+    assert np.array_equal(run.recording().v_y, run.told["v_y"])
+    assert np.array_equal(run.recording().a_y, run.measured["a_y"])
+    found = told_scores(run)
+    assert found.rms_error_m_s == pytest.approx(
+        math.sqrt(sum((run.told["v_y"] - run.v_y) ** 2) / len(run))
+    )
+    assert 0.0 < found.rms_error_deg < 0.3
+    assert found.within_two_sd > 0.9
+
+
+def test_what_was_measured_is_not_told():
+    path = Path.from_waypoints([0, 20, 40], [0, 0, 0], name="straight")
+    run = drive(path, DoubleTrackCar(CAR), Driver(), speed=15.0, rng=np.random.default_rng(0))
+    assert not run.told and told_scores(run) is None and "v_y" in run.measured
+
+
+@pytest.fixture(scope="module")
+def learnt():
+    """What the axle identifier learns of a v_y that is told."""
+    car = DoubleTrackCar(CAR)
+    state, teller, rng = car.start(SPEED), lateral(), np.random.default_rng(5)
+    sensors, rows, forces = imu_and_localization(rng), [], []
+    for k in range(2000):
+        measured = sensors.measure(state, rng)
+        rows.append(teller.tell(measured).in_place_of(measured))
+        forces.append(state.axle_force)
+        angle = (0.3 + k / 1500.0) * 0.05 * math.sin(0.022 * k + math.sin(0.009 * k))
+        state = car.step(state, angle, SPEED)
+    signals = dict(zip(Measured._fields, np.array(rows).T, strict=True))
+    recording = Recording(
+        name="told",
+        delta_f=signals["delta"],
+        delta_r=np.zeros(len(rows)),
+        axle_force=np.array(forces),
+        **{name: signals[name] for name in ("t", "v_x", "v_y", "r", "a_y")},
+    )
+    return identify(recording, CAR, AxleIdentifier.for_vehicle(CAR)).freeze()
+
+
+def test_a_friction_that_drops_is_noticed_without_v_y_and_the_car_stays_on_its_path(learnt):
+    place = 50.0
+    friction = Friction(changes=(FrictionChange(scale=0.5, at_place=place),))
+    identifier = OnlineIdentifier(AxleIdentifier.for_vehicle(CAR), CAR, DT, learnt)
+    run = drive(
+        iso_3888_1(),
+        DoubleTrackCar(CAR, friction=friction),
+        Tracker(prediction_tire(learnt), period=DT, delay=0.06),
+        speed=27.5,
+        sensors=imu_and_localization(np.random.default_rng(4)),
+        delay=2,
+        rng=np.random.default_rng(1),
+        learner=Learner(Supervisor(identifier, prediction_tire(learnt))),
+        lateral=lateral(start=learnt),
+    )
+    assert run.completed
+    assert np.abs(run.e_y).max() < 0.3
+    dropped_at = run.t[np.argmax(place < run.X)]
+    lost = [t for t, note in run.notes if note.startswith("friction lost")]
+    assert 0.0 < lost[0] - dropped_at < 0.7
+    assert not [note for _, note in run.notes if note.startswith("sensor fault")]
+
+
+@pytest.mark.parametrize(
+    ("channel", "kind", "size"),
+    [("r", "biased", 0.06), ("v_x", "scaled", 0.8), ("a_y", "stuck", 0.0), ("delta", "stuck", 0.0)],
+)
+def test_a_sensor_that_breaks_is_noticed_without_v_y(learnt, channel, kind, size):
+    fault = SensorFault(channel=channel, kind=kind, start=2.0, duration=math.inf, size=size)
+    sensors = FaultySensors(imu_and_localization(np.random.default_rng(4)), [fault])
+    identifier = OnlineIdentifier(AxleIdentifier.for_vehicle(CAR), CAR, DT, learnt)
+    run = drive(
+        iso_3888_1(),
+        DoubleTrackCar(CAR),
+        Tracker(prediction_tire(learnt), period=DT, delay=0.06),
+        speed=20.0,
+        sensors=sensors,
+        delay=2,
+        rng=np.random.default_rng(1),
+        learner=Learner(Supervisor(identifier, prediction_tire(learnt))),
+        lateral=lateral(start=learnt),
+    )
+    noticed = [t for t, note in run.notes if note.startswith("sensor fault")]
+    assert 2.0 <= noticed[0] < 5.0
+
+
+def test_a_car_that_stands_on_good_tires_hears_no_alarm(learnt):
+    """The same drive, nothing broken, with the learnt curves scaled only in the identifier."""
+    identifier = OnlineIdentifier(AxleIdentifier.for_vehicle(CAR), CAR, DT, learnt)
+    stiff = replace(learnt, W=1.3 * learnt.W)
+    run = drive(
+        iso_3888_1(),
+        DoubleTrackCar(CAR),
+        Tracker(prediction_tire(learnt), period=DT, delay=0.06),
+        speed=25.0,
+        sensors=imu_and_localization(np.random.default_rng(4)),
+        delay=2,
+        rng=np.random.default_rng(1),
+        learner=Learner(Supervisor(identifier, prediction_tire(learnt))),
+        lateral=lateral(start=stiff),
+    )
+    assert run.completed
+    assert not [note for _, note in run.notes if note.startswith("sensor fault")]
