@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.doctor_answers import Right
 from benchmarks.fault_cases import Case, Scale
 from models.faults import (
     Bank,
@@ -31,6 +32,11 @@ class Planted(NamedTuple):
     code: str
     channel: str
     size: float
+
+    @property
+    def right(self) -> Right:
+        """How it may be called."""
+        return ((self.code, self.channel),)
 
 
 Plant = Callable[[Vehicle, float], Planted]  # of a car and a size of a sedan, with sign

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.doctor_answers import Right
 from benchmarks.fault_cases import Case, Scale, StraightOnly, other_car
 from benchmarks.random_cars import good_sensors
 from models.faults import (
@@ -72,10 +73,10 @@ class JumpInTurn:
 
 
 class Gross(NamedTuple):
-    """A fault, and what findings are right: code and channel, "" for any."""
+    """A fault, and how it may be called."""
 
     case: Case
-    right: tuple[tuple[str, str], ...]
+    right: Right
 
 
 Draw = Callable[[Vehicle, np.random.Generator], Gross]

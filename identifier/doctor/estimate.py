@@ -207,7 +207,8 @@ class Search:
             listed.append((one.suspect, first))
             # Numbers of the car can be measured; a drive is no reason to overrule who did.
             of_car = first.repair is not None and first.repair.vehicle
-            if not alike and not of_car and first.confidence > SURE:
+            believed = self._believed(one.suspect, self.fit)  # together with the others too
+            if believed and not alike and not of_car and first.confidence > SURE:
                 clear.append(one.suspect)
             for other, share in zip(alike, shares[2:].tolist(), strict=True):
                 second = self._finding(other.suspect, other.fit, share, group, [one.suspect])

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.doctor import drawn
 from benchmarks.doctor_cases import KINDS, planted
 from benchmarks.everyday_drives import drawn_everyday
 from identifier.doctor import Finding, estimate, examine
@@ -138,6 +139,18 @@ def test_a_size_that_stands_on_its_own_is_sure_beside_a_number_of_the_car(driven
     late = Late(channels=("r",), delay=0.08).apply(log)
     found = {one.code: one for one in estimate(late, inertia.case.car(car))}
     assert found["delay"].sure and not found["yaw_inertia"].sure
+
+
+def test_what_nobody_believes_is_not_sure_nor_what_rests_on_it():
+    """A lag of a small car that the drive hardly tells: several sizes drift off together."""
+    log, car, _ = drawn("tenth", 600)
+    fault = planted("lag v_y", car, np.random.default_rng([600, 13, 7]))
+    bad = fault.case.log(log)
+    found = estimate(bad, car)
+    scaled = next(one for one in found if (one.code, one.channel) == ("factor", "v_y"))
+    assert math.log(scaled.size) > 3.5 * 0.2
+    assert scaled.confidence > 0.95
+    assert not any(one.sure for one in found)
 
 
 def test_what_a_straight_drive_cannot_tell_is_said(driven):

@@ -1,0 +1,71 @@
+"""How the doctor's answers are judged: what is right, at which place, and what is an alarm."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks import doctor_answers
+from benchmarks.doctor import drawn
+from benchmarks.doctor_answers import PARTS, WHOLE, Clean, judge_clean, parts_of, rank_of
+from benchmarks.targets import Targets
+from identifier.doctor import Diagnosis, Finding
+
+
+@pytest.fixture(scope="module")
+def drive():
+    return drawn("sedan", 1)
+
+
+def test_a_fault_is_named_by_its_code_and_one_of_its_channels():
+    listed = [Finding(code="delay", channel="r+a_y"), Finding(code="sign", channel="v_y")]
+    assert rank_of(listed, (("delay", "a_y"),)) == 1
+    assert rank_of(listed, (("sign", "r"), ("sign", "v_y"))) == 2
+    assert rank_of(listed, (("sign", ""),)) == 2
+    assert rank_of(listed, (("sign", "r"),)) == 0
+    assert rank_of([], (("sign", "r"),)) == 0
+
+
+def test_a_drive_is_asked_as_a_whole_and_in_halves(drive):
+    log, _, _ = drive
+    parts = parts_of(log)
+    assert set(parts) == {WHOLE, *PARTS}
+    assert parts[WHOLE].duration == log.duration
+    for name in PARTS:
+        assert parts[name].duration == pytest.approx(0.5 * log.duration, abs=2.0 * log.dt)
+    assert parts["first half"].t[-1] < parts["second half"].t[0]
+    assert parts["middle"].t[0] == pytest.approx(0.25 * log.duration, abs=2.0 * log.dt)
+
+
+def test_only_a_half_may_be_called_straight(drive, monkeypatch):
+    log, car, _ = drive
+    straight = replace(log, r=0.01 * log.r)
+    alarms = doctor_answers.said_of_clean("sedan", 1, straight, car).alarms
+    assert alarms[WHOLE]
+    assert not any(alarms[part] for part in PARTS)
+    late = Finding(code="delay", channel="r", confidence=0.3, group=0.9, text="late")
+    monkeypatch.setattr(
+        doctor_answers.ti,
+        "diagnose",
+        lambda log, car: Diagnosis(name=log.name, findings=(late,), unseen=()),
+    )
+    alarms = doctor_answers.said_of_clean("sedan", 1, log, car).alarms
+    assert set(alarms.values()) == {("late",)}
+
+
+def test_alarms_are_counted_by_drive_and_by_half(capsys):
+    quiet: dict[str, tuple[str, ...]] = dict.fromkeys((WHOLE, *PARTS), ())
+    loud = {**quiet, "middle": ("v_y is in mm/s",)}
+    targets = Targets("doctor")
+    judge_clean([Clean("sedan", 1, quiet), Clean("race", 2, loud)], targets)
+    assert targets.values["alarms"] == 0.0
+    assert targets.values["alarms/halves"] == pytest.approx(100.0 / 6.0)
+    assert targets.missed == ["halves of clean drives with an alarm"]
+    assert "race 2, middle" in capsys.readouterr().out
+
+
+def test_drives_of_classes_and_seeds_are_their_own(drive):
+    log, _, exact = drive
+    again, _, _ = drawn("sedan", 1)
+    np.testing.assert_array_equal(again.r, log.r)
+    assert log.axle_force is None and exact.axle_force is not None
