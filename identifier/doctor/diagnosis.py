@@ -23,7 +23,7 @@ from models.recordings.repair import Repair
 from models.vehicle import Vehicle, VehicleError
 
 RATIOS = ("steering_ratio", "factor")  # codes of gross findings whose factor is any number
-FACTOR, ROUNDS = "factor.delta_f", 4
+FACTOR, ROUNDS, SETTLED = "factor.delta_f", 4, 0.1  # deviations
 WITHOUT_V_Y = "all but what contradicts physics or the car: the log has no lateral velocity"
 NEVER = (
     "mass: scales all forces alike and leaves the motion as it is; weigh the car",
@@ -144,14 +144,19 @@ def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding | N
     drive, car : with it.
     """
     assert coarse.repair is not None
-    factor, deviation = coarse.repair.factor["delta_f"], math.nan
+    factor = coarse.repair.factor["delta_f"]
+    stretches = stretches_of(drive, car, longest=LONGEST, pieces=PIECES)
     for _ in range(ROUNDS):
-        balance = Balance(stretches_of(drive, car, longest=LONGEST, pieces=PIECES), car)
+        balance = Balance(stretches, car)
         if len(balance) < FEWEST:
             return coarse
         fit = Fitter(balance).fit([FACTOR], {})
-        by, deviation = math.exp(-fit.sizes[FACTOR]), fit.deviation(FACTOR)
-        drive, factor = Repair(factor={"delta_f": by}).apply(drive, car)[0], factor * by
+        moved, deviation = -fit.sizes[FACTOR], fit.deviation(FACTOR)
+        factor *= math.exp(moved)
+        if abs(moved) < SETTLED * deviation:
+            break
+        by = Repair(factor={"delta_f": math.exp(moved)})
+        stretches = tuple(by.apply(one, car)[0] for one in stretches)
     if abs(math.log(abs(factor))) < NEAR and factor > 0.0:
         return None
     exact = steering_finding(factor, coarse.confidence, deviation=deviation)
