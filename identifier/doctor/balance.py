@@ -12,17 +12,15 @@ force follows slip, and the sway of its body, whose roll follows a_y, over the c
 
 import math
 from collections.abc import Mapping
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 from scipy.sparse import csr_array
 
 from codegen.arrays import Array
 from identifier.axle.curve import unit_matrix
-from identifier.verdict.motion import white_noise
+from identifier.verdict.motion import BRISK, white_noise
 from models.recordings import Recording
 from models.recordings.record import CHANNELS
 from models.smoothing import low_passed, smoothed, window
@@ -38,8 +36,6 @@ LONG, SHORT = 0.4, 0.1  # lengths of ψ, in periods of the swings of the drive
 QUIET = 0.1  # noise over what no model explains, for which ψ is as long as it must be
 FASTEST, SLOWEST = 4.0, 16.0  # periods of the swings that are believed, in sqrt(L/g)
 MARGIN = 0.4  # s at both ends, what a delay may be
-LEAST = 2.0  # s, below which a stretch between two gaps is not looked at
-BRISK = 0.6  # speed in sqrt(g L) from which a window counts
 BANKS = 6  # cosines over the drive in which a bank may swing
 OVERLAP = 4  # windows that begin within the length of one
 WANDER = 0.03  # of a force: what no model of this size explains; of kinematics a third
@@ -437,43 +433,3 @@ def window_length(
     noise = math.hypot(white["v_y"], arm * white["r"]) / GRAVITY
     quiet = float(np.cbrt(2.0 * math.pi**2 * dt * (noise / wanted) ** 2))
     return min(max(quiet, SHORT * period), LONG * period)
-
-
-def stretches_of(
-    recording: Recording, vehicle: Vehicle, *, longest: float, pieces: int
-) -> tuple[Recording, ...]:
-    """Return the recording, or of a long one the liveliest stretch of each of its parts.
-
-    Parameters
-    ----------
-    recording : the drive.
-    vehicle : the car.
-    longest : that is looked at as a whole [s]; the stretches have it together.
-    pieces : how many stretches.
-    """
-    n, dt = len(recording), recording.dt
-    if recording.duration <= longest:
-        return _unbroken(recording)
-    length = int(longest / pieces / dt)
-    lively = np.where(recording.v_x > BRISK * vehicle.froude_speed, recording.r**2, 0.0)
-    total = np.concatenate([[0.0], np.cumsum(lively)])
-    bounds: NDArray[np.intp] = np.linspace(0, n, pieces + 1).astype(np.intp)
-    found: list[Recording] = []
-    for first, last in pairwise(bounds):
-        starts = np.arange(first, last - length + 1, max(1, length // 10))
-        best = int(starts[np.argmax(total[starts + length] - total[starts])])
-        found += _unbroken(recording, slice(best, best + length))
-    return tuple(found)
-
-
-def _unbroken(recording: Recording, part: slice = slice(None)) -> tuple[Recording, ...]:
-    """Return the stretches of a part of a recording that no gap breaks, the longest at least."""
-    first, end, _ = part.indices(len(recording))
-    edges = [first, *(k for k in recording.breaks if first < k < end), end]
-    pieces = sorted((slice(a, b) for a, b in pairwise(edges)), key=lambda one: one.start - one.stop)
-    least = int(LEAST / recording.dt)
-    kept = [one for one in pieces if one.stop - one.start >= least] or pieces[:1]
-    kept.sort(key=lambda one: one.start)
-    if kept == [slice(0, len(recording))]:
-        return (recording,)
-    return tuple(recording.taken(one) for one in kept)

@@ -15,15 +15,12 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.verdict.motion import Windows, white_noise
+from identifier.doctor.pieces import SLOWEST, driven_windows, looked_at, usual_speed
+from identifier.verdict.motion import white_noise
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 
-WINDOW = 0.2  # [s]
-SLOWEST = 0.3  # of the 95th percentile of speed, below which a window does not count
 FEWEST, MOST = 20, 500  # windows: fewer say nothing, of more that many are taken all over the log
-PIECE, PIECES = 60.0, 10  # s, and how many of them are looked at of a drive of hours
-SHORTEST = 200  # samples of such a piece
 STIFFNESS = np.geomspace(1.0, 100.0, 28)  # c [1/rad]
 FRICTION = np.array([0.3, 0.5, 0.8, 1.2, 1.8, 3.0])  # μ [-]
 # A stiffness that is twice the told one costs as much as 14 % of what is left unexplained.
@@ -77,7 +74,7 @@ class Motion(NamedTuple):
     def of(cls, recording: Recording) -> "Motion | None":
         """Return that of a recording, None where too little of it is driven."""
         pieces = looked_at(recording)
-        speed = float(np.percentile(np.concatenate([np.abs(one.v_x) for one in pieces]), 95))
+        speed = usual_speed(pieces)
         if speed == 0.0:
             return None
         parts = [cls._of_piece(one, SLOWEST * speed) for one in pieces]
@@ -129,53 +126,6 @@ def _hidden(pieces: tuple[Recording, ...], fast: float) -> frozenset[str]:
         if float(np.std(np.concatenate(means))) < CLEAR * noise:
             found.add(name)
     return frozenset(found)
-
-
-def looked_at(recording: Recording) -> tuple[Recording, ...]:
-    """Return the pieces of a drive that the screen looks at: all of a short one, some of a long.
-
-    Parameters
-    ----------
-    recording : of any length, of one stretch or several.
-    """
-    parts = [recording]
-    if recording.breaks:
-        parts = [recording.taken(np.arange(s.start, s.stop)) for s in recording.stretches]
-    n = max(round(PIECE / recording.dt), SHORTEST)
-    total = sum(len(part) for part in parts)
-    if total <= PIECES * n:
-        return tuple(parts)
-    starts = [(part, k) for part in parts for k in range(0, max(len(part) - n, 0) + 1, n)]
-    some = np.unique(np.linspace(0, len(starts) - 1, PIECES).astype(int))
-    return tuple(
-        part.taken(np.arange(k, min(k + n, len(part)))) for part, k in (starts[j] for j in some)
-    )
-
-
-def driven_pieces(recording: Recording) -> tuple[Recording, ...]:
-    """Return the pieces that are looked at in which the car drives, all where it never does.
-
-    Parameters
-    ----------
-    recording : of any length.
-    """
-    pieces = looked_at(recording)
-    speed = float(np.percentile(np.concatenate([np.abs(one.v_x) for one in pieces]), 95))
-    return tuple(one for one in pieces if len(driven_windows(one, SLOWEST * speed))) or pieces
-
-
-def driven_windows(recording: Recording, fast: float) -> Windows:
-    """Return the windows in which a car is never slower than a speed, forward or backward.
-
-    Parameters
-    ----------
-    fast : that speed, in the unit of the log.
-    """
-    n = max(2, round(WINDOW / recording.dt))
-    starts = np.arange(0, max(len(recording) - n, 0), max(1, n // 2))
-    total = np.concatenate([[0], np.cumsum(np.abs(recording.v_x) < fast)])
-    drives = total[starts + n + 1] == total[starts] if starts.size else starts > 0
-    return Windows(starts=starts[drives], n=n, duration=n * recording.dt)
 
 
 def unexplained(motion: Motion, vehicle: Vehicle, reading: Reading) -> float:

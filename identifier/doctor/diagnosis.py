@@ -4,10 +4,11 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from identifier.doctor.balance import Balance, stretches_of
+from identifier.doctor.balance import Balance
 from identifier.doctor.estimate import FEWEST, LONGEST, PIECES, Examination, examine
 from identifier.doctor.finding import Finding
 from identifier.doctor.fit import Fitter
+from identifier.doctor.pieces import stretches_of
 from identifier.doctor.screen import (
     NEAR,
     Screened,

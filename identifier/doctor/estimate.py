@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identifier.doctor.balance import BANKS, Balance, Sizes, stretches_of
+from identifier.doctor.balance import BANKS, Balance, Sizes
 from identifier.doctor.finding import Finding
 from identifier.doctor.fit import Fit, Fitter, Outlook
+from identifier.doctor.pieces import stretches_of
 from identifier.doctor.suspects import SUSPECTS, Suspect
 from models.recordings import Recording
 from models.vehicle import Vehicle

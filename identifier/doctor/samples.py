@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.doctor.consistency import driven_pieces
 from identifier.doctor.finding import Finding
+from identifier.doctor.pieces import driven_pieces
 from models.recordings import Recording
 from models.recordings.repair import Repair
 

@@ -10,8 +10,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identifier.doctor.consistency import Motion, driven_pieces, driven_windows, looked_at
+from identifier.doctor.consistency import Motion
 from identifier.doctor.finding import Finding
+from identifier.doctor.pieces import (
+    SLOWEST,
+    driven_pieces,
+    driven_windows,
+    looked_at,
+    usual_speed,
+)
 from identifier.doctor.readings import DEGREE, Change, Read, read
 from identifier.doctor.samples import sample_findings
 from models.recordings import Recording, RecordingError
@@ -177,10 +184,10 @@ def quiet_finding(recording: Recording) -> Finding | None:
     ----------
     recording : as it was read.
     """
-    fast = max(float(np.percentile(np.abs(recording.v_x), 95)), 1e-9)
-    turns = []
-    for piece in looked_at(recording):
-        windows = driven_windows(piece, 0.3 * fast)
+    pieces = looked_at(recording)
+    fast, turns = max(usual_speed(pieces), 1e-9), []
+    for piece in pieces:
+        windows = driven_windows(piece, SLOWEST * fast)
         if len(windows):
             turns.append(np.abs(windows.mean(piece.v_x * piece.r)))
     peak = float(np.percentile(np.concatenate(turns), 100.0 * (1.0 - LIVELY))) if turns else 0.0

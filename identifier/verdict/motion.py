@@ -46,12 +46,24 @@ class Windows:
         ----------
         min_speed : a window counts where the car is never slower [m/s], in one stretch.
         """
-        n = max(2, round(WINDOW / recording.dt))
+        return cls.where(recording.v_x >= min_speed, recording, WINDOW)
+
+    @classmethod
+    def where(cls, counts: NDArray[np.bool_], recording: Recording, length: float) -> "Windows":
+        """Return the windows of a length in one stretch of which every sample counts.
+
+        Parameters
+        ----------
+        counts : which samples do (n,).
+        recording : whose windows they are.
+        length : of a window [s].
+        """
+        n = max(2, round(length / recording.dt))
         starts = np.arange(0, max(len(recording) - n, 0), max(1, n // 2))
-        total = np.concatenate([[0], np.cumsum(recording.v_x < min_speed)])
-        drives = total[starts + n + 1] == total[starts] if starts.size else starts > 0
-        drives &= recording.within_a_stretch(starts, n)
-        return cls(starts=starts[drives], n=n, duration=n * recording.dt)
+        total = np.concatenate([[0], np.cumsum(~counts)])
+        whole = total[starts + n + 1] == total[starts] if starts.size else starts > 0
+        whole &= recording.within_a_stretch(starts, n)
+        return cls(starts=starts[whole], n=n, duration=n * recording.dt)
 
     def __len__(self) -> int:
         """Return how many there are."""

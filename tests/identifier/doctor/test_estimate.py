@@ -10,8 +10,9 @@ from benchmarks.doctor import drawn
 from benchmarks.doctor_cases import KINDS, planted
 from benchmarks.everyday_drives import drawn_everyday
 from identifier.doctor import Finding, estimate, examine
-from identifier.doctor.balance import Balance, cubic, stretches_of, thinned, window_length
+from identifier.doctor.balance import Balance, cubic, thinned, window_length
 from identifier.doctor.fit import Fitter
+from identifier.doctor.pieces import stretches_of
 from identifier.doctor.suspects import SUSPECTS
 from models.faults import Late, Misaligned, SensorFault, Together
 from models.recordings import Repair

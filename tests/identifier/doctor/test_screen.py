@@ -9,7 +9,8 @@ from benchmarks.doctor_gross import drawn
 from benchmarks.fault_cases import StraightOnly
 from benchmarks.random_cars import CLASSES, good_sensors, random_car, random_drive
 from benchmarks.recorded_cars import CARMAKER, DART
-from identifier.doctor.consistency import PIECE, PIECES, Motion, Reading, looked_at, unexplained
+from identifier.doctor.consistency import Motion, Reading, unexplained
+from identifier.doctor.pieces import PIECE, PIECES, looked_at
 from identifier.doctor.samples import sample_findings
 from identifier.doctor.screen import screen, steering_finding
 from models.faults import ClockJump, Held, Jitter, Mirrored, SensorFault, Together, WrongUnit

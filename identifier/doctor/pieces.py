@@ -1,0 +1,116 @@
+"""Which pieces of a drive the doctor looks at: all of a short one, some of a long one.
+
+The screen takes pieces from all over a drive, the search for sizes its liveliest stretches. None
+runs across a gap. Pieces are slices of the drive: nothing is copied.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identifier.verdict.motion import BRISK, Windows
+from models.recordings import Recording
+from models.vehicle import Vehicle
+
+WINDOW = 0.2  # [s]
+SLOWEST = 0.3  # of the 95th percentile of speed, below which a window does not count
+PIECE, PIECES = 60.0, 10  # s, and how many of them are looked at of a drive of hours
+SHORTEST = 200  # samples of such a piece
+LEAST = 2.0  # s, below which a stretch between two gaps is not looked at
+
+
+def looked_at(recording: Recording) -> tuple[Recording, ...]:
+    """Return the pieces of a drive that the screen looks at: all of a short one, some of a long.
+
+    Parameters
+    ----------
+    recording : of any length, of one stretch or several.
+    """
+    n = max(round(PIECE / recording.dt), SHORTEST)
+    places = list(recording.stretches)
+    if len(recording) > PIECES * n:
+        cut = [
+            slice(k, min(k + n, one.stop))
+            for one in places
+            for k in range(one.start, max(one.stop - n, one.start) + 1, n)
+        ]
+        some = np.unique(np.linspace(0, len(cut) - 1, PIECES).astype(int))
+        places = [cut[k] for k in some]
+    return _taken(recording, places)
+
+
+def driven_pieces(recording: Recording) -> tuple[Recording, ...]:
+    """Return the pieces that are looked at in which the car drives, all where it never does.
+
+    Parameters
+    ----------
+    recording : of any length.
+    """
+    pieces = looked_at(recording)
+    fast = SLOWEST * usual_speed(pieces)
+    return tuple(one for one in pieces if len(driven_windows(one, fast))) or pieces
+
+
+def usual_speed(pieces: tuple[Recording, ...]) -> float:
+    """Return the 95th percentile of the speed, forward or backward, in the unit of the log.
+
+    Parameters
+    ----------
+    pieces : that are looked at.
+    """
+    return float(np.percentile(np.concatenate([np.abs(one.v_x) for one in pieces]), 95))
+
+
+def driven_windows(recording: Recording, fast: float) -> Windows:
+    """Return the windows in which a car is never slower than a speed, forward or backward.
+
+    Parameters
+    ----------
+    recording : a piece that is looked at.
+    fast : that speed, in the unit of the log.
+    """
+    return Windows.where(np.abs(recording.v_x) >= fast, recording, WINDOW)
+
+
+def stretches_of(
+    recording: Recording, vehicle: Vehicle, *, longest: float, pieces: int
+) -> tuple[Recording, ...]:
+    """Return the recording, or of a long one the liveliest stretch of each of its parts.
+
+    Parameters
+    ----------
+    recording : the drive.
+    vehicle : the car.
+    longest : that is looked at as a whole [s]; the stretches have it together.
+    pieces : how many stretches.
+    """
+    n, dt = len(recording), recording.dt
+    if recording.duration <= longest:
+        return _taken(recording, _unbroken(recording, slice(0, n)))
+    length = int(longest / pieces / dt)
+    lively = np.where(recording.v_x > BRISK * vehicle.froude_speed, recording.r**2, 0.0)
+    total = np.concatenate([[0.0], np.cumsum(lively)])
+    bounds: NDArray[np.intp] = np.linspace(0, n, pieces + 1).astype(np.intp)
+    places: list[slice] = []
+    for first, last in pairwise(bounds):
+        starts = np.arange(first, last - length + 1, max(1, length // 10))
+        best = int(starts[np.argmax(total[starts + length] - total[starts])])
+        places += _unbroken(recording, slice(best, best + length))
+    return _taken(recording, places)
+
+
+def _unbroken(recording: Recording, part: slice) -> list[slice]:
+    """Return the stretches of a part of a recording that no gap breaks, the longest at least."""
+    edges = [part.start, *(k for k in recording.breaks if part.start < k < part.stop), part.stop]
+    pieces = sorted((slice(a, b) for a, b in pairwise(edges)), key=lambda one: one.start - one.stop)
+    least = int(LEAST / recording.dt)
+    kept = [one for one in pieces if one.stop - one.start >= least] or pieces[:1]
+    return sorted(kept, key=lambda one: one.start)
+
+
+def _taken(recording: Recording, places: list[slice]) -> tuple[Recording, ...]:
+    """Return pieces of a recording, itself where it is all of it."""
+    if places == [slice(0, len(recording))]:
+        return (recording,)
+    return tuple(recording.taken(place) for place in places)
