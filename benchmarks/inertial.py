@@ -157,7 +157,8 @@ def by_satellites(exact: Recording, size: float, rng: np.random.Generator) -> Ar
     rng : source of randomness.
     """
     n, late, every = len(exact), round(SATELLITES_LATE / exact.dt), round(0.1 / exact.dt)
-    v_y = np.concatenate([np.full(late, exact.v_y[0]), exact.v_y[:-late]])
+    true = exact.needed("v_y")
+    v_y = np.concatenate([np.full(late, true[0]), true[:-late]])
     turns = 2.0 * np.pi * (exact.t / rng.uniform(20.0, 60.0) + rng.uniform())
     off = 0.025 * size * (rng.normal() + rng.normal() * np.sin(turns))
     v_y = (v_y + off + 0.05 * size * rng.normal(size=n))[np.arange(n) // every * every]
@@ -307,7 +308,7 @@ def random_drives(targets: Targets, cars: int) -> None:
             told[kind]["none"].append((slip, error))
             for sensors, run in (
                 ("satellites", with_v_y(drive, drive.satellites, SATELLITES_LATE)),
-                ("v_y", with_v_y(drive, drive.shown.v_y, 0.0)),
+                ("v_y", with_v_y(drive, drive.shown.needed("v_y"), 0.0)),
             ):
                 error = frozen_error(as_exact(run.freeze()), drive.exact)
                 told[kind][sensors].append((side_slip(run, drive.exact), error))
