@@ -61,7 +61,7 @@ from tireid.figures.style import paper_design
 from tireid.learning import identify
 from tireid.output import output_folder, require_free, text_table, write_json
 from tireid.progress import Progress, say, tell
-from tireid.reports.identify import write_identify_report
+from tireid.reports.identify import side_slip_text, write_identify_report
 from tireid.verdicts import verdict_text, warn_of_stored
 
 LEARNING, JUDGING, DRAWING = "learning", "replays and verdict", "curves and figures"
@@ -245,23 +245,11 @@ def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool)
     if model.known_slip is None:
         return "frozen; `tireid compare` sets it beside the other methods"
     known = np.degrees(model.known_slip)
-    return _side_slip_line(learnt) + (
+    told = side_slip_text(learnt)
+    return (f"{told}\n" if told else "") + (
         f"known to {known[0]:.1f} / {known[1]:.1f} deg of slip (front / rear)\n"
         f"certificate: {certificate.verdict}; grip, cornering stiffness, weights, offsets and "
         "covariance stay in their boxes by construction (summary.json lists them)"
-    )
-
-
-def _side_slip_line(learnt: History) -> str:
-    """Return how well a run knew side slip, where it told it; else nothing."""
-    if "v_y_sd" not in learnt.outputs:
-        return ""
-    moves = learnt.recording.v_x >= learnt.design.min_speed
-    sd = learnt.outputs["v_y_sd"].ravel()[moves] / learnt.recording.v_x[moves]
-    seen = 100.0 * float(np.mean(learnt.outputs["side_slip_observable"].ravel()[moves]))
-    median = float(np.degrees(np.median(sd)))
-    return (
-        f"side slip was told to ± {median:.2g} deg (median), observable {seen:.0f} % of the time\n"
     )
 
 

@@ -80,8 +80,7 @@ def write_identify_report(
     ]
     report = Report(
         title=f"Tires of {learnt.vehicle.name}, learnt on {learnt.recording.name}",
-        summary=f"{learnt.recording.duration:.4g} s of driving, learnt sample by sample from "
-        "speed, lateral velocity, yaw rate and steering.",
+        summary=_how_learnt(learnt),
         numbers=[verdict_headline(verdict), *identify_headlines(model, runs, last)],
         warnings=[
             *verdict_warnings(verdict),
@@ -91,6 +90,34 @@ def write_identify_report(
         sections=sections,
     )
     write_report(folder / REPORT, report)
+
+
+def _how_learnt(learnt: History) -> str:
+    """Return what was learnt from, in words."""
+    estimated = learnt.recording.logged_v_y is None
+    lateral = "acceleration" if estimated else "velocity"
+    told = side_slip_text(learnt)
+    more = f" Nobody measured lateral velocity: {told}." if estimated and told else ""
+    return (
+        f"{learnt.recording.duration:.4g} s of driving, learnt sample by sample from speed, "
+        f"lateral {lateral}, yaw rate and steering.{more}"
+    )
+
+
+def side_slip_text(learnt: History) -> str:
+    """Return how well a run knew side slip, where it tells it; else nothing.
+
+    Parameters
+    ----------
+    learnt : the run.
+    """
+    if not {"v_y_sd", "side_slip_observable"} <= set(learnt.outputs):
+        return ""
+    moves = learnt.recording.v_x >= learnt.design.min_speed
+    sd = learnt.outputs["v_y_sd"].ravel()[moves] / learnt.recording.v_x[moves]
+    seen = 100.0 * float(np.mean(learnt.outputs["side_slip_observable"].ravel()[moves]))
+    median = float(np.degrees(np.median(sd)))
+    return f"side slip was told to ± {median:.2g} deg (median), observable {seen:.0f} % of the time"
 
 
 def identify_headlines(
