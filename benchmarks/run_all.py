@@ -32,6 +32,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "fault_table": ["{out}"],
     "doctor_gross": [],
     "verdicts": [],
+    "verdicts_without_v_y": [],
     "doctor": [],
     "plant_against_commonroad": ["{out}"],
     "paper_gains": [],
