@@ -60,8 +60,12 @@ class Exported:
                 f"{cost.flash} B flash, {cost.ram} B RAM, {cost.replay.stack} B stack"
             )
         wrote = f"wrote {self.folder}/, hash {self.package.about['hash']}"
-        estimates = self.package.specialized.vehicle.estimates
-        return "\n".join([*lines, *self.told, *([estimates] if estimates else []), wrote])
+        step = self.package.specialized
+        needs = [port.name for port in step.inputs if port.name != "v_y" or not step.tells_v_y]
+        reads = f"{type(step.method).__name__} reads {', '.join(needs)}"
+        reads += ", and v_y where it is measured; it tells v_y" if step.tells_v_y else ""
+        estimates = [step.vehicle.estimates] if step.vehicle.estimates else []
+        return "\n".join([*lines, *self.told, *estimates, reads, wrote])
 
     def __repr__(self) -> str:
         return f"<Exported {self.package.specialized.name} in {self.folder}>"
@@ -74,6 +78,7 @@ def export(
     vehicle: Vehicle | None = None,
     name: str = "tireid",
     single: bool = False,
+    with_a_y: bool = False,
     fmu: bool = False,
     onnx: bool = False,
     mpc: bool = False,
@@ -89,6 +94,7 @@ def export(
     vehicle : the car; None takes that of the run or the model, for a method the sedan.
     name : prefix of every symbol.
     single : float unless the build says double.
+    with_a_y : a_y of an accelerometer is an input too, of a method that can go without it.
     fmu : also FMUs 2.0 and 3.0 for Co-Simulation.
     onnx : also the model, frozen, as ONNX.
     mpc : also a tracker that steers by what is learnt.
@@ -125,6 +131,7 @@ def export(
         target,
         name=name,
         single=single,
+        with_a_y=with_a_y,
         fmu=fmu,
         onnx=onnx,
         mpc=mpc,
@@ -140,6 +147,7 @@ def export_method(
     *,
     name: str,
     single: bool,
+    with_a_y: bool,
     fmu: bool,
     onnx: bool,
     mpc: bool,
@@ -153,6 +161,7 @@ def export_method(
     folder : to write.
     name : prefix of every symbol.
     single : float unless the build says double.
+    with_a_y : a_y of an accelerometer is an input too, of a method that can go without it.
     fmu : also FMUs 2.0 and 3.0.
     onnx : also the model, frozen, as ONNX.
     mpc : also a tracker.
@@ -171,7 +180,7 @@ def export_method(
         Progress("export", lasts, long=True) as progress,
         output_folder(folder, force=overwrite) as scratch,
     ):
-        package = build_package(method, vehicle, start, name=name, single=single)
+        package = build_package(method, vehicle, start, name=name, single=single, with_a_y=with_a_y)
         costs = measure(package, progress.begin(COSTS))
         place = scratch / IDENTIFIER if mpc else scratch
         write_files(place, package, figures_text(costs), costs)

@@ -332,6 +332,7 @@ def readme(package: Package, about_figures: str) -> str:
             "modes": modes,
             "implausible_row": _implausible_row(specialized),
             "stale_time": f"{STALE_TIME:g}",
+            **_about_signals(specialized),
             **_about_gaps(specialized),
             "libraries": f"{', '.join(called) or 'nothing'} of `<math.h>`, copies of structures",
             "samples": str(SAMPLES),
@@ -354,6 +355,31 @@ def _modes(specialized: SpecializedStep) -> str:
         f"`{name}_get_weights` and\n`{name}_set_weights` store it and bring it back, "
         f"`{name}_reset` begins anew with it, `{name}_init`\nforgets it."
     )
+
+
+def _about_signals(specialized: SpecializedStep) -> dict[str, str]:
+    """Return what the step reads and tells, and what is said of signals that may be missing."""
+    name, absent = specialized.name, []
+    signals = "v_x, v_y, r and steering"
+    if specialized.reads_a_y:
+        signals = "v_x, v_y, r, a_y and steering"
+        absent.append(
+            "`a_y` is what an accelerometer shows, which feels a bank of the road and the roll of\n"
+            "the body. Where there is none it is NaN: no sample is refused for it."
+        )
+    if specialized.tells_v_y:
+        signals = "v_x, r, a_y and steering"
+        absent.append(
+            "`v_y` may be NaN, and is where no sensor measures it; what no car has counts as NaN.\n"
+            f"What is told of it is in `{name}_output`, which `{name}_get_output` copies: use it\n"
+            "where `side_slip_observable` is 1, and as sure as `v_y_sd` says. All are zero before\n"
+            "the first sample, and where samples have been refused for too long."
+        )
+    return {
+        "signals": signals,
+        "tells": ", without v_y,\nwhich is told" if specialized.tells_v_y else "",
+        "absent": "".join(f"{sentence}\n\n" for sentence in absent),
+    }
 
 
 def _implausible_row(specialized: SpecializedStep) -> str:

@@ -1,6 +1,7 @@
 """`tireid export`: what it writes and what it refuses."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -60,6 +61,46 @@ def test_single_precision_is_the_default_of_the_build(tmp_path):
     assert json.loads((tmp_path / "a" / "tireid.json").read_text())["precision"] == "float"
 
 
+def test_a_y_is_an_input_where_it_is_asked_for(tmp_path, capsys):
+    for words, inputs in (([], "v_x, v_y, r, delta_f, delta_r"), (["--with-a-y"], "delta_r, a_y")):
+        assert main(["export", "--out", str(tmp_path / f"a{len(words)}"), *words]) == 0
+        told = [line for line in capsys.readouterr().err.splitlines() if "reads" in line]
+        assert told[0].endswith(f" {inputs}")
+    manifest = json.loads((tmp_path / "a1" / "tireid.json").read_text())
+    assert manifest["inputs"][-1]["name"] == "a_y"
+    assert "bank" in [one["name"] for one in manifest["carried"]]
+
+
+def test_what_was_learnt_without_a_lateral_velocity_goes_on_without_it(tmp_path, logs, capsys):
+    """From a log to C and FMU: the C begins with what was learnt, and tells what Python tells."""
+    if find_compiler() is None:
+        pytest.skip("needs a C compiler")
+    drive = replace(read_recording(logs / "slalom.csv"), v_y=None)
+    if drive.a_y is None:
+        force = drive.axle_force.sum(axis=1)
+        drive = replace(drive, a_y=force / CAR.mass)
+    method = make_method("inertial", CAR)
+    model = identify(drive, CAR, method).freeze()
+    model.save(tmp_path / "weights.json")
+    CAR.to_toml(tmp_path / "car.toml")
+    out, weights = tmp_path / "package", str(tmp_path / "weights.json")
+    words = ["--weights", weights, "--method", "inertial", "--fmu"]
+    assert main(["export", "--out", str(out), *words]) == 0
+    told = capsys.readouterr().err
+    assert "reads v_x, r, delta_f, delta_r, a_y, and v_y where it is measured" in told
+    package = CompiledPackage.from_folder(out)
+    np.testing.assert_array_equal(package.weights["W"], model.W)
+    run, expected = package.run(drive), identify(drive, CAR, method, start=model)
+    assert (run.status == 0).all()
+    np.testing.assert_allclose(run.axle_force, expected.axle_force, atol=1e-6)
+    np.testing.assert_allclose(run.outputs["v_y"], expected.outputs["v_y"], atol=1e-9)
+    assert np.ptp(run.outputs["v_y"]) > 0.05
+    text = (out / "README.md").read_text()
+    assert "| `v_y_sd` | m/s |" in text and "without v_y" in text
+    for version in (2, 3):
+        assert (out / f"tireid_fmi{version}.fmu").stat().st_size > 10_000
+
+
 def test_fmus_lie_beside_the_c(tmp_path):
     assert main(["export", "--out", str(tmp_path / "a"), "--paper", "--fmu"]) == 0
     assert (tmp_path / "a" / "tireid_fmi2.fmu").stat().st_size > 10_000
@@ -80,6 +121,7 @@ def test_the_frozen_network_lies_beside_the_c(tmp_path):
         (["--paper", "--method", "axle"], "give only one of --method, --paper"),
         (["--weights", "missing.json"], "missing.json"),
         (["--method", "eso", "--onnx"], "--onnx"),
+        (["--method", "rls", "--with-a-y"], "has no use for a_y"),
     ],
 )
 def test_bad_words_are_one_line_and_leave_nothing(words, complaint, tmp_path, capsys):

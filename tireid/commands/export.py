@@ -41,6 +41,11 @@ def add_parser(commands: Any) -> None:
     add_weights(parser, "begin with it, as identified")
     parser.add_argument("--name", default="tireid", help="prefix of every symbol (%(default)s)")
     parser.add_argument("--single", action="store_true", help="float unless the build says double")
+    parser.add_argument(
+        "--with-a-y",
+        action="store_true",
+        help="a_y of an accelerometer is an input too, of a method that can go without it",
+    )
     parser.add_argument("--fmu", action="store_true", help="also FMUs 2.0 and 3.0, Co-Simulation")
     parser.add_argument("--onnx", action="store_true", help="also the model, frozen, as ONNX")
     parser.add_argument(
@@ -64,6 +69,7 @@ def run(options: argparse.Namespace) -> None:
         options.out,
         name=options.name,
         single=options.single,
+        with_a_y=options.with_a_y,
         fmu=options.fmu,
         onnx=options.onnx,
         mpc=options.mpc,
