@@ -22,20 +22,16 @@ Loop = Callable[[Array], Array]
 HAND_WRITTEN = Path(__file__).with_name("hand_written_step.c")
 
 PACKAGE_LOOP = """
-#include <string.h>
 #include "tireid.h"
-#define WIDTH ((int)(sizeof(tireid_input) / sizeof(tireid_real)))
 void run(long n, const double *s, double *force)
 {
     tireid_state state;
     tireid_params params;
     tireid_default_params(&params);
     tireid_init(&state);
-    for (long k = 0; k < n; ++k, s += WIDTH) {
-        tireid_real sample[WIDTH], now[2];
-        tireid_input in;
-        for (int i = 0; i < WIDTH; ++i) sample[i] = (tireid_real)s[i];
-        memcpy(&in, sample, sizeof in);
+    for (long k = 0; k < n; ++k, s += %(width)d) {
+        const tireid_input in = { %(sample)s };
+        tireid_real now[2];
         tireid_step(&state, &params, &in);
         tireid_get_forces(&state, now);
         force[2 * k] = (double)now[0];
@@ -75,7 +71,9 @@ def package_loop(package: Package, *, single: bool, flags: Sequence[str]) -> Loo
     name = package.specialized.name
     files = {p: t for p, t in package.files.items() if p.startswith(("include/", "src/"))}
     define = f"-D{name.upper()}_SINGLE={int(single)}"
-    source = renamed(PACKAGE_LOOP, {"tireid": name})
+    width = len(package.specialized.inputs)
+    sample = ", ".join(f"(tireid_real)s[{i}]" for i in range(width))
+    source = renamed(PACKAGE_LOOP % {"width": width, "sample": sample}, {"tireid": name})
     library = _build({**files, "loop.c": source}, [*flags, define, "-Iinclude", "-Isrc"])
     return lambda samples: _forces(library, samples)
 

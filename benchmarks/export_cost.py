@@ -4,8 +4,9 @@
 
 One run of 45 s (4500 steps), the paper's network with 10 units and its integral law, on the sedan.
 The package is built as its CMakeLists.txt says, its guards included; the literal CasADi algebra and
-a hand-written loop, both without guards, with the same flags. All take turns on one core; times are
-of this process, so that a busy machine does not count. Ratios: median over the turns, quartiles
+a hand-written loop, both without guards, with the same flags; packages of the default method and of
+the one that tells v_y stand beside them, on the same run. All take turns on one core; times are of
+this process, so that a busy machine does not count. Ratios: median over the turns, quartiles
 in brackets. Forces must agree, those of the loop to rounding.
 """
 
@@ -15,6 +16,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -32,7 +34,7 @@ from codegen import find_compiler
 from codegen.arrays import Array
 from identifier.export.compiled import samples_of
 from identifier.export.package import Package, build_package
-from identifier.methods import REFERENCE, make_method
+from identifier.methods import DEFAULT, REFERENCE, WITHOUT_V_Y, make_method
 from identifier.paper.design import PaperIdentifier, axle_impulse
 from models.maneuvers import Slalom
 from models.plant import Plant
@@ -57,6 +59,8 @@ KEYS = {
     NUMPY: "numpy",
 }
 ROUNDING = 1e-9  # where the same is computed
+OTHERS = (DEFAULT, WITHOUT_V_Y)  # methods beside the paper's
+MOST = 5.0  # us of a step of the last of them
 
 
 def steps(package: Package) -> dict[str, Loop]:
@@ -131,6 +135,39 @@ def times(ways: Mapping[str, Loop], samples: Array) -> dict[str, Array]:
     return {name: np.array(values) for name, values in found.items()}
 
 
+def print_other_steps(targets: Targets) -> None:
+    """Print what a step of the other methods takes, in double and float.
+
+    Parameters
+    ----------
+    targets : record what is measured.
+    """
+    car = sedan()
+    drive = replace(Plant(car).simulate(SLALOM, speed=20.0).recording(), axle_force=None)
+    ways, samples = {}, {}
+    for law in OTHERS:
+        package = build_package(make_method(law, car), car)
+        specialized = package.specialized
+        shown = replace(drive, v_y=None) if specialized.tells_v_y else drive
+        rows = samples_of(shown, [port.name for port in specialized.inputs])
+        for single, key in ((False, law), (True, f"{law}_float")):
+            ways[key] = package_loop(package, single=single, flags=release_flags(package))
+            samples[key] = rows
+    found: dict[str, list[float]] = {key: [] for key in ways}
+    for _ in range(TURNS):
+        for key, way in ways.items():
+            begin = time.process_time()
+            way(samples[key])
+            found[key].append((time.process_time() - begin) / len(samples[key]))
+    for key, values in found.items():
+        print(f"  {key:36}{1e9 * min(values):12.1f}{1e9 * np.median(values):10.1f}")
+        if key != WITHOUT_V_Y:
+            targets.record(f"step/{key}", 1e9 * float(np.median(values)), "ns")
+    label = f"a step of {WITHOUT_V_Y} in double"
+    median = 1e6 * float(np.median(found[WITHOUT_V_Y]))
+    targets.at_most(label, median, MOST, "us", key=f"step/{WITHOUT_V_Y}")
+
+
 def _mid(ratios: Array) -> float:
     return float(np.median(ratios))
 
@@ -158,6 +195,7 @@ def main() -> int:
     for name, values in measured.items():
         print(f"  {name:36}{1e9 * values.min():12.1f}{1e9 * np.median(values):10.1f}")
         targets.record(f"step/{KEYS[name]}", 1e9 * float(np.median(values)), "ns")
+    print_other_steps(targets)
     own, literal, loop = (measured[name] for name in (PACKAGE, LITERAL, LOOP))
     label = f"{PACKAGE} over {LITERAL} {_spread(own / literal)}"
     targets.at_most(label, _mid(own / literal), 0.7, "", key="ratio/literal")

@@ -26,6 +26,7 @@ from typing import NamedTuple
 from benchmarks.targets import Targets, keeps
 from identifier.axle import AxleIdentifier
 from identifier.export.package import Package, build_package
+from identifier.inertial import InertialIdentifier
 from identifier.methods import make_method
 from models.vehicle import sedan
 from mpc.export.pair import build_pair
@@ -36,6 +37,8 @@ STEPS = 10_000_000  # of each package
 SHORT, LONG = 2, 40  # stages
 SHARE_LONG = 100  # of the steps, one in so many is taken with the long horizon
 LAWS = ("axle", "integral")
+SENSING = ("inertial",)  # identifiers alone
+UNUSED = "float-divide-by-zero"  # by 0, of an innovation of 0, whose quotient is not used
 LONGEST = 2048  # bytes of an input
 BEGINNINGS = 16  # random inputs that the search begins with
 SECONDS = 30  # of an input, before it counts as a hang
@@ -54,12 +57,16 @@ class NoFuzzerError(RuntimeError):
 
 
 class Subject(NamedTuple):
-    """What is fuzzed: files of a package, its name, the harness and macros for it."""
+    """What is fuzzed: files of a package, its name, the harness and macros for it.
+
+    left_out : sanitizers that do not look at it, beside those that look at none.
+    """
 
     files: Mapping[str, str]
     name: str
     harness: str
     macros: tuple[str, ...]
+    left_out: str = ""
 
 
 class Outcome(NamedTuple):
@@ -80,33 +87,43 @@ def subjects(steps: int) -> Iterator[tuple[str, int, Subject]]:
     steps : of each package.
     """
     car = sedan()
-    for law in LAWS:
+    for law in (*LAWS, *SENSING):
         package = build_package(make_method(law, car), car)
         macros = ("LEARNT=W", *_boxes(package))
         yield (
             f"identifier/{law}",
             steps,
-            Subject(package.files, package.specialized.name, "identifier_fuzz.c", macros),
+            Subject(
+                package.files,
+                package.specialized.name,
+                "identifier_fuzz.c",
+                macros,
+                UNUSED if law in SENSING else "",
+            ),
         )
-        for stages, taken in ((SHORT, steps), (LONG, max(1, steps // SHARE_LONG))):
+        horizons = ((SHORT, steps), (LONG, max(1, steps // SHARE_LONG)))
+        for stages, taken in horizons if law in LAWS else ():
             tracker = build_pair(package, Problem(horizon=stages)).tracker
             subject = Subject(tracker.files, tracker.name, "tracker_fuzz.c", ())
             yield f"tracker/{law}/{stages}", taken, subject
 
 
 def _boxes(package: Package) -> tuple[str, ...]:
-    """Return the boxes of what the axle identifier learns as macros, none for another method."""
+    """Return the boxes of axle curves and what is learnt beside them as macros, if any."""
     method = package.specialized.method
-    if not isinstance(method, AxleIdentifier):
+    if not isinstance(method, AxleIdentifier | InertialIdentifier):
         return ()
     b, rounding = method.bounds, 1.0 + 2e-7  # float has not all of these numbers
     rows = [
         ((0.0, b.compliance * rounding), (0.0, 1.0), (-offset * rounding, offset * rounding))
         for offset in (b.steering, b.v_y)
     ]
-    own = ",".join(repr(limit) for row in rows for pair in row for limit in pair)
     grip = f"{b.least_grip / rounding!r},{b.most_grip * rounding!r}"
-    return ("BOXES=1", f"LARGEST={b.weight!r}", f"GRIP={grip}", f"OWN={own}")
+    boxes = ("BOXES=1", f"LARGEST={b.weight!r}", f"GRIP={grip}")
+    if isinstance(method, InertialIdentifier):
+        return boxes
+    own = ",".join(repr(limit) for row in rows for pair in row for limit in pair)
+    return (*boxes, f"OWN={own}")
 
 
 def build(subject: Subject, folder: Path, *, single: bool = False, compiler: str = "clang") -> Path:
@@ -133,7 +150,8 @@ def build(subject: Subject, folder: Path, *, single: bool = False, compiler: str
         (folder / file).write_bytes((HARNESSES / file).read_bytes())
     sources = sorted(path for path in subject.files if re.fullmatch(r"src/.*\.c", path))
     macros = [f"-D{subject.name.upper()}_SINGLE={int(single)}", *(f"-D{m}" for m in subject.macros)]
-    sanitized = [f"-fsanitize={SANITIZERS}", f"-fno-sanitize={LEFT_OUT}"]
+    left_out = ",".join(one for one in (LEFT_OUT, subject.left_out) if one)
+    sanitized = [f"-fsanitize={SANITIZERS}", f"-fno-sanitize={left_out}"]
     words = [*FLAGS, *sanitized, *macros, "-Iinclude", "-Isrc", *sources, subject.harness]
     command = [compiler, *words, "-lm", "-o", "fuzz"]
     subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)

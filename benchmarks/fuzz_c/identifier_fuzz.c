@@ -2,7 +2,7 @@
  *
  * Nothing but the public header is read; of the carried values only that they are numbers. Where
  * BOXES is set, weights that were not told otherwise must stay within it: LARGEST of a weight, GRIP
- * least and most of their sum, OWN least and most of the rest, per axle. */
+ * least and most of their sum, and where it is told OWN least and most of the rest, per axle. */
 #include "reader.h"
 
 #include "tireid.h"
@@ -17,6 +17,7 @@ static int told; /* weights that were not learnt are in the state */
 
 static struct {
     double v_x, v_y, r, wave, phase, amplitude;
+    int measured; /* whether a sensor shows v_y to a step that tells it */
 } car;
 
 static void check_numbers(const void *numbers, size_t size)
@@ -33,7 +34,9 @@ static void check_boxes(void)
 {
 #ifdef BOXES
     static const double grip[2] = { GRIP };
+#ifdef OWN
     static const double own[2][3][2] = { OWN };
+#endif
     tireid_weights weights;
     unsigned axle, i;
     CHECK(tireid_get_weights(&state, &weights) == TIREID_OK);
@@ -45,10 +48,12 @@ static void check_boxes(void)
             CHECK(fabs((double)weights.W[axle][i]) <= LARGEST);
         }
         CHECK((sum >= grip[0]) && (sum <= grip[1]));
+#ifdef OWN
         for (i = 0U; i < 3U; i++) {
             CHECK((double)weights.own[axle][i] >= own[axle][i][0]);
             CHECK((double)weights.own[axle][i] <= own[axle][i][1]);
         }
+#endif
     }
 #endif
 }
@@ -83,6 +88,11 @@ static void take_step(void)
     CHECK(tireid_get_forces(&state, force) == TIREID_OK);
     CHECK(fabs((double)force[0]) <= (double)exported.max_force);
     CHECK(fabs((double)force[1]) <= (double)exported.max_force);
+#if TIREID_TELLS_V_Y
+    CHECK(output.v_y_sd >= (tireid_real)0);
+    CHECK((output.side_slip_observable == (tireid_real)0)
+        || (output.side_slip_observable == (tireid_real)1));
+#endif
     CHECK((state.faults - before.faults) <= 1U);
     CHECK((status != TIREID_BAD_INPUT) || (state.faults == (before.faults + 1U)));
 #ifdef LEARNT
@@ -117,6 +127,14 @@ static void sense(void)
     input.r = (tireid_real)car.r;
     input.delta_f = (tireid_real)delta;
     input.delta_r = (tireid_real)0;
+#if TIREID_READS_A_Y
+    input.a_y = (tireid_real)((front + rear) / 1500.0);
+#endif
+#if TIREID_TELLS_V_Y
+    if (!car.measured) {
+        input.v_y = (tireid_real)NAN;
+    }
+#endif
 }
 
 static void begin_road(reader *from)
@@ -127,6 +145,9 @@ static void begin_road(reader *from)
     }
     car.wave = between(from, 0.0, 12.0);
     car.amplitude = between(from, 0.0, 0.3);
+#if TIREID_TELLS_V_Y
+    car.measured = (take_byte(from) >= 192U) ? 1 : 0;
+#endif
     if (take_byte(from) < 64U) {
         car.v_y = car.r = 0.0;
     }
@@ -137,7 +158,11 @@ static void drive(reader *from)
 {
     const uint32_t fault = take_byte(from);
     unsigned n = 1U + take_byte(from);
+#if TIREID_READS_A_Y
+    tireid_real *const signals[] = { &input.v_x, &input.a_y, &input.r, &input.delta_f };
+#else
     tireid_real *const signals[] = { &input.v_x, &input.v_y, &input.r, &input.delta_f };
+#endif
     tireid_real *const signal = signals[fault % 4U];
     const tireid_real held = *signal;
     const double wrong = ((fault & 0xF0U) == 0xF0U) ? hostile(from) : between(from, -3.0, 3.0);

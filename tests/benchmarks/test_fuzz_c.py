@@ -11,6 +11,7 @@ from benchmarks import fuzz_c
 needs_fuzzer = pytest.mark.skipif(not fuzz_c.has_fuzzer(), reason=fuzz_c.MISSING)
 STEPS = {"identifier": 150_000, "tracker": 30_000}
 NAMES = [f"{kind}/{law}" for law in fuzz_c.LAWS for kind in STEPS]
+NAMES += [f"identifier/{law}" for law in fuzz_c.SENSING]
 
 
 @pytest.fixture(scope="module")
