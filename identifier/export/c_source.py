@@ -131,8 +131,9 @@ def _switches(specialized: SpecializedStep) -> dict[str, tuple[object, str]]:
         ),
         "READS_A_Y": (int(specialized.reads_a_y), "a_y is an input, NaN where there is none"),
         "TELLS_V_Y": (
-            int(specialized.tells_v_y),
-            "v_y is an output; as an input it may be NaN",
+            len(specialized.side_slip),
+            "v_y is an output, as an input it may be NaN; 2: so is v_y_sd; 3: and whether it is "
+            "observable",
         ),
         "RESTS_FIRST": (
             int(specialized.rests_first),

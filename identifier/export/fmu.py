@@ -206,19 +206,20 @@ def variables(specialized: SpecializedStep) -> tuple[Variable, ...]:
             specialized.min_speed,
             "below it forces are zero, learning rests",
         ),
-        *(_side_slip(specialized) if specialized.tells_v_y else ()),
+        *_side_slip(specialized),
     )
 
 
 def _side_slip(specialized: SpecializedStep) -> Iterator[Variable]:
-    """Yield the outputs of a step that tells v_y; one of the inputs has that name already."""
+    """Yield what the step tells of v_y, which is the name of an input already."""
     names: Mapping[str, tuple[int, str, Kind]] = {
         "v_y": (14, "v_y_estimate", "real"),
         "v_y_sd": (15, "v_y_sd", "real"),
         "side_slip_observable": (16, "side_slip_observable", "boolean"),
     }
     ports = {port.name: port for port in specialized.outputs}
-    for name, (reference, shown, kind) in names.items():
+    for name in specialized.side_slip:
+        reference, shown, kind = names[name]
         unit = ports[name].unit if kind == "real" else ""
         yield _output(reference, shown, kind, unit, ports[name].description)
 
@@ -472,7 +473,7 @@ def export_fmu(specialized: SpecializedStep, path: Path, version: Version = 2) -
     """Write an FMU for Co-Simulation; the same step gives the same bytes.
 
     Inputs v_x, v_y, r, delta_f, delta_r and outputs F_yf, F_yr, SI; beside them a_y where the step
-    reads it, and v_y_estimate, v_y_sd and side_slip_observable where it tells v_y. Samples are
+    reads it, and v_y_estimate, v_y_sd and side_slip_observable as far as it tells them. Samples are
     taken at multiples of the step's interval after the start, whatever the communication step; a
     step from t to t + h takes those in [t, t + h).
 

@@ -22,7 +22,13 @@ from codegen.package import (
 from codegen.template import Values, Words, filled
 from identifier.export.c_source import PREFIX, PROGRAMS, C, c_sources
 from identifier.export.layout import Member, carried_members, output_members, rules
-from identifier.export.specialize import ACCELERATION, Signal, SpecializedStep, specialize
+from identifier.export.specialize import (
+    ACCELERATION,
+    SIDE_SLIP,
+    Signal,
+    SpecializedStep,
+    specialize,
+)
 from identifier.method import Method, vehicle_numbers
 from identifier.refused import NOWHERE, STALE_TIME, stale_samples
 from identifier.tire_model import TireModel
@@ -369,10 +375,11 @@ def _about_signals(specialized: SpecializedStep) -> dict[str, str]:
         )
     if specialized.tells_v_y:
         signals = "v_x, r, a_y and steering"
+        flagged = " Use it where\n`side_slip_observable` is 1, and as sure as `v_y_sd` says."
         absent.append(
             "`v_y` may be NaN, and is where no sensor measures it; what no car has counts as NaN.\n"
-            f"What is told of it is in `{name}_output`, which `{name}_get_output` copies: use it\n"
-            "where `side_slip_observable` is 1, and as sure as `v_y_sd` says. All are zero before\n"
+            f"What is told of it is in `{name}_output`, which `{name}_get_output` copies."
+            f"{flagged if specialized.side_slip == SIDE_SLIP else ''} All of\nit is zero before "
             "the first sample, and where samples have been refused for too long."
         )
     return {

@@ -7,6 +7,7 @@ and else goes without, as where none is logged.
 """
 
 from collections.abc import Mapping
+from itertools import takewhile
 from typing import NamedTuple
 
 import casadi as ca
@@ -42,6 +43,7 @@ ACCELERATION = Signal(
     "m/s^2",
     "lateral acceleration that an accelerometer shows, left positive; NaN where there is none",
 )
+SIDE_SLIP = ("v_y", "v_y_sd", "side_slip_observable")
 SAMPLED = ("x", "u", "v_x", "a_y")
 
 
@@ -90,8 +92,14 @@ class SpecializedStep(NamedTuple):
 
     @property
     def tells_v_y(self) -> bool:
-        """Whether v_y is an output, so that NaN is one as an input."""
+        """Whether v_y is an output, so that it may be NaN as an input."""
         return not self.method.needs_v_y
+
+    @property
+    def side_slip(self) -> tuple[str, ...]:
+        """Outputs that tell v_y: the first one, two or all of `SIDE_SLIP`, or none of them."""
+        told = {port.name for port in self.outputs} if self.tells_v_y else set()
+        return tuple(takewhile(told.__contains__, SIDE_SLIP))
 
 
 def _described(port: Port, size: int) -> Signal:

@@ -18,7 +18,7 @@ typedef double tireid_real;
 #define TIREID_JUDGES 1 /* the step has a gate of its own */
 #define TIREID_DECIDES 0 /* equations at rest are others than those of driving */
 #define TIREID_READS_A_Y 0 /* a_y is an input, NaN where there is none */
-#define TIREID_TELLS_V_Y 0 /* v_y is an output; as an input it may be NaN */
+#define TIREID_TELLS_V_Y 0 /* v_y is an output, as an input it may be NaN; 2: so is v_y_sd; 3: and whether it is observable */
 #define TIREID_RESTS_FIRST 0 /* the first sample of all is one to rest at before it is taken */
 #define TIREID_RULES 5U /* of weights that are taken over */
 #define TIREID_COVARIANCE 0U /* rows of a covariance among the weights */

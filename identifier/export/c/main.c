@@ -92,8 +92,13 @@ static void print_side_slip(const tireid_state *state)
 {
     tireid_output output;
     (void)tireid_get_output(state, &output);
-    printf("%.9g,%.9g,%d,", (double)output.v_y, (double)output.v_y_sd,
-        (output.side_slip_observable > 0) ? 1 : 0);
+    printf("%.9g,", (double)output.v_y);
+#if TIREID_TELLS_V_Y > 1
+    printf("%.9g,", (double)output.v_y_sd);
+#endif
+#if TIREID_TELLS_V_Y > 2
+    printf("%d,", (output.side_slip_observable > 0) ? 1 : 0);
+#endif
 }
 #endif
 
@@ -119,7 +124,9 @@ int main(int argc, char *argv[])
     }
     (void)tireid_default_params(&params);
     (void)tireid_init(&state);
-    printf("t,Fyf,Fyr,%sstatus\n", TIREID_TELLS_V_Y ? "vy,vy_sd,side_slip_observable," : "");
+    printf("t,Fyf,Fyr,%s%s%sstatus\n", (TIREID_TELLS_V_Y > 0) ? "vy," : "",
+        (TIREID_TELLS_V_Y > 1) ? "vy_sd," : "",
+        (TIREID_TELLS_V_Y > 2) ? "side_slip_observable," : "");
     while (fgets(line, LINE, log) != NULL) {
         char *piece[COLUMNS];
         const int count = split(line, piece);

@@ -69,6 +69,8 @@ int MODEL(fmu_get_real)(const Memory *memory, unsigned int reference, double *va
 #if MODEL_TELLS_V_Y
   else if (reference == VR_V_Y)
     *value = (double)memory->state.output.v_y;
+#endif
+#if MODEL_TELLS_V_Y > 1
   else if (reference == VR_V_Y_SD)
     *value = (double)memory->state.output.v_y_sd;
 #endif
@@ -95,9 +97,8 @@ int MODEL(fmu_get_integer)(const Memory *memory, unsigned int reference, int32_t
 }
 
 int MODEL(fmu_get_boolean)(const Memory *memory, unsigned int reference, int *value) {
-  if (reference == VR_ADAPTATION)
-    *value = memory->state.adapts != 0;
-#if MODEL_TELLS_V_Y
+  if (reference == VR_ADAPTATION) *value = memory->state.adapts != 0;
+#if MODEL_TELLS_V_Y > 2
   else if (reference == VR_OBSERVABLE)
     *value = memory->state.output.side_slip_observable > 0;
 #endif

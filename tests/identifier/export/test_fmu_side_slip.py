@@ -1,5 +1,7 @@
 """The FMU of a method that tells v_y: a_y goes in, v_y, its deviation and a flag come out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -70,7 +72,7 @@ def test_fmpy_finds_nothing_to_complain_about_and_all_has_units(paths, version):
 @pytest.mark.parametrize("version", [2, 3])
 def test_side_slip_is_told_without_a_lateral_velocity(paths, version, slalom):
     """An input that is not connected is no number, so that nothing is measured by it."""
-    drive = slalom.taken(np.arange(1500))
+    drive = replace(slalom.taken(np.arange(1500)), v_y=None)
     told = simulated(paths[version], drive, ("v_x", "r", "delta_f", "delta_r", "a_y"))
     assert (told["status"] == 0).all()
     history = identify(drive, CAR, make_method("inertial", CAR))
@@ -115,6 +117,17 @@ def test_what_is_told_is_to_the_last_bit_what_the_step_tells(paths, version, ste
     slave.freeInstance()
     np.testing.assert_array_equal(told, expected)
     assert np.ptp(told[:, 2]) > 0.1
+
+
+@pytest.mark.parametrize("law", ["linear_kf", "washout"])
+def test_an_fmu_tells_as_much_of_side_slip_as_its_step(law, tmp_path, monkeypatch):
+    """Not every method knows how sure it is, or whether anything can be seen."""
+    monkeypatch.setattr(binaries, "MINGW", "no-such-compiler")
+    step = specialize(make_method(law, CAR), CAR)
+    export_fmu(step, tmp_path / "one.fmu")
+    about = fmpy.read_model_description(str(tmp_path / "one.fmu"))
+    told = [v.name for v in about.modelVariables if v.name in TOLD]
+    assert told == list(TOLD[: len(step.side_slip)]) and 0 < len(told) < 3
 
 
 def test_an_fmu_has_a_y_where_its_step_reads_it_and_no_side_slip_where_it_tells_none():

@@ -9,6 +9,7 @@ import pytest
 from codegen import find_compiler
 from identifier.export.compiled import CompiledPackage, Status, samples_of
 from identifier.export.package import build_package
+from identifier.export.specialize import SIDE_SLIP
 from identifier.methods import make_method
 from identifier.refused import STALE_TIME
 from identifier.run import OnlineIdentifier, identify
@@ -16,15 +17,16 @@ from models.vehicle import sedan
 from tests.identifier.export.conftest import BANKED
 
 CAR = sedan()
-LAWS = ("axle", "integral", "rls", "stiffness_rls", "eso", BANKED, "inertial")
-SIDE_SLIP = ("v_y", "v_y_sd", "side_slip_observable")
+OTHERS = ("rls", "stiffness_rls", "eso", "linear_kf", "washout")
+LAWS = ("axle", "integral", *OTHERS, BANKED, "inertial")
+TELL_V_Y = ("linear_kf", "washout", "inertial")
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
 
 
 @pytest.fixture(scope="module")
 def shipped(packages):
     """By law, what a package is computed with; each test begins anew."""
-    others = {law: build_package(make_method(law, CAR), CAR) for law in LAWS[2:5]}
+    others = {law: build_package(make_method(law, CAR), CAR) for law in OTHERS}
     return {law: CompiledPackage.of(one) for law, one in {**packages, **others}.items()}
 
 
@@ -72,7 +74,7 @@ def test_gaps_are_met_as_beside_a_car_in_python(law, shipped, slalom):
     for port, value in zip(SIDE_SLIP, told[:, 3:].T, strict=False):
         assert np.abs(run.outputs[port].ravel() - value).max() < 1e-9
     np.testing.assert_array_equal(run.status == Status.STALE, told[:, 0] > 0)
-    read = [0, 2, 3, 4] if law == "inertial" else slice(5)  # whose v_y may be missing
+    read = [0, 2, 3, 4] if law in TELL_V_Y else slice(5)  # whose v_y may be missing
     refused = ~(np.abs(rows[:, read]) < 1e3).all(axis=1)
     np.testing.assert_array_equal(np.isin(run.status, [Status.BAD_INPUT, Status.STALE]), refused)
     assert shipped[law].faults >= refused.sum() == online.counts.refused

@@ -216,9 +216,13 @@ def test_the_self_test_sees_a_wrong_vector(packages, write, run, compiler):
 @pytest.mark.parametrize("law", [law for law in METHODS if law not in ("linear", "mhe")])
 def test_every_method_passes_its_own_test_without_a_warning(law, write, run):
     folder = write(build_package(make_method(law, CAR), CAR))
-    sources = ["src/tireid.c", "src/tireid_equations.c", "tests/test_tireid.c"]
+    library = ["src/tireid.c", "src/tireid_equations.c"]
+    sources = [*library, "tests/test_tireid.c"]
     told = []
     for single in (0, 1):
+        example = [*STRICT, f"-DTIREID_SINGLE={single}", "-Iinclude", "examples/main.c"]
+        answer = run("gcc", *example, "-fsyntax-only", cwd=folder)
+        assert (answer.returncode, answer.stderr) == (0, "")
         flags = [*STRICT, f"-DTIREID_SINGLE={single}", "-Iinclude", "-o", "self_test"]
         answer = run("gcc", *flags, *sources, "-lm", cwd=folder)
         assert (answer.returncode, answer.stderr) == (0, "")
@@ -256,7 +260,7 @@ def test_the_example_tells_side_slip_from_a_log_without_a_lateral_velocity(
     told = example(folder, run, log).stdout.splitlines()
     assert told[0] == "t,Fyf,Fyr,vy,vy_sd,side_slip_observable,status"
     rows = np.loadtxt(told[1:], delimiter=",")
-    expected = identify(slalom, CAR, make_method("inertial", CAR))
+    expected = identify(replace(slalom, v_y=None), CAR, make_method("inertial", CAR))
     for column, port in enumerate(("v_y", "v_y_sd", "side_slip_observable"), start=3):
         np.testing.assert_allclose(rows[:, column], expected.outputs[port].ravel(), atol=1e-8)
     assert (rows[:, -1] == 0).all() and rows[2000:, 5].mean() > 0.5
