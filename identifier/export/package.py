@@ -370,8 +370,9 @@ def _about_signals(specialized: SpecializedStep) -> dict[str, str]:
     if specialized.reads_a_y:
         signals = "v_x, v_y, r, a_y and steering"
         absent.append(
-            "`a_y` is what an accelerometer shows, which feels a bank of the road and the roll of\n"
-            "the body. Where there is none it is NaN: no sample is refused for it."
+            "`a_y` is what an accelerometer shows that is fixed to the body: what tires push, and\n"
+            "a share of gravity where the body rolls. Where there is none it is NaN: no sample is\n"
+            "refused for it."
         )
     if specialized.tells_v_y:
         signals = "v_x, r, a_y and steering"

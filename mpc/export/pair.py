@@ -10,7 +10,9 @@ from identifier.axle.model import AxleModel
 from identifier.axle.slip import SHORTEST
 from identifier.export.c_source import PREFIX
 from identifier.export.package import Package
-from identifier.method import CannotFreezeError
+from identifier.inertial import InertialIdentifier
+from identifier.inertial.motion import SENSORS
+from identifier.method import CannotFreezeError, Method
 from identifier.paper.network import NetworkModel
 from identifier.tire_model import TireModel
 from models.vehicle import GRAVITY
@@ -70,7 +72,7 @@ def handover_sources(identifier: Package, tracker: MpcPackage) -> dict[str, str]
     specialized, model = identifier.specialized, frozen_start(identifier)
     name = specialized.name
     force = {"MAX_FORCE": (repr(round(specialized.limits.force, 1)), "of an axle [N]")}
-    numbers, arrays = HANDOVERS[model.kind](model, tracker)
+    numbers, arrays = HANDOVERS[model.kind](model, tracker, specialized.method)
     text = header(
         f"{name}_handover_tables.h",
         f"Numbers of the handover.\n\n{generated(identifier.about)}",
@@ -92,7 +94,7 @@ Numbers = dict[str, tuple[object, str]]
 Arrays = dict[str, tuple[Sequence[float], str]]
 
 
-def _of_curves(model: AxleModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:
+def _of_curves(model: AxleModel, tracker: MpcPackage, method: Method) -> tuple[Numbers, Arrays]:
     shortest = repr(SHORTEST * model.vehicle.wheelbase)
     numbers: Numbers = {
         "CURVES": (1, "what is learnt are curves over slip; else a network"),
@@ -100,6 +102,12 @@ def _of_curves(model: AxleModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:
         "SWAY": (repr(GRAVITY / model.sway.frequency**2), "g over the roll's frequency^2 [m]"),
         "SHORTEST": (shortest, "lag that is always there [m]"),
     }
+    if isinstance(method, InertialIdentifier):
+        share = repr(method.prior.sway_share)
+        numbers |= {
+            "SWAY_SHARE": (share, "of the sway of the body, which is not learnt"),
+            "STEERING": (f"{SENSORS.index('steering')}U", "which of the sensors' errors it is"),
+        }
     return numbers, {
         "load": (model.vehicle.axle_loads, "static, of the axles [N]"),
         "ladder": (model.ladder, "scales of the units [rad]"),
@@ -107,8 +115,8 @@ def _of_curves(model: AxleModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:
     }
 
 
-def _of_network(model: NetworkModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:
-    del tracker
+def _of_network(model: NetworkModel, tracker: MpcPackage, method: Method) -> tuple[Numbers, Arrays]:
+    del tracker, method
     assert model.network.scale is not None, "a network that was learnt has scales"
     numbers: Numbers = {
         "CURVES": (0, "what is learnt is a network; else curves over slip"),
@@ -178,7 +186,7 @@ def build_pair(
     return Pair(identifier, tracker, files | handover_sources(identifier, tracker))
 
 
-HANDOVERS: Mapping[str, Callable[[Any, MpcPackage], tuple[Numbers, Arrays]]] = {
+HANDOVERS: Mapping[str, Callable[[Any, MpcPackage, Method], tuple[Numbers, Arrays]]] = {
     AxleModel.kind: _of_curves,
     NetworkModel.kind: _of_network,
 }

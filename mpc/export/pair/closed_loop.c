@@ -70,18 +70,33 @@ static tireid_mpc_input look(const simulated_car *car, const tireid_mpc_params *
     return in;
 }
 
-/* Tell the identifier what the sensors say, and hand over what it has learnt. */
+/* Tell the identifier what the sensors say, and hand over what it has learnt; where it tells v_y, the
+ * tracker is not shown another one. */
 static bool learn(tireid_state *identifier, const tireid_params *limits, const simulated_car *car,
-    const tireid_mpc_input *seen, tireid_mpc_params *params, bool hands_over)
+    tireid_mpc_input *seen, tireid_mpc_params *params, bool hands_over)
 {
     tireid_input in;
     tireid_weights learnt;
+#if TIREID_TELLS_V_Y
+    tireid_output told;
+#endif
     in.v_x = (tireid_real)car->v_x;
+#if TIREID_TELLS_V_Y
+    in.v_y = (tireid_real)NAN; /* no sensor: the tracker steers by the one that is told */
+#else
     in.v_y = (tireid_real)seen->v_y;
+#endif
     in.r = (tireid_real)seen->r;
     in.delta_f = (tireid_real)car->delta;
     in.delta_r = 0;
+#if TIREID_READS_A_Y
+    in.a_y = (tireid_real)(((car->force[0] + car->force[1]) / (double)params->car[0]) + noise(0.1));
+#endif
     (void)tireid_step(identifier, limits, &in);
+#if TIREID_TELLS_V_Y
+    (void)tireid_get_output(identifier, &told);
+    seen->v_y = (tireid_mpc_real)told.v_y;
+#endif
     (void)tireid_get_weights(identifier, &learnt);
     return hands_over && tireid_handover(&learnt, params, (tireid_mpc_real)SHARE);
 }
@@ -120,7 +135,7 @@ static result drive(bool learns, FILE *log)
     seed = 1UL;
     while ((car.s < (PASSES * LANE_CHANGES_PASS)) && (fabs(car.e_y) < WIDEST)) {
         const double t = (double)found.steps * (double)params.period;
-        const tireid_mpc_input seen = look(&car, &params);
+        tireid_mpc_input seen = look(&car, &params);
         tireid_mpc_real steering = 0;
         tireid_mpc_status status;
         clock_t start;

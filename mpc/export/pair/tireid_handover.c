@@ -21,25 +21,40 @@
 #define FLAT ((real)0.05)       /* of the slope at zero: there the peak is reached */
 #define LEAST_RISE ((real)0.04) /* of the slope at zero, beyond the slip that is of use */
 
+/* What an axle has beside its curve: compliance [m per load], share of the sway of the body, and
+ * what sensors are off by: steering in front [rad], v_y at the rear [m/s]. */
+static void beside(const tireid_weights *learnt, uint32_t i, real own[3])
+{
+#if TIREID_TELLS_V_Y
+    own[0] = (real)learnt->own[i];
+    own[1] = (real)TIREID_HANDOVER_SWAY_SHARE;
+    own[2] = (i == 0U) ? (real)learnt->sensors[TIREID_HANDOVER_STEERING] : (real)0.0;
+#else
+    own[0] = (real)learnt->own[i][0];
+    own[1] = (real)learnt->own[i][1];
+    own[2] = (real)learnt->own[i][2];
+#endif
+}
+
 /* Weights of the prediction: offsets and lag, scales, then compliance, least lag and units. */
 static bool convert(const tireid_weights *learnt, real w[WEIGHTS])
 {
     bool is_tire = true;
     uint32_t i;
     uint32_t j;
-    w[0] = (real)learnt->own[0][2];
-    w[1] = (real)learnt->own[1][2];
     w[2] = SHORTEST;
-    is_tire = ((w[0] - w[0]) <= (real)0.0) && ((w[1] - w[1]) <= (real)0.0);
     for (j = 0U; j < UNITS; j++) {
         w[3U + j] = (real)1.0 / ladder[j];
     }
     for (i = 0U; i < 2U; i++) {
         real *axle = &w[3U + UNITS + (i * AXLE)];
-        const real sways = SWAY * (real)learnt->own[i][1];
-        const real compliance = ((real)learnt->own[i][0] + sways) / load[i];
+        real own[3];
+        real compliance;
         real slope = (real)0.0;
         real most = (real)0.0;
+        beside(learnt, i, own);
+        w[i] = own[2];
+        compliance = (own[0] + (SWAY * own[1])) / load[i];
         for (j = 0U; j < UNITS; j++) {
             const real weight = (real)learnt->W[i][j];
             const real force = weight * load[i];
@@ -48,7 +63,8 @@ static bool convert(const tireid_weights *learnt, real w[WEIGHTS])
             axle[2U + j] = force;
         }
         is_tire = is_tire && (most <= MAX_FORCE) && (slope >= LEAST_SLOPE)
-            && (compliance >= (real)0.0) && ((compliance - compliance) <= (real)0.0);
+            && (compliance >= (real)0.0) && ((compliance - compliance) <= (real)0.0)
+            && ((own[2] - own[2]) <= (real)0.0);
         axle[0] = compliance;
         axle[1] = (compliance * (real)0.02 * (slope * load[i])) + SHORTEST;
     }
