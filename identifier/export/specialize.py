@@ -126,9 +126,15 @@ def specialize(
     Raises
     ------
     ValueError
-        Where stored weights are those of another structure, or the method has no use for a_y.
+        Where stored weights are those of another structure, the method has no use for a_y, or its
+        step is not straight-line code.
     """
     setup = method.setup(vehicle, start)
+    if not setup.scan.step.is_a("SXFunction"):
+        raise ValueError(
+            f"{type(method).__name__} cannot be exported: its step solves a problem by many calls, "
+            "and is not the straight-line code of a controller"
+        )
     if with_a_y and "a_y" not in setup.scan.over:
         raise ValueError(f"{type(method).__name__} has no use for a_y")
     with_a_y = with_a_y or method.needs_a_y

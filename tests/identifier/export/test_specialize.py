@@ -40,6 +40,11 @@ def test_the_folded_step_is_the_method_up_to_rounding(law, slalom):
     assert error <= 1e-6  # N, of 5000; the tires' own sin, cos and exp are far from exact
 
 
+def test_a_step_that_solves_a_problem_is_not_exported():
+    with pytest.raises(ValueError, match="HorizonEstimator cannot be exported: its step solves"):
+        specialize(make_method("mhe", CAR), CAR)
+
+
 def test_a_y_is_an_input_of_methods_that_need_it_and_of_others_where_it_is_asked_for():
     inputs = [port.name for port in specialize(make_method("axle", CAR), CAR).inputs]
     assert inputs == ["v_x", "v_y", "r", "delta_f", "delta_r"]
