@@ -405,7 +405,7 @@ def carmaker(targets: Targets) -> None:
             targets.at_most(f"learnt on {learnt}, asked {asked}", ratio, 1.3, "-", key=key)
 
 
-def _own_sensors() -> dict[str, tuple[Recording, Recording]]:
+def own_sensors() -> dict[str, tuple[Recording, Recording]]:
     """Return what the 1:10 car's own sensors and Vicon show of each run, by its name."""
     table = np.genfromtxt(
         DATA / "dart_imu.csv.gz", delimiter=",", names=True, dtype=None, encoding="utf-8"
@@ -443,7 +443,7 @@ def dart(targets: Targets) -> None:
     targets : collects what is missed.
     """
     print("Real 1:10 car, encoder, IMU and steering: side slip above 1 m/s, frozen on other runs")
-    runs = _own_sensors()
+    runs = own_sensors()
     ratios = []
     for name, (own, vicon) in runs.items():
         history = without_v_y(own, DART, (0.0, 0.0))

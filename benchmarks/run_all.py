@@ -27,6 +27,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "sensor_faults": [],
     "beginnings": [],
     "inertial": [],
+    "without_v_y": [],
     "noisy_runs": [],
     "several_rates": [],
     "fault_table": ["{out}"],

@@ -361,7 +361,7 @@ class HorizonEstimator(Method):
 
     @property
     def remark(self) -> str:
-        """Say what it does without, and what it costs."""
+        """Say which tires it stands on, and what it solves."""
         return f"{self.filter.remark}; solves for the last {self.samples} samples at each"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:

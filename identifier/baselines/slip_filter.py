@@ -275,9 +275,9 @@ class SlipFilter(Method):
 
     @property
     def remark(self) -> str:
-        """Say what it does without, and what it stands on."""
+        """Say which tires it stands on."""
         on = "learnt tires of Dugoff" if self.learns else "the vehicle's linear tires"
-        return f"without v_y, which it tells, on {on}"
+        return f"on {on}"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs.

@@ -135,8 +135,8 @@ class Washout(Method):
 
     @property
     def remark(self) -> str:
-        """Say what it does without, and what it stands on."""
-        return "without v_y, which it tells, by integration above the vehicle's linear tires"
+        """Say what it stands on."""
+        return "by integration, and below its cutoff on the vehicle's linear tires"
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs.

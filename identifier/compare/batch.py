@@ -4,7 +4,7 @@ A run has the bits of the same run by `identify`; its error is summed up while i
 """
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 
 from codegen import Scan
 from codegen.arrays import Array
-from identifier.compare.course import INFINITE, Course, Scores, Trial, rmse, run_scored
+from identifier.compare.course import (
+    INFINITE,
+    Course,
+    Scores,
+    Trial,
+    rmse,
+    run_scored,
+    shown_to,
+)
 from identifier.method import CannotFreezeError, Method, Setup
 from identifier.reproducibility import AxleRmse, counted_samples
 from identifier.run import IMPOSSIBLE_FORCE, DivergedError, check_recording, state_index
@@ -100,9 +108,7 @@ def identify_batch(
     counts = counted_samples(recording, slowest if min_speed is None else min_speed)
     instants = {np.inf: len(recording)} | {t: state_index(recording, t) for t in freeze_times}
     kept = sorted(set(instants.values()) - {len(recording)})
-    setups = [
-        design.setup(car).begin(recording.x[0]) for design, car in zip(designs, cars, strict=True)
-    ]
+    setups = [design.setup(car) for design, car in zip(designs, cars, strict=True)]
     groups: dict[Scan, list[int]] = defaultdict(list)
     for i, setup in enumerate(setups):
         groups[setup.scan].append(i)
@@ -110,7 +116,7 @@ def identify_batch(
     for scan, members in groups.items():
         scores = run_scored(
             scan,
-            [{**setups[i].carry, **setups[i].constants} for i in members],
+            [{**setups[i].begun(recording), **setups[i].constants} for i in members],
             recording,
             impossible=[IMPOSSIBLE_FORCE * cars[i].weight for i in members],
             counts=counts,
@@ -203,10 +209,7 @@ def cross_replay_batch(
     freezes = [True] * len(methods)
     models: dict[tuple[int, str], TireModel] = {}
     for learnt in course.recordings:
-        runs = identify_batch(
-            learnt, course.vehicle, methods, min_speed=course.min_speed, workers=workers
-        )
-        for i, run in enumerate(runs):
+        for i, run in _learnt_on(learnt, course, methods, workers):
             assert run.online is not None  # a course has true forces
             online[i][learnt.name] = _finite(run.online)
             time = run.diverged_at
@@ -229,6 +232,23 @@ def cross_replay_batch(
         Trial(online=o, frozen=f if can else None, diverged_at=d)
         for o, f, can, d in zip(online, frozen, freezes, diverged_at, strict=True)
     )
+
+
+def _learnt_on(
+    recording: Recording, course: Course, methods: Sequence[Method], workers: int | None
+) -> Iterator[tuple[int, BatchRun]]:
+    """Yield by number of the method its run over what a comparison shows it of a recording."""
+    for reads in (True, False):
+        some = {i: method for i, method in enumerate(methods) if method.needs_v_y == reads}
+        if some:
+            runs = identify_batch(
+                shown_to(next(iter(some.values())), recording),
+                course.vehicle,
+                list(some.values()),
+                min_speed=course.min_speed,
+                workers=workers,
+            )
+            yield from zip(some, runs, strict=True)
 
 
 def _finite(error: AxleRmse) -> AxleRmse:

@@ -7,7 +7,7 @@ axles together, in percent.
 import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -130,15 +130,29 @@ class Shares(NamedTuple):
     other: float | None
 
 
+def shown_to(method: Method, recording: Recording) -> Recording:
+    """Return what a comparison shows a method: no lateral velocity, where it tells one.
+
+    Parameters
+    ----------
+    recording : that is learnt on.
+    """
+    return recording if method.needs_v_y else replace(recording, v_y=None)
+
+
 def cross_replay(method: Method, course: Course) -> Trial:
-    """Learn on each recording afresh, freeze at its end and replay on all."""
+    """Learn on each recording afresh, freeze at its end and replay on all.
+
+    A method that tells lateral velocity learns without that of the recording; the frozen tires of
+    all are asked at the same slip.
+    """
     online, frozen, diverged_at, freezes = {}, {}, {}, True
     told: dict[str, SideSlip] = {}
     for recording in course.recordings:
-        history = identify(recording, course.vehicle, method)
+        history = identify(shown_to(method, recording), course.vehicle, method)
         end = float(recording.t[-1])
         online[recording.name] = course.error(recording, history.axle_force)
-        found = side_slip(history, course.min_speed)
+        found = side_slip(history, course.min_speed, recording.v_y)
         told |= {} if found is None else {recording.name: found}
         if history.diverged_at is not None:
             diverged_at[recording.name] = history.diverged_at
@@ -179,20 +193,20 @@ class SideSlip:
     within: float | None
 
 
-def side_slip(history: History, min_speed: float) -> SideSlip | None:
+def side_slip(history: History, min_speed: float, truth: Array | None) -> SideSlip | None:
     """Return what a run told of lateral velocity; None of a method that reads it.
 
     Parameters
     ----------
     history : of a method.
     min_speed : samples below this speed [m/s] do not count.
+    truth : v_y that it is judged by (n,) [m/s], or None.
     """
     if "v_y" not in history.outputs:
         return None
     recording, outputs = history.recording, history.outputs
     v_y = outputs["v_y"].ravel()
     sd = outputs["v_y_sd"].ravel() if "v_y_sd" in outputs else None
-    truth = recording.logged_v_y
     if truth is None:
         return SideSlip(v_y=v_y, v_y_sd=sd, rms=None, within=None)
     counts = counted_samples(recording, min_speed)

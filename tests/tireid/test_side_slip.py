@@ -41,7 +41,8 @@ def methods(result):
 
 def by_hand(name, recording):
     """RMSE of side slip [deg] and share within two sigma [%], from the outputs of a run."""
-    outputs = identify(recording, CAR, make_method(name, CAR)).outputs
+    blind = replace(recording, v_y=None)
+    outputs = identify(blind, CAR, make_method(name, CAR)).outputs
     v_y = outputs["v_y"].ravel()
     slip = (v_y - recording.v_y) / recording.v_x  # small angles
     away = np.abs(v_y - recording.v_y)
@@ -72,6 +73,10 @@ def test_the_table_has_a_column_of_side_slip_and_a_dash_for_methods_that_read_it
         told = [one["rms_deg"] for one in methods[name]["side_slip"].values()]
         assert rows[name][0] == f"{np.mean(told):.3f}"
         assert rows[name][0] in page
+    for text in (page, (result / "tables.txt").read_text()):
+        assert "inertial, linear_kf, joint_ekf, washout: shown no v_y" in text or (
+            "linear_kf, joint_ekf, washout, inertial: shown no v_y" in text
+        )
     assert "Side slip as methods without a lateral velocity told it." in page
     assert faults_of((result / "report.html").read_text(encoding="utf-8")) == []
     assert (result / "side_slip.png").read_bytes().startswith(b"\x89PNG")
@@ -86,22 +91,22 @@ def test_without_a_method_that_tells_there_is_no_figure(logs, tmp_path, undrawn)
 
 def test_a_sample_too_slow_does_not_count_and_one_that_is_off_does(slalom):
     history = identify(slalom, CAR, make_method("washout", CAR))
-    found = side_slip(history, 1.0)
+    found = side_slip(history, 1.0, slalom.v_y)
     moved = slalom.v_y.copy()
     moved[100] += 9.0
-    wrong = replace(history, recording=replace(slalom, v_y=moved))
-    assert side_slip(wrong, 1.0).rms > found.rms + 0.2
+    assert side_slip(history, 1.0, moved).rms > found.rms + 0.2
     v_x = slalom.v_x.copy()
     v_x[100] = 0.5
-    slow = replace(history, recording=replace(slalom, v_y=moved, v_x=v_x))
-    assert side_slip(slow, 1.0).rms == pytest.approx(found.rms, rel=0.01)
-    assert side_slip(identify(slalom, CAR, make_method("linear", CAR)), 1.0) is None
+    slow = replace(history, recording=replace(slalom, v_x=v_x))
+    assert side_slip(slow, 1.0, moved).rms == pytest.approx(found.rms, rel=0.01)
+    linear = identify(slalom, CAR, make_method("linear", CAR))
+    assert side_slip(linear, 1.0, slalom.v_y) is None
 
 
 def test_a_method_that_has_diverged_has_an_infinite_error(slalom):
     history = identify(slalom, CAR, make_method("linear_kf", CAR))
     outputs = {port: np.full_like(value, np.nan) for port, value in history.outputs.items()}
-    found = side_slip(replace(history, outputs=outputs), 1.0)
+    found = side_slip(replace(history, outputs=outputs), 1.0, slalom.v_y)
     assert found.rms == np.inf and found.within == 0.0
 
 
@@ -112,6 +117,17 @@ def test_a_batch_finds_the_errors_of_force_and_records_no_side_slip(slalom):
     name = slalom.name
     assert alone.side_slip[name].rms > 0.0 and not batch.side_slip
     assert batch.online[name].front == pytest.approx(alone.online[name].front, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", [*TOLD, "axle"])
+def test_a_comparison_shows_no_lateral_velocity_to_a_method_that_tells_it(name, slalom, rng):
+    wrong = replace(slalom, v_y=rng.permutation(slalom.v_y))
+    method = make_method(name, CAR)
+    found, other = (
+        cross_replay(method, Course(vehicle=CAR, recordings=(one,), min_speed=1.0)).online
+        for one in (slalom, wrong)
+    )
+    assert (found == other) == (name != "axle")
 
 
 @pytest.mark.parametrize("method", ["inertial", "joint_ekf"])

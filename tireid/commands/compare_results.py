@@ -64,6 +64,7 @@ def summary_rows(comparison: Comparison) -> list[list[str]]:
 
 SLIP = ("side slip [deg]", "within 2 sigma")  # columns of methods that estimate v_y
 NOT_TOLD = "-"
+NOT_SHOWN = "shown no v_y; they tell it, and side slip is judged by the recorded one"
 
 
 def _slip_cells(trial: Trial) -> list[str]:
@@ -101,6 +102,8 @@ def remarks(comparison: Comparison) -> list[str]:
         if name in METHODS:
             method = make_method(name, comparison.course.vehicle, comparison.seed)
             told.setdefault(method.remark, []).append(name)
+            if not method.needs_v_y:
+                told.setdefault(NOT_SHOWN, []).append(name)
     for name, why in comparison.left_out.items():
         told.setdefault(why, []).append(name)
     return [f"{', '.join(names)}: {remark}" for remark, names in told.items() if remark]

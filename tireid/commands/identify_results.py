@@ -355,7 +355,7 @@ def _draw(
     if OBSERVED in learnt.outputs:
         figures["error"] = error_figure(learnt, freeze_times=list(frozen))
         figures["weights"] = weights_figure(learnt, list(frozen))
-    told = side_slip(learnt, learnt.design.min_speed)
+    told = side_slip(learnt, learnt.design.min_speed, learnt.recording.logged_v_y)
     if told is not None:
         figures["side_slip"] = side_slip_figure([learnt.recording], {"estimate": {name: told}})
     if learnt.tracks_over(next(learnt.blocks())):
