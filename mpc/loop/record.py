@@ -108,7 +108,7 @@ class Drive:
     def recording(self) -> Recording:
         """Return what an identifier would read of it: measured signals, axle forces as truth.
 
-        Where nothing measures v_y, it is what was told.
+        Where nothing measures v_y, it is what was told, and marked as that: no method is shown it.
 
         Raises
         ------
@@ -125,6 +125,7 @@ class Drive:
             delta_r=np.zeros_like(self.t),
             a_y=self.measured["a_y"],
             axle_force=self.axle_force,
+            estimated=("v_y",) if self.told else (),
         )
 
 

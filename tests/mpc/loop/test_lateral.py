@@ -234,6 +234,7 @@ def test_the_tracker_steers_on_what_is_told_and_the_record_says_so():
     assert [m.v_y for m in driver.seen] == run.told["v_y"].tolist()
     assert "v_y" not in run.measured
     assert np.array_equal(run.recording().v_y, run.told["v_y"])
+    assert run.recording().estimated == ("v_y",)
     assert np.array_equal(run.recording().a_y, run.measured["a_y"])
     found = told_scores(run)
     assert found.rms_error_m_s == pytest.approx(
@@ -247,6 +248,7 @@ def test_what_was_measured_is_not_told():
     path = Path.from_waypoints([0, 20, 40], [0, 0, 0], name="straight")
     run = drive(path, DoubleTrackCar(CAR), Driver(), speed=15.0, rng=np.random.default_rng(0))
     assert not run.told and told_scores(run) is None and "v_y" in run.measured
+    assert run.recording().estimated == ()
 
 
 @pytest.fixture(scope="module")
