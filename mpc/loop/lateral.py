@@ -24,6 +24,7 @@ from models.sensors import is_shown
 from mpc.loop.sensing import Measured
 
 UNKNOWN = 1.0  # m/s: standard deviation of v_y where nothing is known
+FINEST = 1e-3  # m/s: least deviation that is believed
 
 
 class Told(NamedTuple):
@@ -169,7 +170,7 @@ class LateralVelocity:
         silent = not found or identifier.stale or identifier.diverged
         v_y, sd = (math.nan if silent else float(found[k].item()) for k in ("v_y", "v_y_sd"))
         if math.isnan(self._v_y):
-            self._v_y, self._P[1, 1] = (0.0, UNKNOWN**2) if silent else (v_y, sd**2)
+            self._v_y, self._P[1, 1] = (v_y, sd**2) if math.isfinite(v_y) else (0.0, UNKNOWN**2)
         felt = m.a_y - self._bias
         if is_shown("a_y", m.a_y):
             level = felt - self._roll * self._rolls[0]
@@ -188,7 +189,7 @@ class LateralVelocity:
 
     def _listen(self, v_y: float, sd: float) -> None:
         """Correct by the identifier's v_y [m/s], as far as it has been as right as it says."""
-        time, innovation = self.trust.correlation_time, v_y - self._v_y
+        time, innovation, sd = self.trust.correlation_time, v_y - self._v_y, max(sd, FINEST)
         surprise = innovation**2 / (self._P[1, 1] + sd**2)
         self._surprise += min(self._dt / time, 1.0) * (surprise - self._surprise)
         self._correct(1, innovation, sd**2 * max(self._surprise, 1.0), 2.0 * time / self._dt)
@@ -197,7 +198,7 @@ class LateralVelocity:
         """Move place and velocity by a sample of an acceleration in the plane of the road."""
         trust, dt = self.trust, self._dt
         felt = all(is_shown(name, getattr(m, name)) for name in ("v_x", "r", "a_y"))
-        slides = level + self._bias - m.v_x * m.r if felt else 0.0
+        slides = level + self._bias - m.v_x * m.r if felt else self._bias
         last, before = self._last if self._last is not None else (m, slides)
         then = self._v_y
         self._v_y += dt * (0.5 * (before + slides) - self._bias)
