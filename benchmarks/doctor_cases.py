@@ -12,6 +12,7 @@ import numpy as np
 
 from benchmarks.doctor_answers import Right
 from benchmarks.fault_cases import Case, Scale
+from identifier.doctor.readings import DEGREE
 from models.faults import (
     Bank,
     Lagging,
@@ -40,7 +41,6 @@ class Planted(NamedTuple):
 
 
 Plant = Callable[[Vehicle, float], Planted]  # of a car and a size of a sedan, with sign
-DEGREE = math.radians(1.0)
 
 
 def _offset(channel: str, shape: str) -> Plant:

@@ -31,12 +31,12 @@ from benchmarks.doctor_answers import (
 )
 from benchmarks.everyday_drives import KINDS as MANEUVERS
 from benchmarks.everyday_drives import drawn_everyday
-from benchmarks.gross_cases import DEGREES, KINDS, Gross
+from benchmarks.gross_cases import KINDS, Gross
 from benchmarks.random_cars import CLASSES
 from benchmarks.recorded_cars import DATA
 from benchmarks.targets import Targets, keeps, show
 from identifier.doctor import Finding
-from identifier.doctor.suspects import SUSPECTS
+from identifier.doctor.suspects import DEGREES, SUSPECTS
 from models.faults import SensorFault
 from models.recordings import Recording
 from models.vehicle import Vehicle

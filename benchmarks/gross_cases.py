@@ -10,6 +10,7 @@ import numpy as np
 from benchmarks.doctor_answers import Right
 from benchmarks.fault_cases import Case, Scale, StraightOnly, other_car
 from benchmarks.random_cars import good_sensors
+from identifier.doctor.suspects import DEGREES
 from models.faults import (
     AnotherCar,
     ClockJump,
@@ -23,8 +24,6 @@ from models.faults import (
 )
 from models.recordings import Recording
 from models.vehicle import Vehicle
-
-DEGREES = 180.0 / math.pi
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

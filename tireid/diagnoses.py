@@ -6,12 +6,25 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from matplotlib.figure import Figure
+
 from identifier.doctor import Diagnosis, Finding
 from identifier.doctor.diagnosis import WITHOUT_V_Y
-from models.recordings import LogMap, Repair
+from models.recordings import LogMap, Recording, Repair
 from models.recordings.reader import repair_text
+from models.vehicle import Vehicle
 from tireid.output import text_table
-from tireid.report import Block, Paragraph, Section, Table, printed
+from tireid.report import (
+    Block,
+    Headline,
+    Paragraph,
+    Report,
+    Section,
+    Table,
+    printed,
+    write_report,
+)
+from tireid.reports.common import READ, REPORT, drawing, origin
 from tireid.verdicts import with_doubt
 
 HEADER = ("found", "size", "confidence", "repair")
@@ -101,16 +114,12 @@ def diagnosis_text(diagnosis: Diagnosis, *, unseen: bool = True) -> str:
     diagnosis : of a log.
     unseen : whether what the log cannot tell stands below.
     """
-    if not diagnosis.findings:
-        lines = ["doctor: nothing found"]
-    else:
-        count = len(diagnosis.findings)
-        lines = [f"doctor: {count} finding{'s' * (count > 1)}"]
-        lines.append(text_table([list(HEADER), *finding_rows(diagnosis)], "<<<<"))
-        lines += [one.text for one in diagnosis.findings]
-    if unseen:
-        lines += [f"cannot be seen: {line}" for line in diagnosis.unseen]
-    return "\n".join(lines)
+    count = len(diagnosis.findings)
+    if count:
+        head = f"doctor: {count} finding{'s' * (count > 1)}"
+        table = text_table([list(HEADER), *finding_rows(diagnosis)], "<<<<")
+        return "\n".join([head, table, *diagnosis.lines(unseen=unseen)])
+    return "\n".join(["doctor: nothing found", *diagnosis.lines(unseen=unseen)])
 
 
 def diagnosis_warnings(diagnosis: Diagnosis) -> list[str]:
@@ -167,6 +176,52 @@ def doctor_text(diagnosis: Diagnosis, repair: Repair, path: Path | None) -> str:
     elif diagnosis.repair:
         lines.append("what is sure is taken out with --repair")
     return "\n".join(lines)
+
+
+def write_doctor_report(
+    folder: Path,
+    recording: Recording,
+    vehicle: Vehicle,
+    diagnosis: Diagnosis,
+    after: Diagnosis | None,
+    figure: Figure,
+    *,
+    command: str,
+) -> None:
+    """Write the report of a diagnosis.
+
+    Parameters
+    ----------
+    folder : where to.
+    recording : as it was read.
+    vehicle : as it was told.
+    diagnosis : of both.
+    after : that of the repaired log, None where nothing was repaired.
+    figure : of force over slip, before and after.
+    command : as it was typed.
+    """
+    drawn = drawing(figure, "Force over slip angle, as logged and repaired.", READ["doctor"])
+    sections = [
+        diagnosis_section(diagnosis),
+        Section(heading="What the tires say", blocks=[drawn]),
+    ]
+    if after is not None:
+        sections.append(diagnosis_section(after, heading="After the repair"))
+    count = len(diagnosis.findings)
+    numbers = [
+        Headline(str(count), f"finding{'s' * (count != 1)} in the log or the car's file"),
+        Headline(str(sum(one.sure for one in diagnosis.findings)), "of them sure, with a repair"),
+    ]
+    if after is not None:
+        numbers.append(Headline(str(len(after.findings)), "left after the repair"))
+    report = Report(
+        title=f"Diagnosis of {recording.name}",
+        summary=f"{recording.duration:.4g} s of driving of {vehicle.name}.",
+        numbers=numbers,
+        warnings=diagnosis_warnings(diagnosis),
+        sections=[*sections, origin(command, vehicle, [recording])],
+    )
+    write_report(folder / REPORT, report)
 
 
 def write_repair(path: Path, told: LogMap, diagnosis: Diagnosis) -> LogMap:

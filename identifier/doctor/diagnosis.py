@@ -58,11 +58,20 @@ class Diagnosis:
         """What takes out all that is sure."""
         return combined(one for one in self.findings if one.sure)
 
+    def lines(self, *, unseen: bool = True) -> list[str]:
+        """Return the findings, and how certain they are, a line each.
+
+        Parameters
+        ----------
+        unseen : whether what the log cannot tell follows.
+        """
+        found = [f"{one.text} ({_certainty(one)})" for one in self.findings]
+        return found + [f"cannot be seen: {line}" for line in self.unseen if unseen]
+
     def summary(self) -> str:
         """Return the findings and what is unseen as lines of text."""
-        lines = [f"{one.text} ({_certainty(one)})" for one in self.findings]
-        found = lines or ["nothing found"]
-        return "\n".join([f"{self.name}:", *found, *(f"cannot be seen: {s}" for s in self.unseen)])
+        nothing = [] if self.findings else ["nothing found"]
+        return "\n".join([f"{self.name}:", *nothing, *self.lines()])
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain numbers and words, ready for JSON; None is what is not known."""

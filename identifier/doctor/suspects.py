@@ -13,7 +13,7 @@ from models.recordings import Repair
 from models.vehicle import Vehicle
 
 SEDAN = 2.7  # m, wheelbase of whose size the numbers are
-DEGREE = math.degrees(1.0)
+DEGREES = math.degrees(1.0)  # in a rad
 POWERS: Mapping[str, float] = {"": 0.0, "length": 1.0, "speed": 0.5, "time": 0.5, "rate": -0.5}
 
 
@@ -108,7 +108,7 @@ def _channels() -> tuple[Suspect, ...]:
         ("a_y", "m/s^2", 0.7, 0.05, "", "the lateral acceleration reads {size} too much",
          " m/s²", 1.0),
         ("delta_f", "rad", 0.03, 0.0015, "", "the steering angle reads {size} too much",
-         "°", DEGREE),
+         "°", DEGREES),
     )  # fmt: skip
     found = [
         Suspect(f"offset.{name}", "offset", name, unit, plausible, least, grows, True, text,
@@ -149,7 +149,7 @@ def _channels() -> tuple[Suspect, ...]:
 SUSPECTS = (
     *_channels(),
     Suspect("velocity_sensor_angle", "velocity_sensor_angle", "v_y", "rad", 0.02, 0.0012, "", True,
-            "the velocity sensor is turned by {size} (+: to the left)", "°", DEGREE),
+            "the velocity sensor is turned by {size} (+: to the left)", "°", DEGREES),
     Suspect("velocity_sensor_x", "velocity_sensor_x", "v_y", "m", 0.8, 0.04, "length", True,
             "the velocity is measured {size} ahead of the center of gravity", " m"),
     Suspect("acceleration_sensor_x", "acceleration_sensor_x", "a_y", "m", 0.8, 0.04, "length",
@@ -159,7 +159,7 @@ SUSPECTS = (
     Suspect("yaw_inertia", "yaw_inertia", "", "", 0.5, 0.08, "", True,
             "the yaw inertia is told {size} times too large", ""),
     Suspect("bank", "bank", "", "rad", 0.03, 0.003, "", True,
-            "the road falls by {size} (+: to the left), or wind pushes so", "°", DEGREE),
+            "the road falls by {size} (+: to the left), or wind pushes so", "°", DEGREES),
 )  # fmt: skip
 NUISANCES = {  # mean, standard deviation, and what both grow with, of a sedan
     "relaxation.front": (0.17, 0.08, ""),  # wheelbases

@@ -17,12 +17,11 @@ from tireid.commands.options import (
     read_vehicle,
     told_map,
 )
-from tireid.diagnoses import add_repair, diagnosis_text, write_repair
-from tireid.figures.doctor import draw_diagnosis
+from tireid.diagnoses import add_repair, diagnosis_text, write_doctor_report, write_repair
+from tireid.figures.forces import draw_diagnosis
 from tireid.figures.style import save_figure
 from tireid.output import output_folder, require_free, write_json
 from tireid.progress import say, tell
-from tireid.reports.doctor import write_doctor_report
 
 
 def add_parser(commands: Any) -> None:

@@ -1,4 +1,7 @@
-"""Axle forces over time as in the paper's Figs. 2-5: online above, frozen replays below."""
+"""Axle forces over time as in the paper's Figs. 2-5: online above, frozen replays below.
+
+And those that the motion shows, over slip angle, as a log is told and as the doctor repairs it.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -8,9 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from codegen.arrays import Array
+from identifier.doctor.consistency import Motion, Reading, forces_and_slips
 from identifier.reproducibility import Replay, freeze_key, online_error
 from identifier.run import History
 from models.recordings import Recording
+from models.vehicle import Vehicle
 from tireid.figures.style import (
     AXLES,
     BLUE,
@@ -338,4 +343,36 @@ def inputs_figure(recording: Recording, *, window: Window = None) -> Figure:
         legend_beside(steering)
     label_time(panels[-1], recording.t)
     figure.align_ylabels()
+    return figure
+
+
+@styled
+def draw_diagnosis(
+    recording: Recording, vehicle: Vehicle, repaired: Recording, car: Vehicle
+) -> Figure:
+    """Draw force over slip angle of both axles before and after a repair.
+
+    Parameters
+    ----------
+    recording, vehicle : as they were told.
+    repaired, car : with the repair; the same where there is none.
+    """
+    figure = new_figure(PAGE, 2.9)
+    panels = figure.subplots(1, 2)
+    shown = [("as logged", GREY, recording, vehicle)]
+    if repaired is not recording:
+        shown.append(("repaired", BLUE, repaired, car))
+    for name, color, one, told in shown:
+        motion = Motion.of(one)
+        if motion is None:
+            continue
+        axles = forces_and_slips(motion, told, Reading())
+        for panel, slip, force in zip(panels, axles.slip, axles.force, strict=True):
+            panel.plot(np.degrees(slip), force, ".", color=color, markersize=2.5, label=name)
+    for panel, title in zip(panels, AXLES, strict=True):
+        panel.set_title(title)
+        panel.set_xlabel("slip angle [deg]")
+        panel.set_ylabel("force that the motion shows [load]")
+        panel.axhline(0.0, color=GREY, linewidth=0.5)
+    legend_above(figure)
     return figure
