@@ -96,6 +96,17 @@ def test_gross_repairs_come_before_fine_ones_and_only_sure_ones_are_taken():
     assert combined(findings).offset == {"r": 0.1}
 
 
+def test_a_unit_comes_before_the_offset_that_is_found_behind_it(driven):
+    """Logged in degrees with 0.02 rad/s too much: the offset is told in rad/s, and taken off so."""
+    car, log = driven
+    biased = SensorFault(channel="r", kind="biased", size=0.02).apply(log)
+    found = diagnose(SensorFault(channel="r", kind="scaled", size=57.3).apply(biased), car)
+    assert [(one.code, one.channel) for one in found.findings] == [("unit", "r"), ("offset", "r")]
+    assert found.findings[1].size == pytest.approx(0.02, abs=0.002)
+    mended, _ = found.repair.apply(replace(biased, r=57.3 * biased.r), car)
+    np.testing.assert_allclose(mended.r, log.r, atol=0.002)
+
+
 def test_whether_something_is_wrong_is_one_question_and_which_of_several_another():
     one, other = (
         Finding(code=code, channel="v_y", confidence=0.45, group=0.9) for code in ("lag", "delay")
