@@ -161,7 +161,7 @@ class Read:
     Parameters
     ----------
     best : the reading that is taken.
-    other : the next best, None where nothing comes near.
+    other : the next best that means something else.
     """
 
     best: Explanation
