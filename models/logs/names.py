@@ -15,9 +15,19 @@ from typing import NamedTuple
 import numpy as np
 
 from models.logs.log import Channel, Heading, LogFile, RecordingError
-from models.logs.signals import BETA, COLUMNS, NEEDED, QUANTITIES, Signal
+from models.logs.signals import (
+    AHEAD,
+    BETA,
+    COLUMNS,
+    NEEDED,
+    QUANTITIES,
+    WHEELS,
+    Signal,
+    quantity_of,
+)
 from models.logs.stamps import typical_rate
 from models.logs.units import ANGLE, FORCE, RATE, is_told, quantities, to_si
+from models.logs.wheel_names import ahead_words, wheel_words
 
 SURE = 0.8  # confidence from which a proposal is used without being told to
 STANDARD, KNOWN, WORDS, VAGUE = 1.0, 0.95, 0.9, 0.82  # our own name, a logger's, its words, one
@@ -48,12 +58,12 @@ VELOCITY = "vel|velocity|v|speed|spd|geschwindigkeit|geschw"
 ACCELERATIONS = "acc|accel|acceleration|a|beschleunigung|beschl|gforce"
 YAW = "yaw|gier|psi"
 CHANGE = "rate|vel|velocity|speed|geschwindigkeit|dot|p|d"
-WHEELS = ("wheel", "wheels", "tire", "tyre", "rad", "reifen", "whl")
+WHEEL_WORDS = ("wheel", "wheels", "tire", "tyre", "rad", "reifen", "whl")
 CORNERS = ("fl", "fr", "rl", "rr", "vl", "vr", "hl", "hr", "lf", "rf", "lr")
 REFERENCE = ("cmd", "command", "target", "desired", "des", "ref", "request", "req", "limit", "max",
              "min", "std", "stddev", "var", "cov", "covariance", "err", "error", "quality", "valid",
              "status", "soll", "accuracy", "sigma", "bias", "offset", "dev")  # fmt: skip
-NOT_BODY = (*WHEELS, *CORNERS, *REFERENCE)
+NOT_BODY = (*WHEEL_WORDS, *CORNERS, *REFERENCE)
 RULES: Mapping[str, Rule] = {
     "v_x": Rule(
         ("vx", "velx", "xvel", "velocityx", "vxb", "vlon", "vlong", "vellong", "vellon", "velfwd",
@@ -263,13 +273,17 @@ def name_confidence(signal: str, name: str) -> float:
 
     Parameters
     ----------
-    signal : one of `RULES`.
+    signal : one of `RULES`, a wheel or a_x.
     name : of the channel.
     """
     ours = (COLUMNS.get(signal, signal), signal)
     if name in ours:
         return STANDARD
     listed = words_of(name)
+    if signal in WHEELS:
+        return WORDS if wheel_words(signal, listed) else 0.0
+    if signal == AHEAD:
+        return WORDS if ahead_words(listed) else 0.0
     rule, words = RULES[signal], frozenset(listed)
     ends = ["".join(listed[k:]) for k in range(len(listed))]
     if set(rule.known) & set(ends[:1]):
@@ -356,7 +370,7 @@ def _candidates(signal: str, listed: Sequence[Heading]) -> list[Guess]:
 
 def _with_unit(signal: str, one: Heading, guess: Guess) -> Guess:
     """Return a guess by what the unit says of it."""
-    quantity = QUANTITIES[signal]
+    quantity = quantity_of(signal, one.unit)
     if not is_told(one.unit):
         if guess.confidence == STANDARD:  # names of ours are in SI, as the documents say
             return guess

@@ -13,11 +13,14 @@ import numpy as np
 
 from codegen.arrays import Array, filled
 from models.logs.log import RecordingError
-from models.logs.units import ACCELERATION, ANGLE, FORCE, RATE, SPEED
+from models.logs.units import ACCELERATION, ANGLE, FORCE, RATE, SPEED, TURNS, quantities
 from models.schema import shown
 
 BETA = "beta"
 INSTEAD = {"v_y": BETA, BETA: "v_y"}  # one of them is read, never both
+AXLES = (("wheel_fl", "wheel_fr"), ("wheel_rl", "wheel_rr"))
+WHEELS = (*AXLES[0], *AXLES[1], "wheel")  # as turns or as speeds; the last is that of an encoder
+AHEAD = "a_x"  # it helps wheels alone, which stand in for v_x
 NEEDED = ("v_x", "v_y", "r", "delta_f")  # beta may stand in for v_y, or a_y, less surely
 QUANTITIES: Mapping[str, str] = MappingProxyType(
     {
@@ -30,9 +33,12 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
         "a_y": ACCELERATION,
         "Fyf": FORCE,
         "Fyr": FORCE,
+        AHEAD: ACCELERATION,
+        **dict.fromkeys(WHEELS, SPEED),  # or rates of turns, `quantity_of`
     }
 )
-COLUMNS = {"v_x": "vx", "v_y": "vy", "a_y": "ay"}  # what a column is called where it differs
+# What a column is called where it differs.
+COLUMNS = {"v_x": "vx", "v_y": "vy", "a_y": "ay", AHEAD: "ax"}
 MEANINGS: Mapping[str, str] = MappingProxyType(
     {
         "v_x": "forward speed",
@@ -44,19 +50,38 @@ MEANINGS: Mapping[str, str] = MappingProxyType(
         "a_y": "lateral acceleration",
         "Fyf": "front axle force",
         "Fyr": "rear axle force",
+        AHEAD: "acceleration along the car",
+        "wheel_fl": "speed of the front left wheel",
+        "wheel_fr": "speed of the front right wheel",
+        "wheel_rl": "speed of the rear left wheel",
+        "wheel_rr": "speed of the rear right wheel",
+        "wheel": "speed of the wheels, by one encoder",
     }
 )
 LARGEST_RATIO = 1e3  # of hand wheel over road wheel, either way
 
 
 def told_by(signals: Iterable[str]) -> set[str]:
-    """Return what signals tell, by name; beta tells v_y.
+    """Return what signals tell, by name; beta tells v_y, wheels tell v_x.
 
     Parameters
     ----------
     signals : our names.
     """
-    return {"v_y" if name == BETA else name for name in signals}
+    stands_for = {BETA: "v_y", **dict.fromkeys(WHEELS, "v_x")}
+    return {stands_for.get(name, name) for name in signals}
+
+
+def quantity_of(name: str, unit: str) -> str:
+    """Return what a signal is; of wheels a speed or a rate, as the unit has it.
+
+    Parameters
+    ----------
+    name : of the signal, ours.
+    unit : as written.
+    """
+    turns = [one for one in quantities(unit) if one in (RATE, TURNS)]
+    return turns[0] if name in WHEELS and turns else QUANTITIES[name]
 
 
 def signal_name(name: str) -> str | None:

@@ -11,8 +11,10 @@ from models.schema import shown
 
 SPEED, ANGLE, RATE = "speed", "angle", "yaw rate"
 ACCELERATION, FORCE, TIME = "acceleration", "force", "time"
+TURNS = "rate of turns"  # of wheels; in rad/s it is called a rate as that of yaw
 SI = {SPEED: "m/s", ANGLE: "rad", RATE: "rad/s", ACCELERATION: "m/s^2", FORCE: "N", TIME: "s"}
 
+REVOLUTION = 2.0 * math.pi
 DEGREE, POUND, FOOT, MILE = math.pi / 180.0, 4.4482216152605, 0.3048, 1609.344
 G = 9.80665  # standard acceleration of free fall, by which "g" and "kgf" are defined [m/s^2]
 PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1.0 / 60.0, "h": 1.0 / 3600.0}
@@ -87,11 +89,20 @@ FACTORS = {
         "kgf": G,
         "kp": G,
     },
+    TURNS: {
+        "rpm": REVOLUTION / 60.0,
+        "1/min": REVOLUTION / 60.0,
+        "u/min": REVOLUTION / 60.0,
+        "rev/min": REVOLUTION / 60.0,
+        "rps": REVOLUTION,
+        "rev/s": REVOLUTION,
+        "u/s": REVOLUTION,
+        "hz": REVOLUTION,
+    },
     TIME: {spelling: 1.0 / PER_SECOND[unit] for spelling, unit in _TIMES.items()},
 }
 OTHERS = {  # what else loggers log, so that an error can say what a unit is of
     "length": ("m", "mm", "cm", "km", "ft", "in", "mi"),
-    "rate of turns": ("rpm", "1/min", "u/min", "rev/min"),
     "torque": ("nm", "n*m", "lbft", "lb-ft", "ft-lb"),
     "pressure": ("bar", "mbar", "kpa", "pa", "psi", "hpa"),
     "temperature": ("c", "degc", "f", "degf", "k"),
@@ -99,7 +110,7 @@ OTHERS = {  # what else loggers log, so that an error can say what a unit is of
     "current": ("a", "ma"),
     "share": ("%", "percent", "ratio"),
     "mass": ("kg", "t"),
-    "frequency": ("hz", "khz"),
+    "frequency": ("khz",),
     "power": ("kw", "w", "hp"),
 }
 NO_UNIT = ("", "-", "none", "1", "unitless", "n/a", "si")
@@ -236,6 +247,7 @@ def _typical(quantity: str) -> tuple[str, ...]:
         ACCELERATION: ("m/s^2", "g"),
         FORCE: ("N", "kN", "lbf"),
         TIME: ("s", "ms", "us", "ns"),
+        TURNS: ("rpm", "1/min", "Hz"),
     }[quantity]
 
 

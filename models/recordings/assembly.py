@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from scipy.signal import butter, lfilter, lfilter_zi
@@ -20,10 +20,10 @@ from models.logs.clock import (
     without_empty,
 )
 from models.logs.log import Channel, Heading, LogFile, RecordingError, one_run
-from models.logs.signals import BETA, QUANTITIES, Signal
+from models.logs.signals import AHEAD, BETA, QUANTITIES, WHEELS, Signal, quantity_of
 from models.logs.spelling import without_unit
 from models.logs.units import TIME, is_told, to_si
-from models.recordings.choice import chosen_signals, column_of, listing
+from models.recordings.choice import BESIDE, chosen_signals, column_of, has_wheels, listing
 from models.recordings.map import AXES, LogMap
 from models.recordings.record import (
     LARGEST,
@@ -33,10 +33,21 @@ from models.recordings.record import (
     resample,
     side_by_side,
 )
+from models.recordings.wheel_scale import learnt_scales, scale_text, wheel_factor
+from models.recordings.wheels import rolled
 from models.schema import require_few, shown
 
 SHORTEST = 1.0  # [s]: a stretch of less teaches nothing, since learning waits half a second
-FIELDS = {"Fyf": "axle_force", "Fyr": "axle_force", BETA: "delta_f"}
+FIELDS = {
+    "Fyf": "axle_force",
+    "Fyr": "axle_force",
+    BETA: "delta_f",
+    AHEAD: "a_y",
+    **dict.fromkeys(WHEELS, "v_x"),
+}
+
+
+T = TypeVar("T")
 
 
 class Stretches(NamedTuple):
@@ -76,9 +87,20 @@ def recording_of(
     headings = log.headings()
     reading = chosen_signals(log, headings, log_map, run)
     wants_clock = _wants_clock(log, headings, log_map.clock)
-    parts = _channels(log, label, reading.signals, log_map if wants_clock else None, run)
-    stretches = _stretches(label, reading.signals, parts, log_map, dt)
+    signals = reading.signals
+    parts = _channels(log, label, signals, log_map, run, wants_clock=wants_clock)
+    learnt = ""
+    if "v_x" in signals and has_wheels(signals):
+        learnt = scale_text(learnt_scales(parts, signals, _wheel_units(headings, signals)))
+    if "v_x" in signals:
+        signals, parts = _without_wheels(signals), _without_wheels(parts)
+    stretches = _stretches(label, signals, parts, log_map, dt)
+    rolls = ""
+    if has_wheels(signals):
+        kept, rolls = _on_wheels(label, stretches.kept, log_map, dt)
+        stretches = stretches._replace(kept=kept)
     notes = (*_notes(log), *reading.notes, *_gap_notes(stretches.kept))
+    notes += tuple(note for note in (learnt, rolls) if note)
     if stretches.short:
         several = "es" if stretches.short > 1 else ""
         notes += (f"left out: {stretches.short} stretch{several} of less than {_shortest(dt):g} s",)
@@ -109,9 +131,19 @@ def _wants_clock(log: LogFile, headings: Sequence[Heading], clock: str) -> bool:
 
 
 def _channels(
-    log: LogFile, label: str, signals: Mapping[str, Signal], timed: LogMap | None, run: str | None
+    log: LogFile,
+    label: str,
+    signals: Mapping[str, Signal],
+    log_map: LogMap,
+    run: str | None,
+    *,
+    wants_clock: bool,
 ) -> dict[str, list[Raw]]:
-    """Return by signal its channels in SI, each on its own clock, or on that which a map names."""
+    """Return by signal its channels in SI, each on its own clock, or on that which a map names.
+
+    Turns of wheels become speeds, where there is no v_x that tells their radius.
+    """
+    timed = log_map if wants_clock else None
     names = list(dict.fromkeys(one for signal in signals.values() for one in signal.channel))
     asked = names if timed is None else [*names, timed.clock]
     by_name = dict(zip(asked, log.read(asked, run), strict=True))
@@ -128,7 +160,9 @@ def _channels(
             unit = signal.unit if is_told(signal.unit) else channel.unit
             what = f"{label}: {column_of(ours)}"
             what += "" if name == column_of(ours) else f" (channel {name!r})"
-            factor = to_si(unit, QUANTITIES[ours], what)
+            factor = to_si(unit, quantity_of(ours, unit), what)
+            if ours in WHEELS and "v_x" not in signals:
+                factor *= wheel_factor(what, ours, unit, log_map.wheels)
             _require_finite(label, column_of(ours), channel)
             values = scaled(channel.values, factor)
             _require_of_a_car(label, ours, values, channel)
@@ -303,6 +337,48 @@ def _recording(name: str, stretch: Stretch, log_map: LogMap, dt: float) -> Recor
         delta_r=signals["delta_r"] if "delta_r" in signals else np.zeros(t.size),
         a_y=signals.get("a_y"),
         axle_force=force,
+    )
+
+
+def _wheel_units(headings: Sequence[Heading], signals: Mapping[str, Signal]) -> dict[str, str]:
+    """Return the units of wheels, told or else of the file, by signal."""
+    units = {one.name: one.unit for one in headings}
+    return {
+        name: one.unit if is_told(one.unit) else units[one.channel[0]]
+        for name, one in signals.items()
+        if name in WHEELS
+    }
+
+
+def _without_wheels(by_name: Mapping[str, T]) -> dict[str, T]:
+    return {name: one for name, one in by_name.items() if name not in BESIDE}
+
+
+def _on_wheels(
+    label: str, stretches: Sequence[Stretch], log_map: LogMap, dt: float
+) -> tuple[list[Stretch], str]:
+    """Return stretches with v_x in place of wheels, and how far these were trusted, in words."""
+    found, gated, held, n = [], 0, 0, 0
+    wheels, repair, sign = log_map.wheels, log_map.repair, AXES[log_map.axes]
+    for one in stretches:
+        still = np.zeros(one.t.size)
+        speeds = {name: values for name, values in one.signals.items() if name in WHEELS}
+        turns = {  # as they were driven: wheels are brought to the center of gravity by them
+            name: sign * repair.factor.get(name, 1.0) * one.signals.get(name, still)
+            - repair.offset.get(name, 0.0)
+            for name in ("r", "delta_f", "delta_r")
+        }
+        try:
+            told = rolled(speeds, **turns, wheels=wheels, dt=dt, a_x=one.signals.get(AHEAD))
+        except RecordingError as error:
+            raise RecordingError(f"{label}: {error}") from None
+        signals = {"v_x": told.v_x, **_without_wheels(one.signals)}
+        found.append(one._replace(signals=signals))
+        gated, held, n = gated + told.gated, held + told.held, n + one.t.size
+    names = ", ".join(name for name in WHEELS if name in stretches[0].signals)
+    return found, (
+        f"vx is made of {names}: at {100.0 * gated / n:.2g} % of the samples a wheel slipped and "
+        f"was left out, at {100.0 * held / n:.2g} % all were, and the speed went on as before"
     )
 
 

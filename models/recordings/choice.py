@@ -5,18 +5,20 @@ where every signal that is needed is sure. What was proposed is said in the reco
 something is not sure, the error says what it may be, and the word that tells it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 from models.logs.log import Heading, LogFile, RecordingError, some
 from models.logs.names import Proposal, propose
 from models.logs.signals import (
+    AHEAD,
     BETA,
     COLUMNS,
     INSTEAD,
     NEEDED,
     QUANTITIES,
+    WHEELS,
     Signal,
     require_fitting,
     told_by,
@@ -26,6 +28,7 @@ from models.logs.units import SI
 from models.recordings.map import LogMap
 from models.schema import shown
 
+BESIDE = (*WHEELS, AHEAD)  # of which v_x is made
 INVERSE = {"Fyf_inv": "Fyf", "Fyr_inv": "Fyr"}  # computed backwards from the motion
 
 
@@ -65,19 +68,22 @@ def chosen_signals(
     """
     names = [one.name for one in headings]
     by_map = as_listed(log, log_map.signals, names)
+    lost = _lost_text(log_map.signals, by_map)
     if log_map.is_complete:
-        return Reading(by_map, ())
+        return Reading(by_map, lost)
     told = _beside(standard_signals(log, names), by_map)
+    told = _without_wheels(told, by_map)
     missing = missing_signals(told)
     if has_v_y(told) and not missing:
-        return Reading(told, ())
+        return Reading(told, lost)
     _refuse_words(log, missing if has_v_y(told) else ["v_y", *missing], run)
     proposal = propose(log, headings, run)
-    found = likely_signals(told, proposal)
+    found = _without_wheels(likely_signals(told, proposal), by_map)
     if missing := missing_signals(found):
         raise RecordingError(missing_text(log, missing, proposal, names))
     notes = [_taken_text(name, found[name]) for name in found if name not in told]
-    return Reading(found, (*notes, *([] if has_v_y(found) else [_without_v_y_text(proposal)])))
+    without = [] if has_v_y(found) else [_without_v_y_text(proposal)]
+    return Reading(found, (*lost, *notes, *without))
 
 
 def as_listed(
@@ -85,7 +91,8 @@ def as_listed(
 ) -> dict[str, Signal]:
     """Return signals with the names of their channels as the log lists them.
 
-    A channel that is listed with its unit, "Vel Lat [km/h]", may be told without.
+    A channel that is listed with its unit, "Vel Lat [km/h]", may be told without. A v_x that is
+    not there is left out where wheels are told.
 
     Parameters
     ----------
@@ -106,13 +113,16 @@ def as_listed(
         channels = []
         for channel in signal.channel:
             likely = [channel] if channel in names else bare.get(channel, [])
+            if not likely and name == "v_x" and has_wheels(signals):
+                break
             if len(likely) != 1:
                 raise RecordingError(
                     f"{log.path}: there is no column {shown(channel)} to read as "
                     f"{column_of(name)}; {listing(likely or names)}"
                 )
             channels += likely
-        found[name] = replace(signal, channel=tuple(channels))
+        else:
+            found[name] = replace(signal, channel=tuple(channels))
     return found
 
 
@@ -125,10 +135,33 @@ def likely_signals(told: Mapping[str, Signal], proposal: Proposal) -> dict[str, 
     proposal : of the same log.
     """
     sure = {name: one for name, one in proposal.signals().items() if name not in told}
+    if has_wheels(told):
+        sure.pop("v_x", None)
+    if "v_x" in told_by(told) or "v_x" in proposal.guesses:
+        sure = {name: one for name, one in sure.items() if name not in WHEELS}
+    if not has_wheels((*sure, *told)):
+        sure.pop(AHEAD, None)
     found = _beside(sure, told)
     if ("Fyf" in found) != ("Fyr" in found):
         found = {name: one for name, one in found.items() if name not in ("Fyf", "Fyr")}
     return {name: found[name] for name in QUANTITIES if name in found}
+
+
+def has_wheels(signals: Iterable[str]) -> bool:
+    """Return whether there is the speed of a wheel, of which v_x can be made.
+
+    Parameters
+    ----------
+    signals : our names.
+    """
+    return any(name in WHEELS for name in signals)
+
+
+def _without_wheels(found: Mapping[str, Signal], by_map: Mapping[str, Signal]) -> dict[str, Signal]:
+    """Return signals without wheels that v_x has no need of and nobody told to learn of."""
+    if "v_x" not in found:
+        return dict(found)
+    return {name: one for name, one in found.items() if name not in BESIDE or name in by_map}
 
 
 def _refuse_words(log: LogFile, missing: list[str], run: str | None) -> None:
@@ -192,7 +225,7 @@ def missing_signals(signals: Mapping[str, Signal]) -> list[str]:
     ----------
     signals : by our name.
     """
-    there = {*signals, *(["v_y"] if has_v_y(signals) or "a_y" in signals else [])}
+    there = told_by(signals) | ({"v_y"} if "a_y" in signals else set())
     return [name for name in NEEDED if name not in there]
 
 
@@ -210,6 +243,14 @@ def _taken_text(name: str, signal: Signal) -> str:
     channels = [without_unit(one) for one in signal.channel]
     unit = f" [{signal.unit}]" if signal.unit else ""
     return f"{column_of(name)} is taken from {' + '.join(channels)}{unit}, by its name"
+
+
+def _lost_text(told: Mapping[str, Signal], listed: Mapping[str, Signal]) -> tuple[str, ...]:
+    """Return what is said where the v_x that a map tells is not in the log, and wheels are."""
+    if "v_x" not in told or "v_x" in listed:
+        return ()
+    channels = " + ".join(told["v_x"].channel)
+    return (f"there is no column {shown(channels)}: vx is made of the wheels",)
 
 
 def _without_v_y_text(proposal: Proposal) -> str:

@@ -28,16 +28,18 @@ from models.logs.signals import (
     NEEDED,
     QUANTITIES,
     Signal,
+    quantity_of,
     require_fitting,
     signal_name,
     told_by,
 )
 from models.logs.units import to_si
 from models.recordings.repair import Repair
+from models.recordings.wheels import Wheels
 from models.schema import Table, read_toml, shown
 
 AXES = {"ISO": 1.0, "SAE": -1.0}  # sign of everything but speed: y left and z up, or both turned
-TABLES = ("file", "clock", "filters", "signals", "repair")
+TABLES = ("file", "clock", "filters", "signals", "wheels", "repair")
 SIGNAL_KEYS = tuple(one.name for one in fields(Signal))
 
 
@@ -47,7 +49,8 @@ class LogMap:
 
     Parameters
     ----------
-    signals : by our name (v_x, v_y or beta, r, delta_f, delta_r, a_y, Fyf, Fyr) how it is read.
+    signals : by our name (v_x or wheels, v_y or beta, r, delta_f, delta_r, a_y, Fyf, Fyr) how it is
+        read.
     axes : of the file: "ISO" (y to the left, z up) or "SAE" (y to the right, z down).
     run : which of the file's runs; empty where there is one.
     dbc : database of a CAN log, a path, in a log.toml from its folder; empty where there is none.
@@ -56,6 +59,7 @@ class LogMap:
     longest_gap : the log is cut where a channel has no sample for longer [s].
     low_pass : cut-off of a low pass on all signals [Hz]; None filters nothing. All pass the same
         one, of second order, which looks at no later sample: so none is late against another.
+    wheels : what they are, where v_x is made of their speeds.
     repair : what is taken out of the recording, and told of the car, after reading.
 
     Raises
@@ -72,6 +76,7 @@ class LogMap:
     clock_unit: str = ""
     longest_gap: float = LONGEST_GAP
     low_pass: float | None = None
+    wheels: Wheels = field(default_factory=Wheels)
     repair: Repair = field(default_factory=Repair)
 
     def __post_init__(self) -> None:
@@ -86,7 +91,7 @@ class LogMap:
             raise RecordingError(f"low_pass must be positive and finite, it is {self.low_pass}")
         for name, signal in self.signals.items():
             if signal.unit:
-                to_si(signal.unit, QUANTITIES[name], f"signals.{name}")
+                to_si(signal.unit, quantity_of(name, signal.unit), f"signals.{name}")
 
     @property
     def is_complete(self) -> bool:
@@ -147,6 +152,8 @@ class LogMap:
             inner = table.table("signals")
             inner.only(*QUANTITIES)
             given["signals"] = {key: _signal(inner.table(key), key) for key in inner.data}
+        if "wheels" in table:
+            given["wheels"] = Wheels.of_table(table.table("wheels"))
         if "repair" in table:
             given["repair"] = Repair.of_table(table.table("repair"))
         return cls(**given)
@@ -173,6 +180,7 @@ class LogMap:
         for name in QUANTITIES:
             if name in self.signals:
                 blocks.append(_block(f"signals.{name}", _signal_numbers(self.signals[name])))
+        blocks.append(_block("wheels", self.wheels.table()))
         repair = self.repair.tables()
         inner = {key: value for key, value in repair.items() if isinstance(value, dict)}
         blocks.append(_block("repair", {k: v for k, v in repair.items() if k not in inner}))

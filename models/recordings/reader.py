@@ -92,9 +92,10 @@ def read_repaired(
     RecordingError
         One line: file and run, column, rule, value, remedy.
     """
-    told = map_of(log_map)
+    told = with_columns(map_of(log_map), columns)
+    told = replace(told, wheels=told.wheels.completed(told.repair.on(vehicle)))
     judged = check and not told.repair
-    recording = read_recording(path, run, dt, check=judged, columns=columns, log_map=told)
+    recording = read_recording(path, run, dt, check=judged, log_map=told)
     if told.repair:
         recording, vehicle = told.repair.apply(recording, vehicle)
         note = f"repaired by the map: {repair_text(told.repair)}"

@@ -13,6 +13,7 @@ from models.logs.log import RecordingError
 from models.logs.signals import QUANTITIES, Signal
 from models.recordings import LogMap, Repair
 from models.recordings.map import told_signals
+from models.recordings.wheels import DRIVEN, Wheels
 
 finite = st.floats(-1e6, 1e6, allow_nan=False)
 factors = finite.filter(bool)
@@ -23,7 +24,7 @@ names = st.text(st.characters(exclude_categories=["Cs", "Cc"]), min_size=1, max_
 @st.composite
 def signals(draw) -> dict[str, Signal]:
     found = {}
-    chosen = draw(st.sets(st.sampled_from(["v_x", "r", "delta_f", "a_y", "v_y"])))
+    chosen = draw(st.sets(st.sampled_from(["v_x", "r", "delta_f", "a_y", "v_y", "wheel_rl"])))
     for name in sorted(chosen):
         steers = name == "delta_f"
         table = draw(st.booleans()) if steers else False
@@ -45,6 +46,14 @@ def signals(draw) -> dict[str, Signal]:
     words=st.lists(names, min_size=2, max_size=2),
     gap=positive,
     low_pass=st.none() | positive,
+    wheels=st.builds(
+        Wheels,
+        radius=st.sampled_from([(), (0.31,), (0.3, 0.32), (0.3, 0.31, 0.32, 0.33)]),
+        track=st.sampled_from([(), (1.5,), (1.5, 1.6)]),
+        wheelbase=st.none() | st.floats(1.0, 9.0),
+        driven=st.sampled_from(["", *DRIVEN]),
+        acceleration=st.floats(1.0, 50.0),
+    ),
     repair=st.builds(
         Repair,
         factor=st.dictionaries(st.sampled_from(["r", "v_y"]), factors),
@@ -54,7 +63,7 @@ def signals(draw) -> dict[str, Signal]:
     ),
 )
 def test_what_is_written_reads_back_bit_for_bit(
-    tmp_path_factory, told, axes, words, gap, low_pass, repair
+    tmp_path_factory, told, axes, words, gap, low_pass, wheels, repair
 ) -> None:
     made = LogMap(
         signals=told,
@@ -63,6 +72,7 @@ def test_what_is_written_reads_back_bit_for_bit(
         clock=words[1],
         longest_gap=gap,
         low_pass=low_pass,
+        wheels=wheels,
         repair=repair,
     )
     path = tmp_path_factory.mktemp("map") / "log.toml"
@@ -99,7 +109,7 @@ def test_an_empty_map_is_an_empty_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "rule"),
     [
-        ("[files]\n", "files is unknown, known are file, clock, filters, signals, repair"),
+        ("[files]\n", "files is unknown, known are file, clock, filters, signals, wheels, repair"),
         ("[file]\naxis = 'ISO'\n", "file.axis is unknown, known are axes, run, dbc"),
         ("[file]\naxes = 'NED'\n", "axes must be one of ISO, SAE, not 'NED'"),
         ("[signals.vy]\nchannel = 'a'\n", "signals.vy is unknown, known are v_x, v_y, beta"),

@@ -1,0 +1,50 @@
+"""Which channel is the speed of which wheel, by its name and unit."""
+
+import numpy as np
+import pytest
+
+from models.logs.names import RULES, SURE, name_confidence
+from models.logs.signals import WHEELS
+from tests.models.logs.test_names import WAVE, proposed
+
+CALLED = {
+    "wheel_fl": ["wheel_fl", "WheelSpeed_FL", "Wheel Speed FL", "WHL_SPD_FL", "ESP_VL_Radgeschw",
+                 "nWheelFL", "Vhcl.FL.rotv", "Wheel Speed Front Left", "v_Rad_VL", "omega_fl",
+                 "WheelSpeedFrontLeft", "/vehicle/wheel_speeds/lf.speed"],
+    "wheel_fr": ["WHEEL_SPEED_FR", "ws_fr", "Raddrehzahl vorne rechts", "wheelVel_RF"],
+    "wheel_rl": ["wheel_speed_rl", "omega_rl", "HL_Radgeschw", "WheelRPM_RL"],
+    "wheel_rr": ["ws_rr", "vWheelRR", "Wheel_Spd_RearRight", "WSPEED RR"],
+    "wheel": ["wheel", "wheel_speed", "encoder", "wheel_encoder", "WheelSpeed", "wheel rpm"],
+}  # fmt: skip
+NO_WHEEL = ["Engine RPM", "Steering Wheel Speed", "Wheel Slip FL", "Brake Pressure FL", "v_x",
+            "Tire Temp FL", "WheelSpeed_FL_valid", "Wheel Angle FL", "Suspension Travel FL",
+            "WheelBasedVehicleSpeed", "Ground Speed", "yaw rate", "encoder ticks"]  # fmt: skip
+
+
+@pytest.mark.parametrize(("signal", "name"), [(s, n) for s, all_ in CALLED.items() for n in all_])
+def test_a_name_of_a_logger_is_that_wheel_and_nothing_else(signal: str, name: str) -> None:
+    found = {one: name_confidence(one, name) for one in (*WHEELS, *RULES)}
+    assert found[signal] >= SURE
+    assert not any(value for one, value in found.items() if one != signal)
+
+
+@pytest.mark.parametrize("name", NO_WHEEL)
+def test_a_name_of_something_else_is_no_wheel(name: str) -> None:
+    assert not any(name_confidence(one, name) for one in WHEELS)
+
+
+@pytest.mark.parametrize("unit", ["rad/s", "rpm", "1/min", "Hz", "deg/s", "m/s", "km/h", "mph"])
+def test_a_wheel_turns_or_has_a_speed(unit: str) -> None:
+    found = proposed(("WheelSpeed_FL", unit, 30.0 + WAVE))
+    assert found.is_sure("wheel_fl") and found.guesses["wheel_fl"].unit == unit
+
+
+@pytest.mark.parametrize("unit", ["%", "bar", "", "deg", "m/s^2"])
+def test_a_wheel_of_another_unit_or_none_is_not_sure(unit: str) -> None:
+    assert not proposed(("WheelSpeed_FL", unit, 30.0 + WAVE)).is_sure("wheel_fl")
+
+
+def test_a_wheel_that_never_turns_or_is_there_twice_is_not_sure() -> None:
+    assert not proposed(("ws_rr", "rpm", np.full(200, 3.0))).is_sure("wheel_rr")
+    twice = proposed(("ws_rr", "rpm", 30.0 + WAVE), ("omega_rr", "rad/s", 3.0 + WAVE))
+    assert not twice.is_sure("wheel_rr") and len(twice.rivals["wheel_rr"]) == 2

@@ -1,0 +1,230 @@
+"""Forward speed of wheels: where nothing slips it is exact, and slip is found and left out."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.logs.log import RecordingError
+from models.maneuvers import RandomSteer
+from models.plant import Plant
+from models.recordings.wheel_scale import learnt_scale
+from models.recordings.wheels import Wheels, rolled
+from models.vehicle import sedan
+from tests.models.wheel_speeds import CORNERS, anti_lock, gentle_slip, rolling, shown, spin
+
+CAR = sedan()
+KNOWN = Wheels().completed(CAR)
+FRONT, REAR, ALL = (0, 1), (2, 3), (0, 1, 2, 3)
+
+
+def speed(t):
+    """Faster and slower by 4 m/s, then hard on the brakes from 30 s on."""
+    calm = 18.0 + 4.0 * np.sin(2.0 * np.pi * t / 20.0)
+    return np.where(t > 30.0, np.maximum(18.0 - 7.0 * (t - 30.0), 10.0), calm)
+
+
+@pytest.fixture(scope="module")
+def run():
+    steer = RandomSteer(
+        amplitude=np.radians(3.0), frequency=0.4, seed=3, onset=1.0, rate_limit=1.0, duration=39.99
+    )
+    return Plant(CAR).simulate(steer, speed=speed)
+
+
+def slipping(run, columns, slip):
+    """Gentle slip of all wheels and an event of some."""
+    slips = gentle_slip(run)
+    slips[:, columns] += np.column_stack([slip] * len(columns))
+    return slips
+
+
+def told(run, speeds, wheels=KNOWN):
+    return rolled(speeds, run.r, run.delta_f, run.delta_r, wheels, 0.01)
+
+
+def rms(away):
+    return float(np.sqrt(np.mean(away**2)))
+
+
+def against_mean(run, slips, wheels=KNOWN, seed=0):
+    """Errors of v_x, gated and by the mean of all wheels [m/s], and what was gated."""
+    speeds = shown(run, slips, np.random.default_rng(seed))
+    result = told(run, speeds, wheels)
+    mean = np.mean([*speeds.values()], axis=0)
+    return rms(result.v_x - run.v_x), rms(mean - run.v_x), result
+
+
+def test_a_rear_wheel_without_slip_tells_the_speed_of_the_center_of_gravity_exactly(run):
+    speeds = shown(run, np.zeros((run.t.size, 4)))
+    for name in CORNERS[2:]:
+        only = told(run, {name: speeds[name]})
+        np.testing.assert_allclose(only.v_x, run.v_x, atol=1e-9)
+        assert only.gated == only.held == 0
+
+
+def test_front_wheels_miss_it_by_side_slip_alone(run):
+    """The front wheels roll with v_y + l_f r, of which the slip angle of the rear is not known."""
+    speeds = shown(run, np.zeros((run.t.size, 4)))
+    front = told(run, {name: speeds[name] for name in CORNERS[:2]}).v_x - run.v_x
+    rear_slip = run.delta_r - np.arctan2(run.v_y - CAR.l_r * run.r, run.v_x)
+    missed = np.abs(np.sin(run.delta_f) * np.tan(rear_slip) * run.v_x)
+    assert np.abs(front).max() < 1.05 * missed.max() + 1e-6
+    uncorrected = rolling(run)[:, 0] - run.v_x
+    assert rms(front) < 0.2 * rms(uncorrected)
+
+
+def test_without_the_track_an_axle_tells_it_by_its_mean(run):
+    speeds = shown(run, np.zeros((run.t.size, 4)))
+    rear = told(run, {name: speeds[name] for name in CORNERS[2:]}, Wheels()).v_x
+    np.testing.assert_allclose(rear, run.v_x, atol=1e-9)
+    with pytest.raises(RecordingError, match=r"wheel_rl is alone .* \[wheels\] track"):
+        told(run, {"wheel_rl": speeds["wheel_rl"]}, Wheels())
+
+
+@pytest.mark.parametrize("driven", ["", "front", "all"])
+@pytest.mark.parametrize(
+    ("columns", "event"),
+    [
+        (FRONT, lambda t: spin(t, 8.0, 3.0, 0.3)),
+        (FRONT, lambda t: spin(t, 18.0, 2.5, 0.15, rise=1.2)),
+        ((1,), lambda t: spin(t, 8.0, 4.0, 0.5)),
+        (REAR, lambda t: spin(t, 8.0, 1.5, -1.0)),
+        (ALL, lambda t: spin(t, 8.0, 1.0, 0.3)),
+        (ALL, lambda t: anti_lock(t, 30.0, 1.5)),
+    ],
+    ids=["axle spins", "axle spins up slowly", "wheel spins", "handbrake", "all spin", "anti-lock"],
+)
+def test_slip_costs_a_fraction_of_what_it_costs_the_mean(run, driven, columns, event):
+    slips = slipping(run, columns, event(run.t))
+    ours, mean, result = against_mean(run, slips, replace(KNOWN, driven=driven))
+    assert ours < 0.3 * mean
+    assert ours < 0.2
+    assert result.gated > 50
+
+
+def test_wheels_that_all_agree_are_all_trusted_but_driven_ones_stand_back(run):
+    ours, mean, result = against_mean(run, gentle_slip(run))
+    assert ours < 1.05 * mean
+    assert result.gated < 0.01 * run.t.size and result.held == 0
+    free, _, _ = against_mean(run, gentle_slip(run), replace(KNOWN, driven="front"))
+    assert free < 0.9 * ours  # the sedan drives and brakes by its front wheels in the plant
+
+
+def test_a_lone_encoder_is_bounded_by_what_a_car_can_do(run):
+    slips = gentle_slip(run)
+    mean = np.mean([*shown(run, slips, np.random.default_rng(1)).values()], axis=0)
+    mean[1000:1003] = 80.0  # a spike
+    mean[2000:2004] = 0.0  # and a hole
+    wheels = replace(KNOWN, driven="all")
+    result = told(run, {"wheel": mean}, wheels)
+    assert rms(result.v_x - run.v_x) < 0.15
+    assert np.abs(np.diff(result.v_x)).max() < 0.5
+    assert result.held >= 7
+
+
+def test_no_sample_looks_at_a_later_one(run):
+    speeds = shown(run, slipping(run, ALL, anti_lock(run.t, 30.0, 1.5)), np.random.default_rng(2))
+    whole = told(run, speeds).v_x
+    n = 3075
+    cut = {name: one[:n] for name, one in speeds.items()}
+    begun = rolled(cut, run.r[:n], run.delta_f[:n], run.delta_r[:n], KNOWN, 0.01).v_x
+    np.testing.assert_array_equal(begun, whole[:n])
+
+
+def test_a_long_log_is_worked_through_in_blocks_that_leave_no_trace(run, monkeypatch):
+    import models.recordings.wheels as module
+
+    speeds = shown(run, slipping(run, FRONT, spin(run.t, 8.0, 3.0, 0.3)), np.random.default_rng(2))
+    whole = told(run, speeds)
+    pieces = lambda n: (slice(k, min(k + 7, n)) for k in range(0, n, 7))  # noqa: E731
+    monkeypatch.setattr(module, "blocks", pieces)
+    again = told(run, speeds)
+    np.testing.assert_array_equal(again.v_x, whole.v_x)
+    assert again[1:] == whole[1:]
+
+
+def random_slips(run, seed, most):
+    """Slip of one to `most` wheels at a time, six times: it sets in fast or slowly, either way."""
+    rng = np.random.default_rng(seed)
+    slips = gentle_slip(run)
+    for _ in range(6):
+        columns = rng.choice(4, size=rng.integers(1, most + 1), replace=False)
+        begin, size = rng.uniform(2.0, 24.0), rng.choice([-1.0, 1.0]) * rng.uniform(0.05, 0.6)
+        event = spin(run.t, begin, rng.uniform(0.2, 3.0), size, rise=rng.uniform(0.05, 1.0))
+        slips[:, columns] += event[:, None]
+    return np.maximum(slips, -1.0)
+
+
+def test_of_random_events_that_leave_a_wheel_rolling_few_are_noticed_in_the_speed(run):
+    errors = []
+    for seed in range(16):
+        ours, mean, result = against_mean(run, random_slips(run, seed, 3), seed=seed)
+        errors.append(ours / mean)
+        assert np.abs(result.v_x - run.v_x)[run.t > 36.0].max() < 0.5  # it comes back
+    assert np.median(errors) < 0.1
+    assert max(errors) < 1.0
+
+
+def test_where_all_wheels_slip_an_acceleration_along_the_car_carries_over(run):
+    felt = run.a_x + 0.3 + 0.2 * np.random.default_rng(9).standard_normal(run.t.size)
+    with_it, without, mean = [], [], []
+    for seed in range(12):
+        speeds = shown(run, random_slips(run, seed, 4), np.random.default_rng(seed))
+        motion = run.r, run.delta_f, run.delta_r
+        for found, one in ((with_it, felt), (without, None)):
+            away = rolled(speeds, *motion, KNOWN, 0.01, one).v_x - run.v_x
+            found.append(rms(away))
+            assert np.abs(away)[run.t > 36.0].max() < 0.5
+        mean.append(rms(np.mean([*speeds.values()], axis=0) - run.v_x))
+    assert np.median(np.divide(with_it, mean)) < 0.2
+    assert rms(np.array(with_it)) < 0.5 * rms(np.array(without))
+
+
+@pytest.mark.parametrize(
+    ("given", "rule"),
+    [
+        ({"radius": (0.001,)}, "wheels: radius must lie between 0.01 and 2, it is 0.001"),
+        ({"radius": (0.3, float("nan"))}, "wheels: radius must lie between"),
+        ({"radius": (0.3, 0.3, 0.3)}, "one per axle or one per wheel, not 3 numbers"),
+        ({"track": (-1.5,)}, "wheels: track must lie between"),
+        ({"track": (1.5, 1.5, 1.5)}, "wheels: track must be one number or one per axle"),
+        ({"wheelbase": 0.0}, "wheels: wheelbase must lie between"),
+        ({"acceleration": float("inf")}, "wheels: acceleration must lie between"),
+        ({"driven": "left"}, "wheels: driven must be one of front, rear, all, none, not 'left'"),
+    ],
+)
+def test_what_no_wheels_have_is_refused_in_one_line(given, rule):
+    with pytest.raises(RecordingError) as caught:
+        Wheels(**given)
+    assert rule in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_each_wheel_has_its_radius():
+    assert Wheels().radius_of("wheel_fl") is None
+    assert Wheels(radius=(0.3,)).radius_of("wheel_rr") == 0.3
+    axles = Wheels(radius=(0.3, 0.4))
+    assert [axles.radius_of(name) for name in (*CORNERS, "wheel")] == [0.3, 0.3, 0.4, 0.4, 0.4]
+    corners = Wheels(radius=(0.30, 0.31, 0.32, 0.34))
+    assert [corners.radius_of(name) for name in CORNERS] == [0.30, 0.31, 0.32, 0.34]
+    assert corners.radius_of("wheel") == pytest.approx(0.33)
+
+
+# The radius by a second speed.
+
+
+def test_straight_driving_tells_the_radius_and_slip_does_not(run):
+    slips = slipping(run, REAR, spin(run.t, 8.0, 3.0, 0.3))
+    speeds = shown(run, slips, np.random.default_rng(0), noise=0.03)
+    gnss = run.v_x + 0.05 * np.random.default_rng(1).standard_normal(run.t.size)
+    value, seconds = learnt_scale(run.t, gnss, run.r, speeds["wheel_rl"] / 0.317)
+    assert value == pytest.approx(0.317, rel=2e-3)
+    assert 2.0 < seconds < 30.0
+
+
+def test_where_nothing_is_straight_or_nothing_agrees_no_radius_is_told(run):
+    speeds = shown(run, gentle_slip(run))
+    assert learnt_scale(run.t, run.v_x, run.r + 0.3, speeds["wheel_rl"]) is None
+    unlike = 20.0 + 5.0 * np.random.default_rng(0).standard_normal(run.t.size)
+    assert learnt_scale(run.t, run.v_x, run.r, unlike) is None
+    assert learnt_scale(run.t, run.v_x, run.r, np.zeros(run.t.size)) is None
