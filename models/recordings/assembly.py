@@ -33,7 +33,7 @@ from models.recordings.record import (
     resample,
     side_by_side,
 )
-from models.recordings.wheel_scale import learnt_scales, scale_text, wheel_factor
+from models.recordings.wheel_scale import Scale, learnt_scales, scale_text, wheel_factor
 from models.recordings.wheels import rolled
 from models.schema import require_few, shown
 
@@ -87,13 +87,12 @@ def recording_of(
     headings = log.headings()
     reading = chosen_signals(log, headings, log_map, run)
     wants_clock = _wants_clock(log, headings, log_map.clock)
-    signals = reading.signals
-    parts = _channels(log, label, signals, log_map, run, wants_clock=wants_clock)
-    learnt = ""
-    if "v_x" in signals and has_wheels(signals):
-        learnt = scale_text(learnt_scales(parts, signals, _wheel_units(headings, signals)))
+    signals, learnt = reading.signals, ""
     if "v_x" in signals:
-        signals, parts = _without_wheels(signals), _without_wheels(parts)
+        if has_wheels(signals):
+            learnt = _scale_note(log, signals, log_map, run)
+        signals = _without_wheels(signals)
+    parts = _channels(log, label, signals, log_map, run, wants_clock=wants_clock)
     stretches = _stretches(label, signals, parts, log_map, dt)
     rolls = ""
     if has_wheels(signals):
@@ -340,8 +339,48 @@ def _recording(name: str, stretch: Stretch, log_map: LogMap, dt: float) -> Recor
     )
 
 
-def _wheel_units(headings: Sequence[Heading], signals: Mapping[str, Signal]) -> dict[str, str]:
-    """Return the units of wheels, told or else of the file, by signal."""
+def wheel_scales(
+    log: LogFile, signals: Mapping[str, Signal], log_map: LogMap, run: str | None
+) -> dict[str, Scale]:
+    """Return how wheels roll by the v_x that is logged as well, by name of the wheel.
+
+    Parameters
+    ----------
+    log : as a format reads it.
+    signals : v_x, wheels, and r where it is there; others are not looked at.
+    log_map : how the log is read.
+    run : of the log.
+
+    Raises
+    ------
+    RecordingError
+        Where a channel of them cannot be read.
+    """
+    headings = log.headings()
+    of_wheels = {name: signals[name] for name in ("v_x", "r", *WHEELS) if name in signals}
+    wants_clock = _wants_clock(log, headings, log_map.clock)
+    parts = _channels(log, str(log.path), of_wheels, log_map, run, wants_clock=wants_clock)
+    return learnt_scales(parts, of_wheels, wheel_units(headings, of_wheels))
+
+
+def _scale_note(
+    log: LogFile, signals: Mapping[str, Signal], log_map: LogMap, run: str | None
+) -> str:
+    """Return what v_x tells of the wheels, which nothing else is read of."""
+    try:
+        return scale_text(wheel_scales(log, signals, log_map, run))
+    except RecordingError as error:
+        return f"of the wheels nothing is learnt: {error}"
+
+
+def wheel_units(headings: Sequence[Heading], signals: Mapping[str, Signal]) -> dict[str, str]:
+    """Return the units of wheels, told or else of the file, by signal.
+
+    Parameters
+    ----------
+    headings : of the log's channels.
+    signals : how each is read.
+    """
     units = {one.name: one.unit for one in headings}
     return {
         name: one.unit if is_told(one.unit) else units[one.channel[0]]

@@ -147,6 +147,24 @@ def likely_signals(told: Mapping[str, Signal], proposal: Proposal) -> dict[str, 
     return {name: found[name] for name in QUANTITIES if name in found}
 
 
+def with_wheels(signals: Mapping[str, Signal], proposal: Proposal) -> dict[str, Signal]:
+    """Return signals and, beside a v_x, the wheels of which it tells how they roll.
+
+    Parameters
+    ----------
+    signals : by our name.
+    proposal : of the same log.
+    """
+    if "v_x" not in signals:
+        return dict(signals)
+    there = {channel for one in signals.values() for channel in one.channel}
+    sure = {name: one for name, one in proposal.signals().items() if name in WHEELS}
+    more = {name: one for name, one in sure.items() if not there & set(one.channel)}
+    return {name: one for name, one in signals.items() if name != AHEAD} | {
+        name: one for name, one in more.items() if name not in signals
+    }
+
+
 def has_wheels(signals: Iterable[str]) -> bool:
     """Return whether there is the speed of a wheel, of which v_x can be made.
 

@@ -12,26 +12,31 @@ import numpy as np
 from codegen.escape import visible
 from models.files import write_atomically
 from models.logs.door import open_log
-from models.logs.log import Channel, Listed, LogFile, one_run, some
+from models.logs.log import Channel, Listed, LogFile, RecordingError, one_run, some
 from models.logs.names import Proposal, propose
 from models.logs.signals import MEANINGS, NEEDED, Signal
-from models.recordings import split_log_argument
+from models.recordings import LogMap, split_log_argument
+from models.recordings.assembly import wheel_scales, wheel_units
 from models.recordings.choice import (
     as_listed,
     column_of,
     column_word,
     has_v_y,
+    has_wheels,
     likely_signals,
     likely_text,
     missing_signals,
     standard_signals,
+    with_wheels,
 )
+from models.recordings.wheel_scale import scale_text, wheel_factor, with_scales
 from tireid.commands import COMMANDS, DONE, FAILS
 from tireid.commands.options import add_force, add_log_map, told_map
 from tireid.output import require_free, text_table
 from tireid.progress import say, tell
 
 MOST_NUMBERS = 5e7  # that are read to tell ranges; of a larger log only those of likely channels
+NO_RADIUS = "\n# [wheels]\n# radius =   # by which a wheel rolls [m]\n"
 LONGEST_NAME = 48  # letters of a channel in the table
 
 
@@ -72,6 +77,7 @@ def run(options: argparse.Namespace) -> int:
     proposal = propose(log, log.headings(), chosen)
     by_map = as_listed(log, told.signals, names)
     signals = likely_signals({**standard_signals(log, names), **by_map}, proposal)
+    signals = with_wheels(signals, proposal)
     missing = missing_signals(signals)
     tell("\n".join(_head(log, chosen)))
     seen = _seen(log, listed, signals, chosen)
@@ -79,16 +85,47 @@ def run(options: argparse.Namespace) -> int:
     if not has_v_y(signals) and not missing:
         tell(f"{column_of('a_y')} is there: without vy, identify estimates it")
     tell(missing_text(options.log, missing, proposal))
+    said, of_wheels, rolls = _wheels(log, signals, told, chosen)
+    if said:
+        tell(said)
     if options.write is not None:
-        text = replace(told, signals=signals).toml(options.write.parent)
-        write_atomically(options.write, text + unsure_toml(missing, proposal))
+        text = of_wheels.toml(options.write.parent)
+        text += unsure_toml(missing, proposal) + ("" if rolls else NO_RADIUS)
+        write_atomically(options.write, text)
         say(f"wrote {options.write}" + (": what is missing stands behind # in it" * bool(missing)))
-    return FAILS if missing else DONE
+    return DONE if rolls and not missing else FAILS
 
 
 def _run_of(log: LogFile, name: str) -> str | None:
     names = log.runs()
     return one_run(log.path, names if name else names[:1], name or None)
+
+
+def _wheels(
+    log: LogFile, signals: Mapping[str, Signal], told: LogMap, run: str | None
+) -> tuple[str, LogMap, bool]:
+    """Return what is said of wheels, the map with what is learnt, and whether v_x is known."""
+    plain = replace(told, signals=signals)
+    if not has_wheels(signals):
+        return "", plain, True
+    if "v_x" in signals:
+        try:
+            scales = wheel_scales(log, signals, told, run)
+        except RecordingError as error:
+            return f"of the wheels nothing is learnt: {error}", _without_wheels(plain), True
+        wheels, scaled = with_scales(told.wheels, signals, scales)
+        return scale_text(scales), replace(told, wheels=wheels, signals=scaled), True
+    try:
+        for name, unit in wheel_units(log.headings(), signals).items():
+            wheel_factor(column_of(name), name, unit, told.wheels)
+    except RecordingError as error:
+        return str(error), plain, False
+    return "vx is made of the wheels", plain, True
+
+
+def _without_wheels(told: LogMap) -> LogMap:
+    kept = {name: one for name, one in told.signals.items() if not has_wheels((name,))}
+    return replace(told, signals=kept)
 
 
 def _head(log: LogFile, run: str | None) -> list[str]:

@@ -1,0 +1,171 @@
+"""Logs of an IMU, wheel speeds and steering alone, wheels that spin included: learnt end to end."""
+
+import csv
+import json
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import tireid as ti
+from models.maneuvers import RandomSteer
+from models.plant import Plant
+from models.recordings import LogMap, Recording
+from models.recordings.wheels import Wheels
+from tests.models.wheel_speeds import CORNERS, anti_lock, gentle_slip, shown, spin
+from tireid.cli import main
+
+CAR = ti.sedan()
+RADIUS = np.array([0.314, 0.315, 0.318, 0.317])
+RPM = 30.0 / np.pi
+
+
+def driven(seed, amplitude, speed):
+    steer = RandomSteer(
+        amplitude=np.radians(amplitude),
+        frequency=0.5,
+        seed=seed,
+        onset=4.0,
+        rate_limit=1.0,
+        duration=29.99,
+    )
+    return Plant(CAR).simulate(steer, speed=speed, name=f"drive{seed}")
+
+
+@pytest.fixture(scope="module")
+def run():
+    return driven(3, 4.0, lambda t: 19.0 + 1.5 * np.sin(0.5 * t))
+
+
+@pytest.fixture(scope="module")
+def wheels(run):
+    """The front wheels, which drive, spin three times; once all are braked at the limit."""
+    t, slips = run.t, gentle_slip(run)
+    spins = (7.0, 2.0, 0.3, 0.15), (13.0, 1.5, 0.2, 0.6), (22.0, 2.5, 0.4, 0.3)
+    for begin, lasts, size, rise in spins:
+        slips[:, :2] += spin(t, begin, lasts, size, rise)[:, None]
+    for k in range(4):
+        slips[:, k] += anti_lock(t, 18.0, 1.0, frequency=6.0 + 0.7 * k, phase=0.23 * k)
+    return shown(run, slips, np.random.default_rng(0))
+
+
+def imu(run, seed=1):
+    """What an IMU and the steering show, with noise and a bias."""
+    rng, n = np.random.default_rng(seed), run.t.size
+    return {
+        "t": run.t,
+        "r": run.r + 0.002 * rng.normal(size=n),
+        "delta_f": run.delta_f,
+        "ay": run.a_y + 0.05 + 0.1 * rng.normal(size=n),
+    }
+
+
+def errors(run, recording):
+    """Side slip [deg] that is missed, and frozen forces as a share, worst of both axles."""
+    history = ti.identify(recording, CAR, check=False)
+    exact = run.recording()
+    away = np.degrees(history.recording.v_y / history.recording.v_x - run.v_y / run.v_x)[400:]
+    missed = history.freeze().predict(exact) - exact.axle_force
+    share = np.sqrt((missed**2).mean(axis=0) / (exact.axle_force**2).mean(axis=0))
+    return float(np.sqrt(np.mean(away**2))), float(share.max())
+
+
+def test_side_slip_and_forces_stay_right_while_driven_wheels_spin(run, wheels):
+    signals = imu(run)
+    known = LogMap(wheels=Wheels().completed(CAR))
+    gated = Recording.from_dataframe({**signals, **wheels}, log_map=known)
+    mean = np.mean([*wheels.values()], axis=0)
+    ungated = Recording.from_dataframe({**signals, "vx": mean}, check=False)
+    exact = Recording.from_dataframe({**signals, "vx": run.v_x})
+    slip, force = errors(run, gated)
+    slip_of_exact, force_of_exact = errors(run, exact)
+    slip_of_mean, force_of_mean = errors(run, ungated)
+    assert slip < 1.3 * slip_of_exact + 0.02
+    assert force < 1.2 * force_of_exact + 0.01
+    assert slip_of_mean > 1.5 * slip
+    assert force_of_mean > force
+
+
+def write(path, data):
+    with path.open("w", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(data)
+        table.writerows(np.column_stack([*data.values()]).tolist())
+    return str(path)
+
+
+def logger(run, wheels, **more):
+    """The log as a logger writes it: turns of wheels per minute, degrees, g."""
+    signals = imu(run)
+    turns = {
+        f"WheelSpeed_{name[-2:].upper()} [rpm]": RPM * one / radius
+        for (name, one), radius in zip(wheels.items(), RADIUS, strict=True)
+    }
+    return {
+        "Time [s]": signals["t"],
+        "Yaw Rate [deg/s]": np.degrees(signals["r"]),
+        "Road Wheel Angle [deg]": np.degrees(signals["delta_f"]),
+        "Lateral Acc [g]": signals["ay"] / 9.80665,
+        **turns,
+        **more,
+    }
+
+
+def test_a_log_with_a_second_speed_teaches_the_radius_for_one_without(
+    run, wheels, tmp_path, capsys
+):
+    CAR.to_toml(tmp_path / "car.toml")
+    alone = write(tmp_path / "alone.csv", logger(run, wheels))
+    assert main(["channels", alone]) == 1  # turns, and nobody knows of which radius
+    said = capsys.readouterr().out
+    assert "wheel_fl: speed of the front left wheel" in said
+    assert "a rate of turns: tell the radius of the wheels by [wheels] radius" in said
+    first = driven(5, 2.0, lambda t: 18.0 + np.sin(0.3 * t))
+    slips = shown(first, gentle_slip(first), np.random.default_rng(2))
+    gnss = first.v_x + 0.05 * np.random.default_rng(3).normal(size=first.t.size)
+    both = write(tmp_path / "both.csv", logger(first, slips, **{"Ground Speed [km/h]": 3.6 * gnss}))
+    told = tmp_path / "log.toml"
+    assert main(["channels", both, "--write", str(told)]) == 0
+    assert "wheels roll by vx" in capsys.readouterr().out
+    data = tomllib.loads(told.read_text())
+    np.testing.assert_allclose(data["wheels"]["radius"], RADIUS, rtol=0.005)
+    assert main(["channels", alone, "--log", str(told)]) == 0
+    out = tmp_path / "out"
+    words = ["identify", alone, "--vehicle", str(tmp_path / "car.toml"), "--log", str(told)]
+    assert main([*words, "--out", str(out), "--accept"]) == 0
+    captured = capsys.readouterr()
+    assert "there is no column 'Ground Speed [km/h]': vx is made of the wheels" in captured.err
+    assert "vx is made of wheel_fl, wheel_fr, wheel_rl, wheel_rr" in captured.err
+    assert "a log has no lateral velocity: inertial learns" in captured.err
+    assert json.loads((out / "summary.json").read_text())
+
+
+def test_identify_says_what_a_speed_tells_of_wheels_and_uses_the_speed(run, wheels, tmp_path):
+    path = tmp_path / "log.csv"
+    write(path, {**imu(run), **wheels, "vx": run.v_x})
+    told = {name: f"{name} [m/s]" for name in CORNERS}
+    recording = ti.read_recording(path, columns=told)
+    np.testing.assert_array_equal(recording.v_x, run.v_x)
+    assert any("wheels roll by vx" in note for note in recording.notes)
+    data = {**imu(run), **wheels, "vx": run.v_x}
+    data["wheel_rr"] = np.where((run.t > 3.0) & (run.t < 5.0), np.nan, data["wheel_rr"])
+    write(path, data)
+    recording = ti.read_recording(path, columns=told)
+    assert any("of the wheels nothing is learnt" in note for note in recording.notes)
+    assert recording.t.size == run.t.size
+
+
+def test_one_encoder_is_enough_where_it_does_not_slip(run):
+    slips = shown(run, gentle_slip(run), np.random.default_rng(0))
+    encoder = np.mean([*slips.values()], axis=0)
+    known = replace(Wheels().completed(CAR), radius=(0.316,))
+    one = Recording.from_dataframe(
+        {**imu(run), "wheel": encoder / 0.316}, log_map=LogMap(wheels=known)
+    )
+    slip, force = errors(run, one)
+    slip_of_exact, force_of_exact = errors(
+        run, Recording.from_dataframe({**imu(run), "vx": run.v_x})
+    )
+    assert slip < 1.3 * slip_of_exact + 0.02
+    assert force < 1.2 * force_of_exact + 0.01
