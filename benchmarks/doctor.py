@@ -239,13 +239,14 @@ def report(outcomes: list[Outcome], targets: Targets) -> None:
             f"{kind} {100 * np.mean([one.named for one in some if one.kind == kind]):.0f}"
             for kind in CLASSES
         ]
-        targets.record(f"named/{fault}", 100.0 * float(np.mean([one.named for one in some])), "%")
+        key = fault.replace(" ", "_")
+        targets.record(f"named/{key}", 100.0 * float(np.mean([one.named for one in some])), "%")
         errors = np.abs([one.error for one in some if one.named])
         told = "never named"
         if errors.size:
             middle, largest = float(np.median(errors)), float(errors.max())
-            targets.record(f"error/{fault}/median", middle)
-            targets.record(f"error/{fault}/largest", largest)
+            targets.record(f"error/{key}/median", middle)
+            targets.record(f"error/{key}/largest", largest)
             told = f"error {middle:.4f}, at most {largest:.4f}"
         show(f"{fault} named [%]", f"{', '.join(by_class)}; {told}")
     share = 100.0 * float(np.mean([one.named for one in outcomes]))

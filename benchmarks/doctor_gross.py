@@ -174,7 +174,7 @@ def report(outcomes: list[Outcome], targets: Targets) -> None:
         groups[one.fault].append(one)
     for fault, some in groups.items():
         share = 100.0 * float(np.mean([one.named for one in some]))
-        targets.record(f"named/{fault}", share, "%")
+        targets.record(f"named/{fault.replace(' ', '_')}", share, "%")
         show(f"{fault} named", f"{share:.0f} % of {len(some)}")
         for one in some:
             if not one.named:
