@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from identifier.run import History
     from identifier.tire_model import TireModel
     from identifier.verdict import Verdict
-    from models.recordings import LogMap, Recording, Repair, read_recording, read_repaired
+    from models.recordings import LogMap, Recording, Repair, Wheels, read_recording, read_repaired
     from models.vehicle import Vehicle, sedan
     from mpc import path as paths
     from tireid.driving import drive, sample_recording
@@ -43,6 +43,7 @@ _HOMES = {
     "TireModel": ("identifier.tire_model", "TireModel"),
     "Vehicle": ("models.vehicle", "Vehicle"),
     "Verdict": ("identifier.verdict", "Verdict"),
+    "Wheels": ("models.recordings", "Wheels"),
     "certify": ("identifier.methods", "certify"),
     "diagnose": ("identifier.doctor", "diagnose"),
     "drive": ("tireid.driving", "drive"),
@@ -69,6 +70,7 @@ __all__ = [
     "TireModel",
     "Vehicle",
     "Verdict",
+    "Wheels",
     "__version__",
     "certify",
     "diagnose",

@@ -16,7 +16,6 @@ import numpy as np
 
 from models.logs.log import Channel, Heading, LogFile, RecordingError
 from models.logs.signals import (
-    AHEAD,
     BETA,
     COLUMNS,
     NEEDED,
@@ -27,7 +26,7 @@ from models.logs.signals import (
 )
 from models.logs.stamps import typical_rate
 from models.logs.units import ANGLE, FORCE, RATE, is_told, quantities, to_si
-from models.logs.wheel_names import ahead_words, wheel_words
+from models.logs.wheel_names import wheel_words
 
 SURE = 0.8  # confidence from which a proposal is used without being told to
 STANDARD, KNOWN, WORDS, VAGUE = 1.0, 0.95, 0.9, 0.82  # our own name, a logger's, its words, one
@@ -273,7 +272,7 @@ def name_confidence(signal: str, name: str) -> float:
 
     Parameters
     ----------
-    signal : one of `RULES`, a wheel or a_x.
+    signal : one of `RULES`, or a wheel.
     name : of the channel.
     """
     ours = (COLUMNS.get(signal, signal), signal)
@@ -282,8 +281,6 @@ def name_confidence(signal: str, name: str) -> float:
     listed = words_of(name)
     if signal in WHEELS:
         return WORDS if wheel_words(signal, listed) else 0.0
-    if signal == AHEAD:
-        return WORDS if ahead_words(listed) else 0.0
     rule, words = RULES[signal], frozenset(listed)
     ends = ["".join(listed[k:]) for k in range(len(listed))]
     if set(rule.known) & set(ends[:1]):

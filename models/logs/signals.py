@@ -19,8 +19,7 @@ from models.schema import shown
 BETA = "beta"
 INSTEAD = {"v_y": BETA, BETA: "v_y"}  # one of them is read, never both
 AXLES = (("wheel_fl", "wheel_fr"), ("wheel_rl", "wheel_rr"))
-WHEELS = (*AXLES[0], *AXLES[1], "wheel")  # as turns or as speeds; the last is that of an encoder
-AHEAD = "a_x"  # it helps wheels alone, which stand in for v_x
+WHEELS = (*AXLES[0], *AXLES[1], "wheel")  # turns or speeds, the last of one encoder: for v_x
 NEEDED = ("v_x", "v_y", "r", "delta_f")  # beta may stand in for v_y, or a_y, less surely
 QUANTITIES: Mapping[str, str] = MappingProxyType(
     {
@@ -33,12 +32,10 @@ QUANTITIES: Mapping[str, str] = MappingProxyType(
         "a_y": ACCELERATION,
         "Fyf": FORCE,
         "Fyr": FORCE,
-        AHEAD: ACCELERATION,
         **dict.fromkeys(WHEELS, SPEED),  # or rates of turns, `quantity_of`
     }
 )
-# What a column is called where it differs.
-COLUMNS = {"v_x": "vx", "v_y": "vy", "a_y": "ay", AHEAD: "ax"}
+COLUMNS = {"v_x": "vx", "v_y": "vy", "a_y": "ay"}  # what a column is called where it differs
 MEANINGS: Mapping[str, str] = MappingProxyType(
     {
         "v_x": "forward speed",
@@ -50,7 +47,6 @@ MEANINGS: Mapping[str, str] = MappingProxyType(
         "a_y": "lateral acceleration",
         "Fyf": "front axle force",
         "Fyr": "rear axle force",
-        AHEAD: "acceleration along the car",
         "wheel_fl": "speed of the front left wheel",
         "wheel_fr": "speed of the front right wheel",
         "wheel_rl": "speed of the rear left wheel",

@@ -1,4 +1,4 @@
-"""Which channel is the speed of which wheel, or the acceleration along the car, by its name.
+"""Which channel of a log is the speed of which wheel, by the words of its name.
 
 Loggers say "Wheel Speed FL", "WHL_SPD_FL", "ESP_VL_Radgeschw", "nWheelFL", "Vhcl.FL.rotv",
 "omega_rl", "ws_rr"; a model car with one encoder has "encoder" or "wheel_speed".
@@ -41,10 +41,6 @@ OTHERS = _set(
     "pos pulse pulses ticks count counter direction dir based valid status error quality state "
     "target desired ref request cmd command limit max min std cov var offset sas lws"
 )
-ACCELERATION = _set("acc accel acceleration accelerometer a g gforce beschleunigung beschl")
-ALONG = _set("long longitudinal lon lgt laengs x")
-WHOLE = _set("ax accx accelx xaccel acclong longacc glong longg carax laengsbeschleunigung")
-BODY = _set("imu car vehicle vhcl body cog cg sensor linear force gps inertial xsens")
 
 
 def wheel_words(signal: str, words: Sequence[str]) -> bool:
@@ -66,18 +62,3 @@ def wheel_words(signal: str, words: Sequence[str]) -> bool:
         if listed >= place and not rest & ANYWHERE:
             return bool(rest & BOTH or (rest & WHEEL and rest & TURNS))
     return False
-
-
-def ahead_words(words: Sequence[str]) -> bool:
-    """Return whether a name is that of the acceleration along the car.
-
-    Parameters
-    ----------
-    words : of the name, in small letters.
-    """
-    rest = frozenset(words) - BODY
-    return bool(rest) and (
-        "".join(words) in WHOLE
-        or (rest <= ACCELERATION | ALONG and bool(rest & ACCELERATION and rest & ALONG))
-        or (len(rest) == 1 and rest <= WHOLE)
-    )

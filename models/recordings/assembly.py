@@ -20,10 +20,10 @@ from models.logs.clock import (
     without_empty,
 )
 from models.logs.log import Channel, Heading, LogFile, RecordingError, one_run
-from models.logs.signals import AHEAD, BETA, QUANTITIES, WHEELS, Signal, quantity_of
+from models.logs.signals import BETA, QUANTITIES, WHEELS, Signal, quantity_of
 from models.logs.spelling import without_unit
 from models.logs.units import TIME, is_told, to_si
-from models.recordings.choice import BESIDE, chosen_signals, column_of, has_wheels, listing
+from models.recordings.choice import chosen_signals, column_of, has_wheels, listing
 from models.recordings.map import AXES, LogMap
 from models.recordings.record import (
     LARGEST,
@@ -42,7 +42,6 @@ FIELDS = {
     "Fyf": "axle_force",
     "Fyr": "axle_force",
     BETA: "delta_f",
-    AHEAD: "a_y",
     **dict.fromkeys(WHEELS, "v_x"),
 }
 
@@ -390,7 +389,7 @@ def wheel_units(headings: Sequence[Heading], signals: Mapping[str, Signal]) -> d
 
 
 def _without_wheels(by_name: Mapping[str, T]) -> dict[str, T]:
-    return {name: one for name, one in by_name.items() if name not in BESIDE}
+    return {name: one for name, one in by_name.items() if name not in WHEELS}
 
 
 def _on_wheels(
@@ -408,7 +407,7 @@ def _on_wheels(
             for name in ("r", "delta_f", "delta_r")
         }
         try:
-            told = rolled(speeds, **turns, wheels=wheels, dt=dt, a_x=one.signals.get(AHEAD))
+            told = rolled(speeds, **turns, wheels=wheels, dt=dt)
         except RecordingError as error:
             raise RecordingError(f"{label}: {error}") from None
         signals = {"v_x": told.v_x, **_without_wheels(one.signals)}

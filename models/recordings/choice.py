@@ -12,7 +12,6 @@ from typing import NamedTuple
 from models.logs.log import Heading, LogFile, RecordingError, some
 from models.logs.names import Proposal, propose
 from models.logs.signals import (
-    AHEAD,
     BETA,
     COLUMNS,
     INSTEAD,
@@ -28,7 +27,6 @@ from models.logs.units import SI
 from models.recordings.map import LogMap
 from models.schema import shown
 
-BESIDE = (*WHEELS, AHEAD)  # of which v_x is made
 INVERSE = {"Fyf_inv": "Fyf", "Fyr_inv": "Fyr"}  # computed backwards from the motion
 
 
@@ -139,8 +137,6 @@ def likely_signals(told: Mapping[str, Signal], proposal: Proposal) -> dict[str, 
         sure.pop("v_x", None)
     if "v_x" in told_by(told) or "v_x" in proposal.guesses:
         sure = {name: one for name, one in sure.items() if name not in WHEELS}
-    if not has_wheels((*sure, *told)):
-        sure.pop(AHEAD, None)
     found = _beside(sure, told)
     if ("Fyf" in found) != ("Fyr" in found):
         found = {name: one for name, one in found.items() if name not in ("Fyf", "Fyr")}
@@ -160,9 +156,7 @@ def with_wheels(signals: Mapping[str, Signal], proposal: Proposal) -> dict[str, 
     there = {channel for one in signals.values() for channel in one.channel}
     sure = {name: one for name, one in proposal.signals().items() if name in WHEELS}
     more = {name: one for name, one in sure.items() if not there & set(one.channel)}
-    return {name: one for name, one in signals.items() if name != AHEAD} | {
-        name: one for name, one in more.items() if name not in signals
-    }
+    return {**more, **signals}
 
 
 def has_wheels(signals: Iterable[str]) -> bool:
@@ -179,7 +173,7 @@ def _without_wheels(found: Mapping[str, Signal], by_map: Mapping[str, Signal]) -
     """Return signals without wheels that v_x has no need of and nobody told to learn of."""
     if "v_x" not in found:
         return dict(found)
-    return {name: one for name, one in found.items() if name not in BESIDE or name in by_map}
+    return {name: one for name, one in found.items() if name not in WHEELS or name in by_map}
 
 
 def _refuse_words(log: LogFile, missing: list[str], run: str | None) -> None:

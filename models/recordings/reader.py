@@ -33,8 +33,10 @@ def read_recording(
     """Read one run of a log and bring it to a uniform sample time.
 
     Columns of standard names are in SI and ISO axes: t [s], vx, vy [m/s], r [rad/s], delta_f
-    [rad]; if present also delta_r [rad] (else 0), ay [m/s^2], Fyf and Fyr [N], run (text); a unit
-    that the file tells is converted. Others are ignored. Where there are no Fyf and Fyr, the
+    [rad]; if present also delta_r [rad] (else 0), wheel_fl, wheel_fr, wheel_rl, wheel_rr or wheel
+    [m/s, or rad/s where the map tells a radius] where there is no vx, ay [m/s^2], Fyf and Fyr [N],
+    run (text); a unit that the file tells is converted. Others are ignored. Where there are no Fyf
+    and Fyr, the
     columns Fyf_inv and Fyr_inv (forces computed backwards from the motion) stand in for them.
     Signals of other names are told by `columns` or a map; where neither tells them and names and
     units leave no doubt, they are taken and the recording's notes say so.

@@ -8,7 +8,7 @@ where v_y is that of rear wheels without slip, v_y = l_r r + (v_x - r y) tan δ_
 Wheels that are driven or braked are not trusted where they leave what the car can have done since
 it was last known. Without slip all wheels agree. Where they do not, a car that speeds up is as slow
 as its slowest wheel, one that brakes as fast as its fastest, and one that rolls out goes on as it
-went. Where the acceleration along the car is logged, it tells how the speed goes on.
+went.
 """
 
 import math
@@ -40,8 +40,6 @@ WINDOW = 0.05  # [s], over which the acceleration of a wheel is taken
 MEMORY = 0.15  # [s], over which that of the car is
 BRAKED, ROLLS_OUT = -1.0, -0.3  # [m/s²]: below the first wheels are braked, above the other driven
 UNSURE = 0.25  # of the largest acceleration: how far it may have changed while nothing is trusted
-MISSHOWN = 0.7  # [m/s²]: slope of the road and v_y r, which an accelerometer shows as well
-LEVEL = 8.0  # [s], over which they are learnt
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -173,8 +171,7 @@ class Rolled(NamedTuple):
 class _Trust(NamedTuple):
     """What is carried from sample to sample: the speed, its change, and since when none is known.
 
-    v [m/s]; a: acceleration beyond what is measured [m/s²]; held: time since a wheel was trusted
-    [s]; known: the speed then, and what was measured since [m/s].
+    v [m/s]; a [m/s²]; held: time since a wheel was trusted [s]; known: the speed then [m/s].
     """
 
     v: float
@@ -184,15 +181,15 @@ class _Trust(NamedTuple):
 
 
 class _Rule(NamedTuple):
-    """What a car can do between samples: dt [s], all others [m/s²] but for the memory of a [s]."""
+    """What holds for all samples.
+
+    dt [s]; most: acceleration of a car, steady: of a wheel that may be trusted [m/s²]; free:
+    whether each wheel is known not to be driven.
+    """
 
     dt: float
-    steady: float  # of a wheel that may be trusted, beyond what is measured
-    turns: float  # largest a
-    change: float  # of the acceleration that passes for none
-    unsure: float  # error of the acceleration while no wheel is trusted
-    memory: float
-    measured: bool
+    most: float
+    steady: float
     free: tuple[bool, ...]
 
 
@@ -203,7 +200,6 @@ def rolled(
     delta_r: Array,
     wheels: Wheels,
     dt: float,
-    a_x: Array | None = None,
 ) -> Rolled:
     """Return the forward speed at the center of gravity; no sample looks at a later one.
 
@@ -214,7 +210,6 @@ def rolled(
     delta_f, delta_r : angles of the road wheels [rad], (n,).
     wheels : their places, and which are driven.
     dt : sample time [s].
-    a_x : what an accelerometer along the car shows [m/s²], (n,); None where there is none.
 
     Raises
     ------
@@ -224,15 +219,10 @@ def rolled(
     names, most = _sources(speeds, wheels), wheels.acceleration
     n, v_x = r.size, large((r.size,))
     span = max(1, round(WINDOW / dt))
-    measured = a_x is not None
     rule = _Rule(
         dt=dt,
-        steady=(2.0 * MISSHOWN if measured else most) + NOISE / (span * dt),
-        turns=2.0 * MISSHOWN if measured else most,
-        change=(MISSHOWN + NOISE / (span * dt)) if measured else UNSURE * most,
-        unsure=MISSHOWN if measured else UNSURE * most,
-        memory=LEVEL if measured else MEMORY,
-        measured=measured,
+        most=most,
+        steady=most + NOISE / (span * dt),
         free=tuple(
             bool(wheels.driven) and not set(group) & set(_pushed(wheels)) for group in names
         ),
@@ -250,10 +240,9 @@ def rolled(
         rows = rows[begin:]
         if state is None:
             state = _begun(rows[0].tolist(), rule.free)
-        felt = np.zeros(len(rows)) if a_x is None else a_x[part]
         found = []
-        for row, rate, push in zip(rows.tolist(), rates.tolist(), felt.tolist(), strict=True):
-            state = _step(state, row, rate, push, rule)
+        for row, rate in zip(rows.tolist(), rates.tolist(), strict=True):
+            state = _step(state, row, rate, rule)
             found.append(state.v)
             held += state.held > 0.0
         v_x[part] = found
@@ -269,46 +258,42 @@ def _begun(row: Sequence[float], free: Sequence[bool]) -> _Trust:
     return _Trust(middle, 0.0, 0.0, middle)
 
 
-def _step(
-    state: _Trust, row: Sequence[float], rates: Sequence[float], push: float, rule: _Rule
-) -> _Trust:
+def _step(state: _Trust, row: Sequence[float], rates: Sequence[float], rule: _Rule) -> _Trust:
     """Return the speed at the next sample.
 
     row : speed of the center of gravity by each wheel [m/s].
     rates : by which each changed lately [m/s²].
-    push : acceleration that is measured [m/s²], zero where none is.
     """
     v, a, since, known = state
-    dt = rule.dt
-    speeds_up = push + a
-    ahead, known = v + speeds_up * dt, known + push * dt
+    dt, most = rule.dt, rule.most
+    ahead = v + a * dt
     near, alike = (NOISE + share * abs(ahead) for share in (SLIP, ALIKE))
-    doubt = rule.unsure * since
+    doubt = UNSURE * most * since
     likely = [
         k
         for k, c in enumerate(row)
-        if abs(rates[k] - push) <= rule.steady and abs(c - ahead) <= near + doubt
+        if abs(rates[k]) <= rule.steady and abs(c - ahead) <= near + doubt
     ]
     if not likely:
-        if not rule.measured and all((c - ahead) * a < 0.0 for c in row):
+        if all((c - ahead) * a < 0.0 for c in row):
             return _Trust(v, 0.0, since + dt, known)  # what it went on by leads away from all
         return _Trust(ahead, a, since + dt, known)
-    if speeds_up > BRAKED:  # driven wheels run ahead of the car, however little
+    if a > BRAKED:  # driven wheels run ahead of the car, however little
         likely = [k for k in likely if rule.free[k]] or likely
-    likely = [k for k in likely if abs(rates[k] - speeds_up) <= rule.change] or likely
+    likely = [k for k in likely if abs(rates[k] - a) <= UNSURE * most] or likely
     speeds = [row[k] for k in likely]
-    if speeds_up > ROLLS_OUT:
+    if a > ROLLS_OUT:
         best = min(speeds)
-    elif speeds_up < BRAKED:
+    elif a < BRAKED:
         best = max(speeds)
     else:
         best = min(speeds, key=lambda c: abs(c - ahead))
     kept = [c for c in speeds if abs(c - best) <= alike]
-    reach = rule.turns * dt + doubt
+    reach = most * dt + doubt
     now = min(max(sum(kept) / len(kept), ahead - reach), ahead + reach)
     passed = since + dt
-    slope = min(max((now - known) / passed, -rule.turns), rule.turns)
-    a += (1.0 - math.exp(-passed / rule.memory)) * (slope - a)
+    slope = min(max((now - known) / passed, -most), most)
+    a += (1.0 - math.exp(-passed / MEMORY)) * (slope - a)
     return _Trust(now, a, 0.0, now)
 
 

@@ -170,19 +170,6 @@ def test_axes_and_signs_that_a_map_turns_are_turned_before_wheels_are_brought_ov
     np.testing.assert_allclose(mended.v_x, right.v_x, rtol=1e-12)
 
 
-def test_an_acceleration_along_the_car_carries_over_what_no_wheel_shows(run):
-    slips = gentle_slip(run) + spin(run.t, 8.0, 3.0, 0.4, rise=0.8)[:, None]
-    wheels = shown(run, slips, np.random.default_rng(0))
-    alone = Recording.from_dataframe(
-        columns(run, wheels), log_map=LogMap(wheels=replace(TRACK, radius=()))
-    )
-    felt = run.a_x + 0.3 + 0.2 * np.random.default_rng(1).standard_normal(run.t.size)
-    data = columns(run, wheels, ax=felt)
-    helped = Recording.from_dataframe(data, log_map=LogMap(wheels=replace(TRACK, radius=())))
-    away, less = (np.abs(one.v_x - run.v_x).max() for one in (alone, helped))
-    assert less < 0.5 * away and less < 2.0
-
-
 @pytest.mark.parametrize(
     ("change", "told", "rule"),
     [

@@ -166,21 +166,6 @@ def test_of_random_events_that_leave_a_wheel_rolling_few_are_noticed_in_the_spee
     assert max(errors) < 1.0
 
 
-def test_where_all_wheels_slip_an_acceleration_along_the_car_carries_over(run):
-    felt = run.a_x + 0.3 + 0.2 * np.random.default_rng(9).standard_normal(run.t.size)
-    with_it, without, mean = [], [], []
-    for seed in range(12):
-        speeds = shown(run, random_slips(run, seed, 4), np.random.default_rng(seed))
-        motion = run.r, run.delta_f, run.delta_r
-        for found, one in ((with_it, felt), (without, None)):
-            away = rolled(speeds, *motion, KNOWN, 0.01, one).v_x - run.v_x
-            found.append(rms(away))
-            assert np.abs(away)[run.t > 36.0].max() < 0.5
-        mean.append(rms(np.mean([*speeds.values()], axis=0) - run.v_x))
-    assert np.median(np.divide(with_it, mean)) < 0.2
-    assert rms(np.array(with_it)) < 0.5 * rms(np.array(without))
-
-
 @pytest.mark.parametrize(
     ("given", "rule"),
     [
