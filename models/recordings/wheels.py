@@ -40,6 +40,8 @@ WINDOW = 0.05  # [s], over which the acceleration of a wheel is taken
 MEMORY = 0.15  # [s], over which that of the car is
 BRAKED, ROLLS_OUT = -1.0, -0.3  # [m/s²]: below the first wheels are braked, above the other driven
 UNSURE = 0.25  # of the largest acceleration: how far it may have changed while nothing is trusted
+PATIENCE = 2.0  # [s]: after it wheels that all agree again are believed the sooner
+SLOW = 1.0  # [m/s]: below it sensors of wheels show nothing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -269,11 +271,12 @@ def _step(state: _Trust, row: Sequence[float], rates: Sequence[float], rule: _Ru
     ahead = v + a * dt
     near, alike = (NOISE + share * abs(ahead) for share in (SLIP, ALIKE))
     doubt = UNSURE * most * since
-    likely = [
-        k
-        for k, c in enumerate(row)
-        if abs(rates[k]) <= rule.steady and abs(c - ahead) <= near + doubt
-    ]
+    steady = [abs(rate) <= rule.steady for rate in rates]
+    if max(row) - min(row) <= near and all(steady):
+        doubt *= 1.0 + since / PATIENCE
+    if max(abs(ahead), *map(abs, row)) < SLOW:
+        doubt, steady = SLOW, [True] * len(row)
+    likely = [k for k, c in enumerate(row) if steady[k] and abs(c - ahead) <= near + doubt]
     if not likely:
         if all((c - ahead) * a < 0.0 for c in row):
             return _Trust(v, 0.0, since + dt, known)  # what it went on by leads away from all
@@ -288,11 +291,14 @@ def _step(state: _Trust, row: Sequence[float], rates: Sequence[float], rule: _Ru
         best = max(speeds)
     else:
         best = min(speeds, key=lambda c: abs(c - ahead))
-    kept = [c for c in speeds if abs(c - best) <= alike]
+    kept = [k for k in likely if abs(row[k] - best) <= alike]
     reach = most * dt + doubt
-    now = min(max(sum(kept) / len(kept), ahead - reach), ahead + reach)
+    now = min(max(sum(row[k] for k in kept) / len(kept), ahead - reach), ahead + reach)
     passed = since + dt
-    slope = min(max((now - known) / passed, -most), most)
+    slope = (now - known) / passed
+    if since > MEMORY:  # what was trusted before says little of how it goes on
+        slope = sum(rates[k] for k in kept) / len(kept)
+    slope = min(max(slope, -most), most)
     a += (1.0 - math.exp(-passed / MEMORY)) * (slope - a)
     return _Trust(now, a, 0.0, now)
 

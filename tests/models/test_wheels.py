@@ -123,6 +123,30 @@ def test_a_lone_encoder_is_bounded_by_what_a_car_can_do(run):
     assert result.held >= 7
 
 
+def stop_and_go(rng, n=6000):
+    """Speed of a car that stands, launches, holds and brakes at random [m/s], (n,)."""
+    wanted = np.repeat(rng.choice([0.0, 1.0], n // 100) * rng.uniform(-10.0, 9.0, n // 100), 100)
+    v, a, found = rng.choice([0.0, 20.0]), 0.0, []
+    for one in wanted:
+        a += 0.125 * (one - a)
+        v = min(max(v + 0.01 * a, 0.0), 45.0)
+        found.append(v)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("size", [1.0, 0.1], ids=["car", "model car"])
+def test_without_slip_wheels_are_trusted_whatever_the_car_does(size):
+    """From standstill too, where sensors of wheels show nothing below a threshold."""
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        v = size * stop_and_go(rng)
+        still, shows = np.zeros(v.size), v > 0.6 * size
+        speeds = {name: shows * (v + 0.02 * size * rng.standard_normal(v.size)) for name in CORNERS}
+        result = rolled(speeds, still, still, still, Wheels(track=(1.5,)), 0.01)
+        assert np.abs(result.v_x - v).max() < 0.7 * size + 0.1
+        assert result.held < 0.01 * v.size
+
+
 def test_no_sample_looks_at_a_later_one(run):
     speeds = shown(run, slipping(run, ALL, anti_lock(run.t, 30.0, 1.5)), np.random.default_rng(2))
     whole = told(run, speeds).v_x
