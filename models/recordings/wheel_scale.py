@@ -61,8 +61,8 @@ def wheel_factor(what: str, name: str, unit: str, wheels: Wheels) -> float:
         return 1.0
     if radius is None:
         raise RecordingError(
-            f"{what} is in {unit.strip()}, a rate of turns: tell the radius of the wheels by "
-            "[wheels] radius in log.toml, in m, or the unit as [m/s] *RADIUS"
+            f"{what} is in {unit.strip()}, a rate of turns: tell the radius of the wheels, in m, "
+            "by [wheels] radius in a log.toml (--log FILE)"
         )
     return radius
 

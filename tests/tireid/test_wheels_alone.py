@@ -120,7 +120,8 @@ def test_a_log_with_a_second_speed_teaches_the_radius_for_one_without(
     assert main(["channels", alone]) == 1  # turns, and nobody knows of which radius
     said = capsys.readouterr().out
     assert "wheel_fl: speed of the front left wheel" in said
-    assert "a rate of turns: tell the radius of the wheels by [wheels] radius" in said
+    assert "a rate of turns: tell the radius of the wheels, in m, by [wheels] radius" in said
+    assert "all that is needed is there" not in said
     first = driven(5, 2.0, lambda t: 18.0 + np.sin(0.3 * t))
     slips = shown(first, gentle_slip(first), np.random.default_rng(2))
     gnss = first.v_x + 0.05 * np.random.default_rng(3).normal(size=first.t.size)

@@ -84,8 +84,9 @@ def run(options: argparse.Namespace) -> int:
     tell(channels_text(listed, seen, signals, proposal, frozenset(told.signals)))
     if not has_v_y(signals) and not missing:
         tell(f"{column_of('a_y')} is there: without vy, identify estimates it")
-    tell(missing_text(options.log, missing, proposal))
     said, of_wheels, rolls = _wheels(log, signals, told, chosen)
+    if rolls or missing:
+        tell(missing_text(options.log, missing, proposal))
     if said:
         tell(said)
     if options.write is not None:
