@@ -64,11 +64,11 @@ def drives(packages, slalom, samples):
         specialized = packages[law].specialized
         rows = samples_of(slalom, [port.name for port in specialized.inputs])
         rows = with_faults(rows, at=2)
-        rows[1500:1700:2, 5], rows[2200:2400, 5], rows[2700:2710, 5] = np.nan, np.inf, 1e30
+        rows[1950:1990:2, 5], rows[2150:2200, 5], rows[2350:2360, 5] = np.nan, np.inf, 1e30
         if specialized.tells_v_y:
-            rows[:2600, 1] = np.nan
-            rows[2800:2900, 1], rows[2900:3000, 1], rows[3000:, 1] = 1e4, -np.inf, np.nan
-        found[law] = rows[1400:3100]
+            rows[:2250, 1] = np.nan
+            rows[2300:2330, 1], rows[2380:2400, 1], rows[2400:, 1] = 1e4, -np.inf, np.nan
+        found[law] = rows[1900:2600]
     return found
 
 
