@@ -21,9 +21,11 @@ from identifier.inertial import InertialIdentifier
 from identifier.run import OnlineIdentifier
 from models.rules import require_positive_fields
 from models.sensors import is_shown
+from models.vehicle import Vehicle
 from mpc.loop.sensing import Measured
 
 UNKNOWN = 1.0  # m/s: standard deviation of v_y where nothing is known
+TOLD_ROLL = 0.25  # standard deviation of the roll that a chassis tells, as a share of it
 FINEST = 1e-3  # m/s: least deviation that is believed
 
 
@@ -61,10 +63,34 @@ class TellsLateral(Protocol):
 
 
 class Body(NamedTuple):
-    """A body that rolls under lateral acceleration: natural frequency [rad/s], damping [-]."""
+    """A body that rolls under lateral acceleration.
+
+    frequency, damping : of its roll [rad/s], [-].   roll, sd_roll : outwards, as the accelerometer
+    feels it, and the standard deviation of that [rad/g].
+    """
 
     frequency: float
     damping: float
+    roll: float
+    sd_roll: float
+
+    @classmethod
+    def of(cls, vehicle: Vehicle, method: InertialIdentifier) -> "Body":
+        """Return the body of a car as its chassis tells it, or as the method takes it to be.
+
+        Parameters
+        ----------
+        vehicle : with or without chassis.
+        method : what is believed of a body that nobody told.
+        """
+        if vehicle.chassis is None:
+            frequency = method.roll_frequency / vehicle.froude_time
+            return cls(frequency, method.roll_damping, method.beliefs.roll, method.beliefs.sd_roll)
+        leans = vehicle.weight * vehicle.roll_arm  # N m per g, and per rad of roll
+        spring, inertia = vehicle.chassis.roll_stiffness - leans, vehicle.chassis.roll_inertia
+        frequency, roll = math.sqrt(spring / inertia), leans / spring
+        damping = vehicle.chassis.roll_damping / (2.0 * inertia * frequency)
+        return cls(frequency, damping, roll, TOLD_ROLL * roll)
 
     def step(self, rolls: tuple[float, float], level: float, dt: float) -> tuple[float, float]:
         """Return what it rolls by and the rate of that a sample later, implicit.
@@ -94,7 +120,6 @@ class Localization:
     acceleration : of a_y - v_x r, sample by sample [m/s²].
     bias : of the accelerometer and the road's bank [m/s²].
     bias_time : in which that changes [s].
-    roll, sd_roll : of the body, outwards, as the accelerometer feels it, and its deviation [rad/g].
     correlation_time : for which the identifier errs alike [s].
     clip : standard deviations from which an innovation counts no more.
     lost : rate at which v_y may change where no acceleration is shown [m/s²].
@@ -108,12 +133,10 @@ class Localization:
 
     position: float = 0.025
     heading: float = 0.002
-    acceleration: float = 0.25
+    acceleration: float = 0.15
     bias: float = 0.15
     bias_time: float = 10.0
-    roll: float = 0.06
-    sd_roll: float = 0.04
-    correlation_time: float = 0.2
+    correlation_time: float = 1.0
     clip: float = 3.0
     lost: float = 5.0
     observable: float = 0.01
@@ -131,6 +154,7 @@ class LateralVelocity:
     ----------
     identifier : of a method that tells v_y; it is told every sample here, and learns.
     localization : how far position and heading are trusted; None takes the default.
+    body : how it rolls; None takes what the chassis of the identifier's vehicle tells.
 
     Raises
     ------
@@ -139,21 +163,21 @@ class LateralVelocity:
     """
 
     def __init__(
-        self, identifier: OnlineIdentifier, localization: Localization | None = None
+        self,
+        identifier: OnlineIdentifier,
+        localization: Localization | None = None,
+        body: Body | None = None,
     ) -> None:
         method = identifier.method
         if not isinstance(method, InertialIdentifier):
             raise ValueError(f"{type(method).__name__} tells no v_y")
         self.identifier, self.trust = identifier, localization or Localization()
         self._dt = method.dt
-        self._body = Body(
-            frequency=method.roll_frequency / identifier.vehicle.froude_time,
-            damping=method.roll_damping,
-        )
+        self._body = body or Body.of(identifier.vehicle, method)
         self._rolls = (0.0, 0.0)  # ä and its rate [m/s²], [m/s³]
         self._place: Array | None = None  # X, Y [m], dead reckoned
-        self._v_y, self._bias, self._roll = math.nan, 0.0, self.trust.roll
-        self._P = np.diag([0.0, UNKNOWN**2, self.trust.bias**2, self.trust.sd_roll**2])
+        self._v_y, self._bias, self._roll = math.nan, 0.0, self._body.roll
+        self._P = np.diag([0.0, UNKNOWN**2, self.trust.bias**2, self._body.sd_roll**2])
         self._surprise = 1.0  # mean square of the identifier's errors over what it tells of them
         self._last: tuple[Measured, float] | None = None  # a sample ago, and a + b - v_x r of it
 

@@ -47,9 +47,9 @@ def states(duration=12.0, friction=None, amplitude=0.06):
         state = car.step(state, angle, SPEED)
 
 
-def lateral(localization=None, start=None):
-    method = InertialIdentifier.for_vehicle(CAR, dt=DT)
-    return LateralVelocity(OnlineIdentifier(method, CAR, DT, start), localization)
+def lateral(localization=None, start=None, car=CAR, body=None):
+    method = InertialIdentifier.for_vehicle(car, dt=DT)
+    return LateralVelocity(OnlineIdentifier(method, car, DT, start), localization, body)
 
 
 def told_over(driven, *faults, seed=0, localization=None):
@@ -170,7 +170,7 @@ def test_numbers_of_trust_must_be_positive():
 
 def test_a_body_rolls_as_its_equation_says():
     """Against the closed form of a step, of second order."""
-    body, a = Body(frequency=11.0, damping=0.3), 4.0
+    body, a = Body(frequency=11.0, damping=0.3, roll=0.1, sd_roll=0.02), 4.0
     now, dt, times = (0.0, 0.0), 1e-4, np.arange(1, 8001) * 1e-4
     rolled = []
     for _ in times:
@@ -182,11 +182,24 @@ def test_a_body_rolls_as_its_equation_says():
     np.testing.assert_allclose(rolled, a * (1.0 - np.exp(-z * w * times) * free), atol=0.01)
 
 
+def test_the_chassis_tells_how_the_body_rolls(swings):
+    """Against what the plant does; a car without a chassis is taken for a usual one."""
+    method = InertialIdentifier.for_vehicle(CAR, dt=DT)
+    roll, a_y = (np.array([getattr(one, name) for one in swings]) for name in ("roll", "a_y"))
+    told, now, rolled = Body.of(CAR, method), (0.0, 0.0), []
+    for value in a_y:
+        now = told.step(now, value, DT)
+        rolled.append(told.roll * now[0] / GRAVITY)
+    np.testing.assert_allclose(rolled, roll, atol=0.1 * np.abs(roll).max())
+    usual = Body.of(replace(CAR, chassis=None), method)
+    assert usual.sd_roll > told.sd_roll and abs(usual.roll - told.roll) < 2.0 * usual.sd_roll
+
+
 def test_it_is_what_all_measurements_at_once_say(monkeypatch, rng):
     """On a straight, without the identifier: the Gaussian mean and variance from one big matrix."""
     monkeypatch.setattr(OnlineIdentifier, "outputs", property(lambda self: {}))
-    trust = Localization(clip=1e6, roll=1e-9, sd_roll=1e-9)
-    teller, n = lateral(trust), 60
+    trust, stiff = Localization(clip=1e6), Body(10.0, 0.3, roll=1e-9, sd_roll=1e-9)
+    teller, n = lateral(trust, body=stiff), 60
     y = 0.02 * rng.standard_normal(n) + 0.3 * DT * np.arange(n)
     for k in range(n):
         told = teller.tell(Measured(k * DT, SPEED * k * DT, y[k], 0, SPEED, math.nan, 0, 0, 0))
