@@ -166,6 +166,29 @@ class History:
             raise DivergedError(f"the law diverged at {diverged_at:g} s, before {t:g} s")
         return self.design.frozen(self.vehicle, state)
 
+    def calibrated(self, t: float | None = None) -> TireModel:
+        """Return the model of `freeze`, its `band` calibrated on stretches that did not teach it.
+
+        It takes as long as four times what learning took. Where the method has no band, or too
+        little is driven, it is the frozen model.
+
+        Parameters
+        ----------
+        t : time of the freeze in the recording's own clock [s]; None is the end.
+
+        Raises
+        ------
+        DivergedError
+            Where the law had diverged by then.
+        CannotFreezeError
+            Where the method estimates a signal, not a model.
+        ValueError
+            Where the recording begins after that time.
+        """
+        from identifier.verdict import calibrated
+
+        return calibrated(self, t)
+
     def verdict(self, t: float | None = None) -> "Verdict":
         """Return whether the answer is good, and what speaks against it; computed at each call.
 

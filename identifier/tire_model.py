@@ -258,6 +258,70 @@ class TireModel(ABC):
         del alpha
         return None
 
+    def half_band(self, alpha: Array, level: float = 0.9) -> Array | None:
+        """Return half the width of `band`, (k, 2) [N]; None where the model cannot tell.
+
+        Parameters
+        ----------
+        alpha : slip angles [rad], (k,).
+        level : share of cases that the band shall hold, above 0 and below 1.
+        """
+        del alpha, level
+        return None
+
+    @overload
+    def band(self, alpha: float, axle: Axle, level: float = ...) -> tuple[float, float] | None: ...
+    @overload
+    def band(
+        self, alpha: ArrayLike, axle: Axle | None = None, level: float = ...
+    ) -> tuple[Array, Array] | None: ...
+
+    def band(
+        self, alpha: ArrayLike, axle: Axle | None = None, level: float = 0.9
+    ) -> tuple[float, float] | tuple[Array, Array] | None:
+        """Return between which forces the true one lies [N]: (low, high), each as of `force`.
+
+        None where the model cannot tell how sure it is.
+
+        Parameters
+        ----------
+        alpha, axle : as of `force`.
+        level : in which share of cases it shall, above 0 and below 1.
+
+        Raises
+        ------
+        ValueError
+            Where the axle has another name, or the level is impossible.
+        """
+        slip = np.asarray(alpha, dtype=np.float64)
+        center = np.asarray(self.force(slip, axle))
+        half = self.half_band(slip.ravel(), level)
+        if half is None:
+            return None
+        half = half.reshape(*slip.shape, 2)
+        half = half if axle is None else half[..., AXLES.index(axle)]
+        if center.ndim == 0:
+            return float(center - half), float(center + half)
+        return center - half, center + half
+
+    def samples(self, n: int, rng: np.random.Generator) -> "tuple[TireModel, ...]":
+        """Return models drawn from what is not known of the tires.
+
+        Parameters
+        ----------
+        n : how many.
+        rng : source of randomness.
+
+        Raises
+        ------
+        ValueError
+            Where the model cannot tell how sure it is.
+        """
+        del n, rng
+        raise ValueError(
+            f"a {type(self).__name__} cannot tell how sure it is: nothing to draw from"
+        )
+
     def estimates(self) -> tuple[Estimate, ...]:
         """Return what a verdict tells of each axle: stiffness, without a doubt that is known."""
         told = self.vehicle.bicycle[4:]

@@ -10,6 +10,14 @@ from numpy.typing import NDArray
 
 from codegen import Scan
 from codegen.arrays import Array
+from identifier.axle.band import (
+    LEVEL,
+    RELATIVE,
+    BandCalibration,
+    BandSpread,
+    colored,
+    root,
+)
 from identifier.axle.car import Car, car_numbers
 from identifier.axle.curve import EDGES, doublings, unit_matrix
 from identifier.axle.dynamics import lagged_force, series_compliance, static_curve
@@ -28,6 +36,7 @@ LARGEST_WEIGHT = 100.0  # static axle loads: no unit of a tire carries more
 ROUNDING = 1e-6  # of correlations, as learning in float leaves them
 LARGEST_SD = 0.25  # standard deviation over the prior's, above which a slip is not known
 DECIDED = 0.5  # standard deviation over the prior's, up to which a drive decided a number
+DRAWS = 1000  # of weights, before a possible tire must have been among them
 BENT = 0.4  # slope over that at zero, below which a curve shows where it saturates
 
 
@@ -47,6 +56,7 @@ class AxleModel(TireModel):
     covariance : of [W, own], (2, n + 3, n + 3).
     prior_covariance : `covariance` before the first sample.
     excitation : largest slip [rad], then time of learning above each of `EDGES` [s], (2, 9).
+    calibration : of the band, by stretches that did not teach it; None where nobody calibrated.
 
     Raises
     ------
@@ -65,6 +75,7 @@ class AxleModel(TireModel):
     covariance: Array
     prior_covariance: Array
     excitation: Array
+    calibration: BandCalibration | None = None
 
     def __post_init__(self) -> None:
         doublings(self.ladder)
@@ -164,6 +175,96 @@ class AxleModel(TireModel):
                 count = sure.size if sure.all() else int(np.argmin(sure))
                 known[i] = largest * count / grid.size
         return known
+
+    def half_band(self, alpha: Array, level: float = LEVEL) -> Array:
+        """Return half the width of the band around the steady forces, (k, 2) [N].
+
+        Without a calibration errors are taken to be as learning is told.
+
+        Parameters
+        ----------
+        alpha : slip angles [rad], (k,).
+        level : share of cases that the band shall hold, above 0 and below 1.
+
+        Raises
+        ------
+        ValueError
+            Where the level is impossible.
+        """
+        factor = (self.calibration or BandCalibration.told()).factor(alpha)
+        return self.band_spread(alpha).half_width(factor, level) * self._loads
+
+    def band_spread(self, alpha: Array) -> BandSpread:
+        """Return the variances of the steady forces that a band is made of, (k, 2).
+
+        Parameters
+        ----------
+        alpha : slip angles [rad], (k,).
+        """
+        T, scales, n = unit_matrix(alpha, self.ladder), np.array(self.ladder), len(self.ladder)
+        slope = (1.0 - T * T) @ (self.W / scales).T
+        zero = np.array([1.0, 1.0 / self.reference_speed])  # of slip, for an offset of one
+
+        def variance(both: Array) -> Array:
+            weights = np.einsum("ki,aij,kj->ka", T, both[:, :n, :n], T)
+            total: Array = weights + (slope * zero) ** 2 * both[:, -1, -1]
+            return total
+
+        left, before = variance(self._posterior()), variance(self.prior_covariance)
+        return BandSpread.of(T @ self.W.T, left, before)
+
+    def _posterior(self, factors: Array | None = None) -> Array:
+        """Return the covariance of both axles, its noise as colored as it was."""
+        color = (self.calibration or BandCalibration.told()).color
+        size = np.ones(2) if factors is None else factors
+        both = zip(self.covariance, self.prior_covariance, color, size, strict=True)
+        return np.array([colored(P, prior, float(c), float(f)) for P, prior, c, f in both])
+
+    def samples(self, n: int, rng: np.random.Generator) -> tuple["AxleModel", ...]:
+        """Return models drawn from what learning left open, and from the errors of a model.
+
+        Parameters
+        ----------
+        n : how many.
+        rng : source of randomness.
+
+        Raises
+        ------
+        ValueError
+            Where n is negative, or no tire is among what was drawn.
+        """
+        if n < 0:
+            raise ValueError(f"n must not be negative, it is {n}")
+        factors = (self.calibration or BandCalibration.told()).factors
+        size = np.sqrt(np.mean(factors**2, axis=1))
+        roots = [root(P) for P in self._posterior(size)]
+        drawn: list[AxleModel] = []
+        for _ in range(DRAWS * n):
+            if len(drawn) == n:
+                break
+            one = self._drawn(roots, 1.0 + RELATIVE * size * rng.standard_normal(2), rng)
+            if one is not None:
+                drawn.append(one)
+        if len(drawn) < n:
+            raise ValueError(
+                "no tire is among what the covariance leaves open: it knows too little"
+            )
+        return tuple(drawn)
+
+    def _drawn(
+        self, roots: list[Array], scale: Array, rng: np.random.Generator
+    ) -> "AxleModel | None":
+        """Return a model drawn, offsets and lags within what is possible; None: no tire."""
+        n, car, at_most = len(self.ladder), self.vehicle, self.plausibility
+        away = np.array([root @ rng.standard_normal(len(root)) for root in roots])
+        W = (self.W + away[:, :n]) * scale[:, None]
+        slope = (W / np.array(self.ladder)).sum(axis=1)
+        if not ((W.sum(axis=1) > 0.0) & (slope > 0.0)).all() or np.abs(W).max() > LARGEST_WEIGHT:
+            return None
+        zeros = np.array([at_most.max_steering, at_most.slow])
+        low = np.column_stack([np.zeros((2, 2)), -zeros])
+        high = np.column_stack([np.full(2, car.wheelbase), np.ones(2), zeros])
+        return replace(self, W=W, own=np.clip(self.own + away[:, n:], low, high))
 
     def estimates(self) -> tuple[Estimate, ...]:
         """Return stiffness, grip, relaxation length and offset of each axle, with their doubt.
@@ -344,6 +445,7 @@ class AxleModel(TireModel):
             "cornering_stiffness_N_rad": self.cornering_stiffness.tolist(),
             "relaxation_length_m": self.relaxation_length.tolist(),
             "known_slip_rad": self.known_slip.tolist(),
+            **({} if self.calibration is None else {"band": self.calibration.to_dict()}),
         }
 
     @classmethod
@@ -370,6 +472,7 @@ class AxleModel(TireModel):
                 sway=Sway(**data["sway"]),
                 plausibility=Plausibility(**data["plausibility"]),
                 **{name: np.array(data[name], dtype=np.float64) for name in ARRAYS},
+                calibration=BandCalibration.from_dict(data["band"]) if "band" in data else None,
             )
         except KeyError as error:
             raise FrozenModelError(f"{source}: key {error} is missing") from error
@@ -382,6 +485,10 @@ def _require_plausible(data: dict[str, Any], source: str) -> None:
     table = Table(data, f"{source}: ", FrozenModelError)
     for name, record in (("sway", Sway), ("plausibility", Plausibility)):
         table.table(name).record(record)
+    if "band" in data:
+        band = table.table("band")
+        for name in ("factors", "color"):
+            band.array(name)
     for name in ("ladder", "edges", *ARRAYS):
         largest = float(np.abs(table.array(name)).max(initial=0.0))
         if largest > LARGEST:

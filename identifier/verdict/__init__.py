@@ -1,6 +1,15 @@
 """A verdict with every answer: is it good, what speaks against it, and why."""
 
+from identifier.verdict.bands import calibrated, within_band
 from identifier.verdict.judging import judge, judge_prediction
 from identifier.verdict.verdict import Finding, Number, Verdict
 
-__all__ = ["Finding", "Number", "Verdict", "judge", "judge_prediction"]
+__all__ = [
+    "Finding",
+    "Number",
+    "Verdict",
+    "calibrated",
+    "judge",
+    "judge_prediction",
+    "within_band",
+]

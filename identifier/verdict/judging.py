@@ -2,10 +2,8 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.axle import AxleIdentifier
@@ -25,6 +23,7 @@ from identifier.verdict.motion import (
     modelled_force,
     noise_variance,
 )
+from identifier.verdict.parts import taught_elsewhere
 from identifier.verdict.rules import MOST_MISSED, PERCENT, Drive, findings
 from identifier.verdict.verdict import WITHOUT_V_Y, Finding, Number, Verdict
 from models.recordings import Recording
@@ -35,8 +34,6 @@ STRETCH = 0.3  # share of the windows that may be missed in one piece
 REST_MISSED = 0.08  # of the force elsewhere, where a piece is,
 CONFINED = 0.6  # and of what is missed with the piece
 TINY = 1e-9  # of a force, squared [static axle loads²]
-PARTS = 4  # of the drive, each of which is left out once
-Indices = NDArray[np.intp]
 GEOMETRY = "center_of_gravity"
 CENTER = tuple(one for one in CAUSES if one.code == GEOMETRY)
 
@@ -60,7 +57,7 @@ def judge(history: History, t: float | None = None) -> Verdict:
     end = float(whole.t[-1]) if t is None else t
     frozen = state_index(whole, end)
     asked = portion(whole, frozen)
-    n, road = asked.place(frozen), _road_felt(history, asked)
+    n, road = asked.place(frozen), road_felt(history, asked)
     until = None if n == len(asked.recording) else float(asked.recording.t[n])
 
     def taught(mended: Mended) -> TireModel:
@@ -87,8 +84,14 @@ def judge(history: History, t: float | None = None) -> Verdict:
     return _verdict(drive, [*findings(drive), *reached, *_asked_of(asked, whole)])
 
 
-def _road_felt(history: History, asked: Portion) -> Array | None:
-    """Return what a banked road pushed over a portion of a run (k,) [weights]; None unknown."""
+def road_felt(history: History, asked: Portion) -> Array | None:
+    """Return what a banked road pushed over a portion of a run (k,) [weights]; None unknown.
+
+    Parameters
+    ----------
+    history : the run.
+    asked : of its recording.
+    """
     pushes = []
     for block in history.blocks(asked.samples):
         first, last = np.searchsorted(asked.samples, [block.part.start, block.part.stop])
@@ -285,40 +288,26 @@ def _apart(force: Array, vehicle: Vehicle, found: Evidence) -> Array:
 def _elsewhere(taught: Tires, drive: Drive, car: Vehicle) -> Array | None:
     """Return what models taught without a part of the drive miss of that part, over its force (2,).
 
-    The parts follow one another and hold equal shares of the force (squared); in the one that is
-    left out the car is made to stand, so that learning rests. A window counts where such a model
-    knows the slip.
+    A window counts where such a model knows the slip.
     """
     recording, found = drive.recording, drive.found
     windows = found.windows
-    power = np.cumsum(np.sum(found.measured**2, axis=1))
-    if not power[-1] > 0.0:
-        return None
-    part = np.minimum((PARTS * power / power[-1]).astype(np.intp), PARTS - 1)
     slip = np.abs(windows.mean(np.asarray(recording.alpha(car.l_f, car.l_r))))
     missed, force = np.zeros_like(found.measured), np.zeros_like(found.measured)
-    for k in range(PARTS):
-        mine = part == k
-        if not mine.any():
-            continue
-        model = _taught_without(taught, recording, car, windows.starts[mine], windows.n)
+
+    def teach(halting: Recording) -> TireModel:
+        return taught(Mended(halting, car))
+
+    parts = 0
+    for mine, model in taught_elsewhere(teach, recording, found):
         if model is None:
             return None
+        parts += 1
         known = model.known_slip
         counted = mine[:, None] & (slip <= (np.inf if known is None else known))
         away = found.measured - modelled_force(model, recording, windows)
         missed[counted], force[counted] = away[counted], found.measured[counted]
+    if parts == 0:
+        return None
     seen = np.mean(force != 0.0, axis=0)
     return np.where(seen > 0.0, clean_share(missed, force, found.noise * seen), 0.0)
-
-
-def _taught_without(
-    taught: Tires, recording: Recording, vehicle: Vehicle, starts: Indices, n: int
-) -> TireModel | None:
-    """Return what a drive teaches without some windows; None where nothing comes of it."""
-    halt = np.array(recording.v_x)
-    halt[starts[0] : starts[-1] + n + 1] = 0.0
-    try:
-        return taught(Mended(replace(recording, v_x=halt), vehicle))
-    except (ArithmeticError, ValueError):
-        return None

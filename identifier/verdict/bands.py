@@ -1,0 +1,215 @@
+"""Bands that hold: calibrated on stretches of the drive that did not teach, by the motion alone.
+
+Each quarter of the drive is asked of a model that was taught without it. Over windows of 0.3 s the
+impulse of an axle says which force it made, with no true force; what the model misses of it, noise
+of the sensors taken off, gives by range of slip the factor with which a band of 90 % would have
+held there (conformal prediction). Errors follow one another: how long they stay alike says how many
+of them tell something new.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import Array
+from identifier.axle.band import (
+    CENTERS,
+    LEAST,
+    LEVEL,
+    MOST,
+    MOST_COLOR,
+    BandCalibration,
+    BandSpread,
+    normal_quantile,
+    ranges_of,
+)
+from identifier.axle.learning import Regression
+from identifier.axle.model import AxleModel
+from identifier.run import History, learn, state_index
+from identifier.tire_model import TireModel
+from identifier.verdict.judging import road_felt
+from identifier.verdict.motion import Windows, evidence, modelled_force
+from identifier.verdict.parts import taught_elsewhere
+from models.recordings import Recording
+from models.recordings.portion import portion
+
+SHARED = 10.0  # windows of all ranges that count in each, so that few windows decide nothing
+INDEPENDENT = 0.5  # of the windows, which overlap by half
+ELSEWHERE = (1.6, 1.0, 1.0, 1.1, 1.2, 1.2)
+# of an instant of another drive, over a window of a part left out, by range of slip: means hide
+# errors of quick passes through zero; chosen on 128 random cars, seeds 100 to 131
+
+
+def within_band(model: TireModel, recording: Recording, level: float = LEVEL) -> Array | None:
+    """Return in which share of windows of a drive the band holds what the motion shows, (2,).
+
+    White noise of the sensors is added to the band. None where the model has none, or too little
+    is driven.
+
+    Parameters
+    ----------
+    model : that is asked.
+    recording : the drive.
+    level : of the band.
+    """
+    if not isinstance(model, AxleModel):
+        return None
+    found = evidence(model, recording)
+    if found is None:
+        return None
+    slip, loads = model.lagged_slip(recording), np.array(model.vehicle.axle_loads)
+    half = np.column_stack([model.half_band(slip[:, i], level)[:, i] for i in range(2)]) / loads
+    noise = normal_quantile(level) ** 2 * found.noise
+    wide = np.sqrt(found.windows.mean(half) ** 2 + noise)
+    share: Array = np.mean(np.abs(found.measured - found.modelled) <= wide, axis=0)
+    return share
+
+
+class Missed(NamedTuple):
+    """What was missed where a model was not taught, window by window, axle by axle.
+
+    error : [static axle loads], nan where no part was left out (m, 2).   share : of the window in
+    which the slip was in each range (6, m, 2).   scaled, held : variances of the model that was
+    asked, as `BandSpread` has them, at the mean of the slip there (6, m, 2).
+    """
+
+    error: Array
+    share: Array
+    scaled: Array
+    held: Array
+
+
+def calibrated(history: History, t: float | None = None) -> TireModel:
+    """Return the model frozen at a time, its band calibrated; as frozen where that cannot be done.
+
+    It cannot where the model has no band, or too little is driven.
+
+    Parameters
+    ----------
+    history : the run.
+    t : time of the freeze in the recording's own clock [s]; None is the end.
+
+    Raises
+    ------
+    DivergedError
+        Where the law had diverged by then.
+    CannotFreezeError
+        Where the method estimates a signal, not a model.
+    ValueError
+        Where the recording begins after that time.
+    """
+    model, whole = history.freeze(t), history.recording
+    if not isinstance(model, AxleModel):
+        return model
+    frozen = state_index(whole, float(whole.t[-1]) if t is None else t)
+    asked = portion(whole, frozen)
+    n, recording = asked.place(frozen), asked.recording
+    until = None if n == len(recording) else float(recording.t[n])
+    found = evidence(model, recording, road_felt(history, asked))
+    if found is None:
+        return model
+
+    def teach(halting: Recording) -> TireModel:
+        return learn(halting, history.vehicle, history.design, history.start, until)
+
+    one, each = found.measured.shape, (len(CENTERS), *found.measured.shape)
+    missed = Missed(np.full(one, np.nan), *(np.zeros(each) for _ in range(3)))
+    for mine, other in taught_elsewhere(teach, recording, found):
+        if isinstance(other, AxleModel):
+            asked_of = _missed(other, recording, found.windows, found.measured)
+            for into, values in zip(missed, asked_of, strict=True):
+                into[..., mine, :] = values[..., mine, :]
+    return replace(model, calibration=calibration(missed, found.noise, found.windows))
+
+
+def _missed(model: AxleModel, recording: Recording, windows: Windows, measured: Array) -> Missed:
+    size, count = np.abs(model.lagged_slip(recording)), len(CENTERS)
+    within = ranges_of(size)
+    share = np.array([windows.mean(1.0 * (within == k)) for k in range(count)])
+    total = np.array([windows.mean(size * (within == k)) for k in range(count)])
+    slip = np.divide(total, share, out=np.zeros_like(total), where=share > 0.0)
+    spread = BandSpread(np.empty_like(slip), np.empty_like(slip))
+    for axle in range(2):
+        at = model.band_spread(slip[..., axle].ravel())
+        for into, values in zip(spread, at, strict=True):
+            into[..., axle] = values[:, axle].reshape(slip.shape[:2])
+    return Missed(measured - modelled_force(model, recording, windows), share, *spread)
+
+
+def calibration(missed: Missed, noise: Array, windows: Windows) -> BandCalibration | None:
+    """Return factors and color of errors on stretches that did not teach; None: too few windows.
+
+    Parameters
+    ----------
+    missed : the errors.
+    noise : variance of the sensors' white noise in them (2,).
+    windows : where they are.
+    """
+    factors, told = np.ones((2, len(CENTERS))), False
+    for i in range(2):
+        asked = np.isfinite(missed.error[:, i])
+        error = missed.error[asked, i]
+        share, *spread = (values[:, asked, i] for values in missed[1:])
+        needed = BandSpread(*spread).needed_factor(error, noise[i])
+        everywhere = quantile(needed.ravel(), share.ravel())
+        if not np.isfinite(everywhere):
+            continue
+        told = True
+        for k in range(len(CENTERS)):
+            own, count = quantile(needed[k], share[k]), float(share[k].sum())
+            if np.isfinite(own):
+                mean = (count * own + SHARED * everywhere) / (count + SHARED)
+            else:
+                mean = everywhere
+            factors[i, k] = ELSEWHERE[k] * np.sqrt(mean)
+    if not told:
+        return None
+    color = [color_of(missed.error[:, i], windows) for i in range(2)]
+    return BandCalibration(factors=np.clip(factors, LEAST, MOST), color=np.array(color))
+
+
+def quantile(values: Array, share: Array) -> float:
+    """Return what the next value stays below in a share `LEVEL` of cases; inf: too few to tell.
+
+    Parameters
+    ----------
+    values : of windows that overlap by half (m,).
+    share : of each that counts (m,).
+    """
+    order = np.argsort(values)
+    count = np.cumsum(share[order])
+    total = float(count[-1]) if count.size else 0.0
+    needed = LEVEL * (total + 1.0 / INDEPENDENT)  # as if one more window were farther out than all
+    at = int(np.searchsorted(count, needed))
+    return float(values[order[at]]) if at < values.size else float("inf")
+
+
+def color_of(error: Array, windows: Windows) -> float:
+    """Return how much longer errors are correlated than learning is told, at least 1.
+
+    The sum of their autocorrelation, over windows that do not overlap, until it is first not
+    positive.
+
+    Parameters
+    ----------
+    error : of the windows, nan where nothing was asked (m,).
+    windows : where they are.
+    """
+    step = max(1, windows.n // 2)
+    place = np.round(windows.starts / step).astype(np.intp)
+    series = np.full(int(place.max()) + 1, np.nan)
+    series[place] = error
+    known: NDArray[np.bool_] = np.isfinite(series)
+    value = np.where(known, series, 0.0)
+    power, total = float(np.mean(value[known] ** 2)), 1.0
+    for lag in range(2, len(series) // 4, 2):
+        pairs = known[lag:] & known[:-lag]
+        if not pairs.any():
+            break
+        alike = float(np.mean((value[lag:] * value[:-lag])[pairs])) / max(power, 1e-12)
+        if alike <= 0.0:
+            break
+        total += 2.0 * alike
+    return float(np.clip(total * windows.duration / Regression().correlation_time, 1.0, MOST_COLOR))

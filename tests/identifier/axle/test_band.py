@@ -1,0 +1,226 @@
+"""The band around the learnt curves: it holds on drives never seen, and widens where nobody was."""
+
+import json
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from identifier.axle import AxleIdentifier, AxleModel
+from identifier.axle.band import BandCalibration, BandSpread, colored, normal_quantile, ranges_of
+from identifier.methods import load_model, make_method
+from identifier.run import identify
+from identifier.verdict import calibrated, within_band
+from identifier.verdict.bands import color_of, quantile
+from identifier.verdict.motion import Windows
+from models.maneuvers import RandomSteer
+from models.plant import Plant
+from models.vehicle import sedan
+
+SLIP = np.linspace(-0.3, 0.3, 61)
+
+
+def learnt(recording, car):
+    return identify(recording, car, AxleIdentifier.for_vehicle(car))
+
+
+@pytest.fixture(scope="module", name="run")
+def a_run(swinging):
+    car, drives = swinging
+    return learnt(drives[0], car)
+
+
+@pytest.fixture(scope="module")
+def swinging():
+    """A sedan on the plant, and drives of it at three speeds."""
+    drives = []
+    for seed, speed in ((3, 20.0), (4, 17.0), (5, 23.0)):
+        steering = RandomSteer(
+            amplitude=0.08, frequency=0.6, seed=seed, onset=1.0, rate_limit=0.8, duration=22.0
+        )
+        drives.append(Plant(sedan()).simulate(steering, speed=speed).recording())
+    return sedan(), drives
+
+
+@pytest.fixture(scope="module", name="model")
+def a_model(run):
+    return run.calibrated()
+
+
+def coverage(model, recording, level=0.9):
+    """Share of samples whose true force lies in the band around the replayed one (2,)."""
+    slip, loads = model.lagged_slip(recording), recording.axle_force
+    half = np.column_stack([model.half_band(slip[:, i], level)[:, i] for i in range(2)])
+    inside = np.abs(model.axle_force(recording) - loads) <= half
+    return inside[recording.t > 1.5].mean(axis=0)
+
+
+def test_bands_hold_on_drives_that_were_not_seen(model, swinging):
+    held = np.mean([coverage(model, one) for one in swinging[1][1:]])
+    assert 0.8 <= held <= 0.99
+    wrong = replace(model, W=1.4 * model.W)  # the alarm rings: a curve 40 % off leaves its band
+    assert np.mean([coverage(wrong, one) for one in swinging[1][1:]]) < 0.6
+
+
+def test_a_calibrated_band_follows_errors_and_a_told_one_does_not(run, model, swinging):
+    car, (first, *_) = swinging
+    rng = np.random.default_rng(2)
+    slow = np.cumsum(rng.standard_normal(len(first))) * 0.006  # a velocity sensor that wanders
+    other = learnt(replace(first, v_y=first.v_y + slow), car)
+    rough, told = other.calibrated(), other.freeze()
+    assert rough.calibration.factors.mean() > 1.5 * model.calibration.factors.mean()
+    assert told.calibration is None and run.freeze().calibration is None
+    at = np.array([0.03])
+    assert (rough.half_band(at) > 1.3 * model.half_band(at)).all()
+    assert (rough.half_band(at) > 1.3 * told.half_band(at)).all()
+
+
+def test_calibration_leaves_the_frozen_model_as_it_is(run, model):
+    frozen = run.freeze()
+    for name in ("W", "own", "covariance", "prior_covariance", "excitation"):
+        np.testing.assert_array_equal(getattr(model, name), getattr(frozen, name))
+    assert "band" not in frozen.to_dict()
+    assert model.to_dict() == frozen.to_dict() | {"band": model.calibration.to_dict()}
+    np.testing.assert_array_equal(run.calibrated(15.0).W, run.freeze(15.0).W)
+
+
+def test_a_band_widens_with_its_level_and_around_its_curve(model):
+    halves = [model.half_band(SLIP, level) for level in (0.1, 0.5, 0.9, 0.99)]
+    assert all((b > a).all() for a, b in pairwise(halves))
+    low, high = model.band(SLIP)
+    np.testing.assert_allclose(0.5 * (low + high), model.force(SLIP))
+    np.testing.assert_allclose(high - low, 2.0 * model.half_band(SLIP))
+    np.testing.assert_allclose(high[::-1], -low, atol=1e-6)  # odd in slip
+    one = model.band(0.05, "rear", 0.8)
+    assert isinstance(one[0], float) and one[0] < model.force(0.05, "rear") < one[1]
+    assert one[1] == pytest.approx(model.band([0.05], level=0.8)[1][0, 1])
+
+
+@pytest.mark.parametrize("level", [0.0, 1.0, -0.1, 90.0, np.nan])
+def test_an_impossible_level_is_refused(model, level):
+    with pytest.raises(ValueError, match="level must be above 0 and below 1"):
+        model.band(0.1, level=level)
+
+
+def test_where_nobody_was_the_band_is_the_priors(swinging, model):
+    car, drives = swinging
+    new = AxleIdentifier.for_vehicle(car).frozen(car, learnt(drives[0], car).state_at(0.0))
+    T = np.tanh(0.3 / np.array(new.ladder))
+    n, C = T.size, new.prior_covariance
+    prior = np.sqrt(np.einsum("j,ajk,k->a", T, C[:, :n, :n], T)) * np.array(car.axle_loads)
+    assert (new.half_band(np.array([0.3]))[0] >= 1.64 * prior).all()
+    narrowed = replace(
+        new, calibration=BandCalibration(factors=np.full((2, 6), 0.1), color=np.full(2, 9.0))
+    )
+    np.testing.assert_allclose(narrowed.half_band(SLIP), new.half_band(SLIP), rtol=1e-9)
+    known = float(model.known_slip.min())
+    relative = model.half_band(np.array([0.8 * known, 2.0 * known])) / model.half_band(
+        np.array([0.8 * known])
+    )
+    assert (relative[1] > 1.5).all()
+
+
+def test_a_band_survives_a_file_and_old_files_have_none(run, model, tmp_path, refused_in_one_line):
+    model.save(tmp_path / "new.json")
+    run.freeze().save(tmp_path / "old.json")
+    again, old = load_model(tmp_path / "new.json"), load_model(tmp_path / "old.json")
+    assert old.calibration is None
+    np.testing.assert_array_equal(again.half_band(SLIP), model.half_band(SLIP))
+    data = json.loads((tmp_path / "new.json").read_text())
+    wrong = {
+        "factors": (np.zeros((2, 6)).tolist(), "within 0.1 and 100"),
+        "color": ([1.0], "shape"),
+        "level": (0.5, "level of the band must be 0.9"),
+        "ranges": ([], "ranges of the band must be"),
+    }
+    for name, (value, said) in wrong.items():
+        refused_in_one_line(data | {"band": data["band"] | {name: value}}, said)
+    refused_in_one_line(data | {"band": {}}, "missing")
+    refused_in_one_line(data | {"band": 3}, "band")
+
+
+def test_samples_fill_the_band(model):
+    drawn = model.samples(200, np.random.default_rng(1))
+    assert all(isinstance(one, AxleModel) for one in drawn)
+    slip = np.array([0.03, 0.06, 0.2])
+    away = np.abs(np.array([one.force(slip) for one in drawn]) - model.force(slip))
+    share = (away <= model.half_band(slip)).mean(axis=0)
+    assert (share > 0.8).all() and (share < 1.0).any()
+    assert not np.allclose(drawn[0].own, drawn[1].own)
+    assert model.samples(0, np.random.default_rng(1)) == ()
+    with pytest.raises(ValueError, match="n must not be negative"):
+        model.samples(-1, np.random.default_rng(1))
+    with pytest.raises(ValueError, match="no tire is among"):
+        replace(model, W=-model.W).samples(1, np.random.default_rng(1))
+
+
+def test_models_without_doubt_have_no_band(swinging):
+    car, drives = swinging
+    run = identify(drives[0], car, make_method("linear", car, 0))
+    tire = run.calibrated()
+    assert tire.band(0.1) is None and within_band(tire, drives[1]) is None
+    with pytest.raises(ValueError, match="cannot tell how sure it is"):
+        tire.samples(1, np.random.default_rng(1))
+
+
+def test_too_short_a_drive_leaves_the_band_as_told(swinging):
+    car, drives = swinging
+    assert calibrated(learnt(drives[0].between(0.0, 1.5), car)).calibration is None
+
+
+def test_windows_of_a_drive_lie_in_the_band_as_often_as_it_says(model, swinging):
+    share = within_band(model, swinging[1][1])
+    assert ((share > 0.75) & (share <= 1.0)).all()
+    assert (within_band(replace(model, W=1.5 * model.W), swinging[1][1]) < 0.6).all()
+    assert (within_band(model, swinging[1][1], 0.2) < share).all()
+
+
+# Pieces, reached by another road.
+
+
+def test_samples_that_tell_less_are_fewer_samples():
+    """A linear regression whose errors come in runs of nine knows what a ninth of them tells."""
+    rng = np.random.default_rng(4)
+    prior, H = np.diag([4.0, 1.0, 0.5]), rng.standard_normal((50, 3))
+    all_told = np.linalg.inv(np.linalg.inv(prior) + H.T @ H)
+    a_ninth = np.linalg.inv(np.linalg.inv(prior) + H.T @ H / 9.0)
+    np.testing.assert_allclose(colored(all_told, prior, 9.0), a_ninth, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(colored(all_told, prior, 1.0), all_told, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(colored(prior, prior, 9.0), prior, rtol=1e-9, atol=1e-15)
+
+
+def test_the_needed_factor_makes_a_band_that_just_reaches():
+    rng = np.random.default_rng(5)
+    spread = BandSpread.of(*rng.uniform(0.1, 1.0, (2, 40)), np.full(40, 20.0))
+    error = rng.uniform(0.0, 3.0, 40)
+    needed = spread.needed_factor(error, 0.0)
+    reached = spread.half_width(np.sqrt(needed), 0.9)
+    assert (needed > 0.0).sum() > 10
+    np.testing.assert_allclose(reached[needed > 0.0], error[needed > 0.0])
+    assert (reached >= error - 1e-12).all()
+    assert (spread.needed_factor(error, 0.01) <= needed).all()
+
+
+def test_the_quantile_leaves_room_for_one_more_window():
+    values = np.arange(100.0)
+    assert quantile(values, np.ones(100)) == 91.0  # 0.9 of 102, counted from 1
+    assert quantile(values[:10], np.ones(10)) == np.inf
+    assert quantile(values, np.where(values < 50, 1.0, 0.0)) == 46.0
+
+
+@pytest.mark.parametrize(("time", "low", "high"), [(0.0, 2.5, 6.0), (2.0, 15.0, 90.0)])
+def test_errors_that_stay_alike_count_less(swinging, time, low, high):
+    recording = swinging[1][0]
+    windows, rng = Windows.of(recording, 1.0), np.random.default_rng(6)
+    white = rng.standard_normal(len(recording))
+    keep = np.exp(-recording.dt / time) if time else 0.0
+    error = np.zeros(len(recording))
+    for k in range(1, len(recording)):
+        error[k] = keep * error[k - 1] + white[k]
+    assert low <= color_of(windows.mean(error), windows) <= high
+
+
+def test_ranges_and_quantiles_are_those_of_tables():
+    assert normal_quantile(0.9) == pytest.approx(1.644854, abs=1e-6)
+    np.testing.assert_array_equal(ranges_of(np.array([0.0, 0.0101, 0.05, 0.5])), [0, 1, 3, 5])
