@@ -243,7 +243,9 @@ class InertialIdentifier(Method):
                 "motion_UD": np.zeros(rest),  # begins with the first sample
                 "gate": np.zeros(len(GateState._fields)),
                 "body": np.zeros(2),
-                "heard": np.concatenate([np.zeros(4), [first.r_noise, first.a_y_noise]]),
+                "heard": np.concatenate(
+                    [np.zeros(4), [first.r_noise, first.a_y_noise], np.zeros(4)]
+                ),
                 "heard_v_y": heard_v_y,
                 "running": np.zeros(2),
                 "excitation": excitation,

@@ -17,27 +17,34 @@ from identifier.axle.covariance import TINY, Factors, excited, updated
 def propagated(factors: Factors, F: Any, Q: list[Any]) -> Factors:
     """Return the factors after m⁺ = F z + w.
 
+    F is given by its way: rows for the a numbers on the way to m⁺, then for m⁺, each over z and
+    the numbers on the way before it. So what many rows share is multiplied with U once.
+
     Parameters
     ----------
     factors : of z, q entries.
-    F : Jacobian of what moves (m, q), sparse.
+    F : Jacobian of what moves (a + m, q + a), sparse.
     Q : variances of w, m entries; None where there is none.
     """
     U, D = factors
     q, m = len(D), len(Q)
+    steps = [[(F[i, j], j) for j in range(F.shape[1]) if F.has_nz(i, j)] for i in range(F.shape[0])]
 
-    def times(i: int, k: int) -> Any:
-        """Row i of F U in column k."""
-        terms = [F[i, j] * U[j, k] for j in range(min(k, q)) if F.has_nz(i, j)]
-        return sum(terms, start=F[i, k] if F.has_nz(i, k) else ca.SX(0))
+    def column(k: int) -> list[Any]:
+        """Column k of F U."""
+        values = [*(U[j, k] for j in range(k)), ca.SX(1), *[ca.SX(0)] * (q - k - 1)]
+        for terms in steps:
+            values.append(sum((slope * values[j] for slope, j in terms), start=ca.SX(0)))
+        return values[-m:]
 
     noisy = [i for i in range(m) if Q[i] is not None]
+    moved = [column(k) for k in range(q)]
     rows = [
-        [*(times(i, k) for k in range(m)), *(ca.SX(float(i == j)) for j in noisy)] for i in range(m)
+        [*(moved[k][i] for k in range(m)), *(ca.SX(float(i == j)) for j in noisy)] for i in range(m)
     ]
     weights = [*D[:m], *(Q[i] for i in noisy)]
     after = {
-        (i, k): times(i, k) if i < m else U[i, k] for i in range(q) for k in range(max(i + 1, m), q)
+        (i, k): moved[k][i] if i < m else U[i, k] for i in range(q) for k in range(max(i + 1, m), q)
     }
     diagonal: list[Any] = [*D]
     for j in reversed(range(m)):

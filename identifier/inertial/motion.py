@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from identifier.axle.car import Car, larger
+from identifier.axle.car import Car
 from identifier.axle.curve import Curve, curve
 from identifier.axle.slip import SHORTEST
 from models.vehicle import GRAVITY
@@ -136,14 +136,74 @@ class Laws(NamedTuple):
     aside: Any
 
 
+class Way:
+    """How a step leads to what moves: by numbers on the way, of each its expression.
+
+    Numbers that are `held` have no gradient: what a step moves them by is of second order.
+    """
+
+    def __init__(self) -> None:
+        self._symbols: list[Any] = []
+        self._values: list[Any] = []
+        self._on_the_way: list[tuple[Any, Any]] = []
+
+    def held(self, value: Any) -> Any:
+        """Return a number of which the gradient is left out, as a symbol.
+
+        Parameters
+        ----------
+        value : expression of any shape.
+        """
+        symbol = ca.SX.sym("held", *value.shape)
+        self._symbols.append(symbol)
+        self._values.append(value)
+        return symbol
+
+    def by(self, value: Any) -> Any:
+        """Return a number that others go on from, as a symbol.
+
+        Parameters
+        ----------
+        value : expression of any shape.
+        """
+        symbol = self.held(value)
+        self._on_the_way.append((symbol, value))
+        return symbol
+
+    def valued(self, expressions: list[Any]) -> list[Any]:
+        """Return expressions with the numbers on the way put in.
+
+        Parameters
+        ----------
+        expressions : of z and symbols.
+        """
+        for symbol, value in zip(reversed(self._symbols), reversed(self._values), strict=True):
+            expressions = ca.substitute(expressions, [symbol], [value])
+        return expressions
+
+    def gradient(self, z: Any, moving: Any) -> Any:
+        """Return F by its way, as `identifier.inertial.gaussian.propagated` takes it.
+
+        Parameters
+        ----------
+        z : symbols (q,).
+        moving : what moves (8,), an expression of z and of symbols on the way.
+        """
+        symbols, values = zip(*self._on_the_way, strict=True)
+        numbers = ca.vertcat(*values, moving)
+        return self.valued([ca.jacobian(numbers, ca.vertcat(z, *symbols))])[0]
+
+
 class Predicted(NamedTuple):
     """After a step: what moves (8,) of z, the slip α (2,) [rad] and the rolling body.
 
+    by_way : how the step leads to `moving`, and that as an expression of the numbers on the way.
     tilt, tilt_rate : ä [m/s²] and its rate [m/s³].   curve : at the slip before the step.
     force_rate : of the lagged slip times the slope of the curve [1/s], (2,).
     """
 
     moving: Any
+    by_way: tuple[Way, Any]
     alpha: Any
     tilt: Any
     tilt_rate: Any
@@ -208,28 +268,33 @@ def predicted(
     scales : 1/α_j of the units [1/rad], (1, n).
     steps : doublings between the units.
     """
+    way = Way()
     v_x = (before.v_x + now.v_x) / 2
     at = curve(z.slip, z.W, scales, steps)
-    sigma = larger(z.compliance, 0) * at.carcass_slope + SHORTEST * (car.arm[0] - car.arm[1])
+    wheelbase = car.arm[0] - car.arm[1]
+    steep = way.held(at.carcass_slope <= at.slope)
+    carcass = steep * way.by(at.slope) + (1 - steep) * way.held(at.carcass_slope)
+    sigma = way.by(z.compliance * carcass + SHORTEST * wheelbase)
     length = v_x * dt * (1 / sigma)
     e = ca.exp(-length)
     mean = (1 - e) * (1 / length)
     sway = -laws.sway * tilt[1] * (1 / v_x)
     was = slip_angle(car, before, z.v_y, z.r, z.steering) + sway
-    held = slip_angle(car, now, z.v_y, z.r, z.steering) + sway  # where v_y and r stayed as they are
-    slip = e * z.slip + (mean - e) * was + (1 - mean) * held
+    stays = slip_angle(car, now, z.v_y, z.r, z.steering) + sway  # where v_y and r stay as they are
+    slip = e * z.slip + (mean - e) * was + (1 - mean) * stays
     cos_delta = cosine(now.delta)
-    force = (at.force + at.slope * (slip - z.slip) / 2) * cos_delta + z.error
+    slope = way.held(at.slope)
+    force = way.by((at.force + slope * (slip - z.slip) / 2) * cos_delta + z.error)
     arm, turn = car.arm, turning(car) * (1 + z.inertia)
     push = GRAVITY * car.share
-    pull = at.slope * cos_delta * (1 - mean) * (dt / (2 * v_x))  # force lost per change of v_y
+    pull = way.held(slope * cos_delta * (1 - mean) * (dt / (2 * v_x)))  # force per change of v_y
     a = ca.dot(push, force) - v_x * z.r + GRAVITY * z.bank
     b = ca.dot(turn, force)
     m11, m12 = 1 + ca.dot(push, pull), ca.dot(push * arm, pull) + dt * v_x / 2
     m21, m22 = ca.dot(turn, pull), 1 + ca.dot(turn * arm, pull)
     per = dt / (m11 * m22 - m12 * m21)
-    v_y = z.v_y + (m22 * a - m12 * b) * per
-    r = z.r + (m11 * b - m21 * a) * per
+    v_y = way.by(z.v_y + (m22 * a - m12 * b) * per)
+    r = way.by(z.r + (m11 * b - m21 * a) * per)
     alpha = slip_angle(car, now, v_y, r, z.steering) + sway
     slip = e * z.slip + (mean - e) * was + (1 - mean) * alpha
     bank_rate = z.bank_rate - dt * (laws.bank_damping * z.bank_rate + laws.bank_stiffness * z.bank)
@@ -237,16 +302,11 @@ def predicted(
     rate = (rate + dt * laws.roll_stiffness * (ca.dot(push, force) - rolling)) / (
         1 + dt * laws.roll_damping + dt**2 * laws.roll_stiffness
     )
-    return Predicted(
-        moving=ca.vertcat(
-            v_y, r, slip, laws.forgets * z.error, z.bank + dt * z.bank_rate, bank_rate
-        ),
-        alpha=alpha,
-        tilt=rolling + dt * rate,
-        tilt_rate=rate,
-        curve=at,
-        force_rate=at.slope * (slip - z.slip) / dt,
-    )
+    moving = ca.vertcat(v_y, r, slip, laws.forgets * z.error, z.bank + dt * z.bank_rate, bank_rate)
+    force_rate = at.slope * (slip - z.slip) / dt
+    numbers = [moving, alpha, rolling + dt * rate, rate, force_rate]
+    moved, alpha, tilting, rate, force_rate = way.valued(numbers)
+    return Predicted(moved, (way, moving), alpha, tilting, rate, at, force_rate)
 
 
 class Shown(NamedTuple):

@@ -5,7 +5,7 @@ correlated, so that v_y is corrected by what the curves are found to be and the 
 Carried: motion (8,), W (2, n), own (2,) the compliances, sensors (5,) and UD the factors of the
 covariance of what is learnt, motion_UD those of what moves, in the order of
 `identifier.inertial.motion`; gate as of the axle
-identifier; body (2,), heard (6,), running (2,), excitation (2, 9).
+identifier; body (2,), heard (10,), running (2,), excitation (2, 9).
 Sampled: x = [v_y, r], of which v_y is not read; u, v_x, a_y, NaN where there is none.
 """
 
@@ -45,6 +45,8 @@ CARRY = ("motion", *LEARNT, *KEPT)
 OUTPUTS = ("axle_force", "v_y", "v_y_sd", "side_slip_observable")
 LOAD = "static axle loads"
 FIRST_CHANGE = 5  # of what is carried of a measured v_y, where its changes begin
+SAME = 0.01  # of the square of a change, up to which the next one is none: a number that settles
+MOST_WAITING = 2  # numbers of a channel that wait for its turn
 MOST_COUNTED = 1000  # samples
 MOST_SLIDING = 0.7  # |v_y|/v_x from which the filter begins anew
 MOST_NOISE = 9.0  # of the noise that is held for true, what one sample may show
@@ -89,8 +91,9 @@ PORTS = (
     Port("body", "m/s^2; m/s^3", "motion of the rolling body and its rate"),
     Port(
         "heard",
-        "rad/s, m/s^2; squares",
-        "newest r and a_y, those before, and variances of their noise",
+        "rad/s, m/s^2; squares; -; rad/s, m/s^2",
+        "newest r and a_y, those before, variances of their noise, how many numbers wait, "
+        "and the innovation of those",
     ),
     Port(
         "heard_v_y",
@@ -128,15 +131,31 @@ class LearntLimits(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """What the channels tell of themselves: which are fresh, variances of noise, what is carried.
+    """What the channels tell of themselves, and which of them has its turn.
 
-    fresh : 1 where a number is there and not the one of the sample before, (2,).
-    variance : of noise [rad²/s², m²/s⁴], (2,).   heard : next state (6,).
+    first : 1 where that is r, 0 where it is a_y.   counts : 1 where it has a number.
+    share : 1 over the numbers that waited for this turn, (2,) [-]: of errors that one in a row
+    repeats of another, the sum counts.
+    fresh : 1 where a number is new, (2,).   left : innovations of those that wait (2,).
+    variance : of noise [rad²/s², m²/s⁴], (2,).   heard : next state (8,), without those.
     """
 
+    first: Any
+    counts: Any
+    share: list[Any]
     fresh: list[Any]
+    left: list[Any]
     variance: list[Any]
     heard: Any
+
+    def turn(self, of_r: Any, of_a_y: Any) -> Any:
+        """Return what belongs to the channel that has its turn.
+
+        Parameters
+        ----------
+        of_r, of_a_y : one of these.
+        """
+        return ca.if_else(self.first, of_r, of_a_y)
 
 
 class Change(NamedTuple):
@@ -165,7 +184,7 @@ def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
         "motion_UD": ca.SX.sym("motion_UD", 1, len(triangle(q)) - len(triangle(q - MOVING))),
     }
     ports["gate"], last = named_port(GateState, "gate")
-    sizes = {"body": 2, "heard": 6, "heard_v_y": heard_size(delay), "running": 2}
+    sizes = {"body": 2, "heard": 10, "heard_v_y": heard_size(delay), "running": 2}
     ports |= {name: ca.SX.sym(name, k) for name, k in sizes.items()}
     ports["excitation"] = ca.SX.sym("excitation", 2, 1 + len(EDGES))
     ports |= {name: ca.SX.sym(name, k) for name, k in (("x", 2), ("u", 2), ("v_x", 1), ("a_y", 1))}
@@ -205,15 +224,17 @@ def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
     known = factors_of([*ca.horzsplit(ports["motion_UD"]), *ca.horzsplit(ports["UD"])], q)
     if delay is None:  # nothing depends on the bias of a sensor that is not looked at
         known.U.update({(i, q - 1): ca.SX(0) for i in range(q - 1)})
-    F = ca.jacobian(ahead.moving, z)
+    way, moving = ahead.by_way
+    F = way.gradient(z, moving)
     factors = propagated(known, F, _process_noise(trust, ahead))
     ahead_z = ca.vertcat(ahead.moving, z[MOVING:])
-    corrected, factors = _corrected(
+    corrected, factors, heard = _corrected(
         (car, laws, trust), ahead, ahead_z, factors, noise, now, scales, steps
     )
     heard_v_y = ports["heard_v_y"]
     if delay is not None:
-        change = Change(ahead.moving[0] - z[0], F[0, :] - ca.SX.eye(q)[0, :])
+        difference = ahead.moving[0] - z[0]
+        change = Change(difference, ca.jacobian(difference, z))
         corrected, factors, heard_v_y = _lateral(
             ports, trust, delay, (corrected, factors), gated, goes_on, change
         )
@@ -231,7 +252,7 @@ def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
         *corrected[MOVING:],  # which are not moved unless the filter goes on
     ]
     after = [
-        a if a is b else ca.if_else(goes_on, a, b)
+        a if a is b else goes_on * a if b.is_zero() else ca.if_else(goes_on, a, b)
         for a, b in zip(row_of(factors), row_of(begun_factors), strict=True)
     ]
     moving = ports["motion_UD"].numel()
@@ -251,7 +272,7 @@ def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
         "motion_UD": ca.horzcat(*after[:moving]),
         "gate": gated.state,
         "body": tilt,
-        "heard": noise.heard,
+        "heard": heard,
         "heard_v_y": heard_v_y,
         "running": ca.vertcat(ca.logic_and(runs, sane), ca.if_else(goes_on, fast, 0)),
         "excitation": excited(
@@ -281,24 +302,36 @@ def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
 def _noise(ports: dict[str, Any], trust: TrustNumbers, gated: Gate, goes_on: Any) -> Noise:
     """Return what is new of r and a_y, and how noisy they are.
 
-    A sensor that is slower than the log repeats its number: that is no news. Second differences of
-    news show noise and next to nothing of a car: their mean square is six variances.
+    A sensor that is slower than the log repeats its number, or settles to it in two steps where a
+    filter stands between: that is no news. Second differences of news show noise and next to
+    nothing of a car: their mean square is six variances.
+    One channel is taken at a sample, that of which more numbers wait: a second update would cost as
+    much as the first and tell what the next sample does.
     """
     heard, a_y = ports["heard"], ports["a_y"]
     there = ca.logic_and(a_y == a_y, ca.fabs(a_y) < trust.surge)  # NaN is not NaN
     newest = [gated.r, ca.if_else(there, a_y, heard[1])]
-    fresh, variance, state = [], [], []
+    fresh, waiting, variance, state = [], [], [], []
     for i, y in enumerate(newest):
-        news = ca.logic_and(ca.logic_and(y != heard[i], goes_on), _is_good(gated))
-        second = y - 2 * heard[i] + heard[2 + i]
         old = heard[4 + i]
+        differs = (y - heard[i]) ** 2 > SAME * (heard[i] - heard[2 + i]) ** 2
+        news = ca.logic_and(ca.logic_and(differs, goes_on), _is_good(gated))
+        second = y - 2 * heard[i] + heard[2 + i]
         shows = smaller(second**2 / 6, MOST_NOISE * old + LEAST)
         variance.append(ca.if_else(news, old + trust.noise_gain * (shows - old), old))
         fresh.append(news)
+        waiting.append(goes_on * smaller(heard[6 + i] + news, MOST_WAITING))
         before = ca.if_else(news, heard[i], heard[2 + i])
-        state.append((y, ca.if_else(goes_on, before, y)))
+        holds = ca.logic_and(goes_on, ca.logic_not(news))
+        state.append((ca.if_else(holds, heard[i], y), ca.if_else(goes_on, before, y)))
     now, before = zip(*state, strict=True)
-    return Noise(fresh, variance, ca.vertcat(*now, *before, *variance))
+    of_r, of_a_y = waiting
+    first = of_r >= of_a_y
+    left = [ca.if_else(first, 0, of_r), ca.if_else(first, of_a_y, 0)]
+    share = [1 / larger(one, 1) for one in waiting]
+    counts = ca.logic_and(ca.if_else(first, of_r, of_a_y) > 0, _is_good(gated))
+    waits = ca.vertcat(*now, *before, *variance, *left)
+    return Noise(first, counts, share, fresh, [heard[8], heard[9]], variance, waits)
 
 
 def _missed(trust: TrustNumbers, ahead: Predicted) -> Any:
@@ -321,8 +354,12 @@ def _corrected(
     now: Sample,
     scales: Any,
     steps: tuple[int, ...],
-) -> tuple[list[Any], Factors]:
-    """Return z and its factors after r and a_y of the sample."""
+) -> tuple[list[Any], Factors, Any]:
+    """Return z and its factors after r or a_y, and what is carried of these channels.
+
+    The innovation of the one that waits is kept: its turn comes at the next sample, where its
+    number may be a new one, or none.
+    """
     car, laws, trust = told
     n = len(steps) + 1
     symbol = ca.SX.sym("z", z.numel())
@@ -333,22 +370,28 @@ def _corrected(
     rate = ahead.force_rate
     turn = ca.substitute(ca.dot(turning(car), expected.curve.force), symbol, z)
     late = (turn, GRAVITY * ca.dot(car.share, rate))
-    kept = ca.vertsplit(z)
+    before = ca.vertsplit(z)
     floors = (trust.r_error, trust.a_y_error + trust.a_y_share * ahead.tilt**2)
-    for i, error in enumerate(floors):
-        drift = sum(
-            H[i, j] * (kept[j] - z[j]) for j in range(len(kept)) if H.has_nz(i, j) and i > 0
-        )
-        kept, factors = measured(
-            kept,
-            factors,
-            H[i, :],
-            innovation=noise.heard[i] - y[i] - drift,
-            R=error + noise.variance[i] + (trust.lateness * late[i]) ** 2,
-            clip=trust.clip,
-            counts=noise.fresh[i],
-        )
-    return kept, factors
+    error = [floor + (trust.lateness * one) ** 2 for floor, one in zip(floors, late, strict=True)]
+    nu = [
+        ca.if_else(fresh, noise.heard[i] - y[i], left)
+        for i, (fresh, left) in enumerate(zip(noise.fresh, noise.left, strict=True))
+    ]
+    kept, factors = measured(
+        before,
+        factors,
+        noise.turn(H[0, :], H[1, :]),
+        innovation=noise.turn(*nu),
+        R=noise.turn(
+            *(e * share + R for e, share, R in zip(error, noise.share, noise.variance, strict=True))
+        ),
+        clip=trust.clip,
+        counts=noise.counts,
+    )
+    h = noise.turn(H[1, :], H[0, :])  # of the channel that waits
+    drift = sum(h[0, j] * (kept[j] - one) for j, one in enumerate(before) if h.has_nz(0, j))
+    left = noise.turn(nu[1], nu[0]) - drift
+    return kept, factors, ca.vertcat(noise.heard, noise.turn(0, left), noise.turn(left, 0))
 
 
 def heard_size(delay: int | None) -> int:

@@ -50,6 +50,22 @@ def test_a_step_gives_f_p_f_plus_q(P, rng):
     np.testing.assert_allclose(dense(evaluate(after, P)), expected, rtol=1e-10, atol=1e-10)
 
 
+def test_numbers_on_the_way_are_gone_on_from(P, rng):
+    """a = A z, m+ = B z + C a is one step by B + C A."""
+    A, B, C = rng.normal(size=(2, Q)), rng.normal(size=(MOVES, Q)), rng.normal(size=(MOVES, 2))
+    by_way = np.block([[A, np.zeros((2, 2))], [B, C]])
+    noise = [None, ca.SX(0.3), None]
+
+    def after(F):
+        return lambda symbols: ca.vertcat(
+            *row_of(propagated(factors_of(symbols, Q), ca.sparsify(ca.SX(ca.DM(F))), noise))
+        )
+
+    np.testing.assert_allclose(
+        evaluate(after(by_way), P), evaluate(after(B + C @ A), P), rtol=1e-9, atol=1e-12
+    )
+
+
 def test_what_is_learnt_keeps_the_bits_of_its_factors_over_a_step(P, rng):
     F = ca.SX(ca.DM(rng.normal(size=(MOVES, Q))))
 

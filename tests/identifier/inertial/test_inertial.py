@@ -167,6 +167,29 @@ def test_a_channel_that_repeats_its_numbers_counts_them_once(banked):
     assert np.mean(np.abs(error) < 2 * sd) > 0.8
 
 
+def test_a_number_that_settles_in_two_steps_counts_once(banked):
+    """A filter between sensor and log shows most of a new number at once, the rest a step later."""
+    shown = as_shown(banked)
+    held = 10 * (np.arange(len(shown)) // 10)
+    first = np.arange(len(shown)) % 10 == 0
+
+    def settling(y):
+        jump = np.diff(y[held], prepend=y[0])
+        return y[held] - 0.03 * first * jump
+
+    once = replace(shown, r=shown.r[held], a_y=shown.a_y[held])
+    twice = replace(once, r=settling(shown.r), a_y=settling(shown.a_y))
+    sds, noises = [], []
+    for recording in (once, twice):
+        history = identify(recording, CAR, METHOD)
+        error, sd, _ = errors(history, banked)
+        assert np.mean(np.abs(error) < 2 * sd) > 0.8
+        sds.append(np.median(sd))
+        noises.append(history.state["heard"][-1].ravel()[4:6])
+    assert sds[1] == pytest.approx(sds[0], rel=0.1)
+    np.testing.assert_allclose(noises[1], noises[0], rtol=0.35)
+
+
 def alarms(history):
     fast = history.state["running"].reshape(-1, 2)[1:, 1]
     return fast > METHOD.trust.alarm
