@@ -34,6 +34,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "doctor_gross": [],
     "verdicts": [],
     "verdicts_without_v_y": [],
+    "bands": [],
     "doctor": [],
     "plant_against_commonroad": ["{out}"],
     "paper_gains": [],

@@ -56,6 +56,7 @@ def within_band(model: TireModel, recording: Recording, level: float = LEVEL) ->
     """
     if not isinstance(model, AxleModel):
         return None
+    recording = portion(recording).recording
     found = evidence(model, recording)
     if found is None:
         return None

@@ -374,6 +374,18 @@ def test_the_learnt_axles_are_drawn_each_in_its_own_numbers() -> None:
             np.testing.assert_allclose(np.asarray(axes.lines[axle].get_ydata()), values, rtol=1e-6)
 
 
+def test_the_band_is_drawn_around_the_curve_of_each_axle() -> None:
+    model = unlike_axles()
+    for axle, axes in enumerate(slip_figure(model, made_up().recording).axes[:2]):
+        (band,) = [one for one in axes.collections if one.get_label() == "band of 90 %"]
+        corners = np.array(band.get_paths()[0].vertices)
+        slip = np.radians(np.unique(corners[:, 0])[20:-20:10])
+        sides = [f[:, axle] / 1e3 for f in model.band(slip) or ()]
+        for at, low, high in zip(slip, *sides, strict=True):
+            drawn = corners[np.isclose(np.radians(corners[:, 0]), at), 1]
+            assert drawn.min() == pytest.approx(low) and drawn.max() == pytest.approx(high)
+
+
 def test_slow_samples_are_left_out_of_the_slip_figure() -> None:
     history = made_up()
     recording = replace(history.recording, v_x=np.where(np.arange(N) < 100, 0.1, 15.0))

@@ -194,13 +194,21 @@ def test_the_curve_is_that_of_the_model_and_says_where_it_is_known(result):
     assert names[:3] == ["slip_rad", "Fyf_N", "Fyr_N"]
     slip = table[:, 0]
     np.testing.assert_allclose(table[:, 1:3], model.force_at(slip), rtol=1e-6, atol=1e-3)
-    assert (names[3:] == ["front_known", "rear_known"]) == (model.known_slip is not None)
+    assert (names[3:5] == ["front_known", "rear_known"]) == (model.known_slip is not None)
     if model.known_slip is not None:
         for axle, known in enumerate(model.known_slip):
             clear = ~np.isclose(np.abs(slip), known, rtol=1e-7)  # nine digits of it are written
             inside = np.abs(slip) <= known
             np.testing.assert_array_equal((table[:, 3 + axle] == 1.0)[clear], inside[clear])
             assert 0.0 < table[:, 3 + axle].mean() < 1.0
+    band = model.band(slip)
+    ends = ["Fyf_low_N", "Fyr_low_N", "Fyf_high_N", "Fyr_high_N"]
+    assert (names[5:] == ends) == (band is not None)
+    if band is not None:
+        np.testing.assert_allclose(table[:, 5:], np.hstack(band), rtol=1e-6, atol=1e-3)
+        assert model.calibration is not None  # the weights file keeps it
+        page = (result / "report.html").read_text()
+        assert "nine of ten forces of other drives" in page and "had not taught the model" in page
 
 
 def test_figures_are_written(result):

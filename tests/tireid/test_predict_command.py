@@ -82,6 +82,20 @@ def test_slip_beyond_what_is_known_is_told(logs, tmp_path, capsys):
     assert f"which {100.0 * beyond:.0f} /" in capsys.readouterr().out
 
 
+def test_it_says_how_often_the_band_held(logs, tmp_path, capsys):
+    run = ti.identify(read_recording(logs / "slalom.csv"), ti.sedan())
+    tire = run.calibrated()
+    tire.save(tmp_path / "model.json")
+    summary, _ = predicted(tmp_path / "out", tmp_path / "model.json", logs / "quick.csv")
+    held = summary["windows_within_band"]
+    said = f"in {100.0 * held[0]:.0f} / {100.0 * held[1]:.0f} % of the windows of 0.3 s"
+    assert said in capsys.readouterr().out
+    assert min(held) > 0.7
+    replace(tire, W=0.6 * tire.W).save(tmp_path / "weak.json")
+    weak, _ = predicted(tmp_path / "weak", tmp_path / "weak.json", logs / "quick.csv", status=3)
+    assert max(weak["windows_within_band"]) < 0.6
+
+
 def test_an_axle_model_is_mounted_on_the_car_that_drove(model, logs, tmp_path, capsys):
     """A car with more load in the back: forces scale by the loads of the axles."""
     car = ti.sedan()

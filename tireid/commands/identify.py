@@ -205,7 +205,7 @@ def run(options: argparse.Namespace) -> int:
         doctor = doctor_text(diagnosis, repair, options.repair)
         parts_told = (told, vehicle.estimates, doctor, verdict_text(verdict))
         told = "\n".join(part for part in parts_told if part)
-        model = network or histories[0].freeze(freeze_times[-1])
+        model = network or load_model(folder / "weights.json")
         write_json(folder / "doctor.json", {**diagnosis.to_dict(), "applied": repair.tables()})
         write_identify_report(
             folder,

@@ -170,6 +170,7 @@ def write_results(
     parts : of the online run, over each of several logs that were learnt on.
     progress : told how far it is; None tells nobody.
     """
+    calibrated = learnt.calibrated(max(frozen))
     write_json(
         folder / "summary.json",
         summarize(
@@ -177,14 +178,15 @@ def write_results(
         ),
     )
     for t in frozen:
-        last, model = "" if t == max(frozen) else f"_{freeze_key(t)}s", learnt.freeze(t)
+        last = "" if t == max(frozen) else f"_{freeze_key(t)}s"
+        model = learnt.freeze(t) if last else calibrated
         judged = verdict if t == max(frozen) else None
         model.save(folder / f"weights{last}.json", valid=None if judged is None else judged.valid)
         columns = curve_columns(model, [run.recording for run in (learnt, *others)])
         write_csv(folder / f"curve{last}.csv", columns)
     _write_curves(folder, learnt, others, frozen, progress or Progress("curves"))
     say("drawing figures")
-    return _draw(folder, learnt, others, frozen)
+    return _draw(folder, learnt, others, frozen, calibrated)
 
 
 def file_name(recording: Recording) -> str:
@@ -339,17 +341,25 @@ def curve_columns(model: TireModel, recordings: Sequence[Recording]) -> dict[str
     if known is not None:
         inside = (np.abs(slip)[:, None] <= known).astype(np.float64)
         columns |= {"front_known": inside[:, 0], "rear_known": inside[:, 1]}
+    band = model.band(slip)
+    if band is not None:
+        for side, bound in zip(("low", "high"), band, strict=True):
+            columns |= {f"Fyf_{side}_N": bound[:, 0], f"Fyr_{side}_N": bound[:, 1]}
     return columns
 
 
 def _draw(
-    folder: Path, learnt: History, others: Sequence[History], frozen: Frozen
+    folder: Path,
+    learnt: History,
+    others: Sequence[History],
+    frozen: Frozen,
+    calibrated: TireModel,
 ) -> dict[str, Figure]:
     name, last = learnt.recording.name, max(frozen)
     own = {t: replays[name] for t, replays in frozen.items()}
     figures = {
         "forces": force_figure(learnt, own),
-        "slip": slip_figure(learnt.freeze(last), learnt.recording, learnt),
+        "slip": slip_figure(calibrated, learnt.recording, learnt),
         "inputs": inputs_figure(learnt.recording),
     }
     if OBSERVED in learnt.outputs:

@@ -13,7 +13,7 @@ from identifier.method import vehicle_numbers
 from identifier.methods import load_model
 from identifier.reproducibility import Prediction, beyond_known
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict
+from identifier.verdict import Verdict, within_band
 from models.recordings.record import ALL
 from tireid import __version__
 from tireid.commands import COMMANDS
@@ -137,6 +137,7 @@ def summary(model: TireModel, prediction: Prediction, verdict: Verdict) -> dict[
     """
     error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
     beyond, known = beyond_known(model, prediction.recording), model.known_slip
+    inside = within_band(model, prediction.recording)
     shares = (None, None) if motion is None else motion.explained
     return {
         "verdict": verdict.to_dict(),
@@ -156,6 +157,7 @@ def summary(model: TireModel, prediction: Prediction, verdict: Verdict) -> dict[
         },
         "known_slip_rad": None if known is None else known.tolist(),
         "beyond_known_slip": beyond,
+        "windows_within_band": None if inside is None else inside.tolist(),
         "model": type(model).__name__,
         "vehicle": vehicle_numbers(model.vehicle),
         "version": __version__,
@@ -190,6 +192,12 @@ def prediction_text(model: TireModel, prediction: Prediction) -> str:
         lines.append(
             f"known to {front:.1f} / {rear:.1f} deg of slip, which {100.0 * beyond[0]:.0f} / "
             f"{100.0 * beyond[1]:.0f} % of the samples exceed (front / rear)"
+        )
+    inside = within_band(model, prediction.recording)
+    if inside is not None:
+        lines.append(
+            f"in {100.0 * inside[0]:.0f} / {100.0 * inside[1]:.0f} % of the windows of 0.3 s the "
+            "force that the motion shows lies in the band of 90 % (front / rear)"
         )
     if model.vehicle.estimates:
         lines.append(model.vehicle.estimates)

@@ -38,6 +38,7 @@ from tireid.figures.style import (
 from tireid.figures.thinned import cloud, shown_of_run
 
 UNKNOWN = "slip not known"
+BAND = "band of 90 %"
 CLOUD: Mapping[str, Any] = {  # thousands of points: pixels where the rest of a drawing is lines
     "linestyle": "",
     "marker": ".",
@@ -138,8 +139,14 @@ def _label_slip(axes: Axes, axle: int) -> None:
 
 
 def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: float) -> None:
-    """Draw the steady curve of an axle."""
+    """Draw the steady curve of an axle, in its band where it has one."""
     slip = np.linspace(np.deg2rad(ends[0]), np.deg2rad(ends[1]), 200)
+    band = model.band(slip)
+    if band is not None:
+        low, high = (force[:, axle] / newtons for force in band)
+        axes.fill_between(
+            np.rad2deg(slip), low, high, color=SKY, alpha=0.35, linewidth=0.0, label=BAND
+        )
     axes.plot(
         np.rad2deg(slip),
         model.force(slip)[:, axle] / newtons,

@@ -25,7 +25,8 @@ READ = {
     "forces": "Online and frozen lie on the truth where there is one; the residual below is small "
     "against the force and shows no pattern that repeats.",
     "slip": "Points follow the curve. A loop around it is relaxation, a second branch another "
-    "friction, a shift an offset of steering or lateral velocity; shaded slip is not known.",
+    "friction, a shift an offset of steering or lateral velocity; shaded slip is not known. The "
+    "band around the curve is where nine of ten forces of other drives are to be expected.",
     "learnt": "Each number comes to rest once it was excited; steps late in the drive are a "
     "friction or a sensor that changed.",
     "doctor": "Points of a good log lie on one rising curve, each axle on its own; a cloud, a loop "

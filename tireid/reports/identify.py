@@ -199,6 +199,9 @@ def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> 
         Table(caption=f"The tires by {law}.", header=["", *AXLES, "unit"], rows=facts),
         drawing(figures["slip"], "Axle force over slip angle: drive and curve.", READ["slip"]),
     ]
+    told = band_sentence(model)
+    if told:
+        blocks.append(Paragraph(text=told))
     for name, caption in (
         ("side_slip", "Side slip as it was estimated."),
         ("learnt", "What was learnt over time."),
@@ -208,6 +211,32 @@ def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> 
         if name in figures:
             blocks.append(drawing(figures[name], caption, READ[name]))
     return blocks
+
+
+def band_sentence(model: TireModel) -> str:
+    """Return how wide the band is where slip is known, in words; empty where there is none.
+
+    Parameters
+    ----------
+    model : frozen, its band calibrated or not.
+    """
+    known = model.known_slip
+    half = None if known is None else model.half_band(known)
+    if known is None or half is None or not (known > 0.0).all():
+        return ""
+    at = model.force(known)
+    shares = [100.0 * float(half[i, i]) / max(abs(float(at[i, i])), 1.0) for i in range(2)]
+    calibrated = getattr(model, "calibration", None) is not None
+    how = (
+        "its width was found on parts of the drive that had not taught the model, by the motion"
+        if calibrated
+        else "the drive was too short to check its width, which is what learning believes"
+    )
+    return (
+        "The band is where nine of ten forces of other drives are to be expected: at the end of "
+        f"the known slip ± {shares[0]:.1f} / {shares[1]:.1f} % of the force (front / rear); {how}. "
+        "Where slip is not known it widens to what was believed before the drive."
+    )
 
 
 def _errors(
