@@ -129,7 +129,8 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
     panels[0, 0].set_ylabel(f"lateral force [{unit.name}]")
     if known is not None:
         panels[1, 0].set_ylabel(f"residual [{unit.name}]")
-    legend_above(figure, order=(UNKNOWN,))
+    labels = {label for axes in figure.axes for label in axes.get_legend_handles_labels()[1]}
+    legend_above(figure, columns=None if len(labels) < 6 else 3, order=(UNKNOWN,))
     return figure
 
 
