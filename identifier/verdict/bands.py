@@ -27,11 +27,10 @@ from identifier.axle.band import (
 )
 from identifier.axle.learning import Regression
 from identifier.axle.model import AxleModel
-from identifier.run import History, learn, state_index
+from identifier.run import History
 from identifier.tire_model import TireModel
-from identifier.verdict.judging import road_felt
 from identifier.verdict.motion import Windows, evidence, modelled_force
-from identifier.verdict.parts import taught_elsewhere
+from identifier.verdict.parts import asked_run, taught_elsewhere
 from models.recordings import Recording
 from models.recordings.portion import portion
 
@@ -101,19 +100,16 @@ def calibrated(history: History, t: float | None = None) -> TireModel:
     ValueError
         Where the recording begins after that time.
     """
-    model, whole = history.freeze(t), history.recording
+    run = asked_run(history, t)
+    model, recording = run.model, run.portion.recording
     if not isinstance(model, AxleModel):
         return model
-    frozen = state_index(whole, float(whole.t[-1]) if t is None else t)
-    asked = portion(whole, frozen)
-    n, recording = asked.place(frozen), asked.recording
-    until = None if n == len(recording) else float(recording.t[n])
-    found = evidence(model, recording, road_felt(history, asked))
+    found = evidence(model, recording, run.road)
     if found is None:
         return model
 
     def teach(halting: Recording) -> TireModel:
-        return learn(halting, history.vehicle, history.design, history.start, until)
+        return run.taught(halting, history.vehicle)
 
     one, each = found.measured.shape, (len(CENTERS), *found.measured.shape)
     missed = Missed(np.full(one, np.nan), *(np.zeros(each) for _ in range(3)))

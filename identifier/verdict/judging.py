@@ -9,7 +9,7 @@ from codegen.arrays import Array
 from identifier.axle import AxleIdentifier
 from identifier.method import Method
 from identifier.reproducibility import motion_error
-from identifier.run import History, identify, learn, state_index
+from identifier.run import History, identify
 from identifier.tire_model import AXLES, GRIP, STIFFNESS, Estimate, TireModel
 from identifier.verdict.causes import CAUSES, Ask, Mended, Suspect, suspects
 from identifier.verdict.motion import (
@@ -23,7 +23,7 @@ from identifier.verdict.motion import (
     modelled_force,
     noise_variance,
 )
-from identifier.verdict.parts import taught_elsewhere
+from identifier.verdict.parts import asked_run, taught_elsewhere, without_v_y
 from identifier.verdict.rules import MOST_MISSED, PERCENT, Drive, findings
 from identifier.verdict.verdict import WITHOUT_V_Y, Finding, Number, Verdict
 from models.recordings import Recording
@@ -53,21 +53,17 @@ def judge(history: History, t: float | None = None) -> Verdict:
     CannotFreezeError
         Where the method estimates a signal, not a model.
     """
-    model, whole = history.freeze(t), history.recording
-    end = float(whole.t[-1]) if t is None else t
-    frozen = state_index(whole, end)
-    asked = portion(whole, frozen)
-    n, road = asked.place(frozen), road_felt(history, asked)
-    until = None if n == len(asked.recording) else float(asked.recording.t[n])
+    run = asked_run(history, t)
+    model, asked, whole, road = run.model, run.portion, history.recording, run.road
 
     def taught(mended: Mended) -> TireModel:
-        return learn(mended.recording, mended.vehicle, history.design, history.start, until)
+        return run.taught(mended.recording, mended.vehicle)
 
     drive = _looked_at(taught, model, asked, whole.t, road)
     if drive is None:
         return _too_short(model)
     drive = drive._replace(
-        center=None if drive.notes or _without_v_y(asked) else _center(drive, taught, road),
+        center=None if drive.notes or without_v_y(asked) else _center(drive, taught, road),
         elsewhere=_elsewhere(taught, drive, history.vehicle),
         apart=_apart(history.axle_force[asked.samples], history.vehicle, drive.found),
         learns=True,
@@ -79,36 +75,9 @@ def judge(history: History, t: float | None = None) -> Verdict:
             f"the {one.title} rests at its bound, {one.value:.3g} {one.unit}: {one.meaning}",
             one.refuses,
         )
-        for one in history.design.reached(history.vehicle, history.state_at(end))
+        for one in history.design.reached(history.vehicle, history.state_at(run.end))
     ]
     return _verdict(drive, [*findings(drive), *reached, *_asked_of(asked, whole)])
-
-
-def road_felt(history: History, asked: Portion) -> Array | None:
-    """Return what a banked road pushed over a portion of a run (k,) [weights]; None unknown.
-
-    Parameters
-    ----------
-    history : the run.
-    asked : of its recording.
-    """
-    pushes = []
-    for block in history.blocks(asked.samples):
-        first, last = np.searchsorted(asked.samples, [block.part.start, block.part.stop])
-        mine = asked.samples[first:last] - block.part.start
-        around = slice(mine[0], mine[-1] + 2)
-        state = {port: v[around] for port, v in block.state.items()}
-        design = history.design
-        push = design.beside_force(state) if _without_v_y(asked) else design.road_push(state)
-        if push is None:
-            return None
-        pushes.append(push[mine - mine[0]])
-    return np.concatenate(pushes)
-
-
-def _without_v_y(asked: Portion) -> bool:
-    """Return whether no sensor showed v_y: then the motion is what the accelerometer shows."""
-    return asked.recording.logged_v_y is None
 
 
 def judge_prediction(model: TireModel, recording: Recording) -> Verdict:
@@ -179,7 +148,7 @@ def _looked_at(
             notes = (_stretch(found, rest, clock[asked.samples], first, last),)
             found = rest
     listed: tuple[Suspect, ...] = ()
-    if not ((found.missed <= MOST_MISSED).all() or _without_v_y(asked)):
+    if not ((found.missed <= MOST_MISSED).all() or without_v_y(asked)):
         listed = suspects(_ask(tires, found.windows, road), recording, model.vehicle)
     return Drive(model=model, recording=recording, found=found, suspects=listed, notes=notes)
 

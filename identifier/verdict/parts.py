@@ -1,17 +1,104 @@
-"""A drive in parts, and what a model makes of each that was taught without it."""
+"""What of a run is asked: a portion of its drive, and parts of it, each left out once."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from codegen.arrays import Array
+from identifier.run import History, learn, state_index
 from identifier.tire_model import TireModel
 from identifier.verdict.motion import Evidence
 from models.recordings import Recording
+from models.recordings.portion import Portion, portion
+from models.vehicle import Vehicle
 
 PARTS = 4  # of the drive, each of which is left out once
 Teach = Callable[[Recording], TireModel]
+
+
+class AskedRun(NamedTuple):
+    """A run whose frozen model is asked about a portion of its drive, k samples.
+
+    model : frozen.   history : the run.   portion : of its recording.   end : time of the freeze
+    in the recording's own clock [s].   until : the same in that of the portion, None at its end.
+    road : what a banked road pushed (k,) [weights], None unknown.
+    """
+
+    model: TireModel
+    history: History
+    portion: Portion
+    end: float
+    until: float | None
+    road: Array | None
+
+    def taught(self, recording: Recording, vehicle: Vehicle) -> TireModel:
+        """Return what the run's method learns of another drive until the freeze.
+
+        Parameters
+        ----------
+        recording : of the portion's samples.
+        vehicle : the car, as the method knows it.
+        """
+        return learn(recording, vehicle, self.history.design, self.history.start, self.until)
+
+
+def asked_run(history: History, t: float | None = None) -> AskedRun:
+    """Return what of a run is asked.
+
+    Parameters
+    ----------
+    history : the run.
+    t : time of the freeze in the recording's own clock [s]; None is the end.
+
+    Raises
+    ------
+    DivergedError
+        Where the law had diverged by then.
+    CannotFreezeError
+        Where the method estimates a signal, not a model.
+    """
+    model, whole = history.freeze(t), history.recording
+    end = float(whole.t[-1]) if t is None else t
+    frozen = state_index(whole, end)
+    asked = portion(whole, frozen)
+    n = asked.place(frozen)
+    until = None if n == len(asked.recording) else float(asked.recording.t[n])
+    return AskedRun(model, history, asked, end, until, road_felt(history, asked))
+
+
+def road_felt(history: History, asked: Portion) -> Array | None:
+    """Return what a banked road pushed over a portion of a run (k,) [weights]; None unknown.
+
+    Parameters
+    ----------
+    history : the run.
+    asked : of its recording.
+    """
+    pushes = []
+    for block in history.blocks(asked.samples):
+        first, last = np.searchsorted(asked.samples, [block.part.start, block.part.stop])
+        mine = asked.samples[first:last] - block.part.start
+        around = slice(mine[0], mine[-1] + 2)
+        state = {port: v[around] for port, v in block.state.items()}
+        design = history.design
+        push = design.beside_force(state) if without_v_y(asked) else design.road_push(state)
+        if push is None:
+            return None
+        pushes.append(push[mine - mine[0]])
+    return np.concatenate(pushes)
+
+
+def without_v_y(asked: Portion) -> bool:
+    """Return whether no sensor showed v_y: then the motion is what the accelerometer shows.
+
+    Parameters
+    ----------
+    asked : portion of a recording.
+    """
+    return asked.recording.logged_v_y is None
 
 
 def taught_elsewhere(

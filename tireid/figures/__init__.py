@@ -13,10 +13,9 @@ from tireid.figures.forces import (
     prediction_figure,
     side_by_side_figure,
 )
-from tireid.figures.lateral import drive_lateral_figure
 from tireid.figures.paper import comparison_figure, error_figure, locus_figure, weights_figure
 from tireid.figures.scheme import scheme_figure
-from tireid.figures.side_slip import side_slip_figure
+from tireid.figures.side_slip import drive_lateral_figure, side_slip_figure
 from tireid.figures.style import figure_png, figure_svg, save_figure
 from tireid.figures.tires import (
     TireCurve,

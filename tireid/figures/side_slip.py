@@ -1,4 +1,4 @@
-"""Side slip over time: what was recorded, and what was estimated without it, with its band."""
+"""Side slip and lateral velocity as they were estimated, with their band, beside what is known."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,12 +10,15 @@ from matplotlib.figure import Figure
 from codegen.arrays import Array
 from identifier.compare.course import SIGMAS, SideSlip
 from models.recordings import Recording
+from mpc.loop import Drive
 from tireid.figures.compare import method_label, short_names
+from tireid.figures.drive import ARC
 from tireid.figures.style import (
     AMBER,
     BLUE,
     GREEN,
     GREY,
+    ONLINE,
     ORANGE,
     PAGE,
     PURPLE,
@@ -34,6 +37,7 @@ MOST = 4  # recordings that are drawn
 OTHERS = (ORANGE, GREEN, PURPLE, AMBER, SKY, GREY)
 COLUMNS = 5  # entries of a row of the legend
 BAND = "within 2 standard deviations"
+MILLI = 1e3
 BEYOND = 1.6  # times what was recorded, or estimated first: an axis reaches no farther
 
 
@@ -126,3 +130,43 @@ def _draw(
 def _degrees(v_y: Array, v_x: Array) -> Array:
     """Return side slip [deg], zero at standstill."""
     return np.degrees(np.where(v_x > 0.0, np.arctan2(v_y, np.maximum(v_x, 1e-9)), 0.0))
+
+
+@styled
+def drive_lateral_figure(drive: Drive) -> Figure:
+    """Draw the v_y that was told over the true one, and its error, each with the band of two sigma.
+
+    Parameters
+    ----------
+    drive : of a car whose v_y was told.
+    """
+    told, band = drive.told["v_y"], SIGMAS * drive.told["v_y_sd"]
+    inertial = drive.told["inertial_v_y"]
+    figure = new_figure(PAGE, 3.6)
+    above, below = figure.subplots(2, 1, sharex=True)
+    shade: Mapping[str, Any] = {
+        "color": BLUE,
+        "alpha": 0.2,
+        "linewidth": 0.0,
+        "label": "told, two sigma",
+    }
+    told_look: Mapping[str, Any] = {**ONLINE, "label": "told"}
+    alone: Mapping[str, Any] = {
+        "color": GREY,
+        "linewidth": 0.8,
+        "label": "inertial identifier alone",
+    }
+    above.fill_between(drive.s, told - band, told + band, **shade)
+    above.plot(drive.s, inertial, **alone)
+    above.plot(drive.s, drive.v_y, **TRUTH)
+    above.plot(drive.s, told, **told_look)
+    above.set_ylabel("$v_y$\n[m/s]")
+    below.fill_between(drive.s, -MILLI * band, MILLI * band, **shade)
+    below.plot(drive.s, MILLI * (inertial - drive.v_y), **alone)
+    below.plot(drive.s, MILLI * (told - drive.v_y), **told_look)
+    reach = 1.2 * MILLI * float(np.max(np.maximum(band, np.abs(told - drive.v_y))))
+    below.set(ylabel="error of it\n[mm/s]", xlabel=ARC, ylim=(-reach, reach))
+    below.set_xlim(0.0, float(drive.s[-1]))
+    figure.align_ylabels([above, below])
+    legend_above(figure)
+    return figure
