@@ -10,6 +10,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib import font_manager
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
@@ -39,7 +40,7 @@ from tireid.figures import (
 )
 from tireid.figures.forces import side_by_side_figure
 from tireid.figures.scheme import BLOCKS, DIFFERENCE, SIGNALS, SUM
-from tireid.figures.style import BLACK, force_range, force_unit_of, impulse_unit
+from tireid.figures.style import BLACK, force_range, force_unit_of, impulse_unit, with_own_fonts
 
 N = 300
 CAR = Vehicle(
@@ -625,3 +626,20 @@ def test_times_of_a_clock_that_began_long_ago_fit_their_titles_and_axes() -> Non
     assert {"20", "22"} <= {one.split(".")[0] for one in shown}
     figure.axes[2].set_title("Front axle, frozen at 1700000022.25 s, which is long", loc="left")
     assert overlapping_titles(figure)
+
+
+def test_fonts_of_matplotlib_are_found_where_the_list_of_the_machine_lacks_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    fonts = font_manager.fontManager
+    system = [entry for entry in fonts.ttflist if "mpl-data" not in entry.fname]
+    monkeypatch.setattr(fonts, "ttflist", system)
+    for name in ("DejaVu Sans Display", "STIXGeneral", "cmr10"):
+        with pytest.raises(ValueError, match=name):
+            fonts.findfont(name, fallback_to_default=False)
+    with_own_fonts()
+    for name in ("DejaVu Sans Display", "STIXGeneral", "cmr10"):
+        assert Path(fonts.findfont(name, fallback_to_default=False)).is_file()
+    listed = len(fonts.ttflist)
+    with_own_fonts()
+    assert len(fonts.ttflist) == listed

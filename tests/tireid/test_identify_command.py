@@ -537,6 +537,17 @@ def test_an_axle_that_does_not_push_is_not_handed_on(logs, tmp_path, monkeypatch
         assert json.loads((out / "weights.json").read_text())["valid"] is False
 
 
+def test_what_cannot_be_read_back_as_tires_is_refused_by_the_name_of_its_log(
+    logs, tmp_path, monkeypatch, capsys
+):
+    whole = AxleModel.force_at
+    monkeypatch.setattr(AxleModel, "force_at", lambda self, alpha: whole(self, alpha) * [1.0, -1.0])
+    words = ["identify", logs / "slalom.csv", "--vehicle", logs / "car.toml"]
+    line = refusal(capsys, [*words, "--out", tmp_path / "out"])
+    assert "slalom: at 8 s no tires were learnt: axle forces must rise with slip" in line
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_what_is_not_valid_exits_with_three_unless_it_is_accepted(logs, tmp_path, capsys, laid_out):
     def biased(row):
         row["vy"] = repr(float(row["vy"]) + 0.6)

@@ -8,7 +8,7 @@ import numpy as np
 
 from codegen.escape import visible
 from identifier.doctor import diagnose
-from identifier.method import CannotFreezeError, Method
+from identifier.method import CannotFreezeError, FrozenModelError, Method, require_alive
 from identifier.methods import load_model
 from identifier.paper.network import Weights
 from identifier.reproducibility import (
@@ -186,6 +186,8 @@ def run(options: argparse.Namespace) -> int:
             told = network_table(law, histories, replays)
         else:
             learnt = histories[0]
+            for t in freeze_times:
+                _require_tires(learnt, t)
             pieces = learnt.parts(logs) if len(logs) > 1 else []
             verdict = learnt.verdict(freeze_times[-1])
             frozen = {t: _replays(t, learnt, [*pieces, *histories[1:]]) for t in freeze_times}
@@ -233,6 +235,16 @@ def _require_model(law: str, design: Method, vehicle: Vehicle) -> None:
         design.frozen(vehicle, design.setup(vehicle).carry)
     except CannotFreezeError as error:
         raise CannotFreezeError(f"--method {law}: {error}; tireid compare shows it") from None
+
+
+def _require_tires(learnt: History, t: float) -> None:
+    """Refuse what was learnt of a log that no tires made: it could not be read back."""
+    try:
+        require_alive(FrozenModelError, learnt.freeze(t))
+    except FrozenModelError as error:
+        raise FrozenModelError(
+            f"{learnt.recording.name}: at {freeze_key(t)} s no tires were learnt: {error}"
+        ) from None
 
 
 def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool) -> str:

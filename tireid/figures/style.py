@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, ParamSpec
 
 import numpy as np
-from matplotlib import style
+from matplotlib import font_manager, get_data_path, style
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -108,6 +108,22 @@ def new_figure(width: float, height: float) -> Figure:
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
+
+
+def with_own_fonts() -> None:
+    """List the fonts that Matplotlib brings, where the list it keeps on this machine lacks them.
+
+    A list that was made while an environment was being removed knows the fonts of the system only,
+    for ever: formulas then lose their signs, and every figure complains.
+    """
+    fonts = font_manager.fontManager
+    listed = {entry.name for entry in fonts.ttflist}
+    if not {"DejaVu Sans Display", "STIXGeneral", "cmr10"} <= listed:
+        for path in sorted(Path(get_data_path(), "fonts", "ttf").glob("*.ttf")):
+            fonts.addfont(path)
+
+
+with_own_fonts()
 
 
 def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
