@@ -79,7 +79,9 @@ METHODS: Mapping[str, Factory] = {
 
 # By kind of model, the method that goes on learning from one.
 LEARNERS: Mapping[str, Callable[[Any, Vehicle, float], Method]] = {
-    AxleModel.kind: lambda _, vehicle, dt: AxleIdentifier.for_vehicle(vehicle, dt=dt),
+    AxleModel.kind: lambda model, vehicle, dt: (
+        InertialIdentifier if model.tells_v_y else AxleIdentifier
+    ).for_vehicle(vehicle, dt=dt),
     NetworkModel.kind: lambda model, vehicle, dt: PaperIdentifier.for_vehicle(
         vehicle, network=model.network, dt=dt
     ),

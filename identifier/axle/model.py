@@ -27,7 +27,7 @@ from identifier.axle.step import FROZEN_CARRY, OVER, build_frozen
 from identifier.method import FORMAT, FrozenModelError, Setup, vehicle_from, vehicle_numbers
 from identifier.tire_model import AXLES, GRIP, STIFFNESS, Estimate, Fact, TireModel
 from models.recordings import Recording
-from models.schema import Table
+from models.schema import Table, shown
 from models.vehicle import Vehicle
 
 ARRAYS = ("W", "own", "covariance", "prior_covariance", "excitation")
@@ -57,6 +57,7 @@ class AxleModel(TireModel):
     prior_covariance : `covariance` before the first sample.
     excitation : largest slip [rad], then time of learning above each of `EDGES` [s], (2, 9).
     calibration : of the band, by stretches that did not teach it; None where nobody calibrated.
+    tells_v_y : whether the inertial identifier learnt it, which needs no v_y and tells it.
 
     Raises
     ------
@@ -76,6 +77,7 @@ class AxleModel(TireModel):
     prior_covariance: Array
     excitation: Array
     calibration: BandCalibration | None = None
+    tells_v_y: bool = False
 
     def __post_init__(self) -> None:
         doublings(self.ladder)
@@ -446,6 +448,7 @@ class AxleModel(TireModel):
             "relaxation_length_m": self.relaxation_length.tolist(),
             "known_slip_rad": self.known_slip.tolist(),
             **({} if self.calibration is None else {"band": self.calibration.to_dict()}),
+            **({"tells_v_y": True} if self.tells_v_y else {}),
         }
 
     @classmethod
@@ -473,6 +476,7 @@ class AxleModel(TireModel):
                 plausibility=Plausibility(**data["plausibility"]),
                 **{name: np.array(data[name], dtype=np.float64) for name in ARRAYS},
                 calibration=BandCalibration.from_dict(data["band"]) if "band" in data else None,
+                tells_v_y=bool(data.get("tells_v_y", False)),
             )
         except KeyError as error:
             raise FrozenModelError(f"{source}: key {error} is missing") from error
@@ -485,6 +489,8 @@ def _require_plausible(data: dict[str, Any], source: str) -> None:
     table = Table(data, f"{source}: ", FrozenModelError)
     for name, record in (("sway", Sway), ("plausibility", Plausibility)):
         table.table(name).record(record)
+    if "tells_v_y" in data and not isinstance(data["tells_v_y"], bool):
+        table.refuse("tells_v_y", f"must be true or false, it is {shown(data['tells_v_y'])}")
     if "band" in data:
         band = table.table("band")
         for name in ("factors", "color"):

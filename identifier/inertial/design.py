@@ -397,6 +397,7 @@ class InertialIdentifier(Method):
             covariance=after,
             prior_covariance=prior,
             excitation=state["excitation"].copy(),
+            tells_v_y=True,
         )
 
 

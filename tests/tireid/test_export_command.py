@@ -9,7 +9,8 @@ import pytest
 from codegen import find_compiler
 from identifier.export import processor as figures
 from identifier.export.compiled import CompiledPackage
-from identifier.methods import make_method
+from identifier.method import FrozenModelError
+from identifier.methods import load_model, make_method
 from identifier.run import identify
 from models.recordings import read_recording
 from models.vehicle import sedan
@@ -84,7 +85,7 @@ def test_what_was_learnt_without_a_lateral_velocity_goes_on_without_it(tmp_path,
     model.save(tmp_path / "weights.json")
     CAR.to_toml(tmp_path / "car.toml")
     out, weights = tmp_path / "package", str(tmp_path / "weights.json")
-    words = ["--weights", weights, "--method", "inertial", "--fmu"]
+    words = ["--weights", weights, "--fmu"]
     assert main(["export", "--out", str(out), *words]) == 0
     told = capsys.readouterr().err
     assert "reads v_x, r, delta_f, delta_r, a_y, and v_y where it is measured" in told
@@ -99,6 +100,19 @@ def test_what_was_learnt_without_a_lateral_velocity_goes_on_without_it(tmp_path,
     assert "| `v_y_sd` | m/s |" in text and "without v_y" in text
     for version in (2, 3):
         assert (out / f"tireid_fmi{version}.fmu").stat().st_size > 10_000
+    assert (
+        main(["export", "--out", str(tmp_path / "b"), "--weights", weights, "--method", "axle"])
+        == 0
+    )
+    assert "tells v_y" not in capsys.readouterr().err
+
+
+def test_a_word_that_is_no_truth_value_of_a_stored_model_is_refused(tmp_path):
+    model = make_method("axle", CAR).frozen(CAR, make_method("axle", CAR).setup(CAR).carry)
+    data = model.to_dict() | {"tells_v_y": "yes"}
+    (tmp_path / "weights.json").write_text(json.dumps(data), encoding="utf-8")
+    with pytest.raises(FrozenModelError, match="tells_v_y must be true or false"):
+        load_model(tmp_path / "weights.json")
 
 
 def test_fmus_lie_beside_the_c(tmp_path):

@@ -1,7 +1,7 @@
 """One drive for each tire that a tracker is told: linear, frozen, true, or learnt on the way."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -101,6 +101,8 @@ def lateral_velocity(vehicle: Vehicle, learnt: TireModel | None = None) -> Later
 def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
     """Return what goes on learning while the tracker drives, and hands over what is fit.
 
+    v_y is there, measured or estimated: what was learnt without it goes on by the axle identifier.
+
     Parameters
     ----------
     learnt : what the tracker is told at the start.
@@ -110,6 +112,8 @@ def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
     ValueError
         Where no method can go on from there, or its law has no certificate.
     """
+    if isinstance(learnt, AxleModel):
+        learnt = replace(learnt, tells_v_y=False)
     try:
         method = continuing(learnt, vehicle, PERIOD)
     except ValueError as error:
