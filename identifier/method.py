@@ -379,6 +379,7 @@ class Method(ABC):
             """Below this speed [m/s] learning rests and forces read zero."""
 
     judged_by = ""  # what gives the certificate, where a package cannot hold it
+    estimates = ""  # what a method tells that learns no tire
 
     @property
     def needs_v_y(self) -> bool:
@@ -514,9 +515,8 @@ class Method(ABC):
             Where no run can begin with that model.
         """
 
-    @abstractmethod
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> TireModel:
-        """Return the model that carried values make.
+        """Return the model that carried values make: none, where a method does not say more.
 
         Parameters
         ----------
@@ -527,6 +527,23 @@ class Method(ABC):
         CannotFreezeError
             For a method that estimates a signal.
         """
+        del vehicle, state
+        raise CannotFreezeError(f"it estimates {self.estimates}, not a tire")
+
+    def require_fresh(self, start: TireModel | None) -> None:
+        """Refuse to begin a run with a stored model, where no tire is learnt.
+
+        Parameters
+        ----------
+        start : None, or the model.
+
+        Raises
+        ------
+        ValueError
+            Where it is a model.
+        """
+        if start is not None:
+            raise ValueError("what learns no tire cannot begin with a stored model")
 
 
 # The format of stored frozen models, and the error of a file that does not keep it.

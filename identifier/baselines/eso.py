@@ -15,14 +15,13 @@ import casadi as ca
 import numpy as np
 
 from codegen import Scan
-from codegen.arrays import Array
 from identifier.baselines.ports import (
     OVER,
     impulse,
     sample_ports,
     turning_force,
 )
-from identifier.method import AXLE_FORCE, CannotFreezeError, Method, Port, Setup
+from identifier.method import AXLE_FORCE, Method, Port, Setup
 from identifier.tire_model import TireModel
 from identifier.tuning import Range, around
 from models.rules import require_positive
@@ -93,6 +92,8 @@ class ExtendedStateObserver(Method):
         Where a number is not positive.
     """
 
+    estimates = "axle forces"
+
     bandwidth: float
     dt: float = 0.01
     min_speed: float = 1.0
@@ -135,8 +136,7 @@ class ExtendedStateObserver(Method):
         ValueError
             Where a stored model is given.
         """
-        if start is not None:
-            raise ValueError("an extended state observer cannot begin with a stored model")
+        self.require_fresh(start)
         return Setup(
             scan=_scan(),
             carry={
@@ -151,18 +151,3 @@ class ExtendedStateObserver(Method):
                 "sampling": np.array([self.dt, self.min_speed]),
             },
         )
-
-    def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> TireModel:
-        """Refuse: there is no model.
-
-        Parameters
-        ----------
-        state : of the run.
-
-        Raises
-        ------
-        CannotFreezeError
-            Always.
-        """
-        del vehicle, state
-        raise CannotFreezeError("an extended state observer estimates forces, not a tire")

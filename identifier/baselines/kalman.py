@@ -20,7 +20,6 @@ import casadi as ca
 import numpy as np
 
 from codegen import Scan
-from codegen.arrays import Array
 from identifier.baselines.ports import (
     LAG_PORTS,
     OVER,
@@ -30,7 +29,7 @@ from identifier.baselines.ports import (
     motion_rate,
     sample_ports,
 )
-from identifier.method import AXLE_FORCE, COVARIANCE, CannotFreezeError, Method, Port, Setup
+from identifier.method import AXLE_FORCE, COVARIANCE, Method, Port, Setup
 from identifier.tire_model import TireModel
 from identifier.tuning import Range, around
 from models.bicycle import BicycleParameters
@@ -240,6 +239,8 @@ class ForceEkf(Method):
         Where a number is not positive.
     """
 
+    estimates = "axle forces"
+
     force_walk: float
     v_y_noise: float
     r_noise: float
@@ -304,8 +305,7 @@ class ForceEkf(Method):
         ValueError
             Where a stored model is given.
         """
-        if start is not None:
-            raise ValueError("a filter of forces cannot begin with a stored model")
+        self.require_fresh(start)
         R = np.array([self.v_y_noise, self.r_noise]) ** 2
         return Setup(
             scan=_scan(),
@@ -325,18 +325,3 @@ class ForceEkf(Method):
                 "sampling": np.array([self.dt, self.min_speed]),
             },
         )
-
-    def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> TireModel:
-        """Refuse: there is no model.
-
-        Parameters
-        ----------
-        state : of the run.
-
-        Raises
-        ------
-        CannotFreezeError
-            Always.
-        """
-        del vehicle, state
-        raise CannotFreezeError("a filter of forces estimates forces, not a tire")

@@ -70,8 +70,7 @@ class LinearBaseline(Method):
         ValueError
             Where a stored model is given.
         """
-        if start is not None:
-            raise ValueError("the linear tire learns nothing, it cannot begin with a stored model")
+        self.require_fresh(start)
         return self.frozen(vehicle, {}).setup(self.dt)
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:

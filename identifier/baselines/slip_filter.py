@@ -31,8 +31,6 @@ from identifier.baselines.without_v_y import (
     expected,
     heard_ports,
     predicted,
-    refuse_freeze,
-    refuse_start,
     steady_v_y,
 )
 from identifier.method import AXLE_FORCE, COVARIANCE, Method, Port, Setup, resumed
@@ -200,6 +198,8 @@ class SlipFilter(Method):
         Where the tire is unknown or a number not positive.
     """
 
+    estimates = "lateral velocity"
+
     tire: str
     r_noise: float
     a_y_noise: float
@@ -294,7 +294,7 @@ class SlipFilter(Method):
         """
         theta = np.zeros(TIRES[self.tire].unknowns)
         if not self.learns:
-            refuse_start(start)
+            self.require_fresh(start)
         elif start is not None:
             refusal = "the stored model is not a curve 'dugoff'"
             stored = resumed(start, CurveModel, refusal, curve="dugoff").parameters
@@ -329,7 +329,7 @@ class SlipFilter(Method):
             Where no tire is learnt.
         """
         if not self.learns:
-            refuse_freeze(state)
+            Method.frozen(self, vehicle, state)
         theta = state["estimate"].ravel()[2:].reshape(2, 2)
         stiffness, friction = np.exp(theta) * [vehicle.bicycle[4:], [self.friction] * 2]
         return CurveModel(

@@ -14,14 +14,11 @@ import casadi as ca
 import numpy as np
 
 from codegen import Scan
-from codegen.arrays import Array
 from identifier.baselines.curves import CURVES
 from identifier.baselines.without_v_y import (
     OVER,
     V_Y,
     heard_ports,
-    refuse_freeze,
-    refuse_start,
     steady_v_y,
 )
 from identifier.method import AXLE_FORCE, Method, Port, Setup
@@ -93,6 +90,8 @@ class Washout(Method):
         Where a number is not positive.
     """
 
+    estimates = "lateral velocity"
+
     cutoff: float
     dt: float = 0.01
     min_speed: float = 1.0
@@ -151,7 +150,7 @@ class Washout(Method):
         ValueError
             Where a stored model is given.
         """
-        refuse_start(start)
+        self.require_fresh(start)
         return Setup(
             scan=_scan(),
             carry={name: np.zeros(1) for name in CARRY},
@@ -161,18 +160,3 @@ class Washout(Method):
                 "sampling": np.array([self.dt, self.min_speed]),
             },
         )
-
-    def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> TireModel:
-        """Refuse: there is no model.
-
-        Parameters
-        ----------
-        state : of the run.
-
-        Raises
-        ------
-        CannotFreezeError
-            Always.
-        """
-        del vehicle
-        refuse_freeze(state)

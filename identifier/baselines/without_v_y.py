@@ -6,16 +6,13 @@ A steady turn needs F_r = l_f m v_x r/L, so that on a linear tire its v_y is
 l_r r + v_x (δ_r - F_r/C_r): what every one of them begins with.
 """
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple
 
 import casadi as ca
 
-from codegen.arrays import Array
 from identifier.baselines.kalman import FilteredTire, midpoint
 from identifier.baselines.ports import Sample, motion_rate, sample_ports, turning_force
-from identifier.method import CannotFreezeError, Port
-from identifier.tire_model import TireModel
+from identifier.method import Port
 from models.bicycle import BicycleParameters
 
 OVER = ("x", "u", "v_x", "a_y")  # of x the yaw rate alone
@@ -147,35 +144,3 @@ def corrected(P: Any, H: Any, R: Any, innovation: Any, outlier: Any) -> Correcte
     keep = ca.SX.eye(P.size1()) - K @ H
     after = keep @ P @ keep.T + K @ R @ K.T
     return Corrected(K @ trusted, (after + after.T) / 2, keep, H.T @ S_inverse @ trusted)
-
-
-def refuse_start(start: TireModel | None) -> None:
-    """Refuse to begin with a stored model, where no tire is learnt.
-
-    Parameters
-    ----------
-    start : None, or the model.
-
-    Raises
-    ------
-    ValueError
-        Where it is a model.
-    """
-    if start is not None:
-        raise ValueError("what learns no tire cannot begin with a stored model")
-
-
-def refuse_freeze(state: Mapping[str, Array]) -> NoReturn:
-    """Refuse to freeze what learns no tire.
-
-    Parameters
-    ----------
-    state : of the run, not looked at.
-
-    Raises
-    ------
-    CannotFreezeError
-        Always.
-    """
-    del state
-    raise CannotFreezeError("it estimates lateral velocity on the vehicle's tires, and learns none")

@@ -37,7 +37,7 @@ def test_linear_tire_is_stiffness_times_slip_online_and_frozen(car, drive):
     np.testing.assert_allclose(history.axle_force, expected, rtol=1e-12, atol=1e-9)
     frozen = history.freeze(1.0).axle_force(recording)
     np.testing.assert_array_equal(frozen, history.axle_force)
-    with pytest.raises(ValueError, match="learns nothing"):
+    with pytest.raises(ValueError, match="what learns no tire"):
         identify(recording, car, method, start=history.freeze(1.0))
 
 
