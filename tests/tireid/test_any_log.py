@@ -11,6 +11,8 @@ from tireid.cli import main
 
 CAR = ti.sedan()
 
+pytestmark = pytest.mark.usefixtures("undrawn")  # words and numbers are asked, not pictures
+
 
 @pytest.fixture(scope="module")
 def log():
