@@ -71,6 +71,7 @@ def test_nothing_that_judges_sees_a_true_force(drive, log, monkeypatch):
     [(None, 0), (Mirrored(channels=("r",)), 2), (Late(channels=("r",), delay=0.3), 3)],
     ids=["good", "refused", "not valid"],
 )
+@pytest.mark.usefixtures("undrawn")
 def test_answers_are_those_of_the_command(drive, log, tmp_path, fault, code):
     shown, car, out = Case(fault).log(log), drive.car.told, tmp_path / "out"
     words = [str(write_recording(blind(shown), tmp_path / "log.csv")), "--out", str(out)]

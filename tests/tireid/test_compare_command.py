@@ -99,6 +99,7 @@ def test_a_signal_estimator_has_no_frozen_error(numbers, result):
     assert "a signal, no model" in (result / "tables.txt").read_text()
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_table_says_which_baselines_know_lag_and_offsets(words, tmp_path, capsys):
     out, names = tmp_path / "out", ("linear", "stiffness_rls", "magic_formula_ekf", "dugoff_ekf")
     assert main([*words, "--method", *names, "--floor", "0", "--out", str(out)]) == 0
@@ -280,6 +281,7 @@ def test_without_a_log_the_plant_drives(tmp_path, laid_out):
     assert set(data["recordings"]) == {"slalom_20", "step_steer", "lane_change", "slalom_25"}
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_recording_that_teaches_nothing_right_makes_the_exit_code(logs, tmp_path, capsys):
     log = read_recording(logs / "slalom.csv")
     write_recording(replace(log, v_y=log.v_y + 0.6), tmp_path / "biased.csv")

@@ -83,6 +83,7 @@ def test_its_errors_are_those_of_onnxruntime(words, logs, tmp_path, capsys, undr
     }
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_what_a_learnt_model_leaves_is_left_too(words, logs, tmp_path):
     assert main([*words, "--network", str(tire_file(tmp_path / "tire.onnx"))]) == 0
     out, quick = tmp_path / "out", read_recording(logs / "quick.csv")
