@@ -11,6 +11,7 @@ from typing import Any
 
 import casadi as ca
 
+from identifier.axle.car import larger
 from identifier.axle.covariance import TINY, Factors, excited, updated
 
 
@@ -83,7 +84,7 @@ def measured(
     direction = excited(factors, row, 0)
     per_S = 1 / (direction.a + R)
     surprise = innovation**2 * per_S
-    share = ca.if_else(surprise > clip**2, clip / ca.sqrt(surprise), 1)
+    share = clip / ca.sqrt(larger(surprise, clip**2))  # sqrt(clip²) is clip, to the last bit
     gain = counts * share * innovation * per_S
     moved = [one + along * gain for one, along in zip(z, direction.v, strict=True)]
     return moved, updated(factors, direction, counts * (1 / R))

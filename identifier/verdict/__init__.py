@@ -2,11 +2,11 @@
 
 from identifier.verdict.bands import calibrated, within_band
 from identifier.verdict.judging import judge, judge_prediction
-from identifier.verdict.verdict import Finding, Number, Verdict
+from identifier.verdict.verdict import Number, Objection, Verdict
 
 __all__ = [
-    "Finding",
     "Number",
+    "Objection",
     "Verdict",
     "calibrated",
     "judge",

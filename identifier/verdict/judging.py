@@ -25,7 +25,7 @@ from identifier.verdict.motion import (
 )
 from identifier.verdict.parts import asked_run, taught_elsewhere, without_v_y
 from identifier.verdict.rules import MOST_MISSED, PERCENT, Drive, findings
-from identifier.verdict.verdict import WITHOUT_V_Y, Finding, Number, Verdict
+from identifier.verdict.verdict import WITHOUT_V_Y, Number, Objection, Verdict
 from models.recordings import Recording
 from models.recordings.portion import Portion, portion
 from models.vehicle import Vehicle
@@ -69,7 +69,7 @@ def judge(history: History, t: float | None = None) -> Verdict:
         learns=True,
     )
     reached = [
-        Finding(
+        Objection(
             "at_bound",
             one.axle,
             f"the {one.title} rests at its bound, {one.value:.3g} {one.unit}: {one.meaning}",
@@ -100,13 +100,13 @@ def judge_prediction(model: TireModel, recording: Recording) -> Verdict:
     return _verdict(drive, [*findings(drive), *_asked_of(asked, recording)])
 
 
-def _asked_of(asked: Portion, whole: Recording) -> list[Finding]:
+def _asked_of(asked: Portion, whole: Recording) -> list[Objection]:
     """Return a note where only a portion of a drive was asked."""
     if len(asked.recording) == len(whole):
         return []
     minutes = len(asked.recording) * whole.dt / 60.0, whole.duration / 60.0
     return [
-        Finding(
+        Objection(
             "portion",
             None,
             "judged by {:.3g} of its {:.3g} minutes: of each part of the drive those in which the "
@@ -137,7 +137,7 @@ def _looked_at(
     """
     recording = asked.recording
     found = evidence(model, recording, road)
-    notes: tuple[Finding, ...] = ()
+    notes: tuple[Objection, ...] = ()
     if found is None:
         return None
     if not (found.missed <= REST_MISSED).all():
@@ -160,10 +160,10 @@ def _center(drive: Drive, tires: Tires, road: Array | None) -> Suspect:
     return next(one for one in listed if one.cause.code == GEOMETRY)
 
 
-def _stretch(found: Evidence, rest: Evidence, t: Array, first: int, last: int) -> Finding:
+def _stretch(found: Evidence, rest: Evidence, t: Array, first: int, last: int) -> Objection:
     starts = found.windows.starts
     begin, end = t[starts[first]], t[starts[last - 1] + found.windows.n]
-    return Finding(
+    return Objection(
         "stretch",
         None,
         f"from {begin:.4g} to {end:.4g} s the motion is not explained, elsewhere all but "
@@ -187,7 +187,7 @@ def _ask(tires: Tires, windows: Windows, road: Array | None) -> Ask:
     return ask
 
 
-def _verdict(drive: Drive, listed: list[Finding]) -> Verdict:
+def _verdict(drive: Drive, listed: list[Objection]) -> Verdict:
     """Return the verdict of what was found."""
     listed.sort(key=lambda finding: not finding.refuses)
     found, model, recording = drive.found, drive.model, drive.recording
@@ -234,7 +234,7 @@ def _pair(values: Array | None) -> tuple[float, ...] | None:
 
 
 def _too_short(model: TireModel) -> Verdict:
-    finding = Finding(
+    finding = Objection(
         "too_short",
         None,
         f"fewer than {FEWEST} windows of {WINDOW:g} s are driven briskly: there is nothing to "

@@ -9,7 +9,7 @@ from codegen.arrays import Array
 from identifier.tire_model import AXLES, TireModel
 from identifier.verdict.causes import TELLING, Suspect
 from identifier.verdict.motion import Evidence
-from identifier.verdict.verdict import Finding
+from identifier.verdict.verdict import Objection
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 
@@ -49,14 +49,14 @@ class Drive(NamedTuple):
     recording: Recording
     found: Evidence
     suspects: tuple[Suspect, ...] = ()
-    notes: tuple[Finding, ...] = ()
+    notes: tuple[Objection, ...] = ()
     center: Suspect | None = None
     elsewhere: Array | None = None
     apart: Array | None = None
     learns: bool = False
 
 
-def findings(drive: Drive) -> list[Finding]:
+def findings(drive: Drive) -> list[Objection]:
     """Return all that is found.
 
     Parameters
@@ -71,7 +71,7 @@ def _forceless(drive: Drive) -> list[bool]:
     return [bool(peak < LEAST_FORCE) for peak in drive.found.peak]
 
 
-def _no_force(drive: Drive) -> Iterator[Finding]:
+def _no_force(drive: Drive) -> Iterator[Objection]:
     forceless = _forceless(drive)
     noise = np.sqrt(drive.found.noise)
     for axle, peak, none, hidden in zip(
@@ -85,7 +85,7 @@ def _no_force(drive: Drive) -> Iterator[Finding]:
             )
             if hidden:
                 said = "noise of v_y and yaw rate hides it: mend the sensors"
-            yield Finding(
+            yield Objection(
                 "no_force",
                 axle,
                 f"the drive shows no force to learn from or to judge by (at most {peak:.2g} of "
@@ -108,10 +108,10 @@ def _cause(drive: Drive) -> str:
     )
 
 
-def _missed(drive: Drive) -> Iterator[Finding]:
+def _missed(drive: Drive) -> Iterator[Objection]:
     for axle, missed, none in zip(AXLES, drive.found.missed, _forceless(drive), strict=True):
         if not (missed <= MOST_MISSED or none):
-            yield Finding(
+            yield Objection(
                 "force_missed",
                 axle,
                 f"the frozen model misses {PERCENT * missed:.0f} % of the force that the motion "
@@ -120,13 +120,13 @@ def _missed(drive: Drive) -> Iterator[Finding]:
             )
 
 
-def _elsewhere(drive: Drive) -> Iterator[Finding]:
+def _elsewhere(drive: Drive) -> Iterator[Objection]:
     if drive.elsewhere is None:
         return
     found = zip(AXLES, drive.elsewhere, drive.found.missed, _forceless(drive), strict=True)
     for axle, missed, here, none in found:
         if not (missed <= MOST_MISSED_ELSEWHERE or here > MOST_MISSED or none):
-            yield Finding(
+            yield Objection(
                 "not_repeated",
                 axle,
                 f"what most of the drive teaches misses {PERCENT * missed:.0f} % of the force in "
@@ -136,7 +136,7 @@ def _elsewhere(drive: Drive) -> Iterator[Finding]:
             )
 
 
-def _unknown(drive: Drive) -> Iterator[Finding]:
+def _unknown(drive: Drive) -> Iterator[Objection]:
     car, windows = drive.model.vehicle, drive.found.windows
     slip = np.abs(windows.mean(np.asarray(drive.recording.alpha(car.l_f, car.l_r))))
     for i, axle in enumerate(AXLES):
@@ -146,7 +146,7 @@ def _unknown(drive: Drive) -> Iterator[Finding]:
         power = drive.found.measured[:, i] ** 2
         mean = float(np.sqrt(np.sum(power * doubt[:, i] ** 2) / max(float(power.sum()), 1e-12)))
         if not (mean <= MOST_DOUBT or _forceless(drive)[i]):
-            yield Finding(
+            yield Objection(
                 "prior",
                 axle,
                 f"where the drive's force is, the curve is still {PERCENT * mean:.0f} % as unsure "
@@ -156,7 +156,7 @@ def _unknown(drive: Drive) -> Iterator[Finding]:
             )
 
 
-def _stiffness(drive: Drive) -> Iterator[Finding]:
+def _stiffness(drive: Drive) -> Iterator[Objection]:
     vehicle = drive.model.vehicle
     loads = np.array(vehicle.axle_loads)
     stiffness = drive.model.stiffness
@@ -166,7 +166,7 @@ def _stiffness(drive: Drive) -> Iterator[Finding]:
     for axle, each, C, before in zip(AXLES, relative, stiffness, told, strict=True):
         if not STIFFNESS[0] <= each <= STIFFNESS[1]:
             usual = False
-            yield Finding(
+            yield Objection(
                 "no_tire",
                 axle,
                 f"a cornering stiffness of {C:.3g} N/rad is {each:.2g} static loads per rad, "
@@ -175,7 +175,7 @@ def _stiffness(drive: Drive) -> Iterator[Finding]:
                 True,
             )
         elif not 1.0 / FAR_FROM_TOLD <= C / before <= FAR_FROM_TOLD:
-            yield Finding(
+            yield Objection(
                 "far_from_told",
                 axle,
                 f"a cornering stiffness of {C:.3g} N/rad against {before:.3g} told: l_f and l_r "
@@ -184,7 +184,7 @@ def _stiffness(drive: Drive) -> Iterator[Finding]:
             )
     ratio = float(relative[1] / relative[0]) if relative[0] > 0.0 else np.inf
     if usual and not REAR_OVER_FRONT[0] <= ratio <= REAR_OVER_FRONT[1]:
-        yield Finding(
+        yield Objection(
             "front_against_rear",
             None,
             f"the rear tires are {ratio:.2g} times as stiff over their load as the front ones, "
@@ -194,7 +194,7 @@ def _stiffness(drive: Drive) -> Iterator[Finding]:
         )
 
 
-def _shape(drive: Drive) -> Iterator[Finding]:
+def _shape(drive: Drive) -> Iterator[Objection]:
     known = drive.model.known_slip
     if known is None or not drive.learns:
         return
@@ -205,7 +205,7 @@ def _shape(drive: Drive) -> Iterator[Finding]:
         secant = np.asarray(drive.model.force(grid, axle)) / grid
         steepest = float(secant.max()) / max(float(slope), 1e-12)
         if steepest > STIFFENS:
-            yield Finding(
+            yield Objection(
                 "curve_stiffens",
                 axle,
                 f"the curve is {steepest:.2g} times as steep at "
@@ -215,12 +215,12 @@ def _shape(drive: Drive) -> Iterator[Finding]:
             )
 
 
-def _apart(drive: Drive) -> Iterator[Finding]:
+def _apart(drive: Drive) -> Iterator[Objection]:
     if drive.apart is None:
         return
     for axle, apart, none in zip(AXLES, drive.apart, _forceless(drive), strict=True):
         if not (apart <= MOST_APART or none):
-            yield Finding(
+            yield Objection(
                 "online_apart",
                 axle,
                 f"what was found online lies {PERCENT * apart:.0f} % from the frozen model over "
@@ -229,14 +229,14 @@ def _apart(drive: Drive) -> Iterator[Finding]:
             )
 
 
-def _v_y_stuck(drive: Drive) -> Iterator[Finding]:
+def _v_y_stuck(drive: Drive) -> Iterator[Objection]:
     recording, windows = drive.recording, drive.found.windows
     v_y, brisk = recording.logged_v_y, windows.starts
     if v_y is None:
         return
     moves = float(np.std(recording.r[brisk] * recording.v_x[brisk])) > LEAST_FORCE * GRAVITY
     if moves and not float(np.ptp(v_y[brisk])) > 0.0:
-        yield Finding(
+        yield Objection(
             "v_y_stuck",
             None,
             "v_y never changes while the car turns: it was not measured, and slip angles without "
@@ -245,11 +245,11 @@ def _v_y_stuck(drive: Drive) -> Iterator[Finding]:
         )
 
 
-def _car(drive: Drive) -> Iterator[Finding]:
+def _car(drive: Drive) -> Iterator[Objection]:
     vehicle, found = drive.model.vehicle, drive.found
     ratio = vehicle.yaw_inertia / (vehicle.mass * vehicle.l_f * vehicle.l_r)
     if not INERTIA[0] <= ratio <= INERTIA[1]:
-        yield Finding(
+        yield Objection(
             "yaw_inertia",
             None,
             f"the told yaw inertia is {ratio:.2g} m l_f l_r, cars have {INERTIA[0]:g} to "
@@ -263,7 +263,7 @@ def _car(drive: Drive) -> Iterator[Finding]:
         yield from _a_y(drive, vehicle, found)
 
 
-def _center(drive: Drive) -> Iterator[Finding]:
+def _center(drive: Drive) -> Iterator[Objection]:
     """The split of the force between the axles follows the center of gravity, and nothing else."""
     suspect, vehicle = drive.center, drive.model.vehicle
     if suspect is None or any(_forceless(drive)):
@@ -273,7 +273,7 @@ def _center(drive: Drive) -> Iterator[Finding]:
     moved = not CENTER[0] <= off <= CENTER[1]
     if moved and suspect.share > CERTAIN and gained > NOTICED:
         share = PERCENT * min(suspect.share, 1.0)
-        yield Finding(
+        yield Objection(
             "center_of_gravity",
             None,
             f"{suspect.text}: that would explain {share:.0f} % of what is missed; are l_f and l_r "
@@ -282,7 +282,7 @@ def _center(drive: Drive) -> Iterator[Finding]:
         )
 
 
-def _turning(recording: Recording, found: Evidence) -> Iterator[Finding]:
+def _turning(recording: Recording, found: Evidence) -> Iterator[Objection]:
     """Without a v_y: a_y and v_x r are the same but for v̇_y, bank and roll."""
     felt, turning = (
         found.windows.mean(one) for one in (recording.needed("a_y"), recording.v_x * recording.r)
@@ -293,7 +293,7 @@ def _turning(recording: Recording, found: Evidence) -> Iterator[Finding]:
         return
     slope = float(np.mean(felt * turning)) / power
     if not TURNING_SLOPE[0] <= slope <= TURNING_SLOPE[1]:
-        yield Finding(
+        yield Objection(
             "a_y_disagrees",
             None,
             f"the recorded a_y is {slope:.2g} times v_x r ({TURNING_SLOPE[0]:g} to "
@@ -302,7 +302,7 @@ def _turning(recording: Recording, found: Evidence) -> Iterator[Finding]:
         )
 
 
-def _a_y(drive: Drive, vehicle: Vehicle, found: Evidence) -> Iterator[Finding]:
+def _a_y(drive: Drive, vehicle: Vehicle, found: Evidence) -> Iterator[Objection]:
     assert drive.recording.a_y is not None
     recorded = found.windows.mean(drive.recording.a_y)
     motion = found.measured @ np.array(vehicle.axle_loads) / vehicle.mass
@@ -313,7 +313,7 @@ def _a_y(drive: Drive, vehicle: Vehicle, found: Evidence) -> Iterator[Finding]:
     slope = float(recorded @ motion) / float(motion @ motion)
     missed = float(np.sqrt(np.mean((recorded - motion) ** 2))) / size
     if missed > MOST_A_Y or not A_Y_SLOPE[0] <= slope <= A_Y_SLOPE[1]:
-        yield Finding(
+        yield Objection(
             "a_y_disagrees",
             None,
             f"the recorded a_y lies {PERCENT * missed:.0f} % from what v_y, r and v_x give, "

@@ -26,7 +26,7 @@ WITHOUT_V_Y = (
 )
 
 
-class Finding(NamedTuple):
+class Objection(NamedTuple):
     """What speaks against an answer.
 
     code : for machines.   axle : that it is about, None for the car or the drive.
@@ -82,7 +82,7 @@ class Verdict:
     blind : what more nobody can see of this drive.
     """
 
-    findings: tuple[Finding, ...]
+    findings: tuple[Objection, ...]
     numbers: tuple[Number, ...]
     measures: Mapping[str, tuple[float, ...] | float | None]
     blind: tuple[str, ...] = ()

@@ -124,3 +124,13 @@ def test_entries_are_those_of_the_product(P):
         return ca.vertcat(entry(factors, 0, 0), entry(factors, 1, 4), entry(factors, 5, 5))
 
     np.testing.assert_allclose(evaluate(some, P), [P[0, 0], P[1, 4], P[5, 5]], rtol=1e-10)
+
+
+def test_nothing_is_divided_by_zero_where_nothing_surprises():
+    """The slope of z over the innovation is the gain, also at none and up to the clip."""
+    innovation, h = ca.SX.sym("nu"), ca.sparsify(ca.SX(ca.DM([[1.0] + [0.0] * (Q - 1)])))
+    factors = factors_of(ca.vertsplit(ca.SX(ca.DM(packed(np.eye(Q)[None])[0]))), Q)
+    z, _ = measured([ca.SX(0)] * Q, factors, h, innovation=innovation, R=1.0, clip=3.0, counts=1)
+    slope = ca.Function("slope", [innovation], [ca.jacobian(z[0], innovation)])
+    assert [float(slope(nu)) for nu in (0.0, 1.0, -4.2)] == pytest.approx([0.5] * 3)
+    assert float(slope(4.3)) == pytest.approx(0.0, abs=1e-12)

@@ -417,7 +417,7 @@ def test_every_finding_is_in_the_documents():
     written = set()
     for file in ("rules.py", "judging.py"):
         text = (folder / file).read_text(encoding="utf-8")
-        written |= set(re.findall(r'Finding\(\s*"(\w+)"', text))
+        written |= set(re.findall(r'Objection\(\s*"(\w+)"', text))
     page = (folder.parents[1] / "docs" / "results.md").read_text(encoding="utf-8")
     assert len(written) > 10
     assert written == set(re.findall(r"^\| `(\w+)` \| (?:no|yes)", page, flags=re.MULTILINE))
