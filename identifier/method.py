@@ -317,6 +317,11 @@ class Port(NamedTuple):
 AXLE_FORCE = Port(
     "axle_force", "N", "lateral axle forces, front and rear, left positive, frame of the body"
 )
+HALF_BAND = Port(
+    "half_band",
+    "N",
+    "half the width of the 90 % band around axle_force, front and rear; 0 where forces read zero",
+)
 
 
 def force_unit_name(force_unit: float) -> str:
@@ -395,6 +400,23 @@ class Method(ABC):
     def remark(self) -> str:
         """What a table of methods must say of it beside its name; empty: nothing."""
         return ""
+
+    def setup_with_band(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
+        """Return what a run needs whose step tells `half_band` (2,) [N] beside its force.
+
+        Parameters
+        ----------
+        vehicle : the car, as far as the identifier knows it.
+        start : as of `setup`; its calibration is that of the band.
+
+        Raises
+        ------
+        ValueError
+            Where the method cannot tell how sure it is, or stored weights are those of another
+            structure.
+        """
+        del vehicle, start
+        raise ValueError(f"{type(self).__name__} cannot tell how sure it is: it has no band")
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -495,7 +517,7 @@ class Method(ABC):
         KeyError
             Where the method does not describe it.
         """
-        for port in self.ports:
+        for port in (*self.ports, HALF_BAND):
             if port.name == name:
                 return port
         raise KeyError(f"{type(self).__name__} has no port {name!r}")

@@ -174,7 +174,7 @@ class TireModel(ABC):
     @property
     def reference_speed(self) -> float:
         """Speed [m/s] at which a force that depends on it is given, 4 sqrt(g L): brisk driving."""
-        return max(4.0 * self.vehicle.froude_speed, self.min_speed)
+        return brisk_speed(self.vehicle, self.min_speed)
 
     def predict(self, recording: Recording) -> Array:
         """Return the axle forces that the model predicts of a drive, (n, 2) [N].
@@ -258,26 +258,54 @@ class TireModel(ABC):
         del alpha
         return None
 
-    def half_band(self, alpha: Array, level: float = 0.9) -> Array | None:
+    def half_band(
+        self, alpha: Array, level: float = 0.9, *, v_x: float | Array | None = None
+    ) -> Array | None:
         """Return half the width of `band`, (k, 2) [N]; None where the model cannot tell.
 
         Parameters
         ----------
         alpha : slip angles [rad], (k,).
         level : share of cases that the band shall hold, above 0 and below 1.
+        v_x : speed [m/s], a number or (k,), positive; None takes that of the drive that taught.
         """
-        del alpha, level
+        del alpha, level, v_x
+        return None
+
+    def half_band_over(self, recording: Recording, level: float = 0.9) -> Array | None:
+        """Return half the width of the band around `axle_force` of a drive, (n, 2) [N].
+
+        None where the model cannot tell.
+
+        Parameters
+        ----------
+        recording : its signals are the input.
+        level : share of samples that the band shall hold, above 0 and below 1.
+        """
+        del recording, level
         return None
 
     @overload
-    def band(self, alpha: float, axle: Axle, level: float = ...) -> tuple[float, float] | None: ...
+    def band(
+        self, alpha: float, axle: Axle, level: float = ..., *, v_x: float | None = ...
+    ) -> tuple[float, float] | None: ...
     @overload
     def band(
-        self, alpha: ArrayLike, axle: Axle | None = None, level: float = ...
+        self,
+        alpha: ArrayLike,
+        axle: Axle | None = None,
+        level: float = ...,
+        *,
+        v_x: float | None = ...,
     ) -> tuple[Array, Array] | None: ...
 
     def band(
-        self, alpha: ArrayLike, axle: Axle | None = None, level: float = 0.9
+        self,
+        alpha: ArrayLike,
+        axle: Axle | None = None,
+        level: float = 0.9,
+        *,
+        v_x: float | None = None,
     ) -> tuple[float, float] | tuple[Array, Array] | None:
         """Return between which forces the true one lies [N]: (low, high), each as of `force`.
 
@@ -287,15 +315,16 @@ class TireModel(ABC):
         ----------
         alpha, axle : as of `force`.
         level : in which share of cases it shall, above 0 and below 1.
+        v_x : speed [m/s], positive; None takes that of the drive that taught.
 
         Raises
         ------
         ValueError
-            Where the axle has another name, or the level is impossible.
+            Where the axle has another name, or level or speed are impossible.
         """
         slip = np.asarray(alpha, dtype=np.float64)
         center = np.asarray(self.force(slip, axle))
-        half = self.half_band(slip.ravel(), level)
+        half = self.half_band(slip.ravel(), level, v_x=v_x)
         if half is None:
             return None
         half = half.reshape(*slip.shape, 2)
@@ -429,6 +458,17 @@ class TireModel(ABC):
         )
         name = f"{type(self).__name__} of {self.vehicle.name!r}"
         return f"<{name}: stiffness {front:.4g} / {rear:.4g} N/rad{known}>"
+
+
+def brisk_speed(vehicle: Vehicle, min_speed: float) -> float:
+    """Return 4 sqrt(g L), but no speed at which forces read zero [m/s].
+
+    Parameters
+    ----------
+    vehicle : its wheelbase is L.
+    min_speed : below which they do [m/s].
+    """
+    return max(4.0 * vehicle.froude_speed, min_speed)
 
 
 def drift(vehicle: Vehicle, slope: Any, v_x: Any) -> Any:

@@ -119,3 +119,19 @@ def is_shown(channel: str, value: float) -> bool:
     value : in its SI unit.
     """
     return abs(value) <= LARGEST_SHOWN[channel]
+
+
+NORMAL_MEDIAN = 0.6745  # of |x|, for x normal with variance one
+
+
+def white_noise(signal: Array) -> float:
+    """Return the standard deviation of the white part of a signal, by its second differences.
+
+    Their median is taken: steps and outliers are not noise.
+
+    Parameters
+    ----------
+    signal : samples (n,).
+    """
+    bend = signal[2:] - 2.0 * signal[1:-1] + signal[:-2]
+    return float(np.median(np.abs(bend)) / (NORMAL_MEDIAN * np.sqrt(6.0)))

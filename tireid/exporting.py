@@ -25,6 +25,9 @@ from tireid.progress import Progress
 
 IDENTIFIER = "identifier"  # folder of the package where a tracker lies beside it
 COSTS, TRACKING, UNITS, NETWORK = "costs on Arm processors", "the tracker", "FMUs", "ONNX"
+UNCALIBRATED = (
+    "the band is as learning is told of its errors: begin with the model of a drive to calibrate it"
+)
 PARTS = (  # of an export: about how long each takes, and the option that asks for it
     ("the identifier", 1.0, ""),
     (COSTS, 17.0, ""),
@@ -65,7 +68,8 @@ class Exported:
         reads = f"{type(step.method).__name__} reads {', '.join(needs)}"
         reads += ", and v_y where it is measured; it tells v_y" if step.tells_v_y else ""
         estimates = [step.vehicle.estimates] if step.vehicle.estimates else []
-        return "\n".join([*lines, *self.told, *estimates, reads, wrote])
+        told = [UNCALIBRATED] if step.tells_band and step.band is None else []
+        return "\n".join([*lines, *self.told, *estimates, reads, *told, wrote])
 
     def __repr__(self) -> str:
         return f"<Exported {self.package.specialized.name} in {self.folder}>"
@@ -79,6 +83,7 @@ def export(
     name: str = "tireid",
     single: bool = False,
     with_a_y: bool = False,
+    band: bool = False,
     fmu: bool = False,
     onnx: bool = False,
     mpc: bool = False,
@@ -95,6 +100,8 @@ def export(
     name : prefix of every symbol.
     single : float unless the build says double.
     with_a_y : a_y of an accelerometer is an input too, of a method that can go without it.
+    band : half the width of the band of 90 % around each force is an output too; of a run it is
+        calibrated, of a model as far as that is.
     fmu : also FMUs 2.0 and 3.0 for Co-Simulation.
     onnx : also the model, frozen, as ONNX.
     mpc : also a tracker that steers by what is learnt.
@@ -116,7 +123,7 @@ def export(
     if isinstance(source, History):
         method, car = source.design, vehicle or source.vehicle
         try:
-            start = source.freeze()
+            start = source.calibrated() if band else source.freeze()
         except CannotFreezeError:  # a filter of forces learns nothing that a run could begin with
             start = None
     elif isinstance(source, TireModel):
@@ -132,6 +139,7 @@ def export(
         name=name,
         single=single,
         with_a_y=with_a_y,
+        band=band,
         fmu=fmu,
         onnx=onnx,
         mpc=mpc,
@@ -148,6 +156,7 @@ def export_method(
     name: str,
     single: bool,
     with_a_y: bool,
+    band: bool,
     fmu: bool,
     onnx: bool,
     mpc: bool,
@@ -162,6 +171,7 @@ def export_method(
     name : prefix of every symbol.
     single : float unless the build says double.
     with_a_y : a_y of an accelerometer is an input too, of a method that can go without it.
+    band : half the width of the band around each force is an output too, calibrated as `start` is.
     fmu : also FMUs 2.0 and 3.0.
     onnx : also the model, frozen, as ONNX.
     mpc : also a tracker.
@@ -180,7 +190,9 @@ def export_method(
         Progress("export", lasts, long=True) as progress,
         output_folder(folder, force=overwrite) as scratch,
     ):
-        package = build_package(method, vehicle, start, name=name, single=single, with_a_y=with_a_y)
+        package = build_package(
+            method, vehicle, start, name=name, single=single, with_a_y=with_a_y, with_band=band
+        )
         costs = measure(package, progress.begin(COSTS))
         place = scratch / IDENTIFIER if mpc else scratch
         write_files(place, package, figures_text(costs), costs)

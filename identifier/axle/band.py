@@ -1,14 +1,18 @@
 """A band around the curve of an axle: what the covariance leaves open, and what no curve can say.
 
-Half the width at a slip x, in static axle loads: z sqrt((m² + v) (f² (1 - ρ) + max(f, 1)² ρ)).
-z: of the level.   v = t'P t + (φ' o)²: variance that learning left, t = tanh(x/α_j), o: standard
-deviation of the zero of the slip.   m² = (0.04 φ)² + 0.01²: errors of the model, as learning is
-told of them.   f: factor of a range of slip, by which errors on stretches that did not teach the
-model are larger or smaller than that.   ρ: v over that from which on a slip is not known, at most
-1; there nothing is narrowed.
+Half the width at a slip x and a speed v_x, in static axle loads: z sqrt((m² s² + v)(f² (1 - ρ) +
+max(f, 1)² ρ)).
+z: of the level.   v = h'P h, h = [t, 0, 0, φ'/v_x or φ']: variance that learning left of weights
+t = tanh(x/α_j) and of the zero of the slip.   m² = (0.04 φ)² + 0.01²: errors of the model, as
+learning is told of them.   s: mean speed of the drive that taught over v_x: an error of a lateral
+velocity is one of slip by 1/v_x.   f: factor of a range of slip times one of a range of speed, by
+which errors on stretches that did not teach the model are larger or smaller than that.   ρ: v over
+that from which on a slip is not known, at most 1; there nothing is narrowed.
 Learning takes errors to be correlated over a time that is told; where they are over a longer one,
-as many samples tell less by `color`, the ratio of both: P' = (P₀⁻¹ + (P⁻¹ - P₀⁻¹)/color)⁻¹, which
-ends at the prior P₀ where nothing was learnt.
+as many samples tell less by `color`, the ratio c of both: P' = (P₀⁻¹ + (P⁻¹ - P₀⁻¹)/c)⁻¹, which
+ends at the prior P₀ where nothing was learnt. With v₀ = h'P₀ h and p = v/v₀, v₀ p c/(1 + p (c - 1))
+is never below h'P' h: along the axes that P and P₀ share it is a mean of a concave function, here
+taken of the mean (Jensen). That bound is v of the band: it costs no inverse.
 """
 
 from dataclasses import dataclass
@@ -19,9 +23,15 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.axle.learning import Regression
+from models.recordings import Recording
+from models.sensors import white_noise
+from models.vehicle import Vehicle
 
 RANGES = (0.01, 0.02, 0.04, 0.08, 0.16)  # rad: ends of the ranges of slip, the last is open
 CENTERS = (0.005, 0.015, 0.03, 0.06, 0.12, 0.24)  # rad: where the factor of a range holds
+SPEEDS = (2.0, 3.0, 4.0)  # sqrt(g L): ends of the ranges of speed, first and last are open
+AT_SPEEDS = (1.5, 2.5, 3.5, 4.5)  # sqrt(g L): where the factor of a range of speed holds
+STRETCH = (0.5, 2.0)  # s at most and least
 LEVEL = 0.9  # at which factors are found, and which is asked for if no other is told
 RELATIVE = Regression().relative_error  # of the force
 FLOOR = 0.5 * Regression().error  # static axle loads
@@ -38,7 +48,11 @@ class BandCalibration:
     Parameters
     ----------
     factors : of the errors of each range of slip, (2, 6).
+    speeds : of the errors of each range of speed, over all, (2, 4).
     color : variance of a mean of errors over that of errors as told, at least 1, (2,).
+    speed : root mean square of v_x there [m/s], positive.
+    noise : standard deviation of the white noise that sensors made: of the lateral velocity of
+        front and rear axle [m/s], and of the steering in front [rad], (3,).
 
     Raises
     ------
@@ -47,12 +61,17 @@ class BandCalibration:
     """
 
     factors: Array
+    speeds: Array
     color: Array
+    speed: float
+    noise: Array
 
     def __post_init__(self) -> None:
         for name, shape, low, high in (
             ("factors", (2, len(CENTERS)), LEAST, MOST),
+            ("speeds", (2, len(AT_SPEEDS)), LEAST, MOST),
             ("color", (2,), 1.0, MOST_COLOR),
+            ("noise", (3,), 0.0, MOST),
         ):
             value = getattr(self, name)
             if value.shape != shape:
@@ -62,29 +81,59 @@ class BandCalibration:
                     f"{name} of the band must be within {low:g} and {high:g}, they reach from "
                     f"{value.min():g} to {value.max():g}"
                 )
+        if not 0.0 < self.speed < np.inf:
+            raise ValueError(f"speed of the band must be positive, it is {self.speed} m/s")
 
     @classmethod
-    def told(cls) -> Self:
-        """Return that of a model whose errors are as learning is told."""
-        return cls(factors=np.ones((2, len(CENTERS))), color=np.ones(2))
+    def told(cls, speed: float) -> Self:
+        """Return that of a model whose errors are as learning is told, of a speed.
 
-    def factor(self, alpha: Array) -> Array:
-        """Return the factors at slip angles, (k, 2): between centers straight in the log of slip.
+        Parameters
+        ----------
+        speed : [m/s], positive.
+        """
+        ones = np.ones((2, len(CENTERS))), np.ones((2, len(AT_SPEEDS)))
+        return cls(
+            factors=ones[0], speeds=ones[1], color=np.ones(2), speed=speed, noise=np.zeros(3)
+        )
+
+    def factor(self, alpha: Array, relative_speed: Array) -> Array:
+        """Return the factors at slip angles and speeds, (k, 2): straight between centers.
 
         Parameters
         ----------
         alpha : slip angles [rad], (k,).
+        relative_speed : over sqrt(g L), (k,).
         """
-        at = np.log(np.maximum(np.abs(alpha), CENTERS[0]))
-        return np.stack([np.interp(at, np.log(CENTERS), row) for row in self.factors], axis=1)
+        size = np.abs(alpha)
+        return np.stack(
+            [
+                np.interp(size, CENTERS, slip) * np.interp(relative_speed, AT_SPEEDS, speed)
+                for slip, speed in zip(self.factors, self.speeds, strict=True)
+            ],
+            axis=1,
+        )
+
+    def stretch(self, v_x: Array) -> Array:
+        """Return s, by which errors of the model are larger at speeds, (k,).
+
+        Parameters
+        ----------
+        v_x : speeds [m/s], positive, (k,).
+        """
+        return np.asarray(np.clip(self.speed / v_x, *STRETCH), dtype=np.float64)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the calibration as plain numbers, ready for JSON."""
         return {
             "ranges": list(RANGES),
+            "speed_ranges": list(SPEEDS),
             "level": LEVEL,
             "factors": self.factors.tolist(),
+            "speeds": self.speeds.tolist(),
             "color": self.color.tolist(),
+            "speed": self.speed,
+            "noise": self.noise.tolist(),
         }
 
     @classmethod
@@ -102,11 +151,20 @@ class BandCalibration:
         KeyError
             Where a key is missing.
         """
-        for name, ours in (("ranges", list(RANGES)), ("level", LEVEL)):
+        for name, ours in (
+            ("ranges", list(RANGES)),
+            ("speed_ranges", list(SPEEDS)),
+            ("level", LEVEL),
+        ):
             if data[name] != ours:
                 raise ValueError(f"{name} of the band must be {ours}, they are {data[name]}")
-        factors, color = (np.array(data[name], dtype=np.float64) for name in ("factors", "color"))
-        return cls(factors=factors, color=color)
+        factors, speeds, color, noise = (
+            np.array(data[name], dtype=np.float64)
+            for name in ("factors", "speeds", "color", "noise")
+        )
+        return cls(
+            factors=factors, speeds=speeds, color=color, speed=float(data["speed"]), noise=noise
+        )
 
 
 def ranges_of(slip: Array) -> Any:
@@ -158,6 +216,39 @@ def colored(P: Array, prior: Array, color: float, factor: float = 1.0) -> Array:
     return wider
 
 
+def colored_variance(left: Array, before: Array, color: Array) -> Array:
+    """Return a bound of h'P' h, P' of `colored`, that is never below it and needs no inverse.
+
+    Parameters
+    ----------
+    left, before : h'P h and h'P₀ h, (k, 2).
+    color : how much less samples tell, at least 1, (2,).
+    """
+    share = np.minimum(left / np.maximum(before, TINY), 1.0)
+    wider: Array = np.maximum(left, before * share * color / (1.0 + share * (color - 1.0)))
+    return wider
+
+
+def sensor_noise(recording: Recording, vehicle: Vehicle) -> Array:
+    """Return the white noise of sensors as the slip of the axles feels it, (3,).
+
+    Standard deviations: lateral velocity of front and rear axle [m/s], steering in front [rad].
+
+    Parameters
+    ----------
+    recording : with the noise.
+    vehicle : its geometry.
+    """
+    sideways, turning = white_noise(recording.needed("v_y")), white_noise(recording.r)
+    return np.array(
+        [
+            np.hypot(sideways, vehicle.l_f * turning),
+            np.hypot(sideways, vehicle.l_r * turning),
+            white_noise(recording.delta_f),
+        ]
+    )
+
+
 def root(P: Array) -> Array:
     """Return R with R R' = P (q, q), also where P is singular.
 
@@ -174,23 +265,24 @@ def root(P: Array) -> Array:
 class BandSpread(NamedTuple):
     """Variances of the force of an axle [static axle loads²], as errors are told to be.
 
-    scaled : (1 - ρ) (m² + v), by the factor.   held : ρ (m² + v), which no factor narrows.
+    scaled : (1 - ρ) (m² s² + v), by the factor.   held : ρ (m² s² + v), which no factor narrows.
     """
 
     scaled: Array
     held: Array
 
     @classmethod
-    def of(cls, force: Array, left: Array, before: Array) -> Self:
+    def of(cls, force: Array, left: Array, before: Array, stretch: Array | float = 1.0) -> Self:
         """Return those of a force, of the variance that learning left, and of the prior's.
 
         Parameters
         ----------
         force : φ of the model [static axle loads].
         left, before : v and v₀ [static axle loads²].
+        stretch : s, of errors of the model.
         """
         share = np.minimum(left / np.maximum(UNKNOWN**2 * before, TINY), 1.0)
-        total = (RELATIVE * force) ** 2 + FLOOR**2 + left
+        total = ((RELATIVE * force) ** 2 + FLOOR**2) * stretch**2 + left
         return cls((1.0 - share) * total, share * total)
 
     def half_width(self, factor: Array, level: float) -> Array:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import casadi as ca
@@ -10,6 +10,8 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
+from identifier.axle.band import AT_SPEEDS, CENTERS, BandCalibration
+from identifier.axle.band_step import band_numbers, hinges
 from identifier.axle.bank import UNPROVEN, RoadSlope, SlopeNumbers, SlopeState, road_push
 from identifier.axle.car import car_numbers
 from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
@@ -31,7 +33,7 @@ from identifier.axle.watch import BEGIN, Watch
 from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.method import OTHER_STRUCTURE, Method, Port, Reached, Setup, Track, resumed
-from identifier.tire_model import AXLES, TireModel
+from identifier.tire_model import AXLES, TireModel, brisk_speed
 from identifier.tuning import Range, ranges_around
 from models.vehicle import GRAVITY, Vehicle
 
@@ -234,6 +236,35 @@ class AxleIdentifier(Method):
             ends_run=self.plausibility.rest(self.dt),
         )
 
+    def setup_with_band(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
+        """Return what a run needs whose step tells `half_band` (2,) [N] beside its force.
+
+        Parameters
+        ----------
+        start : as of `setup`; without a calibration errors are taken to be as learning is told.
+
+        Raises
+        ------
+        ValueError
+            Where stored weights are those of another structure.
+        """
+        setup = self.setup(vehicle, start)
+        stored = start.calibration if isinstance(start, AxleModel) else None
+        told = BandCalibration.told(brisk_speed(vehicle, self.min_speed))
+        noise = np.array([self.regression.noise, self.regression.noise, 0.0])
+        calibration = stored or replace(told, noise=noise)
+        rises = self.rising_until is not None
+        return setup._replace(
+            scan=_scan(doublings(self.ladder), rises, bands=True),
+            constants={
+                **setup.constants,
+                "banding": band_numbers(calibration, vehicle.froude_speed),
+                "slip_factors": hinges(calibration.factors, CENTERS),
+                "speed_factors": hinges(calibration.speeds, AT_SPEEDS),
+                "prior": packed(self.prior.covariance(vehicle, self.ladder)),
+            },
+        )
+
     def _within_bounds(self, W: Array, own: Array, P: Array) -> tuple[Array, Array]:
         """Return what is begun with, within bounds: a file or a prior may lie outside."""
         n = len(self.ladder)
@@ -355,5 +386,6 @@ def _projection(n: int, rises: bool) -> ca.Function:
 
 
 @cache
-def _scan(steps: tuple[int, ...], rises: bool) -> Scan:
-    return Scan(build_step(steps, rises=rises), carry=CARRY, over=LEARNING_OVER)
+def _scan(steps: tuple[int, ...], rises: bool, *, bands: bool = False) -> Scan:
+    step = build_step(steps, rises=rises, bands=bands)
+    return Scan(step, carry=CARRY, over=LEARNING_OVER)

@@ -16,12 +16,16 @@ from identifier.axle.band import (
     BandCalibration,
     BandSpread,
     colored,
+    colored_variance,
+    normal_quantile,
     root,
+    sensor_noise,
 )
 from identifier.axle.car import Car, car_numbers
 from identifier.axle.curve import EDGES, doublings, unit_matrix
 from identifier.axle.dynamics import lagged_force, series_compliance, static_curve
 from identifier.axle.gate import GateState, Plausibility
+from identifier.axle.prior import SD_FRICTION, friction_direction
 from identifier.axle.slip import SHORTEST, Sway, SwayState
 from identifier.axle.step import FROZEN_CARRY, OVER, build_frozen
 from identifier.method import FORMAT, FrozenModelError, Setup, vehicle_from, vehicle_numbers
@@ -178,7 +182,9 @@ class AxleModel(TireModel):
                 known[i] = largest * count / grid.size
         return known
 
-    def half_band(self, alpha: Array, level: float = LEVEL) -> Array:
+    def half_band(
+        self, alpha: Array, level: float = LEVEL, *, v_x: float | Array | None = None
+    ) -> Array:
         """Return half the width of the band around the steady forces, (k, 2) [N].
 
         Without a calibration errors are taken to be as learning is told.
@@ -187,37 +193,112 @@ class AxleModel(TireModel):
         ----------
         alpha : slip angles [rad], (k,).
         level : share of cases that the band shall hold, above 0 and below 1.
+        v_x : speed [m/s], a number or (k,), positive; None takes that of the drive that taught.
+
+        Raises
+        ------
+        ValueError
+            Where the level is impossible, or a speed is not positive.
+        """
+        speed = np.broadcast_to(self._calibration.speed if v_x is None else v_x, np.shape(alpha))
+        if not (speed > 0.0).all():
+            raise ValueError(f"v_x of a band must be positive, it is {speed.min()}")
+        factor = self._calibration.factor(alpha, speed / self.vehicle.froude_speed)
+        return self.band_spread(alpha, speed).half_width(factor, level) * self._loads
+
+    def half_band_over(self, recording: Recording, level: float = LEVEL) -> Array:
+        """Return half the width of the band around `axle_force` of a drive, (n, 2) [N].
+
+        White noise of the drive's own sensors is in it, as far as the lag lets it pass; it is zero
+        where the forces read zero.
+
+        Parameters
+        ----------
+        recording : its signals are the input.
+        level : share of samples that the band shall hold, above 0 and below 1.
 
         Raises
         ------
         ValueError
             Where the level is impossible.
         """
-        factor = (self.calibration or BandCalibration.told()).factor(alpha)
-        return self.band_spread(alpha).half_width(factor, level) * self._loads
+        slip, v_x = self.lagged_slip(recording), np.maximum(recording.v_x, self.min_speed)
+        curve = np.stack(
+            [self.half_band(slip[:, i], level, v_x=v_x)[:, i] for i in range(2)], axis=1
+        )
+        noise = self._noise_of_slip(sensor_noise(recording, self.vehicle), v_x[:, None])
+        slope = self._slope_at(slip)
+        slopes = np.maximum(slope, 0.02 * self._slope_at(np.zeros((1, 2))))
+        lag = self.own[:, 0] * slopes + SHORTEST * self.vehicle.wheelbase
+        e = np.exp(-v_x[:, None] * recording.dt / lag)
+        passed = normal_quantile(level) * slope * noise * np.sqrt((1.0 - e) / (1.0 + e))
+        wide = np.hypot(curve, passed * self._loads)
+        half: Array = np.where(recording.v_x[:, None] >= self.min_speed, wide, 0.0)
+        return half
 
-    def band_spread(self, alpha: Array) -> BandSpread:
+    @staticmethod
+    def _noise_of_slip(noise: Array, v_x: Array) -> Array:
+        """Return the standard deviation of slip by noise of sensors [rad], (n, 2)."""
+        sideways, steering = noise[:2] / v_x, np.array([noise[2], 0.0])
+        return np.asarray(np.hypot(sideways, steering), dtype=np.float64)
+
+    def _slope_at(self, slip: Array) -> Array:
+        """Return the slope of the curves at slips of front and rear axle (n, 2) [1/rad]."""
+        scales = np.array(self.ladder)
+        units = np.tanh(slip[..., None] / scales)
+        slope: Array = ((1.0 - units**2) * self.W / scales).sum(axis=-1)
+        return slope
+
+    @property
+    def _calibration(self) -> BandCalibration:
+        return self.calibration or BandCalibration.told(self.reference_speed)
+
+    def band_spread(self, alpha: Array, v_x: Array) -> BandSpread:
         """Return the variances of the steady forces that a band is made of, (k, 2).
 
         Parameters
         ----------
         alpha : slip angles [rad], (k,).
+        v_x : speeds [m/s], positive, (k,).
         """
-        T, scales, n = unit_matrix(alpha, self.ladder), np.array(self.ladder), len(self.ladder)
+        T = unit_matrix(alpha, self.ladder)
+        scales, n = np.array(self.ladder), len(self.ladder)
         slope = (1.0 - T * T) @ (self.W / scales).T
-        zero = np.array([1.0, 1.0 / self.reference_speed])  # of slip, for an offset of one
+        zero = slope * np.column_stack([np.ones_like(v_x), 1.0 / v_x])  # of slip, by its offset
+        h = np.zeros((2, len(T), n + 3))
+        h[:, :, :n], h[:, :, -1] = T, zero.T
+        left, before = (
+            np.einsum("aki,aij,akj->ka", h, both, h)
+            for both in (self.covariance, self.prior_covariance)
+        )
+        calibration = self._calibration
+        left = colored_variance(left, before, calibration.color)
+        return BandSpread.of(T @ self.W.T, left, before, calibration.stretch(v_x)[:, None])
 
-        def variance(both: Array) -> Array:
-            weights = np.einsum("ki,aij,kj->ka", T, both[:, :n, :n], T)
-            total: Array = weights + (slope * zero) ** 2 * both[:, -1, -1]
-            return total
+    def on_another_road(self, sd_friction: float = SD_FRICTION) -> "AxleModel":
+        """Return the model for a road whose friction is not that of the drive that taught.
 
-        left, before = variance(self._posterior()), variance(self.prior_covariance)
-        return BandSpread.of(T @ self.W.T, left, before)
+        Its curve stays, its band opens along φ = μ φ₀(α/μ), the change that friction makes.
+
+        Parameters
+        ----------
+        sd_friction : standard deviation of ln μ between the roads [-], as of `Prior`.
+
+        Raises
+        ------
+        ValueError
+            Where it is negative or not finite.
+        """
+        if not 0.0 <= sd_friction < np.inf:
+            raise ValueError(f"sd_friction must be finite, not negative, it is {sd_friction}")
+        n, wider = len(self.ladder), self.covariance.copy()
+        change = sd_friction * self.W @ friction_direction(self.ladder).T
+        wider[:, :n, :n] += change[:, :, None] * change[:, None, :]
+        return replace(self, covariance=wider)
 
     def _posterior(self, factors: Array | None = None) -> Array:
         """Return the covariance of both axles, its noise as colored as it was."""
-        color = (self.calibration or BandCalibration.told()).color
+        color = self._calibration.color
         size = np.ones(2) if factors is None else factors
         both = zip(self.covariance, self.prior_covariance, color, size, strict=True)
         return np.array([colored(P, prior, float(c), float(f)) for P, prior, c, f in both])
@@ -237,7 +318,7 @@ class AxleModel(TireModel):
         """
         if n < 0:
             raise ValueError(f"n must not be negative, it is {n}")
-        factors = (self.calibration or BandCalibration.told()).factors
+        factors = self._calibration.factors
         size = np.sqrt(np.mean(factors**2, axis=1))
         roots = [root(P) for P in self._posterior(size)]
         drawn: list[AxleModel] = []
@@ -493,8 +574,9 @@ def _require_plausible(data: dict[str, Any], source: str) -> None:
         table.refuse("tells_v_y", f"must be true or false, it is {shown(data['tells_v_y'])}")
     if "band" in data:
         band = table.table("band")
-        for name in ("factors", "color"):
+        for name in ("factors", "speeds", "color", "noise"):
             band.array(name)
+        band.number("speed")
     for name in ("ladder", "edges", *ARRAYS):
         largest = float(np.abs(table.array(name)).max(initial=0.0))
         if largest > LARGEST:

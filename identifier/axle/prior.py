@@ -17,6 +17,7 @@ from models.vehicle import Vehicle
 
 SLIPS = np.linspace(0.002, 0.6, 300)  # rad, where a curve and its projection must agree
 RIDGE = 0.3  # keeps projected weights small where units are alike
+SD_FRICTION = 0.3  # of ln μ from one road to another [-]
 STEP = 1.2  # ratio over which log-derivatives are taken
 
 
@@ -43,7 +44,7 @@ class Prior:
 
     friction: float = 0.8
     sd_stiffness: float = 0.5
-    sd_friction: float = 0.3
+    sd_friction: float = SD_FRICTION
     sd_shape: float = 0.15
     compliance: float
     sd_compliance: float

@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
+from identifier.axle.band import AT_SPEEDS, CENTERS
+from identifier.axle.band_step import AtSample, BandNumbers, half_band
 from identifier.axle.bank import UNPROVEN, SlopeNumbers, SlopeState, road_push, slope_step
 from identifier.axle.car import (
     Car,
@@ -52,7 +54,7 @@ from identifier.axle.slip import (
     sway,
 )
 from identifier.axle.watch import Watched, WatchNumbers, WatchState, watched
-from identifier.method import AXLE_FORCE, FACTORS, NOT_NEGATIVE, Port
+from identifier.method import AXLE_FORCE, FACTORS, HALF_BAND, NOT_NEGATIVE, Port
 from models.vehicle import GRAVITY
 
 # From a sample to the axle forces of given weights: what learning and the frozen model share.
@@ -280,13 +282,15 @@ class RegressionSample(NamedTuple):
     drift: Any
 
 
-def build_step(steps: tuple[int, ...], *, rises: bool = False) -> ca.Function:
+def build_step(steps: tuple[int, ...], *, rises: bool = False, bands: bool = False) -> ca.Function:
     """Return the step; every number stays an input of it.
 
     Parameters
     ----------
     steps : doublings between the units, the structure.
     rises : whether curves are kept from falling at a slip; adds the input `rising` (n,).
+    bands : whether half the width of the band is told, too; adds the output `half_band` (2,) [N]
+        and the inputs that it needs.
     """
     n = len(steps) + 1
     f = forward(steps)
@@ -310,14 +314,46 @@ def build_step(steps: tuple[int, ...], *, rises: bool = False) -> ca.Function:
     next_state |= _kept_books(f, ports, sample, means, watch)
     next_state["watch"] = watch.state
     next_state["kept"] = ports["kept"] + watch.follow * (theta - ports["kept"])
+    outputs = {AXLE_FORCE.name: f.axle_force}
+    if bands:
+        outputs[HALF_BAND.name] = _half_band(f, ports)
     return ca.Function(
-        "_".join(["axle_step", *map(str, steps), *["rising"] * rises]),
+        "_".join(["axle_step", *map(str, steps), *["rising"] * rises, *["bands"] * bands]),
         list(ports.values()),
-        [*(next_state[name] for name in CARRY), f.axle_force],
+        [*(next_state[name] for name in CARRY), *outputs.values()],
         list(ports),
-        [*(f"{name}_next" for name in CARRY), "axle_force"],
+        [*(f"{name}_next" for name in CARRY), *outputs],
         {"cse": True},
     )
+
+
+def _half_band(f: Forward, ports: dict[str, Any]) -> Any:
+    """Return half the width of the band around the force (2,) [N]; adds its ports."""
+    n = f.curve.units.shape[1]
+    ports["banding"], numbers = axle_port(BandNumbers, "banding")
+    ports["slip_factors"] = ca.SX.sym("slip_factors", 2, len(CENTERS))
+    ports["speed_factors"] = ca.SX.sym("speed_factors", 2, len(AT_SPEEDS))
+    ports["prior"] = ca.SX.sym("prior", 2, len(triangle(n + 3)))
+    per_v_x, slip = reciprocal(f.gated.v_x), ca.fabs(f.x)
+
+    def of_axle(i: int) -> Any:
+        at = AtSample(
+            units=ca.horzsplit(f.curve.units[i, :]),
+            slope=f.curve.slope[i],
+            force=f.curve.force[i],
+            slip=slip[i],
+            per_v_x=per_v_x,
+            e=f.hold.e[i],
+            by_offset=(1, per_v_x)[i],
+        )
+        P, prior = (factors_of(ca.horzsplit(ports[name][i, :]), n + 3) for name in ("UD", "prior"))
+        mine = BandNumbers(*(column[i] for column in numbers))
+        slips, speeds = (
+            ca.horzsplit(ports[name][i, :]) for name in ("slip_factors", "speed_factors")
+        )
+        return half_band(at, P, prior, mine, slips, speeds)
+
+    return ca.if_else(f.gated.on, ca.vertcat(of_axle(0), of_axle(1)) * f.car.load, 0)
 
 
 def _regression(f: Forward, ports: dict[str, Any]) -> tuple[Any, Any, dict[str, Any]]:

@@ -20,9 +20,10 @@ from scipy.sparse import csr_array
 
 from codegen.arrays import Array
 from identifier.axle.curve import unit_matrix
-from identifier.verdict.motion import BRISK, white_noise
+from identifier.verdict.motion import BRISK
 from models.recordings import Recording
 from models.recordings.record import CHANNELS
+from models.sensors import white_noise
 from models.smoothing import low_passed, smoothed, window
 from models.vehicle import GRAVITY, Vehicle
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.doctor.pieces import SLOWEST, driven_windows, looked_at, usual_speed
-from identifier.verdict.motion import white_noise
 from models.recordings import Recording
+from models.sensors import white_noise
 from models.vehicle import GRAVITY, Vehicle
 
 FEWEST, MOST = 20, 500  # windows: fewer say nothing, of more that many are taken all over the log

@@ -135,6 +135,10 @@ def _switches(specialized: SpecializedStep) -> dict[str, tuple[object, str]]:
             "v_y is an output, as an input it may be NaN; 2: so is v_y_sd; 3: and whether it is "
             "observable",
         ),
+        "TELLS_BAND": (
+            int(specialized.tells_band),
+            "half_band is an output: half the width of the band around axle_force",
+        ),
         "RESTS_FIRST": (
             int(specialized.rests_first),
             "the first sample of all is one to rest at before it is taken",

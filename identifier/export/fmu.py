@@ -207,6 +207,7 @@ def variables(specialized: SpecializedStep) -> tuple[Variable, ...]:
             "below it forces are zero, learning rests",
         ),
         *_side_slip(specialized),
+        *_band(specialized),
     )
 
 
@@ -222,6 +223,15 @@ def _side_slip(specialized: SpecializedStep) -> Iterator[Variable]:
         reference, shown, kind = names[name]
         unit = ports[name].unit if kind == "real" else ""
         yield _output(reference, shown, kind, unit, ports[name].description)
+
+
+def _band(specialized: SpecializedStep) -> Iterator[Variable]:
+    """Yield half the width of the band of either axle, where the step tells it."""
+    if specialized.tells_band:
+        for reference, axle, letter in ((17, "front", "f"), (18, "rear", "r")):
+            words = f"half the width of the 90 % band around F_y{letter} of the {axle} axle"
+            name = f"F_y{letter}_half_band"
+            yield _output(reference, name, "real", "N", f"{words}; 0 where forces read zero")
 
 
 def _output(reference: int, name: str, kind: Kind, unit: str, description: str) -> Variable:
@@ -473,9 +483,10 @@ def export_fmu(specialized: SpecializedStep, path: Path, version: Version = 2) -
     """Write an FMU for Co-Simulation; the same step gives the same bytes.
 
     Inputs v_x, v_y, r, delta_f, delta_r and outputs F_yf, F_yr, SI; beside them a_y where the step
-    reads it, and v_y_estimate, v_y_sd and side_slip_observable as far as it tells them. Samples are
-    taken at multiples of the step's interval after the start, whatever the communication step; a
-    step from t to t + h takes those in [t, t + h).
+    reads it, v_y_estimate, v_y_sd and side_slip_observable as far as it tells them, F_yf_half_band
+    and F_yr_half_band where it tells the band. Samples are taken at multiples of the step's
+    interval after the start, whatever the communication step; a step from t to t + h takes those in
+    [t, t + h).
 
     Parameters
     ----------

@@ -66,6 +66,7 @@ def ingredients(specialized: SpecializedStep, *, single: bool) -> dict[str, Any]
         },
         "inputs": [_described(signal) for signal in specialized.inputs],
         "outputs": [_described(signal) for signal in specialized.outputs],
+        **({"band": plain(specialized.band)} if specialized.tells_band else {}),
         "carried": [
             {
                 **_described(signal),
@@ -269,6 +270,7 @@ def build_package(
     name: str = "tireid",
     single: bool = False,
     with_a_y: bool = False,
+    with_band: bool = False,
 ) -> Package:
     """Return the package of a method for a car; the same input gives the same bytes.
 
@@ -279,6 +281,7 @@ def build_package(
     name : beginning of every symbol and file name.
     single : whether float is the default precision.
     with_a_y : whether a_y is an input of a method that goes without it as well.
+    with_band : whether half the width of the band is an output, calibrated as `start` is.
 
     Raises
     ------
@@ -287,10 +290,11 @@ def build_package(
     UnknownOperationError
         Where the method needs an operation that has no plain C.
     ValueError
-        Where stored weights are those of another structure, or the method has no use for a_y.
+        Where stored weights are those of another structure, or the method has no use for a_y or
+        no band.
     """
     check_name(name)
-    specialized = specialize(method, vehicle, start, name, with_a_y=with_a_y)
+    specialized = specialize(method, vehicle, start, name, with_a_y=with_a_y, with_band=with_band)
     content = ingredients(specialized, single=single)
     about = summary(specialized, content)
     files = c_sources(specialized, single=single, about=about)

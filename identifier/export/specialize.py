@@ -8,14 +8,14 @@ and else goes without, as where none is logged.
 
 from collections.abc import Mapping
 from itertools import takewhile
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
 from codegen.tuned import Tuned, tuned
-from identifier.method import Method, Port, Setup
+from identifier.method import HALF_BAND, Method, Port, Setup
 from identifier.refused import GATE, SampleLimits, judges_samples
 from identifier.tire_model import TireModel
 from models.vehicle import Vehicle
@@ -67,6 +67,7 @@ class SpecializedStep(NamedTuple):
     believed : carried port whose first five entries are the inputs that the step went on with,
         older ones where a sample was not believed; None where the method has no such port.
     limits : of inputs and forces.
+    band : numbers of the calibration of its band, None where there is none.
     """
 
     name: str
@@ -84,6 +85,12 @@ class SpecializedStep(NamedTuple):
     rests_first: bool
     believed: str | None
     limits: SampleLimits
+    band: Mapping[str, Any] | None
+
+    @property
+    def tells_band(self) -> bool:
+        """Whether half the width of the band around the forces is an output."""
+        return any(port.name == HALF_BAND.name for port in self.outputs)
 
     @property
     def reads_a_y(self) -> bool:
@@ -113,6 +120,7 @@ def specialize(
     name: str = "tireid",
     *,
     with_a_y: bool = False,
+    with_band: bool = False,
 ) -> SpecializedStep:
     """Return the step of a method for a car, ready to be exported.
 
@@ -122,14 +130,15 @@ def specialize(
     start : weights to begin with; None begins with those of the method.
     name : C identifier.
     with_a_y : whether a_y is an input of a method that goes without it as well.
+    with_band : whether half the width of the band is an output, calibrated as `start` is.
 
     Raises
     ------
     ValueError
-        Where stored weights are those of another structure, the method has no use for a_y, or its
-        step is not straight-line code.
+        Where stored weights are those of another structure, the method has no use for a_y or no
+        band, or its step is not straight-line code.
     """
-    setup = method.setup(vehicle, start)
+    setup = (method.setup_with_band if with_band else method.setup)(vehicle, start)
     if not setup.scan.step.is_a("SXFunction"):
         raise ValueError(
             f"{type(method).__name__} cannot be exported: its step solves a problem by many calls, "
@@ -159,6 +168,7 @@ def specialize(
         rests_first=setup.observe is not None,
         believed=GATE if judges_samples(carry) else None,
         limits=SampleLimits.of(vehicle),
+        band=start.to_dict().get("band") if with_band and start is not None else None,
     )
 
 

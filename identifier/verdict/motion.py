@@ -15,12 +15,12 @@ from codegen.arrays import Array
 from identifier.axle.car import Car, axle_impulse, car_numbers
 from identifier.tire_model import TireModel
 from models.recordings import Recording
+from models.sensors import white_noise
 from models.vehicle import GRAVITY, Vehicle
 
 WINDOW = 0.3  # T [s]: shorter ones show the noise of the sensors, longer ones no transient
 BRISK = 0.6  # speed in sqrt(g L) from which a window counts; slower, slip angles mean little
 FEWEST = 8  # windows, below which nothing can be said
-NORMAL_MEDIAN = 0.6745  # of |x|, for x normal with variance one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,19 +126,6 @@ def modelled_force(model: TireModel, recording: Recording, windows: Windows) -> 
     """
     loads = np.array(model.vehicle.axle_loads)
     return windows.mean(model.axle_force(recording) / loads)
-
-
-def white_noise(signal: Array) -> float:
-    """Return the standard deviation of the white part of a signal, by its second differences.
-
-    Their median is taken: steps and outliers are not noise.
-
-    Parameters
-    ----------
-    signal : samples (n,).
-    """
-    bend = signal[2:] - 2.0 * signal[1:-1] + signal[:-2]
-    return float(np.median(np.abs(bend)) / (NORMAL_MEDIAN * np.sqrt(6.0)))
 
 
 def noise_variance(recording: Recording, vehicle: Vehicle, windows: Windows) -> Array:

@@ -46,6 +46,11 @@ def add_parser(commands: Any) -> None:
         action="store_true",
         help="a_y of an accelerometer is an input too, of a method that can go without it",
     )
+    parser.add_argument(
+        "--band",
+        action="store_true",
+        help="half the width of the 90 %% band around each force is an output too",
+    )
     parser.add_argument("--fmu", action="store_true", help="also FMUs 2.0 and 3.0, Co-Simulation")
     parser.add_argument("--onnx", action="store_true", help="also the model, frozen, as ONNX")
     parser.add_argument(
@@ -70,6 +75,7 @@ def run(options: argparse.Namespace) -> None:
         name=options.name,
         single=options.single,
         with_a_y=options.with_a_y,
+        band=options.band,
         fmu=options.fmu,
         onnx=options.onnx,
         mpc=options.mpc,

@@ -102,6 +102,15 @@ static void print_side_slip(const tireid_state *state)
 }
 #endif
 
+#if TIREID_TELLS_BAND
+static void print_band(const tireid_state *state)
+{
+    tireid_output output;
+    (void)tireid_get_output(state, &output);
+    printf("%.9g,%.9g,", (double)output.half_band[0], (double)output.half_band[1]);
+}
+#endif
+
 int main(int argc, char *argv[])
 {
     static char line[LINE];
@@ -124,7 +133,8 @@ int main(int argc, char *argv[])
     }
     (void)tireid_default_params(&params);
     (void)tireid_init(&state);
-    printf("t,Fyf,Fyr,%s%s%sstatus\n", (TIREID_TELLS_V_Y > 0) ? "vy," : "",
+    printf("t,Fyf,Fyr,%s%s%s%sstatus\n",
+        (TIREID_TELLS_BAND > 0) ? "Fyf_half_band,Fyr_half_band," : "", (TIREID_TELLS_V_Y > 0) ? "vy," : "",
         (TIREID_TELLS_V_Y > 1) ? "vy_sd," : "",
         (TIREID_TELLS_V_Y > 2) ? "side_slip_observable," : "");
     while (fgets(line, LINE, log) != NULL) {
@@ -145,6 +155,9 @@ int main(int argc, char *argv[])
         (void)tireid_get_forces(&state, force);
         printf("%.6f,%.9g,%.9g,", number(piece, count, column[T], 0.0), (double)force[0],
             (double)force[1]);
+#if TIREID_TELLS_BAND
+        print_band(&state);
+#endif
 #if TIREID_TELLS_V_Y
         print_side_slip(&state);
 #endif

@@ -25,7 +25,8 @@ enum {
   VR_A_Y = 13,
   VR_V_Y = 14, /* that is told */
   VR_V_Y_SD = 15,
-  VR_OBSERVABLE = 16
+  VR_OBSERVABLE = 16,
+  VR_HALF_BAND = 17 /* of the front axle, then of the rear one */
 };
 
 /* Plain numbers: a copy of this is a saved state. */

@@ -22,12 +22,11 @@ from identifier.verdict.motion import (
     evidence,
     measured_force,
     noise_variance,
-    white_noise,
 )
 from identifier.verdict.rules import Drive, findings
 from models.maneuvers import RandomSteer
 from models.plant import Plant
-from models.sensors import Sensor, Sensors
+from models.sensors import Sensor, Sensors, white_noise
 from models.vehicle import sedan
 
 SENSORS = Sensors(
