@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from identifier.axle import AxleIdentifier, AxleModel
-from identifier.axle.band import BandCalibration, BandSpread, colored, normal_quantile, ranges_of
+from identifier.axle.band import (
+    BandCalibration,
+    BandSpread,
+    colored,
+    colored_variance,
+    normal_quantile,
+    ranges_of,
+)
 from identifier.methods import load_model, make_method
 from identifier.run import identify
 from identifier.verdict import calibrated, within_band
@@ -91,7 +98,6 @@ def test_a_band_widens_with_its_level_and_around_its_curve(model):
     low, high = model.band(SLIP)
     np.testing.assert_allclose(0.5 * (low + high), model.force(SLIP))
     np.testing.assert_allclose(high - low, 2.0 * model.half_band(SLIP))
-    np.testing.assert_allclose(high[::-1], -low, atol=1e-6)  # odd in slip
     one = model.band(0.05, "rear", 0.8)
     assert isinstance(one[0], float) and one[0] < model.force(0.05, "rear") < one[1]
     assert one[1] == pytest.approx(model.band([0.05], level=0.8)[1][0, 1])
@@ -111,7 +117,12 @@ def test_where_nobody_was_the_band_is_the_priors(swinging, model):
     prior = np.sqrt(np.einsum("j,ajk,k->a", T, C[:, :n, :n], T)) * np.array(car.axle_loads)
     assert (new.half_band(np.array([0.3]))[0] >= 1.64 * prior).all()
     narrowed = replace(
-        new, calibration=BandCalibration(factors=np.full((2, 6), 0.1), color=np.full(2, 9.0))
+        new,
+        calibration=replace(
+            BandCalibration.told(new.reference_speed),
+            factors=np.full((2, 6), 0.1),
+            color=np.full(2, 9.0),
+        ),
     )
     np.testing.assert_allclose(narrowed.half_band(SLIP), new.half_band(SLIP), rtol=1e-9)
     known = float(model.known_slip.min())
@@ -119,6 +130,70 @@ def test_where_nobody_was_the_band_is_the_priors(swinging, model):
         np.array([0.8 * known])
     )
     assert (relative[1] > 1.5).all()
+
+
+def test_a_band_is_wider_where_the_car_is_slower_than_it_was_taught(model):
+    taught = model.calibration.speed
+    assert taught == pytest.approx(20.0, rel=0.05)
+    flat = replace(model, calibration=replace(model.calibration, speeds=np.ones((2, 4))))
+    at = np.array([0.02])
+    slow, usual, fast = (flat.half_band(at, v_x=share * taught) for share in (0.6, 1.0, 1.5))
+    assert (slow > 1.05 * usual).all() and (fast < 0.99 * usual).all()
+    np.testing.assert_array_equal(usual, flat.half_band(at))
+    one, other = model.band(0.02, "front", v_x=12.0), model.band(0.02, "front")
+    assert one[1] - one[0] > other[1] - other[0]
+    ranged = replace(flat.calibration, speeds=np.array([[1.0, 1.0, 1.0, 2.0]] * 2))
+    for speed, times in ((1.0, 1.0), (3.5, 1.0), (4.0, 1.5), (4.5, 2.0), (9.0, 2.0)):
+        told, by_slip = (one.factor(at, np.array([speed])) for one in (ranged, flat.calibration))
+        np.testing.assert_allclose(told, times * by_slip)
+    with pytest.raises(ValueError, match="v_x of a band must be positive, it is 0"):
+        model.band(0.02, v_x=0.0)
+
+
+def test_a_drive_at_two_speeds_gives_each_its_own_factor(swinging):
+    """Errors of a velocity sensor that is rough while the car is slow are errors there alone."""
+    car, _ = swinging
+    together = RandomSteer(
+        amplitude=0.08, frequency=0.6, seed=8, onset=1.0, rate_limit=0.8, duration=40.0
+    )
+    drive = Plant(sedan()).simulate(together, speed=lambda t: np.where(t < 20, 13.0, 20.0))
+    drive = drive.recording()
+    rng = np.random.default_rng(2)
+    slow = np.cumsum(rng.standard_normal(len(drive))) * 0.006 * (drive.v_x < 15.0)
+    rough = learnt(replace(drive, v_y=drive.v_y + slow), car).calibrated().calibration
+    first, second = (rough.speeds[:, k].mean() for k in (1, 2))
+    assert first > 1.2 * second
+
+
+def test_a_band_over_a_drive_holds_with_noise_in_it(model, swinging):
+    """That of slip alone does not: a force is wrong by its slip, too."""
+    drive, rng = swinging[1][2], np.random.default_rng(9)
+    noisy = replace(drive, v_y=drive.v_y + 0.15 * rng.standard_normal(len(drive)))
+    away = np.abs(model.axle_force(noisy) - drive.axle_force)[drive.t > 1.5]
+    slip = model.lagged_slip(noisy)
+    curve = np.column_stack([model.half_band(slip[:, i], v_x=noisy.v_x)[:, i] for i in range(2)])
+    over = model.half_band_over(noisy)
+    assert (over >= curve).all()
+    held, alone = (np.mean(away <= half[drive.t > 1.5]) for half in (over, curve))
+    assert held > 0.85 and alone < 0.75
+    still = replace(drive, v_x=np.where(drive.t > 20.0, 0.1, drive.v_x))
+    assert (model.half_band_over(still)[-100:] == 0.0).all()
+
+
+def test_on_another_road_the_band_opens_by_what_friction_may_do(model):
+    open_ = model.on_another_road()
+    np.testing.assert_array_equal(open_.W, model.W)
+    grip = np.array([0.1])
+    assert (open_.half_band(grip) > 1.5 * model.half_band(grip)).all()
+    near = np.array([1e-3])  # friction does not change the stiffness
+    np.testing.assert_allclose(open_.half_band(near), model.half_band(near), rtol=0.1)
+    for mu in (0.75, 1.3):
+        alpha = np.linspace(0.04, 0.15, 20)
+        truth = mu * model.force_at(alpha / mu)
+        assert (np.abs(truth - model.force_at(alpha)) <= open_.half_band(alpha)).all()
+    for sd in (-0.1, np.nan):
+        with pytest.raises(ValueError, match="sd_friction must be finite, not negative"):
+            model.on_another_road(sd)
 
 
 def test_a_band_survives_a_file_and_old_files_have_none(run, model, tmp_path, refused_in_one_line):
@@ -133,6 +208,10 @@ def test_a_band_survives_a_file_and_old_files_have_none(run, model, tmp_path, re
         "color": ([1.0], "shape"),
         "level": (0.5, "level of the band must be 0.9"),
         "ranges": ([], "ranges of the band must be"),
+        "speed_ranges": ([1.0], "speed_ranges of the band must be"),
+        "speeds": (np.zeros((2, 4)).tolist(), "within 0.1 and 100"),
+        "speed": (-3.0, "speed of the band must be positive"),
+        "noise": ([-1.0, 0.0, 0.0], "within 0 and 100"),
     }
     for name, (value, said) in wrong.items():
         refused_in_one_line(data | {"band": data["band"] | {name: value}}, said)
@@ -188,6 +267,49 @@ def test_samples_that_tell_less_are_fewer_samples():
     np.testing.assert_allclose(colored(all_told, prior, 9.0), a_ninth, rtol=1e-9, atol=1e-15)
     np.testing.assert_allclose(colored(all_told, prior, 1.0), all_told, rtol=1e-9, atol=1e-15)
     np.testing.assert_allclose(colored(prior, prior, 9.0), prior, rtol=1e-9, atol=1e-15)
+
+
+def test_the_variance_without_an_inverse_is_never_below_that_with_one():
+    rng = np.random.default_rng(7)
+    over = []
+    for _ in range(300):
+        half, H = rng.standard_normal((2, 4, 4))
+        prior = half @ half.T + 0.01 * np.eye(4)
+        P = np.linalg.inv(np.linalg.inv(prior) + rng.uniform(0.0, 30.0) * H.T @ H)
+        color, h = rng.uniform(1.0, 60.0), rng.standard_normal(4)
+        left, before = np.array([[h @ P @ h]]), np.array([[h @ prior @ h]])
+        bound = float(colored_variance(left, before, np.array([color]))[0, 0])
+        exact = float(h @ colored(P, prior, color) @ h)
+        assert exact * (1.0 - 1e-9) <= bound <= before[0, 0] * (1.0 + 1e-9)
+        over.append(bound / exact)
+    assert np.median(over) < 3.0
+    alike = colored_variance(left, left, np.array([9.0]))  # along one axis it is exact
+    np.testing.assert_allclose(alike, left)
+    part = colored_variance(0.2 * before, before, np.array([9.0]))
+    np.testing.assert_allclose(part, before / (1.0 + 4.0 / 9.0))
+
+
+def test_the_variance_is_that_of_the_force_by_its_slope_over_what_was_learnt(model):
+    """Central differences of the replayed curve, over weights and over the zero of the slip."""
+    x, v_x, step = 0.03, 18.0, 1e-6
+    for axle in range(2):
+        n, slope = len(model.ladder), []
+        for j in range(n):
+            W = [model.W.copy(), model.W.copy()]
+            W[0][axle, j] += step
+            W[1][axle, j] -= step
+            up, down = (replace(model, W=w).force_at(np.array([x]))[0, axle] for w in W)
+            slope.append((up - down) / (2.0 * step))
+        up, down = (model.force_at(np.array([x + d]))[0, axle] for d in (step, -step))
+        slope += [0.0, 0.0, (up - down) / (2.0 * step) / (1.0, v_x)[axle]]
+        h = np.array(slope) / model.vehicle.axle_loads[axle]
+        told = replace(model, calibration=None)
+        spread = told.band_spread(np.array([x]), np.array([v_x]))
+        phi = model.force_at(np.array([x]))[0, axle] / model.vehicle.axle_loads[axle]
+        stretch = np.clip(told.reference_speed / v_x, 0.5, 2.0)
+        m2 = ((0.04 * phi) ** 2 + 0.01**2) * stretch**2
+        total = float((spread.scaled + spread.held)[0, axle])
+        assert total == pytest.approx(m2 + h @ model.covariance[axle] @ h, rel=1e-5)
 
 
 def test_the_needed_factor_makes_a_band_that_just_reaches():

@@ -2,10 +2,12 @@
 
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from identifier.axle.band import BandCalibration
 from identifier.export.compiled import samples_of
 from identifier.export.package import build_package
 from identifier.methods import make_method
@@ -24,7 +26,14 @@ STRICT = [
     "-Werror",
 ]
 TWO = ("integral", "axle")
-BANKED = "axle, with a_y"
+BANKED = "axle, with a_y and band"
+CALIBRATION = BandCalibration(
+    factors=np.array([[0.5, 0.7, 1.2, 0.9, 2.0, 1.0], [1.5, 1.2, 0.8, 0.7, 1.1, 3.0]]),
+    speeds=np.array([[1.1, 0.9, 1.0, 0.8], [0.7, 1.3, 1.2, 1.0]]),
+    color=np.array([3.0, 12.0]),
+    speed=19.0,
+    noise=np.array([0.03, 0.02, 0.001]),
+)
 
 
 @pytest.fixture(scope="session")
@@ -32,7 +41,14 @@ def packages():
     """By law: the paper's network; what tireid learns by, without and with a_y; without v_y."""
     car = sedan()
     found = {law: build_package(make_method(law, car), car) for law in (*TWO, "inertial")}
-    return found | {BANKED: build_package(make_method("axle", car), car, with_a_y=True)}
+    return found | {BANKED: banded(car, with_a_y=True)}
+
+
+def banded(car, **options):
+    """A package of the default that tells its band, which somebody has calibrated."""
+    axle = make_method("axle", car)
+    start = replace(axle.frozen(car, axle.setup(car).carry), calibration=CALIBRATION)
+    return build_package(axle, car, start, with_band=True, **options)
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,147 @@
+"""The band in C and FMU: that of the model, narrower as it learns; zero where forces read zero."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.axle.band import BandCalibration
+from identifier.axle.band_step import hinged, hinges
+from identifier.export import fmu as binaries
+from identifier.export.compiled import CompiledPackage, samples_of
+from identifier.export.fmu import export_fmu, fmu_text
+from identifier.export.package import build_package, run_in_virtual_machine
+from identifier.export.specialize import specialize
+from identifier.methods import make_method
+from identifier.run import identify
+from models.vehicle import sedan
+from tests.identifier.export.conftest import CALIBRATION, banded
+
+CAR = sedan()
+AXLE = make_method("axle", CAR)
+
+
+@pytest.fixture(scope="module", name="model")
+def a_model(slalom):
+    """What twenty seconds of the slalom teach, its band as somebody calibrated it."""
+    run = identify(slalom.between(0.0, 20.0), CAR, AXLE)
+    return replace(run.freeze(), calibration=CALIBRATION)
+
+
+@pytest.fixture(scope="module")
+def package(model):
+    return build_package(AXLE, CAR, model, with_band=True)
+
+
+def by_axle(half, slip, v_x):
+    return np.column_stack([half(slip[:, i], v_x=v_x)[:, i] for i in range(2)])
+
+
+@pytest.mark.parametrize("single", [False, True])
+def test_the_c_tells_the_band_of_the_model(single, package, model, slalom):
+    """That over slip, and on top what the noise of the sensors makes of it."""
+    compiled = CompiledPackage.of(package, single=single)
+    compiled.set_adaptation(False)
+    drive = slalom.between(20.0, 45.0)
+    told = compiled.run(drive).outputs["half_band"]
+    of_slip = by_axle(model.half_band, model.lagged_slip(drive), drive.v_x)
+    late = drive.t > drive.t[0] + 1.0
+    assert (told[late] > of_slip[late] * (1.0 - 1e-4)).all()
+    silent = replace(model, calibration=replace(CALIBRATION, noise=np.zeros(3)))
+    exact = CompiledPackage.of(build_package(AXLE, CAR, silent, with_band=True), single=single)
+    exact.set_adaptation(False)
+    again = exact.run(drive).outputs["half_band"]
+    np.testing.assert_allclose(again[late], of_slip[late], rtol=2e-4 if single else 1e-6)
+    narrow = replace(model, calibration=replace(CALIBRATION, factors=0.8 * CALIBRATION.factors))
+    other = by_axle(narrow.half_band, model.lagged_slip(drive), drive.v_x)
+    assert not np.allclose(again[late], other[late], rtol=1e-2)  # the alarm rings
+
+
+def test_noise_widens_it_as_that_of_a_drive_with_such_sensors(package, model, slalom):
+    drive, rng = slalom.between(20.0, 45.0), np.random.default_rng(3)
+    sideways = CALIBRATION.noise[1] * rng.standard_normal(len(drive))
+    noisy = replace(drive, v_y=drive.v_y + sideways)
+    compiled = CompiledPackage.of(package)
+    compiled.set_adaptation(False)
+    told = compiled.run(noisy).outputs["half_band"][100:, 1]
+    np.testing.assert_allclose(told, model.half_band_over(noisy)[100:, 1], rtol=0.01)
+    assert (told > 1.002 * model.half_band_over(drive)[100:, 1]).mean() > 0.5
+
+
+def test_the_c_is_to_the_last_bit_what_casadi_says_while_it_learns_and_the_band_narrows(
+    packages, slalom
+):
+    package, rows = banded(CAR), samples_of(slalom)[:800]
+    expected, _ = run_in_virtual_machine(package.specialized, rows)
+    told = CompiledPackage.of(package, single=False).run_samples(rows)
+    np.testing.assert_array_equal(told.outputs["half_band"], expected[:, 2:4])
+    plain = CompiledPackage.of(packages["axle"], single=False).run_samples(rows).axle_force
+    np.testing.assert_allclose(told.axle_force, plain, rtol=1e-9, atol=1e-6)
+    small = np.abs(told.axle_force[:, 0]) < 500.0
+    half, number = told.outputs["half_band"][:, 0], np.arange(800)
+    assert 0.0 < half[small & (number > 600)].mean() < 0.7 * half[small & (number < 100)].mean()
+
+
+def test_where_forces_read_zero_there_is_no_band(package, slalom):
+    rows = samples_of(slalom)[:300]
+    rows[200:, 0] = 0.3
+    told = CompiledPackage.of(package).run_samples(rows).outputs["half_band"]
+    assert (told[50:200] > 0.0).all()
+    assert (told[280:] == 0.0).all()
+
+
+def test_the_manifest_keeps_the_calibration_and_says_what_is_told(package):
+    manifest = json.loads(package.files["tireid.json"])
+    again = BandCalibration.from_dict(manifest["band"])
+    np.testing.assert_array_equal(again.factors, CALIBRATION.factors)
+    assert {"name": "half_band", "size": 2} in [
+        {key: one[key] for key in ("name", "size")} for one in manifest["outputs"]
+    ]
+    afresh = json.loads(build_package(AXLE, CAR, with_band=True).files["tireid.json"])
+    assert afresh["band"] is None
+    assert "band" not in json.loads(build_package(AXLE, CAR).files["tireid.json"])
+
+
+@pytest.mark.parametrize("law", ["integral", "inertial", "linear_kf"])
+def test_a_method_that_cannot_tell_how_sure_it_is_has_no_band(law):
+    with pytest.raises(ValueError, match="cannot tell how sure it is: it has no band"):
+        specialize(make_method(law, CAR), CAR, with_band=True)
+
+
+def test_hinges_are_the_straight_lines_between_centers():
+    values, at = np.array([[1.0, 3.0, 2.0, 2.5], [0.5, 0.4, 0.9, 4.0]]), (0.1, 0.2, 0.5, 0.6)
+    for x in (0.0, 0.1, 0.15, 0.2, 0.44, 0.55, 0.6, 9.0):
+        for numbers, row in zip(hinges(values, at), values, strict=True):
+            found = float(hinged(list(map(float, numbers)), at, x))
+            assert found == pytest.approx(np.interp(x, at, row))
+
+
+def test_an_fmu_has_a_band_where_its_step_tells_one():
+    for told in (False, True):
+        text = fmu_text(specialize(AXLE, CAR, with_band=told), 3)["modelDescription.xml"]
+        assert all((f'name="F_y{end}_half_band"' in text) == told for end in "fr")
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_an_fmu_tells_the_band_of_the_step_to_the_last_bit(
+    version, package, slalom, tmp_path, monkeypatch
+):
+    fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")
+    if not binaries.targets():
+        pytest.skip("needs a C compiler on Linux x86-64")
+    monkeypatch.setattr(binaries, "MINGW", "no-such-compiler")
+    path = tmp_path / "one.fmu"
+    export_fmu(package.specialized, path, version)
+    names = ["F_yf_half_band", "F_yr_half_band"]
+    drive = slalom.taken(np.arange(300))
+    inputs = ("v_x", "v_y", "r", "delta_f")
+    table = np.zeros(len(drive), dtype=[(name, float) for name in ("time", *inputs)])
+    for name in table.dtype.names:
+        table[name] = getattr(drive, "t" if name == "time" else name)
+    told = fmpy.simulate_fmu(
+        *[str(path)], stop_time=3.0, step_size=0.01, output_interval=0.01, input=table, output=names
+    )
+    expected, _ = run_in_virtual_machine(package.specialized, samples_of(drive))
+    for column, name in enumerate(names, start=2):
+        np.testing.assert_allclose(told[name][1:], expected[:, column], rtol=1e-6)
