@@ -223,9 +223,7 @@ class AxleModel(TireModel):
             Where the level is impossible.
         """
         slip, v_x = self.lagged_slip(recording), np.maximum(recording.v_x, self.min_speed)
-        curve = np.stack(
-            [self.half_band(slip[:, i], level, v_x=v_x)[:, i] for i in range(2)], axis=1
-        )
+        curve = self.half_band_along(slip, v_x, level)
         noise = self._noise_of_slip(sensor_noise(recording, self.vehicle), v_x[:, None])
         slope = self._slope_at(slip)
         slopes = np.maximum(slope, 0.02 * self._slope_at(np.zeros((1, 2))))
@@ -235,6 +233,18 @@ class AxleModel(TireModel):
         wide = np.hypot(curve, passed * self._loads)
         half: Array = np.where(recording.v_x[:, None] >= self.min_speed, wide, 0.0)
         return half
+
+    def half_band_along(self, slip: Array, v_x: Array, level: float = LEVEL) -> Array:
+        """Return half the width of the band where each axle has its own slip, (n, 2) [N].
+
+        Parameters
+        ----------
+        slip : of front and rear axle [rad], (n, 2).
+        v_x : speeds [m/s], positive, (n,).
+        level : share of cases that the band shall hold, above 0 and below 1.
+        """
+        both = [self.half_band(slip[:, i], level, v_x=v_x)[:, i] for i in range(2)]
+        return np.column_stack(both)
 
     @staticmethod
     def _noise_of_slip(noise: Array, v_x: Array) -> Array:

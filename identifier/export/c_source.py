@@ -122,6 +122,9 @@ def _switches(specialized: SpecializedStep) -> dict[str, tuple[object, str]]:
         "COVARIANCE": (f"{order}U", "rows of a covariance among the weights"),
         "SLACK": (SLACK, "of a variance, in parts, to zero"),
     }
+    band: dict[str, tuple[object, str]] = {
+        "TELLS_BAND": (1, "half_band is an output: half the width of the band around axle_force")
+    }
     return {
         "LEARNS": (int(bool(learnt)), "there are weights, which adaptation moves"),
         "JUDGES": (int(specialized.believed is not None), "the step has a gate of its own"),
@@ -135,14 +138,11 @@ def _switches(specialized: SpecializedStep) -> dict[str, tuple[object, str]]:
             "v_y is an output, as an input it may be NaN; 2: so is v_y_sd; 3: and whether it is "
             "observable",
         ),
-        "TELLS_BAND": (
-            int(specialized.tells_band),
-            "half_band is an output: half the width of the band around axle_force",
-        ),
         "RESTS_FIRST": (
             int(specialized.rests_first),
             "the first sample of all is one to rest at before it is taken",
         ),
+        **(band if specialized.tells_band else {}),
         "RULES": (f"{count}U", "of weights that are taken over"),
         **(ruled if order else {"COVARIANCE": ruled["COVARIANCE"]} if count else {}),
     }

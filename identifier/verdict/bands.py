@@ -62,7 +62,9 @@ def within_band(model: TireModel, recording: Recording, level: float = LEVEL) ->
     found = evidence(model, recording)
     if found is None:
         return None
-    half = model.half_band_over(recording, level) / np.array(model.vehicle.axle_loads)
+    speed = np.maximum(recording.v_x, model.min_speed)
+    half = model.half_band_along(model.lagged_slip(recording), speed, level)
+    half = half / np.array(model.vehicle.axle_loads)
     noise = normal_quantile(level) ** 2 * found.noise
     wide = np.sqrt(found.windows.mean(half) ** 2 + noise)
     share: Array = np.mean(np.abs(found.measured - found.modelled) <= wide, axis=0)

@@ -102,7 +102,7 @@ static void print_side_slip(const tireid_state *state)
 }
 #endif
 
-#if TIREID_TELLS_BAND
+#ifdef TIREID_TELLS_BAND
 static void print_band(const tireid_state *state)
 {
     tireid_output output;
@@ -133,10 +133,13 @@ int main(int argc, char *argv[])
     }
     (void)tireid_default_params(&params);
     (void)tireid_init(&state);
-    printf("t,Fyf,Fyr,%s%s%s%sstatus\n",
-        (TIREID_TELLS_BAND > 0) ? "Fyf_half_band,Fyr_half_band," : "", (TIREID_TELLS_V_Y > 0) ? "vy," : "",
+#ifdef TIREID_TELLS_BAND
+    printf("t,Fyf,Fyr,Fyf_half_band,Fyr_half_band,status\n");
+#else
+    printf("t,Fyf,Fyr,%s%s%sstatus\n", (TIREID_TELLS_V_Y > 0) ? "vy," : "",
         (TIREID_TELLS_V_Y > 1) ? "vy_sd," : "",
         (TIREID_TELLS_V_Y > 2) ? "side_slip_observable," : "");
+#endif
     while (fgets(line, LINE, log) != NULL) {
         char *piece[COLUMNS];
         const int count = split(line, piece);
@@ -155,7 +158,7 @@ int main(int argc, char *argv[])
         (void)tireid_get_forces(&state, force);
         printf("%.6f,%.9g,%.9g,", number(piece, count, column[T], 0.0), (double)force[0],
             (double)force[1]);
-#if TIREID_TELLS_BAND
+#ifdef TIREID_TELLS_BAND
         print_band(&state);
 #endif
 #if TIREID_TELLS_V_Y

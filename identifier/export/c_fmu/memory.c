@@ -74,7 +74,7 @@ int MODEL(fmu_get_real)(const Memory *memory, unsigned int reference, double *va
   else if (reference == VR_V_Y_SD)
     *value = (double)memory->state.output.v_y_sd;
 #endif
-#if MODEL_TELLS_BAND
+#ifdef MODEL_TELLS_BAND
   else if (reference >= VR_HALF_BAND && reference < VR_HALF_BAND + FORCES)
     *value = (double)memory->state.output.half_band[reference - VR_HALF_BAND];
 #endif

@@ -34,10 +34,6 @@ def package(model):
     return build_package(AXLE, CAR, model, with_band=True)
 
 
-def by_axle(half, slip, v_x):
-    return np.column_stack([half(slip[:, i], v_x=v_x)[:, i] for i in range(2)])
-
-
 @pytest.mark.parametrize("single", [False, True])
 def test_the_c_tells_the_band_of_the_model(single, package, model, slalom):
     """That over slip, and on top what the noise of the sensors makes of it."""
@@ -45,7 +41,7 @@ def test_the_c_tells_the_band_of_the_model(single, package, model, slalom):
     compiled.set_adaptation(False)
     drive = slalom.between(20.0, 45.0)
     told = compiled.run(drive).outputs["half_band"]
-    of_slip = by_axle(model.half_band, model.lagged_slip(drive), drive.v_x)
+    of_slip = model.half_band_along(model.lagged_slip(drive), drive.v_x)
     late = drive.t > drive.t[0] + 1.0
     assert (told[late] > of_slip[late] * (1.0 - 1e-4)).all()
     silent = replace(model, calibration=replace(CALIBRATION, noise=np.zeros(3)))
@@ -54,7 +50,7 @@ def test_the_c_tells_the_band_of_the_model(single, package, model, slalom):
     again = exact.run(drive).outputs["half_band"]
     np.testing.assert_allclose(again[late], of_slip[late], rtol=2e-4 if single else 1e-6)
     narrow = replace(model, calibration=replace(CALIBRATION, factors=0.8 * CALIBRATION.factors))
-    other = by_axle(narrow.half_band, model.lagged_slip(drive), drive.v_x)
+    other = narrow.half_band_along(model.lagged_slip(drive), drive.v_x)
     assert not np.allclose(again[late], other[late], rtol=1e-2)  # the alarm rings
 
 
