@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Scan
-from codegen.arrays import Array
+from codegen.arrays import Array, blocks
 from identifier.axle.band import (
     LEVEL,
     RELATIVE,
@@ -222,16 +222,14 @@ class AxleModel(TireModel):
         ValueError
             Where the level is impossible.
         """
-        slip, v_x = self.lagged_slip(recording), np.maximum(recording.v_x, self.min_speed)
-        curve = self.half_band_along(slip, v_x, level)
-        noise = self._noise_of_slip(sensor_noise(recording, self.vehicle), v_x[:, None])
-        slope = self._slope_at(slip)
-        slopes = np.maximum(slope, 0.02 * self._slope_at(np.zeros((1, 2))))
-        lag = self.own[:, 0] * slopes + SHORTEST * self.vehicle.wheelbase
-        e = np.exp(-v_x[:, None] * recording.dt / lag)
-        passed = normal_quantile(level) * slope * noise * np.sqrt((1.0 - e) / (1.0 + e))
-        wide = np.hypot(curve, passed * self._loads)
-        half: Array = np.where(recording.v_x[:, None] >= self.min_speed, wide, 0.0)
+        slip, noise = self.lagged_slip(recording), sensor_noise(recording, self.vehicle)
+        half = np.zeros_like(slip)
+        for part in blocks(len(slip)):
+            v_x = np.maximum(recording.v_x[part], self.min_speed)
+            curve = self.half_band_along(slip[part], v_x, level)
+            passed = self._noise_passed(slip[part], v_x[:, None], noise, recording.dt)
+            wide = np.hypot(curve, normal_quantile(level) * passed * self._loads)
+            half[part] = np.where(recording.v_x[part, None] >= self.min_speed, wide, 0.0)
         return half
 
     def half_band_along(self, slip: Array, v_x: Array, level: float = LEVEL) -> Array:
@@ -246,11 +244,17 @@ class AxleModel(TireModel):
         both = [self.half_band(slip[:, i], level, v_x=v_x)[:, i] for i in range(2)]
         return np.column_stack(both)
 
-    @staticmethod
-    def _noise_of_slip(noise: Array, v_x: Array) -> Array:
-        """Return the standard deviation of slip by noise of sensors [rad], (n, 2)."""
+    def _noise_passed(self, slip: Array, v_x: Array, noise: Array, dt: float) -> Array:
+        """Return what noise of sensors makes of the forces, through the lag [static loads], (n, 2).
+
+        White noise through a lag of first order leaves (1 - e)/(1 + e) of its variance.
+        """
         sideways, steering = noise[:2] / v_x, np.array([noise[2], 0.0])
-        return np.asarray(np.hypot(sideways, steering), dtype=np.float64)
+        slope = self._slope_at(slip)
+        slopes = np.maximum(slope, 0.02 * self._slope_at(np.zeros((1, 2))))
+        e = np.exp(-v_x * dt / (self.own[:, 0] * slopes + SHORTEST * self.vehicle.wheelbase))
+        passed: Array = slope * np.hypot(sideways, steering) * np.sqrt((1.0 - e) / (1.0 + e))
+        return passed
 
     def _slope_at(self, slip: Array) -> Array:
         """Return the slope of the curves at slips of front and rear axle (n, 2) [1/rad]."""

@@ -75,13 +75,14 @@ def run(options: argparse.Namespace) -> int:
     if recording.estimated:
         say(f"{recording.name}: vy is estimated by inertial, which begins with the model")
     verdict = prediction.verdict()
+    half = model.half_band_over(recording)
     with output_folder(options.out, force=options.force) as folder:
         parts = blocks(len(recording))
         write_long_csv(
-            folder / "forces.csv", (force_columns(model, prediction, part) for part in parts)
+            folder / "forces.csv", (force_columns(model, prediction, half, part) for part in parts)
         )
-        write_json(folder / "summary.json", summary(model, prediction, verdict))
-        told = prediction_text(model, prediction)
+        write_json(folder / "summary.json", summary(model, prediction, verdict, half))
+        told = prediction_text(model, prediction, half)
     tell(f"{told}\n{verdict_text(verdict, numbers=False)}")
     say(f"wrote {options.out}/")
     return exit_code(verdict, options)
@@ -107,26 +108,51 @@ def _model(options: argparse.Namespace) -> TireModel:
     return model.mounted_on(vehicle)
 
 
-def force_columns(model: TireModel, prediction: Prediction, part: slice = ALL) -> dict[str, Array]:
-    """Return the columns of forces.csv: time, slip angles, predicted and true forces.
+def truth_within_band(prediction: Prediction, half: Array | None) -> Array | None:
+    """Return in which share of samples the true force lies in the band, (2,); None: nobody knows.
+
+    Parameters
+    ----------
+    prediction : of a recording.
+    half : width of its band (n, 2) [N]; samples without one do not count.
+    """
+    truth = prediction.recording.axle_force
+    if half is None or truth is None or not (half > 0.0).any():
+        return None
+    inside = (np.abs(prediction.axle_force - truth) <= half) & (half > 0.0)
+    share: Array = inside.sum(axis=0) / np.maximum((half > 0.0).sum(axis=0), 1)
+    return share
+
+
+def force_columns(
+    model: TireModel, prediction: Prediction, half: Array | None, part: slice = ALL
+) -> dict[str, Array]:
+    """Return the columns of forces.csv: time, slip angles, predicted, band and true forces.
 
     Parameters
     ----------
     model : that predicted.
     prediction : of a recording.
+    half : width of its band (n, 2) [N]; None where the model has none.
     part : samples that are asked for.
     """
     recording, car = prediction.recording, model.vehicle
     alpha = recording.alpha(car.l_f, car.l_r, part)
     columns = {"t_s": recording.t[part], "alpha_f_rad": alpha[:, 0], "alpha_r_rad": alpha[:, 1]}
-    forces = {"predicted": prediction.axle_force, "true": recording.axle_force}
+    forces = {
+        "predicted": prediction.axle_force,
+        "half_band": half,
+        "true": recording.axle_force,
+    }
     for name, force in forces.items():
         if force is not None:
             columns |= {f"Fyf_{name}_N": force[part, 0], f"Fyr_{name}_N": force[part, 1]}
     return columns
 
 
-def summary(model: TireModel, prediction: Prediction, verdict: Verdict) -> dict[str, Any]:
+def summary(
+    model: TireModel, prediction: Prediction, verdict: Verdict, half: Array | None
+) -> dict[str, Any]:
     """Return what summary.json holds; null stands for what cannot be known.
 
     Parameters
@@ -134,10 +160,11 @@ def summary(model: TireModel, prediction: Prediction, verdict: Verdict) -> dict[
     model : that predicted.
     prediction : of a recording.
     verdict : on the model over that recording.
+    half : width of the band of its forces (n, 2) [N]; None where the model has none.
     """
     error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
     beyond, known = beyond_known(model, prediction.recording), model.known_slip
-    inside = within_band(model, prediction.recording)
+    inside, held = within_band(model, prediction.recording), truth_within_band(prediction, half)
     shares = (None, None) if motion is None else motion.explained
     return {
         "verdict": verdict.to_dict(),
@@ -158,19 +185,21 @@ def summary(model: TireModel, prediction: Prediction, verdict: Verdict) -> dict[
         "known_slip_rad": None if known is None else known.tolist(),
         "beyond_known_slip": beyond,
         "windows_within_band": None if inside is None else inside.tolist(),
+        "truth_within_band": None if held is None else held.tolist(),
         "model": type(model).__name__,
         "vehicle": vehicle_numbers(model.vehicle),
         "version": __version__,
     }
 
 
-def prediction_text(model: TireModel, prediction: Prediction) -> str:
+def prediction_text(model: TireModel, prediction: Prediction, half: Array | None) -> str:
     """Return what is to be said of a prediction, as lines of text.
 
     Parameters
     ----------
     model : that predicted.
     prediction : of a recording.
+    half : width of the band of its forces (n, 2) [N]; None where the model has none.
     """
     error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
     lines = []
@@ -198,6 +227,12 @@ def prediction_text(model: TireModel, prediction: Prediction) -> str:
         lines.append(
             f"in {100.0 * inside[0]:.0f} / {100.0 * inside[1]:.0f} % of the windows of 0.3 s the "
             "force that the motion shows lies in the band of 90 % (front / rear)"
+        )
+    held = truth_within_band(prediction, half)
+    if held is not None:
+        lines.append(
+            f"{100.0 * held[0]:.0f} / {100.0 * held[1]:.0f} % of the true forces lie in it, the "
+            "noise of the sensors in the band (front / rear)"
         )
     if model.vehicle.estimates:
         lines.append(model.vehicle.estimates)
