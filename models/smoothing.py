@@ -1,9 +1,9 @@
 """Low passes of sampled signals: a window without phase, one of first order, and its inverse."""
 
 import math
+from itertools import accumulate
 
 import numpy as np
-from scipy.signal import lfilter
 
 from codegen.arrays import Array
 
@@ -45,8 +45,10 @@ def low_passed(signal: Array, lag: float, dt: float) -> Array:
     keep = math.exp(-dt / lag)
     ramp = (1.0 - keep) * lag / dt  # lag of a straight line, T u_dot
     # y_k = keep y_(k-1) + (1 - keep) u_(k-1) + (1 - ramp) (u_k - u_(k-1)), from y_0 = u_0
-    y, _ = lfilter([1.0 - ramp, ramp - keep], [1.0, -keep], signal, zi=[ramp * signal[0]])
-    return np.asarray(y, dtype=np.float64)
+    now, before = (1.0 - ramp) * signal[1:], (ramp - keep) * signal[:-1]
+    steps = zip(before.tolist(), now.tolist(), strict=True)
+    y = accumulate(steps, lambda y, u: (keep * y + u[0]) + u[1], initial=float(signal[0]))
+    return np.fromiter(y, np.float64, signal.size)
 
 
 def without_low_pass(signal: Array, lag: float, dt: float, half: int) -> Array:

@@ -6,10 +6,9 @@ frozen model, by nonlinear least squares from several random starts.
 
 from collections.abc import Callable, Sequence
 from functools import partial, singledispatch
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.optimize import OptimizeResult, least_squares
 
 from codegen.arrays import Array
 from identifier.axle import AxleIdentifier, AxleModel
@@ -24,6 +23,9 @@ from identifier.reproducibility import axle_rms, counted_samples
 from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
 
 STEP = 1e-6  # of the one-sided differences, for parameters of order one
 GAIN = 1e-7  # a step that lowers the cost by a smaller share is the last
@@ -83,8 +85,10 @@ def fit_floor(
 
 def _fitted(
     residual: Callable[[Array], Array], start: Array, structure: Structure, steps: int
-) -> OptimizeResult:
+) -> "OptimizeResult":
     """Return SciPy's solution, from a start that is moved into the bounds."""
+    from scipy.optimize import least_squares  # takes as long to import as all the rest
+
     lower, upper = structure.lower, structure.upper
     bounded = np.isfinite([lower, upper]).any()
     # MINPACK, which knows no bounds, counts the evaluations of differences too.

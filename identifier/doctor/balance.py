@@ -15,11 +15,10 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import nnls
-from scipy.sparse import csr_array
 
 from codegen.arrays import Array
 from identifier.axle.curve import unit_matrix
+from identifier.doctor.windows import Windows, not_negative
 from identifier.verdict.motion import BRISK
 from models.recordings import Recording
 from models.recordings.record import CHANNELS
@@ -176,13 +175,7 @@ class Balance:
         psi = np.hanning(length)  # zero at its ends, so that sums by parts are exact
         self.psi = psi / psi.sum()
         self.psi_dot = np.gradient(np.pad(self.psi, 1), self.dt)[1:-1]
-        self.mean, self.rate = self._matrix(self.psi), self._matrix(-self.psi_dot)
-
-    def _matrix(self, weights: Array) -> csr_array:
-        rows = np.repeat(np.arange(self.starts.size), weights.size)
-        columns = (self.starts[:, None] + np.arange(weights.size)).ravel()
-        values = np.tile(weights, self.starts.size)
-        return csr_array((values, (rows, columns)), shape=(self.starts.size, self.at.size))
+        self.mean, self.rate = (Windows(self.starts, one) for one in (self.psi, -self.psi_dot))
 
     def _norms(self, half: int, every: int) -> tuple[float, float]:
         """Return the power that smoothing and ψ, or ψ̇, leave of white noise of every sample."""
@@ -365,9 +358,7 @@ def rising(basis: Array, y: Array) -> Array:
     """
     gram = basis.T @ basis
     k = gram.shape[0]
-    R = np.linalg.cholesky(gram + (RIDGE * np.trace(gram) / k + 1e-12) * np.eye(k))
-    weights, _ = nnls(R.T, np.linalg.solve(R, basis.T @ y))
-    return np.asarray(weights, dtype=np.float64)
+    return not_negative(gram + (RIDGE * np.trace(gram) / k + 1e-12) * np.eye(k), basis.T @ y)
 
 
 # Signals.

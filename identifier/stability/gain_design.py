@@ -17,12 +17,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import brentq
 
 from identifier.paper.laws import LAWS, DrivingError, Gains, diagonal
 from identifier.stability.bounds import small_gain
 from identifier.stability.loop import direction_matrix
 from identifier.stability.operation import Operation, proven_bounds
+from identifier.stability.roots import root
 from identifier.stability.sampled_bound import (
     Disturbance,
     Learning,
@@ -103,7 +103,7 @@ def gain_for_phase_margin(
     highest = 1e6 * (a + lam) if dt is None else math.pi / dt * (1.0 - 1e-9)
     if not excess(highest) < 0.0:
         raise DesignError(f"every gain has a phase margin above {phase_margin} deg")
-    crossing = float(brentq(excess, 1e-9 * a, highest, xtol=1e-14 * a, rtol=1e-14))
+    crossing = root(excess, 1e-9 * a, highest, xtol=1e-14 * a, rtol=1e-14)
     first, second, third, zero = factors(crossing)
     return float(a * abs(first * second * third / zero))
 
@@ -228,7 +228,7 @@ def _leakage_of_V(layer: Learning, V_max: float, X: float) -> float:
     strongest = min(2.0 * weakest, 0.5 * (weakest + most))
     if excess(strongest) > 0.0:
         raise DesignError(f"no leakage keeps |V| below {V_max:.3g} at this sampling interval")
-    return float(brentq(excess, weakest, strongest, xtol=1e-14 * weakest, rtol=1e-14))
+    return root(excess, weakest, strongest, xtol=1e-14 * weakest, rtol=1e-14)
 
 
 # What keeps the weights of the paper's network over hours of driving, by name.

@@ -22,9 +22,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from identifier.stability.limits import integral_euler_limit, integral_limit
+from identifier.stability.roots import root
 from models.rules import require_positive
 
 
@@ -149,7 +149,7 @@ def _sampled(
         frequencies[:-1], frequencies[1:], found[:-1], found[1:], strict=True
     ):
         if ahead[0] > 0.0 and here[1] > 0.0 >= ahead[1]:
-            frequency = float(brentq(lambda w: balance(w)[1], low, high))
+            frequency = root(lambda w: balance(w)[1], low, high)
             m = balance(frequency)[0]
             return LimitCycle(leakage=m, amplitude=m / rho_W, frequency=frequency)
     return None

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq, minimize_scalar
 
 from codegen.arrays import Array
 from identifier.paper.laws import DrivingError
@@ -26,6 +25,7 @@ from identifier.stability.loop import (
     scaled_matrices,
 )
 from identifier.stability.lyapunov import require_hurwitz
+from identifier.stability.roots import root
 from models.rules import require_positive
 
 if TYPE_CHECKING:
@@ -170,7 +170,7 @@ def _first_crossing(
     def excess(x: float) -> float:
         return float(growth_at(np.array([x]))[0]) - level
 
-    return float(brentq(excess, low, grid[first], xtol=1e-14, rtol=1e-14))
+    return root(excess, low, grid[first], xtol=1e-14, rtol=1e-14)
 
 
 def _frequency(loop: Loop, integrator: Integrator, dt: float) -> float:
@@ -260,7 +260,7 @@ def drift_frequency(
     low, high = float(grid[first - 1]), float(grid[first])
     if relative(low)[0] <= 0.0:
         return low
-    return float(brentq(lambda w: float(relative(w)[0]), low, high, xtol=1e-13 * size))
+    return root(lambda w: float(relative(w)[0]), low, high, xtol=1e-13 * size)
 
 
 def passivity_shortage(
@@ -285,6 +285,8 @@ def passivity_shortage(
     grid = np.log(size * np.geomspace(1e-4, 1e3, 1401))
     worst = int(np.argmin(lowest(grid)))
     around = (grid[max(worst - 1, 0)], grid[min(worst + 1, grid.size - 1)])
+    from scipy.optimize import minimize_scalar
+
     found = minimize_scalar(
         lambda x: float(lowest(x)[0]), bounds=around, method="bounded", options={"xatol": 1e-10}
     )

@@ -6,7 +6,6 @@ from itertools import pairwise
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from scipy.signal import butter, lfilter, lfilter_zi
 
 from codegen.arrays import Array, filled
 from models.logs.clock import (
@@ -426,6 +425,8 @@ def _low_pass(signal: Array, cut_off: float, dt: float) -> Array:
         raise RecordingError(
             f"low_pass must be below half the sampling rate, {0.5 / dt:g} Hz, it is {cut_off:g}"
         )
+    from scipy.signal import butter, lfilter, lfilter_zi  # takes longer than to read a short log
+
     b, a = butter(2, cut_off, fs=1.0 / dt)
     filtered, _ = lfilter(b, a, signal, zi=lfilter_zi(b, a) * signal[0])
     smooth: Array = filtered

@@ -1,7 +1,7 @@
 """The path from above at one scale: cones, the driven tracks, and the car at every few meters."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,9 +12,6 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from codegen.arrays import Array
 from models.faults import SensorFault
 from models.vehicle import Vehicle
-from mpc.handover.rules import Verdict
-from mpc.loop import Drive
-from mpc.path import Path
 from tireid.figures.style import (
     AMBER,
     BLACK,
@@ -29,6 +26,10 @@ from tireid.figures.style import (
     styled,
 )
 
+if TYPE_CHECKING:
+    from mpc.loop import Drive
+    from mpc.path import Path
+
 # How long the tracker took for a step: a histogram with its percentiles, and where it failed.
 
 BINS = 60
@@ -37,7 +38,7 @@ MILLI = 1e3
 
 
 @styled
-def drive_solve_figure(drive: Drive) -> Figure:
+def drive_solve_figure(drive: "Drive") -> Figure:
     """Draw the solve times of a drive as a histogram and over time."""
     times = MILLI * drive.solve_time
     median, p99, largest = np.quantile(times, [0.5, 0.99, 1.0])
@@ -136,7 +137,7 @@ ARC = "arc length of the path [m]"
 
 @styled
 def drive_errors_figure(
-    drives: Mapping[str, Drive],
+    drives: Mapping[str, "Drive"],
     *,
     off_path: float,
     drops: Sequence[tuple[float, float]] = (),
@@ -200,7 +201,7 @@ def mark_drops(axes: Axes, drops: Sequence[tuple[float, float]]) -> None:
         )
 
 
-def mark_faults(axes: Axes, drives: Mapping[str, Drive], faults: Sequence[SensorFault]) -> None:
+def mark_faults(axes: Axes, drives: Mapping[str, "Drive"], faults: Sequence[SensorFault]) -> None:
     """Shade where a sensor is broken, and mark where a supervisor came to doubt the sensors.
 
     Parameters
@@ -208,6 +209,8 @@ def mark_faults(axes: Axes, drives: Mapping[str, Drive], faults: Sequence[Sensor
     axes : panel over arc length.
     drives : by the name in the legend; faults are placed by the time of the first.
     """
+    from mpc.handover.rules import Verdict
+
     first = next(iter(drives.values()))
     for fault in faults:
         if fault.start > first.t[-1]:
@@ -242,7 +245,7 @@ def friction_label(mu: float) -> str:
     return f"friction {mu:g}"
 
 
-def _mark_notes(axes: Axes, drive: Drive, color: str) -> None:
+def _mark_notes(axes: Axes, drive: "Drive", color: str) -> None:
     """Mark on the curve where the tracker was told of another tire."""
     if drive.notes:
         at = np.searchsorted(drive.t, [t for t, _ in drive.notes])
@@ -277,7 +280,7 @@ NEAR = 0.75  # a limit is drawn where a command comes this close to it
 
 @styled
 def drive_steering_figure(
-    drives: Mapping[str, Drive],
+    drives: Mapping[str, "Drive"],
     *,
     angle_limit: float,
     rate_limit: float,
@@ -423,7 +426,7 @@ SEEN = 0.05  # deviations are drawn larger until the largest is this share of th
 
 
 @styled
-def drive_path_figure(drives: Mapping[str, Drive]) -> Figure:
+def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
     """Draw the path, its cones and where every car drove; the first with its outlines.
 
     A path too large for cars to be seen is drawn as a whole with its deviations magnified, as the
@@ -456,7 +459,7 @@ def drive_path_figure(drives: Mapping[str, Drive]) -> Figure:
     return figure
 
 
-def _extent(path: Path, drives: Mapping[str, Drive]) -> tuple[Array, Array]:
+def _extent(path: "Path", drives: Mapping[str, "Drive"]) -> tuple[Array, Array]:
     """Corners of what is shown: the path with its cones, and the tracks as far as not absurd."""
     places = np.column_stack([path.X, path.Y])
     low, high = places.min(axis=0) - MARGIN, places.max(axis=0) + MARGIN
@@ -472,7 +475,7 @@ def _extent(path: Path, drives: Mapping[str, Drive]) -> tuple[Array, Array]:
     return low, high
 
 
-def _large(path: Path, drives: Mapping[str, Drive]) -> Figure:
+def _large(path: "Path", drives: Mapping[str, "Drive"]) -> Figure:
     figure = new_figure(PAGE, 3.6)
     whole, part = figure.subplots(1, 2, width_ratios=(1.25, 1.0))
     largest = max(float(np.abs(drive.e_y).max()) for drive in drives.values())
@@ -505,7 +508,7 @@ def _round(value: float) -> float:
     return float(steps[steps <= max(value, 1.0)][-1])
 
 
-def _draw(axes: Axes, path: Path, drives: Mapping[str, Drive]) -> None:
+def _draw(axes: Axes, path: "Path", drives: Mapping[str, "Drive"]) -> None:
     axes.plot(path.X, path.Y, **PATH)
     if len(path.cones):
         axes.plot(path.cones[:, 0], path.cones[:, 1], **CONES)
@@ -515,7 +518,7 @@ def _draw(axes: Axes, path: Path, drives: Mapping[str, Drive]) -> None:
         axes.plot(drive.X, drive.Y, label=label, **tire_look(label))
 
 
-def _draw_cars(axes: Axes, drive: Drive, color: str) -> None:
+def _draw_cars(axes: Axes, drive: "Drive", color: str) -> None:
     every = CARS_EVERY * drive.vehicle.wheelbase
     at = np.searchsorted(drive.s, np.arange(drive.s[0], drive.s[-1], every))
     signals = (drive.X, drive.Y, drive.psi, drive.delta)

@@ -1,7 +1,7 @@
 """Side slip and lateral velocity as they were estimated, with their band, beside what is known."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from codegen.arrays import Array
 from identifier.compare.course import SIGMAS, SideSlip
 from models.recordings import Recording
-from mpc.loop import Drive
 from tireid.figures.compare import method_label, short_names
 from tireid.figures.drive import ARC
 from tireid.figures.style import (
@@ -31,6 +30,9 @@ from tireid.figures.style import (
     styled,
 )
 from tireid.figures.thinned import Signal, drawn_times, shown
+
+if TYPE_CHECKING:
+    from mpc.loop import Drive
 
 FIRST = "inertial"  # which has the band where several tell v_y
 MOST = 4  # recordings that are drawn
@@ -133,7 +135,7 @@ def _degrees(v_y: Array, v_x: Array) -> Array:
 
 
 @styled
-def drive_lateral_figure(drive: Drive) -> Figure:
+def drive_lateral_figure(drive: "Drive") -> Figure:
     """Draw the v_y that was told over the true one, and its error, each with the band of two sigma.
 
     Parameters

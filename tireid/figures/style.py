@@ -17,7 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, ScalarFormatter
 
 from codegen.arrays import Array
 from identifier.method import force_unit_name
@@ -92,9 +92,38 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
     @wraps(draw)
     def wrapper(*args: P.args, **kwargs: P.kwargs) -> Figure:
         with style.context(["default", LOOK]):
-            return draw(*args, **kwargs)
+            return _numbered(draw(*args, **kwargs))
 
     return wrapper
+
+
+class PlainNumbers(ScalarFormatter):
+    r"""The usual numbers of an axis as words: math, `$\mathdefault{1.5}$`, is laid out slowly.
+
+    What stands beside the axis, as ×10³, stays as it is.
+    """
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """Return a number of the axis.
+
+        Parameters
+        ----------
+        x : where it stands.
+        pos : which of them it is.
+        """
+        return MATH_NUMBER.sub(r"\1", super().__call__(x, pos))
+
+
+MATH_NUMBER = re.compile(r"^\$\\mathdefault\{([^\\{}]*)\}\$$")
+
+
+def _numbered(figure: Figure) -> Figure:
+    """Return a figure whose linear axes have plain numbers."""
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            if type(axis.get_major_formatter()) is ScalarFormatter:
+                axis.set_major_formatter(PlainNumbers())
+    return figure
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -126,6 +155,20 @@ def with_own_fonts() -> None:
 with_own_fonts()
 
 
+def _lay_out(figure: Figure) -> None:
+    """Fit labels into a figure, once: it is drawn more than once, and this takes as long as that.
+
+    A figure that was drawn keeps its places; `set_layout_engine` lets it be laid out anew.
+    Matplotlib draws a figure that has an engine twice.
+    """
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        resolution, figure.dpi = figure.dpi, RESOLUTION  # at fewer dots letters are less exact
+        engine.execute(figure)
+        figure.dpi = resolution
+        figure.set_layout_engine(None)  # that of rcParams, where `LOOK` has none
+
+
 def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
     """Return a figure as PNG, the same bytes for the same figure.
 
@@ -136,6 +179,7 @@ def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
     """
     buffer = BytesIO()
     with style.context(["default", LOOK]):
+        _lay_out(figure)
         figure.savefig(buffer, format="png", dpi=resolution, metadata={"Software": None})
     return buffer.getvalue()
 
@@ -158,6 +202,7 @@ def figure_svg(figure: Figure) -> bytes:
     """
     buffer = BytesIO()
     with style.context(["default", LOOK, VECTOR]):
+        _lay_out(figure)
         figure.savefig(buffer, format="svg", dpi=CLOUDS, metadata={"Date": None, "Creator": None})
     return OUTLINE.sub(lambda path: DIGITS.sub(rb"\1", path[0]), buffer.getvalue())
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,7 +14,6 @@ from identifier.run import History
 from identifier.tire_model import TireModel
 from models.bicycle import measured_slip
 from models.recordings import Recording
-from mpc.loop import Drive
 from tireid.figures.drive import AT_THE_END, ORACLE, tire_look
 from tireid.figures.style import (
     AXLES,
@@ -36,6 +35,9 @@ from tireid.figures.style import (
     styled,
 )
 from tireid.figures.thinned import cloud, shown_of_run
+
+if TYPE_CHECKING:
+    from mpc.loop import Drive
 
 UNKNOWN = "slip not known"
 BAND = "band of 90 %"
@@ -183,7 +185,7 @@ class TireCurve:
     force: Array
 
 
-def axle_slip(drive: Drive) -> Array:
+def axle_slip(drive: "Drive") -> Array:
     """Return the slip angles δ - atan2(v_y ± l r, v_x) in the paper's sign [rad], (n, 2).
 
     Parameters
@@ -201,7 +203,7 @@ REACH = 1.25  # curves go on this far beyond the slip of the drive
 
 
 @styled
-def drive_tires_figure(drive: Drive, curves: Sequence[TireCurve]) -> Figure:
+def drive_tires_figure(drive: "Drive", curves: Sequence[TireCurve]) -> Figure:
     """Draw the forces of a drive as a cloud, and the curves that trackers believed.
 
     Below stands what each curve misses of the true one, where the true one is known.
