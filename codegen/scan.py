@@ -5,7 +5,7 @@ Without a C compiler that works the CasADi virtual machine does the same, more s
 
 import ctypes
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
 from typing import NamedTuple, TypeAlias
 
@@ -18,7 +18,8 @@ from codegen.compiler import CompilationError, load_library
 log = logging.getLogger("tireid.codegen")
 
 # k runs over samples. Carried ports alternate between two buffers; every other output is written
-# straight into the record on recorded samples and into scratch memory on the others.
+# straight into the record on recorded samples and into scratch memory on the others. Ports without
+# a record are not recorded.
 LOOP = """
 #include <string.h>
 
@@ -37,12 +38,13 @@ int {name}_scan(long n, long every, const double** arg, const long* arg_step,
     for (i = 0; i < n_carry; ++i) {{
       call_arg[carry_arg[i]] = carry_now[i];
       call_res[carry_res[i]] = carry_next[i];
-      if (keep)
+      if (keep && carry_record[i])
         memcpy(carry_record[i] + row * carry_size[i], carry_now[i],
                (size_t)carry_size[i] * sizeof(double));
     }}
     for (i = 0; i < n_out; ++i)
-      call_res[out_res[i]] = keep ? out_record[i] + row * out_size[i] : out_scratch[i];
+      call_res[out_res[i]] =
+          keep && out_record[i] ? out_record[i] + row * out_size[i] : out_scratch[i];
     if ({name}(call_arg, call_res, iw, w, 0)) return 1;
     for (i = 0; i < n_carry; ++i) {{
       swap = carry_now[i];
@@ -153,7 +155,14 @@ class Scan:
             sz_w=max(step.sz_w(), 1),
         )
 
-    def __call__(self, n: int, values: Mapping[str, Array], *, every: int = 1) -> dict[str, Array]:
+    def __call__(
+        self,
+        n: int,
+        values: Mapping[str, Array],
+        *,
+        every: int = 1,
+        ports: Collection[str] | None = None,
+    ) -> dict[str, Array]:
         """Run `n` samples.
 
         Parameters
@@ -162,25 +171,35 @@ class Scan:
         values : one array for every input of the step: carried ports their start, ports of `over`
             one row a sample (n, size), constants their value. Matrices have the port's shape.
         every : record each `every`-th sample.
+        ports : carried ones and other outputs that are recorded; None records all. Memory that is
+            written for the first time takes as long as a step does.
 
         Returns
         -------
-        For each carried port `p` its value before each recorded step (n_recorded, *shape), as
-        `p_final` after the last, and as `p_all` both (n_recorded + 1, *shape); for each other
-        output its value (n_recorded, *shape). Column vectors have the shape (n_recorded, size).
+        For each carried port `p` its value as `p_final` after the last step; for those that are
+        recorded before each recorded step (n_recorded, *shape), and as `p_all` both (n_recorded +
+        1, *shape); for each other output that is recorded its value (n_recorded, *shape). Column
+        vectors have the shape (n_recorded, size).
 
         Raises
         ------
         ValueError
-            Where a value is missing, unknown, or has the wrong shape.
+            Where a value is missing, unknown, or has the wrong shape, or there is no such port.
         """
         packed = self.packed(n, values)
         if every < 1:
             raise ValueError(f"every must be at least 1, it is {every}")
+        recorded = set(self.carry) | set(self.outputs)
+        if ports is not None:
+            if unknown := sorted(set(ports) - recorded):
+                raise ValueError(
+                    f"{self.step.name()} records no {unknown}, only {sorted(recorded)}"
+                )
+            recorded &= set(ports)
         return (
-            self._run_virtual_machine(n, packed, every)
+            self._run_virtual_machine(n, packed, every, recorded)
             if self.loop is None
-            else self._run_compiled(self.loop, n, packed, every)
+            else self._run_compiled(self.loop, n, packed, every, recorded)
         )
 
     def packed(self, n: int, values: Mapping[str, Array]) -> dict[str, Array]:
@@ -222,25 +241,39 @@ class Scan:
             packed[port] = np.ascontiguousarray(by_columns)
         return packed
 
-    def _shape_all(self, record: dict[str, Array]) -> dict[str, Array]:
-        found: dict[str, Array] = {}
+    def _shape_all(self, record: dict[str, Array], last: dict[str, Array]) -> dict[str, Array]:
+        """Return records, of carried ports with a row after the last, in the shapes of ports."""
+        found = {f"{p}_final": shaped(flat, self._size_in[p]) for p, flat in last.items()}
         for port, flat in record.items():
             if port in self.carry:
+                flat[-1] = last[port]
                 everything = shaped(flat, self._size_in[port])
                 found[f"{port}_all"] = everything
-                found[port], found[f"{port}_final"] = everything[:-1], everything[-1]
+                found[port] = everything[:-1]
             else:
                 found[port] = shaped(flat, self._size_out[port])
         return found
 
     def _run_compiled(
-        self, loop: "ctypes._NamedFuncPointer", n: int, packed: dict[str, Array], every: int
+        self,
+        loop: "ctypes._NamedFuncPointer",
+        n: int,
+        packed: dict[str, Array],
+        every: int,
+        recorded: Collection[str],
     ) -> dict[str, Array]:
         layout, n_rows = self.layout, -(-n // every)
         now = [packed[p].copy() for p in self.carry]
         following = [np.empty_like(a) for a in now]
-        state = [np.empty((n_rows + 1, a.size)) for a in now]
-        outputs = [np.empty((n_rows, size)) for size in layout.out_sizes]
+        record = {
+            p: np.empty((n_rows + 1, a.size))
+            for p, a in zip(self.carry, now, strict=True)
+            if p in recorded
+        } | {
+            p: np.empty((n_rows, size))
+            for p, size in zip(self.outputs, layout.out_sizes, strict=True)
+            if p in recorded
+        }
         scratch = [np.empty(size) for size in layout.out_sizes]
         arrays = [packed[p] for p in self._size_in]
         integer_work, work = np.empty(layout.sz_iw, dtype=np.int64), np.empty(layout.sz_w)
@@ -256,11 +289,11 @@ class Scan:
             layout.carry_size,
             now_pointers,
             next_pointers,
-            pointers(state),
+            pointers([record.get(p) for p in self.carry]),
             ctypes.c_long(len(self.outputs)),
             layout.out_res,
             layout.out_size,
-            pointers(outputs),
+            pointers([record.get(p) for p in self.outputs]),
             pointers(scratch),
             (ctypes.c_void_p * layout.sz_arg)(),
             (ctypes.c_void_p * layout.sz_res)(),
@@ -269,14 +302,11 @@ class Scan:
         )
         if failed:
             raise RuntimeError(f"{self.step.name()} reported a failure")
-        for rows, last in zip(state, following if n % 2 else now, strict=True):
-            rows[-1] = last
-        record = dict(zip(self.carry, state, strict=True))
-        record |= dict(zip(self.outputs, outputs, strict=True))
-        return self._shape_all(record)
+        last = dict(zip(self.carry, following if n % 2 else now, strict=True))
+        return self._shape_all(record, last)
 
     def _run_virtual_machine(
-        self, n: int, packed: dict[str, Array], every: int
+        self, n: int, packed: dict[str, Array], every: int, recorded: Collection[str]
     ) -> dict[str, Array]:
         step = self.step
         specialized = step.mapaccum(
@@ -297,24 +327,27 @@ class Scan:
         results = dict(
             zip(step.name_out(), specialized.call([ca.DM(a) for a in arguments]), strict=True)
         )
-        record = {}
+        record, last = {}, {}
         for port in self.carry:
             after = np.array(results[f"{port}_next"]).T.reshape(n, -1)
-            before = np.vstack([packed[port][None], after[:-1]])[::every]
-            record[port] = np.vstack([before, after[-1:]])
-        for port in self.outputs:
+            last[port] = after[-1]
+            if port in recorded:
+                before = np.vstack([packed[port][None], after[:-1]])[::every]
+                record[port] = np.vstack([before, after[-1:]])
+        for port in (port for port in self.outputs if port in recorded):
             record[port] = np.array(results[port]).T.reshape(n, -1)[::every]
-        return self._shape_all(record)
+        return self._shape_all(record, last)
 
 
-def pointers(arrays: list[Array]) -> "ctypes.Array[ctypes.c_void_p]":
+def pointers(arrays: Sequence[Array | None]) -> "ctypes.Array[ctypes.c_void_p]":
     """Return where arrays begin, as C wants it.
 
     Parameters
     ----------
-    arrays : contiguous; the caller keeps them alive.
+    arrays : contiguous; the caller keeps them alive. None is nowhere.
     """
-    return (ctypes.c_void_p * max(len(arrays), 1))(*(a.ctypes.data for a in arrays))
+    places = (None if a is None else a.ctypes.data for a in arrays)
+    return (ctypes.c_void_p * max(len(arrays), 1))(*places)
 
 
 def shaped(flat: Array, size: tuple[int, int]) -> Array:

@@ -6,7 +6,7 @@ the same code; they differ in the `Method` that is handed over.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import asdict, is_dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeVar, cast
 
@@ -110,6 +110,8 @@ class Setup(NamedTuple):
         recording: Recording,
         parts: Iterable[slice] | None = None,
         carry: Mapping[str, Array] | None = None,
+        *,
+        ports: Collection[str] | None = None,
     ) -> Iterator["Block"]:
         """Yield what the compiled step records over a recording, block by block.
 
@@ -120,14 +122,27 @@ class Setup(NamedTuple):
         recording : its signals are the input; its forces are not looked at.
         parts : of the recording, one after the other; None takes all of it in `blocks`.
         carry : values that are carried into the first part; None begins with the recording.
+        ports : carried ones and outputs that are recorded; None records all.
         """
         following = self.begun(recording) if carry is None else dict(carry)
         for part in blocks(len(recording)) if parts is None else parts:
-            shown, record, following = self._over(recording, part, following)
+            shown = self.shown(recording, part)
+            values = {**following, **shown.signals, **self.constants}
+            record = self.scan(shown.samples, values, ports=ports)
+            following = {port: record[f"{port}_final"] for port in self.scan.carry}
             yield Block(
                 part=part,
-                state={port: shown.of_recording(record[f"{port}_all"]) for port in self.scan.carry},
-                outputs={port: shown.of_recording(record[port]) for port in self.scan.outputs},
+                state={
+                    port: shown.of_recording(record[f"{port}_all"])
+                    for port in self.scan.carry
+                    if port in record
+                },
+                outputs={
+                    port: shown.of_recording(record[port])
+                    for port in self.scan.outputs
+                    if port in record
+                },
+                after=following,
             )
 
     def output(self, recording: Recording, port: str) -> Array:
@@ -139,7 +154,7 @@ class Setup(NamedTuple):
         port : of the output.
         """
         told = large((len(recording), self.scan.step.numel_out(port)))
-        for block in self.run(recording):
+        for block in self.run(recording, ports=(port,)):
             told[block.part] = block.outputs[port]
         return told
 
@@ -152,22 +167,9 @@ class Setup(NamedTuple):
         n : samples that are taken.
         """
         following = self.begun(recording)
-        for part in blocks(n):
-            _, _, following = self._over(recording, part, following, whole=False)
+        for block in self.run(recording, blocks(n), ports=()):
+            following = dict(block.after)
         return following
-
-    def _over(
-        self, recording: Recording, part: slice, carry: Mapping[str, Array], *, whole: bool = True
-    ) -> tuple["Shown", dict[str, Array], dict[str, Array]]:
-        """Return what is shown of a part, what is recorded of it, and what is carried after it.
-
-        whole : whether all samples are recorded, or the last alone.
-        """
-        shown = self.shown(recording, part)
-        values = {**carry, **shown.signals, **self.constants}
-        record = self.scan(shown.samples, values, every=1 if whole else shown.samples)
-        after = {port: np.asarray(record[f"{port}_final"]) for port in self.scan.carry}
-        return shown, record, after
 
     def begun(self, recording: Recording) -> dict[str, Array]:
         """Return what is carried into the first sample of a recording, by port.
@@ -195,17 +197,41 @@ class Block(NamedTuple):
     """What a step records over a part of a recording, k samples.
 
     part : the samples.   state : by port, the carried values in effect at each sample and after the
-    last (k + 1, ...).   outputs : by port, the other outputs at each sample (k, ...).
+    last (k + 1, ...).   outputs : by port, the other outputs at each sample (k, ...).   after : by
+    port, all values that are carried on.
     """
 
     part: slice
     state: Mapping[str, Array]
     outputs: Mapping[str, Array]
+    after: Mapping[str, Array]
 
     @property
-    def before(self) -> dict[str, Array]:
+    def before(self) -> Mapping[str, Array]:
         """Carried values in effect at each sample, by port, (k, ...)."""
-        return {port: values[:-1] for port, values in self.state.items()}
+        return Before(self.state)
+
+
+class Before(Mapping[str, Array]):
+    """Carried values in effect at each sample, of those that have a row after the last.
+
+    Parameters
+    ----------
+    state : by port (k + 1, ...).
+    """
+
+    def __init__(self, state: Mapping[str, Array]) -> None:
+        self._state = state
+
+    def __getitem__(self, port: str) -> Array:
+        return self._state[port][:-1]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._state)
+
+    def __len__(self) -> int:
+        """Return how many ports there are."""
+        return len(self._state)
 
 
 class Shown(NamedTuple):

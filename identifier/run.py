@@ -3,15 +3,16 @@
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Stepper
 from codegen.arrays import Array, blocks, large
-from identifier.method import AXLE_FORCE, Block, Method, Setup, Track
+from identifier.method import Block, Method, Setup, Track
 from identifier.refused import NOWHERE, STALE_TIME, SampleLimits, judges_samples, stale_samples
+from identifier.rerun import Recalled, Rerun, holds
 from identifier.tire_model import TireModel
 from models.recordings import Recording, RecordingError
 from models.vehicle import Vehicle
@@ -59,8 +60,8 @@ class History:
     axle_force : forces that were identified online (n, 2) [N].
     state : by port, the carried values in effect at each sample and after the last (n + 1, ...).
     outputs : by port, the other outputs of the step at each sample (n, ...).
-        Of a long recording both are computed again where they are asked for: `blocks` and
-        `state_at` do so without having all of them at once.
+        `identify` computes both again where they are asked for, port by port; of a long recording
+        `blocks` and `state_at` do so without having all of its samples at once.
     start : the stored model that the run began with; None where it began afresh.
     """
 
@@ -117,13 +118,14 @@ class History:
             yield from self.state.run.blocks(samples)
             return
         for part in blocks(len(self.recording)):
-            if not _holds(part, samples):
+            if not holds(part, samples):
                 continue
             around = slice(part.start, part.stop + 1)
             yield Block(
                 part=part,
                 state={name: values[around] for name, values in self.state.items()},
                 outputs={name: values[part] for name, values in self.outputs.items()},
+                after={name: values[part.stop] for name, values in self.state.items()},
             )
 
     def state_at(self, t: float) -> dict[str, Array]:
@@ -226,7 +228,7 @@ class History:
             if isinstance(state, Recalled) and isinstance(outputs, Recalled):
                 state, outputs = state.of(first, end), outputs.of(first, end)
             else:
-                state = self._carried(first, end)
+                state = {name: values[first : end + 1] for name, values in state.items()}
                 outputs = {name: values[first:end] for name, values in outputs.items()}
             force = self.axle_force[first:end]
             found.append(
@@ -235,147 +237,9 @@ class History:
             first = end
         return found
 
-    def _carried(self, first: int, end: int) -> dict[str, Array]:
-        """Return the carried values in effect at the samples of a part, and after its last."""
-        found = {name: values[first : end + 1] for name, values in self.state.items()}
-        if end in self.recording.breaks:  # at sample `end` there are those after the rest
-            setup = self.design.setup(self.vehicle, self.start)
-            carry = {name: values[-2] for name, values in found.items()}
-            (block,) = setup.run(self.recording, [slice(end - 1, end)], carry)
-            found = {
-                name: np.concatenate([values[:-1], block.state[name][-1:]])
-                for name, values in found.items()
-            }
-        return found
-
     def __repr__(self) -> str:
         diverged = "" if self.diverged_at is None else f", diverged at {self.diverged_at:g} s"
         return f"<{type(self.design).__name__} over {self.recording!r}{diverged}>"
-
-
-# A run over a long recording: of the way there only where each block began is kept.
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LongRun:
-    """A run that is computed again, block by block, or a part of it.
-
-    Parameters
-    ----------
-    setup : of the run.
-    recording : what it ran over.
-    begins : values carried into each block, by port.
-    last : values carried after the last sample of the recording, by port.
-    first, end : samples of the part, from first to before end.
-    """
-
-    setup: Setup
-    recording: Recording
-    begins: tuple[Mapping[str, Array], ...]
-    last: Mapping[str, Array]
-    first: int
-    end: int
-
-    def __len__(self) -> int:
-        """Return the number of samples of the part."""
-        return self.end - self.first
-
-    def blocks(self, samples: NDArray[np.intp] | None = None) -> Iterator[Block]:
-        """Yield what was recorded, block by block, counted from the first sample of the part.
-
-        Parameters
-        ----------
-        samples : rising indices; blocks without one are left out. None yields all.
-        """
-        for whole, begin in zip(blocks(len(self.recording)), self.begins, strict=True):
-            begins, ends = max(whole.start, self.first), min(whole.stop, self.end)
-            part = slice(begins - self.first, ends - self.first)
-            if begins >= ends or not _holds(part, samples):
-                continue
-            (block,) = self.setup.run(self.recording, [slice(whole.start, ends)], begin)
-            cut = begins - whole.start
-            yield Block(
-                part=part,
-                state={port: values[cut:] for port, values in block.state.items()},
-                outputs={
-                    port: values[cut:] for port, values in without_force(block.outputs).items()
-                },
-            )
-
-    def state_at(self, index: int) -> dict[str, Array]:
-        """Return the carried values in effect at a sample, or after the last.
-
-        Parameters
-        ----------
-        index : of the sample, counted from the first of the part; as many as there are is the end.
-        """
-        sample, after = self.first + index, int(index == len(self))
-        if sample == len(self.recording):
-            return dict(self.last)
-        taken = sample - after  # after the last: no rest before the sample that follows
-        whole = zip(blocks(len(self.recording)), self.begins, strict=True)
-        part, begin = next(one for one in whole if one[0].start <= taken < one[0].stop)
-        (block,) = self.setup.run(self.recording, [slice(part.start, taken + 1)], begin)
-        return {port: values[after - 2] for port, values in block.state.items()}
-
-
-def _holds(part: slice, samples: NDArray[np.intp] | None) -> bool:
-    """Return whether one of the samples, which rise, lies in a part; None are all."""
-    if samples is None:
-        return True
-    first, last = np.searchsorted(samples, [part.start, part.stop])
-    return bool(first < last)
-
-
-class Recalled(Mapping[str, Array]):
-    """By port, what a long run recorded: computed again when it is asked for.
-
-    Parameters
-    ----------
-    run : computed again.
-    kind : "state" or "outputs".
-    ports : names of them.
-    """
-
-    def __init__(self, run: LongRun, kind: Literal["state", "outputs"], ports: tuple[str, ...]):
-        self.run, self._kind, self._ports = run, kind, ports
-
-    def __getitem__(self, port: str) -> Array:
-        if port not in self._ports:
-            raise KeyError(port)
-        n, found = len(self.run), np.empty(0)
-        for block in self.run.blocks():
-            values = getattr(block, self._kind)[port]
-            if not found.size:
-                found = large((n + (self._kind == "state"), *values.shape[1:]))
-            found[block.part.start : block.part.start + len(values)] = values
-        return found
-
-    def of(self, first: int, end: int) -> "Recalled":
-        """Return the same of the samples from first to before end.
-
-        Parameters
-        ----------
-        first, end : of the whole run.
-        """
-        return Recalled(replace(self.run, first=first, end=end), self._kind, self._ports)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._ports)
-
-    def __len__(self) -> int:
-        """Return how many ports there are."""
-        return len(self._ports)
-
-
-def without_force(outputs: Mapping[str, Array]) -> dict[str, Array]:
-    """Return the outputs of a step but for the axle forces.
-
-    Parameters
-    ----------
-    outputs : by port.
-    """
-    return {port: values for port, values in outputs.items() if port != AXLE_FORCE.name}
 
 
 # Running a method over a recording, in compiled code.
@@ -436,30 +300,27 @@ def identify(
     check_recording(recording, design)
     setup = design.setup(vehicle, start)
     v_y = None if recording.v_y is not None else large((len(recording),))
-    force, begins, parts = large((len(recording), 2)), [], blocks(len(recording))
-    state: Mapping[str, Array] = {}
-    outputs: Mapping[str, Array] = {}
+    force, begins = large((len(recording), 2)), []
     following: Mapping[str, Array] = setup.begun(recording)
-    for block in setup.run(recording, parts):
+    ports = ("axle_force",) if v_y is None else ("axle_force", "v_y")
+    parts = tuple(blocks(len(recording)))
+    for block in setup.run(recording, parts, ports=ports):
         force[block.part] = block.outputs["axle_force"]
         if v_y is not None:
             v_y[block.part] = block.outputs["v_y"].ravel()
-        state, outputs = block.state, without_force(block.outputs)
         begins.append(following)
-        following = {port: values[-1].copy() for port, values in state.items()}
+        following = block.after
         if progress is not None:
             progress(block.part.stop / len(recording))
-    if len(begins) > 1:
-        run = LongRun(
-            setup=setup,
-            recording=recording,
-            begins=tuple(begins),
-            last=following,
-            first=0,
-            end=len(recording),
-        )
-        state = Recalled(run, "state", tuple(state))
-        outputs = Recalled(run, "outputs", tuple(outputs))
+    run = Rerun(
+        setup=setup,
+        recording=recording,
+        parts=parts,
+        begins=tuple(begins),
+        last=following,
+        first=0,
+        end=len(recording),
+    )
     if v_y is not None and np.isfinite(v_y).all():
         v_y.setflags(write=False)
         recording = replace(recording, v_y=v_y, estimated=("v_y",))
@@ -468,8 +329,8 @@ def identify(
         design=design,
         recording=recording,
         axle_force=force,
-        state=state,
-        outputs=outputs,
+        state=Recalled(run, "state"),
+        outputs=Recalled(run, "outputs"),
         start=start,
     )
 

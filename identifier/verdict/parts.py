@@ -81,13 +81,11 @@ def road_felt(history: History, asked: Portion) -> Array | None:
     for block in history.blocks(asked.samples):
         first, last = np.searchsorted(asked.samples, [block.part.start, block.part.stop])
         mine = asked.samples[first:last] - block.part.start
-        around = slice(mine[0], mine[-1] + 2)
-        state = {port: v[around] for port, v in block.state.items()}
-        design = history.design
-        push = design.beside_force(state) if without_v_y(asked) else design.road_push(state)
+        tell = history.design.beside_force if without_v_y(asked) else history.design.road_push
+        push = tell(block.state)
         if push is None:
             return None
-        pushes.append(push[mine - mine[0]])
+        pushes.append(push[mine])
     return np.concatenate(pushes)
 
 

@@ -53,6 +53,19 @@ def test_scan_repeats_the_loop_by_hand(scan, rng, n, every):
     np.testing.assert_allclose(record["s_final"], s_final, rtol=1e-13)
 
 
+@pytest.mark.parametrize("ports", [(), ("s",), ("corner",), ("M", "y")])
+@pytest.mark.parametrize("every", [1, 3])
+def test_what_is_recorded_alone_has_the_bits_that_it_has_among_all(scan, rng, ports, every):
+    M, s, u = rng.normal(size=(2, 3)), rng.normal(size=2), rng.normal(size=(8, 3))
+    values = {"M": M, "s": s, "u": u, "c": np.array(0.1)}
+    everything, some = scan(8, values, every=every), scan(8, values, every=every, ports=ports)
+    assert {"M_final", "s_final"} <= set(some)
+    assert {p.removesuffix("_final").removesuffix("_all") for p in some} == {"M", "s", *ports}
+    assert {p for p in ("M", "s", "y", "corner") if p in some} == set(ports)
+    for port, array in some.items():
+        np.testing.assert_array_equal(array, everything[port], err_msg=port)
+
+
 def test_scan_does_not_change_what_it_is_given(scan, rng):
     M, s, u = rng.normal(size=(2, 3)), rng.normal(size=2), rng.normal(size=(5, 3))
     before = M.copy(), s.copy(), u.copy()
@@ -69,6 +82,8 @@ def test_wrong_shapes_and_names_are_refused(scan):
         scan(4, good | {"M": np.zeros((3, 2))})
     with pytest.raises(ValueError, match=r"missing inputs \['c'\]"):
         scan(4, {k: v for k, v in good.items() if k != "c"})
+    with pytest.raises(ValueError, match=r"records no \['u'\], only \['M', 'corner', 's', 'y'\]"):
+        scan(4, good, ports=("u", "M"))
     with pytest.raises(ValueError, match="no output 'u_next'"):
         Scan(leaky_step(), carry=("u",), over=())
 

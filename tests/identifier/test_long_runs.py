@@ -13,7 +13,8 @@ from codegen import arrays
 from identifier.axle import AxleIdentifier
 from identifier.methods import make_method
 from identifier.reproducibility import beyond_known, predict, reproduce
-from identifier.run import Recalled, identify, learn
+from identifier.rerun import Recalled
+from identifier.run import identify, learn
 from models.recordings import Recording, check_against_vehicle, evidence, portion
 from models.recordings.checks import check_physics
 from models.recordings.record import joined
@@ -57,7 +58,7 @@ def test_a_run_in_blocks_has_the_bits_of_one_in_a_piece(whole, method, request):
     request.getfixturevalue("in_blocks")
     blocks = identify(whole, CAR, design)
     assert isinstance(blocks.state, Recalled)
-    assert not isinstance(piece.state, Recalled)
+    assert len(blocks.state.run.parts) > 10
     np.testing.assert_array_equal(piece.axle_force, blocks.axle_force)
     assert list(piece.state) == list(blocks.state)
     for kind in ("state", "outputs"):
@@ -87,12 +88,14 @@ def test_a_freeze_within_a_block_or_at_its_ends_is_that_of_one_piece(whole, requ
 def test_the_parts_of_a_run_over_two_logs_are_those_of_one_in_a_piece(whole, method, request):
     logs = [whole.between(0.0, 6.5), whole.between(8.0, 11.0), whole.between(11.5, 15.0)]
     drive, design = joined(logs), make_method(method, CAR)
-    pieces = identify(drive, CAR, design).parts(logs)
+    run = identify(drive, CAR, design)
+    pieces = run.parts(logs)
+    assert len(run.state.run.parts) == 1
     frozen = [one.freeze().to_dict() for one in pieces]
     request.getfixturevalue("in_blocks")
     blocks = identify(drive, CAR, design).parts(logs)
     for one, other, log in zip(pieces, blocks, logs, strict=True):
-        assert isinstance(other.state, Recalled) and not isinstance(one.state, Recalled)
+        assert len(other.state.run.parts) > 10
         np.testing.assert_array_equal(one.axle_force, other.axle_force)
         for kind in ("state", "outputs"):
             for port, values in getattr(one, kind).items():
@@ -122,7 +125,8 @@ def test_only_blocks_that_are_asked_for_are_computed_again(whole, in_blocks):
 
 
 def test_only_blocks_that_are_asked_for_are_given_of_a_run_in_memory(whole, request):
-    piece = identify(whole, CAR, AxleIdentifier.for_vehicle(CAR))
+    run = identify(whole, CAR, AxleIdentifier.for_vehicle(CAR))
+    piece = replace(run, state=dict(run.state), outputs=dict(run.outputs))
     request.getfixturevalue("in_blocks")
     asked = np.array([130, 1000])
     given = list(piece.blocks(asked))
@@ -132,6 +136,35 @@ def test_only_blocks_that_are_asked_for_are_given_of_a_run_in_memory(whole, requ
         for port, values in piece.state.items():
             np.testing.assert_array_equal(block.state[port][k - block.part.start], values[k])
     assert list(piece.blocks(asked[:0])) == []
+
+
+def test_what_was_asked_for_of_one_block_is_computed_together_of_the_next(
+    whole, in_blocks, monkeypatch
+):
+    """Weights, then a step's own numbers: twice over the first block, once over every other."""
+    blocks = identify(whole, CAR, AxleIdentifier.for_vehicle(CAR))
+    ran = []
+    scan = type(blocks.state.run.setup.scan)
+    call = scan.__call__
+    monkeypatch.setattr(
+        scan,
+        "__call__",
+        lambda self, *a, ports, **k: ran.append(ports) or call(self, *a, ports=ports, **k),
+    )
+    for block in blocks.blocks():
+        assert len(block.state["W"]) == len(block.before["own"]) + 1
+    assert ran[:2] == [{"W"}, {"own"}]
+    assert ran[2:] == [{"W", "own"}] * (len(blocks.state.run.parts) - 1)
+
+
+def test_of_a_run_of_one_block_what_was_asked_for_is_kept_and_nothing_else(whole):
+    run = identify(whole, CAR, AxleIdentifier.for_vehicle(CAR))
+    assert run.state["W"] is run.state["W"]
+    (found,) = run.state.run._found.values()
+    assert set(found.values["state"]) == {"W"} and not found.values["outputs"]
+    assert set(run.outputs) == set(run.state.run.ports("outputs"))
+    with pytest.raises(KeyError):
+        run.state["no such port"]
 
 
 def test_errors_over_blocks_are_those_over_the_whole(whole, request):
