@@ -32,8 +32,8 @@ from models.recordings.record import (
     resample,
     side_by_side,
 )
+from models.recordings.rolled import rolled
 from models.recordings.wheel_scale import Scale, learnt_scales, scale_text, wheel_factor
-from models.recordings.wheels import rolled
 from models.schema import require_few, shown
 
 SHORTEST = 1.0  # [s]: a stretch of less teaches nothing, since learning waits half a second

@@ -12,7 +12,8 @@ from models.maneuvers import RandomSteer
 from models.plant import Plant
 from models.recordings import LogMap, Recording, Repair, read_recording
 from models.recordings.reader import read_repaired
-from models.recordings.wheels import Wheels, rolled
+from models.recordings.rolled import rolled
+from models.recordings.wheels import Wheels
 from models.vehicle import sedan
 from tests.models.wheel_speeds import CORNERS, gentle_slip, shown, spin
 

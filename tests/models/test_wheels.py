@@ -8,8 +8,9 @@ import pytest
 from models.logs.log import RecordingError
 from models.maneuvers import RandomSteer
 from models.plant import Plant
+from models.recordings.rolled import rolled
 from models.recordings.wheel_scale import learnt_scale
-from models.recordings.wheels import Wheels, rolled
+from models.recordings.wheels import Wheels
 from models.vehicle import sedan
 from tests.models.wheel_speeds import CORNERS, anti_lock, gentle_slip, rolling, shown, spin
 
@@ -157,7 +158,7 @@ def test_no_sample_looks_at_a_later_one(run):
 
 
 def test_a_long_log_is_worked_through_in_blocks_that_leave_no_trace(run, monkeypatch):
-    import models.recordings.wheels as module
+    import models.recordings.rolled as module
 
     speeds = shown(run, slipping(run, FRONT, spin(run.t, 8.0, 3.0, 0.3)), np.random.default_rng(2))
     whole = told(run, speeds)

@@ -1,0 +1,298 @@
+"""Forward speed at the center of gravity from wheel speeds: causal, without wheels that slip.
+
+A wheel at (x, y) from the center of gravity, turned by δ, rolls at
+    s = (v_x - r y) cos δ + (v_y + x r) sin δ,
+where v_y is that of rear wheels without slip, v_y = l_r r + (v_x - r y) tan δ_r; so
+    v_x = r y + (s - L r sin δ_f) / (cos δ_f + tan δ_r sin δ_f)   in front,
+    v_x = r y + s cos δ_r                                         behind.
+Wheels that are driven or braked are not trusted where they leave what the car can have done since
+it was last known. Without slip all wheels agree. Where they do not, a car that speeds up is as slow
+as its slowest wheel, one that brakes as fast as its fastest, and one that rolls out goes on as it
+went. The step from sample to sample is compiled.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import cache, reduce
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from codegen import Scan
+from codegen.arrays import Array, blocks, large
+from models.logs.log import RecordingError
+from models.logs.signals import AXLES, WHEELS
+from models.recordings.wheels import DRIVEN, Wheels
+
+SLIP, NOISE = 0.03, 0.05  # more than this share of the speed, and [m/s], is no usual slip
+ALIKE = 0.01  # wheels that differ by this share, and NOISE, have no slip that tells them apart
+WINDOW = 0.05  # [s], over which the acceleration of a wheel is taken
+MEMORY = 0.15  # [s], over which that of the car is
+BRAKED, ROLLS_OUT = -1.0, -0.3  # [m/s²]: below the first wheels are braked, above the other driven
+UNSURE = 0.25  # of the largest acceleration: how far it may have changed while nothing is trusted
+PATIENCE = 2.0  # [s]: after it wheels that all agree again are believed the sooner
+SLOW = 1.0  # [m/s]: below it sensors of wheels show nothing
+
+
+class Rolled(NamedTuple):
+    """Forward speed of a stretch [m/s], (n,), and what of it is not what all wheels say.
+
+    gated, held : samples at which a wheel was left out, and at which all were.
+    """
+
+    v_x: Array
+    gated: int
+    held: int
+
+
+def rolled(
+    speeds: Mapping[str, Array],
+    r: Array,
+    delta_f: Array,
+    delta_r: Array,
+    wheels: Wheels,
+    dt: float,
+) -> Rolled:
+    """Return the forward speed at the center of gravity; no sample looks at a later one.
+
+    Parameters
+    ----------
+    speeds : at which wheels roll [m/s], by names of `WHEELS`, each (n,); at least one.
+    r : yaw rate [rad/s], (n,).
+    delta_f, delta_r : angles of the road wheels [rad], (n,).
+    wheels : their places, and which are driven.
+    dt : sample time [s].
+
+    Raises
+    ------
+    RecordingError
+        Where one wheel of an axle stands alone and the track is not known.
+    """
+    names, most = _sources(speeds, wheels), wheels.acceleration
+    n, v_x = r.size, large((r.size,))
+    span = max(1, round(WINDOW / dt))
+    free = [bool(wheels.driven) and not set(group) & set(_pushed(wheels)) for group in names]
+    rule = np.array([dt, most, most + NOISE / (span * dt)])
+    scan, constants = trust_scan(len(names)), {"rule": rule, "free": np.array(free, dtype=float)}
+    gated = held = 0
+    trust: Array | None = None
+    for part in blocks(n):
+        early = slice(max(part.start - span, 0), part.stop)
+        motion = r[early], delta_f[early], delta_r[early]
+        of_part = {name: one[early] for name, one in speeds.items()}
+        rows = np.column_stack([_brought(group, of_part, *motion, wheels) for group in names])
+        before = rows[np.maximum(np.arange(len(rows)) - span, 0)]
+        begin = part.start - early.start
+        rates = (rows - before)[begin:] / (span * dt)
+        rows = rows[begin:]
+        if trust is None:
+            trust = _begun(rows[0], free)
+        samples = {"row": rows, "rates": rates}
+        record = scan(len(rows), {"trust": trust, **samples, **constants}, ports=("v", "held"))
+        trust = record["trust_final"]
+        v_x[part] = record["v"].ravel()
+        held += int(np.count_nonzero(record["held"] > 0.0))
+        agree = np.abs(rows - v_x[part, None]) <= NOISE + SLIP * np.abs(v_x[part, None])
+        gated += int(np.count_nonzero(~agree.all(axis=1)))
+    return Rolled(v_x, gated, held)
+
+
+class Trust(NamedTuple):
+    """What is carried from sample to sample: the speed, its change, and since when none is known.
+
+    v [m/s]; a [m/s²]; held: time since a wheel was trusted [s]; known: the speed then [m/s].
+    """
+
+    v: ca.SX
+    a: ca.SX
+    held: ca.SX
+    known: ca.SX
+
+
+class Rule(NamedTuple):
+    """What holds for all samples.
+
+    dt [s]; most: acceleration of a car, steady: of a wheel that may be trusted [m/s²]; free: of
+    each wheel, whether it is known not to be driven, (k,).
+    """
+
+    dt: ca.SX
+    most: ca.SX
+    steady: ca.SX
+    free: ca.SX
+
+
+def trusted(trust: Trust, c: ca.SX, rates: ca.SX, rule: Rule) -> Trust:
+    """Return the speed at the next sample.
+
+    Parameters
+    ----------
+    trust : before it.
+    c : speed of the center of gravity by each wheel [m/s], (k,).
+    rates : by which each changed lately [m/s²], (k,).
+    rule : of all samples.
+    """
+    v, a, since, known = trust
+    dt, most, limit, free = rule
+    wheels = range(c.numel())
+    ahead, passed = v + a * dt, since + dt
+    near, alike = (NOISE + share * ca.fabs(ahead) for share in (SLIP, ALIKE))
+
+    steady = [ca.fabs(rates[k]) <= limit for k in wheels]
+    agree = ca.logic_and(_most(c, wheels) - _least(c, wheels) <= near, _every(steady))
+    doubt = UNSURE * most * since
+    doubt = ca.if_else(agree, doubt * (1.0 + since / PATIENCE), doubt)
+    slow = ca.fmax(ca.fabs(ahead), _most(ca.fabs(c), wheels)) < SLOW
+    doubt = ca.if_else(slow, SLOW, doubt)
+    reached = [ca.fabs(c[k] - ahead) <= near + doubt for k in wheels]
+    likely = [ca.logic_and(ca.logic_or(slow, steady[k]), reached[k]) for k in wheels]
+    some = _any(likely)
+
+    # Nobody is trusted: it goes on as it went, unless that leads away from all wheels.
+    astray = _every([(c[k] - ahead) * a < 0.0 for k in wheels])
+    v_held, a_held = ca.if_else(astray, v, ahead), ca.if_else(astray, 0.0, a)
+
+    # Driven wheels run ahead of the car, however little.
+    likely = _rather(likely, ca.vertsplit(free), ca.logic_not(a > BRAKED))
+    as_before = [ca.fabs(rates[k] - a) <= UNSURE * most for k in wheels]
+    likely = _rather(likely, as_before, ca.SX(0.0))
+    best = ca.if_else(
+        a > ROLLS_OUT,
+        _lowest(c, likely),
+        ca.if_else(a < BRAKED, -_lowest(-c, likely), _nearest(c, likely, ahead)),
+    )
+    kept = [ca.logic_and(likely[k], ca.fabs(c[k] - best) <= alike) for k in wheels]
+    reach = most * dt + doubt
+    now = ca.fmin(ca.fmax(_mean(c, kept), ahead - reach), ahead + reach)
+    # After a while, what was trusted before says little of how it goes on.
+    slope = ca.if_else(since > MEMORY, _mean(rates, kept), (now - known) / passed)
+    slope = ca.fmin(ca.fmax(slope, -most), most)
+    a_now = a + (1.0 - ca.exp(-passed / MEMORY)) * (slope - a)
+    return Trust(
+        ca.if_else(some, now, v_held),
+        ca.if_else(some, a_now, a_held),
+        ca.if_else(some, 0.0, passed),
+        ca.if_else(some, now, known),
+    )
+
+
+def _most(c: ca.SX, wheels: Sequence[int]) -> ca.SX:
+    return -_least(-c, wheels)
+
+
+def _least(c: ca.SX, wheels: Sequence[int]) -> ca.SX:
+    return _lowest(c, [ca.SX(1.0) for _ in wheels])
+
+
+def _every(conditions: Sequence[ca.SX]) -> ca.SX:
+    return reduce(ca.logic_and, conditions)
+
+
+def _any(conditions: Sequence[ca.SX]) -> ca.SX:
+    return reduce(ca.logic_or, conditions)
+
+
+def _rather(likely: Sequence[ca.SX], those: Sequence[ca.SX], unless: ca.SX) -> list[ca.SX]:
+    """Return those of the likely wheels, where there are any of them, or else all."""
+    both = [ca.logic_and(one, those[k]) for k, one in enumerate(likely)]
+    none = ca.logic_or(unless, ca.logic_not(_any(both)))
+    return [ca.logic_or(both[k], ca.logic_and(none, one)) for k, one in enumerate(likely)]
+
+
+def _lowest(c: ca.SX, among: Sequence[ca.SX]) -> ca.SX:
+    """Return the lowest number of some, infinite where there is none."""
+    return reduce(ca.fmin, (ca.if_else(one, c[k], ca.inf) for k, one in enumerate(among)))
+
+
+def _nearest(c: ca.SX, among: Sequence[ca.SX], to: ca.SX) -> ca.SX:
+    """Return the number of some that is nearest to another, of several the first."""
+    best, distance = ca.SX(0.0), ca.SX(ca.inf)
+    for k, one in enumerate(among):
+        away = ca.fabs(c[k] - to)
+        nearer = ca.logic_and(one, away < distance)
+        best, distance = ca.if_else(nearer, c[k], best), ca.if_else(nearer, away, distance)
+    return best
+
+
+def _mean(c: ca.SX, among: Sequence[ca.SX]) -> ca.SX:
+    """Return the mean of some, not a number where there is none."""
+    total = sum((ca.if_else(one, c[k], 0.0) for k, one in enumerate(among)), start=ca.SX(0.0))
+    return total / sum(among, start=ca.SX(0.0))
+
+
+@cache
+def trust_scan(k: int) -> Scan:
+    """Return the compiled loop over samples.
+
+    Parameters
+    ----------
+    k : wheels, and axles that count as one.
+    """
+    trust, row, rates = ca.SX.sym("trust", 4), ca.SX.sym("row", k), ca.SX.sym("rates", k)
+    rule, free = ca.SX.sym("rule", 3), ca.SX.sym("free", k)
+    after = trusted(
+        Trust(*(trust[i] for i in range(4))), row, rates, Rule(rule[0], rule[1], rule[2], free)
+    )
+    step = ca.Function(
+        f"rolled_{k}",
+        [trust, row, rates, rule, free],
+        [ca.vertcat(*after), after.v, after.held],
+        ["trust", "row", "rates", "rule", "free"],
+        ["trust_next", "v", "held"],
+    )
+    return Scan(step, carry=("trust",), over=("row", "rates"))
+
+
+def _begun(row: Array, free: Sequence[bool]) -> Array:
+    """Return the speed before the first sample: the middle one of wheels, if they can be free."""
+    known = sorted(c for c, rolls in zip(row, free, strict=True) if rolls) or sorted(row)
+    middle = known[(len(known) - 1) // 2]
+    return np.array([middle, 0.0, 0.0, middle])
+
+
+def _pushed(wheels: Wheels) -> tuple[str, ...]:
+    """Return the wheels that are driven; a lone encoder counts with the motor."""
+    driven = DRIVEN[wheels.driven]
+    return (*driven, WHEELS[4]) if driven else ()
+
+
+def _sources(speeds: Mapping[str, Array], wheels: Wheels) -> list[tuple[str, ...]]:
+    """Return the wheels, and the axles whose track is not known, that each tell the speed."""
+    found: list[tuple[str, ...]] = [(WHEELS[4],)] if WHEELS[4] in speeds else []
+    for axle in AXLES:
+        there = tuple(name for name in axle if name in speeds)
+        if wheels.track:
+            found += [(name,) for name in there]
+        elif len(there) == 2:
+            found.append(there)
+        elif there:
+            raise RecordingError(
+                f"{there[0]} is alone on its axle: tell its place by [wheels] track, in m"
+            )
+    return found
+
+
+def _brought(
+    group: Sequence[str],
+    speeds: Mapping[str, Array],
+    r: Array,
+    delta_f: Array,
+    delta_r: Array,
+    wheels: Wheels,
+) -> Array:
+    """Return the forward speed of the center of gravity by a wheel or an axle, (n,)."""
+    s: Array = np.mean([speeds[name] for name in group], axis=0)
+    name = group[0]
+    front = name in AXLES[0] or (name == WHEELS[4] and wheels.driven == "front")
+    along = s * np.cos(delta_r)
+    if front:
+        sine, cosine = np.sin(delta_f), np.cos(delta_f)
+        if wheels.wheelbase is None:
+            along = s * cosine
+        else:
+            along = (s - wheels.wheelbase * r * sine) / (cosine + np.tan(delta_r) * sine)
+    if len(group) > 1 or name == WHEELS[4]:
+        return along
+    track = wheels.track[0 if front else -1]
+    side = 0.5 if name in (AXLES[0][0], AXLES[1][0]) else -0.5
+    return along + side * track * r
