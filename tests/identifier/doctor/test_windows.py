@@ -1,4 +1,4 @@
-"""Sums under windows, weights that are not negative: against SciPy's sparse matrix and `nnls`."""
+"""Sums under windows and weights that are not negative, against SciPy: sparse matrix, `nnls`."""
 
 import numpy as np
 import pytest
