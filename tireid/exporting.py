@@ -213,7 +213,7 @@ def export_method(
                 progress.step(2)
         if onnx:
             progress.begin(NETWORK)
-            _write_onnx(scratch, method, vehicle, package, start)
+            _write_onnx(scratch, method, vehicle, package, start, band=band)
     return Exported(folder=folder, package=package, costs=tuple(costs), told=tuple(told))
 
 
@@ -238,7 +238,13 @@ def _write_texts(folder: Path, texts: Mapping[str, str]) -> None:
 
 
 def _write_onnx(
-    folder: Path, method: Method, vehicle: Vehicle, package: Package, start: TireModel | None
+    folder: Path,
+    method: Method,
+    vehicle: Vehicle,
+    package: Package,
+    start: TireModel | None,
+    *,
+    band: bool,
 ) -> None:
     from identifier.export.onnx import export_onnx
 
@@ -246,7 +252,7 @@ def _write_onnx(
         model = start or method.frozen(vehicle, package.specialized.carry)
     except CannotFreezeError as error:
         raise ValueError(f"--onnx: {error}") from error
-    export_onnx(model, folder / f"{package.specialized.name}.onnx")
+    export_onnx(model, folder / f"{package.specialized.name}.onnx", with_band=band)
 
 
 # With `mpc`: the tracker beside the identifier, and a car driven by both.

@@ -200,10 +200,12 @@ class AxleModel(TireModel):
         ValueError
             Where the level is impossible, or a speed is not positive.
         """
-        speed = np.broadcast_to(self._calibration.speed if v_x is None else v_x, np.shape(alpha))
+        speed = np.broadcast_to(
+            self.effective_calibration.speed if v_x is None else v_x, np.shape(alpha)
+        )
         if not (speed > 0.0).all():
             raise ValueError(f"v_x of a band must be positive, it is {speed.min()}")
-        factor = self._calibration.factor(alpha, speed / self.vehicle.froude_speed)
+        factor = self.effective_calibration.factor(alpha, speed / self.vehicle.froude_speed)
         return self.band_spread(alpha, speed).half_width(factor, level) * self._loads
 
     def half_band_over(self, recording: Recording, level: float = LEVEL) -> Array:
@@ -264,7 +266,8 @@ class AxleModel(TireModel):
         return slope
 
     @property
-    def _calibration(self) -> BandCalibration:
+    def effective_calibration(self) -> BandCalibration:
+        """Calibration of the band; where there is none, of errors as learning is told of them."""
         return self.calibration or BandCalibration.told(self.reference_speed)
 
     def band_spread(self, alpha: Array, v_x: Array) -> BandSpread:
@@ -285,7 +288,7 @@ class AxleModel(TireModel):
             np.einsum("aki,aij,akj->ka", h, both, h)
             for both in (self.covariance, self.prior_covariance)
         )
-        calibration = self._calibration
+        calibration = self.effective_calibration
         left = colored_variance(left, before, calibration.color)
         return BandSpread.of(T @ self.W.T, left, before, calibration.stretch(v_x)[:, None])
 
@@ -312,7 +315,7 @@ class AxleModel(TireModel):
 
     def _posterior(self, factors: Array | None = None) -> Array:
         """Return the covariance of both axles, its noise as colored as it was."""
-        color = self._calibration.color
+        color = self.effective_calibration.color
         size = np.ones(2) if factors is None else factors
         both = zip(self.covariance, self.prior_covariance, color, size, strict=True)
         return np.array([colored(P, prior, float(c), float(f)) for P, prior, c, f in both])
@@ -332,7 +335,7 @@ class AxleModel(TireModel):
         """
         if n < 0:
             raise ValueError(f"n must not be negative, it is {n}")
-        factors = self._calibration.factors
+        factors = self.effective_calibration.factors
         size = np.sqrt(np.mean(factors**2, axis=1))
         roots = [root(P) for P in self._posterior(size)]
         drawn: list[AxleModel] = []

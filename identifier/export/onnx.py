@@ -8,7 +8,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from codegen.arrays import Array
 from codegen.escape import visible
+from identifier.axle.band import (
+    AT_SPEEDS,
+    CENTERS,
+    FLOOR,
+    LEVEL,
+    RELATIVE,
+    UNKNOWN,
+    normal_quantile,
+    root,
+)
+from identifier.axle.band_step import LEAST_BEFORE, hinges
 from identifier.axle.model import AxleModel
 from identifier.export.specialize import INPUTS, Signal
 from identifier.own_network import OnnxModel
@@ -210,29 +222,95 @@ FROZEN_INPUTS = (
 )
 
 
-def axle_graph(model: AxleModel, *, single: bool = False) -> bytes:
+HALF_BANDS = (
+    Signal("F_yf_half_band", "N", "half the width of the 90 % band around F_yf"),
+    Signal("F_yr_half_band", "N", "half the width of the 90 % band around F_yr"),
+)
+
+
+def axle_graph(model: AxleModel, *, single: bool = False, with_band: bool = False) -> bytes:
     """Return the static curves as ONNX; inputs alpha_f, alpha_r, outputs F_yf, F_yr, (batch, 1).
 
     Parameters
     ----------
     single : whether numbers are float32; else they are float64.
+    with_band : whether half the width of their bands is told, too, at the speed of the drive that
+        taught the model.
     """
     graph = Graph(single)
     scales = graph.constant("inverse_scales", 1.0 / np.array(model.ladder)[None])
-    for slip, force, weights, load in zip(
-        FROZEN_INPUTS, OUTPUTS, model.W, model.vehicle.axle_loads, strict=True
+    for axle, (slip, force, weights, load) in enumerate(
+        zip(FROZEN_INPUTS, OUTPUTS, model.W, model.vehicle.axle_loads, strict=True)
     ):
         bent = graph.apply("MatMul", [slip.name, scales], f"{slip.name}_over_scales")
         units = graph.apply("Tanh", [bent], f"{slip.name}_units")
         share = graph.constant(f"{force.name}_weights", load * weights[:, None])
         graph.apply("MatMul", [units, share], force.name)
+        if with_band:
+            _half_band(graph, model, axle, units, force.name)
     return graph.model_bytes(
         "axle_force_curves",
         FROZEN_INPUTS,
-        OUTPUTS,
+        (*OUTPUTS, *(HALF_BANDS if with_band else ())),
         f"Static axle force over slip angle of {visible(model.vehicle.name)}; {SLIP_SIGN}",
         {"vehicle": visible(model.vehicle.name)},
     )
+
+
+def _half_band(graph: Graph, model: AxleModel, axle: int, units: str, force: str) -> None:
+    """Add half the width of the band of an axle; the formula of `identifier.axle.band`.
+
+    Parameters
+    ----------
+    axle : 0 in front, 1 at the rear.
+    units, force : names of t (batch, n) and of the force [N] (batch, 1).
+    """
+    port, n = HALF_BANDS[axle], len(model.ladder)
+    load, calibration = model.vehicle.axle_loads[axle], model.effective_calibration
+    speed = calibration.speed
+
+    def node(operator: str, *inputs: str, result: str = "") -> str:
+        name = result or f"{port.name}_{len(graph.nodes)}"
+        return graph.apply(operator, inputs, name)
+
+    def number(value: ArrayLike) -> str:
+        matrix = np.atleast_2d(np.asarray(value, dtype=np.float64))
+        return graph.constant(f"{port.name}_number_{len(graph.constants)}", matrix)
+
+    def squares(row: str, by: Array) -> str:
+        product = node("MatMul", row, number(by))
+        return node("MatMul", node("Mul", product, product), number(np.ones((by.shape[1], 1))))
+
+    by_offset = (1.0, 1.0 / speed)[axle]
+    bent = node("Sub", number(1.0), node("Mul", units, units))
+    slope = node("MatMul", bent, number((by_offset * model.W[axle] / model.ladder)[:, None]))
+    h = graph.apply("Concat", [units, slope], f"{port.name}_h", axis=1)
+    learnt = [*range(n), n + 2]  # weights and the zero of the slip
+    left, before = (
+        squares(h, root(P[axle][np.ix_(learnt, learnt)]))
+        for P in (model.covariance, model.prior_covariance)
+    )
+    before = node("Max", before, number(LEAST_BEFORE))
+    share = node("Min", node("Div", left, before), number(1.0))
+    c = float(calibration.color[axle])
+    told = node("Add", number(1.0), node("Mul", share, number(c - 1.0)))
+    colored = node("Div", node("Mul", node("Mul", before, share), number(c)), told)
+    left = node("Max", colored, left)
+    relative = node("Mul", force, number(RELATIVE / load))
+    total = node("Add", node("Add", node("Mul", relative, relative), number(FLOOR**2)), left)
+    ratio = node("Div", left, node("Mul", before, number(UNKNOWN**2)))
+    unknown = node("Min", ratio, number(1.0))
+    slips = hinges(calibration.factors, CENTERS)[axle]
+    size = node("Min", node("Abs", FROZEN_INPUTS[axle].name), number(CENTERS[-1]))
+    over = node("Max", node("Sub", size, number(CENTERS[:-1])), number(0.0))
+    by_slip = node("Add", node("MatMul", over, number(slips[1:, None])), number(slips[0]))
+    at = speed / model.vehicle.froude_speed
+    factor = node("Mul", by_slip, number(np.interp(at, AT_SPEEDS, calibration.speeds[axle])))
+    wide = node("Max", factor, number(1.0))
+    narrow, wide = (node("Mul", one, one) for one in (factor, wide))
+    opened = node("Mul", unknown, node("Sub", wide, narrow))
+    variance = node("Mul", total, node("Add", narrow, opened))
+    node("Mul", node("Sqrt", variance), number(load * normal_quantile(LEVEL)), result=port.name)
 
 
 # By kind of model: the content of its file, from the model and whether numbers are float32.
@@ -241,13 +319,16 @@ GRAPHS: Mapping[str, Callable[[Any, bool], bytes]] = {
     AxleModel.kind: lambda model, single: axle_graph(model, single=single),
     OnnxModel.kind: lambda model, _: model.content,
 }
+BANDED: Mapping[str, Callable[[Any, bool], bytes]] = {  # likewise with the band
+    AxleModel.kind: lambda model, single: axle_graph(model, single=single, with_band=True),
+}
 
 
 class NoOnnxError(ValueError):
     """A frozen model of a kind that has no ONNX form."""
 
 
-def onnx_bytes(model: TireModel, *, single: bool = False) -> bytes:
+def onnx_bytes(model: TireModel, *, single: bool = False, with_band: bool = False) -> bytes:
     """Return a frozen model as the content of an ONNX file; the same model gives the same bytes.
 
     Parameters
@@ -255,11 +336,12 @@ def onnx_bytes(model: TireModel, *, single: bool = False) -> bytes:
     model : the whole model for a network, the static force curves for an axle model, and the
         network itself for one that came from an ONNX file.
     single : whether numbers are float32; else they are float64.
+    with_band : whether half the width of the band is told, too, which axle models have.
 
     Raises
     ------
     NoOnnxError
-        For any other kind of model.
+        For any other kind of model, or one that has no band where it is asked for.
     MissingOnnxError
         Where the package onnx is not installed.
     """
@@ -267,16 +349,23 @@ def onnx_bytes(model: TireModel, *, single: bool = False) -> bytes:
         raise NoOnnxError(
             f"{type(model).__name__} has no ONNX form, only networks and axle curves have"
         )
-    return GRAPHS[model.kind](model, single)
+    if not with_band:
+        return GRAPHS[model.kind](model, single)
+    if model.kind not in BANDED:
+        raise NoOnnxError(f"{type(model).__name__} cannot tell how sure it is: it has no band")
+    return BANDED[model.kind](model, single)
 
 
-def export_onnx(model: TireModel, path: Path, *, single: bool = False) -> None:
+def export_onnx(
+    model: TireModel, path: Path, *, single: bool = False, with_band: bool = False
+) -> None:
     """Write a frozen model as an ONNX file.
 
     Parameters
     ----------
     model : see `onnx_bytes`.
     single : whether numbers are float32; else they are float64.
+    with_band : see `onnx_bytes`.
 
     Raises
     ------
@@ -285,4 +374,4 @@ def export_onnx(model: TireModel, path: Path, *, single: bool = False) -> None:
     MissingOnnxError
         Where the package onnx is not installed.
     """
-    write_atomically(path, onnx_bytes(model, single=single))
+    write_atomically(path, onnx_bytes(model, single=single, with_band=with_band))

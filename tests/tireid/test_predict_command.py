@@ -91,6 +91,13 @@ def test_it_says_how_often_the_band_held(logs, tmp_path, capsys):
     said = f"in {100.0 * held[0]:.0f} / {100.0 * held[1]:.0f} % of the windows of 0.3 s"
     assert said in capsys.readouterr().out
     assert min(held) > 0.7
+    table = np.genfromtxt(tmp_path / "out" / "forces.csv", delimiter=",", names=True)
+    for k, axle in enumerate(("Fyf", "Fyr")):
+        half = table[f"{axle}_half_band_N"]
+        away = np.abs(table[f"{axle}_predicted_N"] - table[f"{axle}_true_N"])
+        share = np.mean(away[half > 0.0] <= half[half > 0.0])
+        assert summary["truth_within_band"][k] == pytest.approx(share, abs=0.01)
+        assert share > 0.7
     replace(tire, W=0.6 * tire.W).save(tmp_path / "weak.json")
     weak, _ = predicted(tmp_path / "weak", tmp_path / "weak.json", logs / "quick.csv", status=3)
     assert max(weak["windows_within_band"]) < 0.6

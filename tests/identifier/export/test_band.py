@@ -11,6 +11,7 @@ from identifier.axle.band_step import hinged, hinges
 from identifier.export import fmu as binaries
 from identifier.export.compiled import CompiledPackage, samples_of
 from identifier.export.fmu import export_fmu, fmu_text
+from identifier.export.onnx import NoOnnxError, onnx_bytes
 from identifier.export.package import build_package, run_in_virtual_machine
 from identifier.export.specialize import specialize
 from identifier.methods import make_method
@@ -141,3 +142,20 @@ def test_an_fmu_tells_the_band_of_the_step_to_the_last_bit(
     expected, _ = run_in_virtual_machine(package.specialized, samples_of(drive))
     for column, name in enumerate(names, start=2):
         np.testing.assert_allclose(told[name][1:], expected[:, column], rtol=1e-6)
+
+
+@pytest.mark.parametrize("single", [False, True])
+def test_onnx_tells_the_band_of_the_model(single, model):
+    pytest.importorskip("onnx", reason="needs the package onnx")
+    runtime = pytest.importorskip("onnxruntime", reason="needs the package onnxruntime")
+    session = runtime.InferenceSession(onnx_bytes(model, single=single, with_band=True))
+    alpha = np.linspace(-0.4, 0.4, 81)
+    column = alpha[:, None].astype(np.float32 if single else np.float64)
+    told = session.run(None, {"alpha_f": column, "alpha_r": column})
+    expected = np.column_stack([model.force_at(alpha), model.half_band(alpha)])
+    np.testing.assert_allclose(np.hstack(told), expected, rtol=2e-4 if single else 1e-9, atol=0.1)
+    assert len(runtime.InferenceSession(onnx_bytes(model)).get_outputs()) == 2
+    paper = make_method("integral", CAR)
+    network = paper.frozen(CAR, paper.setup(CAR).carry)
+    with pytest.raises(NoOnnxError, match="cannot tell how sure it is"):
+        onnx_bytes(network, with_band=True)
