@@ -279,7 +279,7 @@ class BandSpread(NamedTuple):
         ----------
         force : φ of the model [static axle loads].
         left, before : v and v₀ [static axle loads²].
-        stretch : s, of errors of the model.
+        stretch : s, of errors of the model [-], a number or (k, 1).
         """
         share = np.minimum(left / np.maximum(UNKNOWN**2 * before, TINY), 1.0)
         total = ((RELATIVE * force) ** 2 + FLOOR**2) * stretch**2 + left
