@@ -175,3 +175,24 @@ def test_beside_a_tracker_the_identifier_lies_in_a_folder_of_its_own(monkeypatch
     assert said[0] == "identifier", "and nothing else, when the tracker is to be written"
     assert (out / "identifier" / "include" / "tireid.h").is_file()
     assert not (out / "include").exists()
+
+
+def test_the_band_is_exported_as_it_was_calibrated(tmp_path, logs, capsys):
+    run = identify(read_recording(logs / "slalom.csv"), CAR, make_method("axle", CAR))
+    run.calibrated().save(tmp_path / "weights.json")
+    words = ["export", "--band", "--weights", str(tmp_path / "weights.json")]
+    assert main([*words, "--out", str(tmp_path / "told")]) == 0
+    manifest = json.loads((tmp_path / "told" / "tireid.json").read_text())
+    assert manifest["band"] == run.calibrated().calibration.to_dict()
+    assert "half_band" in (tmp_path / "told" / "include" / "tireid_config.h").read_text()
+    assert exporting.UNCALIBRATED not in capsys.readouterr().err
+    again = exporting.export(run, tmp_path / "run", band=True)
+    assert again.package.specialized.band == manifest["band"]
+
+
+def test_a_band_that_nobody_calibrated_is_said_and_a_method_without_one_refused(tmp_path, capsys):
+    assert main(["export", "--band", "--out", str(tmp_path / "fresh")]) == 0
+    assert exporting.UNCALIBRATED in capsys.readouterr().err
+    assert main(["export", "--band", "--paper", "--out", str(tmp_path / "paper")]) == 2
+    assert "cannot tell how sure it is: it has no band" in capsys.readouterr().err
+    assert not (tmp_path / "paper").exists()
