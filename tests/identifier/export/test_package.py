@@ -266,6 +266,20 @@ def test_the_example_tells_side_slip_from_a_log_without_a_lateral_velocity(
     assert (rows[:, -1] == 0).all() and rows[2000:, 5].mean() > 0.5
 
 
+def test_the_example_prints_the_band_beside_the_forces(packages, write, run, slalom):
+    folder, drive = write(packages[BANKED]), slalom.taken(np.arange(400))
+    names = {"t": "t", "ay": "a_y", "vx": "v_x", "vy": "v_y", "r": "r", "delta_f": "delta_f"}
+    table = np.column_stack([getattr(drive, signal) for signal in names.values()])
+    log = folder / "log.csv"
+    np.savetxt(log, table, delimiter=",", header=",".join(names), comments="", fmt="%.17g")
+    told = example(folder, run, log).stdout.splitlines()
+    assert told[0] == "t,Fyf,Fyr,Fyf_half_band,Fyr_half_band,status"
+    rows = np.loadtxt(told[1:], delimiter=",")
+    compiled = CompiledPackage.of(packages[BANKED]).run(drive).outputs["half_band"]
+    np.testing.assert_allclose(rows[:, 3:5], compiled, rtol=1e-6)
+    assert (compiled[10:] > 0.0).all()
+
+
 @pytest.mark.parametrize(
     ("law", "columns", "missing"),
     [
