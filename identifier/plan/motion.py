@@ -1,0 +1,132 @@
+"""The bicycle on curves of the axle identifier, many cars and many steerings at a time.
+
+Rows are steerings m and tires k: arrays of lanes (..., m, k).   v_x is held.
+m_v (dv_y/dt + v_x r) = F_f cos δ + F_r,   I_z dr/dt = l_f F_f cos δ - l_r F_r,   F_i = F_z,i φ_i(x)
+x follows α over the lag of `identifier.axle.slip`, exactly for α linear over a step (first-order
+hold); with it its sensitivities to compliance and sway share. Velocities take the force of the slip
+at the end of the step (semi-implicit), so that stiff tires at low speed stay stable.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from codegen.arrays import Array
+from identifier.axle.slip import SHORTEST
+from identifier.plan.tires import PlausibleTires
+
+STEP = 0.037  # of the time sqrt(L/g): 20 ms in a sedan
+LEAST_SLOPE = 0.02  # of that at zero, for the lag
+
+
+class Motion(NamedTuple):
+    """What cars do, at n times: lanes (n, m, k), axles (n, 2, m, k).
+
+    slip : lagged x [rad].   force : φ [static axle loads].   slope : dφ/dx [1/rad].
+    of_compliance, of_share : ∂x/∂s [rad per m/load] and ∂x/∂k [rad].
+    v_y : [m/s].   r : [rad/s].   X, Y : center of gravity [m].   psi : heading [rad].
+    """
+
+    slip: Array
+    force: Array
+    slope: Array
+    of_compliance: Array
+    of_share: Array
+    v_y: Array
+    r: Array
+    X: Array
+    Y: Array
+    psi: Array
+
+
+class Entry(NamedTuple):
+    """Where cars come in: X, Y [m] and heading [rad], (m,) each."""
+
+    X: Array
+    Y: Array
+    psi: Array
+
+
+def time_step(tires: PlausibleTires) -> float:
+    """Return the step of the simulation [s]."""
+    return STEP * tires.vehicle.froude_time
+
+
+def simulate(tires: PlausibleTires, delta: Array, v_x: float, entry: Entry) -> Motion:
+    """Return the motion of all tires under all steerings.
+
+    Parameters
+    ----------
+    tires : k pairs of axles.
+    delta : angles of the front wheels at steps of `time_step` [rad], (n, m).
+    v_x : speed [m/s].
+    entry : of each steering.
+    """
+    car, dt, scales = tires.vehicle, time_step(tires), 1.0 / np.array(tires.method.ladder)
+    n, m, k = *delta.shape, len(tires.W)
+    W = tires.W.transpose(2, 1, 0)[:, :, None, :]  # (units, 2, 1, k)
+    inverse = scales[:, None, None, None]
+    flattest = LEAST_SLOPE * (W * inverse).sum(axis=0)
+    s, share = (tires.own[:, i][:, None, None] for i in (0, 1))
+    loads = np.array(car.axle_loads)
+    to_v, to_r = loads / car.mass, np.array([car.l_f, -car.l_r]) * loads / car.yaw_inertia
+    arm = np.array([car.l_f, -car.l_r])[:, None, None]
+    stiffness, damping, soft = tires.method.sway.numbers()
+    shortest = SHORTEST * car.wheelbase
+    cos_delta = np.cos(delta)
+    lanes, axles = np.zeros((m, k)), np.zeros((2, m, k))
+    v_y = r = rho = rho_dot = lanes
+    x = alpha = p_s = p_k = sway = axles
+    force, slope, bend = axles, (W * inverse).sum(axis=0) + axles, axles
+    X, Y, psi = (np.repeat(one[:, None], k, axis=1) for one in entry)
+    out = Motion(*(np.empty((n, *(one.shape))) for one in (x, x, x, x, x, v_y, r, X, Y, psi)))
+    for i in range(n):
+        # Sway of the body, semi-implicit, and the slip that it makes.
+        a = to_v[0] * force[0] + to_v[1] * force[1]
+        rho_dot = (rho_dot + dt * stiffness * (a - rho)) / (1.0 + dt * damping)
+        rho = rho + dt * rho_dot
+        sway_now = -rho_dot * soft / v_x
+        alpha_now = np.arctan((v_y + arm * r) / v_x)
+        np.negative(alpha_now, out=alpha_now)
+        alpha_now[0] += delta[i][:, None]
+        alpha_now += share * sway_now
+        # The lag and its sensitivities.
+        C = np.maximum(slope, flattest)
+        sigma = s * C + shortest
+        z = v_x * dt / sigma
+        e = np.exp(-z)
+        phi = (1.0 - e) / z
+        change = alpha_now - alpha
+        by_sigma = ((e - phi) * change - z * e * (alpha - x)) / sigma
+        p_s = e * p_s + by_sigma * (C + s * bend * p_s)
+        p_k = e * p_k + (1.0 - e) * sway + (1.0 - phi) * (sway_now - sway)
+        x = e * x + (1.0 - e) * alpha + (1.0 - phi) * change
+        alpha, sway = alpha_now, sway_now
+        T = np.tanh(x * inverse)
+        slopes = W * (1.0 - T * T) * inverse
+        force, slope = (W * T).sum(axis=0), slopes.sum(axis=0)
+        bend = np.where(slope < flattest, 0.0, -2.0 * (T * slopes * inverse).sum(axis=0))
+        for to, value in zip(
+            out, (x, force, slope, p_s, p_k, v_y, r, X, Y, psi), strict=True
+        ):
+            to[i] = value
+        front = force[0] * cos_delta[i][:, None]
+        v_y = v_y + dt * (to_v[0] * front + to_v[1] * force[1] - v_x * r)
+        r = r + dt * (to_r[0] * front + to_r[1] * force[1])
+        course = psi + 0.5 * dt * r
+        X = X + dt * (v_x * np.cos(course) - v_y * np.sin(course))
+        Y = Y + dt * (v_x * np.sin(course) + v_y * np.cos(course))
+        psi = psi + dt * r
+    return out
+
+
+def steps_of(tires: PlausibleTires, duration: float) -> Array:
+    """Return the times of a simulation [s], (n,).
+
+    Parameters
+    ----------
+    duration : [s].
+    """
+    dt = time_step(tires)
+    return dt * np.arange(math.ceil(duration / dt) + 1)

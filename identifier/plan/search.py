@@ -1,0 +1,313 @@
+"""The steering that teaches most within an area: one pass through it, found by a global search.
+
+A pass enters at the left edge of the area (X along its length, Y to the left, origin in its corner)
+at a place and a heading that are found too. Steering is N angles joined by half cosines, whose
+durations change from the first to the last by one ratio. Differential evolution (R. Storn, K.
+Price, J. Global Optimization 11, 1997) makes the expected error small, meant over all tires that
+the car may have; a pass is possible where each of these cars stays in the area, none slides at the
+rear, and the likely one keeps its share of the grip at both axles.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import differential_evolution
+
+from codegen.arrays import Array
+from identifier.plan.information import asked, covariance_after, expected_error
+from identifier.plan.motion import Entry, Motion, simulate, steps_of
+from identifier.plan.tires import PlausibleTires
+from models.maneuvers import Swings
+from models.rules import require_positive, require_within
+from models.vehicle import GRAVITY
+
+POPULATION, GENERATIONS = 64, 70
+SWING = 0.75  # sqrt(L/g): mean duration of a change from angle to angle, 0.4 s in a sedan
+CHIRP = math.log(3.0)  # largest ratio of the last to the mean duration, and of the mean to the first
+REAR = 0.97  # share of the grip that no rear axle passes, whatever the tires
+OVERHANG = 0.32  # wheelbases by which a car reaches beyond its axles
+HALF_WIDTH = 0.33  # wheelbases, of a car without a chassis
+WIDER = 1.12  # of the body over its track
+LARGEST_HEADING = math.radians(60.0)  # at the entry
+FEWEST = 3  # changes of the angle that make a pass
+
+
+class PlanError(ValueError):
+    """No maneuver is possible as asked; the message says what would be."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Space:
+    """Where, how fast and how hard it is driven.
+
+    Parameters
+    ----------
+    length, width : of the area [m], the longer side first.
+    speed : that is held [m/s].
+    share : of the grip that the likely tires take at most, at both axles [-].
+    margin : between any part of the car and the edge of the area [m].
+    rate_limit : largest steering rate of the front wheels [rad/s].
+    max_angle : of the front wheels [rad].
+
+    Raises
+    ------
+    PlanError
+        Where a number is not positive, or the share not between 0.2 and 0.97.
+    """
+
+    length: float
+    width: float
+    speed: float
+    share: float
+    margin: float
+    rate_limit: float
+    max_angle: float
+
+    def __post_init__(self) -> None:
+        require_positive(
+            PlanError,
+            **{name: getattr(self, name) for name in ("length", "width", "speed", "rate_limit")},
+        )
+        require_within(PlanError, 0.0, 1e3, margin=self.margin)
+        require_within(PlanError, 0.2, REAR, share=self.share)
+        require_within(PlanError, math.radians(1.0), math.radians(60.0), max_angle=self.max_angle)
+
+
+class Body(NamedTuple):
+    """How far a car reaches from its center of gravity [m]: ahead, behind, to each side."""
+
+    ahead: float
+    behind: float
+    side: float
+
+
+def body_of(tires: PlausibleTires) -> Body:
+    """Return the size of the body of a car."""
+    car = tires.vehicle
+    over = OVERHANG * car.wheelbase
+    side = HALF_WIDTH * car.wheelbase
+    if car.chassis is not None:
+        track = max(car.chassis.track_front, car.chassis.track_rear)
+        side = 0.5 * WIDER * track
+    return Body(car.l_f + over, car.l_r + over, side)
+
+
+class Steerings(NamedTuple):
+    """m steerings: times (m, N + 1) [s], angles (m, N + 1) [rad], and entries."""
+
+    times: Array
+    angles: Array
+    entry: Entry
+
+    def delta(self, t: Array) -> Array:
+        """Return the angles of the front wheels over time [rad], (n, m).
+
+        Parameters
+        ----------
+        t : [s], (n,).
+        """
+        return np.column_stack(
+            [
+                _maneuver(times, angles, float(times[-1]), math.inf).steering(t)[:, 0]
+                for times, angles in zip(self.times, self.angles, strict=True)
+            ]
+        )
+
+
+def _maneuver(times: Array, angles: Array, duration: float, rate: float) -> Swings:
+    limit = rate if math.isfinite(rate) else 1e6
+    return Swings(
+        times=tuple(map(float, times)),
+        angles=tuple(map(float, angles)),
+        rate_limit=limit,
+        duration=duration,
+    )
+
+
+class Pass(NamedTuple):
+    """One way through the area.
+
+    steering : of the front wheels from the entry on.   entry : where and how it comes in.
+    motion : of all plausible tires, as `Motion` with m = 1.   covariance : after it, of the likely
+    tires, (2, q, q).   error : expected after it, meant over all tires [-].
+    """
+
+    steering: Swings
+    entry: Entry
+    motion: Motion
+    covariance: Array
+    error: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Search:
+    """A pass of a given duration that is looked for.
+
+    Parameters
+    ----------
+    tires : that the car may have.
+    space : where and how.
+    duration : of the pass [s].
+    """
+
+    tires: PlausibleTires
+    space: Space
+    duration: float
+
+    @property
+    def swings(self) -> int:
+        """How many changes of the angle a pass has."""
+        return max(FEWEST, round(self.duration / (SWING * self.tires.vehicle.froude_time)))
+
+    @property
+    def largest_angle(self) -> float:
+        """Angle that no swing passes [rad]: a bend at the grip, and the slip it takes."""
+        car, grip = self.tires.vehicle, float(self.tires.grip[0].mean())
+        bend = car.wheelbase * grip * GRAVITY / self.space.speed**2
+        return min(self.space.max_angle, bend + 1.5 * float(self.tires.slip_at(REAR)[0, 0]))
+
+    def steerings(self, numbers: Array) -> Steerings:
+        """Return the steerings that numbers between -1 and 1 stand for; rates are kept.
+
+        Parameters
+        ----------
+        numbers : N - 1 angles, ratio of durations, place and heading of the entry, (m, N + 2).
+        """
+        N, space = self.swings, self.space
+        u, (chirp, place, heading) = numbers[:, : N - 1], numbers[:, N - 1 :].T
+        spans = np.exp(CHIRP * chirp[:, None] * np.linspace(-1.0, 1.0, N))
+        spans *= self.duration / spans.sum(axis=1, keepdims=True)
+        angles = np.zeros((len(numbers), N + 1))
+        angles[:, 1:N] = u * self.largest_angle
+        reach = 2.0 / math.pi * space.rate_limit * spans * (1.0 - 1e-9)
+        for k in range(1, N):
+            angles[:, k] = np.clip(
+                angles[:, k], angles[:, k - 1] - reach[:, k - 1], angles[:, k - 1] + reach[:, k - 1]
+            )
+        for k in range(N - 1, 0, -1):
+            angles[:, k] = np.clip(
+                angles[:, k], angles[:, k + 1] - reach[:, k], angles[:, k + 1] + reach[:, k]
+            )
+        times = np.column_stack([np.zeros(len(numbers)), np.cumsum(spans, axis=1)])
+        body = body_of(self.tires)
+        psi = LARGEST_HEADING * heading
+        free = 0.5 * space.width - space.margin - body.side
+        X = space.margin + body.behind * np.cos(psi) + body.side * np.abs(np.sin(psi))
+        return Steerings(times, angles, Entry(X, 0.5 * space.width + free * place, psi))
+
+    def costs(self, numbers: Array) -> Array:
+        """Return the expected error of steerings, more than 1 where they are not possible, (m,)."""
+        steerings = self.steerings(numbers)
+        motion = self.motion(steerings)
+        violation = self.violation(motion)
+        P = covariance_after(self.tires, motion, self.space.speed)
+        error = expected_error(self.tires, asked(self.tires, self.space.speed), P).mean(axis=1)
+        cost: Array = np.where(violation > 0.0, 1.0 + violation, error)
+        return cost
+
+    def motion(self, steerings: Steerings) -> Motion:
+        """Return what all tires do under steerings."""
+        t = steps_of(self.tires, self.duration)
+        return simulate(self.tires, steerings.delta(t), self.space.speed, steerings.entry)
+
+    def violation(self, motion: Motion) -> Array:
+        """Return by how much motions break a limit, not positive where they are possible, (m,)."""
+        slip = np.abs(motion.slip).max(axis=0)  # (2, m, k)
+        limit = self.tires.slip_at(REAR).T  # (2, k)
+        over = [slip[1] / limit[1] - 1.0]
+        over += [slip[:, :, 0].T / self.tires.slip_at(self.space.share)[0] - 1.0]
+        outside = self.beyond(motion) / self.tires.vehicle.wheelbase
+        worst = [one.max(axis=1) for one in (*over, outside)]
+        return np.asarray(np.sum(np.maximum(worst, 0.0), axis=0))
+
+    def beyond(self, motion: Motion) -> Array:
+        """Return by how far the margin is broken at most [m], (m, k); negative inside."""
+        space, body = self.space, body_of(self.tires)
+        c, s = np.cos(motion.psi), np.sin(motion.psi)
+        worst = np.full(motion.v_y.shape[1:], -math.inf)
+        for along in (body.ahead, -body.behind):
+            for side in (body.side, -body.side):
+                X = motion.X + along * c - side * s
+                Y = motion.Y + along * s + side * c
+                for low in (X, space.length - X, Y, space.width - Y):
+                    worst = np.maximum(worst, (space.margin - 1e-6 - low).max(axis=0))
+        return worst
+
+    def beginnings(self, rng: np.random.Generator) -> Array:
+        """Return numbers to begin with, swings to the left and the right of all sizes, (m, N + 2).
+
+        Parameters
+        ----------
+        rng : source of randomness.
+        """
+        N = self.swings
+        size = np.exp(rng.uniform(math.log(0.05), 0.0, (POPULATION, 1)))
+        sign = np.where(np.arange(N - 1) % 2 == 0, 1.0, -1.0)
+        u = size * sign * rng.uniform(-0.2, 1.0, (POPULATION, N - 1))
+        u *= rng.choice([-1.0, 1.0], (POPULATION, 1))
+        rest = rng.uniform(-1.0, 1.0, (POPULATION, 3)) * [1.0, 0.9, 0.3]
+        return np.column_stack([u, rest])
+
+    def best(
+        self, rng: np.random.Generator, progress: Callable[[float], None] | None = None
+    ) -> Pass:
+        """Return the pass that teaches most.
+
+        Parameters
+        ----------
+        rng : source of randomness.
+        progress : called with the share of the generations.
+
+        Raises
+        ------
+        PlanError
+            Where no pass is possible.
+        """
+        done = 0
+
+        def after(*_: object) -> None:
+            nonlocal done
+            done += 1
+            if progress is not None:
+                progress(done / GENERATIONS)
+
+        found = differential_evolution(
+            lambda u: self.costs(u.T),
+            [(-1.0, 1.0)] * (self.swings + 2),
+            init=self.beginnings(rng),
+            maxiter=GENERATIONS,
+            mutation=(0.3, 0.8),
+            recombination=0.8,
+            tol=0.0,
+            polish=False,
+            updating="deferred",
+            vectorized=True,
+            callback=after,
+            rng=rng,
+        )
+        if not found.fun < 1.0:
+            raise PlanError(
+                f"no pass of {self.duration:.3g} s at {self.space.speed:g} m/s stays in "
+                f"{self.space.length:g} x {self.space.width:g} m with every tire that the car may "
+                "have: give more room, a lower speed, a shorter pass or less margin"
+            )
+        return self.as_pass(np.array([found.x]))
+
+    def as_pass(self, numbers: Array) -> Pass:
+        """Return the pass that one row of numbers stands for."""
+        steerings = self.steerings(numbers)
+        motion = self.motion(steerings)
+        P = covariance_after(self.tires, motion, self.space.speed)
+        error = expected_error(self.tires, asked(self.tires, self.space.speed), P)
+        steering = _maneuver(
+            steerings.times[0], steerings.angles[0], self.duration, self.space.rate_limit
+        )
+        return Pass(steering, steerings.entry, motion, P[0, 0], float(error.mean()))
+
+
+def after_pass(tires: PlausibleTires, one: Pass) -> PlausibleTires:
+    """Return the tires when a pass was driven."""
+    return replace(tires, covariance=one.covariance)

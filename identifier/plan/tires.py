@@ -1,0 +1,126 @@
+"""Tires that a car may have, as far as anybody knows before it drives: what a plan must stand.
+
+Of a car that was never identified: brush tires (models as in the prior of the axle identifier) of
+the told stiffness and friction, and those that are softer, stiffer, more slippery or grippier by
+a share. No car is believed to oversteer at small slip: where the told rear axle is softer for its
+load than the front one, both are taken to be alike. Of a model that was learnt: its own curve, and
+curves drawn from what learning left open.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from codegen.arrays import Array
+from identifier.axle import AxleIdentifier, AxleModel
+from identifier.axle.curve import unit_matrix
+from identifier.axle.prior import fiala_weights
+from models.vehicle import Vehicle
+
+SPREAD = 0.3  # of stiffness and of friction, either way
+DRAWN = 6  # curves of a learnt model
+SLIPS = np.linspace(0.0, 0.5, 501)[1:]  # rad, where curves are looked at
+FLAT = 0.98  # of the largest force of a curve: slip that matters ends where it is reached
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlausibleTires:
+    """k pairs of axles, the first of which is taken for the truth until more is known.
+
+    Parameters
+    ----------
+    vehicle : the car, as it is told.
+    method : that is to learn.
+    W : weights [static axle loads], (k, 2, n).
+    own : compliance [m per load], sway share [-], offset (2, 3), of all.
+    covariance : of weights and own before the maneuver, (2, n + 3, n + 3).
+    prior : that of a car that never drove.
+    """
+
+    vehicle: Vehicle
+    method: AxleIdentifier
+    W: Array
+    own: Array
+    covariance: Array
+    prior: Array
+
+    @classmethod
+    def told(cls, vehicle: Vehicle, friction: float) -> Self:
+        """Return the tires that a car may have that was never identified.
+
+        Parameters
+        ----------
+        friction : believed of tires and road [-].
+        """
+        method = AxleIdentifier.for_vehicle(vehicle)
+        method = replace(method, prior=replace(method.prior, friction=friction))
+        ladder, prior = method.ladder, method.prior
+        bicycle, loads = vehicle.bicycle, vehicle.axle_loads
+        front, rear = bicycle.C_f / loads[0], bicycle.C_r / loads[1]
+        if rear < front:
+            front = rear = (front * rear) ** 0.5
+        low, high = 1.0 - SPREAD, 1.0 + SPREAD
+        cases = (
+            (front, rear, friction),
+            (low * front, low * rear, friction),
+            (high * front, high * rear, friction),
+            (front, rear, low * friction),
+            (front, rear, high * friction),
+            (low * front, high * rear, friction),
+            (low * front, low * rear, low * friction),
+        )
+        W = [[fiala_weights(c, mu, ladder) for c in (f, r)] for f, r, mu in cases]
+        P = prior.covariance(vehicle, ladder)
+        own = prior.means(vehicle, ladder)[1]
+        return cls(vehicle=vehicle, method=method, W=np.array(W), own=own, covariance=P, prior=P)
+
+    @classmethod
+    def learnt(cls, model: AxleModel, rng: np.random.Generator) -> Self:
+        """Return the tires that a car may have of which a model was learnt.
+
+        Parameters
+        ----------
+        model : the car's.
+        rng : source of the curves that are drawn.
+        """
+        drawn = model.samples(DRAWN, rng)
+        return cls(
+            vehicle=model.vehicle,
+            method=replace(AxleIdentifier.for_vehicle(model.vehicle), ladder=model.ladder),
+            W=np.array([model.W, *(one.W for one in drawn)]),
+            own=model.own * [1.0, 1.0, 0.0],
+            covariance=model.covariance,
+            prior=model.prior_covariance,
+        )
+
+    @property
+    def grip(self) -> Array:
+        """Largest force of the curves [static axle loads], (k, 2)."""
+        return self._curves.max(axis=0)
+
+    def slip_at(self, share: float) -> Array:
+        """Return the least slip at which the curves reach a share of their grip [rad], (k, 2).
+
+        Parameters
+        ----------
+        share : of the largest force, at most 1.
+        """
+        reached = self._curves >= share * self.grip
+        slips: Array = SLIPS[reached.argmax(axis=0)]
+        return slips
+
+    @property
+    def _curves(self) -> Array:
+        """Forces at `SLIPS`, (501, k, 2)."""
+        units = unit_matrix(SLIPS, self.method.ladder)
+        return np.einsum("sj,kaj->ska", units, self.W)
+
+    def after(self, covariance: Array) -> Self:
+        """Return the same tires when more is known of them.
+
+        Parameters
+        ----------
+        covariance : of weights and own, (2, n + 3, n + 3).
+        """
+        return replace(self, covariance=covariance)
