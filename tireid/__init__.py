@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from tireid.driving import drive, sample_recording
     from tireid.exporting import export
     from tireid.learning import identify, replay
+    from tireid.planning import plan
 
     __version__: str
 
@@ -51,6 +52,7 @@ _HOMES = {
     "identify": ("tireid.learning", "identify"),
     "make_method": ("identifier.methods", "make_method"),
     "paths": ("mpc.path", ""),
+    "plan": ("tireid.planning", "plan"),
     "read_recording": ("models.recordings", "read_recording"),
     "read_repaired": ("models.recordings", "read_repaired"),
     "replay": ("tireid.learning", "replay"),
@@ -79,6 +81,7 @@ __all__ = [
     "identify",
     "make_method",
     "paths",
+    "plan",
     "read_recording",
     "read_repaired",
     "replay",

@@ -1,7 +1,8 @@
 """What the axle identifier will know after a maneuver: covariance, and the error to be expected.
 
-P⁻¹ = P₀⁻¹ + Σ h h'/R, with the regressor h and the variance R of `identifier.axle.learning`; none
-of it is forgotten, as maneuvers are shorter than the memory. The figure that is made small is the
+P⁻¹ = P₀⁻¹ + Σ h h'/R, with the regressor h and the variance R of `identifier.axle.learning`,
+whose errors are taken to be alike for half a second, as those of a model are; none of it is
+forgotten, as maneuvers are shorter than the memory. The figure that is made small is the
 root mean square, over both axles and the slips that matter, of the standard deviation of the force
 over the grip: sqrt(mean(t'P t + (φ' o)²))/μ (I-optimal design; V. V. Fedorov, Theory of Optimal
 Experiments, 1972).
@@ -17,6 +18,8 @@ from identifier.axle.curve import unit_matrix
 from identifier.plan.motion import Motion, time_step
 from identifier.plan.tires import FLAT, PlausibleTires
 
+COLOR = 5.0  # times the correlation time that learning is told: half a second, as errors of models
+EVERY = 3  # step of the simulation that counts: 60 ms in a sedan, the regressor is low-passed
 MATTERING = 12  # slips at which the curve is asked, up to where it is flat
 
 
@@ -40,12 +43,12 @@ def covariance_after(tires: PlausibleTires, motion: Motion, v_x: float) -> Array
     g[:, 1, ..., n + 2] = motion.slope[:, 1] / v_x
     e = float(np.exp(-numbers.bandwidth * dt))
     half = 0.5 * (1.0 - e)
-    h = lfilter([half, half], [1.0, -e], g, axis=0)
+    h = lfilter([half, half], [1.0, -e], g, axis=0)[::EVERY]
     y = np.einsum("taMkj,kaj->taMk", h[..., :n], tires.W)
     sigma = numbers.error + numbers.relative_error * np.abs(y)
-    sigma += numbers.lateness * numbers.bandwidth * np.abs(motion.force - y)
-    sigma += numbers.noise * np.maximum(motion.slope, 0.0) / v_x
-    h /= (sigma * np.sqrt(numbers.correlation_time / dt))[..., None]
+    sigma += numbers.lateness * numbers.bandwidth * np.abs(motion.force[::EVERY] - y)
+    sigma += numbers.noise * np.maximum(motion.slope[::EVERY], 0.0) / v_x
+    h /= (sigma * np.sqrt(COLOR * numbers.correlation_time / (EVERY * dt)))[..., None]
     lanes = np.ascontiguousarray(h.transpose(2, 3, 1, 4, 0))
     information = lanes @ lanes.swapaxes(-1, -2)
     P: Array = np.linalg.inv(np.linalg.inv(tires.covariance) + information)

@@ -5,19 +5,60 @@ m_v (dv_y/dt + v_x r) = F_f cos δ + F_r,   I_z dr/dt = l_f F_f cos δ - l_r F_r
 x follows α over the lag of `identifier.axle.slip`, exactly for α linear over a step (first-order
 hold); with it its sensitivities to compliance and sway share. Velocities take the force of the slip
 at the end of the step (semi-implicit), so that stiff tires at low speed stay stable.
+Who drives holds the planned course, which is that of the first tires:
+δ = δ_plan - (2 ω e_ψ + ω² e_y/v_x)/G, G the yaw rate of a steady bend per angle, so that deviations
+die out with a double pole at ω, slowly against the swings.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from codegen.arrays import Array
 from identifier.axle.slip import SHORTEST
 from identifier.plan.tires import PlausibleTires
+from models.vehicle import GRAVITY
 
+HOLD = 0.6  # 1/sqrt(L/g): pole of deviations from the course, 1.1 rad/s in a sedan
 STEP = 0.037  # of the time sqrt(L/g): 20 ms in a sedan
 LEAST_SLOPE = 0.02  # of that at zero, for the lag
+
+
+class Hold(NamedTuple):
+    """Steering per deviation from the course: of heading [-], to the left [rad/m]."""
+
+    heading: float
+    aside: float
+
+    def steering(self, reference: tuple[Any, Any, Any], now: tuple[Any, Any, Any]) -> Any:
+        """Return what is added to the planned angle [rad].
+
+        Parameters
+        ----------
+        reference, now : X, Y [m] and heading [rad], as planned and as they are.
+        """
+        (X, Y, psi), (X_now, Y_now, psi_now) = reference, now
+        e_y = (Y_now - Y) * np.cos(psi) - (X_now - X) * np.sin(psi)
+        return -self.heading * (psi_now - psi) - self.aside * e_y
+
+
+NO_HOLD = Hold(0.0, 0.0)
+
+
+def hold_of(tires: PlausibleTires, v_x: float) -> Hold:
+    """Return how the course is held by the first tires.
+
+    Parameters
+    ----------
+    tires : k pairs of axles.
+    v_x : speed [m/s].
+    """
+    car, omega = tires.vehicle, HOLD / tires.vehicle.froude_time
+    c_f, c_r = (tires.W[0] / np.array(tires.method.ladder)).sum(axis=1)
+    per_yaw_rate = car.wheelbase / v_x + v_x / GRAVITY * (1.0 / c_f - 1.0 / c_r)  # 1/G [s]
+    per_yaw_rate = max(per_yaw_rate, 0.5 * car.wheelbase / v_x)
+    return Hold(2.0 * omega * per_yaw_rate, omega**2 / v_x * per_yaw_rate)
 
 
 class Motion(NamedTuple):
@@ -38,6 +79,7 @@ class Motion(NamedTuple):
     X: Array
     Y: Array
     psi: Array
+    delta: Array
 
 
 class Entry(NamedTuple):
@@ -53,18 +95,19 @@ def time_step(tires: PlausibleTires) -> float:
     return STEP * tires.vehicle.froude_time
 
 
-def simulate(tires: PlausibleTires, delta: Array, v_x: float, entry: Entry) -> Motion:
+def simulate(tires: PlausibleTires, planned: Array, v_x: float, entry: Entry, hold: Hold) -> Motion:
     """Return the motion of all tires under all steerings.
 
     Parameters
     ----------
     tires : k pairs of axles.
-    delta : angles of the front wheels at steps of `time_step` [rad], (n, m).
+    planned : angles of the front wheels at steps of `time_step` [rad], (n, m).
     v_x : speed [m/s].
     entry : of each steering.
+    hold : how the course of the first tires is held.
     """
     car, dt, scales = tires.vehicle, time_step(tires), 1.0 / np.array(tires.method.ladder)
-    n, m, k = *delta.shape, len(tires.W)
+    n, m, k = *planned.shape, len(tires.W)
     W = tires.W.transpose(2, 1, 0)[:, :, None, :]  # (units, 2, 1, k)
     inverse = scales[:, None, None, None]
     flattest = LEAST_SLOPE * (W * inverse).sum(axis=0)
@@ -74,14 +117,15 @@ def simulate(tires: PlausibleTires, delta: Array, v_x: float, entry: Entry) -> M
     arm = np.array([car.l_f, -car.l_r])[:, None, None]
     stiffness, damping, soft = tires.method.sway.numbers()
     shortest = SHORTEST * car.wheelbase
-    cos_delta = np.cos(delta)
     lanes, axles = np.zeros((m, k)), np.zeros((2, m, k))
     v_y = r = rho = rho_dot = lanes
     x = alpha = p_s = p_k = sway = axles
     force, slope, bend = axles, (W * inverse).sum(axis=0) + axles, axles
     X, Y, psi = (np.repeat(one[:, None], k, axis=1) for one in entry)
-    out = Motion(*(np.empty((n, *(one.shape))) for one in (x, x, x, x, x, v_y, r, X, Y, psi)))
+    out = Motion(*(np.empty((n, *(one.shape))) for one in (x, x, x, x, x, v_y, r, X, Y, psi, r)))
     for i in range(n):
+        course = X[:, :1], Y[:, :1], psi[:, :1]
+        delta = planned[i][:, None] + hold.steering(course, (X, Y, psi))
         # Sway of the body, semi-implicit, and the slip that it makes.
         a = to_v[0] * force[0] + to_v[1] * force[1]
         rho_dot = (rho_dot + dt * stiffness * (a - rho)) / (1.0 + dt * damping)
@@ -89,7 +133,7 @@ def simulate(tires: PlausibleTires, delta: Array, v_x: float, entry: Entry) -> M
         sway_now = -rho_dot * soft / v_x
         alpha_now = np.arctan((v_y + arm * r) / v_x)
         np.negative(alpha_now, out=alpha_now)
-        alpha_now[0] += delta[i][:, None]
+        alpha_now[0] += delta
         alpha_now += share * sway_now
         # The lag and its sensitivities.
         C = np.maximum(slope, flattest)
@@ -108,15 +152,14 @@ def simulate(tires: PlausibleTires, delta: Array, v_x: float, entry: Entry) -> M
         force, slope = (W * T).sum(axis=0), slopes.sum(axis=0)
         bend = np.where(slope < flattest, 0.0, -2.0 * (T * slopes * inverse).sum(axis=0))
         for to, value in zip(
-            out, (x, force, slope, p_s, p_k, v_y, r, X, Y, psi), strict=True
+            out, (x, force, slope, p_s, p_k, v_y, r, X, Y, psi, delta), strict=True
         ):
             to[i] = value
-        front = force[0] * cos_delta[i][:, None]
+        front = force[0] * np.cos(delta)
         v_y = v_y + dt * (to_v[0] * front + to_v[1] * force[1] - v_x * r)
         r = r + dt * (to_r[0] * front + to_r[1] * force[1])
-        course = psi + 0.5 * dt * r
-        X = X + dt * (v_x * np.cos(course) - v_y * np.sin(course))
-        Y = Y + dt * (v_x * np.sin(course) + v_y * np.cos(course))
+        c, s_ = np.cos(psi + 0.5 * dt * r), np.sin(psi + 0.5 * dt * r)
+        X, Y = X + dt * (v_x * c - v_y * s_), Y + dt * (v_x * s_ + v_y * c)
         psi = psi + dt * r
     return out
 
@@ -129,4 +172,4 @@ def steps_of(tires: PlausibleTires, duration: float) -> Array:
     duration : [s].
     """
     dt = time_step(tires)
-    return dt * np.arange(math.ceil(duration / dt) + 1)
+    return dt * np.arange(math.ceil(duration / dt) + 1, dtype=np.float64)

@@ -2,10 +2,11 @@
 
 A pass enters at the left edge of the area (X along its length, Y to the left, origin in its corner)
 at a place and a heading that are found too. Steering is N angles joined by half cosines, whose
-durations change from the first to the last by one ratio. Differential evolution (R. Storn, K.
-Price, J. Global Optimization 11, 1997) makes the expected error small, meant over all tires that
-the car may have; a pass is possible where each of these cars stays in the area, none slides at the
-rear, and the likely one keeps its share of the grip at both axles.
+durations change from the first to the last by one ratio; in a long pass they repeat, every other
+time mirrored. Differential evolution (R. Storn, K. Price, J. Global Optimization 11, 1997) makes
+the expected error small, meant over all tires that the car may have; a pass is possible where each
+of these cars stays in the area, none slides at the rear, and the likely one keeps its share of the
+grip at both axles.
 """
 
 import math
@@ -18,21 +19,23 @@ from scipy.optimize import differential_evolution
 
 from codegen.arrays import Array
 from identifier.plan.information import asked, covariance_after, expected_error
-from identifier.plan.motion import Entry, Motion, simulate, steps_of
+from identifier.plan.motion import NO_HOLD, Entry, Motion, hold_of, simulate, steps_of
 from identifier.plan.tires import PlausibleTires
 from models.maneuvers import Swings
 from models.rules import require_positive, require_within
 from models.vehicle import GRAVITY
 
-POPULATION, GENERATIONS = 64, 70
+POPULATION, GENERATIONS = 64, 100
 SWING = 0.75  # sqrt(L/g): mean duration of a change from angle to angle, 0.4 s in a sedan
-CHIRP = math.log(3.0)  # largest ratio of the last to the mean duration, and of the mean to the first
+CHIRP = math.log(
+    3.0
+)  # largest ratio of the last to the mean duration, and of the mean to the first
 REAR = 0.97  # share of the grip that no rear axle passes, whatever the tires
 OVERHANG = 0.32  # wheelbases by which a car reaches beyond its axles
 HALF_WIDTH = 0.33  # wheelbases, of a car without a chassis
 WIDER = 1.12  # of the body over its track
 LARGEST_HEADING = math.radians(60.0)  # at the entry
-FEWEST = 3  # changes of the angle that make a pass
+FEWEST, MOST = 3, 14  # changes of the angle; where a pass has more, they are driven mirrored
 
 
 class PlanError(ValueError):
@@ -51,6 +54,7 @@ class Space:
     margin : between any part of the car and the edge of the area [m].
     rate_limit : largest steering rate of the front wheels [rad/s].
     max_angle : of the front wheels [rad].
+    held : whether who drives holds the planned course, or steers blindly.
 
     Raises
     ------
@@ -65,6 +69,7 @@ class Space:
     margin: float
     rate_limit: float
     max_angle: float
+    held: bool = True
 
     def __post_init__(self) -> None:
         require_positive(
@@ -132,7 +137,7 @@ class Pass(NamedTuple):
 
     steering : of the front wheels from the entry on.   entry : where and how it comes in.
     motion : of all plausible tires, as `Motion` with m = 1.   covariance : after it, of the likely
-    tires, (2, q, q).   error : expected after it, meant over all tires [-].
+    tires, (2, q, q).   error : expected after it, meant over all tires [-].   t : of motion [s].
     """
 
     steering: Swings
@@ -140,6 +145,17 @@ class Pass(NamedTuple):
     motion: Motion
     covariance: Array
     error: float
+    t: Array
+
+    def course(self, t: Array) -> Array:
+        """Return X, Y [m] and heading [rad] of the likely tires, (n, 3).
+
+        Parameters
+        ----------
+        t : since the entry [s], (n,).
+        """
+        lines = (one[:, 0, 0] for one in (self.motion.X, self.motion.Y, self.motion.psi))
+        return np.column_stack([np.interp(t, self.t, line) for line in lines])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,8 +175,15 @@ class Search:
 
     @property
     def swings(self) -> int:
-        """How many changes of the angle a pass has."""
-        return max(FEWEST, round(self.duration / (SWING * self.tires.vehicle.froude_time)))
+        """How many changes of the angle there are before they repeat."""
+        wanted = round(self.duration / (SWING * self.tires.vehicle.froude_time))
+        return max(FEWEST, round(wanted / self.repeats))
+
+    @property
+    def repeats(self) -> int:
+        """How often the swings are driven, every other time mirrored."""
+        wanted = self.duration / (SWING * self.tires.vehicle.froude_time)
+        return max(1, math.ceil(wanted / MOST))
 
     @property
     def largest_angle(self) -> float:
@@ -179,7 +202,7 @@ class Search:
         N, space = self.swings, self.space
         u, (chirp, place, heading) = numbers[:, : N - 1], numbers[:, N - 1 :].T
         spans = np.exp(CHIRP * chirp[:, None] * np.linspace(-1.0, 1.0, N))
-        spans *= self.duration / spans.sum(axis=1, keepdims=True)
+        spans *= self.duration / self.repeats / spans.sum(axis=1, keepdims=True)
         angles = np.zeros((len(numbers), N + 1))
         angles[:, 1:N] = u * self.largest_angle
         reach = 2.0 / math.pi * space.rate_limit * spans * (1.0 - 1e-9)
@@ -191,6 +214,9 @@ class Search:
             angles[:, k] = np.clip(
                 angles[:, k], angles[:, k + 1] - reach[:, k], angles[:, k + 1] + reach[:, k]
             )
+        again = [(-1.0) ** k * angles[:, 1:] for k in range(self.repeats)]
+        angles = np.column_stack([angles[:, :1], *again])
+        spans = np.tile(spans, self.repeats)
         times = np.column_stack([np.zeros(len(numbers)), np.cumsum(spans, axis=1)])
         body = body_of(self.tires)
         psi = LARGEST_HEADING * heading
@@ -202,16 +228,20 @@ class Search:
         """Return the expected error of steerings, more than 1 where they are not possible, (m,)."""
         steerings = self.steerings(numbers)
         motion = self.motion(steerings)
-        violation = self.violation(motion)
-        P = covariance_after(self.tires, motion, self.space.speed)
-        error = expected_error(self.tires, asked(self.tires, self.space.speed), P).mean(axis=1)
-        cost: Array = np.where(violation > 0.0, 1.0 + violation, error)
+        cost = 1.0 + self.violation(motion)
+        possible = cost <= 1.0
+        if possible.any():
+            kept = Motion(*(one[..., possible, :] for one in motion))
+            P = covariance_after(self.tires, kept, self.space.speed)
+            doubt = asked(self.tires, self.space.speed)
+            cost[possible] = expected_error(self.tires, doubt, P).mean(axis=1)
         return cost
 
     def motion(self, steerings: Steerings) -> Motion:
         """Return what all tires do under steerings."""
         t = steps_of(self.tires, self.duration)
-        return simulate(self.tires, steerings.delta(t), self.space.speed, steerings.entry)
+        hold = hold_of(self.tires, self.space.speed) if self.space.held else NO_HOLD
+        return simulate(self.tires, steerings.delta(t), self.space.speed, steerings.entry, hold)
 
     def violation(self, motion: Motion) -> Array:
         """Return by how much motions break a limit, not positive where they are possible, (m,)."""
@@ -305,7 +335,14 @@ class Search:
         steering = _maneuver(
             steerings.times[0], steerings.angles[0], self.duration, self.space.rate_limit
         )
-        return Pass(steering, steerings.entry, motion, P[0, 0], float(error.mean()))
+        return Pass(
+            steering,
+            steerings.entry,
+            motion,
+            P[0, 0],
+            float(error.mean()),
+            steps_of(self.tires, self.duration),
+        )
 
 
 def after_pass(tires: PlausibleTires, one: Pass) -> PlausibleTires:

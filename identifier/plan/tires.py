@@ -97,7 +97,8 @@ class PlausibleTires:
     @property
     def grip(self) -> Array:
         """Largest force of the curves [static axle loads], (k, 2)."""
-        return self._curves.max(axis=0)
+        most: Array = self._curves.max(axis=0)
+        return most
 
     def slip_at(self, share: float) -> Array:
         """Return the least slip at which the curves reach a share of their grip [rad], (k, 2).
@@ -114,7 +115,8 @@ class PlausibleTires:
     def _curves(self) -> Array:
         """Forces at `SLIPS`, (501, k, 2)."""
         units = unit_matrix(SLIPS, self.method.ladder)
-        return np.einsum("sj,kaj->ska", units, self.W)
+        curves: Array = np.einsum("sj,kaj->ska", units, self.W)
+        return curves
 
     def after(self, covariance: Array) -> Self:
         """Return the same tires when more is known of them.

@@ -16,6 +16,7 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "init": "a commented vehicle file to fill in",
         "channels": "what a log holds, what its channels probably are, and a log.toml that says so",
         "doctor": "what is wrong with a log or with its car's file, and a log.toml that mends it",
+        "plan": "what to drive next: the steering that teaches most in the space there is",
         "identify": "learn tire forces from a recording, freeze the weights and test them",
         "predict": "axle forces of a drive by a stored model, and what they miss",
         "compare": "learn, freeze and replay with every method, side by side",

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         side_by_side_figure,
     )
     from tireid.figures.paper import comparison_figure, error_figure, locus_figure, weights_figure
+    from tireid.figures.plan import plan_area_figure, plan_band_figure, plan_steering_figure
     from tireid.figures.scheme import scheme_figure
     from tireid.figures.side_slip import drive_lateral_figure, side_slip_figure
     from tireid.figures.style import figure_png, figure_svg, save_figure
@@ -42,6 +43,7 @@ _HOMES = {
     ),
     "forces": ("force_figure", "inputs_figure", "prediction_figure", "side_by_side_figure"),
     "paper": ("comparison_figure", "error_figure", "locus_figure", "weights_figure"),
+    "plan": ("plan_area_figure", "plan_band_figure", "plan_steering_figure"),
     "scheme": ("scheme_figure",),
     "side_slip": ("drive_lateral_figure", "side_slip_figure"),
     "style": ("figure_png", "figure_svg", "save_figure"),
@@ -67,6 +69,9 @@ __all__ = [
     "matrix_figure",
     "methods_figure",
     "pareto_figure",
+    "plan_area_figure",
+    "plan_band_figure",
+    "plan_steering_figure",
     "prediction_figure",
     "save_figure",
     "scheme_figure",

@@ -37,6 +37,12 @@ READ = {
     "weights": "They come to rest; weights that grow to the end are those of a law that drifts.",
     "film": "The curve that is steered by and the one that was learnt are those known at that "
     "moment; shaded slip was not known then.",
+    "plan_area": "The black box is the area, the dashed one what its margin leaves to the body of "
+    "the car; the thick line is the center of gravity with the likely tires, thin ones with others "
+    "that it may have; a dot is the entry.",
+    "plan_steering": "Above what the front wheels are asked to do, below how much of its grip each "
+    "axle of the likely tires gives.",
+    "plan_band": "Where the band narrows, the drive will have taught; beyond it nothing changes.",
     "path": "Outlines are the first car every few meters; the green band is the path.",
     "errors": "The deviation is near zero where the tracker knows the tires. Where there are any: "
     "diamonds mark a tire that was handed over, red shades a broken sensor, dots where it was "

@@ -1,0 +1,19 @@
+"""Maneuvers that teach most: what the axle identifier does not know yet, within an area."""
+
+from identifier.plan.motion import hold_of
+from identifier.plan.plan import Plan, Rival, make_plan
+from identifier.plan.rehearsal import rehearse
+from identifier.plan.search import Pass, PlanError, Space
+from identifier.plan.tires import PlausibleTires
+
+__all__ = [
+    "Pass",
+    "Plan",
+    "PlanError",
+    "PlausibleTires",
+    "Rival",
+    "Space",
+    "hold_of",
+    "make_plan",
+    "rehearse",
+]

@@ -1,0 +1,279 @@
+"""A plan: passes through an area that teach most, one after the other, beside slalom and random.
+
+A pass lasts as long as the area lets it. Where the car can turn inside, that is all of the time;
+else it drives through, comes back slowly and enters again: each pass is planned with what is known
+after those before it.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from codegen.arrays import Array
+from identifier.plan.information import asked, covariance_after, deviation, expected_error
+from identifier.plan.motion import Entry, Motion, hold_of, simulate, steps_of
+from identifier.plan.search import (
+    FEWEST,
+    SWING,
+    Pass,
+    PlanError,
+    Search,
+    Space,
+    after_pass,
+    body_of,
+)
+from identifier.plan.tires import PlausibleTires
+from models.maneuvers import RandomSteer, Slalom
+from models.vehicle import GRAVITY
+
+TURNS = 0.8  # share of the planned lateral force that a car may need to turn inside the area
+MOST_PASSES = 12
+LEAST_TIME, MOST_TIME = 0.5, 60.0  # s
+SLALOM = 0.27  # 1/sqrt(L/g): frequency of the slalom it is compared with, 0.5 Hz for a sedan
+AMPLITUDES = np.geomspace(0.05, 1.0, 24)  # of the largest angle
+RANDOM = 8  # random steerings that it is compared with
+LONGER = np.array([1.0, 1.5, 2.0, 3.0, 4.5, 6.0, 8.0, 10.0])  # times, of a slalom that catches up
+
+
+class Rival(NamedTuple):
+    """A maneuver of the same length, on an open field.
+
+    error : expected after it [-].   length, width : of the field that the likely car takes [m].
+    catches_up : after what time it is as good as the plan [s]; inf where not in ten times its time.
+    """
+
+    name: str
+    error: float
+    length: float
+    width: float
+    catches_up: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """What to drive, and what it is expected to teach.
+
+    Parameters
+    ----------
+    tires : what the car may have, as known before.
+    space : where and how.
+    passes : in the order in which they are driven.
+    rivals : slalom and random steering, of the same length.
+    """
+
+    tires: PlausibleTires
+    space: Space
+    passes: tuple[Pass, ...]
+    rivals: tuple[Rival, ...]
+
+    @property
+    def time(self) -> float:
+        """Length of all passes together [s]."""
+        return sum(one.steering.duration for one in self.passes)
+
+    @property
+    def error_before(self) -> float:
+        """Expected error of the forces over the grip before the maneuver [-]."""
+        doubt = asked(self.tires, self.space.speed)
+        return float(expected_error(self.tires, doubt, self.tires.covariance).mean())
+
+    @property
+    def error(self) -> float:
+        """Expected error of the forces over the grip after all passes [-]."""
+        return self.passes[-1].error
+
+    def deviations(self) -> tuple[Array, Array, Array]:
+        """Return slips [rad], and the deviation of the force there before and after, (2, s) [N]."""
+        doubt = asked(self.tires, self.space.speed)
+        loads = np.array(self.tires.vehicle.axle_loads)[:, None]
+        before = deviation(doubt, self.tires.covariance) * loads
+        return doubt.slips, before, deviation(doubt, self.passes[-1].covariance) * loads
+
+    @property
+    def clearance(self) -> float:
+        """Least distance of any part of the car to the edge, with all plausible tires [m]."""
+        search = Search(tires=self.tires, space=self.space, duration=self.passes[0].t[-1])
+        return self.space.margin - max(
+            float(search.beyond(one.motion).max()) for one in self.passes
+        )
+
+    @property
+    def lateral_acceleration(self) -> float:
+        """Largest, of the likely tires [m/s²]."""
+        loads = np.array(self.tires.vehicle.axle_loads)
+        felt = [
+            np.abs(np.tensordot(loads, one.motion.force[:, :, 0, 0], (0, 1))) for one in self.passes
+        ]
+        return float(max(one.max() for one in felt)) / self.tires.vehicle.mass
+
+
+def longest_pass(tires: PlausibleTires, space: Space) -> float:
+    """Return how long a pass may last [s]: inf where the car can turn inside the area.
+
+    Parameters
+    ----------
+    tires : that the car may have.
+    space : where and how.
+    """
+    body = body_of(tires)
+    slippery = float(tires.grip.min(axis=1).min())
+    radius = space.speed**2 / (TURNS * space.share * slippery * GRAVITY)
+    reach = math.hypot(radius + body.side, body.ahead) + space.margin
+    if 2.0 * reach <= space.width:
+        return math.inf
+    free = space.length - 2.0 * space.margin - body.ahead - body.behind
+    return max(free, 0.0) / space.speed
+
+
+def make_plan(
+    tires: PlausibleTires,
+    space: Space,
+    time: float,
+    rng: np.random.Generator,
+    progress: Callable[[float], None] | None = None,
+) -> Plan:
+    """Return the passes that teach most.
+
+    Parameters
+    ----------
+    tires : that the car may have.
+    space : where and how.
+    time : of all passes together [s].
+    rng : source of randomness of the search.
+    progress : called with the share that is done.
+
+    Raises
+    ------
+    PlanError
+        Where the area is too small for the speed, or the time is none to learn in.
+    """
+    if not LEAST_TIME <= time <= MOST_TIME:
+        raise PlanError(f"the time must be {LEAST_TIME:g} to {MOST_TIME:g} s, it is {time:g}")
+    least = tires.vehicle.lowest_speed * 3.0
+    if space.speed < least:
+        raise PlanError(
+            f"nothing is learnt below {least:.3g} m/s with this car, the speed is {space.speed:g}"
+        )
+    longest = longest_pass(tires, space)
+    needed = FEWEST * SWING * tires.vehicle.froude_time
+    if min(longest, time) < needed:
+        raise PlanError(_too_small(tires, space, min(longest, time), needed))
+    count = max(1, math.ceil(time / longest))
+    if count > MOST_PASSES:
+        raise PlanError(
+            f"{time:g} s in this area take {count} passes of {longest:.2g} s, more than "
+            f"{MOST_PASSES}: give more room or less time"
+        )
+    passes: list[Pass] = []
+    known = tires
+    for k in range(count):
+        search = Search(tires=known, space=space, duration=time / count)
+
+        def share(done: float, before: int = k) -> None:
+            if progress is not None:
+                progress((before + done) / count)
+
+        passes.append(search.best(rng, share))
+        known = after_pass(known, passes[-1])
+    rivals = _rivals(tires, space, time, passes[-1].error)
+    return Plan(tires=tires, space=space, passes=tuple(passes), rivals=rivals)
+
+
+def _too_small(tires: PlausibleTires, space: Space, longest: float, needed: float) -> str:
+    """Return why there is no pass, and what would make one."""
+    body = body_of(tires)
+    own = 2.0 * space.margin + body.ahead + body.behind
+    if space.width < 2.0 * (space.margin + body.side):
+        least = 2.0 * (space.margin + body.side)
+        return (
+            f"the area is {space.width:g} m wide and the car with its margins {least:.3g} m: give "
+            "more room or less margin"
+        )
+    slower = max(space.length - own, 0.0) / needed
+    told = f", or drive at {slower:.3g} m/s" if slower > 3.0 * tires.vehicle.lowest_speed else ""
+    return (
+        f"at {space.speed:g} m/s a pass lasts {longest:.2g} s, and {needed:.2g} s are needed to "
+        f"steer three times: the area must be {own + needed * space.speed:.3g} m long{told}"
+    )
+
+
+def _rivals(tires: PlausibleTires, space: Space, time: float, error: float) -> tuple[Rival, ...]:
+    """Return a slalom and random steering at the share of the grip, with as much room as wanted."""
+    tau = tires.vehicle.froude_time
+    search = Search(tires=tires, space=space, duration=time)
+    frequency, sizes = SLALOM / tau, AMPLITUDES * search.largest_angle
+    rate = max(space.rate_limit, 2.1 * math.pi * frequency * float(sizes[-1]))
+
+    def slalom(amplitude: float, duration: float) -> Slalom:
+        return Slalom(
+            amplitude=amplitude, frequency=frequency, onset=0.0, rate_limit=rate, duration=duration
+        )
+
+    def swings(amplitude: float, seed: int) -> RandomSteer:
+        return RandomSteer(
+            amplitude=amplitude,
+            frequency=1.5 * frequency,
+            seed=seed,
+            onset=0.0,
+            rate_limit=1.6 * rate,
+            duration=time,
+        )
+
+    def hardest(of: Callable[[float], Slalom | RandomSteer]) -> float:
+        """Return the largest amplitude that keeps the share of the grip."""
+        t = steps_of(tires, min(time, 4.0 / frequency))
+        delta = np.column_stack([of(size).steering(t)[:, 0] for size in sizes])
+        slip = np.abs(_free(tires, delta, space.speed).slip[..., 0]).max(axis=0)
+        kept = (slip <= tires.slip_at(space.share)[0][:, None]).all(axis=0)
+        return float(sizes[kept.argmin() - 1 if not kept.all() and kept[0] else kept.size - 1])
+
+    def rated(name: str, delta: Array, catches_up: float) -> Rival:
+        motion = _free(tires, delta, space.speed)
+        P = covariance_after(tires, motion, space.speed)
+        found = expected_error(tires, asked(tires, space.speed), P).mean(axis=1)
+        body, half = body_of(tires), delta.shape[1] // 2
+        one = int(np.argsort(found)[half])
+        length, width = extent(motion.X[:, one, 0], motion.Y[:, one, 0])
+        length, width = length + body.ahead + body.behind, width + 2.0 * body.side
+        return Rival(name, float(found[one]), length, width, catches_up)
+
+    size, t = hardest(lambda amplitude: slalom(amplitude, time)), steps_of(tires, time)
+    late = math.inf
+    for times in LONGER:
+        longer = steps_of(tires, float(times) * time)
+        delta = slalom(size, float(times) * time).steering(longer)[:, :1]
+        P = covariance_after(tires, _free(tires, delta, space.speed), space.speed)
+        if float(expected_error(tires, asked(tires, space.speed), P).mean()) <= error:
+            late = float(times) * time
+            break
+    drawn = []
+    for seed in range(RANDOM):
+        largest = hardest(lambda amplitude, seed=seed: swings(amplitude, seed))  # type: ignore[misc]
+        drawn.append(swings(largest, seed).steering(t)[:, 0])
+    return (
+        rated("slalom", slalom(size, time).steering(t)[:, :1], late),
+        rated("random", np.column_stack(drawn), math.nan),
+    )
+
+
+def _free(tires: PlausibleTires, delta: Array, v_x: float) -> Motion:
+    """Return the motion on an open field."""
+    at = np.zeros(delta.shape[1])
+    return simulate(tires, delta, v_x, Entry(at, at, at), hold_of(tires, v_x))
+
+
+def extent(X: Array, Y: Array) -> tuple[float, float]:
+    """Return length and width [m] of the least rectangle, however turned, around a way.
+
+    Parameters
+    ----------
+    X, Y : of the way [m], (n,).
+    """
+    angles = np.linspace(0.0, math.pi, 361)[:-1]
+    c, s = np.cos(angles), np.sin(angles)
+    along, across = (np.ptp(np.outer(a, X) + np.outer(b, Y), axis=1) for a, b in ((c, s), (-s, c)))
+    k = int((along * across).argmin())
+    return float(max(along[k], across[k])), float(min(along[k], across[k]))

@@ -1,0 +1,340 @@
+"""`tireid plan --area 40x40 --speed 15`: the maneuver that teaches most in the space there is."""
+
+import argparse
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from codegen.arrays import Array
+from identifier.method import vehicle_numbers
+from identifier.methods import load_model
+from identifier.plan import Plan, hold_of
+from models.files import digest
+from models.vehicle import Vehicle
+from tireid import __version__
+from tireid.commands import COMMANDS
+from tireid.commands.options import add_output, add_seed, add_vehicle, read_vehicle, seed_of
+from tireid.figures import plan_area_figure, plan_band_figure, plan_steering_figure, save_figure
+from tireid.output import output_folder, text_table, write_csv, write_json
+from tireid.planning import FRICTION, MARGIN, RATE, SHARE, TIME, plan
+from tireid.progress import Progress, say, tell
+from tireid.reports.plan import plan_words, write_plan_report
+from tireid.verdicts import warn_of_stored
+
+PERIOD = 0.01  # s, of steering.csv
+RUN_UP = 1.0  # s straight ahead, before each pass
+METERS, KILOMETERS = "m/s", "km/h"
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : subparsers of `tireid`.
+    """
+    parser = commands.add_parser(
+        "plan",
+        help=COMMANDS["plan"],
+        description="Plan the steering that narrows the band of the tires' forces most, within an "
+        "area, with a margin, for every tire that the car may have (stiffness and grip within "
+        "30 %%, or what a model leaves open); write steering.csv, a path for tireid drive, figures "
+        "and report.html, which compares it with a slalom and with random steering.",
+    )
+    add_vehicle(parser, default="the sedan; with --after that of the model")
+    parser.add_argument(
+        "--area", required=True, metavar="LxW", help="length and width [m], as 40x40"
+    )
+    parser.add_argument(
+        "--speed", required=True, metavar="V", help="held throughout: 15 or 15m/s, 54km/h"
+    )
+    parser.add_argument(
+        "--time",
+        type=float,
+        default=TIME,
+        metavar="S",
+        help="of steering, over as many passes as the area takes (%(default)g)",
+    )
+    parser.add_argument(
+        "--after",
+        type=Path,
+        metavar="FILE",
+        help="weights.json, as identified: plan what is still unknown",
+    )
+    parser.add_argument(
+        "--mu", type=float, metavar="MU", help=f"friction, a guess within 30 %% ({FRICTION:g})"
+    )
+    parser.add_argument(
+        "--grip",
+        type=float,
+        default=100.0 * SHARE,
+        metavar="PERCENT",
+        help="share of the grip that is used at most (%(default)g)",
+    )
+    parser.add_argument(
+        "--margin",
+        type=float,
+        metavar="M",
+        help=f"from the car to the edge of the area ({MARGIN:g} wheelbases)",
+    )
+    parser.add_argument(
+        "--steering-rate",
+        type=float,
+        metavar="DEG/S",
+        help=f"largest, of the front wheels ({math.degrees(RATE):.0f} over sqrt(L/g))",
+    )
+    parser.add_argument(
+        "--steering-angle",
+        type=float,
+        default=30.0,
+        metavar="DEG",
+        help="largest, of the front wheels (%(default)g)",
+    )
+    parser.add_argument(
+        "--steering-ratio",
+        type=float,
+        metavar="RATIO",
+        help="hand wheel over front wheels: steering.csv tells the hand wheel too",
+    )
+    parser.add_argument(
+        "--blind",
+        action="store_true",
+        help="nobody holds the course, steering alone is played: takes more room",
+    )
+    add_seed(parser, "the search")
+    add_output(parser, "plan")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command; return 0."""
+    area, speed = parse_area(options.area), parse_speed(options.speed)
+    ratio = options.steering_ratio
+    if ratio is not None and not 1.0 <= ratio <= 100.0:
+        raise ValueError(f"--steering-ratio must be 1 to 100, it is {ratio:g}")
+    seed, model = seed_of(options), None
+    if options.after is not None:
+        model = load_model(options.after)
+        warn_of_stored(options.after)
+    vehicle = (
+        model.vehicle if model is not None and options.vehicle is None else read_vehicle(options)
+    )
+    with output_folder(options.out, force=options.force) as folder:
+        with Progress("planning") as progress:
+            found = plan(
+                vehicle,
+                area=area,
+                speed=speed,
+                time=options.time,
+                after=model,
+                friction=options.mu,
+                share=0.01 * options.grip,
+                margin=options.margin,
+                rate_limit=_radians(options.steering_rate),
+                max_angle=math.radians(options.steering_angle),
+                held=not options.blind,
+                seed=seed,
+                progress=progress,
+            )
+        inputs = inputs_of(options, vehicle, area, speed)
+        write_plan(folder, found, inputs, ratio)
+        figures = {
+            "area": plan_area_figure(found),
+            "steering": plan_steering_figure(found, ratio),
+            "band": plan_band_figure(found),
+        }
+        for name, figure in figures.items():
+            save_figure(figure, folder / f"{name}.png")
+        write_plan_report(folder, found, figures, inputs=inputs, command=options.words)
+    tell("\n".join([*plan_words(found), plan_table(found)]))
+    say(f"wrote {options.out}/")
+    return 0
+
+
+def _radians(degrees: float | None) -> float | None:
+    return None if degrees is None else math.radians(degrees)
+
+
+def parse_area(text: str) -> tuple[float, float]:
+    """Return length and width [m] of --area.
+
+    Parameters
+    ----------
+    text : such as 40x40 or 60x20.5m.
+
+    Raises
+    ------
+    ValueError
+        Where it is no area, or none that a car fits in and somebody has.
+    """
+    found = re.fullmatch(r"\s*([\d.]+)\s*m?\s*[xX×*]\s*([\d.]+)\s*m?\s*", text, re.ASCII)
+    try:
+        sides = (float(found[1]), float(found[2])) if found else ()
+    except ValueError:
+        sides = ()
+    if len(sides) != 2:
+        raise ValueError(f"--area wants length x width in meters (40x40), not {text!r}")
+    if not all(0.1 <= side <= 5000.0 for side in sides):
+        raise ValueError(f"--area must have sides of 0.1 to 5000 m, it is {text.strip()}")
+    return sides[0], sides[1]
+
+
+def parse_speed(text: str) -> float:
+    """Return the speed [m/s] of --speed.
+
+    Parameters
+    ----------
+    text : 15, 15m/s or 54km/h.
+
+    Raises
+    ------
+    ValueError
+        Where it is no speed of a car.
+    """
+    found = re.fullmatch(r"\s*([\d.]+)\s*(m/s|km/h)?\s*", text, re.ASCII)
+    try:
+        value = float(found[1]) if found else math.nan
+    except ValueError:
+        value = math.nan
+    speed = value / (3.6 if found and found[2] == KILOMETERS else 1.0)
+    if not 0.1 <= speed <= 100.0:
+        raise ValueError(
+            f"--speed wants 0.1 to 100 m/s (15, 15{METERS}, 54{KILOMETERS}), not {text!r}"
+        )
+    return speed
+
+
+def inputs_of(
+    options: argparse.Namespace, vehicle: Vehicle, area: tuple[float, float], speed: float
+) -> dict[str, Any]:
+    """Return all that went into a plan, ready for JSON.
+
+    Parameters
+    ----------
+    vehicle : the car.
+    area : length and width [m].
+    speed : [m/s].
+    """
+    return {
+        "vehicle": vehicle_numbers(vehicle),
+        "area_m": list(area),
+        "speed_m_s": speed,
+        "time_s": options.time,
+        "after": None if options.after is None else str(options.after),
+        "friction": options.mu,
+        "grip_percent": options.grip,
+        "margin_m": options.margin,
+        "steering_rate_deg_s": options.steering_rate,
+        "steering_angle_deg": options.steering_angle,
+        "blind": options.blind,
+        "seed": seed_of(options),
+    }
+
+
+def steering_columns(found: Plan, ratio: float | None) -> dict[str, Array]:
+    """Return the columns of steering.csv: pass by pass from its entry on, with the course.
+
+    Parameters
+    ----------
+    found : the plan.
+    ratio : hand wheel over front wheels; None tells no hand wheel.
+    """
+    rows = []
+    for k, one in enumerate(found.passes):
+        t = PERIOD * np.arange(round(one.steering.duration / PERIOD) + 1, dtype=np.float64)
+        delta = one.steering.steering(t)[:, 0]
+        r = np.interp(t, one.t, one.motion.r[:, 0, 0])
+        rows.append(np.column_stack([np.full(t.size, k + 1), t, delta, one.course(t), r]))
+    names = ("pass", "t_s", "delta_f_rad", "X_m", "Y_m", "psi_rad", "r_expected_rad_s")
+    columns = dict(zip(names, np.vstack(rows).T, strict=True))
+    if ratio is not None:
+        columns["hand_wheel_deg"] = np.degrees(ratio * columns["delta_f_rad"])
+    return columns
+
+
+def path_columns(found: Plan, k: int) -> dict[str, Array]:
+    """Return way-points of a pass for `tireid drive --path`, with its straight run-up.
+
+    Parameters
+    ----------
+    found : the plan.
+    k : which pass, from 0.
+    """
+    one, car = found.passes[k], found.tires.vehicle
+    step = 0.4 * car.wheelbase / found.space.speed
+    t = np.linspace(0.0, one.steering.duration, max(8, round(one.steering.duration / step)))
+    X, Y, psi = one.course(t).T
+    back = np.arange(round(RUN_UP / step), 0, -1) * step * found.space.speed
+    before = X[0] - back * np.cos(psi[0]), Y[0] - back * np.sin(psi[0])
+    return {"X_m": np.append(before[0], X), "Y_m": np.append(before[1], Y)}
+
+
+def write_plan(folder: Path, found: Plan, inputs: dict[str, Any], ratio: float | None) -> None:
+    """Write steering.csv, a path for each pass and summary.json.
+
+    Parameters
+    ----------
+    folder : an empty folder.
+    found : the plan.
+    inputs : all that went in, ready for JSON.
+    ratio : hand wheel over front wheels.
+    """
+    write_csv(folder / "steering.csv", steering_columns(found, ratio))
+    for k in range(len(found.passes)):
+        name = "path.csv" if k == 0 else f"path_{k + 1}.csv"
+        write_csv(folder / name, path_columns(found, k))
+    write_json(folder / "summary.json", summary(found, inputs))
+
+
+def summary(found: Plan, inputs: dict[str, Any]) -> dict[str, Any]:
+    """Return what summary.json holds.
+
+    Parameters
+    ----------
+    found : the plan.
+    inputs : all that went in, ready for JSON.
+    """
+    slips, before, after = found.deviations()
+    hold = hold_of(found.tires, found.space.speed)
+    return {
+        "passes": len(found.passes),
+        "time_s": found.time,
+        "expected_error_before": found.error_before,
+        "expected_error": found.error,
+        "rivals": {
+            one.name: {
+                "expected_error": one.error,
+                "length_m": one.length,
+                "width_m": one.width,
+                "catches_up_s": one.catches_up if math.isfinite(one.catches_up) else None,
+            }
+            for one in found.rivals
+        },
+        "least_distance_to_edge_m": found.clearance,
+        "peak_lateral_acceleration_m_s2": found.lateral_acceleration,
+        "hold_rad_per_rad": hold.heading if found.space.held else None,
+        "hold_rad_per_m": hold.aside if found.space.held else None,
+        "band": {
+            "slip_rad": slips.tolist(),
+            "sd_before_N": before.tolist(),
+            "sd_after_N": after.tolist(),
+        },
+        "inputs": inputs,
+        "hash": digest(inputs),
+        "version": __version__,
+    }
+
+
+def plan_table(found: Plan) -> str:
+    """Return the plan beside slalom and random steering, as text."""
+    rows = [["", "time", "room", "expected error"]]
+    space = found.space
+    room = f"{space.length:g} x {space.width:g} m"
+    rows.append(["plan", f"{found.time:.1f} s", room, f"{100.0 * found.error:.1f} %"])
+    for one in found.rivals:
+        wide = f"{one.length:.0f} x {one.width:.1f} m"
+        rows.append([one.name, f"{found.time:.1f} s", wide, f"{100.0 * one.error:.1f} %"])
+    return text_table(rows, "<>>>")

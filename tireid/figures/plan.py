@@ -1,0 +1,101 @@
+"""A planned maneuver: its passes in the area, what is steered, and the band before and after."""
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from codegen.arrays import Array
+from identifier.axle.band import LEVEL, BandSpread
+from identifier.axle.curve import unit_matrix
+from identifier.plan import Plan
+from tireid.figures.style import (
+    AXLES,
+    BLUE,
+    GREY,
+    ORANGE,
+    PAGE,
+    SERIES,
+    force_unit_of,
+    legend_above,
+    new_figure,
+    styled,
+)
+
+
+@styled
+def plan_area_figure(found: Plan) -> Figure:
+    """Draw the passes in the area, with every tire that the car may have."""
+    space = found.space
+    figure = new_figure(PAGE, min(max(1.8, PAGE * space.width / space.length), PAGE))
+    axes = figure.subplots()
+    axes.add_patch(Rectangle((0.0, 0.0), space.length, space.width, fill=False, linewidth=1.2))
+    inner = space.length - 2.0 * space.margin, space.width - 2.0 * space.margin
+    axes.add_patch(
+        Rectangle((space.margin, space.margin), *inner, fill=False, linestyle="--", color=GREY)
+    )
+    for k, one in enumerate(found.passes):
+        color = SERIES[k % len(SERIES)]
+        axes.plot(one.motion.X[:, 0], one.motion.Y[:, 0], color=color, alpha=0.25, linewidth=0.6)
+        axes.plot(one.motion.X[:, 0, 0], one.motion.Y[:, 0, 0], color=color, label=f"pass {k + 1}")
+        axes.plot(one.motion.X[0, 0, 0], one.motion.Y[0, 0, 0], marker="o", color=color)
+    axes.set(xlabel="X [m]", ylabel="Y [m]", aspect="equal")
+    legend_above(figure)
+    return figure
+
+
+@styled
+def plan_steering_figure(found: Plan, ratio: float | None) -> Figure:
+    """Draw the angle of the front wheels of each pass, and what force it asks for."""
+    figure = new_figure(PAGE, 3.4)
+    top, bottom = figure.subplots(2, 1, sharex=True)
+    for k, one in enumerate(found.passes):
+        color = SERIES[k % len(SERIES)]
+        t = np.linspace(0.0, one.steering.duration, 600)
+        top.plot(t, np.degrees(one.steering.steering(t)[:, 0]), color=color, label=f"pass {k + 1}")
+        for axle, line in ((0, "-"), (1, "--")):
+            used = one.motion.force[:, axle, 0, 0] / found.tires.grip[0, axle]
+            bottom.plot(one.t, 100.0 * used, color=color, linestyle=line)
+    top.set(ylabel="front wheels [deg]")
+    if ratio is not None:
+        top.secondary_yaxis(
+            "right", functions=(lambda x: ratio * x, lambda x: x / ratio)
+        ).set_ylabel("hand wheel [deg]")
+    bottom.set(xlabel="time [s]", ylabel="force over grip [%]")
+    bottom.set_title("front solid, rear dashed", loc="right", color="#444444")
+    legend_above(figure)
+    return figure
+
+
+@styled
+def plan_band_figure(found: Plan) -> Figure:
+    """Draw the likely force curves with their band of 90 % before and after the maneuver."""
+    tires = found.tires
+    loads = np.array(tires.vehicle.axle_loads)
+    farthest = 1.2 * float(tires.slip_at(0.98)[0].max())
+    slip = np.linspace(0.0, farthest, 200)
+    units = unit_matrix(slip, tires.method.ladder)
+    unit = force_unit_of(tires.grip[0] * loads)
+    figure = new_figure(PAGE, 2.9)
+    both = figure.subplots(1, 2, sharey=True)
+    for i, (axes, title) in enumerate(zip(both, AXLES, strict=True)):
+        force = units @ tires.W[0, i]
+        for P, color, label in (
+            (tires.covariance, GREY, "before"),
+            (found.passes[-1].covariance, ORANGE, "after"),
+        ):
+            half = _half_band(units, force, P[i], tires.prior[i])
+            low, high = ((force + sign * half) * loads[i] / unit.newtons for sign in (-1.0, 1.0))
+            axes.fill_between(np.degrees(slip), low, high, color=color, alpha=0.3, label=label)
+        axes.plot(np.degrees(slip), force * loads[i] / unit.newtons, color=BLUE, label="likely")
+        axes.set(xlabel="slip angle [deg]")
+        axes.set_title(title)
+    both[0].set(ylabel=f"lateral force [{unit.name}]")
+    legend_above(figure)
+    return figure
+
+
+def _half_band(units: Array, force: Array, P: Array, prior: Array) -> Array:
+    """Return half the width of the band [static axle loads], (k,)."""
+    n = units.shape[1]
+    left, before = (np.einsum("ki,ij,kj->k", units, Q[:n, :n], units) for Q in (P, prior))
+    return BandSpread.of(force, left, before).half_width(np.ones(units.shape[0]), LEVEL)

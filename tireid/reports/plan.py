@@ -1,0 +1,167 @@
+"""The report of `tireid plan`: what to drive, what it will teach, and how safe it is."""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from identifier.plan import Plan, Rival, hold_of
+from models.files import digest
+from tireid.report import Headline, Paragraph, Report, Section, Table, write_report
+from tireid.reports.common import READ, REPORT, drawing, origin
+
+PULL = 3.0  # m/s², of a car that comes to speed, and of one that stops
+
+
+def plan_words(found: Plan) -> list[str]:
+    """Return what to expect and what is safe, as sentences.
+
+    Parameters
+    ----------
+    found : the plan.
+    """
+    space, count = found.space, len(found.passes)
+    each = found.time / count
+    times = f"one pass of {each:.1f} s" if count == 1 else f"{count} passes of {each:.1f} s"
+    said = [
+        f"{times} at {space.speed:g} m/s in {space.length:g} x {space.width:g} m: the expected "
+        f"error of the forces falls from {100.0 * found.error_before:.0f} to "
+        f"{100.0 * found.error:.1f} % of the grip."
+    ]
+    slalom = found.rivals[0]
+    said.append(_against(slalom, found))
+    distance = space.speed**2 / (2.0 * PULL)
+    said.append(
+        f"Up to {found.lateral_acceleration:.1f} m/s² sideways, {100.0 * space.share:.0f} % of the "
+        f"grip of the likely tires; the car stays {found.clearance:.1f} m from the edge with "
+        f"every tire that it may have. It comes in at speed, about {distance:.0f} m of run-up, and "
+        f"needs as much to stop behind the area."
+    )
+    return said
+
+
+def _against(slalom: Rival, found: Plan) -> str:
+    """Return what a slalom would need."""
+    if math.isfinite(slalom.catches_up):
+        length = slalom.length * slalom.catches_up / found.time
+        return (
+            f"A slalom at the same share of the grip leaves {100.0 * slalom.error:.1f} % in that "
+            f"time, and is as good after {slalom.catches_up:.0f} s, {length:.0f} m."
+        )
+    return (
+        f"A slalom at the same share of the grip leaves {100.0 * slalom.error:.1f} % in that time, "
+        f"and is not as good in ten times of it."
+    )
+
+
+def write_plan_report(
+    folder: Path,
+    found: Plan,
+    figures: Mapping[str, Figure],
+    *,
+    inputs: Mapping[str, Any],
+    command: str,
+) -> None:
+    """Write the report of a plan.
+
+    Parameters
+    ----------
+    folder : where to.
+    found : the plan.
+    figures : by the name of their files.
+    inputs : all that went in, ready for JSON.
+    command : as it was typed.
+    """
+    words = plan_words(found)
+    report = Report(
+        title=f"What to drive in {found.space.length:g} x {found.space.width:g} m",
+        summary=words[0],
+        numbers=[
+            Headline(f"{100.0 * found.error:.1f} %", "expected error of the forces over the grip"),
+            Headline(f"{100.0 * found.error_before:.0f} %", "before it"),
+            Headline(f"{100.0 * found.rivals[0].error:.1f} %", "after a slalom of that length"),
+            Headline(f"{found.clearance:.1f} m", "least distance to the edge"),
+        ],
+        warnings=plan_warnings(found),
+        sections=[
+            Section(
+                heading="What to drive",
+                blocks=[
+                    drawing(figures["area"], "The passes in the area.", READ["plan_area"]),
+                    drawing(figures["steering"], "What to steer.", READ["plan_steering"]),
+                    Paragraph(text=_how(found)),
+                ],
+            ),
+            Section(
+                heading="What it will teach",
+                blocks=[
+                    drawing(
+                        figures["band"], "The band of 90 % before and after.", READ["plan_band"]
+                    ),
+                    Paragraph(text=words[1]),
+                    _rivals(found),
+                ],
+            ),
+            Section(heading="How safe it is", blocks=[Paragraph(text=words[2])]),
+            origin(
+                command,
+                found.tires.vehicle,
+                (),
+                all_inputs=f"hash {digest(dict(inputs))}, listed in summary.json",
+            ),
+        ],
+    )
+    write_report(folder / REPORT, report)
+
+
+def plan_warnings(found: Plan) -> list[str]:
+    """Return what to know before somebody drives a plan.
+
+    Parameters
+    ----------
+    found : the plan.
+    """
+    said = [
+        "Drive on a closed field only, at half the speed first: tires outside of what was taken "
+        "for possible, a wet place or a lower speed change the way."
+    ]
+    if not found.space.held:
+        said.append("Nobody holds the course: whatever pushes the car stays in its way.")
+    return said
+
+
+def _how(found: Plan) -> str:
+    """Return how steering.csv is to be driven."""
+    how = (
+        "steering.csv holds the angle of the front wheels over the time since the entry of each "
+        "pass, and the course that the likely tires take; path.csv is that course for tireid "
+        "drive --path. The speed is held."
+    )
+    if not found.space.held:
+        return how
+    hold = hold_of(found.tires, found.space.speed)
+    return (
+        f"{how} Who steers, a robot or a person, also holds the course, slowly: add "
+        f"{hold.heading:.3g} rad per rad of heading that is missing and {hold.aside:.3g} rad per "
+        "meter that the car is off to the right."
+    )
+
+
+def _rivals(found: Plan) -> Table:
+    """Return the plan beside slalom and random steering."""
+    space = found.space
+    rows: list[list[str | float | None]] = [
+        ["plan", found.time, space.length, space.width, 100.0 * found.error]
+    ]
+    rows += [
+        [one.name, found.time, one.length, one.width, 100.0 * one.error] for one in found.rivals
+    ]
+    return Table(
+        caption="The plan beside maneuvers of the same length at the same share of the grip; their "
+        "room is what the car takes on an open field, without margins; random is the median of "
+        "eight.",
+        header=["maneuver", "time [s]", "length [m]", "width [m]", "expected error [% of grip]"],
+        rows=rows,
+    )
