@@ -19,7 +19,7 @@ from identifier.plan.motion import Motion, time_step
 from identifier.plan.tires import FLAT, PlausibleTires
 
 COLOR = 5.0  # times the correlation time that learning is told: half a second, as errors of models
-EVERY = 3  # step of the simulation that counts: 60 ms in a sedan, the regressor is low-passed
+EVERY = 2  # step of the simulation that counts: 54 ms in a sedan, the regressor is low-passed
 MATTERING = 12  # slips at which the curve is asked, up to where it is flat
 
 

@@ -21,7 +21,7 @@ from identifier.plan.tires import PlausibleTires
 from models.vehicle import GRAVITY
 
 HOLD = 0.6  # 1/sqrt(L/g): pole of deviations from the course, 1.1 rad/s in a sedan
-STEP = 0.037  # of the time sqrt(L/g): 20 ms in a sedan
+STEP = 0.05  # of the time sqrt(L/g): 27 ms in a sedan
 LEAST_SLOPE = 0.02  # of that at zero, for the lag
 
 

@@ -6,7 +6,7 @@ after those before it.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -26,14 +26,15 @@ from identifier.plan.search import (
     body_of,
 )
 from identifier.plan.tires import PlausibleTires
-from models.maneuvers import RandomSteer, Slalom
-from models.vehicle import GRAVITY
+from models.maneuvers import Maneuver, RandomSteer, Slalom
+from models.vehicle import GRAVITY, Vehicle
 
 TURNS = 0.8  # share of the planned lateral force that a car may need to turn inside the area
 MOST_PASSES = 12
 LEAST_TIME, MOST_TIME = 0.5, 60.0  # s
 SLALOM = 0.27  # 1/sqrt(L/g): frequency of the slalom it is compared with, 0.5 Hz for a sedan
 AMPLITUDES = np.geomspace(0.05, 1.0, 24)  # of the largest angle
+PROBED = 15.0  # sqrt(L/g), of a maneuver whose amplitude is looked for: 8 s in a sedan
 RANDOM = 8  # random steerings that it is compared with
 LONGER = np.array([1.0, 1.5, 2.0, 3.0, 4.5, 6.0, 8.0, 10.0])  # times, of a slalom that catches up
 
@@ -200,67 +201,101 @@ def _too_small(tires: PlausibleTires, space: Space, longest: float, needed: floa
     )
 
 
-def _rivals(tires: PlausibleTires, space: Space, time: float, error: float) -> tuple[Rival, ...]:
-    """Return a slalom and random steering at the share of the grip, with as much room as wanted."""
-    tau = tires.vehicle.froude_time
-    search = Search(tires=tires, space=space, duration=time)
-    frequency, sizes = SLALOM / tau, AMPLITUDES * search.largest_angle
-    rate = max(space.rate_limit, 2.1 * math.pi * frequency * float(sizes[-1]))
+Steering = Callable[[float], Maneuver]  # of an amplitude [rad]
 
-    def slalom(amplitude: float, duration: float) -> Slalom:
-        return Slalom(
-            amplitude=amplitude, frequency=frequency, onset=0.0, rate_limit=rate, duration=duration
-        )
 
-    def swings(amplitude: float, seed: int) -> RandomSteer:
-        return RandomSteer(
-            amplitude=amplitude,
-            frequency=1.5 * frequency,
-            seed=seed,
-            onset=0.0,
-            rate_limit=1.6 * rate,
-            duration=time,
-        )
+def hardest(tires: PlausibleTires, space: Space, of: Steering) -> Maneuver:
+    """Return the hardest of maneuvers that keeps the share of the grip, with the likely tires.
 
-    def hardest(of: Callable[[float], Slalom | RandomSteer]) -> float:
-        """Return the largest amplitude that keeps the share of the grip."""
-        t = steps_of(tires, min(time, 4.0 / frequency))
-        delta = np.column_stack([of(size).steering(t)[:, 0] for size in sizes])
-        slip = np.abs(_free(tires, delta, space.speed).slip[..., 0]).max(axis=0)
-        kept = (slip <= tires.slip_at(space.share)[0][:, None]).all(axis=0)
-        return float(sizes[kept.argmin() - 1 if not kept.all() and kept[0] else kept.size - 1])
+    Parameters
+    ----------
+    tires : that the car may have.
+    space : speed and share; its sides are not looked at.
+    of : the maneuver by its amplitude.
+    """
+    sizes = AMPLITUDES * Search(tires=tires, space=space, duration=1.0).largest_angle
+    every = [of(float(size)) for size in sizes]
+    t = steps_of(tires, min(every[0].duration, PROBED * tires.vehicle.froude_time))
+    delta = np.column_stack([one.steering(t)[:, 0] for one in every])
+    slip = np.abs(free_motion(tires, delta, space.speed).slip[..., 0]).max(axis=0)
+    kept = (slip <= tires.slip_at(space.share)[0][:, None]).all(axis=0)
+    return every[max(int(kept.argmin()) - 1, 0) if not kept.all() else -1]
 
-    def rated(name: str, delta: Array, catches_up: float) -> Rival:
-        motion = _free(tires, delta, space.speed)
-        P = covariance_after(tires, motion, space.speed)
-        found = expected_error(tires, asked(tires, space.speed), P).mean(axis=1)
-        body, half = body_of(tires), delta.shape[1] // 2
-        one = int(np.argsort(found)[half])
-        length, width = extent(motion.X[:, one, 0], motion.Y[:, one, 0])
-        length, width = length + body.ahead + body.behind, width + 2.0 * body.side
-        return Rival(name, float(found[one]), length, width, catches_up)
 
-    size, t = hardest(lambda amplitude: slalom(amplitude, time)), steps_of(tires, time)
-    late = math.inf
-    for times in LONGER:
-        longer = steps_of(tires, float(times) * time)
-        delta = slalom(size, float(times) * time).steering(longer)[:, :1]
-        P = covariance_after(tires, _free(tires, delta, space.speed), space.speed)
-        if float(expected_error(tires, asked(tires, space.speed), P).mean()) <= error:
-            late = float(times) * time
-            break
-    drawn = []
-    for seed in range(RANDOM):
-        largest = hardest(lambda amplitude, seed=seed: swings(amplitude, seed))  # type: ignore[misc]
-        drawn.append(swings(largest, seed).steering(t)[:, 0])
-    return (
-        rated("slalom", slalom(size, time).steering(t)[:, :1], late),
-        rated("random", np.column_stack(drawn), math.nan),
+def slalom_of(vehicle: Vehicle, duration: float, frequency: float | None = None) -> Steering:
+    """Return slaloms by their amplitude.
+
+    Parameters
+    ----------
+    duration : [s].
+    frequency : [Hz]; None takes 0.27 sqrt(g/L), 0.5 Hz for a sedan.
+    """
+    f = SLALOM / vehicle.froude_time if frequency is None else frequency
+    return lambda amplitude: Slalom(
+        amplitude=amplitude,
+        frequency=f,
+        onset=0.0,
+        rate_limit=2.1 * math.pi * f * amplitude,
+        duration=duration,
     )
 
 
-def _free(tires: PlausibleTires, delta: Array, v_x: float) -> Motion:
-    """Return the motion on an open field."""
+def random_of(vehicle: Vehicle, duration: float, seed: int) -> Steering:
+    """Return random steerings by their amplitude, swings half as fast again as those of a slalom.
+
+    Parameters
+    ----------
+    duration : [s].
+    seed : of the swings.
+    """
+    f = 1.5 * SLALOM / vehicle.froude_time
+    return lambda amplitude: RandomSteer(
+        amplitude=amplitude,
+        frequency=f,
+        seed=seed,
+        onset=0.0,
+        rate_limit=2.1 * math.pi * f * amplitude,
+        duration=duration,
+    )
+
+
+def _rivals(tires: PlausibleTires, space: Space, time: float, error: float) -> tuple[Rival, ...]:
+    """Return a slalom and random steering at the share of the grip, with as much room as wanted."""
+    slalom = hardest(tires, space, slalom_of(tires.vehicle, float(LONGER[-1]) * time))
+    late = math.inf
+    for times in LONGER:
+        if _rated(tires, space, [slalom], float(times) * time).error <= error:
+            late = float(times) * time
+            break
+    drawn = [hardest(tires, space, random_of(tires.vehicle, time, seed)) for seed in range(RANDOM)]
+    first = _rated(tires, space, [slalom], time)._replace(name="slalom", catches_up=late)
+    return first, _rated(tires, space, drawn, time)
+
+
+def _rated(
+    tires: PlausibleTires, space: Space, maneuvers: Sequence[Maneuver], time: float
+) -> Rival:
+    """Return the median of maneuvers."""
+    t = steps_of(tires, time)
+    delta = np.column_stack([one.steering(t)[:, 0] for one in maneuvers])
+    motion = free_motion(tires, delta, space.speed)
+    P = covariance_after(tires, motion, space.speed)
+    found = expected_error(tires, asked(tires, space.speed), P).mean(axis=1)
+    one, body = int(np.argsort(found)[len(maneuvers) // 2]), body_of(tires)
+    length, width = extent(motion.X[:, one, 0], motion.Y[:, one, 0])
+    length, width = length + body.ahead + body.behind, width + 2.0 * body.side
+    return Rival("random", float(found[one]), length, width, math.nan)
+
+
+def free_motion(tires: PlausibleTires, delta: Array, v_x: float) -> Motion:
+    """Return the motion on an open field, from the origin along X.
+
+    Parameters
+    ----------
+    tires : k pairs of axles.
+    delta : angles of the front wheels at steps of the simulation [rad], (n, m).
+    v_x : speed [m/s].
+    """
     at = np.zeros(delta.shape[1])
     return simulate(tires, delta, v_x, Entry(at, at, at), hold_of(tires, v_x))
 

@@ -1,33 +1,40 @@
-"""A planned pass on a car whose tires nobody planned with: steered, and held on its course."""
+"""A planned maneuver on a car whose tires nobody planned with: steered, and held on its course."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from codegen.arrays import Array
 from identifier.plan.motion import Hold
-from identifier.plan.search import Pass
+from models.maneuvers import Maneuver
 from models.plant import Plant, StepwisePlant
 from models.recordings import Recording
 
 LEAD = 1.0  # s straight ahead before the pass
 PERIOD = 0.01  # s, of who steers
+Course = Callable[
+    [Array], Array
+]  # times since the entry [s] (n,) -> X, Y [m], heading [rad] (n, 3)
 
 
-def rehearse(plant: Plant, one: Pass, speed: float, hold: Hold) -> tuple[Recording, Array]:
-    """Return what exact sensors see of a pass, and the way of the center of gravity.
+def rehearse(
+    plant: Plant, steering: Maneuver, course: Course, speed: float, hold: Hold
+) -> tuple[Recording, Array]:
+    """Return what exact sensors see of a maneuver, and the way of the center of gravity.
 
     Parameters
     ----------
     plant : the car.
-    one : the pass.
+    steering : as planned.
+    course : of the maneuver, as planned.
     speed : [m/s].
     hold : how the course is held.
 
     Returns
     -------
-    The recording, from `LEAD` seconds before the pass on, with true forces; X, Y [m] and heading
-    [rad] of each sample (n, 3) in the area.
+    The recording, from `LEAD` seconds before the maneuver on, with true forces; X, Y [m] and
+    heading [rad] of each of its samples (n, 3).
 
     Raises
     ------
@@ -35,18 +42,18 @@ def rehearse(plant: Plant, one: Pass, speed: float, hold: Hold) -> tuple[Recordi
         Where the car leaves the range of its equations.
     """
     stepwise, before = StepwisePlant(plant, period=PERIOD), round(LEAD / PERIOD)
-    X, Y, psi = (float(value[0]) for value in one.entry)
+    X, Y, psi = map(float, course(np.zeros(1))[0])
     state = stepwise.start(
         speed, X=X - LEAD * speed * np.cos(psi), Y=Y - LEAD * speed * np.sin(psi), psi=psi
     )
-    t = PERIOD * np.arange(before + round(one.steering.duration / PERIOD) + 1, dtype=np.float64)
-    planned = one.steering.steering(t - LEAD)[:, 0]
-    course = one.course(np.maximum(t - LEAD, 0.0))
+    t = PERIOD * np.arange(before + round(steering.duration / PERIOD) + 1, dtype=np.float64)
+    planned = np.where(t < LEAD, 0.0, steering.steering(np.maximum(t - LEAD, 0.0))[:, 0])
+    wanted = course(np.maximum(t - LEAD, 0.0))
     rows: list[Any] = []
     for k in range(t.size):
         x = state.x
         rows.append([*x[[0, 1, 2, 12, 5, 6, 7]], state.acceleration[1], *state.axle_force])
-        added = hold.steering(tuple(course[k]), (x[5], x[6], x[7])) if k >= before else 0.0
+        added = hold.steering(tuple(wanted[k]), (x[5], x[6], x[7])) if k >= before else 0.0
         state = stepwise.step(state, np.array([planned[k] + added, 0.0]), speed)
     v_x, v_y, r, delta, X_, Y_, psi_, a_y, front, rear = np.array(rows).T
     recording = Recording(

@@ -5,8 +5,8 @@ at a place and a heading that are found too. Steering is N angles joined by half
 durations change from the first to the last by one ratio; in a long pass they repeat, every other
 time mirrored. Differential evolution (R. Storn, K. Price, J. Global Optimization 11, 1997) makes
 the expected error small, meant over all tires that the car may have; a pass is possible where each
-of these cars stays in the area, none slides at the rear, and the likely one keeps its share of the
-grip at both axles.
+of these cars stays in the area, none slides at the rear, all are calm at its end, and the likely
+one keeps its share of the grip at both axles.
 """
 
 import math
@@ -30,6 +30,7 @@ SWING = 0.75  # sqrt(L/g): mean duration of a change from angle to angle, 0.4 s 
 CHIRP = math.log(
     3.0
 )  # largest ratio of the last to the mean duration, and of the mean to the first
+CALM = 0.5  # share of the grip that the rear axle may still need at the end of a pass
 REAR = 0.97  # share of the grip that no rear axle passes, whatever the tires
 OVERHANG = 0.32  # wheelbases by which a car reaches beyond its axles
 HALF_WIDTH = 0.33  # wheelbases, of a car without a chassis
@@ -249,6 +250,7 @@ class Search:
         limit = self.tires.slip_at(REAR).T  # (2, k)
         over = [slip[1] / limit[1] - 1.0]
         over += [slip[:, :, 0].T / self.tires.slip_at(self.space.share)[0] - 1.0]
+        over += [np.abs(motion.slip[-1, 1]) / self.tires.slip_at(CALM)[:, 1] - 1.0]
         outside = self.beyond(motion) / self.tires.vehicle.wheelbase
         worst = [one.max(axis=1) for one in (*over, outside)]
         return np.asarray(np.sum(np.maximum(worst, 0.0), axis=0))

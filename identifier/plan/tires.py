@@ -1,10 +1,10 @@
 """Tires that a car may have, as far as anybody knows before it drives: what a plan must stand.
 
-Of a car that was never identified: brush tires (models as in the prior of the axle identifier) of
-the told stiffness and friction, and those that are softer, stiffer, more slippery or grippier by
-a share. No car is believed to oversteer at small slip: where the told rear axle is softer for its
-load than the front one, both are taken to be alike. Of a model that was learnt: its own curve, and
-curves drawn from what learning left open.
+Of a car that was never identified: brush tires (as in the prior of the axle identifier) of the told
+stiffness and friction, and those that are softer, stiffer, more slippery or grippier by a share;
+the least stable of them steers neutrally on a slippery road. No car is believed to oversteer at
+small slip: where the told rear axle is softer for its load than the front one, both are taken to be
+alike. Of a model that was learnt: its own curve, and curves drawn from what learning left open.
 """
 
 from dataclasses import dataclass, replace
@@ -58,14 +58,15 @@ class PlausibleTires:
         ladder, prior = method.ladder, method.prior
         bicycle, loads = vehicle.bicycle, vehicle.axle_loads
         front, rear = bicycle.C_f / loads[0], bicycle.C_r / loads[1]
+        neutral = (front * rear) ** 0.5
         if rear < front:
-            front = rear = (front * rear) ** 0.5
+            front = rear = neutral
         low, high = 1.0 - SPREAD, 1.0 + SPREAD
         cases = (
             (front, rear, friction),
             (low * front, low * rear, friction),
             (high * front, high * rear, friction),
-            (front, rear, low * friction),
+            (neutral, neutral, low * friction),
             (front, rear, high * friction),
             (low * front, high * rear, friction),
             (low * front, low * rear, low * friction),
