@@ -35,6 +35,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "verdicts": [],
     "verdicts_without_v_y": [],
     "bands": [],
+    "plan": [],
     "doctor": [],
     "plant_against_commonroad": ["{out}"],
     "paper_gains": [],

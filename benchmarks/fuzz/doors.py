@@ -46,6 +46,7 @@ IDENTIFY = "identify log.csv --vehicle car.toml --out out"
 LOGGER = IDENTIFY.replace("log.csv", "logger.csv")
 COMPARE = "compare log.csv --vehicle car.toml --floor 0 --jobs 1 --out out --method"
 PREDICT = "predict --out out"
+PLAN = "plan --area 40x10 --speed 12 --time 1 --out out"
 FILTER = "--method magic_formula_ekf"
 DRIVE = "drive --path path.csv --speed 12m/s --film none --out out"
 DOORS = (
@@ -135,6 +136,9 @@ DOORS = (
         f"{DRIVE} --mu 0.9 --mu-drop 20:0.5 --tires linear --delay 20 --fault r:stuck:1:1 --seed 3",
     ),
     _door("words of predict", 3, f"{PREDICT} axle.json log.csv --columns r=r --vehicle car.toml"),
+    _door("plan car", 2, f"{PLAN} --vehicle sedan.toml", "sedan.toml"),
+    _door("plan after", 2, f"{PLAN} --after axle.json", "axle.json"),
+    _door("words of plan", 3, f"{PLAN} --mu 0.8 --grip 80 --margin 1 --steering-ratio 15"),
     _door("words of init", 2, "init out.toml"),
     _door("words of channels", 3, "channels log.csv --columns r=r --write out.toml"),
     _door("words of doctor", 2, "doctor log.csv --vehicle car.toml --columns r=r"),

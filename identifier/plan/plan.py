@@ -158,6 +158,13 @@ def make_plan(
         raise PlanError(
             f"nothing is learnt below {least:.3g} m/s with this car, the speed is {space.speed:g}"
         )
+    body = body_of(tires)
+    narrowest = 2.0 * (space.margin + body.side)
+    if space.width < narrowest:
+        raise PlanError(
+            f"the area is {space.width:g} m wide and the car with its margins {narrowest:.3g} m: "
+            "give more room or less margin"
+        )
     longest = longest_pass(tires, space)
     needed = FEWEST * SWING * tires.vehicle.froude_time
     if min(longest, time) < needed:
@@ -187,12 +194,6 @@ def _too_small(tires: PlausibleTires, space: Space, longest: float, needed: floa
     """Return why there is no pass, and what would make one."""
     body = body_of(tires)
     own = 2.0 * space.margin + body.ahead + body.behind
-    if space.width < 2.0 * (space.margin + body.side):
-        least = 2.0 * (space.margin + body.side)
-        return (
-            f"the area is {space.width:g} m wide and the car with its margins {least:.3g} m: give "
-            "more room or less margin"
-        )
     slower = max(space.length - own, 0.0) / needed
     told = f", or drive at {slower:.3g} m/s" if slower > 3.0 * tires.vehicle.lowest_speed else ""
     return (

@@ -14,6 +14,7 @@ from models.maneuvers import (
     Slalom,
     SlowlyIncreasingSteer,
     StepSteer,
+    Swings,
     TwoStepSteer,
 )
 
@@ -155,3 +156,31 @@ def test_random_steer_is_its_seed():
     np.testing.assert_array_equal(first.steering(t), replace(first).steering(t))
     other = replace(first, seed=4).steering(t)
     assert np.corrcoef(first.steering(t)[:, 0], other[:, 0])[0, 1] < 0.5
+
+
+def test_swings_pass_their_angles_and_rest_before_and_after():
+    swings = Swings(times=(1.0, 1.5, 2.5), angles=(0.0, 0.1, 0.0), rate_limit=0.4, duration=4.0)
+    t = np.array([0.0, 1.0, 1.25, 1.5, 2.0, 2.5, 4.0])
+    np.testing.assert_allclose(
+        swings.steering(t)[:, 0], [0.0, 0.0, 0.05, 0.1, 0.05, 0.0, 0.0], atol=1e-15
+    )
+    fine = swings.steering(np.linspace(0.0, 4.0, 40001))[:, 0]
+    assert np.abs(np.diff(fine) / 1e-4).max() == pytest.approx(0.1 * np.pi, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("others", "words"),
+    [
+        ({"rate_limit": 0.3}, "more than rate_limit"),
+        ({"times": (1.0, 1.0, 2.0)}, "times must rise"),
+        ({"times": (-1.0, 1.0, 2.0)}, "times must rise"),
+        ({"angles": (0.0, 0.1, 0.1)}, "first and the last angle must be 0"),
+        ({"angles": (0.0, 0.0)}, "finite pairs"),
+        ({"angles": (0.0, float("nan"), 0.0)}, "finite pairs"),
+        ({"duration": 0.0}, "duration must be positive"),
+    ],
+)
+def test_swings_that_cannot_be_steered_are_refused(others, words):
+    numbers = {"times": (1.0, 1.5, 2.5), "angles": (0.0, 0.1, 0.0), "rate_limit": 0.4}
+    with pytest.raises(ManeuverError, match=words):
+        Swings(**{**numbers, "duration": 4.0, **others})
