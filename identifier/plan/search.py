@@ -226,7 +226,12 @@ class Search:
         return Steerings(times, angles, Entry(X, 0.5 * space.width + free * place, psi))
 
     def costs(self, numbers: Array) -> Array:
-        """Return the expected error of steerings, more than 1 where they are not possible, (m,)."""
+        """Return the expected error of steerings, more than 1 where they are not possible, (m,).
+
+        Parameters
+        ----------
+        numbers : as of `steerings`, (m, N + 2).
+        """
         steerings = self.steerings(numbers)
         motion = self.motion(steerings)
         cost = 1.0 + self.violation(motion)
@@ -329,7 +334,12 @@ class Search:
         return self.as_pass(np.array([found.x]))
 
     def as_pass(self, numbers: Array) -> Pass:
-        """Return the pass that one row of numbers stands for."""
+        """Return the pass that numbers stand for.
+
+        Parameters
+        ----------
+        numbers : as of `steerings`, (1, N + 2).
+        """
         steerings = self.steerings(numbers)
         motion = self.motion(steerings)
         P = covariance_after(self.tires, motion, self.space.speed)

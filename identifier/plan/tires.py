@@ -35,7 +35,7 @@ class PlausibleTires:
     W : weights [static axle loads], (k, 2, n).
     own : compliance [m per load], sway share [-], offset (2, 3), of all.
     covariance : of weights and own before the maneuver, (2, n + 3, n + 3).
-    prior : that of a car that never drove.
+    prior : that of a car that never drove, (2, n + 3, n + 3).
     """
 
     vehicle: Vehicle
