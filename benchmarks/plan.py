@@ -5,10 +5,10 @@
 Random cars of four classes; the planner is told the car with stiffnesses off by 0.7 to 1.4, and a
 friction that is typical of the class. A slalom of 24 s at the same share of the grip (and one at 70
 % of it) is driven first, from the same knowledge; the plan has a third of its time and half of its
-area, as planned, margins counted in both. Random steering has the time of the plan and all the room that it
-wants. Each is driven on the double-track plant, held on its course, with good sensors; the default
-identifier learns, and what it has frozen at the end is asked about another drive, at random up to
-the limit. Constants of the planner were chosen on seeds 100 to 107.
+area, as planned, margins counted in both. Random steering has the time of the plan and all the room
+that it wants. Each is driven on the double-track plant, held on its course, with good sensors; the
+default identifier learns, and what it has frozen at the end is asked about another drive, at random
+up to the limit. Constants of the planner were chosen on seeds 100 to 109.
 """
 
 import argparse

@@ -1,5 +1,6 @@
 """Driving a car along a path with a tracker, and what came of it."""
 
+from mpc.loop.dither import Dither
 from mpc.loop.drive import COMPLETED, LearningTires, PathTracker, drive
 from mpc.loop.lateral import LateralVelocity, Localization, TellsLateral, Told
 from mpc.loop.record import Drive, Plan, Scores, ToldScores, scores, told_scores
@@ -18,6 +19,7 @@ from mpc.loop.sensing import (
 __all__ = [
     "COMPLETED",
     "CarSensors",
+    "Dither",
     "Drive",
     "FaultySensors",
     "LateralVelocity",

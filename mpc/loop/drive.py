@@ -14,6 +14,7 @@ import numpy as np
 from codegen.arrays import Array
 from models.sensors import is_shown
 from mpc.cars import Car, CarState
+from mpc.loop.dither import Dither
 from mpc.loop.lateral import TellsLateral
 from mpc.loop.record import Drive, Recorder
 from mpc.loop.sensing import CarSensors, Measured, Measures, SpeedProfile
@@ -85,6 +86,7 @@ def drive(
     rng: np.random.Generator,
     learner: LearningTires | None = None,
     lateral: TellsLateral | None = None,
+    dither: Dither | None = None,
     laps: float = 1.0,
     time_limit: float = 300.0,
     widest: float = 2.0,
@@ -107,6 +109,7 @@ def drive(
     learner : what may change the tracker's tire on the way.
     lateral : tells v_y, and a_y in the plane of the road, in place of the sensors; None takes what
         they show.
+    dither : weaves along the path to teach; None keeps to it.
     laps : how often to drive a closed path; an open one is driven once.
     time_limit : after which the drive is given up [s].
     widest : deviation at which the car has left the path [m].
@@ -150,16 +153,17 @@ def drive(
         if learner is not None:
             record.note(state.t, learner.observe(measured, tracker))
         ahead = profile.ahead(projected.s, place.v_x, tracker.times, car.speed_gain)
-        command = tracker.step(
-            Measurement(
-                e_y=projected.e_y,
-                e_psi=projected.heading_error(place.psi),
-                v_y=measured.v_y if is_shown("v_y", measured.v_y) else math.nan,
-                r=measured.r if is_shown("r", measured.r) else math.nan,
-                kappa=ahead.kappa,
-                v_x=ahead.v_x,
-            )
+        situation = Measurement(
+            e_y=projected.e_y,
+            e_psi=projected.heading_error(place.psi),
+            v_y=measured.v_y if is_shown("v_y", measured.v_y) else math.nan,
+            r=measured.r if is_shown("r", measured.r) else math.nan,
+            kappa=ahead.kappa,
+            v_x=ahead.v_x,
         )
+        if dither is not None:
+            situation = dither.displaced(situation, state.t, tracker.times, tracker.period)
+        command = tracker.step(situation)
         v_ref = profile.reference(here.s, car.speed_gain)
         if record.plan_is_due:
             there = profile.ahead(projected.s, place.v_x, tracker.plan_times, car.speed_gain)

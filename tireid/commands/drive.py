@@ -60,6 +60,7 @@ def headline(conditions: Conditions) -> str:
     drops = "".join(f", {mu:g} from {s:g} m on" for s, mu in setup.drops)
     noise = "sensor noise" if conditions.noise else "no noise"
     noise += ", no v_y" if conditions.kind == IMU else ""
+    noise += f", weave of {conditions.dither:g} m" if conditions.dither > 0.0 else ""
     noise += "".join(f", {fault}" for fault in conditions.faults)
     return (
         f"{setup.path.name} at {speed}{share}; friction {setup.mu:g}{drops}; "
@@ -103,6 +104,7 @@ def inputs_of(
         "period_ms": 1e3 * PERIOD,
         "noise": conditions.noise,
         **({"sensors": conditions.kind} if conditions.kind != FULL else {}),
+        **({"dither_m": conditions.dither} if conditions.dither > 0.0 else {}),
         "faults": [_finite(asdict(fault)) for fault in conditions.faults],
         "seed": conditions.seed,
     }
@@ -220,6 +222,14 @@ def add_parser(commands: Any) -> None:
         metavar="CHANNEL:KIND:START:DURATION[:SIZE]",
         help=f"a sensor that breaks on the path, times in s (v_y:biased:3:inf:0.5); kinds: "
         f"{', '.join(KINDS)}; may be repeated",
+    )
+    parser.add_argument(
+        "--dither",
+        type=float,
+        default=0.0,
+        metavar="M",
+        help="weave by at most so much about the path, to learn from it; where the car goes on "
+        "learning the weave fades as the tires become known (%(default)g: off)",
     )
     add_seed(parser, "noise and learning")
     parser.add_argument(

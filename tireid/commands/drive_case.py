@@ -17,7 +17,16 @@ from mpc.loop import CarSensors, FaultySensors, imu_and_localization
 from mpc.path import BUILT_IN, Path
 from tireid.commands.options import chosen_method, network_model, read_vehicle, seed_of
 from tireid.driving.learn import learning_drive
-from tireid.driving.runs import FROZEN, FULL, IMU, LEARNING, LINEAR, ORACLE, Conditions
+from tireid.driving.runs import (
+    FROZEN,
+    FULL,
+    IMU,
+    LEARNING,
+    LINEAR,
+    ORACLE,
+    Conditions,
+    require_dither,
+)
 from tireid.driving.setup import PERIOD, Setup, SpeedWish, require_friction
 from tireid.learning import identify
 from tireid.progress import Progress
@@ -146,6 +155,7 @@ def conditions_of(options: argparse.Namespace) -> Conditions:
     """
     if not 0.0 < options.laps <= 100.0:
         raise ValueError(f"--laps must be positive and at most 100, it is {options.laps:g}")
+    require_dither("--dither", options.dither)
     path = named_path(options.path)
     if options.laps != 1.0 and not path.closed:
         raise ValueError(f"--laps is for a closed path, {path.name} is not")
@@ -169,6 +179,7 @@ def conditions_of(options: argparse.Namespace) -> Conditions:
         laps=options.laps,
         faults=tuple(parse_fault(text, options.sensors) for text in options.fault),
         kind=options.sensors,
+        dither=options.dither,
     )
 
 

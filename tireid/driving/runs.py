@@ -1,6 +1,6 @@
 """One drive for each tire that a tracker is told: linear, frozen, true, or learnt on the way."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,8 +9,9 @@ import numpy as np
 from codegen import find_compiler
 from identifier.axle import AxleModel
 from identifier.inertial import InertialIdentifier
+from identifier.method import CannotFreezeError
 from identifier.methods import continuing
-from identifier.run import OnlineIdentifier
+from identifier.run import DivergedError, OnlineIdentifier
 from identifier.tire_model import TireModel
 from models.faults import SensorFault
 from models.friction import Friction
@@ -19,6 +20,7 @@ from mpc.handover.learner import Learner
 from mpc.handover.supervisor import Supervisor
 from mpc.loop import (
     CarSensors,
+    Dither,
     Drive,
     FaultySensors,
     LateralVelocity,
@@ -122,9 +124,42 @@ def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
     return Learner(Supervisor(identifier, prediction_tire(learnt, vehicle)))
 
 
+PROBED = 0.03  # rad: slip at which curves are asked how unsure they are
+SURE, UNSURE = 0.1, 0.25  # standard deviations over the prior's, between which a weave begins
+ASKED = 0.5  # s between two looks
+
+
+def unknown_of(learner: LearningTires | None) -> Callable[[], float] | None:
+    """Return what tells how much of the tires is unknown, 0 to 1; None where nobody learns.
+
+    Parameters
+    ----------
+    learner : beside the tracker.
+    """
+    if not isinstance(learner, Learner):
+        return None
+    last, calls = 1.0, 0
+
+    def unknown() -> float:
+        nonlocal last, calls
+        if calls % round(ASKED / PERIOD) == 0:
+            try:
+                model = learner.supervisor.identifier.model()
+            except (DivergedError, CannotFreezeError, ValueError):  # no model now
+                model = None
+            if isinstance(model, AxleModel):
+                unsure = float(model.relative_sd(np.array([PROBED])).max())
+                last = min(max((unsure - SURE) / (UNSURE - SURE), 0.0), 1.0)
+        calls += 1
+        return last
+
+    return unknown
+
+
 LINEAR, FROZEN, ORACLE, LEARNING = TIRES = ("linear", "frozen", "oracle", "learning")
 FULL, IMU = SENSORS = ("full", "imu")
 WIDEST = 2.0  # deviation at which a car is off the path [m]
+WIDEST_WEAVE = 0.5  # m
 PLAN_EVERY = 4  # periods between two plans that are kept: half a frame of the film
 
 
@@ -141,6 +176,7 @@ class Conditions:
     laps : of a closed path.
     faults : of the sensors, while the path is driven.
     kind : of the sensors, of `SENSORS`; imu measures no v_y.
+    dither : deviation that a weave may make which teaches [m]; 0 keeps to the path.
     """
 
     setup: Setup
@@ -150,6 +186,7 @@ class Conditions:
     laps: float
     faults: tuple[SensorFault, ...] = ()
     kind: str = FULL
+    dither: float = 0.0
 
     @property
     def sensors(self) -> CarSensors:
@@ -205,6 +242,23 @@ class Run:
             f"<Run on {self.label} tires along {self.drive.path.name}: {self.drive.ending}; "
             f"{rms:.3f} m rms off the path, {peak:.3f} m at most>"
         )
+
+
+def require_dither(name: str, dither: float) -> None:
+    """Refuse a weave that is none, or wider than a car drives for the sake of knowing.
+
+    Parameters
+    ----------
+    name : of the number.
+    dither : deviation that it may make [m].
+
+    Raises
+    ------
+    ValueError
+        Where it is not 0 to 0.5 m.
+    """
+    if not 0.0 <= dither <= WIDEST_WEAVE:
+        raise ValueError(f"{name} must be 0 to {WIDEST_WEAVE:g} m, it is {dither:g}")
 
 
 def require_compiler() -> None:
@@ -274,6 +328,14 @@ def run_drive(
     except NoCompilerError as error:
         raise ValueError(str(error)) from None
     learner = _learner(label, setup, learnt)
+    weave = None
+    if conditions.dither > 0.0:
+        weave = Dither(
+            vehicle=setup.vehicle,
+            amplitude=conditions.dither,
+            grip=setup.grip,
+            need=unknown_of(learner),
+        )
     witness = Witness(learner, PERIOD) if isinstance(learner, Learner) else None
     with Progress(f"driving on {label} tires") as progress:
         driven = drive_tracker(
@@ -286,6 +348,7 @@ def run_drive(
             rng=np.random.default_rng([conditions.seed, 2]),
             learner=witness or learner,
             lateral=conditions.lateral(learnt),
+            dither=weave,
             laps=conditions.laps,
             widest=WIDEST,
             plan_every=PLAN_EVERY,
@@ -326,6 +389,7 @@ def drive(
     noise: bool = True,
     sensors: str = FULL,
     laps: float = 1.0,
+    dither: float = 0.0,
     seed: int = 0,
 ) -> Run:
     """Drive a double-track car along a path; the tracker steers by the tires that it is told of.
@@ -345,6 +409,8 @@ def drive(
     sensors : full, or imu: gyro, accelerometer, wheel speed, steering and a localization of
         position and heading, but no v_y, which an inertial identifier tells.
     laps : of a closed path.
+    dither : deviation that a weave may make which teaches [m], at most 0.5; 0 keeps to the path.
+        Where the car goes on learning it fades as the tires become known.
     seed : of the noise.
 
     Returns
@@ -372,6 +438,7 @@ def drive(
         raise ValueError(f"laps are of a closed path, {path.name} is not")
     if learning and tire is None:
         raise ValueError("learning goes on from a tire: none is given")
+    require_dither("dither", dither)
     vehicle.require_chassis()
     setup = Setup(
         path=path,
@@ -382,7 +449,13 @@ def drive(
         wish=SpeedWish(share if speed is None else None, speed),
     )
     conditions = Conditions(
-        setup=setup, delay=round(periods), noise=noise, seed=seed, laps=laps, kind=sensors
+        setup=setup,
+        delay=round(periods),
+        noise=noise,
+        seed=seed,
+        laps=laps,
+        kind=sensors,
+        dither=dither,
     )
     label = LINEAR if tire is None else LEARNING if learning else FROZEN
     return run_drive(label, conditions, tire)
