@@ -26,11 +26,11 @@ from benchmarks.answers import blind, drawn, force_error
 from benchmarks.random_cars import CLASSES, FIRST_SEED, RandomCar
 from benchmarks.targets import Targets, keeps, show
 from codegen.arrays import Array
-from identifier.plan import Plan, PlanError, hold_of, rehearse
+from identifier.plan import PlanError, hold_of, rehearse
 from identifier.plan.motion import steps_of
 from identifier.plan.plan import extent, free_motion, hardest, random_of, slalom_of
 from identifier.plan.rehearsal import LEAD, Course
-from identifier.plan.search import Space, body_of
+from identifier.plan.search import Space, body_of, edge_distance
 from identifier.plan.tires import PlausibleTires
 from models.maneuvers import Maneuver
 from models.recordings import Recording
@@ -115,19 +115,6 @@ def open_course(tires: PlausibleTires, speed: float, steering: Maneuver) -> Cour
     return lambda at: np.column_stack([np.interp(at, t, line) for line in lines])
 
 
-def outside(found: Plan, way: Array) -> float:
-    """Return how far a car left the area at most [m], negative where it did not."""
-    (X, Y, psi), body, space = way.T, body_of(found.tires), found.space
-    worst = -math.inf
-    for along in (body.ahead, -body.behind):
-        for side in (body.side, -body.side):
-            x = X + along * np.cos(psi) - side * np.sin(psi)
-            y = Y + along * np.sin(psi) + side * np.cos(psi)
-            over = max((-x).max(), (x - space.length).max(), (-y).max(), (y - space.width).max())
-            worst = max(worst, float(over))
-    return worst
-
-
 def case(job: tuple[str, int]) -> Taught | str:
     """Return what maneuvers taught one random car; why there is no plan.
 
@@ -189,7 +176,7 @@ def case(job: tuple[str, int]) -> Taught | str:
         gentle=gentle.errors[long],
         random=random.errors[TIME],
         area=found.space.length * found.space.width / taken,
-        outside=outside(found, plan.way),
+        outside=-float(edge_distance(found.space, body, *plan.way.T)),
         reaches=min(good, default=math.inf),
         expected=100.0 * found.error,
     )

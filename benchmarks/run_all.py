@@ -36,6 +36,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "verdicts_without_v_y": [],
     "bands": [],
     "plan": [],
+    "dither": [],
     "doctor": [],
     "plant_against_commonroad": ["{out}"],
     "paper_gains": [],

@@ -5,8 +5,9 @@ from collections.abc import Callable
 import numpy as np
 
 from identifier.axle import AxleModel
-from identifier.plan import Plan, PlanError, PlausibleTires, Space, make_plan
+from identifier.plan import Plan, PlanError, PlausibleTires, Rehearsal, Space, make_plan
 from identifier.tire_model import TireModel
+from models.plant import Plant, PlantError
 from models.vehicle import Vehicle
 
 TIME = 6.0  # s, of steering
@@ -89,6 +90,27 @@ def plan(
             raise PlanError("friction is known from what was learnt: leave one of them out")
         tires = PlausibleTires.learnt(_of_car(after, vehicle), rng)
     return make_plan(tires, space, time, rng, progress)
+
+
+def rehearsals(found: Plan) -> tuple[Rehearsal, ...]:
+    """Return how the double-track car of the vehicle drives a plan; none where it has no tires.
+
+    Parameters
+    ----------
+    found : the plan.
+
+    Raises
+    ------
+    PlanError
+        Where that car does not keep on its wheels.
+    """
+    chassis = found.tires.vehicle.chassis
+    if chassis is None or chassis.tire is None:
+        return ()
+    try:
+        return found.rehearsed(Plant(found.tires.vehicle))
+    except PlantError as error:
+        raise PlanError(f"the double-track car of the vehicle cannot drive it: {error}") from None
 
 
 def _of_car(model: TireModel, vehicle: Vehicle) -> AxleModel:

@@ -82,6 +82,12 @@ MORE = (
         "--speed 1e999%",
     ),
     *(
+        "--dither nan",
+        "--area 1e999x3",
+        "--area x",
+        "--steering-ratio 0",
+        "--after axle.json",
+        "--blind",
         "--speed 0.9",
         "--mu nan",
         "--mu-drop 1e308:1",

@@ -14,7 +14,8 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.plan.information import asked, covariance_after, deviation, expected_error
-from identifier.plan.motion import Entry, Motion, hold_of, simulate, steps_of
+from identifier.plan.motion import NO_HOLD, Entry, Motion, hold_of, simulate, steps_of
+from identifier.plan.rehearsal import LEAD, rehearse
 from identifier.plan.search import (
     FEWEST,
     SWING,
@@ -24,9 +25,12 @@ from identifier.plan.search import (
     Space,
     after_pass,
     body_of,
+    edge_distance,
 )
 from identifier.plan.tires import PlausibleTires
 from models.maneuvers import Maneuver, RandomSteer, Slalom
+from models.plant import Plant
+from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 
 TURNS = 0.8  # share of the planned lateral force that a car may need to turn inside the area
@@ -51,6 +55,18 @@ class Rival(NamedTuple):
     length: float
     width: float
     catches_up: float
+
+
+class Rehearsal(NamedTuple):
+    """A pass on a plant.
+
+    log : what exact sensors see.   clearance : least distance to the edge [m].   side_slip : its
+    largest size [rad].
+    """
+
+    log: Recording
+    clearance: float
+    side_slip: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,6 +116,30 @@ class Plan:
         return self.space.margin - max(
             float(search.beyond(one.motion).max()) for one in self.passes
         )
+
+    def rehearsed(self, plant: Plant) -> tuple[Rehearsal, ...]:
+        """Return how another car drives each pass: one whose tires need not be as planned.
+
+        Parameters
+        ----------
+        plant : the car.
+
+        Raises
+        ------
+        PlantError
+            Where it leaves the range of its equations.
+        """
+        hold = hold_of(self.tires, self.space.speed) if self.space.held else NO_HOLD
+        body = body_of(self.tires)
+        driven = []
+        for one in self.passes:
+            log, way = rehearse(plant, one.steering, one.course, self.space.speed, hold)
+            inside = way[log.t >= LEAD - 1e-9]
+            assert log.v_y is not None
+            side_slip = float(np.abs(np.arctan2(log.v_y, log.v_x)).max())
+            clearance = float(edge_distance(self.space, body, *inside.T))
+            driven.append(Rehearsal(log, clearance, side_slip))
+        return tuple(driven)
 
     @property
     def lateral_acceleration(self) -> float:

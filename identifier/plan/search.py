@@ -101,6 +101,25 @@ def body_of(tires: PlausibleTires) -> Body:
     return Body(car.l_f + over, car.l_r + over, side)
 
 
+def edge_distance(space: Space, body: Body, X: Array, Y: Array, psi: Array) -> Array:
+    """Return the least distance of a body on its way to the edge of the area [m], (...).
+
+    Parameters
+    ----------
+    space : the area.
+    body : the car.
+    X, Y, psi : center of gravity [m] and heading [rad] over time, (n, ...).
+    """
+    c, s = np.cos(psi), np.sin(psi)
+    least = np.full(psi.shape[1:], math.inf)
+    for along in (body.ahead, -body.behind):
+        for side in (body.side, -body.side):
+            x, y = X + along * c - side * s, Y + along * s + side * c
+            for distance in (x, space.length - x, y, space.width - y):
+                least = np.minimum(least, distance.min(axis=0))
+    return least
+
+
 class Steerings(NamedTuple):
     """m steerings: times (m, N + 1) [s], angles (m, N + 1) [rad], and entries."""
 
@@ -262,16 +281,8 @@ class Search:
 
     def beyond(self, motion: Motion) -> Array:
         """Return by how far the margin is broken at most [m], (m, k); negative inside."""
-        space, body = self.space, body_of(self.tires)
-        c, s = np.cos(motion.psi), np.sin(motion.psi)
-        worst = np.full(motion.v_y.shape[1:], -math.inf)
-        for along in (body.ahead, -body.behind):
-            for side in (body.side, -body.side):
-                X = motion.X + along * c - side * s
-                Y = motion.Y + along * s + side * c
-                for low in (X, space.length - X, Y, space.width - Y):
-                    worst = np.maximum(worst, (space.margin - 1e-6 - low).max(axis=0))
-        return worst
+        way = motion.X, motion.Y, motion.psi
+        return self.space.margin - 1e-6 - edge_distance(self.space, body_of(self.tires), *way)
 
     def beginnings(self, rng: np.random.Generator) -> Array:
         """Return numbers to begin with, swings to the left and the right of all sizes, (m, N + 2).

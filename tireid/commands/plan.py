@@ -19,7 +19,7 @@ from tireid.commands import COMMANDS
 from tireid.commands.options import add_output, add_seed, add_vehicle, read_vehicle, seed_of
 from tireid.figures import plan_area_figure, plan_band_figure, plan_steering_figure, save_figure
 from tireid.output import output_folder, text_table, write_csv, write_json
-from tireid.planning import FRICTION, MARGIN, RATE, SHARE, TIME, plan
+from tireid.planning import FRICTION, MARGIN, RATE, SHARE, TIME, plan, rehearsals
 from tireid.progress import Progress, say, tell
 from tireid.reports.plan import plan_words, write_plan_report
 from tireid.verdicts import warn_of_stored
@@ -139,6 +139,7 @@ def run(options: argparse.Namespace) -> int:
                 seed=seed,
                 progress=progress,
             )
+        driven = rehearsals(found)
         inputs = inputs_of(options, vehicle, area, speed)
         write_plan(folder, found, inputs, ratio)
         figures = {
@@ -148,8 +149,10 @@ def run(options: argparse.Namespace) -> int:
         }
         for name, figure in figures.items():
             save_figure(figure, folder / f"{name}.png")
-        write_plan_report(folder, found, figures, inputs=inputs, command=options.words)
-    tell("\n".join([*plan_words(found), plan_table(found)]))
+        write_plan_report(
+            folder, found, figures, inputs=inputs, command=options.words, driven=driven
+        )
+    tell("\n".join([*plan_words(found, driven), plan_table(found)]))
     say(f"wrote {options.out}/")
     return 0
 

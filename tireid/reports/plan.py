@@ -1,13 +1,13 @@
 """The report of `tireid plan`: what to drive, what it will teach, and how safe it is."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
 
-from identifier.plan import Plan, Rival, hold_of
+from identifier.plan import Plan, Rehearsal, Rival, hold_of
 from models.files import digest
 from tireid.report import Headline, Paragraph, Report, Section, Table, write_report
 from tireid.reports.common import READ, REPORT, drawing, origin
@@ -15,12 +15,13 @@ from tireid.reports.common import READ, REPORT, drawing, origin
 PULL = 3.0  # m/s², of a car that comes to speed, and of one that stops
 
 
-def plan_words(found: Plan) -> list[str]:
+def plan_words(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
     """Return what to expect and what is safe, as sentences.
 
     Parameters
     ----------
     found : the plan.
+    driven : how the car of the vehicle file drives it, if it can be simulated.
     """
     space, count = found.space, len(found.passes)
     each = found.time / count
@@ -39,7 +40,18 @@ def plan_words(found: Plan) -> list[str]:
         f"every tire that it may have. It comes in at speed, about {distance:.0f} m of run-up, and "
         f"needs as much to stop behind the area."
     )
+    if driven:
+        side_slip = max(one.side_slip for one in driven)
+        said.append(
+            f"Rehearsed on the double-track car of the vehicle file: {least(driven):.1f} m from "
+            f"the edge, side slip up to {math.degrees(side_slip):.1f} degrees."
+        )
     return said
+
+
+def least(driven: Sequence[Rehearsal]) -> float:
+    """Return the least distance to the edge in rehearsals [m]."""
+    return min(one.clearance for one in driven)
 
 
 def _against(slalom: Rival, found: Plan) -> str:
@@ -63,6 +75,7 @@ def write_plan_report(
     *,
     inputs: Mapping[str, Any],
     command: str,
+    driven: Sequence[Rehearsal],
 ) -> None:
     """Write the report of a plan.
 
@@ -73,8 +86,9 @@ def write_plan_report(
     figures : by the name of their files.
     inputs : all that went in, ready for JSON.
     command : as it was typed.
+    driven : rehearsals of the passes.
     """
-    words = plan_words(found)
+    words = plan_words(found, driven)
     report = Report(
         title=f"What to drive in {found.space.length:g} x {found.space.width:g} m",
         summary=words[0],
@@ -84,7 +98,7 @@ def write_plan_report(
             Headline(f"{100.0 * found.rivals[0].error:.1f} %", "after a slalom of that length"),
             Headline(f"{found.clearance:.1f} m", "least distance to the edge"),
         ],
-        warnings=plan_warnings(found),
+        warnings=plan_warnings(found, driven),
         sections=[
             Section(
                 heading="What to drive",
@@ -104,7 +118,7 @@ def write_plan_report(
                     _rivals(found),
                 ],
             ),
-            Section(heading="How safe it is", blocks=[Paragraph(text=words[2])]),
+            Section(heading="How safe it is", blocks=[Paragraph(text=text) for text in words[2:]]),
             origin(
                 command,
                 found.tires.vehicle,
@@ -116,12 +130,13 @@ def write_plan_report(
     write_report(folder / REPORT, report)
 
 
-def plan_warnings(found: Plan) -> list[str]:
+def plan_warnings(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
     """Return what to know before somebody drives a plan.
 
     Parameters
     ----------
     found : the plan.
+    driven : rehearsals of the passes.
     """
     said = [
         "Drive on a closed field only, at half the speed first: tires outside of what was taken "
@@ -129,6 +144,11 @@ def plan_warnings(found: Plan) -> list[str]:
     ]
     if not found.space.held:
         said.append("Nobody holds the course: whatever pushes the car stays in its way.")
+    if driven and least(driven) < 0.0:
+        said.append(
+            f"The double-track car of the vehicle file leaves the area by {-least(driven):.1f} m: "
+            "its tires are not among those planned for. Tell --mu, or ask for less --grip."
+        )
     return said
 
 
