@@ -5,6 +5,7 @@ import math
 import pytest
 
 from models.faults import SensorFault
+from tireid.cli import main
 from tireid.commands.drive_case import parse_drop, parse_fault, parse_speed
 from tireid.driving.setup import SpeedWish, require_friction
 
@@ -96,3 +97,9 @@ def test_what_is_no_fault_is_refused_with_its_rule(text, said):
     with pytest.raises(ValueError, match=r"^--fault") as refusal:
         parse_fault(text)
     assert said in str(refusal.value)
+
+
+@pytest.mark.parametrize("word", ["-0.1", "0.6", "nan"])
+def test_a_weave_that_is_none_is_refused_before_anything_is_driven(tmp_path, capsys, word):
+    assert main(["drive", "--dither", word, "--out", str(tmp_path / "out")]) == 2
+    assert "--dither must be 0 to 0.5 m" in capsys.readouterr().err
