@@ -59,7 +59,13 @@ from tireid.commands.options import (
 from tireid.diagnoses import add_repair, doctor_text, write_repair
 from tireid.figures.style import paper_design
 from tireid.learning import identify
-from tireid.output import output_folder, require_free, text_table, write_json
+from tireid.output import (
+    output_folder,
+    require_curves,
+    require_free,
+    text_table,
+    write_json,
+)
 from tireid.progress import Progress, say, tell
 from tireid.reports.identify import side_slip_text, write_identify_report
 from tireid.verdicts import verdict_text, warn_of_stored
@@ -115,6 +121,13 @@ def add_parser(commands: Any) -> None:
     add_seed(parser, "the initial weights of the paper's network")
     add_network_arguments(parser, "freeze nothing, judge this network instead")
     add_accept(parser)
+    parser.add_argument(
+        "--curves",
+        choices=("csv", "parquet"),
+        default="csv",
+        help="as what curves over time are written (csv); parquet is smaller, sooner written and "
+        "has all digits",
+    )
     add_output(parser, "identify")
     parser.set_defaults(run=run)
 
@@ -131,6 +144,7 @@ def run(options: argparse.Namespace) -> int:
         warn_of_stored(options.weights)
     if options.run_name is not None and len(options.logs) > 1:
         raise ValueError("--run goes with one LOG: name runs as LOG:RUN")
+    require_curves(options.curves)
     if options.repair is not None:
         require_free(options.repair, force=options.force)
     logs = [_read(log, options.run_name, vehicle, design, options) for log in options.logs]
@@ -180,7 +194,7 @@ def run(options: argparse.Namespace) -> int:
             verdict = judge_prediction(network, histories[0].recording)
             progress.begin(DRAWING)
             replays, figures = write_network_results(
-                folder, options.network, law, network, histories, verdict
+                folder, options.network, law, network, histories, verdict, options.curves
             )
             by_key = {NETWORK: replays}
             told = network_table(law, histories, replays)
@@ -199,6 +213,7 @@ def run(options: argparse.Namespace) -> int:
                 frozen,
                 verdict,
                 pieces,
+                curves=options.curves,
                 progress=progress.begin(DRAWING),
             )
             by_key = {f"{freeze_key(t)} s": replays for t, replays in frozen.items()}

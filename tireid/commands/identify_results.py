@@ -39,7 +39,7 @@ from tireid.figures import (
     slip_figure,
     weights_figure,
 )
-from tireid.output import text_table, write_csv, write_json, write_long_csv
+from tireid.output import text_table, write_csv, write_json, write_table
 from tireid.progress import Progress, say
 
 # The machine-readable result of `tireid identify`: summary.json, whose keys are stable.
@@ -155,6 +155,7 @@ def write_results(
     verdict: Verdict,
     parts: Sequence[History] = (),
     *,
+    curves: str = "csv",
     progress: Progress | None = None,
 ) -> dict[str, Figure]:
     """Write everything that was learnt into a folder; return the figures by the name of their file.
@@ -168,6 +169,7 @@ def write_results(
     frozen : freeze time [s] to recording name to replay.
     verdict : on the model of the last freeze.
     parts : of the online run, over each of several logs that were learnt on.
+    curves : "csv" or "parquet", as what curves over time are written.
     progress : told how far it is; None tells nobody.
     """
     calibrated = learnt.calibrated(max(frozen))
@@ -184,7 +186,7 @@ def write_results(
         model.save(folder / f"weights{last}.json", valid=None if judged is None else judged.valid)
         columns = curve_columns(model, [run.recording for run in (learnt, *others)])
         write_csv(folder / f"curve{last}.csv", columns)
-    _write_curves(folder, learnt, others, frozen, progress or Progress("curves"))
+    _write_curves(folder, learnt, others, frozen, curves, progress or Progress("curves"))
     say("drawing figures")
     return _draw(folder, learnt, others, frozen, calibrated)
 
@@ -220,6 +222,7 @@ def _write_curves(
     learnt: History,
     others: Sequence[History],
     frozen: Frozen,
+    curves: str,
     progress: Progress,
 ) -> None:
     count = 1 + len(others)
@@ -228,14 +231,14 @@ def _write_curves(
             f"frozen_{freeze_key(t)}s": by_name[history.recording.name]
             for t, by_name in frozen.items()
         }
-        name = "forces.csv" if history is learnt else f"forces_{file_name(history.recording)}.csv"
+        name = "forces" if history is learnt else f"forces_{file_name(history.recording)}"
         told = progress.within(WRITING * k / count, WRITING * (k + 1) / count)
-        write_forces(folder / name, history, replays, told)
+        write_forces(folder / f"{name}.{curves}", history, replays, told)
     if OBSERVED in learnt.outputs:
         found = learnt.blocks()
-        write_long_csv(folder / "errors.csv", (_error_columns(learnt, one) for one in found))
+        write_table(folder / f"errors.{curves}", (_error_columns(learnt, one) for one in found))
     parts = (_weight_columns(learnt, one) for one in learnt.blocks())
-    write_long_csv(folder / "weights.csv", parts)
+    write_table(folder / f"weights.{curves}", parts)
 
 
 def _error_columns(learnt: History, block: Block) -> dict[str, Array]:
@@ -288,7 +291,7 @@ def write_forces(
             if progress is not None:
                 progress(part.stop / n)
 
-    write_long_csv(path, parts())
+    write_table(path, parts())
 
 
 def _force_columns(
@@ -393,6 +396,7 @@ def write_network_results(
     model: OnnxModel,
     histories: Sequence[History],
     verdict: Verdict,
+    curves: str = "csv",
 ) -> tuple[Mapping[str, Replay], dict[str, Figure]]:
     """Write everything that is known of a network into a folder; return replays and figures.
 
@@ -404,6 +408,7 @@ def write_network_results(
     model : the network.
     histories : what was identified online over each recording.
     verdict : on the network.
+    curves : "csv" or "parquet", as what curves over time are written.
     """
     replays = {history.recording.name: replay(model, history) for history in histories}
     about = {
@@ -422,7 +427,7 @@ def write_network_results(
         recording = history.recording
         name, own = file_name(recording), replays[recording.name]
         last = "" if history is histories[0] else f"_{name}"
-        write_forces(folder / f"forces{last}.csv", history, {NETWORK: own})
+        write_forces(folder / f"forces{last}.{curves}", history, {NETWORK: own})
         figures[f"slip{last}"] = slip_figure(model, recording, history)
         figures[f"replay_{name}"] = prediction_figure(own, history)
     figures["inputs"] = inputs_figure(histories[0].recording)

@@ -204,11 +204,11 @@ def figure_svg(figure: Figure) -> bytes:
     with style.context(["default", LOOK, VECTOR]):
         _lay_out(figure)
         figure.savefig(buffer, format="svg", dpi=CLOUDS, metadata={"Date": None, "Creator": None})
-    return OUTLINE.sub(lambda path: DIGITS.sub(rb"\1", path[0]), buffer.getvalue())
+    return OUTLINE.sub(lambda path: DIGITS.sub(b"", path[0]), buffer.getvalue())
 
 
 OUTLINE = re.compile(rb' d="[^"]*"')  # of a curve or a glyph, in points or finer
-DIGITS = re.compile(rb"(\.\d{2})\d+")  # more are not seen
+DIGITS = re.compile(rb"(?<=\.\d\d)\d+")  # more are not seen
 
 
 def save_figure(figure: Figure, path: Path) -> None:
