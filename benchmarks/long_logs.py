@@ -5,13 +5,16 @@ it over and over, with noise of its own on every sample and without a jump in ti
 runs as a user runs it, in a process of its own. Memory that counts is what the process alone holds
 (RssAnon of /proc, sampled): pages of files that are mapped are the system's, which takes them back
 when it needs them; the largest of both together (VmHWM) stands beside it. Reading lasts until the
-command says that it has read.
+command says that it has read. Time that counts is that of the processor, so that a busy machine
+does not count; the wall clock's stands beside it. What the command compiles once on a machine has
+been compiled.
 
     python -m benchmarks.long_logs [--long] [--record]
 
 `--long` adds the ten hours. Linux only.
 """
 
+import resource
 import subprocess
 import sys
 import tempfile
@@ -27,10 +30,11 @@ from benchmarks.targets import Targets, keeps, show
 from models.recordings import Recording
 from models.vehicle import sedan
 from tireid.driving import sample_recording
+from tireid.learning import identify
 
 HOUR, DT = 3600.0, 0.01  # s
-SECONDS = {1: 60.0, 10: 480.0}  # that a log of so many hours may take
-GIGABYTES = 2.0
+SECONDS = {1: 6.0, 10: 40.0}  # of the processor that a log of so many hours may take
+GIGABYTES = {1: 0.4, 10: 0.5}
 GROWTH = 1.5  # of what the process holds, from one hour to ten
 NOISE = {"v_x": 0.01, "v_y": 0.01, "r": 0.002, "delta_f": 0.0, "a_y": 0.05}  # SI
 ROWS = 100_000  # that are written at once
@@ -63,11 +67,13 @@ def write_log(path: Path, base: Recording, hours: int) -> None:
 class Run(NamedTuple):
     """What a run of the command took.
 
-    seconds : of the whole process.   reading : of these until the log was read.   held : most that
-    the process alone held [MB].   mapped : most with mapped pages [MB].
+    seconds : of the whole process.   processor : of its processor [s].   reading : of the seconds
+    until the log was read.   held : most that the process alone held [MB].   mapped : most with
+    mapped pages [MB].
     """
 
     seconds: float
+    processor: float
     reading: float
     held: float
     mapped: float
@@ -80,7 +86,7 @@ def run(words: list[str]) -> Run:
     ----------
     words : after `tireid`.
     """
-    begin = time.perf_counter()
+    begin, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
     process = subprocess.Popen(
         [sys.executable, "-m", "tireid", *words],
         stdout=subprocess.DEVNULL,
@@ -110,7 +116,9 @@ def run(words: list[str]) -> Run:
     ear.join()
     if process.returncode != 0 or not read:
         raise RuntimeError(f"tireid {' '.join(words)} ended with {process.returncode}")
-    return Run(seconds, read[0], most["RssAnon"], most["VmHWM"])
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return Run(seconds, processor, read[0], most["RssAnon"], most["VmHWM"])
 
 
 def main() -> int:
@@ -120,6 +128,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="tireid-long-") as folder:
         log, car, out = Path(folder) / "log.csv", Path(folder) / "car.toml", Path(folder) / "out"
         sedan().to_toml(car)
+        identify(base, sedan())  # compiles the step
         for duration in hours:
             write_log(log, base, duration)
             words = ["identify", str(log), "--vehicle", str(car), "--out", str(out), "--force"]
@@ -128,8 +137,10 @@ def main() -> int:
             size = log.stat().st_size / 1e6
             show(f"{duration} h", f"{size:.0f} MB, read in {took.reading:.1f} s")
             label = f"{duration} h of log to the report"
-            targets.at_most(label, took.seconds, SECONDS[duration], "s", f"{key}/seconds")
-            targets.at_most(f"{label}, memory", took.held / 1e3, GIGABYTES, "GB", f"{key}/held")
+            targets.at_most(label, took.processor, SECONDS[duration], "s", f"{key}/processor")
+            targets.record(f"{key}/seconds", took.seconds, "s")
+            most = GIGABYTES[duration]
+            targets.at_most(f"{label}, memory", took.held / 1e3, most, "GB", f"{key}/held")
             targets.record(f"{key}/mapped", took.mapped / 1e3, "GB")
             targets.record(f"{key}/log", size, "MB")
             targets.record(f"{key}/reading", 100.0 * took.reading / took.seconds, "%")

@@ -5,10 +5,13 @@ block by block, and what is kept of every sample lies on disk where it is large:
 not grow with the recording. Up to `LONG` samples there is one block, and all is in memory.
 """
 
+import mmap
 import os
 import tempfile
+import weakref
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from typing import IO, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +35,8 @@ def blocks(n: int, first: int = 0, *, overlap: int = 0) -> Iterator[slice]:
     size = BLOCK if n > LONG else max(n, 1)
     for begin in range(first, n, size):
         yield slice(begin, min(begin + size + overlap, n))
+        if n > LONG:
+            _let_go()
 
 
 def thinning(n: int) -> int:
@@ -59,8 +64,39 @@ def large(shape: tuple[int, ...]) -> Array:
         with suppress(OSError), tempfile.TemporaryFile(prefix="tireid-") as file:
             if hasattr(os, "posix_fallocate"):  # else a disk that is full would kill the process
                 os.posix_fallocate(file.fileno(), 0, size)
-            return np.asarray(np.memmap(file, np.float64, "w+", shape=shape))
+            return on_disk(file, np.dtype(np.float64), shape, "w+")
     return np.empty(shape)
+
+
+def on_disk(
+    file: IO[bytes], dtype: np.dtype[Any], shape: tuple[int, ...], mode: Literal["r", "w+"]
+) -> NDArray[Any]:
+    """Return an array that is a file, of which memory holds what was used last alone.
+
+    Parameters
+    ----------
+    file : which may be closed then.
+    dtype : of its numbers.
+    shape : of the array.
+    mode : "r", or "w+" to make the file as large as that.
+    """
+    mapped = np.memmap(file, dtype, mode=mode, shape=shape)
+    if isinstance(mapped.base, mmap.mmap):
+        _mapped.add(mapped.base)
+    return np.asarray(mapped)
+
+
+_mapped: "weakref.WeakSet[mmap.mmap]" = weakref.WeakSet()
+
+
+def _let_go() -> None:
+    """Let the system take back the pages of arrays on disk: they count as memory of the process.
+
+    What was written stays: in the file, or in the cache of the system, whose memory that is then.
+    """
+    if hasattr(mmap, "MADV_DONTNEED"):
+        for mapped in tuple(_mapped):
+            mapped.madvise(mmap.MADV_DONTNEED)
 
 
 def filled(n: int, compute: Callable[[slice], Array]) -> Array:

@@ -12,6 +12,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from codegen.arrays import on_disk
 from models.logs.log import RecordingError
 
 LONGEST_IN_MEMORY = 1 << 20  # numbers: 8 MB of a column of float64
@@ -87,4 +88,4 @@ class Growing:
         with _told(self._file), self._file as file:
             file.flush()
             # A plain array on the map, which keeps the file until the last view of it is gone.
-            return np.asarray(np.memmap(file, self._dtype, mode="r", shape=(self._size,)))
+            return on_disk(file, self._dtype, (self._size,), "r")

@@ -1,6 +1,8 @@
 """Blocks of long recordings, and arrays that lie on disk."""
 
+import gc
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -65,3 +67,23 @@ def test_a_large_array_is_in_memory_where_the_disk_is_full(monkeypatch):
     monkeypatch.setattr(arrays, "IN_MEMORY", 800)
     monkeypatch.setattr(arrays.os, "posix_fallocate", full, raising=False)
     assert large((101,)).base is None
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="Linux tells what memory holds")
+def test_pages_on_disk_are_let_go_after_a_block_and_hold_what_was_written():
+    def held():
+        lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
+        return next(float(line.split()[1]) / 1024 for line in lines if line.startswith("RssFile"))
+
+    n = 4_000_000
+    array = large((n,))
+    array[:] = np.arange(n)
+    full = held()
+    for _ in blocks(LONG + 1):
+        pass
+    assert held() < full - 25.0  # of 32 MB
+    np.testing.assert_array_equal(array, np.arange(n))
+    kept = len(arrays._mapped)
+    del array
+    gc.collect()
+    assert len(arrays._mapped) < kept

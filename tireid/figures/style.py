@@ -92,7 +92,7 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
     @wraps(draw)
     def wrapper(*args: P.args, **kwargs: P.kwargs) -> Figure:
         with style.context(["default", LOOK]):
-            return _numbered(draw(*args, **kwargs))
+            return draw(*args, **kwargs)
 
     return wrapper
 
@@ -115,15 +115,6 @@ class PlainNumbers(ScalarFormatter):
 
 
 MATH_NUMBER = re.compile(r"^\$\\mathdefault\{([^\\{}]*)\}\$$")
-
-
-def _numbered(figure: Figure) -> Figure:
-    """Return a figure whose linear axes have plain numbers."""
-    for axes in figure.axes:
-        for axis in (axes.xaxis, axes.yaxis):
-            if type(axis.get_major_formatter()) is ScalarFormatter:
-                axis.set_major_formatter(PlainNumbers())
-    return figure
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -158,11 +149,14 @@ with_own_fonts()
 def _lay_out(figure: Figure) -> None:
     """Fit labels into a figure, once: it is drawn more than once, and this takes as long as that.
 
-    A figure that was drawn keeps its places; `set_layout_engine` lets it be laid out anew.
-    Matplotlib draws a figure that has an engine twice.
+    Numbers of linear axes become words. A figure that was drawn keeps its places, until it is given
+    a layout engine again: matplotlib draws one that has an engine twice.
     """
     engine = figure.get_layout_engine()
     if engine is not None:
+        for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
+            if type(axis.get_major_formatter()) is ScalarFormatter:
+                axis.set_major_formatter(PlainNumbers())
         resolution, figure.dpi = figure.dpi, RESOLUTION  # at fewer dots letters are less exact
         engine.execute(figure)
         figure.dpi = resolution
