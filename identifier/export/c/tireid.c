@@ -19,6 +19,12 @@ static const tireid_real *tireid_numbers(const void *structure)
     return structure;
 }
 
+/* The same, to write them. */
+static tireid_real *tireid_own_numbers(void *structure)
+{
+    return structure;
+}
+
 /* Sum of n numbers, which is finite only where all of them are; in parts that may run abreast. */
 static inline tireid_real tireid_sum(const tireid_real *x, uint32_t n)
 {
@@ -217,7 +223,7 @@ static tireid_status tireid_advance(
     }
 #endif
     if (tireid_believes(params, &next, &out)) {
-        tireid_copy((tireid_real *)(void *)&state->values, tireid_numbers(&next),
+        tireid_copy(tireid_own_numbers(&state->values), tireid_numbers(&next),
             (uint32_t)(sizeof(tireid_values) / sizeof(tireid_real)));
         state->output = out;
         state->started = 1U;
