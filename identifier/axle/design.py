@@ -199,7 +199,7 @@ class AxleIdentifier(Method):
             stored = resumed(start, AxleModel, OTHER_STRUCTURE, ladder=self.ladder)
             W, own, P, excitation = stored.W, stored.own, stored.covariance, stored.excitation
         widest = per_variance(prior_P, n, self.regression.widest)
-        W, own = self._within_bounds(W, own, P)
+        W, own = self.within_bounds(W, own, P)
         return Setup(
             scan=_scan(doublings(self.ladder), self.rising_until is not None),
             carry={
@@ -265,7 +265,7 @@ class AxleIdentifier(Method):
             },
         )
 
-    def _within_bounds(self, W: Array, own: Array, P: Array) -> tuple[Array, Array]:
+    def within_bounds(self, W: Array, own: Array, P: Array) -> tuple[Array, Array]:
         """Return what is begun with, within bounds: a file or a prior may lie outside."""
         n = len(self.ladder)
         slope = self._rising().get("rising")

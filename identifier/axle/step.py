@@ -414,10 +414,7 @@ def _sample_of(
     sigma = _deviation(f, numbers, y_hat)
     fast, slow = error_means(change, errors, (innovation / sigma) ** 2, learns)
     bound = numbers.clip * sigma * slow
-    last = ports["filters"][:, -1]
-    force = last + learns * numbers.smooth * (y - last)
-    peak = larger(ca.fabs(force), errors.peak * numbers.decay)
-    peak = ca.if_else(learns, peak, errors.peak)
+    force, peak = _recent_force(ports, numbers, y, errors.peak, learns)
     holds = peak >= numbers.least_force
     alarms = learns * alarm(change, fast, slow)
     both = (
@@ -436,6 +433,60 @@ def _sample_of(
         drift=change.offset * (watch.known < watching.known) * alarms,
     )
     return sample, ErrorState(fast, slow, peak)
+
+
+def _recent_force(
+    ports: dict[str, Any], numbers: RegressionNumbers, y: Any, last_peak: Any, learns: Any
+) -> tuple[Any, Any]:
+    """Return the mean of y over a moment and its recent peak, (2,) each."""
+    last = ports["filters"][:, -1]
+    force = last + learns * numbers.smooth * (y - last)
+    peak = larger(ca.fabs(force), last_peak * numbers.decay)
+    return force, ca.if_else(learns, peak, last_peak)
+
+
+# The same regression with weights that stay: what a drive tells of them, to be added up.
+
+EVIDENCE_CARRY = ("gate", "sway", "slip", "sensitivity", "filters", "peak", "bank")
+
+
+def build_evidence(steps: tuple[int, ...]) -> ca.Function:
+    """Return the step that tells the regression at given weights, and learns nothing.
+
+    Outputs, rows front and rear: h (2, q), zero but for the offset where there is no force to learn
+    from; y (2,), what h'[w, own] shall be where the regression is replaced by its tangent at the given
+    numbers; R (2,) its variance; learns, 1 or 0.
+
+    Parameters
+    ----------
+    steps : doublings between the units.
+    """
+    f = forward(steps)
+    n, ports = len(steps) + 1, dict(f.ports)
+    h, y, next_state = _regression(f, ports)
+    y, next_state["bank"] = _without_bank(f, ports, y)
+    numbers = RegressionNumbers(*ca.vertsplit(ports["regression"]))
+    ports["peak"] = ca.SX.sym("peak", 2)
+    force, next_state["peak"] = _recent_force(ports, numbers, y, ports["peak"], f.gated.learns)
+    next_state["filters"] = ca.horzcat(next_state["filters"], force)
+    next_state |= f.next_state
+    y_hat = ca.sum2(ports["W"] * h[:, :n])
+    seen = ca.horzcat(h[:, :-1] * (next_state["peak"] >= numbers.least_force), h[:, -1])
+    tangent = ca.sum2(seen * ca.horzcat(ports["W"], ports["own"]))
+    return ca.Function(
+        "_".join(["axle_evidence", *map(str, steps)]),
+        list(ports.values()),
+        [
+            *(next_state[name] for name in EVIDENCE_CARRY),
+            seen,
+            y - y_hat + tangent,
+            _deviation(f, numbers, y_hat) ** 2 * numbers.samples,
+            f.gated.learns,
+        ],
+        list(ports),
+        [*(f"{name}_next" for name in EVIDENCE_CARRY), "h", "y", "R", "learns"],
+        {"cse": True},
+    )
 
 
 def _deviation(f: Forward, numbers: RegressionNumbers, y_hat: Any) -> Any:

@@ -1,0 +1,340 @@
+"""What a drive tells of the tires as numbers that add up: information matrix and vector.
+
+The regression y = h'θ + e, θ = [w, s, k, offset] per axle, is that of learning, taken at a reference
+θ₀ that stays (`build_evidence`): slip, its lag and the variances R of e then do not depend on what
+is learnt, and over the samples of a drive, without forgetting,
+
+    Λ = Σ h h'/R,   η = Σ h y/R,   c = Σ y²/R,   n = Σ 1
+
+say all there is to say of θ (Fisher's sufficient statistics; the information filter of D. Simon,
+Optimal State Estimation, 2006, section 6.2). They add up: those of many drives are the sum of
+theirs, whoever computed them and in whatever order. In w, at the lag of the reference, that is
+exact; in s, k and the offsets y is replaced by its tangent at θ₀ (Gauss-Newton), so that a
+reference close to the tires matters: a merged model is the next one.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cache
+
+import numpy as np
+
+from codegen import Scan
+from codegen.arrays import Array
+from identifier.axle.car import car_numbers
+from identifier.axle.curve import EDGES, doublings
+from identifier.axle.design import AxleIdentifier
+from identifier.axle.gate import GateState
+from identifier.axle.model import AxleModel
+from identifier.axle.slip import SensitivityState, SwayState
+from identifier.axle.bank import SlopeState
+from identifier.axle.step import EVIDENCE_CARRY, LEARNING_OVER, build_evidence
+from identifier.method import Setup
+from models.recordings import Recording
+from models.vehicle import Vehicle
+
+STEP = 0.05  # s between samples that are added: a fifth of the filter's time constant loses nothing
+CHUNK = 4000  # added samples that are held at once
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Information:
+    """What drives tell of an axle model at a reference, rows front and rear.
+
+    Parameters
+    ----------
+    matrix : Λ [1/θ²], (2, q, q).
+    vector : η [1/θ], (2, q).
+    square : c [-], (2,).
+    samples : n, those that count once their errors are alike over a correlation time [-].
+    seconds : time of learning [s].
+
+    Raises
+    ------
+    ValueError
+        Where shapes do not fit or a number is not finite.
+    """
+
+    matrix: Array
+    vector: Array
+    square: Array
+    samples: float
+    seconds: float
+
+    def __post_init__(self) -> None:
+        q = self.vector.shape[-1]
+        for name, shape in (("matrix", (2, q, q)), ("vector", (2, q)), ("square", (2,))):
+            value = getattr(self, name)
+            if value.shape != shape:
+                raise ValueError(f"{name} must have shape {shape}, it has {value.shape}")
+            if not np.isfinite(value).all():
+                raise ValueError(f"{name} holds a number that is not finite")
+        for name in ("samples", "seconds"):
+            value = getattr(self, name)
+            if not 0.0 <= value < math.inf:
+                raise ValueError(f"{name} must not be negative, it is {value}")
+
+    @classmethod
+    def nothing(cls, q: int) -> "Information":
+        """Return what no drive tells.
+
+        Parameters
+        ----------
+        q : parameters of an axle.
+        """
+        return cls(
+            matrix=np.zeros((2, q, q)),
+            vector=np.zeros((2, q)),
+            square=np.zeros(2),
+            samples=0.0,
+            seconds=0.0,
+        )
+
+    def __add__(self, other: "Information") -> "Information":
+        """Return what both tell together."""
+        return Information(
+            matrix=self.matrix + other.matrix,
+            vector=self.vector + other.vector,
+            square=self.square + other.square,
+            samples=self.samples + other.samples,
+            seconds=self.seconds + other.seconds,
+        )
+
+    def misfit(self, theta: Array) -> Array:
+        """Return the mean squared error over what is told of it, (2,) [-]; 1 as told.
+
+        Parameters
+        ----------
+        theta : parameters, (2, q).
+        """
+        squares = (
+            self.square
+            - 2.0 * np.einsum("ai,ai->a", theta, self.vector)
+            + np.einsum("ai,aij,aj->a", theta, self.matrix, theta)
+        )
+        return np.asarray(np.maximum(squares, 0.0) / max(self.samples, 1.0))
+
+
+def total(parts: Iterable[Information], q: int) -> Information:
+    """Return what many tell together; sums are exact to the last bit in any order.
+
+    Parameters
+    ----------
+    parts : of drives.
+    q : parameters of an axle.
+    """
+    some = list(parts)
+    if not some:
+        return Information.nothing(q)
+
+    def added(name: str) -> Array:
+        rows = np.array([np.ravel(getattr(one, name)) for one in some])
+        sums = [math.fsum(column) for column in rows.T]
+        return np.reshape(sums, np.shape(getattr(some[0], name)))
+
+    return Information(
+        matrix=added("matrix"),
+        vector=added("vector"),
+        square=added("square"),
+        samples=math.fsum(one.samples for one in some),
+        seconds=math.fsum(one.seconds for one in some),
+    )
+
+
+def reference_of(design: AxleIdentifier, vehicle: Vehicle) -> AxleModel:
+    """Return the model that nothing was learnt of: the brush tire of what is told of the car.
+
+    Parameters
+    ----------
+    design : whose prior it is.
+    vehicle : the car.
+    """
+    W, own = design.prior.means(vehicle, design.ladder)
+    P = design.prior.covariance(vehicle, design.ladder)
+    W, own = design.within_bounds(W, own, P)
+    return AxleModel(
+        vehicle=vehicle,
+        ladder=design.ladder,
+        sway=design.sway,
+        plausibility=design.plausibility,
+        W=W,
+        own=own,
+        covariance=P,
+        prior_covariance=P,
+        excitation=np.zeros((2, 1 + len(EDGES))),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evidence:
+    """Adds up what drives tell at a reference.
+
+    Parameters
+    ----------
+    design : the identifier, whose regression it is.
+    reference : the model θ₀ that lag, slip and variances are taken at.
+
+    Raises
+    ------
+    ValueError
+        Where the reference has other units than the design.
+    """
+
+    design: AxleIdentifier
+    reference: AxleModel
+    _setup: Setup = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        design, model = self.design, self.reference
+        if model.ladder != design.ladder:
+            raise ValueError(
+                f"the reference's units are at {model.ladder} rad, the design's at {design.ladder}"
+            )
+        n = len(design.ladder)
+        setup = Setup(
+            scan=_scan(doublings(design.ladder)),
+            carry={
+                "gate": np.zeros(len(GateState._fields)),
+                "sway": np.zeros(len(SwayState._fields)),
+                "slip": np.tile([0.0, 0.0, 1.0, 0.0], (2, 1)),
+                "sensitivity": np.zeros((2, len(SensitivityState._fields))),
+                "filters": np.zeros((2, n + 5)),
+                "peak": np.zeros(2),
+                "bank": np.zeros(len(SlopeState._fields)),
+            },
+            constants={
+                "W": model.W,
+                "own": model.own,
+                "dt": np.array(design.dt),
+                "car": car_numbers(model.vehicle),
+                "scales": 1.0 / np.array(design.ladder)[None],
+                "plausibility": design.plausibility.numbers(),
+                "roll": design.sway.numbers(),
+                "regression": design.regression.numbers(design.dt),
+                "road": design.road.numbers(design.dt),
+            },
+            ends_run=design.plausibility.rest(design.dt),
+        )
+        object.__setattr__(self, "_setup", setup)
+
+    def of(self, recording: Recording) -> Information:
+        """Return what a drive tells; each of its stretches begins anew.
+
+        Parameters
+        ----------
+        recording : with v_y, measured or estimated, at the design's interval.
+
+        Raises
+        ------
+        RecordingError
+            Where it has no v_y.
+        """
+        return total(self.parts(recording, math.inf), len(self.design.ladder) + 3)
+
+    def parts(self, recording: Recording, longest: float) -> list[Information]:
+        """Return what the parts of a drive tell, one after the other.
+
+        Parameters
+        ----------
+        recording : with v_y, measured or estimated, at the design's interval.
+        longest : time that a part may last [s]; stretches make parts of their own.
+        """
+        recording.needed("v_y")
+        told: list[Information] = []
+        for piece in recording.stretches:
+            told += self._of_stretch(recording.taken(piece), longest)
+        return told
+
+    def _of_stretch(self, stretch: Recording, longest: float) -> list[Information]:
+        every = max(round(STEP / self.design.dt), 1)
+        count = len(stretch)
+        size = every * max(min(round(min(longest, 1e6) / self.design.dt / every), count), 1)
+        carry = dict(self._setup.carry)
+        told = []
+        for begin in range(0, count, size):
+            sums = []
+            for first in range(begin, min(begin + size, count), every * CHUNK):
+                part = slice(first, min(first + every * CHUNK, begin + size, count))
+                shown = self._setup.shown(stretch, part)
+                values = {**carry, **shown.signals, **self._setup.constants}
+                record = self._setup.scan(shown.samples, values, every=every)
+                carry = {port: record[f"{port}_final"] for port in EVIDENCE_CARRY}
+                sums.append(_added(record, every, self.design.dt))
+            told.append(total(sums, len(self.design.ladder) + 3))
+        return told
+
+
+def _added(record: dict[str, Array], every: int, dt: float) -> Information:
+    """Return the sums over recorded samples; each stands for `every` of them."""
+    learns = record["learns"].ravel() > 0.5
+    h, y, R = record["h"][learns], record["y"][learns], record["R"][learns]
+    weighted = every * h / R[:, :, None]
+    return Information(
+        matrix=np.stack([weighted[:, i].T @ h[:, i] for i in (0, 1)]),
+        vector=np.einsum("kai,ka->ai", weighted, y),
+        square=(every * y**2 / R).sum(axis=0),
+        samples=float(every * learns.sum()),
+        seconds=float(every * learns.sum() * dt),
+    )
+
+
+def merged(
+    design: AxleIdentifier, reference: AxleModel, told: Information, excitation: Array
+) -> AxleModel:
+    """Return the model of all that was told, with the prior: θ = (Λ₀ + Λ)⁻¹ (Λ₀ θ_p + η).
+
+    Parameters
+    ----------
+    design : whose prior and bounds hold.
+    reference : that the information was taken at; its car is the model's.
+    told : by all drives together.
+    excitation : largest slip and times of learning of all drives together, (2, 9).
+    """
+    vehicle = reference.vehicle
+    n = len(design.ladder)
+    W, own = design.prior.means(vehicle, design.ladder)
+    P0 = design.prior.covariance(vehicle, design.ladder)
+    theta, P = posterior(told, np.hstack([W, own]), P0)
+    W, own = design.within_bounds(theta[:, :n], theta[:, n:], P)
+    return AxleModel(
+        vehicle=vehicle,
+        ladder=design.ladder,
+        sway=design.sway,
+        plausibility=design.plausibility,
+        W=W,
+        own=own,
+        covariance=P,
+        prior_covariance=P0,
+        excitation=excitation,
+    )
+
+
+def posterior(told: Information, mean: Array, covariance: Array) -> tuple[Array, Array]:
+    """Return mean (2, q) and covariance (2, q, q) of θ after the information.
+
+    Errors that are larger than told widen the covariance.
+
+    Parameters
+    ----------
+    told : information of drives.
+    mean : of the prior (2, q).
+    covariance : of the prior (2, q, q).
+    """
+    theta, P = np.zeros_like(mean), np.zeros_like(covariance)
+    for i in (0, 1):
+        sd = np.sqrt(np.diag(covariance[i]))  # scaled, the sum is well conditioned
+        correlation = covariance[i] / np.outer(sd, sd)
+        before = np.linalg.inv(correlation)
+        after = before + told.matrix[i] * np.outer(sd, sd)
+        P[i] = np.linalg.inv(0.5 * (after + after.T))
+        P[i] = 0.5 * (P[i] + P[i].T)
+        away = told.vector[i] - told.matrix[i] @ mean[i]
+        theta[i] = mean[i] + sd * (P[i] @ (sd * away))
+        P[i] *= np.outer(sd, sd)
+    return theta, P
+
+
+@cache
+def _scan(steps: tuple[int, ...]) -> Scan:
+    return Scan(build_evidence(steps), carry=EVIDENCE_CARRY, over=LEARNING_OVER)
