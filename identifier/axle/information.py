@@ -22,13 +22,13 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
+from identifier.axle.bank import SlopeState
 from identifier.axle.car import car_numbers
 from identifier.axle.curve import EDGES, doublings
 from identifier.axle.design import AxleIdentifier
 from identifier.axle.gate import GateState
 from identifier.axle.model import AxleModel
 from identifier.axle.slip import SensitivityState, SwayState
-from identifier.axle.bank import SlopeState
 from identifier.axle.step import EVIDENCE_CARRY, LEARNING_OVER, build_evidence
 from identifier.method import Setup
 from models.recordings import Recording
@@ -230,10 +230,11 @@ class Evidence:
         RecordingError
             Where it has no v_y.
         """
-        return total(self.parts(recording, math.inf), len(self.design.ladder) + 3)
+        told = [one for _, one in self.parts(recording, math.inf)]
+        return total(told, len(self.design.ladder) + 3)
 
-    def parts(self, recording: Recording, longest: float) -> list[Information]:
-        """Return what the parts of a drive tell, one after the other.
+    def parts(self, recording: Recording, longest: float) -> list[tuple[float, Information]]:
+        """Return when the parts of a drive begin [s], counted from its first sample, what they tell.
 
         Parameters
         ----------
@@ -241,12 +242,14 @@ class Evidence:
         longest : time that a part may last [s]; stretches make parts of their own.
         """
         recording.needed("v_y")
-        told: list[Information] = []
+        told: list[tuple[float, Information]] = []
         for piece in recording.stretches:
-            told += self._of_stretch(recording.taken(piece), longest)
+            begin = float(recording.t[piece.start] - recording.t[0])
+            parts = self._of_stretch(recording.taken(piece), longest)
+            told += [(begin + after, one) for after, one in parts]
         return told
 
-    def _of_stretch(self, stretch: Recording, longest: float) -> list[Information]:
+    def _of_stretch(self, stretch: Recording, longest: float) -> list[tuple[float, Information]]:
         every = max(round(STEP / self.design.dt), 1)
         count = len(stretch)
         size = every * max(min(round(min(longest, 1e6) / self.design.dt / every), count), 1)
@@ -261,7 +264,7 @@ class Evidence:
                 record = self._setup.scan(shown.samples, values, every=every)
                 carry = {port: record[f"{port}_final"] for port in EVIDENCE_CARRY}
                 sums.append(_added(record, every, self.design.dt))
-            told.append(total(sums, len(self.design.ladder) + 3))
+            told.append((begin * self.design.dt, total(sums, len(self.design.ladder) + 3)))
         return told
 
 

@@ -20,6 +20,7 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "identify": "learn tire forces from a recording, freeze the weights and test them",
         "predict": "axle forces of a drive by a stored model, and what they miss",
         "compare": "learn, freeze and replay with every method, side by side",
+        "fleet": "thousands of logs in one command: learn, merge, where the next car starts, watch",
         "check": "certificate of a design: margins, bounds, advice; or a design from a bandwidth",
         "export": "the identifier as clean C for a microcontroller, as FMU and ONNX for simulators",
         "drive": "steer a car along a path at the limit of grip, on the tires that were learnt",

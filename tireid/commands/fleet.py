@@ -1,0 +1,266 @@
+"""`tireid fleet learn|merge|prior|report`: thousands of logs in one command."""
+
+import argparse
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
+from models.vehicle import Vehicle
+from tireid.cluster import cluster
+from tireid.commands import COMMANDS, DONE, FAILS
+from tireid.commands.options import (
+    add_force,
+    add_jobs,
+    add_log_map,
+    jobs_of,
+    told_map,
+)
+from tireid.fleet.learn import PART, Telling, find_logs, learn_fleet, on_this_machine
+from tireid.fleet.merge import BY, Merged, fleet_prior, merge, usable
+from tireid.fleet.store import Store
+from tireid.output import output_folder, require_free, text_table, write_json
+from tireid.progress import Progress, Stopwatch, say, tell
+
+SHOWN = 5  # logs with errors that are named
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : subparsers of `tireid`.
+    """
+    parser = commands.add_parser(
+        "fleet",
+        help=COMMANDS["fleet"],
+        description="Learn from thousands of logs into a store, a Parquet dataset with a row for "
+        "each log, and ask it: one model of many logs, where the next car starts, which car's "
+        "tires changed. Needs pip install 'tireid[fleet]'.",
+    )
+    tasks = parser.add_subparsers(dest="task", metavar="TASK", required=True)
+    _add_learn(tasks)
+    _add_merge(tasks)
+    _add_prior(tasks)
+
+
+def _add_learn(tasks: Any) -> None:
+    parser = tasks.add_parser(
+        "learn",
+        help="learn logs that the store does not hold yet",
+        description="Learn each log on its own and keep, per log, the frozen model, what it tells "
+        "of the tires as information matrix and vector, the verdict and how it was driven. A log "
+        "that cannot be used becomes a row with its error. Run it again after it was stopped, or "
+        "with more logs: only what is missing is learnt.",
+    )
+    parser.add_argument(
+        "logs", nargs="+", metavar="PATTERN", help="logs, quoted: 'logs/**/*.csv', s3://..."
+    )
+    parser.add_argument(
+        "--vehicle",
+        required=True,
+        metavar="FILE",
+        help="car as TOML; {name} in it stands for a tag: cars/{vehicle}.toml",
+    )
+    parser.add_argument("--out", required=True, metavar="STORE", help="folder or address to keep")
+    parser.add_argument(
+        "--tags",
+        default="",
+        metavar="PATTERN",
+        help="what paths end with, as in '{vehicle}/{tires}/{date}-*.csv'; vehicle, tires and date "
+        "(2026-03-31) are known by name, the others stand in the column tags",
+    )
+    parser.add_argument(
+        "--weights", type=Path, metavar="FILE", help="stored model or prior: begin with it"
+    )
+    parser.add_argument(
+        "--judge",
+        choices=("motion", "full", "none"),
+        default="motion",
+        help="verdict of each log: does the model give its motion back, all that tireid identify "
+        "asks (ten times as long), or none (%(default)s)",
+    )
+    parser.add_argument(
+        "--part",
+        type=float,
+        default=PART,
+        metavar="S",
+        help="longest piece of a log that is kept as one [s] (%(default)g)",
+    )
+    parser.add_argument(
+        "--again", action="store_true", help="also learn logs whose row holds an error"
+    )
+    add_log_map(parser)
+    parser.add_argument(
+        "--no-check", action="store_true", help="accept logs that contradict physics"
+    )
+    add_jobs(parser)
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="work on the Dask cluster of this scheduler, as in tcp://host:8786",
+    )
+    parser.set_defaults(run=_learn)
+
+
+def _add_question(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("store", metavar="STORE", help="that fleet learn keeps")
+    parser.add_argument(
+        "--where",
+        default="",
+        metavar="SQL",
+        help="rows that count, by a condition on their columns: \"a_y_most > 4 and tires = 'x'\"",
+    )
+    parser.add_argument(
+        "--all", action="store_true", help="also logs whose answer the verdict refuses"
+    )
+
+
+def _add_by(parser: argparse.ArgumentParser, default: str) -> None:
+    parser.add_argument(
+        "--by",
+        default=default,
+        metavar="NAMES",
+        help=f"what logs of a group have in common, of {', '.join(BY)} and tags (%(default)s)",
+    )
+
+
+def _add_merge(tasks: Any) -> None:
+    parser = tasks.add_parser(
+        "merge",
+        help="one model of the logs of each group",
+        description="Add up what logs tell, group by group, and write a model of each, as "
+        "weights.json is, and a table.",
+    )
+    _add_question(parser)
+    _add_by(parser, "vehicle,tires")
+    parser.add_argument(
+        "--out", type=Path, default=Path("tireid-fleet-merge"), metavar="DIR", help="(%(default)s)"
+    )
+    add_force(parser)
+    parser.set_defaults(run=_merge)
+
+
+def _add_prior(tasks: Any) -> None:
+    parser = tasks.add_parser(
+        "prior",
+        help="where the next car starts",
+        description="Learn from the cars of a store what they have in common and how they differ, "
+        "and write a model to begin with: tireid identify --weights FILE.",
+    )
+    _add_question(parser)
+    _add_by(parser, "vehicle,tires")
+    parser.add_argument(
+        "--vehicle", type=Path, required=True, metavar="FILE", help="the next car, as TOML"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("prior.json"), metavar="FILE", help="(%(default)s)"
+    )
+    add_force(parser)
+    parser.set_defaults(run=_prior)
+
+
+def _learn(options: argparse.Namespace) -> int:
+    """Learn logs into a store; return 1 where a log could not be used."""
+    watch, jobs = Stopwatch(), jobs_of(options)
+    tasks, left = find_logs(options.logs, options.vehicle, options.tags)
+    for log, why in list(left.items())[:SHOWN]:
+        say(f"{log}: left out, {why}")
+    telling = Telling(
+        log_map=told_map(options),
+        weights=options.weights,
+        judging=options.judge,
+        check=not options.no_check,
+        part=options.part,
+    )
+    store = Store(options.out)
+    there: Any = cluster(options.scheduler) if options.scheduler else nullcontext()
+    with there as elsewhere, Progress("fleet learn", long=True) as progress:
+
+        def done(ready: int, of: int) -> None:
+            progress(ready / max(of, 1), f"{ready} of {of} logs")
+
+        spread = elsewhere if options.scheduler else on_this_machine(jobs)
+        learnt, of = learn_fleet(tasks, telling, store, spread, again=options.again, done=done)
+    wanted = {task.log for task in tasks}
+    rows = [r for r in store.rows(("log", "error", "valid", "seconds")) if r.log in wanted]
+    errors = [row for row in rows if row.error]
+    for row in errors[:SHOWN]:
+        say(f"{row.log}: {row.error}")
+    hours = sum(row.seconds or 0.0 for row in rows) / 3600.0
+    refused = sum(row.valid is False for row in rows)
+    tell(
+        f"{of} logs, {hours:.3g} h: {learnt} learnt now, {of - learnt} before; {refused} not valid, "
+        f"{len(errors)} could not be used"
+        + (f", the column error of {options.out} says why" if errors else "")
+    )
+    say(f"wrote {options.out} in {watch.seconds:.0f} s")
+    return FAILS if errors else DONE
+
+
+def _groups(options: argparse.Namespace) -> list[Merged]:
+    store = Store(options.store)
+    store.require()
+    rows = store.rows(where=options.where)
+    some = usable(rows, refused=options.all)
+    if not some:
+        raise ValueError(
+            f"{options.store}: none of {len(rows)} logs can be used"
+            + ("" if options.all else "; --all takes those too that the verdict refuses")
+        )
+    say(f"{len(some)} of {len(rows)} logs")
+    return merge(some, [one for one in options.by.split(",") if one])
+
+
+def _merge(options: argparse.Namespace) -> int:
+    """Merge the logs of each group into a model."""
+    groups = _groups(options)
+    with output_folder(options.out, force=options.force) as folder:
+        table = []
+        for k, one in enumerate(groups):
+            file = f"model-{k:04d}.json"
+            one.model.save(folder / file)
+            C = one.model.cornering_stiffness
+            table.append(
+                {
+                    **dict(one.key),
+                    "file": file,
+                    "logs": one.logs,
+                    "learning_s": one.told.seconds,
+                    "cornering_stiffness_N_rad": C.tolist(),
+                    "known_slip_rad": one.model.known_slip.tolist(),
+                    "error_over_told": one.misfit.tolist(),
+                }
+            )
+        write_json(folder / "models.json", table)
+    tell(_table(groups))
+    say(f"wrote {options.out}/")
+    return DONE
+
+
+def _table(groups: list[Merged]) -> str:
+    rows = [["group", "logs", "learning", "stiffness front, rear", "known to"]]
+    for one in groups:
+        C, known = one.model.cornering_stiffness / 1e3, one.model.known_slip * 57.29578
+        rows.append(
+            [
+                one.name,
+                str(one.logs),
+                f"{one.told.seconds / 60.0:.1f} min",
+                f"{C[0]:.1f}, {C[1]:.1f} kN/rad",
+                f"{known[0]:.1f}, {known[1]:.1f} deg",
+            ]
+        )
+    return text_table(rows, "<>>>>")
+
+
+def _prior(options: argparse.Namespace) -> int:
+    """Write where the next car starts."""
+    require_free(options.out, force=options.force)
+    vehicle = Vehicle.from_toml(options.vehicle)
+    prior = fleet_prior(_groups(options))
+    model = prior.model(vehicle)
+    model.save(options.out)
+    tell(f"where {vehicle.name} starts, from {prior.cars} cars:\n{model.summary()}")
+    say(f"wrote {options.out}: tireid identify LOG --weights {options.out}")
+    return DONE
