@@ -1,8 +1,8 @@
 """What a drive tells of the tires as numbers that add up: information matrix and vector.
 
-The regression y = h'θ + e, θ = [w, s, k, offset] per axle, is that of learning, taken at a reference
-θ₀ that stays (`build_evidence`): slip, its lag and the variances R of e then do not depend on what
-is learnt, and over the samples of a drive, without forgetting,
+The regression y = h'θ + e, θ = [w, s, k, offset] per axle, is that of learning, taken at a
+reference θ₀ that stays (`build_evidence`): slip, its lag and the variances R of e then do not
+depend on what is learnt, and over the samples of a drive, without forgetting,
 
     Λ = Σ h h'/R,   η = Σ h y/R,   c = Σ y²/R,   n = Σ 1
 
@@ -17,6 +17,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from identifier.axle.curve import EDGES, doublings
 from identifier.axle.design import AxleIdentifier
 from identifier.axle.gate import GateState
 from identifier.axle.model import AxleModel
+from identifier.axle.prior import friction_direction
 from identifier.axle.slip import SensitivityState, SwayState
 from identifier.axle.step import EVIDENCE_CARRY, LEARNING_OVER, build_evidence
 from identifier.method import Setup
@@ -234,7 +236,7 @@ class Evidence:
         return total(told, len(self.design.ladder) + 3)
 
     def parts(self, recording: Recording, longest: float) -> list[tuple[float, Information]]:
-        """Return when the parts of a drive begin [s], counted from its first sample, what they tell.
+        """Return when the parts of a drive begin, from its first sample [s], and what they tell.
 
         Parameters
         ----------
@@ -336,6 +338,51 @@ def posterior(told: Information, mean: Array, covariance: Array) -> tuple[Array,
         theta[i] = mean[i] + sd * (P[i] @ (sd * away))
         P[i] *= np.outer(sd, sd)
     return theta, P
+
+
+# How tires differ from a model: stiffer or softer, more or less grip, with offsets of their own.
+
+LARGEST_CHANGE = 0.5  # standard deviation of ln C and ln μ that is believed before
+
+
+class Change(NamedTuple):
+    """How tires differ from a model: ln of stiffness and of friction over it, rows front and rear.
+
+    value (2, 2) [-].   covariance (2, 2, 2) [-], of the errors that were there.
+    """
+
+    value: Array
+    covariance: Array
+
+
+def change_from(
+    told: Information, theta: Array, design: AxleIdentifier, vehicle: Vehicle
+) -> Change:
+    """Return how the tires that drives tell of differ from given curves.
+
+    Along φ = μ φ₀(C α/μ) weights change by w - M w a ln C and by M w a ln μ. Sensors may be off
+    otherwise than when the curves were learnt: offsets are estimated beside it, and left out.
+
+    Parameters
+    ----------
+    told : by the drives.
+    theta : [W, own] of the curves, (2, q).
+    design : whose units and offsets they are.
+    vehicle : the car.
+    """
+    n = len(design.ladder)
+    M = friction_direction(design.ladder)
+    offsets = design.prior.covariance(vehicle, design.ladder)[:, -1, -1]
+    value, covariance = np.zeros((2, 2)), np.zeros((2, 2, 2))
+    for i in (0, 1):
+        by_friction = M @ theta[i, :n]
+        J = np.zeros((theta.shape[1], 3))
+        J[:n, 0], J[:n, 1], J[-1, 2] = theta[i, :n] - by_friction, by_friction, 1.0
+        before = np.diag([LARGEST_CHANGE**-2, LARGEST_CHANGE**-2, 1.0 / offsets[i]])
+        P = np.linalg.inv(J.T @ told.matrix[i] @ J + before)
+        value[i] = (P @ J.T @ (told.vector[i] - told.matrix[i] @ theta[i]))[:2]
+        covariance[i] = P[:2, :2]
+    return Change(value, covariance * told.misfit(theta)[:, None, None])
 
 
 @cache

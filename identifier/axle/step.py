@@ -454,8 +454,8 @@ def build_evidence(steps: tuple[int, ...]) -> ca.Function:
     """Return the step that tells the regression at given weights, and learns nothing.
 
     Outputs, rows front and rear: h (2, q), zero but for the offset where there is no force to learn
-    from; y (2,), what h'[w, own] shall be where the regression is replaced by its tangent at the given
-    numbers; R (2,) its variance; learns, 1 or 0.
+    from; y (2,), what h'[w, own] shall be where the regression is replaced by its tangent at the
+    given numbers; R (2,) its variance; learns, 1 or 0.
 
     Parameters
     ----------

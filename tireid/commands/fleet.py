@@ -1,9 +1,9 @@
-"""`tireid fleet learn|merge|prior|report`: thousands of logs in one command."""
+"""`tireid fleet learn|merge|prior|watch|report`: thousands of logs in one command."""
 
 import argparse
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from models.vehicle import Vehicle
 from tireid.cluster import cluster
@@ -17,9 +17,11 @@ from tireid.commands.options import (
 )
 from tireid.fleet.learn import PART, Telling, find_logs, learn_fleet, on_this_machine
 from tireid.fleet.merge import BY, Merged, fleet_prior, merge, usable
-from tireid.fleet.store import Store
+from tireid.fleet.store import LogRow, Store
+from tireid.fleet.watch import Watching, watch
 from tireid.output import output_folder, require_free, text_table, write_json
 from tireid.progress import Progress, Stopwatch, say, tell
+from tireid.reports.fleet import write_fleet_report, write_watch_report
 
 SHOWN = 5  # logs with errors that are named
 
@@ -42,6 +44,8 @@ def add_parser(commands: Any) -> None:
     _add_learn(tasks)
     _add_merge(tasks)
     _add_prior(tasks)
+    _add_watch(tasks)
+    _add_report(tasks)
 
 
 def _add_learn(tasks: Any) -> None:
@@ -160,9 +164,70 @@ def _add_prior(tasks: Any) -> None:
     parser.set_defaults(run=_prior)
 
 
+def _add_watch(tasks: Any) -> None:
+    parser = tasks.add_parser(
+        "watch",
+        help="whose tires changed, when, and to what it is likely due",
+        description="Compare each car's later logs with its first ones, its baseline, and tell of "
+        "changes of stiffness and friction: wear, other tires, a wet road. Exit code 1 where one "
+        "lasts. Logs are ordered by their date.",
+    )
+    _add_question(parser)
+    _add_by(parser, "vehicle")
+    _add_watching(parser)
+    parser.add_argument(
+        "--out", type=Path, default=Path("tireid-fleet-watch"), metavar="DIR", help="(%(default)s)"
+    )
+    add_force(parser)
+    parser.set_defaults(run=_watch)
+
+
+def _add_watching(parser: argparse.ArgumentParser) -> None:
+    usual = Watching()
+    for name, what in (
+        ("false_alarms", "accepted false alarms in 1000 h of learning"),
+        ("baseline", "learning of a car that is its baseline [s]"),
+        ("stiffness", "change of stiffness that is looked for, of ln C"),
+        ("friction", "change of friction that is looked for, of ln mu"),
+    ):
+        parser.add_argument(
+            f"--{name.replace('_', '-')}",
+            type=float,
+            default=getattr(usual, name),
+            metavar="X",
+            help=f"{what} (%(default)g)",
+        )
+
+
+def _watching(options: argparse.Namespace) -> Watching:
+    return Watching(
+        baseline=options.baseline,
+        false_alarms=options.false_alarms,
+        stiffness=options.stiffness,
+        friction=options.friction,
+    )
+
+
+def _add_report(tasks: Any) -> None:
+    parser = tasks.add_parser(
+        "report",
+        help="a page on what the store holds, with figures",
+        description="Write report.html: merged models, how stiffness went log by log, what "
+        "changed, and which logs were left out.",
+    )
+    _add_question(parser)
+    _add_by(parser, "vehicle")
+    _add_watching(parser)
+    parser.add_argument(
+        "--out", type=Path, default=Path("tireid-fleet"), metavar="DIR", help="(%(default)s)"
+    )
+    add_force(parser)
+    parser.set_defaults(run=_report)
+
+
 def _learn(options: argparse.Namespace) -> int:
     """Learn logs into a store; return 1 where a log could not be used."""
-    watch, jobs = Stopwatch(), jobs_of(options)
+    clock, jobs = Stopwatch(), jobs_of(options)
     tasks, left = find_logs(options.logs, options.vehicle, options.tags)
     for log, why in list(left.items())[:SHOWN]:
         say(f"{log}: left out, {why}")
@@ -190,26 +255,67 @@ def _learn(options: argparse.Namespace) -> int:
     hours = sum(row.seconds or 0.0 for row in rows) / 3600.0
     refused = sum(row.valid is False for row in rows)
     tell(
-        f"{of} logs, {hours:.3g} h: {learnt} learnt now, {of - learnt} before; {refused} not valid, "
-        f"{len(errors)} could not be used"
+        f"{of} logs, {hours:.3g} h: {learnt} learnt now, {of - learnt} before; "
+        f"{refused} not valid, {len(errors)} could not be used"
         + (f", the column error of {options.out} says why" if errors else "")
     )
-    say(f"wrote {options.out} in {watch.seconds:.0f} s")
+    say(f"wrote {options.out} in {clock.seconds:.0f} s")
     return FAILS if errors else DONE
 
 
-def _groups(options: argparse.Namespace) -> list[Merged]:
+class Asked(NamedTuple):
+    """All rows that --where takes, those of them that are used, and what groups them."""
+
+    rows: list[LogRow]
+    used: list[LogRow]
+    by: list[str]
+
+
+def _asked(options: argparse.Namespace) -> Asked:
     store = Store(options.store)
     store.require()
     rows = store.rows(where=options.where)
-    some = usable(rows, refused=options.all)
-    if not some:
+    used = usable(rows, refused=options.all)
+    if not used:
         raise ValueError(
             f"{options.store}: none of {len(rows)} logs can be used"
             + ("" if options.all else "; --all takes those too that the verdict refuses")
         )
-    say(f"{len(some)} of {len(rows)} logs")
-    return merge(some, [one for one in options.by.split(",") if one])
+    say(f"{len(used)} of {len(rows)} logs")
+    return Asked(rows, used, [one for one in options.by.split(",") if one])
+
+
+def _groups(options: argparse.Namespace) -> list[Merged]:
+    asked = _asked(options)
+    return merge(asked.used, asked.by)
+
+
+def _watch(options: argparse.Namespace) -> int:
+    """Tell whose tires changed; return 1 where a change lasts."""
+    watching, asked = _watching(options), _asked(options)
+    watched = watch(asked.used, asked.by, watching)
+    with output_folder(options.out, force=options.force) as folder:
+        write_json(folder / "alarms.json", [alarm.to_dict() for alarm in watched.alarms])
+        write_watch_report(folder, options.store, watched, command=options.words)
+    lines = [alarm.line for alarm in watched.alarms] or ["no change was noticed"]
+    short = f"; {len(watched.short)} are not beyond their baseline yet" if watched.short else ""
+    tell("\n".join([*lines, f"{len(watched.seen)} cars, {watched.hours:.3g} h{short}"]))
+    say(f"wrote {options.out}/")
+    return FAILS if any(not alarm.ended for alarm in watched.alarms) else DONE
+
+
+def _report(options: argparse.Namespace) -> int:
+    """Write a page on what a store holds."""
+    watching, asked = _watching(options), _asked(options)
+    groups = merge(asked.used, asked.by)
+    watched = watch(asked.used, asked.by, watching)
+    with output_folder(options.out, force=options.force) as folder:
+        write_fleet_report(
+            folder, options.store, asked.rows, groups, watched, command=options.words
+        )
+    tell(_table(groups))
+    say(f"wrote {options.out}/")
+    return DONE
 
 
 def _merge(options: argparse.Namespace) -> int:

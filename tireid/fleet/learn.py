@@ -44,6 +44,7 @@ TOGETHER = 8  # logs that a process takes at once, and whose rows are written at
 PART = 300.0  # s of a log whose information is kept as one
 DT = 0.01  # s, to which logs are brought
 Judging = Literal["motion", "full", "none"]
+DATE = r"\d{4}-\d{2}-\d{2}(?:[T ][\d.:-]+(?:Z|[+-]\d{2}:?\d{2})?)?"
 FIELD = re.compile(r"\{(\w+)\}")
 EXPECTED = (ValueError, ArithmeticError, OSError, MemoryError, CompilationError, ImportError)
 
@@ -176,7 +177,7 @@ def tag_pattern(tags: str) -> re.Pattern[str]:
         raise ValueError(f"--tags {tags}: wants {{name}} for parts of a path, each name once")
     parts = FIELD.split(tags)
     words = [re.escape(text).replace(r"\*", "[^/]*") for text in parts[::2]]
-    groups = [f"(?P<{name}>[^/]+?)" for name in parts[1::2]]
+    groups = [f"(?P<{name}>{DATE if name == 'date' else '[^/]+?'})" for name in parts[1::2]]
     body = "".join(a + b for a, b in zip(words, [*groups, ""], strict=True))
     return re.compile(rf"(?:^|/){body}$")
 
@@ -359,7 +360,7 @@ def learn_fleet(
     spread_map: Map,
     *,
     again: bool = False,
-    done: Callable[[int, int], None] = lambda ready, of: None,
+    done: Callable[[int, int], None] | None = None,
 ) -> tuple[int, int]:
     """Learn the logs that a store has no row of, and keep what comes; return how many, and of all.
 
@@ -380,11 +381,13 @@ def learn_fleet(
     }
     left = [one for one in tasks if (one.log, settings[one.vehicle], one.size) not in known]
     ready, of = len(tasks) - len(left), len(tasks)
-    done(ready, of)
+    if done is not None:
+        done(ready, of)
     for rows in spread_map(LearnSome(telling, settings), _together(left)):
         store.keep(rows)
         ready += len(rows)
-        done(ready, of)
+        if done is not None:
+            done(ready, of)
     store.settle()
     return len(left), of
 

@@ -1,10 +1,10 @@
 """One model of many logs, and of many cars where the next one starts.
 
-What logs tell adds up (`identifier.axle.information`): the model of a group is that of the sum, with
-the prior of its car counted once. Cars of a fleet differ: θ_v ~ N(m, T) of each car v, of which its
-logs tell θ̂_v with covariance P_v. m and T are found by expectation and maximization (N. Laird and
-J. Ware, Biometrics 38, 1982), T begins at the prior of the identifier and is held by it as by
-`WORTH` more cars. Where the next car starts is m, as sure as N(m, T + T/V).
+What logs tell adds up (`identifier.axle.information`): the model of a group is that of the sum,
+with the prior of its car counted once. Cars of a fleet differ: θ_v ~ N(m, T) of each car v, of
+which its logs tell θ̂_v with covariance P_v. m and T are found by expectation and maximization
+(N. Laird and J. Ware, Biometrics 38, 1982), T begins at the prior of the identifier and is held by
+it as by `WORTH` more cars. Where the next car starts is m, as sure as N(m, T + T/V).
 """
 
 import json
@@ -41,7 +41,7 @@ class Merged:
     key : what they have in common, by `BY` or tag.
     logs : how many there are.
     told : what they tell.
-    model : of it; None where they tell of nothing.
+    model : of it.
     """
 
     key: tuple[tuple[str, str], ...]
