@@ -3,11 +3,9 @@
 import json
 import os
 import socket
-import subprocess
 import sys
 import time
 from functools import partial
-from pathlib import Path
 
 import pytest
 
@@ -16,29 +14,12 @@ from identifier.compare.course import Course
 from identifier.compare.sweep import CHUNK, sweep
 from models.recordings import read_recording
 from models.vehicle import sedan
+from tests.tireid.local_cluster import free_port, start
 from tireid.cli import main
 from tireid.cluster import ClusterError, cluster
 
 pytest.importorskip("distributed", reason="needs Dask: pip install 'tireid[cluster]'")
 pytestmark = pytest.mark.filterwarnings("default")  # Dask's own
-
-ROOT = Path(__file__).resolve().parents[2]
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
-def start(kind, options, folder):
-    return subprocess.Popen(
-        [sys.executable, "-m", f"distributed.cli.dask_{kind}", "--no-dashboard", *options],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
 
 
 @pytest.fixture(scope="module")

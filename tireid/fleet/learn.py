@@ -421,7 +421,7 @@ def on_this_machine(jobs: int) -> Map:
                 yield rows
             left = [one for k, one in enumerate(left) if k not in finished]
             for suspect in left[: 2 * jobs]:  # of these one took its process with it
-                yield from _one_by_one(work, suspect)
+                yield _carefully(work, suspect)
             left = left[2 * jobs :]
 
     return spread_map
@@ -456,15 +456,13 @@ def _until_one_dies(
         pool.shutdown(cancel_futures=True)
 
 
-def _one_by_one(
-    work: Callable[[Any], list[LogRow]], portion: Sequence[Task]
-) -> Iterator[list[LogRow]]:
-    """Yield the rows of a portion, each log in a process that it may take with it."""
-    rows: list[LogRow] = []
-    for task in portion:
-        found = [row for _, some in _until_one_dies(work, [(task,)], 1) for row in some]
-        rows += found or [_died(task, work)]
-    yield rows
+def _carefully(work: Callable[[Any], list[LogRow]], portion: Sequence[Task]) -> list[LogRow]:
+    """Return the rows of a portion from a process of its own; where it dies, log by log."""
+    for _, rows in _until_one_dies(work, [tuple(portion)], 1):
+        return rows
+    if len(portion) == 1:
+        return [_died(portion[0], work)]
+    return [row for task in portion for row in _carefully(work, [task])]
 
 
 def _died(task: Task, work: Any) -> LogRow:

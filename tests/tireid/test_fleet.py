@@ -1,0 +1,386 @@
+"""Thousands of logs, here a few: learnt once, kept whatever happens, merged, and watched over."""
+
+import hashlib
+import json
+import os
+import shutil
+import signal
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tireid.commands.fleet as command
+import tireid.fleet.learn as learning
+from identifier.axle import AxleIdentifier, AxleModel
+from identifier.axle.information import reference_of
+from identifier.axle.prior import fiala_weights
+from identifier.methods import load_model
+from models.recordings import read_recording
+from models.vehicle import sedan
+from tests.tireid.local_cluster import free_port, start
+from tireid.cli import main
+from tireid.cluster import cluster
+from tireid.fleet.learn import LearnSome, Telling, find_logs, learn_fleet, on_this_machine
+from tireid.fleet.merge import MergeError, fleet_prior, merge, usable
+from tireid.fleet.store import LogRow, Store, StoreError, information_columns
+from tireid.fleet.watch import Watching, watch
+from tireid.learning import identify
+
+for name in ("pyarrow", "fsspec"):
+    pytest.importorskip(name, reason="needs a store: pip install 'tireid[fleet]'")
+pytestmark = pytest.mark.filterwarnings("default")  # Dask's own
+
+DAYS = 3
+CAR, TAGS = "cars/{vehicle}.toml", "{vehicle}/{tires}/{date}-*.csv"
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory, logs):
+    """A folder of two cars' logs, two drives over and over, and one log that is none."""
+    folder = tmp_path_factory.mktemp("fleet")
+    (folder / "cars").mkdir()
+    for car in ("red", "blue"):
+        replace(sedan(), name=car, chassis=None).to_toml(folder / "cars" / f"{car}.toml")
+        (folder / car / "summer").mkdir(parents=True)
+        for day in range(DAYS):
+            for drive in ("slalom", "quick"):
+                path = folder / car / "summer" / f"2026-03-{day + 1:02d}-{drive}.csv"
+                path.write_bytes((logs / f"{drive}.csv").read_bytes())
+    (folder / "red" / "summer" / "2026-03-09-broken.csv").write_text("t,vx\n0,1\n")
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def there(fleet, monkeypatch):
+    monkeypatch.chdir(fleet)
+
+
+def learnt(out, *more):
+    words = ["fleet", "learn", "*/*/*.csv", "--vehicle", CAR, "--tags", TAGS, "--out", str(out)]
+    return main([*words, "--jobs", "1", *more])
+
+
+@pytest.fixture(scope="module")
+def store(fleet, tmp_path_factory):
+    """The address of a store of all logs."""
+    out, before = tmp_path_factory.mktemp("store") / "all", Path.cwd()
+    os.chdir(fleet)
+    try:
+        assert learnt(out) == 1  # one log is none
+    finally:
+        os.chdir(before)
+    return str(out)
+
+
+def digest(out):
+    """A hash of every file of a store."""
+    files = sorted(path for path in Path(out).rglob("*") if path.is_file())
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+def test_each_log_becomes_a_row_and_a_bad_one_says_why(store):
+    rows = Store(store).rows(light=False)
+    assert len(rows) == 4 * DAYS + 1
+    (bad,) = [row for row in rows if row.error]
+    assert bad.log == "red/summer/2026-03-09-broken.csv" and "column" in bad.error
+    assert bad.date == "2026-03-09" and not bad.model and not usable([bad])
+    good = rows[0]
+    assert (good.vehicle, good.tires, good.date) == ("blue", "summer", "2026-03-01")
+    assert isinstance(good.frozen, AxleModel) and good.parts[0].seconds > 3.0
+    assert good.frozen.cornering_stiffness[0] == good.stiffness_front
+    assert good.told_car.name == "blue" and good.valid is not None
+
+
+def test_what_is_there_is_not_learnt_again_and_what_is_new_is(store, fleet, tmp_path, capsys):
+    store = shutil.copytree(store, tmp_path / "store")
+    assert learnt(store) == 1
+    assert "0 learnt now, 13 before" in capsys.readouterr().out
+    assert learnt(store, "--again") == 1
+    assert "1 learnt now, 12 before" in capsys.readouterr().out
+    extra = fleet / "blue" / "summer" / "2026-03-20-more.csv"
+    extra.write_bytes((fleet / "blue/summer/2026-03-01-quick.csv").read_bytes())
+    try:
+        before = digest(store)
+        assert learnt(store) == 1
+        assert "1 learnt now, 13 before" in capsys.readouterr().out
+        changed = {name for name, one in digest(store).items() if before.get(name) != one}
+        assert len(changed) == 1  # its bucket alone
+    finally:
+        extra.unlink()
+
+
+class StoppedError(Exception):
+    pass
+
+
+def test_a_run_that_was_stopped_goes_on_and_ends_with_the_same_bytes(tmp_path, monkeypatch):
+    tasks, _ = find_logs(["*/*/*.csv"], CAR, TAGS)
+    telling = Telling(log_map=learning.LogMap())
+    whole, halted = Store(str(tmp_path / "whole")), Store(str(tmp_path / "halted"))
+    learn_fleet(tasks, telling, whole, map)
+
+    def stopping(work, portions):
+        for k, one in enumerate(portions):
+            if k == 3:
+                raise StoppedError
+            yield work(one)
+
+    with pytest.raises(StoppedError):
+        learn_fleet(tasks, telling, halted, stopping)
+    kept = len(halted.rows(("log",)))
+    assert 0 < kept < len(tasks)
+    done = []
+
+    def backwards(work, portions):
+        for one in reversed(list(portions)):
+            done.append(len(one))
+            yield work(one)
+
+    learn_fleet(tasks, telling, halted, backwards)
+    assert sum(done) == len(tasks) - kept
+    assert digest(tmp_path / "halted") == digest(tmp_path / "whole")
+
+
+def kill_at(log, portion):
+    if any(task.log == log for task in portion):
+        os.kill(os.getpid(), signal.SIGKILL)
+    return [LogRow(log=task.log, setting="", size=0, vehicle="", tires="", date="", tags="{}")
+            for task in portion]  # fmt: skip
+
+
+class Deadly(LearnSome):
+    def __call__(self, tasks):
+        return kill_at("red/summer/2026-03-02-quick.csv", tasks)
+
+
+def test_a_log_that_kills_its_process_costs_its_own_row_alone():
+    tasks, _ = find_logs(["*/*/*.csv"], CAR, TAGS)
+    telling = Telling(log_map=learning.LogMap())
+    work = Deadly(telling, {task.vehicle: "told" for task in tasks})
+    rows = [row for some in on_this_machine(2)(work, learning._together(tasks)) for row in some]
+    assert sorted(row.log for row in rows) == [task.log for task in tasks]
+    assert [row.log for row in rows if "died" in row.error] == ["red/summer/2026-03-02-quick.csv"]
+
+
+def test_a_dask_worker_that_is_killed_loses_nothing_and_the_bytes_are_the_same(tmp_path, fleet):
+    pytest.importorskip("distributed", reason="needs Dask: pip install 'tireid[fleet]'")
+    tasks, _ = find_logs(["*/*/*.csv"], CAR, TAGS)
+    telling = Telling(log_map=learning.LogMap())
+    here, there = Store(str(tmp_path / "here")), Store(str(tmp_path / "there"))
+    learn_fleet(tasks, telling, here, map)
+    port = free_port()
+    address = f"tcp://127.0.0.1:{port}"
+    options = [address, "--nthreads", "1", "--no-nanny"]
+    running = [
+        start("scheduler", ["--host", "127.0.0.1", "--port", str(port)], fleet),
+        *(start("worker", options, fleet) for _ in range(2)),
+    ]
+    killed = []
+
+    def kill_one(ready, of):
+        if ready > 0 and not killed:
+            killed.append(ready)
+            running[1].kill()
+
+    try:
+        with cluster(address) as elsewhere:
+            learn_fleet(tasks, telling, there, elsewhere, done=kill_one)
+    finally:
+        for process in reversed(running):
+            process.kill()
+            process.wait(timeout=20)
+    assert killed and killed[0] < len(tasks)
+    assert digest(tmp_path / "there") == digest(tmp_path / "here")
+
+
+def test_a_store_lies_at_any_address_of_fsspec(store):
+    away = Store("memory://fleet")
+    rows = Store(store).rows(light=False)
+    by_bucket = {}
+    for row in rows:
+        by_bucket.setdefault(learning.bucket_of(row.log), []).append(row)
+    for some in by_bucket.values():
+        away.keep(some)
+    assert away.exists and len(away.rows(("log",))) == len(rows)
+    away.settle()
+    assert [row.log for row in away.rows(("log",))] == [row.log for row in rows]
+    assert away.rows(light=False)[0] == rows[0]
+
+
+def test_models_are_merged_by_what_logs_have_in_common(store, tmp_path, capsys):
+    out = tmp_path / "merged"
+    assert main(["fleet", "merge", store, "--all", "--by", "vehicle,week", "--out", str(out)]) == 0
+    told = json.loads((out / "models.json").read_text())
+    assert [(one["vehicle"], one["week"]) for one in told] == [
+        ("blue", "2026-W09"), ("blue", "2026-W10"), ("red", "2026-W09"), ("red", "2026-W10"),
+    ]  # fmt: skip
+    assert sum(one["logs"] for one in told) >= 4 * DAYS
+    model = load_model(out / told[0]["file"])
+    assert model.cornering_stiffness == pytest.approx(told[0]["cornering_stiffness_N_rad"])
+    assert "blue 2026-W09" in capsys.readouterr().out
+
+
+def test_a_question_in_sql_chooses_rows_and_sees_nothing_else(store):
+    pytest.importorskip("duckdb", reason="needs DuckDB: pip install 'tireid[fleet]'")
+    rows = Store(store).rows(where="vehicle = 'red' AND error = ''")
+    assert {row.vehicle for row in rows} == {"red"} and len(rows) == 2 * DAYS
+    for wrong in ("nobody > 3", "log IN (SELECT content FROM read_text('cars/red.toml'))"):
+        with pytest.raises(StoreError, match=r"all: "):
+            Store(store).rows(where=wrong)
+
+
+def test_cars_of_another_kind_are_not_merged(store):
+    rows = usable(Store(store).rows(), refused=True)
+    with pytest.raises(MergeError, match="are of cars whose files differ: merge --by vehicle"):
+        merge(rows, [])
+    with pytest.raises(MergeError, match="'driver' is none of what is known of it: vehicle, tires"):
+        merge(rows, ["driver"])
+    with pytest.raises(MergeError, match="must begin with year-month-day"):
+        merge([replace(rows[0], date="yesterday")], ["week"])
+
+
+def test_the_next_car_starts_where_the_fleet_is(store, tmp_path):
+    out = tmp_path / "prior.json"
+    words = ["fleet", "prior", store, "--all", "--vehicle", "cars/red.toml", "--out", str(out)]
+    assert main(words) == 0
+    prior = load_model(out)
+    groups = merge(usable(Store(store).rows(), refused=True), ["vehicle"])
+    fleet = np.mean([one.model.cornering_stiffness for one in groups], axis=0)
+    told = reference_of(AxleIdentifier.for_vehicle(sedan()), sedan()).cornering_stiffness
+    assert np.abs(prior.cornering_stiffness - fleet).max() < 0.5 * np.abs(told - fleet).max()
+    sure = [np.trace(P) for P in prior.covariance]
+    assert (np.array(sure) < [np.trace(P) for P in prior.prior_covariance]).all()
+    recording = read_recording("red/summer/2026-03-01-quick.csv")
+    begun = identify(recording, prior.vehicle, start=prior, check=False)
+    assert begun.freeze(0.5).cornering_stiffness == pytest.approx(prior.cornering_stiffness)
+    with pytest.raises(MergeError, match="no log of the store can be used"):
+        fleet_prior([])
+
+
+# Watching, on rows that are made: information of one drive, and tires that are chosen.
+
+
+def rows_of(store, truths, *, noise=0.004, seed=0):
+    """Rows of one car, a log a day, whose tires have a stiffness and a friction of their own."""
+    rng = np.random.default_rng(seed)
+    row = next(one for one in Store(store).rows() if one.part_begin)
+    (told,) = row.parts
+    told = replace(told, seconds=60.0)
+    design = AxleIdentifier.for_vehicle(row.told_car)
+    per_load = row.told_car.cornering_stiffness_front / row.told_car.axle_loads[0]
+    made = []
+    for k, (front, rear, friction) in enumerate(truths):
+        theta = np.zeros(told.vector.shape)
+        for i, factor in enumerate((front, rear)):
+            C = per_load * factor * np.exp(noise * rng.standard_normal())
+            theta[i, :-3] = fiala_weights(C, 0.9 * friction, design.ladder)
+        one = replace(
+            told,
+            vector=np.einsum("aij,aj->ai", told.matrix, theta),
+            square=np.einsum("ai,aij,aj->a", theta, told.matrix, theta) + 0.01 * told.samples,
+        )
+        made.append(
+            replace(row, log=f"{k:03d}", date=f"2026-{k // 28 + 1:02d}-{k % 28 + 1:02d}",
+                    part_begin=[0.0], **information_columns([one]))
+        )  # fmt: skip
+    return made
+
+
+SAME = (1.0, 1.0, 1.0)
+
+
+def test_a_stiffness_that_falls_by_a_tenth_is_noticed_within_half_an_hour(store):
+    rows = rows_of(store, [SAME] * 40 + [(0.9, 1.0, 1.0)] * 30)
+    (alarm,) = watch(rows, ["vehicle"], Watching()).alarms
+    assert alarm.statistic == 0 and alarm.began == "040" and not alarm.ended
+    assert np.expm1(alarm.change[0]) == pytest.approx(-0.1, abs=0.03)
+    assert alarm.after <= 20 * 60.0 + 30 * 60.0
+    assert "in a step" in alarm.line and "other tires" in alarm.cause
+
+
+def test_a_slow_loss_is_told_from_a_step(store):
+    rows = rows_of(store, [SAME] * 20 + [(1.0, 1.0 - 0.002 * k, 1.0) for k in range(80)])
+    (alarm,) = watch(rows, ["vehicle"], Watching()).alarms
+    assert alarm.statistic == 1 and not alarm.abrupt and "wear" in alarm.cause
+
+
+def test_tires_that_stay_and_minutes_of_a_broken_sensor_make_no_alarm(store):
+    assert not watch(rows_of(store, [SAME] * 80), ["vehicle"], Watching()).alarms
+    broken = [SAME] * 30 + [(0.6, 1.4, 0.5)] * 8 + [SAME] * 30
+    assert not watch(rows_of(store, broken), ["vehicle"], Watching()).alarms
+
+
+def test_an_alarm_ends_where_its_cause_does(store):
+    rows = rows_of(store, [SAME] * 30 + [(0.9, 1.0, 1.0)] * 30 + [SAME] * 40)
+    (alarm,) = watch(rows, ["vehicle"], Watching()).alarms
+    assert 60 <= int(alarm.ended) < 80
+
+
+def test_fewer_false_alarms_are_paid_with_a_higher_threshold():
+    often, seldom = Watching(false_alarms=10.0), Watching(false_alarms=0.1)
+    assert seldom.threshold(60.0) - often.threshold(60.0) == pytest.approx(np.log(100.0))
+    with pytest.raises(ValueError, match="false_alarms must be positive, it is 0"):
+        Watching(false_alarms=0.0)
+
+
+def test_watch_and_report_write_pages(store, tmp_path, undrawn, capsys):
+    words = [store, "--all", "--baseline", "10"]
+    assert main(["fleet", "watch", *words, "--out", str(tmp_path / "watch")]) in (0, 1)
+    assert "2 cars" in capsys.readouterr().out
+    assert json.loads((tmp_path / "watch" / "alarms.json").read_text()) is not None
+    assert main(["fleet", "report", *words, "--out", str(tmp_path / "report")]) == 0
+    page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    assert "Cornering stiffness, log by log" in page and "2026-03-09-broken.csv" in page
+
+
+def test_alarms_are_told_and_drawn(store, tmp_path, laid_out, monkeypatch, capsys):
+    rows = rows_of(store, [SAME] * 40 + [(0.9, 0.9, 1.0)] * 30)
+    monkeypatch.setattr(command.Store, "rows", lambda *_, **__: rows)
+    assert main(["fleet", "watch", store, "--out", str(tmp_path / "out")]) == 1
+    assert "both axles alike" in capsys.readouterr().out
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "against its baseline" in page
+
+
+# What is told wrongly is said in one line.
+
+
+def test_wrong_words_are_refused_in_one_line(store, tmp_path, capsys, monkeypatch):
+    def said(*words):
+        assert main(["fleet", *words]) == 2
+        return capsys.readouterr().err.splitlines()[-1]
+
+    learn = ["learn", "*/*/*.csv", "--out", str(tmp_path / "x"), "--vehicle"]
+    assert "names no log" in said("learn", "none/*.csv", "--out", "x", "--vehicle", "cars/red.toml")
+    assert "{vehicle} is no tag" in said(*learn, CAR)
+    assert "each name once" in said(*learn, "cars/red.toml", "--tags", "{a}/{a}.csv")
+    assert "at least 10 s" in said(*learn, "cars/red.toml", "--part", "1")
+    assert "is no store" in said("merge", str(tmp_path / "nothing"))
+    assert "no such file" in said(*learn, "cars/green.toml")
+    monkeypatch.setitem(sys.modules, "duckdb", None)
+    assert "pip install 'tireid[fleet]'" in said("merge", store, "--where", "seconds > 1")
+    monkeypatch.setitem(sys.modules, "fsspec.core", None)
+    assert "pip install 'tireid[fleet]'" in said("merge", store)
+
+
+def test_a_file_that_is_none_of_a_store_is_named(tmp_path):
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    (tmp_path / "logs").mkdir()
+    path = tmp_path / "logs" / "bucket-00.parquet"
+    parquet.write_table(pyarrow.table({"log": ["a"]}), path)
+    with pytest.raises(StoreError, match="is not of this version's store"):
+        Store(str(tmp_path)).rows(("log",))
+    path.write_bytes(b"PAR1 no")
+    with pytest.raises(StoreError, match="cannot be read as a store's file"):
+        Store(str(tmp_path)).rows()
+
+
+def test_tags_are_found_at_the_end_of_a_path_and_dates_are_dates():
+    tags = learning.tag_pattern("{vehicle}/{date}-{drive}.csv")
+    found = tags.search("/data/fleet/a 1/2026-03-31-2.csv").groupdict()
+    assert found == {"vehicle": "a 1", "date": "2026-03-31", "drive": "2"}
+    assert tags.search("a/b/c.csv") is None
