@@ -10,11 +10,11 @@ from functools import partial
 import pytest
 
 import tireid.cluster
+from benchmarks.local_cluster import free_port, start
 from identifier.compare.course import Course
 from identifier.compare.sweep import CHUNK, sweep
 from models.recordings import read_recording
 from models.vehicle import sedan
-from tests.tireid.local_cluster import free_port, start
 from tireid.cli import main
 from tireid.cluster import ClusterError, cluster
 

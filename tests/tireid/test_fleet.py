@@ -14,13 +14,13 @@ import pytest
 
 import tireid.commands.fleet as command
 import tireid.fleet.learn as learning
+from benchmarks.local_cluster import free_port, start
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.information import reference_of
 from identifier.axle.prior import fiala_weights
 from identifier.methods import load_model
 from models.recordings import read_recording
 from models.vehicle import sedan
-from tests.tireid.local_cluster import free_port, start
 from tireid.cli import main
 from tireid.cluster import cluster
 from tireid.fleet.learn import LearnSome, Telling, find_logs, learn_fleet, on_this_machine
@@ -157,10 +157,10 @@ class Deadly(LearnSome):
 
 
 def test_a_log_that_kills_its_process_costs_its_own_row_alone():
-    tasks, _ = find_logs(["*/*/*.csv"], CAR, TAGS)
+    tasks, _ = find_logs(["red/summer/2026-03-02-*.csv", "red/summer/*-03-quick.csv"], CAR, TAGS)
     telling = Telling(log_map=learning.LogMap())
     work = Deadly(telling, {task.vehicle: "told" for task in tasks})
-    rows = [row for some in on_this_machine(2)(work, learning._together(tasks)) for row in some]
+    rows = [row for some in on_this_machine(2)(work, [tuple(tasks)]) for row in some]
     assert sorted(row.log for row in rows) == [task.log for task in tasks]
     assert [row.log for row in rows if "died" in row.error] == ["red/summer/2026-03-02-quick.csv"]
 

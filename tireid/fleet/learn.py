@@ -225,17 +225,31 @@ def learn_log(task: Task, telling: Telling, setting: str) -> LogRow:
     try:
         vehicle = Vehicle.from_toml(task.vehicle)
         row = replace(row, vehicle=vehicle_name or vehicle.name)
-        return _learnt(row, task, vehicle, telling)
+        with _near(task.log) as path:
+            recording, vehicle = read_repaired(
+                path, vehicle, dt=DT, check=telling.check, log_map=telling.log_map
+            )
+        return learnt(row, recording, vehicle, telling)
     except EXPECTED as error:
         text = " ".join(str(error).split()) or type(error).__name__
         return replace(row, error=text[:500])
 
 
-def _learnt(row: LogRow, task: Task, vehicle: Vehicle, telling: Telling) -> LogRow:
-    with _near(task.log) as path:
-        recording, vehicle = read_repaired(
-            path, vehicle, dt=DT, check=telling.check, log_map=telling.log_map
-        )
+def learnt(row: LogRow, recording: Recording, vehicle: Vehicle, telling: Telling) -> LogRow:
+    """Return the row with what is learnt of its log.
+
+    Parameters
+    ----------
+    row : the log's name and what its path says.
+    recording : the log, at `DT`.
+    vehicle : the car that drove.
+    telling : what is told of all logs.
+
+    Raises
+    ------
+    ValueError, ArithmeticError
+        Where nothing can be learnt of it.
+    """
     start = None if telling.weights is None else load_model(telling.weights)
     usual = InertialIdentifier if recording.logged_v_y is None else AxleIdentifier
     method = usual.for_vehicle(vehicle, dt=recording.dt)
@@ -409,8 +423,10 @@ def on_this_machine(jobs: int) -> Map:
 
     Parameters
     ----------
-    jobs : processes.
+    jobs : processes; one alone is this one.
     """
+    if jobs == 1:
+        return map
 
     def spread_map(work: Callable[[Any], Any], portions: Any) -> Iterator[list[LogRow]]:
         left = list(portions)

@@ -1,0 +1,567 @@
+"""A fleet: speed, merging, priors, what the watch finds, and a cluster that loses a worker.
+
+    python -m benchmarks.fleet [--only speed hours merge prior watch cluster] [--record]
+
+speed    500 logs of 60 s, CSV, by `tireid fleet learn`: everyday drives, each some times over.
+hours    1000 h in Parquet files of an hour, all of them one file's content under other names.
+merge    random cars of four classes, six drives each: information of drives against that of all of
+         them as one recording, at one reference (the prior); and the merged model, each drive at
+         its own, against the model learnt over all drives in a row and against least squares at
+         once, repeated until it rests: error of frozen forces on drives never seen.
+prior    cars of one kind on tires that differ by a tenth: how long the next car learns until its
+         frozen forces miss 5 % of the rms force on another drive, and stay below.
+watch    500 cars for two hours after their baseline. Each is one of `DRIVEN` random cars, whose
+         baseline is driven; its later minutes are drawn from others that were driven, with
+         sensors that fail for one to five minutes; a fifth of the cars lose a tenth of stiffness
+         at one axle or both. Tires of a car that did not change are a false alarm.
+cluster  two workers of Dask, one killed in the middle.
+"""
+
+import argparse
+import hashlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.everyday_drives import KINDS, everyday_drive
+from benchmarks.local_cluster import free_port, start
+from benchmarks.random_cars import CLASSES, FIRST_SEED, RandomCar, random_car, random_drive
+from benchmarks.targets import Targets, keeps, show
+from codegen.arrays import Array
+from identifier.axle import AxleIdentifier, AxleModel
+from identifier.axle.information import Evidence, merged, reference_of, total
+from identifier.run import identify, learn
+from identifier.tire_model import TireModel
+from models.faults import SensorFault
+from models.plant import PlantError
+from models.recordings import LogMap, Recording, joined, write_recording
+from models.tires import DugoffTire, FialaTire, MagicFormula, Tire
+from tireid.cluster import cluster
+from tireid.fleet.learn import Telling, find_logs, learn_fleet, learnt
+from tireid.fleet.merge import fleet_prior, merge
+from tireid.fleet.store import LogRow, Store
+from tireid.fleet.watch import Watching, watch
+
+PARTS = ("speed", "hours", "merge", "prior", "watch", "cluster")
+LOGS, MINUTE = 500, 60.0
+HOURS = 1000
+DISTINCT = 20  # drives that logs are made of
+DRIVEN = 40  # cars of the watched fleet that are driven
+CARS, AFTER = 500, 120  # cars, minutes of each after its baseline
+BASELINE, LATER, SOFTER, FAULTY = 20, 20, 12, 6  # minutes that are driven of a car
+LOSES = 5  # one of so many cars loses stiffness,
+LOSS = 0.9
+FAULTS = 0.02  # share of minutes in which a sensor begins to fail
+LONGEST_FAULT = 5  # min
+
+
+@contextmanager
+def in_folder() -> Iterator[Path]:
+    """Yield a folder that is gone afterwards."""
+    with tempfile.TemporaryDirectory(prefix="tireid-fleet-") as folder:
+        yield Path(folder)
+
+
+def drives_of(car: RandomCar, count: int, rng: np.random.Generator) -> list[Recording]:
+    """Return logs of a car's everyday drives, a minute each.
+
+    Parameters
+    ----------
+    car : that drives.
+    count : how many.
+    rng : source of drives and noise.
+    """
+    found: list[Recording] = []
+    for k in range(10 * count):
+        if len(found) == count:
+            break
+        with suppress(PlantError):
+            found.append(everyday_drive(car, KINDS[k % 2], rng).log(rng))
+    if len(found) < count:
+        raise PlantError(f"a {car.kind} has no everyday drives")
+    return found
+
+
+# How long it takes, and what it holds.
+
+
+def run_learn(logs: str, folder: Path, jobs: int) -> tuple[float, float]:
+    """Run the command over logs; return seconds and the most it holds, all processes [GB].
+
+    Parameters
+    ----------
+    logs : pattern.
+    folder : with car.toml; the store goes there.
+    jobs : processes.
+    """
+    words = ["fleet", "learn", logs, "--vehicle", str(folder / "car.toml")]
+    words += ["--out", str(folder / "store"), "--jobs", str(jobs)]
+    began = time.perf_counter()
+    command = subprocess.Popen([sys.executable, "-m", "tireid", *words], start_new_session=True)
+    most = [0.0]
+    over = threading.Event()
+
+    def look() -> None:
+        while not over.wait(0.2):
+            most[0] = max(most[0], held(command.pid))
+
+    thread = threading.Thread(target=look)
+    thread.start()
+    code = command.wait()
+    over.set()
+    thread.join()
+    if code != 0:
+        raise RuntimeError(f"tireid {' '.join(words)} ended with {code}")
+    return time.perf_counter() - began, most[0]
+
+
+def held(session: int) -> float:
+    """Return the memory that all processes of a session hold of their own [GB].
+
+    Parameters
+    ----------
+    session : its number.
+    """
+    total_kB = 0
+    for entry in Path("/proc").iterdir():
+        with suppress(OSError, ValueError, IndexError):
+            pid = int(entry.name)
+            if os.getsid(pid) != session:
+                continue
+            status = (entry / "status").read_text(encoding="utf-8")
+            total_kB += int(status.split("RssAnon:")[1].split()[0])
+    return total_kB / 1e6
+
+
+def speed(targets: Targets, jobs: int, count: int) -> None:
+    """Time the command over logs of a minute.
+
+    Parameters
+    ----------
+    targets : where numbers go.
+    jobs : processes.
+    count : logs.
+    """
+    with in_folder() as folder:
+        rng = np.random.default_rng(FIRST_SEED)
+        car = random_car("sedan", rng)
+        car.told.to_toml(folder / "car.toml")
+        (folder / "logs").mkdir()
+        texts = []
+        for log in drives_of(car, DISTINCT, rng):
+            texts.append(write_recording(log, folder / "one.csv").read_bytes())
+        for k in range(count):
+            (folder / "logs" / f"{k:05d}.csv").write_bytes(texts[k % DISTINCT])
+        seconds, most = run_learn(str(folder / "logs" / "*.csv"), folder, jobs)
+    targets.at_most(f"{count} logs of 60 s, CSV", seconds, 25.0, "s", "speed/seconds")
+    targets.record("speed/logs", count)
+    targets.record("speed/held", most, "GB")
+
+
+def hours(targets: Targets, jobs: int, count: int) -> None:
+    """Time the command over hours of Parquet.
+
+    Parameters
+    ----------
+    targets : where numbers go.
+    jobs : processes.
+    count : hours.
+    """
+    import pyarrow
+    import pyarrow.parquet
+
+    with in_folder() as folder:
+        rng = np.random.default_rng(FIRST_SEED + 1)
+        car = random_car("sedan", rng)
+        car.told.to_toml(folder / "car.toml")
+        drives = drives_of(car, DISTINCT, rng)
+        names = {"vx": "v_x", "vy": "v_y", "r": "r", "delta_f": "delta_f", "ay": "a_y"}
+        columns = {
+            column: np.concatenate([getattr(one, name) for one in drives for _ in range(3)])
+            for column, name in names.items()
+        }
+        columns["t"] = 0.01 * np.arange(columns["r"].size)
+        (folder / "logs").mkdir()
+        pyarrow.parquet.write_table(pyarrow.table(columns), folder / "hour.parquet")
+        for k in range(count):
+            os.link(folder / "hour.parquet", folder / "logs" / f"{k:05d}.parquet")
+        seconds, most = run_learn(str(folder / "logs" / "*.parquet"), folder, jobs)
+    per_thousand = seconds / 60.0 * 1000.0 / count
+    targets.at_most("1000 h of Parquet", per_thousand, 15.0, "min", "hours/minutes")
+    targets.at_most("held by all processes", most, 1.0, "GB", "hours/held")
+    targets.record("hours/driven", count)
+
+
+# Merging and priors.
+
+
+def missed(model: TireModel, drives: Sequence[Recording]) -> float:
+    """Return the share of the rms force that a frozen model misses on drives [-], both axles.
+
+    Parameters
+    ----------
+    model : the frozen model.
+    drives : without noise, with true forces.
+    """
+    shares = []
+    for one in drives:
+        force = one.axle_force
+        assert force is not None
+        late = one.t > one.t[-1] - 29.0
+        away = (model.axle_force(one) - force)[late]
+        shares.append(np.sqrt((away**2).mean(axis=0) / (force[late] ** 2).mean(axis=0)))
+    return float(np.mean(shares))
+
+
+def merging(targets: Targets, cars: int) -> None:
+    """Compare parts that are added with drives that are learnt at once.
+
+    Parameters
+    ----------
+    targets : where numbers go.
+    cars : of each class.
+    """
+    apart_from_once, rows = [], []
+    for k in range(4 * cars):
+        rng = np.random.default_rng([FIRST_SEED + k, 3])
+        car = random_car(list(CLASSES)[k % 4], rng)
+        with suppress(PlantError):
+            logs = [random_drive(car, rng).log(rng) for _ in range(6)]
+            asked = [random_drive(car, rng).exact for _ in range(2)]
+        design = AxleIdentifier.for_vehicle(car.told)
+        before = reference_of(design, car.told)
+        q, none = len(design.ladder) + 3, np.zeros_like(before.excitation)
+        fixed = Evidence(design=design, reference=before)
+        added = merged(design, before, total([fixed.of(one) for one in logs], q), none)
+        once = merged(design, before, fixed.of(joined(logs)), none)
+        scale = np.abs(np.hstack([once.W, once.own])).max()
+        difference = np.abs(np.hstack([added.W, added.own]) - np.hstack([once.W, once.own])).max()
+        apart_from_once.append(difference / scale)
+        own = [Evidence(design=design, reference=_learnt(one, design, car)).of(one) for one in logs]
+        parts = merged(design, before, total(own, q), none)
+        whole = once
+        for _ in range(5):
+            again = Evidence(design=design, reference=whole)
+            whole = merged(design, before, again.of(joined(logs)), none)
+        in_a_row = learn(joined(logs), car.told, design)
+        rows.append([missed(one, asked) for one in (parts, whole, in_a_row)])
+    parts_error, whole_error, row_error = 100.0 * np.median(rows, axis=0)
+    worst = float(np.max(apart_from_once))
+    targets.at_most("merged from learnt at once, linear", 1e9 * worst, 1.0, "1e-9", "merge/linear")
+    ratio = 100.0 * (parts_error / whole_error - 1.0)
+    targets.at_most("error of merged over at once, lag learnt", ratio, 2.0, "%", "merge/lag")
+    targets.record("merge/merged_error", parts_error, "%")
+    targets.record("merge/at_once_error", whole_error, "%")
+    targets.record("merge/in_a_row_error", row_error, "%")
+    targets.record("merge/cars", len(rows))
+
+
+def _learnt(log: Recording, design: AxleIdentifier, car: RandomCar) -> AxleModel:
+    model = learn(log, car.told, design)
+    assert isinstance(model, AxleModel)
+    return model
+
+
+def on_other_tires(
+    car: RandomCar, stiffness: tuple[float, float], friction: float = 1.0
+) -> RandomCar:
+    """Return a car on tires of other stiffness, front and rear, and friction.
+
+    Parameters
+    ----------
+    stiffness : over what it was, front and rear.
+    friction : over what it was.
+    """
+    tires: list[Tire] = []
+    for tire, factor in zip(car.tires, stiffness, strict=True):
+        if isinstance(tire, MagicFormula):
+            c = tire.coefficients
+            changed = replace(c, LKY=c.LKY * factor, LMUY=c.LMUY * friction)
+            tires.append(replace(tire, coefficients=changed))
+        else:
+            assert isinstance(tire, FialaTire | DugoffTire)
+            tires.append(
+                replace(tire, C_alpha=tire.C_alpha * factor, friction=tire.friction * friction)
+            )
+    mu = (car.friction[0] * friction, car.friction[1] * friction)
+    return replace(car, tires=(tires[0], tires[1]), friction=mu)
+
+
+def row_of(log: Recording, car: RandomCar, name: str, k: int) -> LogRow:
+    """Return the row of a log, as `tireid fleet learn` makes it.
+
+    Parameters
+    ----------
+    log : of the car.
+    car : that drove.
+    name : of the car.
+    k : number of the log, a minute apart.
+    """
+    date = np.datetime_as_string(np.datetime64("2026-01-01T00:00") + np.timedelta64(k, "m"))
+    row = LogRow(
+        log=f"{name}-{k:04d}", setting="", size=0, vehicle=name, tires="", date=str(date), tags="{}"
+    )
+    return learnt(row, log, car.told, Telling(log_map=LogMap()))
+
+
+STEPS = (0.0, *np.arange(0.5, 10.0, 0.25), *np.arange(10.0, 29.0, 1.0))  # s into the corners
+REACHED = 0.05
+
+
+def priors(targets: Targets, fleets: int) -> None:
+    """Time the next car of a kind until it knows its tires, afresh and from the fleet.
+
+    Parameters
+    ----------
+    targets : where numbers go.
+    fleets : kinds of car.
+    """
+    afresh: list[float] = []
+    begun: list[float] = []
+    for k in range(fleets):
+        rng = np.random.default_rng([FIRST_SEED + k, 4])
+        kind = random_car(["compact", "sedan"][k % 2], rng)
+        with suppress(PlantError):
+            rows = []
+            for number in range(8):
+                car = _of_kind(kind, rng)
+                logs = [random_drive(car, rng).log(rng) for _ in range(3)]
+                rows += [row_of(one, car, f"{number}", i) for i, one in enumerate(logs)]
+            prior = fleet_prior(merge(rows, ["vehicle"])).model(kind.told)
+            for _ in range(3):
+                car = _of_kind(kind, rng)
+                drive, other = random_drive(car, rng), random_drive(car, rng)
+                log = drive.log(rng)
+                for start, times in ((None, afresh), (prior, begun)):
+                    design = AxleIdentifier.for_vehicle(car.told)
+                    run = identify(log, car.told, design, start)
+                    errors = [missed(run.freeze(8.0 + t), [other.exact]) for t in STEPS]
+                    times.append(_until(np.array(errors)))
+    slow, quick = np.median(afresh), np.median(begun)
+    both = f"{slow:.2f} s afresh, {quick:.2f} s from the fleet, of {len(afresh)} cars"
+    show("time to 5 % error, medians", both)
+    targets.record("prior/afresh", float(slow), "s")
+    targets.record("prior/fleet", float(quick), "s")
+    targets.record("prior/cars", len(afresh))
+    targets.record("prior/never_afresh", int(np.sum(np.array(afresh) >= STEPS[-1])))
+    targets.record("prior/never_fleet", int(np.sum(np.array(begun) >= STEPS[-1])))
+    ratio = float(slow / max(quick, STEPS[1] / 2.0))
+    targets.at_least("prior: times faster to 5 % error", ratio, 3.0, "x", "prior/ratio")
+
+
+def _of_kind(kind: RandomCar, rng: np.random.Generator) -> RandomCar:
+    """A car of a kind, its tires by a tenth or so others."""
+    stiffness = np.exp(0.1 * rng.standard_normal(2))
+    friction = float(np.exp(0.05 * rng.standard_normal()))
+    return on_other_tires(kind, (float(stiffness[0]), float(stiffness[1])), friction)
+
+
+def _until(errors: Array) -> float:
+    """Return when errors are below what is asked for and stay there [s]."""
+    above = np.flatnonzero(errors > REACHED)
+    return float(STEPS[min(int(above[-1]) + 1, len(STEPS) - 1)] if above.size else 0.0)
+
+
+# Watching.
+
+FAILS = ("biased", "drifting", "noisy", "spiking", "scaled")
+SIZES = {"v_x": 1.0, "v_y": 0.3, "r": 0.03, "delta_f": 0.02}  # SI, of a sedan
+
+
+def driven_car(seed: int) -> dict[str, list[LogRow]]:
+    """Return minutes that a random car was driven: its baseline, later, softer tires, faults.
+
+    Parameters
+    ----------
+    seed : of the car.
+    """
+    for attempt in range(20):
+        rng = np.random.default_rng([seed, attempt, 5])
+        car = random_car(["compact", "sedan", "race"][seed % 3], rng)
+        factors = [(LOSS, 1.0), (1.0, LOSS), (LOSS, LOSS)][int(rng.integers(3))]
+        with suppress(PlantError):
+            same = drives_of(car, BASELINE + LATER + FAULTY, rng)
+            soft = drives_of(on_other_tires(car, factors), SOFTER, rng)
+            good, faulty = same[:-FAULTY], [_failing(one, rng) for one in same[-FAULTY:]]
+            name = f"car-{seed}"
+
+            def rows(
+                logs: Sequence[Recording], car: RandomCar = car, name: str = name
+            ) -> list[LogRow]:
+                return [row_of(one, car, name, k) for k, one in enumerate(logs)]
+
+            return {
+                "baseline": rows(good[:BASELINE]),
+                "later": rows(good[BASELINE:]),
+                "softer": rows(soft),
+                "faulty": rows(faulty),
+            }
+    raise PlantError(f"no car of seed {seed} drives")
+
+
+def _failing(log: Recording, rng: np.random.Generator) -> Recording:
+    """A log in which a sensor fails for some of the time or throughout."""
+    kind, channel = str(rng.choice(FAILS)), str(rng.choice(list(SIZES)))
+    size = SIZES[channel] * rng.uniform(0.2, 1.0)
+    size = rng.uniform(0.8, 1.25) if kind == "scaled" else size
+    begin = float(rng.uniform(0.0, 40.0))
+    fault = SensorFault(
+        channel=channel, kind=kind, size=size, start=begin, seed=int(rng.integers(1 << 30))
+    )
+    return fault.apply(log)
+
+
+def watching(targets: Targets, driven: int, jobs: int) -> None:
+    """Count what the watch finds of a fleet, and what it finds that is not there.
+
+    Parameters
+    ----------
+    targets : where numbers go.
+    driven : cars that are driven.
+    jobs : processes.
+    """
+    from identifier.compare.work import spread
+
+    with spread(jobs) as spread_map:
+        cars = list(spread_map(driven_car, range(FIRST_SEED, FIRST_SEED + driven)))
+    rng = np.random.default_rng(FIRST_SEED)
+    rows: list[LogRow] = []
+    loses: dict[str, int] = {}
+    for k in range(CARS):
+        name, minutes = f"car-{k:03d}", cars[k % driven]
+        drawn = list(minutes["baseline"])
+        change = int(rng.integers(20, 80)) if k % LOSES == 0 else AFTER
+        if change < AFTER:
+            loses[name] = BASELINE + change
+        failing = 0
+        for minute in range(AFTER):
+            if failing == 0 and rng.uniform() < FAULTS:
+                failing = int(rng.integers(1, LONGEST_FAULT, endpoint=True))
+            pool = minutes["faulty" if failing else "softer" if minute >= change else "later"]
+            failing = max(failing - 1, 0)
+            drawn.append(pool[int(rng.integers(len(pool)))])
+        rows += [_renamed(one, name, i) for i, one in enumerate(drawn)]
+    used = [row for row in rows if not row.error and row.valid is not False]
+    watched = watch(used, ["vehicle"], Watching())
+    found: dict[str, float] = {}
+    false = 0
+    for alarm in watched.alarms:
+        at, begins = int(alarm.log[-4:]), loses.get(alarm.car, BASELINE + AFTER)
+        if alarm.car in loses and at >= begins and alarm.change[alarm.statistic] < 0.0:
+            found.setdefault(alarm.car, float(at - begins + 1))
+        else:
+            false += 1
+    within = sum(minutes <= 30.0 for minutes in found.values())
+    targets.at_least(
+        "cars that lost a tenth, found within 30 min", 100.0 * within / len(loses), 100.0, "%",
+        "watch/found",
+    )  # fmt: skip
+    rate = 1000.0 * false / watched.hours
+    targets.at_most("false alarms in 1000 h of learning", rate, 1.0, "", "watch/false_alarms")
+    targets.record("watch/hours", watched.hours, "h")
+    targets.record("watch/cars", CARS)
+    targets.record("watch/driven", driven)
+    targets.record("watch/lose", len(loses))
+    targets.record("watch/false", false)
+    targets.record("watch/refused", len(rows) - len(used))
+    if found:
+        targets.record("watch/median_minutes", float(np.median(list(found.values()))), "min")
+        targets.record("watch/worst_minutes", max(found.values()), "min")
+
+
+def _renamed(row: LogRow, name: str, k: int) -> LogRow:
+    date = np.datetime_as_string(np.datetime64("2026-01-01T00:00") + np.timedelta64(k, "m"))
+    return replace(row, log=f"{name}-{k:04d}", vehicle=name, date=str(date))
+
+
+# A cluster that loses a worker.
+
+
+def on_a_cluster(targets: Targets, count: int) -> None:
+    """Compare the store of a cluster, one worker of which is killed, with that of this machine.
+
+    Parameters
+    ----------
+    targets : where numbers go.
+    count : logs.
+    """
+    with in_folder() as folder:
+        rng = np.random.default_rng(FIRST_SEED)
+        car = random_car("sedan", rng)
+        car.told.to_toml(folder / "car.toml")
+        (folder / "logs").mkdir()
+        for k, log in enumerate(drives_of(car, count, rng)):
+            write_recording(log, folder / "logs" / f"{k:04d}.csv")
+        tasks, _ = find_logs([str(folder / "logs" / "*.csv")], str(folder / "car.toml"))
+        telling = Telling(log_map=LogMap())
+        here, there = Store(str(folder / "here")), Store(str(folder / "there"))
+        learn_fleet(tasks, telling, here, map)
+        port = free_port()
+        address = f"tcp://127.0.0.1:{port}"
+        scheduler = start("scheduler", ["--host", "127.0.0.1", "--port", str(port)], folder)
+        words = [address, "--nthreads", "1", "--no-nanny"]
+        workers = [start("worker", words, folder) for _ in range(2)]
+        killed: list[int] = []
+
+        def kill_one(ready: int, of: int) -> None:
+            if ready >= of / 3 and not killed:
+                killed.append(ready)
+                workers[0].kill()
+
+        try:
+            with cluster(address) as elsewhere:
+                learn_fleet(tasks, telling, there, elsewhere, done=kill_one)
+        finally:
+            for process in (*workers, scheduler):
+                process.kill()
+                process.wait(timeout=20)
+        same = _digest(folder / "here") == _digest(folder / "there")
+    targets.at_least("a worker killed: same bytes", float(same), 1.0, "", "cluster/same_bytes")
+    targets.record("cluster/killed_after", killed[0] if killed else -1)
+    targets.record("cluster/logs", count)
+
+
+def _digest(folder: Path) -> str:
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    told = [(str(path.relative_to(folder)), path.read_bytes().hex()) for path in files]
+    return hashlib.sha256(json.dumps(told).encode()).hexdigest()
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Measure what the words ask for; return 1 where a target is missed."""
+    keep = keeps()
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.fleet")
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS))
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--logs", type=int, default=LOGS)
+    parser.add_argument("--hours", type=int, default=HOURS)
+    parser.add_argument("--cars", type=int, default=DRIVEN)
+    options = parser.parse_args(argv)
+    targets = Targets("fleet")
+    if "speed" in options.only:
+        speed(targets, options.jobs, options.logs)
+    if "hours" in options.only:
+        hours(targets, options.jobs, options.hours)
+    if "merge" in options.only:
+        merging(targets, max(options.cars // 4, 1))
+    if "prior" in options.only:
+        priors(targets, max(options.cars // 5, 1))
+    if "watch" in options.only:
+        watching(targets, options.cars, options.jobs)
+    if "cluster" in options.only:
+        on_a_cluster(targets, 24)
+    return targets.finish(keep=keep)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
