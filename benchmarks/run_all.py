@@ -37,6 +37,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "bands": [],
     "plan": [],
     "dither": [],
+    "fleet": [],
     "doctor": [],
     "plant_against_commonroad": ["{out}"],
     "paper_gains": [],

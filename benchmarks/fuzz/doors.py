@@ -49,6 +49,7 @@ PREDICT = "predict --out out"
 PLAN = "plan --area 60x12 --speed 12 --time 1.5 --out out"
 FILTER = "--method magic_formula_ekf"
 DRIVE = "drive --path path.csv --speed 12m/s --film none --out out"
+FLEET = "fleet learn log.csv --vehicle car.toml --jobs 1 --out out"
 DOORS = (
     # recordings
     _door("identify csv", 14, IDENTIFY, "log.csv"),
@@ -108,6 +109,9 @@ DOORS = (
     _door("predict network", 2, f"{PREDICT} network.json log.csv", "network.json"),
     _door("predict log", 4, f"{PREDICT} axle.json log.csv --no-check", "log.csv"),
     _door("predict car", 3, f"{PREDICT} axle.json log.csv --vehicle sedan.toml", "sedan.toml"),
+    # fleets
+    _door("fleet learn", 3, FLEET, "log.csv car.toml"),
+    _door("fleet learn, begun", 1, f"{FLEET} --weights axle.json", "axle.json"),
     # networks of the user's own
     _door("identify onnx", 8, f"{IDENTIFY} --network slip.onnx", "slip.onnx"),
     _door("identify onnx, exported", 3, f"{IDENTIFY} --network exported.onnx", "exported.onnx"),
@@ -142,5 +146,6 @@ DOORS = (
     _door("words of init", 2, "init out.toml"),
     _door("words of channels", 3, "channels log.csv --columns r=r --write out.toml"),
     _door("words of doctor", 2, "doctor log.csv --vehicle car.toml --columns r=r"),
+    _door("words of fleet learn", 3, f"{FLEET} --tags {{vehicle}}.csv --part 60 --judge none"),
     _door("words of paper", 0.5, "paper --seeds 0 --out out"),
 )

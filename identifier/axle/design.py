@@ -266,7 +266,14 @@ class AxleIdentifier(Method):
         )
 
     def within_bounds(self, W: Array, own: Array, P: Array) -> tuple[Array, Array]:
-        """Return what is begun with, within bounds: a file or a prior may lie outside."""
+        """Return what is begun with, within bounds: a file or a prior may lie outside.
+
+        Parameters
+        ----------
+        W : weights [static axle loads], (2, n).
+        own : [compliance [m per load], sway share [-], offset ([rad] front, [m/s] rear)], (2, 3).
+        P : covariance of both, (2, n + 3, n + 3): the least move is in its metric.
+        """
         n = len(self.ladder)
         slope = self._rising().get("rising")
         numbers = self.bounds.of_ladder(self.ladder, self.rising_until)

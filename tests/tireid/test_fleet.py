@@ -360,6 +360,11 @@ def test_wrong_words_are_refused_in_one_line(store, tmp_path, capsys, monkeypatc
     assert "at least 10 s" in said(*learn, "cars/red.toml", "--part", "1")
     assert "is no store" in said("merge", str(tmp_path / "nothing"))
     assert "no such file" in said(*learn, "cars/green.toml")
+    (tmp_path / "x").mkdir()
+    (tmp_path / "x" / "mine.txt").write_text("mine")
+    assert "holds something else" in said(*learn, "cars/red.toml")
+    words = ["learn", "*/*/*.csv", "--vehicle", "cars/red.toml", "--out"]
+    assert "is a file" in said(*words, str(tmp_path / "x" / "mine.txt"))
     monkeypatch.setitem(sys.modules, "duckdb", None)
     assert "pip install 'tireid[fleet]'" in said("merge", store, "--where", "seconds > 1")
     monkeypatch.setitem(sys.modules, "fsspec.core", None)

@@ -5,6 +5,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from identifier.methods import load_model
 from models.vehicle import Vehicle
 from tireid.cluster import cluster
 from tireid.commands import COMMANDS, DONE, FAILS
@@ -22,6 +23,7 @@ from tireid.fleet.watch import Watching, watch
 from tireid.output import output_folder, require_free, text_table, write_json
 from tireid.progress import Progress, Stopwatch, say, tell
 from tireid.reports.fleet import write_fleet_report, write_watch_report
+from tireid.verdicts import warn_of_stored
 
 SHOWN = 5  # logs with errors that are named
 
@@ -238,7 +240,15 @@ def _learn(options: argparse.Namespace) -> int:
         check=not options.no_check,
         part=options.part,
     )
+    for car in sorted({task.vehicle for task in tasks}):  # before thousands of rows say it
+        vehicle = Vehicle.from_toml(car)
+        if vehicle.estimates:
+            say(f"{car}: {vehicle.estimates}")
+    if options.weights is not None:
+        load_model(options.weights)
+        warn_of_stored(options.weights)
     store = Store(options.out)
+    store.require_ours()
     there: Any = cluster(options.scheduler) if options.scheduler else nullcontext()
     with there as elsewhere, Progress("fleet learn", long=True) as progress:
 

@@ -168,7 +168,12 @@ HEAVY = ("model",)  # what a fleet's arithmetic does not want
 
 
 def packed_triangles(matrix: Array) -> Array:
-    """Return the upper triangles of symmetric matrices (..., q, q), (..., q (q + 1)/2)."""
+    """Return the upper triangles of symmetric matrices, (..., q (q + 1)/2).
+
+    Parameters
+    ----------
+    matrix : (..., q, q).
+    """
     rows, columns = np.triu_indices(matrix.shape[-1])
     return np.asarray(matrix[..., rows, columns])
 
@@ -242,6 +247,20 @@ class Store:
     def exists(self) -> bool:
         """Whether there are rows, of a run that ended or of one that did not."""
         return bool(self._files("logs") or self._files("pending"))
+
+    def require_ours(self) -> None:
+        """Refuse an address at which there is something else.
+
+        Raises
+        ------
+        StoreError
+            Where there is a file, or a folder that is not empty and no store.
+        """
+        fs, path = self._place
+        if fs.isfile(path):
+            raise StoreError(f"{self.address} is a file: a store is a folder, choose another name")
+        if fs.isdir(path) and not self.exists and fs.ls(path, detail=False):
+            raise StoreError(f"{self.address} holds something else: choose another folder")
 
     def require(self) -> None:
         """Refuse an address without rows.
