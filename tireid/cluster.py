@@ -1,7 +1,7 @@
 """Work spread over a Dask cluster: the same functions, on as many machines as have workers.
 
 Every worker must have this very version of tireid, which is checked. Results come in any order. A
-worker that is lost is made good for by the scheduler.
+worker that is lost is made good for by the scheduler; what several workers died of is told of.
 """
 
 import importlib
@@ -46,7 +46,7 @@ def cluster(address: str) -> Iterator[Map]:
         raise ClusterError(f"{address}: no Dask scheduler answers there") from error
     try:
         _require_workers(client, address)
-        yield partial(_map, dask, client)
+        yield partial(_map, dask, client, address)
     finally:
         client.close()
 
@@ -65,15 +65,31 @@ def _require_workers(client: Any, address: str) -> None:
         raise ClusterError(f"{address}: worker {other[0]} has another version of tireid")
 
 
-def _map(dask: Any, client: Any, work: Callable[[Any], Any], items: Iterable[Any]) -> Iterator[Any]:
+def _map(
+    dask: Any,
+    client: Any,
+    address: str,
+    work: Callable[[Any], Any],
+    items: Iterable[Any],
+    *,
+    lost: Callable[[Any], None] | None = None,
+) -> Iterator[Any]:
+    """Yield results; `lost` is told items that several workers died of, None ends with an error."""
     shared = client.scatter(work, broadcast=True, hash=False)  # once to each worker
-    futures = [client.submit(_work_alone, shared, item, pure=False) for item in items]
+    futures = {client.submit(_work_alone, shared, item, pure=False): item for item in items}
     try:
-        for future in dask.as_completed(futures, loop=client.loop):
-            yield future.result()
+        for future in dask.as_completed(list(futures), loop=client.loop):
+            try:
+                result = future.result()
+            except dask.KilledWorker as error:
+                if lost is None:
+                    raise ClusterError(f"{address}: workers die of their work: {error}") from error
+                lost(futures[future])
+                continue
+            yield result
             future.release()
     finally:
-        client.cancel(futures)
+        client.cancel(list(futures))
 
 
 def _work_alone(work: Callable[[Any], Any], item: Any) -> Any:

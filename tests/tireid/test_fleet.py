@@ -23,7 +23,14 @@ from models.recordings import read_recording
 from models.vehicle import sedan
 from tireid.cli import main
 from tireid.cluster import cluster
-from tireid.fleet.learn import LearnSome, Telling, find_logs, learn_fleet, on_this_machine
+from tireid.fleet.learn import (
+    LearnSome,
+    Telling,
+    find_logs,
+    learn_fleet,
+    on_a_cluster,
+    on_this_machine,
+)
 from tireid.fleet.merge import MergeError, fleet_prior, merge, usable
 from tireid.fleet.store import LogRow, Store, StoreError, information_columns
 from tireid.fleet.watch import Watching, watch
@@ -165,6 +172,23 @@ def test_a_log_that_kills_its_process_costs_its_own_row_alone():
     assert [row.log for row in rows if "died" in row.error] == ["red/summer/2026-03-02-quick.csv"]
 
 
+def test_a_log_that_kills_workers_of_a_cluster_costs_its_own_row_alone():
+    tasks, _ = find_logs(["red/summer/*.csv"], CAR, TAGS)
+    deadly = "red/summer/2026-03-02-quick.csv"
+
+    def elsewhere(work, portions, *, lost):
+        for portion in portions:
+            if any(task.log == deadly for task in portion):
+                lost(portion)
+            else:
+                yield work(portion)
+
+    work = LearnSome(Telling(log_map=learning.LogMap()), {tasks[0].vehicle: "told"})
+    rows = [row for some in on_a_cluster(elsewhere)(work, [tuple(tasks)]) for row in some]
+    assert sorted(row.log for row in rows) == [task.log for task in tasks]
+    assert [row.log for row in rows if "died" in row.error] == [deadly]
+
+
 def test_a_dask_worker_that_is_killed_loses_nothing_and_the_bytes_are_the_same(tmp_path, fleet):
     pytest.importorskip("distributed", reason="needs Dask: pip install 'tireid[fleet]'")
     tasks, _ = find_logs(["*/*/*.csv"], CAR, TAGS)
@@ -187,7 +211,7 @@ def test_a_dask_worker_that_is_killed_loses_nothing_and_the_bytes_are_the_same(t
 
     try:
         with cluster(address) as elsewhere:
-            learn_fleet(tasks, telling, there, elsewhere, done=kill_one)
+            learn_fleet(tasks, telling, there, on_a_cluster(elsewhere), done=kill_one)
     finally:
         for process in reversed(running):
             process.kill()

@@ -16,7 +16,7 @@ from tireid.commands.options import (
     jobs_of,
     told_map,
 )
-from tireid.fleet.learn import PART, Telling, find_logs, learn_fleet, on_this_machine
+from tireid.fleet.learn import PART, Telling, find_logs, learn_fleet, on_a_cluster, on_this_machine
 from tireid.fleet.merge import BY, Merged, fleet_prior, merge, usable
 from tireid.fleet.store import LogRow, Store
 from tireid.fleet.watch import Watching, watch
@@ -255,7 +255,7 @@ def _learn(options: argparse.Namespace) -> int:
         def done(ready: int, of: int) -> None:
             progress(ready / max(of, 1), f"{ready} of {of} logs")
 
-        spread = elsewhere if options.scheduler else on_this_machine(jobs)
+        spread = on_a_cluster(elsewhere) if options.scheduler else on_this_machine(jobs)
         learnt, of = learn_fleet(tasks, telling, store, spread, again=options.again, done=done)
     wanted = {task.log for task in tasks}
     rows = [r for r in store.rows(("log", "error", "valid", "seconds")) if r.log in wanted]

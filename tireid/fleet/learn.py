@@ -443,6 +443,26 @@ def on_this_machine(jobs: int) -> Map:
     return spread_map
 
 
+def on_a_cluster(elsewhere: Callable[..., Iterator[Any]]) -> Map:
+    """Return a map over portions of logs that outlives workers that die; its order is any.
+
+    Parameters
+    ----------
+    elsewhere : of `tireid.cluster.cluster`; tells `lost` what several workers died of.
+    """
+
+    def spread_map(work: Callable[[Any], Any], portions: Any) -> Iterator[list[LogRow]]:
+        suspects: list[Sequence[Task]] = []
+        yield from elsewhere(work, portions, lost=suspects.append)
+        alone = [(task,) for portion in suspects for task in portion]
+        dead: list[Sequence[Task]] = []
+        yield from elsewhere(work, alone, lost=dead.append)
+        for portion in dead:
+            yield [_died(task, work) for task in portion]
+
+    return spread_map
+
+
 def _pool(jobs: int) -> ProcessPoolExecutor:
     # Fresh processes rather than forks: CasADi's graphs must not be built by two threads at once.
     return ProcessPoolExecutor(
