@@ -119,6 +119,19 @@ def test_what_is_there_is_not_learnt_again_and_what_is_new_is(store, fleet, tmp_
         extra.unlink()
 
 
+def test_each_run_of_a_file_is_a_row(logs, tmp_path, capsys):
+    lines = [(logs / f"{name}.csv").read_text().splitlines() for name in ("slalom", "quick")]
+    runs = [f"{one},{k}" for k, some in enumerate(lines) for one in some[1:]]
+    (tmp_path / "two.csv").write_text("\n".join([f"{lines[0][0]},run", *runs]) + "\n")
+    words = ["fleet", "learn", str(tmp_path / "*.csv"), "--vehicle", "cars/red.toml", "--jobs", "1"]
+    for told in ("1 learnt now, 0 before", "0 learnt now, 1 before"):
+        assert main([*words, "--out", str(tmp_path / "store")]) == 0
+        assert told in capsys.readouterr().out
+    rows = Store(str(tmp_path / "store")).rows()
+    assert [Path(row.log).name for row in rows] == ["two.csv:0", "two.csv:1"]
+    assert rows[0].stiffness_front != rows[1].stiffness_front
+
+
 class StoppedError(Exception):
     pass
 

@@ -18,7 +18,7 @@ from tireid.commands.options import (
 )
 from tireid.fleet.learn import PART, Telling, find_logs, learn_fleet, on_a_cluster, on_this_machine
 from tireid.fleet.merge import BY, Merged, fleet_prior, merge, usable
-from tireid.fleet.store import LogRow, Store
+from tireid.fleet.store import LogRow, Store, file_of
 from tireid.fleet.watch import Watching, watch
 from tireid.output import output_folder, require_free, text_table, write_json
 from tireid.progress import Progress, Stopwatch, say, tell
@@ -258,7 +258,7 @@ def _learn(options: argparse.Namespace) -> int:
         spread = on_a_cluster(elsewhere) if options.scheduler else on_this_machine(jobs)
         learnt, of = learn_fleet(tasks, telling, store, spread, again=options.again, done=done)
     wanted = {task.log for task in tasks}
-    rows = [r for r in store.rows(("log", "error", "valid", "seconds")) if r.log in wanted]
+    rows = [r for r in store.rows(("log", "error", "valid", "seconds")) if file_of(r.log) in wanted]
     errors = [row for row in rows if row.error]
     for row in errors[:SHOWN]:
         say(f"{row.log}: {row.error}")

@@ -36,9 +36,9 @@ from identifier.reproducibility import counted_samples
 from identifier.run import identify, learn
 from identifier.tire_model import AXLES
 from identifier.verdict import Verdict, judge_prediction
-from models.recordings import LogMap, Recording, read_repaired
+from models.recordings import LogMap, Recording, RecordingError, read_repaired, runs
 from models.vehicle import Vehicle
-from tireid.fleet.store import LogRow, Store, bucket_of, information_columns, needed
+from tireid.fleet.store import LogRow, Store, bucket_of, file_of, information_columns, needed
 
 TOGETHER = 8  # logs that a process takes at once, and whose rows are written at once
 PART = 300.0  # s of a log whose information is kept as one
@@ -202,8 +202,8 @@ def _written(info: Mapping[str, Any]) -> str:
 # What is learnt of one.
 
 
-def learn_log(task: Task, telling: Telling, setting: str) -> LogRow:
-    """Return the row of a log; where it cannot be used, the row says why.
+def learn_log(task: Task, telling: Telling, setting: str) -> list[LogRow]:
+    """Return the row of a log, one for each run of its file; where it cannot be used, it says why.
 
     Parameters
     ----------
@@ -226,13 +226,36 @@ def learn_log(task: Task, telling: Telling, setting: str) -> LogRow:
         vehicle = Vehicle.from_toml(task.vehicle)
         row = replace(row, vehicle=vehicle_name or vehicle.name)
         with _near(task.log) as path:
-            recording, vehicle = read_repaired(
-                path, vehicle, dt=DT, check=telling.check, log_map=telling.log_map
-            )
-        return learnt(row, recording, vehicle, telling)
+            try:
+                return [_of_run(row, path, None, vehicle, telling)]
+            except RecordingError:
+                names = [] if telling.log_map.dbc or telling.log_map.run else runs(path)
+                if len(names) < 2:
+                    raise
+            return [_tried(replace(row, log=f"{row.log}:{name}"), path, name, vehicle, telling)
+                    for name in names]  # fmt: skip
     except EXPECTED as error:
-        text = " ".join(str(error).split()) or type(error).__name__
-        return replace(row, error=text[:500])
+        return [_failed(row, error)]
+
+
+def _tried(row: LogRow, path: Path, run: str, vehicle: Vehicle, telling: Telling) -> LogRow:
+    """Return the row of a run; where it cannot be used, it says why."""
+    try:
+        return _of_run(row, path, run, vehicle, telling)
+    except EXPECTED as error:
+        return _failed(row, error)
+
+
+def _failed(row: LogRow, error: Exception) -> LogRow:
+    text = " ".join(str(error).split()) or type(error).__name__
+    return replace(row, error=text[:500])
+
+
+def _of_run(row: LogRow, path: Path, run: str | None, vehicle: Vehicle, telling: Telling) -> LogRow:
+    recording, vehicle = read_repaired(
+        path, vehicle, run, dt=DT, check=telling.check, log_map=telling.log_map
+    )
+    return learnt(row, recording, vehicle, telling)
 
 
 def learnt(row: LogRow, recording: Recording, vehicle: Vehicle, telling: Telling) -> LogRow:
@@ -364,7 +387,9 @@ class LearnSome:
         ----------
         tasks : the logs.
         """
-        return [learn_log(one, self.telling, self.settings[one.vehicle]) for one in tasks]
+        return [
+            row for one in tasks for row in learn_log(one, self.telling, self.settings[one.vehicle])
+        ]
 
 
 def learn_fleet(
@@ -389,8 +414,9 @@ def learn_fleet(
     """
     settings = {one: telling.digest(one) for one in {task.vehicle for task in tasks}}
     known = {
-        (row.log, row.setting, row.size)
+        (name, row.setting, row.size)
         for row in store.rows(("log", "setting", "size", "error"))
+        for name in (row.log, file_of(row.log))
         if not (again and row.error)
     }
     left = [one for one in tasks if (one.log, settings[one.vehicle], one.size) not in known]
@@ -399,7 +425,7 @@ def learn_fleet(
         done(ready, of)
     for rows in spread_map(LearnSome(telling, settings), _together(left)):
         store.keep(rows)
-        ready += len(rows)
+        ready += len({file_of(row.log) for row in rows})
         if done is not None:
             done(ready, of)
     store.settle()

@@ -55,14 +55,25 @@ def needed(name: str, what: str = "a fleet's store") -> Any:
         raise ImportError(f"{what} needs {name.partition('.')[0]}: {INSTALL}") from error
 
 
+def file_of(log: str) -> str:
+    """Return the file of a log.
+
+    Parameters
+    ----------
+    log : its name: FILE, or FILE:RUN where a file has several runs.
+    """
+    folder, slash, name = log.rpartition("/")
+    return folder + slash + (name.rpartition(":")[0] or name)
+
+
 def bucket_of(log: str) -> int:
-    """Return the bucket of a log, 0 to 15.
+    """Return the bucket of a log, 0 to 15; the runs of a file lie together.
 
     Parameters
     ----------
     log : its name.
     """
-    return hashlib.blake2b(log.encode(), digest_size=1).digest()[0] % BUCKETS
+    return hashlib.blake2b(file_of(log).encode(), digest_size=1).digest()[0] % BUCKETS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,7 +82,7 @@ class LogRow:
 
     Parameters
     ----------
-    log : its name, by which rows are told apart.
+    log : its name, by which rows are told apart: FILE, or FILE:RUN where it has several runs.
     setting : hash of all that was told: car, map, start, options.
     size : of the file [bytes].
     vehicle, tires, date : as its path or its folder says; the date as ISO 8601.
