@@ -27,7 +27,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -52,7 +52,7 @@ from tireid.cluster import cluster
 from tireid.fleet.learn import Telling, find_logs, learn_fleet, learnt, on_a_cluster
 from tireid.fleet.merge import fleet_prior, merge
 from tireid.fleet.store import LogRow, Store
-from tireid.fleet.watch import Watching, watch
+from tireid.fleet.watch import Watch, Watching, watch
 
 PARTS = ("speed", "hours", "merge", "prior", "watch", "cluster")
 LOGS, MINUTE = 500, 60.0
@@ -450,33 +450,10 @@ def watching(targets: Targets, driven: int, jobs: int) -> None:
 
     with spread(jobs) as spread_map:
         cars = list(spread_map(driven_car, range(FIRST_SEED, FIRST_SEED + driven)))
-    rng = np.random.default_rng(FIRST_SEED)
-    rows: list[LogRow] = []
-    loses: dict[str, int] = {}
-    for k in range(CARS):
-        name, minutes = f"car-{k:03d}", cars[k % driven]
-        drawn = list(minutes["baseline"])
-        change = int(rng.integers(20, 80)) if k % LOSES == 0 else AFTER
-        if change < AFTER:
-            loses[name] = BASELINE + change
-        failing = 0
-        for minute in range(AFTER):
-            if failing == 0 and rng.uniform() < FAULTS:
-                failing = int(rng.integers(1, LONGEST_FAULT, endpoint=True))
-            pool = minutes["faulty" if failing else "softer" if minute >= change else "later"]
-            failing = max(failing - 1, 0)
-            drawn.append(pool[int(rng.integers(len(pool)))])
-        rows += [_renamed(one, name, i) for i, one in enumerate(drawn)]
+    rows, loses = drawn_fleet(cars, np.random.default_rng(FIRST_SEED))
     used = [row for row in rows if not row.error and row.valid is not False]
     watched = watch(used, ["vehicle"], Watching())
-    found: dict[str, float] = {}
-    false = 0
-    for alarm in watched.alarms:
-        at, begins = int(alarm.log[-4:]), loses.get(alarm.car, BASELINE + AFTER)
-        if alarm.car in loses and at >= begins and alarm.change[alarm.statistic] < 0.0:
-            found.setdefault(alarm.car, float(at - begins + 1))
-        else:
-            false += 1
+    found, false = found_and_false(watched, loses)
     within = sum(minutes <= 30.0 for minutes in found.values())
     targets.at_least(
         "cars that lost a tenth, found within 30 min", 100.0 * within / len(loses), 100.0, "%",
@@ -491,8 +468,58 @@ def watching(targets: Targets, driven: int, jobs: int) -> None:
     targets.record("watch/false", false)
     targets.record("watch/refused", len(rows) - len(used))
     if found:
-        targets.record("watch/median_minutes", float(np.median(list(found.values()))), "min")
-        targets.record("watch/worst_minutes", max(found.values()), "min")
+        middle, last = float(np.median(list(found.values()))), max(found.values())
+        show("found after, median and worst", f"{middle:.0f}, {last:.0f} min")
+        targets.record("watch/median_minutes", middle, "min")
+        targets.record("watch/worst_minutes", last, "min")
+
+
+def drawn_fleet(
+    cars: Sequence[dict[str, list[LogRow]]], rng: np.random.Generator
+) -> tuple[list[LogRow], dict[str, int]]:
+    """Return the rows of a fleet, and which minute its cars lose stiffness in, by car.
+
+    Parameters
+    ----------
+    cars : of `driven_car`.
+    rng : source of chance.
+    """
+    rows: list[LogRow] = []
+    loses: dict[str, int] = {}
+    for k in range(CARS):
+        name, minutes = f"car-{k:03d}", cars[k % len(cars)]
+        drawn = list(minutes["baseline"])
+        change = int(rng.integers(20, 80)) if k % LOSES == 0 else AFTER
+        if change < AFTER:
+            loses[name] = BASELINE + change
+        failing = 0
+        for minute in range(AFTER):
+            if failing == 0 and rng.uniform() < FAULTS:
+                failing = int(rng.integers(1, LONGEST_FAULT, endpoint=True))
+            pool = minutes["faulty" if failing else "softer" if minute >= change else "later"]
+            failing = max(failing - 1, 0)
+            drawn.append(pool[int(rng.integers(len(pool)))])
+        rows += [_renamed(one, name, i) for i, one in enumerate(drawn)]
+    return rows, loses
+
+
+def found_and_false(watched: Watch, loses: Mapping[str, int]) -> tuple[dict[str, float], int]:
+    """Return after how many minutes a loss was found, by car, and how many alarms are false.
+
+    Parameters
+    ----------
+    watched : what was seen.
+    loses : minute in which cars lose stiffness.
+    """
+    found: dict[str, float] = {}
+    false = 0
+    for alarm in watched.alarms:
+        at, begins = int(alarm.log[-4:]), loses.get(alarm.car, BASELINE + AFTER)
+        if alarm.car in loses and at >= begins and alarm.change[alarm.statistic] < 0.0:
+            found.setdefault(alarm.car, float(at - begins + 1))
+        else:
+            false += 1
+    return found, false
 
 
 def _renamed(row: LogRow, name: str, k: int) -> LogRow:

@@ -37,7 +37,7 @@ from tireid.fleet.learn import DT
 from tireid.fleet.merge import MergeError, key_of
 from tireid.fleet.store import LogRow
 
-LEAST = 900.0  # s of driving that an alarm takes at least
+LEAST = 600.0  # s of driving that an alarm takes at least
 SHORTEST = 5.0  # s of learning, below which a part says nothing
 FLOOR = 0.01  # standard deviation of ln C that roads make at least
 FLOOR_FRICTION = 0.05  # and of ln μ
