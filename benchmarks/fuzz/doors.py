@@ -146,6 +146,6 @@ DOORS = (
     _door("words of init", 2, "init out.toml"),
     _door("words of channels", 3, "channels log.csv --columns r=r --write out.toml"),
     _door("words of doctor", 2, "doctor log.csv --vehicle car.toml --columns r=r"),
-    _door("words of fleet learn", 3, f"{FLEET} --tags {{vehicle}}.csv --part 60 --judge none"),
+    _door("words of fleet learn", 3, f"{FLEET} --tags {{vehicle}}.* --part 60 --judge none"),
     _door("words of paper", 0.5, "paper --seeds 0 --out out"),
 )
