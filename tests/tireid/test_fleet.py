@@ -23,6 +23,7 @@ from models.recordings import read_recording
 from models.vehicle import sedan
 from tireid.cli import main
 from tireid.cluster import cluster
+from tireid.exchange import claim
 from tireid.fleet.learn import (
     LearnSome,
     Telling,
@@ -402,6 +403,8 @@ def test_wrong_words_are_refused_in_one_line(store, tmp_path, capsys, monkeypatc
     assert "holds something else" in said(*learn, "cars/red.toml")
     words = ["learn", "*/*/*.csv", "--vehicle", "cars/red.toml", "--out"]
     assert "is a file" in said(*words, str(tmp_path / "x" / "mine.txt"))
+    with claim(tmp_path / ".held-claim"):
+        assert "another run of tireid learns into" in said(*words, str(tmp_path / "held"))
     monkeypatch.setitem(sys.modules, "duckdb", None)
     assert "pip install 'tireid[fleet]'" in said("merge", store, "--where", "seconds > 1")
     monkeypatch.setitem(sys.modules, "fsspec.core", None)

@@ -1,7 +1,8 @@
 """`tireid fleet learn|merge|prior|watch|report`: thousands of logs in one command."""
 
 import argparse
-from contextlib import nullcontext
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,9 +17,10 @@ from tireid.commands.options import (
     jobs_of,
     told_map,
 )
+from tireid.exchange import ClaimedError, claim
 from tireid.fleet.learn import PART, Telling, find_logs, learn_fleet, on_a_cluster, on_this_machine
 from tireid.fleet.merge import BY, Merged, fleet_prior, merge, usable
-from tireid.fleet.store import LogRow, Store, file_of
+from tireid.fleet.store import LogRow, Store, StoreError, file_of
 from tireid.fleet.watch import Watching, watch
 from tireid.output import output_folder, require_free, text_table, write_json
 from tireid.progress import Progress, Stopwatch, say, tell
@@ -227,6 +229,25 @@ def _add_report(tasks: Any) -> None:
     parser.set_defaults(run=_report)
 
 
+@contextmanager
+def _claimed(store: str) -> Iterator[None]:
+    """Hold a store that lies in a folder, so that no other run sorts its rows meanwhile."""
+    if "://" in store:
+        yield
+        return
+    folder = Path(store).resolve()
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(claim(folder.parent / f".{folder.name}-claim"))
+        except ClaimedError as error:
+            raise StoreError(
+                f"another run of tireid learns into {store}: wait for it, or choose another folder "
+                f"(where there is none, delete {error})"
+            ) from None
+        yield
+
+
 def _learn(options: argparse.Namespace) -> int:
     """Learn logs into a store; return 1 where a log could not be used."""
     clock, jobs = Stopwatch(), jobs_of(options)
@@ -250,7 +271,7 @@ def _learn(options: argparse.Namespace) -> int:
     store = Store(options.out)
     store.require_ours()
     there: Any = cluster(options.scheduler) if options.scheduler else nullcontext()
-    with there as elsewhere, Progress("fleet learn", long=True) as progress:
+    with _claimed(options.out), there as elsewhere, Progress("fleet learn", long=True) as progress:
 
         def done(ready: int, of: int) -> None:
             progress(ready / max(of, 1), f"{ready} of {of} logs")
