@@ -18,6 +18,7 @@ from models.recordings import Recording, RecordingError
 from models.vehicle import Vehicle
 
 if TYPE_CHECKING:
+    from identifier.axle.guarantee import ForceBound
     from identifier.verdict import Verdict  # which runs the method again, on parts of the drive
 
 IMPOSSIBLE_FORCE = 100.0  # times the car's weight: no tire reaches it, so the law has diverged
@@ -190,6 +191,40 @@ class History:
         from identifier.verdict import calibrated
 
         return calibrated(self, t)
+
+    def guaranteed(
+        self,
+        bound: "float | ForceBound | None" = None,
+        t: float | None = None,
+        model: TireModel | None = None,
+    ) -> TireModel:
+        """Return the model of `freeze` with a guaranteed band: what no curve can leave.
+
+        Where |F/F_z - φ| <= e + τ ρ holds of some curve φ at every instant, the true force lies in
+        `guaranteed_band`. It is the frozen model where the method learns no curve of slip, no
+        lateral velocity was measured, or too little is driven.
+
+        Parameters
+        ----------
+        bound : e of both axles [static axle loads], or e and τ of each, as a `ForceBound`; None
+            estimates them from the drive.
+        t : time of the freeze in the recording's own clock [s]; None is the end.
+        model : frozen at that time, which is to carry it, as of `calibrated`; None freezes one.
+
+        Raises
+        ------
+        BoundViolatedError
+            Where no curve keeps a bound that was told.
+        DivergedError
+            Where the law had diverged by then.
+        CannotFreezeError
+            Where the method estimates a signal, not a model.
+        ValueError
+            Where the recording begins after that time, or the bound is impossible.
+        """
+        from identifier.verdict import guaranteed
+
+        return guaranteed(self, bound, t, model)
 
     def verdict(self, t: float | None = None) -> "Verdict":
         """Return whether the answer is good, and what speaks against it; computed at each call.

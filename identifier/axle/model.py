@@ -25,6 +25,7 @@ from identifier.axle.car import Car, car_numbers
 from identifier.axle.curve import EDGES, doublings, unit_matrix
 from identifier.axle.dynamics import lagged_force, series_compliance, static_curve
 from identifier.axle.gate import GateState, Plausibility
+from identifier.axle.guarantee import Guarantee, force_rate
 from identifier.axle.prior import SD_FRICTION, friction_direction
 from identifier.axle.slip import SHORTEST, Sway, SwayState
 from identifier.axle.step import FROZEN_CARRY, OVER, build_frozen
@@ -62,6 +63,7 @@ class AxleModel(TireModel):
     excitation : largest slip [rad], then time of learning above each of `EDGES` [s], (2, 9).
     calibration : of the band, by stretches that did not teach it; None where nobody calibrated.
     tells_v_y : whether the inertial identifier learnt it, which needs no v_y and tells it.
+    guarantee : weights that the drive left possible; None where nobody asked.
 
     Raises
     ------
@@ -82,6 +84,7 @@ class AxleModel(TireModel):
     excitation: Array
     calibration: BandCalibration | None = None
     tells_v_y: bool = False
+    guarantee: Guarantee | None = None
 
     def __post_init__(self) -> None:
         doublings(self.ladder)
@@ -312,6 +315,51 @@ class AxleModel(TireModel):
         change = sd_friction * self.W @ friction_direction(self.ladder).T
         wider[:, :n, :n] += change[:, :, None] * change[:, None, :]
         return replace(self, covariance=wider)
+
+    def guaranteed_at(self, alpha: Array, rate: Array) -> tuple[Array, Array] | None:
+        """Return least and largest steady force at slip angles, (k, 2) [N]; None: none is stated.
+
+        Parameters
+        ----------
+        alpha : slip angles [rad], (k,).
+        rate : of the force, static axle loads per second (k,).
+        """
+        if self.guarantee is None:
+            return None
+        units = np.repeat(unit_matrix(alpha, self.ladder)[:, None], 2, axis=1)
+        low, high = self.guarantee.limits(units, np.abs(rate)[:, None])
+        return low * self._loads, high * self._loads
+
+    def guaranteed_force(self, recording: Recording) -> tuple[Array, Array] | None:
+        """Return least and largest axle force over a drive, (n, 2) [N], as `axle_force`.
+
+        NaN below the lowest speed; None where no guarantee is stated.
+
+        Parameters
+        ----------
+        recording : its signals are the input.
+        """
+        if self.guarantee is None:
+            return None
+        _, units, rate = self.signals_of(recording)
+        low, high = self.guarantee.limits(units, rate)
+        stands = recording.v_x < self.min_speed
+        low[stands], high[stands] = np.nan, np.nan
+        return low * self._loads, high * self._loads
+
+    def signals_of(self, recording: Recording) -> tuple[Array, Array, Array]:
+        """Return lagged slip (n, 2) [rad], units times cos δ (n, 2, ladder), and ρ (n, 2) [1/s].
+
+        Parameters
+        ----------
+        recording : its signals are the input.
+        """
+        slip = self.lagged_slip(recording)
+        T = np.stack([unit_matrix(slip[:, i], self.ladder) for i in range(2)], axis=1)
+        force: Array = np.einsum("kij,ij->ki", T, self.W)
+        rate = force_rate(force, recording.dt, iter(recording.stretches))
+        T *= np.cos(np.column_stack([recording.delta_f, recording.delta_r]))[..., None]
+        return slip, T, rate
 
     def _posterior(self, factors: Array | None = None) -> Array:
         """Return the covariance of both axles, its noise as colored as it was."""
@@ -546,6 +594,7 @@ class AxleModel(TireModel):
             "relaxation_length_m": self.relaxation_length.tolist(),
             "known_slip_rad": self.known_slip.tolist(),
             **({} if self.calibration is None else {"band": self.calibration.to_dict()}),
+            **({} if self.guarantee is None else {"guarantee": self.guarantee.to_dict()}),
             **({"tells_v_y": True} if self.tells_v_y else {}),
         }
 
@@ -574,6 +623,11 @@ class AxleModel(TireModel):
                 plausibility=Plausibility(**data["plausibility"]),
                 **{name: np.array(data[name], dtype=np.float64) for name in ARRAYS},
                 calibration=BandCalibration.from_dict(data["band"]) if "band" in data else None,
+                guarantee=(
+                    Guarantee.from_dict(data["guarantee"], len(data["ladder"]))
+                    if "guarantee" in data
+                    else None
+                ),
                 tells_v_y=bool(data.get("tells_v_y", False)),
             )
         except KeyError as error:
@@ -594,6 +648,8 @@ def _require_plausible(data: dict[str, Any], source: str) -> None:
         for name in ("factors", "speeds", "color", "noise"):
             band.array(name)
         band.number("speed")
+    if "guarantee" in data:
+        table.table("guarantee")
     for name in ("ladder", "edges", *ARRAYS):
         largest = float(np.abs(table.array(name)).max(initial=0.0))
         if largest > LARGEST:

@@ -1,14 +1,18 @@
 """A verdict with every answer: is it good, what speaks against it, and why."""
 
 from identifier.verdict.bands import calibrated, within_band
+from identifier.verdict.guaranteed import BoundViolatedError, contradictions, guaranteed
 from identifier.verdict.judging import judge, judge_prediction
 from identifier.verdict.verdict import Number, Objection, Verdict
 
 __all__ = [
+    "BoundViolatedError",
     "Number",
     "Objection",
     "Verdict",
     "calibrated",
+    "contradictions",
+    "guaranteed",
     "judge",
     "judge_prediction",
     "within_band",

@@ -49,7 +49,13 @@ class Windows:
         return cls.where(recording.v_x >= min_speed, recording, WINDOW)
 
     @classmethod
-    def where(cls, counts: NDArray[np.bool_], recording: Recording, length: float) -> "Windows":
+    def where(
+        cls,
+        counts: NDArray[np.bool_],
+        recording: Recording,
+        length: float,
+        overlapping: int = 2,
+    ) -> "Windows":
         """Return the windows of a length in one stretch of which every sample counts.
 
         Parameters
@@ -57,9 +63,10 @@ class Windows:
         counts : which samples do (n,).
         recording : whose windows they are.
         length : of a window [s].
+        overlapping : windows that begin within a length.
         """
         n = max(2, round(length / recording.dt))
-        starts = np.arange(0, max(len(recording) - n, 0), max(1, n // 2))
+        starts = np.arange(0, max(len(recording) - n, 0), max(1, n // overlapping))
         total = np.concatenate([[0], np.cumsum(~counts)])
         whole = total[starts + n + 1] == total[starts] if starts.size else starts > 0
         whole &= recording.within_a_stretch(starts, n)
@@ -105,14 +112,26 @@ def measured_force(
     road : what a banked road pushes to the left at each sample, taken off [weights], (n,); without
         v_y what the accelerometer shows beside forces; None where nobody knows of it.
     """
+    impulse, sideways = impulse_signals(recording, vehicle, road)
+    force: Array = windows.rate(impulse) + windows.mean(sideways)[:, None]
+    return force
+
+
+def impulse_signals(
+    recording: Recording, vehicle: Vehicle, road: Array | None = None
+) -> tuple[Array, Array]:
+    """Return ξ (n, 2) [s] and v_x r/g without the road (n,): φ cos δ = dξ/dt + v_x r/g.
+
+    Parameters
+    ----------
+    recording, vehicle, road : as of `measured_force`.
+    """
     car = Car(*car_numbers(vehicle).T)
     v_y = recording.logged_v_y
     still = np.zeros(len(recording)) if v_y is None else v_y
-    impulse = axle_impulse(car, still[:, None], recording.r[:, None])
+    impulse: Array = axle_impulse(car, still[:, None], recording.r[:, None])
     sideways = recording.needed("a_y") if v_y is None else recording.v_x * recording.r
-    sideways = sideways / GRAVITY - (0.0 if road is None else road)
-    force: Array = windows.rate(impulse) + windows.mean(sideways)[:, None]
-    return force
+    return impulse, sideways / GRAVITY - (0.0 if road is None else road)
 
 
 def modelled_force(model: TireModel, recording: Recording, windows: Windows) -> Array:

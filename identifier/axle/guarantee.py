@@ -1,0 +1,389 @@
+"""Curves that a drive leaves possible: the weights lie in a polytope, the force between two bounds.
+
+For each mean over a moment |y - h'w| <= e + τ ρ, and the curve of any tire lies in the prior's box:
+both are linear in the weights w, in static axle loads.   y: force that the motion shows.   h: units
+at the lagged slip of the frozen model, times cos δ.   e: error of curve and sensors.   τ: time [s]
+by which force and curve may differ.   ρ: rate of the model's force [1/s], the larger of its size
+now and of its mean over the last 0.3 s.
+A linear function of w is largest at a vertex of the polytope, so that the two linear programs of
+every slip, max and min of t'w with t = tanh(α/α_j), are one product with all vertices. The force
+lies between them, wider by e + τ ρ (set membership: Milanese and Vicino, Automatica 27, 1991).
+Of the constraints those are looked at that the answer to a part of them breaks, until none is left.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+from scipy.signal import lfilter
+from scipy.spatial import HalfspaceIntersection
+
+from codegen.arrays import Array
+from identifier.axle.curve import unit_matrix
+from identifier.axle.learning import Bounds
+
+MEMORY = 0.3  # s: the mean of the rate
+SECANTS = tuple(0.004 * 2.0**k for k in np.arange(0.0, 7.5, 0.5))  # rad, where a curve bends down
+FIRST, MORE = 150, 100  # constraints that are tried first, and added at a time
+SLACK = 1e-9  # static axle loads
+LEAST_RADIUS = 1e-6  # static axle loads of a ball in the polytope: below it there is no inside
+LARGEST_BOUND = 10.0  # static axle loads
+LONGEST_LATENESS = 1.0  # s
+MOST_VERTICES = 100_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForceBound:
+    """By how much a force may differ from the best curve, front and rear.
+
+    Parameters
+    ----------
+    error : e [static axle loads], (2,).
+    lateness : τ [s], by which a force may be late or early, (2,).
+
+    Raises
+    ------
+    ValueError
+        Where an error is not positive or beyond 10, or a lateness negative or beyond 1 s.
+    """
+
+    error: tuple[float, float]
+    lateness: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for value in self.error:
+            if not 0.0 < value <= LARGEST_BOUND:
+                raise ValueError(
+                    f"the bound of an error must be above 0 and at most {LARGEST_BOUND:g} static "
+                    f"axle loads, it is {value:g}"
+                )
+        for value in self.lateness:
+            if not 0.0 <= value <= LONGEST_LATENESS:
+                raise ValueError(
+                    f"lateness must be from 0 to {LONGEST_LATENESS:g} s, it is {value:g}"
+                )
+
+    @classmethod
+    def of(cls, told: "float | ForceBound") -> "ForceBound":
+        """Return a bound as it is told: a number is the error of both axles, nothing is late.
+
+        Parameters
+        ----------
+        told : number [static axle loads], or the bound itself.
+        """
+        return told if isinstance(told, ForceBound) else cls(error=(float(told), float(told)))
+
+    def allowed(self, rate: Array) -> Array:
+        """Return e + τ ρ [static axle loads], (k, 2).
+
+        Parameters
+        ----------
+        rate : ρ of both axles [1/s], (k, 2).
+        """
+        wide: Array = np.array(self.error) + np.array(self.lateness) * rate
+        return wide
+
+
+class Strips(NamedTuple):
+    """What a drive says of the weights, mean by mean: y (m, 2), h (m, 2, n), ρ (m, 2); when it
+    begins t (m,) [s].
+    """
+
+    y: Array
+    h: Array
+    rate: Array
+    t: Array
+
+    def until(self, m: int) -> "Strips":
+        """Return the first m of them.
+
+        Parameters
+        ----------
+        m : how many.
+        """
+        return Strips(*(values[:m] for values in self))
+
+
+class HalfSpaces(NamedTuple):
+    """A w <= b: (m, n) and (m,)."""
+
+    A: Array
+    b: Array
+
+    def both(self, other: "HalfSpaces") -> "HalfSpaces":
+        """Return what holds where this and the other do.
+
+        Parameters
+        ----------
+        other : half-spaces of as many weights.
+        """
+        return HalfSpaces(np.vstack([self.A, other.A]), np.concatenate([self.b, other.b]))
+
+
+def prior_box(bounds: Bounds, ladder: tuple[float, ...]) -> HalfSpaces:
+    """Return what is believed of any tire, before a drive.
+
+    Saturated force, stiffness at no slip and each weight are within bounds, and the secant
+    stiffness φ(α)/α does not rise with slip, as of every brush and Magic Formula tire.
+
+    Parameters
+    ----------
+    bounds : limits of what is learnt.
+    ladder : slip scales of the units [rad].
+    """
+    n, scales = len(ladder), np.array(ladder)
+    slip = np.array(SECANTS)
+    T = unit_matrix(slip, ladder)
+    secant = slip[:, None] * (1.0 - T * T) / scales - T  # of φ' α - φ <= 0
+    rows = [np.ones(n), -np.ones(n), 1.0 / scales, -1.0 / scales]
+    limits = [bounds.most_grip, -bounds.least_grip, bounds.most_stiffness, -bounds.least_stiffness]
+    return HalfSpaces(
+        np.vstack([*rows, np.eye(n), -np.eye(n), secant]),
+        np.array([*limits, *[bounds.weight] * (2 * n), *[0.0] * len(slip)]),
+    )
+
+
+def strip_sides(y: Array, h: Array, allowed: Array) -> HalfSpaces:
+    """Return |y - h'w| <= allowed of one axle.
+
+    Parameters
+    ----------
+    y : (m,).
+    h : (m, n).
+    allowed : e + τ ρ (m,).
+    """
+    return HalfSpaces(np.vstack([h, -h]), np.concatenate([allowed + y, allowed - y]))
+
+
+def _least(cost: Array, among: HalfSpaces, free: int) -> Array | None:
+    """Return x of least cost with A x <= b, not negative from place `free` on; None: no such."""
+    limits = [(None, None)] * free + [(0.0, None)] * (cost.size - free)
+    tried = _first(among.b.size)
+    while True:
+        found = linprog(cost, among.A[tried], among.b[tried], bounds=limits, method="highs")
+        if not found.success:
+            return None
+        x: Array = found.x
+        more = _broken(among.A @ x - among.b, tried)
+        if not more.size:
+            return x
+        tried = np.append(tried, more)
+
+
+def _first(m: int) -> NDArray[np.intp]:
+    """Return which of m constraints are tried first: the first ones, a box, and some of all."""
+    some = np.linspace(0, m - 1, FIRST).astype(np.intp)
+    return np.union1d(np.arange(min(FIRST, m)), some)
+
+
+def _broken(over: Array, tried: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return which of the constraints that were not tried are broken most; none: it holds."""
+    over = over.copy()
+    over[tried] = -np.inf
+    worst = np.argsort(over)[-MORE:]
+    broken: NDArray[np.intp] = worst[over[worst] > SLACK]
+    return broken
+
+
+def least_bound(strips: Strips, axle: int, box: HalfSpaces) -> tuple[float, float]:
+    """Return error [static axle loads] and lateness [s] with which one curve just fits a drive.
+
+    No bound below both fits any curve: with a told bound, what does not is proof that it is wrong.
+    The least e + τ mean(ρ) is taken, a linear program.
+
+    Parameters
+    ----------
+    strips : of the drive.
+    axle : 0 front, 1 rear.
+    box : what any tire keeps.
+    """
+    y, h, rate = strips.y[:, axle], strips.h[:, axle], strips.rate[:, axle]
+    n = h.shape[1]
+    beside = np.column_stack([np.ones(y.size), rate])
+    sides = np.vstack([np.hstack([h, -beside]), np.hstack([-h, -beside])])
+    kept = np.hstack([box.A, np.zeros((box.b.size, 2))])
+    among = HalfSpaces(np.vstack([kept, sides]), np.concatenate([box.b, y, -y]))
+    cost = np.concatenate([np.zeros(n), [1.0, float(rate.mean())]])
+    x = _least(cost, among, n)
+    if x is None:  # the box alone is never empty, and errors may be as large as they like
+        raise ArithmeticError("no bound fits: the linear program of the least bound has no answer")
+    return max(float(x[n]), 0.0), max(float(x[n + 1]), 0.0)
+
+
+def vertices(among: HalfSpaces) -> Array | None:
+    """Return the vertices (k, n) of a bounded polytope; None where it has no inside.
+
+    Parameters
+    ----------
+    among : its half-spaces.
+    """
+    A, b = among
+    n, length = A.shape[1], np.linalg.norm(A, axis=1)
+    inside = _least(  # the largest ball
+        np.append(np.zeros(n), -1.0), HalfSpaces(np.column_stack([A, length]), b), n
+    )
+    if inside is None or not inside[-1] >= LEAST_RADIUS:
+        return None
+    center, slack = inside[:-1], b - A @ inside[:-1]
+    tried = np.union1d(_first(b.size), np.argsort(slack / length)[:FIRST])
+    while True:
+        sides = np.column_stack([A[tried], -b[tried]])
+        corners: Array = HalfspaceIntersection(sides, center).intersections
+        more = _broken((A @ corners.T).max(axis=1) - b, tried)
+        if not more.size:
+            return np.unique(np.round(corners, 12), axis=0)
+        tried = np.append(tried, more)
+
+
+def possible_weights(strips: Strips, axle: int, bound: ForceBound, box: HalfSpaces) -> Array | None:
+    """Return the vertices (k, n) of the weights that a drive leaves to an axle.
+
+    None where no curve keeps the bound: then it is violated.
+
+    Parameters
+    ----------
+    strips : of the drive.
+    axle : 0 front, 1 rear.
+    bound : of the errors.
+    box : what any tire keeps.
+    """
+    allowed = bound.allowed(strips.rate)[:, axle]
+    return vertices(box.both(strip_sides(strips.y[:, axle], strips.h[:, axle], allowed)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Guarantee:
+    """What a drive leaves possible of both axles, under a bound of the errors.
+
+    Parameters
+    ----------
+    bound : of the errors.
+    told : whether the bound was told; else it was estimated from the drive.
+    corners : vertices of the possible weights of front and rear, (k, n) each.
+
+    Raises
+    ------
+    ValueError
+        Where there are no corners, or one is not finite.
+    """
+
+    bound: ForceBound
+    told: bool
+    corners: tuple[Array, Array]
+
+    def __post_init__(self) -> None:
+        for corners in self.corners:
+            if corners.ndim != 2 or not 0 < len(corners) <= MOST_VERTICES:
+                raise ValueError(
+                    f"corners of the possible weights must be (k, n), they are {corners.shape}"
+                )
+            if not np.isfinite(corners).all():
+                raise ValueError("a corner of the possible weights holds no finite number")
+
+    def reach(self, units: Array) -> tuple[Array, Array]:
+        """Return least and largest h'w of the possible weights, (k, 2) each [static axle loads].
+
+        Parameters
+        ----------
+        units : h of both axles (k, 2, n).
+        """
+        of = [units[:, i] @ corners.T for i, corners in enumerate(self.corners)]
+        return (
+            np.stack([one.min(axis=1) for one in of], axis=1),
+            np.stack([one.max(axis=1) for one in of], axis=1),
+        )
+
+    def limits(self, units: Array, rate: Array) -> tuple[Array, Array]:
+        """Return least and largest force, (k, 2) each [static axle loads].
+
+        Parameters
+        ----------
+        units : h of both axles (k, 2, n).
+        rate : ρ [1/s], (k, 2); 0 in steady state.
+        """
+        low, high = self.reach(units)
+        beside = self.bound.allowed(rate)
+        return low - beside, high + beside
+
+    def contradicted(self, strips: Strips) -> NDArray[np.bool_]:
+        """Return which means of another drive no possible curve explains, (m, 2).
+
+        One is proof that the bound does not hold there: other tires, another road, a sensor.
+
+        Parameters
+        ----------
+        strips : of that drive.
+        """
+        low, high = self.limits(strips.h, strips.rate)
+        outside: NDArray[np.bool_] = (strips.y < low - SLACK) | (strips.y > high + SLACK)
+        return outside
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the guarantee as plain numbers, ready for JSON."""
+        return {
+            "error_static_axle_loads": list(self.bound.error),
+            "lateness_s": list(self.bound.lateness),
+            "told": self.told,
+            "corners": [corners.tolist() for corners in self.corners],
+        }
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any], n: int) -> Self:
+        """Return the guarantee that `to_dict` describes.
+
+        Parameters
+        ----------
+        data : as from `to_dict`.
+        n : number of weights of an axle.
+
+        Raises
+        ------
+        ValueError
+            Where a value is impossible.
+        KeyError
+            Where a key is missing.
+        """
+        pairs = []
+        for name in ("error_static_axle_loads", "lateness_s", "corners"):
+            if not isinstance(data[name], list) or len(data[name]) != 2:
+                raise ValueError(f"{name} of the guarantee must be a pair, front and rear")
+            pairs.append(data[name])
+        if not isinstance(data["told"], bool):
+            raise ValueError(f"told of the guarantee must be true or false, not {data['told']!r}")
+        error, lateness, both = pairs
+        front, rear = (np.array(corners, dtype=np.float64) for corners in both)
+        for corners in (front, rear):
+            if corners.ndim != 2 or corners.shape[1] != n:
+                raise ValueError(f"corners must have {n} weights each, shape (k, {n})")
+        return cls(
+            bound=ForceBound(
+                error=(float(error[0]), float(error[1])),
+                lateness=(float(lateness[0]), float(lateness[1])),
+            ),
+            told=data["told"],
+            corners=(front, rear),
+        )
+
+
+def force_rate(force: Array, dt: float, stretches: Iterator[slice]) -> Array:
+    """Return ρ (k, 2) [1/s]: the larger of |dφ/dt| and of its mean over the last 0.3 s.
+
+    Parameters
+    ----------
+    force : φ of the model (k, 2) [static axle loads].
+    dt : sampling interval [s].
+    stretches : samples that follow one another without a gap.
+    """
+    rate, e = np.zeros_like(force), math.exp(-dt / MEMORY)
+    for part in stretches:
+        here = force[part]
+        if len(here) < 2:
+            continue
+        now = np.abs(np.gradient(here, dt, axis=0))
+        mean, _ = lfilter([1.0 - e], [1.0, -e], now, axis=0, zi=e * now[:1])
+        rate[part] = np.maximum(now, mean)
+    return rate
