@@ -1,15 +1,15 @@
-"""Does the guaranteed band hold? True forces of random drives that nobody learnt from, and its width.
+"""Does the guaranteed band hold? Forces of random drives that nobody learnt from, and its width.
 
     python -m benchmarks.guaranteed [--each N] [--drives N] [--first SEED] [--record]
 
 Random cars of four classes learn on a drive with good sensors, and `run.guaranteed()` states which
-forces they can have, by the motion alone. Then other random drives of each, of other speeds: a drive
+forces they can have, by the motion alone. Then other random drives of each, of other speeds: one
 counts as outside where at any instant the true force of an axle is outside of `guaranteed_force`,
 known slip or not, with exact signals, as the band says nothing of sensors. Half the width of the
 band is meant over the known slip, and set over the largest error of the frozen model there, as
-`bounds_monte_carlo` sets bounds over the largest error that was observed; over the rms error beside.
-Beside it the same with a bound that is told and true: the least that some curve keeps in the drive
-that taught and in those that are asked; and of the recursive outer ellipsoid over the polytope.
+`bounds_monte_carlo` sets bounds over the largest error that was observed; and over the rms error.
+Beside it stand the same with a bound that is told and true, the least that a curve keeps in the
+drive that taught and in those that are asked, and the recursive outer ellipsoid over the polytope.
 Last, where the recordings of CarMaker are there, each run is asked of what the other taught.
 `RESERVE` was chosen on seeds below 1000.
 """
@@ -22,6 +22,7 @@ from concurrent.futures import ProcessPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.answers import blind, drawn
 from benchmarks.random_cars import CLASSES, FIRST_SEED, LEAD
@@ -68,9 +69,10 @@ def learnt(log: Recording, car: Vehicle) -> History:
     return identify(blind(log), car, AxleIdentifier.for_vehicle(car, dt=log.dt))
 
 
-def moving(drive: Recording, lead: float) -> Array:
+def moving(drive: Recording, lead: float) -> NDArray[np.bool_]:
     """Return the samples that count (n,): the car drives, its beginning is over."""
-    return drive.t >= drive.t[0] + lead
+    counts: NDArray[np.bool_] = drive.t >= drive.t[0] + lead
+    return counts
 
 
 def asked(model: AxleModel, drive: Recording, lead: float) -> Asked:
@@ -122,7 +124,7 @@ def true_bound(run: History, drives: list[Recording]) -> ForceBound:
 
 
 def ellipsoid_over_polytope(run: History, model: AxleModel) -> float:
-    """Return the width of the outer ellipsoid's band over that of the polytope, median over slip."""
+    """Return the width of the ellipsoid's band over that of the polytope, median over slip."""
     guarantee, strips = model.guarantee, strips_of(model, run.recording)
     assert guarantee is not None and strips is not None
     slip = np.linspace(0.1, 1.0, 10)[:, None] * model.known_slip

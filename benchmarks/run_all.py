@@ -38,6 +38,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "plan": [],
     "dither": [],
     "fleet": [],
+    "guaranteed": [],
     "doctor": [],
     "plant_against_commonroad": ["{out}"],
     "paper_gains": [],

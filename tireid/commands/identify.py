@@ -33,8 +33,10 @@ from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import resumed_line, verdict_line
 from tireid.commands.identify_results import (
     NETWORK,
+    AskedBound,
     error_cells,
     file_name,
+    guaranteed_text,
     network_table,
     write_network_results,
     write_results,
@@ -115,6 +117,14 @@ def add_parser(commands: Any) -> None:
         metavar="LOG[:RUN]",
         help="recordings to predict",
     )
+    parser.add_argument(
+        "--bound",
+        nargs="*",
+        type=float,
+        metavar="E",
+        help="state forces that are guaranteed where no force differs from the best curve by more "
+        "than E static axle loads, or, with a second number, is late by more [s] (estimated)",
+    )
     add_log_reading(parser)
     add_repair(parser, "learn on what is left, and write it to")
     add_weights(parser, "begin learning with it")
@@ -139,6 +149,9 @@ def run(options: argparse.Namespace) -> int:
     law, design = chosen_method(options, vehicle, seed)
     if options.network is not None and options.freeze is not None:
         raise ValueError("--freeze is for what is learnt: the network of --network is frozen")
+    bound = None if options.bound is None else AskedBound.of(options.bound)
+    if bound is not None and options.network is not None:
+        raise ValueError("--bound is for what is learnt: a network has no set of possible weights")
     start = None if options.weights is None else load_model(options.weights)
     if options.weights is not None:
         warn_of_stored(options.weights)
@@ -214,15 +227,17 @@ def run(options: argparse.Namespace) -> int:
                 verdict,
                 pieces,
                 curves=options.curves,
+                bound=bound,
                 progress=progress.begin(DRAWING),
             )
             by_key = {f"{freeze_key(t)} s": replays for t, replays in frozen.items()}
             closing = _closing_line(learnt, freeze_times[-1], vehicle, resumed=start is not None)
             told = f"{error_table([*histories, *pieces], frozen)}\n{closing}"
         doctor = doctor_text(diagnosis, repair, options.repair)
-        parts_told = (told, vehicle.estimates, doctor, verdict_text(verdict))
-        told = "\n".join(part for part in parts_told if part)
         model = network or load_model(folder / "weights.json")
+        sure = "" if bound is None else guaranteed_text(model)
+        parts_told = (told, sure, vehicle.estimates, doctor, verdict_text(verdict))
+        told = "\n".join(part for part in parts_told if part)
         write_json(folder / "doctor.json", {**diagnosis.to_dict(), "applied": repair.tables()})
         write_identify_report(
             folder,

@@ -3,12 +3,13 @@
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from codegen.arrays import Array, blocks, thinning
+from identifier.axle.guarantee import ForceBound
 from identifier.compare.course import side_slip
 from identifier.method import Block, Method, vehicle_numbers
 from identifier.methods import certify
@@ -41,6 +42,7 @@ from tireid.figures import (
 )
 from tireid.output import text_table, write_csv, write_json, write_table
 from tireid.progress import Progress, say
+from tireid.reports.identify import guaranteed_sentence
 
 # The machine-readable result of `tireid identify`: summary.json, whose keys are stable.
 
@@ -135,6 +137,48 @@ def summarize_replays(
     }
 
 
+class AskedBound(NamedTuple):
+    """That a guaranteed band is asked for; told: under which bound, None estimates it."""
+
+    told: ForceBound | None
+
+    @classmethod
+    def of(cls, numbers: Sequence[float]) -> "AskedBound":
+        """Return what words of the command ask.
+
+        Parameters
+        ----------
+        numbers : error [static axle loads] and lateness [s], or the first of them, or none.
+
+        Raises
+        ------
+        ValueError
+            Where there are more, or a number is impossible.
+        """
+        if len(numbers) > 2:
+            raise ValueError(
+                f"--bound takes an error and a lateness, it was given {len(numbers)} numbers"
+            )
+        if not numbers:
+            return cls(None)
+        error, late = (*numbers, 0.0)[:2]
+        return cls(ForceBound(error=(error, error), lateness=(late, late)))
+
+
+def guaranteed_text(model: TireModel) -> str:
+    """Return what is guaranteed of a model, in words.
+
+    Parameters
+    ----------
+    model : frozen, asked for a guaranteed band.
+    """
+    sentence = guaranteed_sentence(model)
+    return sentence or (
+        "no guaranteed band: it takes a method that learns curves of slip, a lateral velocity that "
+        "was measured, and enough driving"
+    )
+
+
 Frozen = Mapping[float, Mapping[str, Replay]]
 OBSERVED = "xi_tilde"  # the output of a method that learns from the error of an observer
 WRITING = 0.6  # share of the time of curves and figures that a long recording's curves take
@@ -156,6 +200,7 @@ def write_results(
     parts: Sequence[History] = (),
     *,
     curves: str = "csv",
+    bound: AskedBound | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Figure]:
     """Write everything that was learnt into a folder; return the figures by the name of their file.
@@ -170,9 +215,17 @@ def write_results(
     verdict : on the model of the last freeze.
     parts : of the online run, over each of several logs that were learnt on.
     curves : "csv" or "parquet", as what curves over time are written.
+    bound : of the guaranteed band of the last freeze; None asks for none.
     progress : told how far it is; None tells nobody.
+
+    Raises
+    ------
+    BoundViolatedError
+        Where no curve keeps a bound that was told.
     """
     calibrated = learnt.calibrated(max(frozen))
+    if bound is not None:
+        calibrated = learnt.guaranteed(bound.told, max(frozen), calibrated)
     write_json(
         folder / "summary.json",
         summarize(
@@ -347,6 +400,10 @@ def curve_columns(model: TireModel, recordings: Sequence[Recording]) -> dict[str
     band = model.band(slip)
     if band is not None:
         for side, bound in zip(("low", "high"), band, strict=True):
+            columns |= {f"Fyf_{side}_N": bound[:, 0], f"Fyr_{side}_N": bound[:, 1]}
+    sure = model.guaranteed_band(slip)
+    if sure is not None:
+        for side, bound in zip(("least", "most"), sure, strict=True):
             columns |= {f"Fyf_{side}_N": bound[:, 0], f"Fyr_{side}_N": bound[:, 1]}
     return columns
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from codegen.arrays import Array, blocks
 from codegen.escape import visible
@@ -13,7 +14,7 @@ from identifier.method import vehicle_numbers
 from identifier.methods import load_model
 from identifier.reproducibility import Prediction, beyond_known
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict, within_band
+from identifier.verdict import Verdict, contradictions, within_band
 from models.recordings.record import ALL
 from tireid import __version__
 from tireid.commands import COMMANDS
@@ -165,6 +166,7 @@ def summary(
     error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
     beyond, known = beyond_known(model, prediction.recording), model.known_slip
     inside, held = within_band(model, prediction.recording), truth_within_band(prediction, half)
+    against = contradictions(model, prediction.recording)
     shares = (None, None) if motion is None else motion.explained
     return {
         "verdict": verdict.to_dict(),
@@ -186,6 +188,7 @@ def summary(
         "beyond_known_slip": beyond,
         "windows_within_band": None if inside is None else inside.tolist(),
         "truth_within_band": None if held is None else held.tolist(),
+        "moments_against_guarantee": None if against is None else against[1].mean(axis=0).tolist(),
         "model": type(model).__name__,
         "vehicle": vehicle_numbers(model.vehicle),
         "version": __version__,
@@ -234,6 +237,25 @@ def prediction_text(model: TireModel, prediction: Prediction, half: Array | None
             f"{100.0 * held[0]:.0f} / {100.0 * held[1]:.0f} % of the true forces lie in it, the "
             "noise of the sensors in the band (front / rear)"
         )
+    against = contradictions(model, prediction.recording)
+    if against is not None:
+        lines.append(contradiction_line(*against))
     if model.vehicle.estimates:
         lines.append(model.vehicle.estimates)
     return "\n".join(lines)
+
+
+def contradiction_line(t: Array, broken: NDArray[np.bool_]) -> str:
+    """Return whether a drive contradicts what is guaranteed, in words.
+
+    Parameters
+    ----------
+    t, broken : from `contradictions`.
+    """
+    if not broken.any():
+        return "no moment of the drive contradicts the forces that are guaranteed"
+    front, rear = 100.0 * broken.mean(axis=0)
+    return (
+        f"the bound of the guaranteed forces is violated: {front:.2g} / {rear:.2g} % of the "
+        f"moments of 0.3 s contradict it (front / rear), first at {t[broken.any(axis=1)][0]:g} s"
+    )

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
 UNKNOWN = "slip not known"
 BAND = "band of 90 %"
+GUARANTEED = "guaranteed, steady"
 CLOUD: Mapping[str, Any] = {  # thousands of points: pixels where the rest of a drawing is lines
     "linestyle": "",
     "marker": ".",
@@ -149,6 +150,15 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
         low, high = (force[:, axle] / newtons for force in band)
         axes.fill_between(
             np.rad2deg(slip), low, high, color=SKY, alpha=0.35, linewidth=0.0, label=BAND
+        )
+    for side in model.guaranteed_band(slip) or ():
+        axes.plot(
+            np.rad2deg(slip),
+            side[:, axle] / newtons,
+            color=PURPLE,
+            linewidth=0.9,
+            linestyle="--",
+            label=GUARANTEED,
         )
     axes.plot(
         np.rad2deg(slip),

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from identifier.axle.guarantee import Guarantee
 from identifier.doctor import Diagnosis
 from identifier.reproducibility import (
     AxleRmse,
@@ -199,9 +200,9 @@ def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> 
         Table(caption=f"The tires by {law}.", header=["", *AXLES, "unit"], rows=facts),
         drawing(figures["slip"], "Axle force over slip angle: drive and curve.", READ["slip"]),
     ]
-    told = band_sentence(model)
-    if told:
-        blocks.append(Paragraph(text=told))
+    for told in (band_sentence(model), guaranteed_sentence(model)):
+        if told:
+            blocks.append(Paragraph(text=told))
     for name, caption in (
         ("side_slip", "Side slip as it was estimated."),
         ("learnt", "What was learnt over time."),
@@ -236,6 +237,30 @@ def band_sentence(model: TireModel) -> str:
         "The band is where nine of ten forces of other drives are to be expected: at the end of "
         f"the known slip ± {shares[0]:.1f} / {shares[1]:.1f} % of the force (front / rear); {how}. "
         "Where slip is not known it widens to what was believed before the drive."
+    )
+
+
+def guaranteed_sentence(model: TireModel) -> str:
+    """Return which forces are guaranteed where slip is known, in words; empty where none are.
+
+    Parameters
+    ----------
+    model : frozen, with a guaranteed band or without.
+    """
+    known, given = model.known_slip, getattr(model, "guarantee", None)
+    limits = None if known is None else model.guaranteed_band(known)
+    if known is None or not isinstance(given, Guarantee) or limits is None:
+        return ""
+    low, high = (np.diag(side) / model.vehicle.axle_loads for side in limits)
+    ends = [f"{least:.2f} to {most:.2f}" for least, most in zip(low, high, strict=True)]
+    front, rear = given.bound.error
+    late_front, late_rear = (1e3 * tau for tau in given.bound.lateness)
+    return (
+        f"Guaranteed at the end of the known slip: a force of {ends[0]} / {ends[1]} static axle "
+        "loads (front / rear), if no force of the drive or of another differs from the best curve "
+        f"by more than {front:.3f} / {rear:.3f} static axle loads, and {late_front:.0f} / "
+        f"{late_rear:.0f} ms times how fast it changes. That bound was "
+        f"{'told' if given.told else 'estimated from the drive'}."
     )
 
 
