@@ -64,7 +64,7 @@ class Ellipsoid(NamedTuple):
             return self if abs(away) <= allowed else None
         upper = max((-away - allowed) / size, -1.0)  # depth of the cuts: h'w <= y + e and >= y - e
         lower = max((away - allowed) / size, -1.0)
-        if upper > 1.0 or lower > 1.0 or upper + lower > 0.0:
+        if upper > 1.0 or lower > 1.0:
             return None
         if upper * lower >= 1.0 / n:
             return self  # it is the smallest one already

@@ -32,6 +32,7 @@ UNLIKELY = 1.5  # lateness, over error: chosen as `verdict.guaranteed.RESERVE` w
 FIRST, MORE = 150, 100  # constraints that are tried first, and added at a time
 SLACK = 1e-9  # static axle loads
 LEAST_RADIUS = 1e-6  # static axle loads of a ball in the polytope: below it there is no inside
+TINY = 1e-12  # of a size that is divided by: straight ahead nothing is said of the weights
 LARGEST_BOUND = 10.0  # static axle loads
 LONGEST_LATENESS = 1.0  # s
 MOST_VERTICES = 100_000
@@ -223,7 +224,7 @@ def vertices(among: HalfSpaces) -> Array | None:
     among : its half-spaces.
     """
     A, b = among
-    n, length = A.shape[1], np.linalg.norm(A, axis=1)
+    n, length = A.shape[1], np.maximum(np.linalg.norm(A, axis=1), TINY)
     inside = _least(  # the largest ball
         np.append(np.zeros(n), -1.0), HalfSpaces(np.column_stack([A, length]), b), n
     )

@@ -1,0 +1,284 @@
+"""The guaranteed band: two linear programs, no drive outside, and a wrong bound is told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from identifier.axle import AxleIdentifier
+from identifier.axle.ellipsoid import Ellipsoid, outer_ellipsoid
+from identifier.axle.guarantee import (
+    ForceBound,
+    Guarantee,
+    HalfSpaces,
+    Strips,
+    force_rate,
+    least_bound,
+    possible_weights,
+    prior_box,
+    strip_sides,
+    vertices,
+)
+from identifier.method import FrozenModelError
+from identifier.methods import load_model, make_method
+from identifier.run import identify
+from identifier.verdict import BoundViolatedError, contradictions
+from identifier.verdict.guaranteed import strips_of
+from models.friction import Friction, FrictionChange
+from models.maneuvers import RandomSteer
+from models.plant import Plant
+from models.vehicle import sedan
+
+DESIGN = AxleIdentifier.for_vehicle(sedan())
+LADDER = np.array(DESIGN.ladder)
+BOX = prior_box(DESIGN.bounds, DESIGN.ladder)
+TIRE = np.array([0.15, 0.4, 0.3, 0.1])  # weights that some tire could have
+SLIP = np.linspace(-0.3, 0.3, 31)
+
+
+def drawn_strips(rng, error, m=120):
+    """Means of a drive of that tire, both axles alike, off by up to an error."""
+    slip = rng.uniform(-0.12, 0.12, m)
+    h = np.tanh(slip[:, None] / LADDER)
+    y = h @ TIRE + error * rng.uniform(-1.0, 1.0, m)
+    both = np.repeat(h[:, None], 2, axis=1)
+    return Strips(np.column_stack([y, y]), both, np.zeros((m, 2)), 0.1 * np.arange(m))
+
+
+def swung(seed, speed, **road):
+    steering = RandomSteer(
+        amplitude=0.08, frequency=0.6, seed=seed, onset=1.0, rate_limit=0.8, duration=16.0
+    )
+    return Plant(sedan()).simulate(steering, speed=speed, **road).recording()
+
+
+@pytest.fixture(scope="module", name="run")
+def a_run():
+    return identify(replace(swung(3, 20.0), axle_force=None), sedan(), DESIGN)
+
+
+@pytest.fixture(scope="module", name="model")
+def a_model(run):
+    return run.guaranteed()
+
+
+def test_vertices_give_what_two_linear_programs_of_a_slip_give():
+    strips = drawn_strips(np.random.default_rng(1), 0.05)
+    bound = ForceBound(error=(0.06, 0.06))
+    corners = possible_weights(strips, 0, bound, BOX)
+    sides = BOX.both(strip_sides(strips.y[:, 0], strips.h[:, 0], np.full(120, 0.06)))
+    for slip in (0.005, 0.03, 0.1, 0.4):
+        t = np.tanh(slip / LADDER)
+        ends = [
+            sign * linprog(sign * t, sides.A, sides.b, bounds=(None, None), method="highs").fun
+            for sign in (1.0, -1.0)
+        ]
+        np.testing.assert_allclose([(corners @ t).min(), (corners @ t).max()], ends, atol=1e-7)
+
+
+def test_many_more_constraints_than_are_tried_first_lead_to_the_same_polytope():
+    strips = drawn_strips(np.random.default_rng(2), 0.05, m=2000)
+    sides = BOX.both(strip_sides(strips.y[:, 1], strips.h[:, 1], np.full(2000, 0.055)))
+    corners = vertices(sides)
+    assert corners is not None and (sides.b[:, None] + 1e-8 >= sides.A @ corners.T).all()
+    touched = np.sum(np.isclose(sides.A @ corners.T, sides.b[:, None], atol=1e-7), axis=0)
+    assert (touched >= LADDER.size).all()  # each is where four sides meet
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_tire_that_drove_is_among_the_possible_ones(seed):
+    strips = drawn_strips(np.random.default_rng(seed), 0.04)
+    corners = possible_weights(strips, 0, ForceBound(error=(0.04, 0.04)), BOX)
+    true, possible = np.tanh(SLIP[:, None] / LADDER) @ TIRE, np.tanh(SLIP[:, None] / LADDER)
+    span = possible @ corners.T
+    assert (span.min(axis=1) <= true + 1e-9).all() and (true <= span.max(axis=1) + 1e-9).all()
+    e, tau = least_bound(strips, 0, BOX)
+    assert e <= 0.04 and tau == 0.0
+    assert possible_weights(strips, 0, ForceBound(error=(0.99 * e, 1.0)), BOX) is None
+    assert possible_weights(strips, 0, ForceBound(error=(1.01 * e, 1.0)), BOX) is not None
+
+
+def test_where_nothing_is_excited_the_prior_box_stays():
+    rng = np.random.default_rng(3)
+    quiet = drawn_strips(rng, 0.0)
+    quiet = quiet._replace(h=1e-6 * quiet.h, y=1e-6 * quiet.y)  # straight ahead
+    corners, box = possible_weights(quiet, 0, ForceBound(error=(0.05, 0.05)), BOX), vertices(BOX)
+    T = np.tanh(SLIP[:, None] / LADDER)
+    for side in (np.min, np.max):
+        np.testing.assert_allclose(side(T @ corners.T, axis=1), side(T @ box.T, axis=1), atol=1e-7)
+    small = drawn_strips(rng, 0.0)
+    known = possible_weights(small, 0, ForceBound(error=(0.05, 0.05)), BOX)
+    wide = [np.ptp(np.tanh(at / LADDER) @ known.T) for at in (0.1, 0.5)]
+    assert wide[1] > 2.0 * wide[0]  # slip beyond 0.12 rad was not driven
+
+
+def test_a_box_holds_brush_tires_and_no_tire_that_stiffens():
+    for stiffness, friction in ((4.0, 0.3), (12.0, 0.9), (35.0, 1.6)):
+        sliding = np.minimum(np.tan(np.abs(SLIP)) * stiffness / (3.0 * friction), 1.0)
+        force = np.sign(SLIP) * friction * (1.0 - (1.0 - sliding) ** 3)
+        units = np.repeat(np.tanh(SLIP[:, None] / LADDER)[:, None], 2, axis=1)
+        strips = Strips(np.column_stack([force, force]), units, np.zeros((SLIP.size, 2)), SLIP)
+        assert least_bound(strips, 0, BOX)[0] < 0.05 * friction
+    stiffens = np.array([-0.4, 0.0, 0.0, 2.5])
+    assert (BOX.b >= BOX.A @ TIRE).all() and not (BOX.A @ stiffens <= BOX.b).all()
+
+
+def test_forces_of_drives_that_were_not_seen_are_inside(model):
+    for seed, speed in ((4, 17.0), (5, 23.0)):
+        drive = swung(seed, speed)
+        low, high = model.guaranteed_force(replace(drive, axle_force=None))
+        late = drive.t > 1.0
+        assert ((low <= drive.axle_force) & (drive.axle_force <= high))[late].all()
+        t, broken = contradictions(model, drive)
+        assert len(t) > 100 and not broken.any()
+        away = np.abs(model.axle_force(drive) - drive.axle_force)[late].max(axis=0)
+        assert (0.5 * (high - low)[late].mean(axis=0) < 5.0 * away).all()
+
+
+def test_another_road_contradicts_the_guarantee(model):
+    wet = swung(4, 17.0, friction=Friction(changes=(FrictionChange(scale=0.5, at_time=6.0),)))
+    t, broken = contradictions(model, wet)
+    assert broken.any(axis=0).all() and t[broken.any(axis=1)][0] > 5.7
+    low, high = model.guaranteed_force(wet)
+    assert not ((low <= wet.axle_force) & (wet.axle_force <= high)).all()
+
+
+def test_a_told_bound_is_taken_or_its_violation_is_told(run, model):
+    told = run.guaranteed(0.3)
+    assert told.guarantee.told and not model.guarantee.told
+    assert told.guarantee.bound == ForceBound(error=(0.3, 0.3))
+    with pytest.raises(BoundViolatedError, match=r"violated at the front axle: .* from .* s on"):
+        run.guaranteed(0.002)
+    for wrong in (0.0, -0.1, np.nan, 11.0):
+        with pytest.raises(ValueError, match="bound of an error"):
+            run.guaranteed(wrong)
+    with pytest.raises(ValueError, match="lateness"):
+        ForceBound(error=(0.1, 0.1), lateness=(0.0, 2.0))
+
+
+def test_a_wider_bound_holds_a_narrower_one(run):
+    inner, outer = (run.guaranteed(error).guaranteed_band(SLIP) for error in (0.15, 0.25))
+    assert (outer[0] < inner[0]).all() and (outer[1] > inner[1]).all()
+
+
+def test_only_what_came_before_a_freeze_teaches(run):
+    early = run.guaranteed(0.2, t=8.0)
+    shown = strips_of(run.freeze(8.0), run.recording)
+    before = shown.until(int(np.sum(shown.t + 0.3 <= 8.0 + 1e-9)))
+    corners = possible_weights(before, 0, ForceBound(error=(0.2, 0.2)), BOX)
+    np.testing.assert_allclose(
+        np.sort(early.guarantee.corners[0], axis=0), np.sort(corners, axis=0), atol=1e-9
+    )
+
+
+def test_a_band_is_asked_as_a_force_is(model):
+    low, high = model.guaranteed_band(0.05, "rear")
+    assert low < model.force(0.05, "rear") < high
+    both = model.guaranteed_band([[0.05, 0.1]])
+    assert both[0].shape == (1, 2, 2) and both[0][0, 0, 1] == pytest.approx(low)
+    slow, quick = (model.guaranteed_band(0.05, "front", rate) for rate in (0.0, 2.0))
+    late = model.guarantee.bound.lateness[0] * 2.0 * model.vehicle.axle_loads[0]
+    assert slow[0] - quick[0] == pytest.approx(late) == quick[1] - slow[1]
+    with pytest.raises(ValueError, match="axle must be front or rear"):
+        model.guaranteed_band(0.05, "left")
+
+
+def test_a_stored_guarantee_comes_back(model, tmp_path):
+    path = tmp_path / "weights.json"
+    model.save(path)
+    again = load_model(path)
+    np.testing.assert_array_equal(again.guaranteed_band(SLIP), model.guaranteed_band(SLIP))
+    data = model.to_dict()
+    for key, wrong in (
+        ("corners", [[[1.0, 2.0]], [[1.0, 2.0]]]),
+        ("error_static_axle_loads", [0.1]),
+        ("lateness_s", [0.0, -1.0]),
+        ("told", "yes"),
+    ):
+        with pytest.raises(FrozenModelError):
+            type(model).from_dict(data | {"guarantee": data["guarantee"] | {key: wrong}}, "file")
+    with pytest.raises(FrozenModelError, match="missing"):
+        type(model).from_dict(data | {"guarantee": {"told": True}}, "file")
+
+
+def test_a_calibrated_model_can_carry_it(run, model):
+    both = run.guaranteed(model=run.calibrated())
+    assert both.calibration is not None
+    np.testing.assert_array_equal(both.guaranteed_band(SLIP), model.guaranteed_band(SLIP))
+
+
+def test_what_has_no_set_of_weights_has_no_guarantee(run):
+    car, log = sedan(), run.recording
+    paper = identify(log, car, make_method("integral", car)).guaranteed()
+    assert paper.guaranteed_band(0.1) is None and paper.guaranteed_force(log) is None
+    assert run.freeze().guaranteed_band(0.1) is None and contradictions(paper, log) is None
+    short = identify(log.between(0.0, 0.5), car, DESIGN).guaranteed()
+    assert short.guarantee is None
+
+
+def test_without_a_measured_v_y_nothing_is_guaranteed(run):
+    log = replace(run.recording, v_y=None)
+    blind = identify(log, sedan(), make_method("inertial", sedan()))
+    assert blind.guaranteed().guarantee is None
+
+
+def test_the_rate_of_a_ramp_is_its_slope_and_fades_behind_it():
+    dt, t = 0.01, np.arange(300)
+    ramp = np.minimum(0.02 * t, 2.0)  # 2 per second, for a second
+    rate = force_rate(np.column_stack([ramp, 0.5 * ramp]), dt, iter([slice(0, 300)]))
+    np.testing.assert_allclose(rate[:99], np.tile([2.0, 1.0], (99, 1)))
+    np.testing.assert_allclose(rate[200, 0], 2.0 * np.exp(-1.0 / 0.3), rtol=0.05)
+    gap = force_rate(np.column_stack([ramp, ramp]), dt, iter([slice(0, 150), slice(150, 300)]))
+    assert (gap[150:] == 0.0).all()  # nothing is remembered over a gap
+
+
+def test_the_ellipsoid_holds_the_polytope_and_shrinks():
+    strips = drawn_strips(np.random.default_rng(5), 0.04)
+    bound = ForceBound(error=(0.05, 0.05))
+    corners = possible_weights(strips, 0, bound, BOX)
+    outer = outer_ellipsoid(strips, 0, bound, DESIGN.ladder)
+    away = corners - outer.center
+    assert np.einsum("ki,ij,kj->k", away, np.linalg.inv(outer.shape), away).max() <= 1.0 + 1e-8
+    known, sizes = Ellipsoid.around(4), []
+    for h, y in zip(strips.h[:, 0], strips.y[:, 0], strict=True):
+        known = known.cut(h, y, 0.05)
+        sizes.append(np.linalg.slogdet(known.shape)[1])
+    assert (np.diff(sizes) <= 1e-9).all() and sizes[-1] < sizes[0] - 5.0
+    assert known.cut(strips.h[0, 0], strips.y[0, 0] + 1.0, 0.05) is None  # what cannot be is told
+    assert outer_ellipsoid(strips._replace(y=strips.y + 5.0 * strips.t[:, None]), 0, bound,
+                           DESIGN.ladder) is None  # fmt: skip
+
+
+@pytest.mark.parametrize(("y", "allowed"), [(0.6, 0.3), (0.0, 0.2), (-2.2, 0.5), (0.1, 5.0)])
+def test_a_cut_of_a_ball_is_as_small_as_a_search_finds(y, allowed):
+    """About the first axis: of all ellipsoids with that axis, the smallest around the slab."""
+    ball, n, radius = Ellipsoid.around(4, 1.0), 4, 2.0
+    cut = ball.cut(np.eye(4)[0], y, allowed)
+    low, high = max(y - allowed, -radius), min(y + allowed, radius)
+
+    def logvolume(center, half):
+        """Of the ellipsoid with that first half-axis that holds the rims of the slab."""
+        rim = []
+        for at in (low, high, np.clip(center, low, high), 0.0 if low <= 0.0 <= high else low):
+            left = 1.0 - ((at - center) / half) ** 2
+            if left < -1e-12:
+                return np.inf
+            across = radius**2 - at**2
+            rim.append(across / left if across > 1e-12 else 0.0)
+        return np.log(half) + 0.5 * (n - 1) * np.log(max(rim)) if max(rim) > 0.0 else np.inf
+
+    grid = [
+        logvolume(c, half)
+        for c in np.linspace(low, high, 81)
+        for half in np.linspace(0.5 * (high - low) + 1e-9, 2.0 * radius, 81)
+    ]
+    mine = 0.5 * np.linalg.slogdet(cut.shape)[1]
+    assert mine <= min(grid) + 0.02
+
+
+def test_an_empty_guarantee_is_refused():
+    with pytest.raises(ValueError, match="corners"):
+        Guarantee(bound=ForceBound(error=(1, 1)), told=True, corners=(np.ones((0, 4)),) * 2)
+    nowhere = HalfSpaces(np.array([[1.0], [-1.0]]), np.array([0.0, -1.0]))
+    assert vertices(nowhere) is None
