@@ -314,7 +314,7 @@ class AxleModel(TireModel):
         n, wider = len(self.ladder), self.covariance.copy()
         change = sd_friction * self.W @ friction_direction(self.ladder).T
         wider[:, :n, :n] += change[:, :, None] * change[:, None, :]
-        return replace(self, covariance=wider)
+        return replace(self, covariance=wider, guarantee=None)
 
     def guaranteed_at(self, alpha: Array, rate: Array) -> tuple[Array, Array] | None:
         """Return least and largest steady force at slip angles, (k, 2) [N]; None: none is stated.
@@ -476,7 +476,7 @@ class AxleModel(TireModel):
 
     def mounted_on(self, vehicle: Vehicle) -> "AxleModel":
         """Return the tires on another car, their forces scaled by its static axle loads."""
-        return replace(self, vehicle=vehicle)
+        return replace(self, vehicle=vehicle, guarantee=None)  # it was shown of this car alone
 
     @property
     def lagged(self) -> bool:
