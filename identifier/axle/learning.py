@@ -15,7 +15,16 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.axle.car import larger, reciprocal, smaller, within
-from identifier.axle.covariance import Factors, Spread, Symmetric, excited, scaled, updated, width
+from identifier.axle.covariance import (
+    LEAST_VARIANCE,
+    Factors,
+    Spread,
+    Symmetric,
+    excited,
+    scaled,
+    updated,
+    width,
+)
 from models.rules import require_positive_fields
 
 
@@ -38,6 +47,8 @@ class Regression:
     sure_time : its memory [s]: between left and right a curve is learnt at small forces, too.
     clip : largest error that counts in full [its standard deviation].
     widest : trace of the covariance of weights at which forgetting stops, over the prior's [-].
+    rate : by which learning may change the force of a curve [static axle loads/s]; three times
+        what a change of friction asks for.
 
     Raises
     ------
@@ -57,12 +68,13 @@ class Regression:
     sure_time: float = 0.7
     clip: float = 5.0
     widest: float = 2.0
+    rate: float = 30.0
 
     def __post_init__(self) -> None:
         require_positive_fields(self)
 
     def numbers(self, dt: float) -> Array:
-        """Return the numbers of `RegressionNumbers`, (13,).
+        """Return the numbers of `RegressionNumbers`, (14,).
 
         Parameters
         ----------
@@ -84,13 +96,14 @@ class Regression:
                 math.exp(-dt / self.sure_time),
                 min(dt / self.moment, 1.0),
                 self.clip,
+                1.0 / (self.rate * dt),
             ]
         )
 
 
 class RegressionNumbers(NamedTuple):
     """κ, e, (1 - e)/2; (1 - λ)/λ; errors; correlated samples; κ lateness; noise of v_y; least force
-    to learn from, the decay of its memory and the gain of its mean; clip.
+    to learn from, the decay of its memory and the gain of its mean; clip; 1/largest step.
     """
 
     bandwidth: Any
@@ -106,6 +119,7 @@ class RegressionNumbers(NamedTuple):
     decay: Any
     smooth: Any
     clip: Any
+    per_step: Any
 
 
 def filtered(numbers: RegressionNumbers, v: Any, u: Any, first: Any) -> tuple[Any, Any]:
@@ -156,6 +170,7 @@ def update(
 
     θ⁺ = θ + P h e/(R + a), a = h'Ph;  P⁺ = P - κ P h h'P/((R + a) a), κ = a - R (1 - λ)/λ, which
     keeps P positive definite for every a, also where κ < 0 and P grows: 1/h'P⁻¹h stays positive.
+    No D of its factors falls below `LEAST_VARIANCE`: what would do so is learnt from, but P stays.
 
     Parameters
     ----------
@@ -178,7 +193,11 @@ def update(
     trace = spread.trace + sum(growth * one * one for one in v[:n])
     others = [p + growth * one * one for p, one in zip(spread.others, v[n:], strict=True)]
     wide = width(trace, others, limits)
-    moves = ca.logic_and(learns, ca.logic_or(kappa >= 0, wide <= 1))
+    smallest = P.D[0]
+    for one in P.D[1:]:
+        smallest = smaller(one, smallest)
+    thick = smallest * (R + R * forgetting) >= LEAST_VARIANCE * (R + a)
+    moves = ca.logic_and(learns, ca.if_else(kappa >= 0, thick, wide <= 1))
     # β_q = 1 + c a = (R + a)/(R + R (1 - λ)/λ), so that c/β_q = κ/((R + a) a)
     c = ca.if_else(moves, kappa / (a * R * (1 + forgetting)), 0)
     gain = learns * innovation * a * share
@@ -310,6 +329,7 @@ def alarm(numbers: ChangeNumbers, fast: Any, slow: Any) -> Any:
 
 FLOAT = float(np.finfo(np.float32).eps)
 TINY = 1e-12  # of a size that is divided by
+LEAN = 1e-4  # of a step that is limited: towards the center, by more than rounding can do
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -510,11 +530,16 @@ def _times(P: Symmetric, row: list[Any]) -> list[Any]:
     return [sum(P[min(i, j), max(i, j)] * row[j] for j in range(n)) for i in range(n)]
 
 
+def _positive(x: Any) -> Any:
+    """Return a size that rounding may have made zero or negative, as a divisor."""
+    return larger(x + TINY, TINY)
+
+
 def _gripping(numbers: BoundNumbers, w: list[Any], P: Symmetric) -> list[Any]:
     """Move w by the least, in the metric of P, so that its grip is in range."""
     along = _times(P, [1] * len(w))
     grip = sum(w)
-    move = (within(grip, numbers.least_grip, numbers.most_grip) - grip) / (sum(along) + TINY)
+    move = (within(grip, numbers.least_grip, numbers.most_grip) - grip) / _positive(sum(along))
     return [a + b * move for a, b in zip(w, along, strict=True)]
 
 
@@ -532,10 +557,10 @@ def _rising(numbers: BoundNumbers, w: list[Any], P: Symmetric, slope: list[Any])
     falls = (numbers.least_slope - steep) * A > by_grip_alone
     rises = (numbers.most_slope - steep) * A < by_grip_alone
     missing = ca.if_else(falls, numbers.least_slope, numbers.most_slope) - steep
-    per_C = ca.if_else(ca.logic_or(falls, rises), reciprocal(C + TINY), 0)
+    per_C = ca.if_else(ca.logic_or(falls, rises), reciprocal(_positive(C)), 0)
     to_slope, share = missing * per_C, B * per_C
     grip = grip + B * to_slope
-    to_grip = (within(grip, least, most) - grip) / (A - B * share + TINY)
+    to_grip = (within(grip, least, most) - grip) / _positive(A - B * share)
     to_slope = to_slope - to_grip * share
     return [a + b * to_grip + c * to_slope for a, b, c in zip(w, by_grip, by_slope, strict=True)]
 
@@ -552,3 +577,27 @@ def _towards_center(numbers: BoundNumbers, w: list[Any], slope: list[Any] | None
     part = reciprocal(over)
     rest = (1 - part) * numbers.center
     return [part * one + rest for one in w]
+
+
+def limited(numbers: BoundNumbers, per_step: Any, last: list[Any], w: list[Any]) -> list[Any]:
+    """Return weights on the way to others, so that no force of the curve changes by more than told.
+
+    φ changes by Σ T_j Δw_j with 1 >= T_1 >= ... >= T_n >= 0 at any slip, the narrowest unit first:
+    by no more than the largest partial sum |Σ_(j<=k) Δw_j| (Abel). What is within is not moved; a
+    step that is cut leans to the center a little, so that rounding does not leave the bounds.
+
+    Parameters
+    ----------
+    per_step : 1/the largest change of a force [1/static axle loads].
+    last, w : weights before the sample and after it, both within their bounds, n entries.
+    """
+    moves = [b - a for a, b in zip(last, w, strict=True)]
+    over, reached = 1, 0
+    for move in moves:
+        reached = reached + move
+        over = larger(ca.fabs(reached) * per_step, over)
+    part, stay = (1 - LEAN) * reciprocal(over), over <= 1
+    return [
+        ca.if_else(stay, b, a + part * move + LEAN * (numbers.center - a))
+        for a, b, move in zip(last, w, moves, strict=True)
+    ]

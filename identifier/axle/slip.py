@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.axle.car import Car
+from identifier.axle.car import Car, within
 from identifier.axle.curve import Curve
 from identifier.axle.gate import Gate
 from models.rules import require_within
@@ -23,6 +23,8 @@ from models.vehicle import GRAVITY, Vehicle
 
 SHORTEST = 1e-3  # wheelbases: the lag never vanishes
 SLOWEST, FASTEST = 0.1, 100.0  # rad/s, of a body that rolls on springs
+MOST_SENSITIVE = 1e4  # per wheelbase: ∂x/∂s stays below it, also where its recursion does not settle
+MOST_SWAY = 10.0  # g: ρ and ρ'/ω stay below it, at any sampling and however speed changes
 
 
 class SlipState(NamedTuple):
@@ -105,6 +107,7 @@ def sensitivity(
     first: Any,
     sway_before: Any,
     sway_now: Any,
+    wheelbase: Any,
 ) -> tuple[Any, Any]:
     """Return ∂x/∂s and ∂x/∂k after the step, (2,) each.
 
@@ -118,11 +121,14 @@ def sensitivity(
     first : 1 at a restart, else 0.
     sway_before : ∂α/∂k at the last sample [rad].
     sway_now : ∂α/∂k now [rad].
+    wheelbase : L [m].
     """
     p_s, p_k = lasting.of_compliance, lasting.of_share
     change = alpha - last.alpha
     by_sigma = ((h.e - h.phi) * change - h.z * h.e * (last.alpha - last.x)) * h.per_sigma
+    most = MOST_SENSITIVE * (1 / wheelbase)
     p_s = h.e * p_s + by_sigma * (last.slope + compliance * lasting.bend * p_s)
+    p_s = within(p_s, -most, most)
     p_k = h.e * p_k + (1 - h.e) * sway_before + (1 - h.phi) * (sway_now - sway_before)
     return (1 - first) * p_s, first * sway_now + (1 - first) * p_k
 
@@ -187,17 +193,19 @@ class Sway:
         return cls(frequency=min(5.0 * math.sqrt(GRAVITY / vehicle.wheelbase), 0.6 * FASTEST))
 
     def numbers(self) -> Array:
-        """Return [ω², 2 ζ ω, 1/ω²], (3,)."""
-        omega = self.frequency
-        return np.array([omega**2, 2.0 * self.damping * omega, omega**-2])
+        """Return the numbers of `SwayNumbers`, (5,)."""
+        omega, most = self.frequency, MOST_SWAY * GRAVITY
+        return np.array([omega**2, 2.0 * self.damping * omega, omega**-2, most, omega * most])
 
 
 class SwayNumbers(NamedTuple):
-    """ω² [1/s²], 2 ζ ω [1/s] and 1/ω² [s²]."""
+    """ω² [1/s²], 2 ζ ω [1/s] and 1/ω² [s²]; the most that ρ [m/s²] and ρ' [m/s³] may be."""
 
     stiffness: Any
     damping: Any
     compliance: Any
+    most: Any
+    most_rate: Any
 
 
 class SwayState(NamedTuple):
@@ -240,5 +248,7 @@ def sway(
     gain = 1 + dt * G
     rate = state.rate * gain + dt * numbers.stiffness * (a - state.rho)
     rate = (1 - first) * rate / (gain + dt * numbers.damping)
+    rate = within(rate, -numbers.most_rate, numbers.most_rate)
     rho = first * v_x * r + (1 - first) * (state.rho + dt * rate)
+    rho = within(rho, -numbers.most, numbers.most)
     return SwayState(rho, rate, -rate * numbers.compliance * (1 / v_x))

@@ -38,6 +38,7 @@ from identifier.axle.learning import (
     bounded,
     error_means,
     filtered,
+    limited,
     update,
 )
 from identifier.axle.slip import (
@@ -372,6 +373,7 @@ def _regression(f: Forward, ports: dict[str, Any]) -> tuple[Any, Any, dict[str, 
         first=gated.first,
         sway_before=f.last_sway.slip,
         sway_now=f.sway.slip,
+        wheelbase=f.car.arm[0] - f.car.arm[1],
     )
     g = force_gradient(f.curve, p_s, p_k, f.cos_delta, gated.v_x)
     xi = numbers.bandwidth * axle_impulse(f.car, gated.v_y, gated.r)
@@ -582,4 +584,8 @@ def _kept(
     ]
     offset = (limits.steering, limits.v_y)[i]
     slope = ca.vertsplit(ports["rising"]) if "rising" in ports else None
-    return ca.horzcat(*bounded(limits, theta, learnt.weights, offset=offset, slope=slope))
+    theta = bounded(limits, theta, learnt.weights, offset=offset, slope=slope)
+    per_step = RegressionNumbers(*ca.vertsplit(ports["regression"])).per_step
+    per_step = ca.if_else(watch.returns, 0, per_step)  # what is gone back to is gone to at once
+    w = limited(limits, per_step, ca.horzsplit(ports["W"][i, :]), theta[:n])
+    return ca.horzcat(*w, *theta[n:])

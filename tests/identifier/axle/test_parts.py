@@ -84,6 +84,7 @@ def lag(alpha, s, dt, v_x, car):
             first=first,
             sway_before=0,
             sway_now=0,
+            wheelbase=0.01,  # no limit that a sensitivity reaches
         )
         c = units.curve(x, ca.SX(W), ca.SX(SCALES), STEPS)
         state = {"x": number(x), "a": a, "C": number(c.carcass_slope), "phi": number(c.force)}
