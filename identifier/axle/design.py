@@ -4,16 +4,19 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
+from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
+from identifier.axle.along import certified_along
 from identifier.axle.band import AT_SPEEDS, CENTERS, BandCalibration
 from identifier.axle.band_step import band_numbers, hinges
 from identifier.axle.bank import UNPROVEN, RoadSlope, SlopeNumbers, SlopeState, road_push
 from identifier.axle.car import car_numbers
+from identifier.axle.certificate import certified
 from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
 from identifier.axle.gate import GateState, Plausibility
@@ -31,11 +34,14 @@ from identifier.axle.slip import SHORTEST, SensitivityState, Sway, SwayState
 from identifier.axle.step import CARRY, LEARNING_OVER, PORTS, build_step
 from identifier.axle.watch import BEGIN, Watch
 from identifier.certificate import Certificate
-from identifier.driving import Driving
+from identifier.driving import Driving, natural_driving
 from identifier.method import OTHER_STRUCTURE, Method, Port, Reached, Setup, Track, resumed
 from identifier.tire_model import AXLES, TireModel, brisk_speed
 from identifier.tuning import Range, ranges_around
 from models.vehicle import GRAVITY, Vehicle
+
+if TYPE_CHECKING:
+    from identifier.run import History  # which runs it
 
 STEERING, V_Y = (BoundNumbers._fields.index(name) for name in ("steering", "v_y"))
 
@@ -141,16 +147,15 @@ class AxleIdentifier(Method):
         return self.plausibility.min_speed
 
     def certify(self, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
-        """Return what is proven of it: no margins or error bounds; boxes hold after every sample.
+        """Return what is proven of it; the boxes hold after every sample, whatever is measured.
 
         Parameters
         ----------
-        vehicle : not looked at: the boxes are in static axle loads.
-        driving : not looked at: the boxes hold whatever is measured.
+        driving : friction and speed of the drop that is followed; None takes `natural_driving`.
         """
-        del vehicle, driving
         b, rising = self.bounds, self.rising_until
         return Certificate(
+            properties=certified(self, vehicle, driving or natural_driving(vehicle)),
             held={
                 "grip_static_axle_loads": [b.least_grip, b.most_grip],
                 "weight_static_axle_loads": [-b.weight, b.weight],
@@ -165,8 +170,17 @@ class AxleIdentifier(Method):
                 "steering_offset_rad": [-b.steering, b.steering],
                 "v_y_offset_m_s": [-b.v_y, b.v_y],
                 "covariance_over_prior": [0.0, self.regression.widest],
-            }
+            },
         )
+
+    def certify_along(self, history: "History") -> Certificate:
+        """Return what is proven of the curves that a run of it taught.
+
+        Parameters
+        ----------
+        history : of this method.
+        """
+        return Certificate(properties=certified_along(self, history))
 
     @property
     def tunables(self) -> Mapping[str, Range]:

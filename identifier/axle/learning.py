@@ -146,12 +146,14 @@ class Learnt(NamedTuple):
     """Parameters (q entries) and factors of the covariance after an update.
 
     uncertainty : h'Ph before it.   weights : block of the weights of P before it, by place.
+    gains : Ph/(R + h'Ph), by which the innovation moves the parameters; 0 where nothing is learnt.
     """
 
     theta: list[Any]
     P: Factors
     uncertainty: Any
     weights: Symmetric
+    gains: list[Any]
 
 
 def update(
@@ -203,7 +205,8 @@ def update(
     gain = learns * innovation * a * share
     theta = [one + along * gain for one, along in zip(theta, v, strict=True)]
     after = scaled(updated(P, direction, c), moves * wide)
-    return Learnt(theta, after, a, spread.weights)
+    gains = [along * (learns * a * share) for along in v]
+    return Learnt(theta, after, a, spread.weights, gains)
 
 
 # A change of the road's friction: noticed at both axles at once, followed along one direction.

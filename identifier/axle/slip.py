@@ -23,7 +23,9 @@ from models.vehicle import GRAVITY, Vehicle
 
 SHORTEST = 1e-3  # wheelbases: the lag never vanishes
 SLOWEST, FASTEST = 0.1, 100.0  # rad/s, of a body that rolls on springs
-MOST_SENSITIVE = 1e4  # per wheelbase: ∂x/∂s stays below it, also where its recursion does not settle
+MOST_SENSITIVE = (
+    1e4  # per wheelbase: ∂x/∂s stays below it, also where its recursion does not settle
+)
 MOST_SWAY = 10.0  # g: ρ and ρ'/ω stay below it, at any sampling and however speed changes
 
 

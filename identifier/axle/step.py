@@ -294,11 +294,7 @@ def build_step(steps: tuple[int, ...], *, rises: bool = False, bands: bool = Fal
         and the inputs that it needs.
     """
     n = len(steps) + 1
-    f = forward(steps)
-    ports = dict(f.ports)
-    ports["UD"] = ca.SX.sym("UD", 2, len(triangle(n + 3)))
-    ports["friction_direction"] = ca.SX.sym("friction_direction", n, n)
-    ports["per_variance"] = ca.SX.sym("per_variance", 2, 4)
+    f, ports = _symbols(steps)
     h, y, next_state = _regression(f, ports)
     y, next_state["bank"] = _without_bank(f, ports, y)
     sample, means = _sample_of(f, ports, h, y)
@@ -355,6 +351,56 @@ def _half_band(f: Forward, ports: dict[str, Any]) -> Any:
         return half_band(at, P, prior, mine, slips, speeds)
 
     return ca.if_else(f.gated.on, ca.vertcat(of_axle(0), of_axle(1)) * f.car.load, 0)
+
+
+LESSON = ("h", "e", "counts", "gains", "told", "watched")
+
+
+def build_lesson(steps: tuple[int, ...]) -> ca.Function:
+    """Return what a sample teaches, of the ports of the step: the recursion that errors obey.
+
+    h : regressors (2, q).   e : y - h'w (2,).   counts : share of e that counts, after clipping.
+    gains : K (2, q), 0 where nothing is learnt; of lag and offsets also while the watch rests.
+    told : standard deviation that y is told to have (2,), the slow mean of errors in it.
+    watched : whether kept weights come back, and by how much they follow the learnt ones.
+
+    Parameters
+    ----------
+    steps : doublings between the units, the structure.
+    """
+    n = len(steps) + 1
+    f, ports = _symbols(steps)
+    h, y, _ = _regression(f, ports)
+    y, _ = _without_bank(f, ports, y)
+    sample, means = _sample_of(f, ports, h, y)
+    axles = [_learn(ports, sample, i) for i in (0, 1)]
+    watch = _watch(f, ports, h, y, ca.vertcat(*(axle.uncertainty for axle in axles)))
+    e = y - ca.sum2(ports["W"] * h[:, :n])
+    moves = ca.logic_not(watch.rests)
+    gains = ca.vertcat(*(ca.horzcat(*one.gains[:n], *(g * moves for g in one.gains[n:]))
+                         for one in axles))  # fmt: skip
+    samples = RegressionNumbers(*ca.vertsplit(ports["regression"])).samples
+    outputs = (
+        sample.h,
+        e,
+        ca.if_else(e == 0, 1, sample.innovation / e),
+        gains,
+        ca.sqrt(sample.R / (means.slow * samples)),
+        ca.vertcat(watch.returns, watch.follow),
+    )
+    name = "_".join(["axle_lesson", *map(str, steps)])
+    return ca.Function(name, list(ports.values()), list(outputs), list(ports), list(LESSON))
+
+
+def _symbols(steps: tuple[int, ...]) -> tuple[Forward, dict[str, Any]]:
+    """Return the forward part, and its ports with those of the covariance."""
+    n = len(steps) + 1
+    f = forward(steps)
+    ports = dict(f.ports)
+    ports["UD"] = ca.SX.sym("UD", 2, len(triangle(n + 3)))
+    ports["friction_direction"] = ca.SX.sym("friction_direction", n, n)
+    ports["per_variance"] = ca.SX.sym("per_variance", 2, 4)
+    return f, ports
 
 
 def _regression(f: Forward, ports: dict[str, Any]) -> tuple[Any, Any, dict[str, Any]]:

@@ -1,0 +1,259 @@
+"""What is proven of the axle identifier along a drive: how wrong may its forces be after it?
+
+Whatever the true parameters θ* are, ε := y - h'θ* (with the model's nonlinearity, noise, bias and
+all that it leaves out) makes the errors θ̃ = θ - θ* of the weights that learn and k̃ = k - θ* of
+those that are kept obey, exactly, with all other letters known from the run:
+
+θ̃⁺ = (I - c K h') θ̃ + c K ε + m   where weights come back: θ̃⁺ = k̃ + m
+k̃⁺ = k̃ + f (θ̃⁺ - k̃)
+
+K: gain.   c: share of the innovation that counts.   m: what bounds and the limited step moved.
+f: share by which kept weights follow.   So the error of the force at a slip, t'θ̃ with the units
+t = tanh(x/α_j), is (p_0 + r_0)'θ̃_0 + Σ g_k ε_k + M, with the adjoints p, r of θ̃ and k̃ run from
+the end to the beginning, g = c p'K, M = Σ p'm. That is a worst case that is reached: by errors
+|ε_k| <= z σ_k with the signs of g_k.
+"""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from codegen.arrays import Array
+from identifier.axle.certificate import corners, curve_facts, jump_by_learning
+from identifier.axle.covariance import unpacked
+from identifier.axle.curve import doublings
+from identifier.axle.model import AxleModel
+from identifier.axle.step import LESSON, build_lesson
+from identifier.certificate import Property, at_most, statement
+from identifier.tire_model import AXLES
+
+if TYPE_CHECKING:
+    from identifier.axle.design import AxleIdentifier  # which asks for this
+    from identifier.run import History
+
+SLIPS = 12  # over the range that is known, at which errors are bounded
+BEGIN = 3.0  # standard deviations of the prior, within which the truth lies before the drive
+SMALLEST = 1e-4  # rad: where nothing is known
+TINY = 1e-30  # keeps a quotient finite
+ROUNDING = 1e-9  # of a bound
+
+
+class Lessons(NamedTuple):
+    """What N samples taught, rows front and rear, as of `identifier.axle.step.build_lesson`.
+
+    theta : parameters before each sample and after the last (N + 1, 2, q).
+    moved : m, what neither learning nor going back explains (N, 2, q).
+    """
+
+    h: Array
+    e: Array
+    counts: Array
+    gains: Array
+    told: Array
+    watched: Array
+    theta: Array
+    moved: Array
+
+
+class ErrorGains(NamedTuple):
+    """How much of what reaches the force of an axle at m slips, in static axle loads.
+
+    begin : (p_0 + r_0), of the first error of the parameters (m, q).   per_told : Σ |g| σ.
+    per_error : Σ |g|.   bias : Σ g.   noise : root of Σ g².   moved : M.   All (m,).
+    """
+
+    begin: Array
+    per_told: Array
+    per_error: Array
+    bias: Array
+    noise: Array
+    moved: Array
+
+
+def lessons(design: "AxleIdentifier", history: "History") -> Lessons:
+    """Return what the samples of a run taught.
+
+    Parameters
+    ----------
+    history : a run of the design.
+    """
+    setup = design.setup(history.vehicle, history.start)
+    step = build_lesson(doublings(design.ladder))
+    parts, theta, kept = [], [], []
+    for block in history.blocks():
+        seen = setup.shown(history.recording, block.part)
+        signals = {port: seen.of_recording(values) for port, values in seen.signals.items()}
+        parts.append(_taught(step, {**setup.constants, **block.before, **signals}, setup.constants))
+        theta.append(np.concatenate([block.state["W"], block.state["own"]], axis=2))
+        kept.append(block.before["kept"])
+    h, e, counts, gains, told, watched = (
+        np.concatenate([part[name] for part in parts]) for name in LESSON
+    )
+    path = np.concatenate([*(one[:-1] for one in theta), theta[-1][-1:]])
+    learnt = path[:-1] + gains * (counts * e)[:, :, None]
+    learnt = np.where(watched[:, :1, None] > 0.0, np.concatenate(kept), learnt)
+    return Lessons(h, e, counts, gains, told, watched, path, path[1:] - learnt)
+
+
+def _taught(
+    step: ca.Function, values: Mapping[str, Array], constants: Mapping[str, Array]
+) -> dict[str, Array]:
+    """Return the outputs of `build_lesson` for N samples, (N, ...).
+
+    Parameters
+    ----------
+    values : of its ports, (N, ...) but for the constants.
+    constants : ports that are alike for all samples.
+    """
+    N, names = len(values["v_x"]), step.name_in()
+    alike = [i for i, name in enumerate(names) if name in constants]
+    told = []
+    for name in names:
+        value, (rows, columns) = np.asarray(values[name]), step.size_in(name)
+        if name not in constants:
+            value = value.reshape(N, rows, columns).transpose(1, 0, 2).reshape(rows, -1)
+        told.append(value)
+    found = step.map("lessons", "serial", N, alike, [])(*told)
+    return {name: _by_sample(np.array(value), N) for name, value in zip(LESSON, found, strict=True)}
+
+
+def _by_sample(value: Array, N: int) -> Array:
+    """Return (N, rows, columns) of values side by side (rows, N columns); (N, rows) of columns."""
+    rows, columns = value.shape[0], value.shape[1] // N
+    apart = value.reshape(rows, N, columns).transpose(1, 0, 2)
+    return apart[:, :, 0] if columns == 1 else apart
+
+
+def error_gains(taught: Lessons, slips: Array, ladder: tuple[float, ...]) -> list[ErrorGains]:
+    """Return what reaches the force of each axle after a drive, from its end to its beginning.
+
+    Parameters
+    ----------
+    taught : by the drive.
+    slips : at which the force is looked at, of each axle (2, m) [rad].
+    ladder : slip scales of the units [rad].
+    """
+    q, n = taught.h.shape[2], len(ladder)
+    units = np.tanh(slips[:, :, None] / np.array(ladder))
+    p = np.concatenate([units, np.zeros((*slips.shape, q - n))], axis=2)  # (2, m, q)
+    r = np.zeros_like(p)
+    sums = np.zeros((5, *slips.shape))
+    gains = taught.gains * taught.counts[:, :, None]
+    for h, K, told, m, (back, follow) in zip(
+        taught.h[::-1], gains[::-1], taught.told[::-1], taught.moved[::-1], taught.watched[::-1],
+        strict=True,
+    ):  # fmt: skip
+        p = p + follow * r
+        r = (1.0 - follow) * r
+        sums[4] += (p * m[:, None]).sum(axis=2)
+        if back:
+            p, r = np.zeros_like(p), r + p
+            continue
+        g = (p * K[:, None]).sum(axis=2)
+        p = p - g[:, :, None] * h[:, None]
+        size = np.abs(g)
+        sums[:4] += size * told[:, None], size, g, g**2
+    return [
+        ErrorGains(begin, per_told, per_error, bias, np.sqrt(squared), moved)
+        for begin, per_told, per_error, bias, squared, moved in zip(p + r, *sums, strict=True)
+    ]
+
+
+def certified_along(design: "AxleIdentifier", history: "History") -> tuple[Property, ...]:
+    """Return what is proven of the curves that a drive taught.
+
+    Parameters
+    ----------
+    design : the identifier.
+    history : its run over the drive.
+    """
+    model = design.frozen(history.vehicle, history.state_at(float(history.recording.t[-1])))
+    taught = lessons(design, history)
+    known = np.asarray(model.known_slip)
+    slips = np.linspace(1.0 / SLIPS, 1.0, SLIPS) * np.maximum(known, SMALLEST)[:, None]
+    gains = error_gains(taught, slips, design.ladder)
+    carry = design.setup(history.vehicle, history.start).carry
+    begin = unpacked(carry["UD"], len(design.ladder) + 3)
+    box = corners(design.bounds, design.ladder, design.rising_until)
+    jump = np.abs(np.cumsum(np.diff(taught.theta[:, :, : len(design.ladder)], axis=0), axis=2))
+    back = taught.watched[:, 0] > 0.0
+    largest = float(jump[~back].max(initial=0.0))
+    limit = jump_by_learning(design)
+    found = [
+        Property(
+            name="along/jump",
+            title="largest jump of a force by learning",
+            value=largest,
+            limit=limit,
+            margin=limit / max(largest, TINY),
+            status=at_most(largest, good=limit * (1.0 + ROUNDING), bad=limit * (1.0 + ROUNDING)),
+            unit="static loads",
+            advice="weights were changed by something else than learning",
+        )
+    ]
+    for i in range(len(AXLES)):
+        found += _of_axle(i, model, gains[i], begin[i], slips[i], box)
+    return tuple(found)
+
+
+def _of_axle(
+    i: int, model: AxleModel, gains: ErrorGains, begin: Array, slips: Array, box: Array
+) -> tuple[Property, ...]:
+    """Return what is proven of the curve of axle i.
+
+    Parameters
+    ----------
+    model : that was learnt.
+    gains : of errors, at the slips (m,).
+    begin : covariance of the parameters before the drive (q, q).
+    slips : [rad], up to the range that is known (m,).
+    box : corners of the set of weights (k, n).
+    """
+    axle, known = AXLES[i], float(model.known_slip[i])
+    facts = curve_facts(model.W[i : i + 1], model.ladder, max(known, SMALLEST))
+    at_slips = np.tanh(slips[:, None] / np.array(model.ladder))
+    possible = np.abs((box - model.W[i]) @ at_slips.T).max(axis=0)
+    left = BEGIN * np.sqrt(np.einsum("mi,ij,mj->m", gains.begin, begin, gains.begin))
+    error = left + gains.per_told + np.abs(gains.moved)
+    worst = int(np.argmax(error / possible))
+    span = f"{axle} axle, slip up to {known:.3g} rad"
+    part = [
+        ("told", "of that by errors as they are told", gains.per_told, "static loads"),
+        ("begin", "of that by the beginning", left, "static loads"),
+        ("moved", "of that by bounds", np.abs(gains.moved), "static loads"),
+        ("error_gain", "force error per largest error of y", gains.per_error, "-"),
+        ("bias_gain", "force error per constant error of y", np.abs(gains.bias), "-"),
+        ("noise_gain", "deviation of force per deviation of white noise of y", gains.noise, "-"),
+    ]
+    return (
+        Property(
+            name=f"along/{axle}/opposes",
+            title=f"{span}: flattest secant",
+            value=facts.flattest,
+            limit=0.0,
+            margin=facts.flattest,
+            status="pass" if facts.flattest > 0.0 else "fail",
+            unit="static loads/rad",
+            advice="the force does not push against its slip where the curve is called known",
+        ),
+        statement(
+            f"along/{axle}/steepest", f"{span}: steepest secant", facts.steepest, "static loads/rad"
+        ),
+        statement(f"along/{axle}/rises_until", f"{span}: rises until", facts.rises_until, "rad"),
+        Property(
+            name=f"along/{axle}/force_error",
+            title=f"{span}: largest force error, where y errs as told",
+            value=float(error[worst]),
+            limit=float(possible[worst]),
+            margin=float(possible[worst] / error[worst]),
+            status=at_most(float(error[worst]), good=float(possible[worst]), bad=None),
+            unit="static loads",
+            advice="the boxes alone hold the error: drive with more slip",
+        ),
+        *(
+            statement(f"along/{axle}/{name}", f"{span}: {title}", float(value[worst]), unit)
+            for name, title, value, unit in part
+        ),
+    )

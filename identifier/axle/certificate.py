@@ -1,0 +1,333 @@
+"""What is proven of the axle identifier before it drives: docs/methods/certificates.md has the proofs.
+
+Weights w of an axle lie, after every sample, in the polytope of `Bounds`: grip Σ w_j and slope
+Σ w_j/α_j in their ranges, |w_j| <= weight. What is linear in w is largest at a corner of it.
+φ(x) = Σ w_j tanh(x/α_j), in static axle loads; every unit, its slope and its secant change
+monotonically with x > 0, so that their values at the ends of a cell of slips bound them inside.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from itertools import combinations, product
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from codegen.arrays import Array
+from identifier.axle.covariance import LEAST_VARIANCE
+from identifier.axle.learning import FLOAT, LARGEST_Q, LEAN, MOST_SLOW, SLOW_Q, Bounds, unit_slopes
+from identifier.axle.prior import friction_direction
+from identifier.certificate import Property, at_least, at_most, statement
+from identifier.driving import Driving
+from models.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from identifier.axle.design import AxleIdentifier  # which asks for this
+
+LARGEST_SLIP = 1.5  # rad
+CELLS = 2000  # of slip, each a part wider than the one before
+SMALLEST_CELL = 1e-5  # rad, from zero slip
+ON_BOUND = 1e-9  # of a bound, within which a corner lies on it
+LONGEST = 60.0  # s, beyond which a drop is not followed
+FORGETS = (0.5, 0.9)  # share of its own information that a sample may forget: good, bad
+
+
+@cache
+def corners(bounds: Bounds, ladder: tuple[float, ...], rising_until: float | None) -> Array:
+    """Return the corners of the set that weights are kept in, (k, n) [static axle loads].
+
+    Parameters
+    ----------
+    bounds : of the weights.
+    ladder : slip scales of the units [rad].
+    rising_until : as of `AxleIdentifier`; None bounds no slope.
+    """
+    n, most = len(ladder), bounds.weight
+    slabs = [(np.ones(n), (bounds.least_grip, bounds.most_grip))]
+    if rising_until is not None:
+        least = 0.0 if rising_until else bounds.least_stiffness
+        slabs.append((unit_slopes(ladder, rising_until), (least, bounds.most_stiffness)))
+    found = []
+    for active in range(len(slabs) + 1):
+        for chosen in combinations(slabs, active):
+            for free in map(list, combinations(range(n), active)):
+                rest = [j for j in range(n) if j not in free]
+                rows = np.array([row[free] for row, _ in chosen]).reshape(active, active)
+                if active and abs(np.linalg.det(rows)) < ON_BOUND:
+                    continue
+                for ends in product(*(range_ for _, range_ in chosen)):
+                    for at in product((-most, most), repeat=n - active):
+                        w = np.zeros(n)
+                        w[rest] = at
+                        missing = [
+                            end - row @ w for (row, _), end in zip(chosen, ends, strict=True)
+                        ]
+                        w[free] = np.linalg.solve(rows, missing) if active else []
+                        found.append(w)
+    points = np.array(found)
+    inside = (np.abs(points) <= most * (1.0 + ON_BOUND)).all(axis=1)
+    for row, (low, high) in slabs:
+        value = points @ row
+        inside &= (value >= low - ON_BOUND * high) & (value <= high * (1.0 + ON_BOUND))
+    return points[inside]
+
+
+class CurveFacts(NamedTuple):
+    """What holds of force curves on slips from 0 to `until`, proven cell by cell.
+
+    opposes_until, rises_until : slip up to which φ/x and φ' are positive for certain [rad].
+    flattest, steepest : secants φ/x lie between them [static axle loads/rad].
+    """
+
+    until: float
+    opposes_until: float
+    rises_until: float
+    flattest: float
+    steepest: float
+
+
+def _cells(until: float) -> Array:
+    """Return the ends of cells of slip from 0 on [rad]."""
+    narrow = np.geomspace(min(SMALLEST_CELL, 0.1 * until), until, CELLS)
+    return np.concatenate([[0.0], narrow])
+
+
+def curve_facts(W: Array, ladder: tuple[float, ...], until: float) -> CurveFacts:
+    """Return what holds of every curve of a set.
+
+    On a cell from a to b a falling function s of a unit is between s(b) and s(a), so that
+    Σ w_j s_j is at least Σ_(w>0) w_j s_j(b) + Σ_(w<0) w_j s_j(a).
+
+    Parameters
+    ----------
+    W : weights of the curves (k, n) [static axle loads].
+    ladder : slip scales of the units [rad].
+    until : largest slip [rad].
+    """
+    edges = _cells(until)
+    scales = np.array(ladder)
+    at = edges[:, None] / scales
+    slopes = 1.0 / (scales * np.cosh(np.minimum(at, 300.0)) ** 2)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        secants = np.where(at > 0.0, np.tanh(at) / edges[:, None], 1.0 / scales)
+    up, down = np.maximum(W, 0.0).T, np.minimum(W, 0.0).T
+
+    def least(s: Array) -> Array:
+        return np.asarray((s[1:] @ up + s[:-1] @ down).min(axis=1))
+
+    rising, opposing = least(slopes) > 0.0, least(secants)
+    return CurveFacts(
+        until=until,
+        opposes_until=_first(edges, opposing > 0.0),
+        rises_until=_first(edges, rising),
+        flattest=float(opposing.min()),
+        steepest=float((secants[:-1] @ up + secants[1:] @ down).max()),
+    )
+
+
+def _first(edges: Array, good: Array) -> float:
+    """Return the slip up to which all cells are good."""
+    return float(edges[-1] if good.all() else edges[int(np.argmin(good))])
+
+
+def widest_range(W: Array, ladder: tuple[float, ...], until: float) -> float:
+    """Return by how much two curves of a set may differ at one slip [static axle loads].
+
+    Parameters
+    ----------
+    W : corners of the set (k, n).
+    ladder : slip scales of the units [rad].
+    until : largest slip [rad].
+    """
+    units = np.tanh(_cells(until)[:, None] / np.array(ladder))
+    up, down = np.maximum(W, 0.0).T, np.minimum(W, 0.0).T
+    most = (units[1:] @ up + units[:-1] @ down).max(axis=1)
+    least = (units[:-1] @ up + units[1:] @ down).min(axis=1)
+    return float((most - least).max())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrictionDrop:
+    """A drop of friction in a steady corner, for which the time to follow it is proven.
+
+    Parameters
+    ----------
+    to : friction after it over that before [-].
+    left : share of the change that may still be missing when it counts as followed [-].
+    seen : |φ - x φ'| of the regressor: what a change of friction makes there [static axle loads].
+    noise : largest error of the measured force [static axle loads].
+    unsure : standard deviation that lag and offsets leave in it [static axle loads].
+    slope : of the curves in the corner [static axle loads/rad].
+    free : share of the largest variance of weights that is not taken [-].
+    errors : slow mean of the squared error over what is told, when it drops [-].
+    """
+
+    to: float = 0.5
+    left: float = 0.5
+    seen: float = 0.2
+    noise: float = 0.01
+    unsure: float = 0.005
+    slope: float = 20.0
+    free: float = 0.75
+    errors: float = 1.0
+
+    def time(
+        self, design: "AxleIdentifier", vehicle: Vehicle, friction: float, v_x: float
+    ) -> float:
+        """Return for how long at most both axles stay wrong by more than `left` of it [s].
+
+        While both are, the mean of squared errors rises at least as fast as here, the alarm with
+        it, and the variance that the alarm adds opens the gain: at each sample the error falls by
+        at least what is taken off here. inf where that does not end within a minute.
+
+        Parameters
+        ----------
+        friction : before the drop [-].
+        v_x : speed [m/s].
+        """
+        r, change, dt, n = design.regression, design.change, design.dt, len(design.ladder)
+        error = friction * (1.0 - self.to)
+        wrong = self.left * error
+        told = r.error + r.relative_error * friction + r.noise * self.slope / v_x
+        sure = r.error + r.relative_error * friction * self.to
+        samples, step = r.correlation_time / dt, (1.0 - LEAN) * r.rate * dt
+        _, fast_gain, slow_gain, inflation, _ = change.numbers(dt)
+        q = min(((wrong - self.noise) / told) ** 2, LARGEST_Q) if wrong > self.noise else 0.0
+        prior = design.prior.covariance(vehicle, design.ladder)[:, :n, :n]
+        widest = r.widest * np.trace(prior, axis1=1, axis2=2)
+        means = design.prior.means(vehicle, design.ladder)[0] * friction / design.prior.friction
+        along = np.linalg.norm(means @ friction_direction(design.ladder).T, axis=1)
+        room = float((self.free * widest / along**2).min())
+        fast, slow, a, added = 0.0, self.errors, 0.0, 0.0
+        for k in range(1, math.ceil(LONGEST / dt) + 1):
+            fast += fast_gain * (q - fast)
+            slow = min(slow * (1.0 + (SLOW_Q - 1.0) * slow_gain), MOST_SLOW)
+            alarm = min(max(fast / (slow * change.threshold) - 1.0, 0.0), 1.0)
+            if added + alarm * inflation <= room:
+                added, a = added + alarm * inflation, a + alarm * inflation * self.seen**2
+            pull = max(a - self.unsure * math.sqrt(a), 0.0)
+            move = min(
+                pull / (samples * slow * sigma**2 + a) * min(error - self.noise, r.clip * sigma)
+                for sigma in (sure, told)
+            )
+            if pull > 0.0:
+                error -= min(move, step * pull / math.sqrt(a * n * float(widest.max())))
+            if error <= wrong:
+                return k * dt
+            least = samples * sure**2
+            a = a * least / (least + a)
+        return math.inf
+
+
+def certified(design: "AxleIdentifier", vehicle: Vehicle, driving: Driving) -> tuple[Property, ...]:
+    """Return what is proven of a design, whatever is measured unless a title says more.
+
+    Parameters
+    ----------
+    design : the identifier.
+    vehicle : the car, as far as the identifier knows it.
+    driving : its speed and friction are those of the drop.
+    """
+    b, dt = design.bounds, design.dt
+    set_ = corners(b, design.ladder, design.rising_until)
+    facts = curve_facts(set_, design.ladder, LARGEST_SLIP)
+    apart = widest_range(set_, design.ladder, LARGEST_SLIP)
+    jump = jump_by_learning(design)
+    forgets = -math.expm1(-dt / design.regression.memory)
+    lean = _lean_over_rounding(design)
+    follows = FrictionDrop().time(design, vehicle, driving.friction, driving.v_x)
+    by_memory = design.regression.memory * math.log(2.0)
+    again = design.watch.known / 2.0
+    return (
+        Property(
+            name="forgets",
+            title="information along its regressor that a sample forgets; covariance stays positive",
+            value=forgets,
+            limit=FORGETS[0],
+            margin=FORGETS[0] / forgets,
+            status=at_most(forgets, good=FORGETS[0], bad=FORGETS[1]),
+            unit="-",
+            advice="sample faster, or let the memory be longer",
+        ),
+        statement(
+            "smallest_factor",
+            "smallest factor D of the covariance U D U', double and float",
+            LEAST_VARIANCE,
+            "units of weights^2",
+        ),
+        Property(
+            name="lean",
+            title="lean of a limited step to the center, over rounding in float: boxes hold exactly",
+            value=lean,
+            limit=1.0,
+            margin=lean,
+            status=at_least(lean, good=1.0, bad=1.0),
+            unit="-",
+            advice="leave more room between the bounds",
+        ),
+        statement(
+            "opposes_until",
+            "slip up to which every curve that may be learnt pushes against its slip",
+            facts.opposes_until,
+            "rad",
+            "of the curve that was learnt, on its own range: --along LOG",
+        ),
+        statement(
+            "rises_until",
+            "slip up to which every curve that may be learnt rises",
+            facts.rises_until,
+            "rad",
+            "of the curve that was learnt, on its own range: --along LOG",
+        ),
+        statement("steepest", "steepest secant of any curve", facts.steepest, "static loads/rad"),
+        Property(
+            name="jump",
+            title="largest jump of a force by learning, in one sample",
+            value=jump,
+            limit=apart,
+            margin=apart / jump,
+            status=at_most(jump, good=apart, bad=None),
+            unit="static loads",
+            advice="the boxes alone hold it: sample faster, or lower the rate",
+        ),
+        statement(
+            "jump_back",
+            "largest jump where weights from before an alarm come back",
+            apart,
+            "static loads",
+            f"not twice within {again:.3g} s of driving that is explained",
+        ),
+        Property(
+            name="drop_time",
+            title="friction drops to half in a steady corner: both axles stay half wrong",
+            value=follows,
+            limit=by_memory,
+            margin=by_memory / follows,
+            status=at_most(follows, good=by_memory, bad=None),
+            unit="s",
+            advice="no alarm is proven to follow it: larger errors are told than the drop makes",
+        ),
+    )
+
+
+def jump_by_learning(design: "AxleIdentifier") -> float:
+    """Return by how much learning changes a force in one sample at most [static axle loads].
+
+    The step that is let through, and its lean to the center: no partial sum of weights is further
+    from there than n times the weight and the grip.
+
+    Parameters
+    ----------
+    design : the identifier.
+    """
+    b, n = design.bounds, len(design.ladder)
+    return design.regression.rate * design.dt + LEAN * n * (b.weight + b.most_grip)
+
+
+def _lean_over_rounding(design: "AxleIdentifier") -> float:
+    """Return how far a limited step leans inwards, over what rounding in float may do to it."""
+    n, b = len(design.ladder), design.bounds
+    numbers = b.of_ladder(design.ladder, design.rising_until)
+    per_distance = numbers[5:9] if design.rising_until is not None else numbers[[5, 8]]
+    return float(LEAN / per_distance.max() / (8.0 * n * FLOAT * b.weight))
