@@ -26,7 +26,6 @@ from models.rules import LARGEST_FORCE
 from models.schema import Table
 from models.vehicle import BICYCLE, Vehicle
 
-
 if TYPE_CHECKING:
     from identifier.run import History  # which runs methods
 

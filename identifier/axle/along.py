@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 SLIPS = 12  # over the range that is known, at which errors are bounded
 BEGIN = 3.0  # standard deviations of the prior, within which the truth lies before the drive
+MOST = 360_000  # samples that are looked at, those at the end
 SMALLEST = 1e-4  # rad: where nothing is known
 TINY = 1e-30  # keeps a quotient finite
 ROUNDING = 1e-9  # of a bound
@@ -45,6 +46,8 @@ class Lessons(NamedTuple):
 
     theta : parameters before each sample and after the last (N + 1, 2, q).
     moved : m, what neither learning nor going back explains (N, 2, q).
+    begin : covariance of the parameters before the first sample (2, q, q).
+    apart : by how much the kept parameters differ from them there (2, q).
     """
 
     h: Array
@@ -55,46 +58,53 @@ class Lessons(NamedTuple):
     watched: Array
     theta: Array
     moved: Array
+    begin: Array
+    apart: Array
+
+    @property
+    def left(self) -> Array:
+        """Y - h'θ with the parameters at the end (N, 2): ε, as far as the drive shows it."""
+        return np.asarray(self.e + (self.h * (self.theta[:-1] - self.theta[-1])).sum(axis=2))
 
 
-class ErrorGains(NamedTuple):
-    """How much of what reaches the force of an axle at m slips, in static axle loads.
+class Adjoint(NamedTuple):
+    """What reaches the force of an axle at m slips, static axle loads, rows front and rear.
 
-    begin : (p_0 + r_0), of the first error of the parameters (m, q).   per_told : Σ |g| σ.
-    per_error : Σ |g|.   bias : Σ g.   noise : root of Σ g².   moved : M.   All (m,).
+    begin : p_0 + r_0, of the first error of the parameters (2, m, q).   moved : M (2, m).
+    g : of the error of y at each sample (N, 2, m).
     """
 
     begin: Array
-    per_told: Array
-    per_error: Array
-    bias: Array
-    noise: Array
     moved: Array
+    g: Array
 
 
 def lessons(design: "AxleIdentifier", history: "History") -> Lessons:
-    """Return what the samples of a run taught.
+    """Return what the samples of a run taught; of a long one those at its end.
 
     Parameters
     ----------
     history : a run of the design.
     """
     setup = design.setup(history.vehicle, history.start)
-    step = build_lesson(doublings(design.ladder))
-    parts, theta, kept = [], [], []
-    for block in history.blocks():
+    step, n = build_lesson(doublings(design.ladder)), len(history.recording)
+    parts, theta, kept, begin = [], [], [], []
+    for block in history.blocks(np.arange(max(n - MOST, 0), n)):
         seen = setup.shown(history.recording, block.part)
         signals = {port: seen.of_recording(values) for port, values in seen.signals.items()}
         parts.append(_taught(step, {**setup.constants, **block.before, **signals}, setup.constants))
         theta.append(np.concatenate([block.state["W"], block.state["own"]], axis=2))
         kept.append(block.before["kept"])
+        begin.append(block.state["UD"][0])
     h, e, counts, gains, told, watched = (
         np.concatenate([part[name] for part in parts]) for name in LESSON
     )
     path = np.concatenate([*(one[:-1] for one in theta), theta[-1][-1:]])
     learnt = path[:-1] + gains * (counts * e)[:, :, None]
     learnt = np.where(watched[:, :1, None] > 0.0, np.concatenate(kept), learnt)
-    return Lessons(h, e, counts, gains, told, watched, path, path[1:] - learnt)
+    P = unpacked(begin[0], len(design.ladder) + 3)
+    apart = kept[0][0] - path[0]
+    return Lessons(h, e, counts, gains, told, watched, path, path[1:] - learnt, P, apart)
 
 
 def _taught(
@@ -126,7 +136,7 @@ def _by_sample(value: Array, N: int) -> Array:
     return apart[:, :, 0] if columns == 1 else apart
 
 
-def error_gains(taught: Lessons, slips: Array, ladder: tuple[float, ...]) -> list[ErrorGains]:
+def adjoint(taught: Lessons, slips: Array, ladder: tuple[float, ...]) -> Adjoint:
     """Return what reaches the force of each axle after a drive, from its end to its beginning.
 
     Parameters
@@ -138,27 +148,21 @@ def error_gains(taught: Lessons, slips: Array, ladder: tuple[float, ...]) -> lis
     q, n = taught.h.shape[2], len(ladder)
     units = np.tanh(slips[:, :, None] / np.array(ladder))
     p = np.concatenate([units, np.zeros((*slips.shape, q - n))], axis=2)  # (2, m, q)
-    r = np.zeros_like(p)
-    sums = np.zeros((5, *slips.shape))
+    r, moved = np.zeros_like(p), np.zeros(slips.shape)
+    g = np.zeros((len(taught.e), *slips.shape))
     gains = taught.gains * taught.counts[:, :, None]
-    for h, K, told, m, (back, follow) in zip(
-        taught.h[::-1], gains[::-1], taught.told[::-1], taught.moved[::-1], taught.watched[::-1],
-        strict=True,
-    ):  # fmt: skip
+    for k in range(len(taught.e) - 1, -1, -1):
+        back, follow = taught.watched[k]
         p = p + follow * r
         r = (1.0 - follow) * r
-        sums[4] += (p * m[:, None]).sum(axis=2)
+        moved += (p @ taught.moved[k, :, :, None])[:, :, 0]
         if back:
             p, r = np.zeros_like(p), r + p
             continue
-        g = (p * K[:, None]).sum(axis=2)
-        p = p - g[:, :, None] * h[:, None]
-        size = np.abs(g)
-        sums[:4] += size * told[:, None], size, g, g**2
-    return [
-        ErrorGains(begin, per_told, per_error, bias, np.sqrt(squared), moved)
-        for begin, per_told, per_error, bias, squared, moved in zip(p + r, *sums, strict=True)
-    ]
+        g[k] = (p @ gains[k, :, :, None])[:, :, 0]
+        p = p - g[k, :, :, None] * taught.h[k, :, None]
+    moved += (r @ taught.apart[:, :, None])[:, :, 0]
+    return Adjoint(p + r, moved, g)
 
 
 def certified_along(design: "AxleIdentifier", history: "History") -> tuple[Property, ...]:
@@ -173,9 +177,7 @@ def certified_along(design: "AxleIdentifier", history: "History") -> tuple[Prope
     taught = lessons(design, history)
     known = np.asarray(model.known_slip)
     slips = np.linspace(1.0 / SLIPS, 1.0, SLIPS) * np.maximum(known, SMALLEST)[:, None]
-    gains = error_gains(taught, slips, design.ladder)
-    carry = design.setup(history.vehicle, history.start).carry
-    begin = unpacked(carry["UD"], len(design.ladder) + 3)
+    reach = adjoint(taught, slips, design.ladder)
     box = corners(design.bounds, design.ladder, design.rising_until)
     jump = np.abs(np.cumsum(np.diff(taught.theta[:, :, : len(design.ladder)], axis=0), axis=2))
     back = taught.watched[:, 0] > 0.0
@@ -194,20 +196,20 @@ def certified_along(design: "AxleIdentifier", history: "History") -> tuple[Prope
         )
     ]
     for i in range(len(AXLES)):
-        found += _of_axle(i, model, gains[i], begin[i], slips[i], box)
+        found += _of_axle(i, model, taught, reach, slips[i], box)
     return tuple(found)
 
 
 def _of_axle(
-    i: int, model: AxleModel, gains: ErrorGains, begin: Array, slips: Array, box: Array
+    i: int, model: AxleModel, taught: Lessons, reach: Adjoint, slips: Array, box: Array
 ) -> tuple[Property, ...]:
     """Return what is proven of the curve of axle i.
 
     Parameters
     ----------
     model : that was learnt.
-    gains : of errors, at the slips (m,).
-    begin : covariance of the parameters before the drive (q, q).
+    taught : by the drive.
+    reach : of errors, at the slips of both axles (2, m).
     slips : [rad], up to the range that is known (m,).
     box : corners of the set of weights (k, n).
     """
@@ -215,17 +217,20 @@ def _of_axle(
     facts = curve_facts(model.W[i : i + 1], model.ladder, max(known, SMALLEST))
     at_slips = np.tanh(slips[:, None] / np.array(model.ladder))
     possible = np.abs((box - model.W[i]) @ at_slips.T).max(axis=0)
-    left = BEGIN * np.sqrt(np.einsum("mi,ij,mj->m", gains.begin, begin, gains.begin))
-    error = left + gains.per_told + np.abs(gains.moved)
-    worst = int(np.argmax(error / possible))
+    g, sizes = reach.g[:, i], np.abs(reach.g[:, i])
+    by_begin, by_bounds = begin_error(taught, reach)[i], np.abs(reach.moved[i])
+    by_told, by_left = taught.told[:, i] @ sizes, np.abs(taught.left[:, i]) @ sizes
+    error = by_begin + by_told + by_bounds
+    k = int(np.argmax(error / possible))
     span = f"{axle} axle, slip up to {known:.3g} rad"
+    noise = np.sqrt((g**2).sum(axis=0))
     part = [
-        ("told", "of that by errors as they are told", gains.per_told, "static loads"),
-        ("begin", "of that by the beginning", left, "static loads"),
-        ("moved", "of that by bounds", np.abs(gains.moved), "static loads"),
-        ("error_gain", "force error per largest error of y", gains.per_error, "-"),
-        ("bias_gain", "force error per constant error of y", np.abs(gains.bias), "-"),
-        ("noise_gain", "deviation of force per deviation of white noise of y", gains.noise, "-"),
+        ("told", "of that by errors as they are told", by_told, "static loads"),
+        ("begin", "of that by the beginning", by_begin, "static loads"),
+        ("moved", "of that by bounds", by_bounds, "static loads"),
+        ("error_gain", "force error per largest error of y", sizes.sum(axis=0), "-"),
+        ("bias_gain", "force error per constant error of y", np.abs(g.sum(axis=0)), "-"),
+        ("noise_gain", "deviation of force per deviation of white noise of y", noise, "-"),
     ]
     return (
         Property(
@@ -245,15 +250,38 @@ def _of_axle(
         Property(
             name=f"along/{axle}/force_error",
             title=f"{span}: largest force error, where y errs as told",
-            value=float(error[worst]),
-            limit=float(possible[worst]),
-            margin=float(possible[worst] / error[worst]),
-            status=at_most(float(error[worst]), good=float(possible[worst]), bad=None),
+            value=float(error[k]),
+            limit=float(possible[k]),
+            margin=float(possible[k] / error[k]),
+            status=at_most(float(error[k]), good=float(possible[k]), bad=None),
             unit="static loads",
             advice="the boxes alone hold the error: drive with more slip",
         ),
         *(
-            statement(f"along/{axle}/{name}", f"{span}: {title}", float(value[worst]), unit)
+            statement(f"along/{axle}/{name}", f"{span}: {title}", float(value[k]), unit)
             for name, title, value, unit in part
         ),
+        Property(
+            name=f"along/{axle}/left",
+            title=f"{span}: largest force error by what the learnt curve leaves of y",
+            value=float(by_left[k]),
+            limit=float(by_told[k]),
+            margin=float(by_told[k] / max(float(by_left[k]), TINY)),
+            status=at_most(float(by_left[k]), good=float(by_told[k]), bad=None),
+            unit="static loads",
+            advice="y errs by more than is told, and so may the force: sensors, car or signs "
+            "differ from what is told",
+        ),
     )
+
+
+def begin_error(taught: Lessons, reach: Adjoint) -> Array:
+    """Return the force error that the beginning leaves, within `BEGIN` deviations (2, m).
+
+    Parameters
+    ----------
+    taught : by the drive.
+    reach : of errors, at m slips.
+    """
+    variance = np.einsum("ami,aij,amj->am", reach.begin, taught.begin, reach.begin)
+    return np.asarray(BEGIN * np.sqrt(np.maximum(variance, 0.0)))

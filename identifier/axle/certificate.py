@@ -1,4 +1,4 @@
-"""What is proven of the axle identifier before it drives: docs/methods/certificates.md has the proofs.
+"""What is proven of the axle identifier before it drives; proofs: docs/methods/certificates.md.
 
 Weights w of an axle lie, after every sample, in the polytope of `Bounds`: grip Σ w_j and slope
 Σ w_j/α_j in their ranges, |w_j| <= weight. What is linear in w is largest at a corner of it.
@@ -13,6 +13,7 @@ from itertools import combinations, product
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.axle.covariance import LEAST_VARIANCE
@@ -126,7 +127,7 @@ def curve_facts(W: Array, ladder: tuple[float, ...], until: float) -> CurveFacts
     )
 
 
-def _first(edges: Array, good: Array) -> float:
+def _first(edges: Array, good: NDArray[np.bool_]) -> float:
     """Return the slip up to which all cells are good."""
     return float(edges[-1] if good.all() else edges[int(np.argmin(good))])
 
@@ -160,6 +161,8 @@ class FrictionDrop:
     unsure : standard deviation that lag and offsets leave in it [static axle loads].
     slope : of the curves in the corner [static axle loads/rad].
     free : share of the largest variance of weights that is not taken [-].
+    direction : size of the change of weights that another friction makes, over that of a brush
+        tire of that friction [-].
     errors : slow mean of the squared error over what is told, when it drops [-].
     """
 
@@ -169,7 +172,8 @@ class FrictionDrop:
     noise: float = 0.01
     unsure: float = 0.005
     slope: float = 20.0
-    free: float = 0.75
+    free: float = 0.85
+    direction: float = 1.5
     errors: float = 1.0
 
     def time(
@@ -198,6 +202,7 @@ class FrictionDrop:
         widest = r.widest * np.trace(prior, axis1=1, axis2=2)
         means = design.prior.means(vehicle, design.ladder)[0] * friction / design.prior.friction
         along = np.linalg.norm(means @ friction_direction(design.ladder).T, axis=1)
+        along *= self.direction
         room = float((self.free * widest / along**2).min())
         fast, slow, a, added = 0.0, self.errors, 0.0, 0.0
         for k in range(1, math.ceil(LONGEST / dt) + 1):
@@ -242,7 +247,7 @@ def certified(design: "AxleIdentifier", vehicle: Vehicle, driving: Driving) -> t
     return (
         Property(
             name="forgets",
-            title="information along its regressor that a sample forgets; covariance stays positive",
+            title="information along its regressor that a sample forgets: P stays positive",
             value=forgets,
             limit=FORGETS[0],
             margin=FORGETS[0] / forgets,
@@ -258,7 +263,7 @@ def certified(design: "AxleIdentifier", vehicle: Vehicle, driving: Driving) -> t
         ),
         Property(
             name="lean",
-            title="lean of a limited step to the center, over rounding in float: boxes hold exactly",
+            title="lean of a limited step inwards over rounding in float: boxes hold exactly",
             value=lean,
             limit=1.0,
             margin=lean,

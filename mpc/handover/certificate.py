@@ -24,9 +24,8 @@ WRONG_WAY = 0.03  # static axle loads that a force may push the wrong way, for o
 def law_complaint(method: Method, vehicle: Vehicle) -> str | None:
     """Return why a method must not teach while driving, or None.
 
-    The paper's laws need the certificate of their gains. Least squares with bounded parameters
-    is not certified: its boxes hold by construction, and what it teaches is judged by
-    `tire_complaint`.
+    The paper's laws need the certificate of their gains, the default that of its numbers; what
+    least squares with bounded parameters teach is judged by `tire_complaint` besides.
     """
     proven = method.certify(vehicle)
     failed = [entry.title for entry in proven.properties if entry.status == "fail"]

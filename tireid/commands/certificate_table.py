@@ -65,13 +65,14 @@ def certificate_text(certificate: Certificate, force_unit: float) -> str:
     return "\n".join([*lines, f"verdict: {certificate.verdict}"])
 
 
-def held_text(name: str, certificate: Certificate, vehicle: Vehicle) -> str:
-    """Return what is certified of a method without gains: its boxes, and what is not proven.
+def method_text(name: str, certificate: Certificate, vehicle: Vehicle, driving: Driving) -> str:
+    """Return what is certified of a method without gains: its properties and its boxes.
 
     Parameters
     ----------
     name : of the method.
     certificate : what is proven of it.
+    driving : conditions of the drop of friction.
     """
     default = ", the default of tireid identify" if name == DEFAULT else ""
     rows = [
@@ -84,11 +85,15 @@ def held_text(name: str, certificate: Certificate, vehicle: Vehicle) -> str:
         lines += [text_table(rows)]
     else:
         lines += ["nothing is held by construction"]
+    if certificate.properties:
+        told = f"at {driving.v_x:.3g} m/s on a friction of {driving.friction:g}"
+        lines += [f"proven, of drops of friction {told}:", certificate_text(certificate, 1.0)]
+        return "\n".join(lines)
     return "\n".join(
         [
             *lines,
             f"verdict: {certificate.verdict}; no margin and no bound of its error is proven, of "
-            "the paper's laws there are: tireid check --paper",
+            f"{DEFAULT}, the default, there are: tireid check",
         ]
     )
 

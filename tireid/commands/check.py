@@ -33,7 +33,7 @@ from tireid.commands.certificate_table import (
     bound_rows,
     certificate_of,
     certificate_text,
-    held_text,
+    method_text,
     monte_carlo_numbers,
     monte_carlo_text,
     unit_text,
@@ -121,9 +121,9 @@ CONDITIONS = {  # field of the declared driving, and the option that says otherw
     "noise_r": "noise_r",
     "noise_delta": "noise_delta",
 }
+OF_ALL = ("v_x", "friction")  # conditions of which not gains alone are judged
 OF_GAINS = (
-    *CONDITIONS.values(),
-    "along",
+    *(option for field, option in CONDITIONS.items() if field not in OF_ALL),
     "monte_carlo",
 )  # options that ask about the paper's gains
 TEXT, NUMBERS = "certificate.txt", "certificate.json"
@@ -140,7 +140,9 @@ def add_parser(commands: Any) -> None:
         "check",
         help=COMMANDS["check"],
         description="Say what is certified of an identifier; without options, of the default of "
-        "tireid identify. Gains of the paper's laws (--paper, --method NAME, --design FILE) are "
+        "tireid identify: boxes, curve, jumps, the time to follow a drop of friction; with --along "
+        "LOG, also of the tires that it learns there: sector, and the largest error of the force. "
+        "Gains of the paper's laws (--paper, --method NAME, --design FILE) are "
         "judged at the worst regressor: poles, sampling, gain and phase margin, damping, drift, "
         "proven bounds. Exit code 0: nothing fails, 1: something does, 2: bad input. With --tune, "
         "find gains and write them.",
@@ -157,7 +159,7 @@ def add_parser(commands: Any) -> None:
         parser.add_argument(
             f"--noise-{signal}", type=float, metavar=unit, help=f"largest error of {signal}"
         )
-    parser.add_argument("--along", metavar="LOG[:RUN]", help="judge the loop along a recording too")
+    parser.add_argument("--along", metavar="LOG[:RUN]", help="judge a recorded run too")
     add_log_map(parser)
     parser.add_argument(
         "--monte-carlo",
@@ -193,15 +195,27 @@ def run(options: argparse.Namespace) -> int:
     if isinstance(method, PaperIdentifier):
         return _judge_gains(options, vehicle, method)
     _refuse_gains(options, name)
-    certificate = certify(method, vehicle)
-    text = _with_estimates(held_text(name, certificate, vehicle), vehicle)
-    numbers = {"method": name, **certificate.to_dict(), "vehicle": vehicle_numbers(vehicle)}
+    driving = replace(natural_driving(vehicle), **_overrides(options))
+    certificate = certify(method, vehicle, driving)
+    if options.along is not None:
+        drive = read_log(options.along, vehicle, told_map(options), dt=method.dt)
+        along = method.certify_along(identify(drive, vehicle, method))
+        if not along.properties:
+            raise ValueError(f"--along: nothing is proven of {name} along a drive")
+        certificate = replace(certificate, properties=certificate.properties + along.properties)
+    text = _with_estimates(method_text(name, certificate, vehicle, driving), vehicle)
+    numbers = {
+        "method": name,
+        "conditions": {field: getattr(driving, field) for field in OF_ALL},
+        **certificate.to_dict(),
+        "vehicle": vehicle_numbers(vehicle),
+    }
     if options.out is not None:
         with output_folder(options.out, force=options.force) as folder:
             _write_certificate(folder, text, numbers)
     tell(json.dumps(numbers, indent=2) if options.json else text)
     _say_written(options)
-    return 0
+    return FAILS if certificate.verdict == "fail" else DONE
 
 
 def _require_drive(options: argparse.Namespace) -> None:

@@ -280,7 +280,7 @@ def _require_tires(learnt: History, t: float) -> None:
 def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool) -> str:
     """Return the certificate of the paper's identifier, or what the axle identifier knows."""
     model, certificate = learnt.freeze(t), learnt.design.certify(vehicle)
-    if certificate.properties:
+    if model.known_slip is None and certificate.properties:
         first = Weights(W=learnt.state["W"][0], V=learnt.state["V"][0])
         beyond = resumed_line(certificate, paper_design(learnt), first) if resumed else ""
         return "\n".join(line for line in (verdict_line(certificate), beyond) if line)
