@@ -87,9 +87,11 @@ def certificate(method: Method, vehicle: Vehicle) -> dict[str, Any]:
     method : what was exported.
     """
     if method.judged_by:
-        return {"verdict": f"judged by {method.judged_by}", "held_by_construction": {}}
+        verdict = f"judged by {method.judged_by}"
+        return {"verdict": verdict, "properties": {}, "held_by_construction": {}}
     found = method.certify(vehicle)
-    return {"verdict": found.verdict, "held_by_construction": dict(found.held)}
+    told = found.to_dict()
+    return {name: told[name] for name in ("verdict", "properties", "held_by_construction")}
 
 
 def summary(specialized: SpecializedStep, content: Mapping[str, Any]) -> dict[str, str | Words]:
@@ -116,12 +118,27 @@ def _certificate_text(method: Method, proven: Mapping[str, Any]) -> str:
             "design file gives the certificate. None is part of this package."
         )
     verdict, held = proven["verdict"], proven["held_by_construction"]
-    lines = [f"This method is **{verdict}**: no stability margin and no error bound is proven."]
+    proven_of = proven["properties"].values()
+    if proven_of:
+        lines = [f"Certificate of this method, for the interval it was built for: **{verdict}**.\n"]
+        lines += ["| property | value | limit | unit | |", "|---|---|---|---|---|"]
+        lines += [
+            f"| {one['title']} | {_number(one['value'])} | {_number(one['limit'])} | {one['unit']} | "
+            f"{one['status']} |"
+            for one in proven_of
+        ]
+        lines.append("")
+    else:
+        lines = [f"This method is **{verdict}**: no margin and no bound of its error is proven."]
     if held:
         lines.append("What holds by construction after every sample, whatever is measured, in both")
         lines.append("precisions, of what it learns:\n")
         lines += ["| bound | |", "|---|---|", *(f"| {key} | {held[key]} |" for key in held)]
     return "\n".join(lines)
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"
 
 
 def _described(signal: Signal) -> dict[str, Any]:

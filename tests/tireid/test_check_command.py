@@ -155,11 +155,11 @@ def test_numbers_and_units_read_well():
 
 
 def test_without_options_it_says_what_is_certified_of_what_identify_uses(capsys, tmp_path):
-    """The boxes are those of the identifier itself, and no margin is claimed of it."""
+    """Boxes and properties are those of the identifier itself."""
     code, said = checked(capsys, "--out", tmp_path / "judged")
     assert code == 0
     assert said.out.startswith("sedan: axle, the default of tireid identify\n")
-    assert "verdict: not certified; no margin and no bound of its error is proven" in said.out
+    assert said.out.splitlines()[-1] == "verdict: pass"
     held = AxleIdentifier.for_vehicle(sedan()).certify(sedan()).held
     least, most = held["grip_static_axle_loads"]
     assert re.search(rf"grip_static_axle_loads +{number(least)} to {number(most)}\n", said.out)
@@ -168,7 +168,53 @@ def test_without_options_it_says_what_is_certified_of_what_identify_uses(capsys,
     assert numbers["held_by_construction"] == held
     code, said = checked(capsys, "--json")
     assert (code, json.loads(said.out)) == (0, numbers)
-    assert "nothing is held by construction" in checked(capsys, "--method", "linear")[1].out
+    linear = checked(capsys, "--method", "linear")[1].out
+    assert "nothing is held by construction" in linear
+    assert "verdict: not certified; no margin and no bound of its error is proven" in linear
+
+
+def test_the_default_is_judged_along_a_log_on_the_slip_that_it_learns_there(capsys, tmp_path):
+    log = tmp_path / "log.csv"
+    assert main(["sample", str(log)]) == 0
+    code, said = checked(capsys, "--along", log, "--json")
+    found = json.loads(said.out)["properties"]
+    assert code == 0 and json.loads(said.out)["verdict"] == "pass"
+    for axle in ("front", "rear"):
+        error = found[f"along/{axle}/force_error"]
+        parts = [found[f"along/{axle}/{name}"]["value"] for name in ("told", "begin", "moved")]
+        assert error["value"] == pytest.approx(sum(parts)) and error["value"] < 0.1
+        assert found[f"along/{axle}/opposes"]["value"] > 1.0
+    assert found["along/jump"]["value"] <= found["jump"]["value"]
+
+
+def test_a_drive_whose_curve_pushes_the_wrong_way_fails_the_certificate(
+    capsys, tmp_path, monkeypatch
+):
+    """Exit code 1, as documented: the learnt weights are made to fall."""
+    log = tmp_path / "log.csv"
+    assert main(["sample", str(log)]) == 0
+    honest = AxleIdentifier.frozen
+
+    def spoilt(self, vehicle, state):
+        model = honest(self, vehicle, state)
+        return replace(model, W=model.W * [1.0, -1.0, -1.0, 1.0])
+
+    monkeypatch.setattr(AxleIdentifier, "frozen", spoilt)
+    code, said = checked(capsys, "--along", log)
+    assert code == 1 and "does not push against its slip" in said.out
+    assert said.out.splitlines()[-1] == "verdict: fail"
+
+
+def test_friction_and_speed_of_the_default_are_those_that_are_told(capsys):
+    times = []
+    for friction in ("1.0", "1.5"):
+        code, said = checked(capsys, "--friction", friction, "--json")
+        numbers = json.loads(said.out)
+        assert code == 0 and numbers["conditions"]["friction"] == float(friction)
+        times.append(numbers["properties"]["drop_time"]["value"])
+    assert times[0] != times[1]
+    assert checked(capsys, "--slip", "0.1")[0] == 2
+    assert checked(capsys, "--method", "linear", "--along", "no.csv")[0] == 2
 
 
 def test_advice_is_given_for_what_does_not_pass_and_says_what_to_do():

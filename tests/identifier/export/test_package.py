@@ -123,13 +123,16 @@ def test_everything_that_goes_in_changes_the_hash():
 
 
 def test_a_package_says_what_is_proven_of_it(packages):
-    """The default method is not certified; its boxes are those of its design."""
+    """The boxes and the properties of the default are those of its design."""
     axle, integral = packages["axle"], packages["integral"]
-    held = json.loads(axle.files["tireid.json"])["certificate"]["held_by_construction"]
-    bounds = axle.specialized.method.bounds
+    told = json.loads(axle.files["tireid.json"])["certificate"]
+    held, method = told["held_by_construction"], axle.specialized.method
+    assert told["verdict"] == "pass"
+    assert told["properties"]["jump"]["value"] == method.certify(CAR)["jump"].value
+    bounds = method.bounds
     assert held["grip_static_axle_loads"] == [bounds.least_grip, bounds.most_grip]
     text = readme(axle, "")
-    assert "This method is **not certified**" in text
+    assert "built for: **pass**" in text and "| largest jump of a force by learning" in text
     assert f"| compliance_m | [0.0, {bounds.compliance}] |" in text
     assert "not certified" not in readme(integral, "")
     assert "`tireid check`" in readme(integral, "")

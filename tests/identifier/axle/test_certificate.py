@@ -1,0 +1,194 @@
+"""What is certified of the axle identifier holds by another road, and its alarms ring."""
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from identifier.axle import AxleIdentifier
+from identifier.axle import learning as steps
+from identifier.axle.along import BEGIN, adjoint, begin_error, certified_along, lessons
+from identifier.axle.certificate import (
+    FrictionDrop,
+    corners,
+    curve_facts,
+    jump_by_learning,
+    widest_range,
+)
+from identifier.axle.covariance import LEAST_VARIANCE, unpacked
+from identifier.axle.curve import LADDER
+from identifier.run import identify
+
+A = np.array(LADDER)
+
+
+@pytest.fixture(name="design")
+def a_design(car):
+    return AxleIdentifier.for_vehicle(car)
+
+
+@pytest.fixture(name="run")
+def a_run(car, drive):
+    return identify(drive(n=1500, amplitude=0.07), car, AxleIdentifier.for_vehicle(car))
+
+
+def test_forces_of_the_corners_are_those_of_linear_programs(design):
+    """Each most and each least force of the set, by HiGHS."""
+    W = corners(design.bounds, design.ladder, design.rising_until)
+    rows = np.array([np.ones(4), -np.ones(4), 1 / A, -1 / A])
+    limits = [3.0, -0.1, 80.0, -2.0]
+    widest = 0.0
+    for slip in (0.003, 0.02, 0.05, 0.13, 0.4):
+        T = np.tanh(slip / A)
+        least, most = (
+            sign * linprog(sign * T, rows, limits, bounds=(-3.0, 3.0)).fun for sign in (1, -1)
+        )
+        assert (W @ T).min() == pytest.approx(least, abs=1e-7)
+        assert (W @ T).max() == pytest.approx(most, abs=1e-7)
+        widest = max(widest, most - least)
+    assert widest <= widest_range(W, LADDER, 1.5) < 1.2 * widest
+
+
+def test_a_ladder_of_three_and_a_free_slope_have_their_corners_too(design):
+    for ladder, rising in (((0.02, 0.08, 0.16), 0.0), (LADDER, None), (LADDER, 0.03)):
+        W = corners(design.bounds, ladder, rising)
+        grip = W.sum(axis=1)
+        assert W.shape[1] == len(ladder) and np.abs(W).max() <= 3.0 + 1e-9
+        assert 0.1 - 1e-9 <= grip.min() < grip.max() <= 3.0 + 1e-9
+
+
+def test_facts_of_curves_are_those_of_a_fine_grid_from_the_safe_side(rng):
+    grid = np.linspace(1e-4, 0.3, 30_000)
+    falls = 0
+    for _ in range(60):
+        w = rng.uniform(-1.0, 1.5, (1, 4))
+        found = curve_facts(w, LADDER, 0.3)
+        secant = (np.tanh(grid[:, None] / A) @ w[0]) / grid
+        slope = (1.0 / (A * np.cosh(grid[:, None] / A) ** 2)) @ w[0]
+        assert found.flattest <= secant.min() + 1e-12 and found.steepest >= secant.max() - 1e-12
+        size = np.abs(w) @ (1.0 / A)
+        assert found.flattest > secant.min() - 0.02 * size.item()
+        wrong = grid[slope <= 0.0]
+        if wrong.size:
+            falls += 1
+            assert found.rises_until <= wrong[0]
+    assert falls > 10
+
+
+def test_a_limited_step_is_cut_to_the_rate_and_another_is_not_moved(design, rng):
+    numbers = steps.BoundNumbers(*design.bounds.of_ladder(LADDER, 0.0))
+    W = corners(design.bounds, LADDER, 0.0)
+    slips = np.tanh(np.geomspace(1e-4, 2.0, 300)[:, None] / A)
+    for _ in range(60):
+        last, w = (rng.dirichlet(np.ones(len(W))) @ W for _ in range(2))
+        found = steps.limited(numbers, 1.0 / 0.3, list(map(ca.DM, last)), list(map(ca.DM, w)))
+        got = np.array([float(one) for one in found])
+        jump = np.abs(slips @ (got - last)).max()
+        assert jump <= jump_by_learning(design) < 0.3025
+        largest = np.abs(np.cumsum(w - last)).max()
+        assert np.array_equal(got, w) == (largest <= 0.3)
+        assert 0.1 < got.sum() < 3.0 and 2.0 < (got / A).sum() < 80.0
+
+
+def test_a_covariance_at_its_floor_is_learnt_with_but_does_not_shrink(design, car, drive):
+    """The floor is raised to where the drive reaches it: D stops there; without it, it falls."""
+    recording = drive(n=1500, amplitude=0.07)
+    n = len(design.ladder)
+    places = [0, 7, 13, 18, 22, 25, 27]
+    free = identify(recording, car, design).state["UD"][:, :, places]
+    assert LEAST_VARIANCE < free.min() < 1e-5
+    setup = design.setup(car)
+    low = setup.carry["UD"].copy()
+    low[:, places] = LEAST_VARIANCE
+    state, theta = dict(setup.carry), []
+    state["UD"] = low
+    for block in setup.run(recording, carry=state):
+        assert block.state["UD"][:, :, places].min() >= LEAST_VARIANCE * (1.0 - 1e-12)
+        theta.append(block.state["W"])
+    assert np.ptp(np.concatenate(theta), axis=0).max() < 1e-6 and n == 4
+
+
+def test_the_recursion_of_errors_is_that_of_the_step(run, car, rng):
+    """For any truth, the learnt force errs by what the adjoints say: to rounding."""
+    design = run.design
+    taught = lessons(design, run)
+    slips = np.tile([0.01, 0.04, 0.12], (2, 1))
+    reach = adjoint(taught, slips, design.ladder)
+    assert np.abs(taught.moved[:, :, :4]).max() < 1e-12  # the compliance alone rests at a bound
+    for _ in range(5):
+        truth = taught.theta[0] + 0.1 * rng.standard_normal((2, 7))
+        noise = taught.e + (taught.h * (taught.theta[:-1] - truth)).sum(axis=2)
+        wrong = (taught.theta[-1] - truth)[:, :4] @ np.tanh(slips[0][:, None] / A).T
+        begin = np.einsum("ami,ai->am", reach.begin, taught.theta[0] - truth)
+        said = begin + reach.moved + np.einsum("nam,na->am", reach.g, noise)
+        np.testing.assert_allclose(said, wrong, atol=1e-9)
+    assert np.abs(said - begin).max() > 1e-3
+
+
+def test_the_worst_errors_of_y_reach_the_bound_and_larger_ones_pass_it(run):
+    design, (i, m) = run.design, (1, 2)
+    taught = lessons(design, run)
+    reach = adjoint(taught, np.tile([0.01, 0.04, 0.12], (2, 1)), design.ladder)
+    g, begin = reach.g[:, i, m], reach.begin[i, m]
+    by_begin = begin_error(taught, reach)[i, m]
+    side = np.sign(reach.moved[i, m])
+    bound = by_begin + np.abs(g) @ taught.told[:, i] + abs(reach.moved[i, m])
+    assert bound < 1.0
+    for share, passes in ((1.0, False), (1.01, True)):
+        error = side * BEGIN**2 * taught.begin[i] @ begin / by_begin
+        for k in range(len(g)):
+            e = share * side * np.sign(g[k]) * taught.told[k, i] - taught.h[k, i] @ error
+            error = error + taught.gains[k, i] * taught.counts[k, i] * e + taught.moved[k, i]
+        reached = abs(np.tanh(0.12 / A) @ error[:4])
+        assert reached == pytest.approx(bound, rel=2e-2)
+        assert (reached > bound * (1.0 + 1e-6)) == passes
+
+
+def test_a_drive_without_slip_proves_nothing_of_the_force(design, car, drive):
+    straight = identify(drive(n=800, amplitude=1e-5), car, design)
+    found = {entry.name: entry for entry in certified_along(design, straight)}
+    swings = {
+        entry.name: entry
+        for entry in certified_along(design, identify(drive(n=1500, amplitude=0.07), car, design))
+    }
+    name = "along/front/begin"
+    assert swings[name].value < 0.05
+    model = identify(drive(n=800, amplitude=1e-5), car, design).freeze()
+    assert model.known_slip.max() < 0.01
+    assert found["along/front/error_gain"].value < 0.5 * swings["along/front/error_gain"].value
+
+
+def test_the_beginning_is_the_prior_s_where_nothing_was_taught(design, car, drive):
+    standing = identify(drive(n=300, speed=2.0), car, design)  # below the speed of learning
+    taught = lessons(design, standing)
+    reach = adjoint(taught, np.full((2, 1), 0.05), design.ladder)
+    P = unpacked(design.setup(car).carry["UD"], 7)[:, :4, :4]
+    t = np.tanh(0.05 / A)
+    prior = 3.0 * np.sqrt(np.einsum("i,aij,j->a", t, P, t))
+    np.testing.assert_allclose(begin_error(taught, reach)[:, 0], prior, rtol=1e-6)
+    assert not reach.g.any()
+
+
+def test_a_drop_is_followed_later_the_less_is_seen_and_never_without_an_alarm(design, car):
+    def time(design=design, **conditions):
+        return FrictionDrop(**conditions).time(design, car, 1.0, 20.0)
+
+    assert time(seen=0.4) < time() < time(errors=1.5) < 2.0
+    blind = replace(design, change=replace(design.change, threshold=1e9))
+    assert time(blind) == np.inf
+    assert blind.certify(car)["drop_time"].status == "warn"
+    assert time(noise=0.3) == np.inf
+
+
+def test_designs_that_the_proofs_do_not_cover_do_not_pass(design, car):
+    forgetful = replace(design, regression=replace(design.regression, memory=0.004))
+    assert forgetful.certify(car).verdict == "fail"
+    assert forgetful.certify(car)["forgets"].status == "fail"
+    hasty = replace(design, regression=replace(design.regression, rate=1e4))
+    assert hasty.certify(car)["jump"].status == "warn"
+    tight = replace(
+        design, bounds=replace(design.bounds, least_grip=1.0, most_grip=1.002, weight=3.0)
+    )
+    assert tight.certify(car)["lean"].status == "fail"
