@@ -58,10 +58,10 @@ def judge_errors(drives: int, t: Targets) -> None:
         wrong += not found[0]
         unseen += found[1]
         i, m = int(rng.integers(2)), int(rng.integers(SLIPS.size))
-        most, reached, beyond = worst(case, taught, reach, (i, m))
+        most, reached, beyond, matter = worst(case, taught, reach, (i, m))
         passed += reached > most * (1.0 + IDENTITY)
         tight.append(reached / most)
-        if beyond > most * (1.0 + 1e-3):  # where errors of y matter
+        if matter:
             plants += 1
             missed += not beyond > most * (1.0 + IDENTITY)
     told(t, "identity", drives, wrong, drives, unseen)
@@ -102,8 +102,10 @@ def identity(
 
 def worst(
     case: Case, taught: Lessons, reach: Adjoint, at: tuple[int, int]
-) -> tuple[float, float, float]:
+) -> tuple[float, float, float, bool]:
     """Return the bound of a force error, what the worst errors of y reach, and a twentieth more.
+
+    And whether errors of y make a hundredth of the bound.
 
     Parameters
     ----------
@@ -124,7 +126,7 @@ def worst(
         noise = np.zeros_like(taught.told)
         noise[:, i] = share * side * np.sign(g) * told_
         ends.append(abs(float(units @ forward(taught, error, noise)[i, : units.size])))
-    return most, ends[0], ends[1]
+    return most, ends[0], ends[1], by_told > 0.01 * most
 
 
 class Followed(NamedTuple):

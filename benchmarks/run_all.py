@@ -48,6 +48,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "bounds_monte_carlo": [],
     "forgetting": [],
     "hostile_certificates": [],
+    "hostile_axle": [],
     "batch_speed": [],
     "export_cost": [],
     "kill_and_fill": [],
