@@ -123,8 +123,8 @@ def _certificate_text(method: Method, proven: Mapping[str, Any]) -> str:
         lines = [f"Certificate of this method, for the interval it was built for: **{verdict}**.\n"]
         lines += ["| property | value | limit | unit | |", "|---|---|---|---|---|"]
         lines += [
-            f"| {one['title']} | {_number(one['value'])} | {_number(one['limit'])} | {one['unit']} | "
-            f"{one['status']} |"
+            f"| {one['title']} | {_number(one['value'])} | {_number(one['limit'])} "
+            f"| {one['unit']} | {one['status']} |"
             for one in proven_of
         ]
         lines.append("")
