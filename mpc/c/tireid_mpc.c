@@ -17,44 +17,55 @@
 
 #define real tireid_mpc_real
 
-/* Whether all of a measurement are numbers: x - x is zero, and does not overflow. */
+/* Whether the car's own numbers are: x - x is zero, and does not overflow. */
 static bool is_number(const tireid_mpc_input *in)
 {
-    real sum =
-        (in->e_y - in->e_y) + (in->e_psi - in->e_psi) + (in->v_y - in->v_y) + (in->r - in->r);
+    return tireid_mpc_finite(
+        (in->e_y - in->e_y) + (in->e_psi - in->e_psi) + (in->v_y - in->v_y) + (in->r - in->r));
+}
+
+/* What can be said of the road before anything is computed. */
+static tireid_mpc_status judge_road(const tireid_mpc_params *params, const tireid_mpc_input *in)
+{
+    tireid_mpc_status status = TIREID_MPC_OK;
+    bool slow = false;
+    bool known = true;
+    real sum = TIREID_MPC_C(0.0);
     uint32_t k;
     for (k = 0U; k <= N; k++) {
         sum += (in->kappa[k] - in->kappa[k]) + (in->v_x[k] - in->v_x[k]);
+        slow = slow || (in->v_x[k] < params->min_speed);
+        known = known && (in->v_x[k] <= params->max_speed)
+            && tireid_mpc_within(in->kappa[k], params->max_curvature);
     }
-    return tireid_mpc_finite(sum);
+    if (!tireid_mpc_finite(sum)) {
+        status = TIREID_MPC_NOT_FINITE;
+    } else if (!known) {
+        status = TIREID_MPC_OFF_MAP;
+    } else if (slow) {
+        status = TIREID_MPC_TOO_SLOW;
+    } else {
+        /* a road to plan for */
+    }
+    return status;
 }
 
 /* What can be said of a measurement before anything is computed. */
 static tireid_mpc_status judge(const tireid_mpc_params *params, const tireid_mpc_input *in)
 {
-    tireid_mpc_status status = TIREID_MPC_OK;
-    bool slow = false;
-    bool known = tireid_mpc_within(in->v_y, params->max_v_y)
-        && tireid_mpc_within(in->r, params->max_yaw_rate);
-    uint32_t k;
-    for (k = 0U; k <= N; k++) {
-        slow = slow || (in->v_x[k] < params->min_speed);
-        known = known && (in->v_x[k] <= params->max_speed)
-            && tireid_mpc_within(in->kappa[k], params->max_curvature);
-    }
-    if (!is_number(in)) {
+    tireid_mpc_status status = judge_road(params, in);
+    if ((status == TIREID_MPC_NOT_FINITE) || !is_number(in)) {
         status = TIREID_MPC_NOT_FINITE;
     } else if (!tireid_mpc_within(in->e_y, params->widest_e_y)
         || !tireid_mpc_within(in->e_psi, params->widest_e_psi)) {
         status = TIREID_MPC_OFF_PATH;
-    } else if (!known) {
+    } else if ((status == TIREID_MPC_OFF_MAP) || !tireid_mpc_within(in->v_y, params->max_v_y)
+        || !tireid_mpc_within(in->r, params->max_yaw_rate)) {
         status = TIREID_MPC_OFF_MAP;
     } else if ((TIREID_MPC_C(1.0) - (in->kappa[0] * in->e_y)) < NEAREST) {
         status = TIREID_MPC_OFF_PATH;
-    } else if (slow) {
-        status = TIREID_MPC_TOO_SLOW;
     } else {
-        /* a car to plan for */
+        /* a car to plan for, or too slow */
     }
     return status;
 }
@@ -225,6 +236,7 @@ tireid_mpc_status tireid_mpc_reset(tireid_mpc_state *state, real steering)
         state->iterations = 0U;
         state->age = 0U;
         state->planned = 0U;
+        state->shifted = 0U;
         state->started = 0U;
         status = TIREID_MPC_OK;
     }
@@ -282,6 +294,31 @@ static tireid_mpc_status plan(tireid_mpc_state *state, const tireid_mpc_params *
     return status;
 }
 
+/* Move the plan to where the next step begins, where it is not there. */
+static void shift_once(tireid_mpc_state *state, const tireid_mpc_params *params)
+{
+    if ((state->planned != 0U) && (state->shifted == 0U)) {
+        tireid_mpc_shift(state, params);
+    }
+    state->shifted = 1U;
+}
+
+tireid_mpc_status tireid_mpc_prepare(tireid_mpc_state *state, const tireid_mpc_params *params,
+    tireid_mpc_work *work, const tireid_mpc_input *expected)
+{
+    tireid_mpc_status status = TIREID_MPC_BAD_CALL;
+    if ((state != NULL) && (params != NULL) && (work != NULL) && (expected != NULL)) {
+        status = judge_road(params, expected);
+        shift_once(state, params);
+        state->prepared = 0U;
+        if ((status == TIREID_MPC_OK) && (state->planned != 0U) && is_sound(state, params)) {
+            tireid_mpc_prepare_from(
+                state, params, work, state->x[0], &expected->kappa[1], &expected->v_x[1]);
+        }
+    }
+    return status;
+}
+
 tireid_mpc_status tireid_mpc_step(tireid_mpc_state *state, const tireid_mpc_params *params,
     tireid_mpc_work *work, const tireid_mpc_input *input, real *steering)
 {
@@ -293,9 +330,8 @@ tireid_mpc_status tireid_mpc_step(tireid_mpc_state *state, const tireid_mpc_para
         status = judge(params, input);
         state->iterations = 0U;
         state->age += (state->age < UINT32_MAX) ? 1U : 0U;
-        if (state->planned != 0U) {
-            tireid_mpc_shift(state, params);
-        }
+        shift_once(state, params);
+        state->shifted = 0U;
         if (status == TIREID_MPC_OK) {
             take_measurement(state, params, work, input, x);
             status = plan(state, params, work, input, x);
@@ -308,6 +344,7 @@ tireid_mpc_status tireid_mpc_step(tireid_mpc_state *state, const tireid_mpc_para
                 state->lagged[i - LAGGED] = (state->started != 0U) ? x[i] : TIREID_MPC_C(0.0);
             }
         }
+        state->prepared = 0U;
         count(state, status);
         *steering = state->commands[0];
     }

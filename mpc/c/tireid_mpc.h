@@ -5,7 +5,7 @@
  *
  * One step each params.period. Nothing is allocated and every loop is bounded. The caller owns
  * state, parameters and work memory; they hold no pointer and may be copied with memcpy. Work
- * memory means nothing between two steps. Calls on different states may run at the same time, with
+ * memory means nothing between two steps, but what `prepare` leaves there for the next. Calls on different states may run at the same time, with
  * work memory of their own.
  */
 #ifndef TIREID_MPC_H
@@ -73,6 +73,7 @@ typedef struct {
     tireid_mpc_real tolerance; /* of the solver, in parts: 1e-8, in float 1e-5 */
     uint32_t max_iterations;   /* of the solver */
     uint32_t linearizations;   /* a step, 1 in real time */
+    uint32_t max_active_sets;  /* of limits tried in a row; 0: interior point alone */
 } tireid_mpc_params;
 
 typedef struct {
@@ -94,10 +95,13 @@ typedef struct {
     tireid_mpc_real lagged[2];                     /* slip of lagging tires now [rad] */
     uint32_t faults[TIREID_MPC_STATUSES];          /* steps of each status, from init on */
     uint32_t iterations;                           /* of the last solution */
-    uint32_t age;                                  /* steps since the plan was new */
-    uint32_t planned;                              /* 0 until there is a plan */
-    uint32_t guessed;                              /* 1: x and u without a solution */
-    uint32_t started;                              /* 0 until the first step */
+    uint32_t shifted;  /* 1: the plan is where the next step begins, before that */
+    uint32_t prepared; /* 1: work memory is prepared for the next solution */
+    uint32_t switched; /* rows whose limits it reached or left against the plan before */
+    uint32_t age;      /* steps since the plan was new */
+    uint32_t planned;  /* 0 until there is a plan */
+    uint32_t guessed;  /* 1: x and u without a solution */
+    uint32_t started;  /* 0 until the first step */
 } tireid_mpc_state;
 
 /* A stage, linearized: x_next = A x + B u + c, all as differences from the plan; by columns. */
@@ -121,13 +125,27 @@ typedef struct {
     tireid_mpc_real du[TIREID_MPC_HORIZON];
     tireid_mpc_real dx[TIREID_MPC_HORIZON + 1U][TIREID_MPC_STATES];
     tireid_mpc_real feedback[TIREID_MPC_HORIZON][TIREID_MPC_STATES];
+    /* backward: see tireid_mpc_riccati.c */
+    tireid_mpc_real M[TIREID_MPC_HORIZON + 1U][TIREID_MPC_STATES * TIREID_MPC_STATES];
+    tireid_mpc_real m[TIREID_MPC_HORIZON + 1U][TIREID_MPC_STATES];
     tireid_mpc_real Pc[TIREID_MPC_HORIZON][TIREID_MPC_STATES];
+    tireid_mpc_real L[TIREID_MPC_HORIZON][TIREID_MPC_STATES];
+    tireid_mpc_real l[TIREID_MPC_HORIZON];
+    tireid_mpc_real lambda[TIREID_MPC_HORIZON];
     tireid_mpc_real per_lambda[TIREID_MPC_HORIZON];
-    tireid_mpc_real scale[TIREID_MPC_ROWS];
-    tireid_mpc_real value[TIREID_MPC_HORIZON * TIREID_MPC_ROWS]; /* of the rows, at the plan */
+    tireid_mpc_real d[TIREID_MPC_HORIZON];
+    uint32_t held[TIREID_MPC_HORIZON]; /* what a stage has instead of its best input: */
+    tireid_mpc_real
+        held_to[TIREID_MPC_HORIZON]; /* its du, or the difference of the angle behind it */
+    /* rows |value| <= 1, in parts of their limits */
+    tireid_mpc_real scale[TIREID_MPC_HORIZON * TIREID_MPC_ROWS]; /* 1 / limit */
+    tireid_mpc_real value[TIREID_MPC_HORIZON * TIREID_MPC_ROWS]; /* at the plan */
     tireid_mpc_real reached[TIREID_MPC_HORIZON * TIREID_MPC_ROWS];
     tireid_mpc_real regular[TIREID_MPC_HORIZON * TIREID_MPC_ROWS];
     tireid_mpc_real slope[TIREID_MPC_HORIZON * TIREID_MPC_ROWS];
+    int32_t active[TIREID_MPC_HORIZON * TIREID_MPC_ROWS]; /* 1 at its limit, -1 at the other, 0 */
+    int32_t next[TIREID_MPC_HORIZON * TIREID_MPC_ROWS];   /* after what is reached */
+    int32_t begun[TIREID_MPC_HORIZON * TIREID_MPC_ROWS];  /* the same, along the plan */
     tireid_mpc_sides gap;
     tireid_mpc_sides multiplier;
     tireid_mpc_sides gap_step;
@@ -135,6 +153,9 @@ typedef struct {
     tireid_mpc_sides target;
     tireid_mpc_sides weight;
     tireid_mpc_sides inverse;
+    tireid_mpc_real kappa[TIREID_MPC_HORIZON]; /* road that is linearized on */
+    tireid_mpc_real v_x[TIREID_MPC_HORIZON];
+    bool ready; /* the first set of active rows is factorized */
     uint32_t iterations;
 } tireid_mpc_work;
 
@@ -144,13 +165,20 @@ tireid_mpc_status tireid_mpc_init(tireid_mpc_state *state);
 /* Begin with the wheels at an angle [rad], at most 3.2, and no plan; faults are kept. */
 tireid_mpc_status tireid_mpc_reset(tireid_mpc_state *state, tireid_mpc_real steering);
 
+/* Do ahead of a measurement what does not ask for it: shift the plan, linearize along it on the road that
+ * is expected, factorize. Its step then does the first third of the stages anew, and a sweep. Of `expected` the road alone is
+ * read, as the next step will be told. Parameters and work memory must stay as they are until then.
+ * Without a plan, or where the road becomes another, the step does all itself. */
+tireid_mpc_status tireid_mpc_prepare(tireid_mpc_state *state, const tireid_mpc_params *params,
+    tireid_mpc_work *work, const tireid_mpc_input *expected);
+
 /* Take a measurement; steering [rad] is what to command now, whatever the status. No number that is
  * not finite enters the state: what is refused leaves the plan that there was. */
 tireid_mpc_status tireid_mpc_step(tireid_mpc_state *state, const tireid_mpc_params *params,
     tireid_mpc_work *work, const tireid_mpc_input *input, tireid_mpc_real *steering);
 
 /* One iteration from the plan in the state, which is not shifted, and stays where there is no other.
- * x0 is the car at the beginning of the first stage; kappa and v_x are those of the stages. */
+ * Begins from what is prepared, on that road. x0 is the car at the beginning of the first stage; kappa and v_x are those of the stages. */
 tireid_mpc_status tireid_mpc_solve(tireid_mpc_state *state, const tireid_mpc_params *params,
     tireid_mpc_work *work, const tireid_mpc_real x0[TIREID_MPC_STATES],
     const tireid_mpc_real kappa[TIREID_MPC_HORIZON], const tireid_mpc_real v_x[TIREID_MPC_HORIZON]);

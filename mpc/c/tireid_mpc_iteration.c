@@ -11,6 +11,9 @@
 #define STEERING 4U /* place of the angle among the states */
 #define MOST                                                                                       \
     TIREID_MPC_C(1e12) /* of a number that is carried: what is computed of it does not overflow */
+#define FRESH ((N + 2U) / 3U)          /* stages linearized anew where the others are prepared */
+#define NEARLY_TURN TIREID_MPC_C(0.1)  /* lateral acceleration of a road [m/s^2] that is the same */
+#define NEARLY_SPEED TIREID_MPC_C(0.1) /* [m/s] */
 
 #define real tireid_mpc_real
 
@@ -57,6 +60,8 @@ void tireid_mpc_clear(tireid_mpc_state *state)
         }
     }
     state->guessed = 1U;
+    state->prepared = 0U;
+    state->switched = UINT32_MAX; /* no set to begin with */
 }
 
 bool tireid_mpc_on_map(const tireid_mpc_params *params, const real *x)
@@ -115,6 +120,8 @@ void tireid_mpc_guess(tireid_mpc_state *state, const tireid_mpc_params *params, 
         }
     }
     state->guessed = 1U;
+    state->prepared = 0U;
+    state->switched = UINT32_MAX;
     if (!finite || !tireid_mpc_carriable(state->u, N)) {
         tireid_mpc_clear(state);
     }
@@ -136,11 +143,11 @@ static real fed_back(
     return tireid_mpc_clipped(u, params->max_rate);
 }
 
-/* Linearize along the way that the prediction takes from x0 under the plan and its feedback, which
- * answers most of what the car is off the plan before anything is solved. A guess, and what leaves
- * the map, is gone on with along the plan itself. */
+/* Linearize the first stages along the way that the prediction takes from x0 under the plan and its
+ * feedback, which answers most of what the car is off the plan before anything is solved. A guess, and
+ * what leaves the map, is gone on with along the plan itself; behind the first stages all stays. */
 static void linearize(const tireid_mpc_state *state, const tireid_mpc_params *params,
-    tireid_mpc_work *work, const real *x0, const real *kappa, const real *v_x)
+    tireid_mpc_work *work, const real *x0, uint32_t stages)
 {
     bool rolls;
     uint32_t k;
@@ -149,47 +156,53 @@ static void linearize(const tireid_mpc_state *state, const tireid_mpc_params *pa
         work->x[0][i] = x0[i];
     }
     work->x[0][STEERING] = tireid_mpc_clipped(x0[STEERING], params->max_steering);
-    for (k = 0U; k < N; k++) {
+    for (k = 0U; k < stages; k++) {
         real *x = work->x[k];
         real *next = work->x[k + 1U];
         tireid_mpc_stage *stage = &work->stage[k];
         work->u[k] = fed_back(state, params, k, x);
-        tireid_mpc_linearize(params, params->cost, x, work->u[k], kappa[k], v_x[k], stage);
+        tireid_mpc_linearize(
+            params, params->cost, x, work->u[k], work->kappa[k], work->v_x[k], stage);
         rolls = (state->guessed == 0U) && tireid_mpc_on_map(params, stage->c);
         for (i = 0U; i < NX; i++) {
-            next[i] = (rolls || (k == (N - 1U))) ? stage->c[i] : state->x[k + 1U][i];
+            if ((k + 1U) < stages) {
+                next[i] = rolls ? stage->c[i] : state->x[k + 1U][i];
+            } else if (stages == N) {
+                next[i] = stage->c[i];
+            } else {
+                /* as it was */
+            }
             stage->c[i] -= next[i];
         }
     }
-    tireid_mpc_linearize_end(
-        params, params->cost_end, work->x[N], kappa[N - 1U], v_x[N - 1U], &work->stage[N]);
+    if (stages == N) {
+        tireid_mpc_linearize_end(params, params->cost_end, work->x[N], work->kappa[N - 1U],
+            work->v_x[N - 1U], &work->stage[N]);
+    }
 }
 
-/* Values of the rows at the plan, in parts of their limits. */
-static void measure_rows(const tireid_mpc_params *params, tireid_mpc_work *work)
+/* Values of the rows of the first stages at the plan, in parts of their limits. */
+static void measure_rows(const tireid_mpc_params *params, tireid_mpc_work *work, uint32_t stages)
 {
+    const real scale[TIREID_MPC_ROWS] = { TIREID_MPC_C(1.0) / params->max_rate,
+        TIREID_MPC_C(1.0) / params->max_steering, TIREID_MPC_C(1.0) / params->max_e_y,
+        TIREID_MPC_C(1.0) / params->max_slip[0], TIREID_MPC_C(1.0) / params->max_slip[1] };
+    const real regular[TIREID_MPC_ROWS] = { TIREID_MPC_C(0.0), TIREID_MPC_C(0.0),
+        (scale[2] * scale[2]) / params->soft_e_y, (scale[3] * scale[3]) / params->soft_slip,
+        (scale[4] * scale[4]) / params->soft_slip };
     uint32_t k;
-    work->scale[0] = TIREID_MPC_C(1.0) / params->max_rate;
-    work->scale[1] = TIREID_MPC_C(1.0) / params->max_steering;
-    work->scale[2] = TIREID_MPC_C(1.0) / params->max_e_y;
-    work->scale[3] = TIREID_MPC_C(1.0) / params->max_slip[0];
-    work->scale[4] = TIREID_MPC_C(1.0) / params->max_slip[1];
-    for (k = 0U; k < N; k++) {
-        const real *scale = work->scale;
+    uint32_t i;
+    for (k = 0U; k < stages; k++) {
         const tireid_mpc_stage *next = &work->stage[k + 1U];
         const real *x = work->x[k + 1U];
-        real *value = &work->value[k * TIREID_MPC_ROWS];
-        real *regular = &work->regular[k * TIREID_MPC_ROWS];
-        value[0] = scale[0] * work->u[k];
-        value[1] = scale[1] * x[STEERING];
-        value[2] = scale[2] * x[0];
-        value[3] = scale[3] * next->slip[0];
-        value[4] = scale[4] * next->slip[1];
-        regular[0] = TIREID_MPC_C(0.0);
-        regular[1] = TIREID_MPC_C(0.0);
-        regular[2] = (scale[2] * scale[2]) / params->soft_e_y;
-        regular[3] = (scale[3] * scale[3]) / params->soft_slip;
-        regular[4] = (scale[4] * scale[4]) / params->soft_slip;
+        const real at[TIREID_MPC_ROWS] = { work->u[k], x[STEERING], x[0], next->slip[0],
+            next->slip[1] };
+        const uint32_t p = k * TIREID_MPC_ROWS;
+        for (i = 0U; i < TIREID_MPC_ROWS; i++) {
+            work->scale[p + i] = scale[i];
+            work->value[p + i] = scale[i] * at[i];
+            work->regular[p + i] = regular[i];
+        }
     }
 }
 
@@ -230,15 +243,55 @@ static void take(
     }
 }
 
+/* All of a solution that does not ask for more than x0, of the first stages. */
+static void prepare_stages(const tireid_mpc_state *state, const tireid_mpc_params *params,
+    tireid_mpc_work *work, const real *x0, const real *kappa, const real *v_x, uint32_t stages)
+{
+    uint32_t k;
+    for (k = 0U; k < stages; k++) {
+        work->kappa[k] = kappa[k];
+        work->v_x[k] = v_x[k];
+    }
+    linearize(state, params, work, x0, stages);
+    measure_rows(params, work, stages);
+    tireid_mpc_prepare_qp(work, params, state->switched, stages);
+}
+
+void tireid_mpc_prepare_from(tireid_mpc_state *state, const tireid_mpc_params *params,
+    tireid_mpc_work *work, const real *x0, const real *kappa, const real *v_x)
+{
+    prepare_stages(state, params, work, x0, kappa, v_x, N);
+    state->prepared = 1U;
+}
+
+/* Whether what is prepared is of a road that asks for nearly the same lateral acceleration. */
+static bool is_prepared(
+    const tireid_mpc_state *state, const tireid_mpc_work *work, const real *kappa, const real *v_x)
+{
+    bool same = state->prepared != 0U;
+    uint32_t k;
+    for (k = 0U; same && (k < N); k++) {
+        const real faster = v_x[k] - work->v_x[k];
+        const real turn = (kappa[k] - work->kappa[k]) * v_x[k] * v_x[k];
+        same = tireid_mpc_within(turn, NEARLY_TURN) && tireid_mpc_within(faster, NEARLY_SPEED);
+    }
+    return same;
+}
+
 tireid_mpc_status tireid_mpc_solve(tireid_mpc_state *state, const tireid_mpc_params *params,
     tireid_mpc_work *work, const real x0[NX], const real kappa[N], const real v_x[N])
 {
     tireid_mpc_status status = TIREID_MPC_BAD_CALL;
     if ((state != NULL) && (params != NULL) && (work != NULL) && (x0 != NULL) && (kappa != NULL)
         && (v_x != NULL)) {
-        linearize(state, params, work, x0, kappa, v_x);
-        measure_rows(params, work);
-        status = tireid_mpc_qp(work, params);
+        const bool prepared = is_prepared(state, work, kappa, v_x);
+        uint32_t i;
+        prepare_stages(state, params, work, x0, kappa, v_x, prepared ? FRESH : N);
+        state->prepared = 0U;
+        for (i = 0U; i < NX; i++) {
+            work->dx[0][i] = TIREID_MPC_C(0.0);
+        }
+        status = tireid_mpc_qp(work, params, &state->switched);
         state->iterations = work->iterations;
         if ((status != TIREID_MPC_QP_FAILED) && !is_plan(work)) {
             status = TIREID_MPC_QP_FAILED;

@@ -1,5 +1,7 @@
 /* Riccati recursion: backward to feedback and gradients, forward to states and rows.
  *
+ * The cost from stage k on is 1/2 dx'M dx + m'dx; its minimum over du is at K dx + d. A held stage has
+ * K and d of its bound instead: du itself, or the du that brings the angle to its limit.
  * Where the car is on the path does not act on its motion: A is block triangular, its first NE
  * columns have but NE rows. */
 #include "tireid_mpc_riccati.h"
@@ -18,17 +20,18 @@ static void add_rows(const tireid_mpc_work *work, uint32_t k, real *restrict H)
 {
     const tireid_mpc_stage *stage = &work->stage[k + 1U];
     const uint32_t p = k * ROWS;
+    const real *scale = &work->scale[p];
     uint32_t i;
     uint32_t j;
     real W[ROWS];
     for (i = 0U; i < ROWS; i++) {
         W[i] = work->weight[0][p + i] + work->weight[1][p + i];
     }
-    H[0] += W[2] * work->scale[2] * work->scale[2];
-    H[STEERING + (NX * STEERING)] += W[1] * work->scale[1] * work->scale[1];
+    H[0] += W[2] * scale[2] * scale[2];
+    H[STEERING + (NX * STEERING)] += W[1] * scale[1] * scale[1];
     for (i = 0U; i < 2U; i++) {
         const real *a = stage->slip_x;
-        const real w = W[3U + i] * work->scale[3U + i] * work->scale[3U + i];
+        const real w = W[3U + i] * scale[3U + i] * scale[3U + i];
         for (j = NE; j <= STEERING; j++) {
             uint32_t n;
             const real wa = w * a[i + (2U * j)];
@@ -43,12 +46,13 @@ static void add_slopes(const tireid_mpc_work *work, uint32_t k, real *restrict h
 {
     const tireid_mpc_stage *stage = &work->stage[k + 1U];
     const real *g = &work->slope[k * ROWS];
+    const real *scale = &work->scale[k * ROWS];
     uint32_t j;
-    h[0] += g[2] * work->scale[2];
-    h[STEERING] += g[1] * work->scale[1];
+    h[0] += g[2] * scale[2];
+    h[STEERING] += g[1] * scale[1];
     for (j = NE; j <= STEERING; j++) {
-        h[j] += (g[3] * work->scale[3] * stage->slip_x[2U * j])
-            + (g[4] * work->scale[4] * stage->slip_x[1U + (2U * j)]);
+        h[j] += (g[3] * scale[3] * stage->slip_x[2U * j])
+            + (g[4] * scale[4] * stage->slip_x[1U + (2U * j)]);
     }
 }
 
@@ -58,15 +62,21 @@ static uint32_t rows_of(uint32_t j)
     return (j < NE) ? NE : NX;
 }
 
-/* Both triangles of a symmetric matrix from its upper one. */
-static void mirror(const real *restrict M, real *restrict P)
+/* P of the cost behind stage k, both triangles, from that of stage k + 1 and its rows. */
+static void take_behind(const tireid_mpc_work *work, uint32_t k, real *restrict P)
 {
+    const real *restrict M = work->M[k + 1U];
     uint32_t i;
     uint32_t j;
     for (j = 0U; j < NX; j++) {
         for (i = 0U; i <= j; i++) {
             P[i + (NX * j)] = M[i + (NX * j)];
-            P[j + (NX * i)] = M[i + (NX * j)];
+        }
+    }
+    add_rows(work, k, P);
+    for (j = 0U; j < NX; j++) {
+        for (i = 0U; i < j; i++) {
+            P[j + (NX * i)] = P[i + (NX * j)];
         }
     }
 }
@@ -77,7 +87,8 @@ static bool look_behind(
 {
     const tireid_mpc_stage *stage = &work->stage[k];
     const real weight = work->weight[0][k * ROWS] + work->weight[1][k * ROWS];
-    real lambda = R + (weight * work->scale[0] * work->scale[0]);
+    const real scale = work->scale[k * ROWS];
+    real lambda = R + (weight * scale * scale);
     uint32_t i;
     uint32_t j;
     for (i = 0U; i < NX; i++) {
@@ -91,19 +102,34 @@ static bool look_behind(
         work->Pc[k][i] = pc;
         lambda += stage->B[i] * pb;
     }
+    work->lambda[k] = lambda;
     work->per_lambda[k] =
         (lambda > TIREID_MPC_C(0.0)) ? (TIREID_MPC_C(1.0) / lambda) : TIREID_MPC_C(0.0);
     return lambda > TIREID_MPC_C(0.0);
 }
 
-/* Feedback K of stage k, and M = H + A'P A - K'lambda K, its upper triangle. */
-static void feed_back(tireid_mpc_work *work, uint32_t k, const real *restrict P,
-    const real *restrict PB, real *restrict M)
+/* Feedback K of stage k where it is held. */
+static void hold(tireid_mpc_work *work, uint32_t k)
+{
+    const tireid_mpc_stage *stage = &work->stage[k];
+    uint32_t j;
+    for (j = 0U; j < NX; j++) {
+        work->feedback[k][j] = (work->held[k] == TIREID_MPC_ANGLE)
+            ? (-stage->A[STEERING + (NX * j)] / stage->B[STEERING])
+            : TIREID_MPC_C(0.0);
+    }
+}
+
+/* Feedback K of stage k, and M = H + A'P A + K'L, its upper triangle, with L = B'P A = -lambda K; held
+ * to an angle it has L'K + lambda K'K besides. */
+static void feed_back(
+    tireid_mpc_work *work, uint32_t k, const real *restrict P, const real *restrict PB)
 {
     const tireid_mpc_stage *stage = &work->stage[k];
     const real *restrict A = stage->A;
     real *restrict K = work->feedback[k];
-    real L[NX];
+    real *restrict L = work->L[k];
+    real *restrict M = work->M[k];
     real S[NX * NX]; /* P A */
     uint32_t i;
     uint32_t j;
@@ -123,6 +149,9 @@ static void feed_back(tireid_mpc_work *work, uint32_t k, const real *restrict P,
             S[i + (NX * j)] = s;
         }
     }
+    if (work->held[k] != TIREID_MPC_FREE) {
+        hold(work, k);
+    }
     for (j = 0U; j < NX; j++) {
         for (i = 0U; i <= j; i++) {
             real m = stage->H[i + (NX * j)] + (K[i] * L[j]);
@@ -132,80 +161,111 @@ static void feed_back(tireid_mpc_work *work, uint32_t k, const real *restrict P,
             M[i + (NX * j)] = m;
         }
     }
+    if (work->held[k] == TIREID_MPC_ANGLE) {
+        for (j = 0U; j < NX; j++) {
+            for (i = 0U; i <= j; i++) {
+                M[i + (NX * j)] += (L[i] + (work->lambda[k] * K[i])) * K[j];
+            }
+        }
+    }
 }
 
-bool tireid_mpc_factorize(tireid_mpc_work *work, real R)
+bool tireid_mpc_factorize(tireid_mpc_work *work, real R, uint32_t last)
 {
     real P[NX * NX]; /* of the cost behind a stage */
-    real M[NX * NX];
     real PB[NX];
     bool convex = true;
     uint32_t i;
     uint32_t k;
     for (i = 0U; i < (NX * NX); i++) {
-        M[i] = work->stage[N].H[i];
+        work->M[N][i] = work->stage[N].H[i];
     }
-    for (k = N - 1U; k > 0U; k--) {
-        add_rows(work, k, M);
-        mirror(M, P);
+    for (k = last + 1U; k-- > 0U;) {
+        take_behind(work, k, P);
         convex = look_behind(work, k, R, P, PB) && convex;
-        feed_back(work, k, P, PB, M);
+        feed_back(work, k, P, PB); /* of stage 0 for the next plan: here x[0] is zero */
     }
-    add_rows(work, 0U, M);
-    mirror(M, P);
-    convex = look_behind(work, 0U, R, P, PB) && convex;
-    feed_back(work, 0U, P, PB, M); /* for the next plan: here x[0] is zero */
     return convex;
 }
 
-/* s = p + P c of the gradient p behind stage k; return that of the input. */
-static real feed_forward(
-    tireid_mpc_work *work, uint32_t k, real R, const real *restrict p, real *restrict s)
+/* du of stage k where the state is the plan's: its best, or that of its bound. */
+static real alone(const tireid_mpc_work *work, uint32_t k)
 {
     const tireid_mpc_stage *stage = &work->stage[k];
-    real l = (R * work->u[k]) + (work->slope[k * ROWS] * work->scale[0]);
-    uint32_t i;
-    for (i = 0U; i < NX; i++) {
-        s[i] = p[i] + work->Pc[k][i];
-        l += stage->B[i] * s[i];
+    real du = -(work->l[k] * work->per_lambda[k]);
+    if (work->held[k] == TIREID_MPC_RATE) {
+        du = work->held_to[k];
+    } else if (work->held[k] == TIREID_MPC_ANGLE) {
+        du = (work->held_to[k] - stage->c[STEERING]) / stage->B[STEERING];
+    } else {
+        /* free */
     }
-    work->du[k] = -(l * work->per_lambda[k]);
-    return l;
+    return du;
 }
 
-/* Backward: gradients, and the part of du that is not feedback. */
-static void go_backward(tireid_mpc_work *work, real R)
+/* s = m + P c of the gradient m behind stage k, and what of that of the input is not of du. */
+static void feed_forward(
+    tireid_mpc_work *work, uint32_t k, real R, const real *restrict m, real *restrict s)
 {
-    real p[NX];
-    real s[NX];
+    const tireid_mpc_stage *stage = &work->stage[k];
+    real l = (R * work->u[k]) + (work->slope[k * ROWS] * work->scale[k * ROWS]);
+    uint32_t i;
+    for (i = 0U; i < NX; i++) {
+        s[i] = m[i] + work->Pc[k][i];
+        l += stage->B[i] * s[i];
+    }
+    work->l[k] = l;
+}
+
+/* Gradient m of the cost from stage k on, for s of what is behind it. */
+static void look_back(tireid_mpc_work *work, uint32_t k, const real *restrict s, real *restrict m)
+{
+    const tireid_mpc_stage *stage = &work->stage[k];
+    const bool held = work->held[k] != TIREID_MPC_FREE;
+    const real d = work->d[k];
+    const real l = held ? (work->l[k] + (work->lambda[k] * d)) : work->l[k];
     uint32_t i;
     uint32_t j;
-    uint32_t k;
-    for (i = 0U; i < NX; i++) {
-        p[i] = work->stage[N].h[i];
+    for (j = 0U; j < NX; j++) {
+        real g = stage->h[j] + (work->feedback[k][j] * l);
+        for (i = 0U; i < rows_of(j); i++) {
+            g += stage->A[i + (NX * j)] * s[i];
+        }
+        m[j] = g;
     }
-    for (k = N - 1U; k > 0U; k--) {
-        const tireid_mpc_stage *stage = &work->stage[k];
-        real l;
-        add_slopes(work, k, p);
-        l = feed_forward(work, k, R, p, s);
+    if (held) {
         for (j = 0U; j < NX; j++) {
-            real g = stage->h[j] + (work->feedback[k][j] * l);
-            for (i = 0U; i < rows_of(j); i++) {
-                g += stage->A[i + (NX * j)] * s[i];
-            }
-            p[j] = g;
+            m[j] += work->L[k][j] * d;
         }
     }
-    add_slopes(work, 0U, p);
-    (void)feed_forward(work, 0U, R, p, s);
+}
+
+void tireid_mpc_backward(tireid_mpc_work *work, real R, uint32_t last)
+{
+    real m[NX];
+    real s[NX];
+    uint32_t i;
+    uint32_t k;
+    for (i = 0U; i < NX; i++) {
+        m[i] = (last == (N - 1U)) ? work->stage[N].h[i] : work->m[last + 1U][i];
+        work->m[last + 1U][i] = m[i];
+    }
+    for (k = last + 1U; k-- > 0U;) {
+        add_slopes(work, k, m);
+        feed_forward(work, k, R, m, s);
+        work->d[k] = alone(work, k);
+        look_back(work, k, s, m);
+        for (i = 0U; i < NX; i++) {
+            work->m[k][i] = m[i];
+        }
+    }
 }
 
 /* Values of the rows of stage k for what was found. */
 static void reach(tireid_mpc_work *work, uint32_t k, real du, const real *restrict dx)
 {
     const tireid_mpc_stage *next = &work->stage[k + 1U];
-    const real *scale = work->scale;
+    const real *scale = &work->scale[k * ROWS];
     const real *value = &work->value[k * ROWS];
     real *reached = &work->reached[k * ROWS];
     real front = TIREID_MPC_C(0.0);
@@ -222,16 +282,18 @@ static void reach(tireid_mpc_work *work, uint32_t k, real du, const real *restri
     reached[4] = value[4] + (scale[4] * rear);
 }
 
-/* Forward: dx, du and what the rows reach. */
-static void go_forward(tireid_mpc_work *work)
+void tireid_mpc_forward(tireid_mpc_work *work)
 {
-    real now[NX] = { TIREID_MPC_C(0.0) };
+    real now[NX];
     uint32_t i;
     uint32_t j;
     uint32_t k;
+    for (i = 0U; i < NX; i++) {
+        now[i] = work->dx[0][i];
+    }
     for (k = 0U; k < N; k++) {
         const tireid_mpc_stage *stage = &work->stage[k];
-        real du = work->du[k];
+        real du = work->d[k];
         real dx[NX];
         for (j = 0U; j < NX; j++) {
             du += work->feedback[k][j] * now[j];
@@ -253,8 +315,12 @@ static void go_forward(tireid_mpc_work *work)
     }
 }
 
-void tireid_mpc_sweep(tireid_mpc_work *work, real R)
+real tireid_mpc_pull(const tireid_mpc_work *work, uint32_t k)
 {
-    go_backward(work, R);
-    go_forward(work);
+    real pull = work->l[k] + (work->lambda[k] * work->du[k]);
+    uint32_t j;
+    for (j = 0U; j < NX; j++) {
+        pull += work->L[k][j] * work->dx[k][j];
+    }
+    return pull;
 }

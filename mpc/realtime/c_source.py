@@ -34,8 +34,10 @@ PLACES: Mapping[str, str] = {
     "tireid_mpc_equations.h": "src",
     "tireid_mpc_qp.h": "src",
     "tireid_mpc_riccati.h": "src",
+    "tireid_mpc_active.h": "src",
     "tireid_mpc_iteration.h": "src",
     "tireid_mpc_riccati.c": "src",
+    "tireid_mpc_active.c": "src",
     "tireid_mpc_qp.c": "src",
     "tireid_mpc_iteration.c": "src",
     "tireid_mpc.c": "src",
@@ -43,8 +45,9 @@ PLACES: Mapping[str, str] = {
 # Of the tracker as one file, headers first.
 ORDER = (
     *("include/{}_config.h", "include/{}.h"),
-    *("src/{}_equations.h", "src/{}_qp.h", "src/{}_riccati.h", "src/{}_iteration.h"),
-    *("src/{}_equations.c", "src/{}_riccati.c", "src/{}_qp.c", "src/{}_iteration.c", "src/{}.c"),
+    *("src/{}_equations.h", "src/{}_qp.h", "src/{}_riccati.h", "src/{}_active.h"),
+    *("src/{}_iteration.h", "src/{}_equations.c", "src/{}_riccati.c", "src/{}_active.c"),
+    *("src/{}_qp.c", "src/{}_iteration.c", "src/{}.c"),
 )
 READ: Mapping[str, str] = {
     "x": "x[{}]",

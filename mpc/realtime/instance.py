@@ -97,7 +97,7 @@ def params_type(n_weights: int, *, single: bool) -> np.dtype[np.void]:
     return np.dtype(
         [(name, real, (size,)) for name, size in arrays]
         + numbers
-        + [(name, np.uint32) for name in ("max_iterations", "linearizations")],
+        + [(name, np.uint32) for name in ("max_iterations", "linearizations", "max_active_sets")],
         align=True,
     )
 
@@ -111,7 +111,8 @@ def state_type(horizon: int, n_x: int, *, single: bool) -> np.dtype[np.void]:
     n_x : states of the car.
     single : whether numbers are float.
     """
-    real, counts = _real(single), ("iterations", "age", "planned", "guessed", "started")
+    real, solution = _real(single), ("iterations", "shifted", "prepared", "switched")
+    counts = (*solution, "age", "planned", "guessed", "started")
     return np.dtype(
         [
             ("x", real, (horizon + 1, n_x)),
@@ -271,6 +272,20 @@ class Instance:
     def step(self) -> int:
         """Take the measurement in `input`; return the status, and set `steering`."""
         return int(self._library.mpc_step(*self._step))
+
+    def prepare(self) -> Status:
+        """Do ahead of a measurement what does not ask for it, on the road in `input`."""
+        return Status(self._library.mpc_prepare(*self._step[:4]))
+
+    def prepare_from(self, x0: ArrayLike) -> None:
+        """Do ahead of `solve` what does not ask for its state, on the road in `input`.
+
+        Parameters
+        ----------
+        x0 : state that is expected (n_x,).
+        """
+        self.start[:] = x0
+        self._library.mpc_prepare_from(*self.solve_arguments)
 
     def solve(self) -> int:
         """Take one iteration from the plan as it is; return the status."""

@@ -34,6 +34,8 @@ class Tracker:
         multiplier, where gaps count limits as 1; None takes 1e-8, in float 1e-5.
     max_iterations : of the solver.
     linearizations : a step; 1 in real time, some 10 to convergence.
+    max_active_sets : sets of active limits that are tried in a row, each at half an iteration
+        of the interior point, before it and once it comes close; 0 takes that alone.
     single : whether to compute in float.
     clock : of the solve times [s].
 
@@ -59,6 +61,7 @@ class Tracker:
         tolerance: float | None = None,
         max_iterations: int = 40,
         linearizations: int = 1,
+        max_active_sets: int = 6,
         single: bool = False,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
@@ -76,6 +79,8 @@ class Tracker:
         for name, value in solver.items():
             if not value > 0:
                 raise ValueError(f"{name} must be positive, it is {value}")
+        if max_active_sets < 0:
+            raise ValueError(f"max_active_sets must not be negative, it is {max_active_sets}")
         self.tire, self.problem, self.period, self.delay = tire, problem, period, delay
         self._budget, self._clock = budget, clock
         self.instance = Instance(tire.structure, problem.horizon, single=single)
@@ -90,6 +95,7 @@ class Tracker:
             acceleration=guards.fall_back_acceleration,
         )
         params["speeds"], params["gains"] = table
+        solver["max_active_sets"] = max_active_sets
         for name, value in {"period": period, "delay": delay, **solver}.items():
             params[name] = value
         self.set_tire(tire)
@@ -147,6 +153,7 @@ class Tracker:
             raise ValueError("weights and car must be finite")
         params["weights"], params["car"] = weights, car
         params["max_slip"], params["rise"] = valid_slip(tire, self.problem.limits.slip)
+        self.instance.state["prepared"] = 0  # by the tire before
         self.tire = tire
 
     def reset(self, steering: float = 0.0) -> None:
@@ -163,6 +170,23 @@ class Tracker:
         """
         if self.instance.reset(steering) != Status.OK:
             raise ValueError(f"steering must be finite and at most 3.2 rad, it is {steering}")
+
+    def prepare(self, kappa: ArrayLike, v_x: ArrayLike) -> float:
+        """Do ahead of the next measurement what does not ask for it; return the time it took [s].
+
+        The step is a sweep then: its `solve_time_s` is the latency from measurement to command. On
+        another road than it is told with the measurement, or without a plan, it does all itself.
+
+        Parameters
+        ----------
+        kappa : curvature [1/m] that the next measurement will tell, at `times`, (N + 1,).
+        v_x : speed [m/s] that it will tell, (N + 1,).
+        """
+        instance = self.instance
+        instance.input["kappa"], instance.input["v_x"] = kappa, v_x
+        start = self._clock()
+        instance.prepare()
+        return self._clock() - start
 
     def step(self, measurement: Measurement) -> Command:
         """Return what to steer from `delay` after the measurement on."""
@@ -195,6 +219,20 @@ class Tracker:
         status = instance.solve()
         elapsed = self._clock() - start
         return self._command(float(instance.state["x"][1, 4]), status, elapsed)
+
+    def prepare_solution(self, kappa: ArrayLike, v_x: ArrayLike) -> float:
+        """Do ahead of `solve` what does not ask for its state, along the plan as it is; return [s].
+
+        Parameters
+        ----------
+        kappa : curvature of the stages [1/m], (N,) or a number.
+        v_x : speed of the stages [m/s], (N,) or a number.
+        """
+        instance = self.instance
+        instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, v_x
+        start = self._clock()
+        instance.prepare_from(instance.state["x"][0])
+        return self._clock() - start
 
     def solve_converged(
         self, x0: ArrayLike, kappa: ArrayLike, v_x: ArrayLike, *, most: int = 100

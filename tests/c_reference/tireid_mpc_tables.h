@@ -43,6 +43,7 @@ static const tireid_mpc_params tireid_mpc_exported = {
     /* tolerance */ TOLERANCE,
     /* max_iterations */ 40U,
     /* linearizations */ 1U,
+    /* max_active_sets */ 6U,
 };
 
 #endif

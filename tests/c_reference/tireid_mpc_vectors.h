@@ -17,10 +17,10 @@ static const double vector_input[VECTORS][4] = {
 };
 
 static const double vector_output[VECTORS][2] = {
-    { -0.007999999999999913, 0.0 },
-    { -0.015999999999999737, 0.0 },
-    { -0.02399999999999973, 0.0 },
-    { -0.03199999999990485, 0.0 },
+    { -0.008, 0.0 },
+    { -0.016, 0.0 },
+    { -0.024, 0.0 },
+    { -0.032, 0.0 },
 };
 
 static const double vector_road[5][2] = {

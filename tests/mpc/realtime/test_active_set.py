@@ -1,0 +1,127 @@
+"""Sets of active limits before the interior point: what they find, and where none is tried."""
+
+import numpy as np
+import pytest
+
+from mpc.prediction import build_rk4
+from mpc.realtime import Status, Tracker, instance
+from mpc.tires.tire import valid_slip
+from tests.mpc.realtime.test_iteration import dense_solution
+
+MANY = 1000  # rows: more than there are
+
+
+def near_a_plan(tracker, seed, size=1.0):
+    """Plan to convergence with limits reached; a state near its beginning, on the same road."""
+    rng = np.random.default_rng(seed)
+    x0 = np.zeros(tracker.instance.start.size)
+    x0[:5] = size * np.array([0.5, 0.08, 0.3, 0.1, 0.05]) * rng.uniform(-1.0, 1.0, 5)
+    kappa, v_x = (np.full(tracker.problem.horizon, x) for x in (0.012 * x0[0], 18.0 + 4.0 * x0[1]))
+    tracker.solve_converged(x0, kappa, v_x)
+    x0[:4] += size * np.array([0.02, 0.004, 0.03, 0.05]) * rng.standard_normal(4)
+    return x0, kappa, v_x
+
+
+def by_highs(tracker, x0, kappa, v_x):
+    """u of the program that a step solves: along the way from x0 under plan and feedback."""
+    state, problem, tire = tracker.instance.state, tracker.problem, tracker.tire
+    most, fastest, dt = problem.limits.steering, problem.limits.steering_rate, problem.dt
+    rk4, valid = build_rk4(tire.structure), valid_slip(tire, problem.limits.slip)
+    x, u = [np.array(x0)], []
+    for k in range(problem.horizon):
+        fed_back = state["feedback"][k] @ (x[k] - state["x"][k])
+        rate = np.clip(state["u"][k] + fed_back, -fastest, fastest)
+        u.append((np.clip(x[k][4] + dt * rate, -most, most) - x[k][4]) / dt)
+        step = (x[k], u[k], kappa[k], v_x[k], dt, tire.car, tire.weights, *valid)
+        x.append(np.asarray(rk4(*step)).ravel())
+    return dense_solution(tire, problem, np.array(x), np.array(u), kappa, v_x)
+
+
+def solved(tracker, at, *, switched=0):
+    """The command after a solution that switched so many rows; the plan stays."""
+    before = tracker.instance.state.copy()
+    tracker.instance.state["switched"] = switched
+    command = tracker.solve(*at)
+    tracker.instance.state[...] = before
+    return command
+
+
+@pytest.mark.parametrize("seed", [0, 1, 3, 4, 5])  # HiGHS gives up at 2
+def test_a_set_finds_what_a_dense_solver_finds(linear, problem, seed):
+    tracker = Tracker(linear, problem, tolerance=1e-10)
+    at = near_a_plan(tracker, seed)
+    command = solved(tracker, at)
+    assert command.status == Status.OK
+    np.testing.assert_allclose(command.plan_u, by_highs(tracker, *at), atol=1e-5)
+
+
+def test_a_set_finds_what_the_interior_point_finds(tire, problem):
+    by_sets = Tracker(tire, problem)
+    alone = Tracker(tire, problem, tolerance=1e-12, max_active_sets=0)
+    at_limit, few = [], 0
+    for seed in range(30):
+        at = near_a_plan(by_sets, seed)
+        alone.instance.state[...] = by_sets.instance.state
+        found, best = solved(by_sets, at), solved(alone, at)
+        assert (found.status, best.status) == (Status.OK, Status.OK)
+        np.testing.assert_allclose(found.plan_u, best.plan_u, atol=1e-5)
+        few += found.iterations <= 3 < best.iterations
+        at_limit.append(np.abs(found.plan_u).max() / problem.limits.steering_rate)
+    assert few > 20
+    assert np.mean(np.array(at_limit) > 0.999) > 0.5  # the cases press against a hard limit
+
+
+def test_angle_and_rate_are_reached_and_kept_at_once(tire, problem):
+    tracker = Tracker(tire, problem)
+    x0 = np.zeros(tracker.instance.start.size)
+    at = (x0, np.full(problem.horizon, 0.06), np.full(problem.horizon, 8.0))
+    tracker.solve_converged(*at)
+    again = solved(tracker, at)
+    assert (again.status, again.iterations) == (Status.OK, 1)
+    assert np.sum(again.plan_x[1:, 4] >= problem.limits.steering * (1.0 - 1e-9)) > 5
+    assert np.sum(again.plan_u >= problem.limits.steering_rate * (1.0 - 1e-9)) > 2
+
+
+def test_a_step_says_how_many_rows_it_switched(tire, problem):
+    tracker = Tracker(tire, problem)
+    at = near_a_plan(tracker, 3)
+    tracker.solve_converged(*at)
+    assert tracker.instance.state["switched"] == 0
+    thrown = at[0].copy()
+    thrown[0] -= 3.0 * np.sign(thrown[0])
+    tracker.solve(thrown, *at[1:])
+    assert tracker.instance.state["switched"] > problem.horizon // 5
+
+
+def test_no_set_is_tried_after_many_rows_switched_or_without_a_plan(tire, problem):
+    tracker = Tracker(tire, problem, tolerance=1e-12)
+    at = near_a_plan(tracker, 2)
+    counts = [solved(tracker, at, switched=n).iterations for n in (0, problem.horizon // 5, MANY)]
+    assert counts[0] == counts[1] < counts[2]
+    tracker.reset()
+    assert tracker.instance.state["switched"] == np.iinfo(np.uint32).max
+
+
+@pytest.mark.parametrize(
+    ("pattern", "mistake"),
+    [
+        ("next[i] = (outward < -tolerance) ? 0 :", "next[i] = (outward < -1e9) ? 0 :"),
+        ("pull += work->L[k][j] * work->dx[k][j];", "pull += 0.0;"),
+        ("m[j] += work->L[k][j] * d;", "m[j] += 0.0 * d;"),
+        ("active ? (MPC_C(1.0) / work", "active ? (MPC_C(0.5) / work"),
+    ],
+)
+def test_a_mistake_in_the_sets_does_not_pass(linear, problem, pattern, mistake, monkeypatch):
+    source = instance.tracker_source(linear.structure, problem.horizon, single=False)
+    assert source.count(pattern) == 1, pattern
+    mistaken = source.replace(pattern, mistake)
+    monkeypatch.setattr(instance, "tracker_source", lambda *_, **__: mistaken)
+    wrong = Tracker(linear, problem)
+    monkeypatch.undo()
+    right = Tracker(linear, problem)
+    largest = 0.0
+    for seed in range(24):
+        at = near_a_plan(right, seed, size=1.0 + 0.5 * (seed % 3))
+        wrong.instance.state[...] = right.instance.state
+        largest = max(largest, np.abs(solved(wrong, at).plan_u - solved(right, at).plan_u).max())
+    assert largest > 1e-4
