@@ -152,13 +152,29 @@ def ipopt(tire: PredictionTire) -> Nlp:
 class Ours:
     """The tracker, one iteration a step."""
 
-    def __init__(self, tire: PredictionTire, *, converged: bool = False) -> None:
-        self.tracker = Tracker(tire, PROBLEM, period=PROBLEM.dt, clock=time.thread_time)
-        self.converged = converged
+    def __init__(
+        self,
+        tire: PredictionTire,
+        *,
+        converged: bool = False,
+        prepared: bool = False,
+        max_active_sets: int = 6,
+    ) -> None:
+        self.tracker = Tracker(
+            tire,
+            PROBLEM,
+            period=PROBLEM.dt,
+            max_active_sets=max_active_sets,
+            clock=time.thread_time,
+        )
+        self.converged, self.prepared = converged, prepared
+        self.ahead: list[float] = []  # times of what is done ahead of a measurement [s]
 
     def step(self, x0: Array, kappa: Array) -> Answer:
         """Return the plan from a state, on the curvature of the stages."""
         self.tracker.shift()
+        if self.prepared:
+            self.ahead.append(self.tracker.prepare_solution(kappa, SPEED))
         if self.converged:
             told = self.tracker.solve_converged(x0, kappa, SPEED)
         else:

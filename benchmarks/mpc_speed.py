@@ -2,8 +2,11 @@
 
 Thread CPU time of the solver call alone; of each step the least of ROUNDS identical drives, which
 take turns: what other programs on the machine cost is in all but that one. Every solver drives its
-own closed loop; the closed-loop cost says that none of them is fast by being wrong. A last line
-says how long it takes from nothing to the first solution, and at the second start.
+own closed loop; the closed-loop cost says that none of them is fast by being wrong. The interior
+point alone is what the tracker was before it tried sets of active limits. Where a step is prepared
+its time is the latency from the measurement to the command; what was done ahead stands beside it.
+The same once more with the sensor noise of `tireid drive`, over SEEDS. A last line says how long it
+takes from nothing to the first solution, and at the second start.
 """
 
 import os
@@ -31,6 +34,10 @@ from mpc.converged import build_errors
 from mpc.tires.tire import PredictionTire
 
 ROUNDS = 5
+SEEDS = 3  # of noise
+NOISE = np.array([0.02, 0.002, 0.03, 0.003, 0.0])  # m, rad, m/s, rad/s: of `tireid drive`
+MEDIAN, P99 = 0.45, 0.6  # of the interior point alone, at most
+LATENCY = 25.0 / 70.0  # of its median
 FIRST_USE = """
 import time; start = time.perf_counter()
 import numpy as np
@@ -52,13 +59,15 @@ class Loop(NamedTuple):
     cost: float
 
 
-def drive(solver: Peer, plant: Plant, tire: PredictionTire) -> Loop:
-    """Drive the double lane change from the start."""
+def drive(solver: Peer, plant: Plant, tire: PredictionTire, seed: int | None = None) -> Loop:
+    """Drive the double lane change from the start, where there is a seed with noise."""
+    rng = np.random.default_rng(seed)
     errors, q = build_errors(tire.structure), PROBLEM.cost.numbers()
     ahead, now = road()
     x, times, cost, failures = np.zeros(5), [], 0.0, 0
     for k in range(STEPS):
-        answer = solver.step(x, ahead[k])
+        noise = NOISE * rng.standard_normal(5) if seed is not None else np.zeros(5)
+        answer = solver.step(x + noise, ahead[k])
         times.append(answer.time)
         failures += answer.failed
         u = float(answer.u[0])
@@ -86,6 +95,38 @@ def first_use() -> list[float]:
     return [float(answer.stdout.split()[-1]) for answer in answers]
 
 
+def noisy(tire: PredictionTire, plant: Plant, targets: Targets) -> None:
+    """Compare the tracker and its interior point alone under sensor noise.
+
+    Parameters
+    ----------
+    plant : that is driven.
+    targets : record what is measured.
+    """
+    makers: Mapping[str, Callable[[], Ours]] = {
+        "interior": lambda: Ours(tire, max_active_sets=0),
+        "tireid": lambda: Ours(tire),
+        "prepared": lambda: Ours(tire, prepared=True),
+    }
+    times: dict[str, Array] = {}
+    for name, make in makers.items():
+        loops = [[drive(make(), plant, tire, seed) for _ in range(3)] for seed in range(SEEDS)]
+        least = [np.min([1e3 * loop.times for loop in rounds], axis=0) for rounds in loops]
+        times[name] = np.percentile(np.concatenate(least), [50, 99])
+        cost = float(np.mean([rounds[0].cost for rounds in loops]))
+        median, p99 = times[name]
+        print(f"with noise: {name:10} median {median:.4f} ms, p99 {p99:.4f} ms, cost {cost:.4f}")
+        targets.record(f"noisy/{name}/median", median, "ms")
+        targets.record(f"noisy/{name}/p99", p99, "ms")
+        targets.record(f"noisy/{name}/cost", cost, "-")
+    for name in ("tireid", "prepared"):
+        ratio = times[name] / times["interior"]
+        label = f"with noise, {name} over interior point: "
+        key = f"noisy/{name}/of_interior"
+        targets.at_most(f"{label}median", float(ratio[0]), MEDIAN, "-", key=f"{key}_median")
+        targets.at_most(f"{label}p99", float(ratio[1]), P99, "-", key=f"{key}_p99")
+
+
 def main(*, keep: bool = False) -> int:
     """Print the table; return 1 where a target was missed.
 
@@ -96,7 +137,9 @@ def main(*, keep: bool = False) -> int:
     tire = network_fitted_to_curve()
     plant = Plant(tire)
     makers: Mapping[str, tuple[str, Callable[[], Peer]]] = {
-        "tireid": ("tireid, Riccati interior point", lambda: Ours(tire)),
+        "tireid": ("tireid, active sets and interior point", lambda: Ours(tire)),
+        "prepared": ("tireid, prepared: latency", lambda: Ours(tire, prepared=True)),
+        "interior": ("tireid, interior point alone", lambda: Ours(tire, max_active_sets=0)),
         "daqp": ("same linearization, condensed, DAQP", lambda: CondensedDaqp(tire)),
         "hpipm": ("CasADi sqpmethod + HPIPM, 1 iteration", lambda: hpipm(tire)),
         "ipopt": ("IPOPT, converged", lambda: ipopt(tire)),
@@ -115,10 +158,11 @@ def main(*, keep: bool = False) -> int:
             times[name].append(1e3 * last[name].times)
     columns = "median ms      p99      max   of its median   of ours   failed   cost   build s"
     print(f"{'':40}{columns}")
-    targets, median = Targets("mpc_speed"), {}
+    targets, median, late = Targets("mpc_speed"), {}, {}
     for name, rounds in times.items():
         least = np.min(rounds, axis=0)
-        median[name], p99, most = (float(np.percentile(least, q)) for q in (50, 99, 100))
+        median[name], late[name], most = (float(np.percentile(least, q)) for q in (50, 99, 100))
+        p99 = late[name]
         of_ours = median[name] / median["tireid"]
         print(
             f"{makers[name][0]:40}{median[name]:9.4f} {p99:8.4f} {most:8.4f}"
@@ -133,8 +177,23 @@ def main(*, keep: bool = False) -> int:
     targets.record("first_use", first, "s")
     targets.record("second_start", second, "s")
     print(f"from nothing to the first solution {first:.1f} s, second start {second:.2f} s")
-    ours, *peers = median.values()
-    targets.at_most("median over that of the quickest peer", ours / min(peers), 1.0, "-")
+    ahead = solvers["prepared"]
+    assert isinstance(ahead, Ours)
+    work = 1e3 * float(np.median(ahead.ahead))
+    targets.record("prepared/ahead", work, "ms")
+    print(f"prepared: {work:.4f} ms ahead of the measurement, {median['prepared']:.4f} ms after it")
+    peers = [median[name] for name in ("daqp", "hpipm", "ipopt")]
+    ratio = median["tireid"] / min(peers)
+    targets.at_most("median over that of the quickest peer", ratio, 1.0, "-")
+    for label, value, most in (
+        ("median", median["tireid"] / median["interior"], MEDIAN),
+        ("p99", late["tireid"] / late["interior"], P99),
+        ("latency", median["prepared"] / median["interior"], LATENCY),
+    ):
+        targets.at_most(
+            f"{label} over interior point", value, most, "-", key=f"of_interior/{label}"
+        )
+    noisy(tire, plant, targets)
     loss = 100.0 * (last["tireid"].cost / last["ipopt"].cost - 1.0)
     targets.at_most("closed-loop cost over the converged one", loss, 1.0, key="loss")
     targets.at_most("steps that failed", last["tireid"].failures, 0, "")

@@ -55,6 +55,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "mpc_speed": [],
     "mpc_optimality": [],
     "mpc_stress": [],
+    "mpc_deadline": [],
     "mpc_worth": ["{out}"],
     "mpc_friction_drop": ["{out}"],
     "mpc_sensor_faults": ["{out}"],
