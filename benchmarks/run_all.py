@@ -58,6 +58,7 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "mpc_deadline": [],
     "mpc_worth": ["{out}"],
     "mpc_friction_drop": ["{out}"],
+    "mpc_caution": ["{out}"],
     "mpc_sensor_faults": ["{out}"],
     "mpc_without_v_y": ["{out}"],
 }

@@ -252,7 +252,8 @@ def equations_file(prefix: str, about: str, functions: Mapping[str, Statements])
     """
     called = {own for statements in functions.values() for own in statements.called}
     text = own_functions(prefix, called) + "\n".join(
-        f"{signature}\n{{\n{statements.block()}}}\n" for signature, statements in functions.items()
+        f"{signature}\n{{\n{_unread(signature, statements.block())}{statements.block()}}}\n"
+        for signature, statements in functions.items()
     )
     macros = used_macros(prefix, text)
     library = "#include <math.h>\n\n" if macros else ""
@@ -262,6 +263,13 @@ def equations_file(prefix: str, about: str, functions: Mapping[str, Statements])
         "themselves. */\n#if defined(__clang__)\n#pragma STDC FP_CONTRACT OFF\n#endif\n\n"
         f"{macros}{text}"
     )
+
+
+def _unread(signature: str, block: str) -> str:
+    """Return what says that parameters are not read on purpose: of functions that share a type."""
+    names = re.findall(r"(\w+)(?:\[\w*\])?[,)]", signature)
+    unread = [name for name in names if not re.search(rf"\b{name}\b", block)]
+    return "".join(f"    (void){name};\n" for name in unread)
 
 
 # The build file.

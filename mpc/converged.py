@@ -62,7 +62,7 @@ def build_nlp(structure: TireStructure, horizon: int) -> dict[str, Any]:
     car, w = ca.MX.sym("car", N_CAR), ca.MX.sym("w", structure.n_weights)
     q, q_end = ca.MX.sym("q", N_ERRORS), ca.MX.sym("q_end", N_ERRORS)
     bounds, Z = ca.MX.sym("bounds", N_SOFT), ca.MX.sym("Z", N_SOFT)
-    beyond = bounds[1:], ca.MX.sym("rise", 2)
+    beyond = bounds[1:], ca.MX.sym("rise", 2), ca.MX(1.0)
 
     x_next = build_rk4(structure).map(N)(X[:, :-1], U, road[0, :], road[1, :], dt, car, w, *beyond)
     errors = build_errors(structure).map(N)

@@ -12,7 +12,7 @@ import casadi as ca
 
 from codegen.tuned import tuned
 from mpc.problem import N_ERRORS, gauss_newton, tracking_errors
-from mpc.tires.tire import Car, Point, TireStructure, extrapolated_force
+from mpc.tires.tire import Car, Pair, Point, TireStructure, believed_force
 
 # The car along a path as the tracker predicts it: ẋ and its Jacobian.
 #
@@ -28,7 +28,7 @@ NEAREST = 0.1
 
 
 class Ports(NamedTuple):
-    """Symbols of a stage, SX: state, input, parameters; the last two are those of `ValidSlip`."""
+    """Symbols of a stage, SX: state, input, parameters; the last three are those of `ValidSlip`."""
 
     x: Any
     u: Any
@@ -39,6 +39,7 @@ class Ports(NamedTuple):
     w: Any
     max_slip: Any
     rise: Any
+    grip: Any
 
 
 class Motion(NamedTuple):
@@ -59,7 +60,7 @@ def state_size(structure: TireStructure) -> int:
 
 def stage_ports(structure: TireStructure) -> Ports:
     """Return fresh symbols."""
-    sizes = (state_size(structure), 1, 1, 1, 1, N_CAR, structure.n_weights, 2, 2)
+    sizes = (state_size(structure), 1, 1, 1, 1, N_CAR, structure.n_weights, 2, 2, 1)
     pairs = zip(Ports._fields, sizes, strict=True)
     return Ports(*(ca.SX.sym(name, size) for name, size in pairs))
 
@@ -76,7 +77,7 @@ def motion(structure: TireStructure, p: Ports) -> Motion:
     at = Point(v_y, r, delta, p.v_x, car, p.w)
     kinematic = structure.slip(at)
     slip = (lagged[0], lagged[1]) if structure.lagged else kinematic
-    force = extrapolated_force(structure, slip, at, p.max_slip, p.rise)
+    force = believed_force(structure, slip, at, p.max_slip, p.rise, p.grip)
 
     F = ca.SX.sym("F", 2)
     c, s = ca.cos(e_psi), ca.sin(e_psi)
@@ -89,7 +90,7 @@ def motion(structure: TireStructure, p: Ports) -> Motion:
         p.u,
     ]
     if structure.lagged:
-        lengths = structure.lag_length(slip, at)
+        lengths = _lag_lengths(structure, slip, at, p.grip)
         for now, behind, length in zip(kinematic, slip, lengths, strict=True):
             # A lag under half a stage cannot be seen by it, and would make the step unstable.
             rates.append((now - behind) / ca.fmax(length * (1 / p.v_x), 0.5 * p.dt))
@@ -100,11 +101,20 @@ def motion(structure: TireStructure, p: Ports) -> Motion:
     return Motion(x_dot, x_dot_x, ca.jacobian(x_dot, p.u), s_dot, angles, ca.jacobian(angles, p.x))
 
 
+def _lag_lengths(structure: TireStructure, slip: Pair, at: Point, grip: Any) -> Pair:
+    """Return the relaxation lengths [m] on a friction: those of the slip over it."""
+    there = structure.similar(at, grip)
+    if there is None:
+        return structure.lag_length(slip, at)
+    per_grip = 1 / grip
+    return structure.lag_length((slip[0] * per_grip, slip[1] * per_grip), there)
+
+
 RESULTS = ("x_next", "A", "B", "H", "h", "slip", "slip_x")
 
 
 def build_dynamics(structure: TireStructure) -> ca.Function:
-    """Return ẋ as a function of x, u, kappa, v_x, dt, car, w, max_slip, rise.
+    """Return ẋ as a function of x, u, kappa, v_x, dt, car, w, max_slip, rise, grip.
 
     dt only bounds the lag from below.
     """
@@ -130,8 +140,9 @@ def build_stage(structure: TireStructure) -> ca.Function:
     """Return the linearized stage as an SX function with dense ports.
 
     Ports: x (n_x,), u, kappa [1/m], v_x [m/s], dt [s], car (4,), w (n_w,), max_slip (2,) [rad],
-    rise (2,) [N/rad], q (7,). Results: x_next; A = ∂x_next/∂x, B = ∂x_next/∂u; H (n_x, n_x) and
-    h (n_x,) of the cost at x; slip (2,) [rad], the kinematic one, and slip_x (2, n_x).
+    rise (2,) [N/rad], grip [-], q (7,). Results: x_next; A = ∂x_next/∂x, B = ∂x_next/∂u;
+    H (n_x, n_x) and h (n_x,) of the cost at x; slip (2,) [rad], the kinematic one, and
+    slip_x (2, n_x).
     """
     p = stage_ports(structure)
     q = ca.SX.sym("q", N_ERRORS)
@@ -155,6 +166,26 @@ def build_end(structure: TireStructure) -> ca.Function:
     H, h = gauss_newton(tracking_errors(p.x, p.kappa, p.v_x, at.s_dot), p.x, q)
     ports = {name: port for name, port in p._asdict().items() if name not in ("u", "dt")}
     return _finished("end", {**ports, "q": q}, [H, h, at.slip, at.slip_x], RESULTS[3:])
+
+
+@cache
+def build_axles(structure: TireStructure) -> ca.Function:
+    """Return what the axles do at a state, for who watches them.
+
+    Ports: x (n_x,), v_x, car, w, max_slip, rise, grip of `build_stage`. Results: force (2,) [N];
+    slip (2,) [rad], the kinematic one; length (2,) [m] by which the slip lags, 0 where it does not.
+    """
+    p = stage_ports(structure)
+    e_y, e_psi, v_y, r, delta, *lagged = ca.vertsplit(p.x)
+    del e_y, e_psi
+    at = Point(v_y, r, delta, p.v_x, Car(*ca.vertsplit(p.car)), p.w)
+    kinematic = structure.slip(at)
+    slip = (lagged[0], lagged[1]) if structure.lagged else kinematic
+    force = believed_force(structure, slip, at, p.max_slip, p.rise, p.grip)
+    lengths = _lag_lengths(structure, slip, at, p.grip) if structure.lagged else (0.0, 0.0)
+    ports = {name: port for name, port in p._asdict().items() if name not in ("u", "kappa", "dt")}
+    results = [force, ca.vertcat(*kinematic), ca.SX(ca.vertcat(*lengths))]
+    return _finished("axles", ports, results, ("force", "slip", "length"))
 
 
 def _runge_kutta(f: ca.Function, p: Ports) -> tuple[ca.SX, ca.SX, ca.SX]:

@@ -87,6 +87,7 @@ def export(
     fmu: bool = False,
     onnx: bool = False,
     mpc: bool = False,
+    caution: float = 0.0,
     overwrite: bool = False,
 ) -> Exported:
     """Write an identifier as C that goes on learning where the source ended.
@@ -105,6 +106,7 @@ def export(
     fmu : also FMUs 2.0 and 3.0 for Co-Simulation.
     onnx : also the model, frozen, as ONNX.
     mpc : also a tracker that steers by what is learnt.
+    caution : of that tracker, from 0 to 1, as `drive` has it.
     overwrite : replace the folder if it exists.
 
     Raises
@@ -143,6 +145,7 @@ def export(
         fmu=fmu,
         onnx=onnx,
         mpc=mpc,
+        caution=caution,
         overwrite=overwrite,
     )
 
@@ -160,6 +163,7 @@ def export_method(
     fmu: bool,
     onnx: bool,
     mpc: bool,
+    caution: float,
     overwrite: bool,
 ) -> Exported:
     """Write a method as C.
@@ -175,6 +179,7 @@ def export_method(
     fmu : also FMUs 2.0 and 3.0.
     onnx : also the model, frozen, as ONNX.
     mpc : also a tracker.
+    caution : of that tracker, from 0 to 1.
     overwrite : replace the folder if it exists.
 
     Raises
@@ -199,7 +204,7 @@ def export_method(
         told = []
         if mpc:
             progress.begin(TRACKING)
-            told = write_tracker(scratch, package, single=single)
+            told = write_tracker(scratch, package, single=single, caution=caution)
         if fmu:
             progress.begin(UNITS)
             from identifier.export.fmu import export_fmu
@@ -260,7 +265,7 @@ def _write_onnx(
 TRACKER = "mpc"  # folder of the package; that of the identifier is `identifier`
 
 
-def write_tracker(folder: Path, package: Package, *, single: bool) -> list[str]:
+def write_tracker(folder: Path, package: Package, *, single: bool, caution: float) -> list[str]:
     """Write the tracker and what joins it with the identifier; return what to say about it.
 
     Parameters
@@ -268,6 +273,7 @@ def write_tracker(folder: Path, package: Package, *, single: bool) -> list[str]:
     folder : where the identifier lies in a folder of that name.
     package : of the identifier.
     single : whether float is the default precision.
+    caution : of the tracker, from 0 to 1.
 
     Raises
     ------
@@ -275,7 +281,7 @@ def write_tracker(folder: Path, package: Package, *, single: bool) -> list[str]:
         Where what the method learns cannot be handed over, or there is no C compiler.
     """
     try:
-        pair = build_pair(package, single=single)
+        pair = build_pair(package, single=single, caution=caution)
     except NoCompilerError as error:
         raise ValueError(f"--mpc: {error}") from error
     tracker = pair.tracker

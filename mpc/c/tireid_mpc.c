@@ -3,6 +3,7 @@
 
 #include <stddef.h>
 
+#include "tireid_mpc_caution.h"
 #include "tireid_mpc_equations.h"
 #include "tireid_mpc_iteration.h"
 
@@ -79,7 +80,7 @@ static void take_measurement(tireid_mpc_state *state, const tireid_mpc_params *p
     x[1] = in->e_psi;
     x[2] = in->v_y;
     x[3] = in->r;
-    x[STEERING] = state->commands[0];
+    x[STEERING] = state->commands[0] + state->zero;
     for (i = LAGGED; i < NX; i++) {
         x[i] = state->lagged[i - LAGGED];
     }
@@ -104,8 +105,8 @@ static void lead(const tireid_mpc_state *state, const tireid_mpc_params *params,
         const real stop = ((ends < until) && (j > 0U)) ? ends : until;
         if (stop > now) {
             real next[NX];
-            x[STEERING] = state->commands[j];
-            tireid_mpc_predict(params, x, in->kappa[0], in->v_x[0], stop - now, next);
+            x[STEERING] = state->commands[j] + state->zero;
+            tireid_mpc_predict(params, x, in->kappa[0], in->v_x[0], stop - now, state->grip, next);
             for (i = 0U; i < NX; i++) {
                 x[i] = next[i];
             }
@@ -233,6 +234,7 @@ tireid_mpc_status tireid_mpc_reset(tireid_mpc_state *state, real steering)
         }
         state->lagged[0] = TIREID_MPC_C(0.0);
         state->lagged[1] = TIREID_MPC_C(0.0);
+        tireid_mpc_trust(state);
         state->iterations = 0U;
         state->age = 0U;
         state->planned = 0U;
@@ -287,7 +289,7 @@ static tireid_mpc_status plan(tireid_mpc_state *state, const tireid_mpc_params *
         x[i] = now[i];
     }
     lead(state, params, in, params->delay, ahead, x);
-    x[STEERING] = state->commands[0];
+    x[STEERING] = state->commands[0] + state->zero;
     if (tireid_mpc_carriable(x, NX)) {
         status = plan_from(state, params, work, in, x);
     }
@@ -311,7 +313,8 @@ tireid_mpc_status tireid_mpc_prepare(tireid_mpc_state *state, const tireid_mpc_p
         status = judge_road(params, expected);
         shift_once(state, params);
         state->prepared = 0U;
-        if ((status == TIREID_MPC_OK) && (state->planned != 0U) && is_sound(state, params)) {
+        if ((status == TIREID_MPC_OK) && (state->planned != 0U) && is_sound(state, params)
+            && !(params->caution > TIREID_MPC_C(0.0))) { /* which a measurement may change */
             tireid_mpc_prepare_from(
                 state, params, work, state->x[0], &expected->kappa[1], &expected->v_x[1]);
         }
@@ -332,6 +335,7 @@ tireid_mpc_status tireid_mpc_step(tireid_mpc_state *state, const tireid_mpc_para
         state->age += (state->age < UINT32_MAX) ? 1U : 0U;
         shift_once(state, params);
         state->shifted = 0U;
+        tireid_mpc_watch(state, params, input, wheels(state, params), status == TIREID_MPC_OK);
         if (status == TIREID_MPC_OK) {
             take_measurement(state, params, work, input, x);
             status = plan(state, params, work, input, x);

@@ -52,21 +52,29 @@ typedef struct {
     tireid_mpc_real cost_rate;                   /* R of 1/2 R u^2 a stage, u [rad/s] */
     tireid_mpc_real stage_time;                  /* of a stage of the plan [s] */
     tireid_mpc_real period;                      /* between two steps [s], at most stage_time */
-    tireid_mpc_real delay;         /* from a measurement to its command's effect [s] */
-    tireid_mpc_real max_steering;  /* |delta| [rad], hard */
-    tireid_mpc_real max_rate;      /* |u| [rad/s], hard */
-    tireid_mpc_real max_e_y;       /* |e_y| [m], soft */
-    tireid_mpc_real max_slip[2];   /* |alpha|, front and rear [rad], soft; curves end there */
-    tireid_mpc_real rise[2];       /* of the axle forces beyond max_slip [N/rad] */
-    tireid_mpc_real soft_e_y;      /* Z of 1/2 Z s^2 where |e_y| is s beyond [1/m^2] */
-    tireid_mpc_real soft_slip;     /* Z of slip [1/rad^2] */
-    tireid_mpc_real widest_e_y;    /* |e_y| [m] beyond which the car is off the path */
-    tireid_mpc_real widest_e_psi;  /* |e_psi| [rad] */
-    tireid_mpc_real max_v_y;       /* |v_y| [m/s] beyond which the tire is not known */
-    tireid_mpc_real max_yaw_rate;  /* |r| [rad/s] */
-    tireid_mpc_real min_speed;     /* v_x [m/s], positive, now and ahead */
-    tireid_mpc_real max_speed;     /* v_x [m/s] beyond which no input is believed */
-    tireid_mpc_real max_curvature; /* |kappa| [1/m], likewise */
+    tireid_mpc_real delay;        /* from a measurement to its command's effect [s] */
+    tireid_mpc_real max_steering; /* |delta| [rad], hard */
+    tireid_mpc_real max_rate;     /* |u| [rad/s], hard */
+    tireid_mpc_real max_e_y;      /* |e_y| [m], soft */
+    tireid_mpc_real max_slip[2];  /* |alpha|, front and rear [rad], soft; curves end there */
+    tireid_mpc_real rise[2];      /* of the axle forces beyond max_slip [N/rad] */
+    tireid_mpc_real soft_e_y;     /* Z of 1/2 Z s^2 where |e_y| is s beyond [1/m^2] */
+    tireid_mpc_real soft_slip;    /* Z of slip [1/rad^2] */
+    tireid_mpc_real caution;      /* share of what is not known that is feared, 0 to 1 */
+    tireid_mpc_real grips[TIREID_MPC_GRIPS]; /* frictions over that of the tire, 1 and falling */
+    tireid_mpc_real prior[TIREID_MPC_GRIPS]; /* what each is held for at first, see `cost` */
+    tireid_mpc_real surprise;                /* cost of a friction that comes without notice */
+    tireid_mpc_real doubt[2][TIREID_MPC_DOUBTS]; /* half the band of the axle forces [N] */
+    tireid_mpc_real doubt_step;     /* slip from one of them to the next, from 0 on [rad] */
+    tireid_mpc_real force_error[2]; /* of the axle forces as motion shows them [N] */
+    tireid_mpc_real stiffness;      /* slope of the force in front at no slip [N/rad] */
+    tireid_mpc_real widest_e_y;     /* |e_y| [m] beyond which the car is off the path */
+    tireid_mpc_real widest_e_psi;   /* |e_psi| [rad] */
+    tireid_mpc_real max_v_y;        /* |v_y| [m/s] beyond which the tire is not known */
+    tireid_mpc_real max_yaw_rate;   /* |r| [rad/s] */
+    tireid_mpc_real min_speed;      /* v_x [m/s], positive, now and ahead */
+    tireid_mpc_real max_speed;      /* v_x [m/s] beyond which no input is believed */
+    tireid_mpc_real max_curvature;  /* |kappa| [1/m], likewise */
     tireid_mpc_real speeds[TIREID_MPC_SPEEDS]; /* of the rows below [m/s], rising */
     tireid_mpc_real gains[TIREID_MPC_SPEEDS][TIREID_MPC_GAINS]; /* of steering without a plan, SI */
     tireid_mpc_real hold_time; /* how long an old plan is followed [s] */
@@ -93,8 +101,15 @@ typedef struct {
     tireid_mpc_real feedback[TIREID_MPC_HORIZON][TIREID_MPC_STATES];
     tireid_mpc_real commands[TIREID_MPC_COMMANDS]; /* steering [rad], the last one first */
     tireid_mpc_real lagged[2];                     /* slip of lagging tires now [rad] */
-    uint32_t faults[TIREID_MPC_STATUSES];          /* steps of each status, from init on */
-    uint32_t iterations;                           /* of the last solution */
+    tireid_mpc_real zero; /* of the wheels over what is commanded [rad], without caution none */
+    tireid_mpc_real grip; /* friction that is planned with, over that of the tire */
+    /* of each friction: -2 ln of its likelihood over that of the best; its slip [rad]; the impulse of
+     * the axles, followed by it [N s] */
+    tireid_mpc_real cost[TIREID_MPC_GRIPS];
+    tireid_mpc_real slips[TIREID_MPC_GRIPS][2];
+    tireid_mpc_real impulse[TIREID_MPC_GRIPS][2];
+    uint32_t faults[TIREID_MPC_STATUSES]; /* steps of each status, from init on */
+    uint32_t iterations;                  /* of the last solution */
     uint32_t shifted;  /* 1: the plan is where the next step begins, before that */
     uint32_t prepared; /* 1: work memory is prepared for the next solution */
     uint32_t switched; /* rows whose limits it reached or left against the plan before */
@@ -102,6 +117,8 @@ typedef struct {
     uint32_t planned;  /* 0 until there is a plan */
     uint32_t guessed;  /* 1: x and u without a solution */
     uint32_t started;  /* 0 until the first step */
+    uint32_t watched;  /* steps for which impulses are followed */
+    uint32_t doubted;  /* 0 until frictions have their costs */
 } tireid_mpc_state;
 
 /* A stage, linearized: x_next = A x + B u + c, all as differences from the plan; by columns. */
@@ -137,6 +154,7 @@ typedef struct {
     uint32_t held[TIREID_MPC_HORIZON]; /* what a stage has instead of its best input: */
     tireid_mpc_real
         held_to[TIREID_MPC_HORIZON]; /* its du, or the difference of the angle behind it */
+    tireid_mpc_real left[TIREID_MPC_HORIZON][3]; /* share of the soft limits that caution leaves */
     /* rows |value| <= 1, in parts of their limits */
     tireid_mpc_real scale[TIREID_MPC_HORIZON * TIREID_MPC_ROWS]; /* 1 / limit */
     tireid_mpc_real value[TIREID_MPC_HORIZON * TIREID_MPC_ROWS]; /* at the plan */

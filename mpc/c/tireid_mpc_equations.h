@@ -14,10 +14,11 @@
 extern "C" {
 #endif
 
-/* The stage from x[] with input u; its c is x_next itself. */
+/* The stage from x[] with input u; its c is x_next itself. `grip` is friction over the one that the
+ * weights have. */
 void tireid_mpc_linearize(const tireid_mpc_params *params, const tireid_mpc_real *q,
     const tireid_mpc_real *x, tireid_mpc_real u, tireid_mpc_real kappa, tireid_mpc_real v_x,
-    tireid_mpc_stage *stage);
+    tireid_mpc_real grip, tireid_mpc_stage *stage);
 
 /* Cost and slip at the end. */
 void tireid_mpc_linearize_end(const tireid_mpc_params *params, const tireid_mpc_real *q,
@@ -25,7 +26,13 @@ void tireid_mpc_linearize_end(const tireid_mpc_params *params, const tireid_mpc_
 
 /* Where x[] is after a time dt [s] without an input. */
 void tireid_mpc_predict(const tireid_mpc_params *params, const tireid_mpc_real *x,
-    tireid_mpc_real kappa, tireid_mpc_real v_x, tireid_mpc_real dt, tireid_mpc_real *x_next);
+    tireid_mpc_real kappa, tireid_mpc_real v_x, tireid_mpc_real dt, tireid_mpc_real grip,
+    tireid_mpc_real *x_next);
+
+/* Forces of the axles at x[] [N], kinematic slip [rad], and the lengths by which slip lags [m]. */
+void tireid_mpc_axles(const tireid_mpc_params *params, const tireid_mpc_real *x,
+    tireid_mpc_real v_x, tireid_mpc_real grip, tireid_mpc_real force[2], tireid_mpc_real slip[2],
+    tireid_mpc_real length[2]);
 
 #ifdef __cplusplus
 }

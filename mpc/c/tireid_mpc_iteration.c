@@ -3,6 +3,7 @@
 
 #include <stddef.h>
 
+#include "tireid_mpc_caution.h"
 #include "tireid_mpc_equations.h"
 #include "tireid_mpc_qp.h"
 
@@ -162,7 +163,7 @@ static void linearize(const tireid_mpc_state *state, const tireid_mpc_params *pa
         tireid_mpc_stage *stage = &work->stage[k];
         work->u[k] = fed_back(state, params, k, x);
         tireid_mpc_linearize(
-            params, params->cost, x, work->u[k], work->kappa[k], work->v_x[k], stage);
+            params, params->cost, x, work->u[k], work->kappa[k], work->v_x[k], state->grip, stage);
         rolls = (state->guessed == 0U) && tireid_mpc_on_map(params, stage->c);
         for (i = 0U; i < NX; i++) {
             if ((k + 1U) < stages) {
@@ -177,27 +178,47 @@ static void linearize(const tireid_mpc_state *state, const tireid_mpc_params *pa
     }
     if (stages == N) {
         tireid_mpc_linearize_end(params, params->cost_end, work->x[N], work->kappa[N - 1U],
-            work->v_x[N - 1U], &work->stage[N]);
+            work->v_x[N - 1U], state->grip, &work->stage[N]);
     }
 }
 
-/* Values of the rows of the first stages at the plan, in parts of their limits. */
-static void measure_rows(const tireid_mpc_params *params, tireid_mpc_work *work, uint32_t stages)
+/* Ends of the rows of a stage, of which caution leaves a share of the soft ones, and what goes with them:
+ * 1 / limit, and how soft they are. */
+static void limit_rows(
+    const tireid_mpc_params *params, real grip, const real *left, real *scale, real *regular)
 {
-    const real scale[TIREID_MPC_ROWS] = { TIREID_MPC_C(1.0) / params->max_rate,
-        TIREID_MPC_C(1.0) / params->max_steering, TIREID_MPC_C(1.0) / params->max_e_y,
-        TIREID_MPC_C(1.0) / params->max_slip[0], TIREID_MPC_C(1.0) / params->max_slip[1] };
-    const real regular[TIREID_MPC_ROWS] = { TIREID_MPC_C(0.0), TIREID_MPC_C(0.0),
-        (scale[2] * scale[2]) / params->soft_e_y, (scale[3] * scale[3]) / params->soft_slip,
-        (scale[4] * scale[4]) / params->soft_slip };
+    scale[0] = TIREID_MPC_C(1.0) / params->max_rate;
+    scale[1] = TIREID_MPC_C(1.0) / params->max_steering;
+    scale[2] = TIREID_MPC_C(1.0) / (params->max_e_y * left[0]);
+    scale[3] = TIREID_MPC_C(1.0) / (params->max_slip[0] * (grip * left[1]));
+    scale[4] = TIREID_MPC_C(1.0) / (params->max_slip[1] * (grip * left[2]));
+    regular[0] = TIREID_MPC_C(0.0);
+    regular[1] = TIREID_MPC_C(0.0);
+    regular[2] = (scale[2] * scale[2]) / params->soft_e_y;
+    regular[3] = (scale[3] * scale[3]) / params->soft_slip;
+    regular[4] = (scale[4] * scale[4]) / params->soft_slip;
+}
+
+/* Values of the rows of the first stages at the plan, in parts of their limits. */
+static void measure_rows(const tireid_mpc_state *state, const tireid_mpc_params *params,
+    tireid_mpc_work *work, uint32_t stages)
+{
+    const bool cautious = params->caution > TIREID_MPC_C(0.0);
+    const real whole[3] = { TIREID_MPC_C(1.0), TIREID_MPC_C(1.0), TIREID_MPC_C(1.0) };
+    real scale[TIREID_MPC_ROWS];
+    real regular[TIREID_MPC_ROWS];
     uint32_t k;
     uint32_t i;
+    limit_rows(params, state->grip, whole, scale, regular);
     for (k = 0U; k < stages; k++) {
         const tireid_mpc_stage *next = &work->stage[k + 1U];
         const real *x = work->x[k + 1U];
         const real at[TIREID_MPC_ROWS] = { work->u[k], x[STEERING], x[0], next->slip[0],
             next->slip[1] };
         const uint32_t p = k * TIREID_MPC_ROWS;
+        if (cautious) {
+            limit_rows(params, state->grip, work->left[k], scale, regular);
+        }
         for (i = 0U; i < TIREID_MPC_ROWS; i++) {
             work->scale[p + i] = scale[i];
             work->value[p + i] = scale[i] * at[i];
@@ -253,7 +274,10 @@ static void prepare_stages(const tireid_mpc_state *state, const tireid_mpc_param
         work->v_x[k] = v_x[k];
     }
     linearize(state, params, work, x0, stages);
-    measure_rows(params, work, stages);
+    if (params->caution > TIREID_MPC_C(0.0)) {
+        tireid_mpc_tighten(state, params, work);
+    }
+    measure_rows(state, params, work, stages);
     tireid_mpc_prepare_qp(work, params, state->switched, stages);
 }
 

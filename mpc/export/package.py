@@ -205,7 +205,7 @@ PLACES: Mapping[str, str] = {
     "tireid_mpc_params.c": "src",
     "test_tireid_mpc.c": "tests",
 }
-UNTOLD = ("weights", "speeds", "gains")  # in the manifest; the gains have a table of their own
+UNTOLD = ("weights", "speeds", "gains", "doubt", "grips", "prior")  # in the manifest; gains: below
 FORMAT = "tireid mpc package 1"
 FLAGS = (  # of the library
     *("-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros"),
@@ -240,6 +240,7 @@ def build_mpc_package(
     delay: float = 0.0,
     name: str = "tireid_mpc",
     single: bool = False,
+    caution: float = 0.0,
 ) -> MpcPackage:
     """Return the package of a tracker; the same input gives the same bytes.
 
@@ -250,6 +251,7 @@ def build_mpc_package(
     delay : from a measurement until its command acts [s].
     name : beginning of every symbol and file name.
     single : whether float is the default precision.
+    caution : of the tracker, from 0 to 1; a number of the parameters.
 
     Raises
     ------
@@ -261,7 +263,7 @@ def build_mpc_package(
         Where a number is out of its range.
     """
     check_name(name, "_mpc")
-    tracker = Tracker(tire, problem, period=period, delay=delay)
+    tracker = Tracker(tire, problem, period=period, delay=delay, caution=caution)
     params: Params = tracker.params
     content = _ingredients(tracker, params, name, single=single)
     about = _summary(tracker, content)

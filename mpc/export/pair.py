@@ -147,6 +147,7 @@ def build_pair(
     *,
     delay: float = DELAY,
     single: bool = False,
+    caution: float = 0.0,
 ) -> Pair:
     """Return the tracker that goes with an identifier, one step a sample, and what joins them.
 
@@ -156,6 +157,7 @@ def build_pair(
     problem : of the tracker.
     delay : from a measurement until its command acts [s].
     single : whether float is the default precision of the tracker.
+    caution : of the tracker, from 0 to 1; a number of the parameters.
 
     Raises
     ------
@@ -172,6 +174,7 @@ def build_pair(
         delay=delay,
         name=f"{specialized.name}_mpc",
         single=single,
+        caution=caution,
     )
     values: dict[str, str | Words] = {
         "name": specialized.name,

@@ -100,7 +100,7 @@ def previewed_rate(tracker: Tracker, tire: PredictionTire) -> float:
     params_now = instance.params
     params_now["weights"], params_now["car"] = tire.weights, tire.car
     valid = valid_slip(tire, tracker.problem.limits.slip)
-    params_now["max_slip"], params_now["rise"] = valid
+    params_now["max_slip"], params_now["rise"] = valid.slip, valid.rise
     instance.solve()
     rate = float(instance.state["u"][0])
     instance.state[...], instance.params[...] = state, params

@@ -22,10 +22,11 @@ from codegen.package import (
 )
 from codegen.template import Values
 from codegen.tuned import tuned
-from mpc.prediction import build_end, build_rk4, build_stage, state_size
+from mpc.prediction import build_axles, build_end, build_rk4, build_stage, state_size
 from mpc.problem import N_ERRORS
+from mpc.realtime.caution import N_GRIPS
 from mpc.realtime.fall_back import N_GAINS, N_SPEEDS
-from mpc.tires.tire import TireStructure
+from mpc.tires.tire import N_DOUBTS, TireStructure
 
 C = Path(__file__).parents[1] / "c"
 PREFIX = "tireid_mpc"  # of the C as it lies there
@@ -36,9 +37,11 @@ PLACES: Mapping[str, str] = {
     "tireid_mpc_riccati.h": "src",
     "tireid_mpc_active.h": "src",
     "tireid_mpc_iteration.h": "src",
+    "tireid_mpc_caution.h": "src",
     "tireid_mpc_riccati.c": "src",
     "tireid_mpc_active.c": "src",
     "tireid_mpc_qp.c": "src",
+    "tireid_mpc_caution.c": "src",
     "tireid_mpc_iteration.c": "src",
     "tireid_mpc.c": "src",
 }
@@ -46,8 +49,8 @@ PLACES: Mapping[str, str] = {
 ORDER = (
     *("include/{}_config.h", "include/{}.h"),
     *("src/{}_equations.h", "src/{}_qp.h", "src/{}_riccati.h", "src/{}_active.h"),
-    *("src/{}_iteration.h", "src/{}_equations.c", "src/{}_riccati.c", "src/{}_active.c"),
-    *("src/{}_qp.c", "src/{}_iteration.c", "src/{}.c"),
+    *("src/{}_iteration.h", "src/{}_caution.h", "src/{}_equations.c", "src/{}_riccati.c"),
+    *("src/{}_active.c", "src/{}_qp.c", "src/{}_caution.c", "src/{}_iteration.c", "src/{}.c"),
 )
 READ: Mapping[str, str] = {
     "x": "x[{}]",
@@ -59,6 +62,7 @@ READ: Mapping[str, str] = {
     "w": "params->weights[{}]",
     "max_slip": "params->max_slip[{}]",
     "rise": "params->rise[{}]",
+    "grip": "grip",
     "q": "q[{}]",
 }
 
@@ -121,6 +125,8 @@ def _sizes(
         "ERRORS": (f"{N_ERRORS}U", "e_y, e_psi, course, v_y, yaw rate, delta, progress"),
         "SPEEDS": (f"{N_SPEEDS}U", "of the fall-back's table"),
         "GAINS": (f"{N_GAINS}U", "a speed: of e_y, e_psi, v_y, r, wheels; delta, v_y of a turn"),
+        "GRIPS": (f"{N_GRIPS}U", "frictions that are held for possible"),
+        "DOUBTS": (f"{N_DOUBTS}U", "slips at which the doubt of the forces is told"),
         "VERSION": (version_text, "name, hash, version of tireid"),
     }
 
@@ -130,7 +136,7 @@ def _equations(structure: TireStructure, name: str, sentence: str) -> str:
     real, params = f"{name}_real", f"const {name}_params *params"
     bodies = {
         f"void {name}_linearize({params}, const {real} *q,\n    const {real} *x, {real} u, {real} "
-        f"kappa, {real} v_x, {name}_stage *stage)": _body(
+        f"kappa, {real} v_x, {real} grip, {name}_stage *stage)": _body(
             build_stage(structure), name, READ, "stage->{}[{}]"
         ),
         f"void {name}_linearize_end({params}, const {real} *q, const {real} *x,\n    {real} kappa, "
@@ -138,9 +144,12 @@ def _equations(structure: TireStructure, name: str, sentence: str) -> str:
             build_end(structure), name, READ, "stage->{}[{}]"
         ),
         f"void {name}_predict({params}, const {real} *x, {real} kappa,\n    {real} v_x, {real} dt, "
-        f"{real} *x_next)": _body(
+        f"{real} grip, {real} *x_next)": _body(
             _free_motion(structure), name, {**READ, "dt": "dt"}, "x_next[{1}]"
         ),
+        f"void {name}_axles({params}, const {real} *x,\n    {real} v_x, {real} grip, {real} "
+        "force[2], "
+        f"{real} slip[2], {real} length[2])": _body(build_axles(structure), name, READ, "{}[{}]"),
     }
     return equations_file(name, f"The prediction and its derivatives. {sentence}", bodies)
 

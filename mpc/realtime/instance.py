@@ -18,8 +18,9 @@ from codegen.compiler import keep, kept
 from mpc.prediction import state_size
 from mpc.problem import N_ERRORS, Guards, Problem
 from mpc.realtime.c_source import c_sources, python_file
+from mpc.realtime.caution import N_GRIPS
 from mpc.realtime.fall_back import N_GAINS, N_SPEEDS
-from mpc.tires.tire import TireStructure
+from mpc.tires.tire import N_DOUBTS, TireStructure
 
 # What goes into a tracker and what comes out.
 
@@ -74,7 +75,17 @@ N_COMMANDS = 32
 N_STATUSES = 9
 TIMES = ("cost_rate", "stage_time", "period", "delay")
 LIMITS = ("max_steering", "max_rate", "max_e_y", "max_slip", "rise", "soft_e_y", "soft_slip")
-OF_AXLES = ("max_slip", "rise")
+CAUTION = (
+    "caution",
+    "grips",
+    "prior",
+    "surprise",
+    "doubt",
+    "doubt_step",
+    "force_error",
+    "stiffness",
+)
+OF_AXLES = ("max_slip", "rise", "force_error")
 GUARDS = (
     *("widest_e_y", "widest_e_psi", "max_v_y", "max_yaw_rate", "min_speed"),
     *("max_speed", "max_curvature", "speeds", "gains", "hold_time"),
@@ -90,8 +101,15 @@ def params_type(n_weights: int, *, single: bool) -> np.dtype[np.void]:
     single : whether numbers are float.
     """
     real = _real(single)
-    names = [*TIMES, *LIMITS, *GUARDS, "tolerance"]
-    shapes = {**dict.fromkeys(OF_AXLES, (2,)), "speeds": (N_SPEEDS,), "gains": (N_SPEEDS, N_GAINS)}
+    names = [*TIMES, *LIMITS, *CAUTION, *GUARDS, "tolerance"]
+    of_grips = dict.fromkeys(("grips", "prior"), (N_GRIPS,))
+    shapes = {
+        **dict.fromkeys(OF_AXLES, (2,)),
+        **of_grips,
+        "doubt": (2, N_DOUBTS),
+        "speeds": (N_SPEEDS,),
+        "gains": (N_SPEEDS, N_GAINS),
+    }
     numbers = [(name, real, shapes.get(name, ())) for name in names]
     arrays = [("car", 4), ("weights", n_weights), ("cost", N_ERRORS), ("cost_end", N_ERRORS)]
     return np.dtype(
@@ -112,7 +130,7 @@ def state_type(horizon: int, n_x: int, *, single: bool) -> np.dtype[np.void]:
     single : whether numbers are float.
     """
     real, solution = _real(single), ("iterations", "shifted", "prepared", "switched")
-    counts = (*solution, "age", "planned", "guessed", "started")
+    counts = (*solution, "age", "planned", "guessed", "started", "watched", "doubted")
     return np.dtype(
         [
             ("x", real, (horizon + 1, n_x)),
@@ -120,6 +138,11 @@ def state_type(horizon: int, n_x: int, *, single: bool) -> np.dtype[np.void]:
             ("feedback", real, (horizon, n_x)),
             ("commands", real, (N_COMMANDS,)),
             ("lagged", real, (2,)),
+            ("zero", real),
+            ("grip", real),
+            ("cost", real, (N_GRIPS,)),
+            ("slips", real, (N_GRIPS, 2)),
+            ("impulse", real, (N_GRIPS, 2)),
             ("faults", np.uint32, (N_STATUSES,)),
             *((name, np.uint32) for name in counts),
         ],

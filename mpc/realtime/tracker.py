@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from codegen.arrays import Array
 from mpc.problem import Guards, Problem
+from mpc.realtime.caution import require_caution, set_caution
 from mpc.realtime.fall_back import fall_back
 from mpc.realtime.instance import N_COMMANDS, Command, Instance, Measurement, Status, set_params
 from mpc.tires.tire import PredictionTire, valid_slip
@@ -37,6 +38,8 @@ class Tracker:
     max_active_sets : sets of active limits that are tried in a row, each at half an iteration
         of the interior point, before it and once it comes close; 0 takes that alone.
     single : whether to compute in float.
+    caution : share of what is not known of the tires that is feared, from 0 to 1: see
+        `mpc.realtime.caution`.
     clock : of the solve times [s].
 
     Raises
@@ -63,6 +66,7 @@ class Tracker:
         linearizations: int = 1,
         max_active_sets: int = 6,
         single: bool = False,
+        caution: float = 0.0,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         problem = Problem() if problem is None else problem
@@ -82,6 +86,7 @@ class Tracker:
         if max_active_sets < 0:
             raise ValueError(f"max_active_sets must not be negative, it is {max_active_sets}")
         self.tire, self.problem, self.period, self.delay = tire, problem, period, delay
+        self.caution = require_caution("caution", caution)
         self._budget, self._clock = budget, clock
         self.instance = Instance(tire.structure, problem.horizon, single=single)
         params = self.instance.params
@@ -121,6 +126,11 @@ class Tracker:
         return float(self.instance.steering)
 
     @property
+    def grip(self) -> float:
+        """Friction that is planned with, over that of the tire [-]; 1 without caution."""
+        return float(self.instance.state["grip"])
+
+    @property
     def faults(self) -> dict[Status, int]:
         """Steps of each status since the tracker was made."""
         return {status: int(self.instance.state["faults"][status]) for status in Status}
@@ -152,7 +162,9 @@ class Tracker:
         if not (np.isfinite(weights).all() and np.isfinite(car).all()):
             raise ValueError("weights and car must be finite")
         params["weights"], params["car"] = weights, car
-        params["max_slip"], params["rise"] = valid_slip(tire, self.problem.limits.slip)
+        valid = valid_slip(tire, self.problem.limits.slip)
+        params["max_slip"], params["rise"] = valid.slip, valid.rise
+        set_caution(params, tire, self.caution)
         self.instance.state["prepared"] = 0  # by the tire before
         self.tire = tire
 

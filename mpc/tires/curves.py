@@ -19,6 +19,7 @@ from mpc.tires.tire import (
     PredictionTire,
     TireStructure,
     no_lag,
+    not_similar,
     one_friction,
     small_slip,
     wheel_slip,
@@ -68,6 +69,7 @@ class DugoffAxles:
     slip = wheel_slip
     lag_length = no_lag
     at_friction = one_friction
+    similar = not_similar
     saturates = False
     force = limited(_dugoff)
 
@@ -82,6 +84,7 @@ class FialaAxles:
     slip = wheel_slip
     lag_length = no_lag
     at_friction = one_friction
+    similar = not_similar
     saturates = False
     force = limited(_fiala)
 
@@ -96,6 +99,7 @@ class MagicAxles:
     slip = wheel_slip
     lag_length = no_lag
     at_friction = one_friction
+    similar = not_similar
     saturates = False
 
     def force(self, slip: Pair, at: Point) -> Pair:
@@ -128,6 +132,7 @@ class LaggedAxles:
 
     saturates = False
     at_friction = one_friction
+    similar = not_similar
 
     @property
     def n_weights(self) -> int:
@@ -164,6 +169,7 @@ class LinearAxles:
     slip = small_slip
     lag_length = no_lag
     at_friction = one_friction
+    similar = not_similar
     saturates = False
 
     def force(self, slip: Pair, at: Point) -> Pair:

@@ -15,7 +15,15 @@ from identifier.axle.slip import SHORTEST
 from models.plant.dynamics import wheel_loads
 from models.tires import MagicFormula, Tire
 from models.vehicle import GRAVITY, Vehicle, VehicleError
-from mpc.tires.tire import Pair, Point, PredictionTire, wheel_slip
+from mpc.tires.tire import (
+    DOUBT_STEP,
+    N_DOUBTS,
+    Pair,
+    Point,
+    PredictionTire,
+    as_it_is,
+    wheel_slip,
+)
 
 N_COMMON = 3
 N_AXLE = 2  # beside the w_j
@@ -43,6 +51,7 @@ class LadderAxles:
     """
 
     saturates = True
+    similar = as_it_is
 
     units: int
     lagged: bool = True
@@ -141,7 +150,8 @@ def axle_tire(model: AxleModel) -> PredictionTire:
         shortest=shortest,
         offset=(model.own[0, 2], model.own[1, 2]),
     )
-    return PredictionTire(LadderAxles(units=ladder.size), weights, model.vehicle)
+    doubt = model.half_band(DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)).T
+    return PredictionTire(LadderAxles(units=ladder.size), weights, model.vehicle, doubt)
 
 
 # A force curve, tabulated over slip, as a ladder of tanh: a linear least-squares fit.

@@ -11,7 +11,15 @@ from codegen.arrays import Array
 from identifier.own_network import OnnxModel, read_network
 from identifier.paper.network import NetworkModel, network_signals
 from models.bicycle import BicycleParameters
-from mpc.tires.tire import Pair, Point, PredictionTire, no_lag, one_friction, small_slip
+from mpc.tires.tire import (
+    Pair,
+    Point,
+    PredictionTire,
+    no_lag,
+    not_similar,
+    one_friction,
+    small_slip,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,6 +56,12 @@ class NetworkAxles:
         w[2:end] *= ratio
         w[end:] /= ratio
         return w
+
+    def similar(self, at: Point, ratio: Any) -> Point | None:
+        """Return the signals over the ratio; None where the network reads the speed."""
+        if "v_x" in self.inputs:
+            return None
+        return at._replace(v_y=at.v_y / ratio, r=at.r / ratio, delta=at.delta / ratio)
 
     def force(self, slip: Pair, at: Point) -> Pair:
         """Return the axle forces [N], frame of the body."""
@@ -109,6 +123,7 @@ class OnnxAxles:
     slip = small_slip
     lag_length = no_lag
     at_friction = one_friction
+    similar = not_similar
     saturates = False
 
     def force(self, slip: Pair, at: Point) -> Pair:

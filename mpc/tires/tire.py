@@ -88,18 +88,47 @@ class TireStructure(Protocol):
         ratio : friction over the one that the weights have [-].
         """
 
+    def similar(self, at: Point, ratio: Any) -> Point | None:
+        """Return where the force is read of which `ratio` times is that of another friction.
+
+        The slip is over `ratio` there, and so is what else the force follows as it follows slip.
+        None where `at_friction` is not offered.
+
+        Parameters
+        ----------
+        ratio : friction over the one that the weights have [-].
+        """
+
+
+N_DOUBTS = 26
+DOUBT_STEP = 0.02  # rad
+RELATIVE, FLOOR = 0.066, 0.016  # half a band of 90 % of what a learnt tire misses at best
+
 
 class PredictionTire(NamedTuple):
-    """A structure with its weights (n_weights,), and the car that they are of."""
+    """A structure with its weights (n_weights,), and the car that they are of.
+
+    doubt : half the band of 90 % of the axle forces at slips 0, 0.02, … 0.5 rad [N], (2, 26); None
+        where nobody told.
+    """
 
     structure: TireStructure
     weights: Array
     vehicle: Vehicle
+    doubt: Array | None = None
 
     @property
     def car(self) -> Array:
         """The numbers of `Car`, (4,)."""
         return np.array(self.vehicle.bicycle[:4])
+
+    def doubt_or_told(self) -> Array:
+        """Return the doubt (2, 26) [N]; where nobody told it, that of a tire learnt well."""
+        if self.doubt is not None:
+            return self.doubt
+        slip = DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)
+        floor = FLOOR * np.array(self.vehicle.axle_loads)[:, None]
+        return np.hypot(RELATIVE * curves_at(self, slip), floor)
 
 
 def wheel_slip(self: TireStructure, at: Point) -> Pair:
@@ -130,6 +159,28 @@ def one_friction(self: TireStructure, weights: Array, ratio: float) -> None:
     del self, weights, ratio
 
 
+def as_it_is(self: TireStructure, at: Point, ratio: Any) -> Point:
+    """Return `at`: nothing but slip makes the force. A method `similar`.
+
+    Parameters
+    ----------
+    ratio : not looked at.
+    """
+    del self, ratio
+    return at
+
+
+def not_similar(self: TireStructure, at: Point, ratio: Any) -> None:
+    """Return None: another friction is not offered. A method `similar`.
+
+    Parameters
+    ----------
+    at : not looked at.
+    ratio : not looked at.
+    """
+    del self, at, ratio
+
+
 def no_lag(self: TireStructure, slip: Pair, at: Point) -> Pair:
     """Return 0 m: force follows slip at once. A method `lag_length`.
 
@@ -156,10 +207,14 @@ SPEED = 15.0  # m/s; curves of slip do not depend on it
 
 
 class ValidSlip(NamedTuple):
-    """Slip up to which curves are believed [rad], and their slope beyond [N/rad]; (2,) each."""
+    """Slip up to which curves are believed [rad], their slope beyond [N/rad]; (2,) each.
+
+    grip : friction over the one that the curves have, by which all of that scales [-].
+    """
 
     slip: Array
     rise: Array
+    grip: float = 1.0
 
 
 ALL = ValidSlip(np.full(2, np.inf), np.zeros(2))  # the curves as they are
@@ -180,9 +235,43 @@ def valid_slip(tire: PredictionTire, most: tuple[float, float]) -> ValidSlip:
     return ValidSlip(slip, np.maximum(np.maximum(there, LEAST_RISE * slopes[:, 0]), 0.0))
 
 
+def curves_at(tire: PredictionTire, slip: Array) -> Array:
+    """Return the axle forces at slips, straight ahead, (2, k) [N].
+
+    Parameters
+    ----------
+    slip : of both axles [rad], (k,).
+    """
+    x = ca.SX.sym("slip")
+    at = Point(0.0, 0.0, 0.0, SPEED, Car(*tire.car), ca.SX(tire.weights))
+    force = ca.densify(ca.vertcat(*tire.structure.force((x, x), at)))
+    return np.array(ca.Function("curves", [x], [force])(slip[None]))
+
+
 def curve_slopes(tire: PredictionTire) -> Array:
     """Return dF/dα of the axles at `SLIPS` (2, k) [N/rad], straight ahead."""
     return np.array(_slopes(tire.structure)(SLIPS[None], tire.car, tire.weights))
+
+
+def believed_force(
+    structure: TireStructure, slip: Pair, at: Point, max_slip: Any, rise: Any, grip: Any
+) -> Any:
+    """Return the axle forces that the tracker believes where friction may be another [N], (2,).
+
+    Parameters
+    ----------
+    slip : what makes the force [rad].
+    max_slip : slip up to which its curves are believed [rad], (2,).
+    rise : slope beyond [N/rad], (2,).
+    grip : friction over the one that the weights have [-]; not looked at where the structure
+        offers no other.
+    """
+    there = structure.similar(at, grip)
+    if there is None:
+        return extrapolated_force(structure, slip, at, max_slip, rise)
+    per_grip = 1 / grip
+    shared = slip[0] * per_grip, slip[1] * per_grip
+    return grip * extrapolated_force(structure, shared, there, max_slip, rise)
 
 
 def extrapolated_force(

@@ -269,7 +269,7 @@ def test_nothing_of_a_library_is_called(kind):
 def test_ten_units_cost_few_operations():
     """14-28 µs for 40 stages when measured; a count does not depend on the machine."""
     assert build_stage(TIRES["network"].structure).n_instructions() < 4000
-    assert build_stage(TIRES["oracle"].structure).n_instructions() < 7200
+    assert build_stage(TIRES["oracle"].structure).n_instructions() < 7250
 
 
 def test_errors_are_zero_on_the_path():

@@ -1,12 +1,14 @@
 """How fast and on what road: words with units, and one clear line for what is no speed."""
 
 import math
+from types import SimpleNamespace
 
 import pytest
 
 from models.faults import SensorFault
-from tireid.cli import main
-from tireid.commands.drive_case import parse_drop, parse_fault, parse_speed
+from tireid.cli import build_parser, main
+from tireid.commands.drive_case import conditions_of, parse_drop, parse_fault, parse_speed
+from tireid.driving.runs import BacksOff
 from tireid.driving.setup import SpeedWish, require_friction
 
 
@@ -103,3 +105,23 @@ def test_what_is_no_fault_is_refused_with_its_rule(text, said):
 def test_a_weave_that_is_none_is_refused_before_anything_is_driven(tmp_path, capsys, word):
     assert main(["drive", "--dither", word, "--out", str(tmp_path / "out")]) == 2
     assert "--dither must be 0 to 0.5 m" in capsys.readouterr().err
+
+
+def test_caution_is_a_share_and_zero_by_default():
+    def told(*words):
+        return build_parser(["drive", *words]).parse_args(["drive", *words])
+
+    assert conditions_of(told()).caution == 0.0
+    assert conditions_of(told("--caution", "0.5")).caution == 0.5
+    with pytest.raises(ValueError, match="--caution must be from 0 to 1, it is 2"):
+        conditions_of(told("--caution", "2"))
+
+
+def test_a_tracker_that_backs_off_is_noted_once():
+    noted, said = BacksOff(None), []
+    for grip in (1.0, 0.95, 0.7, 0.68, 0.72, 0.9):
+        said.append(noted.observe(None, SimpleNamespace(grip=grip)))
+    assert said == [
+        *(None, None, "plans with 0.70 of the grip"),
+        *(None, None, "plans with 0.90 of the grip"),
+    ]

@@ -59,6 +59,7 @@ def headline(conditions: Conditions) -> str:
     share = "" if wish is None else f", {100.0 * wish:.0f} % of a grip of {setup.grip:.1f} m/s²"
     drops = "".join(f", {mu:g} from {s:g} m on" for s, mu in setup.drops)
     noise = "sensor noise" if conditions.noise else "no noise"
+    noise += f", caution {conditions.caution:g}" if conditions.caution > 0.0 else ""
     noise += ", no v_y" if conditions.kind == IMU else ""
     noise += f", weave of {conditions.dither:g} m" if conditions.dither > 0.0 else ""
     noise += "".join(f", {fault}" for fault in conditions.faults)
@@ -105,6 +106,7 @@ def inputs_of(
         "noise": conditions.noise,
         **({"sensors": conditions.kind} if conditions.kind != FULL else {}),
         **({"dither_m": conditions.dither} if conditions.dither > 0.0 else {}),
+        **({"caution": conditions.caution} if conditions.caution > 0.0 else {}),
         "faults": [_finite(asdict(fault)) for fault in conditions.faults],
         "seed": conditions.seed,
     }
@@ -230,6 +232,14 @@ def add_parser(commands: Any) -> None:
         metavar="M",
         help="weave by at most so much about the path, to learn from it; where the car goes on "
         "learning the weave fades as the tires become known (%(default)g: off)",
+    )
+    parser.add_argument(
+        "--caution",
+        type=float,
+        default=0.0,
+        metavar="SHARE",
+        help="of what is not known of the tires that the tracker fears: 0 believes in them, 1 "
+        "plans with the least grip that motion and band leave possible (%(default)g)",
     )
     add_seed(parser, "noise and learning")
     parser.add_argument(

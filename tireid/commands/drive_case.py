@@ -15,6 +15,7 @@ from models.schema import require_few
 from models.vehicle import Vehicle, sedan
 from mpc.loop import CarSensors, FaultySensors, imu_and_localization
 from mpc.path import BUILT_IN, Path
+from mpc.realtime.caution import require_caution
 from tireid.commands.options import chosen_method, network_model, read_vehicle, seed_of
 from tireid.driving.learn import learning_drive
 from tireid.driving.runs import (
@@ -178,6 +179,7 @@ def conditions_of(options: argparse.Namespace) -> Conditions:
         seed=seed_of(options),
         laps=options.laps,
         faults=tuple(parse_fault(text, options.sensors) for text in options.fault),
+        caution=require_caution("--caution", options.caution),
         kind=options.sensors,
         dither=options.dither,
     )
@@ -307,10 +309,11 @@ def frozen_tires(
     history = identify(recording, setup.vehicle, method, check=False)
     warn_of(history.verdict(), f"what {law} learnt to drive on")
     assert recording.a_y is not None
+    learnt = history.calibrated() if conditions.caution > 0.0 else history.freeze()
     return (
         f"frozen ones learnt by {law} on {recording.duration:.0f} s of random steering on an open "
         f"field, up to {np.abs(recording.a_y).max():.1f} m/s² sidewards"
-    ), history.freeze()
+    ), learnt
 
 
 def _require_its_car(options: argparse.Namespace, learnt: Vehicle, setup: Setup) -> None:

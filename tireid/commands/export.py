@@ -7,6 +7,7 @@ from identifier.method import Method
 from identifier.methods import continuing, load_model
 from identifier.tire_model import TireModel
 from models.vehicle import Vehicle
+from mpc.realtime.caution import require_caution
 from tireid.commands import COMMANDS
 from tireid.commands.options import (
     add_method,
@@ -56,6 +57,14 @@ def add_parser(commands: Any) -> None:
     parser.add_argument(
         "--mpc", action="store_true", help="also a tracker that steers by what is learnt"
     )
+    parser.add_argument(
+        "--caution",
+        type=float,
+        default=0.0,
+        metavar="SHARE",
+        help="of what is not known of the tires that the tracker of --mpc fears, from 0 to 1; a "
+        "number of its parameters (%(default)g)",
+    )
     add_output(parser, "export")
     parser.set_defaults(run=run)
 
@@ -79,6 +88,7 @@ def run(options: argparse.Namespace) -> None:
         fmu=options.fmu,
         onnx=options.onnx,
         mpc=options.mpc,
+        caution=require_caution("--caution", options.caution),
         overwrite=options.force,
     )
     for line in str(exported).splitlines():

@@ -9,7 +9,7 @@ from models.maneuvers import RandomSteer
 from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
 from mpc.cars import Car, DoubleTrackCar
-from mpc.loop import CarSensors, Measured, TellsLateral, cornering_limit, inertial_unit
+from mpc.loop import Measured, Measures, TellsLateral, cornering_limit, inertial_unit
 from tireid.driving.setup import PERIOD
 from tireid.progress import Progress
 
@@ -28,7 +28,7 @@ RATE_LIMIT = 1.0  # rad/s at the road wheels
 
 def learning_drive(
     car: Car,
-    sensors: CarSensors,
+    sensors: Measures,
     rng: np.random.Generator,
     *,
     grip: float,

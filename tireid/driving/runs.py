@@ -36,6 +36,7 @@ from mpc.loop import drive as drive_tracker
 from mpc.path import Path
 from mpc.problem import Problem
 from mpc.realtime import NoCompilerError, Tracker
+from mpc.realtime.caution import require_caution
 from mpc.tires import PredictionTire, prediction_tire
 from tireid.driving.known import Known, Witness
 from tireid.driving.setup import PERIOD, Setup, SpeedWish, require_friction
@@ -69,6 +70,36 @@ class Informer:
         self._mu = mu
         tracker.set_tire(self._setup.oracle(mu))
         return f"told of friction {mu:g}"
+
+
+NOTED = 0.1  # change of the grip that is worth a note
+
+
+class BacksOff:
+    """Stands between a drive and what learns, and notes where the tracker plans with less grip.
+
+    Parameters
+    ----------
+    beside : which is asked, as if nobody stood between; None where nothing learns.
+    """
+
+    def __init__(self, beside: LearningTires | None) -> None:
+        self._beside, self._noted = beside, 1.0
+
+    def observe(self, measured: Measured, tracker: Any) -> str | None:
+        """Ask what learns; return what it said, and the grip where that changed.
+
+        Parameters
+        ----------
+        measured : by the sensors.
+        tracker : which steers.
+        """
+        said = None if self._beside is None else self._beside.observe(measured, tracker)
+        if abs(tracker.grip - self._noted) < NOTED:
+            return said
+        self._noted = tracker.grip
+        grip = f"plans with {tracker.grip:.2f} of the grip"
+        return grip if said is None else f"{said}; {grip}"
 
 
 def friction_now(friction: Friction, measured: Measured) -> float:
@@ -177,6 +208,7 @@ class Conditions:
     faults : of the sensors, while the path is driven.
     kind : of the sensors, of `SENSORS`; imu measures no v_y.
     dither : deviation that a weave may make which teaches [m]; 0 keeps to the path.
+    caution : share of what is not known of the tires that the tracker fears, from 0 to 1.
     """
 
     setup: Setup
@@ -187,6 +219,7 @@ class Conditions:
     faults: tuple[SensorFault, ...] = ()
     kind: str = FULL
     dither: float = 0.0
+    caution: float = 0.0
 
     @property
     def sensors(self) -> CarSensors:
@@ -324,6 +357,7 @@ def run_drive(
             period=PERIOD,
             delay=conditions.delay * PERIOD + lag,
             linearizations=linearizations,
+            caution=conditions.caution,
         )
     except NoCompilerError as error:
         raise ValueError(str(error)) from None
@@ -337,6 +371,7 @@ def run_drive(
             need=unknown_of(learner),
         )
     witness = Witness(learner, PERIOD) if isinstance(learner, Learner) else None
+    beside: LearningTires | None = witness or learner
     with Progress(f"driving on {label} tires") as progress:
         driven = drive_tracker(
             setup.path,
@@ -346,7 +381,7 @@ def run_drive(
             sensors=conditions.driving_sensors,
             delay=conditions.delay,
             rng=np.random.default_rng([conditions.seed, 2]),
-            learner=witness or learner,
+            learner=BacksOff(beside) if conditions.caution > 0.0 else beside,
             lateral=conditions.lateral(learnt),
             dither=weave,
             laps=conditions.laps,
@@ -391,6 +426,7 @@ def drive(
     laps: float = 1.0,
     dither: float = 0.0,
     seed: int = 0,
+    caution: float = 0.0,
 ) -> Run:
     """Drive a double-track car along a path; the tracker steers by the tires that it is told of.
 
@@ -412,6 +448,9 @@ def drive(
     dither : deviation that a weave may make which teaches [m], at most 0.5; 0 keeps to the path.
         Where the car goes on learning it fades as the tires become known.
     seed : of the noise.
+    caution : share of what is not known of the tires that the tracker fears, from 0, which
+        believes in them, to 1, which plans with the least grip that motion and band leave
+        possible.
 
     Returns
     -------
@@ -456,6 +495,7 @@ def drive(
         laps=laps,
         kind=sensors,
         dither=dither,
+        caution=require_caution("caution", caution),
     )
     label = LINEAR if tire is None else LEARNING if learning else FROZEN
     return run_drive(label, conditions, tire)

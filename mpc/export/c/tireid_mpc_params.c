@@ -34,6 +34,19 @@ static bool are_positive(const tireid_mpc_real *const x[], uint32_t n)
     return positive;
 }
 
+/* Whether what is not known of the tire can be feared: a share, frictions that fall from 1. */
+static bool is_caution(const tireid_mpc_params *params)
+{
+    bool caution = is_told(params->caution) && (params->caution >= R(0.0))
+        && (params->caution <= R(1.0)) && (params->grips[0] <= R(1.0));
+    uint32_t k;
+    for (k = 0U; k < TIREID_MPC_GRIPS; k++) {
+        caution = caution && is_told(params->grips[k]) && (params->grips[k] >= R(0.01))
+            && ((k == 0U) || (params->grips[k] <= params->grips[k - 1U]));
+    }
+    return caution;
+}
+
 /* Whether the fall-back's table can be read: rising speeds, gains that are numbers. */
 static bool is_table(const tireid_mpc_params *params)
 {
@@ -75,10 +88,15 @@ bool tireid_mpc_accepts(const tireid_mpc_params *params)
             &params->period, &params->max_steering, &params->max_rate, &params->max_e_y,
             &params->max_slip[0], &params->max_slip[1], &params->soft_e_y, &params->soft_slip,
             &params->widest_e_y, &params->widest_e_psi, &params->max_v_y, &params->max_yaw_rate,
-            &params->min_speed, &params->max_speed, &params->max_curvature, &params->tolerance };
+            &params->min_speed, &params->max_speed, &params->max_curvature, &params->tolerance,
+            &params->surprise, &params->stiffness, &params->doubt_step, &params->force_error[0],
+            &params->force_error[1] };
         accepted = are_positive(positive, (uint32_t)(sizeof positive / sizeof positive[0]))
             && are_told(params->weights, TIREID_MPC_WEIGHTS) && are_not_negative(params->rise, 2U)
-            && are_not_negative(params->cost, TIREID_MPC_ERRORS)
+            && are_not_negative(params->cost, TIREID_MPC_ERRORS) && is_caution(params)
+            && are_not_negative(params->prior, TIREID_MPC_GRIPS)
+            && are_not_negative(params->doubt[0], TIREID_MPC_DOUBTS)
+            && are_not_negative(params->doubt[1], TIREID_MPC_DOUBTS)
             && are_not_negative(params->cost_end, TIREID_MPC_ERRORS) && is_table(params)
             && are_not_negative(&params->hold_time, 1U) && are_not_negative(&params->delay, 1U)
             && (params->delay <= (R(TIREID_MPC_COMMANDS - 1U) * params->period))

@@ -11,7 +11,7 @@ from mpc.prediction import build_dynamics, build_rk4
 from mpc.problem import Limits, Problem
 from mpc.realtime import Tracker
 from mpc.tires import oracle_tire, prediction_tire
-from mpc.tires.tire import ALL, LEAST_RISE, Car, Point, extrapolated_force, valid_slip
+from mpc.tires.tire import ALL, LEAST_RISE, Car, Point, believed_force, valid_slip
 
 CAR = sedan()
 SLIPS = np.linspace(-0.4, 0.4, 161)
@@ -22,7 +22,7 @@ def curves(tire, valid=ALL, delta=0.0):
     """Axle forces [N] over slip as they are believed, (2, k)."""
     x = ca.SX.sym("x")
     at = Point(0.0, 0.0, delta, 20.0, Car(*map(float, tire.car)), ca.SX(tire.weights))
-    force = extrapolated_force(tire.structure, (x, x), at, *map(ca.DM, valid))
+    force = believed_force(tire.structure, (x, x), at, *map(ca.DM, valid))
     return np.array(ca.Function("force", [x], [force])(SLIPS[None]))
 
 
@@ -72,7 +72,7 @@ def test_a_curve_goes_on_without_a_kink(oracle):
     valid, step = valid_slip(oracle, MOST), 1e-6
     x = ca.SX.sym("x", 2)
     at = Point(0.0, 0.0, 0.0, 20.0, Car(*map(float, oracle.car)), ca.SX(oracle.weights))
-    force = extrapolated_force(oracle.structure, (x[0], x[1]), at, *map(ca.DM, valid))
+    force = believed_force(oracle.structure, (x[0], x[1]), at, *map(ca.DM, valid))
     slope = ca.Function("slope", [x], [ca.diag(ca.jacobian(force, x))])
     below, above = (np.array(slope(valid.slip + d)).ravel() for d in (-step, step))
     np.testing.assert_allclose(above, below, rtol=1e-3)
@@ -108,7 +108,7 @@ def test_the_tracker_believes_what_is_of_use_of_the_tire_that_it_is_told():
     tracker = Tracker(dry, Problem(limits=Limits(slip=(0.1, 0.2))))
     for tire in (dry, wet):
         tracker.set_tire(tire)
-        slip, rise = valid_slip(tire, (0.1, 0.2))
+        slip, rise, _ = valid_slip(tire, (0.1, 0.2))
         np.testing.assert_allclose(tracker.params["max_slip"], slip, rtol=1e-14)
         np.testing.assert_allclose(tracker.params["rise"], rise, rtol=1e-14)
     assert (tracker.params["max_slip"] < 0.1).all()

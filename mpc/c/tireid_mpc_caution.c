@@ -1,0 +1,291 @@
+/* What is not known of the forces, and what is done about it.
+ *
+ * The friction of the road over that of the tire is one of a few. Each tells the forces of the axles,
+ * and so how their impulse goes on: p_i = (l m v_y +- I_z r)/L obeys dp_i/dt = F_i - m_i v_x r. What
+ * the motion shows beyond that, over what may be wrong of force and band, makes a friction unlikely:
+ * its cost is -2 ln of its likelihood, over that of the best. A friction may come at any time, so that
+ * no cost is above a surprise. Planned is with the least friction that is not refuted.
+ *
+ * Along the plan the doubt of the forces, less grip at both axles for the whole horizon, moves the car
+ * by the sensitivities of the plan and its feedback: by that much soft limits are tightened. */
+#include "tireid_mpc_caution.h"
+
+#include "tireid_mpc_equations.h"
+#include "tireid_mpc_iteration.h"
+
+#define N TIREID_MPC_HORIZON
+#define NX TIREID_MPC_STATES
+#define STEERING 4U                /* place of the angle among the states */
+#define LAGGED 5U                  /* of lagged slip, where there is */
+#define FOLLOWED TIREID_MPC_C(0.2) /* time in which an impulse follows the measured one [s] */
+#define ALIKE TIREID_MPC_C(0.2)    /* time for which errors of the force are alike [s] */
+#define SETTLED TIREID_MPC_C(0.4)  /* until what is followed tells something [s] */
+#define CLIP TIREID_MPC_C(9.0)     /* square of an error over its expected size that counts */
+#define EXPECTED TIREID_MPC_C(2.0) /* sum of the squares of both axles */
+#define REFUTED TIREID_MPC_C(2.7)  /* cost from which on a friction begins to be: one in ten */
+#define MOVES TIREID_MPC_C(0.05)   /* time in which the grip goes to another [s] */
+#define SIGMAS TIREID_MPC_C(1.645) /* of half a band of 90 % */
+#define LEFT TIREID_MPC_C(0.3)     /* share of a limit that is left */
+
+#define GENTLE TIREID_MPC_C(0.3)    /* slip over the useful one up to which wheels are judged */
+#define FOUND TIREID_MPC_C(0.3)     /* time in which their zero is found [s] */
+#define MOST_ZERO TIREID_MPC_C(0.1) /* of it [rad] */
+
+#define real tireid_mpc_real
+
+static real size_of(real x)
+{
+    return (x < TIREID_MPC_C(0.0)) ? -x : x;
+}
+
+/* Half the band of an axle's force at a slip of the tire as it was told [N]. */
+static real doubt_at(const tireid_mpc_params *params, uint32_t axle, real slip)
+{
+    const real *doubt = params->doubt[axle];
+    const real place = size_of(slip) / params->doubt_step;
+    const real last = (real)(TIREID_MPC_DOUBTS - 1U);
+    real found = doubt[TIREID_MPC_DOUBTS - 1U];
+    if (place < last) {
+        const uint32_t k = (uint32_t)place;
+        found = doubt[k] + ((place - (real)k) * (doubt[k + 1U] - doubt[k]));
+    }
+    return found;
+}
+
+void tireid_mpc_trust(tireid_mpc_state *state)
+{
+    uint32_t j;
+    uint32_t i;
+    for (j = 0U; j < TIREID_MPC_GRIPS; j++) {
+        state->cost[j] = TIREID_MPC_C(0.0);
+        for (i = 0U; i < 2U; i++) {
+            state->slips[j][i] = TIREID_MPC_C(0.0);
+            state->impulse[j][i] = TIREID_MPC_C(0.0);
+        }
+    }
+    state->grip = TIREID_MPC_C(1.0);
+    state->zero = TIREID_MPC_C(0.0);
+    state->watched = 0U;
+    state->doubted = 0U;
+}
+
+/* What the motion showed of one friction: squares of what it misses over what is expected, of both
+ * axles; force in front that it misses [N], and the slip there [rad]. */
+typedef struct {
+    real squares;
+    real front;
+    real slip;
+} sight;
+
+/* Follow the impulses by one friction for a period. */
+static sight follow(tireid_mpc_state *state, const tireid_mpc_params *params,
+    const tireid_mpc_input *in, real wheels, uint32_t j)
+{
+    const real length = params->car[2] + params->car[3];
+    const real lever[2] = { params->car[3] / length, params->car[2] / length };
+    const real turn[2] = { params->car[1] / length, -params->car[1] / length };
+    const real dt = params->period;
+    sight seen = { TIREID_MPC_C(0.0), TIREID_MPC_C(0.0), TIREID_MPC_C(0.0) };
+    real x[NX] = { TIREID_MPC_C(0.0) };
+    real force[2];
+    real slip[2];
+    real lag[2];
+    uint32_t i;
+    x[2] = in->v_y;
+    x[3] = in->r;
+    x[STEERING] = wheels + state->zero;
+    for (i = LAGGED; i < NX; i++) {
+        x[i] = state->slips[j][i - LAGGED];
+    }
+    tireid_mpc_axles(params, x, in->v_x[0], params->grips[j], force, slip, lag);
+    for (i = 0U; i < 2U; i++) {
+        const real mass = params->car[0] * lever[i];
+        const real shown = (mass * in->v_y) + (turn[i] * in->r);
+        const real rate = force[i] - (mass * in->v_x[0] * in->r);
+        const real now = (LAGGED < NX) ? state->slips[j][i] : slip[i];
+        const real rolled = (dt * in->v_x[0]) / (lag[i] + (dt * in->v_x[0]));
+        if (state->watched == 0U) {
+            state->impulse[j][i] = shown;
+            state->slips[j][i] = slip[i];
+        } else {
+            const real error = (shown - (state->impulse[j][i] + (dt * rate))) / FOLLOWED;
+            const real expected = params->force_error[i]
+                + (doubt_at(params, i, now / params->grips[j]) * (params->grips[j] / SIGMAS));
+            const real square = (error / expected) * (error / expected);
+            seen.squares += (square < CLIP) ? square : CLIP;
+            seen.front = (i == 0U) ? error : seen.front;
+            seen.slip = (i == 0U) ? now : seen.slip;
+            state->impulse[j][i] += dt * (rate + error);
+            state->slips[j][i] = now + (rolled * (slip[i] - now));
+        }
+    }
+    return seen;
+}
+
+/* Angle [rad] by which wheels are off what is commanded: where slip is small, friction makes little of
+ * the force that is missed in front. */
+static void find_zero(
+    tireid_mpc_state *state, const tireid_mpc_params *params, const sight *seen, real grip)
+{
+    if (size_of(seen->slip) < (GENTLE * (grip * params->max_slip[0]))) {
+        const real moved = (seen->front / params->stiffness) * (params->period / FOUND);
+        state->zero = tireid_mpc_clipped(state->zero + moved, MOST_ZERO);
+    }
+}
+
+/* Least friction that is not refuted: from the best one down, with a part of the next one. */
+static real least_grip(const tireid_mpc_state *state, const tireid_mpc_params *params)
+{
+    const real width = params->surprise - REFUTED;
+    real share = TIREID_MPC_C(1.0);
+    real grip;
+    uint32_t best = 0U;
+    uint32_t j;
+    for (j = 1U; j < TIREID_MPC_GRIPS; j++) {
+        best = (state->cost[j] < state->cost[best]) ? j : best;
+    }
+    grip = params->grips[best];
+    for (j = best + 1U; j < TIREID_MPC_GRIPS; j++) {
+        const real left = (params->surprise - state->cost[j]) / width;
+        share *= (left < TIREID_MPC_C(1.0)) ? left : TIREID_MPC_C(1.0);
+        grip += share * (params->grips[j] - params->grips[j - 1U]);
+    }
+    return grip;
+}
+
+/* What is missed by each friction changes what it is held for; little does where none explains it. */
+static void judge_grips(tireid_mpc_state *state, const tireid_mpc_params *params, const sight *seen)
+{
+    real fit = seen[0].squares;
+    real counts;
+    real least;
+    uint32_t j;
+    for (j = 1U; j < TIREID_MPC_GRIPS; j++) {
+        fit = (seen[j].squares < fit) ? seen[j].squares : fit;
+    }
+    counts = (params->period / ALIKE) * (EXPECTED / (EXPECTED + fit));
+    for (j = 0U; j < TIREID_MPC_GRIPS; j++) {
+        state->cost[j] += counts * seen[j].squares;
+    }
+    least = state->cost[0];
+    for (j = 1U; j < TIREID_MPC_GRIPS; j++) {
+        least = (state->cost[j] < least) ? state->cost[j] : least;
+    }
+    for (j = 0U; j < TIREID_MPC_GRIPS; j++) {
+        const real cost = state->cost[j] - least;
+        state->cost[j] = (cost < params->surprise) ? cost : params->surprise;
+    }
+}
+
+void tireid_mpc_watch(tireid_mpc_state *state, const tireid_mpc_params *params,
+    const tireid_mpc_input *in, real wheels, bool fit)
+{
+    if (!(params->caution > TIREID_MPC_C(0.0))) {
+        state->grip = TIREID_MPC_C(1.0);
+        state->zero = TIREID_MPC_C(0.0);
+    } else if (!fit) {
+        state->watched = 0U;
+    } else {
+        sight seen[TIREID_MPC_GRIPS];
+        real feared;
+        uint32_t best = 0U;
+        uint32_t j;
+        for (j = 0U; j < TIREID_MPC_GRIPS; j++) {
+            if (state->doubted == 0U) {
+                state->cost[j] = params->prior[j];
+            }
+            seen[j] = follow(state, params, in, wheels, j);
+        }
+        if (((real)state->watched * params->period) > SETTLED) {
+            judge_grips(state, params, seen);
+        }
+        for (j = 1U; j < TIREID_MPC_GRIPS; j++) {
+            best = (state->cost[j] < state->cost[best]) ? j : best;
+        }
+        find_zero(state, params, &seen[best], params->grips[best]);
+        feared = params->caution * (TIREID_MPC_C(1.0) - least_grip(state, params));
+        if (state->doubted == 0U) {
+            state->grip = TIREID_MPC_C(1.0) - feared;
+        }
+        state->grip += (params->period / (params->period + MOVES))
+            * ((TIREID_MPC_C(1.0) - feared) - state->grip);
+        state->watched += (state->watched < UINT32_MAX) ? 1U : 0U;
+        state->doubted = 1U;
+        if (!tireid_mpc_within(state->grip, TIREID_MPC_C(1.0))
+            || !tireid_mpc_carriable(state->cost, TIREID_MPC_GRIPS)
+            || !tireid_mpc_carriable(state->impulse[0], 2U * TIREID_MPC_GRIPS)
+            || !tireid_mpc_carriable(state->slips[0], 2U * TIREID_MPC_GRIPS)) {
+            tireid_mpc_trust(state);
+        }
+    }
+}
+
+/* Move what is off the plan through a stage, with its feedback, and add what a force does. */
+static void pass(const tireid_mpc_stage *stage, const real *feedback, const real *push, real *d)
+{
+    real next[NX];
+    real u = TIREID_MPC_C(0.0);
+    uint32_t i;
+    uint32_t j;
+    for (j = 0U; j < NX; j++) {
+        u += feedback[j] * d[j];
+    }
+    for (i = 0U; i < NX; i++) {
+        next[i] = stage->B[i] * u;
+    }
+    for (j = 0U; j < NX; j++) {
+        for (i = 0U; i < NX; i++) {
+            next[i] += stage->A[i + (NX * j)] * d[j];
+        }
+    }
+    for (i = 0U; i < NX; i++) {
+        d[i] = next[i];
+    }
+    d[2] += push[0];
+    d[3] += push[1];
+}
+
+static real left_of(real margin, real limit)
+{
+    const real share = TIREID_MPC_C(1.0) - (margin / limit);
+    return (share > LEFT) ? share : LEFT;
+}
+
+void tireid_mpc_tighten(
+    const tireid_mpc_state *state, const tireid_mpc_params *params, tireid_mpc_work *work)
+{
+    const real dt = params->stage_time;
+    const bool cautious = params->caution > TIREID_MPC_C(0.0);
+    real d[2][NX] = { { TIREID_MPC_C(0.0) } }; /* by the front and by the rear axle */
+    uint32_t k;
+    uint32_t axle;
+    uint32_t i;
+    for (k = 0U; k < N; k++) {
+        real margin[3] = { TIREID_MPC_C(0.0), TIREID_MPC_C(0.0), TIREID_MPC_C(0.0) };
+        for (axle = 0U; cautious && (axle < 2U); axle++) {
+            const tireid_mpc_stage *stage = &work->stage[k];
+            const real *ahead = work->stage[k + 1U].slip_x;
+            const real slip = stage->slip[axle];
+            const real half =
+                params->caution * (state->grip * doubt_at(params, axle, slip / state->grip));
+            const real less = (slip > TIREID_MPC_C(0.0)) ? -half : half;
+            const real arm = (axle == 0U) ? params->car[2] : -params->car[3];
+            const real push[2] = { (dt * less) / params->car[0],
+                (dt * (arm * less)) / params->car[1] };
+            pass(stage, state->feedback[k], push, d[axle]);
+            margin[0] += size_of(d[axle][0]);
+            for (i = 0U; i < 2U; i++) {
+                real moved = TIREID_MPC_C(0.0);
+                uint32_t j;
+                for (j = 2U; j <= STEERING; j++) {
+                    moved += ahead[i + (2U * j)] * d[axle][j];
+                }
+                margin[1U + i] += size_of(moved);
+            }
+        }
+        work->left[k][0] = left_of(margin[0], params->max_e_y);
+        for (i = 0U; i < 2U; i++) {
+            work->left[k][1U + i] = left_of(margin[1U + i], state->grip * params->max_slip[i]);
+        }
+    }
+}
