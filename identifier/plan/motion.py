@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.axle.slip import SHORTEST
+from identifier.axle.slip import SHORTEST, SwayNumbers
 from identifier.plan.tires import PlausibleTires
 from models.vehicle import GRAVITY
 
@@ -115,7 +115,7 @@ def simulate(tires: PlausibleTires, planned: Array, v_x: float, entry: Entry, ho
     loads = np.array(car.axle_loads)
     to_v, to_r = loads / car.mass, np.array([car.l_f, -car.l_r]) * loads / car.yaw_inertia
     arm = np.array([car.l_f, -car.l_r])[:, None, None]
-    stiffness, damping, soft = tires.method.sway.numbers()
+    stiffness, damping, soft, *_ = SwayNumbers(*tires.method.sway.numbers())
     shortest = SHORTEST * car.wheelbase
     lanes, axles = np.zeros((m, k)), np.zeros((2, m, k))
     v_y = r = rho = rho_dot = lanes
