@@ -178,7 +178,7 @@ static void linearize(const tireid_mpc_state *state, const tireid_mpc_params *pa
     }
     if (stages == N) {
         tireid_mpc_linearize_end(params, params->cost_end, work->x[N], work->kappa[N - 1U],
-            work->v_x[N - 1U], state->grip, &work->stage[N]);
+            work->v_x[N - 1U], &work->stage[N]);
     }
 }
 

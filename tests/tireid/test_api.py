@@ -272,7 +272,8 @@ def test_the_equations_of_motion_are_those_of_the_tracker(tires, name):
         slips = [0.03, -0.02] if tire.lagged else []
         x = np.array([0.0, 0.0, v_y, r, delta, *slips])
         told = tracker(
-            x, 0.0, 0.0, 18.0, 1e-9, theirs.car, theirs.weights, [np.inf, np.inf], [0.0, 0.0]
+            *(x, 0.0, 0.0, 18.0, 1e-9, theirs.car, theirs.weights),
+            *([np.inf, np.inf], [0.0, 0.0], 1.0),
         )
         ours = dynamics([v_y, r, *slips], delta, 18.0)[0]
         rows = [2, 3, *([5, 6] if tire.lagged else [])]
