@@ -81,7 +81,7 @@ typedef struct {
     tireid_mpc_real tolerance; /* of the solver, in parts: 1e-8, in float 1e-5 */
     uint32_t max_iterations;   /* of the solver */
     uint32_t linearizations;   /* a step, 1 in real time */
-    uint32_t max_active_sets;  /* of limits tried in a row; 0: interior point alone */
+    uint32_t max_active_sets;  /* of limits tried in a row; 0, or caution: interior point alone */
 } tireid_mpc_params;
 
 typedef struct {

@@ -164,7 +164,8 @@ def test_missing_tools_are_said_in_the_readme(monkeypatch, tmp_path):
 
 
 def test_beside_a_tracker_the_identifier_lies_in_a_folder_of_its_own(monkeypatch, tmp_path):
-    def seen(folder, package, single):
+    def seen(folder, package, single, caution):
+        assert caution == 0.0
         return [str(path.relative_to(folder)) for path in sorted(folder.iterdir())]
 
     said = []
