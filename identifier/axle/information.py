@@ -154,7 +154,20 @@ def reference_of(design: AxleIdentifier, vehicle: Vehicle) -> AxleModel:
     """
     W, own = design.prior.means(vehicle, design.ladder)
     P = design.prior.covariance(vehicle, design.ladder)
-    W, own = design.within_bounds(W, own, P)
+    return _model(design, vehicle, np.hstack([W, own]), P, P, np.zeros((2, 1 + len(EDGES))))
+
+
+def _model(
+    design: AxleIdentifier,
+    vehicle: Vehicle,
+    theta: Array,
+    P: Array,
+    prior: Array,
+    excitation: Array,
+) -> AxleModel:
+    """Return the model of parameters (2, n + 3) and their covariance, within bounds."""
+    n = len(design.ladder)
+    W, own = design.within_bounds(theta[:, :n], theta[:, n:], P)
     return AxleModel(
         vehicle=vehicle,
         ladder=design.ladder,
@@ -163,8 +176,8 @@ def reference_of(design: AxleIdentifier, vehicle: Vehicle) -> AxleModel:
         W=W,
         own=own,
         covariance=P,
-        prior_covariance=P,
-        excitation=np.zeros((2, 1 + len(EDGES))),
+        prior_covariance=prior,
+        excitation=excitation,
     )
 
 
@@ -297,22 +310,10 @@ def merged(
     excitation : largest slip and times of learning of all drives together, (2, 9).
     """
     vehicle = reference.vehicle
-    n = len(design.ladder)
     W, own = design.prior.means(vehicle, design.ladder)
     P0 = design.prior.covariance(vehicle, design.ladder)
     theta, P = posterior(told, np.hstack([W, own]), P0)
-    W, own = design.within_bounds(theta[:, :n], theta[:, n:], P)
-    return AxleModel(
-        vehicle=vehicle,
-        ladder=design.ladder,
-        sway=design.sway,
-        plausibility=design.plausibility,
-        W=W,
-        own=own,
-        covariance=P,
-        prior_covariance=P0,
-        excitation=excitation,
-    )
+    return _model(design, vehicle, theta, P, P0, excitation)
 
 
 def posterior(told: Information, mean: Array, covariance: Array) -> tuple[Array, Array]:
