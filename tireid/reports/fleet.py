@@ -61,7 +61,7 @@ def write_fleet_report(
     if refused:
         codes = Counter(code for row in refused for code in row.findings).most_common(3)
         often = ", ".join(f"{code} ({count})" for code, count in codes)
-        warnings.append(f"{len(refused)} logs are not valid, most often for {often}.")
+        warnings.append(f"Logs that are not valid: {len(refused)}, most often for {often}.")
     errors = [row for row in rows if row.error]
     if errors:
         warnings.append(f"{len(errors)} logs could not be used.")
