@@ -54,7 +54,8 @@ def stiffness_figure(rows: Sequence[LogRow]) -> Figure:
             some = mine & refused
             axes.plot(when[some], C[some] / 1e3, "o", ms=3.0, color=color, mfc="none")
     for axes, name in zip(panels, AXLES, strict=True):
-        axes.set(title=name, ylabel="cornering stiffness [kN/rad]", ylim=(0.0, None))
+        axes.set(title=name, ylabel="cornering stiffness [kN/rad]")
+        axes.set_ylim(0.0, 1.08 * axes.get_ylim()[1])
     panels[-1].set(xlabel="day since the first log")
     legend_above(figure, columns=4)
     return figure
