@@ -102,7 +102,7 @@ int daqp_iterate(mpc_state *state, const mpc_params *params, mpc_work *work, con
     memcpy(work->kappa, kappa, sizeof work->kappa);
     memcpy(work->v_x, v_x, sizeof work->v_x);
     linearize(state, params, work, x0, MPC_HORIZON);
-    measure_rows(params, work, MPC_HORIZON);
+    measure_rows(state, params, work, MPC_HORIZON);
     condense(work, params);
     result.x = c.x;
     result.lam = c.lambda;
