@@ -312,7 +312,8 @@ def judged(coverage: dict[tuple[str, str], float], targets: Targets) -> None:
     for group in JUDGED:
         if (group, "known") in coverage:
             label = f"{group}, known slip: half-width over the rms error"
-            targets.at_most(label, targets.values[f"{group}/known/band/width"], WIDEST, "")  # type: ignore[arg-type]
+            width = float(targets.values[f"{group}/known/band/width"])
+            targets.at_most(label, width, WIDEST, "")
     if not coverage:
         targets.at_least("drives that were judged", 0.0, 1.0, "")
 

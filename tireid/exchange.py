@@ -22,6 +22,18 @@ UNLOCKABLE = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno
 class ClaimedError(OSError):
     """Another process holds the claim."""
 
+    def refusal(self, doing: str) -> str:
+        """Return what to tell of it.
+
+        Parameters
+        ----------
+        doing : what the other run does, as "is writing out".
+        """
+        return (
+            f"another run of tireid {doing}: wait for it, or choose another folder "
+            f"(where there is none, delete {self})"
+        )
+
 
 @cache
 def _renameat2() -> Any:

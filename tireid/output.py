@@ -81,10 +81,7 @@ def output_folder(target: Path, *, force: bool) -> Iterator[Path]:
         try:
             stack.enter_context(claim(final.parent / f"{prefix}claim"))
         except ClaimedError as error:
-            raise OutputError(
-                f"another run of tireid is writing {target}: wait for it, or choose another folder "
-                f"(where there is none, delete {error})"
-            ) from None
+            raise OutputError(error.refusal(f"is writing {target}")) from None
         _require_replaceable(target, final, force)  # as the last one that held the claim left it
         for left in sorted(final.parent.glob(f"{_literal(prefix)}*.part")):
             say(f"a run was stopped and left {left}: look for what you miss, then delete it")

@@ -20,9 +20,8 @@ import numpy as np
 
 from identifier.paper.laws import LAWS, DrivingError, Gains, diagonal
 from identifier.stability.bounds import small_gain
-from identifier.stability.loop import direction_matrix
+from identifier.stability.loop import direction_matrix, root
 from identifier.stability.operation import Operation, proven_bounds
-from identifier.stability.roots import root
 from identifier.stability.sampled_bound import (
     Disturbance,
     Learning,

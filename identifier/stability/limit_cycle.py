@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identifier.stability.limits import integral_euler_limit, integral_limit
-from identifier.stability.roots import root
+from identifier.stability.loop import root
 from models.rules import require_positive
 
 

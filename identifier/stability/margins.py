@@ -22,10 +22,10 @@ from identifier.stability.loop import (
     eigenvalues,
     exact,
     growth_rate,
+    root,
     scaled_matrices,
 )
 from identifier.stability.lyapunov import require_hurwitz
-from identifier.stability.roots import root
 from models.rules import require_positive
 
 if TYPE_CHECKING:

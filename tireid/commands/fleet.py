@@ -241,10 +241,7 @@ def _claimed(store: str) -> Iterator[None]:
         try:
             stack.enter_context(claim(folder.parent / f".{folder.name}-claim"))
         except ClaimedError as error:
-            raise StoreError(
-                f"another run of tireid learns into {store}: wait for it, or choose another folder "
-                f"(where there is none, delete {error})"
-            ) from None
+            raise StoreError(error.refusal(f"learns into {store}")) from None
         yield
 
 
