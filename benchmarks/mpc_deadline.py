@@ -99,17 +99,19 @@ def main(*, keep: bool = False) -> int:
         came = stress(choice, STEPS, np.random.default_rng(SEED))
         beyond = 100.0 * float(np.mean(came.iterations > cap))
         print(f"{name}: at most {cap} iterations, which {beyond:.1f} % of the steps would pass")
-        targets.record(f"{name}/cap", cap, "")
-        targets.record(f"{name}/beyond", beyond, "%")
+        key = name.replace(" ", "_")
+        targets.record(f"{key}/cap", cap, "")
+        targets.record(f"{key}/beyond", beyond, "%")
         inputs = measured_in(came.recorded, choice[0].weights.size)
         package = build_mpc_package(choice[0], PROBLEM, period=PERIOD, delay=DELAY)
         for kind, tolerance in TOLERANCES.items():
             run = replayed(package, inputs, cap, tolerance)
             print(f"{name:16}{kind:12}{run.instructions:25}{run.most_instructions:10}", flush=True)
-            targets.record(f"{name}/{kind}/mean", run.instructions)
+            at = f"{key}/{kind.replace(' ', '_')}"
+            targets.record(f"{at}/mean", run.instructions)
             label = f"{name}, tolerance {kind}: instructions in the longest step"
             most = CLOCK * DEADLINE
-            targets.at_most(label, run.most_instructions, most, "", key=f"{name}/{kind}/largest")
+            targets.at_most(label, run.most_instructions, most, "", key=f"{at}/largest")
     return targets.finish(keep=keep)
 
 
