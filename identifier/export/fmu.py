@@ -8,7 +8,9 @@ import shutil
 import subprocess
 import tempfile
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import Literal, NamedTuple
 from xml.etree.ElementTree import Element, indent, tostring
@@ -56,40 +58,73 @@ def targets() -> tuple[Target, ...]:
     return tuple(found)
 
 
-def build_binary(target: Target, name: str, sources: Mapping[str, bytes]) -> bytes:
+Files = tuple[tuple[str, bytes], ...]  # content by name
+
+
+def build_binary(
+    target: Target, name: str, model: Mapping[str, bytes], around: Mapping[str, bytes]
+) -> bytes:
     """Compile sources to a shared library and return its content.
 
     Parameters
     ----------
     target : the platform.
     name : model identifier, name of the library.
-    sources : content of C files and headers by name.
+    model : content by name of C files and headers that need no other: compiled once for both
+        versions of FMI, since the equations take longest.
+    around : of those that need them.
 
     Raises
     ------
     CompilationError
         Where the compiler refuses them.
     """
-    with tempfile.TemporaryDirectory(prefix="tireid-") as scratch:
-        folder = Path(scratch)
-        for file, content in sources.items():
-            (folder / file).write_bytes(content)
-        sources_c = [file for file in sources if file.endswith(".c")]
+    built = _objects(target, tuple(sorted(model.items())))
+    with _folder_of({**model, **around, **dict(built)}) as folder:
         library = f"{name}{target.ending}"
-        command = [*target.compiler, *KEEP_GUARDS, *FLAGS, *sources_c, "-o", library, *target.flags]
-        answer = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-        if answer.returncode != 0:
-            first_lines = "\n".join(answer.stderr.splitlines()[:5])
-            raise CompilationError(
-                f"{target.compiler[0]} refused the FMU's sources:\n{first_lines}"
-            )
+        words = [*_c_files(around), *(file for file, _ in built), "-o", library]
+        _compile(target, words, folder)
         log.info("compiled %s for %s", library, target.folder_2)
         return (folder / library).read_bytes()
+
+
+@lru_cache(maxsize=4)
+def _objects(target: Target, model: Files) -> Files:
+    """Return object files of the C files."""
+    with _folder_of(dict(model)) as folder:
+        sources = _c_files(dict(model))
+        _compile(target, ["-c", *sources], folder)
+        built = [Path(source).with_suffix(".o").name for source in sources]
+        return tuple((file, (folder / file).read_bytes()) for file in built)
+
+
+def _c_files(files: Iterable[str]) -> list[str]:
+    return [file for file in files if file.endswith(".c")]
+
+
+@contextmanager
+def _folder_of(files: Mapping[str, bytes]) -> Iterator[Path]:
+    """A folder that holds the files until the block ends."""
+    with tempfile.TemporaryDirectory(prefix="tireid-") as scratch:
+        for file, content in files.items():
+            (Path(scratch) / file).write_bytes(content)
+        yield Path(scratch)
+
+
+def _compile(target: Target, words: Sequence[str], folder: Path) -> None:
+    command = [*target.compiler, *KEEP_GUARDS, *FLAGS, *words, *target.flags]
+    answer = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if answer.returncode != 0:
+        first_lines = "\n".join(answer.stderr.splitlines()[:5])
+        raise CompilationError(f"{target.compiler[0]} refused the FMU's sources:\n{first_lines}")
 
 
 # C source of a step for the FMU: the files of the C package, and those of c_fmu/ around them.
 #
 # What is simulated is what is shipped: the same equations, guards and status codes, in double.
+
+
+TOKEN = "token.h"
 
 
 def token_header(token: str, version: int) -> str:
@@ -101,7 +136,7 @@ def token_header(token: str, version: int) -> str:
     version : of FMI, 2 or 3.
     """
     standard = f"#ifndef MODEL_FMI\n#define MODEL_FMI {version} /* of the standard */\n#endif\n"
-    return header("token.h", "Generated.", [f'#define MODEL_TOKEN "{token}"\n', standard])
+    return header(TOKEN, "Generated.", [f'#define MODEL_TOKEN "{token}"\n', standard])
 
 
 def model_files(specialized: SpecializedStep) -> dict[str, str]:
@@ -514,10 +549,13 @@ def export_fmu(specialized: SpecializedStep, path: Path, version: Version = 2) -
         for name, content in members.items()
         if name.endswith((".c", ".h"))
     }
+    of_fmu = {*SHARED, *OF_VERSION[version], TOKEN}
+    around = {name: content for name, content in sources.items() if name in of_fmu}
+    model = {name: content for name, content in sources.items() if name not in of_fmu}
     for target in built:
         folder = target.folder_2 if version == 2 else target.folder_3
         library = f"binaries/{folder}/{specialized.name}{target.ending}"
-        members[library] = build_binary(target, specialized.name, sources)
+        members[library] = build_binary(target, specialized.name, model, around)
     write_atomically(path, _archive(members))
 
 
@@ -539,7 +577,7 @@ def _text_with(
 ) -> dict[str, str]:
     places = dict.fromkeys((*SHARED, *OF_VERSION[version]), ".")
     text = c_files(FMU, places, {PREFIX: specialized.name})
-    text |= {**shared, "token.h": token_header(token, version)}
+    text |= {**shared, TOKEN: token_header(token, version)}
     sources = sorted(name for name in text if name.endswith(".c"))
     members = {f"sources/{name}": content for name, content in text.items()}
     if version == 2:
