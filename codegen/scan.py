@@ -85,6 +85,7 @@ class Scan:
         of the same shape. Its name becomes part of a C identifier.
     carry : inputs whose value is handed from one sample to the next.
     over : inputs with one row a sample. Every other input is constant.
+    flags : of the compiler; None takes `codegen.compiler.FLAGS`.
 
     Raises
     ------
@@ -92,7 +93,14 @@ class Scan:
         Where the ports do not fit together.
     """
 
-    def __init__(self, step: ca.Function, *, carry: tuple[str, ...], over: tuple[str, ...]) -> None:
+    def __init__(
+        self,
+        step: ca.Function,
+        *,
+        carry: tuple[str, ...],
+        over: tuple[str, ...],
+        flags: tuple[str, ...] | None = None,
+    ) -> None:
         names_in, names_out = list(step.name_in()), list(step.name_out())
         for port in (*carry, *over):
             if port not in names_in:
@@ -115,6 +123,7 @@ class Scan:
         self.step = step
         self.carry = carry
         self.over = over
+        self.flags = flags
         self.constants = tuple(p for p in names_in if p not in carry and p not in over)
         self.outputs = tuple(p for p in names_out if p.removesuffix("_next") not in carry)
         self._size_in = {p: step.size_in(p) for p in names_in}
@@ -127,7 +136,8 @@ class Scan:
         generator = ca.CodeGenerator(f"{name}.c")
         generator.add(self.step)
         try:
-            library = load_library(generator.dump() + LOOP.format(name=name), name)
+            source = generator.dump() + LOOP.format(name=name)
+            library = load_library(source, name, self.flags)
         except (CompilationError, OSError) as error:
             reason = " ".join(str(error).split())
             log.warning("running in the CasADi virtual machine, more slowly: %s", reason)
