@@ -6,6 +6,7 @@ The linear bicycle with the vehicle's own cornering stiffness, so that nothing t
 may be what the solver failed at, reaches it. The delay is a lag of its length.
 """
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,12 +26,16 @@ ENOUGH = 1e-13  # change of the cost, in parts
 
 
 class FallBack(NamedTuple):
-    """Rows by speed [m/s] (k,): gains of x, then steering [rad m] and v_y [m²/s] a curvature."""
+    """Rows by speed [m/s] (k,): gains of x, then steering [rad m] and v_y [m²/s] a curvature.
+
+    Read only: every tracker of the same car and times has the same.
+    """
 
     speeds: Array
     gains: Array
 
 
+@lru_cache(maxsize=32)
 def fall_back(
     vehicle: Vehicle, *, period: float, delay: float, e_y: float, acceleration: float
 ) -> FallBack:
@@ -56,7 +61,10 @@ def fall_back(
         Q = np.diag([1.0 / e_y**2, 0.0, 0.0, 0.0, 0.0])
         R = np.array([[1.0 / STEERING**2 + (per_steering / acceleration) ** 2]])
         rows.append([*feedback(A_d, B_d, Q, R).ravel(), turn, drift])
-    return FallBack(SPEEDS.copy(), np.array([[_rounded(x) for x in row] for row in rows]))
+    table = FallBack(SPEEDS.copy(), np.array([[_rounded(x) for x in row] for row in rows]))
+    for numbers in table:
+        numbers.flags.writeable = False
+    return table
 
 
 def motion(vehicle: Vehicle, v_x: float, lag: float) -> tuple[Array, Array]:
