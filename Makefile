@@ -2,6 +2,8 @@
 PYTHON ?= python3
 VENV := .venv
 PY := $(VENV)/bin/python
+# Bytecode is kept, whatever the shell says: else every process of the tests compiles all modules anew.
+export PYTHONDONTWRITEBYTECODE :=
 
 # LOCKED=1 installs the files that the lock lists by hash, as continuous integration does.
 LOCKED :=
@@ -23,6 +25,9 @@ test: $(VENV)/.test format
 
 tests: $(VENV)/.test
 	$(PY) -m pytest -n auto --dist worksteal -m "not heavy"
+
+# Each core has a process of its own: a second thread of each for algebra would only wait.
+tests heavy: export OPENBLAS_NUM_THREADS := 1
 
 # The sweeps that tests/heavy.toml lists.
 heavy: $(VENV)/.test
