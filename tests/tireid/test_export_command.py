@@ -72,8 +72,11 @@ def test_a_y_is_an_input_where_it_is_asked_for(tmp_path, capsys):
     assert "bank" in [one["name"] for one in manifest["carried"]]
 
 
-def test_what_was_learnt_without_a_lateral_velocity_goes_on_without_it(tmp_path, logs, capsys):
+def test_what_was_learnt_without_a_lateral_velocity_goes_on_without_it(
+    tmp_path, logs, capsys, monkeypatch
+):
     """From a log to C and FMU: the C begins with what was learnt, and tells what Python tells."""
+    monkeypatch.setattr("identifier.export.fmu.MINGW", "no-such-compiler")  # for speed
     if find_compiler() is None:
         pytest.skip("needs a C compiler")
     drive = replace(read_recording(logs / "slalom.csv"), v_y=None)

@@ -4,6 +4,7 @@ import ctypes
 import re
 import subprocess
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -38,12 +39,8 @@ def test_example_and_handover_have_no_warning_in_any_mix_of_precisions(
 
 @pytest.fixture(scope="module")
 def sensing():
-    """Identifiers that read a_y, with a tracker: the default, and the one that tells v_y."""
-    found = {}
-    for law in ("axle", "inertial"):
-        identifier = build_package(make_method(law, CAR), CAR, with_a_y=True)
-        found[law] = build_pair(identifier)
-    return found
+    """By law, an identifier that reads a_y with a tracker: the default, and one that tells v_y."""
+    return cache(lambda law: build_pair(build_package(make_method(law, CAR), CAR, with_a_y=True)))
 
 
 def program(folder, run, compiler="gcc", *, single=0):
@@ -58,7 +55,7 @@ def program(folder, run, compiler="gcc", *, single=0):
 @pytest.mark.parametrize(("law", "single"), [("axle", 0), ("inertial", 0), ("inertial", 1)])
 def test_a_car_with_an_accelerometer_keeps_its_lane(law, single, sensing, write_pair, run):
     """The inertial one without a sensor of v_y: the tracker steers by the v_y that is told."""
-    folder = write_pair(sensing[law])
+    folder = write_pair(sensing(law))
     answer = program(folder, run, single=single)
     assert (answer.returncode, answer.stderr) == (0, "")
     log = folder / "log.csv"
@@ -72,7 +69,7 @@ def test_a_car_with_an_accelerometer_keeps_its_lane(law, single, sensing, write_
 
 def test_what_is_learnt_without_v_y_is_handed_over_whole(sensing, write_pair):
     """Compliance, the share of sway, and the zero of the steering: as Python makes the tire."""
-    pair = sensing["inertial"]
+    pair = sensing("inertial")
     slalom = Slalom(
         amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=9.99
     )

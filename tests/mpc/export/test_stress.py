@@ -16,7 +16,7 @@ SANITIZED = "-std=c99 -g -ffp-contract=off -fsanitize=address,undefined -fno-san
 SOLVES, BUILDS = "-O1", "-O0"  # thousands of solves wait for the program, an alarm for the compiler
 
 
-def build(folder, run, single, steps=3000, optimized=SOLVES):
+def build(folder, run, single, steps, optimized=SOLVES):
     (folder / "hostile.c").write_text(HOSTILE)
     macros = [f"-DTIREID_MPC_SINGLE={single}", f"-DSTEPS={steps}L"]
     flags = [*SANITIZED.split(), optimized, *macros]
@@ -28,16 +28,19 @@ def build(folder, run, single, steps=3000, optimized=SOLVES):
     return str(folder / "hostile")
 
 
+@pytest.mark.parametrize("steps", [1000, 3000])
 @pytest.mark.parametrize("law", LAWS)
-def test_three_thousand_hostile_measurements_find_nothing(law, packages, write, run):
-    answer = run(build(write(packages[law]), run, 0))
+def test_thousands_of_hostile_measurements_find_nothing(law, steps, packages, write, run):
+    answer = run(build(write(packages[law]), run, 0, steps=steps))
     assert (answer.returncode, answer.stderr) == (0, ""), answer.stdout + answer.stderr
     counts = {name: int(n) for name, n in re.findall(r"(\w+) (\d+)", answer.stdout)}
     assert counts.pop("unsolved") == 0
-    assert sum(counts.values()) == 3000
-    assert counts["limit"] <= 30
-    assert counts["failed"] <= 60  # infinite in all but name: 1e300 is finite
-    assert all(counts[name] > 10 for name in ("not_finite", "off_path", "off_map", "slow"))
+    assert sum(counts.values()) == steps
+    assert counts["limit"] <= steps // 100
+    assert counts["failed"] <= steps // 50  # infinite in all but name: 1e300 is finite
+    assert all(
+        counts[name] > steps // 300 for name in ("not_finite", "off_path", "off_map", "slow")
+    )
 
 
 def test_float_keeps_the_same_limits(packages, write, run):
