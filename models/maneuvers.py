@@ -322,13 +322,13 @@ class RandomSteer:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Swings:
-    """Given angles at given times, joined by half cosines, as a maneuver is planned.
+class SampledSteer:
+    """Given angles at given times, joined by straight lines, as a planned maneuver is.
 
     Parameters
     ----------
     times : of the angles [s], rising, (k,); straight ahead before the first.
-    angles : of the front wheels [rad], (k,), the first and the last zero.
+    angles : of the front wheels [rad], (k,), the first zero.
     rate_limit : largest steering rate of either axle [rad/s].
     duration : length [s]; after the last time the last angle is held.
     rear_ratio : rear over front angle [-].
@@ -344,32 +344,25 @@ class Swings:
         t, angles = np.array(self.times), np.array(self.angles)
         if not (t.size == angles.size >= 2 and np.isfinite([*t, *angles]).all()):
             raise ManeuverError(
-                f"Swings: times and angles must be two or more finite pairs, they are {t.size} "
-                f"and {angles.size}"
+                "SampledSteer: times and angles must be two or more finite pairs, they are "
+                f"{t.size} and {angles.size}"
             )
         if not (t[0] >= 0.0 and (np.diff(t) > 0.0).all()):
-            raise ManeuverError(f"Swings: times must rise from 0 on, they are {self.times}")
-        if angles[0] != 0.0 or angles[-1] != 0.0:
-            raise ManeuverError(
-                f"Swings: the first and the last angle must be 0, they are {angles[0]} and "
-                f"{angles[-1]}"
-            )
+            raise ManeuverError(f"SampledSteer: times must rise from 0 on, they are {self.times}")
+        if angles[0] != 0.0:
+            raise ManeuverError(f"SampledSteer: the first angle must be 0, it is {angles[0]}")
         for name in ("rate_limit", "duration"):
             value = getattr(self, name)
             if not 0.0 < value < math.inf:
-                raise ManeuverError(f"Swings: {name} must be positive, it is {value}")
-        steepest = 0.5 * math.pi * float(np.abs(np.diff(angles) / np.diff(t)).max())
+                raise ManeuverError(f"SampledSteer: {name} must be positive, it is {value}")
+        steepest = float(np.abs(np.diff(angles) / np.diff(t)).max())
         steepest *= max(1.0, abs(self.rear_ratio))
         if steepest > self.rate_limit * (1.0 + 1e-9):
             raise ManeuverError(
-                f"Swings: steers at up to {steepest:.4g} rad/s, more than rate_limit "
+                f"SampledSteer: steers at up to {steepest:.4g} rad/s, more than rate_limit "
                 f"{self.rate_limit}"
             )
 
     def steering(self, t: Array) -> Array:
         """Commanded [δ_f, δ_r] [rad], (n, 2), at times `t` (n,) [s]."""
-        knots, angles = np.array(self.times), np.array(self.angles)
-        k = np.clip(np.searchsorted(knots, t, side="right") - 1, 0, knots.size - 2)
-        share = np.clip((t - knots[k]) / np.diff(knots)[k], 0.0, 1.0)
-        blend = 0.5 - 0.5 * np.cos(math.pi * share)
-        return _both(angles[k] + blend * np.diff(angles)[k], self.rear_ratio)
+        return _both(np.interp(t, self.times, self.angles), self.rear_ratio)

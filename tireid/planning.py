@@ -1,6 +1,7 @@
 """Planning what to drive next: the steering that teaches most in the space there is."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -8,6 +9,7 @@ from identifier.axle import AxleModel
 from identifier.plan import Plan, PlanError, PlausibleTires, Rehearsal, Space, make_plan
 from identifier.tire_model import TireModel
 from models.plant import Plant, PlantError
+from models.rules import require_within
 from models.vehicle import Vehicle
 
 TIME = 6.0  # s, of steering
@@ -16,6 +18,7 @@ MARGIN = 0.35  # wheelbases, 1 m for a sedan
 RATE = 0.4  # over sqrt(L/g): 0.7 rad/s for a sedan
 MAX_ANGLE = 0.5  # rad
 FRICTION = 0.8
+SHORTEST_LAG, LONGEST_LAG = 1e-3, 1.0  # s, of the steering
 
 
 def plan(
@@ -30,6 +33,7 @@ def plan(
     margin: float | None = None,
     rate_limit: float | None = None,
     max_angle: float = MAX_ANGLE,
+    steering_lag: float | None = None,
     held: bool = True,
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
@@ -49,6 +53,8 @@ def plan(
     margin : from the car to the edge of the area [m]; None takes 0.35 wheelbases.
     rate_limit : of the front wheels [rad/s]; None takes 0.4/sqrt(L/g).
     max_angle : of the front wheels [rad].
+    steering_lag : time constant from the angle asked for to that of the front wheels, within 30 %
+        [s]; None takes that of the vehicle's chassis, 0.04 where it has none.
     held : whether who steers also holds the planned course; else it is steered blindly.
     seed : of the search.
     progress : called with the share that is done.
@@ -79,16 +85,18 @@ def plan(
         max_angle=max_angle,
         held=held,
     )
+    if steering_lag is not None:
+        require_within(PlanError, SHORTEST_LAG, LONGEST_LAG, steering_lag=steering_lag)
     rng = np.random.default_rng(seed)
     if after is None:
         believed = FRICTION if friction is None else friction
         if not 0.05 <= believed <= 3.0:
             raise PlanError(f"friction must be 0.05 to 3, it is {believed:g}")
-        tires = PlausibleTires.told(vehicle, believed)
+        tires = PlausibleTires.told(vehicle, believed, steering_lag=steering_lag)
     else:
         if friction is not None:
             raise PlanError("friction is known from what was learnt: leave one of them out")
-        tires = PlausibleTires.learnt(_of_car(after, vehicle), rng)
+        tires = PlausibleTires.learnt(_of_car(after, vehicle), rng, steering_lag=steering_lag)
     return make_plan(tires, space, time, rng, progress)
 
 
@@ -104,11 +112,13 @@ def rehearsals(found: Plan) -> tuple[Rehearsal, ...]:
     PlanError
         Where that car does not keep on its wheels.
     """
-    chassis = found.tires.vehicle.chassis
+    tires = found.tires
+    chassis = tires.vehicle.chassis
     if chassis is None or chassis.tire is None:
         return ()
+    steered = replace(chassis, steering_lag=float(tires.steering_lag[0]))
     try:
-        return found.rehearsed(Plant(found.tires.vehicle))
+        return found.rehearsed(Plant(replace(tires.vehicle, chassis=steered)))
     except PlantError as error:
         raise PlanError(f"the double-track car of the vehicle cannot drive it: {error}") from None
 

@@ -33,7 +33,8 @@ def covariance_after(tires: PlausibleTires, motion: Motion, v_x: float) -> Array
     v_x : speed [m/s].
     """
     ladder, numbers = np.array(tires.method.ladder), tires.method.regression
-    dt, n = time_step(tires), ladder.size
+    dt, n = EVERY * time_step(tires), ladder.size
+    motion = Motion(*(one[::EVERY] for one in motion))
     T, m, k = motion.v_y.shape
     g = np.empty((T, 2, m, k, n + 3))
     g[..., :n] = np.tanh(motion.slip[..., None] / ladder)
@@ -43,12 +44,12 @@ def covariance_after(tires: PlausibleTires, motion: Motion, v_x: float) -> Array
     g[:, 1, ..., n + 2] = motion.slope[:, 1] / v_x
     e = float(np.exp(-numbers.bandwidth * dt))
     half = 0.5 * (1.0 - e)
-    h = lfilter([half, half], [1.0, -e], g, axis=0)[::EVERY]
+    h = lfilter([half, half], [1.0, -e], g, axis=0)
     y = np.einsum("taMkj,kaj->taMk", h[..., :n], tires.W)
     sigma = numbers.error + numbers.relative_error * np.abs(y)
-    sigma += numbers.lateness * numbers.bandwidth * np.abs(motion.force[::EVERY] - y)
-    sigma += numbers.noise * np.maximum(motion.slope[::EVERY], 0.0) / v_x
-    h /= (sigma * np.sqrt(COLOR * numbers.correlation_time / (EVERY * dt)))[..., None]
+    sigma += numbers.lateness * numbers.bandwidth * np.abs(motion.force - y)
+    sigma += numbers.noise * np.maximum(motion.slope, 0.0) / v_x
+    h /= (sigma * np.sqrt(COLOR * numbers.correlation_time / dt))[..., None]
     lanes = np.ascontiguousarray(h.transpose(2, 3, 1, 4, 0))
     information = lanes @ lanes.swapaxes(-1, -2)
     P: Array = np.linalg.inv(np.linalg.inv(tires.covariance) + information)

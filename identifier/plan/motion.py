@@ -5,9 +5,10 @@ m_v (dv_y/dt + v_x r) = F_f cos δ + F_r,   I_z dr/dt = l_f F_f cos δ - l_r F_r
 x follows α over the lag of `identifier.axle.slip`, exactly for α linear over a step (first-order
 hold); with it its sensitivities to compliance and sway share. Velocities take the force of the slip
 at the end of the step (semi-implicit), so that stiff tires at low speed stay stable.
-Who drives holds the planned course, which is that of the first tires:
-δ = δ_plan - (2 ω e_ψ + ω² e_y/v_x)/G, G the yaw rate of a steady bend per angle, so that deviations
-die out with a double pole at ω, slowly against the swings.
+Who drives holds the planned course, which is that of the first car:
+u = δ_plan - (2 ω e_ψ + ω² e_y/v_x)/G, G the yaw rate of a steady bend per angle, so that deviations
+die out with a double pole at ω, slowly against the swings. The wheels follow what is asked for over
+the lag of the steering, T dδ/dt = u - δ, exactly for u linear over a step.
 """
 
 import math
@@ -46,6 +47,19 @@ class Hold(NamedTuple):
 NO_HOLD = Hold(0.0, 0.0)
 
 
+class Guide(NamedTuple):
+    """What brings the planned course back to a line along X, so that a long one keeps its lane.
+
+    hold : of the first car.   Y : of the line [m].   rate, angle : that the sum of swings and
+    guidance keeps, [rad/s] and [rad].
+    """
+
+    hold: Hold
+    Y: float
+    rate: float
+    angle: float
+
+
 def hold_of(tires: PlausibleTires, v_x: float) -> Hold:
     """Return how the course is held by the first tires.
 
@@ -67,6 +81,8 @@ class Motion(NamedTuple):
     slip : lagged x [rad].   force : φ [static axle loads].   slope : dφ/dx [1/rad].
     of_compliance, of_share : ∂x/∂s [rad per m/load] and ∂x/∂k [rad].
     v_y : [m/s].   r : [rad/s].   X, Y : center of gravity [m].   psi : heading [rad].
+    asked : of the front wheels [rad]; of the first car it is the plan.
+    delta : of the front wheels, behind what is asked of them [rad].
     """
 
     slip: Array
@@ -79,6 +95,7 @@ class Motion(NamedTuple):
     X: Array
     Y: Array
     psi: Array
+    asked: Array
     delta: Array
 
 
@@ -95,16 +112,24 @@ def time_step(tires: PlausibleTires) -> float:
     return STEP * tires.vehicle.froude_time
 
 
-def simulate(tires: PlausibleTires, planned: Array, v_x: float, entry: Entry, hold: Hold) -> Motion:
+def simulate(
+    tires: PlausibleTires,
+    planned: Array,
+    v_x: float,
+    entry: Entry,
+    hold: Hold,
+    guide: Guide | None = None,
+) -> Motion:
     """Return the motion of all tires under all steerings.
 
     Parameters
     ----------
     tires : k pairs of axles.
-    planned : angles of the front wheels at steps of `time_step` [rad], (n, m).
+    planned : angles asked of the front wheels at steps of `time_step` [rad], (n, m).
     v_x : speed [m/s].
     entry : of each steering.
-    hold : how the course of the first tires is held.
+    hold : how the course of the first car is held.
+    guide : what is planned follows it; None plans the angles as they are.
     """
     car, dt, scales = tires.vehicle, time_step(tires), 1.0 / np.array(tires.method.ladder)
     n, m, k = *planned.shape, len(tires.W)
@@ -118,14 +143,26 @@ def simulate(tires: PlausibleTires, planned: Array, v_x: float, entry: Entry, ho
     stiffness, damping, soft, *_ = SwayNumbers(*tires.method.sway.numbers())
     shortest = SHORTEST * car.wheelbase
     lanes, axles = np.zeros((m, k)), np.zeros((2, m, k))
-    v_y = r = rho = rho_dot = lanes
+    v_y = r = rho = rho_dot = asked = delta = lanes
+    z = dt / tires.steering_lag  # (k,)
+    stays = np.exp(-z)
+    missed = (1.0 - stays) / z
     x = alpha = p_s = p_k = sway = axles
     force, slope, bend = axles, (W * inverse).sum(axis=0) + axles, axles
     X, Y, psi = (np.repeat(one[:, None], k, axis=1) for one in entry)
-    out = Motion(*(np.empty((n, *(one.shape))) for one in (x, x, x, x, x, v_y, r, X, Y, psi, r)))
+    out = Motion(*(np.empty((n, *(one.shape))) for one in (x, x, x, x, x, v_y, r, X, Y, psi, r, r)))
     for i in range(n):
         course = X[:, :1], Y[:, :1], psi[:, :1]
-        delta = planned[i][:, None] + hold.steering(course, (X, Y, psi))
+        wanted = planned[i]
+        if guide is not None:
+            line = X[:, 0], guide.Y, 0.0
+            wanted = wanted + guide.hold.steering(line, (X[:, 0], Y[:, 0], psi[:, 0]))
+            wanted = np.clip(wanted, -guide.angle, guide.angle)
+            reach = guide.rate * dt if i else 0.0
+            wanted = np.clip(wanted, asked[:, 0] - reach, asked[:, 0] + reach)
+        asked_now = wanted[:, None] + hold.steering(course, (X, Y, psi))
+        delta = stays * delta + (1.0 - stays) * asked + (1.0 - missed) * (asked_now - asked)
+        asked = asked_now
         # Sway of the body, semi-implicit, and the slip that it makes.
         a = to_v[0] * force[0] + to_v[1] * force[1]
         rho_dot = (rho_dot + dt * stiffness * (a - rho)) / (1.0 + dt * damping)
@@ -152,7 +189,7 @@ def simulate(tires: PlausibleTires, planned: Array, v_x: float, entry: Entry, ho
         force, slope = (W * T).sum(axis=0), slopes.sum(axis=0)
         bend = np.where(slope < flattest, 0.0, -2.0 * (T * slopes * inverse).sum(axis=0))
         for to, value in zip(
-            out, (x, force, slope, p_s, p_k, v_y, r, X, Y, psi, delta), strict=True
+            out, (x, force, slope, p_s, p_k, v_y, r, X, Y, psi, asked, delta), strict=True
         ):
             to[i] = value
         front = force[0] * np.cos(delta)

@@ -112,10 +112,9 @@ class Plan:
     @property
     def clearance(self) -> float:
         """Least distance of any part of the car to the edge, with all plausible tires [m]."""
-        search = Search(tires=self.tires, space=self.space, duration=self.passes[0].t[-1])
-        return self.space.margin - max(
-            float(search.beyond(one.motion).max()) for one in self.passes
-        )
+        ways = [(one.motion.X, one.motion.Y, one.motion.psi) for one in self.passes]
+        body = body_of(self.tires)
+        return min(float(edge_distance(self.space, body, *way).min()) for way in ways)
 
     def rehearsed(self, plant: Plant) -> tuple[Rehearsal, ...]:
         """Return how another car drives each pass: one whose tires need not be as planned.
@@ -218,7 +217,7 @@ def make_plan(
     passes: list[Pass] = []
     known = tires
     for k in range(count):
-        search = Search(tires=known, space=space, duration=time / count)
+        search = Search(tires=known, space=space, duration=time / count, guided=longest < math.inf)
 
         def share(done: float, before: int = k) -> None:
             if progress is not None:
@@ -254,7 +253,7 @@ def hardest(tires: PlausibleTires, space: Space, of: Steering) -> Maneuver:
     space : speed and share; its sides are not looked at.
     of : the maneuver by its amplitude.
     """
-    sizes = AMPLITUDES * Search(tires=tires, space=space, duration=1.0).largest_angle
+    sizes = AMPLITUDES * Search(tires=tires, space=space, duration=1.0, guided=False).largest_angle
     every = [of(float(size)) for size in sizes]
     t = steps_of(tires, min(every[0].duration, PROBED * tires.vehicle.froude_time))
     delta = np.column_stack([one.steering(t)[:, 0] for one in every])

@@ -47,7 +47,8 @@ def rehearse(
         speed, X=X - LEAD * speed * np.cos(psi), Y=Y - LEAD * speed * np.sin(psi), psi=psi
     )
     t = PERIOD * np.arange(before + round(steering.duration / PERIOD) + 1, dtype=np.float64)
-    planned = np.where(t < LEAD, 0.0, steering.steering(np.maximum(t - LEAD, 0.0))[:, 0])
+    middle = t + 0.5 * PERIOD - LEAD  # angles are held: at the middle of it they are not late
+    planned = np.where(middle < 0.0, 0.0, steering.steering(np.maximum(middle, 0.0))[:, 0])
     wanted = course(np.maximum(t - LEAD, 0.0))
     rows: list[Any] = []
     for k in range(t.size):

@@ -3,10 +3,12 @@
 A pass enters at the left edge of the area (X along its length, Y to the left, origin in its corner)
 at a place and a heading that are found too. Steering is N angles joined by half cosines, whose
 durations change from the first to the last by one ratio; in a long pass they repeat, every other
-time mirrored. Differential evolution (R. Storn, K. Price, J. Global Optimization 11, 1997) makes
-the expected error small, meant over all tires that the car may have; a pass is possible where each
-of these cars stays in the area, none slides at the rear, all are calm at its end, and the likely
-one keeps its share of the grip at both axles.
+time mirrored. Where a car cannot turn inside, what is planned also comes back to the middle line,
+slowly, as who drives holds the course: no angles alone keep a lane for long. Differential evolution
+(R. Storn, K. Price, J. Global Optimization 11, 1997) makes the expected error small, meant over all
+tires that the car may have; a pass is possible where each of these cars stays in the area, none
+slides at the rear, all are calm at its end, and the likely one keeps its share of the grip at both
+axles.
 """
 
 import math
@@ -19,13 +21,14 @@ from scipy.optimize import differential_evolution
 
 from codegen.arrays import Array
 from identifier.plan.information import asked, covariance_after, expected_error
-from identifier.plan.motion import NO_HOLD, Entry, Motion, hold_of, simulate, steps_of
+from identifier.plan.motion import NO_HOLD, Entry, Guide, Motion, hold_of, simulate, steps_of
 from identifier.plan.tires import PlausibleTires
-from models.maneuvers import Swings
+from models.maneuvers import SampledSteer
 from models.rules import require_positive, require_within
 from models.vehicle import GRAVITY
 
-POPULATION, GENERATIONS = 64, 100
+POPULATION, GENERATIONS = 32, 100
+STALLED, GAIN = 20, 0.01  # generations after which a search ends that brought less than a share
 SWING = 0.75  # sqrt(L/g): mean duration of a change from angle to angle, 0.4 s in a sedan
 CHIRP = math.log(
     3.0
@@ -134,22 +137,12 @@ class Steerings(NamedTuple):
         ----------
         t : [s], (n,).
         """
-        return np.column_stack(
-            [
-                _maneuver(times, angles, float(times[-1]), math.inf).steering(t)[:, 0]
-                for times, angles in zip(self.times, self.angles, strict=True)
-            ]
-        )
-
-
-def _maneuver(times: Array, angles: Array, duration: float, rate: float) -> Swings:
-    limit = rate if math.isfinite(rate) else 1e6
-    return Swings(
-        times=tuple(map(float, times)),
-        angles=tuple(map(float, angles)),
-        rate_limit=limit,
-        duration=duration,
-    )
+        lines = []
+        for times, angles in zip(self.times, self.angles, strict=True):
+            k = np.clip(np.searchsorted(times, t, side="right") - 1, 0, times.size - 2)
+            share = np.clip((t - times[k]) / np.diff(times)[k], 0.0, 1.0)
+            lines.append(angles[k] + (0.5 - 0.5 * np.cos(math.pi * share)) * np.diff(angles)[k])
+        return np.column_stack(lines)
 
 
 class Pass(NamedTuple):
@@ -160,7 +153,7 @@ class Pass(NamedTuple):
     tires, (2, q, q).   error : expected after it, meant over all tires [-].   t : of motion [s].
     """
 
-    steering: Swings
+    steering: SampledSteer
     entry: Entry
     motion: Motion
     covariance: Array
@@ -187,11 +180,13 @@ class Search:
     tires : that the car may have.
     space : where and how.
     duration : of the pass [s].
+    guided : along the middle of the area; else the way is free, as where a car can turn inside.
     """
 
     tires: PlausibleTires
     space: Space
     duration: float
+    guided: bool
 
     @property
     def swings(self) -> int:
@@ -265,8 +260,16 @@ class Search:
     def motion(self, steerings: Steerings) -> Motion:
         """Return what all tires do under steerings."""
         t = steps_of(self.tires, self.duration)
-        hold = hold_of(self.tires, self.space.speed) if self.space.held else NO_HOLD
-        return simulate(self.tires, steerings.delta(t), self.space.speed, steerings.entry, hold)
+        space, hold = self.space, hold_of(self.tires, self.space.speed)
+        guide = Guide(hold, 0.5 * space.width, space.rate_limit, space.max_angle)
+        return simulate(
+            self.tires,
+            steerings.delta(t),
+            space.speed,
+            steerings.entry,
+            hold if space.held else NO_HOLD,
+            guide if self.guided else None,
+        )
 
     def violation(self, motion: Motion) -> Array:
         """Return by how much motions break a limit, not positive where they are possible, (m,)."""
@@ -314,16 +317,21 @@ class Search:
         PlanError
             Where no pass is possible.
         """
-        done = 0
+        least: list[float] = []  # cost, after each generation
 
-        def after(*_: object) -> None:
-            nonlocal done
-            done += 1
+        def costs(numbers: Array) -> Array:
+            found = self.costs(numbers.T)
+            least.append(min([*least[-1:], float(found.min())]))
+            return found
+
+        def after(*_: object) -> bool:
             if progress is not None:
-                progress(done / GENERATIONS)
+                progress(len(least) / GENERATIONS)
+            possible = least[-1] < 1.0 and len(least) > STALLED
+            return possible and least[-1] > (1.0 - GAIN) * least[-1 - STALLED]
 
         found = differential_evolution(
-            lambda u: self.costs(u.T),
+            costs,
             [(-1.0, 1.0)] * (self.swings + 2),
             init=self.beginnings(rng),
             maxiter=GENERATIONS,
@@ -355,17 +363,14 @@ class Search:
         motion = self.motion(steerings)
         P = covariance_after(self.tires, motion, self.space.speed)
         error = expected_error(self.tires, asked(self.tires, self.space.speed), P)
-        steering = _maneuver(
-            steerings.times[0], steerings.angles[0], self.duration, self.space.rate_limit
+        t = steps_of(self.tires, self.duration)
+        steering = SampledSteer(
+            times=tuple(t.tolist()),
+            angles=tuple(motion.asked[:, 0, 0].tolist()),
+            rate_limit=self.space.rate_limit,
+            duration=self.duration,
         )
-        return Pass(
-            steering,
-            steerings.entry,
-            motion,
-            P[0, 0],
-            float(error.mean()),
-            steps_of(self.tires, self.duration),
-        )
+        return Pass(steering, steerings.entry, motion, P[0, 0], float(error.mean()), t)
 
 
 def after_pass(tires: PlausibleTires, one: Pass) -> PlausibleTires:

@@ -1,10 +1,13 @@
-"""Tires that a car may have, as far as anybody knows before it drives: what a plan must stand.
+"""Tires and steering that a car may have, as far as is known before it drives: a plan stands all.
 
 Of a car that was never identified: brush tires (as in the prior of the axle identifier) of the told
 stiffness and friction, and those that are softer, stiffer, more slippery or grippier by a share;
 the least stable of them steers neutrally on a slippery road. No car is believed to oversteer at
 small slip: where the told rear axle is softer for its load than the front one, both are taken to be
 alike. Of a model that was learnt: its own curve, and curves drawn from what learning left open.
+The steering follows what is asked of it over the lag of the vehicle file, quicker and slower ones
+by the same share: the slow one drives on the least stable tires. A mass that is wrong is tires of
+another stiffness per load; it does not count on its own.
 """
 
 from dataclasses import dataclass, replace
@@ -19,20 +22,35 @@ from identifier.axle.prior import fiala_weights
 from models.vehicle import Vehicle
 
 SPREAD = 0.3  # of stiffness and of friction, either way
+STEERING_LAG = 0.04  # s, where no vehicle file tells: that of the sedan's
 DRAWN = 6  # curves of a learnt model
 SLIPS = np.linspace(0.0, 0.5, 501)[1:]  # rad, where curves are looked at
 FLAT = 0.98  # of the largest force of a curve: slip that matters ends where it is reached
 
 
+def steering_lag_of(vehicle: Vehicle, told: float | None) -> float:
+    """Return the time constant from the angle asked for to that of the front wheels [s].
+
+    Parameters
+    ----------
+    vehicle : the car.
+    told : of the steering that drives it; None takes that of its chassis, or else 0.04.
+    """
+    if told is not None:
+        return told
+    return STEERING_LAG if vehicle.chassis is None else vehicle.chassis.steering_lag
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlausibleTires:
-    """k pairs of axles, the first of which is taken for the truth until more is known.
+    """k cars, the first of which is taken for the truth until more is known.
 
     Parameters
     ----------
     vehicle : the car, as it is told.
     method : that is to learn.
     W : weights [static axle loads], (k, 2, n).
+    steering_lag : of the front wheels behind what is asked of them [s], (k,).
     own : compliance [m per load], sway share [-], offset (2, 3), of all.
     covariance : of weights and own before the maneuver, (2, n + 3, n + 3).
     prior : that of a car that never drove, (2, n + 3, n + 3).
@@ -41,17 +59,19 @@ class PlausibleTires:
     vehicle: Vehicle
     method: AxleIdentifier
     W: Array
+    steering_lag: Array
     own: Array
     covariance: Array
     prior: Array
 
     @classmethod
-    def told(cls, vehicle: Vehicle, friction: float) -> Self:
+    def told(cls, vehicle: Vehicle, friction: float, *, steering_lag: float | None = None) -> Self:
         """Return the tires that a car may have that was never identified.
 
         Parameters
         ----------
         friction : believed of tires and road [-].
+        steering_lag : see `steering_lag_of`.
         """
         method = AxleIdentifier.for_vehicle(vehicle)
         method = replace(method, prior=replace(method.prior, friction=friction))
@@ -63,33 +83,47 @@ class PlausibleTires:
             front = rear = neutral
         low, high = 1.0 - SPREAD, 1.0 + SPREAD
         cases = (
-            (front, rear, friction),
-            (low * front, low * rear, friction),
-            (high * front, high * rear, friction),
-            (neutral, neutral, low * friction),
-            (front, rear, high * friction),
-            (low * front, high * rear, friction),
-            (low * front, low * rear, low * friction),
+            (front, rear, friction, 1.0),
+            (low * front, low * rear, friction, low),
+            (high * front, high * rear, friction, high),
+            (neutral, neutral, low * friction, high),
+            (front, rear, high * friction, low),
+            (low * front, high * rear, friction, high),
+            (low * front, low * rear, low * friction, 1.0),
         )
-        W = [[fiala_weights(c, mu, ladder) for c in (f, r)] for f, r, mu in cases]
+        W = [[fiala_weights(c, mu, ladder) for c in (f, r)] for f, r, mu, _ in cases]
+        lag = steering_lag_of(vehicle, steering_lag) * np.array([late for *_, late in cases])
         P = prior.covariance(vehicle, ladder)
         own = prior.means(vehicle, ladder)[1]
-        return cls(vehicle=vehicle, method=method, W=np.array(W), own=own, covariance=P, prior=P)
+        return cls(
+            vehicle=vehicle,
+            method=method,
+            W=np.array(W),
+            steering_lag=lag,
+            own=own,
+            covariance=P,
+            prior=P,
+        )
 
     @classmethod
-    def learnt(cls, model: AxleModel, rng: np.random.Generator) -> Self:
+    def learnt(
+        cls, model: AxleModel, rng: np.random.Generator, *, steering_lag: float | None = None
+    ) -> Self:
         """Return the tires that a car may have of which a model was learnt.
 
         Parameters
         ----------
         model : the car's.
         rng : source of the curves that are drawn.
+        steering_lag : see `steering_lag_of`.
         """
         drawn = model.samples(DRAWN, rng)
+        late = 1.0 + SPREAD * np.array([0.0, *np.resize([-1.0, 1.0], DRAWN)])
         return cls(
             vehicle=model.vehicle,
             method=replace(AxleIdentifier.for_vehicle(model.vehicle), ladder=model.ladder),
             W=np.array([model.W, *(one.W for one in drawn)]),
+            steering_lag=steering_lag_of(model.vehicle, steering_lag) * late,
             own=model.own * [1.0, 1.0, 0.0],
             covariance=model.covariance,
             prior=model.prior_covariance,

@@ -10,11 +10,11 @@ from models.maneuvers import (
     DoubleLaneChange,
     ManeuverError,
     RandomSteer,
+    SampledSteer,
     SineWithDwell,
     Slalom,
     SlowlyIncreasingSteer,
     StepSteer,
-    Swings,
     TwoStepSteer,
 )
 
@@ -158,29 +158,28 @@ def test_random_steer_is_its_seed():
     assert np.corrcoef(first.steering(t)[:, 0], other[:, 0])[0, 1] < 0.5
 
 
-def test_swings_pass_their_angles_and_rest_before_and_after():
-    swings = Swings(times=(1.0, 1.5, 2.5), angles=(0.0, 0.1, 0.0), rate_limit=0.4, duration=4.0)
+def test_sampled_angles_are_passed_and_the_last_one_is_held():
+    steer = SampledSteer(times=(1.0, 1.5, 2.5), angles=(0.0, 0.1, 0.02), rate_limit=0.2, duration=4)
     t = np.array([0.0, 1.0, 1.25, 1.5, 2.0, 2.5, 4.0])
-    np.testing.assert_allclose(
-        swings.steering(t)[:, 0], [0.0, 0.0, 0.05, 0.1, 0.05, 0.0, 0.0], atol=1e-15
-    )
-    fine = swings.steering(np.linspace(0.0, 4.0, 40001))[:, 0]
-    assert np.abs(np.diff(fine) / 1e-4).max() == pytest.approx(0.1 * np.pi, rel=1e-4)
+    wanted = [0.0, 0.0, 0.05, 0.1, 0.06, 0.02, 0.02]
+    np.testing.assert_allclose(steer.steering(t)[:, 0], wanted, atol=1e-15)
+    both = replace(steer, rear_ratio=-0.5).steering(t)
+    np.testing.assert_array_equal(both[:, 1], -0.5 * both[:, 0])
 
 
 @pytest.mark.parametrize(
     ("others", "words"),
     [
-        ({"rate_limit": 0.3}, "more than rate_limit"),
+        ({"rate_limit": 0.19}, "more than rate_limit"),
         ({"times": (1.0, 1.0, 2.0)}, "times must rise"),
         ({"times": (-1.0, 1.0, 2.0)}, "times must rise"),
-        ({"angles": (0.0, 0.1, 0.1)}, "first and the last angle must be 0"),
+        ({"angles": (0.1, 0.1, 0.0)}, "the first angle must be 0"),
         ({"angles": (0.0, 0.0)}, "finite pairs"),
         ({"angles": (0.0, float("nan"), 0.0)}, "finite pairs"),
         ({"duration": 0.0}, "duration must be positive"),
     ],
 )
-def test_swings_that_cannot_be_steered_are_refused(others, words):
+def test_sampled_angles_that_cannot_be_steered_are_refused(others, words):
     numbers = {"times": (1.0, 1.5, 2.5), "angles": (0.0, 0.1, 0.0), "rate_limit": 0.4}
     with pytest.raises(ManeuverError, match=words):
-        Swings(**{**numbers, "duration": 4.0, **others})
+        SampledSteer(**{**numbers, "duration": 4.0, **others})

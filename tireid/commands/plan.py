@@ -11,7 +11,7 @@ import numpy as np
 from codegen.arrays import Array
 from identifier.method import vehicle_numbers
 from identifier.methods import load_model
-from identifier.plan import Plan, hold_of
+from identifier.plan import STEERING_LAG, Plan, hold_of
 from models.files import digest
 from models.vehicle import Vehicle
 from tireid import __version__
@@ -94,6 +94,13 @@ def add_parser(commands: Any) -> None:
         help="largest, of the front wheels (%(default)g)",
     )
     parser.add_argument(
+        "--steering-lag",
+        type=float,
+        metavar="S",
+        help="time constant from the angle asked for to that of the front wheels, a guess within "
+        f"30 %% (the vehicle file's, {STEERING_LAG:g} where it has none)",
+    )
+    parser.add_argument(
         "--steering-ratio",
         type=float,
         metavar="RATIO",
@@ -135,6 +142,7 @@ def run(options: argparse.Namespace) -> int:
                 margin=options.margin,
                 rate_limit=_radians(options.steering_rate),
                 max_angle=math.radians(options.steering_angle),
+                steering_lag=options.steering_lag,
                 held=not options.blind,
                 seed=seed,
                 progress=progress,
@@ -232,6 +240,7 @@ def inputs_of(
         "margin_m": options.margin,
         "steering_rate_deg_s": options.steering_rate,
         "steering_angle_deg": options.steering_angle,
+        "steering_lag_s": options.steering_lag,
         "blind": options.blind,
         "seed": seed_of(options),
     }
@@ -318,6 +327,7 @@ def summary(found: Plan, inputs: dict[str, Any]) -> dict[str, Any]:
         },
         "least_distance_to_edge_m": found.clearance,
         "peak_lateral_acceleration_m_s2": found.lateral_acceleration,
+        "steering_lag_s": float(found.tires.steering_lag[0]),
         "hold_rad_per_rad": hold.heading if found.space.held else None,
         "hold_rad_per_m": hold.aside if found.space.held else None,
         "band": {

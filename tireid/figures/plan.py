@@ -21,6 +21,8 @@ from tireid.figures.style import (
     styled,
 )
 
+ARROW = 0.07  # lengths of the area: that shows where and whither a pass comes in
+
 
 @styled
 def plan_area_figure(found: Plan) -> Figure:
@@ -30,14 +32,24 @@ def plan_area_figure(found: Plan) -> Figure:
     axes = figure.subplots()
     axes.add_patch(Rectangle((0.0, 0.0), space.length, space.width, fill=False, linewidth=1.2))
     inner = space.length - 2.0 * space.margin, space.width - 2.0 * space.margin
-    axes.add_patch(
-        Rectangle((space.margin, space.margin), *inner, fill=False, linestyle="--", color=GREY)
-    )
+    dashed = {"fill": False, "linestyle": "--", "color": GREY, "label": "margin"}
+    axes.add_patch(Rectangle((space.margin, space.margin), *inner, **dashed))
     for k, one in enumerate(found.passes):
         color = SERIES[k % len(SERIES)]
-        axes.plot(one.motion.X[:, 0], one.motion.Y[:, 0], color=color, alpha=0.25, linewidth=0.6)
+        others = axes.plot(
+            one.motion.X[:, 0, 1:], one.motion.Y[:, 0, 1:], color=color, alpha=0.4, linewidth=0.6
+        )
         axes.plot(one.motion.X[:, 0, 0], one.motion.Y[:, 0, 0], color=color, label=f"pass {k + 1}")
-        axes.plot(one.motion.X[0, 0, 0], one.motion.Y[0, 0, 0], marker="o", color=color)
+        others[0].set_label("other tires" if k == 0 else None)
+        (X, Y, psi), ahead = one.course(np.zeros(1))[0], ARROW * space.length
+        axes.annotate(
+            "",
+            (X, Y),
+            (X - ahead * np.cos(psi), Y - ahead * np.sin(psi)),
+            arrowprops={"arrowstyle": "-|>", "color": color},
+            annotation_clip=False,
+        )
+    axes.set_xlim(-1.3 * ARROW * space.length, 1.03 * space.length)
     axes.set(xlabel="X [m]", ylabel="Y [m]", aspect="equal")
     legend_above(figure)
     return figure

@@ -39,7 +39,7 @@ READ = {
     "moment; shaded slip was not known then.",
     "plan_area": "The black box is the area, the dashed one what its margin leaves to the body of "
     "the car; the thick line is the center of gravity with the likely tires, thin ones with others "
-    "that it may have; a dot is the entry.",
+    "that it may have; an arrow is the entry.",
     "plan_steering": "Above what the front wheels are asked to do, below how much of its grip each "
     "axle of the likely tires gives.",
     "plan_band": "Where the band narrows, the drive will have taught; beyond it nothing changes.",

@@ -12,7 +12,7 @@ from identifier.plan import Plan, PlanError, PlausibleTires, Space, hold_of, mak
 from identifier.plan import information as information_module
 from identifier.plan import search as search_module
 from identifier.plan.information import asked, covariance_after, deviation, expected_error
-from identifier.plan.motion import NO_HOLD, Entry, Motion, simulate, steps_of, time_step
+from identifier.plan.motion import NO_HOLD, Entry, Guide, Motion, simulate, steps_of, time_step
 from identifier.plan.plan import extent, free_motion, hardest, longest_pass, slalom_of
 from identifier.plan.search import Search, body_of
 from identifier.run import identify
@@ -33,7 +33,7 @@ def tires():
 @pytest.fixture
 def brief(monkeypatch):
     """A search of few generations: it finds less, and keeps every limit."""
-    monkeypatch.setattr(search_module, "GENERATIONS", 6)
+    monkeypatch.setattr(search_module, "GENERATIONS", 15)
 
 
 def space(**others):
@@ -54,6 +54,7 @@ def test_small_angles_move_the_likely_car_as_the_linear_bicycle(tires):
     )
     t, motion = steered(tires, lambda t: 2e-3 * np.sin(3.0 * t), 4.0)
     system = control.ss(np.array(linear.A), np.array(linear.B)[:, :1], np.eye(2), np.zeros((2, 1)))
+    system *= control.ss(-25.0, 25.0, 1.0, 0.0)  # the steering's lag of 40 ms
     x = control.forced_response(system, t, 2e-3 * np.sin(3.0 * t)).outputs
     # What is left is the lag of the tires, some 20 ms.
     assert np.abs(motion.r[:, 0, 0] - x[1]).max() < 0.08 * np.abs(x[1]).max()
@@ -157,7 +158,7 @@ def test_every_tire_that_was_planned_for_stays_in_the_area_and_none_slides(tires
 
 
 def test_a_way_out_of_the_area_and_a_slide_are_noticed(tires):
-    search = Search(tires=tires, space=space(), duration=3.0)
+    search = Search(tires=tires, space=space(), duration=3.0, guided=False)
     swings = np.zeros((2, search.swings + 2))
     swings[1, : search.swings - 1] = 1.0  # all to the left, as far as it goes
     violation = search.violation(search.motion(search.steerings(swings)))
@@ -171,6 +172,34 @@ def test_a_car_that_holds_the_course_needs_less_room(tires):
         return np.ptp(motion.Y[-1, 0])
 
     assert side(hold_of(tires, SPEED)) < 0.3 * side(NO_HOLD)
+
+
+def test_guidance_brings_a_course_back_that_angles_alone_lose(tires):
+    t, at = steps_of(tires, 15.0), np.zeros(1)
+    planned, entry = 0.04 * np.sin(3.0 * t)[:, None] + 0.005, Entry(at, at, at)
+    hold = hold_of(tires, SPEED)
+    guide = Guide(hold, 0.0, rate=0.2, angle=0.04)
+    free = simulate(tires, planned, SPEED, entry, hold)
+    kept = simulate(tires, planned, SPEED, entry, hold, guide)
+    assert np.abs(free.Y[:, 0, 0]).max() > 30.0 > 10.0 * np.abs(kept.Y[:, 0, 0]).max()
+    asked = kept.asked[:, 0, 0]
+    assert asked[0] == 0.0 and np.abs(asked).max() <= 0.04
+    assert np.abs(np.diff(asked) / np.diff(t)).max() <= 0.2 * (1.0 + 1e-9)
+    again = simulate(tires, asked[:, None], SPEED, entry, hold)  # as it is handed over
+    np.testing.assert_allclose(again.Y, kept.Y, atol=1e-9)
+
+
+def test_a_plan_that_knows_the_lag_is_driven_as_planned(brief):
+    slow = replace(CAR, chassis=replace(CAR.require_chassis(), steering_lag=0.12))
+    missed = []
+    for told in (None, 0.01):  # the vehicle file's; and a plan that believes in quick steering
+        known = PlausibleTires.told(slow, 0.9, steering_lag=told)
+        (one,) = make_plan(known, space(), 3.0, np.random.default_rng(0)).passes
+        log, way = rehearse(Plant(slow), one.steering, one.course, SPEED, NO_HOLD)
+        late = log.t >= 1.0 - 1e-9
+        off = (way[late] - one.course(log.t[late] - 1.0))[:, :2]
+        missed.append(np.hypot(*off.T).max())
+    assert missed[0] < 0.6 * missed[1]
 
 
 def test_a_plan_is_worth_more_than_a_slalom_of_its_length(tires, brief):
