@@ -86,6 +86,7 @@ MORE = (
         "--area 1e999x3",
         "--area x",
         "--steering-ratio 0",
+        "--steering-lag 0",
         "--after axle.json",
         "--blind",
         "--speed 0.9",

@@ -35,6 +35,7 @@ def test_a_plan_is_written_with_its_course_and_said_in_words(tmp_path, capsys, u
     np.testing.assert_allclose(
         rows["hand_wheel_deg"], np.degrees(15.0 * rows["delta_f_rad"]), atol=1e-5
     )
+    assert (rows["v_x_m_s"] == 15.0).all()
     first = rows[rows["pass"] == 1.0]
     assert first["delta_f_rad"][0] == 0.0 and first["t_s"][-1] == pytest.approx(2.0)
     path = Path.from_csv(out / "path.csv")  # as tireid drive reads it
@@ -43,6 +44,7 @@ def test_a_plan_is_written_with_its_course_and_said_in_words(tmp_path, capsys, u
     assert at.min() < 0.3
     found = json.loads((out / "summary.json").read_text())
     assert found["passes"] == 2 and found["least_distance_to_edge_m"] > 0.9
+    assert found["steering_lag_s"] == 0.04  # of the sedan's file
     assert found["expected_error"] < found["expected_error_before"]
     assert found["expected_error"] < found["rivals"]["slalom"]["expected_error"]
     said = capsys.readouterr().out
@@ -81,6 +83,9 @@ def test_a_plan_follows_what_was_learnt(tmp_path, undrawn):
         (["--steering-rate", "0"], "rate_limit must be positive"),
         (["--steering-angle", "80"], "max_angle must lie"),
         (["--steering-ratio", "0.1"], "--steering-ratio must be"),
+        (["--steering-lag", "5"], "steering_lag must lie between"),
+        (["--steering-lag", "nan"], "steering_lag must lie between"),
+        (["--area", "60x3"], "is 3 m wide and the car with its margins"),
         (["--seed", "-1"], "--seed must not be negative"),
     ],
 )

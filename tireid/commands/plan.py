@@ -259,8 +259,9 @@ def steering_columns(found: Plan, ratio: float | None) -> dict[str, Array]:
         t = PERIOD * np.arange(round(one.steering.duration / PERIOD) + 1, dtype=np.float64)
         delta = one.steering.steering(t)[:, 0]
         r = np.interp(t, one.t, one.motion.r[:, 0, 0])
-        rows.append(np.column_stack([np.full(t.size, k + 1), t, delta, one.course(t), r]))
-    names = ("pass", "t_s", "delta_f_rad", "X_m", "Y_m", "psi_rad", "r_expected_rad_s")
+        held = np.full(t.size, found.space.speed)
+        rows.append(np.column_stack([np.full(t.size, k + 1), t, delta, one.course(t), r, held]))
+    names = ("pass", "t_s", "delta_f_rad", "X_m", "Y_m", "psi_rad", "r_expected_rad_s", "v_x_m_s")
     columns = dict(zip(names, np.vstack(rows).T, strict=True))
     if ratio is not None:
         columns["hand_wheel_deg"] = np.degrees(ratio * columns["delta_f_rad"])

@@ -36,14 +36,14 @@ def plan_words(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
     distance = space.speed**2 / (2.0 * PULL)
     said.append(
         f"Up to {found.lateral_acceleration:.1f} m/s² sideways, {100.0 * space.share:.0f} % of the "
-        f"grip of the likely tires; the car stays {found.clearance:.1f} m from the edge with "
+        f"grip of the likely tires; the car stays {found.clearance:.2g} m from the edge with "
         f"every tire that it may have. It comes in at speed, about {distance:.0f} m of run-up, and "
         f"needs as much to stop behind the area."
     )
     if driven:
         side_slip = max(one.side_slip for one in driven)
         said.append(
-            f"Rehearsed on the double-track car of the vehicle file: {least(driven):.1f} m from "
+            f"Rehearsed on the double-track car of the vehicle file: {least(driven):.2g} m from "
             f"the edge, side slip up to {math.degrees(side_slip):.1f} degrees."
         )
     return said
@@ -96,7 +96,7 @@ def write_plan_report(
             Headline(f"{100.0 * found.error:.1f} %", "expected error of the forces over the grip"),
             Headline(f"{100.0 * found.error_before:.0f} %", "before it"),
             Headline(f"{100.0 * found.rivals[0].error:.1f} %", "after a slalom of that length"),
-            Headline(f"{found.clearance:.1f} m", "least distance to the edge"),
+            Headline(f"{found.clearance:.2g} m", "least distance to the edge"),
         ],
         warnings=plan_warnings(found, driven),
         sections=[
@@ -146,7 +146,7 @@ def plan_warnings(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
         said.append("Nobody holds the course: whatever pushes the car stays in its way.")
     if driven and least(driven) < 0.0:
         said.append(
-            f"The double-track car of the vehicle file leaves the area by {-least(driven):.1f} m: "
+            f"The double-track car of the vehicle file leaves the area by {-least(driven):.2g} m: "
             "its tires are not among those planned for. Tell --mu, or ask for less --grip."
         )
     return said
@@ -154,16 +154,22 @@ def plan_warnings(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
 
 def _how(found: Plan) -> str:
     """Return how steering.csv is to be driven."""
+    space, lag = found.space, 1e3 * float(found.tires.steering_lag[0])
+    paths = "path.csv" if len(found.passes) == 1 else "path.csv, path_2.csv, ..."
     how = (
-        "steering.csv holds the angle of the front wheels over the time since the entry of each "
-        "pass, and the course that the likely tires take; path.csv is that course for tireid "
-        "drive --path. The speed is held."
+        "steering.csv holds the angle asked of the front wheels [rad], to the left positive, over "
+        "the time since the entry of each pass, and the course of the center of gravity that "
+        "follows: X along the longer side of the area, Y to the left of it, both from the corner "
+        f"in which the area begins, psi from X to the left. The wheels follow over {lag:.0f} ms. "
+        f"The speed is held. {paths}: the course with a straight run-up, as tireid drive --path "
+        f"path.csv --speed {space.speed:g}m/s and other path trackers read it; who tracks it well "
+        "steers much the same."
     )
-    if not found.space.held:
+    if not space.held:
         return how
-    hold = hold_of(found.tires, found.space.speed)
+    hold = hold_of(found.tires, space.speed)
     return (
-        f"{how} Who steers, a robot or a person, also holds the course, slowly: add "
+        f"{how} Who plays steering.csv, a robot or a person, also holds the course, slowly: add "
         f"{hold.heading:.3g} rad per rad of heading that is missing and {hold.aside:.3g} rad per "
         "meter that the car is off to the right."
     )
