@@ -32,8 +32,10 @@ def plan_area_figure(found: Plan) -> Figure:
     axes = figure.subplots()
     axes.add_patch(Rectangle((0.0, 0.0), space.length, space.width, fill=False, linewidth=1.2))
     inner = space.length - 2.0 * space.margin, space.width - 2.0 * space.margin
-    dashed = {"fill": False, "linestyle": "--", "color": GREY, "label": "margin"}
-    axes.add_patch(Rectangle((space.margin, space.margin), *inner, **dashed))
+    corner = space.margin, space.margin
+    axes.add_patch(
+        Rectangle(corner, *inner, fill=False, linestyle="--", color=GREY, label="margin")
+    )
     for k, one in enumerate(found.passes):
         color = SERIES[k % len(SERIES)]
         others = axes.plot(
