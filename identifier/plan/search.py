@@ -342,7 +342,7 @@ class Search:
             updating="deferred",
             vectorized=True,
             callback=after,
-            rng=rng,
+            seed=rng,
         )
         if not found.fun < 1.0:
             raise PlanError(
