@@ -2,7 +2,9 @@
 
 The road is that of a user, by public functions alone: the log is read from a table, which refuses
 wrong signs, units and axes, `ti.identify` refuses a car that cannot have driven it, and learns; the
-model is frozen at the end, `run.verdict` judges. None of them sees a true force.
+model is frozen at the end, `run.verdict` judges. As in `tireid identify` the doctor looks at the
+log too: it is asked where the verdict is valid, as only there its word decides. None of them sees
+a true force.
 """
 
 import math
@@ -44,6 +46,8 @@ class Answer(NamedTuple):
     """The verdict."""
     codes: tuple[str, ...]
     """Of what was found against it; the name of the exception where there was one."""
+    doctor: tuple[str, ...] = ()
+    """What the doctor says that matters, code and channel; asked of valid answers only."""
 
     @property
     def worse(self) -> float:
@@ -105,6 +109,8 @@ def answer(log: Recording, told: Vehicle, judged: Recording) -> Answer:
         run, let_in = _run(blind(log), told)
         tire = run.freeze()
         verdict = run.verdict() if let_in else None
+        valid = verdict is not None and verdict.valid
+        said = ti.diagnose(blind(log), told).findings if valid else ()
         stiffness = tire.stiffness
         assert stiffness is not None
         missed = force_error(tire, judged)
@@ -116,8 +122,9 @@ def answer(log: Recording, told: Vehicle, judged: Recording) -> Answer:
     return Answer(
         missed if all(map(math.isfinite, missed)) else NO_FORCE,
         (float(stiffness[0]), float(stiffness[1])),
-        verdict is not None and verdict.valid,
+        valid,
         tuple(sorted(against)),
+        tuple(sorted({f"{one.code} {one.channel}".strip() for one in said if one.matters})),
     )
 
 

@@ -4,9 +4,11 @@
 
 Each fault of `fault_cases.cases` on the two CarMaker runs, where they are there, and on plant cars
 of four classes: learnt stiffness, error of the force of the frozen model (on the same sensors, on a
-drive with corners) and the verdict. Where a fault can be seen the error at most doubles, where it
-can not the answer is called not valid; a wrong mass alone nobody can see. Writes
-OUT/fault_table.md for docs/benchmarks.md.
+drive with corners), the verdict, and the doctor, whose findings `tireid identify` tells beside it.
+Where a fault can be seen the error at most doubles, where it can not the answer is called not
+valid, or the doctor says something that it does not say of the drive without the fault, be it the
+right cause or another; a wrong mass alone nobody can see. Writes OUT/fault_table.md for
+docs/benchmarks.md.
 """
 
 import argparse
@@ -16,6 +18,7 @@ import textwrap
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,8 +52,19 @@ LABELS = {  # by the first part of the key of a case; its size follows
 }
 UNSEEN = {"mass/1.2": 20.0}  # % that no motion shows: all forces grow with the mass
 SHOWN, WIDTH = {"tenth": "1:10"}, 110  # name of a class in documents; characters of their lines
+SHOWN_AT_MOST = 20  # answers of which nothing is said
 PROCESSES = 2
 Answers = Mapping[str, Answer]  # by case
+
+
+class Silent(NamedTuple):
+    """An answer that is wrong by a fault and that the verdict calls valid."""
+
+    group: str
+    case: str
+    answer: Answer
+    by_doctor: bool
+    """Whether the doctor says something."""
 
 
 def of_log(log: Recording, drive: Recording, told: Vehicle) -> dict[str, Answer]:
@@ -94,7 +108,7 @@ def of_carmaker() -> dict[str, list[Answers]]:
 
 
 def is_told(found: Answer, clean: Answer, unseen: float = 0.0) -> bool:
-    """Return whether the error at most doubles, or the answer is called not valid.
+    """Return whether the error at most doubles, or the verdict calls the answer not valid.
 
     Parameters
     ----------
@@ -103,6 +117,17 @@ def is_told(found: Answer, clean: Answer, unseen: float = 0.0) -> bool:
     unseen : error that is added and that nobody can see [%].
     """
     return not found.valid or found.worse <= max(TWICE * clean.worse, SMALL) + unseen
+
+
+def is_told_by_doctor(found: Answer, clean: Answer) -> bool:
+    """Return whether the doctor says something that it does not say without the fault.
+
+    Parameters
+    ----------
+    found : with the fault.
+    clean : without.
+    """
+    return not {*found.doctor} <= {*clean.doctor}
 
 
 def label_of(case: str) -> str:
@@ -131,10 +156,11 @@ def report(found: Mapping[str, list[Answers]], targets: Targets) -> str:
     asked = sum(map(len, found.values()))
     targets.record("drives", asked)
     head += [f"{SHOWN.get(name, name)} [%]" for name in plants]
-    head = ["what is wrong", *head, f"valid, of {asked}", "of these, wrong and not told"]
+    told = ["of these, wrong", "and the doctor silent"]
+    head = ["what is wrong", *head, f"valid, of {asked}", *told]
     lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     sources = ["name=1:10"] * ("tenth" in plants) + ["fault_table:", "drives"]
-    silent: list[tuple[str, str, Answer]] = []
+    silent: list[Silent] = []
     dead: list[Answer] = []
     for name, label in labels.items():
         row, silent_before = [label], len(silent)
@@ -149,28 +175,39 @@ def report(found: Mapping[str, list[Answers]], targets: Targets) -> str:
             clean = [answers["clean"] for answers in drives]
             pairs = list(zip(some, clean, strict=True))
             silent += [
-                (group, name, one)
+                Silent(group, name, one, is_told_by_doctor(one, good))
                 for one, good in pairs
                 if not is_told(one, good, UNSEEN.get(name, 0.0))
             ]
             dead += [one for one, good in pairs if is_dead(one, good.stiffness)]
         every = [answers[name] for drives in found.values() for answers in drives]
         valid = sum(one.valid for one in every)
-        untold = len(silent) - silent_before
-        targets.record(f"{name}/valid", valid)
-        targets.record(f"{name}/silent", untold)
-        sources.append(f"{name}/{{valid,silent}}")
-        lines.append(f"| {' | '.join([*row, str(valid), str(untold)])} |")
+        mine = silent[silent_before:]
+        counts = {
+            "valid": valid,
+            "silent": len(mine),
+            "silent_with_doctor": sum(not one.by_doctor for one in mine),
+        }
+        for key, count in counts.items():
+            targets.record(f"{name}/{key}", count)
+        sources.append(f"{name}/{{{','.join(counts)}}}")
+        lines.append(f"| {' | '.join([*row, *map(str, counts.values())])} |")
         codes = sorted({code for one in every for code in one.codes})
         show(label, f"{valid} of {len(every)} valid  {', '.join(codes)}")
-    for group, name, one in silent[:20]:
-        show(f"says nothing: {group}, {labels[name]}", f"{one.error[0]:.1f} / {one.error[1]:.1f} %")
+    unheard = [one for one in silent if not one.by_doctor]
+    for one in unheard[:SHOWN_AT_MOST]:
+        error = f"{one.answer.error[0]:.1f} / {one.answer.error[1]:.1f} %"
+        show(f"says nothing: {one.group}, {labels[one.case]}", error)
+    right = [answers["clean"] for drives in found.values() for answers in drives]
+    targets.record("clean/doctor", sum(bool(one.doctor) for one in right))
     everything = [
         one for drives in found.values() for answers in drives for one in answers.values()
     ]
     targets.record("answers", len(everything))
-    label = "answers whose error doubles and that are not called not valid"
+    label = "answers whose error doubles and that the verdict calls valid"
     targets.at_most(label, len(silent), 0, "", "silent")
+    label = "of these, answers of which the doctor says nothing"
+    targets.at_most(label, len(unheard), 0, "", "silent_with_doctor")
     targets.at_most("answers that leave an axle dead", len(dead), 0, "", "dead")
     untold = sum(one.valid for one in dead)
     targets.at_most("answers with a dead axle called valid", untold, 0, "", "dead_valid")

@@ -152,7 +152,7 @@ def report(found: Sequence[Judged], targets: Targets) -> None:
                 targets.record(f"{name}/{key}", value)
     print(f"  {'all':14} {everything}")
     for key, value in everything.numbers().items():
-        if key != "wrong_valid":
+        if key not in ("wrong_valid", "wrong_unsaid"):
             targets.record(key, value)
     for one in everything.wrong_valid:
         _show(one, "wrong and called valid")
@@ -165,6 +165,8 @@ def report(found: Sequence[Judged], targets: Targets) -> None:
     print("Targets")
     label = f"answers more than {WRONG:g} % wrong and called valid"
     targets.at_most(label, len(everything.wrong_valid), 0, "", "wrong_valid")
+    label = "of these, answers of which the doctor says nothing"
+    targets.at_most(label, len(everything.wrong_unsaid), 0, "", "wrong_unsaid")
     share = 100.0 * len(everything.right_refused) / max(len(everything.right), 1)
     targets.at_most(f"answers within {RIGHT:g} % and refused", share, 3.0, key="refused_share")
     for name in ("plants", "recordings"):
@@ -180,17 +182,22 @@ class Counts:
 
     Parameters
     ----------
-    found : the answers; attributes all, wrong, wrong_valid, right, right_refused, clean_refused
-        (of these, where nothing was wrong), door (logs not let in), between, between_valid.
+    found : the answers; attributes all, wrong, wrong_valid, wrong_unsaid (of these, where the
+        doctor says nothing), right, right_refused, clean_refused (of these, where nothing was
+        wrong), right_alarmed (valid, but the doctor says something where nothing was wrong), door
+        (logs not let in), between, between_valid.
     """
 
     def __init__(self, found: Sequence[Judged]) -> None:
         self.all = list(found)
         self.wrong = [one for one in found if one.found.wrong]
         self.wrong_valid = [one for one in self.wrong if one.found.valid]
+        self.wrong_unsaid = [one for one in self.wrong_valid if not one.found.doctor]
         self.right = [one for one in found if one.found.right]
         self.right_refused = [one for one in self.right if not one.found.valid]
         self.clean_refused = [one for one in self.right_refused if one.clean]
+        clean = [one for one in self.right if one.clean]
+        self.right_alarmed = [one for one in clean if one.found.doctor]
         self.door = [one for one in found if REFUSED in one.found.codes]
         self.between = [one for one in found if not (one.found.wrong or one.found.right)]
         self.between_valid = [one for one in self.between if one.found.valid]
@@ -211,7 +218,8 @@ class Counts:
 
 def _show(one: Judged, what: str) -> None:
     error = f"{one.found.error[0]:.1f} / {one.found.error[1]:.1f} %"
-    show(f"{what}: {one.group} {one.seed}", f"{error}, {one.what}  {', '.join(one.found.codes)}")
+    said = [*one.found.codes, *(f"doctor: {finding}" for finding in one.found.doctor)]
+    show(f"{what}: {one.group} {one.seed}", f"{error}, {one.what}  {', '.join(said)}")
 
 
 def main() -> int:

@@ -17,6 +17,7 @@ from benchmarks.fault_cases import Case, StraightOnly, biased, cases
 from benchmarks.random_cars import CLASSES, random_beginning
 from benchmarks.targets import Targets
 from benchmarks.verdicts import Judged
+from identifier.doctor import Diagnosis, Finding
 from models.faults import Late, Mirrored, SensorFault, Together
 from models.recordings import RecordingError, write_recording
 from tireid.cli import main
@@ -127,6 +128,20 @@ def test_the_verdict_is_asked_and_what_refuses_is_kept(drive, log, monkeypatch):
     monkeypatch.setattr("identifier.run.History.verdict", lambda _: Verdict, raising=False)
     asked = answer(log, drive.car.told, drive.exact)
     assert (asked.valid, asked.codes) == (False, ("a", "b"))
+
+
+def test_the_doctor_is_asked_of_answers_that_the_verdict_calls_valid(drive, log, monkeypatch):
+    asked = []
+
+    def diagnose(recording, vehicle):
+        asked.append(recording.axle_force)
+        finding = Finding(code="delay", channel="delta_f", confidence=0.6)
+        return Diagnosis(name="", findings=(finding, Finding(code="offset")), unseen=())
+
+    monkeypatch.setattr("benchmarks.answers.ti.diagnose", diagnose)
+    assert answer(log, drive.car.told, drive.exact).doctor == ("delay delta_f",)
+    assert answer(Mirrored(channels=("r",)).apply(log), drive.car.told, drive.exact).doctor == ()
+    assert asked == [None]
 
 
 def test_drives_of_one_seed_are_of_one_car_and_differ(drive):
@@ -277,6 +292,14 @@ def test_an_error_that_doubles_must_be_told(found, told):
     assert fault_table.is_told(found, GOOD) is told
 
 
+def test_what_the_doctor_says_of_the_drive_without_the_fault_tells_nothing_of_the_fault():
+    late, both = BAD._replace(doctor=("delay delta_f",)), ("delay delta_f", "offset r")
+    assert not fault_table.is_told_by_doctor(BAD, GOOD)
+    assert fault_table.is_told_by_doctor(late, GOOD)
+    assert not fault_table.is_told_by_doctor(late, GOOD._replace(doctor=late.doctor))
+    assert fault_table.is_told_by_doctor(late._replace(doctor=both), late)
+
+
 def test_a_wrong_mass_is_forgiven_what_it_adds_to_all_forces_and_no_more():
     off = fault_table.UNSEEN["mass/1.2"]
     assert off == pytest.approx(100.0 * (1.2 - 1.0))
@@ -293,9 +316,17 @@ def test_the_table_is_markdown_whose_numbers_are_those_recorded():
     assert "| steering 50 ms late | 100 / 100 | 3.0 / 40.0 | " in text
     assert targets.values["silent"] == targets.values["late/50/silent"] == len(found)
     assert targets.values["late/20/silent"] == 0
-    assert text.splitlines()[2 + list(table).index("late/50")].endswith(f"| {len(found)} | 6 |")
+    assert text.splitlines()[2 + list(table).index("late/50")].endswith(f"| {len(found)} | 6 | 6 |")
     targets.values["late/50/sine/error/rear"] = 50.0
     assert len(complaints(text, {"fault_table": targets.values})) == 1
+
+
+def test_an_answer_is_silent_where_neither_verdict_nor_doctor_says_something():
+    table, targets = dict.fromkeys(cases(fault_table.CARMAKER), GOOD), Targets("fault_table")
+    table["late/50"], table["late/80"] = BAD, BAD._replace(doctor=("delay delta_f",))
+    fault_table.report({name: [table] for name in (*fault_table.RUNS, *CLASSES)}, targets)
+    assert (targets.values["silent"], targets.values["silent_with_doctor"]) == (12, 6)
+    assert targets.values["late/80/silent_with_doctor"] == targets.values["clean/doctor"] == 0
 
 
 def test_a_dead_axle_that_is_called_valid_is_told_from_one_that_is_not():
@@ -326,7 +357,10 @@ def test_the_verdict_is_judged_on_answers_that_are_wrong_and_on_those_that_are_r
     refused = GOOD._replace(valid=False)
     between = GOOD._replace(error=(15.0, 3.0))
     assert missed(GOOD, TOLD, NONE, between, between._replace(valid=False)) == []
-    assert missed(GOOD, BAD) == ["answers more than 20 % wrong and called valid"]
+    silent = "of these, answers of which the doctor says nothing"
+    assert missed(GOOD, BAD) == ["answers more than 20 % wrong and called valid", silent]
+    alarmed = BAD._replace(doctor=("delay r",))
+    assert missed(GOOD, alarmed) == ["answers more than 20 % wrong and called valid"]
     assert missed(refused, TOLD) == ["answers within 8 % and refused"]
     assert missed(*[GOOD] * 40, refused, TOLD) == []
     assert missed(TOLD) == ["answers right, and wrong"]
