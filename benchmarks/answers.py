@@ -2,14 +2,14 @@
 
 The road is that of a user, by public functions alone: the log is read from a table, which refuses
 wrong signs, units and axes, `ti.identify` refuses a car that cannot have driven it, and learns; the
-model is frozen at the end, `run.verdict` judges. As in `tireid identify` the doctor looks at the
-log too: it is asked where the verdict is valid, as only there its word decides. None of them sees
-a true force.
+model is frozen at the end, `run.verdict` judges. What the doctor finds, which `ti.identify` asks,
+is kept too. None of them sees a true force.
 """
 
+import logging
 import math
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from itertools import count
 from typing import NamedTuple
@@ -18,6 +18,7 @@ import numpy as np
 
 import tireid as ti
 from benchmarks.random_cars import Beginning, RandomDrive, random_car, random_drive
+from identifier.doctor import Finding
 from identifier.reproducibility import NeverDrivesError
 from models.plant import PlantError
 from models.recordings import Recording, RecordingError
@@ -47,7 +48,7 @@ class Answer(NamedTuple):
     codes: tuple[str, ...]
     """Of what was found against it; the name of the exception where there was one."""
     doctor: tuple[str, ...] = ()
-    """What the doctor says that matters, code and channel; asked of valid answers only."""
+    """What the doctor says that matters, code and channel of each."""
 
     @property
     def worse(self) -> float:
@@ -106,11 +107,10 @@ def answer(log: Recording, told: Vehicle, judged: Recording) -> Answer:
     judged : the drive on which the error is measured, with true forces.
     """
     try:
-        run, let_in = _run(blind(log), told)
+        with _warnings() as said:
+            run, let_in = _run(blind(log), told)
         tire = run.freeze()
         verdict = run.verdict() if let_in else None
-        valid = verdict is not None and verdict.valid
-        said = ti.diagnose(blind(log), told).findings if valid else ()
         stiffness = tire.stiffness
         assert stiffness is not None
         missed = force_error(tire, judged)
@@ -122,10 +122,27 @@ def answer(log: Recording, told: Vehicle, judged: Recording) -> Answer:
     return Answer(
         missed if all(map(math.isfinite, missed)) else NO_FORCE,
         (float(stiffness[0]), float(stiffness[1])),
-        valid,
+        verdict is not None and verdict.valid,
         tuple(sorted(against)),
-        tuple(sorted({f"{one.code} {one.channel}".strip() for one in said if one.matters})),
+        tuple(sorted({f"{one.code} {one.channel}".strip() for one in said})),
     )
+
+
+@contextmanager
+def _warnings() -> Iterator[list[Finding]]:
+    """Collect the findings that the doctor warns of."""
+    found: list[Finding] = []
+
+    def keep(record: logging.LogRecord) -> bool:
+        found.append(vars(record)["finding"])
+        return True
+
+    log = logging.getLogger("tireid.doctor")
+    log.addFilter(keep)
+    try:
+        yield found
+    finally:
+        log.removeFilter(keep)
 
 
 def _run(log: Recording, told: Vehicle) -> tuple[ti.History, bool]:

@@ -28,8 +28,9 @@ def identify(
 ) -> History:
     """Learn the tires of a car from a drive, sample by sample.
 
-    What the doctor finds wrong with the drive or the car is logged as warnings of "tireid.doctor";
-    nothing is repaired: `diagnose` returns the same with its repair.
+    What the doctor finds wrong with the drive or the car, and that matters, is logged as warnings
+    of "tireid.doctor", each with its finding as `record.finding`; nothing is repaired: `diagnose`
+    returns the same with its repair.
 
     Parameters
     ----------
@@ -57,7 +58,9 @@ def identify(
     if check:
         check_against_vehicle(recording, vehicle)
         for finding in diagnose(recording, vehicle).findings:
-            log.warning("%s: %s", recording.name, finding.text)
+            if finding.matters:
+                said = {"finding": finding}
+                log.warning("%s: %s", recording.name, finding.text, extra=said)
     counted_samples(recording, design.min_speed)  # refuses a car that never drives
     history = run_over(recording, vehicle, design, start, progress=progress)
     if history.diverged_at is not None:

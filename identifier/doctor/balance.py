@@ -22,7 +22,7 @@ from identifier.doctor.windows import Windows, not_negative
 from identifier.verdict.motion import BRISK
 from models.recordings import Recording
 from models.recordings.record import CHANNELS
-from models.sensors import white_noise
+from models.sensors import noise_in_means
 from models.smoothing import low_passed, smoothed, window
 from models.vehicle import GRAVITY, Vehicle
 
@@ -105,7 +105,7 @@ class Balance:
         self.vehicle = vehicle
         dt = stretches[0].dt
         self.white = {
-            name: float(np.median([white_noise(getattr(one, name)) for one in stretches]))
+            name: float(np.median([noise_in_means(getattr(one, name)) for one in stretches]))
             for name in CHANNELS
             if getattr(stretches[0], name) is not None
         }
@@ -253,7 +253,7 @@ class Balance:
         """Return slip angles as force follows them [rad], (n, 2)."""
         v_x, v_y, r = x["v_x"], x["v_y"], x["r"]
         a_y_dot = np.convolve(v_y, self.jolt, "same") + np.convolve(v_x * r, self.jerk, "same")
-        later = sizes.get("roll_delay", 0.0)
+        later = max(sizes.get("roll_delay", 0.0), 0.0)
         steps = np.arange(self.at.size) * self.dt
         sideways = v_y + sizes.get("sway", 0.0) * np.interp(steps - later, steps, a_y_dot)
         slip = np.column_stack(
@@ -264,7 +264,7 @@ class Balance:
         )
         rolled = np.concatenate([[0.0], np.cumsum(0.5 * (v_x[1:] + v_x[:-1]) * self.dt)])
         for i, name in enumerate(RELAXATION):
-            length = sizes.get(name, 0.0) * self.vehicle.wheelbase
+            length = max(sizes.get(name, 0.0), 0.0) * self.vehicle.wheelbase
             slip[:, i] = np.interp(rolled - length, rolled, slip[:, i])
         return slip
 
@@ -325,7 +325,7 @@ class Balance:
         arm = (car.l_f, -car.l_r)[part] - ahead
         yaw = car.inertia / (car.l_r, -car.l_f)[part] - ahead
         per_speed = slope / v_x
-        late = get(RELAXATION[part], 0.0) * self.vehicle.wheelbase / v_x
+        late = max(get(RELAXATION[part], 0.0), 0.0) * self.vehicle.wheelbase / v_x
         of_v_y = rate / g**2 + per_speed**2 * mean - 2.0 * late * per_speed * rate / g
         of_r = rate * (yaw / g) ** 2 + (v_x / g + per_speed * arm) ** 2 * mean
         of_r = of_r - 2.0 * late * per_speed * arm * yaw * rate / g

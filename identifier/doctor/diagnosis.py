@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from identifier.doctor.balance import Balance
+from identifier.doctor.balance import Balance, Sizes
 from identifier.doctor.estimate import FEWEST, LONGEST, PIECES, Examination, examine
 from identifier.doctor.finding import Finding
 from identifier.doctor.fit import Fitter
@@ -25,6 +25,7 @@ from models.vehicle import Vehicle, VehicleError
 
 RATIOS = ("steering_ratio", "factor")  # codes of gross findings whose factor is any number
 FACTOR, ROUNDS, SETTLED = "factor.delta_f", 4, 0.1  # deviations
+TOGETHER = 2  # times that a ratio and what is found beside it are asked
 WITHOUT_V_Y = "all but what contradicts physics or the car: the log has no lateral velocity"
 NEVER = (
     "mass: scales all forces alike and leaves the motion as it is; weigh the car",
@@ -105,18 +106,11 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
         return Diagnosis(name=recording.name, findings=contradicts, unseen=(WITHOUT_V_Y, *NEVER))
     gross = screen(recording, vehicle)
     blind = gross.blind
-    found, fine = list(gross.findings), Examination((), ())
+    found, fine = list(gross.findings), Examination((), (), {})
     if not blind:
         try:
-            drive, car = gross.repair.apply(recording, vehicle)
-            wheel = next((one for one in found if one.code in RATIOS and one.repair), None)
-            if wheel is not None:
-                exact = _exact_ratio(wheel, drive, car)
-                k = found.index(wheel)
-                found[k : k + 1] = [] if exact is None else [exact]
-                drive, car = before_sizes(found).apply(recording, vehicle)
-            found += _contradictions(drive, car)
-            fine = examine(drive, car)
+            found, fine = _asked_finely(gross, recording, vehicle)
+            found += _contradictions(*before_sizes(found).apply(recording, vehicle))
         except (RecordingError, VehicleError) as error:
             blind = str(error)
     sizes = doubted(fine.findings, found)
@@ -126,6 +120,36 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
         findings=tuple(_told_once(ranked)),
         unseen=(*_unseen(recording, replace(gross, blind=blind)), *fine.unseen),
     )
+
+
+def _asked_finely(
+    gross: Screened, recording: Recording, vehicle: Vehicle
+) -> tuple[list[Finding], Examination]:
+    """Return the gross findings, the ratio of a steering wheel exactly, and sizes beside them.
+
+    What distorts the motion distorts the ratio: where sizes are found beside it, the ratio is asked
+    again together with them, and they with it.
+
+    Parameters
+    ----------
+    gross : findings of the screen.
+    recording, vehicle : as they were told.
+    """
+    found = list(gross.findings)
+    wheel = next((one for one in found if one.code in RATIOS and one.repair), None)
+    if wheel is None:
+        return found, examine(*gross.repair.apply(recording, vehicle))
+    beside: Sizes = {}
+    drive, car = gross.repair.apply(recording, vehicle)
+    for _ in range(TOGETHER):
+        exact = _exact_ratio(wheel, drive, car, beside)
+        kept = [exact if one is wheel else one for one in gross.findings]
+        found = [one for one in kept if one is not None]
+        fine = examine(*before_sizes(found).apply(recording, vehicle))
+        beside = {key: size for key, size in fine.sizes.items() if key != FACTOR}
+        if not beside:
+            break
+    return found, fine
 
 
 def _contradictions(recording: Recording, vehicle: Vehicle) -> list[Finding]:
@@ -143,7 +167,7 @@ def _told_once(findings: list[Finding]) -> list[Finding]:
     return list(kept.values())
 
 
-def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding | None:
+def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle, beside: Sizes) -> Finding | None:
     """Return the ratio of a steering wheel as the drive says it, no stiffness believed.
 
     None where the drive says that the steering is right.
@@ -152,6 +176,7 @@ def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding | N
     ----------
     coarse : the finding, by which the drive is repaired.
     drive, car : with it.
+    beside : sizes of other faults that are estimated with it, where to begin.
     """
     assert coarse.repair is not None
     factor = coarse.repair.factor["delta_f"]
@@ -160,7 +185,7 @@ def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding | N
         balance = Balance(stretches, car)
         if len(balance) < FEWEST:
             return coarse
-        fit = Fitter(balance).fit([FACTOR], {})
+        fit = Fitter(balance).fit([FACTOR, *beside], beside)
         moved, deviation = -fit.sizes[FACTOR], fit.deviation(FACTOR)
         factor *= math.exp(moved)
         if abs(moved) < SETTLED * deviation:

@@ -31,6 +31,7 @@ TEMPER = 2.0  # odds of e per this gain of J: the model is not exact
 UNSEEN = 0.6  # of what is believed beforehand is left by a drive that tells next to nothing
 SURE = 0.95  # confidence, from which a fault of which no other is like is taken out unasked
 STAYS = 2.0  # deviations by which what is sure may move where the rest is left out
+SEVERAL = 2  # faults at once, beyond which none is sure: rather a motion that the model lacks
 BELIEVED = 3.5  # plausible sizes, beyond which nobody believes one
 
 
@@ -65,6 +66,7 @@ class Search:
             one for one in SUSPECTS if balance.has_accelerometer or "a_y" not in one.channel
         ]
         self.found: list[Found] = []
+        self.in_doubt = False  # whether what would leave no car explained more than a found one
         self.fit = self.fitter.fit((), {})
 
     def keys(self, suspect: Suspect) -> list[str]:
@@ -143,8 +145,21 @@ class Search:
             if awry:
                 start = self.fitter.best_start(start, self.keys(suspect)[0])
             listed.append(self._candidate(suspect, start))
-        listed = [one for one in listed if self._believed(one.suspect, one.fit)]
-        return sorted(listed, key=lambda one: -one.gain)
+        return self._ranked(listed)
+
+    def _ranked(self, listed: list[Candidate]) -> list[Candidate]:
+        """Return the candidates that may be believed, the one that gains most first.
+
+        Where one that would leave no car gains more by far, what is named in its place is in doubt.
+        """
+        believed = [one for one in listed if self._believed(one.suspect, one.fit)]
+        least = max([CHANCE, *(one.gain for one in believed)]) + ALIKE
+        self.in_doubt |= any(
+            one.gain > least
+            and not one.suspect.leaves_a_car(self.size(one.suspect, one.fit.sizes), self.vehicle)
+            for one in listed
+        )
+        return sorted(believed, key=lambda one: -one.gain)
 
     def _candidate(self, suspect: Suspect, start: Sizes) -> Candidate:
         keys = self.keys(suspect)
@@ -155,7 +170,8 @@ class Search:
         size = self.size(suspect, fit.sizes)
         most = BELIEVED * suspect.plausible * suspect.scale(self.vehicle)
         telling = abs(size) > TELLING * self.deviation(suspect, fit)
-        return abs(size) < most and telling and (suspect.signed or size > 0.0)
+        possible = (suspect.signed or size > 0.0) and suspect.leaves_a_car(size, self.vehicle)
+        return abs(size) < most and telling and possible
 
     def run(self) -> None:
         """Take in one fault after the other."""
@@ -178,8 +194,7 @@ class Search:
         again = [
             self._candidate(one.suspect, one.fit.sizes) for one in listed if one.gain > 0.5 * CHANCE
         ]
-        again = [one for one in again if self._believed(one.suspect, one.fit)]
-        return sorted(again, key=lambda one: -one.gain)
+        return self._ranked(again)
 
     def _drop(self) -> None:
         """Drop what the later ones explain too."""
@@ -207,14 +222,16 @@ class Search:
             first = self._finding(one.suspect, self.fit, float(shares[1]), group, names)
             listed.append((one.suspect, first))
             # Numbers of the car can be measured; a drive is no reason to overrule who did.
-            of_car = first.repair is not None and first.repair.vehicle
+            changed = first.repair.vehicle if first.repair is not None else {}
+            measured = not {*changed} <= {*self.vehicle.estimated}
             believed = self._believed(one.suspect, self.fit)  # together with the others too
-            if believed and not alike and not of_car and first.confidence > SURE:
+            if believed and not alike and not measured and first.confidence > SURE:
                 clear.append(one.suspect)
             for other, share in zip(alike, shares[2:].tolist(), strict=True):
                 second = self._finding(other.suspect, other.fit, share, group, [one.suspect])
                 listed.append((other.suspect, second))
-        stands = self._standing(clear)
+        doubtful = self.in_doubt or len(self.found) > SEVERAL
+        stands = set() if doubtful else self._standing(clear)
         return tuple(
             replace(one, sure=one.repair is not None and suspect.key in stands)
             for suspect, one in listed
@@ -263,10 +280,15 @@ class Search:
 
 
 class Examination(NamedTuple):
-    """What was found in a log, what explains most first, and what it cannot tell, a line each."""
+    """What was found in a log.
+
+    findings : what explains most first.   unseen : what the log cannot tell, a line each.
+    sizes : of what was taken in, by key, as they were estimated together.
+    """
 
     findings: tuple[Finding, ...]
     unseen: tuple[str, ...]
+    sizes: Sizes
 
 
 def examine(recording: Recording, vehicle: Vehicle) -> Examination:
@@ -280,10 +302,12 @@ def examine(recording: Recording, vehicle: Vehicle) -> Examination:
     stretches = stretches_of(recording, vehicle, longest=LONGEST, pieces=PIECES)
     balance = Balance(stretches, vehicle)
     if len(balance) < FEWEST:
-        return Examination((), ("sizes of faults: the car hardly drives, or not fast enough",))
+        unseen = "sizes of faults: the car hardly drives, or not fast enough"
+        return Examination((), (unseen,), {})
     search = Search(balance)
     search.run()
-    return Examination(search.findings(), search.unseen())
+    sizes = {key: search.fit.sizes[key] for key in search.chosen}
+    return Examination(search.findings(), search.unseen(), sizes)
 
 
 def estimate(recording: Recording, vehicle: Vehicle) -> tuple[Finding, ...]:

@@ -21,6 +21,7 @@ from identifier.doctor.pieces import (
 )
 from identifier.doctor.readings import DEGREE, Change, Read, read
 from identifier.doctor.samples import sample_findings
+from identifier.doctor.suspects import similar_inertia, usual_inertia
 from models.recordings import Recording, RecordingError
 from models.recordings.checks import physics_contradiction
 from models.recordings.repair import Repair
@@ -28,8 +29,6 @@ from models.vehicle import Vehicle
 
 QUIET = 0.8  # [m/s^2] of v_x r, which a drive must exceed in `LIVELY` of its windows
 LIVELY = 0.005
-INERTIA = (0.5, 1.6)  # of I_z/(m l_f l_r); cars on the road have 0.9 to 1.1
-SMALL, SMALL_INERTIA = 1.0, 0.3  # [m] wheelbase, below which a model car may have as little
 SURE = 0.95
 SEVERAL = 3  # changes at once, beyond which nothing is sure
 WHEEL = (5.0, 30.0)  # ratios of a steering wheel to the road wheels
@@ -229,10 +228,9 @@ def unlike(vehicle: Vehicle) -> list[Finding]:
     ----------
     vehicle : as it was told.
     """
-    similar = vehicle.mass * vehicle.l_f * vehicle.l_r
+    similar, (least, most) = similar_inertia(vehicle), usual_inertia(vehicle)
     ratio = vehicle.yaw_inertia / similar
-    least = SMALL_INERTIA if vehicle.wheelbase < SMALL else INERTIA[0]
-    if least <= ratio <= INERTIA[1]:
+    if least <= ratio <= most:
         return []
     return [
         Finding(
@@ -240,7 +238,7 @@ def unlike(vehicle: Vehicle) -> list[Finding]:
             size=ratio,
             confidence=0.8,
             text=f"the told yaw inertia is {ratio:.2g} times m l_f l_r, of cars {least:g} to "
-            f"{INERTIA[1]:g}: {similar:.4g} kg m² would be usual",
+            f"{most:g}: {similar:.4g} kg m² would be usual",
             repair=Repair(vehicle={"yaw_inertia": similar}),
         )
     ]
@@ -310,7 +308,7 @@ def reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
             code="yaw_inertia",
             size=1.0 / factor,
             confidence=confidence,
-            text=f"the told yaw inertia is about {1.0 / factor:.2g} times too large{doubt}",
+            text=f"the told yaw inertia is about {1.0 / factor:.2g} times the right one{doubt}",
             repair=Repair(vehicle={"yaw_inertia": factor * vehicle.yaw_inertia}),
         )
     if change.code == "steering":
@@ -376,7 +374,7 @@ def steering_finding(
         )
     else:
         code = "factor"
-        text = f"delta_f reads {size:.3g}{off} times too much{turned}{doubt}"
+        text = f"delta_f reads {size:.3g}{off} times the right value{turned}{doubt}"
     return Finding(
         code=code,
         channel="delta_f",

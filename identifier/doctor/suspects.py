@@ -14,6 +14,15 @@ from models.vehicle import Vehicle
 
 SEDAN = 2.7  # m, wheelbase of whose size the numbers are
 DEGREES = math.degrees(1.0)  # in a rad
+INERTIA = (0.5, 1.6)  # of I_z/(m l_f l_r); cars on the road have 0.9 to 1.1
+SMALL, SMALL_INERTIA = 1.0, 0.3  # [m] wheelbase, below which a model car may have as little
+CENTER = (0.25, 0.75)  # l_f over the wheelbase: a load that an axle of a car can have
+OPPOSITES = {  # of what a size says, where it is negative
+    " late ": " early ",
+    "too much": "too little",
+    " ahead of ": " behind ",
+    "too far back": "too far forward",
+}
 POWERS: Mapping[str, float] = {"": 0.0, "length": 1.0, "speed": 0.5, "time": 0.5, "rate": -0.5}
 
 
@@ -26,6 +35,26 @@ def grown(grows: str, vehicle: Vehicle) -> float:
     vehicle : the car.
     """
     return float((vehicle.wheelbase / SEDAN) ** POWERS[grows])
+
+
+def usual_inertia(vehicle: Vehicle) -> tuple[float, float]:
+    """Return from what to what I_z/(m l_f l_r) of cars of a size goes.
+
+    Parameters
+    ----------
+    vehicle : the car.
+    """
+    return (SMALL_INERTIA if vehicle.wheelbase < SMALL else INERTIA[0]), INERTIA[1]
+
+
+def similar_inertia(vehicle: Vehicle) -> float:
+    """Return m l_f l_r, the yaw inertia of two points on the axles [kg m^2].
+
+    Parameters
+    ----------
+    vehicle : the car.
+    """
+    return vehicle.mass * vehicle.l_f * vehicle.l_r
 
 
 class Suspect(NamedTuple):
@@ -88,6 +117,25 @@ class Suspect(NamedTuple):
                 numbers = {"vehicle": right}
         return Repair(**numbers)
 
+    def leaves_a_car(self, size: float, vehicle: Vehicle) -> bool:
+        """Return whether the car without the fault is one, be the told one or not.
+
+        What no car has was not told wrongly: something else is wrong, or beyond the model.
+
+        Parameters
+        ----------
+        size : as in `Sizes`.
+        vehicle : as it was told.
+        """
+        match self.code:
+            case "center_of_gravity":
+                return CENTER[0] < (vehicle.l_f - size) / vehicle.wheelbase < CENTER[1]
+            case "yaw_inertia":
+                least, most = usual_inertia(vehicle)
+                right = vehicle.yaw_inertia * math.exp(-size)
+                return least < right / similar_inertia(vehicle) < most
+        return True
+
     def words(self, size: float, deviation: float) -> str:
         """Return it in words.
 
@@ -95,10 +143,13 @@ class Suspect(NamedTuple):
         ----------
         size, deviation : as in `Sizes`.
         """
+        text = self.text
         if self.is_factor:
             size, deviation = math.exp(size), math.exp(size) * deviation
+        elif size < 0.0 and (said := next((one for one in OPPOSITES if one in text), None)):
+            size, text = -size, text.replace(said, OPPOSITES[said])
         shown = f"{size * self.per_unit:.3g} ± {abs(deviation) * self.per_unit:.2g}{self.shown}"
-        return self.text.format(size=shown)
+        return text.format(size=shown)
 
 
 def _channels() -> tuple[Suspect, ...]:
@@ -133,11 +184,12 @@ def _channels() -> tuple[Suspect, ...]:
         ))  # fmt: skip
     found.append(Suspect(
         "delay.r+a_y", "delay", "r+a_y", "s", 0.12, 0.004, "", True,
-        "the yaw rate and the lateral acceleration, of one device, are {size} late", " ms", 1e3,
+        "the yaw rate and the lateral acceleration, of one device, are {size} late against the "
+        "other channels", " ms", 1e3,
     ))  # fmt: skip
     found += [
         Suspect(f"factor.{name}", "factor", name, "", plausible, least, "", True,
-                f"{words[name]} reads {{size}} times too much", "")
+                f"{words[name]} reads {{size}} times the right value", "")
         for name, plausible, least in (
             ("v_x", 0.15, 0.01), ("v_y", 0.2, 0.015), ("r", 0.15, 0.01), ("delta_f", 0.2, 0.012),
             ("a_y", 0.15, 0.01),
@@ -156,14 +208,14 @@ SUSPECTS = (
             True, "the acceleration is measured {size} ahead of the center of gravity", " m"),
     Suspect("center_of_gravity", "center_of_gravity", "", "m", 0.2, 0.1, "length", True,
             "the center of gravity is told {size} too far back (l_f and l_r)", " m"),
-    Suspect("yaw_inertia", "yaw_inertia", "", "", 0.5, 0.08, "", True,
-            "the yaw inertia is told {size} times too large", ""),
+    Suspect("yaw_inertia", "yaw_inertia", "", "", 0.5, 0.05, "", True,
+            "the told yaw inertia is {size} times the right one", ""),
     Suspect("bank", "bank", "", "rad", 0.03, 0.003, "", True,
             "the road falls by {size} (+: to the left), or wind pushes so", "°", DEGREES),
 )  # fmt: skip
 NUISANCES = {  # mean, standard deviation, and what both grow with, of a sedan
-    "relaxation.front": (0.17, 0.08, ""),  # wheelbases
-    "relaxation.rear": (0.17, 0.08, ""),
+    "relaxation.front": (0.17, 0.11, ""),  # wheelbases; cars on the road have up to 0.4
+    "relaxation.rear": (0.17, 0.11, ""),
     "sway": (0.005, 0.004, "length"),  # m of contact patch per m/s² of acceleration
     "roll_delay": (0.06, 0.05, "time"),  # s, of the roll behind the acceleration
 }

@@ -119,8 +119,8 @@ CAUSES = (
           0.03, 0.4, False, "", _earlier("v_y")),
     Cause("yaw_inertia", "the told yaw inertia is about {factor:.2g} times the true one", 1.0,
           0.5, 4.0, True, "", _by(_inertia)),
-    Cause("center_of_gravity", "the center of gravity is {size:+.2g} m farther back than told "
-          "(l_f and l_r)", 1.0, 0.06, 0.3, True, "length", _by(_center)),
+    Cause("center_of_gravity", "the center of gravity is {size:+.2g} m behind the told one "
+          "(l_f and l_r; +: farther back)", 1.0, 0.06, 0.3, True, "length", _by(_center)),
     Cause("bank", "the road falls by {size:+.2g} degrees (+: to the left), or wind pushes so",
           DEGREE, 0.02, 0.2, True, "", _bank),
     Cause("v_y_scale", "v_y is scaled by {size:+.0f} %", 100.0,

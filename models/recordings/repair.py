@@ -156,8 +156,11 @@ class Repair:
         VehicleError
             Where these are the numbers of no car.
         """
+        if not self.vehicle:
+            return vehicle
         numbers: dict[str, Any] = dict(self.vehicle)
-        return replace(vehicle, **numbers) if numbers else vehicle
+        estimated = tuple(name for name in vehicle.estimated if name not in numbers)
+        return replace(vehicle, estimated=estimated, **numbers)
 
     def _measured(self, repaired: Recording) -> Recording:
         """Return the samples at which every channel was measured."""

@@ -1,6 +1,7 @@
 """Answers are those of a user, and the benchmarks that judge them ring where they should."""
 
 import json
+import logging
 import math
 from dataclasses import replace
 from functools import partial
@@ -130,18 +131,18 @@ def test_the_verdict_is_asked_and_what_refuses_is_kept(drive, log, monkeypatch):
     assert (asked.valid, asked.codes) == (False, ("a", "b"))
 
 
-def test_the_doctor_is_asked_of_answers_that_the_verdict_calls_valid(drive, log, monkeypatch):
-    asked = []
+def test_what_the_doctor_warns_of_is_kept(drive, log, monkeypatch):
+    seen = []
 
     def diagnose(recording, vehicle):
-        asked.append(recording.axle_force)
+        seen.append(recording.axle_force)
         finding = Finding(code="delay", channel="delta_f", confidence=0.6)
         return Diagnosis(name="", findings=(finding, Finding(code="offset")), unseen=())
 
-    monkeypatch.setattr("benchmarks.answers.ti.diagnose", diagnose)
+    monkeypatch.setattr("tireid.learning.diagnose", diagnose)
     assert answer(log, drive.car.told, drive.exact).doctor == ("delay delta_f",)
-    assert answer(Mirrored(channels=("r",)).apply(log), drive.car.told, drive.exact).doctor == ()
-    assert asked == [None]
+    assert seen == [None]
+    assert not logging.getLogger("tireid.doctor").filters
 
 
 def test_drives_of_one_seed_are_of_one_car_and_differ(drive):

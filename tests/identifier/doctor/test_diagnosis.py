@@ -13,7 +13,7 @@ from identifier.doctor import Finding, diagnose
 from identifier.doctor.diagnosis import Diagnosis
 from identifier.doctor.screen import combined
 from identifier.run import identify
-from models.faults import Late, SensorFault, Together, WrongUnit
+from models.faults import Lagging, Late, SensorFault, Together, WrongUnit
 from models.recordings import Repair
 from models.vehicle import sedan
 
@@ -58,6 +58,14 @@ def test_the_ratio_of_the_steering_wheel_is_found(found):
     assert first.size == pytest.approx(14.6, rel=0.08)
     assert first.deviation > 0.0
     assert not found.healthy
+
+
+def test_a_ratio_is_asked_together_with_what_distorts_the_motion(ratio):
+    car, log = ratio
+    said = diagnose(Lagging(channels=("r",), time_constant=0.1).apply(log), car)
+    sizes = {(one.code, one.channel): one.size for one in said.findings}
+    assert sizes["steering_ratio", "delta_f"] == pytest.approx(14.6, rel=0.08)
+    assert sizes["lag", "r"] == pytest.approx(0.1, abs=0.01)
 
 
 def test_what_is_sure_mends_the_log_as_well_as_the_right_one(driven, ratio, found):

@@ -11,6 +11,7 @@ from benchmarks.doctor_cases import KINDS, planted
 from benchmarks.everyday_drives import drawn_everyday
 from identifier.doctor import Finding, estimate, examine
 from identifier.doctor.balance import Balance, cubic, thinned, window_length
+from identifier.doctor.estimate import Candidate, Search
 from identifier.doctor.fit import Fitter
 from identifier.doctor.pieces import stretches_of
 from identifier.doctor.suspects import SUSPECTS
@@ -140,6 +141,71 @@ def test_a_size_that_stands_on_its_own_is_sure_beside_a_number_of_the_car(driven
     late = Late(channels=("r",), delay=0.08).apply(log)
     found = {one.code: one for one in estimate(late, inertia.case.car(car))}
     assert found["delay"].sure and not found["yaw_inertia"].sure
+
+
+def test_a_yaw_inertia_that_nobody_measured_is_taken_out_where_the_drive_tells_it(driven):
+    car, log, _ = driven
+    inertia = planted("yaw inertia", car, np.random.default_rng(5)).case.car(car)
+    guessed = replace(inertia, estimated=("yaw_inertia",))
+    (measured, *_), (found, *_) = estimate(log, inertia), estimate(log, guessed)
+    assert found.code == measured.code == "yaw_inertia"
+    assert found.sure and not measured.sure
+    right = found.repair.on(guessed)
+    assert right.yaw_inertia == pytest.approx(car.yaw_inertia, rel=0.15)
+    assert right.estimated == ()
+
+
+def test_what_leaves_no_car_is_not_believed_and_what_is_named_for_it_is_in_doubt(driven):
+    """The log of a car that is told so that its center of gravity seems to be on the front axle."""
+    car, log, _ = driven
+    center = next(one for one in SUSPECTS if one.code == "center_of_gravity")
+    inertia = next(one for one in SUSPECTS if one.code == "yaw_inertia")
+    assert center.leaves_a_car(0.1, car) and not center.leaves_a_car(0.9 * car.l_f, car)
+    assert inertia.leaves_a_car(0.3, car) and not inertia.leaves_a_car(2.0, car)
+    search = Search(Balance((log,), car))
+    far, small = (
+        {**search.fit.sizes, key: size}
+        for key, size in (("center_of_gravity", 0.9 * car.l_f), ("center_of_gravity", 0.01))
+    )
+    likely = Candidate(inertia, replace(search.fit, sizes={"yaw_inertia": 0.3}), 10.0)
+    other = Candidate(center, replace(search.fit, sizes=small), 30.0)
+    search._believed = lambda suspect, _: suspect is inertia
+    for one in (other, other._replace(fit=replace(search.fit, sizes=far), gain=12.0)):
+        assert search._ranked([likely, one]) == [likely]
+        assert not search.in_doubt
+    assert search._ranked([likely, one._replace(gain=30.0)]) == [likely]
+    assert search.in_doubt
+
+
+def test_where_more_is_wrong_at_once_than_is_believed_nothing_is_sure(driven, monkeypatch):
+    car, log, _ = driven
+    late = Late(channels=("a_y",), delay=0.1)
+    bias = SensorFault(channel="delta_f", kind="biased", size=0.03)
+    bad = Together(faults=(late, bias)).apply(log)
+    assert [one.sure for one in estimate(bad, car)] == [True, True]
+    monkeypatch.setattr("identifier.doctor.estimate.SEVERAL", 1)
+    assert [one.sure for one in estimate(bad, car)] == [False, False]
+
+
+@pytest.mark.parametrize("between", [2, 3])
+def test_nothing_is_found_in_a_right_log_that_was_drawn_from_a_slower_clock(driven, between):
+    car, log, _ = driven
+    t = np.linspace(log.t[0], log.t[-1], between * (len(log) - 1) + 1)
+    names = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")
+    signals = {name: np.interp(t, log.t, getattr(log, name)) for name in names}
+    assert estimate(replace(log, t=t, **signals), car) == ()
+
+
+@pytest.mark.parametrize(
+    ("key", "word"),
+    [("delay.r", "early"), ("offset.r", "too little"), ("velocity_sensor_x", "behind"),
+     ("center_of_gravity", "too far forward")],
+)  # fmt: skip
+def test_what_is_negative_is_said_the_other_way_round(key, word):
+    suspect = next(one for one in SUSPECTS if one.key == key)
+    assert word not in suspect.words(0.1, 0.01)
+    said = suspect.words(-0.1, 0.01)
+    assert word in said and "-" not in said
 
 
 def test_what_nobody_believes_is_not_sure_nor_what_rests_on_it():
