@@ -86,7 +86,18 @@ def curve(x: Any, W: Any, scales: Any, steps: tuple[int, ...]) -> Curve:
     scales : 1/α_j [1/rad], (1, n).
     steps : from `doublings`.
     """
-    T = hidden_units(x, scales, steps)
+    return of_units(hidden_units(x, scales, steps), W, scales)
+
+
+def of_units(T: Any, W: Any, scales: Any) -> Curve:
+    """Return the static force curve where its units are known.
+
+    Parameters
+    ----------
+    T : from `hidden_units`, (2, n).
+    W : weights [static axle loads], (2, n).
+    scales : 1/α_j of the units [1/rad], (1, n).
+    """
     inverse = ca.repmat(scales, 2, 1)
     slopes = W * (1 - T * T) * inverse
     slope, bend = ca.sum2(slopes), -2 * ca.sum2(T * slopes * inverse)

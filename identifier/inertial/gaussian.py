@@ -15,6 +15,32 @@ from identifier.axle.car import larger
 from identifier.axle.covariance import TINY, Factors, excited, updated
 
 
+def as_factor(number: Any) -> Any:
+    """Return a number as one that others are multiplied with: CasADi would turn each product with a
+    choice into a choice.
+
+    Parameters
+    ----------
+    number : scalar expression, finite where it is not chosen.
+    """
+    if number.is_leaf() or number.op() != ca.OP_IF_ELSE_ZERO:
+        return number
+    condition, chosen = number.dep(0), number.dep(1)
+    return (1 - ca.logic_not(condition)) * as_factor(chosen)
+
+
+def chosen_of(condition: Any, a: Any, b: Any) -> Any:
+    """Return a where the condition holds, else b, to be multiplied with; both are finite.
+
+    Parameters
+    ----------
+    condition : 1 or 0.
+    a, b : of one shape, sparse.
+    """
+    not_a = ca.logic_not(condition)
+    return (1 - not_a) * a + (1 - ca.logic_not(not_a)) * b
+
+
 def propagated(factors: Factors, F: Any, Q: list[Any]) -> Factors:
     """Return the factors after m⁺ = F z + w.
 
@@ -29,7 +55,7 @@ def propagated(factors: Factors, F: Any, Q: list[Any]) -> Factors:
     """
     U, D = factors
     q, m = len(D), len(Q)
-    steps = [[(F[i, j], j) for j in range(F.shape[1]) if F.has_nz(i, j)] for i in range(F.shape[0])]
+    steps = [[(as_factor(F[i, j]), j) for j in range(F.shape[1]) if F.has_nz(i, j)] for i in range(F.shape[0])]
 
     def column(k: int) -> list[Any]:
         """Column k of F U."""

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 
 from identifier.axle.car import Car
-from identifier.axle.curve import Curve, curve
+from identifier.axle.curve import Curve, hidden_units, of_units
 from identifier.axle.slip import SHORTEST
 from models.vehicle import GRAVITY
 
@@ -170,6 +170,16 @@ class Way:
         self._on_the_way.append((symbol, value))
         return symbol
 
+    def linear(self, value: Any, slope: Any, x: Any) -> Any:
+        """Return a number with a gradient that is known, and not that of how it is computed.
+
+        Parameters
+        ----------
+        value, slope : f(x) and f'(x), of any shape.
+        x : likewise.
+        """
+        return self.held(value) + self.held(slope) * (x - self.held(x))
+
     def valued(self, expressions: list[Any]) -> list[Any]:
         """Return expressions with the numbers on the way put in.
 
@@ -270,7 +280,7 @@ def predicted(
     """
     way = Way()
     v_x = (before.v_x + now.v_x) / 2
-    at = curve(z.slip, z.W, scales, steps)
+    at = curve_by(way, z, scales, steps)
     wheelbase = car.arm[0] - car.arm[1]
     steep = way.held(at.carcass_slope <= at.slope)
     carcass = steep * way.by(at.slope) + (1 - steep) * way.held(at.carcass_slope)
@@ -306,7 +316,24 @@ def predicted(
     force_rate = at.slope * (slip - z.slip) / dt
     numbers = [moving, alpha, rolling + dt * rate, rate, force_rate]
     moved, alpha, tilting, rate, force_rate = way.valued(numbers)
-    return Predicted(moved, (way, moving), alpha, tilting, rate, at, force_rate)
+    before_it = Curve(*way.valued(list(at)))
+    return Predicted(moved, (way, moving), alpha, tilting, rate, before_it, force_rate)
+
+
+def curve_by(way: Way, z: Unknowns, scales: Any, steps: tuple[int, ...]) -> Curve:
+    """Return the curves at the lagged slip, with the gradient of tanh as tanh tells it.
+
+    Parameters
+    ----------
+    way : to which their units belong.
+    z : slip and weights.
+    scales : 1/α_j of the units [1/rad], (1, n).
+    steps : doublings between the units.
+    """
+    T = hidden_units(z.slip, scales, steps)
+    inverse = ca.repmat(scales, 2, 1)
+    slip = ca.repmat(z.slip, 1, scales.numel())
+    return of_units(way.linear(T, (1 - T * T) * inverse, slip), z.W, scales)
 
 
 class Shown(NamedTuple):
@@ -315,12 +342,9 @@ class Shown(NamedTuple):
     r: Any
     a_y: Any
     force: Any
-    curve: Curve
 
 
-def shown(
-    car: Car, laws: Laws, z: Unknowns, tilt: Any, now: Sample, scales: Any, steps: tuple[int, ...]
-) -> Shown:
+def shown(car: Car, laws: Laws, z: Unknowns, tilt: Any, now: Sample, at: Curve) -> Shown:
     """Return what the sensors should show of a state.
 
     Parameters
@@ -330,11 +354,9 @@ def shown(
     z : at the sample.
     tilt : ä of the rolling body [m/s²].
     now : the sample.
-    scales : 1/α_j of the units [1/rad], (1, n).
-    steps : doublings between the units.
+    at : curves at the lagged slip.
     """
-    at = curve(z.slip, z.W, scales, steps)
     force = at.force * cosine(now.delta) + z.error
     a_y = GRAVITY * (ca.dot(car.share, force) + z.bias) + z.roll * tilt
     a_y += laws.ahead * (1 + z.inertia) * ca.dot(turning(car), force) - laws.aside * z.r**2
-    return Shown(z.r + z.gyro, a_y, force, at)
+    return Shown(z.r + z.gyro, a_y, force)

@@ -16,18 +16,21 @@ import casadi as ca
 
 from identifier.axle.car import Car, axle_port, larger, named_port, smaller, within
 from identifier.axle.covariance import Factors, entry, factors_of, row_of, triangle
-from identifier.axle.curve import EDGES, excited
+from identifier.axle.curve import EDGES, curve, excited
 from identifier.axle.gate import Gate, GateState, Plausibility, gate
 from identifier.axle.learning import BoundNumbers, bounded
 from identifier.axle.step import PLAUSIBILITY
 from identifier.inertial.beliefs import TrustNumbers
-from identifier.inertial.gaussian import measured, propagated
+from identifier.inertial.gaussian import chosen_of, measured, propagated
 from identifier.inertial.motion import (
     MOVING,
     SENSORS,
     Laws,
     Predicted,
     Sample,
+    Way,
+    cosine,
+    curve_by,
     predicted,
     shown,
     size,
@@ -44,10 +47,11 @@ KEPT = ("UD", "motion_UD", "gate", "body", "heard", "heard_v_y", "running", "exc
 CARRY = ("motion", *LEARNT, *KEPT)
 OUTPUTS = ("axle_force", "v_y", "v_y_sd", "side_slip_observable")
 LOAD = "static axle loads"
-FIRST_CHANGE = 5  # of what is carried of a measured v_y, where its changes begin
+FIRST_CHANGE = 6  # of what is carried of a measured v_y, where its changes begin
 SAME = 0.01  # of the square of a change, up to which the next one is none: a number that settles
 MOST_WAITING = 2  # numbers of a channel that wait for its turn
 MOST_COUNTED = 1000  # samples
+TAKEN = 0.5  # of a flag, above which it is set
 MOST_SLIDING = 0.7  # |v_y|/v_x from which the filter begins anew
 MOST_NOISE = 9.0  # of the noise that is held for true, what one sample may show
 MOST_MISSED = 25.0  # one outlier alone is no alarm
@@ -99,7 +103,8 @@ PORTS = (
         "heard_v_y",
         "m/s; (m/s)^2; -; m/s",
         "newest measured v_y and its innovation, variance of its noise, samples since the filter "
-        "began and numbers that were taken, changes of v_y in the last samples, newest first",
+        "began and numbers that were new, 1 where the last sample took one, changes of v_y in the "
+        "last samples, newest first",
     ),
     Port(
         "running",
@@ -131,31 +136,57 @@ class LearntLimits(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """What the channels tell of themselves, and which of them has its turn.
+    """What r and a_y tell of themselves, and which of them comes first.
 
     first : 1 where that is r, 0 where it is a_y.   counts : 1 where it has a number.
-    share : 1 over the numbers that waited for this turn, (2,) [-]: of errors that one in a row
-    repeats of another, the sum counts.
+    turns : 1 where a channel has its turn (2,).   share : 1 over the numbers that waited for it,
+    (2,) [-]: of errors that one in a row repeats of another, the sum counts.
     fresh : 1 where a number is new, (2,).   left : innovations of those that wait (2,).
     variance : of noise [rad²/s², m²/s⁴], (2,).   heard : next state (8,), without those.
     """
 
     first: Any
     counts: Any
+    turns: list[Any]
     share: list[Any]
     fresh: list[Any]
     left: list[Any]
     variance: list[Any]
     heard: Any
 
-    def turn(self, of_r: Any, of_a_y: Any) -> Any:
-        """Return what belongs to the channel that has its turn.
+    def reading(self, h: Any, innovation: list[Any], R: list[Any]) -> "Reading":
+        """Return the reading of the channel that comes first.
 
         Parameters
         ----------
-        of_r, of_a_y : one of these.
+        h, innovation, R : as of `Reading`, of r and a_y.
         """
-        return ca.if_else(self.first, of_r, of_a_y)
+        of_r, of_a_y = zip(ca.vertsplit(h), innovation, R, [self.counts] * 2, strict=True)
+        return Reading(*of_a_y).unless(self.first, Reading(*of_r))
+
+
+class Reading(NamedTuple):
+    """One number that is measured: its gradient h (1, q), innovation, variance of its error, and 1
+    where there is one.
+    """
+
+    h: Any
+    innovation: Any
+    R: Any
+    counts: Any
+
+    def unless(self, condition: Any, other: "Reading") -> "Reading":
+        """Return the other reading where a condition holds, else this one.
+
+        Parameters
+        ----------
+        condition : 1 or 0.
+        other : a reading.
+        """
+        h = chosen_of(condition, other.h, self.h)
+        return Reading(
+            h, *(ca.if_else(condition, a, b) for a, b in zip(other[1:], self[1:], strict=True))
+        )
 
 
 class Change(NamedTuple):
@@ -204,7 +235,6 @@ def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
     gated = gate(ports["plausibility"], dt, last, seen, ports["u"], ports["v_x"])
     runs = ca.logic_and(gated.on, gated.v_x >= slowest)
     goes_on = ca.logic_and(runs, ports["running"][0] > 0.5)
-    noise = _noise(ports, trust, gated, goes_on)
     z = ca.vertcat(
         ports["motion"], ports["W"][0, :].T, ports["W"][1, :].T, ports["own"], ports["sensors"]
     )
@@ -226,18 +256,20 @@ def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
         known.U.update({(i, q - 1): ca.SX(0) for i in range(q - 1)})
     way, moving = ahead.by_way
     F = way.gradient(z, moving)
+    for i in (-MOVING - 2, -MOVING - 1, *range(2 - MOVING, 0)):  # v_y and r on the way, the others
+        F[i, :] *= goes_on  # a filter that begins anew knows of no dependence
     factors = propagated(known, F, _process_noise(trust, ahead))
     ahead_z = ca.vertcat(ahead.moving, z[MOVING:])
-    corrected, factors, heard = _corrected(
-        (car, laws, trust), ahead, ahead_z, factors, noise, now, scales, steps
-    )
-    heard_v_y = ports["heard_v_y"]
+    lateral, heard_v_y = None, ports["heard_v_y"]
     if delay is not None:
         difference = ahead.moving[0] - z[0]
         change = Change(difference, ca.jacobian(difference, z))
-        corrected, factors, heard_v_y = _lateral(
-            ports, trust, delay, (corrected, factors), gated, goes_on, change
-        )
+        lateral, heard_v_y = _lateral(ports, trust, delay, ahead_z, gated, goes_on, change)
+        factors = _unsure_of_v_y(factors, trust, ca.logic_and(goes_on, _is_good(gated)))
+    noise = _noise(ports, trust, gated, goes_on, ca.SX(0) if lateral is None else lateral.counts)
+    corrected, factors, heard = _corrected(
+        (car, laws, trust), ahead, ahead_z, factors, (noise, lateral), now, scales, steps
+    )
     missed = smaller((ca.vertcat(*corrected[4:6]) / _missed(trust, ahead)) ** 2, MOST_MISSED)
     fast = ports["running"][1]
     fast = fast + trust.alarm_gain * ((missed[0] + missed[1]) / 2 - fast)
@@ -246,22 +278,21 @@ def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
     corrected = _bounded(ports, corrected, bounds, limits, n)
 
     sane = ca.fabs(corrected[0]) < MOST_SLIDING * now.v_x  # else it begins anew, a sample later
-    begun, begun_factors = _afresh(ports, trust, car, gated, now, factors)
+    begun, unsure = _afresh(ports, trust, car, gated, now)
     kept = [
         *(ca.if_else(goes_on, a, b) for a, b in zip(corrected[:MOVING], begun, strict=True)),
         *corrected[MOVING:],  # which are not moved unless the filter goes on
     ]
-    after = [
-        a if a is b else goes_on * a if b.is_zero() else ca.if_else(goes_on, a, b)
-        for a, b in zip(row_of(factors), row_of(begun_factors), strict=True)
-    ]
+    variances = (ca.if_else(goes_on, a, b) for a, b in zip(factors.D, unsure, strict=False))
+    factors = Factors(factors.U, [*variances, *factors.D[MOVING:]])
+    after = row_of(factors)
     moving = ports["motion_UD"].numel()
     told = unknowns(ca.vertcat(*kept), n)
     tilt = ca.if_else(
         goes_on, ca.vertcat(ahead.tilt, ahead.tilt_rate), ca.vertcat(gated.v_x * told.r, 0)
     )
-    seen_now = shown(car, laws, told, tilt[0], now, scales, steps)
-    variance = larger(entry(factors_of(after, q), 0, 0), 0)
+    force = curve(told.slip, told.W, scales, steps).force * cosine(now.delta) + told.error
+    variance = larger(entry(factors, 0, 0), 0)
     size_of_slip = larger(ca.fabs(told.slip), ca.fabs(ahead.alpha))
     next_state = {
         "motion": ca.vertcat(*kept[:MOVING]),
@@ -288,7 +319,7 @@ def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
         list(ports.values()),
         [
             *(ca.densify(next_state[name]) for name in CARRY),
-            ca.if_else(gated.on, seen_now.force * car.load, 0),
+            ca.if_else(gated.on, force * car.load, 0),
             ca.if_else(gated.on, told.v_y, 0),
             ca.sqrt(variance),
             ca.logic_and(runs, variance < trust.observable * now.v_x**2),
@@ -299,14 +330,16 @@ def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
     )
 
 
-def _noise(ports: dict[str, Any], trust: TrustNumbers, gated: Gate, goes_on: Any) -> Noise:
+def _noise(
+    ports: dict[str, Any], trust: TrustNumbers, gated: Gate, goes_on: Any, taken: Any
+) -> Noise:
     """Return what is new of r and a_y, and how noisy they are.
 
     A sensor that is slower than the log repeats its number, or settles to it in two steps where a
     filter stands between: that is no news. Second differences of news show noise and next to
     nothing of a car: their mean square is six variances.
     One channel is taken at a sample, that of which more numbers wait: a second update would cost as
-    much as the first and tell what the next sample does.
+    much as the first and tell what the next sample does. Both wait where v_y is `taken`.
     """
     heard, a_y = ports["heard"], ports["a_y"]
     there = ca.logic_and(a_y == a_y, ca.fabs(a_y) < trust.surge)  # NaN is not NaN
@@ -326,12 +359,13 @@ def _noise(ports: dict[str, Any], trust: TrustNumbers, gated: Gate, goes_on: Any
         state.append((ca.if_else(holds, heard[i], y), ca.if_else(goes_on, before, y)))
     now, before = zip(*state, strict=True)
     of_r, of_a_y = waiting
-    first = of_r >= of_a_y
-    left = [ca.if_else(first, 0, of_r), ca.if_else(first, of_a_y, 0)]
+    first, free = of_r >= of_a_y, ca.logic_not(taken)
+    turns = [ca.logic_and(free, first), ca.logic_and(free, ca.logic_not(first))]
+    left = [ca.if_else(turn, 0, one) for turn, one in zip(turns, waiting, strict=True)]
     share = [1 / larger(one, 1) for one in waiting]
     counts = ca.logic_and(ca.if_else(first, of_r, of_a_y) > 0, _is_good(gated))
     waits = ca.vertcat(*now, *before, *variance, *left)
-    return Noise(first, counts, share, fresh, [heard[8], heard[9]], variance, waits)
+    return Noise(first, counts, turns, share, fresh, [heard[8], heard[9]], variance, waits)
 
 
 def _missed(trust: TrustNumbers, ahead: Predicted) -> Any:
@@ -350,26 +384,27 @@ def _corrected(
     ahead: Predicted,
     z: Any,
     factors: Factors,
-    noise: Noise,
+    heard: tuple[Noise, Reading | None],
     now: Sample,
     scales: Any,
     steps: tuple[int, ...],
 ) -> tuple[list[Any], Factors, Any]:
-    """Return z and its factors after r or a_y, and what is carried of these channels.
+    """Return z and its factors after v_y, r or a_y, and what is carried of the last two.
 
-    The innovation of the one that waits is kept: its turn comes at the next sample, where its
-    number may be a new one, or none.
+    Innovations of what waits are kept: its turn comes at a next sample, where its number may be a
+    new one, or none.
     """
-    car, laws, trust = told
+    (car, laws, trust), (noise, lateral) = told, heard
     n = len(steps) + 1
     symbol = ca.SX.sym("z", z.numel())
     tilt = ca.SX.sym("tilt")
-    expected = shown(car, laws, unknowns(symbol, n), tilt, now, scales, steps)
+    named, way = unknowns(symbol, n), Way()
+    at = curve_by(way, named, scales, steps)
+    expected = shown(car, laws, named, tilt, now, at)
     y = ca.vertcat(expected.r, expected.a_y)
-    y, H = ca.substitute([y, ca.jacobian(y, symbol)], [symbol, tilt], [z, ahead.tilt])
-    rate = ahead.force_rate
-    turn = ca.substitute(ca.dot(turning(car), expected.curve.force), symbol, z)
-    late = (turn, GRAVITY * ca.dot(car.share, rate))
+    numbers = way.valued([y, ca.jacobian(y, symbol), ca.dot(turning(car), at.force)])
+    y, H, turn = ca.substitute(numbers, [symbol, tilt], [z, ahead.tilt])
+    late = (turn, GRAVITY * ca.dot(car.share, ahead.force_rate))
     before = ca.vertsplit(z)
     floors = (trust.r_error, trust.a_y_error + trust.a_y_share * ahead.tilt**2)
     error = [floor + (trust.lateness * one) ** 2 for floor, one in zip(floors, late, strict=True)]
@@ -377,21 +412,25 @@ def _corrected(
         ca.if_else(fresh, noise.heard[i] - y[i], left)
         for i, (fresh, left) in enumerate(zip(noise.fresh, noise.left, strict=True))
     ]
+    R = [e * share + R for e, share, R in zip(error, noise.share, noise.variance, strict=True)]
+    read = noise.reading(H, nu, R)
+    if lateral is not None:
+        read = read.unless(lateral.counts, lateral)
     kept, factors = measured(
         before,
         factors,
-        noise.turn(H[0, :], H[1, :]),
-        innovation=noise.turn(*nu),
-        R=noise.turn(
-            *(e * share + R for e, share, R in zip(error, noise.share, noise.variance, strict=True))
-        ),
+        read.h,
+        innovation=read.innovation,
+        R=read.R,
         clip=trust.clip,
-        counts=noise.counts,
+        counts=read.counts,
     )
-    h = noise.turn(H[1, :], H[0, :])  # of the channel that waits
-    drift = sum(h[0, j] * (kept[j] - one) for j, one in enumerate(before) if h.has_nz(0, j))
-    left = noise.turn(nu[1], nu[0]) - drift
-    return kept, factors, ca.vertcat(noise.heard, noise.turn(0, left), noise.turn(left, 0))
+    moved = ca.vertcat(*kept) - z
+    left = [
+        ca.if_else(turn, 0, one - ca.dot(H[i, :].T, moved))
+        for i, (turn, one) in enumerate(zip(noise.turns, nu, strict=True))
+    ]
+    return kept, factors, ca.vertcat(noise.heard, *left)
 
 
 def heard_size(delay: int | None) -> int:
@@ -420,50 +459,49 @@ def _lateral(
     ports: dict[str, Any],
     trust: TrustNumbers,
     late: int,
-    before: tuple[list[Any], Factors],
+    z: Any,
     gated: Gate,
     goes_on: Any,
     change: Change,
-) -> tuple[list[Any], Factors, Any]:
-    """Return z, its factors and what is carried of v_y, after that is measured.
+) -> tuple[Reading, Any]:
+    """Return a measured v_y as a reading, and what is carried of it.
 
     Where it is late, it shows v_y of now less its changes since, as they were predicted: what is
     unsure of them is taken for as large as that of the newest one. Differences of innovations
-    show the noise, from one number to the next.
+    show the noise, from one number to the next. One that follows another at once is not taken: it
+    is the turn of r and a_y.
     """
-    z, factors = before
-    last, newest, old, age, count, *changes = ca.vertsplit(ports["heard_v_y"])
+    last, newest, old, age, count, took, *changes = ca.vertsplit(ports["heard_v_y"])
     changes = [ca.if_else(goes_on, change.v_y, 0), *changes]
     y, learns = ports["x"][0], ca.logic_and(goes_on, _is_good(gated))
     y = ca.if_else(ca.logic_and(_is_good(gated), _plausible(ports, gated, y)), y, last)
     fresh = ca.logic_and(learns, ca.logic_and(y != last, age + 1 >= late))
+    taken = ca.logic_and(fresh, took < TAKEN)
     innovation = y - (z[0] - sum(changes[:late])) - z[-1]
     known = smaller(count + 2, 1 / trust.noise_gain)
     shows = smaller((innovation - newest) ** 2 / 2, MOST_NOISE * old + LEAST)
     variance = ca.if_else(fresh, old + (shows - old) / known, old)
-    h = -late * change.gradient
+    h = -late * change.gradient if late else ca.SX(1, z.numel())
     h[0] += 1
     h[-1] += 1
-    U, D = factors
-    unsure = smaller(D[-1] + learns * trust.v_y_walk, larger(D[-1], trust.v_y_bias))
-    z, factors = measured(
-        z,
-        Factors(U, [*D[:-1], unsure]),
-        h,
-        innovation=innovation,
-        R=trust.v_y_error + variance + (trust.lateness * change.v_y / ports["dt"]) ** 2,
-        clip=trust.clip,
-        counts=fresh,
-    )
+    R = trust.v_y_error + variance + (trust.lateness * change.v_y / ports["dt"]) ** 2
     heard = [
         y,
         ca.if_else(fresh, innovation, newest),
         variance,
         goes_on * smaller(age + 1, MOST_COUNTED),
         smaller(count + fresh, MOST_COUNTED),
+        taken,
         *changes[: max(late - 1, 0)],
     ]
-    return z, factors, ca.vertcat(*heard)
+    return Reading(h, innovation, R, taken), ca.vertcat(*heard)
+
+
+def _unsure_of_v_y(factors: Factors, trust: TrustNumbers, learns: Any) -> Factors:
+    """Return the factors where the bias of a measured v_y may have changed in the step."""
+    U, D = factors
+    unsure = smaller(D[-1] + learns * trust.v_y_walk, larger(D[-1], trust.v_y_bias))
+    return Factors(U, [*D[:-1], unsure])
 
 
 def _loosened(factors: Factors, z: list[Any], amount: Any, n: int) -> Factors:
@@ -501,9 +539,8 @@ def _afresh(
     car: Car,
     gated: Gate,
     now: Sample,
-    factors: Factors,
-) -> tuple[list[Any], Factors]:
-    """Return what moves, and factors, of a filter that begins: in a steady corner."""
+) -> tuple[list[Any], list[Any]]:
+    """Return what moves, and its variances, of a filter that begins: in a steady corner."""
     sensors = ports["sensors"]
     zero, bias = (sensors[SENSORS.index(name)] for name in ("steering", "gyro"))
     r = gated.r - bias
@@ -515,5 +552,4 @@ def _afresh(
     slip = unsure / now.v_x**2
     missed = trust.error**2
     D = [unsure, trust.r, slip, slip, missed, missed, trust.bank, trust.bank_rate]
-    U = {(i, j): ca.SX(0) if i < MOVING else value for (i, j), value in factors.U.items()}
-    return [v_y, r, *ca.vertsplit(alpha), *[ca.SX(0)] * 4], Factors(U, [*D, *factors.D[MOVING:]])
+    return [v_y, r, *ca.vertsplit(alpha), *[ca.SX(0)] * 4], D
