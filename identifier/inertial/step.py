@@ -47,7 +47,7 @@ KEPT = ("UD", "motion_UD", "gate", "body", "heard", "heard_v_y", "running", "exc
 CARRY = ("motion", *LEARNT, *KEPT)
 OUTPUTS = ("axle_force", "v_y", "v_y_sd", "side_slip_observable")
 LOAD = "static axle loads"
-FIRST_CHANGE = 6  # of what is carried of a measured v_y, where its changes begin
+LEFT, FIRST_CHANGE = 7, 8  # of what is carried of a measured v_y: innovation that waits, changes
 SAME = 0.01  # of the square of a change, up to which the next one is none: a number that settles
 MOST_WAITING = 2  # numbers of a channel that wait for its turn
 MOST_COUNTED = 1000  # samples
@@ -260,7 +260,7 @@ def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
         F[i, :] *= goes_on  # a filter that begins anew knows of no dependence
     factors = propagated(known, F, _process_noise(trust, ahead))
     ahead_z = ca.vertcat(ahead.moving, z[MOVING:])
-    lateral, heard_v_y = None, ports["heard_v_y"]
+    lateral, heard_v_y = None, ca.vertsplit(ports["heard_v_y"])
     if delay is not None:
         difference = ahead.moving[0] - z[0]
         change = Change(difference, ca.jacobian(difference, z))
@@ -270,6 +270,9 @@ def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
     corrected, factors, heard = _corrected(
         (car, laws, trust), ahead, ahead_z, factors, (noise, lateral), now, scales, steps
     )
+    if lateral is not None:
+        left = lateral.innovation - ca.dot(lateral.h.T, ca.vertcat(*corrected) - ahead_z)
+        heard_v_y.insert(LEFT, ca.if_else(lateral.counts, 0, left))
     missed = smaller((ca.vertcat(*corrected[4:6]) / _missed(trust, ahead)) ** 2, MOST_MISSED)
     fast = ports["running"][1]
     fast = fast + trust.alarm_gain * ((missed[0] + missed[1]) / 2 - fast)
@@ -304,7 +307,7 @@ def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
         "gate": gated.state,
         "body": tilt,
         "heard": heard,
-        "heard_v_y": heard_v_y,
+        "heard_v_y": ca.vertcat(*heard_v_y),
         "running": ca.vertcat(ca.logic_and(runs, sane), ca.if_else(goes_on, fast, 0)),
         "excitation": excited(
             ports["excitation"],
@@ -409,10 +412,12 @@ def _corrected(
     floors = (trust.r_error, trust.a_y_error + trust.a_y_share * ahead.tilt**2)
     error = [floor + (trust.lateness * one) ** 2 for floor, one in zip(floors, late, strict=True)]
     nu = [
-        ca.if_else(fresh, noise.heard[i] - y[i], left)
-        for i, (fresh, left) in enumerate(zip(noise.fresh, noise.left, strict=True))
+        ca.if_else(fresh, left + share * (noise.heard[i] - y[i] - left), left)
+        for i, (fresh, left, share) in enumerate(
+            zip(noise.fresh, noise.left, noise.share, strict=True)
+        )
     ]
-    R = [e * share + R for e, share, R in zip(error, noise.share, noise.variance, strict=True)]
+    R = [(e + R) * share for e, share, R in zip(error, noise.share, noise.variance, strict=True)]
     read = noise.reading(H, nu, R)
     if lateral is not None:
         read = read.unless(lateral.counts, lateral)
@@ -463,7 +468,7 @@ def _lateral(
     gated: Gate,
     goes_on: Any,
     change: Change,
-) -> tuple[Reading, Any]:
+) -> tuple[Reading, list[Any]]:
     """Return a measured v_y as a reading, and what is carried of it.
 
     Where it is late, it shows v_y of now less its changes since, as they were predicted: what is
@@ -471,20 +476,22 @@ def _lateral(
     show the noise, from one number to the next. One that follows another at once is not taken: it
     is the turn of r and a_y.
     """
-    last, newest, old, age, count, took, *changes = ca.vertsplit(ports["heard_v_y"])
+    last, newest, old, age, count, took, waits, left, *changes = ca.vertsplit(ports["heard_v_y"])
     changes = [ca.if_else(goes_on, change.v_y, 0), *changes]
     y, learns = ports["x"][0], ca.logic_and(goes_on, _is_good(gated))
     y = ca.if_else(ca.logic_and(_is_good(gated), _plausible(ports, gated, y)), y, last)
     fresh = ca.logic_and(learns, ca.logic_and(y != last, age + 1 >= late))
-    taken = ca.logic_and(fresh, took < TAKEN)
+    waiting = goes_on * ca.logic_or(fresh, waits > TAKEN)
+    taken = ca.logic_and(ca.logic_and(learns, waiting), took < TAKEN)
     innovation = y - (z[0] - sum(changes[:late])) - z[-1]
+    share = ca.if_else(ca.logic_and(fresh, waits > TAKEN), 0.5, 1)
     known = smaller(count + 2, 1 / trust.noise_gain)
     shows = smaller((innovation - newest) ** 2 / 2, MOST_NOISE * old + LEAST)
     variance = ca.if_else(fresh, old + (shows - old) / known, old)
     h = -late * change.gradient if late else ca.SX(1, z.numel())
     h[0] += 1
     h[-1] += 1
-    R = trust.v_y_error + variance + (trust.lateness * change.v_y / ports["dt"]) ** 2
+    R = (trust.v_y_error + variance) * share + (trust.lateness * change.v_y / ports["dt"]) ** 2
     heard = [
         y,
         ca.if_else(fresh, innovation, newest),
@@ -492,9 +499,11 @@ def _lateral(
         goes_on * smaller(age + 1, MOST_COUNTED),
         smaller(count + fresh, MOST_COUNTED),
         taken,
+        ca.logic_and(waiting, ca.logic_not(taken)),
         *changes[: max(late - 1, 0)],
     ]
-    return Reading(h, innovation, R, taken), ca.vertcat(*heard)
+    mean = ca.if_else(fresh, left + share * (innovation - left), left)
+    return Reading(h, mean, R, taken), heard
 
 
 def _unsure_of_v_y(factors: Factors, trust: TrustNumbers, learns: Any) -> Factors:
