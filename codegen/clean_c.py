@@ -21,6 +21,7 @@ from codegen.graph import (
     graph_of,
     simplifying,
 )
+from codegen.order import in_order
 
 # Finding again, in the scalars of a function, what a person would have written there.
 #
@@ -146,6 +147,7 @@ Place = Callable[[int, int], str]  # (port, entry by columns) -> C expression
 
 FLOAT_MIN, FLOAT_MAX = 1.2e-38, 3.4e38  # normal numbers of float
 LONGEST = 72  # characters of an expression that is not given a name
+ATOMIC = ("const", "input")  # they are read where they stand
 TWICE = ("sq", "fmin", "fmax", "sign")  # they write an argument twice
 
 BINARY: Mapping[str, str] = {
@@ -220,12 +222,43 @@ class Statements:
         self.members = {place: group for group in self.groups for place in group}
         self.called: set[str] = set()
         self.names = 0
-        for port, entries in enumerate(graph.outputs):
-            for entry, place in enumerate(entries):
-                if returns:
-                    self.lines.append(f"return {_bare(self._condition(place))};")
-                else:
-                    self.lines.append(f"{write(port, entry)} = {_bare(self._real(place))};")
+        if returns:
+            self.lines.append(f"return {_bare(self._condition(graph.outputs[0][0]))};")
+            return
+        for place, at in self._order():
+            if at is None:
+                self._expression(place)
+            else:
+                self.lines.append(f"{write(*at)} = {_bare(self._real(place))};")
+
+    def _order(self) -> list[tuple[int, tuple[int, int] | None]]:
+        """Return what is written one after the other: places, and port and entry of results.
+
+        Results of the port with most entries come first: most of the rest is on the way to them.
+        """
+        ports = sorted(enumerate(self.graph.outputs), key=lambda port: -len(port[1]))
+        results: list[tuple[int, tuple[int, int] | None]] = [
+            (place, (port, entry)) for port, entries in ports for entry, place in enumerate(entries)
+        ]
+        named = {p for p, n in self.uses.items() if n > 1 and self.graph.nodes[p].op not in ATOMIC}
+        first_of = {p: p for p in named} | {p: self.members[p][0] for p in self.members}
+        needs: dict[tuple[int, tuple[int, int] | None], list[tuple[int, None]]] = {
+            (unit, None): self._units(self._needs(unit), first_of) for unit in first_of.values()
+        }
+        needs |= {result: self._units(result[:1], first_of) for result in results}
+        return in_order(needs, results)
+
+    def _units(self, places: Sequence[int], first_of: Mapping[int, int]) -> list[tuple[int, None]]:
+        """Return what is written on its own of what places are made of, each once."""
+        found: dict[tuple[int, None], None] = {}
+        waiting = [*reversed(places)]
+        while waiting:
+            place = waiting.pop()
+            if place in first_of:
+                found[first_of[place], None] = None
+            else:
+                waiting += reversed(self.graph.nodes[place].args)
+        return list(found)
 
     def block(self, indent: int = 4) -> str:
         """Return the statements, one a line.
@@ -277,9 +310,8 @@ class Statements:
             self._call_group(self.members[place], node.op)
             return
         text = self._plain(node)
-        atomic = node.op in ("const", "input")
         long = len(text) > LONGEST and place not in self.results
-        if not atomic and (self.uses[place] > 1 or long):
+        if node.op not in ATOMIC and (self.uses[place] > 1 or long):
             kind = "bool" if node.op in CONDITIONS else f"{self.prefix}_real"
             name = self._new("c" if node.op in CONDITIONS else "t")
             self.lines.append(f"const {kind} {name} = {_bare(text)};")
