@@ -282,8 +282,7 @@ def predicted(
     v_x = (before.v_x + now.v_x) / 2
     at = curve_by(way, z, scales, steps)
     wheelbase = car.arm[0] - car.arm[1]
-    steep = way.held(at.carcass_slope <= at.slope)
-    carcass = steep * way.by(at.slope) + (1 - steep) * way.held(at.carcass_slope)
+    carcass = way.linear(at.carcass_slope, at.bend, z.slip)  # weights are not learnt by the lag
     sigma = way.by(z.compliance * carcass + SHORTEST * wheelbase)
     length = v_x * dt * (1 / sigma)
     e = ca.exp(-length)
