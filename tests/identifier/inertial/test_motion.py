@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from identifier.axle.car import Car, car_numbers
-from identifier.axle.curve import LADDER, doublings
+from identifier.axle.curve import LADDER, curve, doublings
 from identifier.axle.slip import SHORTEST
 from identifier.inertial.motion import (
     MOVING,
@@ -132,7 +132,9 @@ def test_the_bank_and_the_rolling_body_follow_theirs():
 def expected(z, tilt=3.0, delta=0.05):
     symbol = ca.SX.sym("z", z.size)
     now = Sample(ca.SX(V_X), ca.SX(ca.DM([delta, 0.0])))
-    seen = shown(car(), laws(0.01), unknowns(symbol, N), tilt, now, SCALES, STEPS)
+    named = unknowns(symbol, N)
+    at = curve(named.slip, named.W, SCALES, STEPS)
+    seen = shown(car(), laws(0.01), named, tilt, now, at)
     return np.array(ca.Function("f", [symbol], [ca.vertcat(seen.r, seen.a_y)])(z)).ravel()
 
 
