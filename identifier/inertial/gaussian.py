@@ -55,7 +55,10 @@ def propagated(factors: Factors, F: Any, Q: list[Any]) -> Factors:
     """
     U, D = factors
     q, m = len(D), len(Q)
-    steps = [[(as_factor(F[i, j]), j) for j in range(F.shape[1]) if F.has_nz(i, j)] for i in range(F.shape[0])]
+    steps = [
+        [(as_factor(F[i, j]), j) for j in range(F.shape[1]) if F.has_nz(i, j)]
+        for i in range(F.shape[0])
+    ]
 
     def column(k: int) -> list[Any]:
         """Column k of F U."""

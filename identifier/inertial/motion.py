@@ -288,9 +288,9 @@ def predicted(
     e = ca.exp(-length)
     mean = (1 - e) * (1 / length)
     sway = -laws.sway * tilt[1] * (1 / v_x)
-    kept, mid, zero = way.held(e), way.held(mean), way.held(z.steering)
-    was = slip_angle(car, before, z.v_y, z.r, zero) + sway
-    stays = slip_angle(car, now, z.v_y, z.r, zero) + sway  # where v_y and r stay as they are
+    kept, mid = way.held(e), way.held(mean)
+    was = slip_angle(car, before, z.v_y, z.r, z.steering) + sway
+    stays = slip_angle(car, now, z.v_y, z.r, z.steering) + sway  # where v_y and r stay as they are
     slip = kept * z.slip + (mid - kept) * was + (1 - mid) * stays
     cos_delta = cosine(now.delta)
     slope = way.held(at.slope)
@@ -307,7 +307,6 @@ def predicted(
     a = ca.dot(push, force) - v_x * z.r + GRAVITY * way.held(z.bank)
     b = ca.dot(turning(car) * (1 + z.inertia), force)
     r = way.by(z.r + (m11 * b - m21 * a) * per)
-    was = slip_angle(car, before, z.v_y, z.r, z.steering) + sway
     alpha = slip_angle(car, now, v_y, r, z.steering) + sway
     slip = e * z.slip + (mean - e) * was + (1 - mean) * alpha
     bank_rate = z.bank_rate - dt * (laws.bank_damping * z.bank_rate + laws.bank_stiffness * z.bank)

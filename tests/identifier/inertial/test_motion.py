@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from identifier.axle.car import Car, car_numbers
-from identifier.axle.curve import LADDER, curve, doublings
+from identifier.axle.curve import LADDER, doublings, hidden_units, of_units
 from identifier.axle.slip import SHORTEST
 from identifier.inertial.motion import (
     MOVING,
@@ -133,7 +133,7 @@ def expected(z, tilt=3.0, delta=0.05):
     symbol = ca.SX.sym("z", z.size)
     now = Sample(ca.SX(V_X), ca.SX(ca.DM([delta, 0.0])))
     named = unknowns(symbol, N)
-    at = curve(named.slip, named.W, SCALES, STEPS)
+    at = of_units(hidden_units(named.slip, SCALES, STEPS), named.W, SCALES)
     seen = shown(car(), laws(0.01), named, tilt, now, at)
     return np.array(ca.Function("f", [symbol], [ca.vertcat(seen.r, seen.a_y)])(z)).ravel()
 

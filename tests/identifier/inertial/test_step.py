@@ -146,8 +146,8 @@ class ByHand:
         t, z = METHOD.trust, self.z
         exact = by_differences(lambda z: self.step(z, self.tilt, before, sample)[0], z)
         F = composed(self.gradient(z, self.tilt, before, sample))
-        moves = np.sqrt(np.diag(self.P))  # what the gradient leaves out is of second order
-        assert (np.abs((F - exact) * moves).max(axis=1) < 0.03 * np.sqrt(moves**2 + 1e-8)).all()
+        moves = np.sqrt(np.diag(self.P))  # left out is what is of second order, and W by the lag
+        assert (np.abs((F - exact) * moves).max(axis=1) < 0.05 * np.sqrt(moves**2 + 1e-8)).all()
         ahead, tilt, force, rate = self.step(z, self.tilt, before, sample)
         missed = t.error + t.relative_error * np.abs(force)
         noise = np.zeros(Q)
