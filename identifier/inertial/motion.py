@@ -282,20 +282,20 @@ def predicted(
     v_x = (before.v_x + now.v_x) / 2
     at = curve_by(way, z, scales, steps)
     wheelbase = car.arm[0] - car.arm[1]
-    carcass = way.linear(at.carcass_slope, at.bend, z.slip)  # weights are not learnt by the lag
+    steep = way.held(at.carcass_slope <= at.slope)
+    carcass = steep * way.by(at.slope) + (1 - steep) * way.held(at.carcass_slope)
     sigma = way.by(z.compliance * carcass + SHORTEST * wheelbase)
     length = v_x * dt * (1 / sigma)
     e = ca.exp(-length)
     mean = (1 - e) * (1 / length)
     sway = -laws.sway * tilt[1] * (1 / v_x)
-    kept, mid = way.held(e), way.held(mean)
     was = slip_angle(car, before, z.v_y, z.r, z.steering) + sway
     stays = slip_angle(car, now, z.v_y, z.r, z.steering) + sway  # where v_y and r stay as they are
-    slip = kept * z.slip + (mid - kept) * was + (1 - mid) * stays
+    slip = e * z.slip + (mean - e) * was + (1 - mean) * stays
     cos_delta = cosine(now.delta)
     slope = way.held(at.slope)
     force = way.by((at.force + slope * (slip - z.slip) / 2) * cos_delta + z.error)
-    arm, turn = car.arm, turning(car) * (1 + way.held(z.inertia))
+    arm, turn = car.arm, turning(car) * (1 + z.inertia)
     push = GRAVITY * car.share
     pull = way.held(slope * cos_delta * (1 - mean) * (dt / (2 * v_x)))  # force per change of v_y
     a = ca.dot(push, force) - v_x * z.r + GRAVITY * z.bank
@@ -304,8 +304,6 @@ def predicted(
     m21, m22 = ca.dot(turn, pull), 1 + ca.dot(turn * arm, pull)
     per = dt / (m11 * m22 - m12 * m21)
     v_y = way.by(z.v_y + (m22 * a - m12 * b) * per)
-    a = ca.dot(push, force) - v_x * z.r + GRAVITY * way.held(z.bank)
-    b = ca.dot(turning(car) * (1 + z.inertia), force)
     r = way.by(z.r + (m11 * b - m21 * a) * per)
     alpha = slip_angle(car, now, v_y, r, z.steering) + sway
     slip = e * z.slip + (mean - e) * was + (1 - mean) * alpha

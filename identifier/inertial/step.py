@@ -412,12 +412,10 @@ def _corrected(
     floors = (trust.r_error, trust.a_y_error + trust.a_y_share * ahead.tilt**2)
     error = [floor + (trust.lateness * one) ** 2 for floor, one in zip(floors, late, strict=True)]
     nu = [
-        ca.if_else(fresh, left + share * (noise.heard[i] - y[i] - left), left)
-        for i, (fresh, left, share) in enumerate(
-            zip(noise.fresh, noise.left, noise.share, strict=True)
-        )
+        ca.if_else(fresh, noise.heard[i] - y[i], left)
+        for i, (fresh, left) in enumerate(zip(noise.fresh, noise.left, strict=True))
     ]
-    R = [(e + R) * share for e, share, R in zip(error, noise.share, noise.variance, strict=True)]
+    R = [e * share + R for e, share, R in zip(error, noise.share, noise.variance, strict=True)]
     read = noise.reading(H, nu, R)
     if lateral is not None:
         read = read.unless(lateral.counts, lateral)

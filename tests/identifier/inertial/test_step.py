@@ -78,17 +78,6 @@ def by_differences(f, z):
     return np.column_stack(columns)
 
 
-def by_the_lag(z, F):
-    """What weights do by the lag alone, which does not teach them: as a compliance does."""
-    found = np.zeros_like(F)
-    for i in (0, 1):
-        of_W, soft = slice(8 + N * i, 8 + N * i + N), 8 + 2 * N + i
-        slopes = (1 - np.tanh(z[2 + i] / np.array(METHOD.ladder)) ** 2) / np.array(METHOD.ladder)
-        per_slope = F[:MOVING, soft] * z[soft] / (z[of_W] @ slopes)
-        found[:MOVING, of_W] = np.outer(per_slope, slopes)
-    return found
-
-
 class ByHand:
     """The filter with plain matrices; `late` samples of a measured v_y, None does not read it."""
 
@@ -158,8 +147,7 @@ class ByHand:
         exact = by_differences(lambda z: self.step(z, self.tilt, before, sample)[0], z)
         F = composed(self.gradient(z, self.tilt, before, sample))
         moves = np.sqrt(np.diag(self.P))  # what the gradient leaves out is of second order
-        left_out = F + by_the_lag(z, exact) - exact
-        assert (np.abs(left_out * moves).max(axis=1) < 0.03 * np.sqrt(moves**2 + 1e-8)).all()
+        assert (np.abs((F - exact) * moves).max(axis=1) < 0.03 * np.sqrt(moves**2 + 1e-8)).all()
         ahead, tilt, force, rate = self.step(z, self.tilt, before, sample)
         missed = t.error + t.relative_error * np.abs(force)
         noise = np.zeros(Q)
@@ -180,12 +168,11 @@ class ByHand:
         late = np.array([turn, G * LOAD / CAR.weight @ rate])
         floor = np.array([(t.r_error / self.scale) ** 2, t.a_y_error**2])
         floor[1] += (t.a_y_share * tilt[0]) ** 2
-        share = 1 / np.maximum(self.waiting, 1)  # numbers that waited count with their mean
-        R = (floor + (t.lateness * late) ** 2 + self.noise) * share
+        R = (floor + (t.lateness * late) ** 2) / np.maximum(self.waiting, 1) + self.noise
         gradient = exact[0] - np.eye(Q)[0]
         self.changes.append(ahead[0] - z[0])
         i = 0 if self.waiting[0] >= self.waiting[1] else 1  # its turn
-        nus = np.where(news, self.left + share * (y - expected - self.left), self.left)
+        nus = np.where(news, y - expected, self.left)
         h, R, known = H[i], R[i], [nus[i]] if self.waiting[i] else []
         v_ys, took = [], self.took
         if self.late is not None and len(self.changes) >= self.late:
@@ -252,7 +239,7 @@ def runs(request):
 
 def test_lateral_velocity_and_its_deviation_are_those_of_the_textbook(runs):
     told, hand, history = runs
-    assert min(hand.turns[:2]) > 60
+    assert min(hand.turns[:2]) > 40
     assert hand.turns[2] > 60 or hand.late is None
     assert np.abs(told[:, 0]).max() > 0.1
     np.testing.assert_allclose(history.outputs["v_y"].ravel(), told[:, 0], atol=2e-6)
