@@ -13,7 +13,7 @@ learnt: on the whole drive to learn on, without a fault: what caution costs wher
 
 A car has left the path where it is more than 0.5 m off, spins, or gives up. Constants of the
 tracker were chosen on cars 0 to 5 of seeds of their own. Times are those of steps on the learnt
-tires, each step's least of `ROUNDS` drives.
+tires of the first `TIMED` cars, each step's least of `ROUNDS` drives.
 Prints a table, writes OUT/mpc_caution.json.
 """
 
@@ -34,6 +34,7 @@ from benchmarks.targets import Targets, keeps
 from identifier.compare.work import spread
 from identifier.tire_model import TireModel
 from models.faults import SensorFault
+from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
 from mpc.loop.sensing import cornering_limit
 from mpc.path import iso_3888_1, slalom, steady_speed
@@ -52,7 +53,7 @@ SHARES = {"slalom": 0.95, "lane change": 0.97}
 CHANNELS = {"delta_f": "delta"}  # of a drive, by those of a recording
 CARS = 80
 WORKERS = 2
-ROUNDS = 3
+ROUNDS, TIMED = 3, 2  # drives of a car whose steps are timed, such cars
 
 
 class Case(NamedTuple):
@@ -129,25 +130,43 @@ def conditions(case: Case) -> Conditions:
 
 
 @cache
-def learnt(car: int, situation: str) -> TireModel:
-    """Return what is learnt before a car is driven, as the command learns it.
+def recording(car: int, situation: str) -> Recording:
+    """Return the drive that a car learns on, as the command has it.
 
     Parameters
     ----------
     car : its number.
-    situation : of `SITUATIONS`.
+    situation : learnt, or biased.
     """
     told = conditions(Case(situation, "slalom", car, 1.0))
-    recording = learning_drive(
+    return learning_drive(
         told.setup.car(open_field=True),
         told.driving_sensors,
         np.random.default_rng([told.seed, 1]),
         grip=told.setup.grip,
         seed=told.seed,
     )
+
+
+@cache
+def learnt(car: int, situation: str) -> TireModel:
+    """Return what is learnt before a car is driven, as the command learns it.
+
+    Parameters
+    ----------
+    car : its number.
+    situation : short, biased or learnt.
+    """
     if situation == "short":
-        recording = recording.between(0.0, SHORT)
-    return identify(recording, told.setup.vehicle, check=False).calibrated()
+        taught = recording(car, "learnt").between(0.0, SHORT)
+    else:
+        taught = recording(car, situation)
+    return identify(taught, vehicle_of(car), check=False).calibrated()
+
+
+def is_timed(case: Case) -> bool:
+    """Return whether the steps of a drive are timed, which takes `ROUNDS` drives."""
+    return case.situation == "learnt" and case.car < TIMED
 
 
 def score(case: Case) -> Result:
@@ -158,7 +177,7 @@ def score(case: Case) -> Result:
     case : to drive.
     """
     of = case.situation if case.situation in ("short", "biased") else "learnt"
-    rounds = ROUNDS if case.situation == "learnt" else 1
+    rounds = ROUNDS if is_timed(case) else 1
     runs = [run_drive(FROZEN, conditions(case), learnt(case.car, of)) for _ in range(rounds)]
     driven, found = runs[0].drive, runs[0].scores
     step = 1e3 * np.median(np.min([run.drive.solve_time for run in runs], axis=0))
@@ -217,10 +236,11 @@ def judge(found: dict[Case, Result], targets: Targets) -> None:
         targets.at_most(label, float(np.median(more)), 5.0, "%", key=f"learnt/{key}/more")
         targets.record(f"learnt/{key}/more_90", float(np.quantile(more, 0.9)), "%")
     times = [
-        np.median([r.step for case, r in found.items()
-                   if case.situation == "learnt" and case.caution == caution])
+        np.median(
+            [r.step for case, r in found.items() if is_timed(case) and case.caution == caution]
+        )
         for caution in CAUTIONS
-    ]  # fmt: skip
+    ]
     label = "time of a step with caution over without"
     targets.at_most(label, float(times[1] / times[0]), 1.3, "-", key="step")
 

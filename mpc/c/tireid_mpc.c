@@ -77,9 +77,9 @@ static void take_measurement(tireid_mpc_state *state, const tireid_mpc_params *p
 {
     uint32_t i;
     x[0] = in->e_y;
-    x[1] = in->e_psi;
+    x[1] = in->e_psi + (state->drift / in->v_x[0]); /* v_y stays: tires were learnt with it */
     x[2] = in->v_y;
-    x[3] = in->r;
+    x[3] = in->r + state->turning;
     x[STEERING] = state->commands[0] + state->zero;
     for (i = LAGGED; i < NX; i++) {
         x[i] = state->lagged[i - LAGGED];

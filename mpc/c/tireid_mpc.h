@@ -81,7 +81,7 @@ typedef struct {
     tireid_mpc_real tolerance; /* of the solver, in parts: 1e-8, in float 1e-5 */
     uint32_t max_iterations;   /* of the solver */
     uint32_t linearizations;   /* a step, 1 in real time */
-    uint32_t max_active_sets;  /* of limits tried in a row; 0, or caution: interior point alone */
+    uint32_t max_active_sets;  /* of limits tried in a row; 0: interior point alone */
 } tireid_mpc_params;
 
 typedef struct {
@@ -102,6 +102,9 @@ typedef struct {
     tireid_mpc_real commands[TIREID_MPC_COMMANDS]; /* steering [rad], the last one first */
     tireid_mpc_real lagged[2];                     /* slip of lagging tires now [rad] */
     tireid_mpc_real zero; /* of the wheels over what is commanded [rad], without caution none */
+    tireid_mpc_real drift;    /* across the path beyond heading and v_y, by positions [m/s] */
+    tireid_mpc_real turning;  /* beyond the yaw rate, by headings [rad/s] */
+    tireid_mpc_real place[2]; /* e_y [m] and e_psi [rad], followed by what moves the car */
     tireid_mpc_real grip; /* friction that is planned with, over that of the tire */
     /* of each friction: -2 ln of its likelihood over that of the best; its slip [rad]; the impulse of
      * the axles, followed by it [N s] */
@@ -117,6 +120,7 @@ typedef struct {
     uint32_t planned;  /* 0 until there is a plan */
     uint32_t guessed;  /* 1: x and u without a solution */
     uint32_t started;  /* 0 until the first step */
+    uint32_t gentle;   /* steps that told of the zero of the wheels */
     uint32_t watched;  /* steps for which impulses are followed */
     uint32_t doubted;  /* 0 until frictions have their costs */
 } tireid_mpc_state;

@@ -125,9 +125,7 @@ tireid_mpc_status tireid_mpc_active_set(tireid_mpc_work *work, const tireid_mpc_
 {
     tireid_mpc_status status = TIREID_MPC_ITERATION_LIMIT;
     const uint32_t left = params->max_iterations - work->iterations;
-    /* Caution leads doubts along the plan by its feedback, which a set takes from stages at a bound. */
-    const uint32_t sets = (params->caution > TIREID_MPC_C(0.0)) ? 0U : params->max_active_sets;
-    const uint32_t tries = (left < sets) ? left : sets;
+    const uint32_t tries = (left < params->max_active_sets) ? left : params->max_active_sets;
     uint32_t most = MOST_CHANGES;
     uint32_t tried = 0U;
     while ((status == TIREID_MPC_ITERATION_LIMIT) && (tried < tries)) {

@@ -6,6 +6,9 @@
  * its cost is -2 ln of its likelihood, over that of the best. A friction may come at any time, so that
  * no cost is above a surprise. Planned is with the least friction that is not refuted.
  *
+ * Sensors may be off for good. Position and heading show where the car came to, so that what v_y and
+ * the yaw rate tell beyond that is theirs.
+ *
  * Along the plan the doubt of the forces, less grip at both axles for the whole horizon, moves the car
  * by the sensitivities of the plan and its feedback: by that much soft limits are tightened. */
 #include "tireid_mpc_caution.h"
@@ -28,8 +31,14 @@
 #define LEFT TIREID_MPC_C(0.3)     /* share of a limit that is left */
 
 #define GENTLE TIREID_MPC_C(0.3)    /* slip over the useful one up to which wheels are judged */
-#define FOUND TIREID_MPC_C(0.3)     /* time in which their zero is found [s] */
+#define FOUND TIREID_MPC_C(0.3)     /* time in which their zero is found at first [s] */
+#define LASTING TIREID_MPC_C(3.0)   /* and in the end; between them as long as it was looked for */
 #define MOST_ZERO TIREID_MPC_C(0.1) /* of it [rad] */
+
+#define SHOWN TIREID_MPC_C(0.5)        /* time in which a zero of v_y or yaw rate is found [s] */
+#define ASTRAY TIREID_MPC_C(0.5)       /* m, rad: a place that is another one, of another path */
+#define MOST_DRIFT TIREID_MPC_C(1.0)   /* of the zero of v_y [m/s] */
+#define MOST_TURNING TIREID_MPC_C(0.1) /* of the zero of the yaw rate [rad/s] */
 
 #define real tireid_mpc_real
 
@@ -65,6 +74,11 @@ void tireid_mpc_trust(tireid_mpc_state *state)
     }
     state->grip = TIREID_MPC_C(1.0);
     state->zero = TIREID_MPC_C(0.0);
+    state->drift = TIREID_MPC_C(0.0);
+    state->turning = TIREID_MPC_C(0.0);
+    state->place[0] = TIREID_MPC_C(0.0);
+    state->place[1] = TIREID_MPC_C(0.0);
+    state->gentle = 0U;
     state->watched = 0U;
     state->doubted = 0U;
 }
@@ -84,6 +98,7 @@ static sight follow(tireid_mpc_state *state, const tireid_mpc_params *params,
     const real length = params->car[2] + params->car[3];
     const real lever[2] = { params->car[3] / length, params->car[2] / length };
     const real turn[2] = { params->car[1] / length, -params->car[1] / length };
+    const real r = in->r + state->turning;
     const real dt = params->period;
     sight seen = { TIREID_MPC_C(0.0), TIREID_MPC_C(0.0), TIREID_MPC_C(0.0) };
     real x[NX] = { TIREID_MPC_C(0.0) };
@@ -92,7 +107,7 @@ static sight follow(tireid_mpc_state *state, const tireid_mpc_params *params,
     real lag[2];
     uint32_t i;
     x[2] = in->v_y;
-    x[3] = in->r;
+    x[3] = r;
     x[STEERING] = wheels + state->zero;
     for (i = LAGGED; i < NX; i++) {
         x[i] = state->slips[j][i - LAGGED];
@@ -100,8 +115,8 @@ static sight follow(tireid_mpc_state *state, const tireid_mpc_params *params,
     tireid_mpc_axles(params, x, in->v_x[0], params->grips[j], force, slip, lag);
     for (i = 0U; i < 2U; i++) {
         const real mass = params->car[0] * lever[i];
-        const real shown = (mass * in->v_y) + (turn[i] * in->r);
-        const real rate = force[i] - (mass * in->v_x[0] * in->r);
+        const real shown = (mass * in->v_y) + (turn[i] * r);
+        const real rate = force[i] - (mass * in->v_x[0] * r);
         const real now = (LAGGED < NX) ? state->slips[j][i] : slip[i];
         const real rolled = (dt * in->v_x[0]) / (lag[i] + (dt * in->v_x[0]));
         if (state->watched == 0U) {
@@ -123,13 +138,55 @@ static sight follow(tireid_mpc_state *state, const tireid_mpc_params *params,
 }
 
 /* Angle [rad] by which wheels are off what is commanded: where slip is small, friction makes little of
- * the force that is missed in front. */
+ * the force that is missed in front. What tells it is averaged from the first of it on, as of what stays. */
 static void find_zero(
     tireid_mpc_state *state, const tireid_mpc_params *params, const sight *seen, real grip)
 {
     if (size_of(seen->slip) < (GENTLE * (grip * params->max_slip[0]))) {
-        const real moved = (seen->front / params->stiffness) * (params->period / FOUND);
+        const real told = (real)state->gentle * params->period;
+        const real most = (told < LASTING) ? told : LASTING;
+        const real time = (most > FOUND) ? most : FOUND;
+        const real moved = (seen->front / params->stiffness) * (params->period / time);
         state->zero = tireid_mpc_clipped(state->zero + moved, MOST_ZERO);
+        state->gentle += (state->gentle < UINT32_MAX) ? 1U : 0U;
+    }
+}
+
+/* How e_y and e_psi move [m/s, rad/s] by heading, v_y and yaw rate as they are measured. */
+static void move_of(const tireid_mpc_input *in, real moves[2])
+{
+    const real square = in->e_psi * in->e_psi;
+    const real cosine = TIREID_MPC_C(1.0)
+        - (square * (TIREID_MPC_C(0.5) - (square / TIREID_MPC_C(24.0))));
+    const real bent = TIREID_MPC_C(1.0) - (square / TIREID_MPC_C(20.0));
+    const real sine = in->e_psi * (TIREID_MPC_C(1.0) - ((square / TIREID_MPC_C(6.0)) * bent));
+    const real along = (in->v_x[0] * cosine) - (in->v_y * sine);
+    moves[0] = (in->v_x[0] * sine) + (in->v_y * cosine);
+    moves[1] = in->r - ((in->kappa[0] * along) / (TIREID_MPC_C(1.0) - (in->kappa[0] * in->e_y)));
+}
+
+/* Find how the car drifts and turns beyond what heading, v_y and yaw rate tell, by an observer of the place
+ * with both poles at -1 / SHOWN. */
+static void find_drift(
+    tireid_mpc_state *state, const tireid_mpc_params *params, const tireid_mpc_input *in)
+{
+    const real half = TIREID_MPC_C(0.5) * params->period;
+    const real gain = params->period / SHOWN;
+    const real shown[2] = { in->e_y, in->e_psi };
+    real moves[2];
+    real *const zeros[2] = { &state->drift, &state->turning };
+    const real most[2] = { MOST_DRIFT, MOST_TURNING };
+    uint32_t i;
+    move_of(in, moves);
+    for (i = 0U; i < 2U; i++) {
+        const real way = half * (moves[i] + *zeros[i]);
+        const real error = shown[i] - (state->place[i] + way);
+        if ((state->watched == 0U) || !tireid_mpc_within(error, ASTRAY)) {
+            state->place[i] = shown[i] + way;
+        } else {
+            *zeros[i] = tireid_mpc_clipped(*zeros[i] + ((gain / SHOWN) * error), most[i]);
+            state->place[i] += (TIREID_MPC_C(2.0) * way) + (TIREID_MPC_C(2.0) * (gain * error));
+        }
     }
 }
 
@@ -183,6 +240,8 @@ void tireid_mpc_watch(tireid_mpc_state *state, const tireid_mpc_params *params,
     if (!(params->caution > TIREID_MPC_C(0.0))) {
         state->grip = TIREID_MPC_C(1.0);
         state->zero = TIREID_MPC_C(0.0);
+        state->drift = TIREID_MPC_C(0.0);
+        state->turning = TIREID_MPC_C(0.0);
     } else if (!fit) {
         state->watched = 0U;
     } else {
@@ -203,6 +262,7 @@ void tireid_mpc_watch(tireid_mpc_state *state, const tireid_mpc_params *params,
             best = (state->cost[j] < state->cost[best]) ? j : best;
         }
         find_zero(state, params, &seen[best], params->grips[best]);
+        find_drift(state, params, in);
         feared = params->caution * (TIREID_MPC_C(1.0) - least_grip(state, params));
         if (state->doubted == 0U) {
             state->grip = TIREID_MPC_C(1.0) - feared;
@@ -212,6 +272,7 @@ void tireid_mpc_watch(tireid_mpc_state *state, const tireid_mpc_params *params,
         state->watched += (state->watched < UINT32_MAX) ? 1U : 0U;
         state->doubted = 1U;
         if (!tireid_mpc_within(state->grip, TIREID_MPC_C(1.0))
+            || !tireid_mpc_carriable(state->place, 2U)
             || !tireid_mpc_carriable(state->cost, TIREID_MPC_GRIPS)
             || !tireid_mpc_carriable(state->impulse[0], 2U * TIREID_MPC_GRIPS)
             || !tireid_mpc_carriable(state->slips[0], 2U * TIREID_MPC_GRIPS)) {

@@ -240,6 +240,15 @@ static bool is_plan(const tireid_mpc_work *work)
     return plan;
 }
 
+/* Feedback of stage k; under caution as if no bound held it: what a doubt does is answered by the next plans,
+ * which leave the bounds where they have to. */
+static real law(
+    const tireid_mpc_params *params, const tireid_mpc_work *work, uint32_t k, uint32_t i)
+{
+    const bool cautious = params->caution > TIREID_MPC_C(0.0);
+    return cautious ? -(work->L[k][i] * work->per_lambda[k]) : work->feedback[k][i];
+}
+
 /* Take the step, and keep the hard limits to the last bit. */
 static void take(
     tireid_mpc_state *state, const tireid_mpc_params *params, const tireid_mpc_work *work)
@@ -257,7 +266,7 @@ static void take(
         const real after = tireid_mpc_clipped(wanted, params->max_steering);
         for (i = 0U; i < NX; i++) {
             state->x[k + 1U][i] = work->x[k + 1U][i] + work->dx[k + 1U][i];
-            state->feedback[k][i] = work->feedback[k][i];
+            state->feedback[k][i] = law(params, work, k, i);
         }
         state->x[k + 1U][STEERING] = after;
         state->u[k] = tireid_mpc_clipped((after - before) / params->stage_time, params->max_rate);

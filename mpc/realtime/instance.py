@@ -130,7 +130,7 @@ def state_type(horizon: int, n_x: int, *, single: bool) -> np.dtype[np.void]:
     single : whether numbers are float.
     """
     real, solution = _real(single), ("iterations", "shifted", "prepared", "switched")
-    counts = (*solution, "age", "planned", "guessed", "started", "watched", "doubted")
+    counts = (*solution, "age", "planned", "guessed", "started", "gentle", "watched", "doubted")
     return np.dtype(
         [
             ("x", real, (horizon + 1, n_x)),
@@ -139,6 +139,9 @@ def state_type(horizon: int, n_x: int, *, single: bool) -> np.dtype[np.void]:
             ("commands", real, (N_COMMANDS,)),
             ("lagged", real, (2,)),
             ("zero", real),
+            ("drift", real),
+            ("turning", real),
+            ("place", real, (2,)),
             ("grip", real),
             ("cost", real, (N_GRIPS,)),
             ("slips", real, (N_GRIPS, 2)),

@@ -15,17 +15,23 @@ PERIOD, V_X = 0.02, 20.0
 STEPS = 250
 
 
-def slalom(tracker, road, *, zero=0.0, peak=0.012):
-    """Drive a prediction along a sine of curvature; return grips that were planned with."""
+def slalom(tracker, road, *, zero=0.0, peak=0.012, bias=(0.0, 0.0), off=None):
+    """Drive a prediction along a sine of curvature; return grips that were planned with.
+
+    bias: of the sensors of v_y [m/s] and yaw rate [rad/s].   off: takes the deviations [m].
+    """
     step, n_x = build_rk4(road.structure), state_size(road.structure)
     x, waiting, grips = np.zeros(n_x), [0.0, 0.0], []
+    shown = np.array([0.0, 0.0, *bias])
     for k in range(STEPS):
         t = PERIOD * k + tracker.times
         kappa = peak * np.sin(2.0 * np.pi * 0.4 * t)
-        told = Measurement(*map(float, x[:4]), kappa, np.full(t.size, V_X))
+        told = Measurement(*map(float, x[:4] + shown), kappa, np.full(t.size, V_X))
         command = tracker.step(told)
         assert command.status <= Status.ITERATION_LIMIT
         grips.append(tracker.grip)
+        if off is not None:
+            off.append(x[0])
         waiting.append(command.steering)
         x[4] = waiting.pop(0) + zero
         for _ in range(4):
@@ -74,6 +80,22 @@ def test_wheels_that_are_off_what_is_commanded_are_found_and_not_taken_for_ice(l
     assert grips[-1] > 0.85
 
 
+@pytest.mark.parametrize(
+    ("bias", "found"), [((0.3, 0.0), ("drift", -0.3)), ((0.0, 0.02), ("turning", -0.02))]
+)
+def test_what_v_y_and_yaw_rate_are_off_is_found_and_the_car_comes_back(lagging, bias, found):
+    weights = lagging.weights.copy()
+    weights[1] += bias[0]  # learnt by the same sensors
+    deviations = []
+    for caution in (0.0, 1.0):
+        tracker, off = make(lagging._replace(weights=weights), caution), []
+        slalom(tracker, lagging, peak=0.004, bias=bias, off=off)
+        deviations.append(abs(np.mean(off[-125:])))
+    name, value = found
+    assert float(tracker.instance.state[name]) == pytest.approx(value, rel=0.1)
+    assert deviations[1] < 0.3 * deviations[0] or deviations[0] < 0.01
+
+
 def test_a_friction_is_the_tire_with_weights_of_that_friction():
     rng = np.random.default_rng(3)
     for tire in TIRES.values():
@@ -108,7 +130,7 @@ def test_doubt_tightens_slip_along_the_plan(lagging):
         )
         tracker = make(tire, 1.0)
         tracker.instance.params["prior"][1:] = SURPRISE  # of the grip nothing is feared
-        turn = Measurement(0.0, 0.0, 0.0, 0.0, np.full(21, 0.018), np.full(21, V_X))
+        turn = Measurement(0.0, 0.0, 0.0, 0.018 * V_X, np.full(21, 0.018), np.full(21, V_X))
         for _ in range(10):
             command = tracker.step(turn)
         x = command.plan_x[1:]
