@@ -101,11 +101,11 @@ typedef struct {
     tireid_mpc_real feedback[TIREID_MPC_HORIZON][TIREID_MPC_STATES];
     tireid_mpc_real commands[TIREID_MPC_COMMANDS]; /* steering [rad], the last one first */
     tireid_mpc_real lagged[2];                     /* slip of lagging tires now [rad] */
-    tireid_mpc_real zero; /* of the wheels over what is commanded [rad], without caution none */
+    tireid_mpc_real zero;     /* of the wheels over what is commanded [rad], without caution none */
     tireid_mpc_real drift;    /* across the path beyond heading and v_y, by positions [m/s] */
     tireid_mpc_real turning;  /* beyond the yaw rate, by headings [rad/s] */
     tireid_mpc_real place[2]; /* e_y [m] and e_psi [rad], followed by what moves the car */
-    tireid_mpc_real grip; /* friction that is planned with, over that of the tire */
+    tireid_mpc_real grip;     /* friction that is planned with, over that of the tire */
     /* of each friction: -2 ln of its likelihood over that of the best; its slip [rad]; the impulse of
      * the axles, followed by it [N s] */
     tireid_mpc_real cost[TIREID_MPC_GRIPS];

@@ -156,8 +156,8 @@ static void find_zero(
 static void move_of(const tireid_mpc_input *in, real moves[2])
 {
     const real square = in->e_psi * in->e_psi;
-    const real cosine = TIREID_MPC_C(1.0)
-        - (square * (TIREID_MPC_C(0.5) - (square / TIREID_MPC_C(24.0))));
+    const real cosine =
+        TIREID_MPC_C(1.0) - (square * (TIREID_MPC_C(0.5) - (square / TIREID_MPC_C(24.0))));
     const real bent = TIREID_MPC_C(1.0) - (square / TIREID_MPC_C(20.0));
     const real sine = in->e_psi * (TIREID_MPC_C(1.0) - ((square / TIREID_MPC_C(6.0)) * bent));
     const real along = (in->v_x[0] * cosine) - (in->v_y * sine);

@@ -36,8 +36,7 @@ class Tracker:
     max_iterations : of the solver.
     linearizations : a step; 1 in real time, some 10 to convergence.
     max_active_sets : sets of active limits that are tried in a row, each at half an iteration
-        of the interior point, before it and once it comes close; 0 takes that alone, and so does
-        caution.
+        of the interior point, before it and once it comes close; 0 takes that alone.
     single : whether to compute in float.
     caution : share of what is not known of the tires that is feared, from 0 to 1: see
         `mpc.realtime.caution`.
