@@ -12,7 +12,7 @@ biased: learnt and driven with a sensor that is off, channel and size as `random
 learnt: on the whole drive to learn on, without a fault: what caution costs where it is not needed.
 
 A car has left the path where it is more than 0.5 m off, spins, or gives up. Constants of the
-tracker were chosen on cars 0 to 5 of seeds of their own. Times are those of steps on the learnt
+tracker were chosen on cars of seeds below `FIRST_SEED`. Times are those of steps on the learnt
 tires of the first `TIMED` cars, each step's least of `ROUNDS` drives.
 Prints a table, writes OUT/mpc_caution.json.
 """

@@ -1,8 +1,9 @@
 """How much of what is not known of the tires the tracker fears: the numbers that its C reads.
 
 With caution c the tracker plans with a grip of 1 - c (1 - g), where g is the least friction over
-that of the tire that motion and band leave possible, and c times the band of the forces tightens
-the limits along the plan. The equations are in `mpc/c/tireid_mpc_caution.c`.
+that of the tire that motion does not refute, and c times the band of the forces tightens the limits
+along the plan. A wide band alone lowers no grip: the speed stays, and a plan that gives up grip
+which is there leaves the path. The equations are in `mpc/c/tireid_mpc_caution.c`.
 """
 
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from mpc.tires.tire import DOUBT_STEP, Car, Point, PredictionTire, curve_slopes, curves_at
+from mpc.tires.tire import DOUBT_STEP, Car, Point, PredictionTire, curve_slopes
 
 N_GRIPS = 9
 LEAST_GRIP = 0.25  # of the friction that a tire was learnt on: ice, after a dry road
@@ -55,28 +56,10 @@ def set_caution(params: NDArray[Any], tire: PredictionTire, caution: float) -> N
     params["doubt"], params["doubt_step"] = tire.doubt_or_told(), DOUBT_STEP
     params["force_error"] = FORCE_ERROR * np.array(tire.vehicle.axle_loads)
     params["stiffness"] = np.maximum(curve_slopes(tire)[0, 0], 0.1 * params["force_error"][0])
-    params["prior"] = prior_costs(tire, params["max_slip"]) if can else 0.0
+    params["prior"] = np.where(GRIPS < 1.0, SURPRISE, 0.0) if can else 0.0
 
 
 def offers_friction(tire: PredictionTire) -> bool:
     """Return whether the tire can be told for another friction."""
     numbers = Car(*tire.car)
     return tire.structure.similar(Point(0.0, 0.0, 0.0, 1.0, numbers, tire.weights), 1.0) is not None
-
-
-def prior_costs(tire: PredictionTire, slip: Array) -> Array:
-    """Return what each of `GRIPS` is held for by the band alone, (9,): the square of its distance.
-
-    In standard deviations of the force at the slip that is of use, of the axle that is known worse.
-
-    Parameters
-    ----------
-    slip : that is of use [rad], (2,).
-    """
-    at = np.minimum(slip, DOUBT_STEP * (tire.doubt_or_told().shape[1] - 1))
-    force = np.abs(np.diag(curves_at(tire, at)))
-    places = DOUBT_STEP * np.arange(tire.doubt_or_told().shape[1])
-    half = [np.interp(x, places, row) for x, row in zip(at, tire.doubt_or_told(), strict=True)]
-    share = float(np.max(np.array(half) / np.maximum(force, 1e-9))) / SIGMAS
-    costs: Array = np.minimum(((1.0 - GRIPS) / max(share, 1e-9)) ** 2, SURPRISE)
-    return costs

@@ -239,7 +239,7 @@ def add_parser(commands: Any) -> None:
         default=0.0,
         metavar="SHARE",
         help="of what is not known of the tires that the tracker fears: 0 believes in them, 1 "
-        "plans with the least grip that motion and band leave possible (%(default)g)",
+        "plans with the least grip that its motion leaves possible (%(default)g)",
     )
     add_seed(parser, "noise and learning")
     parser.add_argument(

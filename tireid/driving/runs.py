@@ -449,7 +449,7 @@ def drive(
         Where the car goes on learning it fades as the tires become known.
     seed : of the noise.
     caution : share of what is not known of the tires that the tracker fears, from 0, which
-        believes in them, to 1, which plans with the least grip that motion and band leave
+        believes in them, to 1, which plans with the least grip that its motion leaves
         possible.
 
     Returns

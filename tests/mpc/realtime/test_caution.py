@@ -6,7 +6,7 @@ import pytest
 from mpc.handover.road import at_friction
 from mpc.prediction import build_dynamics, build_rk4, state_size
 from mpc.realtime import Measurement, Status, Tracker
-from mpc.realtime.caution import GRIPS, SURPRISE, prior_costs, set_caution
+from mpc.realtime.caution import GRIPS, SURPRISE, set_caution
 from mpc.tires.tire import ALL, DOUBT_STEP, N_DOUBTS, curves_at
 from tests.mpc.realtime.conftest import PROBLEM
 from tests.mpc.test_prediction import TIRES
@@ -111,14 +111,11 @@ def test_a_friction_is_the_tire_with_weights_of_that_friction():
             )
 
 
-def test_a_tire_that_nobody_doubts_more_than_one_learnt_well_begins_at_its_grip(lagging):
-    costs = prior_costs(lagging, np.array([0.1, 0.1]))
-    assert costs[0] == 0.0
-    assert (np.diff(costs) >= 0.0).all()
-    assert costs[-1] == SURPRISE
+def test_a_wide_band_alone_lowers_no_grip(lagging):
     force = curves_at(lagging, DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64))
-    unknown = lagging._replace(doubt=np.abs(force) + 1.0)  # may give nothing at all
-    assert prior_costs(unknown, np.array([0.1, 0.1]))[4] < 1.0
+    tracker = make(lagging._replace(doubt=0.5 * np.abs(force)), 1.0)
+    assert (tracker.params["prior"] == np.where(GRIPS < 1.0, SURPRISE, 0.0)).all()
+    assert slalom(tracker, lagging, peak=0.006).min() > 0.9
 
 
 def test_doubt_tightens_slip_along_the_plan(lagging):
