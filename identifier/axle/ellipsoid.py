@@ -94,7 +94,7 @@ def outer_ellipsoid(
     ladder : slip scales of the units [rad].
     """
     known: Ellipsoid | None = Ellipsoid.around(len(ladder))
-    allowed = bound.allowed(strips.rate)[:, axle]
+    allowed = bound.allowed(strips.beyond, strips.rate)[:, axle]
     for h, y, wide in zip(strips.h[:, axle], strips.y[:, axle], allowed, strict=True):
         if known is None:
             return None

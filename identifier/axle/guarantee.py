@@ -1,18 +1,20 @@
 """Curves that a drive leaves possible: the weights lie in a polytope, the force between two bounds.
 
-For each mean over a moment |y - h'w| <= e + τ ρ, and the curve of any tire lies in the prior's box:
-both are linear in the weights w, in static axle loads.   y: force that the motion shows.   h: units
-at the lagged slip of the frozen model, times cos δ.   e: error of curve and sensors.   τ: time [s]
-by which force and curve may differ.   ρ: rate of the model's force [1/s], the larger of its size
-now and of its mean over the last 0.3 s.
+For each mean over a moment |y - h'w| <= e (1 + β) + τ ρ, and the curve of any tire lies in the
+prior's box: both are linear in the weights w, in static axle loads.   y: force that the motion
+shows.   h: units at the lagged slip of the frozen model, times cos δ.   e: error of curve and
+sensors.   β: by how much slip is beyond that which taught, over it, now or a while ago; it fades
+with 0.3 s.   τ: time [s] by which force and curve may differ.   ρ: rate of the force [1/s], the
+larger of its size now and of its mean over the last 0.3 s.
 A linear function of w is largest at a vertex of the polytope, so that the two linear programs of
 every slip, max and min of t'w with t = tanh(α/α_j), are one product with all vertices. The force
-lies between them, wider by e + τ ρ (set membership: Milanese and Vicino, Automatica 27, 1991).
+lies between them, wider by e (1 + β) + τ ρ (set membership: Milanese and Vicino, Automatica 27,
+1991).
 Of the constraints those are looked at that the answer to a part of them breaks, until none is left.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
@@ -26,7 +28,7 @@ from codegen.arrays import Array
 from identifier.axle.curve import unit_matrix
 from identifier.axle.learning import Bounds
 
-MEMORY = 0.3  # s: the mean of the rate
+MEMORY = 0.3  # s: of the rate, and of slip that was beyond
 SECANTS = tuple(0.004 * 2.0**k for k in np.arange(0.0, 7.5, 0.5))  # rad, where a curve bends down
 UNLIKELY = 1.5  # lateness, over error: chosen as `verdict.guaranteed.RESERVE` was
 FIRST, MORE = 150, 100  # constraints that are tried first, and added at a time
@@ -36,6 +38,7 @@ TINY = 1e-12  # of a size that is divided by: straight ahead nothing is said of 
 LARGEST_BOUND = 10.0  # static axle loads
 LONGEST_LATENESS = 1.0  # s
 MOST_VERTICES = 100_000
+AT_ONCE = 256  # samples times all vertices: so many products stay in the cache
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,25 +82,39 @@ class ForceBound:
         """
         return told if isinstance(told, ForceBound) else cls(error=(float(told), float(told)))
 
-    def allowed(self, rate: Array) -> Array:
-        """Return e + τ ρ [static axle loads], (k, 2).
+    def allowed(self, beyond: Array, rate: Array) -> Array:
+        """Return e (1 + β) + τ ρ [static axle loads], (k, 2).
 
         Parameters
         ----------
+        beyond : β of both axles, (k, 2).
         rate : ρ of both axles [1/s], (k, 2).
         """
-        wide: Array = np.array(self.error) + np.array(self.lateness) * rate
+        wide: Array = np.array(self.error) * (1.0 + beyond) + np.array(self.lateness) * rate
         return wide
 
 
+class DriveSignals(NamedTuple):
+    """Of a drive, by a model: lagged slip (n, 2) [rad], units times cos δ (n, 2, ladder), β (n, 2)
+    and ρ (n, 2) [1/s].
+    """
+
+    slip: Array
+    units: Array
+    beyond: Array
+    rate: Array
+
+
 class Strips(NamedTuple):
-    """What a drive says of the weights, mean by mean: y (m, 2), h (m, 2, n), ρ (m, 2); when it
-    begins t (m,) [s].
+    """What a drive says of the weights, mean by mean: y (m, 2), h (m, 2, n), β (m, 2), ρ (m, 2);
+    speed (m,) [m/s]; when it begins t (m,) [s].
     """
 
     y: Array
     h: Array
+    beyond: Array
     rate: Array
+    v_x: Array
     t: Array
 
     def until(self, m: int) -> "Strips":
@@ -156,7 +173,7 @@ def strip_sides(y: Array, h: Array, allowed: Array) -> HalfSpaces:
     ----------
     y : (m,).
     h : (m, n).
-    allowed : e + τ ρ (m,).
+    allowed : e (1 + β) + τ ρ (m,).
     """
     return HalfSpaces(np.vstack([h, -h]), np.concatenate([allowed + y, allowed - y]))
 
@@ -205,7 +222,7 @@ def least_bound(strips: Strips, axle: int, box: HalfSpaces) -> tuple[float, floa
     """
     y, h, rate = strips.y[:, axle], strips.h[:, axle], strips.rate[:, axle]
     n = h.shape[1]
-    beside = np.column_stack([np.ones(y.size), rate])
+    beside = np.column_stack([1.0 + strips.beyond[:, axle], rate])
     sides = np.vstack([np.hstack([h, -beside]), np.hstack([-h, -beside])])
     kept = np.hstack([box.A, np.zeros((box.b.size, 2))])
     among = HalfSpaces(np.vstack([kept, sides]), np.concatenate([box.b, y, -y]))
@@ -253,7 +270,7 @@ def possible_weights(strips: Strips, axle: int, bound: ForceBound, box: HalfSpac
     bound : of the errors.
     box : what any tire keeps.
     """
-    allowed = bound.allowed(strips.rate)[:, axle]
+    allowed = bound.allowed(strips.beyond, strips.rate)[:, axle]
     return vertices(box.both(strip_sides(strips.y[:, axle], strips.h[:, axle], allowed)))
 
 
@@ -266,18 +283,22 @@ class Guarantee:
     bound : of the errors.
     told : whether the bound was told; else it was estimated from the drive.
     corners : vertices of the possible weights of front and rear, (k, n) each.
+    speed : mean of the drive that taught [m/s].
 
     Raises
     ------
     ValueError
-        Where there are no corners, or one is not finite.
+        Where there are no corners, one is not finite, or the speed is not positive.
     """
 
     bound: ForceBound
     told: bool
     corners: tuple[Array, Array]
+    speed: float
 
     def __post_init__(self) -> None:
+        if not 0.0 < self.speed < np.inf:
+            raise ValueError(f"speed of the guarantee must be positive, it is {self.speed}")
         for corners in self.corners:
             if corners.ndim != 2 or not 0 < len(corners) <= MOST_VERTICES:
                 raise ValueError(
@@ -293,22 +314,21 @@ class Guarantee:
         ----------
         units : h of both axles (k, 2, n).
         """
-        of = [units[:, i] @ corners.T for i, corners in enumerate(self.corners)]
-        return (
-            np.stack([one.min(axis=1) for one in of], axis=1),
-            np.stack([one.max(axis=1) for one in of], axis=1),
-        )
+        of = [_extremes(units[:, i], corners) for i, corners in enumerate(self.corners)]
+        least, most = (np.stack(both, axis=1) for both in zip(*of, strict=True))
+        return least, most
 
-    def limits(self, units: Array, rate: Array) -> tuple[Array, Array]:
+    def limits(self, units: Array, beyond: Array, rate: Array) -> tuple[Array, Array]:
         """Return least and largest force, (k, 2) each [static axle loads].
 
         Parameters
         ----------
         units : h of both axles (k, 2, n).
+        beyond : β (k, 2).
         rate : ρ [1/s], (k, 2); 0 in steady state.
         """
         low, high = self.reach(units)
-        beside = self.bound.allowed(rate)
+        beside = self.bound.allowed(beyond, rate)
         return low - beside, high + beside
 
     def contradicted(self, strips: Strips) -> NDArray[np.bool_]:
@@ -320,7 +340,7 @@ class Guarantee:
         ----------
         strips : of that drive.
         """
-        low, high = self.limits(strips.h, strips.rate)
+        low, high = self.limits(strips.h, strips.beyond, strips.rate)
         outside: NDArray[np.bool_] = (strips.y < low - SLACK) | (strips.y > high + SLACK)
         return outside
 
@@ -331,6 +351,7 @@ class Guarantee:
             "lateness_s": list(self.bound.lateness),
             "told": self.told,
             "corners": [corners.tolist() for corners in self.corners],
+            "speed_m_s": self.speed,
         }
 
     @classmethod
@@ -368,24 +389,60 @@ class Guarantee:
             ),
             told=data["told"],
             corners=(front, rear),
+            speed=float(data["speed_m_s"]),
         )
 
 
-def force_rate(force: Array, dt: float, stretches: Iterator[slice]) -> Array:
+def _extremes(rows: Array, corners: Array) -> tuple[Array, Array]:
+    """Return least and largest product of each row (k, n) with corners (m, n), (k,) each."""
+    least, most = np.empty(len(rows)), np.empty(len(rows))
+    for first in range(0, len(rows), AT_ONCE):
+        part = slice(first, first + AT_ONCE)
+        products = corners @ rows[part].T
+        least[part], most[part] = products.min(axis=0), products.max(axis=0)
+    return least, most
+
+
+def force_rate(
+    units: Array, curves: Sequence[Array], dt: float, stretches: Iterable[slice]
+) -> Array:
     """Return ρ (k, 2) [1/s]: the larger of |dφ/dt| and of its mean over the last 0.3 s.
+
+    Of several curves that which changes most counts, at each instant.
 
     Parameters
     ----------
-    force : φ of the model (k, 2) [static axle loads].
+    units : tanh(x/α_j) of both axles (k, 2, n).
+    curves : weights of front and rear, (m, n) each [static axle loads].
     dt : sampling interval [s].
     stretches : samples that follow one another without a gap.
     """
-    rate, e = np.zeros_like(force), math.exp(-dt / MEMORY)
+    rate, e = np.zeros(units.shape[:2]), math.exp(-dt / MEMORY)
     for part in stretches:
-        here = force[part]
-        if len(here) < 2:
+        if part.stop - part.start < 2:
             continue
-        now = np.abs(np.gradient(here, dt, axis=0))
+        change = np.gradient(units[part], dt, axis=0)
+        of = [_extremes(change[:, i], weights) for i, weights in enumerate(curves)]
+        now = np.column_stack([np.maximum(-least, most) for least, most in of])
         mean, _ = lfilter([1.0 - e], [1.0, -e], now, axis=0, zi=e * now[:1])
         rate[part] = np.maximum(now, mean)
     return rate
+
+
+def slip_beyond(slip: Array, driven: Array, dt: float, stretches: Iterable[slice]) -> Array:
+    """Return β (k, 2): the largest |x|/x_driven - 1 until now, each fading with 0.3 s; 0 within.
+
+    Parameters
+    ----------
+    slip : lagged x (k, 2) [rad].
+    driven : largest of the drive that taught (2,), positive [rad].
+    dt : sampling interval [s].
+    stretches : samples that follow one another without a gap.
+    """
+    beyond = np.zeros_like(slip)
+    for part in stretches:
+        over = np.maximum(np.abs(slip[part]) / driven - 1.0, 0.0)
+        age = dt / MEMORY * np.arange(len(over))[:, None]
+        with np.errstate(divide="ignore"):  # ln 0: nothing was beyond yet
+            beyond[part] = np.exp(np.maximum.accumulate(np.log(over) + age, axis=0) - age)
+    return beyond

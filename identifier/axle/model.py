@@ -25,7 +25,7 @@ from identifier.axle.car import Car, car_numbers
 from identifier.axle.curve import EDGES, doublings, unit_matrix
 from identifier.axle.dynamics import lagged_force, series_compliance, static_curve
 from identifier.axle.gate import GateState, Plausibility
-from identifier.axle.guarantee import Guarantee, force_rate
+from identifier.axle.guarantee import DriveSignals, Guarantee, force_rate, slip_beyond
 from identifier.axle.prior import SD_FRICTION, friction_direction
 from identifier.axle.slip import SHORTEST, Sway, SwayState
 from identifier.axle.step import FROZEN_CARRY, OVER, build_frozen
@@ -327,7 +327,8 @@ class AxleModel(TireModel):
         if self.guarantee is None:
             return None
         units = np.repeat(unit_matrix(alpha, self.ladder)[:, None], 2, axis=1)
-        low, high = self.guarantee.limits(units, np.abs(rate)[:, None])
+        beyond = np.maximum(np.abs(alpha)[:, None] / self._driven_slip - 1.0, 0.0)
+        low, high = self.guarantee.limits(units, beyond, np.abs(rate)[:, None])
         return low * self._loads, high * self._loads
 
     def guaranteed_force(self, recording: Recording) -> tuple[Array, Array] | None:
@@ -341,25 +342,42 @@ class AxleModel(TireModel):
         """
         if self.guarantee is None:
             return None
-        _, units, rate = self.signals_of(recording)
-        low, high = self.guarantee.limits(units, rate)
+        _, units, beyond, rate = self.signals_of(recording)
+        low, high = self.guarantee.limits(units, beyond, rate)
         stands = recording.v_x < self.min_speed
         low[stands], high[stands] = np.nan, np.nan
         return low * self._loads, high * self._loads
 
-    def signals_of(self, recording: Recording) -> tuple[Array, Array, Array]:
-        """Return lagged slip (n, 2) [rad], units times cos δ (n, 2, ladder), and ρ (n, 2) [1/s].
+    def signals_of(self, recording: Recording) -> DriveSignals:
+        """Return slip, units, β and ρ over a drive.
+
+        ρ is of the model's force; where a guarantee is stated, of that possible one which changes
+        most, and the slower the car is against the drive that taught, the larger: the lag of a tire
+        is a length.
 
         Parameters
         ----------
         recording : its signals are the input.
         """
-        slip = self.lagged_slip(recording)
+        slip, stretches = self.lagged_slip(recording), recording.stretches
         T = np.stack([unit_matrix(slip[:, i], self.ladder) for i in range(2)], axis=1)
-        force: Array = np.einsum("kij,ij->ki", T, self.W)
-        rate = force_rate(force, recording.dt, iter(recording.stretches))
+        beyond = slip_beyond(slip, self._driven_slip, recording.dt, stretches)
+        if self.guarantee is None:
+            rate = force_rate(T, (self.W[:1], self.W[1:]), recording.dt, stretches)
+        else:
+            rate = force_rate(T, self.guarantee.corners, recording.dt, stretches)
+            v_x = np.maximum(recording.v_x, self.min_speed)
+            rate *= np.maximum(self.guarantee.speed / v_x, 1.0)[:, None]
         T *= np.cos(np.column_stack([recording.delta_f, recording.delta_r]))[..., None]
-        return slip, T, rate
+        return DriveSignals(slip, T, beyond, rate)
+
+    @property
+    def _driven_slip(self) -> Array:
+        """Largest slip that was seen while learning [rad], (2,); at least that of the first unit,
+        below which any curve is a line.
+        """
+        driven: Array = np.maximum(self.excitation[:, 0], self.ladder[0])
+        return driven
 
     def _posterior(self, factors: Array | None = None) -> Array:
         """Return the covariance of both axles, its noise as colored as it was."""

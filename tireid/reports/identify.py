@@ -259,7 +259,8 @@ def guaranteed_sentence(model: TireModel) -> str:
         f"Guaranteed at the end of the known slip: a force of {ends[0]} / {ends[1]} static axle "
         "loads (front / rear), if no force of the drive or of another differs from the best curve "
         f"by more than {front:.3f} / {rear:.3f} static axle loads, and {late_front:.0f} / "
-        f"{late_rear:.0f} ms times how fast it changes. That bound was "
+        f"{late_rear:.0f} ms times how fast it changes; where slip is beyond that of the drive, by "
+        "as much more as slip is. That bound was "
         f"{'told' if given.told else 'estimated from the drive'}."
     )
 

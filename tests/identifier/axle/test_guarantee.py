@@ -17,6 +17,7 @@ from identifier.axle.guarantee import (
     least_bound,
     possible_weights,
     prior_box,
+    slip_beyond,
     strip_sides,
     vertices,
 )
@@ -43,12 +44,25 @@ def drawn_strips(rng, error, m=120):
     h = np.tanh(slip[:, None] / LADDER)
     y = h @ TIRE + error * rng.uniform(-1.0, 1.0, m)
     both = np.repeat(h[:, None], 2, axis=1)
-    return Strips(np.column_stack([y, y]), both, np.zeros((m, 2)), 0.1 * np.arange(m))
+    return steady_strips(np.column_stack([y, y]), both)
 
 
-def swung(seed, speed, **road):
+def steady_strips(y, h):
+    """Means of a drive within the slip that taught, at 20 m/s, whose forces do not change."""
+    m = len(y)
+    return Strips(
+        y=y,
+        h=h,
+        beyond=np.zeros((m, 2)),
+        rate=np.zeros((m, 2)),
+        v_x=np.full(m, 20.0),
+        t=0.1 * np.arange(m),
+    )
+
+
+def swung(seed, speed, amplitude=0.08, **road):
     steering = RandomSteer(
-        amplitude=0.08, frequency=0.6, seed=seed, onset=1.0, rate_limit=0.8, duration=16.0
+        amplitude=amplitude, frequency=0.6, seed=seed, onset=1.0, rate_limit=1.0, duration=16.0
     )
     return Plant(sedan()).simulate(steering, speed=speed, **road).recording()
 
@@ -118,7 +132,7 @@ def test_a_box_holds_brush_tires_and_no_tire_that_stiffens():
         sliding = np.minimum(np.tan(np.abs(SLIP)) * stiffness / (3.0 * friction), 1.0)
         force = np.sign(SLIP) * friction * (1.0 - (1.0 - sliding) ** 3)
         units = np.repeat(np.tanh(SLIP[:, None] / LADDER)[:, None], 2, axis=1)
-        strips = Strips(np.column_stack([force, force]), units, np.zeros((SLIP.size, 2)), SLIP)
+        strips = steady_strips(np.column_stack([force, force]), units)
         assert least_bound(strips, 0, BOX)[0] < 0.05 * friction
     stiffens = np.array([-0.4, 0.0, 0.0, 2.5])
     assert (BOX.b >= BOX.A @ TIRE).all() and not (BOX.A @ stiffens <= BOX.b).all()
@@ -195,6 +209,7 @@ def test_a_stored_guarantee_comes_back(model, tmp_path):
         ("error_static_axle_loads", [0.1]),
         ("lateness_s", [0.0, -1.0]),
         ("told", "yes"),
+        ("speed_m_s", -3.0),
     ):
         with pytest.raises(FrozenModelError):
             type(model).from_dict(data | {"guarantee": data["guarantee"] | {key: wrong}}, "file")
@@ -232,11 +247,57 @@ def test_without_a_measured_v_y_nothing_is_guaranteed(run):
 def test_the_rate_of_a_ramp_is_its_slope_and_fades_behind_it():
     dt, t = 0.01, np.arange(300)
     ramp = np.minimum(0.02 * t, 2.0)  # 2 per second, for a second
-    rate = force_rate(np.column_stack([ramp, 0.5 * ramp]), dt, iter([slice(0, 300)]))
+    units, curves = (
+        np.repeat(ramp[:, None, None], 2, axis=1),
+        (np.ones((1, 1)), np.full((1, 1), 0.5)),
+    )
+    rate = force_rate(units, curves, dt, [slice(0, 300)])
     np.testing.assert_allclose(rate[:99], np.tile([2.0, 1.0], (99, 1)))
     np.testing.assert_allclose(rate[200, 0], 2.0 * np.exp(-1.0 / 0.3), rtol=0.05)
-    gap = force_rate(np.column_stack([ramp, ramp]), dt, iter([slice(0, 150), slice(150, 300)]))
+    gap = force_rate(units, curves, dt, [slice(0, 150), slice(150, 300)])
     assert (gap[150:] == 0.0).all()  # nothing is remembered over a gap
+    several = force_rate(units, (np.array([[0.2], [-3.0], [1.0]]), curves[1]), dt, [slice(0, 300)])
+    np.testing.assert_allclose(several, rate * [3.0, 1.0])  # that which changes most counts
+
+
+def test_slip_beyond_what_taught_is_remembered_for_a_while():
+    dt, slip = 0.01, np.zeros((200, 2))
+    slip[50:53, 0] = [-0.15, 0.3, 0.12]
+    beyond = slip_beyond(slip, np.array([0.1, 0.2]), dt, [slice(0, 120), slice(120, 200)])
+    np.testing.assert_allclose(beyond[49:52, 0], [0.0, 0.5, 2.0])
+    np.testing.assert_allclose(beyond[51:120, 0], 2.0 * np.exp(-dt * np.arange(69) / 0.3))
+    assert (beyond[120:] == 0.0).all() and (beyond[:, 1] == 0.0).all()
+    again = np.tile(slip, (200, 1))  # it decays by sums of exponents: none may overflow
+    assert np.isfinite(slip_beyond(again, np.array([0.1, 0.2]), 1.0, [slice(0, 40_000)])).all()
+
+
+def test_a_return_from_slip_that_did_not_teach_stays_inside(model):
+    """A slower car with twice the slip comes back late: what no curve of the drive shows."""
+    for seed, speed in ((6, 13.0), (9, 16.0)):
+        drive = swung(seed, speed, amplitude=0.25)
+        slip, units, beyond, rate = model.signals_of(drive)
+        assert np.abs(slip).max() > 1.5 * model.excitation[:, 0].max()
+        y, late = drive.axle_force / model.vehicle.axle_loads, drive.t > 1.0
+        low, high = model.guarantee.limits(units, beyond, rate)
+        assert ((low <= y) & (y <= high))[late].all()
+        own = replace(model, guarantee=None).signals_of(drive)
+        assert (rate >= own.rate - 1e-9).all()  # the model's curve is one of the possible ones
+        low, high = model.guarantee.limits(units, 0.0 * beyond, own.rate)
+        assert not ((low <= y) & (y <= high))[late].all()  # the same without either
+
+
+def test_the_bound_grows_with_slip_that_did_not_teach(model):
+    driven, wide = model.excitation[0, 0], ForceBound(error=(0.1, 0.1))
+    np.testing.assert_allclose(
+        wide.allowed(np.array([[0.0, 0.5]]), np.zeros((1, 2))), [[0.1, 0.15]]
+    )
+    at = np.array([driven, 2.0 * driven])
+    low, high = (side[:, 0] / model.vehicle.axle_loads[0] for side in model.guaranteed_band(at))
+    units = np.repeat(np.tanh(at[:, None] / LADDER)[:, None], 2, axis=1)
+    least, most = (side[:, 0] for side in model.guarantee.reach(units))
+    error = model.guarantee.bound.error[0]
+    np.testing.assert_allclose(high - most, [error, 2.0 * error])
+    np.testing.assert_allclose(least - low, [error, 2.0 * error])
 
 
 def test_the_ellipsoid_holds_the_polytope_and_shrinks():
@@ -285,6 +346,8 @@ def test_a_cut_of_a_ball_is_as_small_as_a_search_finds(y, allowed):
 
 def test_an_empty_guarantee_is_refused():
     with pytest.raises(ValueError, match="corners"):
-        Guarantee(bound=ForceBound(error=(1, 1)), told=True, corners=(np.ones((0, 4)),) * 2)
+        Guarantee(
+            bound=ForceBound(error=(1, 1)), told=True, corners=(np.ones((0, 4)),) * 2, speed=9.0
+        )
     nowhere = HalfSpaces(np.array([[1.0], [-1.0]]), np.array([0.0, -1.0]))
     assert vertices(nowhere) is None
