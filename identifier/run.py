@@ -201,8 +201,8 @@ class History:
         """Return the model of `freeze` with a guaranteed band: what no curve can leave.
 
         Where |F/F_z - φ| <= e (1 + β) + τ ρ holds of some curve φ at every instant, the true force
-        lies in `guaranteed_band`. It is the frozen model where the method learns no curve of slip, no
-        lateral velocity was measured, or too little is driven.
+        lies in `guaranteed_band`. It is the frozen model where the method learns no curve of slip,
+        no lateral velocity was measured, or too little is driven.
 
         Parameters
         ----------

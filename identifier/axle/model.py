@@ -327,7 +327,7 @@ class AxleModel(TireModel):
         if self.guarantee is None:
             return None
         units = np.repeat(unit_matrix(alpha, self.ladder)[:, None], 2, axis=1)
-        beyond = np.maximum(np.abs(alpha)[:, None] / self._driven_slip - 1.0, 0.0)
+        beyond = np.maximum(np.abs(alpha)[:, None] / self.driven_slip - 1.0, 0.0)
         low, high = self.guarantee.limits(units, beyond, np.abs(rate)[:, None])
         return low * self._loads, high * self._loads
 
@@ -361,7 +361,7 @@ class AxleModel(TireModel):
         """
         slip, stretches = self.lagged_slip(recording), recording.stretches
         T = np.stack([unit_matrix(slip[:, i], self.ladder) for i in range(2)], axis=1)
-        beyond = slip_beyond(slip, self._driven_slip, recording.dt, stretches)
+        beyond = slip_beyond(slip, self.driven_slip, recording.dt, stretches)
         if self.guarantee is None:
             rate = force_rate(T, (self.W[:1], self.W[1:]), recording.dt, stretches)
         else:
@@ -372,7 +372,7 @@ class AxleModel(TireModel):
         return DriveSignals(slip, T, beyond, rate)
 
     @property
-    def _driven_slip(self) -> Array:
+    def driven_slip(self) -> Array:
         """Largest slip that was seen while learning [rad], (2,); at least that of the first unit,
         below which any curve is a line.
         """

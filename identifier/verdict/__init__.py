@@ -3,12 +3,14 @@
 from identifier.verdict.bands import calibrated, within_band
 from identifier.verdict.guaranteed import BoundViolatedError, contradictions, guaranteed
 from identifier.verdict.judging import judge, judge_prediction
+from identifier.verdict.online_bound import OnlineBound
 from identifier.verdict.verdict import Number, Objection, Verdict
 
 __all__ = [
     "BoundViolatedError",
     "Number",
     "Objection",
+    "OnlineBound",
     "Verdict",
     "calibrated",
     "contradictions",

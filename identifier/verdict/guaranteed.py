@@ -53,15 +53,14 @@ def strips_of(model: AxleModel, recording: Recording, road: Array | None = None)
     recording : the drive.
     road : what a banked road pushes to the left at each sample [weights], (n,); None unknown.
     """
-    vehicle = model.vehicle
     if recording.logged_v_y is None:
         return None
-    drives = recording.v_x >= max(model.min_speed, BRISK * vehicle.froude_speed)
+    drives = recording.v_x >= least_speed(model)
     windows = Windows.where(drives, recording, WINDOW, OVERLAPPING)
     if len(windows) < FEWEST:
         return None
-    g, slope = _triangle(windows.n, recording.dt)
-    impulse, sideways = impulse_signals(recording, vehicle, road)
+    g, slope = triangle(windows.n, recording.dt)
+    impulse, sideways = impulse_signals(recording, model.vehicle, road)
     _, units, beyond, rate = model.signals_of(recording)
 
     def mean(signal: Array, weights: Array) -> Array:
@@ -79,8 +78,24 @@ def strips_of(model: AxleModel, recording: Recording, road: Array | None = None)
     )
 
 
-def _triangle(n: int, dt: float) -> tuple[Array, Array]:
-    """Return g (n + 1,), and the weights whose product with ξ is Σ g dξ/dt [1/s]."""
+def least_speed(model: AxleModel) -> float:
+    """Return the speed [m/s] from which a moment counts.
+
+    Parameters
+    ----------
+    model : of the car.
+    """
+    return max(model.min_speed, BRISK * model.vehicle.froude_speed)
+
+
+def triangle(n: int, dt: float) -> tuple[Array, Array]:
+    """Return g (n + 1,), and the weights whose product with ξ is Σ g dξ/dt [1/s].
+
+    Parameters
+    ----------
+    n : steps of a moment.
+    dt : sampling interval [s].
+    """
     step = np.minimum(np.arange(n) + 0.5, n - np.arange(n) - 0.5)  # of each step, in its middle
     step /= step.sum()
     around = np.pad(step, 1)

@@ -24,7 +24,7 @@ from identifier.axle.guarantee import (
 from identifier.method import FrozenModelError
 from identifier.methods import load_model, make_method
 from identifier.run import identify
-from identifier.verdict import BoundViolatedError, contradictions
+from identifier.verdict import BoundViolatedError, OnlineBound, contradictions
 from identifier.verdict.guaranteed import strips_of
 from models.friction import Friction, FrictionChange
 from models.maneuvers import RandomSteer
@@ -315,6 +315,56 @@ def test_the_ellipsoid_holds_the_polytope_and_shrinks():
     assert known.cut(strips.h[0, 0], strips.y[0, 0] + 1.0, 0.05) is None  # what cannot be is told
     assert outer_ellipsoid(strips._replace(y=strips.y + 5.0 * strips.t[:, None]), 0, bound,
                            DESIGN.ladder) is None  # fmt: skip
+
+
+def taken(online, drive):
+    """Whether front or rear was violated after each sample, (n, 2)."""
+    told = []
+    for x, u, v_x in zip(drive.x, drive.u, drive.v_x, strict=True):
+        online.update(x, u, v_x)
+        told.append(online.violated)
+    return np.array(told)
+
+
+def test_sample_by_sample_the_ellipsoids_are_those_of_the_recording(run):
+    frozen, bound = run.freeze(), ForceBound(error=(0.1, 0.12), lateness=(0.01, 0.02))
+    for drive in (run.recording, swung(6, 13.0, amplitude=0.25)):  # within what taught, and beyond
+        online = OnlineBound(frozen, bound, drive.dt)
+        assert not taken(online, drive).any()
+        strips = strips_of(frozen, drive)
+        strips = strips.until(int(np.sum(strips.t + 0.31 <= drive.t[-1] + 1e-9)))
+        for axle in range(2):
+            outer = outer_ellipsoid(strips, axle, bound, DESIGN.ladder)
+            np.testing.assert_allclose(online.left[axle].center, outer.center, atol=1e-9)
+            np.testing.assert_allclose(online.left[axle].shape, outer.shape, atol=1e-9)
+    online = OnlineBound(frozen, bound, run.recording.dt)
+    taken(online, run.recording)
+    inner = run.guaranteed(bound).guaranteed_band(SLIP)
+    low, high = online.band(SLIP)
+    assert (low <= inner[0] + 1e-6).all() and (high >= inner[1] - 1e-6).all()
+    assert (high - low)[12:19].max() < 2.5 * (inner[1] - inner[0])[12:19].max()
+
+
+def test_while_driving_a_violated_bound_is_told(model):
+    wet = swung(4, 17.0, friction=Friction(changes=(FrictionChange(scale=0.4, at_time=6.0),)))
+    online = OnlineBound(model, model.guarantee.bound, wet.dt)
+    told = taken(online, wet).any(axis=1)
+    assert told.any() and 6.0 < wet.t[np.argmax(told)] < 10.0
+    assert online.band(SLIP) is None
+    assert taken(online, wet).any(axis=1).all()  # it stays so
+
+
+def test_a_gap_while_driving_is_no_contradiction(model):
+    first, then = swung(4, 17.0), swung(5, 23.0).between(6.0, 12.0)
+    online = OnlineBound(model, model.guarantee.bound, first.dt)
+    assert not taken(online, first.between(0.0, 9.0)).any()
+    online.update(np.array([np.nan, 0.0]), np.zeros(2), 17.0)
+    assert not taken(online, then).any()
+    online = OnlineBound(model, model.guarantee.bound, first.dt)
+    assert not taken(online, first.between(0.0, 9.0)).any()
+    assert taken(online, then).any()  # a jump from one drive to the other
+    with pytest.raises(ValueError, match="dt must be positive"):
+        OnlineBound(model, 0.1, 0.0)
 
 
 @pytest.mark.parametrize(("y", "allowed"), [(0.6, 0.3), (0.0, 0.2), (-2.2, 0.5), (0.1, 5.0)])
