@@ -31,7 +31,7 @@ from benchmarks.targets import Targets, keeps
 from codegen.arrays import Array
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.ellipsoid import outer_ellipsoid
-from identifier.axle.guarantee import ForceBound, Strips, least_bound, prior_box
+from identifier.axle.guarantee import Doubt, ForceBound, Strips, least_bound, prior_box
 from identifier.run import History, identify
 from identifier.verdict.guaranteed import strips_of
 from models.recordings import Recording, read_recording
@@ -119,9 +119,9 @@ def true_bound(run: History, drives: list[Recording]) -> ForceBound:
     for drive in drives:
         force, counts = drive.axle_force, moving(drive, STRAIGHT)
         assert force is not None
-        _, units, beyond, rate = model.signals_of(blind(drive))
+        units, doubt = model.signals_of(blind(drive))
         y = force / np.array(model.vehicle.axle_loads)
-        signals = (y, units, beyond, rate, drive.v_x, drive.t)
+        signals = (y, units, *doubt, drive.v_x, drive.t)
         parts.append(Strips(*(values[counts] for values in signals)))
     all_of = Strips(*(np.concatenate(values) for values in zip(*parts, strict=True)))
     none_late = all_of._replace(rate=np.zeros_like(all_of.rate))
@@ -138,7 +138,7 @@ def ellipsoid_over_polytope(run: History, model: AxleModel) -> float:
     assert strips is not None
     slip = np.linspace(0.1, 1.0, 10)[:, None] * model.known_slip
     units = np.tanh(slip[..., None] / np.array(model.ladder))
-    low, high = guarantee.limits(units, np.zeros_like(slip), np.zeros_like(slip))
+    low, high = guarantee.limits(units, Doubt.none(len(slip)))
     ratios = []
     for axle in range(2):
         outer = outer_ellipsoid(strips, axle, guarantee.bound, model.ladder)

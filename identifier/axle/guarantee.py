@@ -94,26 +94,36 @@ class ForceBound:
         return wide
 
 
-class DriveSignals(NamedTuple):
-    """Of a drive, by a model: lagged slip (n, 2) [rad], units times cos δ (n, 2, ladder), β (n, 2)
-    and ρ (n, 2) [1/s].
+class Doubt(NamedTuple):
+    """What opens a band over a drive, (n, 2) each: β, ρ [1/s], and the share of the force that a
+    force along the car may cost.
     """
 
-    slip: Array
-    units: Array
     beyond: Array
     rate: Array
+    lost: Array
+
+    @classmethod
+    def none(cls, n: int) -> Self:
+        """Return that of n steady forces within the slip that taught, along which nothing pushes.
+
+        Parameters
+        ----------
+        n : how many.
+        """
+        return cls(*np.zeros((3, n, 2)))
 
 
 class Strips(NamedTuple):
-    """What a drive says of the weights, mean by mean: y (m, 2), h (m, 2, n), β (m, 2), ρ (m, 2);
-    speed (m,) [m/s]; when it begins t (m,) [s].
+    """What a drive says of the weights, mean by mean: y (m, 2), h (m, 2, n), means of `Doubt`
+    (m, 2); speed (m,) [m/s]; when it begins t (m,) [s].
     """
 
     y: Array
     h: Array
     beyond: Array
     rate: Array
+    lost: Array
     v_x: Array
     t: Array
 
@@ -318,18 +328,17 @@ class Guarantee:
         least, most = (np.stack(both, axis=1) for both in zip(*of, strict=True))
         return least, most
 
-    def limits(self, units: Array, beyond: Array, rate: Array) -> tuple[Array, Array]:
+    def limits(self, units: Array, doubt: Doubt) -> tuple[Array, Array]:
         """Return least and largest force, (k, 2) each [static axle loads].
 
         Parameters
         ----------
         units : h of both axles (k, 2, n).
-        beyond : β (k, 2).
-        rate : ρ [1/s], (k, 2); 0 in steady state.
+        doubt : that opens the band.
         """
         low, high = self.reach(units)
-        beside = self.bound.allowed(beyond, rate)
-        return low - beside, high + beside
+        kept, beside = 1.0 - doubt.lost, self.bound.allowed(doubt.beyond, doubt.rate)
+        return np.minimum(low, kept * low) - beside, np.maximum(high, kept * high) + beside
 
     def contradicted(self, strips: Strips) -> NDArray[np.bool_]:
         """Return which means of another drive no possible curve explains, (m, 2).
@@ -340,7 +349,7 @@ class Guarantee:
         ----------
         strips : of that drive.
         """
-        low, high = self.limits(strips.h, strips.beyond, strips.rate)
+        low, high = self.limits(strips.h, Doubt(strips.beyond, strips.rate, strips.lost))
         outside: NDArray[np.bool_] = (strips.y < low - SLACK) | (strips.y > high + SLACK)
         return outside
 
@@ -417,16 +426,22 @@ def force_rate(
     dt : sampling interval [s].
     stretches : samples that follow one another without a gap.
     """
-    rate, e = np.zeros(units.shape[:2]), math.exp(-dt / MEMORY)
+    rate = np.zeros(units.shape[:2])
     for part in stretches:
         if part.stop - part.start < 2:
             continue
         change = np.gradient(units[part], dt, axis=0)
         of = [_extremes(change[:, i], weights) for i, weights in enumerate(curves)]
         now = np.column_stack([np.maximum(-least, most) for least, most in of])
-        mean, _ = lfilter([1.0 - e], [1.0, -e], now, axis=0, zi=e * now[:1])
-        rate[part] = np.maximum(now, mean)
+        rate[part] = np.maximum(now, _faded(now, dt))
     return rate
+
+
+def _faded(signal: Array, dt: float) -> Array:
+    """Return the mean of a signal (k, ...) over the last 0.3 s, fading."""
+    e = math.exp(-dt / MEMORY)
+    mean: Array = lfilter([1.0 - e], [1.0, -e], signal, axis=0, zi=e * signal[:1])[0]
+    return mean
 
 
 def slip_beyond(slip: Array, driven: Array, dt: float, stretches: Iterable[slice]) -> Array:
@@ -446,3 +461,33 @@ def slip_beyond(slip: Array, driven: Array, dt: float, stretches: Iterable[slice
         with np.errstate(divide="ignore"):  # ln 0: nothing was beyond yet
             beyond[part] = np.exp(np.maximum.accumulate(np.log(over) + age, axis=0) - age)
     return beyond
+
+
+def grip_lost(along: Array, grip: Array) -> Array:
+    """Return which share of a side force a force along the car may cost, (k, 2).
+
+    An ellipse: 1 - √(1 - (f/grip)²). Which axle is driven or braked nobody tells; each could be.
+
+    Parameters
+    ----------
+    along : f, force along the car over the load of each axle (k, 2).
+    grip : what the axle carries at least (2,) [static axle loads].
+    """
+    lost: Array = 1.0 - np.sqrt(1.0 - np.minimum(np.abs(along) / np.maximum(grip, TINY), 1.0) ** 2)
+    return lost
+
+
+def along_acceleration(v_x: Array, turning: Array, dt: float, stretches: Iterable[slice]) -> Array:
+    """Return dv_x/dt - v_y r over the last 0.3 s (k,) [m/s²].
+
+    Parameters
+    ----------
+    v_x : forward speed (k,) [m/s].
+    turning : v_y r (k,) [m/s²].
+    dt : sampling interval [s].
+    stretches : samples that follow one another without a gap.
+    """
+    along = np.zeros_like(v_x)
+    for part in stretches:
+        along[part] = (v_x[part] - _faded(v_x[part], dt)) / MEMORY - _faded(turning[part], dt)
+    return along

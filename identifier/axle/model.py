@@ -25,7 +25,14 @@ from identifier.axle.car import Car, car_numbers
 from identifier.axle.curve import EDGES, doublings, unit_matrix
 from identifier.axle.dynamics import lagged_force, series_compliance, static_curve
 from identifier.axle.gate import GateState, Plausibility
-from identifier.axle.guarantee import DriveSignals, Guarantee, force_rate, slip_beyond
+from identifier.axle.guarantee import (
+    Doubt,
+    Guarantee,
+    along_acceleration,
+    force_rate,
+    grip_lost,
+    slip_beyond,
+)
 from identifier.axle.prior import SD_FRICTION, friction_direction
 from identifier.axle.slip import SHORTEST, Sway, SwayState
 from identifier.axle.step import FROZEN_CARRY, OVER, build_frozen
@@ -328,7 +335,8 @@ class AxleModel(TireModel):
             return None
         units = np.repeat(unit_matrix(alpha, self.ladder)[:, None], 2, axis=1)
         beyond = np.maximum(np.abs(alpha)[:, None] / self.driven_slip - 1.0, 0.0)
-        low, high = self.guarantee.limits(units, beyond, np.abs(rate)[:, None])
+        rates = np.repeat(np.abs(rate)[:, None], 2, axis=1)
+        low, high = self.guarantee.limits(units, Doubt(beyond, rates, np.zeros_like(rates)))
         return low * self._loads, high * self._loads
 
     def guaranteed_force(self, recording: Recording) -> tuple[Array, Array] | None:
@@ -342,14 +350,13 @@ class AxleModel(TireModel):
         """
         if self.guarantee is None:
             return None
-        _, units, beyond, rate = self.signals_of(recording)
-        low, high = self.guarantee.limits(units, beyond, rate)
+        low, high = self.guarantee.limits(*self.signals_of(recording))
         stands = recording.v_x < self.min_speed
         low[stands], high[stands] = np.nan, np.nan
         return low * self._loads, high * self._loads
 
-    def signals_of(self, recording: Recording) -> DriveSignals:
-        """Return slip, units, β and ρ over a drive.
+    def signals_of(self, recording: Recording) -> tuple[Array, Doubt]:
+        """Return units times cos δ over a drive, (n, 2, ladder), and what opens a band.
 
         ρ is of the model's force; where a guarantee is stated, of that possible one which changes
         most, and the slower the car is against the drive that taught, the larger: the lag of a tire
@@ -359,17 +366,24 @@ class AxleModel(TireModel):
         ----------
         recording : its signals are the input.
         """
-        slip, stretches = self.lagged_slip(recording), recording.stretches
+        slip, dt, stretches = self.lagged_slip(recording), recording.dt, recording.stretches
         T = np.stack([unit_matrix(slip[:, i], self.ladder) for i in range(2)], axis=1)
-        beyond = slip_beyond(slip, self.driven_slip, recording.dt, stretches)
         if self.guarantee is None:
-            rate = force_rate(T, (self.W[:1], self.W[1:]), recording.dt, stretches)
+            rate = force_rate(T, (self.W[:1], self.W[1:]), dt, stretches)
         else:
-            rate = force_rate(T, self.guarantee.corners, recording.dt, stretches)
+            rate = force_rate(T, self.guarantee.corners, dt, stretches)
             v_x = np.maximum(recording.v_x, self.min_speed)
             rate *= np.maximum(self.guarantee.speed / v_x, 1.0)[:, None]
+        v_y = 0.0 if recording.v_y is None else recording.v_y
+        along = along_acceleration(recording.v_x, v_y * recording.r, dt, stretches)
+        carried = (unit_matrix(self.driven_slip, self.ladder) * self.W).sum(axis=1)
+        doubt = Doubt(
+            beyond=slip_beyond(slip, self.driven_slip, dt, stretches),
+            rate=rate,
+            lost=grip_lost(along[:, None] * self.vehicle.mass / self._loads, carried),
+        )
         T *= np.cos(np.column_stack([recording.delta_f, recording.delta_r]))[..., None]
-        return DriveSignals(slip, T, beyond, rate)
+        return T, doubt
 
     @property
     def driven_slip(self) -> Array:

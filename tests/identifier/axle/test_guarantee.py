@@ -9,11 +9,13 @@ from scipy.optimize import linprog
 from identifier.axle import AxleIdentifier
 from identifier.axle.ellipsoid import Ellipsoid, outer_ellipsoid
 from identifier.axle.guarantee import (
+    Doubt,
     ForceBound,
     Guarantee,
     HalfSpaces,
     Strips,
     force_rate,
+    grip_lost,
     least_bound,
     possible_weights,
     prior_box,
@@ -55,6 +57,7 @@ def steady_strips(y, h):
         h=h,
         beyond=np.zeros((m, 2)),
         rate=np.zeros((m, 2)),
+        lost=np.zeros((m, 2)),
         v_x=np.full(m, 20.0),
         t=0.1 * np.arange(m),
     )
@@ -275,15 +278,38 @@ def test_a_return_from_slip_that_did_not_teach_stays_inside(model):
     """A slower car with twice the slip comes back late: what no curve of the drive shows."""
     for seed, speed in ((6, 13.0), (9, 16.0)):
         drive = swung(seed, speed, amplitude=0.25)
-        slip, units, beyond, rate = model.signals_of(drive)
-        assert np.abs(slip).max() > 1.5 * model.excitation[:, 0].max()
+        units, doubt = model.signals_of(drive)
+        assert np.abs(model.lagged_slip(drive)).max() > 1.5 * model.excitation[:, 0].max()
         y, late = drive.axle_force / model.vehicle.axle_loads, drive.t > 1.0
-        low, high = model.guarantee.limits(units, beyond, rate)
+        low, high = model.guarantee.limits(units, doubt)
         assert ((low <= y) & (y <= high))[late].all()
-        own = replace(model, guarantee=None).signals_of(drive)
-        assert (rate >= own.rate - 1e-9).all()  # the model's curve is one of the possible ones
-        low, high = model.guarantee.limits(units, 0.0 * beyond, own.rate)
+        _, own = replace(model, guarantee=None).signals_of(drive)
+        assert (doubt.rate >= own.rate - 1e-9).all()  # the model's is possible too
+        low, high = model.guarantee.limits(units, Doubt.none(len(y))._replace(rate=own.rate))
         assert not ((low <= y) & (y <= high))[late].all()  # the same without either
+
+
+def test_what_the_car_drives_or_brakes_with_may_be_missing_sideways(model):
+    lost = grip_lost(np.array([[0.3, 0.0], [-0.4, 2.0]]), np.array([0.5, 0.5]))
+    np.testing.assert_allclose(lost, [[0.2, 0.0], [0.4, 1.0]])  # 3, 4 and 5 make an ellipse
+    drive = swung(4, 17.0)
+    pulls = replace(drive, v_x=drive.v_x + 2.0 * np.maximum(drive.t - 8.0, 0.0))  # 2 m/s² from 8 s
+    units, doubt = model.signals_of(pulls)
+    before, late = (drive.t > 2.0) & (drive.t < 8.0), drive.t > 10.0
+    loads, carried = (
+        np.array(model.vehicle.axle_loads),
+        model.force_at(model.driven_slip).diagonal(),
+    )
+    expected = 1.0 - np.sqrt(1.0 - (2.0 * model.vehicle.mass / carried) ** 2)
+    np.testing.assert_allclose(doubt.lost[late].mean(axis=0), expected, rtol=0.25)
+    assert (doubt.lost[before] < 0.1 * expected).all()
+    low, high = model.guarantee.limits(units, doubt)
+    least, most = model.guarantee.limits(units, doubt._replace(lost=0.0 * doubt.lost))
+    assert (low <= least).all() and (high >= most).all()
+    reach, at = model.guarantee.reach(units), np.argmax(np.where(late, least[:, 1], -1.0))
+    np.testing.assert_allclose((least - low)[at, 1], (doubt.lost * reach[0])[at, 1])
+    assert high[at, 1] == most[at, 1]  # nothing along the car makes more of a side force
+    assert (carried / loads < 2.0).all()
 
 
 def test_the_bound_grows_with_slip_that_did_not_teach(model):
