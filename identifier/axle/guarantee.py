@@ -11,6 +11,8 @@ every slip, max and min of t'w with t = tanh(α/α_j), are one product with all 
 lies between them, wider by e (1 + β) + τ ρ (set membership: Milanese and Vicino, Automatica 27,
 1991).
 Of the constraints those are looked at that the answer to a part of them breaks, until none is left.
+
+SciPy is imported where a band is asked for: that takes longer than to learn from a log of a minute.
 """
 
 import math
@@ -20,9 +22,6 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
-from scipy.signal import lfilter
-from scipy.spatial import HalfspaceIntersection
 
 from codegen.arrays import Array
 from identifier.axle.curve import unit_matrix
@@ -190,6 +189,8 @@ def strip_sides(y: Array, h: Array, allowed: Array) -> HalfSpaces:
 
 def _least(cost: Array, among: HalfSpaces, free: int) -> Array | None:
     """Return x of least cost with A x <= b, not negative from place `free` on; None: no such."""
+    from scipy.optimize import linprog
+
     limits = [(None, None)] * free + [(0.0, None)] * (cost.size - free)
     tried = _first(among.b.size)
     while True:
@@ -250,6 +251,8 @@ def vertices(among: HalfSpaces) -> Array | None:
     ----------
     among : its half-spaces.
     """
+    from scipy.spatial import HalfspaceIntersection
+
     A, b = among
     n, length = A.shape[1], np.maximum(np.linalg.norm(A, axis=1), TINY)
     inside = _least(  # the largest ball
@@ -439,6 +442,8 @@ def force_rate(
 
 def _faded(signal: Array, dt: float) -> Array:
     """Return the mean of a signal (k, ...) over the last 0.3 s, fading."""
+    from scipy.signal import lfilter
+
     e = math.exp(-dt / MEMORY)
     mean: Array = lfilter([1.0 - e], [1.0, -e], signal, axis=0, zi=e * signal[:1])[0]
     return mean
