@@ -13,6 +13,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,6 +27,7 @@ TAIL = 40  # last lines of them that tell how cells are written
 BLANKS = " "  # the delimiter of columns that any number of blanks and tabs set apart
 DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks"}
 COMMENT = ("#", "%", "//")
+ONES = "1" + " ".join(DELIMITERS)  # of a line in which every cell is 1, if any is
 MISSING = ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "1.#qnan", "-1.#ind")
 MANY = 300  # cells of a line that tell how all are written
 CLEAR = 0.9  # share of cells that a way of reading must make numbers to be sure
@@ -40,6 +42,8 @@ _INSTANT = re.compile(
     r"|(?:\d+:)?\d{1,2}:\d\d(?:[.,]\d+)?"
 )
 _CONTROLS = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
+_QUOTED = re.compile(r'["\r\n\x00]')  # what a reader of CSV does more with than to split
+LONGEST_CELL = csv.field_size_limit()  # characters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -184,6 +188,8 @@ def cells_of(line: str, delimiter: str) -> tuple[str, ...]:
     """
     if delimiter == BLANKS:
         line = " ".join(line.split())
+    if line and len(line) <= LONGEST_CELL and not _QUOTED.search(line):
+        return tuple(cell.strip() for cell in line.split(delimiter))
     try:
         return tuple(cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), []))
     except csv.Error:
@@ -222,8 +228,19 @@ def _way(tail: list[str]) -> _Way | None:
     return best if best is not None and best.share > 0.2 else None
 
 
-def _is_data(cells: Sequence[str], way: _Way) -> bool:
+@cache
+def _numbers(delimiter: str, decimal: str) -> re.Pattern[str]:
+    """Return what a line of nothing but numbers looks like."""
+    cell = (_DOT if decimal == "." else _COMMA).pattern
+    apart = r"\s+" if delimiter == BLANKS else f" *{re.escape(delimiter)} *"
+    return re.compile(rf" *{cell}(?:{apart}{cell})* *")
+
+
+def _is_data(line: _Line, way: _Way) -> bool:
     """Return whether a line is of numbers, at least half of its cells that are filled."""
+    if _numbers(way.delimiter, way.decimal).fullmatch(line.text) and line.text.strip(ONES):
+        return True  # as most lines are: nothing but numbers, not all of them 1, which is a unit
+    cells = line.cells
     filled = [cell for cell in cells[:MANY] if cell]
     right = sum(_is_number(cell, way.decimal, way.thousands) for cell in filled)
     return right > 0 and 2 * right >= len(filled) and not is_units_row(cells)
@@ -290,13 +307,13 @@ def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line]
     zone: list[int] = []
     for place in range(len(above) - 1, -1, -1):
         line = lines[above[place]]
-        if _is_data(line.cells, way) and not line.text.lstrip().startswith(COMMENT):
+        if _is_data(line, way) and not line.text.lstrip().startswith(COMMENT):
             first = above[place]
             continue
         if first is None:
             continue
         higher = [lines[k] for k in above[max(0, place - 40) : place]]
-        alike = sum(len(one.cells) == way.width and _is_data(one.cells, way) for one in higher)
+        alike = sum(len(one.cells) == way.width and _is_data(one, way) for one in higher)
         if alike >= 2 and way.width > 2:
             continue  # a spoiled row, a comment, or the header once more: there is data above
         zone = above[: place + 1][::-1]

@@ -71,6 +71,18 @@ def test_what_is_used_is_imported_and_drawing_still_is_not():
     assert "casadi" in packages and "matplotlib" not in packages
 
 
+@pytest.mark.parametrize(
+    ("command", "unwanted"),
+    [
+        ("fleet", {"scipy", "matplotlib", "pyarrow"}),
+        ("identify", {"scipy"}),
+        ("predict", {"scipy"}),
+    ],
+)
+def test_a_command_begins_without_what_only_some_of_its_options_need(command, unwanted):
+    assert not imported_by(help_of(f"[{command!r}, '--help']")) & unwanted
+
+
 def test_every_promised_name_is_there_and_an_unknown_one_is_refused():
     for name in ti.__all__:
         assert getattr(ti, name) is not None

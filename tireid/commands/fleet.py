@@ -24,7 +24,6 @@ from tireid.fleet.store import LogRow, Store, StoreError, file_of
 from tireid.fleet.watch import Watching, watch
 from tireid.output import output_folder, require_free, text_table, write_json
 from tireid.progress import Progress, Stopwatch, say, tell
-from tireid.reports.fleet import write_fleet_report, write_watch_report
 from tireid.verdicts import warn_of_stored
 
 SHOWN = 5  # logs with errors that are named
@@ -320,6 +319,8 @@ def _groups(options: argparse.Namespace) -> list[Merged]:
 
 def _watch(options: argparse.Namespace) -> int:
     """Tell whose tires changed; return 1 where a change lasts."""
+    from tireid.reports.fleet import write_watch_report  # draws, which learning does not
+
     watching, asked = _watching(options), _asked(options)
     watched = watch(asked.used, asked.by, watching)
     with output_folder(options.out, force=options.force) as folder:
@@ -334,6 +335,8 @@ def _watch(options: argparse.Namespace) -> int:
 
 def _report(options: argparse.Namespace) -> int:
     """Write a page on what a store holds."""
+    from tireid.reports.fleet import write_fleet_report
+
     watching, asked = _watching(options), _asked(options)
     groups = merge(asked.used, asked.by)
     watched = watch(asked.used, asked.by, watching)

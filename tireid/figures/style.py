@@ -14,6 +14,7 @@ from typing import Any, NamedTuple, ParamSpec
 import numpy as np
 from matplotlib import font_manager, get_data_path, style
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
@@ -155,12 +156,46 @@ def _lay_out(figure: Figure) -> None:
     engine = figure.get_layout_engine()
     if engine is not None:
         for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
+            _once(axis)
             if type(axis.get_major_formatter()) is ScalarFormatter:
                 axis.set_major_formatter(PlainNumbers())
         resolution, figure.dpi = figure.dpi, RESOLUTION  # at fewer dots letters are less exact
         engine.execute(figure)
         figure.dpi = resolution
         figure.set_layout_engine(None)  # that of rcParams, where `LOOK` has none
+
+
+ASKED_OFTEN = ("_update_ticks", "_get_ticklabel_bboxes")  # of an axis, ten times a drawing
+
+
+def _once(axis: Axis) -> None:
+    """Let an axis remember its ticks and the boxes of their labels for as long as it stays put.
+
+    Matplotlib finds them anew for the axis, its label, each title and each spine.
+
+    Parameters
+    ----------
+    axis : of a panel that is complete.
+    """
+    for name in ASKED_OFTEN:
+        if not hasattr(axis, name):  # they are not promised by Matplotlib
+            return
+    for name in ASKED_OFTEN:
+        setattr(axis, name, _remembered(axis, getattr(axis, name)))
+
+
+def _remembered(axis: Axis, find: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that finds something of an axis again only where it has moved."""
+    found: list[Any] = [None, None]
+
+    def find_once(*args: Any) -> Any:
+        panel = axis.axes
+        place = (*axis.get_view_interval(), *panel.bbox.bounds, panel.figure.dpi)
+        if found[0] != place:
+            found[:] = place, find(*args)
+        return found[1]
+
+    return find_once
 
 
 def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:

@@ -1,11 +1,14 @@
 """Text files as loggers write them are read as they were meant, or refused in one clear line."""
 
+import csv
 import gzip
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from models.logs import preamble
 from models.logs.door import open_log
 from models.logs.log import RecordingError
 from models.recordings import read_recording
@@ -354,3 +357,37 @@ def test_a_clock_that_a_map_names_knows_the_units_that_a_clock_of_the_file_knows
     lines = [row.partition(",")[2] for row in rows]
     alone = written(tmp_path, "\n".join([f"Time [{unit}],vx,vy,r,delta_f", *lines]), "one.csv")
     np.testing.assert_allclose(read_recording(alone, check=False).t, named.t, rtol=0, atol=1e-9)
+
+
+def lines_at_random(count: int) -> list[str]:
+    """Lines of few characters, so that numbers, quotes, ones and blanks meet often."""
+    rng = np.random.default_rng(5)
+    parts = ["1", "1", "0.5", "-2,5", "1.234,5", "e3", "m/s", "[s]", "nan", '"', " ", "\t", "#", ""]
+    return [
+        rng.choice([",", ";", "\t", "|", " "]).join(rng.choice(parts, rng.integers(1, 6)))
+        for _ in range(count)
+    ]
+
+
+def test_a_line_without_quotes_is_split_as_a_reader_of_csv_does():
+    for line in [*lines_at_random(3000), "", " ", "a\rb,c", "a\0b,c", 200_000 * "x"]:
+        for delimiter in ",;\t|":
+            try:
+                cells = next(csv.reader([line], delimiter=delimiter), [])
+            except csv.Error:
+                cells = [line]
+            assert preamble.cells_of(line, delimiter) == tuple(cell.strip() for cell in cells)
+
+
+def test_a_line_is_data_or_not_whether_seen_at_once_or_cell_by_cell(monkeypatch):
+    cases = [
+        (preamble._Line(1, line, preamble.cells_of(line, delimiter)), way)
+        for line in lines_at_random(3000)
+        for delimiter in preamble.DELIMITERS
+        for way in (preamble._Way(delimiter, sign, "", 3, 1.0) for sign in ".,")
+        if way.decimal != delimiter
+    ]
+    at_once = [preamble._is_data(*case) for case in cases]
+    monkeypatch.setattr(preamble, "_numbers", lambda *_: re.compile("(?!)"))
+    assert at_once == [preamble._is_data(*case) for case in cases]
+    assert 0.01 < np.mean(at_once) < 0.99
