@@ -29,6 +29,7 @@ from tireid.figures import (
     comparison_figure,
     error_figure,
     figure_png,
+    figure_svg,
     force_figure,
     inputs_figure,
     learnt_axles_figure,
@@ -36,6 +37,7 @@ from tireid.figures import (
     save_figure,
     scheme_figure,
     slip_figure,
+    style,
     weights_figure,
 )
 from tireid.figures.forces import side_by_side_figure
@@ -185,6 +187,24 @@ def test_same_data_give_the_same_bytes_and_leave_matplotlib_alone(tmp_path: Path
     save_figure(FIGURES["error"](), tmp_path / "error.png")
     assert (tmp_path / "error.png").read_bytes() == first
     assert dict(matplotlib.rcParams) == before
+
+
+@pytest.mark.parametrize("name", ["forces", "slip", "inputs", "comparison"])
+def test_ticks_that_are_found_once_are_those_of_matplotlib(name, monkeypatch) -> None:
+    def drawn() -> tuple[bytes, bytes]:
+        figure = FIGURES[name]()
+        return figure_png(figure, resolution=60), figure_svg(figure)
+
+    at_once = drawn()
+    monkeypatch.setattr(style, "ASKED_OFTEN", ())
+    assert drawn() == at_once
+
+
+def test_a_figure_that_was_drawn_can_still_be_changed() -> None:
+    figure = FIGURES["slip"]()
+    before = figure_png(figure, resolution=60)
+    figure.axes[0].set_yticks([0.0], ["nothing"])
+    assert figure_png(figure, resolution=60) != before
 
 
 def test_the_users_own_settings_do_not_change_a_figure() -> None:

@@ -5,7 +5,8 @@ grey and dotted; the colors are those of Okabe and Ito, which color-blind reader
 """
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import wraps
 from io import BytesIO
 from pathlib import Path
@@ -156,7 +157,6 @@ def _lay_out(figure: Figure) -> None:
     engine = figure.get_layout_engine()
     if engine is not None:
         for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
-            _once(axis)
             if type(axis.get_major_formatter()) is ScalarFormatter:
                 axis.set_major_formatter(PlainNumbers())
         resolution, figure.dpi = figure.dpi, RESOLUTION  # at fewer dots letters are less exact
@@ -168,20 +168,26 @@ def _lay_out(figure: Figure) -> None:
 ASKED_OFTEN = ("_update_ticks", "_get_ticklabel_bboxes")  # of an axis, ten times a drawing
 
 
-def _once(axis: Axis) -> None:
-    """Let an axis remember its ticks and the boxes of their labels for as long as it stays put.
+@contextmanager
+def _ticks_found_once(figure: Figure) -> Iterator[None]:
+    """Let axes remember their ticks, and the boxes of their labels, for as long as they stay put.
 
     Matplotlib finds them anew for the axis, its label, each title and each spine.
 
     Parameters
     ----------
-    axis : of a panel that is complete.
+    figure : that is laid out and drawn meanwhile, and not changed.
     """
-    for name in ASKED_OFTEN:
-        if not hasattr(axis, name):  # they are not promised by Matplotlib
-            return
-    for name in ASKED_OFTEN:
+    every = [axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)]
+    # They are not promised by Matplotlib: where it has them no more it finds what it finds.
+    known = [(axis, name) for axis in every for name in ASKED_OFTEN if hasattr(axis, name)]
+    for axis, name in known:
         setattr(axis, name, _remembered(axis, getattr(axis, name)))
+    try:
+        yield
+    finally:
+        for axis, name in known:
+            delattr(axis, name)
 
 
 def _remembered(axis: Axis, find: Callable[..., Any]) -> Callable[..., Any]:
@@ -207,7 +213,7 @@ def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
     resolution : dots per inch.
     """
     buffer = BytesIO()
-    with style.context(["default", LOOK]):
+    with style.context(["default", LOOK]), _ticks_found_once(figure):
         _lay_out(figure)
         figure.savefig(buffer, format="png", dpi=resolution, metadata={"Software": None})
     return buffer.getvalue()
@@ -230,7 +236,7 @@ def figure_svg(figure: Figure) -> bytes:
     figure : as a function of this package returns it.
     """
     buffer = BytesIO()
-    with style.context(["default", LOOK, VECTOR]):
+    with style.context(["default", LOOK, VECTOR]), _ticks_found_once(figure):
         _lay_out(figure)
         figure.savefig(buffer, format="svg", dpi=CLOUDS, metadata={"Date": None, "Creator": None})
     return OUTLINE.sub(lambda path: DIGITS.sub(b"", path[0]), buffer.getvalue())
