@@ -7,6 +7,7 @@ way from them to NumPy imports pandas.
 import importlib
 import math
 import re
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -34,13 +35,13 @@ def is_installed() -> bool:
 
 
 def is_used(path: Path) -> bool:
-    """Whether a text is long enough to import pyarrow for it.
+    """Whether pyarrow is imported already, or a text is long enough to import it.
 
     Parameters
     ----------
     path : of the file.
     """
-    return path.stat().st_size > WORTH
+    return "pyarrow" in sys.modules or path.stat().st_size > WORTH
 
 
 def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict[int, Any] | None:

@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -81,11 +82,15 @@ class Layout:
 
 
 class _Line(NamedTuple):
-    """A line of the beginning: its number from 1, and its cells."""
+    """A line of the beginning: its number from 1, and its cells where they are asked for."""
 
     number: int
     text: str
-    cells: tuple[str, ...]
+    delimiter: str
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        return cells_of(self.text, self.delimiter)
 
 
 class _Way(NamedTuple):
@@ -131,7 +136,7 @@ def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
     if way is None:
         return _no_data(path, lines, encoding)
     require_few(RecordingError, str(path), way.width, "columns", "columns")
-    table = [_Line(k, line, cells_of(line, way.delimiter)) for k, line in enumerate(lines, start=1)]
+    table = [_Line(k, line, way.delimiter) for k, line in enumerate(lines, start=1)]
     return _table(path, table, way, encoding)
 
 
@@ -272,7 +277,8 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
         unit.strip("[](){} ") or unit_in_name(name) for name, unit in zip(names, units, strict=True)
     ]
     again = (names_line.text,) if units_line is None else (names_line.text, units_line.text)
-    data = [line.cells for line in lines[first:] if len(line.cells) == len(names)]
+    rows = (line.cells for line in lines[first:])
+    data = tuple(islice((row for row in rows if len(row) == len(names)), ROWS))
     made_by = _maker(lines[:first])
     words = [
         _encoding_word(encoding),
@@ -294,7 +300,7 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
         first=lines[first].number,
         again=again,
         numeric=_numeric(data, names, way),
-        rows=tuple(data[:ROWS]),
+        rows=data,
         words=tuple(words),
         made_by=made_by,
     )
@@ -355,7 +361,7 @@ def _numeric(data: Sequence[Sequence[str]], names: Sequence[str], way: _Way) -> 
     """Return which columns hold numbers: those in which no cell, or few of them, are words."""
     found = []
     for column in range(len(names)):
-        cells = [row[column] for row in data[:ROWS]]
+        cells = [row[column] for row in data]
         filled = [cell for cell in cells if cell.lower() not in MISSING]
         right = sum(_is_number(cell, way.decimal, way.thousands) for cell in filled)
         found.append(2 * right >= len(filled) and not _all_instants(filled))
@@ -425,7 +431,7 @@ def _sections(lines: list[str]) -> dict[str, int] | None:
     found = {
         line.strip().strip("[]").lower(): k
         for k, line in enumerate(lines)
-        if re.fullmatch(r"\s*\[[\w ]+\]\s*", line)
+        if "[" in line and re.fullmatch(r"\s*\[[\w ]+\]\s*", line)
     }
     return found if "data" in found and "column names" in found else None
 

@@ -36,6 +36,7 @@ from identifier.reproducibility import counted_samples
 from identifier.run import identify, learn
 from identifier.tire_model import AXLES
 from identifier.verdict import Verdict, judge_prediction
+from models.logs import arrow
 from models.recordings import LogMap, Recording, RecordingError, read_repaired, runs
 from models.vehicle import Vehicle
 from tireid.fleet.store import LogRow, Store, bucket_of, file_of, information_columns, needed
@@ -492,13 +493,15 @@ def on_a_cluster(elsewhere: Callable[..., Iterator[Any]]) -> Map:
 def _pool(jobs: int) -> ProcessPoolExecutor:
     # Fresh processes rather than forks: CasADi's graphs must not be built by two threads at once.
     return ProcessPoolExecutor(
-        jobs, mp_context=multiprocessing.get_context("spawn"), initializer=_one_thread
+        jobs, mp_context=multiprocessing.get_context("spawn"), initializer=_prepare_process
     )
 
 
-def _one_thread() -> None:
+def _prepare_process() -> None:
+    """Keep a process to one thread; import pyarrow, which reads many short logs sooner."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "ARROW_IO_THREADS"):
         os.environ.setdefault(name, "1")
+    arrow.is_installed()
 
 
 def _until_one_dies(
