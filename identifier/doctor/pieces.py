@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from codegen.arrays import blocks, large
 from identifier.verdict.motion import BRISK, Windows
 from models.recordings import Recording
 from models.vehicle import Vehicle
@@ -89,8 +90,12 @@ def stretches_of(
     if recording.duration <= longest:
         return _taken(recording, _unbroken(recording, slice(0, n)))
     length = int(longest / pieces / dt)
-    lively = np.where(recording.v_x > BRISK * vehicle.froude_speed, recording.r**2, 0.0)
-    total = np.concatenate([[0.0], np.cumsum(lively)])
+    total, brisk = large((n + 1,)), BRISK * vehicle.froude_speed
+    total[0] = 0.0
+    for part in blocks(n):
+        lively = np.where(recording.v_x[part] > brisk, recording.r[part] ** 2, 0.0)
+        so_far = total[part.start : part.start + 1]
+        total[part.start + 1 : part.stop + 1] = np.cumsum(np.concatenate([so_far, lively]))[1:]
     bounds: NDArray[np.intp] = np.linspace(0, n, pieces + 1).astype(np.intp)
     places: list[slice] = []
     for first, last in pairwise(bounds):

@@ -11,13 +11,13 @@ A gap is where a channel has no sample for longer than `LONGEST_GAP`, or than 2.
 intervals: a car can build up or lose all its lateral force meanwhile. It ends a stretch.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import LONG, Array, filled
+from codegen.arrays import LONG, Array, blocks, filled, large
 from models.logs.log import Channel, RecordingError
 from models.logs.stamps import CALENDAR, not_rising, since
 
@@ -74,9 +74,32 @@ def gaps(t: Array, longest: float) -> NDArray[np.intp]:
     t : rising time stamps [s], (n,).
     longest : time without a sample that is none yet [s].
     """
-    steps = np.diff(t)
-    limit = max(longest * (1.0 + 1e-6), GAP_INTERVALS * float(np.median(steps)))
-    return np.flatnonzero(steps > limit) + 1
+    limit = max(longest * (1.0 + 1e-6), GAP_INTERVALS * typical_step(t))
+    found = [part.start + 1 + np.flatnonzero(steps > limit) for part, steps in _steps(t)]
+    return np.concatenate([np.zeros(0, dtype=np.intp), *found])
+
+
+def typical_step(t: Array) -> float:
+    """Return the median time between samples [s], of all of them; NaN of one.
+
+    Parameters
+    ----------
+    t : rising time stamps [s], (n,).
+    """
+    steps = large((max(t.size - 1, 0),))
+    for part, some in _steps(t):
+        steps[part] = some
+    if not steps.size:
+        return np.nan
+    middle = [(steps.size - 1) // 2, steps.size // 2]
+    steps.partition(middle)  # where it lies, which of a long log is on disk
+    return float(np.mean(steps[middle]))
+
+
+def _steps(t: Array) -> Iterator[tuple[slice, Array]]:
+    """Yield the times between samples, block by block."""
+    for part in blocks(max(t.size - 1, 0)):
+        yield part, np.diff(t[part.start : part.stop + 1])
 
 
 def are_one_clock(raws: Sequence[Raw]) -> bool:

@@ -16,6 +16,7 @@ from models.logs.clock import (
     gaps,
     on_one_clock,
     require_rising,
+    typical_step,
     without_empty,
 )
 from models.logs.log import Channel, Heading, LogFile, RecordingError, one_run
@@ -284,7 +285,7 @@ def _judge_time(label: str, raw: Raw) -> None:
             f"{label}: there are {raw.t.size} rows, at least {MINIMUM_SAMPLES} needed"
         )
     require_rising(label, raw)
-    typical = float(np.median(np.diff(raw.t)))
+    typical = typical_step(raw.t)
     if typical > SLOWEST:
         raise RecordingError(
             f"{label}: t must be in s with at least 10 samples per second, its typical step is "

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from codegen import arrays
 from models.logs.clock import (
     LONGEST_GAP,
     Raw,
@@ -12,6 +13,7 @@ from models.logs.clock import (
     gaps,
     on_one_clock,
     sampled,
+    typical_step,
     without_empty,
 )
 from models.logs.log import Channel
@@ -143,3 +145,20 @@ def test_clocks_are_one_where_their_numbers_are() -> None:
     t = DT * np.arange(10)
     assert are_one_clock([raw(t, t), raw(t.copy(), t)])
     assert not are_one_clock([raw(t, t), raw(t + 1e-9, t)])
+
+
+@pytest.mark.parametrize("n", [2, 3, 999, 1000, 5000])
+def test_gaps_of_a_long_clock_are_found_block_by_block(n, rng, monkeypatch):
+    steps = rng.choice([0.01, 0.011, 0.3], n - 1, p=[0.6, 0.39, 0.01])
+    t = np.concatenate([[5.0], 5.0 + np.cumsum(steps)])
+    exact = np.diff(t)
+    monkeypatch.setattr(arrays, "LONG", 100)
+    monkeypatch.setattr(arrays, "BLOCK", 37)
+    monkeypatch.setattr(arrays, "IN_MEMORY", 800)
+    assert typical_step(t) == np.median(exact)
+    limit = max(0.1 * (1.0 + 1e-6), 2.5 * float(np.median(exact)))
+    np.testing.assert_array_equal(gaps(t, 0.1), np.flatnonzero(exact > limit) + 1)
+
+
+def test_one_sample_has_no_gap():
+    assert gaps(np.array([3.0]), 0.1).tolist() == []
