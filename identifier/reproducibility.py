@@ -301,14 +301,15 @@ def beyond_known(model: TireModel, recording: Recording) -> tuple[float, float] 
     known = model.known_slip
     if known is None:
         return None
-    counted = recording.v_x >= model.min_speed
-    if not counted.any():
-        return None
-    beyond, car = np.zeros(2), model.vehicle
+    beyond, count, car = np.zeros(2), 0, model.vehicle
     for part in blocks(len(recording)):
-        alpha = np.abs(recording.alpha(car.l_f, car.l_r, part)[counted[part]])
+        counted = recording.v_x[part] >= model.min_speed
+        alpha = np.abs(recording.alpha(car.l_f, car.l_r, part)[counted])
         beyond += np.count_nonzero(alpha > known, axis=0)
-    front, rear = beyond / np.count_nonzero(counted)
+        count += int(np.count_nonzero(counted))
+    if count == 0:
+        return None
+    front, rear = beyond / count
     return float(front), float(rear)
 
 
@@ -386,12 +387,16 @@ def reproduce(online: History, t_freeze: float, *, since: float | None = None) -
     whole = replay(model, online, since=since)
     recording, tolerance = online.recording, 1e-6 * online.recording.dt
     counted = counted_samples(recording, model.min_speed, since)
-    past = counted & (recording.t < t_freeze - tolerance)
-    after = counted & (recording.t > t_freeze + tolerance)
     truth = recording.axle_force
+    past = counted.copy()
+    past[np.searchsorted(recording.t, t_freeze - tolerance, side="left") :] = False
+    against_online = _side(whole.axle_force, online.axle_force, past)
+    against_truth = _side(whole.axle_force, truth, past)
+    after = counted  # itself: a byte for each sample of a hundred hours is not little
+    after[: np.searchsorted(recording.t, t_freeze + tolerance, side="right")] = False
     sides = Reproduction(
-        past_against_online=_side(whole.axle_force, online.axle_force, past),
-        past_against_truth=_side(whole.axle_force, truth, past),
+        past_against_online=against_online,
+        past_against_truth=against_truth,
         after_against_truth=_side(whole.axle_force, truth, after),
     )
     return replace(whole, reproduction=sides)
