@@ -30,7 +30,7 @@ typedef double tireid_real;
 #define TIREID_MAX_STEERING (1.5) /* likewise [rad] */
 #define TIREID_MAX_FORCE (73575.0) /* likewise [N] */
 #define TIREID_NOWHERE (1000000.0) /* speed of no car [m/s] */
-#define TIREID_VERSION "tireid, tireid" /* name, hash, version of tireid */
+#define TIREID_VERSION "reference" /* name, hash, version of tireid */
 
 /* Time [s] without a sample that could be taken after which no force is told any
  * more; may be set by who compiles the library. */

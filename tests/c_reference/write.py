@@ -46,8 +46,9 @@ def _is_wanted(path: str) -> bool:
 
 def _undated(text: str) -> str:
     """Return a header without version and hash, which every other change moves."""
-    text = re.sub(r"\btireid (\d[\w.+]*|unknown)( from \w+)?", "tireid", text)
-    return re.sub(r'"tireid\w* \w{12}, tireid"', '"reference"', text)
+    # First, as a hash may begin with a digit and look like a version.
+    text = re.sub(r'"tireid\w* \w{12}, tireid [^"]*"', '"reference"', text)
+    return re.sub(r"\btireid (\d[\w.+]*|unknown)( from \w+)?", "tireid", text)
 
 
 if __name__ == "__main__":

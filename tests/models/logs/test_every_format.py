@@ -141,6 +141,7 @@ def test_no_library_of_an_extra_is_imported_for_a_text(tmp_path, drive, monkeypa
         assert name.partition(".")[0] not in LIBRARIES
         return real(name, *rest, **more)
 
+    monkeypatch.delitem(sys.modules, "pyarrow", raising=False)  # another test's
     monkeypatch.setattr(builtins, "__import__", watched)
     assert open_log(written.path).read(["r"])[0].values.size == 300
 
