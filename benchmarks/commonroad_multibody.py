@@ -1,5 +1,6 @@
 """Driving a maneuver with the multi-body car of commonroad-vehicle-models."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -53,5 +54,5 @@ def drive(
             a_y = equations.lateral(f(x, k), parameters) + x[V_X] * x[YAW_RATE]
             v_y = equations.lateral(x, parameters)
             samples.append((a_y, v_y, x[YAW_RATE], x[V_X], -x[ROLL]))
-        x = runge_kutta_step(lambda x, k=k: f(x, k), x, dt)  # type: ignore[misc]
+        x = runge_kutta_step(partial(f, k=k), x, dt)
     return dict(zip(("a_y", "v_y", "r", "v_x", "roll"), np.array(samples).T, strict=True))

@@ -139,6 +139,7 @@ def pieces(path: Path, refusal: type[ValueError], *, limit: str) -> Iterator[byt
     with path.open("rb") as raw:
         zipped = raw.read(2) == b"\x1f\x8b"
         raw.seek(0)
+        # What is read from is enough of a BinaryIO, which a GzipFile is not by name.
         file: BinaryIO = gzip.GzipFile(fileobj=raw) if zipped else raw  # type: ignore[assignment]
         size = 0
         while True:

@@ -66,7 +66,7 @@ def named_port(kind: type[Record], name: str) -> tuple[Any, Record]:
     kind : a NamedTuple of k fields.
     name : of the port.
     """
-    port = ca.SX.sym(name, len(kind._fields))  # type: ignore[attr-defined]
+    port = ca.SX.sym(name, len(kind._fields))  # type: ignore[attr-defined]  # a NamedTuple's
     return port, kind(*ca.vertsplit(port))
 
 
@@ -78,7 +78,7 @@ def axle_port(kind: type[Record], name: str) -> tuple[Any, Record]:
     kind : a NamedTuple of k fields.
     name : of the port.
     """
-    port = ca.SX.sym(name, 2, len(kind._fields))  # type: ignore[attr-defined]
+    port = ca.SX.sym(name, 2, len(kind._fields))  # type: ignore[attr-defined]  # a NamedTuple's
     return port, kind(*ca.horzsplit(port))
 
 

@@ -449,6 +449,17 @@ def _faded(signal: Array, dt: float) -> Array:
     return mean
 
 
+def beyond_driven(slip: Array, driven: Array) -> Array:
+    """Return by how much slip is beyond that of a drive, over it, (k, 2); 0 within: β of now.
+
+    Parameters
+    ----------
+    slip : of both axles [rad], (k, 2), or (k, 1) where both have the same.
+    driven : largest of the drive (2,), positive [rad].
+    """
+    return np.maximum(np.abs(slip) / driven - 1.0, 0.0)
+
+
 def slip_beyond(slip: Array, driven: Array, dt: float, stretches: Iterable[slice]) -> Array:
     """Return β (k, 2): the largest |x|/x_driven - 1 until now, each fading with 0.3 s; 0 within.
 
@@ -461,7 +472,7 @@ def slip_beyond(slip: Array, driven: Array, dt: float, stretches: Iterable[slice
     """
     beyond = np.zeros_like(slip)
     for part in stretches:
-        over = np.maximum(np.abs(slip[part]) / driven - 1.0, 0.0)
+        over = beyond_driven(slip[part], driven)
         age = dt / MEMORY * np.arange(len(over))[:, None]
         with np.errstate(divide="ignore"):  # ln 0: nothing was beyond yet
             beyond[part] = np.exp(np.maximum.accumulate(np.log(over) + age, axis=0) - age)

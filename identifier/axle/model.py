@@ -29,6 +29,7 @@ from identifier.axle.guarantee import (
     Doubt,
     Guarantee,
     along_acceleration,
+    beyond_driven,
     force_rate,
     grip_lost,
     slip_beyond,
@@ -334,7 +335,7 @@ class AxleModel(TireModel):
         if self.guarantee is None:
             return None
         units = np.repeat(unit_matrix(alpha, self.ladder)[:, None], 2, axis=1)
-        beyond = np.maximum(np.abs(alpha)[:, None] / self.driven_slip - 1.0, 0.0)
+        beyond = beyond_driven(alpha[:, None], self.driven_slip)
         rates = np.repeat(np.abs(rate)[:, None], 2, axis=1)
         low, high = self.guarantee.limits(units, Doubt(beyond, rates, np.zeros_like(rates)))
         return low * self._loads, high * self._loads

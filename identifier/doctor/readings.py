@@ -263,7 +263,8 @@ def _scaled(
     before = Reading() if one is None else one.reading
 
     def left(size: float) -> float:
-        return unexplained(motion, vehicle, before._replace(**{name: size}))  # type: ignore[arg-type]
+        told = before._replace(**{name: size})  # type: ignore[arg-type]  # name is of a number
+        return unexplained(motion, vehicle, told)
 
     size = min(map(float, sizes), key=left)
     if abs(math.log(size)) < same:

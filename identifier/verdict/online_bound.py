@@ -17,7 +17,7 @@ from codegen.arrays import Array
 from identifier.axle.car import Car, axle_impulse, car_numbers
 from identifier.axle.curve import unit_matrix
 from identifier.axle.ellipsoid import Ellipsoid
-from identifier.axle.guarantee import MEMORY, ForceBound
+from identifier.axle.guarantee import MEMORY, ForceBound, beyond_driven
 from identifier.axle.model import AxleModel
 from identifier.verdict.guaranteed import OVERLAPPING, least_speed, triangle
 from identifier.verdict.motion import WINDOW
@@ -107,7 +107,7 @@ class OnlineBound:
         inputs["x"][:], inputs["u"][:], inputs["v_x"][:] = x, u, v_x
         self._stepper.advance()
         slip = self._stepper.outputs["lagged_slip"]
-        over = np.maximum(np.abs(slip) / model.driven_slip - 1.0, 0.0)
+        over = beyond_driven(slip, model.driven_slip)
         fading = math.exp(-self.dt / MEMORY)
         last = np.zeros(2) if self._newest is None else self._newest.beyond
         return _Sample(
@@ -153,7 +153,7 @@ class OnlineBound:
         """
         slip, loads = np.asarray(alpha, dtype=np.float64), self.model.vehicle.axle_loads
         units = unit_matrix(slip, self.model.ladder)
-        beyond = np.maximum(np.abs(slip)[:, None] / self.model.driven_slip - 1.0, 0.0)
+        beyond = beyond_driven(slip[:, None], self.model.driven_slip)
         wide = self.bound.allowed(beyond, np.zeros_like(beyond))
         sides = []
         for known in self.left:

@@ -34,9 +34,9 @@ class LinearTire:
         self,
         alpha: Expression,
         kappa: Expression,
-        gamma: Expression,  # noqa: ARG002
+        gamma: Expression,
         F_z: Expression,
-        mu: Expression = 1.0,  # noqa: ARG002
+        mu: Expression = 1.0,
     ) -> TireForces:
         """Longitudinal and lateral force in the wheel frame [N].
 
@@ -45,6 +45,7 @@ class LinearTire:
         gamma : camber [rad]; without effect.
         mu : friction of the road over that of the measurement [-]; without effect.
         """
+        del gamma, mu
         return TireForces(self.slip_stiffness(F_z) * kappa, self.cornering_stiffness(F_z) * alpha)
 
     slip_stiffness = constant_stiffness.slip_stiffness
@@ -89,7 +90,7 @@ class FialaTire:
         self,
         alpha: Expression,
         kappa: Expression,
-        gamma: Expression,  # noqa: ARG002
+        gamma: Expression,
         F_z: Expression,
         mu: Expression = 1.0,
     ) -> TireForces:
@@ -100,6 +101,7 @@ class FialaTire:
         kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
         gamma : camber [rad]; without effect.
         """
+        del gamma
         s = slips(alpha, kappa, self.C_alpha, self.C_kappa)
         sliding = 3.0 * mu * self.friction * positive(F_z)  # demand at which all contact slides
         demand = s.size / s.rolling
@@ -147,7 +149,7 @@ class DugoffTire:
         self,
         alpha: Expression,
         kappa: Expression,
-        gamma: Expression,  # noqa: ARG002
+        gamma: Expression,
         F_z: Expression,
         mu: Expression = 1.0,
     ) -> TireForces:
@@ -158,6 +160,7 @@ class DugoffTire:
         kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
         gamma : camber [rad]; without effect.
         """
+        del gamma
         s = slips(alpha, kappa, self.C_alpha, self.C_kappa)
         half = mu * self.friction * positive(F_z) / (2.0 * s.size)  # λ/(1 + κ)
         lam = smaller(half * s.rolling, 1.0)

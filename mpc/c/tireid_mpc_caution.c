@@ -190,18 +190,25 @@ static void find_drift(
     }
 }
 
-/* Least friction that is not refuted: from the best one down, with a part of the next one. */
-static real least_grip(const tireid_mpc_state *state, const tireid_mpc_params *params)
+/* Place of the friction that is held for the most likely one. */
+static uint32_t best_of(const tireid_mpc_state *state)
 {
-    const real width = params->surprise - REFUTED;
-    real share = TIREID_MPC_C(1.0);
-    real grip;
     uint32_t best = 0U;
     uint32_t j;
     for (j = 1U; j < TIREID_MPC_GRIPS; j++) {
         best = (state->cost[j] < state->cost[best]) ? j : best;
     }
-    grip = params->grips[best];
+    return best;
+}
+
+/* Least friction that is not refuted: from the best one down, with a part of the next one. */
+static real least_grip(const tireid_mpc_state *state, const tireid_mpc_params *params)
+{
+    const real width = params->surprise - REFUTED;
+    const uint32_t best = best_of(state);
+    real share = TIREID_MPC_C(1.0);
+    real grip = params->grips[best];
+    uint32_t j;
     for (j = best + 1U; j < TIREID_MPC_GRIPS; j++) {
         const real left = (params->surprise - state->cost[j]) / width;
         share *= (left < TIREID_MPC_C(1.0)) ? left : TIREID_MPC_C(1.0);
@@ -224,10 +231,7 @@ static void judge_grips(tireid_mpc_state *state, const tireid_mpc_params *params
     for (j = 0U; j < TIREID_MPC_GRIPS; j++) {
         state->cost[j] += counts * seen[j].squares;
     }
-    least = state->cost[0];
-    for (j = 1U; j < TIREID_MPC_GRIPS; j++) {
-        least = (state->cost[j] < least) ? state->cost[j] : least;
-    }
+    least = state->cost[best_of(state)];
     for (j = 0U; j < TIREID_MPC_GRIPS; j++) {
         const real cost = state->cost[j] - least;
         state->cost[j] = (cost < params->surprise) ? cost : params->surprise;
@@ -247,7 +251,7 @@ void tireid_mpc_watch(tireid_mpc_state *state, const tireid_mpc_params *params,
     } else {
         sight seen[TIREID_MPC_GRIPS];
         real feared;
-        uint32_t best = 0U;
+        uint32_t best;
         uint32_t j;
         for (j = 0U; j < TIREID_MPC_GRIPS; j++) {
             if (state->doubted == 0U) {
@@ -258,9 +262,7 @@ void tireid_mpc_watch(tireid_mpc_state *state, const tireid_mpc_params *params,
         if (((real)state->watched * params->period) > SETTLED) {
             judge_grips(state, params, seen);
         }
-        for (j = 1U; j < TIREID_MPC_GRIPS; j++) {
-            best = (state->cost[j] < state->cost[best]) ? j : best;
-        }
+        best = best_of(state);
         find_zero(state, params, &seen[best], params->grips[best]);
         find_drift(state, params, in);
         feared = params->caution * (TIREID_MPC_C(1.0) - least_grip(state, params));

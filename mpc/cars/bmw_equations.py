@@ -118,14 +118,15 @@ def slip_at_the_axles(parameters: Any) -> Iterator[Callable[[Array], None]]:
 
 
 @contextmanager
-def as_published(parameters: Any) -> Iterator[Callable[[Array], None]]:  # noqa: ARG001
+def as_published(parameters: Any) -> Iterator[Callable[[Array], None]]:
     """Leave their program as it is.
 
     Parameters
     ----------
     parameters : theirs, not needed.
     """
-    yield lambda x: None  # noqa: ARG005
+    del parameters
+    yield lambda _: None
 
 
 class MultiBody:

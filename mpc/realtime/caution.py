@@ -17,7 +17,6 @@ from mpc.tires.tire import DOUBT_STEP, Car, Point, PredictionTire, curve_slopes
 N_GRIPS = 9
 LEAST_GRIP = 0.25  # of the friction that a tire was learnt on: ice, after a dry road
 SURPRISE = 8.0  # -2 ln of how likely a road is to change, as a supervisor has it
-SIGMAS = 1.645  # of half a band of 90 %
 FORCE_ERROR = 0.045  # static axle loads, of 0.2 s of motion: noise, load transfer, transients
 GRIPS: Array = LEAST_GRIP ** (np.arange(N_GRIPS) / (N_GRIPS - 1.0))
 

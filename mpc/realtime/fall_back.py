@@ -22,7 +22,6 @@ STEERING = 0.2  # rad that cost as much as `e_y`, where the car hardly moves
 DIGITS = 9  # of what is exported: other digits depend on the machine
 DOUBLINGS = 40  # at most; ten are usual
 ENOUGH = 1e-13  # change of the cost, in parts
-SMALL, TERMS = 0.5, 16  # norm of a matrix of which so many terms are exact to 1e-17
 
 
 class FallBack(NamedTuple):
@@ -134,28 +133,11 @@ def _riccati(A: Array, G: Array, Q: Array) -> Array:
 
 def _sampled(A: Array, B: Array, period: float) -> tuple[Array, Array]:
     """Return A and B of samples with u held."""
+    from scipy.linalg import expm  # takes longer to import than the rest of the tracker
+
     n, m = B.shape
-    M = exponential(period * np.vstack([np.hstack([A, B]), np.zeros((m, n + m))]))
+    M = expm(period * np.vstack([np.hstack([A, B]), np.zeros((m, n + m))]))
     return M[:n, :n], M[:n, n:]
-
-
-def exponential(M: Array) -> Array:
-    """Return e^M by its series, of M halved until it is small, and squared as often.
-
-    As exact as SciPy's, which takes longer to import than the rest of the tracker.
-
-    Parameters
-    ----------
-    M : (n, n).
-    """
-    halvings = max(int(np.ceil(np.log2(max(float(np.linalg.norm(M, 1)), SMALL) / SMALL))), 0)
-    term = total = np.eye(len(M))
-    for k in range(1, TERMS):
-        term = term @ M / (k * 2.0**halvings)
-        total = total + term
-    for _ in range(halvings):
-        total = total @ total
-    return total
 
 
 def _rounded(x: Any) -> float:

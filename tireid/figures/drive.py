@@ -131,7 +131,7 @@ def tire_look(label: str) -> dict[str, Any]:
 
 # How far the car was from its path, and how fast, over the arc length of the path.
 
-TOLD, NOTICED = "told of another tire", "sensor fault noticed"
+REPLANNED, NOTICED = "plans with another tire or grip", "sensor fault noticed"
 ARC = "arc length of the path [m]"
 
 
@@ -183,7 +183,7 @@ def drive_errors_figure(
     for axes in panels:
         mark_faults(axes, drives, faults)
     figure.align_ylabels(panels)
-    legend_above(figure, order=(*drives, TOLD, *(friction_label(mu) for _, mu in drops)))
+    legend_above(figure, order=(*drives, REPLANNED, *(friction_label(mu) for _, mu in drops)))
     return figure
 
 
@@ -246,7 +246,7 @@ def friction_label(mu: float) -> str:
 
 
 def _mark_notes(axes: Axes, drive: "Drive", color: str) -> None:
-    """Mark on the curve where the tracker was told of another tire."""
+    """Mark on the curve from where the tracker plans with another tire or grip."""
     if drive.notes:
         at = np.searchsorted(drive.t, [t for t, _ in drive.notes])
         at = np.minimum(at, drive.t.size - 1)
@@ -260,7 +260,7 @@ def _mark_notes(axes: Axes, drive: "Drive", color: str) -> None:
             markeredgewidth=0.9,
             color=color,
             zorder=3.0,
-            label=TOLD,
+            label=REPLANNED,
         )
 
 

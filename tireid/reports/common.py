@@ -45,8 +45,8 @@ READ = {
     "plan_band": "Where the band narrows, the drive will have taught; beyond it nothing changes.",
     "path": "Outlines are the first car every few meters; the green band is the path.",
     "errors": "The deviation is near zero where the tracker knows the tires. Where there are any: "
-    "diamonds mark a tire that was handed over, red shades a broken sensor, dots where it was "
-    "noticed.",
+    "diamonds mark where it plans with another tire or grip, red shades a broken sensor, dots "
+    "where it was noticed.",
     "steering": "A command at its limit is a car that has no more to give.",
     "tires": "The cloud is what the tires did; a tracker is right where its curve passes through "
     "it. Below, what each curve misses of the true one.",
