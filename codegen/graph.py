@@ -5,6 +5,9 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import casadi as ca
+import numpy as np
+
+from codegen.arrays import Array
 
 OPERATIONS: Mapping[int, str] = {
     getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")
@@ -249,3 +252,52 @@ def assumed(graph: Graph, condition: int, holds: bool) -> Graph:
 
 def _is_le(graph: Graph, place: int) -> bool:
     return graph.nodes[place].op == "le"
+
+
+# A function whose numbers are an input: one library for all cars that are built alike.
+
+
+@simplifying(False)
+def lifted(function: ca.Function, port: str = "constants") -> tuple[ca.Function, Array]:
+    """Return a function that is told its constants, and the constants.
+
+    It computes the same bits, operation by operation; functions that differ in their constants
+    alone become the same function.
+
+    Parameters
+    ----------
+    function : SX.
+    port : name of the input that is added, the last; constants (n,) in their order in `function`.
+    """
+    n = function.n_instructions()
+    places = [k for k in range(n) if OPERATIONS[function.instruction_id(k)] == "const"]
+    ports = [ca.SX.sym(name, *function.size_in(name)) for name in function.name_in()]
+    constants = ca.SX.sym(port, len(places))
+    entries = [ca.vertsplit(ca.vec(one)) if one.numel() else [] for one in ports]
+    work, waiting = dict[int, ca.SX](), iter(ca.vertsplit(constants) if places else [])
+    results = [[ca.SX(0)] * function.numel_out(i) for i in range(function.n_out())]
+    for k in range(n):
+        number = function.instruction_id(k)
+        read, written = function.instruction_input(k), function.instruction_output(k)
+        match OPERATIONS[number]:
+            case "output":
+                results[written[0]][written[1]] = work[read[0]]
+            case "const":
+                work[written[0]] = next(waiting)
+            case "input":
+                work[written[0]] = entries[read[0]][read[1]]
+            case _ if len(read) == 1:
+                work[written[0]] = ca.SX.unary(number, work[read[0]])
+            case _:
+                work[written[0]] = ca.SX.binary(number, work[read[0]], work[read[1]])
+    shaped = [
+        ca.reshape(ca.vertcat(*result), *function.size_out(i)) for i, result in enumerate(results)
+    ]
+    told = ca.Function(
+        function.name(),
+        [*ports, constants],
+        shaped,
+        [*function.name_in(), port],
+        function.name_out(),
+    )
+    return told, np.array([function.instruction_constant(k) for k in places])

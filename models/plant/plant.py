@@ -10,6 +10,7 @@ import numpy as np
 
 from codegen import Scan, compiler
 from codegen.arrays import Array
+from codegen.graph import lifted
 from models.friction import Friction
 from models.maneuvers import Maneuver
 from models.plant.dynamics import N_STATES, Driver, dynamics, runge_kutta
@@ -139,13 +140,26 @@ class PlantError(ArithmeticError):
     """The car left the range of its equations; the message says when."""
 
 
-# Each car and tire is a program of its own: -O1 builds it a third sooner than -O2, whose steps are
-# faster by so little that it is ahead after minutes of driving. The bits are the same.
+# -O1 builds a car a third sooner than -O2, whose steps are faster by so little that it is ahead
+# after minutes of driving. The bits are the same.
 FLAGS = tuple("-O1" if flag == "-O2" else flag for flag in compiler.FLAGS)
 
 
+class CompiledLoop(NamedTuple):
+    """A plant over time: the library of all cars that are built alike, and the numbers of this one.
+
+    scan : of one step of the integration.
+    constants : its input of that name.
+    """
+
+    scan: Scan
+    constants: Array
+
+
 @cache
-def compiled_loop(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver, dt: float) -> Scan:
+def compiled_loop(
+    vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver, dt: float
+) -> CompiledLoop:
     """Return the compiled loop of a plant over time, built once.
 
     Parameters
@@ -155,8 +169,10 @@ def compiled_loop(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver, dt
     driver : who holds the speed.
     dt : step of the integration [s].
     """
-    step = runge_kutta(dynamics(vehicle, tires, driver), dt)
-    return Scan(step, carry=("x",), over=("command", "v_ref", "mu", "aside"), flags=FLAGS)
+    car, constants = lifted(dynamics(vehicle, tires, driver))
+    step = runge_kutta(car, dt)
+    over = ("command", "v_ref", "mu", "aside")
+    return CompiledLoop(Scan(step, carry=("x",), over=over, flags=FLAGS), constants)
 
 
 class Plant:
@@ -251,7 +267,8 @@ class Plant:
         values = {"x": start, "command": command, "v_ref": v_ref}
         values |= {"mu": road.over_time(middle), "places": road.over_place()}
         values["aside"] = np.column_stack((GRAVITY * np.sin(slope), push / self.vehicle.mass))
-        record = self.loop(dt)(n, values, every=every)
+        scan, values["constants"] = self.loop(dt)
+        record = scan(n, values, every=every)
         finite = np.isfinite(record["x"]).all(axis=1)
         if not finite.all():
             raise PlantError(f"the car's state is not finite from t = {t[::every][~finite][0]} s")
@@ -259,7 +276,7 @@ class Plant:
         t = t[::every]
         return PlantRun.from_record(name, self.vehicle, t, maneuver.steering(t), record)
 
-    def loop(self, dt: float) -> Scan:
+    def loop(self, dt: float) -> CompiledLoop:
         """Return the compiled loop over time.
 
         Parameters
@@ -331,7 +348,7 @@ class StepwisePlant:
         self.dt = dt
         self._every = every
         self._places = self.friction.over_place()
-        self._scan = plant.loop(dt)
+        self._loop = plant.loop(dt)
 
     def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> PlantState:
         """Return the car rolling straight ahead.
@@ -383,8 +400,9 @@ class StepwisePlant:
             "mu": self.friction.over_time(middle),
             "places": self._places,
             "aside": np.zeros((n, 2)),
+            "constants": self._loop.constants,
         }
-        record = self._scan(n, values, every=max(n - 1, 1))
+        record = self._loop.scan(n, values, every=max(n - 1, 1))
         now = start + n - 1
         if not np.isfinite(record["x"][-1]).all():
             raise PlantError(f"the car's state is not finite from t = {now * self.dt:.3f} s")

@@ -15,6 +15,7 @@ from codegen.graph import (
     decision,
     function_of,
     graph_of,
+    lifted,
     simplifying,
 )
 from codegen.simplify import simplified
@@ -55,6 +56,35 @@ def compare(one, other, rng, exact):
 def test_a_graph_is_the_function_it_was_read_from(rng):
     step = learning_step()
     compare(step, function_of(graph_of(step), step), rng, exact=True)
+
+
+def test_constants_that_are_told_give_the_same_bits(rng):
+    step = learning_step()
+    told, constants = lifted(step)
+    for v in (0.5, 20.0, 100.0):
+        given = arguments(rng, v)
+        for a, b in zip(step(*given), told(*given, constants), strict=True):
+            np.testing.assert_array_equal(np.array(a), np.array(b))
+    given = arguments(rng, 20.0)
+    assert (np.array(told(*given, 1.1 * constants)[0]) != np.array(step(*given)[0])).all()
+
+
+def test_functions_that_differ_in_their_constants_alone_become_one():
+    def spring(stiffness, damping):
+        x, v = ca.SX.sym("x"), ca.SX.sym("v")
+        force = -stiffness * x - damping * v / 3.0
+        return ca.Function("spring", [x, v], [force], ["x", "v"], ["F"])
+
+    one, of_one = lifted(spring(2000.0, 30.0))
+    other, of_other = lifted(spring(1500.0, 40.0))
+    assert one.serialize() == other.serialize() and sorted(of_one) == [-2000.0, 3.0, 30.0]
+    assert other(0.1, 2.0, of_other) == spring(1500.0, 40.0)(0.1, 2.0)
+
+
+def test_a_function_without_constants_is_told_none():
+    x = ca.SX.sym("x", 0, 1), ca.SX.sym("y")
+    told, constants = lifted(ca.Function("f", x, [x[1] * x[1]], ["x", "y"], ["z"]))
+    assert constants.size == 0 and told([], 3.0, constants) == 9.0
 
 
 def test_equal_expressions_are_one_node():
