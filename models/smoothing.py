@@ -1,11 +1,12 @@
 """Low passes of sampled signals: a window without phase, one of first order, and its inverse."""
 
 import math
-from itertools import accumulate
 
 import numpy as np
 
 from codegen.arrays import Array
+
+NEGLIGIBLE = 1e-20  # share of an earlier sample
 
 
 def window(half: int) -> Array:
@@ -45,10 +46,14 @@ def low_passed(signal: Array, lag: float, dt: float) -> Array:
     keep = math.exp(-dt / lag)
     ramp = (1.0 - keep) * lag / dt  # lag of a straight line, T u_dot
     # y_k = keep y_(k-1) + (1 - keep) u_(k-1) + (1 - ramp) (u_k - u_(k-1)), from y_0 = u_0
-    now, before = (1.0 - ramp) * signal[1:], (ramp - keep) * signal[:-1]
-    steps = zip(before.tolist(), now.tolist(), strict=True)
-    y = accumulate(steps, lambda y, u: (keep * y + u[0]) + u[1], initial=float(signal[0]))
-    return np.fromiter(y, np.float64, signal.size)
+    y = np.array(signal, dtype=np.float64)
+    y[1:] = (ramp - keep) * signal[:-1] + (1.0 - ramp) * signal[1:]
+    # 1/(1 - q) = (1 + q)(1 + q²)(1 + q⁴)...: of a sum over all samples before, by whole arrays
+    behind = 1
+    while behind < y.size and keep > NEGLIGIBLE:
+        y[behind:] += keep * y[:-behind]  # NumPy reads all of the right side first
+        keep, behind = keep * keep, 2 * behind
+    return y
 
 
 def without_low_pass(signal: Array, lag: float, dt: float, half: int) -> Array:

@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.axle.curve import unit_matrix
@@ -175,7 +176,9 @@ class Balance:
         psi = np.hanning(length)  # zero at its ends, so that sums by parts are exact
         self.psi = psi / psi.sum()
         self.psi_dot = np.gradient(np.pad(self.psi, 1), self.dt)[1:-1]
-        self.mean, self.rate = (Windows(self.starts, one) for one in (self.psi, -self.psi_dot))
+        under = self.starts[:, None] + np.arange(length)
+        self.mean, self.rate = (Windows(under, one) for one in (self.psi, -self.psi_dot))
+        self.curved: dict[int, NDArray[np.bool_]] = {}  # which weights of a curve were not zero
 
     def _norms(self, half: int, every: int) -> tuple[float, float]:
         """Return the power that smoothing and ψ, or ψ̇, leave of white noise of every sample."""
@@ -284,7 +287,8 @@ class Balance:
             units = unit_matrix(slip[:, i], LADDER) * np.cos(x[steering])[:, None]
             basis = (self.mean @ units) / self.allowed[:, i : i + 1]
             y = force[:, i] / self.allowed[:, i]
-            w = rising(basis, y)
+            w = rising(basis, y, self.curved.get(i))
+            self.curved[i] = w > 0.0
             # Over the size of the force: to shrink it, by a factor of r, explains nothing.
             size = self.size[i] / max(math.sqrt(float(y @ y) / y.size), 1e-9)
             parts.append((y - basis @ w) * size)
@@ -346,7 +350,7 @@ class Balance:
         return allowed, rms
 
 
-def rising(basis: Array, y: Array) -> Array:
+def rising(basis: Array, y: Array, guess: NDArray[np.bool_] | None = None) -> Array:
     """Return weights of least squares, none negative: a curve that rises ever less (k,).
 
     Without that an odd curve can pass through zero at some slip, and hide an offset of it.
@@ -355,10 +359,12 @@ def rising(basis: Array, y: Array) -> Array:
     ----------
     basis : (m, k).
     y : (m,).
+    guess : which weights are rather not zero (k,).
     """
     gram = basis.T @ basis
     k = gram.shape[0]
-    return not_negative(gram + (RIDGE * np.trace(gram) / k + 1e-12) * np.eye(k), basis.T @ y)
+    ridge = RIDGE * np.trace(gram) / k + 1e-12
+    return not_negative(gram + ridge * np.eye(k), basis.T @ y, guess)
 
 
 # Signals.

@@ -7,7 +7,6 @@ all that the doctor computes of a log of a minute.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
@@ -18,20 +17,17 @@ ROUNDING = 1e-14  # of a gradient over the sizes it is made of
 class Windows(NamedTuple):
     """Windows of one shape: `windows @ x` sums x (n,) or (n, k) under each, (m,) or (m, k).
 
-    starts : first sample of each (m,).   weights : of the samples from there on (l,).
+    under : samples under each (m, l).   weights : of these (l,).
     """
 
-    starts: NDArray[np.intp]
+    under: NDArray[np.intp]
     weights: Array
 
     def __matmul__(self, x: Array) -> Array:
-        if not self.starts.size:
-            return np.zeros((0, *x.shape[1:]))
-        under = sliding_window_view(x, self.weights.size, axis=0)[self.starts]
-        return np.asarray(under @ self.weights, dtype=np.float64)
+        return np.asarray((x.T.take(self.under, axis=-1) @ self.weights).T, dtype=np.float64)
 
 
-def not_negative(gram: Array, moment: Array) -> Array:
+def not_negative(gram: Array, moment: Array, guess: NDArray[np.bool_] | None = None) -> Array:
     """Return the weights w >= 0 at which ½ wᵀ G w - mᵀ w is least (k,).
 
     The active set of Lawson and Hanson (Solving Least Squares Problems, 1974, chapter 23), on the
@@ -41,18 +37,20 @@ def not_negative(gram: Array, moment: Array) -> Array:
     ----------
     gram : G, positive definite (k, k).
     moment : m (k,).
+    guess : which weights are rather not zero (k,): where that is so, nothing is searched.
     """
+    if guess is not None:
+        w = _free_optimum(gram, moment, guess)
+        if (w[guess] > 0.0).all() and not _rising(gram, moment, w, guess)[0].any():
+            return w
     w, free = np.zeros(moment.size), np.zeros(moment.size, dtype=bool)
     for _ in range(10 * moment.size):
-        gradient = moment - gram @ w
-        sure = ROUNDING * (np.abs(moment) + np.abs(gram) @ np.abs(w))
-        rises = ~free & (gradient > sure)
+        rises, gradient = _rising(gram, moment, w, free)
         if not rises.any():
             break
         free[np.argmax(np.where(rises, gradient, -np.inf))] = True
         while True:
-            best = np.zeros(moment.size)
-            best[free] = np.linalg.solve(gram[np.ix_(free, free)], moment[free])
+            best = _free_optimum(gram, moment, free)
             below = free & (best <= 0.0)
             if not below.any():
                 w = best
@@ -62,3 +60,19 @@ def not_negative(gram: Array, moment: Array) -> Array:
             free &= w > ROUNDING * np.abs(w).max(initial=0.0)
             w[~free] = 0.0
     return w
+
+
+def _free_optimum(gram: Array, moment: Array, free: NDArray[np.bool_]) -> Array:
+    """Return the weights where the others are zero, of any sign (k,)."""
+    w = np.zeros(moment.size)
+    w[free] = np.linalg.solve(gram[free][:, free], moment[free])
+    return w
+
+
+def _rising(
+    gram: Array, moment: Array, w: Array, free: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], Array]:
+    """Return which weights at zero would better be larger, and all gradients (k,)."""
+    gradient = moment - gram @ w
+    sure = ROUNDING * (np.abs(moment) + np.abs(gram) @ np.abs(w))
+    return ~free & (gradient > sure), gradient

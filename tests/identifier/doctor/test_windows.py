@@ -12,13 +12,14 @@ from identifier.doctor.windows import Windows, not_negative
 def test_windows_sum_as_a_sparse_matrix_does(shape):
     rng = np.random.default_rng(0)
     starts, weights, x = np.array([0, 3, 50, 180]), rng.standard_normal(20), rng.random(shape)
-    columns = (starts[:, None] + np.arange(20)).ravel()
-    matrix = csr_array((np.tile(weights, 4), (np.repeat(np.arange(4), 20), columns)), (4, 200))
-    np.testing.assert_allclose(Windows(starts, weights) @ x, matrix @ x, rtol=1e-12, atol=1e-14)
+    under = starts[:, None] + np.arange(20)
+    rows = np.repeat(np.arange(4), 20)
+    matrix = csr_array((np.tile(weights, 4), (rows, under.ravel())), (4, 200))
+    np.testing.assert_allclose(Windows(under, weights) @ x, matrix @ x, rtol=1e-12, atol=1e-14)
 
 
 def test_no_window_sums_nothing():
-    nowhere = Windows(np.zeros(0, dtype=np.intp), np.ones(20))
+    nowhere = Windows(np.zeros((0, 20), dtype=np.intp), np.ones(20))
     assert (nowhere @ np.zeros(5)).shape == (0,)
     assert (nowhere @ np.zeros((5, 3))).shape == (0, 3)
 
@@ -33,9 +34,10 @@ def test_weights_are_those_of_nnls(seed):
     gram = basis.T @ basis + 1e-6 * np.eye(5)
     R = np.linalg.cholesky(gram)
     known, _ = nnls(R.T, np.linalg.solve(R, basis.T @ y))
-    np.testing.assert_allclose(
-        not_negative(gram, basis.T @ y), known, rtol=1e-6, atol=1e-8 * np.abs(known).max()
-    )
+    near = {"rtol": 1e-6, "atol": 1e-8 * np.abs(known).max()}
+    np.testing.assert_allclose(not_negative(gram, basis.T @ y), known, **near)
+    for guess in (known > 0.0, known == 0.0, np.ones(5, bool), np.zeros(5, bool)):
+        np.testing.assert_allclose(not_negative(gram, basis.T @ y, guess), known, **near)
 
 
 def test_a_moment_that_pushes_down_leaves_all_weights_at_zero():
