@@ -12,6 +12,7 @@ force follows slip, and the sway of its body, whose roll follows a_y, over the c
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -44,9 +45,19 @@ SMALL = 0.004  # static axle loads
 TYPICAL = 10.0  # slope of a curve [static axle loads per rad], for the noise that slip brings
 
 Sizes = Mapping[str, float]  # of faults, by key; what is not named is not there
+Told = tuple[tuple[str, float], ...]  # the same, those of it that matter
 FRONT, REAR, KINEMATICS = range(3)
 STEERING = ("delta_f", "delta_r")
 RELAXATION = ("relaxation.front", "relaxation.rear")
+# Sizes that change nothing of a part: it is not computed again for their sake.
+TIRES = frozenset({*RELAXATION, "sway", "roll_delay"})
+GEOMETRY = frozenset({"center_of_gravity", "yaw_inertia"})
+AHEAD = frozenset({"acceleration_sensor_x"})
+BANKED = frozenset(f"bank.{k}" for k in range(BANKS))
+NOT_OF_MOTION = TIRES | GEOMETRY | AHEAD | BANKED
+NOT_OF_FORCES = TIRES | AHEAD
+NOT_OF_PART = (AHEAD | {RELAXATION[REAR]}, AHEAD | {RELAXATION[FRONT]}, TIRES | GEOMETRY)
+RECENT = 4  # sizes whose parts are kept
 
 
 class Smooth(NamedTuple):
@@ -66,6 +77,19 @@ class Residual(NamedTuple):
 
     parts: tuple[Array, ...]
     noise: tuple[float, ...]
+
+
+class Motion(NamedTuple):
+    """A drive without its faults, and what follows from it alone.
+
+    channels : by name (n,).   a_y_dot : of what makes the body roll [m/s³], (n,).   rolled : way so
+    far [m], (n,).   v_x : mean under each window [m/s], (m,).
+    """
+
+    channels: Mapping[str, Array]
+    a_y_dot: Array
+    rolled: Array
+    v_x: Array
 
 
 class Car(NamedTuple):
@@ -143,6 +167,9 @@ class Balance:
         self.jerk = np.gradient(np.pad(bell / bell.sum(), 1), self.dt)
         self.jolt = np.gradient(np.pad(self.jerk, 1), self.dt)
         self.norms = self._norms(half, every)
+        self.motion = lru_cache(RECENT)(self._motion)
+        self.forces = lru_cache(RECENT)(self._forces)
+        self.part = lru_cache(len(NOT_OF_PART) * RECENT)(self._part)
         self.allowed, self.size = np.ones((len(self), 3)), np.ones(2)
         if len(self):
             self.allowed, self.size = self._allowed()
@@ -252,24 +279,18 @@ class Balance:
         yaw = car.inertia * rates[:, 1] / g
         return np.column_stack([lateral + yaw / car.l_r, lateral - yaw / car.l_f])
 
-    def _slip(self, x: Mapping[str, Array], car: Car, sizes: Sizes) -> Array:
-        """Return slip angles as force follows them [rad], (n, 2)."""
-        v_x, v_y, r = x["v_x"], x["v_y"], x["r"]
-        a_y_dot = np.convolve(v_y, self.jolt, "same") + np.convolve(v_x * r, self.jerk, "same")
+    def _slip(self, motion: Motion, axle: int, car: Car, sizes: Sizes) -> Array:
+        """Return slip angles of an axle as force follows them [rad], (n,)."""
+        x = motion.channels
         later = max(sizes.get("roll_delay", 0.0), 0.0)
         steps = np.arange(self.at.size) * self.dt
-        sideways = v_y + sizes.get("sway", 0.0) * np.interp(steps - later, steps, a_y_dot)
-        slip = np.column_stack(
-            [
-                x["delta_f"] - np.arctan((sideways + car.l_f * r) / v_x),
-                x["delta_r"] - np.arctan((sideways - car.l_r * r) / v_x),
-            ]
-        )
-        rolled = np.concatenate([[0.0], np.cumsum(0.5 * (v_x[1:] + v_x[:-1]) * self.dt)])
-        for i, name in enumerate(RELAXATION):
-            length = max(sizes.get(name, 0.0), 0.0) * self.vehicle.wheelbase
-            slip[:, i] = np.interp(rolled - length, rolled, slip[:, i])
-        return slip
+        swayed = np.interp(steps - later, steps, motion.a_y_dot)
+        sideways = x["v_y"] + sizes.get("sway", 0.0) * swayed
+        arm = (car.l_f, -car.l_r)[axle]
+        slip = x[STEERING[axle]] - np.arctan((sideways + arm * x["r"]) / x["v_x"])
+        length = max(sizes.get(RELAXATION[axle], 0.0), 0.0) * self.vehicle.wheelbase
+        followed: Array = np.interp(motion.rolled - length, motion.rolled, slip)
+        return followed
 
     def residual(self, sizes: Sizes) -> Residual:
         """Return what the equations miss.
@@ -278,28 +299,43 @@ class Balance:
         ----------
         sizes : of the faults, by key.
         """
-        x, car, bank = self.channels(sizes), Car.of(self.vehicle, sizes), self._bank(sizes)
-        force, slip = self._force(x, car, bank), self._slip(x, car, sizes)
-        v_x = self.mean @ x["v_x"]
-        scales = np.array(LADDER)
-        parts, noise = [], []
-        for i, steering in enumerate(STEERING):
-            units = unit_matrix(slip[:, i], LADDER) * np.cos(x[steering])[:, None]
-            basis = (self.mean @ units) / self.allowed[:, i : i + 1]
-            y = force[:, i] / self.allowed[:, i]
-            w = rising(basis, y, self.curved.get(i))
-            self.curved[i] = w > 0.0
-            # Over the size of the force: to shrink it, by a factor of r, explains nothing.
-            size = self.size[i] / max(math.sqrt(float(y @ y) / y.size), 1e-9)
-            parts.append((y - basis @ w) * size)
-            slope = (1.0 - unit_matrix(self.mean @ slip[:, i], LADDER) ** 2) @ (w / scales)
-            left = self._noise(i, sizes, car, v_x, slope) / self.allowed[:, i] ** 2
-            noise.append(float(np.mean(left)) * size**2)
-        if self.has_accelerometer:
-            parts.append(self._kinematics(x, bank, sizes) / self.allowed[:, KINEMATICS])
-            left = self._noise(KINEMATICS, sizes, car, v_x, v_x)
-            noise.append(float(np.mean(left / self.allowed[:, KINEMATICS] ** 2)))
-        return Residual(tuple(parts), tuple(noise))
+        parts = (FRONT, REAR, KINEMATICS) if self.has_accelerometer else (FRONT, REAR)
+        found = [self.part(i, told(sizes, NOT_OF_PART[i])) for i in parts]
+        return Residual(tuple(part for part, _ in found), tuple(noise for _, noise in found))
+
+    def _motion(self, of: Told) -> Motion:
+        x = self.channels(dict(of))
+        v_x, v_y = x["v_x"], x["v_y"]
+        a_y_dot = np.convolve(v_y, self.jolt, "same")
+        a_y_dot = a_y_dot + np.convolve(v_x * x["r"], self.jerk, "same")
+        rolled = np.concatenate([[0.0], np.cumsum(0.5 * (v_x[1:] + v_x[:-1]) * self.dt)])
+        return Motion(x, a_y_dot, rolled, self.mean @ v_x)
+
+    def _forces(self, of: Told) -> Array:
+        sizes = dict(of)
+        x = self.motion(told(sizes, NOT_OF_MOTION)).channels
+        return self._force(x, Car.of(self.vehicle, sizes), self._bank(sizes))
+
+    def _part(self, part: int, of: Told) -> tuple[Array, float]:
+        """Return what an equation misses (m,), and the mean square that noise leaves in it."""
+        sizes = dict(of)
+        motion, car = self.motion(told(sizes, NOT_OF_MOTION)), Car.of(self.vehicle, sizes)
+        allowed = self.allowed[:, part]
+        if part == KINEMATICS:
+            missed = self._kinematics(motion.channels, self._bank(sizes), sizes)
+            left = self._noise(part, sizes, car, motion.v_x, motion.v_x)
+            return missed / allowed, float(np.mean(left / allowed**2))
+        y = self.forces(told(sizes, NOT_OF_FORCES))[:, part] / allowed
+        slip = self._slip(motion, part, car, sizes)
+        units = unit_matrix(slip, LADDER) * np.cos(motion.channels[STEERING[part]])[:, None]
+        basis = (self.mean @ units) / allowed[:, None]
+        w = rising(basis, y, self.curved.get(part))
+        self.curved[part] = w > 0.0
+        # Over the size of the force: to shrink it, by a factor of r, explains nothing.
+        size = self.size[part] / max(math.sqrt(float(y @ y) / y.size), 1e-9)
+        slope = (1.0 - unit_matrix(self.mean @ slip, LADDER) ** 2) @ (w / np.array(LADDER))
+        left = self._noise(part, sizes, car, motion.v_x, slope) / allowed**2
+        return (y - basis @ w) * size, float(np.mean(left)) * size**2
 
     def _kinematics(self, x: Mapping[str, Array], bank: Array, sizes: Sizes) -> Array:
         g, ahead = GRAVITY, sizes.get("acceleration_sensor_x", 0.0)
@@ -348,6 +384,17 @@ class Balance:
         allowed = np.sqrt(noise + share**2 + SMALL**2)
         rms = np.sqrt(np.mean((force / allowed[:, :2]) ** 2, axis=0))
         return allowed, rms
+
+
+def told(sizes: Sizes, without: frozenset[str]) -> Told:
+    """Return the sizes that matter.
+
+    Parameters
+    ----------
+    sizes : by key.
+    without : keys of those that do not.
+    """
+    return tuple(one for one in sizes.items() if one[0] not in without)
 
 
 def rising(basis: Array, y: Array, guess: NDArray[np.bool_] | None = None) -> Array:
