@@ -37,7 +37,7 @@ from models.faults import SensorFault
 from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
 from mpc.loop.sensing import cornering_limit
-from mpc.path import iso_3888_1, slalom, steady_speed
+from mpc.path import Path, iso_3888_1, slalom, steady_speed
 from tireid.commands.drive_case import conditions_of, make_setup
 from tireid.driving import Conditions, SpeedWish, learning_drive, run_drive
 from tireid.driving.runs import FROZEN
@@ -101,6 +101,17 @@ def fault_of(car: int) -> SensorFault:
     return SensorFault(channel=name, kind="biased", start=0.0, duration=math.inf, size=size)
 
 
+@cache
+def path_of(course: str) -> Path:
+    """Return the path of a course, planned once.
+
+    Parameters
+    ----------
+    course : its name.
+    """
+    return slalom(gap=36.0, cones=12) if course == "slalom" else iso_3888_1()
+
+
 def conditions(case: Case) -> Conditions:
     """Return what `tireid drive` would drive, in a car and on a path of our own.
 
@@ -109,7 +120,7 @@ def conditions(case: Case) -> Conditions:
     case : what to drive.
     """
     car, wet = vehicle_of(case.car), case.situation == "wet"
-    path = slalom(gap=36.0, cones=12) if case.course == "slalom" else iso_3888_1()
+    path = path_of(case.course)
     limit = cornering_limit(car, None, WET if wet else 1.0)
     speed = steady_speed(path, a_y_max=limit, share=SHARES[case.course])
     place = 40.0 + 36.0 * (25.0 + case.car % 10) / 6.0
