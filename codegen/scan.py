@@ -384,7 +384,7 @@ def longs(numbers: Sequence[int]) -> "ctypes.Array[ctypes.c_long]":
     return (ctypes.c_long * max(len(numbers), 1))(*numbers)
 
 
-# A step function taken one sample at a time: the compiled loop of a `Scan`, with its memory kept.
+# A step function taken a few samples at a time: the compiled loop of a `Scan` with its memory kept.
 #
 # For what runs beside a car: nothing is laid out, checked or allocated anew at a sample.
 
@@ -392,13 +392,15 @@ def longs(numbers: Sequence[int]) -> "ctypes.Array[ctypes.c_long]":
 class Stepper:
     """A run that goes on: write `inputs`, `advance`, read `outputs`; the bits of the `Scan`.
 
-    Attributes `inputs` and `outputs` hold one flat array a port, always the same ones: of the
-    ports of `over`, and of the outputs that are not carried. Matrices lie by columns.
+    Attributes `inputs` and `outputs` hold one array a port, always the same ones: of the ports of
+    `over`, flat (size,) or, of several samples at once, one row a sample; and of the outputs that
+    are not carried, those of the last sample, flat. Matrices lie by columns.
 
     Parameters
     ----------
     scan : the compiled step.
     values : start of the carried ports and the constants, by name.
+    samples : how many are taken at once.
 
     Raises
     ------
@@ -406,33 +408,29 @@ class Stepper:
         Where a value is missing, unknown, or has the wrong shape.
     """
 
-    def __init__(self, scan: Scan, values: Mapping[str, Array]) -> None:
+    def __init__(self, scan: Scan, values: Mapping[str, Array], samples: int = 1) -> None:
         step = scan.step
-        samples = {port: np.zeros((1, step.numel_in(port))) for port in scan.over}
-        packed = scan.packed(1, {**values, **samples})
+        rows = {port: np.zeros((samples, step.numel_in(port))) for port in scan.over}
+        packed = scan.packed(samples, {**values, **rows})
         self._scan, self._constants = scan, {port: values[port] for port in scan.constants}
-        self._samples = {port: packed[port] for port in scan.over}
-        self.inputs = {port: packed[port].reshape(-1) for port in scan.over}
+        self._samples, self._rows = samples, {port: packed[port] for port in scan.over}
+        flat = samples == 1
+        self.inputs = {port: row[0] if flat else row for port, row in self._rows.items()}
         self.outputs = {port: np.zeros(step.numel_out(port)) for port in scan.outputs}
         self._now = {port: packed[port].copy() for port in scan.carry}
-        self._following = {port: np.empty_like(array) for port, array in self._now.items()}
+        self._before = {port: np.empty_like(array) for port, array in self._now.items()}
         self._loop = scan.loop
         if self._loop is not None:
             self._arguments = self._laid_out(packed)
 
     def _laid_out(self, packed: dict[str, Array]) -> list[object]:
-        """Return the arguments of the loop, for one sample; the loop swaps the carried arrays."""
+        """Return the arguments of the loop, which records nothing and swaps the carried arrays."""
         scan, layout = self._scan, self._scan.layout
-        self._kept = [  # arrays that only the loop knows
-            *packed.values(),
-            *(before := [np.empty_like(array) for array in self._now.values()]),
-            work := np.empty(layout.sz_w),
-        ]
+        self._kept = [*packed.values(), work := np.empty(layout.sz_w)]  # that only the loop knows
         self._integer_work = np.empty(layout.sz_iw, dtype=np.int64)
-        outputs = pointers(list(self.outputs.values()))
         return [
-            ctypes.c_long(1),
-            ctypes.c_long(1),
+            ctypes.c_long(self._samples),
+            ctypes.c_long(self._samples),
             pointers([packed[port] for port in scan.step.name_in()]),
             layout.arg_step,
             ctypes.c_long(len(scan.carry)),
@@ -440,13 +438,13 @@ class Stepper:
             layout.carry_res,
             layout.carry_size,
             pointers(list(self._now.values())),
-            pointers(list(self._following.values())),
-            pointers(before),
+            pointers(list(self._before.values())),
+            pointers([None] * len(scan.carry)),
             ctypes.c_long(len(scan.outputs)),
             layout.out_res,
             layout.out_size,
-            outputs,
-            outputs,
+            pointers([None] * len(scan.outputs)),
+            pointers(list(self.outputs.values())),
             (ctypes.c_void_p * layout.sz_arg)(),
             (ctypes.c_void_p * layout.sz_res)(),
             self._integer_work.ctypes.data_as(ctypes.c_void_p),
@@ -454,7 +452,7 @@ class Stepper:
         ]
 
     def advance(self) -> None:
-        """Take the sample that `inputs` holds; leave what it tells in `outputs`.
+        """Take the samples that `inputs` holds; leave what the last one tells in `outputs`.
 
         Raises
         ------
@@ -466,14 +464,36 @@ class Stepper:
             return
         if self._loop(*self._arguments):
             raise RuntimeError(f"{self._scan.step.name()} reported a failure")
-        self._now, self._following = self._following, self._now
+        if self._samples % 2:
+            self._now, self._before = self._before, self._now
 
     def _advance_slowly(self) -> None:
-        record = self._scan(1, {**self.state(), **self._samples, **self._constants})
+        n = self._samples
+        record = self._scan(n, {**self.state(), **self._rows, **self._constants})
         for port, array in self.outputs.items():
-            array[:] = record[port].ravel(order="F")
+            array[:] = record[port][-1].ravel(order="F")
         for port, array in self._now.items():
+            self._before[port][:] = record[port][-1].ravel(order="F")
             array[:] = record[f"{port}_final"].ravel(order="F")
+
+    def begin(self, port: str, value: Array) -> None:
+        """Go on from another value of a carried port.
+
+        Parameters
+        ----------
+        port : one of those that are carried.
+        value : in its shape.
+        """
+        self._now[port][:] = np.ravel(value, order="F")
+
+    def before(self, port: str) -> Array:
+        """Return the value of one carried port before the last sample, in its shape; a copy.
+
+        Parameters
+        ----------
+        port : one of those that are carried.
+        """
+        return shaped(self._before[port], self._scan.step.size_in(port)).copy()
 
     def state(self) -> dict[str, Array]:
         """Return the carried values in effect, by port, in their shapes; copies."""

@@ -3,12 +3,12 @@
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from codegen import Scan, compiler
+from codegen import Scan, Stepper, compiler
 from codegen.arrays import Array
 from codegen.graph import lifted
 from models.friction import Friction
@@ -347,8 +347,17 @@ class StepwisePlant:
         self.period = period
         self.dt = dt
         self._every = every
-        self._places = self.friction.over_place()
-        self._loop = plant.loop(dt)
+
+    @cached_property
+    def _steppers(self) -> tuple[Stepper, Stepper]:
+        """Of the first instant, and of a period with the first step of the next one.
+
+        That step is there for its outputs: they are those of the period's end.
+        """
+        scan, constants = self.plant.loop(self.dt)
+        places = self.friction.over_place()
+        values = {"x": np.zeros(N_STATES), "constants": constants, "places": places}
+        return Stepper(scan, values), Stepper(scan, values, self._every + 1)
 
     def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> PlantState:
         """Return the car rolling straight ahead.
@@ -368,7 +377,7 @@ class StepwisePlant:
             raise ValueError(f"v_x must be positive at the start, it is {v_x}")
         x = np.zeros(N_STATES)
         x[[0, 5, 6, 7]] = v_x, X, Y, psi
-        return self._run(0, 1, x, np.zeros(2), v_x)
+        return self._run(self._steppers[0], 0, 1, x, np.zeros(2), v_x)
 
     def step(self, state: PlantState, command: Array, v_ref: float) -> PlantState:
         """Return the plant one period later.
@@ -388,23 +397,20 @@ class StepwisePlant:
         """
         if not np.isfinite([*command, v_ref]).all():
             raise ValueError(f"command and v_ref must be finite, they are {command} and {v_ref}")
-        # One step more than the period has: its outputs are those of the period's end.
-        return self._run(state.steps, self._every + 1, state.x, command, v_ref)
+        n = self._every + 1
+        return self._run(self._steppers[1], state.steps, n, state.x, command, v_ref)
 
-    def _run(self, start: int, n: int, x: Array, command: Array, v_ref: float) -> PlantState:
+    def _run(
+        self, stepper: Stepper, start: int, n: int, x: Array, command: Array, v_ref: float
+    ) -> PlantState:
         middle = self.dt * np.arange(start, start + n, dtype=np.float64) + 0.5 * self.dt
-        values = {
-            "x": x,
-            "command": np.tile(command, (n, 1)),
-            "v_ref": np.full(n, v_ref),
-            "mu": self.friction.over_time(middle),
-            "places": self._places,
-            "aside": np.zeros((n, 2)),
-            "constants": self._loop.constants,
-        }
-        record = self._loop.scan(n, values, every=max(n - 1, 1))
-        now = start + n - 1
-        if not np.isfinite(record["x"][-1]).all():
+        stepper.begin("x", x)
+        stepper.inputs["command"][:] = command
+        stepper.inputs["v_ref"][:] = v_ref
+        stepper.inputs["mu"][:] = self.friction.over_time(middle).reshape(n, 1)
+        stepper.advance()
+        now, x = start + n - 1, stepper.before("x")
+        if not np.isfinite(x).all():
             raise PlantError(f"the car's state is not finite from t = {now * self.dt:.3f} s")
-        outputs = (record[name][-1] for name in PlantState._fields[2:])
-        return PlantState(now, record["x"][-1], *outputs)
+        outputs = (stepper.outputs[name].copy() for name in PlantState._fields[2:])
+        return PlantState(now, x, *outputs)

@@ -41,6 +41,37 @@ def test_steps_are_bit_equal_to_the_loop(scan, rng, n):
     np.testing.assert_array_equal(stepper.state()["s"], whole["s_final"])
 
 
+@pytest.mark.parametrize("samples", [2, 3])
+def test_several_samples_at_once_are_bit_equal_to_the_loop(scan, rng, samples):
+    start = {"M": rng.normal(size=(2, 3)), "s": rng.normal(size=2), "c": np.array(0.1)}
+    u = rng.normal(size=(6, 3))
+    whole = scan(6, {**start, "u": u})
+    stepper = Stepper(scan, start, samples)
+    for k in range(0, 6, samples):
+        stepper.inputs["u"][:] = u[k : k + samples]
+        stepper.advance()
+        last = k + samples - 1
+        np.testing.assert_array_equal(stepper.outputs["y"], whole["y"][last])
+        for port in ("M", "s"):
+            np.testing.assert_array_equal(stepper.before(port), whole[port][last])
+            np.testing.assert_array_equal(stepper.value(port), whole[f"{port}_all"][last + 1])
+
+
+@pytest.mark.parametrize("samples", [1, 2])
+def test_a_run_goes_on_from_another_state(scan, rng, samples):
+    start = {"M": rng.normal(size=(2, 3)), "s": rng.normal(size=2), "c": np.array(0.1)}
+    other, u = rng.normal(size=(2, 3)), rng.normal(size=(samples, 3))
+    stepper = Stepper(scan, start, samples)
+    for _ in range(2):
+        stepper.begin("M", other)
+        stepper.begin("s", start["s"])
+        stepper.inputs["u"][:] = u
+        stepper.advance()
+        expected = scan(samples, {**start, "M": other, "u": u})
+        np.testing.assert_array_equal(stepper.value("M"), expected["M_final"])
+        np.testing.assert_array_equal(stepper.outputs["y"], expected["y"][-1])
+
+
 def test_the_values_at_the_start_stay_the_callers(scan, rng):
     start = {"M": np.asfortranarray(rng.normal(size=(2, 3))), "s": rng.normal(size=2)}
     kept = {port: value.copy() for port, value in start.items()}
