@@ -18,7 +18,6 @@ from identifier.plan.motion import NO_HOLD, Entry, Motion, hold_of, simulate, st
 from identifier.plan.rehearsal import LEAD, rehearse
 from identifier.plan.search import (
     FEWEST,
-    SWING,
     Pass,
     PlanError,
     Search,
@@ -26,6 +25,7 @@ from identifier.plan.search import (
     after_pass,
     body_of,
     edge_distance,
+    swing_time,
 )
 from identifier.plan.tires import PlausibleTires
 from models.maneuvers import Maneuver, RandomSteer, Slalom
@@ -205,7 +205,7 @@ def make_plan(
             "give more room or less margin"
         )
     longest = longest_pass(tires, space)
-    needed = FEWEST * SWING * tires.vehicle.froude_time
+    needed = FEWEST * swing_time(tires, space)
     if min(longest, time) < needed:
         raise PlanError(_too_small(tires, space, min(longest, time), needed))
     count = max(1, math.ceil(time / longest))

@@ -29,7 +29,7 @@ from models.vehicle import GRAVITY
 
 POPULATION, GENERATIONS = 32, 100
 STALLED, GAIN = 20, 0.01  # generations after which a search ends that brought less than a share
-SWING = 0.75  # sqrt(L/g): mean duration of a change from angle to angle, 0.4 s in a sedan
+SWING = 0.75  # sqrt(L/g): least mean duration of a change from angle to angle, 0.4 s in a sedan
 CHIRP = math.log(
     3.0
 )  # largest ratio of the last to the mean duration, and of the mean to the first
@@ -123,6 +123,21 @@ def edge_distance(space: Space, body: Body, X: Array, Y: Array, psi: Array) -> A
     return least
 
 
+def swing_time(tires: PlausibleTires, space: Space) -> float:
+    """Return the mean duration of a change from angle to angle [s].
+
+    Soft tires need large angles: as long as a half cosine takes, at the limit of the steering rate,
+    from the slip of the wanted share of the grip to the same slip on the other side.
+
+    Parameters
+    ----------
+    tires : that the car may have.
+    space : where and how hard.
+    """
+    across = math.pi * float(tires.slip_at(space.share)[0, 0]) / space.rate_limit
+    return max(SWING * tires.vehicle.froude_time, across)
+
+
 class Steerings(NamedTuple):
     """m steerings: times (m, N + 1) [s], angles (m, N + 1) [rad], and entries."""
 
@@ -191,13 +206,13 @@ class Search:
     @property
     def swings(self) -> int:
         """How many changes of the angle there are before they repeat."""
-        wanted = round(self.duration / (SWING * self.tires.vehicle.froude_time))
+        wanted = round(self.duration / swing_time(self.tires, self.space))
         return max(FEWEST, round(wanted / self.repeats))
 
     @property
     def repeats(self) -> int:
         """How often the swings are driven, every other time mirrored."""
-        wanted = self.duration / (SWING * self.tires.vehicle.froude_time)
+        wanted = self.duration / swing_time(self.tires, self.space)
         return max(1, math.ceil(wanted / MOST))
 
     @property
