@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from identifier.axle import AxleIdentifier
+from identifier.axle.covariance import unpacked
 from identifier.run import identify
 from models.faults import Bank
 
@@ -429,9 +430,11 @@ def test_covariance_grows_again_only_while_it_is_no_wider_than_told(car, drive):
             change=replace(design.change, threshold=1e6),
         )
         n = len(design.ladder)
-        history = identify(recording, car, design)
-        times = np.append(recording.t, np.inf)  # before each sample and after the last
-        P = np.stack([design.frozen(car, history.state_at(t)).covariance for t in times])
+        factors = identify(recording, car, design).state["UD"]  # before each sample, after the last
+        P = unpacked(factors.reshape(-1, factors.shape[-1]), n + 3)
+        sd = np.sqrt(np.einsum("aii->ai", P))
+        assert np.linalg.eigvalsh(P / (sd[:, :, None] * sd[:, None]))[:, 0].min() > -1e-6
+        P = P.reshape(*factors.shape[:2], n + 3, n + 3)
         told = design.prior.covariance(car, design.ladder)
         trace, limit = (np.trace(M[..., :n, :n], axis1=-2, axis2=-1) for M in (P, told))
         grew = np.diff(trace, axis=0) > 1e-9 * limit
