@@ -14,6 +14,7 @@ from identifier.methods import make_method
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan
+from tests.kept import Kept
 
 STRICT = [
     "-std=c99",
@@ -40,8 +41,13 @@ CALIBRATION = BandCalibration(
 def packages():
     """By law: the paper's network; what tireid learns by, without and with a_y; without v_y."""
     car = sedan()
-    found = {law: build_package(make_method(law, car), car) for law in (*TWO, "inertial")}
-    return found | {BANKED: banded(car, with_a_y=True)}
+
+    def make(law):
+        if law == BANKED:
+            return banded(car, with_a_y=True)
+        return build_package(make_method(law, car), car)
+
+    return Kept((*TWO, "inertial", BANKED), make)
 
 
 def banded(car, **options):
@@ -75,8 +81,10 @@ def with_faults(rows, at):
 @pytest.fixture(scope="session")
 def drives(packages, slalom, samples):
     """By law, the slalom as rows of its inputs, with a halt and a fault, a_y and v_y in parts."""
-    found = {law: samples for law in TWO}
-    for law in (BANKED, "inertial"):
+
+    def make(law):
+        if law in TWO:
+            return samples
         specialized = packages[law].specialized
         rows = samples_of(slalom, [port.name for port in specialized.inputs])
         rows = with_faults(rows, at=2)
@@ -84,8 +92,9 @@ def drives(packages, slalom, samples):
         if specialized.tells_v_y:
             rows[:2250, 1] = np.nan
             rows[2300:2330, 1], rows[2380:2400, 1], rows[2400:, 1] = 1e4, -np.inf, np.nan
-        found[law] = rows[1900:2600]
-    return found
+        return rows[1900:2600]
+
+    return Kept((*TWO, BANKED, "inertial"), make)
 
 
 def put(folder, files):

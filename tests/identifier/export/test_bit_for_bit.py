@@ -1,6 +1,7 @@
 """The same bits everywhere: two compilers here, two processors in QEMU, CasADi itself."""
 
 import shutil
+from itertools import product
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from identifier.export.compiled import CompiledPackage, Status, samples_of
 from identifier.export.package import run_in_virtual_machine
 from identifier.export.processor import PROCESSORS, missing_tools, replay_here, replay_on
 from tests.identifier.export.conftest import BANKED
+from tests.kept import Kept
 
 needs_arm = pytest.mark.skipif(bool(missing_tools()), reason=f"needs {', '.join(missing_tools())}")
 LAWS = ("integral", "axle", BANKED, "inertial")
@@ -19,11 +21,12 @@ def here(packages, drives):
     """By law and precision, what gcc makes of the slalom on this machine."""
     if shutil.which("gcc") is None:
         pytest.skip("needs gcc")
-    return {
-        (law, single): replay_here("gcc", "tireid", packages[law].files, drives[law], single=single)
-        for law in LAWS
-        for single in (False, True)
-    }
+
+    def replay(key):
+        law, single = key
+        return replay_here("gcc", "tireid", packages[law].files, drives[law], single=single)
+
+    return Kept(product(LAWS, (False, True)), replay)
 
 
 @pytest.mark.parametrize("law", LAWS)

@@ -13,6 +13,7 @@ from identifier.export.specialize import specialize
 from identifier.methods import make_method
 from identifier.run import identify
 from models.vehicle import sedan
+from tests.kept import Kept
 
 fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")
 validation = pytest.importorskip("fmpy.validation")
@@ -33,11 +34,14 @@ def step():
 def paths(step, tmp_path_factory):
     """By version; Linux only, for speed."""
     folder = tmp_path_factory.mktemp("fmu")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(binaries, "MINGW", "no-such-compiler")
-        for version in (2, 3):
+
+    def make(version):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(binaries, "MINGW", "no-such-compiler")
             export_fmu(step, folder / f"{version}.fmu", version)
-    return {version: folder / f"{version}.fmu" for version in (2, 3)}
+        return folder / f"{version}.fmu"
+
+    return Kept((2, 3), make)
 
 
 def simulated(path, drive, names):

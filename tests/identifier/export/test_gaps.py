@@ -15,6 +15,7 @@ from identifier.refused import STALE_TIME
 from identifier.run import OnlineIdentifier, identify
 from models.vehicle import sedan
 from tests.identifier.export.conftest import BANKED
+from tests.kept import Kept
 
 CAR = sedan()
 OTHERS = ("rls", "stiffness_rls", "eso", "linear_kf", "washout")
@@ -26,8 +27,13 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compi
 @pytest.fixture(scope="module")
 def shipped(packages):
     """By law, what a package is computed with; each test begins anew."""
-    others = {law: build_package(make_method(law, CAR), CAR) for law in OTHERS}
-    return {law: CompiledPackage.of(one) for law, one in {**packages, **others}.items()}
+
+    def make(law):
+        other = law in OTHERS
+        package = build_package(make_method(law, CAR), CAR) if other else packages[law]
+        return CompiledPackage.of(package)
+
+    return Kept(LAWS, make)
 
 
 def method_of(law):

@@ -12,6 +12,7 @@ from models.maneuvers import RandomSteer
 from models.plant import Plant
 from models.sensors import Sensor, Sensors
 from models.vehicle import GRAVITY, sedan
+from tests.kept import Kept
 
 CAR = sedan()
 METHOD = InertialIdentifier.for_vehicle(CAR)
@@ -68,16 +69,19 @@ def of_set(sensors, exact, shown, seed):
 @pytest.fixture(scope="module")
 def runs():
     """By set of sensors: errors of v_y and their standard deviations, drive by drive."""
-    found = {sensors: [] for sensors in ("perfect", "receiver", "absent")}
-    for seed in SEEDS:
-        exact, shown = random_plant(seed)
-        for sensors, listed in found.items():
+    plants = Kept(SEEDS, random_plant)
+
+    def driven(sensors):
+        listed = []
+        for seed, (exact, shown) in plants.items():
             history = of_set(sensors, exact, shown, seed)
             error = history.outputs["v_y"].ravel() - exact.v_y
             model = history.freeze()
             force = model.force_at(np.array([0.02, 0.05, 0.08]))
             listed.append((error[100:], history.outputs["v_y_sd"].ravel()[100:], force, model))
-    return found
+        return listed
+
+    return Kept(("perfect", "receiver", "absent"), driven)
 
 
 def rms(listed):

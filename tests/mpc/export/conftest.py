@@ -12,6 +12,7 @@ from tests.identifier.export.conftest import STRICT as STRICT
 from tests.identifier.export.conftest import compiler as compiler
 from tests.identifier.export.conftest import put
 from tests.identifier.export.conftest import run as run
+from tests.kept import Kept
 
 LAWS = ("integral", "axle")
 
@@ -22,13 +23,13 @@ def pairs():
     if shutil.which("gcc") is None:
         pytest.skip("needs gcc")
     car = sedan()
-    return {law: build_pair(build_package(make_method(law, car), car)) for law in LAWS}
+    return Kept(LAWS, lambda law: build_pair(build_package(make_method(law, car), car)))
 
 
 @pytest.fixture(scope="session")
 def packages(pairs):
     """By law, the tracker alone."""
-    return {law: pair.tracker for law, pair in pairs.items()}
+    return Kept(LAWS, lambda law: pairs[law].tracker)
 
 
 @pytest.fixture

@@ -19,6 +19,7 @@ from mpc.export.pair import DELAY, NoHandoverError, build_pair
 from mpc.realtime import Tracker
 from mpc.realtime.instance import CAUTION
 from mpc.tires import prediction_tire
+from tests.kept import Kept
 from tests.mpc.export.conftest import LAWS, STRICT, c_files, put
 
 CAR = sedan()
@@ -140,27 +141,30 @@ def taught(pairs):
         amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=9.99
     )
     recording = Plant(sedan()).simulate(slalom, speed=20.0).recording()
-    found = {}
-    for law in LAWS:
-        found[law] = CompiledPackage.of(pairs[law].identifier, single=False)
-        found[law].run(recording)
-    return found
+
+    def make(law):
+        learner = CompiledPackage.of(pairs[law].identifier, single=False)
+        learner.run(recording)
+        return learner
+
+    return Kept(LAWS, make)
 
 
 @pytest.fixture(scope="module")
 def libraries(pairs, tmp_path_factory):
     """By law, the handover and the tracker in double."""
-    found = {}
-    for law, pair in pairs.items():
-        folder = tmp_path_factory.mktemp(law)
+
+    def make(law):
+        folder, pair = tmp_path_factory.mktemp(law), pairs[law]
         for part, files in (
             ("identifier", pair.identifier.files),
             ("mpc", pair.tracker.files),
             ("", pair.files),
         ):
             put(folder / part, files)
-        found[law] = joined(folder)
-    return found
+        return joined(folder)
+
+    return Kept(LAWS, make)
 
 
 def joined(folder):
