@@ -205,19 +205,24 @@ def run_in_virtual_machine(
     samples : (n, k) in the order of the inputs.
     """
     limits, method = specialized.limits, specialized.method
-    carry = [ca.DM(value) for value in specialized.carry.values()]
-    n, size = len(carry), sum(port.size for port in specialized.outputs)
-    told, now, missed, started = [], np.zeros(size), 0, False
+    function, n = specialized.function, len(specialized.carry)
+    in_place = _InPlace(function)
+    arguments, results = in_place.arguments, in_place.results
+    for array, value in zip(arguments, specialized.carry.values(), strict=False):
+        array[:] = np.ravel(value, order="F")
+    x, delta, *scalars = arguments[n:]
+    now, missed, started = np.zeros(sum(port.size for port in specialized.outputs)), 0, False
+    told = []
 
-    def step(sample: Array) -> tuple[list[ca.DM], Array]:
+    def step(sample: Array) -> Array:
         v_x, v_y, r, delta_f, delta_r, *a_y = sample
-        results = list(
-            specialized.function(
-                *carry, ca.DM([limits.possible(v_y), r]), ca.DM([delta_f, delta_r]), v_x, *a_y
-            )
-        )
-        flat = [np.array(value).ravel(order="F") for value in results[n:]]
-        return results[:n], np.concatenate(flat)
+        x[:], delta[:] = (limits.possible(v_y), r), (delta_f, delta_r)
+        for array, value in zip(scalars, (v_x, *a_y), strict=True):
+            array[:] = value
+        in_place.compute()
+        for carried, following in zip(arguments, results[:n], strict=False):
+            carried[:] = following
+        return np.concatenate(results[n:])
 
     absent = np.array([port == ACCELERATION for port in specialized.inputs])
     nowhere = np.where(absent, np.nan, 0.0)
@@ -227,17 +232,33 @@ def run_in_virtual_machine(
             anew = specialized.believed is None and missed > 0
             if anew if started else specialized.rests_first:
                 rest = np.where(absent, np.nan, sample)
-                carry, _ = step(np.array([0.0, *rest[1:]]))
-            carry, now = step(sample)
+                step(np.array([0.0, *rest[1:]]))
+            now = step(sample)
             missed, started = 0, True
         else:
             missed += 1
             if specialized.believed is not None and started:
-                carry, now = step(nowhere)
+                now = step(nowhere)
             if missed >= stale_samples(STALE_TIME, specialized.dt):
-                now = np.zeros(size)
+                now = np.zeros_like(now)
         told.append(now)
-    return np.array(told), dict(zip(specialized.carry, map(np.array, carry), strict=True))
+    last = [array.reshape(function.size_in(i), order="F") for i, array in enumerate(arguments[:n])]
+    return np.array(told), dict(zip(specialized.carry, last, strict=True))
+
+
+class _InPlace:
+    """A dense function whose `results` are computed of its `arguments`, flat arrays by columns."""
+
+    def __init__(self, function: ca.Function) -> None:
+        buffers: Any  # typed as in C, where memory does not know its size
+        buffers, self.compute = function.buffer()
+        self.arguments = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
+        self.results = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
+        for i, array in enumerate(self.arguments):
+            buffers.set_arg(i, array.data)
+        for i, array in enumerate(self.results):
+            buffers.set_res(i, array.data)
+        self._buffers = buffers  # which nothing else keeps
 
 
 def vectors(specialized: SpecializedStep) -> Vectors:
