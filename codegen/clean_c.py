@@ -46,7 +46,7 @@ def recognized(graph: Graph, *, whole: bool = True) -> Graph:
     place_of: dict[int, int] = {}
     for place, node in enumerate(result.nodes):
         place_of[place] = _by_sines(found, _mapped(node, place_of))
-        for name, template, leaf in _templates():
+        for name, template, leaf in _templates().get(node.op, ()):
             argument = _argument(result, place, template, leaf)
             if argument is not None:
                 place_of[place] = found.add(Node(name, (place_of[argument],)))
@@ -55,7 +55,8 @@ def recognized(graph: Graph, *, whole: bool = True) -> Graph:
 
 
 def _mapped(node: Node, place_of: Mapping[int, int]) -> Node:
-    return node._replace(args=tuple(place_of[a] for a in node.args))
+    args = tuple([place_of[a] for a in node.args])
+    return Node(node.op, args, node.value, node.port, node.entry)
 
 
 def _with_choices(graph: Graph) -> Graph:
@@ -110,19 +111,20 @@ def _by_sines(graph: Graph, node: Node) -> int:
 
 
 @cache
-def _templates() -> list[tuple[str, Graph, int]]:
-    """Return our own functions: name, scalars, place of the argument.
+def _templates() -> Mapping[str, list[tuple[str, Graph, int]]]:
+    """Return our own functions by their last operation: name, scalars, place of the argument.
 
     Each twice: simplified by CasADi, as where a person calls it, and as written, as in `tuned`.
     """
-    found = []
+    found = dict[str, list[tuple[str, Graph, int]]]()
     for on in (True, False):
         with simplifying(on):
             for name, own in OWN.items():
                 x = ca.SX.sym("x")
                 graph = _with_choices(graph_of(ca.Function(name, [x], [own(x)])))
                 leaf = next(i for i, node in enumerate(graph.nodes) if node.op == "input")
-                found.append((name, graph, leaf))
+                last = graph.nodes[graph.outputs[0][0]].op
+                found.setdefault(last, []).append((name, graph, leaf))
     return found
 
 

@@ -5,10 +5,9 @@ becomes (1 - ρ h e) W - (h η g) σ, where (1 - ρ h e) and h η g serve many e
 through another sum where that makes it no longer. Results differ from those before by rounding.
 """
 
+import math
 from collections import Counter
 from collections.abc import Callable, Mapping
-
-import numpy as np
 
 from codegen.graph import Graph, Node
 
@@ -96,14 +95,14 @@ class _Simplifier:
 
     def _sum(self, a: int, sign: float, b: int) -> Form:
         plain = _merged(self._open(a), self._scaled(self._open(b), sign))
-        through = _merged(self._through(plain), {})
+        through = self._through(plain)
         return through if len(through) <= len(plain) else plain
 
     def _through(self, form: Form) -> Form:
         """Return a form with shared sums replaced by their own forms."""
         total: Form = {}
         for place, c in form.items():
-            total = _merged(total, self._scaled(self.shared_form.get(place, {place: 1.0}), c))
+            _add(total, self._scaled(self.shared_form.get(place, {place: 1.0}), c))
         return total
 
     def _number(self, place: int) -> float | None:
@@ -228,14 +227,23 @@ class _Simplifier:
 def _merged(one: Form, other: Form) -> Form:
     """Return the sum of two forms, without what cancels."""
     total = dict(one)
+    _add(total, other)
+    return total
+
+
+def _add(total: Form, other: Form) -> None:
+    """Add a form to another one in its place, which only who made it knows."""
     for place, c in other.items():
-        before = total.get(place, 0.0)
+        if place not in total:
+            if c:
+                total[place] = c
+            continue
+        before = total[place]
         value = before + c
         if abs(value) <= CANCELLED * (abs(before) + abs(c)):
-            total.pop(place, None)
+            del total[place]
             continue
-        near = np.round(value)
-        if near != value and abs(value - near) <= CANCELLED * abs(near) and place in one:
-            value = float(near)  # 0.9999999999999999 is 1
+        near = float(round(value)) if math.isfinite(value) else value
+        if near != value and abs(value - near) <= CANCELLED * abs(near):
+            value = near  # 0.9999999999999999 is 1
         total[place] = value
-    return total
