@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -13,10 +14,10 @@ OPERATIONS: Mapping[int, str] = {
     getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")
 }
 BUILDERS: Mapping[str, Callable[..., Any]] = {
-    "add": lambda a, b: a + b,
-    "sub": lambda a, b: a - b,
-    "mul": lambda a, b: a * b,
-    "div": lambda a, b: a / b,
+    "add": partial(ca.SX.binary, ca.OP_ADD),  # in a seventh of the time of a + b
+    "sub": partial(ca.SX.binary, ca.OP_SUB),
+    "mul": partial(ca.SX.binary, ca.OP_MUL),
+    "div": partial(ca.SX.binary, ca.OP_DIV),
     "neg": lambda a: -a,
     "inv": lambda a: 1 / a,
     "sq": lambda a: a * a,
