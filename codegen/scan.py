@@ -413,6 +413,7 @@ class Stepper:
         rows = {port: np.zeros((samples, step.numel_in(port))) for port in scan.over}
         packed = scan.packed(samples, {**values, **rows})
         self._scan, self._constants = scan, {port: values[port] for port in scan.constants}
+        self._sizes = {port: step.size_in(port) for port in scan.carry}
         self._samples, self._rows = samples, {port: packed[port] for port in scan.over}
         flat = samples == 1
         self.inputs = {port: row[0] if flat else row for port, row in self._rows.items()}
@@ -506,4 +507,4 @@ class Stepper:
         ----------
         port : one of those that are carried.
         """
-        return shaped(self._now[port], self._scan.step.size_in(port)).copy()
+        return shaped(self._now[port], self._sizes[port]).copy()
