@@ -20,6 +20,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -79,33 +80,40 @@ class Outcome(NamedTuple):
     found: str
 
 
-def subjects(steps: int) -> Iterator[tuple[str, int, Subject]]:
-    """Yield what is fuzzed by name, with its steps.
+def tasks(steps: int) -> Iterator[tuple[str, int]]:
+    """Yield the name of what is fuzzed, with its steps.
 
     Parameters
     ----------
     steps : of each package.
     """
-    car = sedan()
     for law in (*LAWS, *SENSING):
-        package = build_package(make_method(law, car), car)
-        macros = ("LEARNT=W", *_boxes(package))
-        yield (
-            f"identifier/{law}",
-            steps,
-            Subject(
-                package.files,
-                package.specialized.name,
-                "identifier_fuzz.c",
-                macros,
-                UNUSED if law in SENSING else "",
-            ),
-        )
-        horizons = ((SHORT, steps), (LONG, max(1, steps // SHARE_LONG)))
-        for stages, taken in horizons if law in LAWS else ():
-            tracker = build_pair(package, Problem(horizon=stages)).tracker
-            subject = Subject(tracker.files, tracker.name, "tracker_fuzz.c", ())
-            yield f"tracker/{law}/{stages}", taken, subject
+        yield f"identifier/{law}", steps
+        if law in LAWS:
+            yield f"tracker/{law}/{SHORT}", steps
+            yield f"tracker/{law}/{LONG}", max(1, steps // SHARE_LONG)
+
+
+def subject(name: str) -> Subject:
+    """Return what is fuzzed by a name.
+
+    Parameters
+    ----------
+    name : one of `tasks`.
+    """
+    _, law, *stages = name.split("/")
+    package = _package(law)
+    if stages:
+        tracker = build_pair(package, Problem(horizon=int(stages[0]))).tracker
+        return Subject(tracker.files, tracker.name, "tracker_fuzz.c", ())
+    macros = ("LEARNT=W", *_boxes(package))
+    left_out = UNUSED if law in SENSING else ""
+    return Subject(package.files, package.specialized.name, "identifier_fuzz.c", macros, left_out)
+
+
+@cache
+def _package(law: str) -> Package:
+    return build_package(make_method(law, sedan()), sedan())
 
 
 def _boxes(package: Package) -> tuple[str, ...]:
@@ -158,6 +166,7 @@ def build(subject: Subject, folder: Path, *, single: bool = False, compiler: str
     return folder / "fuzz"
 
 
+@cache
 def has_fuzzer(compiler: str = "clang") -> bool:
     """Return whether a compiler links libFuzzer with its sanitizers.
 
@@ -240,7 +249,11 @@ def main(words: Sequence[str] | None = None, *, keep: bool = False) -> int:
         print(f"fuzz_c: {MISSING}", file=sys.stderr)
         return 2
     targets = Targets("fuzz_c")
-    chosen = [task for task in subjects(asked.steps) if task[0].startswith(asked.only)]
+    chosen = [
+        (name, steps, subject(name))
+        for name, steps in tasks(asked.steps)
+        if name.startswith(asked.only)
+    ]
 
     def driven(task: tuple[str, int, Subject]) -> Outcome:
         with tempfile.TemporaryDirectory() as scratch:

@@ -2,6 +2,7 @@
 
 import re
 import subprocess
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -16,14 +17,11 @@ NAMES += [f"identifier/{law}" for law in fuzz_c.SENSING]
 
 @pytest.fixture(scope="module")
 def package_of():
-    """A function that gives what is fuzzed by its name, and builds no more than it has to."""
-    found, others = {}, fuzz_c.subjects(1)
+    """A function that gives what is fuzzed by its name, and builds it once."""
 
+    @cache
     def package(name):
-        full = name if name.startswith("identifier") else f"{name}/{fuzz_c.SHORT}"
-        while full not in found:
-            built, _, found[built] = next(others)
-        return found[full]
+        return fuzz_c.subject(name if name.startswith("identifier") else f"{name}/{fuzz_c.SHORT}")
 
     return package
 
