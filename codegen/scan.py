@@ -483,7 +483,7 @@ class Stepper:
         Parameters
         ----------
         port : one of those that are carried.
-        value : in its shape.
+        value : (rows, columns) of the port, flat where it is a column.
         """
         self._now[port][:] = np.ravel(value, order="F")
 
@@ -494,7 +494,7 @@ class Stepper:
         ----------
         port : one of those that are carried.
         """
-        return shaped(self._before[port], self._scan.step.size_in(port)).copy()
+        return shaped(self._before[port], self._sizes[port]).copy()
 
     def state(self) -> dict[str, Array]:
         """Return the carried values in effect, by port, in their shapes; copies."""
