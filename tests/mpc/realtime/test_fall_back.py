@@ -154,7 +154,7 @@ class Exported:
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
             (folder / path).write_text(text)
         sources = sorted(str(path) for path in (folder / "src").glob("*.c"))
-        flags = ["-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared"]
+        flags = ["-std=c99", "-O1", "-ffp-contract=off", "-fPIC", "-shared"]
         words = [*find_compiler(), *flags, f"-I{folder / 'include'}", *sources]
         subprocess.run([*words, "-lm", "-o", str(folder / "tracker.so")], check=True)
         self.library = ctypes.CDLL(str(folder / "tracker.so"))
