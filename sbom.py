@@ -87,7 +87,7 @@ def parts_list() -> dict[str, Any]:
     }
 
 
-class CustomBuildHook(BuildHookInterface):  # type: ignore[misc]
+class CustomBuildHook(BuildHookInterface):  # type: ignore[misc]  # hatchling tells no types
     """Puts the parts list into the wheel."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:

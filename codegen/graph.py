@@ -258,6 +258,18 @@ def _is_le(graph: Graph, place: int) -> bool:
 # A function whose numbers are an input: one library for all cars that are built alike.
 
 
+def _as_casadi(number: int) -> Callable[..., Any]:
+    def build(*arguments: Any) -> Any:
+        make = ca.SX.unary if len(arguments) == 1 else ca.SX.binary
+        return make(number, *arguments)
+
+    return build
+
+
+# Of every operation that CasADi has, and of ours.
+ALL_BUILDERS = {name: _as_casadi(number) for number, name in OPERATIONS.items()} | dict(BUILDERS)
+
+
 @simplifying(False)
 def lifted(function: ca.Function, port: str = "constants") -> tuple[ca.Function, Array]:
     """Return a function that is told its constants, and the constants.
@@ -270,35 +282,14 @@ def lifted(function: ca.Function, port: str = "constants") -> tuple[ca.Function,
     function : SX.
     port : name of the input that is added, the last; constants (n,) in their order in `function`.
     """
-    n = function.n_instructions()
-    places = [k for k in range(n) if OPERATIONS[function.instruction_id(k)] == "const"]
+    graph, n_in = graph_of(function), function.n_in()
+    constants = [place for place in graph.reached() if graph.nodes[place].op == "const"]
+    values = np.array([graph.nodes[place].value for place in constants])
+    for entry, place in enumerate(constants):
+        graph.nodes[place] = Node("input", port=n_in, entry=entry)
+    names = [*function.name_in(), port]
     ports = [ca.SX.sym(name, *function.size_in(name)) for name in function.name_in()]
-    constants = ca.SX.sym(port, len(places))
-    entries = [ca.vertsplit(ca.vec(one)) if one.numel() else [] for one in ports]
-    work, waiting = dict[int, ca.SX](), iter(ca.vertsplit(constants) if places else [])
-    results = [[ca.SX(0)] * function.numel_out(i) for i in range(function.n_out())]
-    for k in range(n):
-        number = function.instruction_id(k)
-        read, written = function.instruction_input(k), function.instruction_output(k)
-        match OPERATIONS[number]:
-            case "output":
-                results[written[0]][written[1]] = work[read[0]]
-            case "const":
-                work[written[0]] = next(waiting)
-            case "input":
-                work[written[0]] = entries[read[0]][read[1]]
-            case _ if len(read) == 1:
-                work[written[0]] = ca.SX.unary(number, work[read[0]])
-            case _:
-                work[written[0]] = ca.SX.binary(number, work[read[0]], work[read[1]])
-    shaped = [
-        ca.reshape(ca.vertcat(*result), *function.size_out(i)) for i, result in enumerate(results)
-    ]
-    told = ca.Function(
-        function.name(),
-        [*ports, constants],
-        shaped,
-        [*function.name_in(), port],
-        function.name_out(),
-    )
-    return told, np.array([function.instruction_constant(k) for k in places])
+    results = [ca.SX(*function.size_out(i)) for i in range(function.n_out())]
+    ports.append(ca.SX.sym(port, values.size))
+    like = ca.Function(function.name(), ports, results, names, function.name_out())
+    return function_of(graph, like, ALL_BUILDERS), values
