@@ -37,7 +37,7 @@ from identifier.verdict.guaranteed import strips_of
 from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle
 
-EACH, DRIVES, PROCESSES, FEWEST = 50, 25, 2, 50  # cars of a class; drives of a car; samples
+EACH, DRIVES, PROCESSES, FEWEST = 50, 50, 2, 50  # cars of a class; drives of a car; samples
 STRAIGHT = 2.0  # s straight ahead, with which a drive that is asked begins
 RUNS = ("slalom1_14_5ms", "experiment2_40kmh")
 TRUE = 1.001  # over the least bound that is true

@@ -81,7 +81,7 @@ def finding_rows(diagnosis: Diagnosis) -> list[list[str]]:
         [
             " ".join(word for word in (one.channel, NAMES.get(one.code, one.code)) if word),
             size_text(one),
-            f"{100.0 * min(one.confidence, 0.99):.0f} %" + (", sure" if one.sure else ""),
+            one.percent + (", sure" if one.sure else ""),
             "none" if one.repair is None else repair_text(one.repair),
         ]
         for one in diagnosis.findings

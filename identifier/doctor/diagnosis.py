@@ -90,7 +90,7 @@ class Diagnosis:
 
 
 def _certainty(one: Finding) -> str:
-    return "sure" if one.sure else f"confidence {100.0 * one.confidence:.0f} %"
+    return "sure" if one.sure else f"confidence {one.percent}"
 
 
 def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:

@@ -6,6 +6,7 @@ from typing import Any
 
 from models.recordings.repair import Repair
 
+MOST = 0.99  # confidence that is told
 MATTERS = 0.5  # confidence that something is wrong, from which it is told as such
 
 
@@ -66,6 +67,11 @@ class Finding:
     def matters(self) -> bool:
         """Whether it is more likely than not that something is wrong."""
         return self.alarm >= MATTERS
+
+    @property
+    def percent(self) -> str:
+        """The confidence as text; 99 % at most, as a log alone proves nothing."""
+        return f"{100.0 * min(self.confidence, MOST):.0f} %"
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain numbers and words, ready for JSON; None is what is not known."""

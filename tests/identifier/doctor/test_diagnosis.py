@@ -127,6 +127,13 @@ def test_whether_something_is_wrong_is_one_question_and_which_of_several_another
     assert Finding(code="straight", confidence=0.99).alarm == 0.99
 
 
+def test_a_log_alone_proves_nothing():
+    certain = Finding(code="straight", confidence=1.0, text="it goes straight ahead")
+    found = Diagnosis(name="log", findings=(certain,), unseen=())
+    assert certain.percent == "99 %"
+    assert found.lines() == ["it goes straight ahead (confidence 99 %)"]
+
+
 def test_nothing_fine_is_sure_on_a_reading_that_is_not(driven):
     car, log = driven
     late = Late(channels=("r",), delay=0.08).apply(log)
