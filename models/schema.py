@@ -398,6 +398,18 @@ class Table:
                 self.refuse(key, f"holds a number that is not finite: {shown(one)}")
         return np.array(level, dtype=np.float64).reshape(shape)
 
+    def only_fields(self, cls: type, *, skip: tuple[str, ...] = ()) -> dict[str, Any]:
+        """Refuse every key that is no field of a dataclass; return the fields by name.
+
+        Parameters
+        ----------
+        cls : the dataclass.
+        skip : fields that do not come from this table.
+        """
+        known = {field.name: field for field in fields(cls) if field.name not in skip}
+        self.only(*known)
+        return known
+
     def record(self, cls: type, *, skip: tuple[str, ...] = ()) -> dict[str, Any]:
         """Return the arguments of a dataclass, each of the type that its field declares.
 
@@ -406,8 +418,7 @@ class Table:
         cls : the dataclass; its fields are the keys that may be there.
         skip : fields that do not come from this table.
         """
-        known = {field.name: field for field in fields(cls) if field.name not in skip}
-        self.only(*known)
+        known = self.only_fields(cls, skip=skip)
         for key, field in known.items():
             if field.default is MISSING and field.default_factory is MISSING:
                 self.value(key)

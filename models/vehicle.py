@@ -416,14 +416,15 @@ class Vehicle:
         file = Path(path)
         data = read_toml(file, VehicleError)
         inner = data.pop("chassis", None)
-        table = Table(data, f"{file}: ", VehicleError)
+        table, outside = Table(data, f"{file}: ", VehicleError), ("chassis", "estimated")
+        table.only_fields(cls, skip=outside)  # before what is missing
         size = [table.number(key) for key in ("mass", "l_f", "l_r")]
         missing = tuple(key for key in RULES if key not in data)
         try:
             data |= {key: value for key, value in estimate(*size).items() if key in missing}
         except VehicleError as error:
             raise VehicleError(f"{file}: {error}") from None
-        values = table.record(cls, skip=("chassis", "estimated")) | {"estimated": missing}
+        values = table.record(cls, skip=outside) | {"estimated": missing}
         if inner is not None:
             parts = Table(inner, f"{file}: ", VehicleError, "chassis.").record(Chassis)
         try:

@@ -84,6 +84,7 @@ def test_six_flat_keys_are_a_vehicle(tmp_path):
     [
         (SIX + "masss = 1.0\n", "masss is unknown"),
         (SIX.replace("mass = 1500\n", ""), "mass is missing"),
+        ("[vehicle]\n" + SIX, "vehicle is unknown, known are name, mass"),
         (SIX.replace("1500", '"1500"'), "mass must be a number"),
         (SIX.replace("1500", "true"), "mass must be a number"),
         (SIX.replace("1500", "-3"), "mass must be positive"),
