@@ -8,6 +8,7 @@ cost on dκ/ds chooses among the lines with the same peak.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import ceil, isfinite
 from typing import Any
 
@@ -109,13 +110,26 @@ def line_through_gates(
     for gate in gates:
         if gate.left - gate.right < 2.0 * clearance:
             raise PathError(f"gates: {gate} is too narrow for a clearance of {clearance} m")
+    spline, inner = _straightest(tuple(gates), start, end, clearance, easing, knots)
+    return sample(spline, inner, spacing, "gates")
+
+
+@lru_cache(maxsize=16)
+def _straightest(
+    gates: tuple[Gate, ...],
+    start: tuple[float, float],
+    end: tuple[float, float],
+    clearance: float,
+    easing: float,
+    knots: float,
+) -> tuple[BSpline, Array]:
+    """Return the line as a spline and its knots; a course is asked for once for each drive."""
     intervals = max(DEGREE + 1, ceil((end[0] - start[0]) / knots))
     inner = np.linspace(start[0], end[0], intervals + 1)
     t = np.concatenate((np.full(DEGREE, start[0]), inner, np.full(DEGREE, end[0])))
     c = _coefficients(t, inner, gates, start, end, clearance, easing)
     greville = np.array([t[i + 1 : i + DEGREE + 1].mean() for i in range(c.size)])  # of y = x
-    spline = BSpline(t, np.column_stack((greville, c)), DEGREE)
-    return sample(spline, inner, spacing, "gates")
+    return BSpline(t, np.column_stack((greville, c)), DEGREE), inner
 
 
 def _coefficients(
