@@ -8,7 +8,7 @@ section, but units count in [UNITS] only. Unknown keys are kept and do nothing.
 import codecs
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from math import inf, pi
 from os import PathLike
@@ -111,6 +111,7 @@ LARGEST = 1e12  # of a number, in the unit of the file: a stiffness in N/km fits
 SOME = 10  # lines in a message
 _KEY = re.compile(r"[A-Za-z_]\w*")
 _SECTION = re.compile(r"\[(.*?)\]")
+_LINE_END = re.compile(r"\r\n|\r|\n")  # alone: str.splitlines also ends a comment at cp1252's "..."
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([EeDd][+-]?\d+)?")
 
 
@@ -141,25 +142,31 @@ class TirFile:
     ----------
     path : the file, for messages.
     entries : all lines of each key, the key in capitals.
-    without_sign : lines that begin with a word but have no "=", by that word in capitals.
+    without_sign : lines that begin with a word but have no "=", by that word in capitals; their
+        value is empty.
     """
 
     path: Path
     entries: Mapping[str, tuple[Entry, ...]]
-    without_sign: Mapping[str, int]
+    without_sign: Mapping[str, tuple[Entry, ...]]
 
     def __contains__(self, key: str) -> bool:
         return key in self.entries
 
     def text(self, key: str, default: str) -> str:
-        """The value as text; the last line counts where a key comes twice.
+        """The value as text.
 
         Parameters
         ----------
         key : in capitals.
         default : the answer where the file has no such key, or an empty value.
+
+        Raises
+        ------
+        TirError
+            Two lines disagree, by more than the case of letters, or the "=" is missing.
         """
-        return (self.entries[key][-1].value or default) if key in self.entries else default
+        return self._text(key, default, self.entries.get(key, ()), self.without_sign.get(key, ()))
 
     def number(self, key: str) -> float | None:
         """The value in SI; None where the file has no such key.
@@ -175,13 +182,10 @@ class TirFile:
             unknown.
         """
         if key not in self.entries:
-            if key in self.without_sign:
-                raise self.error(f'line {self.without_sign[key]}: {key} has no "="')
+            self._require_sign(key, self.without_sign.get(key, ()))
             return None
         values = {self._parsed(key, entry): entry.line for entry in self.entries[key]}
-        if len(values) > 1:
-            lines = ", ".join(str(line) for line in list(values.values())[:SOME])
-            raise self.error(f"{key} has different values in lines {lines}")
+        self._require_one(key, values.values())
         return next(iter(values)) * self._unit(key)
 
     def error(self, reason: str) -> TirError:
@@ -204,13 +208,35 @@ class TirFile:
             f"line {entry.line}: {key} must be a finite number, it is {shown(entry.value)}"
         )
 
+    def _text(
+        self, key: str, default: str, entries: Sequence[Entry], without_sign: Sequence[Entry]
+    ) -> str:
+        if not entries:
+            self._require_sign(key, without_sign)
+            return default
+        self._require_one(key, {entry.value.upper(): entry.line for entry in entries}.values())
+        return entries[-1].value or default
+
+    def _require_sign(self, key: str, without_sign: Sequence[Entry]) -> None:
+        if without_sign:
+            raise self.error(f'line {without_sign[-1].line}: {key} has no "="')
+
+    def _require_one(self, key: str, lines: Collection[int]) -> None:
+        if len(lines) > 1:
+            some = ", ".join(str(line) for line in list(lines)[:SOME])
+            raise self.error(f"{key} has different values in lines {some}")
+
     def _unit(self, key: str) -> float:
         factor = 1.0
         for dimension, exponent in DIMENSIONS.get(key, {}).items():
-            units = [e for e in self.entries.get(dimension, ()) if e.section == "UNITS"]
+            units, without_sign = (
+                [one for one in lines.get(dimension, ()) if one.section == "UNITS"]
+                for lines in (self.entries, self.without_sign)
+            )
+            unit = self._text(dimension, "", units, without_sign)
             if units:
                 try:
-                    factor *= unit_in_si(dimension, units[-1].value) ** exponent
+                    factor *= unit_in_si(dimension, unit) ** exponent
                 except ValueError as error:
                     raise self.error(str(error)) from None
         return factor
@@ -232,9 +258,10 @@ def read_tir(path: str | PathLike[str]) -> TirFile:
     """
     path = Path(path)
     entries: dict[str, list[Entry]] = {}
-    without_sign: dict[str, int] = {}
+    without_sign: dict[str, list[Entry]] = {}
     section = ""
-    for number, raw in enumerate(_decoded(read_bytes(path, TirError)).splitlines(), start=1):
+    lines = _LINE_END.split(_decoded(read_bytes(path, TirError)))
+    for number, raw in enumerate(lines, start=1):
         line = _without_comment(raw).strip()
         key, sign, value = (part.strip() for part in line.partition("="))
         if header := _SECTION.match(line):
@@ -243,9 +270,13 @@ def read_tir(path: str | PathLike[str]) -> TirFile:
             entry = Entry(_unquoted(value), number, section)
             entries.setdefault(key.upper(), []).append(entry)
         elif word := _KEY.match(line):
-            without_sign[word.group().upper()] = number
-    together = {key: tuple(lines) for key, lines in entries.items()}
-    return TirFile(path=path, entries=together, without_sign=without_sign)
+            entry = Entry("", number, section)
+            without_sign.setdefault(word.group().upper(), []).append(entry)
+    return TirFile(
+        path=path,
+        entries={key: tuple(found) for key, found in entries.items()},
+        without_sign={key: tuple(found) for key, found in without_sign.items()},
+    )
 
 
 def _decoded(raw: bytes) -> str:

@@ -289,6 +289,58 @@ def test_two_lines_that_disagree_are_refused(tmp_path: Path) -> None:
     MagicFormula.from_tir(written(tmp_path, f"{PLAIN}\nPCY1 = 1.30 $ said twice"))
 
 
+@pytest.mark.parametrize(
+    ("key", "lines"),
+    [
+        ("TYRESIDE", "TYRESIDE = 'LEFT'\n[MODEL]\nTYRESIDE = 'RIGHT'"),
+        (
+            "PROPERTY_FILE_FORMAT",
+            "PROPERTY_FILE_FORMAT = 'FTIRE'\n\nPROPERTY_FILE_FORMAT = 'PAC2002'",
+        ),
+        ("FORCE", "[UNITS]\nFORCE = 'newton'\n[MODEL]\nFORCE = 9\n[UNITS]\nFORCE = 'kN'"),
+    ],
+)
+def test_two_words_that_disagree_are_refused_as_numbers_are(
+    tmp_path: Path, key: str, lines: str
+) -> None:
+    assert f"{key} has different values in lines " in complaint(tmp_path, f"{lines}\n{PLAIN}")
+
+
+def test_a_word_said_twice_is_one_word(tmp_path: Path) -> None:
+    twice = "TYRESIDE = 'RIGHT'\nTYRESIDE = Right\n[UNITS]\nFORCE = 'kN'\nFORCE = 'KN'"
+    tire = MagicFormula.from_tir(written(tmp_path, f"{twice}\n{PLAIN}"))
+    assert tire.side == "right"
+    assert tire.coefficients.FNOMIN == 4e6
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("TYRESIDE 'RIGHT'", 'line 1: TYRESIDE has no "="'),
+        ("PROPERTY_FILE_FORMAT: 'FTIRE'", 'line 1: PROPERTY_FILE_FORMAT has no "="'),
+        ("[UNITS]\nFORCE 'kN'", 'line 2: FORCE has no "="'),
+    ],
+)
+def test_a_forgotten_equals_sign_is_not_a_missing_word(
+    tmp_path: Path, line: str, says: str
+) -> None:
+    assert says in complaint(tmp_path, f"{line}\n{PLAIN}")
+
+
+def test_a_word_that_begins_a_line_elsewhere_is_no_unit(tmp_path: Path) -> None:
+    text = f"[INERTIA]\nFORCE and MASS as weighed\n{PLAIN}"
+    assert MagicFormula.from_tir(written(tmp_path, text)).coefficients.FNOMIN == 4000.0
+
+
+@pytest.mark.parametrize(
+    "sign", [b"\x85", "\u0085".encode(), "\u2028".encode(), b"\x0b", b"\x0c", b"\x1c"]
+)
+def test_a_comment_ends_with_its_line_alone(tmp_path: Path, sign: bytes) -> None:
+    """0x85 is the ellipsis of cp1252, and the next line of Unicode."""
+    raw = PLAIN.encode() + b"\n$ measured on wet road " + sign + b"LMUY = 0.5\n"
+    assert MagicFormula.from_tir(written(tmp_path, raw)).coefficients.LMUY == 1.0
+
+
 def test_a_symmetric_tire_loses_conicity_and_plysteer(tmp_path: Path) -> None:
     lopsided = {"PHY1": "0.01", "PVY1": "0.02"}
     plain = MagicFormula.from_tir(written(tmp_path, edited(**lopsided)))
