@@ -218,8 +218,8 @@ def read_json(path: Path, refusal: type[ValueError]) -> Any:
 
 
 def read_toml(path: Path, refusal: type[ValueError]) -> dict[str, Any]:
-    """Read a TOML file, as `read_json` a JSON file."""
-    text = read_text(path, refusal, limit="toml")
+    """Read a TOML file, as `read_json` a JSON file; a byte order mark may begin it."""
+    text = read_text(path, refusal, limit="toml", encoding="utf-8-sig")
     longest = max(map(len, text.splitlines()), default=0)  # its parser takes the square of it
     require_few(refusal, str(path), longest, "line", "characters of a line")
     try:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import NamedTuple
 
+import casadi as ca
 import numpy as np
 
 from codegen import Scan, Stepper, compiler
@@ -16,7 +17,7 @@ from models.maneuvers import Maneuver
 from models.plant.dynamics import N_STATES, Driver, dynamics, runge_kutta
 from models.recordings import Recording
 from models.sensors import Sensors
-from models.tires import MagicFormula, Tire
+from models.tires import MagicFormula, Tire, TirError
 from models.vehicle import GRAVITY, Vehicle, VehicleError
 
 # What a plant recorded: the motion, and the forces behind it, which no car measures.
@@ -175,6 +176,48 @@ def compiled_loop(
     return CompiledLoop(Scan(step, carry=("x",), over=over, flags=FLAGS), constants)
 
 
+LEAST, MOST = 0.5, 500.0  # stiffness over load [1/rad or -]: about 20 of real tires
+LEAST_GRIP, MOST_GRIP = 0.05, 10.0  # largest side force over load: about 1
+GRIP_SLIPS = np.geomspace(1e-3, 1.0, 60)  # rad
+
+
+def tire_of(vehicle: Vehicle) -> MagicFormula:
+    """Return the tire of the file that a chassis names.
+
+    Parameters
+    ----------
+    vehicle : the car, with chassis.
+
+    Raises
+    ------
+    VehicleError
+        When the vehicle has no chassis, or names no tire.
+    TirError
+        When the file cannot be used, or its tire can carry no wheel of this car: a unit that is not
+        told, or another tire.
+    """
+    file = vehicle.require_chassis().tire
+    if file is None:
+        raise VehicleError(f"vehicle '{vehicle.name}' names no tire file and none was given")
+    path = os.fspath(file)
+    tire = MagicFormula.from_tir(path)
+    for axle, load in zip(("front", "rear"), vehicle.axle_loads, strict=True):
+        F_z = ca.DM(0.5 * load)
+        grip = ca.mmax(tire.forces(ca.DM(GRIP_SLIPS), 0.0, 0.0, F_z).F_y)
+        for what, force, least, most in (
+            ("cornering stiffness", tire.cornering_stiffness(F_z), LEAST, MOST),
+            ("slip stiffness", tire.slip_stiffness(F_z), LEAST, MOST),
+            ("largest side force", grip, LEAST_GRIP, MOST_GRIP),
+        ):
+            if not least <= (ratio := float(force / F_z) + 0.0) <= most:
+                raise TirError(
+                    f"{path}: {what} under a {axle} wheel of {vehicle.name}, {float(F_z):.4g} N, "
+                    f"must be {least:g} to {most:g} times that load, it is {ratio:.3g} times: "
+                    "check FNOMIN and [UNITS]"
+                )
+    return tire
+
+
 class Plant:
     """A double-track car on its tires.
 
@@ -189,6 +232,8 @@ class Plant:
     ------
     VehicleError
         When the vehicle has no chassis, or names no tire where none is given.
+    TirError
+        When the file that it names is no tire of this car.
     """
 
     def __init__(
@@ -199,14 +244,10 @@ class Plant:
         rear_tire: Tire | None = None,
         driver: Driver | None = None,
     ) -> None:
-        file = vehicle.require_chassis().tire
-        if tire is None and file is None:
-            raise VehicleError(f"vehicle '{vehicle.name}' names no tire file and none was given")
+        vehicle.require_chassis()
         self.vehicle = vehicle
-        if tire is None:
-            tire = MagicFormula.from_tir(os.fspath(file or ""))
-        self.tire: Tire = tire
-        self.rear_tire: Tire = tire if rear_tire is None else rear_tire
+        self.tire: Tire = tire_of(vehicle) if tire is None else tire
+        self.rear_tire: Tire = self.tire if rear_tire is None else rear_tire
         self.driver = driver if driver is not None else Driver()
 
     def simulate(

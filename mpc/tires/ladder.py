@@ -12,9 +12,10 @@ import numpy as np
 from codegen.arrays import Array
 from identifier.axle.model import AxleModel
 from identifier.axle.slip import SHORTEST
+from models.plant import tire_of
 from models.plant.dynamics import wheel_loads
 from models.tires import MagicFormula, Tire
-from models.vehicle import GRAVITY, Vehicle, VehicleError
+from models.vehicle import GRAVITY, Vehicle
 from mpc.tires.tire import (
     DOUBT_STEP,
     N_DOUBTS,
@@ -254,13 +255,13 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
     ------
     VehicleError
         Where the vehicle has no chassis, or names no tire and none is given.
+    TirError
+        Where the file that the chassis names is no tire of this car.
     CurveFitError
         Where a curve is not fitted to 2 %.
     """
     chassis = vehicle.require_chassis()
-    if tire is None and chassis.tire is None:
-        raise VehicleError(f"vehicle '{vehicle.name}' names no tire file and none was given")
-    tire = MagicFormula.from_tir(chassis.tire or "") if tire is None else tire
+    tire = tire_of(vehicle) if tire is None else tire
     alpha = slip_grid(LARGEST_SLIP * min(mu, 1.0))
     grid = np.concatenate([[0.0], alpha])
     force = np.stack([cornering_force(vehicle, tire, axle, grid, mu) for axle in (0, 1)])

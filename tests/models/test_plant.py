@@ -6,6 +6,7 @@ compared with the recorded forces, or both with a closed form.
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -13,10 +14,10 @@ import pytest
 
 from models.friction import Friction, FrictionChange, FrictionError, place_change
 from models.maneuvers import RandomSteer, Slalom, SlowlyIncreasingSteer, StepSteer
-from models.plant import Driver, Plant, PlantError
+from models.plant import Driver, Plant, PlantError, tire_of
 from models.plant.dynamics import relax, tire_force, wheel_loads
 from models.sensors import Sensor, Sensors
-from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
+from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula, TirError
 from models.vehicle import GRAVITY, Vehicle, VehicleError, sedan
 
 CAR = sedan()
@@ -487,3 +488,30 @@ def test_a_step_that_does_not_fit_the_samples_is_refused(dt):
     slalom = Slalom(amplitude=0.02, frequency=0.5, onset=0.1, rate_limit=0.5, duration=0.5)
     with pytest.raises(ValueError, match="multiple of dt"):
         Plant(sedan()).simulate(slalom, speed=20.0, dt=dt)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "says"),
+    [
+        ("FNOMIN", "4", "cornering stiffness under a front wheel of sedan, 4224 N, must be 0.5 to"),
+        ("FNOMIN", "1e-300", "must be 0.5 to 500 times that load, it is 0 times: check FNOMIN"),
+        ("LFZO", "1e-300", "must be 0.5 to 500 times that load, it is 0 times"),
+        ("PKY1", "-1e-300", "cornering stiffness under a front wheel"),
+        ("PKX3", "1e5", "slip stiffness under a front wheel of sedan"),
+        ("LMUY", "1e-9", "largest side force under a front wheel of sedan"),
+    ],
+)
+def test_a_tire_that_carries_no_wheel_of_the_car_is_refused_by_its_file(tmp_path, key, value, says):
+    """FNOMIN = 4 without its kN is a tire of four newtons."""
+    lines = Path(CHASSIS.tire).read_text().splitlines()
+    path = tmp_path / "other.tir"
+    kept = [line for line in lines if line.split("=")[0].strip() != key]
+    path.write_text("\n".join([*kept, f"{key} = {value}"]))
+    car = replace(CAR, chassis=replace(CHASSIS, tire=path))
+    for make in (Plant, tire_of):
+        with pytest.raises(TirError) as error:
+            make(car)
+        assert str(error.value).startswith(f"{path}: ")
+        assert says in str(error.value)
+    path.write_text("\n".join(lines))
+    assert tire_of(car).coefficients == MagicFormula.from_tir(CHASSIS.tire).coefficients

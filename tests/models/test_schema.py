@@ -234,3 +234,10 @@ def test_the_limits_that_hold_are_told(monkeypatch):
     assert "samples=1e+08" in limits_text()
     monkeypatch.setenv(VARIABLE, "samples=7")
     assert "samples=7 " in limits_text()
+
+
+def test_a_toml_file_may_begin_with_a_byte_order_mark(tmp_path):
+    """As editors on Windows write one."""
+    path = tmp_path / "marked.toml"
+    path.write_bytes(b"\xef\xbb\xbfmass = 1.0\r\n")
+    assert read_toml(path, RefusedError) == {"mass": 1.0}
