@@ -1,7 +1,10 @@
 """Files that appear whole or not at all."""
 
+import errno
 import hashlib
 import json
+import os
+import stat
 import tempfile
 from collections.abc import Iterable
 from os import PathLike
@@ -21,15 +24,28 @@ def write_atomically(path: str | PathLike[str], content: str | bytes | Iterable[
     Raises
     ------
     OSError
-        Where the file cannot be written; nothing is left behind.
+        Where the file cannot be written, or something else than a file is there: a folder, or a
+        device, which a file in its place would end for every program; nothing is left behind.
     """
     target = Path(path).resolve()
+    _require_file_or_nothing(target)
     whole = content.encode("utf-8") if isinstance(content, str) else content
     with tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as scratch:
         part = Path(scratch) / target.name  # in the same folder, thus on the same disk
         with part.open("wb") as file:
             file.writelines([whole] if isinstance(whole, bytes) else whole)
         part.replace(target)
+
+
+def _require_file_or_nothing(target: Path) -> None:
+    try:
+        kind = target.stat().st_mode
+    except FileNotFoundError:
+        return
+    if stat.S_ISDIR(kind):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
+    if not stat.S_ISREG(kind):
+        raise OSError(errno.EINVAL, "Is a device, pipe or socket, no file", str(target))
 
 
 def digest(content: Any) -> str:

@@ -4,7 +4,31 @@ import math
 from dataclasses import fields
 from typing import Any
 
+from models.schema import shown
+
 LARGEST_FORCE = 1e7  # of an axle [N]: ten times that of the heaviest dump truck
+
+
+def require_number(refusal: type[ValueError], name: str, value: Any) -> None:
+    """Refuse what is no single real number.
+
+    Parameters
+    ----------
+    refusal : class of the error to raise.
+    name : of the value.
+
+    Raises
+    ------
+    ValueError
+        Of that class, with the value.
+    """
+    try:
+        if not isinstance(value, str | bytes):
+            float(value)
+            return
+    except (TypeError, ValueError):
+        pass
+    raise refusal(f"{name} must be a number, it is {shown(value)}")
 
 
 def require_positive(refusal: type[ValueError], /, **values: float) -> None:
@@ -21,6 +45,7 @@ def require_positive(refusal: type[ValueError], /, **values: float) -> None:
         Of that class, with the first name that breaks the rule and its value; NaN breaks it too.
     """
     for name, value in values.items():
+        require_number(refusal, name, value)
         if not (value > 0.0 and math.isfinite(value)):
             raise refusal(f"{name} must be positive and finite, it is {value}")
 
@@ -55,5 +80,25 @@ def require_within(refusal: type[ValueError], low: float, high: float, /, **valu
         Of that class, with the first name that breaks the rule and its value; NaN breaks it too.
     """
     for name, value in values.items():
+        require_number(refusal, name, value)
         if not low <= value <= high:
             raise refusal(f"{name} must lie between {low:g} and {high:g}, it is {value:.10g}")
+
+
+def require_kind(kind: type, remedy: str, /, **values: Any) -> None:
+    """Refuse every argument of another kind, at the doors that users call.
+
+    Parameters
+    ----------
+    kind : that it must be.
+    remedy : how one is made.
+    **values : what to check, by name.
+
+    Raises
+    ------
+    TypeError
+        With the name of the argument, its value and the remedy.
+    """
+    for name, value in values.items():
+        if not isinstance(value, kind):
+            raise TypeError(f"{name} must be a {kind.__name__}, {remedy}; it is {shown(value)}")

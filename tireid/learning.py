@@ -12,9 +12,16 @@ from identifier.run import DivergedError, History
 from identifier.run import identify as run_over
 from identifier.tire_model import TireModel
 from models.recordings import Recording, check_against_vehicle
+from models.rules import require_kind
 from models.vehicle import Vehicle
 
 log = logging.getLogger("tireid.doctor")
+
+# How to make what a door wants, for who hands it something else.
+RECORDING = "as of read_recording or Recording.from_dataframe"
+VEHICLE = "as of Vehicle.from_toml or sedan"
+METHOD = 'as of make_method("axle", vehicle)'
+TIRE = "as of History.freeze or TireModel.load"
 
 
 def identify(
@@ -52,7 +59,13 @@ def identify(
         Where the car never drives.
     ValueError
         Where recording and method differ in their sampling interval.
+    TypeError
+        Where an argument is of another kind.
     """
+    require_kind(Recording, RECORDING, recording=recording)
+    require_kind(Vehicle, VEHICLE, vehicle=vehicle)
+    if method is not None:
+        require_kind(Method, METHOD, method=method)
     usual = InertialIdentifier if recording.logged_v_y is None else AxleIdentifier
     design = usual.for_vehicle(vehicle, dt=recording.dt) if method is None else method
     if check:
@@ -84,7 +97,11 @@ def replay(tire: TireModel, recording: Recording, *, since: float | None = None)
     ------
     NeverDrivesError
         Where no sample counts.
+    TypeError
+        Where an argument is of another kind.
     """
+    require_kind(TireModel, TIRE, tire=tire)
+    require_kind(Recording, RECORDING, recording=recording)
     return predict(tire, with_v_y(recording, tire), since=since)
 
 

@@ -33,7 +33,8 @@ class ArrayLog:
         found = getattr(data, "columns", data)  # of a data frame; a mapping yields its keys
         try:
             header = [str(column) for column in found]
-            arrays = dict(zip(header, (np.asarray(data[column]) for column in found), strict=True))
+            columns = (_array(name, str(column), data[column]) for column in found)
+            arrays = dict(zip(header, columns, strict=True))
         except (TypeError, KeyError, IndexError):
             raise RecordingError(
                 f"{name}: a data frame or a mapping of arrays is needed, not {type(data).__name__}"
@@ -135,10 +136,22 @@ class ArrayLog:
                 f"{self._name}: {name} must have one axis, its shape is {value.shape}"
             )
         try:
-            if value.dtype.kind in "MmSU":  # a time of the calendar, or words, is no number
+            if value.dtype.kind in "MmSUbc":  # times of the calendar, words, flags, complex numbers
                 raise TypeError
             return value.astype(np.float64)
         except (TypeError, ValueError):
             raise RecordingError(
                 f"{self._name}: {name} must be numeric, its type is {value.dtype}"
             ) from None
+
+
+def _array(name: str, column: str, value: Any) -> NDArray[Any]:
+    """Return a column as an array; what a mask hides is empty, whatever number lies below it."""
+    if isinstance(value, np.ma.MaskedArray) and value.dtype.kind in "iuf":
+        return np.asarray(np.ma.filled(value.astype(np.float64), np.nan))
+    try:
+        return np.asarray(value)
+    except ValueError:
+        raise RecordingError(
+            f"{name}: {column} must have one axis, its rows are of several lengths"
+        ) from None

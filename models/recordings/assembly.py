@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from numbers import Real
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -79,8 +80,8 @@ def recording_of(
     RecordingError
         One line: file and run, column, rule, value, remedy.
     """
-    if not (np.isfinite(dt) and dt > 0.0):
-        raise RecordingError(f"{log.path}: the sample time dt must be positive, it is {dt}")
+    if not (isinstance(dt, Real) and np.isfinite(dt) and dt > 0.0):
+        raise RecordingError(f"{log.path}: the sample time dt must be positive, it is {dt!r}")
     run = one_run(log.path, log.runs(), run or log_map.run or None)
     label = str(log.path) if run is None else f"{log.path}:{run}"
     headings = log.headings()

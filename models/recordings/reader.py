@@ -14,6 +14,7 @@ from models.recordings.checks import check_against_vehicle, check_physics
 from models.recordings.map import LogMap, told_signals
 from models.recordings.record import Recording
 from models.recordings.repair import Repair
+from models.schema import shown
 from models.vehicle import Vehicle, sedan
 
 NO_NAMES: Mapping[str, str] = {}
@@ -166,6 +167,10 @@ def with_columns(told: LogMap, columns: Mapping[str, str]) -> LogMap:
     told : the map.
     columns : as of `read_recording`.
     """
+    if not isinstance(columns, Mapping):
+        raise RecordingError(
+            f'columns must be a mapping as {{"r": "yaw_rate"}}, it is {shown(columns)}'
+        )
     signals = {name: words for name, words in columns.items() if name != "t"}
     told = told.with_signals(told_signals([f"{a}={b}" for a, b in signals.items()]))
     return replace(told, clock=columns["t"]) if "t" in columns else told

@@ -33,6 +33,7 @@ JITTER = 0.02  # largest departure of a sample from the uniform grid, as a share
 
 
 ALL = slice(None)
+OPTIONAL = ("v_y", "a_y", "axle_force")
 MISSING = {
     "v_y": "so slip angles are not known; tireid identify --method inertial estimates it",
     "a_y": "which is needed where vy is not measured",
@@ -115,7 +116,9 @@ class Recording:
         for name in SIGNALS:
             value = getattr(self, name)
             if value is None:
-                continue
+                if name in OPTIONAL:
+                    continue
+                raise RecordingError(f"{self.name}: {name} is needed, it is None")
             array = _read_only(value)
             shape = (n, 2) if name == "axle_force" else (n,)
             if array.shape != shape:
@@ -472,11 +475,21 @@ def _rows(signal: Array, kept: NDArray[np.intp]) -> Array:
 
 def _read_only(value: object) -> Array:
     """Return an array of float64 that nobody may write, a copy where somebody may."""
-    if isinstance(value, np.ndarray) and value.dtype == np.float64 and not value.flags.writeable:
+    if isinstance(value, np.ndarray) and value.dtype == np.float64 and _nobody_writes(value):
         return np.asarray(value)
     array = np.array(value, dtype=np.float64)
     array.setflags(write=False)
     return array
+
+
+def _nobody_writes(array: NDArray[Any]) -> bool:
+    """Return whether an array and, where it is a view, what it looks at cannot be written."""
+    one: Any = array
+    while isinstance(one, np.ndarray) and not isinstance(one, np.memmap):
+        if one.flags.writeable:
+            return False
+        one = one.base
+    return True
 
 
 def side_by_side(first: Array, second: Array) -> Array:

@@ -1,5 +1,7 @@
 """One way to write a file: whole, or as it was before."""
 
+import os
+import stat
 from dataclasses import replace
 from io import FileIO
 from pathlib import Path
@@ -32,6 +34,23 @@ def test_a_link_stays_a_link(tmp_path):
     write_atomically(tmp_path / "link", "new")
     assert (tmp_path / "link").is_symlink()
     assert (tmp_path / "real").read_text() == "new"
+
+
+def test_what_is_no_file_is_never_replaced(tmp_path):
+    """A file in the place of a device would end it for every program, for who may do that."""
+    pipe, folder = tmp_path / "pipe", tmp_path / "folder"
+    os.mkfifo(pipe)
+    folder.mkdir()
+    (tmp_path / "link").symlink_to("pipe")
+    for path in (pipe, tmp_path / "link"):
+        with pytest.raises(OSError, match="device, pipe or socket") as caught:
+            write_atomically(path, "new")
+        assert caught.value.filename == str(pipe)
+        assert stat.S_ISFIFO(pipe.stat().st_mode)
+    with pytest.raises(IsADirectoryError) as caught:
+        write_atomically(folder, "new")
+    assert caught.value.filename == str(folder)
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["folder", "link", "pipe"]
 
 
 def save_recording(path, version):

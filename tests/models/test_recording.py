@@ -2,6 +2,7 @@
 
 import gzip
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -226,3 +227,33 @@ def test_a_long_recording_is_written_by_blocks_with_the_bytes_of_one_piece(
     tracemalloc.stop()
     assert path.read_bytes() == piece
     assert held < 0.5 * len(gzip.decompress(piece) if ending.endswith("gz") else piece)
+
+
+def test_what_somebody_may_write_is_copied_though_the_view_of_it_is_not_writable():
+    table = np.zeros((20, 2))
+    table[:, 0] = 20.0
+    view = table.view()
+    view.flags.writeable = False
+    n = len(table)
+    run = Recording(
+        name="a",
+        t=0.01 * np.arange(n),
+        v_x=view[:, 0],
+        v_y=view[:, 1],
+        r=np.zeros(n),
+        delta_f=np.zeros(n),
+        delta_r=np.zeros(n),
+    )
+    table[:] = np.nan
+    assert (run.v_x == 20.0).all() and not run.needed("v_y").any()
+    again = replace(run, name="b")
+    assert again.v_x is run.v_x  # nobody may write that one
+    assert np.shares_memory(run.taken(slice(0, 15)).v_x, run.v_x)
+
+
+def test_a_signal_that_every_recording_has_is_not_left_out():
+    n = 20
+    words = {name: np.zeros(n) for name in ("v_x", "v_y", "r", "delta_f", "delta_r")}
+    for name in ("v_x", "r", "delta_f", "delta_r"):
+        with pytest.raises(RecordingError, match=f"^a: {name} is needed, it is None$"):
+            Recording(name="a", t=0.01 * np.arange(n), **{**words, name: None})

@@ -208,6 +208,10 @@ def test_columns_of_another_name_and_runs_are_chosen(log):
         ("vy", lambda v: v[:, None], "one axis"),
         ("vx", lambda v: np.where(v > 0, np.nan, v), "must be finite"),
         ("vx", lambda v: v.astype(str), "must be numeric"),
+        ("vx", lambda v: v + 1j, "vx must be numeric, its type is complex128"),
+        ("vx", lambda v: v > 0, "vx must be numeric, its type is bool"),
+        ("vx", lambda v: [*v[1:], [1.0, 2.0]], "vx must have one axis, its rows are of several"),
+        ("vx", lambda v: np.ma.array(v, mask=np.arange(v.size) == 5), "finite, 1 of .* index 5"),
         ("t", lambda t: 1e3 * t, "milliseconds"),
         ("t", lambda t: t[::-1], "must increase"),
     ],
@@ -217,6 +221,34 @@ def test_arrays_are_judged_as_a_file_is(log, name, change, said):
     columns[name] = change(columns[name])
     with pytest.raises(RecordingError, match=f"^recording: .*{said}"):
         ti.Recording.from_dataframe(columns)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ({"dt": "0.01"}, "dt must be positive, it is '0.01'"),
+        ({"dt": None}, "dt must be positive, it is None"),
+        ({"columns": "r=yaw_rate"}, "columns must be a mapping as .* it is 'r=yaw_rate'"),
+        ({"columns": ["r"]}, "columns must be a mapping as .* it is a list of 1"),
+    ],
+)
+def test_arguments_of_another_kind_are_refused_by_their_name(log, words, said):
+    with pytest.raises(RecordingError, match=said):
+        ti.Recording.from_dataframe(columns_of(log), **words)
+
+
+def test_what_a_command_takes_as_a_word_is_refused_with_the_remedy(log, tires):
+    car, tire = ti.sedan(), next(iter(tires.values()))
+    for call, said in (
+        (lambda: ti.identify("log.csv", car), "recording must be a Recording, as of read_rec"),
+        (lambda: ti.identify([log, log], car), "recording must be a Recording, .* a list of 2"),
+        (lambda: ti.identify(log, "car.toml"), "vehicle must be a Vehicle, as of Vehicle.from_"),
+        (lambda: ti.identify(log, car, "rls"), r"method must be a Method, as of make_method\("),
+        (lambda: ti.replay(log, tire), "tire must be a TireModel, as of History.freeze"),
+        (lambda: ti.replay(tire, "log.csv"), "recording must be a Recording"),
+    ):
+        with pytest.raises(TypeError, match=f"^{said}"):
+            call()
 
 
 @pytest.mark.parametrize("data", [[1.0, 2.0], 3.0, None])
