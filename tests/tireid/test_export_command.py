@@ -200,3 +200,9 @@ def test_a_band_that_nobody_calibrated_is_said_and_a_method_without_one_refused(
     assert main(["export", "--band", "--paper", "--out", str(tmp_path / "paper")]) == 2
     assert "cannot tell how sure it is: it has no band" in capsys.readouterr().err
     assert not (tmp_path / "paper").exists()
+
+
+def test_caution_without_a_tracker_is_refused(tmp_path, capsys):
+    assert main(["export", "--caution", "0.5", "--out", str(tmp_path / "out")]) == 2
+    assert "--caution goes with --mpc" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -71,6 +71,9 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Run the command."""
+    caution = require_caution("--caution", options.caution)
+    if caution and not options.mpc:
+        raise ValueError("--caution goes with --mpc: it is of the tracker")
     start = None if options.weights is None else load_model(options.weights)
     if options.weights is not None:
         warn_of_stored(options.weights)
@@ -88,7 +91,7 @@ def run(options: argparse.Namespace) -> None:
         fmu=options.fmu,
         onnx=options.onnx,
         mpc=options.mpc,
-        caution=require_caution("--caution", options.caution),
+        caution=caution,
         overwrite=options.force,
     )
     for line in str(exported).splitlines():

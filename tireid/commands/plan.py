@@ -12,14 +12,26 @@ from codegen.arrays import Array
 from identifier.method import vehicle_numbers
 from identifier.methods import load_model
 from identifier.plan import STEERING_LAG, Plan, hold_of
+from identifier.plan.search import REAR
 from models.files import digest
+from models.rules import require_positive, require_within
 from models.vehicle import Vehicle
 from tireid import __version__
 from tireid.commands import COMMANDS
 from tireid.commands.options import add_output, add_seed, add_vehicle, read_vehicle, seed_of
 from tireid.figures import plan_area_figure, plan_band_figure, plan_steering_figure, save_figure
 from tireid.output import output_folder, text_table, write_csv, write_json
-from tireid.planning import FRICTION, MARGIN, RATE, SHARE, TIME, plan, rehearsals
+from tireid.planning import (
+    FRICTION,
+    LONGEST_LAG,
+    MARGIN,
+    RATE,
+    SHARE,
+    SHORTEST_LAG,
+    TIME,
+    plan,
+    rehearsals,
+)
 from tireid.progress import Progress, say, tell
 from tireid.reports.plan import plan_words, write_plan_report
 from tireid.verdicts import warn_of_stored
@@ -122,6 +134,7 @@ def run(options: argparse.Namespace) -> int:
     ratio = options.steering_ratio
     if ratio is not None and not 1.0 <= ratio <= 100.0:
         raise ValueError(f"--steering-ratio must be 1 to 100, it is {ratio:g}")
+    _require_ranges(options)
     seed, model = seed_of(options), None
     if options.after is not None:
         model = load_model(options.after)
@@ -163,6 +176,22 @@ def run(options: argparse.Namespace) -> int:
     tell("\n".join([*plan_words(found, driven), plan_table(found)]))
     say(f"wrote {options.out}/")
     return 0
+
+
+def _require_ranges(options: argparse.Namespace) -> None:
+    """Refuse by their words, in the units of the command, what no plan is made with."""
+    for word, low, high in (
+        ("--mu", 0.05, 3.0),
+        ("--grip", 20.0, 100.0 * REAR),
+        ("--margin", 0.0, 1e3),
+        ("--steering-angle", 1.0, 60.0),
+        ("--steering-lag", SHORTEST_LAG, LONGEST_LAG),
+    ):
+        value = vars(options)[word.removeprefix("--").replace("-", "_")]
+        if value is not None:
+            require_within(ValueError, low, high, **{word: value})
+    if options.steering_rate is not None:
+        require_positive(ValueError, **{"--steering-rate": options.steering_rate})
 
 
 def _radians(degrees: float | None) -> float | None:
