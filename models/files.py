@@ -27,7 +27,7 @@ def write_atomically(path: str | PathLike[str], content: str | bytes | Iterable[
         Where the file cannot be written, or something else than a file is there: a folder, or a
         device, which a file in its place would end for every program; nothing is left behind.
     """
-    target = Path(path).resolve()
+    target = resolved(path)
     _require_file_or_nothing(target)
     whole = content.encode("utf-8") if isinstance(content, str) else content
     with tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as scratch:
@@ -46,6 +46,24 @@ def _require_file_or_nothing(target: Path) -> None:
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
     if not stat.S_ISREG(kind):
         raise OSError(errno.EINVAL, "Is a device, pipe or socket, no file", str(target))
+
+
+def resolved(path: str | PathLike[str]) -> Path:
+    """Return where a path leads, by all its links.
+
+    Parameters
+    ----------
+    path : of anything, or nothing.
+
+    Raises
+    ------
+    OSError
+        Where links go in a circle; Path.resolve tells some of them as a RuntimeError.
+    """
+    try:
+        return Path(path).resolve()
+    except RuntimeError:
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), os.fspath(path)) from None
 
 
 def digest(content: Any) -> str:

@@ -142,6 +142,7 @@ def one_line(error: Exception | str) -> str:
 def entry() -> NoReturn:
     """Run as a program: a termination cleans up as Ctrl-C does."""
     _open_streams()
+    os.environ["MPLBACKEND"] = "agg"  # nothing is shown, and that of a notebook may not be here
 
     def stop(_number: int, _frame: FrameType | None) -> NoReturn:
         raise KeyboardInterrupt

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
+from models.files import resolved
 from models.schema import read_json
 from tireid.exchange import ClaimedError, claim, exchange
 from tireid.progress import say
@@ -73,7 +74,7 @@ def output_folder(target: Path, *, force: bool) -> Iterator[Path]:
         another run is about to write it; at the end, where it has become such a folder meanwhile:
         then it is left alone, and the message says where the results are.
     """
-    final = target.resolve()
+    final = resolved(target)
     _require_replaceable(target, final, force)
     final.parent.mkdir(parents=True, exist_ok=True)
     prefix = f".{final.name}-"

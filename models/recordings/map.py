@@ -20,7 +20,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from models.files import write_atomically
+from models.files import resolved, write_atomically
 from models.logs.clock import LONGEST_GAP
 from models.logs.log import RecordingError
 from models.logs.signals import (
@@ -201,7 +201,7 @@ def _named_from(file: Path, folder: Path) -> str:
     """Return how a file that is there is named in one of a folder; the name itself of another."""
     if not file.is_file():
         return str(file)
-    whole = file.resolve()
+    whole = resolved(file)
     below = whole.is_relative_to(folder.resolve())
     return whole.relative_to(folder.resolve()).as_posix() if below else str(whole)
 

@@ -1,5 +1,8 @@
 """The command line itself: one-line errors, exit codes, help."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -113,3 +116,29 @@ def test_an_interruption_is_said_and_leaves_nothing(monkeypatch, capsys, tmp_pat
 @pytest.mark.parametrize("error", [OSError(36, "File name too long", "x" * 5000), "y" * 5000])
 def test_what_is_said_of_an_error_is_never_longer_than_a_thousand_characters(error):
     assert len(one_line(error)) < 950
+
+
+def test_an_output_folder_whose_links_go_in_a_circle_is_one_line(tmp_path, capsys):
+    (tmp_path / "out").symlink_to("out")
+    for more in ([], ["--force"]):
+        assert main(["check", "--out", str(tmp_path / "out"), *more]) == 2
+        error = capsys.readouterr().err.splitlines()[-1]
+        assert (
+            error == f"tireid check: error: {tmp_path / 'out'}: too many levels of symbolic links"
+        )
+    words = ["fleet", "learn", "log.csv", "--vehicle", "car.toml", "--out", str(tmp_path / "out")]
+    assert main(words) == 2
+    assert [one.name for one in tmp_path.iterdir()] == ["out"]
+
+
+def test_the_backend_of_a_notebook_is_not_asked_for_by_a_command(tmp_path):
+    """`!tireid` in a notebook inherits one that another environment has installed."""
+    backend = "module://matplotlib_inline_of_another_environment"
+    answer = subprocess.run(
+        [sys.executable, "-m", "tireid.cli", "check", "--out", str(tmp_path / "out")],
+        env={**os.environ, "MPLBACKEND": backend},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert answer.returncode == 0, answer.stderr

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from identifier.methods import load_model
+from models.files import resolved
 from models.vehicle import Vehicle
 from tireid.cluster import cluster
 from tireid.commands import COMMANDS, DONE, FAILS
@@ -234,7 +235,7 @@ def _claimed(store: str) -> Iterator[None]:
     if "://" in store:
         yield
         return
-    folder = Path(store).resolve()
+    folder = resolved(store)
     folder.parent.mkdir(parents=True, exist_ok=True)
     with ExitStack() as stack:
         try:
