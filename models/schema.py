@@ -207,8 +207,16 @@ def read_json(path: Path, refusal: type[ValueError]) -> Any:
     """
     text = read_text(path, refusal)
 
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found = dict(pairs)
+        if len(found) < len(pairs):
+            keys = [key for key, _ in pairs]
+            twice = next(key for key in found if keys.count(key) > 1)
+            raise json.JSONDecodeError(f"{shown(twice)} is told twice in one table", "", 0)
+        return found
+
     try:
-        data = json.loads(text)
+        data = json.loads(text, object_pairs_hook=once)
     except RecursionError:
         raise refusal(f"{path}: cannot be read as JSON: tables or lists too deep") from None
     except ValueError as error:

@@ -311,6 +311,9 @@ def _gap_notes(stretches: list[Stretch]) -> tuple[str, ...]:
     )
 
 
+LEAST_LOW_PASS = 0.01  # Hz: nothing of a drive passes, and the filter's numbers are still right
+
+
 def _recording(name: str, stretch: Stretch, log_map: LogMap, dt: float) -> Recording:
     """Return one stretch as a recording, in ISO axes, filtered where the map says so."""
     t, sign = stretch.t, AXES[log_map.axes]
@@ -319,7 +322,7 @@ def _recording(name: str, stretch: Stretch, log_map: LogMap, dt: float) -> Recor
         for key, values in stretch.signals.items()
     }
     if log_map.low_pass is not None:
-        signals = {key: _low_pass(one, log_map.low_pass, dt) for key, one in signals.items()}
+        signals = {key: _low_pass(name, one, log_map.low_pass, dt) for key, one in signals.items()}
     if BETA in signals:
         v_x, beta = signals["v_x"], signals[BETA]
         signals["v_y"] = filled(t.size, lambda part: v_x[part] * np.tan(beta[part]))
@@ -421,11 +424,12 @@ def _on_wheels(
     )
 
 
-def _low_pass(signal: Array, cut_off: float, dt: float) -> Array:
+def _low_pass(name: str, signal: Array, cut_off: float, dt: float) -> Array:
     """Return a signal behind a Butterworth filter of second order that begins at its value."""
-    if not cut_off < 0.5 / dt:
+    if not LEAST_LOW_PASS <= cut_off < 0.5 / dt:
         raise RecordingError(
-            f"low_pass must be below half the sampling rate, {0.5 / dt:g} Hz, it is {cut_off:g}"
+            f"{name}: low_pass of the map must be at least {LEAST_LOW_PASS:g} Hz and below half "
+            f"the sampling rate, {0.5 / dt:g} Hz, it is {cut_off:g}"
         )
     from scipy.signal import butter, lfilter, lfilter_zi  # takes longer than to read a short log
 

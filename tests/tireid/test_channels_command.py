@@ -116,6 +116,17 @@ def test_sideslip_is_read_in_place_of_lateral_velocity(log):
     assert np.allclose(told.v_y, log.v_y, atol=1e-12)
 
 
+@pytest.mark.parametrize("cut_off", [1e-300, 1e-9, 0.0099, 50.0, 1e9])
+def test_a_filter_that_lets_nothing_pass_or_cannot_be_is_refused(log, cut_off):
+    columns = {"t": log.t, "vx": log.v_x, "vy": log.v_y, "r": log.r, "delta_f": log.delta_f}
+    said = "^mine: low_pass of the map must be at least 0.01 Hz and below half the sampling rate"
+    with pytest.raises(RecordingError, match=said):
+        ti.Recording.from_dataframe(columns, name="mine", log_map=ti.LogMap(low_pass=cut_off))
+    slow = ti.LogMap(low_pass=0.01)
+    least = ti.Recording.from_dataframe(columns, log_map=slow, check=False)
+    assert np.ptp(least.v_x) < 0.5 * np.ptp(log.v_x)
+
+
 def test_mirrored_axes_and_a_filter_are_told_by_the_map(log):
     columns = {"t": log.t, "vx": log.v_x, "vy": -log.v_y, "r": -log.r, "delta_f": -log.delta_f}
     columns["ay"] = -log.a_y
