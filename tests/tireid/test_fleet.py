@@ -120,6 +120,28 @@ def test_what_is_there_is_not_learnt_again_and_what_is_new_is(store, fleet, tmp_
         extra.unlink()
 
 
+def test_a_file_of_a_store_that_somebody_changed_is_refused_by_its_name(store, tmp_path):
+    import pyarrow
+    from pyarrow import parquet
+
+    out = tmp_path / "changed"
+    shutil.copytree(store, out)
+    path = sorted((out / "logs").iterdir())[0]
+    table = parquet.read_table(path)
+    for name, values, said in (
+        ("log", pyarrow.nulls(len(table), pyarrow.string()), "log must be the name of a log in ev"),
+        ("size", pyarrow.array(["many"] * len(table)), "size must be of type int64, it is string"),
+    ):
+        at = table.column_names.index(name)
+        parquet.write_table(table.set_column(at, name, values), path)
+        with pytest.raises(StoreError, match=f"^{path}: {said}"):
+            Store(str(out)).rows()
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(StoreError, match=f"^{path}: must be a file, it is a device, pipe or soc"):
+        Store(str(out)).rows()
+
+
 def test_each_run_of_a_file_is_a_row(logs, tmp_path, capsys):
     lines = [(logs / f"{name}.csv").read_text().splitlines() for name in ("slalom", "quick")]
     runs = [f"{one},{k}" for k, some in enumerate(lines) for one in some[1:]]

@@ -250,9 +250,12 @@ class Store:
         fs.invalidate_cache()
         if not fs.isdir(self._path(kind)):
             return []
-        return sorted(
-            one for one in fs.ls(self._path(kind), detail=False) if one.endswith(".parquet")
-        )
+        found = {one["name"]: one["type"] for one in fs.ls(self._path(kind), detail=True)}
+        names = sorted(name for name in found if name.endswith(".parquet"))
+        for name in names:
+            if found[name] == "other":  # of which reading may not end
+                raise StoreError(f"{name}: must be a file, it is a device, pipe or socket")
+        return names
 
     @property
     def exists(self) -> bool:
@@ -343,6 +346,14 @@ class Store:
         told = (table.schema.metadata or {}).get(b"format", b"").decode()
         if told != FORMAT or table.column_names != list(names):
             raise StoreError(f"{path}: is not of this version's store ({told or 'no format'})")
+        for name in names:
+            column, kind = table.column(name), schema().field(name).type
+            if column.type != kind:
+                raise StoreError(f"{path}: {name} must be of type {kind}, it is {column.type}")
+            if name == "log" and column.null_count:
+                raise StoreError(
+                    f"{path}: log must be the name of a log in every row, one is empty"
+                )
         return table
 
     def keep(self, rows: Sequence[LogRow]) -> None:
