@@ -23,7 +23,7 @@ from models.recordings import Recording, RecordingError
 from models.vehicle import Vehicle
 
 if TYPE_CHECKING:
-    from identifier.verdict import Verdict
+    from identifier.verdict import RoadFriction, Verdict
 
 
 class NeverDrivesError(RecordingError):
@@ -220,6 +220,15 @@ class Prediction:
         from identifier.verdict import judge_prediction
 
         return judge_prediction(self.model, self.recording)
+
+    def friction(self) -> "RoadFriction | None":
+        """Return the friction of the drive's road over that of the one that taught, over time.
+
+        None where the model has no band, or too little is driven; computed at each call.
+        """
+        from identifier.verdict import road_friction
+
+        return road_friction(self.model, self.recording)
 
     def motion_text(self) -> str:
         """Return what the forces explain of the motion, in a line; empty where nobody knows."""

@@ -171,6 +171,20 @@ class TireModel(ABC):
             f"forces of a {type(self).__name__} do not scale with load: {vehicle.name}"
         )
 
+    def at_friction(self, ratio: float) -> "TireModel":
+        """Return the tires on a road of another friction.
+
+        Parameters
+        ----------
+        ratio : friction over that of the drive that taught, positive [-].
+
+        Raises
+        ------
+        ValueError
+            Where the ratio is not positive, or the model cannot be told for another friction.
+        """
+        raise ValueError(f"a {type(self).__name__} cannot be told for a friction of {ratio:g}")
+
     @property
     def reference_speed(self) -> float:
         """Speed [m/s] at which a force that depends on it is given, 4 sqrt(g L): brisk driving."""

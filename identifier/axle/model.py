@@ -40,6 +40,7 @@ from identifier.axle.step import FROZEN_CARRY, OVER, build_frozen
 from identifier.method import FORMAT, FrozenModelError, Setup, vehicle_from, vehicle_numbers
 from identifier.tire_model import AXLES, GRIP, STIFFNESS, Estimate, Fact, TireModel
 from models.recordings import Recording
+from models.rules import require_positive
 from models.schema import Table, shown
 from models.vehicle import Vehicle
 
@@ -263,14 +264,19 @@ class AxleModel(TireModel):
         White noise through a lag of first order leaves (1 - e)/(1 + e) of its variance.
         """
         sideways, steering = noise[:2] / v_x, np.array([noise[2], 0.0])
-        slope = self._slope_at(slip)
-        slopes = np.maximum(slope, 0.02 * self._slope_at(np.zeros((1, 2))))
+        slope = self.slope_at(slip)
+        slopes = np.maximum(slope, 0.02 * self.slope_at(np.zeros((1, 2))))
         e = np.exp(-v_x * dt / (self.own[:, 0] * slopes + SHORTEST * self.vehicle.wheelbase))
         passed: Array = slope * np.hypot(sideways, steering) * np.sqrt((1.0 - e) / (1.0 + e))
         return passed
 
-    def _slope_at(self, slip: Array) -> Array:
-        """Return the slope of the curves at slips of front and rear axle (n, 2) [1/rad]."""
+    def slope_at(self, slip: Array) -> Array:
+        """Return the slope of the curves at slips of both axles [static loads/rad], (n, 2).
+
+        Parameters
+        ----------
+        slip : of front and rear axle [rad], (n, 2).
+        """
         scales = np.array(self.ladder)
         units = np.tanh(slip[..., None] / scales)
         slope: Array = ((1.0 - units**2) * self.W / scales).sum(axis=-1)
@@ -510,6 +516,23 @@ class AxleModel(TireModel):
     def mounted_on(self, vehicle: Vehicle) -> "AxleModel":
         """Return the tires on another car, their forces scaled by its static axle loads."""
         return replace(self, vehicle=vehicle, guarantee=None)  # it was shown of this car alone
+
+    def at_friction(self, ratio: float) -> "AxleModel":
+        """Return the tires on a road of another friction, φ(α) → μ φ(α/μ); the stiffness stays."""
+        require_positive(ValueError, ratio=ratio)
+        n = len(self.ladder)
+        unit = np.concatenate([np.full(n, ratio), np.ones(3)])
+        excitation = self.excitation.copy()
+        excitation[:, 0] *= ratio
+        return replace(
+            self,
+            ladder=tuple(ratio * scale for scale in self.ladder),
+            W=ratio * self.W,
+            covariance=self.covariance * np.outer(unit, unit),
+            prior_covariance=self.prior_covariance * np.outer(unit, unit),
+            excitation=excitation,
+            guarantee=None,  # of the road that taught
+        )
 
     @property
     def lagged(self) -> bool:

@@ -1,6 +1,7 @@
 """A verdict with every answer: is it good, what speaks against it, and why."""
 
 from identifier.verdict.bands import calibrated, within_band
+from identifier.verdict.friction import Road, RoadFriction, road_friction
 from identifier.verdict.guaranteed import BoundViolatedError, contradictions, guaranteed
 from identifier.verdict.judging import judge, judge_prediction
 from identifier.verdict.online_bound import OnlineBound
@@ -11,11 +12,14 @@ __all__ = [
     "Number",
     "Objection",
     "OnlineBound",
+    "Road",
+    "RoadFriction",
     "Verdict",
     "calibrated",
     "contradictions",
     "guaranteed",
     "judge",
     "judge_prediction",
+    "road_friction",
     "within_band",
 ]

@@ -24,11 +24,13 @@ class Mended(NamedTuple):
     """A drive and a car from which a fault was taken out.
 
     road : what a bank pushes to the left, taken off what the motion shows [weights].
+    friction : of the road over that of the drive that taught [-].
     """
 
     recording: Recording
     vehicle: Vehicle
     road: float = 0.0
+    friction: float = 1.0
 
 
 Mend = Callable[[Recording, Vehicle, float], Mended]
@@ -100,6 +102,10 @@ def _bank(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
     return Mended(recording, vehicle, size)
 
 
+def _friction(recording: Recording, vehicle: Vehicle, size: float) -> Mended:
+    return Mended(recording, vehicle, friction=math.exp(size))
+
+
 DEGREE, MILLI = math.degrees(1.0), 1e3
 CAUSES = (
     Cause("sensor_ahead", "v_y is measured {size:+.2g} m from the center of gravity (+: ahead)",
@@ -127,6 +133,10 @@ CAUSES = (
           0.1, 0.5, True, "", _scaled("v_y")),
     Cause("yaw_rate_scale", "the yaw rate is scaled by {size:+.0f} %", 100.0,
           0.05, 0.25, True, "", _scaled("r")),
+)  # fmt: skip
+OF_ROAD = Cause(  # that a model of another drive may be asked about
+    "friction", "the road has {factor:.2g} times the friction of the drive that taught", 1.0,
+    0.1, 1.7, True, "", _friction,
 )  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """Judging a run, and a model that is asked about a drive."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -11,7 +11,8 @@ from identifier.method import Method
 from identifier.reproducibility import motion_error
 from identifier.run import History, identify
 from identifier.tire_model import AXLES, GRIP, STIFFNESS, Estimate, TireModel
-from identifier.verdict.causes import CAUSES, Ask, Mended, Suspect, suspects
+from identifier.verdict.causes import CAUSES, OF_ROAD, Ask, Cause, Mended, Suspect, suspects
+from identifier.verdict.friction import RoadFriction, road_friction
 from identifier.verdict.motion import (
     FEWEST,
     WINDOW,
@@ -33,6 +34,7 @@ from models.vehicle import Vehicle
 STRETCH = 0.3  # share of the windows that may be missed in one piece
 REST_MISSED = 0.08  # of the force elsewhere, where a piece is,
 CONFINED = 0.6  # and of what is missed with the piece
+ROADS = 3  # stretches of another friction that are told one by one
 TINY = 1e-9  # of a force, squared [static axle loads²]
 GEOMETRY = "center_of_gravity"
 CENTER = tuple(one for one in CAUSES if one.code == GEOMETRY)
@@ -90,14 +92,26 @@ def judge_prediction(model: TireModel, recording: Recording) -> Verdict:
     """
 
     def mounted(mended: Mended) -> TireModel:
-        return model if mended.vehicle == model.vehicle else model.mounted_on(mended.vehicle)
+        tires = model if mended.vehicle == model.vehicle else model.mounted_on(mended.vehicle)
+        return tires if mended.friction == 1.0 else tires.at_friction(mended.friction)
 
     asked = portion(recording)
     road = _road_driven(asked.recording, model.vehicle)
-    drive = _looked_at(mounted, model, asked, recording.t, road)
+    drive = _looked_at(mounted, model, asked, recording.t, road, (*CAUSES, OF_ROAD))
     if drive is None:
         return _too_short(model)
-    return _verdict(drive, [*findings(drive), *_asked_of(asked, recording)])
+    roads = _roads(road_friction(model, recording, road))
+    return _verdict(drive, [*findings(drive), *roads, *_asked_of(asked, recording)])
+
+
+def _roads(found: RoadFriction | None) -> list[Objection]:
+    """Return a note for each of the first stretches on another road than that which taught."""
+    roads = () if found is None else found.roads
+    listed = [Objection("another_road", None, one.text, False) for one in roads[:ROADS]]
+    if len(roads) > ROADS:
+        more = f"and {len(roads) - ROADS} more stretches of another friction"
+        listed.append(Objection("another_road", None, more, False))
+    return listed
 
 
 def _asked_of(asked: Portion, whole: Recording) -> list[Objection]:
@@ -128,7 +142,12 @@ Tires = Callable[[Mended], TireModel]  # of a car and a drive that a fault was t
 
 
 def _looked_at(
-    tires: Tires, model: TireModel, asked: Portion, clock: Array, road: Array | None
+    tires: Tires,
+    model: TireModel,
+    asked: Portion,
+    clock: Array,
+    road: Array | None,
+    causes: Iterable[Cause] = CAUSES,
 ) -> Drive | None:
     """Return what the rules look at; None where too little is driven.
 
@@ -149,7 +168,7 @@ def _looked_at(
             found = rest
     listed: tuple[Suspect, ...] = ()
     if not ((found.missed <= MOST_MISSED).all() or without_v_y(asked)):
-        listed = suspects(_ask(tires, found.windows, road), recording, model.vehicle)
+        listed = suspects(_ask(tires, found.windows, road), recording, model.vehicle, causes)
     return Drive(model=model, recording=recording, found=found, suspects=listed, notes=notes)
 
 

@@ -14,7 +14,7 @@ from identifier.method import vehicle_numbers
 from identifier.methods import load_model
 from identifier.reproducibility import Prediction, beyond_known
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict, contradictions, within_band
+from identifier.verdict import RoadFriction, Verdict, contradictions, within_band
 from models.recordings.record import ALL
 from tireid import __version__
 from tireid.commands import COMMANDS
@@ -31,7 +31,7 @@ from tireid.commands.options import (
     told_map,
 )
 from tireid.learning import replay
-from tireid.output import output_folder, text_table, write_json, write_long_csv
+from tireid.output import output_folder, text_table, write_csv, write_json, write_long_csv
 from tireid.progress import say, tell
 from tireid.verdicts import verdict_text, warn_of_stored
 
@@ -47,7 +47,8 @@ def add_parser(commands: Any) -> None:
         "predict",
         help=COMMANDS["predict"],
         description="Predict the axle forces of LOG with a stored model, which learns nothing from "
-        "it; write forces.csv and summary.json. Where LOG has true forces, say how much is missed; "
+        "it; write forces.csv, summary.json and, where it can be told, friction.csv, of the road "
+        "over that of the drive that taught. Where LOG has true forces, say how much is missed; "
         "else how much of the measured lateral and yaw acceleration the forces explain, in means "
         "over 0.2 s.",
     )
@@ -76,14 +77,18 @@ def run(options: argparse.Namespace) -> int:
     if recording.estimated:
         say(f"{recording.name}: vy is estimated by inertial, which begins with the model")
     verdict = prediction.verdict()
-    half = model.half_band_over(recording)
+    half, friction = model.half_band_over(recording), prediction.friction()
     with output_folder(options.out, force=options.force) as folder:
         parts = blocks(len(recording))
         write_long_csv(
             folder / "forces.csv", (force_columns(model, prediction, half, part) for part in parts)
         )
-        write_json(folder / "summary.json", summary(model, prediction, verdict, half))
-        told = prediction_text(model, prediction, half)
+        if friction is not None:
+            columns = {"t_s": friction.t, "friction": friction.ratio, "sd_of_log": friction.sd}
+            columns |= {"another": friction.another, "unexplained": friction.unexplained}
+            write_csv(folder / "friction.csv", columns)
+        write_json(folder / "summary.json", summary(model, prediction, verdict, half, friction))
+        told = prediction_text(model, prediction, half, friction)
     tell(f"{told}\n{verdict_text(verdict, numbers=False)}")
     say(f"wrote {options.out}/")
     return exit_code(verdict, options)
@@ -152,7 +157,11 @@ def force_columns(
 
 
 def summary(
-    model: TireModel, prediction: Prediction, verdict: Verdict, half: Array | None
+    model: TireModel,
+    prediction: Prediction,
+    verdict: Verdict,
+    half: Array | None,
+    friction: RoadFriction | None = None,
 ) -> dict[str, Any]:
     """Return what summary.json holds; null stands for what cannot be known.
 
@@ -162,6 +171,7 @@ def summary(
     prediction : of a recording.
     verdict : on the model over that recording.
     half : width of the band of its forces (n, 2) [N]; None where the model has none.
+    friction : of the drive's road; None where nobody can tell.
     """
     error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
     beyond, known = beyond_known(model, prediction.recording), model.known_slip
@@ -189,13 +199,24 @@ def summary(
         "windows_within_band": None if inside is None else inside.tolist(),
         "truth_within_band": None if held is None else held.tolist(),
         "moments_against_guarantee": None if against is None else against[1].mean(axis=0).tolist(),
+        "friction": None
+        if friction is None
+        else {
+            "as_taught": friction.as_taught,
+            "roads": [one._asdict() for one in friction.roads],
+        },
         "model": type(model).__name__,
         "vehicle": vehicle_numbers(model.vehicle),
         "version": __version__,
     }
 
 
-def prediction_text(model: TireModel, prediction: Prediction, half: Array | None) -> str:
+def prediction_text(
+    model: TireModel,
+    prediction: Prediction,
+    half: Array | None,
+    friction: RoadFriction | None = None,
+) -> str:
     """Return what is to be said of a prediction, as lines of text.
 
     Parameters
@@ -203,6 +224,7 @@ def prediction_text(model: TireModel, prediction: Prediction, half: Array | None
     model : that predicted.
     prediction : of a recording.
     half : width of the band of its forces (n, 2) [N]; None where the model has none.
+    friction : of the drive's road; None where nobody can tell.
     """
     error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
     lines = []
@@ -240,6 +262,12 @@ def prediction_text(model: TireModel, prediction: Prediction, half: Array | None
     against = contradictions(model, prediction.recording)
     if against is not None:
         lines.append(contradiction_line(*against))
+    if friction is not None and not friction.roads:
+        lines.append(
+            "friction: that of the drive that taught, as far as the tires show it"
+            if friction.as_taught
+            else "friction: the tires slide too little to show it"
+        )
     if model.vehicle.estimates:
         lines.append(model.vehicle.estimates)
     return "\n".join(lines)

@@ -1,0 +1,132 @@
+"""Another friction is told where tires slide, with its size, and nowhere else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.axle import AxleIdentifier
+from identifier.reproducibility import predict
+from identifier.run import identify
+from identifier.verdict import judge_prediction, road_friction
+from identifier.verdict.friction import filtered
+from models.friction import Friction, FrictionChange
+from models.maneuvers import RandomSteer
+from models.plant import Plant
+from models.sensors import Sensor, Sensors
+from models.vehicle import sedan
+
+SENSORS = Sensors(
+    v_x=Sensor(noise=0.03), v_y=Sensor(noise=0.03), r=Sensor(noise=0.003), delta=Sensor(noise=5e-4)
+)
+DROP = 10.0  # s
+
+
+def driven(seed, friction=None, amplitude=0.06):
+    steering = RandomSteer(
+        amplitude=amplitude, frequency=0.6, seed=seed, onset=1.0, rate_limit=0.8, duration=24.0
+    )
+    run = Plant(sedan()).simulate(steering, speed=20.0, friction=friction)
+    return SENSORS.apply(run.recording(), np.random.default_rng(seed))
+
+
+def taught(log):
+    blind = replace(log, axle_force=None)
+    return identify(blind, sedan(), AxleIdentifier.for_vehicle(sedan(), dt=log.dt)).calibrated()
+
+
+@pytest.fixture(scope="module")
+def tires():
+    """Learnt on the friction that the tires were measured on, with a band."""
+    return taught(driven(3))
+
+
+@pytest.fixture(scope="module")
+def same():
+    return driven(5)
+
+
+@pytest.fixture(scope="module")
+def wetter():
+    """Half the friction from a time on."""
+    return driven(5, Friction(changes=(FrictionChange(scale=0.5, at_time=DROP),)), 0.05)
+
+
+def test_half_the_friction_is_told_within_a_second_with_its_size(tires, wetter):
+    (road,) = predict(tires, wetter).friction().roads
+    wrong = np.abs(tires.axle_force(wetter) - wetter.axle_force) / tires.vehicle.axle_loads
+    slides = wetter.t[np.argmax((wrong.max(axis=1) > 0.15) & (wetter.t >= DROP))]
+    assert DROP < road.first < slides + 1.0
+    assert road.last == pytest.approx(wetter.t[-1], abs=0.3)
+    assert abs(road.ratio - 0.5) < 2.0 * road.sd < 0.2
+
+
+def test_the_road_that_taught_is_told_as_such(tires, same):
+    found = road_friction(tires, same)
+    assert found.roads == () and found.as_taught
+    assert found.unexplained.max() < 0.5
+
+
+def test_what_came_later_changes_nothing_that_was_told(tires, wetter):
+    whole = road_friction(tires, wetter)
+    part = road_friction(tires, wetter.between(0.0, DROP + 4.0))
+    n = part.t.size - 2
+    np.testing.assert_allclose(whole.ratio[:n], part.ratio[:n], rtol=0.1)
+    np.testing.assert_array_equal(whole.another[:n] > 0.5, part.another[:n] > 0.5)
+
+
+@pytest.mark.parametrize("off", [-0.01, 0.01])
+def test_another_zero_of_the_steering_is_no_other_road(tires, same, off):
+    assert road_friction(tires, replace(same, delta_f=same.delta_f + off)).roads == ()
+
+
+def test_a_gentle_drive_tells_nothing(tires):
+    found = road_friction(tires, driven(6, Friction(scale=0.5), 0.005))
+    assert found.roads == () and not found.as_taught
+
+
+def test_more_friction_is_told_where_the_grip_was_learnt_alone(same):
+    wet = taught(driven(5, Friction(scale=0.5), 0.05))
+    (road,) = road_friction(wet, same).roads
+    assert 1.4 < road.ratio < 2.2  # beyond what was learnt the curve is a guess
+    assert road_friction(taught(driven(3, amplitude=0.012)), same).roads == ()
+
+
+def test_forces_that_no_friction_makes_are_told_as_such(tires, same):
+    mirrored = replace(same, v_y=-same.v_y)
+    found = road_friction(tires, mirrored)
+    assert found.unexplained.max() > 0.9
+
+
+def test_the_verdict_of_a_prediction_names_the_road(tires, wetter, same):
+    verdict = judge_prediction(tires, wetter)
+    assert "another_road" in [one.code for one in verdict.findings if not one.refuses]
+    assert any("of the friction of the drive that taught" in line for line in verdict.lines)
+    slippery = driven(5, Friction(scale=0.5), 0.05)
+    missed = [one for one in judge_prediction(tires, slippery).findings if one.refuses]
+    assert any("likely cause: the road has 0.5" in one.text for one in missed)
+    assert "another_road" not in [one.code for one in judge_prediction(tires, same).findings]
+
+
+def test_tires_on_another_road_keep_their_stiffness(tires):
+    alpha = np.array([0.001, 0.02, 0.1])
+    half = tires.at_friction(0.5)
+    np.testing.assert_allclose(half.force_at(0.5 * alpha), 0.5 * tires.force_at(alpha), rtol=1e-12)
+    np.testing.assert_allclose(half.cornering_stiffness, tires.cornering_stiffness, rtol=1e-12)
+    np.testing.assert_allclose(half.known_slip, 0.5 * tires.known_slip, rtol=1e-9)
+    for ratio in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match="ratio must be positive"):
+            tires.at_friction(ratio)
+
+
+def test_a_stretch_begins_where_it_is_sure_and_ends_where_it_is_not_likely():
+    """Windows of a road, of half its friction, and of the road again, without noise."""
+    grid = np.log([0.5, 1.0, 2.0])
+    t = 0.15 * np.arange(600)
+    half = (t > 30.0) & (t < 60.0)
+    away = np.full((3, t.size, 2), 0.2)
+    away[0, half], away[1, ~half] = 0.0, 0.0
+    slope, variance = np.zeros((3, t.size, 2)), np.full((t.size, 2), 0.05**2)
+    (road,) = filtered(t, grid, away, slope, variance).roads
+    assert 30.0 < road.first < 30.8 and 59.5 < road.last < 60.8
+    assert road.ratio == pytest.approx(0.5, abs=0.02)
