@@ -41,6 +41,7 @@ ANYTHING = 0.3  # static axle loads: of forces that no friction explains
 OVERLAP = 0.5  # of a window is new
 ANOTHER = 0.25  # |ln μ| from which a road counts as another
 SURE, LIKELY = 0.99, 0.5  # probability from which that is told, and as long as it goes on
+TWO_SIGMA = 2.0  # of its doubt: a friction nearer to that which taught is not told
 SIMILAR = 0.1  # of ln μ: by so much roads of a tire are not similar
 
 
@@ -85,7 +86,7 @@ class RoadFriction(NamedTuple):
 
     @property
     def roads(self) -> tuple[Road, ...]:
-        """Stretches of another friction, each from when that is sure on, until it is not likely."""
+        """Stretches of another friction, each from when that is sure on until it is not likely."""
         likely = np.concatenate([[False], self.another >= LIKELY, [False]])
         edges, found = np.flatnonzero(likely[1:] != likely[:-1]), []
         for begin, past in zip(edges[::2], edges[1::2], strict=True):
@@ -96,8 +97,9 @@ class RoadFriction(NamedTuple):
             ln, sd = np.log(self.ratio[first:past]), self.sd[first:past]
             mean = float(np.average(ln, weights=1.0 / sd**2))
             doubt = math.hypot(float(np.median(sd)), SIMILAR * mean)
-            ratio = math.exp(mean)
-            found.append(Road(float(self.t[first]), float(self.t[past - 1]), ratio, ratio * doubt))
+            if abs(mean) > TWO_SIGMA * doubt:
+                ends = float(self.t[first]), float(self.t[past - 1])
+                found.append(Road(*ends, math.exp(mean), math.exp(mean) * doubt))
         return tuple(found)
 
     @property

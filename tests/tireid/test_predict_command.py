@@ -9,6 +9,9 @@ import pytest
 
 import tireid as ti
 from identifier.methods import make_method
+from models.friction import Friction, FrictionChange
+from models.maneuvers import RandomSteer
+from models.plant import Plant
 from models.recordings import read_recording, write_recording
 from tireid.cli import main
 
@@ -151,3 +154,25 @@ def test_a_folder_is_replaced_only_when_told(model, logs, tmp_path, capsys):
     line = ["predict", str(model), str(logs / "quick.csv"), "--out", str(out)]
     assert [main(line), main(line), main([*line, "--force"])] == [0, 2, 0]
     assert "add --force" in capsys.readouterr().err
+
+
+def test_another_road_is_told_with_its_friction(model, tmp_path, capsys):
+    steering = RandomSteer(
+        amplitude=0.05, frequency=0.6, seed=5, onset=1.0, rate_limit=0.8, duration=24.0
+    )
+    wet = Friction(changes=(FrictionChange(scale=0.5, at_time=10.0),))
+    run = Plant(ti.sedan()).simulate(steering, speed=20.0, friction=wet)
+    write_recording(replace(run.recording(), axle_force=None), tmp_path / "wet.csv")
+    out = tmp_path / "out"
+    summary, _ = predicted(out, model, tmp_path / "wet.csv", "--accept")
+    (road,) = summary["friction"]["roads"]
+    assert 10.0 < road["first"] < 14.0 and abs(road["ratio"] - 0.5) < 2.0 * road["sd"]
+    table = np.genfromtxt(out / "friction.csv", delimiter=",", names=True)
+    assert table["another"][table["t_s"] > road["first"] + 1.0].min() > 0.5
+    assert "of the friction of the drive that taught" in capsys.readouterr().out
+
+
+def test_a_road_that_is_the_same_is_said_to_be(model, logs, tmp_path, capsys):
+    summary, _ = predicted(tmp_path / "out", model, logs / "quick.csv")
+    assert summary["friction"] == {"as_taught": True, "roads": []}
+    assert "friction: that of the drive that taught" in capsys.readouterr().out
