@@ -225,7 +225,7 @@ def _repeats(name: str, runs: Runs, noisy: bool, recording: Recording) -> Iterat
     repeats = runs.length > 1
     share = float(np.sum(runs.length - 1)) / n
     again = int(np.count_nonzero(repeats))
-    if noisy and share > REPEATED and again >= 5:
+    if noisy and share - _rounded_alike(getattr(recording, name)) > REPEATED and again >= 5:
         typical = float(np.median(runs.length[repeats])) * recording.dt
         yield Finding(
             code="held",
@@ -249,6 +249,21 @@ def _repeats(name: str, runs: Runs, noisy: bool, recording: Recording) -> Iterat
             text=f"{name} does not change from {first:.4g} s on for {length * recording.dt:.3g} s: "
             "frozen; cut the log there",
         )
+
+
+def _rounded_alike(signal: Array) -> float:
+    """Return the share of neighbors that rounding alone makes equal; 0 where nothing was rounded.
+
+    Differences of a rounded channel are multiples k of its last digit. Where noise makes them,
+    ln(share of k) falls with k²: those of ±1 and ±2 tell how many are 0.
+    """
+    steps = np.abs(np.diff(signal))
+    moved = steps[steps > 1e-9 * float(np.abs(signal).max())]
+    if not moved.size:
+        return 0.0
+    digits = np.round(moved / float(moved.min()))
+    one, two = (float(np.count_nonzero(digits == k)) / (2.0 * signal.size) for k in (1, 2))
+    return one * (one / two) ** (1.0 / 3.0) if two > 0.0 else 0.0
 
 
 def _runs_on(name: str, noisy: bool, recording: Recording, first: int, length: int) -> bool:

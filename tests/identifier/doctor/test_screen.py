@@ -227,6 +227,23 @@ def test_lost_samples_a_coarse_sensor_and_copies_are_named(one):
     assert copied.code == "copied"
 
 
+def rounded_speed(one, lost):
+    """The drive as it slows down and speeds up, v_x with two digits in km/h, some samples lost."""
+    _, log = one
+    rng = np.random.default_rng(5)
+    v_x = 25.0 + 15.0 * np.sin(0.3 * log.t) + 0.03 * rng.standard_normal(len(log))
+    v_x = np.round(3.6 * v_x, 2) / 3.6
+    again = 1 + np.flatnonzero(rng.random(len(log) - 1) < lost)
+    v_x[again] = v_x[again - 1]
+    return [one for one in sample_findings(replace(log, v_x=v_x)) if one.channel == "v_x"]
+
+
+def test_numbers_that_rounding_makes_alike_are_no_lost_samples(one):
+    assert rounded_speed(one, lost=0.0) == []
+    (held,) = rounded_speed(one, lost=0.04)
+    assert held.code == "held"
+
+
 def test_a_slow_sampling_interval_is_a_clock_in_ms_and_nothing_else_is_asked(one):
     car, log = one
     for broken in (log, replace(log, r=-log.r)):
