@@ -10,7 +10,7 @@ import pytest
 import tireid as ti
 from identifier.axle import AxleIdentifier
 from identifier.inertial import InertialIdentifier
-from models.maneuvers import RandomSteer
+from models.maneuvers import RandomSteer, SampledSteer
 from models.plant import Plant
 from models.recordings import Recording, RecordingError, read_recording, write_recording
 from models.recordings.record import joined
@@ -99,6 +99,27 @@ def test_a_channel_that_is_scaled_is_not_valid(exact, channel, factor, code):
     verdict = ti.identify(wrong, CAR, check=False).verdict()
     assert not verdict.valid
     assert code in [one.code for one in verdict.findings]
+
+
+@pytest.fixture(scope="module")
+def swept():
+    """A sine sweep to 2.5 Hz, in which v_y changes as fast as the car turns."""
+    t = np.arange(0.0, 40.0, 0.02)
+    angle = np.radians(1.5) * np.sin(2.0 * np.pi * (0.1 + 0.03 * t) * t)
+    maneuver = SampledSteer(
+        times=tuple(t), angles=tuple(angle), rate_limit=1.0, duration=float(t[-1])
+    )
+    return Plant(CAR).simulate(maneuver, speed=25.0, name="sweep").recording()
+
+
+@pytest.mark.parametrize(("factor", "right"), [(1.0, True), (1.3, False)])
+def test_a_y_is_held_against_the_change_of_v_y_too(swept, factor, right):
+    log = as_logged(swept)
+    run = ti.identify(replace(log, a_y=factor * log.a_y), CAR, check=False)
+    assert ("a_y_disagrees" not in [one.code for one in run.verdict().findings]) == right
+    if right:
+        assert run.verdict().valid
+        assert (missed(run.freeze(), swept) < 0.08).all()
 
 
 def test_a_car_with_three_times_the_inertia_is_not_valid(exact):
