@@ -1,13 +1,15 @@
 """What the signals of a drive must agree on, whatever its tires are: residuals over faults.
 
-Kinematics, of a log with an accelerometer:  a_y = v̇_y + v_x r - g sin β.
+Kinematics, of a log with an accelerometer:  a_y - ρ a_y(t - τ) = v̇_y + v_x r - g sin β, where the
+body rolls with the accelerometer by ρ/(1 - ρ) rad for each g, τ behind, so that it shows weight.
 Dynamics, per axle in static axle loads:  dξ_i/dt + v_x r/g - sin β = h_i(α_i) cos δ_i, of an odd
 curve h_i = Σ_j w_j tanh(α/α_j) that nobody knows: the weights that fit best are taken for every
 size of the faults (variable projection).   ξ_i = v_y/g ± I_z r/(L F_z,i),
 α_i = δ_i - atan((v_y ± l_i r)/v_x).
 Both are asked in means over smooth windows ψ, ∫ψ ẋ dt = -∫ψ̇ x dt: no signal is differentiated.
 What a real car adds is estimated beside the faults and reported by nobody: the way it rolls before
-force follows slip, and the sway of its body, whose roll follows a_y, over the contact patches.
+force follows slip, the sway of its body, whose roll follows a_y, over the contact patches, and the
+weight that an accelerometer shows as it rolls with the body.
 """
 
 import math
@@ -42,6 +44,7 @@ BANKS = 6  # cosines over the drive in which a bank may swing
 OVERLAP = 4  # windows that begin within the length of one
 WANDER = 0.03  # of a force: what no model of this size explains; of kinematics a third
 SMALL = 0.004  # static axle loads
+MOST_TILT = 0.15  # ρ of the softest body, 10 degrees for each g; none leans into the turn
 TYPICAL = 10.0  # slope of a curve [static axle loads per rad], for the noise that slip brings
 
 Sizes = Mapping[str, float]  # of faults, by key; what is not named is not there
@@ -50,13 +53,17 @@ FRONT, REAR, KINEMATICS = range(3)
 STEERING = ("delta_f", "delta_r")
 RELAXATION = ("relaxation.front", "relaxation.rear")
 # Sizes that change nothing of a part: it is not computed again for their sake.
-TIRES = frozenset({*RELAXATION, "sway", "roll_delay"})
+TIRES = frozenset({*RELAXATION, "sway"})
+BODY = frozenset({"tilt"})
+ROLL = frozenset({"roll_delay"})
 GEOMETRY = frozenset({"center_of_gravity", "yaw_inertia"})
 AHEAD = frozenset({"acceleration_sensor_x"})
 BANKED = frozenset(f"bank.{k}" for k in range(BANKS))
-NOT_OF_MOTION = TIRES | GEOMETRY | AHEAD | BANKED
-NOT_OF_FORCES = TIRES | AHEAD
-NOT_OF_PART = (AHEAD | {RELAXATION[REAR]}, AHEAD | {RELAXATION[FRONT]}, TIRES | GEOMETRY)
+NOT_OF_MOTION = TIRES | ROLL | BODY | GEOMETRY | AHEAD | BANKED
+NOT_OF_FORCES = TIRES | ROLL | BODY | AHEAD
+NOT_OF_AXLES = AHEAD | BODY
+NOT_OF_PART = (NOT_OF_AXLES | {RELAXATION[REAR]}, NOT_OF_AXLES | {RELAXATION[FRONT]},
+               TIRES | GEOMETRY)  # fmt: skip
 RECENT = 4  # sizes whose parts are kept
 
 
@@ -282,14 +289,19 @@ class Balance:
     def _slip(self, motion: Motion, axle: int, car: Car, sizes: Sizes) -> Array:
         """Return slip angles of an axle as force follows them [rad], (n,)."""
         x = motion.channels
-        later = max(sizes.get("roll_delay", 0.0), 0.0)
-        steps = np.arange(self.at.size) * self.dt
-        swayed = np.interp(steps - later, steps, motion.a_y_dot)
+        swayed = self._as_it_rolls(motion.a_y_dot, sizes)
         sideways = x["v_y"] + sizes.get("sway", 0.0) * swayed
         arm = (car.l_f, -car.l_r)[axle]
         slip = x[STEERING[axle]] - np.arctan((sideways + arm * x["r"]) / x["v_x"])
         length = max(sizes.get(RELAXATION[axle], 0.0), 0.0) * self.vehicle.wheelbase
         followed: Array = np.interp(motion.rolled - length, motion.rolled, slip)
+        return followed
+
+    def _as_it_rolls(self, signal: Array, sizes: Sizes) -> Array:
+        """Return what the roll of the body follows as late as the body does, (n,)."""
+        later = max(sizes.get("roll_delay", 0.0), 0.0)
+        steps = np.arange(self.at.size) * self.dt
+        followed: Array = np.interp(steps - later, steps, signal)
         return followed
 
     def residual(self, sizes: Sizes) -> Residual:
@@ -340,7 +352,8 @@ class Balance:
     def _kinematics(self, x: Mapping[str, Array], bank: Array, sizes: Sizes) -> Array:
         g, ahead = GRAVITY, sizes.get("acceleration_sensor_x", 0.0)
         rates = self.rate @ np.column_stack([x["v_y"], x["r"]])
-        means = self.mean @ (x["a_y"] - x["v_x"] * x["r"] + g * bank)
+        weight = tilted(sizes) * self._as_it_rolls(x["a_y"], sizes)
+        means = self.mean @ (x["a_y"] - weight - x["v_x"] * x["r"] + g * bank)
         return np.asarray((means - rates[:, 0] - ahead * rates[:, 1]) / g, dtype=np.float64)
 
     # Noise. Faults that merely make the noise smaller must not look true.
@@ -384,6 +397,18 @@ class Balance:
         allowed = np.sqrt(noise + share**2 + SMALL**2)
         rms = np.sqrt(np.mean((force / allowed[:, :2]) ** 2, axis=0))
         return allowed, rms
+
+
+def tilted(sizes: Sizes) -> float:
+    """Return ρ, the share of a_y that is weight as the body rolls: from 0 to its most, smoothly.
+
+    Parameters
+    ----------
+    sizes : by key; without a tilt there is none.
+    """
+    if "tilt" not in sizes:
+        return 0.0
+    return 0.5 * MOST_TILT * (1.0 + sizes["tilt"] / math.hypot(1.0, sizes["tilt"]))
 
 
 def told(sizes: Sizes, without: frozenset[str]) -> Told:

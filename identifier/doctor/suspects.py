@@ -218,4 +218,5 @@ NUISANCES = {  # mean, standard deviation, and what both grow with, of a sedan
     "relaxation.rear": (0.17, 0.11, ""),
     "sway": (0.005, 0.004, "length"),  # m of contact patch per m/s² of acceleration
     "roll_delay": (0.06, 0.05, "time"),  # s, of the roll behind the acceleration
+    "tilt": (0.0, 2.0, ""),  # of the roll of the body over its most, see `balance.tilted`
 }

@@ -68,6 +68,34 @@ def test_a_planted_fault_is_named_first_or_second_with_its_size(driven, kind):
     assert (right[0].repair is None) == (kind == "bank")
 
 
+def rolling(exact, log, degrees_per_g):
+    """The log of an accelerometer that rolls with the body, a mass on spring and damper."""
+    omega, damping, gain = 2.0 * math.pi * 1.6, 0.35, math.radians(degrees_per_g) / GRAVITY
+    roll = rate = 0.0
+    angle = np.empty(len(exact))
+    for k, a_y in enumerate(exact.a_y):
+        angle[k] = roll
+        rate += exact.dt * (omega**2 * (gain * a_y - roll) - 2.0 * damping * omega * rate)
+        roll += exact.dt * rate
+    shown = exact.a_y * np.cos(angle) + GRAVITY * np.sin(angle)
+    return replace(log, a_y=shown + log.a_y - exact.a_y)
+
+
+@pytest.mark.parametrize("degrees_per_g", [0.0, 2.0, 4.0, 6.0])
+def test_an_accelerometer_on_a_body_that_rolls_has_no_fault(driven, degrees_per_g):
+    car, log, exact = driven
+    assert examine(rolling(exact, log, degrees_per_g), car).findings == ()
+
+
+@pytest.mark.parametrize("factor", [0.8, 1.4])
+def test_a_scale_that_no_roll_explains_is_named_beside_it(driven, factor):
+    car, log, exact = driven
+    shown = rolling(exact, log, 4.0)
+    found = estimate(replace(shown, a_y=factor * shown.a_y), car)
+    assert (found[0].code, found[0].channel) == ("factor", "a_y")
+    assert found[0].size == pytest.approx(factor, rel=0.1)
+
+
 def test_every_kind_of_fault_has_a_suspect():
     codes = {(one.code, one.channel) for one in SUSPECTS}
     car = drawn_everyday("sedan", "slalom", 1).car.told
