@@ -28,6 +28,8 @@ def write_atomically(path: str | PathLike[str], content: str | bytes | Iterable[
         device, which a file in its place would end for every program; nothing is left behind.
     """
     target = resolved(path)
+    if not target.parent.exists():
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(target.parent))
     _require_file_or_nothing(target)
     whole = content.encode("utf-8") if isinstance(content, str) else content
     with tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as scratch:

@@ -62,6 +62,14 @@ def test_it_lists_what_is_there_and_what_is_missing(folder, capsys):
     assert "all that is needed is there" in capsys.readouterr().out
 
 
+def test_what_is_there_of_a_log_without_lateral_velocity_is_what_stands_in_for_it(tmp_path, capsys):
+    path = tmp_path / "imu.csv"
+    rows = [f"{0.01 * k:.2f},20.0,0.{k % 10},{k % 7},0.0{k % 3}" for k in range(200)]
+    path.write_text("\n".join(["t,vx,r,ay,delta_f", *rows]))
+    assert main(["channels", str(path)]) == 0
+    assert "all that is needed is there: vx, r, delta_f, ay\n" in capsys.readouterr().out
+
+
 def test_a_log_of_a_logger_goes_to_the_verdict_of_the_same_in_si(folder, tmp_path, capsys):
     told = tmp_path / "log.toml"
     motec, car = str(folder / "motec.csv"), str(folder / "car.toml")

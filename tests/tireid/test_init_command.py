@@ -53,6 +53,9 @@ def test_nothing_is_replaced_unasked(tmp_path, capsys):
     assert path.read_text(encoding="utf-8") != "precious"
     assert main(["init", str(tmp_path / "car.txt")]) == 2
     assert main(["init", str(tmp_path / "none" / "car.toml")]) == 2
+    assert (
+        capsys.readouterr().err.strip().endswith(f"{tmp_path / 'none'}: no such file or directory")
+    )
     assert sorted(one.name for one in tmp_path.iterdir()) == ["car.toml"]
 
 

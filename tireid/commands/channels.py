@@ -14,7 +14,7 @@ from models.files import write_atomically
 from models.logs.door import open_log
 from models.logs.log import Channel, Listed, LogFile, RecordingError, one_run, some
 from models.logs.names import Proposal, propose
-from models.logs.signals import MEANINGS, NEEDED, Signal
+from models.logs.signals import MEANINGS, NEEDED, Signal, told_by
 from models.recordings import LogMap, split_log_argument
 from models.recordings.assembly import wheel_scales, wheel_units
 from models.recordings.choice import (
@@ -86,7 +86,7 @@ def run(options: argparse.Namespace) -> int:
         tell(f"{column_of('a_y')} is there: without vy, identify estimates it")
     said, of_wheels, rolls = _wheels(log, signals, told, chosen)
     if rolls or missing:
-        tell(missing_text(options.log, missing, proposal))
+        tell(missing_text(options.log, missing, proposal, signals))
     if said:
         tell(said)
     if options.write is not None:
@@ -202,7 +202,9 @@ def _meaning(
     return ""
 
 
-def missing_text(log: str, missing: Sequence[str], proposal: Proposal) -> str:
+def missing_text(
+    log: str, missing: Sequence[str], proposal: Proposal, signals: Mapping[str, Signal]
+) -> str:
     """Return what is missing, and the words that would tell it.
 
     Parameters
@@ -210,9 +212,14 @@ def missing_text(log: str, missing: Sequence[str], proposal: Proposal) -> str:
     log : as it was typed.
     missing : signals that are needed and not sure.
     proposal : what the channels probably are.
+    signals : that are sure.
     """
     if not missing:
-        return f"all that is needed is there: {', '.join(map(column_of, NEEDED))}"
+        there = told_by(signals)
+        needed = [name for name in NEEDED if name in there]
+        if "v_y" not in there:
+            needed.append("a_y")
+        return f"all that is needed is there: {', '.join(map(column_of, needed))}"
     lines = []
     for name in missing:
         likely = likely_text(name, proposal)
