@@ -152,7 +152,7 @@ class Search:
 
         Where one that would leave no car gains more by far, what is named in its place is in doubt.
         """
-        believed = [one for one in listed if self._believed(one.suspect, one.fit)]
+        believed = [one for one in listed if self._believed(one.suspect, one.fit, one.gain)]
         least = max([CHANCE, *(one.gain for one in believed)]) + ALIKE
         self.in_doubt |= any(
             one.gain > least
@@ -166,10 +166,17 @@ class Search:
         fit = self.fitter.fit([*self.chosen, *keys], start)
         return Candidate(suspect, fit, self.fit.J - fit.J - 0.5 * (len(keys) - 1))
 
-    def _believed(self, suspect: Suspect, fit: Fit) -> bool:
+    def _believed(self, suspect: Suspect, fit: Fit, gain: float = 0.0) -> bool:
+        """Return whether a size stands out, by its deviation or by what it gains of J.
+
+        Both say the same where sizes change all in proportion; beside one that is bounded, as the
+        roll of the body, a size may be uncertain and yet surely not zero.
+        """
         size = self.size(suspect, fit.sizes)
         most = BELIEVED * suspect.plausible * suspect.scale(self.vehicle)
-        telling = abs(size) > TELLING * self.deviation(suspect, fit)
+        least = suspect.least * suspect.scale(self.vehicle)
+        by_gain = math.hypot(size / math.sqrt(2.0 * gain), least) if gain > 0.0 else math.inf
+        telling = abs(size) > TELLING * min(self.deviation(suspect, fit), by_gain)
         possible = (suspect.signed or size > 0.0) and suspect.leaves_a_car(size, self.vehicle)
         return abs(size) < most and telling and possible
 

@@ -87,7 +87,7 @@ def test_an_accelerometer_on_a_body_that_rolls_has_no_fault(driven, degrees_per_
     assert examine(rolling(exact, log, degrees_per_g), car).findings == ()
 
 
-@pytest.mark.parametrize("factor", [0.8, 1.4])
+@pytest.mark.parametrize("factor", [0.8, 1.28, 1.4])
 def test_a_scale_that_no_roll_explains_is_named_beside_it(driven, factor):
     car, log, exact = driven
     shown = rolling(exact, log, 4.0)
@@ -198,7 +198,7 @@ def test_what_leaves_no_car_is_not_believed_and_what_is_named_for_it_is_in_doubt
     )
     likely = Candidate(inertia, replace(search.fit, sizes={"yaw_inertia": 0.3}), 10.0)
     other = Candidate(center, replace(search.fit, sizes=small), 30.0)
-    search._believed = lambda suspect, _: suspect is inertia
+    search._believed = lambda suspect, *_: suspect is inertia
     for one in (other, other._replace(fit=replace(search.fit, sizes=far), gain=12.0)):
         assert search._ranked([likely, one]) == [likely]
         assert not search.in_doubt
