@@ -25,7 +25,7 @@ FAR_FROM_TOLD = 3.0  # ratio of learnt to told stiffness, or told to learnt
 STIFFENS = 1.6  # secant at the known slip over slope at zero: no tire stiffens with slip
 INERTIA = (0.3, 2.0)  # I_z/(m l_f l_r): two points on the axles have 1
 MOST_A_Y = 0.25  # share of the recorded a_y that v_y, r and v_x do not give
-A_Y_SLOPE = (0.87, 1.2)  # of the recorded a_y on theirs: a body that rolls reads up to 1.15
+A_Y_SLOPE = (0.87, 1.25)  # of the recorded a_y on theirs: a body that rolls reads up to 1.2
 ROLLING = (0.85, 1.25)  # the same of an estimated v_y, which the roll distorts as well
 CENTER = (-0.065, 0.12)  # of the wheelbase: where right cars seem to have their center of gravity,
 # forward and back of the told one; the body rolls, which looks like a center farther back

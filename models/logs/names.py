@@ -24,6 +24,7 @@ from models.logs.signals import (
     Signal,
     quantity_of,
 )
+from models.logs.spelling import without_ending
 from models.logs.stamps import typical_rate
 from models.logs.units import ANGLE, FORCE, RATE, is_told, quantities, to_si
 from models.logs.wheel_names import wheel_words
@@ -351,8 +352,9 @@ def _candidates(signal: str, listed: Sequence[Heading]) -> list[Guess]:
     """Return the channels whose names and units may be a signal."""
     found = []
     for one in listed:
-        by_name = name_confidence(signal, one.name)
-        by_hand = name_confidence(HAND, one.name) if signal == "delta_f" else 0.0
+        names = {one.name, without_ending(one.name, one.unit)}
+        by_name = max(name_confidence(signal, name) for name in names)
+        by_hand = max(name_confidence(HAND, name) for name in names) if signal == "delta_f" else 0.0
         best = max(by_name, by_hand)
         if best > 0.0:
             found.append(

@@ -87,3 +87,17 @@ def without_unit(name: str) -> str:
     name : of a column, as in the file.
     """
     return _UNIT_BEHIND.sub("", name)
+
+
+def without_ending(name: str, unit: str) -> str:
+    """Return a name without the unit after its last words, where it is that unit.
+
+    Parameters
+    ----------
+    name : of a column, as in the file: "speed_kmh".
+    unit : that was understood: "km/h".
+    """
+    for ending, meant in _LONGEST_FIRST:
+        if meant == unit and name.endswith("_" + ending):
+            return name.removesuffix("_" + ending)
+    return name

@@ -102,6 +102,20 @@ def test_a_log_with_units_is_proposed_whole() -> None:
     assert set(signals) == {"v_x", "v_y", "r", "delta_f", "a_y"}
 
 
+def test_units_at_the_end_of_names_hide_no_signal() -> None:
+    found = proposed(
+        ("vehicle_speed_mps", "m/s", 20 + WAVE),
+        ("vy_mps", "m/s", WAVE),
+        ("yaw_rate_radps", "rad/s", 0.3 * WAVE),
+        ("road_wheel_angle_rad", "rad", 0.1 * WAVE),
+        ("lat_accel_mps2", "m/s^2", WAVE),
+    )
+    assert found.unsure() == ()
+    assert {one.channel[0].split("_")[0] for one in found.signals().values()} == {
+        *("vehicle", "vy", "yaw", "road", "lat"),
+    }
+
+
 def test_of_two_that_are_equal_none_is_taken() -> None:
     found = proposed(("GPS Speed", "km/h", WAVE), ("Ground Speed", "km/h", WAVE))
     assert not found.is_sure("v_x") and "v_x" in found.unsure()
