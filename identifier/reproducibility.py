@@ -183,7 +183,7 @@ def _mean_acceleration(
     return acceleration
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
 class Prediction:
     """One recording as a frozen model predicts it.
 
@@ -239,7 +239,7 @@ class Prediction:
         return f"explained are {' and '.join(shares)} acceleration" if shares else ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Replay:
     """One recording replayed with frozen weights.
 

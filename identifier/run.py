@@ -49,7 +49,7 @@ def state_index(recording: Recording, t: float) -> int:
     return int(np.searchsorted(times, t + tolerance, side="right")) - 1
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
 class History:
     """An online run over n samples.
 

@@ -54,7 +54,7 @@ DRAWS = 1000  # of weights, before a possible tire must have been among them
 BENT = 0.4  # slope over that at zero, below which a curve shows where it saturates
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
 class AxleModel(TireModel):
     """Axle forces φ(x) = Σ w_j tanh(x/α_j) of lagged slip x, in static axle loads.
 

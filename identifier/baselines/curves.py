@@ -204,7 +204,7 @@ def unlagged() -> dict[str, Array]:
     return {"slip": np.zeros(2), "alpha": np.zeros(2), "begun": np.zeros(1)}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
 class CurveModel(TireModel):
     """Axle forces of a curve with parameters that no longer change.
 

@@ -227,7 +227,7 @@ def _replay_scan(network: Network) -> Scan:
     return Scan(build_replay(network), carry=(), over=("x", "u", "v_x"))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
 class NetworkModel(TireModel):
     """Axle forces F_y = C α + U Ŵ tanh(V̂ x̄) with weights that no longer change.
 

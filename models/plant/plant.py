@@ -23,7 +23,7 @@ from models.vehicle import GRAVITY, Vehicle, VehicleError
 # What a plant recorded: the motion, and the forces behind it, which no car measures.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlantRun:
     """The truth of a run: n samples, SI, ISO axes; wheels in the order FL, FR, RL, RR.
 

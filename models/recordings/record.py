@@ -52,7 +52,7 @@ LARGEST = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
 class Recording:
     """Signals of one drive, all of the same length n, uniformly sampled and read-only.
 

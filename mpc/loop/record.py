@@ -40,7 +40,7 @@ class Plan(NamedTuple):
         return X - self.x[:, 0] * np.sin(psi), Y + self.x[:, 0] * np.cos(psi)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Drive:
     """A drive of n periods along a path; signals without another word are the truth, SI, ISO axes.
 
