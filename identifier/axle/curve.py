@@ -146,5 +146,5 @@ def excited(state: Any, size: Any, *, dt: Any, samples: Any, learns: Any) -> Any
     largest = state[:, 0]
     largest += learns * smaller(1, 1 / samples) * larger(size - largest, 0)
     spent = dt * learns
-    times = [state[:, 1 + k] + spent * (size >= edge) for k, edge in enumerate(EDGES)]
+    times = [state[:, 1 + k] + ca.if_else(size >= edge, spent, 0) for k, edge in enumerate(EDGES)]
     return ca.horzcat(largest, *times)

@@ -14,6 +14,8 @@ import casadi as ca
 from identifier.axle.car import larger
 from identifier.axle.covariance import TINY, Factors, excited, updated
 
+CONDITIONS = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_AND, ca.OP_OR, ca.OP_NOT)
+
 
 def as_factor(number: Any) -> Any:
     """Return a number as one that others are multiplied with: CasADi would turn each product with a
@@ -23,22 +25,14 @@ def as_factor(number: Any) -> Any:
     ----------
     number : scalar expression, finite where it is not chosen.
     """
-    if number.is_leaf() or number.op() != ca.OP_IF_ELSE_ZERO:
+    if number.is_leaf():
+        return number
+    if number.op() in CONDITIONS:
+        return 1 - ca.logic_not(number)
+    if number.op() != ca.OP_IF_ELSE_ZERO:
         return number
     condition, chosen = number.dep(0), number.dep(1)
     return (1 - ca.logic_not(condition)) * as_factor(chosen)
-
-
-def chosen_of(condition: Any, a: Any, b: Any) -> Any:
-    """Return a where the condition holds, else b, to be multiplied with; both are finite.
-
-    Parameters
-    ----------
-    condition : 1 or 0.
-    a, b : of one shape, sparse.
-    """
-    not_a = ca.logic_not(condition)
-    return (1 - not_a) * a + (1 - ca.logic_not(not_a)) * b
 
 
 def propagated(factors: Factors, F: Any, Q: list[Any]) -> Factors:

@@ -237,17 +237,16 @@ def cosine(delta: Any) -> Any:
     return 1 - delta**2 / 2 + delta**4 / FIRST_COS
 
 
-def slip_angle(car: Car, at: Sample, v_y: Any, r: Any, steering: Any) -> Any:
+def slip_angle(at: Sample, sideways: Any, steering: Any) -> Any:
     """Return α [rad], (2,).
 
     Parameters
     ----------
     at : speed and steering.
-    v_y : [m/s].
-    r : yaw rate [rad/s].
+    sideways : v_y of the axles, v_y ± l r [m/s], (2,).
     steering : δ₀ [rad].
     """
-    return at.delta + ca.vertcat(steering, 0) - ca.atan((v_y + car.arm * r) * (1 / at.v_x))
+    return at.delta + ca.vertcat(steering, 0) - ca.atan(sideways * (1 / at.v_x))
 
 
 def predicted(
@@ -283,14 +282,15 @@ def predicted(
     at = curve_by(way, z, scales, steps)
     wheelbase = car.arm[0] - car.arm[1]
     steep = way.held(at.carcass_slope <= at.slope)
-    carcass = steep * way.by(at.slope) + (1 - steep) * way.held(at.carcass_slope)
+    carcass = steep * at.slope + (1 - steep) * way.held(at.carcass_slope)
     sigma = way.by(z.compliance * carcass + SHORTEST * wheelbase)
     length = v_x * dt * (1 / sigma)
     e = ca.exp(-length)
     mean = (1 - e) * (1 / length)
     sway = -laws.sway * tilt[1] * (1 / v_x)
-    was = slip_angle(car, before, z.v_y, z.r, z.steering) + sway
-    stays = slip_angle(car, now, z.v_y, z.r, z.steering) + sway  # where v_y and r stay as they are
+    sideways = way.by(z.v_y + car.arm * z.r)
+    was = slip_angle(before, sideways, z.steering) + sway
+    stays = slip_angle(now, sideways, z.steering) + sway  # where v_y and r stay as they are
     slip = e * z.slip + (mean - e) * was + (1 - mean) * stays
     cos_delta = cosine(now.delta)
     slope = way.held(at.slope)
@@ -305,7 +305,7 @@ def predicted(
     per = dt / (m11 * m22 - m12 * m21)
     v_y = way.by(z.v_y + (m22 * a - m12 * b) * per)
     r = way.by(z.r + (m11 * b - m21 * a) * per)
-    alpha = slip_angle(car, now, v_y, r, z.steering) + sway
+    alpha = slip_angle(now, way.by(v_y + car.arm * r), z.steering) + sway
     slip = e * z.slip + (mean - e) * was + (1 - mean) * alpha
     bank_rate = z.bank_rate - dt * (laws.bank_damping * z.bank_rate + laws.bank_stiffness * z.bank)
     rolling, rate = tilt

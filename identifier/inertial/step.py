@@ -21,7 +21,7 @@ from identifier.axle.gate import Gate, GateState, Plausibility, gate
 from identifier.axle.learning import BoundNumbers, bounded
 from identifier.axle.step import PLAUSIBILITY
 from identifier.inertial.beliefs import TrustNumbers
-from identifier.inertial.gaussian import chosen_of, measured, propagated
+from identifier.inertial.gaussian import as_factor, measured, propagated
 from identifier.inertial.motion import (
     MOVING,
     SENSORS,
@@ -154,15 +154,23 @@ class Noise(NamedTuple):
     variance: list[Any]
     heard: Any
 
-    def reading(self, h: Any, innovation: list[Any], R: list[Any]) -> "Reading":
-        """Return the reading of the channel that comes first.
+    def reading(
+        self, h: Any, innovation: list[Any], R: list[Any], lateral: "Reading | None"
+    ) -> "Reading":
+        """Return that of v_y where it counts, else that of the channel that comes first.
 
         Parameters
         ----------
         h, innovation, R : as of `Reading`, of r and a_y.
+        lateral : of v_y, None where there is none.
         """
-        of_r, of_a_y = zip(ca.vertsplit(h), innovation, R, [self.counts] * 2, strict=True)
-        return Reading(*of_a_y).unless(self.first, Reading(*of_r))
+        of_r, of_a_y = zip(innovation, R, [self.counts] * 2, strict=True)
+        rest = [ca.if_else(self.first, a, b) for a, b in zip(of_r, of_a_y, strict=True)]
+        row = sum(as_factor(turn) * h[i, :] for i, turn in enumerate(self.turns))
+        if lateral is None:
+            return Reading(row, *rest)
+        rest = [ca.if_else(lateral.counts, a, b) for a, b in zip(lateral[1:], rest, strict=True)]
+        return Reading(row + as_factor(lateral.counts) * lateral.h, *rest)
 
 
 class Reading(NamedTuple):
@@ -174,19 +182,6 @@ class Reading(NamedTuple):
     innovation: Any
     R: Any
     counts: Any
-
-    def unless(self, condition: Any, other: "Reading") -> "Reading":
-        """Return the other reading where a condition holds, else this one.
-
-        Parameters
-        ----------
-        condition : 1 or 0.
-        other : a reading.
-        """
-        h = chosen_of(condition, other.h, self.h)
-        return Reading(
-            h, *(ca.if_else(condition, a, b) for a, b in zip(other[1:], self[1:], strict=True))
-        )
 
 
 class Change(NamedTuple):
@@ -256,7 +251,7 @@ def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
         known.U.update({(i, q - 1): ca.SX(0) for i in range(q - 1)})
     way, moving = ahead.by_way
     F = way.gradient(z, moving)
-    for i in (-MOVING - 2, -MOVING - 1, *range(2 - MOVING, 0)):  # v_y and r on the way, the others
+    for i in (-MOVING - 4, -MOVING - 3, *range(2 - MOVING, 0)):  # v_y and r on the way, the others
         F[i, :] *= goes_on  # a filter that begins anew knows of no dependence
     factors = propagated(known, F, _process_noise(trust, ahead))
     ahead_z = ca.vertcat(ahead.moving, z[MOVING:])
@@ -416,9 +411,7 @@ def _corrected(
         for i, (fresh, left) in enumerate(zip(noise.fresh, noise.left, strict=True))
     ]
     R = [e * share + R for e, share, R in zip(error, noise.share, noise.variance, strict=True)]
-    read = noise.reading(H, nu, R)
-    if lateral is not None:
-        read = read.unless(lateral.counts, lateral)
+    read = noise.reading(H, nu, R, lateral)
     kept, factors = measured(
         before,
         factors,
@@ -554,7 +547,7 @@ def _afresh(
     stiffness = larger(ca.dot(ports["W"][1, :], ports["scales"]), STIFFNESS)
     lean = smaller(ca.fabs(gated.v_x * r) / GRAVITY, 1) / stiffness * ca.sign(r)
     v_y = gated.v_x * (gated.delta[1] - lean) - car.arm[1] * r
-    alpha = slip_angle(car, now, v_y, r, zero)
+    alpha = slip_angle(now, v_y + car.arm * r, zero)
     unsure = trust.v_y + (DOUBTED * gated.v_x * lean) ** 2
     slip = unsure / now.v_x**2
     missed = trust.error**2
