@@ -205,6 +205,8 @@ Place = Callable[[int, int], str]  # (port, entry by columns) -> C expression
 
 FLOAT_MIN, FLOAT_MAX = 1.2e-38, 3.4e38  # normal numbers of float
 LONGEST = 72  # characters of an expression that is not given a name
+FEW = 150  # results, of which compilers keep or write several at once in any order
+LARGEST = 6  # operations in one of more results that is computed only where it is read
 ATOMIC = ("const", "input")  # they are read where they stand
 TWICE = ("sq", "fmin", "fmax", "sign")  # they write an argument twice
 
@@ -256,6 +258,7 @@ class Statements:
     read : C expression of an entry of an input.
     write : C lvalue of an entry of an output.
     returns : whether the one output is a truth value that is returned.
+    sums : whether the sum of all that is written is returned, which is finite only where all is.
 
     Raises
     ------
@@ -264,7 +267,14 @@ class Statements:
     """
 
     def __init__(
-        self, graph: Graph, *, prefix: str, read: Place, write: Place, returns: bool = False
+        self,
+        graph: Graph,
+        *,
+        prefix: str,
+        read: Place,
+        write: Place,
+        returns: bool = False,
+        sums: bool = False,
     ) -> None:
         self.graph, self.prefix, self.read = graph, prefix, read
         self.uses = graph.uses()
@@ -274,6 +284,7 @@ class Statements:
                     self.uses[argument] += 1
         results = [place for entries in graph.outputs for place in entries]
         self.results = {place for place in results if self.uses[place] == 1}  # named by their place
+        self.large = self._large()
         self.text: dict[int, str] = {}
         self.lines: list[str] = []
         self.groups = _groups(graph)
@@ -286,19 +297,44 @@ class Statements:
         for place, at in self._order():
             if at is None:
                 self._expression(place)
-            else:
-                self.lines.append(f"{write(*at)} = {_bare(self._real(place))};")
+                continue
+            self.lines.append(f"{write(*at)} = {_bare(self._real(place))};")
+            if sums:
+                self.lines.append(f"sum += {write(*at)};")
+        if sums:
+            self.lines.insert(0, f"{prefix}_real sum = {literal(0.0, prefix)};")
+            self.lines.append("return sum;")
+
+    def _are_few(self) -> bool:
+        return sum(map(len, self.graph.outputs)) <= FEW
+
+    def _large(self) -> set[int]:
+        """Return what is read once, and is computed when it frees more than it makes."""
+        operations, large = dict[int, int](), set[int]()
+        if self._are_few():
+            return large
+        for place, uses in self.uses.items():
+            node = self.graph.nodes[place]
+            size = 0 if node.op in ATOMIC else 1 + sum(operations[a] for a in node.args)
+            if size >= LARGEST and uses == 1 and place not in self.results:
+                large.add(place)
+            operations[place] = 0 if uses > 1 or place in large else size
+        return large
 
     def _order(self) -> list[tuple[int, tuple[int, int] | None]]:
         """Return what is written one after the other: places, and port and entry of results.
 
-        Results of the port with most entries come first: most of the rest is on the way to them.
+        Results that need least come first: few numbers wait for the others meanwhile. Where there
+        are few results, those that lie side by side are written together, most of them first.
         """
-        ports = sorted(enumerate(self.graph.outputs), key=lambda port: -len(port[1]))
-        results: list[tuple[int, tuple[int, int] | None]] = [
-            (place, (port, entry)) for port, entries in ports for entry, place in enumerate(entries)
-        ]
+        results: list[tuple[int, tuple[int, int] | None]] = []
+        for port, entries in sorted(enumerate(self.graph.outputs), key=lambda port: -len(port[1])):
+            results += [(place, (port, entry)) for entry, place in enumerate(entries)]
+        if not self._are_few():
+            needed = self.graph.needed()
+            results.sort(key=lambda result: needed[result[0]])
         named = {p for p, n in self.uses.items() if n > 1 and self.graph.nodes[p].op not in ATOMIC}
+        named |= self.large
         first_of = {p: p for p in named} | {p: self.members[p][0] for p in self.members}
         needs: dict[tuple[int, tuple[int, int] | None], list[tuple[int, None]]] = {
             (unit, None): self._units(self._needs(unit), first_of) for unit in first_of.values()
@@ -369,7 +405,7 @@ class Statements:
             return
         text = self._plain(node)
         long = len(text) > LONGEST and place not in self.results
-        if node.op not in ATOMIC and (self.uses[place] > 1 or long):
+        if node.op not in ATOMIC and (self.uses[place] > 1 or long or place in self.large):
             kind = "bool" if node.op in CONDITIONS else f"{self.prefix}_real"
             name = self._new("c" if node.op in CONDITIONS else "t")
             self.lines.append(f"const {kind} {name} = {_bare(text)};")

@@ -95,6 +95,25 @@ class Graph:
                 needed.update(self.nodes[place].args)
         return sorted(needed)
 
+    def needed(self) -> dict[int, int]:
+        """Return how many operations each entry of an output takes, by its place."""
+        uses, found = self.uses(), dict[int, int]()
+        ends = {place for entries in self.outputs for place in entries}
+        cones: dict[int, int] = {}  # of each place a bit for each place that it needs
+        for place, node in enumerate(self.nodes):
+            if place not in uses:
+                continue
+            cone = 1 << place if node.args else 0
+            for argument in node.args:
+                cone |= cones[argument]
+                uses[argument] -= 1
+                if uses[argument] == 0:
+                    del cones[argument]
+            cones[place] = cone
+            if place in ends:
+                found[place] = cone.bit_count()
+        return found
+
     def uses(self) -> dict[int, int]:
         """Return how often each place that outputs depend on is read."""
         reached = self.reached()

@@ -25,12 +25,13 @@ typedef double t_real;
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
 
 
-def statements(function):
+def statements(function, *, sums=False):
     return Statements(
         recognized(graph_of(function)),
         prefix="t",
         read=lambda port, entry: f"in[{entry}]",
         write=lambda port, entry: f"out[{entry}]",
+        sums=sums,
     )
 
 
@@ -113,6 +114,40 @@ def test_an_operation_without_plain_c_is_refused():
     x = ca.SX.sym("x")
     with pytest.raises(UnknownOperationError, match="no plain C for log"):
         statements(ca.Function("f", [x], [ca.log(x)]))
+
+
+def many(n):
+    """More results than a few, each a long sum of what the others read, too."""
+    x = ca.SX.sym("x", 6)
+    sums = [sum(ca.sin(float(i + k)) * x[k] * x[(i + k) % 6] for k in range(6)) for i in range(n)]
+    return ca.Function("f", [x], [ca.vertcat(*(one / (1 + ca.sumsqr(x)) for one in sums))])
+
+
+@needs_compiler
+@pytest.mark.parametrize("n", [20, 200])
+def test_many_results_are_those_of_casadi_and_so_is_their_sum(n, rng):
+    function, given = many(n), rng.normal(size=6)
+    text = statements(function, sums=True).block()
+    source = f"{PREAMBLE}double t_f(const double *in, double *out)\n{{\n{text}}}\n"
+    library = load_library(source, "clean_c_sum")
+    library.t_f.restype = ctypes.c_double
+    out = np.empty(n)
+    for changed in (given, np.where(np.arange(6) == 2, np.nan, given)):
+        inputs = np.ascontiguousarray(changed)
+        total = library.t_f(*(ctypes.c_void_p(a.ctypes.data) for a in (inputs, out)))
+        np.testing.assert_array_equal(out, np.array(function(inputs)).ravel())
+        assert total == pytest.approx(out.sum(), nan_ok=True)
+        assert np.isfinite(total) == np.isfinite(out).all()
+
+
+def test_of_many_results_those_that_need_least_are_written_first():
+    x = ca.SX.sym("x", 3)
+    deep = x[0]
+    for _ in range(40):
+        deep = 1 / (deep + x[1])
+    shallow = [x[2] * float(i + 2) for i in range(200)]
+    text = statements(ca.Function("f", [x], [ca.vertcat(deep, *shallow)])).block()
+    assert text.index("out[200] = ") < text.index("out[0] = ")
 
 
 def waiting(needs, order):

@@ -93,6 +93,14 @@ def test_equal_expressions_are_one_node():
     assert operations(graph_of(function)).count("sin") == 1
 
 
+def test_operations_that_a_result_takes_are_counted_once():
+    x = ca.SX.sym("x", 2)
+    shared = x[0] * x[1]
+    graph = graph_of(ca.Function("f", [x], [x[0], shared, (shared + 1) * (shared - x[1])]))
+    needed = graph.needed()
+    assert [needed[place] for (place,) in graph.outputs] == [0, 1, 4]
+
+
 def test_our_own_functions_are_found_again_and_those_of_libraries_replaced(rng):
     x = ca.SX.sym("x", 4)
     own = ca.Function("f", [x], [tanh(x[0]) + exp(x[1]) * atan(x[2]) - sin(x[3])])
