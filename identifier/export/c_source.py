@@ -12,7 +12,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
-from codegen.clean_c import Statements, literal, recognized
+from codegen.clean_c import FEW, Statements, literal, recognized
 from codegen.graph import graph_of
 from codegen.package import (
     c_files,
@@ -105,8 +105,12 @@ def _config(specialized: SpecializedStep, *, single: bool, about: Values) -> str
             _structure(f"{name}_output", _declarations(output_members(specialized), name)),
             _structure(f"{name}_weights", _declarations(learnt, name), "What is learnt."),
             _structure(
+                f"{name}_signals", _declarations(others, name), "What else is carried, but weights."
+            ),
+            _structure(
                 f"{name}_values",
-                (f"    {name}_weights weights;\n" if learnt else "") + _declarations(others, name),
+                (f"    {name}_weights weights;\n" if learnt else "")
+                + f"    {name}_signals signals;\n",
                 "What is carried from step to step.",
             ),
         ],
@@ -143,6 +147,7 @@ def _switches(specialized: SpecializedStep) -> dict[str, tuple[object, str]]:
             "the first sample of all is one to rest at before it is taken",
         ),
         **(band if specialized.tells_band else {}),
+        "SUMS": (int(_sums(specialized)), "equations return the sum of all numbers that they tell"),
         "RULES": (f"{count}U", "of weights that are taken over"),
         **(ruled if order else {"COVARIANCE": ruled["COVARIANCE"]} if count else {}),
     }
@@ -167,6 +172,11 @@ def _numbers(specialized: SpecializedStep, about: Values) -> dict[str, tuple[obj
 
 def _number(value: float) -> str:
     return literal(value, "x").removeprefix("X_C(").removesuffix(")")
+
+
+def _sums(specialized: SpecializedStep) -> bool:
+    """Return whether the equations sum up what they tell, while it is at hand."""
+    return sum(map(specialized.function.numel_out, range(specialized.function.n_out()))) > FEW
 
 
 def _weights_and_others(specialized: SpecializedStep) -> tuple[list[Member], list[Member]]:
@@ -226,8 +236,8 @@ def _start(specialized: SpecializedStep, learnt: list[Member], others: list[Memb
         )
         return ",\n".join(_by_rows(text, indent) for text in texts)
 
-    weights = f"    {{\n{lines(learnt, '        ')} }}" if learnt else ""
-    return ",\n".join(part for part in (weights, lines(others, "    ")) if part)
+    parts = [lines(members, "        ") for members in (learnt, others) if members]
+    return ",\n".join(f"    {{\n{part} }}" for part in parts)
 
 
 def _by_rows(text: str, indent: str) -> str:
@@ -254,24 +264,31 @@ def _wrapped(text: str, indent: str, width: int = 100) -> str:
 
 def _equations(specialized: SpecializedStep, about: Values) -> str:
     name, parts = specialized.name, specialized.parts
-    moves = f"(const {name}_values *now, const {name}_input *in, {name}_values *next,"
-    moves += f"\n    {name}_output *out)"
-    functions = {f"void {name}_driving{moves}": _statements(specialized, parts.where_true)}
+    learnt, _ = _weights_and_others(specialized)
+    known, learns = (f"const {name}_weights *known, ", f" {name}_weights *learnt,")
+    moves = f"({known if learnt else ''}const {name}_signals *now, const {name}_input *in,"
+    moves += f"\n   {learns if learnt else ''} {name}_signals *next, {name}_output *out)"
+    real = f"{name}_real"
+    functions = {f"{real} {name}_driving{moves}": _statements(specialized, parts.where_true)}
     if parts.where_false is not None:
         condition = _statements(specialized, parts.condition, returns=True)
         functions[f"bool {name}_drives(const {name}_input *in)"] = condition
         elsewhere = _statements(specialized, parts.where_false)
-        functions[f"void {name}_elsewhere{moves}"] = elsewhere
+        functions[f"{real} {name}_elsewhere{moves}"] = elsewhere
     return equations_file(name, f"The equations. {generated(about)}", functions)
 
 
 def _statements(
     specialized: SpecializedStep, function: ca.Function, *, returns: bool = False
 ) -> Statements:
-    return Statements(
+    statements = Statements(
         recognized(graph_of(function)),
         prefix=specialized.name,
         read=lambda port, entry: read_expression(specialized, port, entry),
         write=lambda port, entry: "" if returns else write_expression(specialized, port, entry),
         returns=returns,
+        sums=_sums(specialized) and not returns,
     )
+    if not returns and not _sums(specialized):
+        statements.lines.append(f"return {literal(0.0, specialized.name)};")
+    return statements

@@ -32,7 +32,7 @@ class Member(NamedTuple):
     @property
     def path(self) -> str:
         """Place in the structure of carried values."""
-        return f"weights.{self.signal.name}" if self.learnt else self.signal.name
+        return f"{'weights' if self.learnt else 'signals'}.{self.signal.name}"
 
     def declaration(self, real: str) -> str:
         """Return what declares it, with a comment.
@@ -87,7 +87,8 @@ def read_expression(specialized: SpecializedStep, port: int, entry: int) -> str:
     if name in SAMPLED:
         return f"in->{READS[name][entry]}"
     member = carried_members(specialized)[port]
-    return f"now->{member.path}{member.element(entry)}"
+    part = "known" if member.learnt else "now"
+    return f"{part}->{member.signal.name}{member.element(entry)}"
 
 
 def write_expression(specialized: SpecializedStep, port: int, entry: int) -> str:
@@ -100,7 +101,8 @@ def write_expression(specialized: SpecializedStep, port: int, entry: int) -> str
     """
     state = carried_members(specialized)
     if port < len(state):
-        return f"next->{state[port].path}{state[port].element(entry)}"
+        part = "learnt" if state[port].learnt else "next"
+        return f"{part}->{state[port].signal.name}{state[port].element(entry)}"
     told = output_members(specialized)[port - len(state)]
     return f"out->{told.signal.name}{told.element(entry)}"
 

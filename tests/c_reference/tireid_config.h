@@ -20,6 +20,7 @@ typedef double tireid_real;
 #define TIREID_READS_A_Y 0 /* a_y is an input, NaN where there is none */
 #define TIREID_TELLS_V_Y 0 /* v_y is an output, as an input it may be NaN; 2: so is v_y_sd; 3: and whether it is observable */
 #define TIREID_RESTS_FIRST 0 /* the first sample of all is one to rest at before it is taken */
+#define TIREID_SUMS 1 /* equations return the sum of all numbers that they tell */
 #define TIREID_RULES 5U /* of weights that are taken over */
 #define TIREID_COVARIANCE 0U /* rows of a covariance among the weights */
 
@@ -68,9 +69,8 @@ typedef struct {
     tireid_real kept[2][7];
 } tireid_weights;
 
-/* What is carried from step to step. */
+/* What else is carried, but weights. */
 typedef struct {
-    tireid_weights weights;
     /* last good v_x, v_y, r, delta_f, delta_r; on; time of steady learning; bad and stuck samples in a row [SI] */
     tireid_real gate[9];
     tireid_real sway[3]; /* roll: state, its rate, slip of the contact patch [m/s^2; m/s^3; rad] */
@@ -80,6 +80,12 @@ typedef struct {
     tireid_real sensitivity[2][3];
     /* filters of the regressors and of the target; mean force; per axle [static axle loads] */
     tireid_real filters[2][9];
+} tireid_signals;
+
+/* What is carried from step to step. */
+typedef struct {
+    tireid_weights weights;
+    tireid_signals signals;
 } tireid_values;
 
 #endif

@@ -52,20 +52,21 @@ static const tireid_values tireid_start = {
             { TIREID_C(0.10953470834323155), TIREID_C(0.7401469020848701),
               TIREID_C(-0.014606194235042183), TIREID_C(-0.03892073340774112),
               TIREID_C(0.027000000000000003), TIREID_C(0.2), TIREID_C(0.0) } } },
-    { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0),
-      TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0) },
-    { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0) },
-    {
-        { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(1.0), TIREID_C(0.0) },
-        { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(1.0), TIREID_C(0.0) } },
-    {
-        { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0) },
-        { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0) } },
     {
         { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0),
           TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0) },
-        { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0),
-          TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0) } }
+        { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0) },
+        {
+            { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(1.0), TIREID_C(0.0) },
+            { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(1.0), TIREID_C(0.0) } },
+        {
+            { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0) },
+            { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0) } },
+        {
+            { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0),
+              TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0) },
+            { TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0),
+              TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0), TIREID_C(0.0) } } }
 };
 
 static const tireid_output tireid_no_output = { { TIREID_C(0.0), TIREID_C(0.0) } };

@@ -25,6 +25,7 @@ static tireid_real *tireid_own_numbers(void *structure)
     return structure;
 }
 
+#if TIREID_LEARNS || !TIREID_SUMS
 /* Sum of n numbers, which is finite only where all of them are; in parts that may run abreast. */
 static inline tireid_real tireid_sum(const tireid_real *x, uint32_t n)
 {
@@ -52,29 +53,32 @@ static inline tireid_real tireid_sum(const tireid_real *x, uint32_t n)
     }
     return ((a + b) + (c + d)) + ((e + f) + (g + h));
 }
+#endif
 
-/* Copy n numbers, eight abreast. Of an assignment compilers make an instruction that takes its time
- * to begin, and waits for the numbers that were written last. */
+/* As many numbers as compilers copy in a few instructions, without a call. */
+typedef struct {
+    tireid_real number[TIREID_SINGLE ? 16 : 8];
+} tireid_block;
+
+#define TIREID_BLOCK ((uint32_t)(sizeof(tireid_block) / sizeof(tireid_real)))
+
+static const tireid_block *tireid_block_at(const void *number)
+{
+    return number;
+}
+
+static tireid_block *tireid_own_block_at(void *number)
+{
+    return number;
+}
+
+/* Copy n numbers. Of one assignment compilers make a call, or an instruction that takes its time to
+ * begin. */
 static inline void tireid_copy(tireid_real *to, const tireid_real *from, uint32_t n)
 {
     uint32_t i = 0U;
-    for (; (i + 8U) <= n; i += 8U) {
-        const tireid_real a = from[i];
-        const tireid_real b = from[i + 1U];
-        const tireid_real c = from[i + 2U];
-        const tireid_real d = from[i + 3U];
-        const tireid_real e = from[i + 4U];
-        const tireid_real f = from[i + 5U];
-        const tireid_real g = from[i + 6U];
-        const tireid_real h = from[i + 7U];
-        to[i] = a;
-        to[i + 1U] = b;
-        to[i + 2U] = c;
-        to[i + 3U] = d;
-        to[i + 4U] = e;
-        to[i + 5U] = f;
-        to[i + 6U] = g;
-        to[i + 7U] = h;
+    for (; (i + TIREID_BLOCK) <= n; i += TIREID_BLOCK) {
+        *tireid_own_block_at(&to[i]) = *tireid_block_at(&from[i]);
     }
     for (; i < n; i++) {
         to[i] = from[i];
@@ -117,17 +121,24 @@ static tireid_input tireid_possible(const tireid_params *params, const tireid_in
 }
 #endif
 
-/* Whether a result is finite, as a whole, with forces that a car may have. */
-static bool tireid_believes(
-    const tireid_params *params, const tireid_values *values, const tireid_output *out)
+#if TIREID_LEARNS || !TIREID_SUMS
+/* Sum of all numbers that a step tells. */
+static inline tireid_real tireid_sum_of(const tireid_values *next, const tireid_output *out)
 {
     const tireid_real *told = tireid_numbers(out);
     tireid_real sum =
-        tireid_sum(tireid_numbers(values), (uint32_t)(sizeof(tireid_values) / sizeof(tireid_real)));
+        tireid_sum(tireid_numbers(next), (uint32_t)(sizeof(tireid_values) / sizeof(tireid_real)));
     uint32_t i;
     for (i = 0U; i < (uint32_t)(sizeof(tireid_output) / sizeof(tireid_real)); i++) {
         sum += told[i];
     }
+    return sum;
+}
+#endif
+
+/* Whether a result is finite, which the sum of its numbers says, with forces that a car may have. */
+static bool tireid_believes(const tireid_params *params, tireid_real sum, const tireid_output *out)
+{
     return tireid_finite(sum) && tireid_within(out->axle_force[0], params->max_force)
         && tireid_within(out->axle_force[1], params->max_force);
 }
@@ -184,12 +195,12 @@ tireid_status tireid_reset(tireid_state *state)
 /* Whether a step went on with this sample, and not with the last one that it believed. */
 static bool tireid_believed(const tireid_values *next, const tireid_input *in)
 {
-    return (next->gate[0] == in->v_x)
+    return (next->signals.gate[0] == in->v_x)
 #if !TIREID_TELLS_V_Y
-        && (next->gate[1] == in->v_y)
+        && (next->signals.gate[1] == in->v_y)
 #endif
-        && (next->gate[2] == in->r) && (next->gate[3] == in->delta_f)
-        && (next->gate[4] == in->delta_r);
+        && (next->signals.gate[2] == in->r) && (next->signals.gate[3] == in->delta_f)
+        && (next->signals.gate[4] == in->delta_r);
 }
 #endif
 
@@ -199,17 +210,18 @@ static tireid_status tireid_advance(
 {
     tireid_values next;
     tireid_output out;
+    tireid_real sum;
     tireid_status status;
 #if TIREID_DECIDES
     if (tireid_drives(input)) {
-        tireid_driving(&state->values, input, &next, &out);
+        sum = tireid_driving(TIREID_PARTS(&state->values), input, TIREID_PARTS(&next), &out);
         status = TIREID_OK;
     } else {
-        tireid_elsewhere(&state->values, input, &next, &out);
+        sum = tireid_elsewhere(TIREID_PARTS(&state->values), input, TIREID_PARTS(&next), &out);
         status = (input->v_x < (tireid_real)TIREID_MIN_SPEED) ? TIREID_REST : TIREID_IMPLAUSIBLE;
     }
 #else
-    tireid_driving(&state->values, input, &next, &out);
+    sum = tireid_driving(TIREID_PARTS(&state->values), input, TIREID_PARTS(&next), &out);
     status = (input->v_x < (tireid_real)TIREID_MIN_SPEED) ? TIREID_REST : TIREID_OK;
 #if TIREID_JUDGES
     if (!tireid_believed(&next, input)) {
@@ -222,7 +234,12 @@ static tireid_status tireid_advance(
         next.weights = state->values.weights;
     }
 #endif
-    if (tireid_believes(params, &next, &out)) {
+#if TIREID_LEARNS || !TIREID_SUMS
+    if ((TIREID_SUMS == 0) || (state->adapts == 0U)) {
+        sum = tireid_sum_of(&next, &out);
+    }
+#endif
+    if (tireid_believes(params, sum, &out)) {
         tireid_copy(tireid_own_numbers(&state->values), tireid_numbers(&next),
             (uint32_t)(sizeof(tireid_values) / sizeof(tireid_real)));
         state->output = out;
@@ -262,17 +279,21 @@ static void tireid_begin(
 {
     tireid_values next;
     tireid_output out;
+    tireid_real sum;
     tireid_input rest = *input;
     rest.v_x = TIREID_C(0.0);
 #if TIREID_READS_A_Y
     rest.a_y = tireid_absent;
 #endif
 #if TIREID_DECIDES
-    tireid_elsewhere(&state->values, &rest, &next, &out);
+    sum = tireid_elsewhere(TIREID_PARTS(&state->values), &rest, TIREID_PARTS(&next), &out);
 #else
-    tireid_driving(&state->values, &rest, &next, &out);
+    sum = tireid_driving(TIREID_PARTS(&state->values), &rest, TIREID_PARTS(&next), &out);
 #endif
-    if (tireid_believes(params, &next, &out)) {
+#if !TIREID_SUMS
+    sum = tireid_sum_of(&next, &out);
+#endif
+    if (tireid_believes(params, sum, &out)) {
         state->values = next;
     }
 }

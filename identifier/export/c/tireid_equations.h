@@ -30,18 +30,29 @@ typedef struct {
 } tireid_rule;
 #endif
 
+/* The parts of carried values, each by its own pointer: what small processors read lies within 1 kB
+ * of one. */
+#if TIREID_LEARNS
+#define TIREID_NOW const tireid_weights *known, const tireid_signals *now
+#define TIREID_NEXT tireid_weights *learnt, tireid_signals *next
+#define TIREID_PARTS(values) &(values)->weights, &(values)->signals
+#else
+#define TIREID_NOW const tireid_signals *now
+#define TIREID_NEXT tireid_signals *next
+#define TIREID_PARTS(values) &(values)->signals
+#endif
+
 #if TIREID_DECIDES
 /* Where the equations of a driving car hold. */
 bool tireid_drives(const tireid_input *in);
 
-/* One step at rest, and with a sample that no car can be in. */
-void tireid_elsewhere(
-    const tireid_values *now, const tireid_input *in, tireid_values *next, tireid_output *out);
+/* One step at rest, and with a sample that no car can be in. Returns as the next one. */
+tireid_real tireid_elsewhere(TIREID_NOW, const tireid_input *in, TIREID_NEXT, tireid_output *out);
 #endif
 
-/* One step from `now` to `next`, which are not the same. */
-void tireid_driving(
-    const tireid_values *now, const tireid_input *in, tireid_values *next, tireid_output *out);
+/* One step from now to next, which are not the same. Returns the sum of all numbers that it tells,
+ * which is finite only where all of them are; zero where TIREID_SUMS is not set. */
+tireid_real tireid_driving(TIREID_NOW, const tireid_input *in, TIREID_NEXT, tireid_output *out);
 
 #ifdef __cplusplus
 }

@@ -67,7 +67,7 @@ def test_the_processor_computes_the_bits_of_this_machine(
 def test_one_bit_of_one_weight_would_be_noticed(here, packages, samples):
     files = dict(packages["integral"].files)
     place = "src/tireid_equations.c"
-    first = "next->weights.V[9][3] = "
+    first = "learnt->V[9][3] = "
     assert files[place].count(first) >= 1
     files[place] = files[place].replace(first, f"{first}(TIREID_C(1.0) + TIREID_C(1.2e-7)) * ", 1)
     found = replay_on(PROCESSORS[0], "tireid", files, samples, single=True)

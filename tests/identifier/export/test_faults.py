@@ -72,7 +72,7 @@ def test_bounds_narrower_than_the_declared_are_broken(changed, complaint, packag
     ("guard", "complaint"),
     [
         ("tireid_accepts(params, input)", "not finite|beyond the limit|changed the weights"),
-        ("tireid_believes(params, &next, &out)", "not finite|beyond the limit"),
+        ("tireid_believes(params, sum, &out)", "not finite|beyond the limit"),
     ],
 )
 def test_without_a_guard_the_alarm_rings(guard, complaint, packages, write, run):
@@ -83,12 +83,12 @@ def test_without_a_guard_the_alarm_rings(guard, complaint, packages, write, run)
     without = text.replace(guard, "true").replace(
         "tireid_status tireid_step(",
         "bool (*const kept)(const tireid_params *, const tireid_input *) = tireid_accepts;\n"
-        "bool (*const kept_too)(const tireid_params *, const tireid_values *,"
+        "bool (*const kept_too)(const tireid_params *, tireid_real,"
         " const tireid_output *) = tireid_believes;\n\ntireid_status tireid_step(",
         1,
     )
     if guard.startswith("tireid_accepts"):  # a second guard alone still keeps the state
-        without = without.replace("tireid_believes(params, &next, &out)", "true")
+        without = without.replace("tireid_believes(params, sum, &out)", "true")
     source.write_text(without)
     answer = run(str(build(folder, run, "gcc", 0, optimized=BUILDS)))
     assert answer.returncode != 0
