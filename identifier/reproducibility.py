@@ -235,7 +235,11 @@ class Prediction:
         if self.motion is None:
             return ""
         parts = zip(("lateral", "yaw"), self.motion.explained, strict=True)
-        shares = [f"{100.0 * share:.1f} % of the {name}" for name, share in parts if share]
+        shares = [
+            f"{f'{100.0 * share:.1f} %' if share > 0.0 else 'nothing'} of the {name}"
+            for name, share in parts
+            if share is not None
+        ]
         return f"explained are {' and '.join(shares)} acceleration" if shares else ""
 
 

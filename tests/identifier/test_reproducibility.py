@@ -10,11 +10,13 @@ from identifier.methods import load_model
 from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import (
     AxleRmse,
+    MotionError,
     axle_rms,
     counted_samples,
     force_rms,
     freeze_key,
     online_error,
+    predict,
     replay,
     reproduce,
 )
@@ -219,3 +221,12 @@ def test_no_samples_have_no_size():
         assert np.isnan([none.front, none.rear, none.both]).all()
     some = axle_rms(force, np.array([True, False, True, False]), -force)
     assert (some.front, some.rear) == (2.0, 2.0)
+
+
+def test_what_explains_less_than_nothing_is_said_to_explain_nothing(history):
+    motion = MotionError(lateral=0.1, yaw=30.0, lateral_rms=1.0, yaw_rms=1.0)
+    prediction = replace(predict(history.freeze(4.0), history.recording), motion=motion)
+    said = "explained are 99.0 % of the lateral and nothing of the yaw acceleration"
+    assert prediction.motion_text() == said
+    still = replace(prediction, motion=replace(motion, yaw_rms=0.0))
+    assert still.motion_text() == "explained are 99.0 % of the lateral acceleration"
