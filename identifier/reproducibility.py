@@ -224,11 +224,10 @@ class Prediction:
     def friction(self) -> "RoadFriction | None":
         """Return the friction of the drive's road over that of the one that taught, over time.
 
-        None where the model has no band, or too little is driven; computed at each call.
+        None where the model has no band, or too little is driven; computed at each call, as part
+        of the verdict.
         """
-        from identifier.verdict import road_friction
-
-        return road_friction(self.model, self.recording)
+        return self.verdict().friction
 
     def motion_text(self) -> str:
         """Return what the forces explain of the motion, in a line; empty where nobody knows."""

@@ -518,7 +518,17 @@ class AxleModel(TireModel):
         return replace(self, vehicle=vehicle, guarantee=None)  # it was shown of this car alone
 
     def at_friction(self, ratio: float) -> "AxleModel":
-        """Return the tires on a road of another friction, φ(α) → μ φ(α/μ); the stiffness stays."""
+        """Return the tires on a road of another friction, φ(α) → μ φ(α/μ); the stiffness stays.
+
+        Parameters
+        ----------
+        ratio : friction over that of the drive that taught, positive [-].
+
+        Raises
+        ------
+        ValueError
+            Where the ratio is not positive.
+        """
         require_positive(ValueError, ratio=ratio)
         n = len(self.ladder)
         unit = np.concatenate([np.full(n, ratio), np.ones(3)])

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -100,8 +101,9 @@ def judge_prediction(model: TireModel, recording: Recording) -> Verdict:
     drive = _looked_at(mounted, model, asked, recording.t, road, (*CAUSES, OF_ROAD))
     if drive is None:
         return _too_short(model)
-    roads = _roads(road_friction(model, recording, road))
-    return _verdict(drive, [*findings(drive), *roads, *_asked_of(asked, recording)])
+    friction = road_friction(model, recording, road)
+    listed = [*findings(drive), *_roads(friction), *_asked_of(asked, recording)]
+    return replace(_verdict(drive, listed), friction=friction)
 
 
 def _roads(found: RoadFriction | None) -> list[Objection]:

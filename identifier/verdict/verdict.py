@@ -8,10 +8,11 @@ recording.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from identifier.tire_model import Axle
+from identifier.verdict.friction import RoadFriction
 
 UNSEEN = (
     "a wrong mass, which scales all forces alike: weigh the car",
@@ -80,12 +81,15 @@ class Verdict:
     numbers : what was learnt, each with its doubt.
     measures : what was measured on the way, by name, front and rear or one value.
     blind : what more nobody can see of this drive.
+    friction : of the drive's road over that of the drive that taught a stored model, window by
+        window; None of a run, and where nobody can tell.
     """
 
     findings: tuple[Objection, ...]
     numbers: tuple[Number, ...]
     measures: Mapping[str, tuple[float, ...] | float | None]
     blind: tuple[str, ...] = ()
+    friction: RoadFriction | None = field(default=None, compare=False, repr=False)
 
     @property
     def valid(self) -> bool:

@@ -77,7 +77,7 @@ def run(options: argparse.Namespace) -> int:
     if recording.estimated:
         say(f"{recording.name}: vy is estimated by inertial, which begins with the model")
     verdict = prediction.verdict()
-    half, friction = model.half_band_over(recording), prediction.friction()
+    half, friction = model.half_band_over(recording), verdict.friction
     with output_folder(options.out, force=options.force) as folder:
         parts = blocks(len(recording))
         write_long_csv(
@@ -87,7 +87,7 @@ def run(options: argparse.Namespace) -> int:
             columns = {"t_s": friction.t, "friction": friction.ratio, "sd_of_log": friction.sd}
             columns |= {"another": friction.another, "unexplained": friction.unexplained}
             write_csv(folder / "friction.csv", columns)
-        write_json(folder / "summary.json", summary(model, prediction, verdict, half, friction))
+        write_json(folder / "summary.json", summary(model, prediction, verdict, half))
         told = prediction_text(model, prediction, half, friction)
     tell(f"{told}\n{verdict_text(verdict, numbers=False)}")
     say(f"wrote {options.out}/")
@@ -157,11 +157,7 @@ def force_columns(
 
 
 def summary(
-    model: TireModel,
-    prediction: Prediction,
-    verdict: Verdict,
-    half: Array | None,
-    friction: RoadFriction | None = None,
+    model: TireModel, prediction: Prediction, verdict: Verdict, half: Array | None
 ) -> dict[str, Any]:
     """Return what summary.json holds; null stands for what cannot be known.
 
@@ -171,9 +167,9 @@ def summary(
     prediction : of a recording.
     verdict : on the model over that recording.
     half : width of the band of its forces (n, 2) [N]; None where the model has none.
-    friction : of the drive's road; None where nobody can tell.
     """
     error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
+    friction = verdict.friction
     beyond, known = beyond_known(model, prediction.recording), model.known_slip
     inside, held = within_band(model, prediction.recording), truth_within_band(prediction, half)
     against = contradictions(model, prediction.recording)
@@ -215,7 +211,7 @@ def prediction_text(
     model: TireModel,
     prediction: Prediction,
     half: Array | None,
-    friction: RoadFriction | None = None,
+    friction: RoadFriction | None,
 ) -> str:
     """Return what is to be said of a prediction, as lines of text.
 

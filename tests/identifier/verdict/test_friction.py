@@ -80,6 +80,20 @@ def test_another_zero_of_the_steering_is_no_other_road(tires, same, off):
     assert road_friction(tires, replace(same, delta_f=same.delta_f + off)).roads == ()
 
 
+def test_a_banked_road_is_taken_off_and_the_verdict_tells_the_same(tires):
+    steering = RandomSteer(
+        amplitude=0.05, frequency=0.6, seed=5, onset=1.0, rate_limit=0.8, duration=24.0
+    )
+    wet = Friction(changes=(FrictionChange(scale=0.5, at_time=DROP),))
+    run = Plant(sedan()).simulate(
+        steering, speed=20.0, friction=wet, bank=lambda t: np.full(t.size, 0.03)
+    )
+    prediction = predict(tires, SENSORS.apply(run.recording(), np.random.default_rng(5)))
+    (road,) = prediction.friction().roads
+    assert DROP < road.first < DROP + 5.0 and abs(road.ratio - 0.5) < 2.0 * road.sd
+    assert road.text in [one.text for one in prediction.verdict().findings]
+
+
 def test_a_gentle_drive_tells_nothing(tires):
     found = road_friction(tires, driven(6, Friction(scale=0.5), 0.005))
     assert found.roads == () and not found.as_taught
