@@ -4,7 +4,8 @@ Kinematics, of a log with an accelerometer:  a_y - ρ a_y(t - τ) = v̇_y + v_x 
 body rolls with the accelerometer by ρ/(1 - ρ) rad for each g, τ behind, so that it shows weight.
 Dynamics, per axle in static axle loads:  dξ_i/dt + v_x r/g - sin β = h_i(α_i) cos δ_i, of an odd
 curve h_i = Σ_j w_j tanh(α/α_j) that nobody knows: the weights that fit best are taken for every
-size of the faults (variable projection).   ξ_i = v_y/g ± I_z r/(L F_z,i),
+size of the faults (variable projection); with downforce it grows as 1 + κ_i v_x².
+ξ_i = v_y/g ± I_z r/(L F_z,i),
 α_i = δ_i - atan((v_y ± l_i r)/v_x).
 Both are asked in means over smooth windows ψ, ∫ψ ẋ dt = -∫ψ̇ x dt: no signal is differentiated.
 What a real car adds is estimated beside the faults and reported by nobody: the way it rolls before
@@ -44,6 +45,7 @@ BANKS = 6  # cosines over the drive in which a bank may swing
 OVERLAP = 4  # windows that begin within the length of one
 WANDER = 0.03  # of a force: what no model of this size explains; of kinematics a third
 SMALL = 0.004  # static axle loads
+LIGHTEST = 0.2  # load of an axle that lifts, over the static one
 MOST_TILT = 0.15  # ρ of the softest body, 10 degrees for each g; none leans into the turn
 TYPICAL = 10.0  # slope of a curve [static axle loads per rad], for the noise that slip brings
 
@@ -52,6 +54,7 @@ Told = tuple[tuple[str, float], ...]  # the same, those of it that matter
 FRONT, REAR, KINEMATICS = range(3)
 STEERING = ("delta_f", "delta_r")
 RELAXATION = ("relaxation.front", "relaxation.rear")
+DOWNFORCE = ("downforce.front", "downforce.rear")  # κ [s²/m²]
 # Sizes that change nothing of a part: it is not computed again for their sake.
 TIRES = frozenset({*RELAXATION, "sway"})
 BODY = frozenset({"tilt"})
@@ -59,11 +62,13 @@ ROLL = frozenset({"roll_delay"})
 GEOMETRY = frozenset({"center_of_gravity", "yaw_inertia"})
 AHEAD = frozenset({"acceleration_sensor_x"})
 BANKED = frozenset(f"bank.{k}" for k in range(BANKS))
-NOT_OF_MOTION = TIRES | ROLL | BODY | GEOMETRY | AHEAD | BANKED
-NOT_OF_FORCES = TIRES | ROLL | BODY | AHEAD
+PRESSED = frozenset(DOWNFORCE)
+NOT_OF_FORCES = TIRES | ROLL | BODY | AHEAD | PRESSED
+NOT_OF_MOTION = NOT_OF_FORCES | GEOMETRY | BANKED
 NOT_OF_AXLES = AHEAD | BODY
-NOT_OF_PART = (NOT_OF_AXLES | {RELAXATION[REAR]}, NOT_OF_AXLES | {RELAXATION[FRONT]},
-               TIRES | GEOMETRY)  # fmt: skip
+NOT_OF_PART = (NOT_OF_AXLES | {RELAXATION[REAR], DOWNFORCE[REAR]},
+               NOT_OF_AXLES | {RELAXATION[FRONT], DOWNFORCE[FRONT]},
+               TIRES | GEOMETRY | PRESSED)  # fmt: skip
 RECENT = 4  # sizes whose parts are kept
 
 
@@ -339,13 +344,16 @@ class Balance:
             return missed / allowed, float(np.mean(left / allowed**2))
         y = self.forces(told(sizes, NOT_OF_FORCES))[:, part] / allowed
         slip = self._slip(motion, part, car, sizes)
-        units = unit_matrix(slip, LADDER) * np.cos(motion.channels[STEERING[part]])[:, None]
+        x = motion.channels
+        pressed = np.maximum(1.0 + sizes.get(DOWNFORCE[part], 0.0) * x["v_x"] ** 2, LIGHTEST)
+        units = unit_matrix(slip, LADDER) * (pressed * np.cos(x[STEERING[part]]))[:, None]
         basis = (self.mean @ units) / allowed[:, None]
         w = rising(basis, y, self.curved.get(part))
         self.curved[part] = w > 0.0
         # Over the size of the force: to shrink it, by a factor of r, explains nothing.
         size = self.size[part] / max(math.sqrt(float(y @ y) / y.size), 1e-9)
         slope = (1.0 - unit_matrix(self.mean @ slip, LADDER) ** 2) @ (w / np.array(LADDER))
+        slope *= self.mean @ pressed
         left = self._noise(part, sizes, car, motion.v_x, slope) / allowed**2
         return (y - basis @ w) * size, float(np.mean(left)) * size**2
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identifier.doctor.balance import BANKS, Balance, Sizes
+from identifier.doctor.balance import BANKS, DOWNFORCE, Balance, Sizes
 from identifier.doctor.finding import Finding
 from identifier.doctor.fit import Fit, Fitter, Outlook
 from identifier.doctor.pieces import stretches_of
@@ -74,11 +74,14 @@ class Search:
 
         Parameters
         ----------
-        suspect : of which a bank has several.
+        suspect : of which a bank has several, and downforce one for each axle.
         """
-        if suspect.code != "bank":
-            return [suspect.key]
-        return [f"bank.{k}" for k in range(BANKS if self.balance.has_accelerometer else 1)]
+        match suspect.code:
+            case "bank":
+                return [f"bank.{k}" for k in range(BANKS if self.balance.has_accelerometer else 1)]
+            case "downforce":
+                return [*DOWNFORCE]
+        return [suspect.key]
 
     @property
     def chosen(self) -> list[str]:
@@ -86,13 +89,16 @@ class Search:
         return [key for one in self.found for key in self.keys(one.suspect)]
 
     def size(self, suspect: Suspect, sizes: Sizes) -> float:
-        """Return the size of a suspect: of a bank, its rms over the drive.
+        """Return the size of a suspect: of a bank, its rms over the drive, of downforce, the mean.
 
         Parameters
         ----------
         suspect : whose keys are among the sizes.
         sizes : by key.
         """
+        if suspect.code == "downforce":
+            shares = np.array(self.vehicle.axle_loads) / self.vehicle.weight
+            return float(shares @ [sizes[key] for key in DOWNFORCE])
         if suspect.code != "bank":
             return sizes[suspect.key]
         swings = np.array([sizes.get(f"bank.{k}", 0.0) for k in range(BANKS)])

@@ -22,6 +22,7 @@ OPPOSITES = {  # of what a size says, where it is negative
     "too much": "too little",
     " ahead of ": " behind ",
     "too far back": "too far forward",
+    "push more at speed, as by a downforce": "push less at speed, as by a lift",
 }
 POWERS: Mapping[str, float] = {"": 0.0, "length": 1.0, "speed": 0.5, "time": 0.5, "rate": -0.5}
 
@@ -104,7 +105,7 @@ class Suspect(NamedTuple):
         """
         numbers: dict[str, Any] = {self.code: size}
         match self.code:
-            case "bank":
+            case "bank" | "downforce":
                 return None
             case "factor":
                 numbers = {"factor": {self.channel: math.exp(-size)}}
@@ -212,6 +213,9 @@ SUSPECTS = (
             "the told yaw inertia is {size} times the right one", ""),
     Suspect("bank", "bank", "", "rad", 0.03, 0.003, "", True,
             "the road falls by {size} (+: to the left), or wind pushes so", "°", DEGREES),
+    Suspect("downforce", "downforce", "", "s^2/m^2", 2e-4, 5e-5, "", True,
+            "the tires push more at speed, as by a downforce of {size} of the weight at 100 km/h",
+            " %", 100.0 * (100.0 / 3.6) ** 2),
 )  # fmt: skip
 NUISANCES = {  # mean, standard deviation, and what both grow with, of a sedan
     "relaxation.front": (0.17, 0.11, ""),  # wheelbases; cars on the road have up to 0.4

@@ -83,13 +83,17 @@ def judge(history: History, t: float | None = None) -> Verdict:
     return _verdict(drive, [*findings(drive), *reached, *_asked_of(asked, whole)])
 
 
-def judge_prediction(model: TireModel, recording: Recording) -> Verdict:
+def judge_prediction(
+    model: TireModel, recording: Recording, *, another_road: bool = True
+) -> Verdict:
     """Return the verdict on a stored model over a drive: does it give back the drive's motion?
 
     Parameters
     ----------
     model : that learns nothing from it.
     recording : the drive.
+    another_road : whether the road may be another one than that which taught, and its friction is
+        told; of a drive that taught the model it is not.
     """
 
     def mounted(mended: Mended) -> TireModel:
@@ -98,10 +102,11 @@ def judge_prediction(model: TireModel, recording: Recording) -> Verdict:
 
     asked = portion(recording)
     road = _road_driven(asked.recording, model.vehicle)
-    drive = _looked_at(mounted, model, asked, recording.t, road, (*CAUSES, OF_ROAD))
+    causes = (*CAUSES, OF_ROAD) if another_road else CAUSES
+    drive = _looked_at(mounted, model, asked, recording.t, road, causes)
     if drive is None:
         return _too_short(model)
-    friction = road_friction(model, recording, road)
+    friction = road_friction(model, recording, road) if another_road else None
     listed = [*findings(drive), *_roads(friction), *_asked_of(asked, recording)]
     return replace(_verdict(drive, listed), friction=friction)
 

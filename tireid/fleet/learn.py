@@ -288,7 +288,7 @@ def learnt(row: LogRow, recording: Recording, vehicle: Vehicle, telling: Telling
     if not isinstance(model, AxleModel):
         raise TypeError(f"{type(method).__name__} freezes no axle model")
     if telling.judging == "motion":
-        verdict = judge_prediction(model, recording)
+        verdict = judge_prediction(model, recording, another_road=False)
     evidence = Evidence(
         design=AxleIdentifier.for_vehicle(vehicle, dt=recording.dt), reference=model
     )
