@@ -338,8 +338,11 @@ class Store:
         parquet, pyarrow = needed("pyarrow.parquet"), needed("pyarrow")
         fs, _ = self._place
         try:
-            with fs.open(path, "rb") as file:
-                table = parquet.read_table(file, columns=None if columns is None else list(columns))
+            # Its bytes, and not the file: a thread of pyarrow that lets go of what belongs to Python
+            # while Python ends aborts the program.
+            held = pyarrow.BufferReader(fs.cat_file(path))
+            with parquet.ParquetFile(held) as file:
+                table = file.read(columns=None if columns is None else list(columns))
         except (OSError, ValueError, pyarrow.ArrowException) as error:
             raise StoreError(f"{path}: cannot be read as a store's file: {error}") from error
         names = COLUMNS if columns is None else columns
