@@ -5,6 +5,7 @@ import json
 import os
 import shutil
 import signal
+import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -100,6 +101,16 @@ def test_each_log_becomes_a_row_and_a_bad_one_says_why(store):
     assert isinstance(good.frozen, AxleModel) and good.parts[0].seconds > 3.0
     assert good.frozen.cornering_stiffness[0] == good.stiffness_front
     assert good.told_car.name == "blue" and good.valid is not None
+
+
+def test_a_store_is_read_without_the_threads_of_a_dataset(store):
+    # They may hold a file of Python's while Python ends, which aborts the program.
+    program = (
+        "import sys; from tireid.fleet.store import Store; "
+        f"assert Store({store!r}).rows(light=False); print('pyarrow._dataset' in sys.modules)"
+    )
+    told = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (told.returncode, told.stdout) == (0, "False\n"), told.stderr
 
 
 def test_what_is_there_is_not_learnt_again_and_what_is_new_is(store, fleet, tmp_path, capsys):

@@ -338,8 +338,8 @@ class Store:
         parquet, pyarrow = needed("pyarrow.parquet"), needed("pyarrow")
         fs, _ = self._place
         try:
-            # Its bytes, and not the file: a thread of pyarrow that lets go of what belongs to Python
-            # while Python ends aborts the program.
+            # Its bytes, not the file: a thread of pyarrow that lets go of what belongs to Python while
+            # Python ends aborts the program.
             held = pyarrow.BufferReader(fs.cat_file(path))
             with parquet.ParquetFile(held) as file:
                 table = file.read(columns=None if columns is None else list(columns))
