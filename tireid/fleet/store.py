@@ -338,7 +338,7 @@ class Store:
         parquet, pyarrow = needed("pyarrow.parquet"), needed("pyarrow")
         fs, _ = self._place
         try:
-            # Its bytes, not the file: a thread of pyarrow that lets go of what belongs to Python while
+            # Its bytes, not the file: a thread of pyarrow that drops what belongs to Python while
             # Python ends aborts the program.
             held = pyarrow.BufferReader(fs.cat_file(path))
             with parquet.ParquetFile(held) as file:
