@@ -179,8 +179,8 @@ class Fitter:
         covariance = np.asarray(np.linalg.inv(H) * np.outer(sd, sd), dtype=np.float64)
         return Fit(sizes=sizes, J=J, covariance=covariance, misses=tuple(self.misses(found)))
 
-    def best_start(self, sizes: Sizes, key: str) -> Sizes:
-        """Return the sizes with one more, of those in `TRIED` that fits best.
+    def best_start(self, sizes: Sizes, key: str) -> tuple[float, Sizes]:
+        """Return J and the sizes with one more, of those in `TRIED` that fits best.
 
         Parameters
         ----------
@@ -188,7 +188,28 @@ class Fitter:
         key : of the one.
         """
         tried = [{**sizes, key: times * self._sd(key)} for times in TRIED]
-        return min(tried, key=lambda one: self.cost(self.balance.residual(one), one))
+        costs = [self.cost(self.balance.residual(one), one) for one in tried]
+        best = int(np.argmin(costs))
+        return costs[best], tried[best]
+
+    def moved(self, fit: Fit, others: Mapping[str, float]) -> dict[str, float]:
+        """Return how far sizes move that are estimated without others that are there, by key.
+
+        Each of the others has the size that is told of it, of either sign: squares add.
+
+        Parameters
+        ----------
+        fit : of the sizes that may move.
+        others : sizes that are not among them, by key.
+        """
+        here, names = list(fit.sizes), [*fit.sizes, *others]
+        sizes = {**dict.fromkeys(names, 0.0), **fit.sizes}
+        sd = np.array([self._sd(key) for key in names])
+        _, H = self._slopes(self.balance.residual(sizes), sizes, names, sd)
+        n = len(here)
+        there = np.array([*others.values()]) / sd[n:]
+        shifts = np.linalg.solve(H[:n, :n], H[:n, n:] * there) * sd[:n, None]
+        return dict(zip(here, np.sqrt(np.sum(shifts**2, axis=1)).tolist(), strict=True))
 
     def outlook(self, fit: Fit, suspects: Mapping[str, list[str]]) -> dict[str, Outlook]:
         """Return what each suspect promises beside a fit, if all were straight lines.
