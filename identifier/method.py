@@ -8,7 +8,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import asdict, is_dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeVar, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeGuard, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,8 @@ from models.schema import Table
 from models.vehicle import BICYCLE, Vehicle
 
 if TYPE_CHECKING:
+    from identifier.axle.guarantee import HalfSpaces
+    from identifier.inertial.beliefs import Body
     from identifier.run import History  # which runs methods
 
 
@@ -52,11 +54,21 @@ def resumed(start: TireModel, kind: type[Model], refusal: str, **structure: Any)
     ValueError
         Where the model is of another kind or structure.
     """
-    if not isinstance(start, kind) or any(
-        getattr(start, name) != value for name, value in structure.items()
-    ):
+    if not fits(start, kind, **structure):
         raise ValueError(refusal)
     return start
+
+
+def fits(start: TireModel, kind: type[Model], **structure: Any) -> TypeGuard[Model]:
+    """Return whether a stored model is of the kind and structure that a method learns.
+
+    Parameters
+    ----------
+    start, kind, structure : as of `resumed`.
+    """
+    return isinstance(start, kind) and all(
+        getattr(start, name) == value for name, value in structure.items()
+    )
 
 
 OTHER_STRUCTURE = "the stored weights are of another structure than the design's"
@@ -542,6 +554,32 @@ class Method(ABC):
         state : carried values by port at n + 1 instants, of a run.
         """
         del state
+        return None
+
+    learns_kind = ""  # kind of model that it learns, and that a run of it can begin with
+
+    def resumes(self, model: TireModel) -> bool:
+        """Return whether a run can begin with a stored model: with none, if it does not say more.
+
+        Parameters
+        ----------
+        model : its weights.
+        """
+        del model
+        return False
+
+    def possible_tires(self) -> "HalfSpaces | None":
+        """Return the weights that the curve of a tire can have; None where it learns no curves."""
+        return None
+
+    def believed_body(self, vehicle: Vehicle) -> "Body | None":
+        """Return how a car's body is believed to roll; None where no accelerometer tells v_y.
+
+        Parameters
+        ----------
+        vehicle : the car, as far as the method knows it.
+        """
+        del vehicle
         return None
 
     def port(self, name: str) -> Port:

@@ -6,6 +6,7 @@ F = +C α. Axle forces are lateral, in the frame of the body, left positive.
 
 import json
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
@@ -19,8 +20,10 @@ from models.files import write_atomically
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
-if TYPE_CHECKING:
-    from identifier.method import Setup  # whose methods make such models
+if TYPE_CHECKING:  # what some models answer with
+    from identifier.axle.band import BandCalibration, SpreadByRange
+    from identifier.axle.guarantee import Doubt, Guarantee
+    from identifier.method import Setup
 
 Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
@@ -185,6 +188,10 @@ class TireModel(ABC):
         """
         raise ValueError(f"a {type(self).__name__} cannot be told for a friction of {ratio:g}")
 
+    def beside_v_y(self) -> "TireModel":
+        """Return the model as one that goes on learning where a lateral velocity is told."""
+        return self
+
     @property
     def reference_speed(self) -> float:
         """Speed [m/s] at which a force that depends on it is given, 4 sqrt(g L): brisk driving."""
@@ -272,6 +279,68 @@ class TireModel(ABC):
         del alpha
         return None
 
+    def slope_over(self, recording: Recording) -> Array:
+        """Return the slope of the force curves over the slip of a drive [static loads/rad], (n, 2).
+
+        Parameters
+        ----------
+        recording : its signals are the input.
+
+        Raises
+        ------
+        ValueError
+            Where forces are no curves of slip.
+        """
+        del recording
+        raise ValueError(f"forces of a {type(self).__name__} are no curves of slip")
+
+    @property
+    def has_band(self) -> bool:
+        """Whether the model can tell how sure it is."""
+        return False
+
+    def with_calibration(self, calibration: "BandCalibration | None") -> "TireModel":
+        """Return the model, its band calibrated; as it is where it has none.
+
+        Parameters
+        ----------
+        calibration : None takes errors to be as learning is told.
+        """
+        del calibration
+        return self
+
+    def spread_by_range(
+        self, recording: Recording, mean: Callable[[Array], Array]
+    ) -> "SpreadByRange":
+        """Return the variances that a band is made of, by range of slip and window of a drive.
+
+        Parameters
+        ----------
+        recording : its signals are the input.
+        mean : over the windows: signals (n, ...) -> (m, ...).
+
+        Raises
+        ------
+        ValueError
+            Where the model cannot tell how sure it is.
+        """
+        del recording, mean
+        raise ValueError(f"a {type(self).__name__} cannot tell how sure it is: it has no band")
+
+    def half_band_of_curves(self, recording: Recording, level: float = 0.9) -> Array | None:
+        """Return half the width of `band` at the slip and speed of a drive, (n, 2) [N].
+
+        Of the steady forces, without noise of the drive's sensors. None where the model cannot
+        tell.
+
+        Parameters
+        ----------
+        recording : its signals are the input.
+        level : share of cases that the band shall hold, above 0 and below 1.
+        """
+        del recording, level
+        return None
+
     def half_band(
         self, alpha: Array, level: float = 0.9, *, v_x: float | Array | None = None
     ) -> Array | None:
@@ -346,6 +415,33 @@ class TireModel(ABC):
         if center.ndim == 0:
             return float(center - half), float(center + half)
         return center - half, center + half
+
+    @property
+    def guarantee(self) -> "Guarantee | None":
+        """Weights that the drive left possible; None where nobody asked, or none are of curves."""
+        return None
+
+    def with_guarantee(self, guarantee: "Guarantee") -> "TireModel":
+        """Return the model with its guaranteed band; as it is where it can carry none.
+
+        Parameters
+        ----------
+        guarantee : weights that are possible.
+        """
+        del guarantee
+        return self
+
+    def signals_of(self, recording: Recording) -> "tuple[Array, Doubt] | None":
+        """Return what a guarantee reads of a drive: units of the curves (n, 2, k), and doubt.
+
+        None where forces are no curves of slip.
+
+        Parameters
+        ----------
+        recording : its signals are the input.
+        """
+        del recording
+        return None
 
     def guaranteed_at(self, alpha: Array, rate: Array) -> tuple[Array, Array] | None:
         """Return `guaranteed_band` of both axles, (k, 2) each [N]; None where none is stated.

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Callable
 
-from identifier.axle import AxleIdentifier, AxleModel
+from identifier.axle import AxleIdentifier
 from identifier.doctor import diagnose
 from identifier.inertial import InertialIdentifier
 from identifier.method import Method
@@ -121,5 +121,5 @@ def with_v_y(recording: Recording, tire: TireModel) -> Recording:
     if recording.v_y is not None:
         return recording
     design = InertialIdentifier.for_vehicle(tire.vehicle, dt=recording.dt)
-    start = tire if isinstance(tire, AxleModel) and tire.ladder == design.ladder else None
+    start = tire if design.resumes(tire) else None
     return run_over(recording, tire.vehicle, design, start).recording

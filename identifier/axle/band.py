@@ -262,6 +262,18 @@ def root(P: Array) -> Array:
     return half
 
 
+class SpreadByRange(NamedTuple):
+    """What a band is made of at the slip of a drive, by range of slip, in m windows.
+
+    share : of the window in which the slip of an axle was in the range (6, m, 2).   scaled, held :
+    variances at the mean of the slip there, as of `BandSpread` (6, m, 2).
+    """
+
+    share: Array
+    scaled: Array
+    held: Array
+
+
 class BandSpread(NamedTuple):
     """Variances of the force of an axle [static axle loads²], as errors are told to be.
 

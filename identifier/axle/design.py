@@ -20,6 +20,7 @@ from identifier.axle.certificate import certified
 from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
 from identifier.axle.gate import GateState, Plausibility
+from identifier.axle.guarantee import HalfSpaces, prior_box
 from identifier.axle.learning import (
     BoundNumbers,
     Bounds,
@@ -35,7 +36,7 @@ from identifier.axle.step import CARRY, LEARNING_OVER, PORTS, build_step
 from identifier.axle.watch import BEGIN, Watch
 from identifier.certificate import Certificate
 from identifier.driving import Driving, natural_driving
-from identifier.method import OTHER_STRUCTURE, Method, Port, Reached, Setup, Track, resumed
+from identifier.method import OTHER_STRUCTURE, Method, Port, Reached, Setup, Track, fits, resumed
 from identifier.tire_model import AXLES, TireModel, brisk_speed
 from identifier.tuning import Range, ranges_around
 from models.vehicle import GRAVITY, Vehicle
@@ -91,6 +92,8 @@ class AxleIdentifier(Method):
         Where the ladder does not rise by powers of two, dt is not positive, or rising_until is
         negative.
     """
+
+    learns_kind = AxleModel.kind
 
     prior: Prior
     sway: Sway
@@ -182,6 +185,19 @@ class AxleIdentifier(Method):
         """
         return Certificate(properties=certified_along(self, history))
 
+    def resumes(self, model: TireModel) -> bool:
+        """Return whether a run can begin with a stored model.
+
+        Parameters
+        ----------
+        model : its weights.
+        """
+        return fits(model, AxleModel, ladder=self.ladder)
+
+    def possible_tires(self) -> HalfSpaces:
+        """Return the weights that the curve of a tire can have, within the bounds."""
+        return prior_box(self.bounds, self.ladder)
+
     @property
     def tunables(self) -> Mapping[str, Range]:
         """What a search may vary, around the numbers that it has."""
@@ -210,7 +226,7 @@ class AxleIdentifier(Method):
         P = prior_P = self.prior.covariance(vehicle, self.ladder)
         excitation = np.zeros((2, 1 + len(EDGES)))
         if start is not None:
-            stored = resumed(start, AxleModel, OTHER_STRUCTURE, ladder=self.ladder)
+            stored = self._resumed(start)
             W, own, P, excitation = stored.W, stored.own, stored.covariance, stored.excitation
         widest = per_variance(prior_P, n, self.regression.widest)
         W, own = self.within_bounds(W, own, P)
@@ -250,6 +266,10 @@ class AxleIdentifier(Method):
             ends_run=self.plausibility.rest(self.dt),
         )
 
+    def _resumed(self, start: TireModel) -> AxleModel:
+        """Return stored weights to begin with, of this structure."""
+        return resumed(start, AxleModel, OTHER_STRUCTURE, ladder=self.ladder)
+
     def setup_with_band(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs whose step tells `half_band` (2,) [N] beside its force.
 
@@ -263,7 +283,7 @@ class AxleIdentifier(Method):
             Where stored weights are those of another structure.
         """
         setup = self.setup(vehicle, start)
-        stored = start.calibration if isinstance(start, AxleModel) else None
+        stored = None if start is None else self._resumed(start).calibration
         told = BandCalibration.told(brisk_speed(vehicle, self.min_speed))
         noise = np.array([self.regression.noise, self.regression.noise, 0.0])
         calibration = stored or replace(told, noise=noise)

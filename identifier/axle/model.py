@@ -1,5 +1,6 @@
 """The axle model, frozen: force curves of slip, their lag and sway, and where they are known."""
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from typing import Any
@@ -11,13 +12,16 @@ from numpy.typing import NDArray
 from codegen import Scan
 from codegen.arrays import Array, blocks
 from identifier.axle.band import (
+    CENTERS,
     LEVEL,
     RELATIVE,
     BandCalibration,
     BandSpread,
+    SpreadByRange,
     colored,
     colored_variance,
     normal_quantile,
+    ranges_of,
     root,
     sensor_noise,
 )
@@ -183,6 +187,20 @@ class AxleModel(TireModel):
         return relative_sd
 
     @property
+    def has_band(self) -> bool:
+        """Whether the model can tell how sure it is: by its covariance."""
+        return True
+
+    def with_calibration(self, calibration: BandCalibration | None) -> "AxleModel":
+        """Return the model, its band calibrated.
+
+        Parameters
+        ----------
+        calibration : None takes errors to be as learning is told.
+        """
+        return replace(self, calibration=calibration)
+
+    @property
     def known_slip(self) -> Array:
         """Largest slip [rad] that was seen while learning and where the doubt is small, (2,)."""
         grid = np.linspace(0.0, 1.0, 201)[1:]
@@ -258,6 +276,19 @@ class AxleModel(TireModel):
         both = [self.half_band(slip[:, i], level, v_x=v_x)[:, i] for i in range(2)]
         return np.column_stack(both)
 
+    def half_band_of_curves(self, recording: Recording, level: float = LEVEL) -> Array:
+        """Return half the width of `band` at the slip and speed of a drive, (n, 2) [N].
+
+        Of the steady forces, without noise of the drive's sensors.
+
+        Parameters
+        ----------
+        recording : its signals are the input.
+        level : share of cases that the band shall hold, above 0 and below 1.
+        """
+        speed = np.maximum(recording.v_x, self.min_speed)
+        return self.half_band_along(self.lagged_slip(recording), speed, level)
+
     def _noise_passed(self, slip: Array, v_x: Array, noise: Array, dt: float) -> Array:
         """Return what noise of sensors makes of the forces, through the lag [static loads], (n, 2).
 
@@ -281,6 +312,15 @@ class AxleModel(TireModel):
         units = np.tanh(slip[..., None] / scales)
         slope: Array = ((1.0 - units**2) * self.W / scales).sum(axis=-1)
         return slope
+
+    def slope_over(self, recording: Recording) -> Array:
+        """Return the slope of the curves over the slip of a drive [static loads/rad], (n, 2).
+
+        Parameters
+        ----------
+        recording : its signals are the input.
+        """
+        return self.slope_at(self.lagged_slip(recording))
 
     @property
     def effective_calibration(self) -> BandCalibration:
@@ -308,6 +348,28 @@ class AxleModel(TireModel):
         calibration = self.effective_calibration
         left = colored_variance(left, before, calibration.color)
         return BandSpread.of(T @ self.W.T, left, before, calibration.stretch(v_x)[:, None])
+
+    def spread_by_range(
+        self, recording: Recording, mean: Callable[[Array], Array]
+    ) -> SpreadByRange:
+        """Return the variances that a band is made of, by range of slip and window of a drive.
+
+        Parameters
+        ----------
+        recording : its signals are the input.
+        mean : over the windows: signals (n, ...) -> (m, ...).
+        """
+        size, count = np.abs(self.lagged_slip(recording)), len(CENTERS)
+        within, v_x = ranges_of(size), np.tile(mean(recording.v_x), count)
+        share = np.array([mean(1.0 * (within == k)) for k in range(count)])
+        total = np.array([mean(size * (within == k)) for k in range(count)])
+        slip = np.divide(total, share, out=np.zeros_like(total), where=share > 0.0)
+        spread = BandSpread(np.empty_like(slip), np.empty_like(slip))
+        for axle in range(2):
+            at = self.band_spread(slip[..., axle].ravel(), v_x)
+            for into, values in zip(spread, at, strict=True):
+                into[..., axle] = values[:, axle].reshape(slip.shape[:2])
+        return SpreadByRange(share, *spread)
 
     def on_another_road(self, sd_friction: float = SD_FRICTION) -> "AxleModel":
         """Return the model for a road whose friction is not that of the drive that taught.
@@ -361,6 +423,15 @@ class AxleModel(TireModel):
         stands = recording.v_x < self.min_speed
         low[stands], high[stands] = np.nan, np.nan
         return low * self._loads, high * self._loads
+
+    def with_guarantee(self, guarantee: Guarantee) -> "AxleModel":
+        """Return the model with its guaranteed band.
+
+        Parameters
+        ----------
+        guarantee : weights that are possible.
+        """
+        return replace(self, guarantee=guarantee)
 
     def signals_of(self, recording: Recording) -> tuple[Array, Doubt]:
         """Return units times cos δ over a drive, (n, 2, ladder), and what opens a band.
@@ -516,6 +587,10 @@ class AxleModel(TireModel):
     def mounted_on(self, vehicle: Vehicle) -> "AxleModel":
         """Return the tires on another car, their forces scaled by its static axle loads."""
         return replace(self, vehicle=vehicle, guarantee=None)  # it was shown of this car alone
+
+    def beside_v_y(self) -> "AxleModel":
+        """Return the model as one that the axle identifier goes on learning, which is told v_y."""
+        return replace(self, tells_v_y=False)
 
     def at_friction(self, ratio: float) -> "AxleModel":
         """Return the tires on a road of another friction, φ(α) → μ φ(α/μ); the stiffness stays.

@@ -6,13 +6,61 @@ Froude's rule when they become the inputs of the compiled step.
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from codegen.arrays import Array
 from identifier.inertial.motion import MOVING, places, size
 from models.rules import require_positive_fields
+from models.vehicle import Vehicle
+
+TOLD_ROLL = 0.25  # standard deviation of the roll that a chassis tells, as a share of it
+
+
+class Body(NamedTuple):
+    """A body that rolls under lateral acceleration.
+
+    frequency, damping : of its roll [rad/s], [-].   roll, sd_roll : outwards, as the accelerometer
+    feels it, and the standard deviation of that [rad/g].
+    """
+
+    frequency: float
+    damping: float
+    roll: float
+    sd_roll: float
+
+    @classmethod
+    def of_chassis(cls, vehicle: Vehicle) -> Self | None:
+        """Return the body of a car as its chassis tells it; None where it tells none.
+
+        Parameters
+        ----------
+        vehicle : with or without chassis.
+        """
+        if vehicle.chassis is None:
+            return None
+        leans = vehicle.weight * vehicle.roll_arm  # N m per g, and per rad of roll
+        spring, inertia = vehicle.chassis.roll_stiffness - leans, vehicle.chassis.roll_inertia
+        frequency, roll = math.sqrt(spring / inertia), leans / spring
+        damping = vehicle.chassis.roll_damping / (2.0 * inertia * frequency)
+        return cls(frequency, damping, roll, TOLD_ROLL * roll)
+
+    def step(self, rolls: tuple[float, float], level: float, dt: float) -> tuple[float, float]:
+        """Return what it rolls by and the rate of that a sample later, implicit.
+
+        Parameters
+        ----------
+        rolls : before.
+        level : acceleration in the plane of the road [m/s²].
+        dt : sampling interval [s].
+        """
+        now, rate = rolls
+        stiff = dt * self.frequency**2
+        rate = (rate + stiff * (level - now)) / (
+            1.0 + 2.0 * self.damping * self.frequency * dt + dt * stiff
+        )
+        return now + dt * rate, rate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,16 +15,17 @@ from identifier.axle.covariance import packed, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
 from identifier.axle.design import AxleIdentifier
 from identifier.axle.gate import GateState, Plausibility
+from identifier.axle.guarantee import HalfSpaces, prior_box
 from identifier.axle.learning import Bounds, inward, rising_shares
 from identifier.axle.model import AxleModel
 from identifier.axle.prior import Prior
 from identifier.axle.slip import FASTEST, SHORTEST, Sway
 from identifier.certificate import Certificate
 from identifier.driving import Driving
-from identifier.inertial.beliefs import Beliefs, Trust, TrustNumbers
+from identifier.inertial.beliefs import Beliefs, Body, Trust, TrustNumbers
 from identifier.inertial.motion import MOVING, SENSORS, of_axles, size
 from identifier.inertial.step import CARRY, OVER, PORTS, build_step, heard_size
-from identifier.method import OTHER_STRUCTURE, Method, Port, Reached, Setup, Track, resumed
+from identifier.method import OTHER_STRUCTURE, Method, Port, Reached, Setup, Track, fits, resumed
 from identifier.tire_model import AXLES, TireModel
 from identifier.tuning import Range, ranges_around
 from models.rules import require_within
@@ -91,6 +92,8 @@ class InertialIdentifier(Method):
     ValueError
         Where the ladder does not rise by powers of two, or a number is none of a car.
     """
+
+    learns_kind = AxleModel.kind
 
     prior: Prior
     plausibility: Plausibility
@@ -160,6 +163,19 @@ class InertialIdentifier(Method):
     def remark(self) -> str:
         """Say what it does without."""
         return "" if self.reads_v_y else "without v_y, which it tells"
+
+    def resumes(self, model: TireModel) -> bool:
+        """Return whether a run can begin with a stored model.
+
+        Parameters
+        ----------
+        model : its weights.
+        """
+        return fits(model, AxleModel, ladder=self.ladder)
+
+    def possible_tires(self) -> HalfSpaces:
+        """Return the weights that the curve of a tire can have, within the bounds."""
+        return prior_box(self.bounds, self.ladder)
 
     @property
     def tunables(self) -> Mapping[str, Range]:
@@ -265,6 +281,17 @@ class InertialIdentifier(Method):
             },
             ends_run=self.plausibility.rest(self.dt),
         )
+
+    def believed_body(self, vehicle: Vehicle) -> Body:
+        """Return how the body rolls: as a chassis tells it, or else as is believed of any.
+
+        Parameters
+        ----------
+        vehicle : with or without chassis.
+        """
+        frequency = self.roll_frequency / vehicle.froude_time
+        believed = Body(frequency, self.roll_damping, self.beliefs.roll, self.beliefs.sd_roll)
+        return Body.of_chassis(vehicle) or believed
 
     def _laws(self, vehicle: Vehicle) -> Array:
         """Return the numbers of `Laws`."""

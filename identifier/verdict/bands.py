@@ -25,14 +25,12 @@ from identifier.axle.band import (
     BandCalibration,
     BandSpread,
     normal_quantile,
-    ranges_of,
     sensor_noise,
 )
 from identifier.axle.learning import Regression
-from identifier.axle.model import AxleModel
 from identifier.run import History
 from identifier.tire_model import TireModel
-from identifier.verdict.motion import Windows, evidence, modelled_force
+from identifier.verdict.motion import Evidence, Windows, evidence, modelled_force
 from identifier.verdict.parts import asked_run, taught_elsewhere
 from models.recordings import Recording
 from models.recordings.portion import portion
@@ -56,14 +54,13 @@ def within_band(model: TireModel, recording: Recording, level: float = LEVEL) ->
     recording : the drive.
     level : of the band.
     """
-    if not isinstance(model, AxleModel):
-        return None
     recording = portion(recording).recording
+    half = model.half_band_of_curves(recording, level)
+    if half is None:
+        return None
     found = evidence(model, recording)
     if found is None:
         return None
-    speed = np.maximum(recording.v_x, model.min_speed)
-    half = model.half_band_along(model.lagged_slip(recording), speed, level)
     half = half / np.array(model.vehicle.axle_loads)
     noise = normal_quantile(level) ** 2 * found.noise
     wide = np.sqrt(found.windows.mean(half) ** 2 + noise)
@@ -108,7 +105,7 @@ def calibrated(history: History, t: float | None = None) -> TireModel:
     """
     run = asked_run(history, t)
     model, recording = run.model, run.portion.recording
-    if not isinstance(model, AxleModel):
+    if not model.has_band:
         return model
     found = evidence(model, recording, run.road)
     if found is None:
@@ -123,32 +120,21 @@ def calibrated(history: History, t: float | None = None) -> TireModel:
     within = np.searchsorted(SPEEDS, speeds / model.vehicle.froude_speed, side="right")
     empty = np.zeros((3, *each))
     missed = Missed(np.full(one, np.nan), empty[0], empty[1], empty[2], within)
-    for mine, other in taught_elsewhere(teach, recording, found):
-        if isinstance(other, AxleModel):
-            other = replace(other, calibration=BandCalibration.told(speed))
-            asked_of = _missed(other, recording, found.windows, found.measured)
-            for into, values in zip(missed[:-1], asked_of, strict=True):
-                into[..., mine, :] = values[..., mine, :]
     told = BandCalibration.told(speed)
+    for mine, other in taught_elsewhere(teach, recording, found):
+        if other is None:
+            continue
+        asked_of = _missed(other.with_calibration(told), recording, found)
+        for into, values in zip(missed[:-1], asked_of, strict=True):
+            into[..., mine, :] = values[..., mine, :]
     told = replace(told, noise=sensor_noise(recording, model.vehicle))
-    return replace(model, calibration=calibration(missed, found.noise, found.windows, told))
+    return model.with_calibration(calibration(missed, found.noise, found.windows, told))
 
 
-def _missed(
-    model: AxleModel, recording: Recording, windows: Windows, measured: Array
-) -> tuple[Array, ...]:
-    """Return error, share, scaled and held of `Missed` in all windows."""
-    size, count = np.abs(model.lagged_slip(recording)), len(CENTERS)
-    within, v_x = ranges_of(size), np.tile(windows.mean(recording.v_x), count)
-    share = np.array([windows.mean(1.0 * (within == k)) for k in range(count)])
-    total = np.array([windows.mean(size * (within == k)) for k in range(count)])
-    slip = np.divide(total, share, out=np.zeros_like(total), where=share > 0.0)
-    spread = BandSpread(np.empty_like(slip), np.empty_like(slip))
-    for axle in range(2):
-        at = model.band_spread(slip[..., axle].ravel(), v_x)
-        for into, values in zip(spread, at, strict=True):
-            into[..., axle] = values[:, axle].reshape(slip.shape[:2])
-    return measured - modelled_force(model, recording, windows), share, *spread
+def _missed(model: TireModel, recording: Recording, found: Evidence) -> tuple[Array, ...]:
+    """Return error, share, scaled and held of `Missed` in all windows, of a model with a band."""
+    spread = model.spread_by_range(recording, found.windows.mean)
+    return found.measured - modelled_force(model, recording, found.windows), *spread
 
 
 def calibration(

@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.axle.band import LEVEL, normal_quantile
-from identifier.axle.model import AxleModel
 from identifier.tire_model import GRIP, TireModel
 from identifier.verdict.motion import evidence, modelled_force
 from models.recordings import Recording
@@ -124,9 +123,10 @@ def road_friction(
     road : what a banked road pushes to the left at each sample of `portion(recording)`, taken off
         [weights]; None where nobody knows of it.
     """
-    if not isinstance(model, AxleModel):
-        return None
     asked = portion(recording)
+    band = model.half_band_of_curves(asked.recording)
+    if band is None:
+        return None
     found = evidence(model, asked.recording, road)
     if found is None:
         return None
@@ -139,9 +139,7 @@ def road_friction(
     for k, mu in enumerate(np.exp(grid)):
         tires = model.at_friction(float(mu))
         away[k] = found.measured - modelled_force(tires, asked.recording, windows)
-        slope[k] = windows.mean(tires.slope_at(tires.lagged_slip(asked.recording)))
-    speed = np.maximum(asked.recording.v_x, model.min_speed)
-    band = model.half_band_along(model.lagged_slip(asked.recording), speed)
+        slope[k] = windows.mean(tires.slope_over(asked.recording))
     sd = windows.mean(band / np.array(model.vehicle.axle_loads)) / normal_quantile(LEVEL)
     beside = BESIDE if recording.logged_v_y is not None else math.hypot(BESIDE, OF_ESTIMATE)
     variance = sd**2 + found.noise + beside**2 + (OF_FORCE * found.measured) ** 2

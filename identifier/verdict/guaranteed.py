@@ -9,8 +9,6 @@ The bound that is estimated is `RESERVE` times the least one with which any curv
 and a little more: the quick part of errors, which means hide, has to find room in it.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,10 +20,8 @@ from identifier.axle.guarantee import (
     Strips,
     least_bound,
     possible_weights,
-    prior_box,
 )
-from identifier.axle.learning import Bounds, Regression
-from identifier.axle.model import AxleModel
+from identifier.axle.learning import Regression
 from identifier.run import History
 from identifier.tire_model import AXLES, TireModel
 from identifier.verdict.motion import BRISK, FEWEST, WINDOW, Windows, impulse_signals
@@ -42,10 +38,11 @@ class BoundViolatedError(ValueError):
     """No tire's curve keeps the bound that was told: the drive contradicts it."""
 
 
-def strips_of(model: AxleModel, recording: Recording, road: Array | None = None) -> Strips | None:
+def strips_of(model: TireModel, recording: Recording, road: Array | None = None) -> Strips | None:
     """Return what a drive says of the weights of a model; None where too little is driven.
 
     None without a lateral velocity that was measured: slip would be what the model makes of it.
+    None of a model whose forces are no curves of slip.
 
     Parameters
     ----------
@@ -59,9 +56,12 @@ def strips_of(model: AxleModel, recording: Recording, road: Array | None = None)
     windows = Windows.where(drives, recording, WINDOW, OVERLAPPING)
     if len(windows) < FEWEST:
         return None
+    signals = model.signals_of(recording)
+    if signals is None:
+        return None
+    units, doubt = signals
     g, slope = triangle(windows.n, recording.dt)
     impulse, sideways = impulse_signals(recording, model.vehicle, road)
-    units, doubt = model.signals_of(recording)
 
     def mean(signal: Array, weights: Array) -> Array:
         flat = signal.reshape(len(signal), -1)
@@ -79,7 +79,7 @@ def strips_of(model: AxleModel, recording: Recording, road: Array | None = None)
     )
 
 
-def least_speed(model: AxleModel) -> float:
+def least_speed(model: TireModel) -> float:
     """Return the speed [m/s] from which a moment counts.
 
     Parameters
@@ -135,19 +135,14 @@ def guaranteed(
     """
     told = None if bound is None else ForceBound.of(bound)
     run = asked_run(history, t)
-    carries, limits = run.model if model is None else model, getattr(history.design, "bounds", None)
-    if not (
-        isinstance(run.model, AxleModel)
-        and isinstance(carries, AxleModel)
-        and isinstance(limits, Bounds)
-    ):
+    carries, box = run.model if model is None else model, history.design.possible_tires()
+    if box is None:
         return carries
     strips = strips_of(run.model, run.portion.recording, run.road)
     if strips is not None and run.until is not None:
         strips = strips.until(int(np.searchsorted(strips.t, run.until - WINDOW, side="right")))
     if strips is None or len(strips.t) < FEWEST:
         return carries
-    box = prior_box(limits, run.model.ladder)
     chosen = estimated_bound(strips, box) if told is None else told
     corners = []
     for axle in range(2):
@@ -161,7 +156,7 @@ def guaranteed(
         corners=(corners[0], corners[1]),
         speed=float(strips.v_x.mean()),
     )
-    return replace(carries, guarantee=guarantee)
+    return carries.with_guarantee(guarantee)
 
 
 def estimated_bound(strips: Strips, box: HalfSpaces) -> ForceBound:
@@ -210,7 +205,7 @@ def contradictions(
     recording : the drive, with a lateral velocity.
     road : as of `strips_of`.
     """
-    if not isinstance(model, AxleModel) or model.guarantee is None:
+    if model.guarantee is None:
         return None
     strips = strips_of(model, recording, road)
     if strips is None:

@@ -10,9 +10,8 @@ from identifier.axle.model import AxleModel
 from identifier.axle.slip import SHORTEST
 from identifier.export.c_source import PREFIX
 from identifier.export.package import Package
-from identifier.inertial import InertialIdentifier
 from identifier.inertial.motion import SENSORS
-from identifier.method import CannotFreezeError, Method
+from identifier.method import CannotFreezeError
 from identifier.paper.network import NetworkModel
 from identifier.tire_model import TireModel
 from models.vehicle import GRAVITY
@@ -72,7 +71,7 @@ def handover_sources(identifier: Package, tracker: MpcPackage) -> dict[str, str]
     specialized, model = identifier.specialized, frozen_start(identifier)
     name = specialized.name
     force = {"MAX_FORCE": (repr(round(specialized.limits.force, 1)), "of an axle [N]")}
-    numbers, arrays = HANDOVERS[model.kind](model, tracker, specialized.method)
+    numbers, arrays = HANDOVERS[model.kind](model, tracker)
     text = header(
         f"{name}_handover_tables.h",
         f"Numbers of the handover.\n\n{generated(identifier.about)}",
@@ -94,7 +93,7 @@ Numbers = dict[str, tuple[object, str]]
 Arrays = dict[str, tuple[Sequence[float], str]]
 
 
-def _of_curves(model: AxleModel, tracker: MpcPackage, method: Method) -> tuple[Numbers, Arrays]:
+def _of_curves(model: AxleModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:
     shortest = repr(SHORTEST * model.vehicle.wheelbase)
     numbers: Numbers = {
         "CURVES": (1, "what is learnt are curves over slip; else a network"),
@@ -102,8 +101,8 @@ def _of_curves(model: AxleModel, tracker: MpcPackage, method: Method) -> tuple[N
         "SWAY": (repr(GRAVITY / model.sway.frequency**2), "g over the roll's frequency^2 [m]"),
         "SHORTEST": (shortest, "lag that is always there [m]"),
     }
-    if isinstance(method, InertialIdentifier):
-        share = repr(method.prior.sway_share)
+    if model.tells_v_y:  # beside it the share of the sway is none of what is learnt
+        share = repr(float(model.own[0, 1]))
         numbers |= {
             "SWAY_SHARE": (share, "of the sway of the body, which is not learnt"),
             "STEERING": (f"{SENSORS.index('steering')}U", "which of the sensors' errors it is"),
@@ -115,8 +114,8 @@ def _of_curves(model: AxleModel, tracker: MpcPackage, method: Method) -> tuple[N
     }
 
 
-def _of_network(model: NetworkModel, tracker: MpcPackage, method: Method) -> tuple[Numbers, Arrays]:
-    del tracker, method
+def _of_network(model: NetworkModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:
+    del tracker
     assert model.network.scale is not None, "a network that was learnt has scales"
     numbers: Numbers = {
         "CURVES": (0, "what is learnt is a network; else curves over slip"),
@@ -189,7 +188,7 @@ def build_pair(
     return Pair(identifier, tracker, files | handover_sources(identifier, tracker))
 
 
-HANDOVERS: Mapping[str, Callable[[Any, MpcPackage, Method], tuple[Numbers, Arrays]]] = {
+HANDOVERS: Mapping[str, Callable[[Any, MpcPackage], tuple[Numbers, Arrays]]] = {
     AxleModel.kind: _of_curves,
     NetworkModel.kind: _of_network,
 }

@@ -17,15 +17,13 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.inertial import InertialIdentifier
+from identifier.inertial.beliefs import Body
 from identifier.run import OnlineIdentifier
 from models.rules import require_positive_fields
 from models.sensors import is_shown
-from models.vehicle import Vehicle
 from mpc.loop.sensing import Measured
 
 UNKNOWN = 1.0  # m/s: standard deviation of v_y where nothing is known
-TOLD_ROLL = 0.25  # standard deviation of the roll that a chassis tells, as a share of it
 FINEST = 1e-3  # m/s: least deviation that is believed
 
 
@@ -60,53 +58,6 @@ class TellsLateral(Protocol):
         ----------
         measured : by the sensors; v_y is not read.
         """
-
-
-class Body(NamedTuple):
-    """A body that rolls under lateral acceleration.
-
-    frequency, damping : of its roll [rad/s], [-].   roll, sd_roll : outwards, as the accelerometer
-    feels it, and the standard deviation of that [rad/g].
-    """
-
-    frequency: float
-    damping: float
-    roll: float
-    sd_roll: float
-
-    @classmethod
-    def of(cls, vehicle: Vehicle, method: InertialIdentifier) -> "Body":
-        """Return the body of a car as its chassis tells it, or as the method takes it to be.
-
-        Parameters
-        ----------
-        vehicle : with or without chassis.
-        method : what is believed of a body that nobody told.
-        """
-        if vehicle.chassis is None:
-            frequency = method.roll_frequency / vehicle.froude_time
-            return cls(frequency, method.roll_damping, method.beliefs.roll, method.beliefs.sd_roll)
-        leans = vehicle.weight * vehicle.roll_arm  # N m per g, and per rad of roll
-        spring, inertia = vehicle.chassis.roll_stiffness - leans, vehicle.chassis.roll_inertia
-        frequency, roll = math.sqrt(spring / inertia), leans / spring
-        damping = vehicle.chassis.roll_damping / (2.0 * inertia * frequency)
-        return cls(frequency, damping, roll, TOLD_ROLL * roll)
-
-    def step(self, rolls: tuple[float, float], level: float, dt: float) -> tuple[float, float]:
-        """Return what it rolls by and the rate of that a sample later, implicit.
-
-        Parameters
-        ----------
-        rolls : before.
-        level : acceleration in the plane of the road [m/s²].
-        dt : sampling interval [s].
-        """
-        now, rate = rolls
-        stiff = dt * self.frequency**2
-        rate = (rate + stiff * (level - now)) / (
-            1.0 + 2.0 * self.damping * self.frequency * dt + dt * stiff
-        )
-        return now + dt * rate, rate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -169,11 +120,12 @@ class LateralVelocity:
         body: Body | None = None,
     ) -> None:
         method = identifier.method
-        if not isinstance(method, InertialIdentifier):
+        believed = method.believed_body(identifier.vehicle)
+        if believed is None:
             raise ValueError(f"{type(method).__name__} tells no v_y")
         self.identifier, self.trust = identifier, localization or Localization()
         self._dt = method.dt
-        self._body = body or Body.of(identifier.vehicle, method)
+        self._body = body or believed
         self._rolls = (0.0, 0.0)  # ä and its rate [m/s²], [m/s³]
         self._place: Array | None = None  # X, Y [m], dead reckoned
         self._v_y, self._bias, self._roll = math.nan, 0.0, self._body.roll

@@ -1,13 +1,12 @@
 """One drive for each tire that a tracker is told: linear, frozen, true, or learnt on the way."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from codegen import find_compiler
-from identifier.axle import AxleModel
 from identifier.inertial import InertialIdentifier
 from identifier.method import CannotFreezeError
 from identifier.methods import continuing
@@ -127,8 +126,8 @@ def lateral_velocity(vehicle: Vehicle, learnt: TireModel | None = None) -> Later
     learnt : what it begins with, where these are curves of axles; else it begins afresh.
     """
     method = InertialIdentifier.for_vehicle(vehicle, dt=PERIOD)
-    start = learnt if isinstance(learnt, AxleModel) else None
-    return LateralVelocity(OnlineIdentifier(method, vehicle, PERIOD, start))
+    begins = learnt is not None and learnt.kind == method.learns_kind
+    return LateralVelocity(OnlineIdentifier(method, vehicle, PERIOD, learnt if begins else None))
 
 
 def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
@@ -145,8 +144,7 @@ def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
     ValueError
         Where no method can go on from there, or its law has no certificate.
     """
-    if isinstance(learnt, AxleModel):
-        learnt = replace(learnt, tells_v_y=False)
+    learnt = learnt.beside_v_y()
     try:
         method = continuing(learnt, vehicle, PERIOD)
     except ValueError as error:
@@ -175,11 +173,11 @@ def unknown_of(learner: LearningTires | None) -> Callable[[], float] | None:
         nonlocal last, calls
         if calls % round(ASKED / PERIOD) == 0:
             try:
-                model = learner.supervisor.identifier.model()
+                sd = learner.supervisor.identifier.model().relative_sd(np.array([PROBED]))
             except (DivergedError, CannotFreezeError, ValueError):  # no model now
-                model = None
-            if isinstance(model, AxleModel):
-                unsure = float(model.relative_sd(np.array([PROBED])).max())
+                sd = None
+            if sd is not None:
+                unsure = float(sd.max())
                 last = min(max((unsure - SURE) / (UNSURE - SURE), 0.0), 1.0)
         calls += 1
         return last

@@ -8,6 +8,7 @@ import pytest
 
 from identifier.axle import AxleIdentifier
 from identifier.inertial import InertialIdentifier
+from identifier.inertial.beliefs import Body
 from identifier.run import OnlineIdentifier, identify
 from models.faults import FaultError, SensorFault
 from models.friction import Friction, FrictionChange
@@ -27,7 +28,6 @@ from mpc.loop import (
     imu_and_localization,
     told_scores,
 )
-from mpc.loop.lateral import Body
 from mpc.path import Path, iso_3888_1
 from mpc.realtime import Tracker
 from mpc.tires import prediction_tire
@@ -186,12 +186,12 @@ def test_the_chassis_tells_how_the_body_rolls(swings):
     """Against what the plant does; a car without a chassis is taken for a usual one."""
     method = InertialIdentifier.for_vehicle(CAR, dt=DT)
     roll, a_y = (np.array([getattr(one, name) for one in swings]) for name in ("roll", "a_y"))
-    told, now, rolled = Body.of(CAR, method), (0.0, 0.0), []
+    told, now, rolled = method.believed_body(CAR), (0.0, 0.0), []
     for value in a_y:
         now = told.step(now, value, DT)
         rolled.append(told.roll * now[0] / GRAVITY)
     np.testing.assert_allclose(rolled, roll, atol=0.1 * np.abs(roll).max())
-    usual = Body.of(replace(CAR, chassis=None), method)
+    usual = method.believed_body(replace(CAR, chassis=None))
     assert usual.sd_roll > told.sd_roll and abs(usual.roll - told.roll) < 2.0 * usual.sd_roll
 
 
