@@ -25,10 +25,10 @@ from benchmarks.targets import Targets, keeps
 from codegen.arrays import Array
 from identifier.driving import natural_driving
 from identifier.methods import REFERENCE, make_method
-from identifier.paper.design import PaperIdentifier, design_for
+from identifier.paper.design import PaperIdentifier, design_for, with_keeping
 from identifier.paper.network import NetworkModel
 from identifier.run import identify
-from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS, with_keeping
+from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS
 from models.friction import Friction
 from models.maneuvers import RandomSteer
 from models.plant import Plant

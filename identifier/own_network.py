@@ -15,17 +15,17 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
-from identifier.method import (
+from identifier.frozen import (
     FORMAT,
     FrozenModelError,
-    Method,
-    Setup,
     require_alive,
     require_min_speed,
     vehicle_from,
     vehicle_numbers,
 )
+from identifier.method import Method
 from identifier.paper.network import SIGNALS, network_signals
+from identifier.setup import Setup
 from identifier.tire_model import TireModel, drift
 from models.bicycle import BicycleParameters
 from models.rules import LARGEST_FORCE

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array, large
-from identifier.method import AXLE_FORCE, Block, Setup
+from identifier.setup import AXLE_FORCE, Block, Setup
 from models.recordings import Recording
 
 Kind = Literal["state", "outputs"]

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from codegen import Stepper
 from codegen.arrays import Array, blocks, large
-from identifier.method import Block, Method, Setup, Track
+from identifier.method import Method, Track
 from identifier.refused import NOWHERE, STALE_TIME, SampleLimits, judges_samples, stale_samples
 from identifier.rerun import Recalled, Rerun, holds
+from identifier.setup import Block, Setup
 from identifier.tire_model import TireModel
 from models.recordings import Recording, RecordingError
 from models.vehicle import Vehicle

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
+from identifier.setup import Setup
 from models.files import write_atomically
 from models.recordings import Recording
 from models.vehicle import Vehicle
@@ -23,7 +24,6 @@ from models.vehicle import Vehicle
 if TYPE_CHECKING:  # what some models answer with
     from identifier.axle.band import BandCalibration, SpreadByRange
     from identifier.axle.guarantee import Doubt, Guarantee
-    from identifier.method import Setup
 
 Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
@@ -86,7 +86,7 @@ class TireModel(ABC):
             """Below this speed [m/s] the forces read zero."""
 
     @abstractmethod
-    def setup(self, dt: float) -> "Setup":
+    def setup(self, dt: float) -> Setup:
         """Return what a replay needs.
 
         Parameters
@@ -617,7 +617,7 @@ class TireModel(ABC):
         FrozenModelError
             Where the file is not such a model; one line that names it.
         """
-        from identifier.methods import load_model
+        from identifier.stored import load_model
 
         return load_model(Path(path))
 

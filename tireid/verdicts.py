@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from codegen.escape import visible
-from identifier.methods import stored_verdict
+from identifier.stored import stored_verdict
 from identifier.verdict import Number, Verdict
 from tireid.output import text_table
 from tireid.progress import complain

@@ -27,7 +27,7 @@ from matplotlib.figure import Figure
 import tireid.cli
 import tireid.output
 from codegen.arrays import Array
-from identifier.methods import load_model
+from identifier.stored import load_model
 from identifier.tire_model import TireModel
 from models.recordings import Recording
 from tireid.figures import style

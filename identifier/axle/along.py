@@ -27,11 +27,11 @@ from identifier.axle.curve import doublings
 from identifier.axle.model import AxleModel
 from identifier.axle.step import LESSON, build_lesson
 from identifier.certificate import Property, at_most, statement
+from identifier.method import Run
 from identifier.tire_model import AXLES
 
 if TYPE_CHECKING:
     from identifier.axle.design import AxleIdentifier  # which asks for this
-    from identifier.run import History
 
 SLIPS = 12  # over the range that is known, at which errors are bounded
 BEGIN = 3.0  # standard deviations of the prior, within which the truth lies before the drive
@@ -79,7 +79,7 @@ class Adjoint(NamedTuple):
     g: Array
 
 
-def lessons(design: "AxleIdentifier", history: "History") -> Lessons:
+def lessons(design: "AxleIdentifier", history: Run) -> Lessons:
     """Return what the samples of a run taught; of a long one those at its end.
 
     Parameters
@@ -165,7 +165,7 @@ def adjoint(taught: Lessons, slips: Array, ladder: tuple[float, ...]) -> Adjoint
     return Adjoint(p + r, moved, g)
 
 
-def certified_along(design: "AxleIdentifier", history: "History") -> tuple[Property, ...]:
+def certified_along(design: "AxleIdentifier", history: Run) -> tuple[Property, ...]:
     """Return what is proven of the curves that a drive taught.
 
     Parameters

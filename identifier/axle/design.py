@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
@@ -36,13 +35,11 @@ from identifier.axle.step import CARRY, LEARNING_OVER, PORTS, build_step
 from identifier.axle.watch import BEGIN, Watch
 from identifier.certificate import Certificate
 from identifier.driving import Driving, natural_driving
-from identifier.method import OTHER_STRUCTURE, Method, Port, Reached, Setup, Track, fits, resumed
+from identifier.method import OTHER_STRUCTURE, Method, Reached, Run, Track, fits, resumed
+from identifier.setup import Port, Setup
 from identifier.tire_model import AXLES, TireModel, brisk_speed
 from identifier.tuning import Range, ranges_around
 from models.vehicle import GRAVITY, Vehicle
-
-if TYPE_CHECKING:
-    from identifier.run import History  # which runs it
 
 STEERING, V_Y = (BoundNumbers._fields.index(name) for name in ("steering", "v_y"))
 
@@ -176,7 +173,7 @@ class AxleIdentifier(Method):
             },
         )
 
-    def certify_along(self, history: "History") -> Certificate:
+    def certify_along(self, history: Run) -> Certificate:
         """Return what is proven of the curves that a run of it taught.
 
         Parameters

@@ -32,7 +32,7 @@ from identifier.axle.model import AxleModel
 from identifier.axle.prior import friction_direction
 from identifier.axle.slip import SensitivityState, SwayState
 from identifier.axle.step import EVIDENCE_CARRY, LEARNING_OVER, build_evidence
-from identifier.method import Setup
+from identifier.setup import Setup
 from models.recordings import Recording
 from models.vehicle import Vehicle
 

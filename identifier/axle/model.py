@@ -41,7 +41,8 @@ from identifier.axle.guarantee import (
 from identifier.axle.prior import SD_FRICTION, friction_direction
 from identifier.axle.slip import SHORTEST, Sway, SwayState
 from identifier.axle.step import FROZEN_CARRY, OVER, build_frozen
-from identifier.method import FORMAT, FrozenModelError, Setup, vehicle_from, vehicle_numbers
+from identifier.frozen import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
+from identifier.setup import Setup
 from identifier.tire_model import AXLES, GRIP, STIFFNESS, Estimate, Fact, TireModel
 from models.recordings import Recording
 from models.rules import require_positive

@@ -55,7 +55,7 @@ from identifier.axle.slip import (
     sway,
 )
 from identifier.axle.watch import Watched, WatchNumbers, WatchState, watched
-from identifier.method import AXLE_FORCE, FACTORS, HALF_BAND, NOT_NEGATIVE, Port
+from identifier.setup import AXLE_FORCE, FACTORS, HALF_BAND, NOT_NEGATIVE, Port
 from models.vehicle import GRAVITY
 
 # From a sample to the axle forces of given weights: what learning and the frozen model share.

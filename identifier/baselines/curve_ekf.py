@@ -17,7 +17,8 @@ from codegen.arrays import Array
 from identifier.baselines.curves import CURVES, CurveModel, measured_slip, unlagged
 from identifier.baselines.kalman import NOISE, PORTS, FilteredTire, build_step
 from identifier.baselines.ports import LAG_DESCRIBED, OVER, axle_loads
-from identifier.method import Method, Port, Setup, resumed
+from identifier.method import Method, resumed
+from identifier.setup import Port, Setup
 from identifier.tire_model import TireModel
 from identifier.tuning import Range, around
 from models.bicycle import BicycleParameters

@@ -25,14 +25,14 @@ from identifier.baselines.ports import (
     lagged_slip,
     sample_ports,
 )
-from identifier.method import (
+from identifier.frozen import (
     FORMAT,
     FrozenModelError,
-    Setup,
     require_min_speed,
     vehicle_from,
     vehicle_numbers,
 )
+from identifier.setup import Setup
 from identifier.tire_model import Fact, TireModel
 from models.bicycle import BicycleParameters, slip_angles
 from models.schema import Table

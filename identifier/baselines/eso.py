@@ -21,7 +21,8 @@ from identifier.baselines.ports import (
     sample_ports,
     turning_force,
 )
-from identifier.method import AXLE_FORCE, Method, Port, Setup
+from identifier.method import Method
+from identifier.setup import AXLE_FORCE, Port, Setup
 from identifier.tire_model import TireModel
 from identifier.tuning import Range, around
 from models.rules import require_positive

@@ -44,7 +44,8 @@ from identifier.baselines.without_v_y import (
     predicted,
     steady_v_y,
 )
-from identifier.method import COVARIANCE, Method, Port, Setup
+from identifier.method import Method
+from identifier.setup import COVARIANCE, Port, Setup
 from identifier.tire_model import TireModel
 from identifier.tuning import Range, ranges_around
 from models.rules import require_positive, require_within

@@ -29,7 +29,8 @@ from identifier.baselines.ports import (
     motion_rate,
     sample_ports,
 )
-from identifier.method import AXLE_FORCE, COVARIANCE, Method, Port, Setup
+from identifier.method import Method
+from identifier.setup import AXLE_FORCE, COVARIANCE, Port, Setup
 from identifier.tire_model import TireModel
 from identifier.tuning import Range, around
 from models.bicycle import BicycleParameters

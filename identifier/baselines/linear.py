@@ -23,7 +23,8 @@ from identifier.baselines.ports import (
     sample_ports,
     turning_force,
 )
-from identifier.method import AXLE_FORCE, NOT_NEGATIVE, Method, Port, Setup, resumed
+from identifier.method import Method, resumed
+from identifier.setup import AXLE_FORCE, NOT_NEGATIVE, Port, Setup
 from identifier.tire_model import TireModel
 from identifier.tuning import Range, around
 from models.bicycle import slip_angles

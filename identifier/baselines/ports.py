@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from identifier.method import Port
+from identifier.setup import Port
 from models.bicycle import BicycleParameters, bicycle
 
 OVER = ("x", "u", "v_x")

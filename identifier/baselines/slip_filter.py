@@ -33,7 +33,8 @@ from identifier.baselines.without_v_y import (
     predicted,
     steady_v_y,
 )
-from identifier.method import AXLE_FORCE, COVARIANCE, Method, Port, Setup, resumed
+from identifier.method import Method, resumed
+from identifier.setup import AXLE_FORCE, COVARIANCE, Port, Setup
 from identifier.tire_model import TireModel
 from identifier.tuning import Range, ranges_around
 from models.bicycle import BicycleParameters

@@ -12,7 +12,7 @@ import casadi as ca
 
 from identifier.baselines.kalman import FilteredTire, midpoint
 from identifier.baselines.ports import Sample, motion_rate, sample_ports, turning_force
-from identifier.method import Port
+from identifier.setup import Port
 from models.bicycle import BicycleParameters
 
 OVER = ("x", "u", "v_x", "a_y")  # of x the yaw rate alone

@@ -21,9 +21,10 @@ from identifier.compare.course import (
     run_scored,
     shown_to,
 )
-from identifier.method import CannotFreezeError, Method, Setup
+from identifier.method import CannotFreezeError, Method
 from identifier.reproducibility import AxleRmse, counted_samples
 from identifier.run import IMPOSSIBLE_FORCE, DivergedError, check_recording, state_index
+from identifier.setup import Setup
 from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from codegen import BatchScan, Scan
 from codegen.arrays import Array
-from identifier.method import CannotFreezeError, Method, shown
+from identifier.method import CannotFreezeError, Method
 from identifier.refused import judges_samples
 from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
 from identifier.run import History, identify
+from identifier.setup import shown
 from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from codegen.arrays import Array
 from codegen.clean_c import literal
 from identifier.export.specialize import SAMPLED, Signal, SpecializedStep
-from identifier.method import COVARIANCE, FACTORS, NOT_NEGATIVE
+from identifier.setup import COVARIANCE, FACTORS, NOT_NEGATIVE
 
 READS = {"x": ("v_y", "r"), "u": ("delta_f", "delta_r"), "v_x": ("v_x",), "a_y": ("a_y",)}
 

@@ -29,7 +29,8 @@ from identifier.export.specialize import (
     SpecializedStep,
     specialize,
 )
-from identifier.method import Method, vehicle_numbers
+from identifier.frozen import vehicle_numbers
+from identifier.method import Method
 from identifier.refused import NOWHERE, STALE_TIME, stale_samples
 from identifier.tire_model import TireModel
 from models.vehicle import Vehicle

@@ -15,8 +15,9 @@ import numpy as np
 
 from codegen.arrays import Array
 from codegen.tuned import Tuned, tuned
-from identifier.method import HALF_BAND, Method, Port, Setup
+from identifier.method import Method
 from identifier.refused import GATE, SampleLimits, judges_samples
+from identifier.setup import HALF_BAND, Port, Setup
 from identifier.tire_model import TireModel
 from models.vehicle import Vehicle
 

@@ -38,7 +38,7 @@ from identifier.inertial.motion import (
     turning,
     unknowns,
 )
-from identifier.method import AXLE_FORCE, FACTORS, NOT_NEGATIVE, Port
+from identifier.setup import AXLE_FORCE, FACTORS, NOT_NEGATIVE, Port
 from models.vehicle import GRAVITY
 
 OVER = ("x", "u", "v_x", "a_y")

@@ -19,13 +19,15 @@ from codegen import Scan
 from codegen.arrays import Array
 from identifier.certificate import Certificate
 from identifier.driving import Driving, natural_driving
-from identifier.method import Method, Port, Setup, in_force_unit
+from identifier.method import Method
 from identifier.paper.laws import INPUT_SOURCES, INTEGRATORS, LAWS, Gains, diagonal
 from identifier.paper.network import Network, NetworkModel, Weights, first_weights, natural_network
 from identifier.paper.step import CARRY, GAINS, OVER, PORTS, Structure, build_step
+from identifier.setup import Port, Setup, in_force_unit
 from identifier.stability.certificate import certify
-from identifier.stability.gain_design import decay_rate, design_gains
-from identifier.stability.operation import Operation, minimal_decay, operation
+from identifier.stability.gain_design import KEEPINGS, decay_rate, design_gains
+from identifier.stability.loop import direction_matrix
+from identifier.stability.operation import Operation, minimal_decay, operation, proven_bounds
 from identifier.tire_model import TireModel
 from models.bicycle import BicycleParameters, bicycle
 from models.rules import require_within
@@ -374,6 +376,35 @@ def design_for(
 def _placeholder() -> Gains:
     """Gains that are replaced once the design around them is known."""
     return Gains(A_d=diagonal(1.0), forgetting=1.0, eta_W=0.0, eta_V=0.0, rho_W=0.0, rho_V=0.0)
+
+
+def with_keeping(design: PaperIdentifier, known: Operation, keeping: str) -> PaperIdentifier:
+    """Return the design with its weights kept otherwise, η_V lowered where V would cost margin.
+
+    Parameters
+    ----------
+    design : of the paper's leakage, as `design_for` finds it.
+    known : where it runs, `PaperIdentifier.operation`.
+    keeping : one of `KEEPINGS`.
+
+    Raises
+    ------
+    ValueError
+        Where the name is unknown, or the design has a dead zone or a projection already.
+    """
+    if keeping not in KEEPINGS:
+        raise ValueError(f"keeping must be one of {list(KEEPINGS)}, not {keeping!r}")
+    first = design.gains
+    if first.W_free or first.V_free or np.isfinite([first.W_max, first.V_max]).any():
+        raise ValueError("the weights of this design are kept by a dead zone or a projection")
+    gains = KEEPINGS[keeping](first, known)
+    if gains == first:
+        return design
+    chosen = LAWS[design.law]
+    law, D = chosen.error(gains.lead), direction_matrix(chosen, gains.matrix)
+    W = proven_bounds(gains, law, known, D).W
+    free_of_cost = gains.eta_W / (known.x_bar_max * W) ** 2  # rule 5 of `gain_design`
+    return replace(design, gains=replace(gains, eta_V=min(gains.eta_V, free_of_cost)))
 
 
 # A design as a TOML file: design.toml, read strictly and written with its units.

@@ -16,16 +16,15 @@ from codegen import Scan
 from codegen.arrays import Array
 from codegen.elementary import tanh
 from identifier.driving import REFERENCE_WHEELBASE
-from identifier.method import (
+from identifier.frozen import (
     FORMAT,
-    OTHER_STRUCTURE,
     FrozenModelError,
-    Setup,
     require_min_speed,
-    resumed,
     vehicle_from,
     vehicle_numbers,
 )
+from identifier.method import OTHER_STRUCTURE, resumed
+from identifier.setup import Setup
 from identifier.tire_model import TireModel, drift
 from models.bicycle import BicycleParameters, linear_axle_force, slip_angles
 from models.rules import require_positive, require_within

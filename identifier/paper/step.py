@@ -13,7 +13,6 @@ from typing import Any
 
 import casadi as ca
 
-from identifier.method import AXLE_FORCE, Port
 from identifier.paper.laws import (
     INPUT_SOURCES,
     INTEGRATORS,
@@ -27,6 +26,7 @@ from identifier.paper.laws import (
     whole,
 )
 from identifier.paper.network import Network, hidden_layer, network_signals
+from identifier.setup import AXLE_FORCE, Port
 from models.bicycle import BicycleParameters, bicycle, linear_axle_force
 
 CARRY = ("xi_hat", "z", "W", "V")

@@ -8,11 +8,12 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
-from identifier.method import Method, Port, Setup, in_force_unit
+from identifier.method import Method
 from identifier.paper.design import natural_force_unit
 from identifier.paper.network import Network, NetworkModel, Weights, first_weights, natural_network
 from identifier.regression.laws import LAWS, Numbers
 from identifier.regression.step import OVER, PORTS, Structure, build_step
+from identifier.setup import Port, Setup, in_force_unit
 from identifier.tire_model import TireModel
 from identifier.tuning import SIZE, SIZE_RANGE, Range, hidden_units, ranges_around, with_numbers
 from models.vehicle import Vehicle

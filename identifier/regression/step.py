@@ -14,11 +14,11 @@ from typing import Any
 
 import casadi as ca
 
-from identifier.method import COVARIANCE, Port
 from identifier.paper.laws import ball
 from identifier.paper.network import Network, hidden_layer, network_signals
 from identifier.paper.step import NETWORK_PORTS
 from identifier.regression.laws import LAWS, Lags, Numbers, Weights, filtered_pair
+from identifier.setup import COVARIANCE, Port
 from models.bicycle import BicycleParameters, bicycle, linear_axle_force
 
 CARRY = ("W", "V", "target_lag", "regressor_lag", "fresh")

@@ -2,9 +2,9 @@
 
 from identifier.certificate import Certificate, Property
 from identifier.paper.laws import DrivingError
-from identifier.stability.certificate import along_run, certify
+from identifier.stability.certificate import certify
 from identifier.stability.gain_design import DesignError, GainDesign, design_gains
-from identifier.stability.loop import INSTANTANEOUS, INTEGRAL
+from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, along_run
 from identifier.stability.operation import Operation
 from identifier.stability.pi_lead import pi_lead
 

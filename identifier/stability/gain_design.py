@@ -14,14 +14,13 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identifier.paper.laws import LAWS, DrivingError, Gains, diagonal
+from identifier.paper.laws import DrivingError, Gains, diagonal
 from identifier.stability.bounds import small_gain
-from identifier.stability.loop import direction_matrix, root
-from identifier.stability.operation import Operation, proven_bounds
+from identifier.stability.loop import root
+from identifier.stability.operation import Operation
 from identifier.stability.sampled_bound import (
     Disturbance,
     Learning,
@@ -31,9 +30,6 @@ from identifier.stability.sampled_bound import (
     output_layer,
 )
 from models.rules import require_positive
-
-if TYPE_CHECKING:
-    from identifier.paper.design import PaperIdentifier  # which asks for this
 
 LAG_RULE = 1.0 / math.tan(math.radians(22.5))  # a/Ω for 45 degrees of lag through two equal poles
 FASTEST = 0.2  # largest a dt
@@ -283,32 +279,3 @@ KEEPINGS: Mapping[str, Callable[[Gains, Operation], Gains]] = {
     "projection": projection,
 }
 DEFAULT_KEEPING = "projection"  # of designs that are found; measured by benchmarks/forgetting.py
-
-
-def with_keeping(design: "PaperIdentifier", known: Operation, keeping: str) -> "PaperIdentifier":
-    """Return the design with its weights kept otherwise, η_V lowered where V would cost margin.
-
-    Parameters
-    ----------
-    design : of the paper's leakage, as `design_for` finds it.
-    known : where it runs, `PaperIdentifier.operation`.
-    keeping : one of `KEEPINGS`.
-
-    Raises
-    ------
-    ValueError
-        Where the name is unknown, or the design has a dead zone or a projection already.
-    """
-    if keeping not in KEEPINGS:
-        raise ValueError(f"keeping must be one of {list(KEEPINGS)}, not {keeping!r}")
-    first = design.gains
-    if first.W_free or first.V_free or np.isfinite([first.W_max, first.V_max]).any():
-        raise ValueError("the weights of this design are kept by a dead zone or a projection")
-    gains = KEEPINGS[keeping](first, known)
-    if gains == first:
-        return design
-    chosen = LAWS[design.law]
-    law, D = chosen.error(gains.lead), direction_matrix(chosen, gains.matrix)
-    W = proven_bounds(gains, law, known, D).W
-    free_of_cost = gains.eta_W / (known.x_bar_max * W) ** 2  # rule 5 of `gain_design`
-    return replace(design, gains=replace(gains, eta_V=min(gains.eta_V, free_of_cost)))

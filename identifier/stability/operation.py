@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import casadi as ca
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from codegen.arrays import Array
 from identifier.driving import SPEED_SPREAD, YAW_OVERSHOOT, Driving
 from identifier.paper.laws import DrivingError, Gains
-from identifier.paper.network import network_signals
+from identifier.paper.network import Network, network_signals
 from identifier.stability.loop import INTEGRATORS, Integrator, Loop, spectral_radius, worst_gain
 from identifier.stability.sampled_bound import (
     Disturbance,
@@ -27,8 +27,29 @@ from models.bicycle import bicycle
 from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
 
-if TYPE_CHECKING:
-    from identifier.paper.design import PaperIdentifier  # which asks for this
+
+class Sampled(Protocol):
+    """What of a design its operation follows from: the network that it samples, and how."""
+
+    @property
+    def network(self) -> Network:
+        """Structure and scales of the network."""
+
+    @property
+    def input_source(self) -> str:
+        """Where the network reads the state: "measured" or "estimated"."""
+
+    @property
+    def integrator(self) -> str:
+        """Of the step: "euler", "rk4" or "exact"."""
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval [s]."""
+
+    @property
+    def force_unit(self) -> float:
+        """Unit of the weights of the output [N]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -443,7 +464,7 @@ def disturbance(vehicle: Vehicle, driving: Driving, *, dt: float, unit: float) -
     )
 
 
-def largest_input(design: "PaperIdentifier", vehicle: Vehicle, driving: Driving) -> float:
+def largest_input(design: Sampled, vehicle: Vehicle, driving: Driving) -> float:
     """Bound on |x_bar| [-], noise of the sensors in it.
 
     Parameters
@@ -469,7 +490,7 @@ def largest_input(design: "PaperIdentifier", vehicle: Vehicle, driving: Driving)
     return float(np.linalg.norm([(signals[name] + noise[name]) / scale for name, scale in named]))
 
 
-def input_per_error(design: "PaperIdentifier", vehicle: Vehicle, driving: Driving) -> float:
+def input_per_error(design: Sampled, vehicle: Vehicle, driving: Driving) -> float:
     """What |ξ̃| adds to |x_bar| where the network reads x_hat = x - K ξ̃ [1/(U s)].
 
     Parameters
@@ -486,7 +507,7 @@ def input_per_error(design: "PaperIdentifier", vehicle: Vehicle, driving: Drivin
     return float(np.linalg.norm(np.array(ca.evalf(ca.densify(per_error))), 2))
 
 
-def operation(design: "PaperIdentifier", vehicle: Vehicle, driving: Driving) -> Operation:
+def operation(design: Sampled, vehicle: Vehicle, driving: Driving) -> Operation:
     """Return what the certificate of a design needs.
 
     (14) is given what holds for sure: the ideal weights W = 0, that leave all of f as w_bar. The V

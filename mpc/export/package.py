@@ -24,7 +24,7 @@ from codegen.package import (
     rows,
 )
 from codegen.template import Values, Words, filled
-from identifier.method import vehicle_numbers
+from identifier.frozen import vehicle_numbers
 from mpc.prediction import build_stage, state_size
 from mpc.problem import Problem
 from mpc.realtime import Measurement, Status, Tracker

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.method import FrozenModelError
-from identifier.methods import load_model
+from identifier.frozen import FrozenModelError
+from identifier.stored import load_model
 from models.recordings import Recording
 from models.vehicle import Vehicle
 

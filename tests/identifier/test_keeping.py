@@ -7,9 +7,9 @@ import pytest
 
 from identifier.driving import natural_driving
 from identifier.methods import make_method
-from identifier.paper.design import VARIANTS, PaperIdentifier, design_for
+from identifier.paper.design import VARIANTS, PaperIdentifier, design_for, with_keeping
 from identifier.run import identify
-from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS, with_keeping
+from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS
 from models.maneuvers import RandomSteer, Slalom
 from models.plant import Plant
 from models.vehicle import sedan

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.method import FrozenModelError
-from identifier.methods import load_model
+from identifier.frozen import FrozenModelError
 from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import (
     AxleRmse,
@@ -21,6 +20,7 @@ from identifier.reproducibility import (
     reproduce,
 )
 from identifier.run import identify
+from identifier.stored import load_model
 
 
 @pytest.fixture(name="history")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from identifier.method import vehicle_from, vehicle_numbers
+from identifier.frozen import vehicle_from, vehicle_numbers
 from models.bicycle import BicycleParameters
 from models.tires import MagicFormula
 from models.vehicle import GRAVITY, Chassis, Vehicle, VehicleError, sedan

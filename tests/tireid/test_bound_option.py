@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from identifier.methods import load_model
+from identifier.stored import load_model
 from tireid.cli import main
 
 

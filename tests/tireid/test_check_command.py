@@ -10,9 +10,15 @@ import pytest
 from identifier.axle import AxleIdentifier
 from identifier.certificate import Certificate, Property
 from identifier.driving import natural_driving
-from identifier.paper.design import PaperIdentifier, design_for, design_text, read_design
+from identifier.paper.design import (
+    PaperIdentifier,
+    design_for,
+    design_text,
+    read_design,
+    with_keeping,
+)
 from identifier.paper_study import paper_design
-from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS, with_keeping
+from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS
 from models.vehicle import sedan
 from tireid.cli import main
 from tireid.commands.certificate_table import (

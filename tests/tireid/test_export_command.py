@@ -9,9 +9,10 @@ import pytest
 from codegen import find_compiler
 from identifier.export import processor as figures
 from identifier.export.compiled import CompiledPackage
-from identifier.method import FrozenModelError
-from identifier.methods import load_model, make_method
+from identifier.frozen import FrozenModelError
+from identifier.methods import make_method
 from identifier.run import identify
+from identifier.stored import load_model
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tireid import exporting

@@ -19,7 +19,7 @@ from benchmarks.local_cluster import free_port, start
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.information import reference_of
 from identifier.axle.prior import fiala_weights
-from identifier.methods import load_model
+from identifier.stored import load_model
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tireid.cli import main

@@ -8,8 +8,9 @@ import pytest
 
 from benchmarks.fuzz.server import SLIP, steady_stiffness
 from identifier.axle import AxleModel
-from identifier.methods import METHODS, draws_weights, load_model, make_method
+from identifier.methods import METHODS, draws_weights, make_method
 from identifier.paper.design import PaperIdentifier, design_text
+from identifier.stored import load_model
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tests.pages import faults_of, outline

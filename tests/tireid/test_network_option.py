@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from identifier.export.onnx import export_onnx
-from identifier.methods import load_model, make_method
+from identifier.methods import make_method
 from identifier.own_network import FrozenMethod, OnnxModel, UnusableNetworkError, read_network
 from identifier.paper.network import Network, NetworkModel, Weights
 from identifier.run import identify
+from identifier.stored import load_model
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tireid.cli import main

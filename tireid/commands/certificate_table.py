@@ -7,10 +7,10 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.driving import Driving
-from identifier.method import force_unit_name
 from identifier.methods import DEFAULT, certify
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.network import Weights
+from identifier.setup import force_unit_name
 from identifier.stability import Certificate, Property
 from identifier.stability.monte_carlo import Observed
 from models.vehicle import Vehicle

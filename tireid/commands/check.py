@@ -13,14 +13,22 @@ from typing import Any
 import numpy as np
 
 from identifier.driving import BANDWIDTH, Driving, natural_driving
-from identifier.method import vehicle_numbers
+from identifier.frozen import vehicle_numbers
 from identifier.methods import REFERENCE, certify
-from identifier.paper.design import PHASE_MARGIN, VARIANTS, PaperIdentifier, design_for, design_text
+from identifier.paper.design import (
+    PHASE_MARGIN,
+    VARIANTS,
+    PaperIdentifier,
+    design_for,
+    design_text,
+    with_keeping,
+)
 from identifier.paper.laws import LAWS, Gains
 from identifier.run import identify
 from identifier.stability import Certificate, DesignError, Operation
-from identifier.stability.certificate import judged_loop, loop_along
-from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS, with_keeping
+from identifier.stability.along import loop_along
+from identifier.stability.certificate import judged_loop
+from identifier.stability.gain_design import DEFAULT_KEEPING, KEEPINGS
 from identifier.stability.loop import direction_matrix
 from identifier.stability.monte_carlo import Beginning, Observed, monte_carlo
 from identifier.stability.operation import proven_bounds

@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 from identifier.compare.course import Shares, Trial, frozen_shares, where_learnt_and_elsewhere
 from identifier.compare.study import Comparison, Frozen, ranking
 from identifier.compare.sweep import Candidate, best_candidate, frozen_share, pareto_front
-from identifier.method import vehicle_numbers
+from identifier.frozen import vehicle_numbers
 from identifier.methods import METHODS, make_method
 from identifier.reproducibility import AxleRmse
 from identifier.verdict import Verdict

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from identifier.method import vehicle_numbers
+from identifier.frozen import vehicle_numbers
 from identifier.tire_model import TireModel
 from models.faults import KINDS
 from models.files import digest

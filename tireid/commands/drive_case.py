@@ -8,7 +8,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from identifier.methods import load_model
+from identifier.stored import load_model
 from identifier.tire_model import TireModel
 from models.faults import SIZED, FaultError, SensorFault
 from models.schema import require_few

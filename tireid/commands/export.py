@@ -4,7 +4,8 @@ import argparse
 from typing import Any
 
 from identifier.method import Method
-from identifier.methods import continuing, load_model
+from identifier.methods import continuing
+from identifier.stored import load_model
 from identifier.tire_model import TireModel
 from models.vehicle import Vehicle
 from mpc.realtime.caution import require_caution

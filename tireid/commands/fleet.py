@@ -6,7 +6,7 @@ from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from identifier.methods import load_model
+from identifier.stored import load_model
 from models.files import resolved
 from models.vehicle import Vehicle
 from tireid.cluster import cluster

@@ -8,8 +8,8 @@ import numpy as np
 
 from codegen.escape import visible
 from identifier.doctor import diagnose
-from identifier.method import CannotFreezeError, FrozenModelError, Method, require_alive
-from identifier.methods import load_model
+from identifier.frozen import FrozenModelError, require_alive
+from identifier.method import CannotFreezeError, Method
 from identifier.paper.network import Weights
 from identifier.reproducibility import (
     Replay,
@@ -20,6 +20,7 @@ from identifier.reproducibility import (
     reproduce,
 )
 from identifier.run import History, check_recording
+from identifier.stored import load_model
 from identifier.verdict import judge_prediction
 from models.recordings import (
     Recording,

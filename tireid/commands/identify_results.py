@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from codegen.arrays import Array, blocks, thinning
 from identifier.axle.guarantee import ForceBound
 from identifier.compare.course import side_slip
-from identifier.method import Block, Method, vehicle_numbers
+from identifier.frozen import vehicle_numbers
+from identifier.method import Method
 from identifier.methods import certify
 from identifier.own_network import OnnxModel
 from identifier.reproducibility import (
@@ -24,6 +25,7 @@ from identifier.reproducibility import (
     replay,
 )
 from identifier.run import History
+from identifier.setup import Block
 from identifier.tire_model import TireModel
 from identifier.verdict import Verdict
 from models.recordings import Recording

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array, blocks
 from codegen.escape import visible
-from identifier.method import vehicle_numbers
-from identifier.methods import load_model
+from identifier.frozen import vehicle_numbers
 from identifier.reproducibility import Prediction, beyond_known
+from identifier.stored import load_model
 from identifier.tire_model import TireModel
 from identifier.verdict import RoadFriction, Verdict, contradictions, within_band
 from models.recordings.record import ALL

@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from codegen.arrays import Array
-from identifier.method import force_unit_name
 from identifier.paper.design import VARIANTS
 from identifier.run import History
+from identifier.setup import force_unit_name
 from identifier.stability.loop import INTEGRATORS, Loop, eigenvalues, root_locus
 from identifier.stability.margins import gain_margin, phase_margin
 from tireid.figures.style import (

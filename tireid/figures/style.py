@@ -22,10 +22,10 @@ from matplotlib.legend import Legend
 from matplotlib.ticker import FuncFormatter, ScalarFormatter
 
 from codegen.arrays import Array
-from identifier.method import force_unit_name
 from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import AxleRmse, freeze_key
 from identifier.run import History
+from identifier.setup import force_unit_name
 
 P = ParamSpec("P")
 

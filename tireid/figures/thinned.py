@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import LONG, Array, blocks
-from identifier.method import Block
 from identifier.run import History
+from identifier.setup import Block
 from models.recordings import Recording
 
 COLUMNS = 1500  # of pixels, more than any panel has

@@ -29,11 +29,11 @@ from codegen.compiler import CompilationError
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.information import Evidence
 from identifier.compare.work import Map
+from identifier.frozen import vehicle_numbers
 from identifier.inertial import InertialIdentifier
-from identifier.method import vehicle_numbers
-from identifier.methods import load_model
 from identifier.reproducibility import counted_samples
 from identifier.run import identify, learn
+from identifier.stored import load_model
 from identifier.tire_model import AXLES
 from identifier.verdict import Verdict, judge_prediction
 from models.logs import arrow

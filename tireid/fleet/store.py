@@ -24,7 +24,7 @@ import numpy as np
 from codegen.arrays import Array
 from identifier.axle import AxleModel
 from identifier.axle.information import Information
-from identifier.method import vehicle_from
+from identifier.frozen import vehicle_from
 from models.vehicle import Vehicle
 
 BUCKETS = 16

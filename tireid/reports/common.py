@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from matplotlib.figure import Figure
 
 from codegen.arrays import LONG, blocks
-from identifier.method import vehicle_numbers
+from identifier.frozen import vehicle_numbers
 from models.files import digest, digest_of_bytes
 from models.recordings import Recording
 from models.vehicle import Vehicle

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from identifier.axle import AxleIdentifier, AxleModel
-from identifier.method import FrozenModelError
-from identifier.methods import load_model, stored_verdict
+from identifier.frozen import FrozenModelError
 from identifier.run import identify
+from identifier.stored import load_model, stored_verdict
 
 
 def learnt(recording, car, start=None):

@@ -16,8 +16,9 @@ from identifier.axle.band import (
     normal_quantile,
     ranges_of,
 )
-from identifier.methods import load_model, make_method
+from identifier.methods import make_method
 from identifier.run import identify
+from identifier.stored import load_model
 from identifier.verdict import calibrated, within_band
 from identifier.verdict.bands import color_of, quantile
 from identifier.verdict.motion import Windows

@@ -23,9 +23,10 @@ from identifier.axle.guarantee import (
     strip_sides,
     vertices,
 )
-from identifier.method import FrozenModelError
-from identifier.methods import load_model, make_method
+from identifier.frozen import FrozenModelError
+from identifier.methods import make_method
 from identifier.run import identify
+from identifier.stored import load_model
 from identifier.verdict import BoundViolatedError, OnlineBound, contradictions
 from identifier.verdict.guaranteed import strips_of
 from models.friction import Friction, FrictionChange

@@ -10,9 +10,9 @@ from scipy.signal import lsim
 
 from identifier.baselines import CurveModel, LinearBaseline
 from identifier.baselines.curves import CURVES
-from identifier.method import FrozenModelError
-from identifier.methods import load_model
+from identifier.frozen import FrozenModelError
 from identifier.run import identify
+from identifier.stored import load_model
 from models.tires import DugoffTire
 
 PARAMETERS = {

@@ -11,8 +11,9 @@ from identifier.baselines.horizon import LONGEST, build_stage
 from identifier.baselines.slip_filter import LIMITS, TIRES, Numbers
 from identifier.baselines.without_v_y import expected, predicted
 from identifier.method import CannotFreezeError
-from identifier.methods import load_model, make_method
+from identifier.methods import make_method
 from identifier.run import identify
+from identifier.stored import load_model
 from models.bicycle import BicycleParameters, bicycle
 from models.recordings import RecordingError
 from models.vehicle import Vehicle

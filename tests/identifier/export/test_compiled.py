@@ -15,8 +15,8 @@ from identifier.export.compiled import (
 )
 from identifier.export.package import build_package
 from identifier.methods import make_method
+from identifier.paper.design import with_keeping
 from identifier.run import identify
-from identifier.stability.gain_design import with_keeping
 from models.vehicle import sedan
 from tests.identifier.export.conftest import BANKED
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from identifier.export.onnx import onnx_bytes
-from identifier.method import FrozenModelError
-from identifier.methods import load_model
+from identifier.frozen import FrozenModelError
 from identifier.own_network import OnnxModel, UnusableNetworkError, read_network
 from identifier.paper.network import Network, NetworkModel, Weights
+from identifier.stored import load_model
 from models.bicycle import slip_angles
 
 onnx = pytest.importorskip("onnx", reason="needs the package onnx")

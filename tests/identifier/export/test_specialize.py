@@ -10,9 +10,9 @@ from identifier.export.compiled import samples_of
 from identifier.export.layout import Member, covariance_order
 from identifier.export.package import run_in_virtual_machine, synthetic_samples
 from identifier.export.specialize import Signal, SpecializedStep, specialize
-from identifier.method import COVARIANCE
 from identifier.methods import METHODS, make_method
 from identifier.run import identify
+from identifier.setup import COVARIANCE
 from models.vehicle import sedan
 
 CAR = sedan()

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from identifier.driving import natural_driving
-from identifier.paper.design import PaperIdentifier
+from identifier.paper.design import PaperIdentifier, with_keeping
 from identifier.paper.laws import DrivingError
-from identifier.stability.gain_design import with_keeping
 from identifier.stability.loop import INTEGRAL
 from identifier.stability.monte_carlo import Beginning, monte_carlo
 from identifier.stability.sampled_bound import Learning

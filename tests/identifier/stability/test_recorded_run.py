@@ -5,7 +5,7 @@ import numpy as np
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import LAWS
 from identifier.run import identify
-from identifier.stability.certificate import loop_along, network_inputs
+from identifier.stability.along import loop_along, network_inputs
 from identifier.stability.loop import direction_matrix
 from identifier.stability.operation import proven_bounds, worst_loop
 

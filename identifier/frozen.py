@@ -1,0 +1,118 @@
+"""The format of stored frozen models, and what no tires of a road are."""
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+
+from codegen.arrays import Array
+from models.rules import LARGEST_FORCE
+from models.schema import Table
+from models.vehicle import BICYCLE, Vehicle
+
+FORMAT = "tireid frozen model 1"
+
+
+class FrozenModelError(ValueError):
+    """A file does not hold a frozen model; the message names the file and what is wrong."""
+
+
+DEAD = 0.02  # of the stated stiffness, below which an axle does not push
+PROBE = 0.02  # rad, a slip at which every tire pushes back
+WIDE = 0.3  # rad, beyond the slip of every tire's peak
+LARGEST_MIN_SPEED = 50.0  # m/s: above it, a car would have forces on motorways only
+
+VEHICLE_KEYS = ("name", *BICYCLE)
+
+
+def vehicle_numbers(vehicle: Vehicle) -> dict[str, Any]:
+    """Return the name and the six numbers of the bicycle by the words of a vehicle file, SI.
+
+    Where some of them are estimated, `estimated` lists which.
+    """
+    numbers = {key: getattr(vehicle, key) for key in VEHICLE_KEYS}
+    return numbers | ({"estimated": list(vehicle.estimated)} if vehicle.estimated else {})
+
+
+def vehicle_from(data: Mapping[str, Any]) -> Vehicle:
+    """Return the car that `vehicle_numbers` describes.
+
+    Parameters
+    ----------
+    data : as from `vehicle_numbers`.
+
+    Raises
+    ------
+    ValueError
+        Where a key is missing or unknown, or a value has a wrong type or is impossible.
+    """
+    table = Table(data, "", FrozenModelError, "vehicle.")
+    return Vehicle(**table.record(Vehicle, skip=("chassis",)))
+
+
+class SteadyTires(Protocol):
+    """What has steady axle forces at slip angles, and knows the linear tires of its car."""
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """The car, with the cornering stiffnesses that are stated of it."""
+
+    def force_at(self, alpha: Array) -> Array:
+        """Return the steady axle forces at slip angles, (k, 2) [N].
+
+        Parameters
+        ----------
+        alpha : slip angles in the paper's sign [rad], (k,).
+        """
+
+
+def require_alive(refusal: type[ValueError], tires: SteadyTires) -> None:
+    """Refuse tires that no road has: forces that are not finite or too large, or a dead axle.
+
+    Parameters
+    ----------
+    refusal : class of the error to raise.
+    tires : both axles.
+
+    Raises
+    ------
+    ValueError
+        Of that class, with the forces or the stiffness.
+    """
+    force = np.asarray(tires.force_at(np.array([-WIDE, -PROBE, PROBE, WIDE])))
+    if not (np.abs(force) <= LARGEST_FORCE).all():
+        raise refusal(
+            f"axle forces must be finite and below {LARGEST_FORCE:g} N, at {WIDE} rad of slip and "
+            f"less they reach {np.abs(force).max():g} N"
+        )
+    if not (force[2] > force[1]).all():
+        raise refusal(
+            f"axle forces must rise with slip, at {-PROBE} and {PROBE} rad they are "
+            f"{force[1].tolist()} and {force[2].tolist()} N: check units, the order of inputs, "
+            "and the sign of slip (slip_sign)"
+        )
+    slope = (force[2] - force[1]) / (2.0 * PROBE)
+    for axle, here, said in zip(("front", "rear"), slope, tires.vehicle.bicycle[4:], strict=True):
+        if not here >= DEAD * said:
+            raise refusal(
+                f"the {axle} axle does not push: it has {here:.4g} N/rad, its vehicle {said:.4g}; "
+                "check the units of force and slip"
+            )
+
+
+def require_min_speed(speed: float) -> None:
+    """Refuse a lowest speed [m/s] that is not positive, or that no car drives at.
+
+    Parameters
+    ----------
+    speed : below which forces read zero.
+
+    Raises
+    ------
+    ValueError
+        Where it is not above zero, or above `LARGEST_MIN_SPEED`.
+    """
+    if not 0.0 < speed <= LARGEST_MIN_SPEED:
+        raise ValueError(
+            f"min_speed must be positive and at most {LARGEST_MIN_SPEED:g} m/s, it is {speed:g}"
+        )
