@@ -8,8 +8,10 @@ that no name breaks a line, rings a bell or hides what follows it.
 
 import html as standard_html
 import unicodedata
+from typing import Any
 
 MARKDOWN = frozenset("\\`*_{}[]<>#|~!&$@")  # what means something inside a paragraph or a table
+SHOWN = 60  # characters of a value in a message
 
 
 def visible(text: str, *, keep: str = "") -> str:
@@ -27,6 +29,21 @@ def visible(text: str, *, keep: str = "") -> str:
     )
 
 
+def shown(value: Any) -> str:
+    """Return a value as a message shows it: short, on one line, without controls.
+
+    Parameters
+    ----------
+    value : as it was read.
+    """
+    if isinstance(value, int) and value.bit_length() > 128:
+        return f"a whole number of {value.bit_length()} bits"
+    if isinstance(value, dict | list | tuple):
+        return f"a {'table' if isinstance(value, dict) else 'list'} of {len(value)}"
+    text = repr(value[: SHOWN + 1] if isinstance(value, str | bytes) else value)
+    return visible(text if len(text) <= SHOWN else f"{text[:SHOWN]}...")
+
+
 def c_comment(text: str) -> str:
     """Return text for the inside of a C comment between /* and */, with a blank on either side.
 
@@ -34,11 +51,11 @@ def c_comment(text: str) -> str:
     ----------
     text : any; it can neither end the comment nor seem to begin another.
     """
-    shown = visible(text)
+    inside = visible(text)
     for pair in ("*/", "/*", "//", "??"):  # ?? begins a trigraph, of which ??/ is a backslash
-        while pair in shown:
-            shown = shown.replace(pair, " ".join(pair))
-    return shown
+        while pair in inside:
+            inside = inside.replace(pair, " ".join(pair))
+    return inside
 
 
 def c_string(text: str) -> str:
@@ -72,8 +89,7 @@ def markdown(text: str) -> str:
     ----------
     text : any; it is shown as it stands, without marks, links, formulas or HTML.
     """
-    shown = visible(text)
-    return "".join(f"&#{ord(one)};" if one in MARKDOWN else one for one in shown)
+    return "".join(f"&#{ord(one)};" if one in MARKDOWN else one for one in visible(text))
 
 
 def html(text: str) -> str:

@@ -4,13 +4,14 @@ from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 
+from codegen.escape import shown
 from identifier.axle.model import AxleModel
 from identifier.baselines.curves import CurveModel
 from identifier.frozen import FORMAT, FrozenModelError, require_alive
 from identifier.own_network import OnnxModel
 from identifier.paper.network import NetworkModel
 from identifier.tire_model import TireModel
-from models.schema import Table, read_json, shown
+from models.schema import Table, read_json
 
 MODELS: Mapping[str, type[TireModel]] = {
     model.kind: model for model in (NetworkModel, AxleModel, CurveModel, OnnxModel)

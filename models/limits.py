@@ -66,7 +66,7 @@ def limits() -> InputLimits:
         except ValueError:
             asked[name] = math.nan
         if name not in known or not asked[name] > 0.0:
-            from models.schema import shown  # with all that reads files: help does not need it
+            from codegen.escape import shown  # with all of that package: help does not need it
 
             raise LimitError(
                 f"{VARIABLE} must hold NAME=NUMBER of {', '.join(known)}, not {shown(word)}"

@@ -4,7 +4,7 @@ import math
 from dataclasses import fields
 from typing import Any
 
-from models.schema import shown
+from codegen.escape import shown
 
 LARGEST_FORCE = 1e7  # of an axle [N]: ten times that of the heaviest dump truck
 

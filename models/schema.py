@@ -20,7 +20,7 @@ from typing import Any, BinaryIO, NoReturn, Union, get_args, get_origin, get_typ
 import numpy as np
 
 from codegen.arrays import Array
-from codegen.escape import visible
+from codegen.escape import SHOWN, shown, visible
 from models.limits import VARIABLE
 from models.limits import InputLimits as InputLimits
 from models.limits import LimitError as LimitError
@@ -29,7 +29,6 @@ from models.limits import limits_text as limits_text
 
 CHUNK = 1 << 20  # bytes that are unpacked at a time
 SWELLS, SWOLLEN_FROM = 200, 1 << 28  # times that a log packs, judged beyond so many bytes
-SHOWN = 60  # characters of a value in a message
 LONGEST_NAME = 200  # characters
 
 
@@ -55,21 +54,6 @@ def require_few(refusal: type[ValueError], where: str, count: float, limit: str,
             f"{where}: {what} must be at most {most:g}, here are {count:.10g}; "
             f"{VARIABLE}={limit}=NUMBER in the environment raises the limit"
         )
-
-
-def shown(value: Any) -> str:
-    """Return a value as a message shows it: short, on one line, without controls.
-
-    Parameters
-    ----------
-    value : as it was read.
-    """
-    if isinstance(value, int) and value.bit_length() > 128:
-        return f"a whole number of {value.bit_length()} bits"
-    if isinstance(value, dict | list | tuple):
-        return f"a {'table' if isinstance(value, dict) else 'list'} of {len(value)}"
-    text = repr(value[: SHOWN + 1] if isinstance(value, str | bytes) else value)
-    return visible(text if len(text) <= SHOWN else f"{text[:SHOWN]}...")
 
 
 def require_file(path: Path, refusal: type[ValueError], *, limit: str) -> None:

@@ -12,10 +12,11 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from codegen.escape import shown
 from models.bicycle import BicycleParameters
 from models.files import write_atomically
 from models.rules import require_positive, require_within
-from models.schema import Table, read_toml, require_name, shown
+from models.schema import Table, read_toml, require_name
 
 # What a car needs beyond the linear bicycle: roll, load transfer, tire lag and drive force.
 #

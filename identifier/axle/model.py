@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from codegen import Scan
 from codegen.arrays import Array, blocks
+from codegen.escape import shown
 from identifier.axle.band import (
     CENTERS,
     LEVEL,
@@ -46,7 +47,7 @@ from identifier.setup import Setup
 from identifier.tire_model import AXLES, GRIP, STIFFNESS, Estimate, Fact, TireModel
 from models.recordings import Recording
 from models.rules import require_positive
-from models.schema import Table, shown
+from models.schema import Table
 from models.vehicle import Vehicle
 
 ARRAYS = ("W", "own", "covariance", "prior_covariance", "excitation")

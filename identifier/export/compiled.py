@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 
 from codegen import load_library
 from codegen.arrays import Array
+from codegen.escape import shown
 from codegen.package import NAME, c_files, one_file
 from identifier.export.c_source import ORDER, PREFIX, C
 from identifier.export.package import FORMAT, Package
 from identifier.export.specialize import INPUTS
 from identifier.refused import STALE_TIME, stale_samples, with_rests
 from models.recordings import Recording
-from models.schema import Table, read_json, read_text, shown
+from models.schema import Table, read_json, read_text
 
 
 class Status(IntEnum):

@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 
+from codegen.escape import shown
 from models.logs.log import RecordingError
-from models.schema import shown
 
 LONGEST_REASON = 160  # characters
 FULL = (errno.ENOSPC, errno.EDQUOT)

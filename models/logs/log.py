@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from codegen.escape import visible
-from models.schema import shown
+from codegen.escape import shown, visible
 
 SOME = 12  # names in a message
 LONGEST = 200  # characters of them

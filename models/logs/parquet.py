@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from codegen.escape import shown
 from models.logs.arrow import doubles, whole_numbers, words
 from models.logs.foreign import need, one_line
 from models.logs.log import RecordingError
 from models.logs.spelling import unit_in_name
 from models.logs.stamps import MISSING, nanoseconds
 from models.logs.table import Cells, Gathered, Kind, TableLog
-from models.schema import require_few, require_file, shown
+from models.schema import require_few, require_file
 
 HEAD = 400  # rows that tell what columns are
 WHAT = "a Parquet file"  # that a file is read as

@@ -18,9 +18,10 @@ from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
+from codegen.escape import shown
 from models.logs.log import RecordingError
 from models.logs.spelling import is_unit, is_units_row, unit_in_name
-from models.schema import require_few, shown
+from models.schema import require_few
 
 HEAD, LINES = 1 << 18, 1500  # bytes and lines that are looked at
 ROWS = 400  # of data that tell what columns are

@@ -12,9 +12,9 @@ from types import MappingProxyType
 import numpy as np
 
 from codegen.arrays import Array, filled
+from codegen.escape import shown
 from models.logs.log import RecordingError
 from models.logs.units import ACCELERATION, ANGLE, FORCE, RATE, SPEED, TURNS, quantities
-from models.schema import shown
 
 BETA = "beta"
 INSTEAD = {"v_y": BETA, BETA: "v_y"}  # one of them is read, never both

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from codegen.escape import shown
 from models.logs.growing import Growing
 from models.logs.log import (
     Channel,
@@ -23,7 +24,7 @@ from models.logs.log import (
     some,
 )
 from models.logs.stamps import find_clock, seconds, told_clock, typical_rate
-from models.schema import LONGEST_NAME, limits, require_few, shown
+from models.schema import LONGEST_NAME, limits, require_few
 
 RUN = "run"
 MOST_WORDS = 10_000  # names of runs in one log

@@ -19,12 +19,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from codegen.escape import shown
 from models.logs import arrow
 from models.logs.log import RecordingError
 from models.logs.preamble import BLANKS, COMMENT, HEAD, MISSING, Layout, cells_of, find_layout
 from models.logs.stamps import nanoseconds
 from models.logs.table import Cells, Gathered, Kind, TableLog, Words
-from models.schema import pieces, require_few, shown
+from models.schema import pieces, require_few
 
 BLOCK, SMALL_BLOCK = 1 << 22, 1 << 19  # bytes of text that are read at once: pyarrow, Python
 QUOTES = 8  # that may stand before the end of a block and not close

@@ -6,8 +6,8 @@ A spelling may mean two things ("kN" is a force, "kn" a speed): the quantity tha
 import math
 import re
 
+from codegen.escape import shown
 from models.logs.log import RecordingError
-from models.schema import shown
 
 SPEED, ANGLE, RATE = "speed", "angle", "yaw rate"
 ACCELERATION, FORCE, TIME = "acceleration", "force", "time"

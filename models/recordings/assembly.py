@@ -9,6 +9,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from codegen.arrays import Array, filled
+from codegen.escape import shown
 from models.logs.clock import (
     SLOWEST,
     Raw,
@@ -36,7 +37,7 @@ from models.recordings.record import (
 )
 from models.recordings.rolled import rolled
 from models.recordings.wheel_scale import Scale, learnt_scales, scale_text, wheel_factor
-from models.schema import require_few, shown
+from models.schema import require_few
 
 SHORTEST = 1.0  # [s]: a stretch of less teaches nothing, since learning waits half a second
 FIELDS = {

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from codegen.escape import shown
 from models.logs.log import Heading, LogFile, RecordingError, some
 from models.logs.names import Proposal, propose
 from models.logs.signals import (
@@ -25,7 +26,6 @@ from models.logs.signals import (
 from models.logs.spelling import without_unit
 from models.logs.units import SI
 from models.recordings.map import LogMap
-from models.schema import shown
 
 INVERSE = {"Fyf_inv": "Fyf", "Fyr_inv": "Fyr"}  # computed backwards from the motion
 

@@ -20,6 +20,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from codegen.escape import shown
 from models.files import resolved, write_atomically
 from models.logs.clock import LONGEST_GAP
 from models.logs.log import RecordingError
@@ -36,7 +37,7 @@ from models.logs.signals import (
 from models.logs.units import to_si
 from models.recordings.repair import Repair
 from models.recordings.wheels import Wheels
-from models.schema import Table, read_toml, shown
+from models.schema import Table, read_toml
 
 AXES = {"ISO": 1.0, "SAE": -1.0}  # sign of everything but speed: y left and z up, or both turned
 TABLES = ("file", "clock", "filters", "signals", "wheels", "repair")

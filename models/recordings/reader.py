@@ -6,6 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from codegen.escape import shown
 from models.logs.door import ENDINGS, open_log
 from models.logs.log import LogFile, RecordingError
 from models.logs.memory import ArrayLog
@@ -14,7 +15,6 @@ from models.recordings.checks import check_against_vehicle, check_physics
 from models.recordings.map import LogMap, told_signals
 from models.recordings.record import Recording
 from models.recordings.repair import Repair
-from models.schema import shown
 from models.vehicle import Vehicle, sedan
 
 NO_NAMES: Mapping[str, str] = {}

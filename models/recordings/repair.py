@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from codegen.arrays import Array, blocks, filled, large
+from codegen.escape import shown
 from models.logs.log import RecordingError
 from models.recordings.record import CHANNELS, MINIMUM_SAMPLES, Recording
-from models.schema import Table, shown
+from models.schema import Table
 from models.smoothing import without_low_pass
 from models.vehicle import BICYCLE, Vehicle
 

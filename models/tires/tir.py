@@ -15,7 +15,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from models.schema import read_bytes, shown
+from codegen.escape import shown
+from models.schema import read_bytes
 from models.tires.magic_formula_coefficients import ESSENTIAL, Coefficients
 
 # Units of a tire property file: which keys have one, and what it is in SI.

@@ -16,7 +16,8 @@ from scipy.interpolate import CubicSpline
 from scipy.sparse.linalg import splu
 
 from codegen.arrays import Array
-from models.schema import limits, read_text, require_few, shown
+from codegen.escape import shown
+from models.schema import limits, read_text, require_few
 from mpc.path.line import Line, PathError, uniform_grid
 
 LEAST, MOST = -12.0, 18.0  # exponents of λ over the sixth power of the mean gap

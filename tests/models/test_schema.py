@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from codegen.escape import shown
 from models.schema import (
     VARIABLE,
     InputLimits,
@@ -20,7 +21,6 @@ from models.schema import (
     read_toml,
     require_few,
     require_name,
-    shown,
 )
 
 
