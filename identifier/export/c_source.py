@@ -12,7 +12,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
-from codegen.clean_c import FEW, Statements, literal, recognized
+from codegen.clean_c import Statements, literal, recognized
 from codegen.graph import graph_of
 from codegen.package import (
     c_files,
@@ -41,6 +41,7 @@ from identifier.refused import GATE, NOWHERE, STALE_TIME
 
 C = Path(__file__).parent / "c"
 PREFIX = "tireid"  # of the C as it lies there
+MOST_UNSUMMED = 150  # numbers that equations tell; more they sum up while these are at hand
 LIBRARY: Mapping[str, str] = {
     "tireid.h": "include",
     "tireid_equations.h": "src",
@@ -176,7 +177,10 @@ def _number(value: float) -> str:
 
 def _sums(specialized: SpecializedStep) -> bool:
     """Return whether the equations sum up what they tell, while it is at hand."""
-    return sum(map(specialized.function.numel_out, range(specialized.function.n_out()))) > FEW
+    return (
+        sum(map(specialized.function.numel_out, range(specialized.function.n_out())))
+        > MOST_UNSUMMED
+    )
 
 
 def _weights_and_others(specialized: SpecializedStep) -> tuple[list[Member], list[Member]]:

@@ -36,6 +36,15 @@ def test_a_ladder_is_stretched_exactly(tire, ratio):
     )
 
 
+@pytest.mark.parametrize("ratio", [0.3, 1.7])
+def test_a_model_and_the_tire_made_of_it_are_stretched_alike(learnt, ratio):
+    """The law stands twice: of scales of slip in the model, of their inverses among weights."""
+    weights = at_friction(prediction_tire(learnt), ratio).weights
+    np.testing.assert_allclose(
+        weights, prediction_tire(learnt.at_friction(ratio)).weights, rtol=1e-12
+    )
+
+
 def test_a_network_of_slip_is_stretched_exactly(car, rng):
     method = make_method("integral", car)
     method = replace(method, network=Network(inputs=("v_y", "r", "delta_f")))
