@@ -1,4 +1,4 @@
-"""The format of stored frozen models, and what no tires of a road are."""
+"""The format of stored frozen models, and the refusal of tires that no road has."""
 
 from collections.abc import Mapping
 from typing import Any, Protocol
