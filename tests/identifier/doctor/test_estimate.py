@@ -293,6 +293,42 @@ def test_what_nobody_believes_is_not_sure_nor_what_rests_on_it():
     assert not any(one.sure for one in found)
 
 
+def test_what_else_is_a_little_off_moves_a_size_as_far_as_is_told(driven):
+    """A factor of r beside a small delay that is not estimated, and beside one of v_y."""
+    car, log, _ = driven
+    bad = replace(log, r=1.1 * log.r)
+    fitter = Fitter(Balance((bad,), car))
+    fit, least = fitter.fit(["factor.r"], {}), 0.004
+    for key, channel in (("delay.a_y", "a_y"), ("delay.v_y", "v_y")):
+        told = fitter.moved(fit, {key: least})["factor.r"]
+        late = Late(channels=(channel,), delay=least).apply(bad)
+        there = Fitter(Balance((late,), car)).fit(["factor.r"], {})
+        assert abs(there.sizes["factor.r"] - fit.sizes["factor.r"]) == pytest.approx(told, rel=0.35)
+    both = fitter.moved(fit, {"delay.a_y": least, "delay.v_y": least})["factor.r"]
+    assert both > told
+
+
+def test_what_small_faults_could_make_is_not_sure_and_its_deviation_says_so(driven, monkeypatch):
+    car, log, _ = driven
+    bad = SensorFault(channel="r", kind="scaled", size=1.1).apply(log)
+    (found, *_) = estimate(bad, car)
+    search = Search(Balance((bad,), car))
+    search.run()
+    alone = search.deviation(search.found[0].suspect, search.fit)
+    assert found.deviation > 1.1 * found.size * alone
+    assert found.sure
+    monkeypatch.setattr(sys.modules[Search.__module__], "STANDS", 20.0)
+    assert not estimate(bad, car)[0].sure
+
+
+def test_a_log_that_no_fault_explains_has_none_and_says_so(driven):
+    """The steering is what a servo was told, which went another way."""
+    car, log, _ = driven
+    said = examine(replace(log, delta_f=log.delta_f[::-1].copy()), car)
+    assert said.findings == () and not said.sizes
+    assert "front axle" in said.unseen[0] and "commanded" in said.unseen[0]
+
+
 def test_what_a_straight_drive_cannot_tell_is_said(driven):
     car, log, _ = driven
     names = ("v_y", "r", "delta_f", "a_y")
