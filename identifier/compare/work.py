@@ -8,6 +8,8 @@ any time.
 import hashlib
 import json
 import multiprocessing
+import os
+import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
@@ -42,11 +44,41 @@ def spread(workers: int, *, chunk: int = 1) -> Iterator[Map]:
     if workers == 1:
         yield map
         return
-    pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
+    pool = fresh_processes(workers)
     try:
         yield lambda work, items: pool.map(work, items, chunksize=chunk)
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def fresh_processes(workers: int, prepare: Callable[[], None] | None = None) -> ProcessPoolExecutor:
+    """Return a pool of new processes that end with this one, however it ends.
+
+    Parameters
+    ----------
+    workers : number of processes.
+    prepare : what each does first; a function of a module.
+    """
+    return ProcessPoolExecutor(
+        workers,
+        mp_context=multiprocessing.get_context("spawn"),
+        initializer=_begin_process,
+        initargs=(prepare,),
+    )
+
+
+def _begin_process(prepare: Callable[[], None] | None) -> None:
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    if prepare is not None:
+        prepare()
+
+
+def _end_with_parent() -> None:
+    """End this process with the one that made it: one that is killed tells its pool nothing."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -1,7 +1,11 @@
 """Work that was stopped goes on where it was, and never takes the result of other work."""
 
 import json
+import subprocess
+import sys
+import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -149,3 +153,36 @@ def test_a_digest_sees_every_entry_the_shape_and_the_type_of_an_array():
     assert content_digest(long, 2.0) == content_digest(np.zeros(5000), 2.0)
     assert content_digest(long[::2]) == content_digest(np.zeros(2500)), "strides do not matter"
     assert content_digest("a", "b") != content_digest("ab")
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="asks /proc who lives")
+def test_processes_end_with_the_one_that_made_them_when_that_is_killed():
+    program = (
+        "import os, time\n"
+        "from identifier.compare.work import fresh_processes\n"
+        "if __name__ == '__main__':\n"
+        "    pool = fresh_processes(2)\n"
+        "    waits = [pool.submit(time.sleep, 0.5) for _ in range(2)]\n"
+        "    [one.result() for one in waits]\n"
+        "    print(*pool._processes, flush=True)\n"
+        "    time.sleep(60)\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True
+    ) as parent:
+        assert parent.stdout is not None
+        workers = [int(one) for one in parent.stdout.readline().split()]
+        assert workers and all(_lives(one) for one in workers)
+        parent.kill()
+    until = time.monotonic() + 10.0
+    while any(_lives(one) for one in workers) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert not any(_lives(one) for one in workers)
+
+
+def _lives(process):
+    """Whether a process is there and no zombie that nobody has waited for."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False

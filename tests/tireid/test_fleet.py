@@ -303,12 +303,24 @@ def test_a_question_in_sql_chooses_rows_and_sees_nothing_else(store):
             Store(store).rows(where=wrong)
 
 
+def test_stiffness_of_a_small_car_has_digits_in_the_table(store):
+    (group, *_) = merge(usable(Store(store).rows(where="vehicle = 'red'"), refused=True), [])
+    small = replace(group.model, W=1e-3 * group.model.W)
+    words = command._table([replace(group, model=small)]).split("kN/rad")[0].replace(",", "")
+    told = [float(one) for one in words.split()[-2:]]
+    assert told == pytest.approx(small.cornering_stiffness / 1e3, rel=0.005)
+
+
 def test_cars_of_another_kind_are_not_merged(store):
     rows = usable(Store(store).rows(), refused=True)
     with pytest.raises(MergeError, match="are of cars whose files differ: merge --by vehicle"):
         merge(rows, [])
-    with pytest.raises(MergeError, match="'driver' is none of what is known of it: vehicle, tires"):
+    with pytest.raises(
+        MergeError, match="'driver' is none of what is known of it: vehicle, tires"
+    ) as no:
         merge(rows, ["driver"])
+    known = str(no.value).rpartition(": ")[2].split(", ")
+    assert len(set(known)) == len(known)
     with pytest.raises(MergeError, match="must begin with year-month-day"):
         merge([replace(rows[0], date="yesterday")], ["week"])
 

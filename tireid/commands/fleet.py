@@ -385,7 +385,7 @@ def _table(groups: list[Merged]) -> str:
                 one.name,
                 str(one.logs),
                 f"{one.told.seconds / 60.0:.1f} min",
-                f"{C[0]:.1f}, {C[1]:.1f} kN/rad",
+                f"{C[0]:.3g}, {C[1]:.3g} kN/rad",
                 f"{known[0]:.1f}, {known[1]:.1f} deg",
             ]
         )

@@ -9,13 +9,12 @@ what it was doing, which is done again, and a log that it dies of twice becomes 
 
 import hashlib
 import json
-import multiprocessing
 import os
 import posixpath
 import re
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -28,7 +27,7 @@ import numpy as np
 from codegen.compiler import CompilationError
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.information import Evidence
-from identifier.compare.work import Map
+from identifier.compare.work import Map, fresh_processes
 from identifier.frozen import vehicle_numbers
 from identifier.inertial import InertialIdentifier
 from identifier.reproducibility import counted_samples
@@ -490,13 +489,6 @@ def on_a_cluster(elsewhere: Callable[..., Iterator[Any]]) -> Map:
     return spread_map
 
 
-def _pool(jobs: int) -> ProcessPoolExecutor:
-    # Fresh processes rather than forks: CasADi's graphs must not be built by two threads at once.
-    return ProcessPoolExecutor(
-        jobs, mp_context=multiprocessing.get_context("spawn"), initializer=_prepare_process
-    )
-
-
 def _prepare_process() -> None:
     """Keep a process to one thread; import pyarrow, which reads many short logs sooner."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "ARROW_IO_THREADS"):
@@ -508,7 +500,7 @@ def _until_one_dies(
     work: Callable[[Any], list[LogRow]], portions: Sequence[Any], jobs: int
 ) -> Iterator[tuple[int, list[LogRow]]]:
     """Yield which portion is done and its rows, as long as no process dies."""
-    pool = _pool(jobs)
+    pool = fresh_processes(jobs, _prepare_process)
     try:
         futures = {pool.submit(work, one): k for k, one in enumerate(portions)}
         for future in as_completed(futures):

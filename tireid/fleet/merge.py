@@ -85,7 +85,7 @@ def _value(row: LogRow, name: str) -> str:
         return str(getattr(row, name))
     tags = json.loads(row.tags)
     if name not in tags:
-        known = ", ".join((*BY, *sorted(tags)))
+        known = ", ".join(dict.fromkeys((*BY, *sorted(tags))))
         raise MergeError(f"{row.log}: {name!r} is none of what is known of it: {known}")
     return str(tags[name])
 
