@@ -60,6 +60,9 @@ int {name}_scan(long n, long every, const double** arg, const long* arg_step,
 Longs: TypeAlias = "ctypes.Array[ctypes.c_long]"
 
 
+ADDRESSES = ("loop", "layout")  # of a scan, found when they are asked for
+
+
 class Layout(NamedTuple):
     """What is alike in every call of a compiled loop: places and sizes of ports, for C."""
 
@@ -128,6 +131,10 @@ class Scan:
         self.outputs = tuple(p for p in names_out if p.removesuffix("_next") not in carry)
         self._size_in = {p: step.size_in(p) for p in names_in}
         self._size_out = {p: step.size_out(p) for p in names_out}
+
+    def __getstate__(self) -> dict[str, object]:
+        """Return what it is made of: what points into this process is loaded anew in another."""
+        return {name: value for name, value in vars(self).items() if name not in ADDRESSES}
 
     @cached_property
     def loop(self) -> "ctypes._NamedFuncPointer | None":

@@ -8,7 +8,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -236,7 +236,7 @@ class PaperIdentifier(Method):
                 "gains": np.array([getattr(self.gains, name) for name in GAINS]),
                 "sampling": np.array([self.dt, self.force_unit, self.min_speed]),
             },
-            observe=lambda x: {"xi_hat": axle_impulse(x, vehicle) / self.force_unit},
+            observe=partial(_observed, vehicle, self.force_unit),
         )
 
     def numbers(self) -> dict[str, Any]:
@@ -273,6 +273,11 @@ class PaperIdentifier(Method):
 @cache
 def _scan(structure: Structure) -> Scan:
     return Scan(build_step(structure), carry=CARRY, over=OVER)
+
+
+def _observed(vehicle: Vehicle, force_unit: float, x: Array) -> dict[str, Array]:
+    """Return the observer's state at the first measurement."""
+    return {"xi_hat": axle_impulse(x, vehicle) / force_unit}
 
 
 def axle_impulse(x: Array, vehicle: Vehicle) -> Array:

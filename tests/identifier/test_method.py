@@ -1,5 +1,6 @@
 """What every method answers: its ports, a setup without a recording, where observers begin."""
 
+import pickle
 from dataclasses import replace
 
 import casadi as ca
@@ -12,6 +13,7 @@ from identifier.methods import METHODS, REGRESSIONS, certify, make_method
 from identifier.run import identify
 from models.bicycle import bicycle
 from models.vehicle import sedan
+from tests.identifier.conftest import felt
 
 CAR = sedan()
 OBSERVING = {"integral", "instantaneous", "instantaneous_scaled", "pi_lead"}
@@ -47,6 +49,18 @@ def test_an_observer_begins_at_the_first_measurement(name, drive):
 def test_a_method_without_an_observer_begins_alike_wherever_it_begins(name):
     setup = make_method(name, CAR).setup(CAR)
     assert setup.begin(np.array([1.0, 1.0])) is setup
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_a_run_goes_to_another_process_and_tells_the_same_there(name, drive):
+    run = identify(felt(drive(n=300)), CAR, make_method(name, CAR))
+    forces = run.axle_force.copy()
+    there = pickle.loads(pickle.dumps(run))
+    np.testing.assert_array_equal(there.axle_force, forces)
+    for ours, theirs in ((run.state, there.state), (run.outputs, there.outputs)):
+        assert set(ours) == set(theirs)
+        for port, values in ours.items():
+            np.testing.assert_array_equal(theirs[port], values)
 
 
 @pytest.mark.parametrize("name", METHODS)
