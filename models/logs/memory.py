@@ -12,6 +12,7 @@ from models.logs.log import Channel, Clock, Heading, Listed, RecordingError, cho
 
 TIMES = ("t", "time", "timestamp")  # what the clock is called
 RUN = "run"
+NANOSECONDS = 1e9  # of a second
 
 
 class ArrayLog:
@@ -21,7 +22,8 @@ class ArrayLog:
     ----------
     name : stands for the file in messages.
     data : a data frame or a mapping, by column: what `data[column]` is has one axis.
-    clock : column that is the time; empty takes the one called t or time.
+    clock : column that is the time: seconds, or times of the calendar or durations, which count
+        from the first; empty takes the one called t or time.
 
     Raises
     ------
@@ -135,6 +137,8 @@ class ArrayLog:
             raise RecordingError(
                 f"{self._name}: {name} must have one axis, its shape is {value.shape}"
             )
+        if name == self._clock and value.dtype.kind in "Mm":
+            return _since_first(value)
         try:
             if value.dtype.kind in "MmSUbc":  # times of the calendar, words, flags, complex numbers
                 raise TypeError
@@ -145,8 +149,20 @@ class ArrayLog:
             ) from None
 
 
+def _since_first(stamps: NDArray[Any]) -> Array:
+    """Return times of the calendar, or durations, since the first [s]; those missing are NaN."""
+    there = stamps[~np.isnat(stamps)]
+    seconds = np.full(stamps.size, np.nan)
+    if there.size:
+        since = (there - there[0]).astype("timedelta64[ns]").astype(np.int64)
+        seconds[~np.isnat(stamps)] = since / NANOSECONDS
+    return seconds
+
+
 def _array(name: str, column: str, value: Any) -> NDArray[Any]:
     """Return a column as an array; what a mask hides is empty, whatever number lies below it."""
+    if getattr(getattr(value, "dtype", None), "tz", None) is not None:  # of pandas
+        return np.asarray(value, dtype="datetime64[ns]")  # of UTC, where no hour is there twice
     if isinstance(value, np.ma.MaskedArray) and value.dtype.kind in "iuf":
         return np.asarray(np.ma.filled(value.astype(np.float64), np.nan))
     try:

@@ -39,6 +39,7 @@ from models.recordings.rolled import rolled
 from models.recordings.wheel_scale import Scale, learnt_scales, scale_text, wheel_factor
 from models.schema import require_few
 
+FASTEST = 5e-4  # [s]: shortest step by which a unit of the time is guessed
 SHORTEST = 1.0  # [s]: a stretch of less teaches nothing, since learning waits half a second
 FIELDS = {
     "Fyf": "axle_force",
@@ -291,8 +292,16 @@ def _judge_time(label: str, raw: Raw) -> None:
     if typical > SLOWEST:
         raise RecordingError(
             f"{label}: t must be in s with at least 10 samples per second, its typical step is "
-            f"{typical:.6g}" + ("; milliseconds? divide by 1000" if typical >= 1.0 else "")
+            f"{typical:.6g}{_other_unit(typical)}"
         )
+
+
+def _other_unit(step: float) -> str:
+    """Return what the time may be in where samples are so far apart."""
+    for power, unit in ((3, "milliseconds"), (6, "microseconds"), (9, "nanoseconds")):
+        if FASTEST <= step / 10.0**power <= SLOWEST:
+            return f"; {unit}? divide by 1{power * '0'}"
+    return ""
 
 
 def _pieces(t: Array, longest: float) -> list[slice]:

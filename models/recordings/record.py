@@ -168,7 +168,8 @@ class Recording:
         Parameters
         ----------
         data : a pandas data frame, or a mapping of arrays of one length, by column. Names, units
-            and signs are those of `read_recording`; `delta_r` may be missing.
+            and signs are those of `read_recording`; `delta_r` may be missing. Times of the
+            calendar and durations count from the first.
         name : of the recording, in place of a file's.
         run : which run of the column "run", where there are several.
         dt : sample time T_s to resample to [s].

@@ -252,6 +252,38 @@ def test_what_a_command_takes_as_a_word_is_refused_with_the_remedy(log, tires):
             call()
 
 
+@pytest.mark.parametrize("kind", ["datetime64[ns]", "datetime64[us]", "timedelta64[ms]"])
+def test_times_of_the_calendar_and_durations_count_from_the_first(log, kind):
+    columns = {"vx": log.v_x, "vy": log.v_y, "r": log.r, "delta_f": log.delta_f}
+    milliseconds = np.round(1e3 * (log.t - log.t[0])).astype("timedelta64[ms]")
+    start = np.datetime64("2026-03-29T00:59:55") if kind.startswith("d") else 0
+    stamped = {"t": (start + milliseconds).astype(kind), **columns}
+    told = ti.Recording.from_dataframe(stamped)
+    plain = ti.Recording.from_dataframe({"t": log.t - log.t[0], **columns})
+    np.testing.assert_allclose(told.t, plain.t, atol=1e-9)
+    np.testing.assert_allclose(told.r, plain.r, atol=1e-9)
+    stamped["t"][7] = "NaT"
+    with pytest.raises(RecordingError, match=r"1 of .* are empty, .* the first in index 7"):
+        ti.Recording.from_dataframe(stamped)
+
+
+def test_an_hour_that_is_there_twice_in_summer_time_is_no_jump(log):
+    pandas = pytest.importorskip("pandas", reason="needs pandas, which is no dependency")
+    t = pandas.to_datetime("2026-10-25 00:59:55", utc=True) + pandas.to_timedelta(log.t, unit="s")
+    columns = {"vx": log.v_x, "vy": log.v_y, "r": log.r, "delta_f": log.delta_f}
+    data = pandas.DataFrame({"t": t.tz_convert("Europe/Berlin"), **columns})
+    np.testing.assert_allclose(ti.Recording.from_dataframe(data).t, log.t - log.t[0], atol=1e-6)
+
+
+@pytest.mark.parametrize("unit", ["milli", "micro", "nano"])
+def test_the_unit_of_a_time_that_is_not_in_seconds_is_guessed(log, unit):
+    power = {"milli": 3, "micro": 6, "nano": 9}[unit]
+    data = {"t": 10.0**power * log.t, "vx": log.v_x, "vy": log.v_y, "r": log.r,
+            "delta_f": log.delta_f}  # fmt: skip
+    with pytest.raises(RecordingError, match=f"; {unit}seconds[?] divide by 1{power * '0'}$"):
+        ti.Recording.from_dataframe(data)
+
+
 @pytest.mark.parametrize("data", [[1.0, 2.0], 3.0, None])
 def test_what_has_no_columns_is_refused(data):
     with pytest.raises(RecordingError, match="a data frame or a mapping"):
