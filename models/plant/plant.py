@@ -198,7 +198,10 @@ def tire_of(vehicle: Vehicle) -> MagicFormula:
     """
     file = vehicle.require_chassis().tire
     if file is None:
-        raise VehicleError(f"vehicle '{vehicle.name}' names no tire file and none was given")
+        raise VehicleError(
+            f"vehicle '{vehicle.name}' names no tire file and none was given: say which by "
+            'tire = "my_tire.tir" in its table [chassis]'
+        )
     path = os.fspath(file)
     tire = MagicFormula.from_tir(path)
     for axle, load in zip(("front", "rear"), vehicle.axle_loads, strict=True):

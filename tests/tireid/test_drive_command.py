@@ -260,7 +260,8 @@ def test_tires_of_another_car_lead_somewhere(bend, tmp_path, capsys, undrawn):
     heavy.save(tmp_path / "heavy.json")
     words = ["--path", bend, "--weights", tmp_path / "heavy.json", "--out", tmp_path / "out"]
     said = refusal(capsys, words)
-    assert "was learnt on the car 'heavy', driven is 'sedan': give that car by --vehicle" in said
+    masses = f"(mass {1.1 * car.mass:.6g} there, {car.mass:.6g} here)"
+    assert f"was learnt on the car 'heavy', driven is 'sedan' {masses}: give that car by" in said
     assert "tireid init" in said and "docs/driving.md" in said
     replace(tire, vehicle=replace(car, name="mine")).save(tmp_path / "mine.json")
     words = ["drive", "--path", bend, "--weights", tmp_path / "mine.json", "--film", "none"]

@@ -8,6 +8,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
+from identifier.frozen import VEHICLE_KEYS
 from identifier.stored import load_model
 from identifier.tire_model import TireModel
 from models.faults import SIZED, FaultError, SensorFault
@@ -326,8 +327,14 @@ def _require_its_car(options: argparse.Namespace, learnt: Vehicle, setup: Setup)
             f"{mine}the {setup.vehicle.name!r} that --plant {setup.plant} brings: leave --weights "
             "out to learn on it first"
         )
+    driven = setup.vehicle
+    apart = "; ".join(
+        f"{key} {getattr(learnt, key):.6g} there, {getattr(driven, key):.6g} here"
+        for key in VEHICLE_KEYS
+        if key != "name" and getattr(learnt, key) != getattr(driven, key)
+    )
     raise ValueError(
-        f"{mine}{setup.vehicle.name!r}: give that car by --vehicle FILE, with its table [chassis] "
-        "(tireid init writes one, docs/driving.md says what it holds), or leave --weights out to "
-        "learn on the car that is driven"
+        f"{mine}{driven.name!r} ({apart}): give that car by --vehicle FILE, with its table "
+        "[chassis] (tireid init writes one, docs/driving.md says what it holds), or leave "
+        "--weights out to learn on the car that is driven"
     )
