@@ -363,10 +363,10 @@ def examine(recording: Recording, vehicle: Vehicle) -> Examination:
         return Examination((), (unseen,), {})
     search = Search(balance)
     search.run()
+    sizes = {key: search.fit.sizes[key] for key in search.chosen}
     worst = int(np.argmax(search.fit.misses))
     if search.fit.misses[worst] > BEYOND:
-        return Examination((), (f"sizes of faults: {UNEXPLAINED[worst]}",), {})
-    sizes = {key: search.fit.sizes[key] for key in search.chosen}
+        return Examination((), (f"sizes of faults: {UNEXPLAINED[worst]}",), sizes)
     return Examination(search.findings(), search.unseen(), sizes)
 
 

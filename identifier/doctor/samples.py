@@ -189,6 +189,7 @@ def _channel(name: str, signal: Array, recording: Recording, jumps: bool) -> Ite
             text=f"{name} has a new value every {1e3 * stairs * dt:.3g} ms only and repeats it in "
             f"between: so it is {1e3 * delay:.3g} ms late in the mean",
             repair=Repair(delay={name: delay}),
+            sure=True,
         )
     elif quantum is None and (noise > 0.0 or name in ("v_y", "r", "a_y")):
         yield from _repeats(name, runs, noise > 0.0, recording)

@@ -13,7 +13,7 @@ from identifier.doctor import Finding, diagnose
 from identifier.doctor.diagnosis import Diagnosis
 from identifier.doctor.screen import combined
 from identifier.run import identify
-from models.faults import Lagging, Late, SensorFault, Together, WrongUnit
+from models.faults import Held, Lagging, Late, SensorFault, Together, WrongUnit
 from models.recordings import Repair
 from models.vehicle import sedan
 
@@ -145,6 +145,18 @@ def test_nothing_fine_is_sure_on_a_reading_that_is_not(driven):
     assert found["delay", "r"].size == pytest.approx(0.08, abs=0.01)
     assert not found["delay", "r"].sure
     assert not diagnose(wheel, car).repair
+
+
+def test_a_receiver_of_satellites_is_brought_to_the_clock_of_the_others(driven):
+    """v_y at 10 Hz, held in between, 150 ms late: 195 ms in the mean."""
+    car, log = driven
+    late = Late(channels=("v_y",), delay=0.15).apply(log)
+    received = Held(channels=("v_y",), every=0.1, lasts=0.1).apply(late)
+    found = diagnose(received, car)
+    assert {(one.code, one.channel) for one in found.findings if one.sure} == {
+        ("held", "v_y"), ("delay", "v_y")
+    }  # fmt: skip
+    assert found.repair.delay == {"v_y": pytest.approx(0.195, abs=0.02)}
 
 
 def test_nothing_is_looked_for_where_nothing_was_driven(driven):
