@@ -29,7 +29,7 @@ LIKELY, HOPELESS = 8, 0.5  # suspects that are looked at closely, from this shar
 PROMISING = 12  # that are looked at closely then, by the sizes that were tried
 AWRY = 9.0  # mean square of a part, from which straight lines promise nothing: all are looked at
 BEYOND = 20.0  # mean square of a part with all that was found, from which nothing was understood
-GIVEN_UP = 40.0  # the same, from which no third fault is asked for
+TRIED, GIVEN_UP = 2, 40.0  # faults, with which the same is so large that no other is asked for
 UNEXPLAINED = (
     "no tire explains the front axle, whichever of them is taken out: a steering angle that was "
     "commanded and not measured, play, or several faults at once",
@@ -229,7 +229,7 @@ class Search:
 
     def _search(self) -> None:
         while len(self.found) < MOST:
-            if len(self.found) >= SEVERAL and max(self.fit.misses) > GIVEN_UP:
+            if len(self.found) >= TRIED and max(self.fit.misses) > GIVEN_UP:
                 break
             listed = self._trusted(self.candidates())
             if not listed or listed[0].gain < CHANCE:
