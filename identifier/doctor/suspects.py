@@ -214,8 +214,8 @@ SUSPECTS = (
     Suspect("bank", "bank", "", "rad", 0.03, 0.003, "", True,
             "the road falls by {size} (+: to the left), or wind pushes so", "°", DEGREES),
     Suspect("downforce", "downforce", "", "s^2/m^2", 2e-4, 5e-5, "", True,
-            "the tires push more at speed, as by a downforce of {size} of the weight at 100 km/h",
-            " %", 100.0 * (100.0 / 3.6) ** 2),
+            "the tires push more at speed, as by a downforce of {size}",
+            " % of the weight at 100 km/h", 100.0 * (100.0 / 3.6) ** 2),
 )  # fmt: skip
 NUISANCES = {  # mean, standard deviation, and what both grow with, of a sedan
     "relaxation.front": (0.17, 0.11, ""),  # wheelbases; cars on the road have up to 0.4
