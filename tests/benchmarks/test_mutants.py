@@ -1,12 +1,13 @@
 """The mutation run: what it plants, that it plants the same again, that it sees what tests miss."""
 
 import subprocess
+import tomllib
 from itertools import chain
 from pathlib import Path
 
 import pytest
 
-from benchmarks.mutants import plant, written_fault
+from benchmarks.mutants import PLANTED, plant, written_fault
 from benchmarks.mutation.c_faults import c_faults, changes_tokens, tokens
 from benchmarks.mutation.draw import C_FOLDERS, changes, draw, shares, strata
 from benchmarks.mutation.faults import Fault, function_at
@@ -207,6 +208,11 @@ def test_the_function_of_a_line_is_the_innermost():
     at = next(k for k, line in enumerate(lines, 1) if "yield new" in line)
     assert function_at(str(path), at) == "_Rules._other_names"
     assert function_at(str(path), 1) == "<module>"
+
+
+def test_every_fault_that_was_written_down_follows_the_code():
+    entries = tomllib.loads(PLANTED.read_text(encoding="utf-8"))["fault"]
+    assert len({written_fault(entry).kind for entry in entries}) == len(entries)
 
 
 def test_a_fault_that_was_written_down_must_match_its_file_once(tmp_path):
