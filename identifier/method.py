@@ -269,18 +269,6 @@ class Method(ABC):
         del state
         return None
 
-    learns_kind = ""  # kind of model that it learns, and that a run of it can begin with
-
-    def resumes(self, model: TireModel) -> bool:
-        """Return whether a run can begin with a stored model: with none, if it does not say more.
-
-        Parameters
-        ----------
-        model : its weights.
-        """
-        del model
-        return False
-
     def possible_tires(self) -> "HalfSpaces | None":
         """Return the weights that the curve of a tire can have; None where it learns no curves."""
         return None

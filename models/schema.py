@@ -15,7 +15,7 @@ import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import Any, BinaryIO, NoReturn, Union, get_args, get_origin, get_type_hints
+from typing import Any, NoReturn, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -123,8 +123,7 @@ def pieces(path: Path, refusal: type[ValueError], *, limit: str) -> Iterator[byt
     with path.open("rb") as raw:
         zipped = raw.read(2) == b"\x1f\x8b"
         raw.seek(0)
-        # What is read from is enough of a BinaryIO, which a GzipFile is not by name.
-        file: BinaryIO = gzip.GzipFile(fileobj=raw) if zipped else raw  # type: ignore[assignment]
+        file = gzip.GzipFile(fileobj=raw) if zipped else raw
         size = 0
         while True:
             try:

@@ -35,7 +35,7 @@ from identifier.axle.step import CARRY, LEARNING_OVER, PORTS, build_step
 from identifier.axle.watch import BEGIN, Watch
 from identifier.certificate import Certificate
 from identifier.driving import Driving, natural_driving
-from identifier.method import OTHER_STRUCTURE, Method, Reached, Run, Track, fits, resumed
+from identifier.method import OTHER_STRUCTURE, Method, Reached, Run, Track, resumed
 from identifier.setup import Port, Setup
 from identifier.tire_model import AXLES, TireModel, brisk_speed
 from identifier.tuning import Range, ranges_around
@@ -89,8 +89,6 @@ class AxleIdentifier(Method):
         Where the ladder does not rise by powers of two, dt is not positive, or rising_until is
         negative.
     """
-
-    learns_kind = AxleModel.kind
 
     prior: Prior
     sway: Sway
@@ -181,15 +179,6 @@ class AxleIdentifier(Method):
         history : of this method.
         """
         return Certificate(properties=certified_along(self, history))
-
-    def resumes(self, model: TireModel) -> bool:
-        """Return whether a run can begin with a stored model.
-
-        Parameters
-        ----------
-        model : its weights.
-        """
-        return fits(model, AxleModel, ladder=self.ladder)
 
     def possible_tires(self) -> HalfSpaces:
         """Return the weights that the curve of a tire can have, within the bounds."""

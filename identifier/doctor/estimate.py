@@ -29,7 +29,7 @@ LIKELY, HOPELESS = 8, 0.5  # suspects that are looked at closely, from this shar
 PROMISING = 12  # that are looked at closely then, by the sizes that were tried
 AWRY = 9.0  # mean square of a part, from which straight lines promise nothing: all are looked at
 BEYOND = 20.0  # mean square of a part with all that was found, from which nothing was understood
-TRIED, GIVEN_UP = 2, 40.0  # faults, with which the same is so large that no other is asked for
+GIVEN_UP_WITH, GIVEN_UP_FROM = 2, 40.0  # faults and the same, from which no other is asked for
 UNEXPLAINED = (
     "no tire explains the front axle, whichever of them is taken out: a steering angle that was "
     "commanded and not measured, play, or several faults at once",
@@ -76,7 +76,6 @@ class Search:
             one for one in SUSPECTS if balance.has_accelerometer or "a_y" not in one.channel
         ]
         self.found: list[Found] = []
-        self.left_open: dict[str, float] = {}  # of sizes of what was found, by key
         self.in_doubt = False  # whether what would leave no car explained more than a found one
         self.fit = self.fitter.fit((), {})
 
@@ -124,17 +123,34 @@ class Search:
         suspect : whose keys are among those of the fit.
         fit : with it.
         """
-        least = suspect.least * suspect.scale(self.vehicle)
-        return math.hypot(fit.deviation(self.keys(suspect)[0]), least)
+        return math.hypot(fit.deviation(self.keys(suspect)[0]), self.least(suspect))
+
+    def least(self, suspect: Suspect) -> float:
+        """Return the size of a suspect that nobody need mend, on this car [SI].
+
+        Parameters
+        ----------
+        suspect : of any size.
+        """
+        return suspect.least * suspect.scale(self.vehicle)
 
     def real_deviation(self, suspect: Suspect, fit: Fit) -> float:
         """Return the same of a real log, in which all else is a little off.
+
+        A real log has each other fault too, as large as its `least`: small delays, scales and
+        offsets that nobody looks for shift what is estimated without them, each in its own way.
 
         Parameters
         ----------
         suspect, fit : as in `deviation`.
         """
-        moved = self.left_open.get(self.keys(suspect)[0], 0.0)
+        left = [one for one in self.suspects if self.keys(one)[0] not in fit.sizes]
+        least = {
+            key: self.least(one) / math.sqrt(len(self.keys(one)))
+            for one in left
+            for key in self.keys(one)
+        }
+        moved = self.fitter.moved(fit, least)[self.keys(suspect)[0]]
         return math.hypot(self.deviation(suspect, fit), moved)
 
     def outlook(self) -> tuple[list[Suspect], dict[str, Outlook]]:
@@ -202,34 +218,17 @@ class Search:
         """
         size = self.size(suspect, fit.sizes)
         most = BELIEVED * suspect.plausible * suspect.scale(self.vehicle)
-        least = suspect.least * suspect.scale(self.vehicle)
-        by_gain = math.hypot(size / math.sqrt(2.0 * gain), least) if gain > 0.0 else math.inf
+        by_gain = math.inf
+        if gain > 0.0:
+            by_gain = math.hypot(size / math.sqrt(2.0 * gain), self.least(suspect))
         telling = abs(size) > TELLING * min(self.deviation(suspect, fit), by_gain)
         possible = (suspect.signed or size > 0.0) and suspect.leaves_a_car(size, self.vehicle)
         return abs(size) < most and telling and possible
 
     def run(self) -> None:
-        """Take in one fault after the other; ask what else would change their sizes."""
-        self._search()
-        self.left_open = self._moved_by_the_rest() if self.found else {}
-
-    def _moved_by_the_rest(self) -> dict[str, float]:
-        """Return how far the sizes of what was found move by what nobody need mend, by key.
-
-        A real log has each other fault too, as large as its `least`: small delays, scales and
-        offsets that nobody looks for shift what is estimated without them, each in its own way.
-        """
-        left = [one for one in self.suspects if not {*self.keys(one)} & {*self.chosen}]
-        least = {
-            key: one.least * one.scale(self.vehicle) / math.sqrt(len(self.keys(one)))
-            for one in left
-            for key in self.keys(one)
-        }
-        return self.fitter.moved(self.fit, least)
-
-    def _search(self) -> None:
+        """Take in one fault after the other."""
         while len(self.found) < MOST:
-            if len(self.found) >= TRIED and max(self.fit.misses) > GIVEN_UP:
+            if len(self.found) >= GIVEN_UP_WITH and max(self.fit.misses) > GIVEN_UP_FROM:
                 break
             listed = self._trusted(self.candidates())
             if not listed or listed[0].gain < CHANCE:
@@ -274,18 +273,21 @@ class Search:
             shares = odds / odds.sum()
             group = float(1.0 - shares[0])
             names = [other.suspect for other in alike]
-            first = self._finding(one.suspect, self.fit, float(shares[1]), group, names)
+            deviation = self.real_deviation(one.suspect, self.fit)
+            told = float(shares[1]), group
+            first = self._finding(one.suspect, self.fit.sizes, deviation, told, names)
             listed.append((one.suspect, first))
             # Numbers of the car can be measured; a drive is no reason to overrule who did.
             changed = first.repair.vehicle if first.repair is not None else {}
             measured = not {*changed} <= {*self.vehicle.estimated}
             believed = self._believed(one.suspect, self.fit)  # together with the others too
-            size = self.size(one.suspect, self.fit.sizes)
-            believed &= abs(size) > STANDS * self.real_deviation(one.suspect, self.fit)
+            believed = believed and abs(self.size(one.suspect, self.fit.sizes)) > STANDS * deviation
             if believed and not alike and not measured and first.confidence > SURE:
                 clear.append(one.suspect)
             for other, share in zip(alike, shares[2:].tolist(), strict=True):
-                second = self._finding(other.suspect, other.fit, share, group, [one.suspect])
+                off = self.real_deviation(other.suspect, other.fit)
+                told = share, group
+                second = self._finding(other.suspect, other.fit.sizes, off, told, [one.suspect])
                 listed.append((other.suspect, second))
         doubtful = self.in_doubt or len(self.found) > SEVERAL
         stands = set() if doubtful else self._standing(clear)
@@ -312,12 +314,13 @@ class Search:
     def _finding(
         self,
         suspect: Suspect,
-        fit: Fit,
-        confidence: float,
-        group: float,
+        sizes: Sizes,
+        deviation: float,
+        told: tuple[float, float],
         alike: list[Suspect],
     ) -> Finding:
-        size, deviation = self.size(suspect, fit.sizes), self.real_deviation(suspect, fit)
+        """Return a suspect as a finding, told with its confidence and that of its group."""
+        size = self.size(suspect, sizes)
         text = suspect.words(size, deviation)
         if alike:
             others = ", ".join(f"{one.code} {one.channel}".strip() for one in alike)
@@ -329,8 +332,8 @@ class Search:
             size=math.exp(size) if factor else size,
             deviation=math.exp(size) * deviation if factor else deviation,
             unit=suspect.unit,
-            confidence=confidence,
-            group=group,
+            confidence=told[0],
+            group=told[1],
             text=text,
             repair=suspect.repair(size, self.vehicle),
         )

@@ -23,7 +23,7 @@ STEP = 0.02  # of a standard deviation, for slopes
 ITERATIONS, CLOSE = 10, 0.01  # of J
 TRIED = (-2.0, -1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0, 2.0)  # believed deviations
 TRIES, DAMPED = 5, 0.1
-SEVERAL = ("bank.", "downforce.")  # sizes of one suspect
+OF_ONE = ("bank.", "downforce.")  # how several sizes of one suspect begin
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,7 +141,7 @@ class Fitter:
         return (size - self.mean.get(key, 0.0)) / self._sd(key)
 
     def _sd(self, key: str) -> float:
-        return self.sd[key.partition(".")[0] if key.startswith(SEVERAL) else key]
+        return self.sd[key.partition(".")[0] if key.startswith(OF_ONE) else key]
 
     def fit(self, keys: Iterable[str], start: Mapping[str, float]) -> Fit:
         """Return the sizes that fit best, from a start on.

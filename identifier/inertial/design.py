@@ -94,8 +94,6 @@ class InertialIdentifier(Method):
         Where the ladder does not rise by powers of two, or a number is none of a car.
     """
 
-    learns_kind = AxleModel.kind
-
     prior: Prior
     plausibility: Plausibility
     bounds: Bounds

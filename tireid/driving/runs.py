@@ -126,8 +126,8 @@ def lateral_velocity(vehicle: Vehicle, learnt: TireModel | None = None) -> Later
     learnt : what it begins with, where these are curves of axles; else it begins afresh.
     """
     method = InertialIdentifier.for_vehicle(vehicle, dt=PERIOD)
-    begins = learnt is not None and learnt.kind == method.learns_kind
-    return LateralVelocity(OnlineIdentifier(method, vehicle, PERIOD, learnt if begins else None))
+    start = learnt if learnt is not None and method.resumes(learnt) else None
+    return LateralVelocity(OnlineIdentifier(method, vehicle, PERIOD, start))
 
 
 def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
