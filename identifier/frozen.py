@@ -8,7 +8,7 @@ import numpy as np
 from codegen.arrays import Array
 from models.rules import LARGEST_FORCE
 from models.schema import Table
-from models.vehicle import BICYCLE, Vehicle
+from models.vehicle import AREAS, BICYCLE, Vehicle
 
 FORMAT = "tireid frozen model 1"
 
@@ -28,9 +28,12 @@ VEHICLE_KEYS = ("name", *BICYCLE)
 def vehicle_numbers(vehicle: Vehicle) -> dict[str, Any]:
     """Return the name and the six numbers of the bicycle by the words of a vehicle file, SI.
 
-    Where some of them are estimated, `estimated` lists which.
+    Where the car has downforce its areas follow; where some numbers are estimated, `estimated`
+    lists which.
     """
     numbers = {key: getattr(vehicle, key) for key in VEHICLE_KEYS}
+    if vehicle.has_downforce:
+        numbers |= {key: getattr(vehicle, key) for key in AREAS}
     return numbers | ({"estimated": list(vehicle.estimated)} if vehicle.estimated else {})
 
 

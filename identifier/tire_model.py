@@ -197,6 +197,11 @@ class TireModel(ABC):
         """Speed [m/s] at which a force that depends on it is given, 4 sqrt(g L): brisk driving."""
         return brisk_speed(self.vehicle, self.min_speed)
 
+    @property
+    def curve_speed(self) -> float:
+        """Speed [m/s] at which curves and stiffness are given that are asked for without one."""
+        return self.reference_speed
+
     def predict(self, recording: Recording) -> Array:
         """Return the axle forces that the model predicts of a drive, (n, 2) [N].
 
@@ -224,7 +229,8 @@ class TireModel(ABC):
         ----------
         alpha : slip angles in the paper's sign [rad], a number or an array of any shape.
         axle : "front" or "rear", for a result of the shape of `alpha`; None gives both, (..., 2).
-        v_x : speed [m/s]; None takes `reference_speed`. A curve of slip does not look at it.
+        v_x : speed [m/s]; None takes `curve_speed`. A curve of slip does not look at it, but where
+            the car has downforce.
 
         Raises
         ------
@@ -235,7 +241,7 @@ class TireModel(ABC):
             raise ValueError(f"axle must be front or rear, it is {axle!r}")
         slip = np.asarray(alpha, dtype=np.float64)
         pairs = np.tile(slip.ravel(), (2, 1))
-        speed = self.reference_speed if v_x is None else v_x
+        speed = self.curve_speed if v_x is None else v_x
         found = self._force_curve()(pairs, speed) if slip.size else pairs
         both: Array = np.array(found, dtype=np.float64).T.reshape(*slip.shape, 2)
         if axle is None:
@@ -256,7 +262,7 @@ class TireModel(ABC):
     def stiffness(self) -> Array:
         """Cornering stiffness: slope of the steady force at zero slip [N/rad], (2,)."""
         alpha = ca.MX.sym("alpha", 2)
-        force = self.curve_expression(alpha, self.reference_speed)
+        force = self.curve_expression(alpha, self.curve_speed)
         slope = ca.Function("stiffness", [alpha], [ca.jacobian(force, alpha)])
         both = np.array([1.0, 1.0])  # the axles slip alike
         stiffness: Array = np.array(slope(np.zeros(2))) @ both

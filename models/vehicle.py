@@ -12,10 +12,13 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from codegen.arrays import Array
 from codegen.escape import shown
 from models.bicycle import BicycleParameters
 from models.files import write_atomically
-from models.rules import require_positive, require_within
+from models.rules import require_number, require_positive, require_within
 from models.schema import Table, read_toml, require_name
 
 # What a car needs beyond the linear bicycle: roll, load transfer, tire lag and drive force.
@@ -188,6 +191,17 @@ RULES = {
 }
 UNITS = ("kg m2", "N/rad", "N/rad")  # of the same
 
+# Downforce of an axle grows with the square of speed, ½ ρ A v_x², and adds to its static load.
+#
+# What a car may have is told over its static axle load at a speed: Formula cars have 0.4 of it at
+# 30 m/s, the lightest of Formula Student about 2; lift takes off a few hundredths on road cars.
+
+AIR_DENSITY = 1.2  # ρ [kg/m³]: dry air at 20 °C, 100 m above the sea
+LIGHTEST = 0.2  # load of an axle that lifts, over the static one: a car that flies is not modelled
+DOWNFORCE_SPEED = 30.0  # m/s
+LEAST_PRESS, MOST_PRESS = -0.5, 5.0  # static axle loads of downforce there
+AREAS = ("downforce_area_front", "downforce_area_rear")  # of a `Vehicle`
+
 __all__ = [
     "GRAVITY",
     "BicycleParameters",
@@ -249,7 +263,9 @@ class Vehicle:
     yaw_inertia : moment of inertia about the vertical axis [kg m^2].
     l_f, l_r : distance from the center of gravity to the front and rear axle [m].
     cornering_stiffness_front, cornering_stiffness_rear : slope of the lateral force of the axle
-        (both tires) over its slip angle at zero [N/rad].
+        (both tires) over its slip angle at zero, at its static load [N/rad].
+    downforce_area_front, downforce_area_rear : coefficient of downforce times area of the axle
+        [m^2]: it adds ½ ρ A v_x^2 to the static load; negative where the body lifts.
     chassis : what the double-track plant needs, or None.
     estimated : names of the values that nobody measured, but that follow from the others by a
         rule; two cars that differ in it alone are equal.
@@ -257,8 +273,8 @@ class Vehicle:
     Raises
     ------
     VehicleError
-        For a value that is not positive and finite, for an inertia or a stiffness that no car of
-        that mass has, or for springs too soft to carry the body.
+        For a value that is not positive and finite, for an inertia, a stiffness or a downforce
+        that no car of that mass has, or for springs too soft to carry the body.
     """
 
     name: str = "car"
@@ -268,6 +284,8 @@ class Vehicle:
     l_r: float
     cornering_stiffness_front: float
     cornering_stiffness_rear: float
+    downforce_area_front: float = 0.0
+    downforce_area_rear: float = 0.0
     chassis: Chassis | None = None
     estimated: tuple[str, ...] = field(default=(), compare=False)
 
@@ -310,6 +328,16 @@ class Vehicle:
                     f"cornering_stiffness_{name} in N/rad must be 0.5 to 500 times the static load "
                     f"of the axle, {load:.4g} N, it is {stiffness:g}: check the units"
                 )
+        for name, load in zip(AREAS, self.axle_loads, strict=True):
+            require_number(VehicleError, name, getattr(self, name))
+            unit = 0.5 * AIR_DENSITY * DOWNFORCE_SPEED**2 / load  # static loads per m^2
+            if not LEAST_PRESS <= getattr(self, name) * unit <= MOST_PRESS:
+                raise VehicleError(
+                    f"{name} in m^2 must lie between {LEAST_PRESS / unit:.3g} and "
+                    f"{MOST_PRESS / unit:.3g}, a downforce of {LEAST_PRESS:g} to {MOST_PRESS:g} "
+                    f"static loads of the axle at {DOWNFORCE_SPEED:g} m/s, it is "
+                    f"{getattr(self, name):g}: check the units"
+                )
 
     @property
     def wheelbase(self) -> float:
@@ -328,6 +356,31 @@ class Vehicle:
             self.weight * self.l_r / self.wheelbase,
             self.weight * self.l_f / self.wheelbase,
         )
+
+    @property
+    def downforce(self) -> tuple[float, float]:
+        """Downforce of the front and the rear axle over static load and v_x^2, κ [s^2/m^2]."""
+        front, rear = (
+            0.5 * AIR_DENSITY * getattr(self, name) / load
+            for name, load in zip(AREAS, self.axle_loads, strict=True)
+        )
+        return front, rear
+
+    @property
+    def has_downforce(self) -> bool:
+        """Whether the load of an axle changes with speed."""
+        return any(getattr(self, name) != 0.0 for name in AREAS)
+
+    def load_ratio(self, v_x: float | Array) -> Array:
+        """Return the loads of the axles over the static ones, λ = 1 + κ v_x^2 [-], (..., 2).
+
+        Parameters
+        ----------
+        v_x : longitudinal speed [m/s], of any shape.
+        """
+        pressed = 1.0 + np.asarray(v_x, dtype=np.float64)[..., None] ** 2 * self.downforce
+        ratio: Array = np.maximum(pressed, LIGHTEST)
+        return ratio
 
     @property
     def froude_speed(self) -> float:
@@ -400,8 +453,9 @@ class Vehicle:
     def from_toml(cls, path: str | os.PathLike[str]) -> "Vehicle":
         """Read a vehicle from a TOML file: mass, l_f, l_r and what else is known of it.
 
-        Name, yaw inertia, cornering stiffnesses and the table [chassis] may be left out; inertia
-        and stiffnesses are estimated then, see `estimated`.
+        Name, yaw inertia, cornering stiffnesses, areas of downforce and the table [chassis] may be
+        left out; inertia and stiffnesses are estimated then, see `estimated`, and the axles carry
+        their static loads at any speed.
 
         Parameters
         ----------
@@ -440,7 +494,7 @@ class Vehicle:
     def to_toml(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
         """Write the vehicle so that `from_toml` gives back an equal one, bit for bit.
 
-        What is estimated is left out, as it was in the file.
+        What is estimated is left out, as it was in the file; so is a downforce of zero.
 
         Parameters
         ----------
@@ -453,7 +507,8 @@ class Vehicle:
             When the file is there and `overwrite` is False.
         """
         file = Path(path)
-        out = ("estimated", *self.estimated)
+        without = (name for name in AREAS if getattr(self, name) == 0.0)
+        out = ("estimated", *self.estimated, *without)
         content = toml_text(self, folder=file.parent, table="chassis", leave_out=out)
         if not overwrite and file.exists():
             raise FileExistsError(f"{file} exists; overwrite=True replaces it")

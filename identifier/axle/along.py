@@ -87,7 +87,8 @@ def lessons(design: "AxleIdentifier", history: Run) -> Lessons:
     history : a run of the design.
     """
     setup = design.setup(history.vehicle, history.start)
-    step, n = build_lesson(doublings(design.ladder)), len(history.recording)
+    pressed, n = history.vehicle.has_downforce, len(history.recording)
+    step = build_lesson(doublings(design.ladder), pressed=pressed)
     parts, theta, kept, begin = [], [], [], []
     for block in history.blocks(np.arange(max(n - MOST, 0), n)):
         seen = setup.shown(history.recording, block.part)

@@ -4,6 +4,8 @@ Weights w of an axle lie, after every sample, in the polytope of `Bounds`: grip 
 Σ w_j/α_j in their ranges, |w_j| <= weight. What is linear in w is largest at a corner of it.
 φ(x) = Σ w_j tanh(x/α_j), in static axle loads; every unit, its slope and its secant change
 monotonically with x > 0, so that their values at the ends of a cell of slips bound them inside.
+Of a car with downforce all that is of φ, and a force is λ φ, with λ = 1 + κ v_x². How long a drop
+of friction takes is proven of λ = 1 alone, and not stated of such a car.
 """
 
 import math
@@ -228,6 +230,8 @@ class FrictionDrop:
 def certified(design: "AxleIdentifier", vehicle: Vehicle, driving: Driving) -> tuple[Property, ...]:
     """Return what is proven of a design, whatever is measured unless a title says more.
 
+    Of a car with downforce without the time that a drop of friction takes.
+
     Parameters
     ----------
     design : the identifier.
@@ -241,10 +245,8 @@ def certified(design: "AxleIdentifier", vehicle: Vehicle, driving: Driving) -> t
     jump = jump_by_learning(design)
     forgets = -math.expm1(-dt / design.regression.memory)
     lean = _lean_over_rounding(design)
-    follows = FrictionDrop().time(design, vehicle, driving.friction, driving.v_x)
-    by_memory = design.regression.memory * math.log(2.0)
     again = design.watch.known / 2.0
-    return (
+    proven = (
         Property(
             name="forgets",
             title="information along its regressor that a sample forgets: P stays positive",
@@ -303,16 +305,23 @@ def certified(design: "AxleIdentifier", vehicle: Vehicle, driving: Driving) -> t
             "static loads",
             f"not twice within {again:.3g} s of driving that is explained",
         ),
-        Property(
-            name="drop_time",
-            title="friction drops to half in a steady corner: both axles stay half wrong",
-            value=follows,
-            limit=by_memory,
-            margin=by_memory / follows,
-            status=at_most(follows, good=by_memory, bad=None),
-            unit="s",
-            advice="no alarm is proven to follow it: larger errors are told than the drop makes",
-        ),
+    )
+    return proven if vehicle.has_downforce else (*proven, _drop(design, vehicle, driving))
+
+
+def _drop(design: "AxleIdentifier", vehicle: Vehicle, driving: Driving) -> Property:
+    """Return how long the drop of friction of a car takes whose loads are the static ones."""
+    follows = FrictionDrop().time(design, vehicle, driving.friction, driving.v_x)
+    by_memory = design.regression.memory * math.log(2.0)
+    return Property(
+        name="drop_time",
+        title="friction drops to half in a steady corner: both axles stay half wrong",
+        value=follows,
+        limit=by_memory,
+        margin=by_memory / follows,
+        status=at_most(follows, good=by_memory, bad=None),
+        unit="s",
+        advice="no alarm is proven to follow it: larger errors are told than the drop makes",
     )
 
 

@@ -33,6 +33,16 @@ class Curve(NamedTuple):
     carcass_slope: Any
     bend: Any
 
+    def under(self, load: Any) -> "Curve":
+        """Return the curve of axles under another load than the static one.
+
+        Parameters
+        ----------
+        load : over the static one, λ (2,) [-].
+        """
+        units = self.units * ca.repmat(load, 1, self.units.shape[1])
+        return Curve(units, *(load * one for one in self[1:]))
+
 
 def doublings(ladder: tuple[float, ...]) -> tuple[int, ...]:
     """Return by how many doublings of its argument each unit follows from the next wider one.

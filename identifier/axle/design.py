@@ -14,7 +14,7 @@ from identifier.axle.along import certified_along
 from identifier.axle.band import AT_SPEEDS, CENTERS, BandCalibration
 from identifier.axle.band_step import band_numbers, hinges
 from identifier.axle.bank import UNPROVEN, RoadSlope, SlopeNumbers, SlopeState, road_push
-from identifier.axle.car import car_numbers
+from identifier.axle.car import car_numbers, downforce_numbers
 from identifier.axle.certificate import certified
 from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
@@ -217,7 +217,7 @@ class AxleIdentifier(Method):
         widest = per_variance(prior_P, n, self.regression.widest)
         W, own = self.within_bounds(W, own, P)
         return Setup(
-            scan=_scan(doublings(self.ladder), self.rising_until is not None),
+            scan=self._scan(vehicle),
             carry={
                 "W": W,
                 "own": own,
@@ -247,10 +247,15 @@ class AxleIdentifier(Method):
                 "friction_direction": friction_direction(self.ladder),
                 "per_variance": widest,
                 **self._rising(),
+                **downforce_numbers(vehicle),
             },
             only_with_a_y=("bank",),
             ends_run=self.plausibility.rest(self.dt),
         )
+
+    def _scan(self, vehicle: Vehicle, *, bands: bool = False) -> Scan:
+        rises, pressed = self.rising_until is not None, vehicle.has_downforce
+        return _scan(doublings(self.ladder), rises=rises, bands=bands, pressed=pressed)
 
     def _resumed(self, start: TireModel) -> AxleModel:
         """Return stored weights to begin with, of this structure."""
@@ -273,9 +278,8 @@ class AxleIdentifier(Method):
         told = BandCalibration.told(brisk_speed(vehicle, self.min_speed))
         noise = np.array([self.regression.noise, self.regression.noise, 0.0])
         calibration = stored or replace(told, noise=noise)
-        rises = self.rising_until is not None
         return setup._replace(
-            scan=_scan(doublings(self.ladder), rises, bands=True),
+            scan=self._scan(vehicle, bands=True),
             constants={
                 **setup.constants,
                 "banding": band_numbers(calibration, vehicle.froude_speed),
@@ -413,6 +417,6 @@ def _projection(n: int, rises: bool) -> ca.Function:
 
 
 @cache
-def _scan(steps: tuple[int, ...], rises: bool, *, bands: bool = False) -> Scan:
-    step = build_step(steps, rises=rises, bands=bands)
+def _scan(steps: tuple[int, ...], *, rises: bool, bands: bool, pressed: bool) -> Scan:
+    step = build_step(steps, rises=rises, bands=bands, pressed=pressed)
     return Scan(step, carry=CARRY, over=LEARNING_OVER)

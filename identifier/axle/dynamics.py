@@ -1,6 +1,7 @@
 """The frozen axle model in continuous time: force curves of a slip that lags by a first order.
 
-F = F_z Σ w_j tanh(α'/α_j) cos δ   and   σ dα'/dt = v_x (α - α'),   σ = (s + k g/ω²) C(α') + σ_0.
+F = F_z λ Σ w_j tanh(α'/α_j) cos δ   and   σ dα'/dt = v_x (α - α'),   σ = (s + k g/ω²) λ C + σ_0.
+λ = 1 + κ v_x² is the load of the axle over the static one: 1 where the car has no downforce.
 The sway of the body gives way in series with the carcass: its share k adds k g/ω² to the
 compliance s. That is without the inertia of the roll: ω is above what steering asks for.
 """
@@ -11,10 +12,10 @@ import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.axle.car import Car
+from identifier.axle.car import Car, load_ratio
 from identifier.axle.curve import Curve, curve, doublings
 from identifier.axle.slip import SHORTEST
-from models.vehicle import GRAVITY
+from models.vehicle import GRAVITY, Vehicle
 
 
 def static_curve(slip: Any, W: Array, ladder: tuple[float, ...]) -> Curve:
@@ -28,6 +29,25 @@ def static_curve(slip: Any, W: Array, ladder: tuple[float, ...]) -> Curve:
     """
     scales = ca.DM(1.0 / np.array(ladder)[None])
     return curve(slip, ca.DM(W), scales, doublings(ladder))
+
+
+def curve_at_speed(
+    slip: Any, v_x: Any, W: Array, ladder: tuple[float, ...], vehicle: Vehicle
+) -> Curve:
+    """Return the force curve of a car at a slip and a speed, in static axle loads.
+
+    Parameters
+    ----------
+    slip : (2,) [rad].
+    v_x : longitudinal speed [m/s].
+    W : weights [static axle loads], (2, n).
+    ladder : slip scales [rad], (n,).
+    vehicle : whose downforce counts; without any the speed is not looked at.
+    """
+    static = static_curve(slip, W, ladder)
+    if not vehicle.has_downforce:
+        return static
+    return static.under(load_ratio(ca.DM(vehicle.downforce), v_x))
 
 
 def series_compliance(own: Array, roll_frequency: float) -> Array:

@@ -2,10 +2,11 @@
 
 For each mean over a moment |y - h'w| <= e (1 + β) + τ ρ, and the curve of any tire lies in the
 prior's box: both are linear in the weights w, in static axle loads.   y: force that the motion
-shows.   h: units at the lagged slip of the frozen model, times cos δ.   e: error of curve and
-sensors.   β: by how much slip is beyond that which taught, over it, now or a while ago; it fades
-with 0.3 s.   τ: time [s] by which force and curve may differ.   ρ: rate of the force [1/s], the
-larger of its size now and of its mean over the last 0.3 s.
+shows.   h: units at the lagged slip of the frozen model, times cos δ and, where the car has
+downforce, the load of the axle over the static one.   e: error of curve and sensors.   β: by how
+much slip is beyond that which taught, over it, now or a while ago; it fades with 0.3 s.   τ: time
+[s] by which force and curve may differ.   ρ: rate of the force [1/s], the larger of its size now
+and of its mean over the last 0.3 s.
 A linear function of w is largest at a vertex of the polytope, so that the two linear programs of
 every slip, max and min of t'w with t = tanh(α/α_j), are one product with all vertices. The force
 lies between them, wider by e (1 + β) + τ ρ (set membership: Milanese and Vicino, Automatica 27,
@@ -487,7 +488,7 @@ def grip_lost(along: Array, grip: Array) -> Array:
     Parameters
     ----------
     along : f, force along the car over the load of each axle (k, 2).
-    grip : what the axle carries at least (2,) [static axle loads].
+    grip : what the axle carries at least (2,) or (k, 2) [static axle loads].
     """
     lost: Array = 1.0 - np.sqrt(1.0 - np.minimum(np.abs(along) / np.maximum(grip, TINY), 1.0) ** 2)
     return lost

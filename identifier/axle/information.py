@@ -24,7 +24,7 @@ import numpy as np
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.axle.bank import SlopeState
-from identifier.axle.car import car_numbers
+from identifier.axle.car import car_numbers, downforce_numbers
 from identifier.axle.curve import EDGES, doublings
 from identifier.axle.design import AxleIdentifier
 from identifier.axle.gate import GateState
@@ -208,7 +208,7 @@ class Evidence:
             )
         n = len(design.ladder)
         setup = Setup(
-            scan=_scan(doublings(design.ladder)),
+            scan=_scan(doublings(design.ladder), pressed=model.vehicle.has_downforce),
             carry={
                 "gate": np.zeros(len(GateState._fields)),
                 "sway": np.zeros(len(SwayState._fields)),
@@ -228,6 +228,7 @@ class Evidence:
                 "roll": design.sway.numbers(),
                 "regression": design.regression.numbers(design.dt),
                 "road": design.road.numbers(design.dt),
+                **downforce_numbers(model.vehicle),
             },
             ends_run=design.plausibility.rest(design.dt),
         )
@@ -387,5 +388,5 @@ def change_from(
 
 
 @cache
-def _scan(steps: tuple[int, ...]) -> Scan:
-    return Scan(build_evidence(steps), carry=EVIDENCE_CARRY, over=LEARNING_OVER)
+def _scan(steps: tuple[int, ...], *, pressed: bool) -> Scan:
+    return Scan(build_evidence(steps, pressed=pressed), carry=EVIDENCE_CARRY, over=LEARNING_OVER)

@@ -26,9 +26,9 @@ from identifier.axle.band import (
     root,
     sensor_noise,
 )
-from identifier.axle.car import Car, car_numbers
+from identifier.axle.car import Car, car_numbers, downforce_numbers
 from identifier.axle.curve import EDGES, doublings, unit_matrix
-from identifier.axle.dynamics import lagged_force, series_compliance, static_curve
+from identifier.axle.dynamics import curve_at_speed, lagged_force, series_compliance
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.guarantee import (
     Doubt,
@@ -48,7 +48,7 @@ from identifier.tire_model import AXLES, GRIP, STIFFNESS, Estimate, Fact, TireMo
 from models.recordings import Recording
 from models.rules import require_positive
 from models.schema import Table
-from models.vehicle import Vehicle
+from models.vehicle import DOWNFORCE_SPEED, Vehicle
 
 ARRAYS = ("W", "own", "covariance", "prior_covariance", "excitation")
 LARGEST = 1e9  # of the numbers in a file, SI and static axle loads
@@ -65,6 +65,8 @@ class AxleModel(TireModel):
     """Axle forces φ(x) = Σ w_j tanh(x/α_j) of lagged slip x, in static axle loads.
 
     Odd in slip up to the sensor offsets, saturating at Σ w_j. Rows are axles, front and rear.
+    Where the car has downforce, forces are those times λ = 1 + κ v_x² (`Vehicle.load_ratio`); what
+    is told without a speed is of the static loads.
 
     Parameters
     ----------
@@ -146,13 +148,13 @@ class AxleModel(TireModel):
 
     @property
     def cornering_stiffness(self) -> Array:
-        """Slope of the force curves at zero [N/rad], (2,): the linear part of the model."""
+        """Slope of the force curves at zero, under static loads [N/rad], (2,): the linear part."""
         slope: Array = (self.W / np.array(self.ladder)).sum(axis=1)
         return slope * self._loads
 
     @property
     def relaxation_length(self) -> Array:
-        """Lag of slip at small slip [m], (2,); it shortens with the slope of the curve."""
+        """Lag of slip at small slip, under static loads [m], (2,); it goes with the slope."""
         slope: Array = (self.W / np.array(self.ladder)).sum(axis=1)
         return self.own[:, 0] * np.maximum(slope, 0.0) + SHORTEST * self.vehicle.wheelbase
 
@@ -160,8 +162,13 @@ class AxleModel(TireModel):
     def _loads(self) -> Array:
         return np.array(self.vehicle.axle_loads)
 
+    @property
+    def curve_speed(self) -> float:
+        """Speed [m/s] of curves that are asked for without one: with downforce 0, static loads."""
+        return 0.0 if self.vehicle.has_downforce else self.reference_speed
+
     def force_at(self, alpha: Array) -> Array:
-        """Return the steady axle forces at slip angles, (k, 2) [N].
+        """Return the steady axle forces at slip angles under static loads, (k, 2) [N].
 
         Parameters
         ----------
@@ -225,7 +232,8 @@ class AxleModel(TireModel):
         ----------
         alpha : slip angles [rad], (k,).
         level : share of cases that the band shall hold, above 0 and below 1.
-        v_x : speed [m/s], a number or (k,), positive; None takes that of the drive that taught.
+        v_x : speed [m/s], a number or (k,), positive; None takes errors at that of the drive that
+            taught, of forces under static loads.
 
         Raises
         ------
@@ -238,7 +246,8 @@ class AxleModel(TireModel):
         if not (speed > 0.0).all():
             raise ValueError(f"v_x of a band must be positive, it is {speed.min()}")
         factor = self.effective_calibration.factor(alpha, speed / self.vehicle.froude_speed)
-        return self.band_spread(alpha, speed).half_width(factor, level) * self._loads
+        pressed = self.vehicle.load_ratio(0.0 if v_x is None else speed)
+        return self.band_spread(alpha, speed, pressed).half_width(factor, level) * self._loads
 
     def half_band_over(self, recording: Recording, level: float = LEVEL) -> Array:
         """Return half the width of the band around `axle_force` of a drive, (n, 2) [N].
@@ -297,14 +306,15 @@ class AxleModel(TireModel):
         White noise through a lag of first order leaves (1 - e)/(1 + e) of its variance.
         """
         sideways, steering = noise[:2] / v_x, np.array([noise[2], 0.0])
-        slope = self.slope_at(slip)
-        slopes = np.maximum(slope, 0.02 * self.slope_at(np.zeros((1, 2))))
+        pressed = self.vehicle.load_ratio(v_x[:, 0])
+        slope = self.slope_at(slip) * pressed
+        slopes = np.maximum(slope, 0.02 * self.slope_at(np.zeros((1, 2))) * pressed)
         e = np.exp(-v_x * dt / (self.own[:, 0] * slopes + SHORTEST * self.vehicle.wheelbase))
         passed: Array = slope * np.hypot(sideways, steering) * np.sqrt((1.0 - e) / (1.0 + e))
         return passed
 
     def slope_at(self, slip: Array) -> Array:
-        """Return the slope of the curves at slips of both axles [static loads/rad], (n, 2).
+        """Return the slope of the curves under static loads at slips [static loads/rad], (n, 2).
 
         Parameters
         ----------
@@ -322,20 +332,21 @@ class AxleModel(TireModel):
         ----------
         recording : its signals are the input.
         """
-        return self.slope_at(self.lagged_slip(recording))
+        return self.slope_at(self.lagged_slip(recording)) * self.vehicle.load_ratio(recording.v_x)
 
     @property
     def effective_calibration(self) -> BandCalibration:
         """Calibration of the band; where there is none, of errors as learning is told of them."""
         return self.calibration or BandCalibration.told(self.reference_speed)
 
-    def band_spread(self, alpha: Array, v_x: Array) -> BandSpread:
+    def band_spread(self, alpha: Array, v_x: Array, pressed: Array | float = 1.0) -> BandSpread:
         """Return the variances of the steady forces that a band is made of, (k, 2).
 
         Parameters
         ----------
         alpha : slip angles [rad], (k,).
         v_x : speeds [m/s], positive, (k,).
+        pressed : loads of the axles over the static ones, (k, 2), or one for all [-].
         """
         T = unit_matrix(alpha, self.ladder)
         scales, n = np.array(self.ladder), len(self.ladder)
@@ -343,13 +354,16 @@ class AxleModel(TireModel):
         zero = slope * np.column_stack([np.ones_like(v_x), 1.0 / v_x])  # of slip, by its offset
         h = np.zeros((2, len(T), n + 3))
         h[:, :, :n], h[:, :, -1] = T, zero.T
+        load = np.broadcast_to(pressed, (len(T), 2))
+        h *= load.T[:, :, None]
         left, before = (
             np.einsum("aki,aij,akj->ka", h, both, h)
             for both in (self.covariance, self.prior_covariance)
         )
         calibration = self.effective_calibration
         left = colored_variance(left, before, calibration.color)
-        return BandSpread.of(T @ self.W.T, left, before, calibration.stretch(v_x)[:, None])
+        force = T @ self.W.T * load
+        return BandSpread.of(force, left, before, calibration.stretch(v_x)[:, None])
 
     def spread_by_range(
         self, recording: Recording, mean: Callable[[Array], Array]
@@ -367,8 +381,9 @@ class AxleModel(TireModel):
         total = np.array([mean(size * (within == k)) for k in range(count)])
         slip = np.divide(total, share, out=np.zeros_like(total), where=share > 0.0)
         spread = BandSpread(np.empty_like(slip), np.empty_like(slip))
+        pressed = self.vehicle.load_ratio(v_x)
         for axle in range(2):
-            at = self.band_spread(slip[..., axle].ravel(), v_x)
+            at = self.band_spread(slip[..., axle].ravel(), v_x, pressed)
             for into, values in zip(spread, at, strict=True):
                 into[..., axle] = values[:, axle].reshape(slip.shape[:2])
         return SpreadByRange(share, *spread)
@@ -395,7 +410,9 @@ class AxleModel(TireModel):
         return replace(self, covariance=wider, guarantee=None)
 
     def guaranteed_at(self, alpha: Array, rate: Array) -> tuple[Array, Array] | None:
-        """Return least and largest steady force at slip angles, (k, 2) [N]; None: none is stated.
+        """Return least and largest steady force at slip angles under static loads, (k, 2) [N].
+
+        None: none is stated.
 
         Parameters
         ----------
@@ -436,7 +453,7 @@ class AxleModel(TireModel):
         return replace(self, guarantee=guarantee)
 
     def signals_of(self, recording: Recording) -> tuple[Array, Doubt]:
-        """Return units times cos δ over a drive, (n, 2, ladder), and what opens a band.
+        """Return units times load and cos δ over a drive, (n, 2, ladder), and what opens a band.
 
         ρ is of the model's force; where a guarantee is stated, of that possible one which changes
         most, and the slower the car is against the drive that taught, the larger: the lag of a tire
@@ -448,6 +465,8 @@ class AxleModel(TireModel):
         """
         slip, dt, stretches = self.lagged_slip(recording), recording.dt, recording.stretches
         T = np.stack([unit_matrix(slip[:, i], self.ladder) for i in range(2)], axis=1)
+        pressed = self.vehicle.load_ratio(recording.v_x)
+        T *= pressed[..., None]
         if self.guarantee is None:
             rate = force_rate(T, (self.W[:1], self.W[1:]), dt, stretches)
         else:
@@ -456,7 +475,7 @@ class AxleModel(TireModel):
             rate *= np.maximum(self.guarantee.speed / v_x, 1.0)[:, None]
         v_y = 0.0 if recording.v_y is None else recording.v_y
         along = along_acceleration(recording.v_x, v_y * recording.r, dt, stretches)
-        carried = (unit_matrix(self.driven_slip, self.ladder) * self.W).sum(axis=1)
+        carried = (unit_matrix(self.driven_slip, self.ladder) * self.W).sum(axis=1) * pressed
         doubt = Doubt(
             beyond=slip_beyond(slip, self.driven_slip, dt, stretches),
             rate=rate,
@@ -579,6 +598,9 @@ class AxleModel(TireModel):
             unsure = 100.0 * np.diag(self.relative_sd(known))
             lines.append(Fact("standard deviation there over the prior's", unsure, "%"))
         lines.append(Fact("time of learning", self.learning_time.sum(axis=1), "s"))
+        if self.vehicle.has_downforce:
+            more = 100.0 * (self.vehicle.load_ratio(DOWNFORCE_SPEED) - 1.0)
+            lines.append(Fact(f"more of all forces at {DOWNFORCE_SPEED:g} m/s", more, "%"))
         return tuple(lines)
 
     @property
@@ -632,10 +654,10 @@ class AxleModel(TireModel):
         Parameters
         ----------
         alpha : slip angles (2,) [rad], the wheels straight ahead.
-        v_x : not looked at.
+        v_x : longitudinal speed [m/s]; looked at where the car has downforce.
         """
-        del v_x
-        return static_curve(alpha, self.W, self.ladder).force * ca.DM(self._loads)
+        at = curve_at_speed(alpha, v_x, self.W, self.ladder, self.vehicle)
+        return at.force * ca.DM(self._loads)
 
     def force_expression(
         self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
@@ -652,7 +674,7 @@ class AxleModel(TireModel):
         """
         return lagged_force(
             Car(*car_numbers(self.vehicle).T),
-            static_curve(slip, self.W, self.ladder),
+            curve_at_speed(slip, v_x, self.W, self.ladder, self.vehicle),
             series_compliance(self.own, self.sway.frequency),
             self.own[:, 2],
             slip=slip,
@@ -697,7 +719,7 @@ class AxleModel(TireModel):
         dt : sampling interval of what is replayed [s].
         """
         return Setup(
-            scan=_frozen_scan(doublings(self.ladder)),
+            scan=_frozen_scan(doublings(self.ladder), pressed=self.vehicle.has_downforce),
             carry={
                 "gate": np.zeros(len(GateState._fields)),
                 "sway": np.zeros(len(SwayState._fields)),
@@ -711,6 +733,7 @@ class AxleModel(TireModel):
                 "scales": 1.0 / np.array(self.ladder)[None],
                 "plausibility": self.plausibility.numbers(),
                 "roll": self.sway.numbers(),
+                **downforce_numbers(self.vehicle),
             },
             ends_run=self.plausibility.rest(dt),
         )
@@ -809,5 +832,5 @@ def _is_covariance(P: Array) -> bool:
 
 
 @cache
-def _frozen_scan(steps: tuple[int, ...]) -> Scan:
-    return Scan(build_frozen(steps), carry=FROZEN_CARRY, over=OVER)
+def _frozen_scan(steps: tuple[int, ...], *, pressed: bool) -> Scan:
+    return Scan(build_frozen(steps, pressed=pressed), carry=FROZEN_CARRY, over=OVER)

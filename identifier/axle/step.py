@@ -4,6 +4,7 @@ Carried, rows front and rear: W (2, n) and own (2, 3), what is learnt; UD (2, q 
 factors of its covariance P = U D U', D on the diagonal, q = n + 3; gate, sway, slip as in
 `forward`; sensitivity (2, 3); filters (2, q + 2); errors (2, 3); excitation (2, 9); watch (7,) and
 kept (2, q), the weights that are gone back to after a fault; bank (4,), of the accelerometer.
+Of a car with downforce every force, slope and regressor is that of the load at v_x (`Curve.under`).
 Sampled: x, u, v_x, and a_y [m/s²] of an accelerometer, NaN where there is none. Everything else is
 a number that stays an input. Forces are told with the weights before the sample.
 """
@@ -20,6 +21,7 @@ from identifier.axle.car import (
     axle_impulse,
     axle_port,
     larger,
+    load_ratio,
     named_port,
     reciprocal,
     smaller,
@@ -94,12 +96,13 @@ class Forward(NamedTuple):
     next_state: dict[str, Any]
 
 
-def forward(steps: tuple[int, ...]) -> Forward:
+def forward(steps: tuple[int, ...], *, pressed: bool = False) -> Forward:
     """Return the forward part as CasADi expressions of fresh symbols.
 
     Parameters
     ----------
     steps : doublings between the units.
+    pressed : whether the load of the axles changes with speed; adds the input `downforce` (2,).
     """
     n = len(steps) + 1
     W, own, dt = ca.SX.sym("W", 2, n), ca.SX.sym("own", 2, 3), ca.SX.sym("dt")
@@ -146,6 +149,9 @@ def forward(steps: tuple[int, ...]) -> Forward:
         "plausibility": plausibility,
         "roll": roll_port,
     }
+    if pressed:
+        ports["downforce"] = ca.SX.sym("downforce", 2)
+        at_x = at_x.under(load_ratio(ports["downforce"], gated.v_x))
     return Forward(
         ports=ports,
         car=car,
@@ -168,22 +174,28 @@ def forward(steps: tuple[int, ...]) -> Forward:
     )
 
 
-def build_frozen(steps: tuple[int, ...]) -> ca.Function:
+def build_frozen(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Function:
     """Return the frozen model as a step: weights in, axle_force [N], slips [rad] out, (2,).
 
     Parameters
     ----------
     steps : doublings between the units.
+    pressed : as of `forward`.
     """
-    f = forward(steps)
+    f = forward(steps, pressed=pressed)
     return ca.Function(
-        "_".join(["axle_frozen", *map(str, steps)]),
+        _name("axle_frozen", steps, pressed=pressed),
         list(f.ports.values()),
         [*f.next_state.values(), f.axle_force, f.x, f.size],
         list(f.ports),
         [*(f"{name}_next" for name in f.next_state), "axle_force", "lagged_slip", "slip_size"],
         {"cse": True},
     )
+
+
+def _name(kind: str, steps: tuple[int, ...], **parts: bool) -> str:
+    """Return the name of a function of a structure, with the parts that it has beside."""
+    return "_".join([kind, *map(str, steps), *(part for part, there in parts.items() if there)])
 
 
 MOVING = 2.0  # errors of y that a force must have to tell weights apart
@@ -283,7 +295,9 @@ class RegressionSample(NamedTuple):
     drift: Any
 
 
-def build_step(steps: tuple[int, ...], *, rises: bool = False, bands: bool = False) -> ca.Function:
+def build_step(
+    steps: tuple[int, ...], *, rises: bool = False, bands: bool = False, pressed: bool = False
+) -> ca.Function:
     """Return the step; every number stays an input of it.
 
     Parameters
@@ -292,9 +306,10 @@ def build_step(steps: tuple[int, ...], *, rises: bool = False, bands: bool = Fal
     rises : whether curves are kept from falling at a slip; adds the input `rising` (n,).
     bands : whether half the width of the band is told, too; adds the output `half_band` (2,) [N]
         and the inputs that it needs.
+    pressed : as of `forward`.
     """
     n = len(steps) + 1
-    f, ports = _symbols(steps)
+    f, ports = _symbols(steps, pressed=pressed)
     h, y, next_state = _regression(f, ports)
     y, next_state["bank"] = _without_bank(f, ports, y)
     sample, means = _sample_of(f, ports, h, y)
@@ -315,7 +330,7 @@ def build_step(steps: tuple[int, ...], *, rises: bool = False, bands: bool = Fal
     if bands:
         outputs[HALF_BAND.name] = _half_band(f, ports)
     return ca.Function(
-        "_".join(["axle_step", *map(str, steps), *["rising"] * rises, *["bands"] * bands]),
+        _name("axle_step", steps, rising=rises, bands=bands, pressed=pressed),
         list(ports.values()),
         [*(next_state[name] for name in CARRY), *outputs.values()],
         list(ports),
@@ -356,7 +371,7 @@ def _half_band(f: Forward, ports: dict[str, Any]) -> Any:
 LESSON = ("h", "e", "counts", "gains", "told", "watched")
 
 
-def build_lesson(steps: tuple[int, ...]) -> ca.Function:
+def build_lesson(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Function:
     """Return what a sample teaches, of the ports of the step: the recursion that errors obey.
 
     h : regressors (2, q).   e : y - h'w (2,).   counts : share of e that counts, after clipping.
@@ -367,9 +382,10 @@ def build_lesson(steps: tuple[int, ...]) -> ca.Function:
     Parameters
     ----------
     steps : doublings between the units, the structure.
+    pressed : as of `forward`.
     """
     n = len(steps) + 1
-    f, ports = _symbols(steps)
+    f, ports = _symbols(steps, pressed=pressed)
     h, y, _ = _regression(f, ports)
     y, _ = _without_bank(f, ports, y)
     sample, means = _sample_of(f, ports, h, y)
@@ -388,14 +404,14 @@ def build_lesson(steps: tuple[int, ...]) -> ca.Function:
         ca.sqrt(sample.R / (means.slow * samples)),
         ca.vertcat(watch.returns, watch.follow),
     )
-    name = "_".join(["axle_lesson", *map(str, steps)])
+    name = _name("axle_lesson", steps, pressed=pressed)
     return ca.Function(name, list(ports.values()), list(outputs), list(ports), list(LESSON))
 
 
-def _symbols(steps: tuple[int, ...]) -> tuple[Forward, dict[str, Any]]:
+def _symbols(steps: tuple[int, ...], *, pressed: bool) -> tuple[Forward, dict[str, Any]]:
     """Return the forward part, and its ports with those of the covariance."""
     n = len(steps) + 1
-    f = forward(steps)
+    f = forward(steps, pressed=pressed)
     ports = dict(f.ports)
     ports["UD"] = ca.SX.sym("UD", 2, len(triangle(n + 3)))
     ports["friction_direction"] = ca.SX.sym("friction_direction", n, n)
@@ -498,7 +514,7 @@ def _recent_force(
 EVIDENCE_CARRY = ("gate", "sway", "slip", "sensitivity", "filters", "peak", "bank")
 
 
-def build_evidence(steps: tuple[int, ...]) -> ca.Function:
+def build_evidence(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Function:
     """Return the step that tells the regression at given weights, and learns nothing.
 
     Outputs, rows front and rear: h (2, q), zero but for the offset where there is no force to learn
@@ -508,8 +524,9 @@ def build_evidence(steps: tuple[int, ...]) -> ca.Function:
     Parameters
     ----------
     steps : doublings between the units.
+    pressed : as of `forward`.
     """
-    f = forward(steps)
+    f = forward(steps, pressed=pressed)
     n, ports = len(steps) + 1, dict(f.ports)
     h, y, next_state = _regression(f, ports)
     y, next_state["bank"] = _without_bank(f, ports, y)
@@ -522,7 +539,7 @@ def build_evidence(steps: tuple[int, ...]) -> ca.Function:
     seen = ca.horzcat(h[:, :-1] * (next_state["peak"] >= numbers.least_force), h[:, -1])
     tangent = ca.sum2(seen * ca.horzcat(ports["W"], ports["own"]))
     return ca.Function(
-        "_".join(["axle_evidence", *map(str, steps)]),
+        _name("axle_evidence", steps, pressed=pressed),
         list(ports.values()),
         [
             *(next_state[name] for name in EVIDENCE_CARRY),

@@ -215,6 +215,7 @@ def network_graph(model: NetworkModel, *, single: bool = False) -> bytes:
 # The axle model's static force curve as ONNX: F_i = load_i Σ_j w_ij tanh(α_i/α_j).
 #
 # What the whole model adds, the lag of slip and the sway of the body, has a state and stays out.
+# So does downforce, which needs a speed: its κ are told as metadata, F times 1 + κ v_x².
 
 FROZEN_INPUTS = (
     Signal("alpha_f", "rad", "slip angle of the front axle, paper's sign"),
@@ -230,6 +231,8 @@ HALF_BANDS = (
 
 def axle_graph(model: AxleModel, *, single: bool = False, with_band: bool = False) -> bytes:
     """Return the static curves as ONNX; inputs alpha_f, alpha_r, outputs F_yf, F_yr, (batch, 1).
+
+    Of a car with downforce those of the static loads.
 
     Parameters
     ----------
@@ -248,12 +251,17 @@ def axle_graph(model: AxleModel, *, single: bool = False, with_band: bool = Fals
         graph.apply("MatMul", [units, share], force.name)
         if with_band:
             _half_band(graph, model, axle, units, force.name)
+    car, loads, more = model.vehicle, "", {}
+    if car.has_downforce:
+        loads = " under static loads, at v_x times 1 + downforce v_x^2"
+        keys = ("downforce_front_s2_m2", "downforce_rear_s2_m2")
+        more = dict(zip(keys, map(repr, car.downforce), strict=True))
     return graph.model_bytes(
         "axle_force_curves",
         FROZEN_INPUTS,
         (*OUTPUTS, *(HALF_BANDS if with_band else ())),
-        f"Static axle force over slip angle of {visible(model.vehicle.name)}; {SLIP_SIGN}",
-        {"vehicle": visible(model.vehicle.name)},
+        f"Static axle force over slip angle of {visible(car.name)}{loads}; {SLIP_SIGN}",
+        {"vehicle": visible(car.name), **more},
     )
 
 

@@ -35,6 +35,7 @@ from models.vehicle import GRAVITY, Vehicle
 NEAR = 0.99  # of a bound, from which on a number rests at it
 RISING_UNTIL = 0.0  # rad, the slip at which force curves shall not fall: the cornering stiffness
 MOST = {"bias": 0.1, "roll": 0.3, "gyro": 0.1, "inertia": 0.4}  # others are in `Bounds`
+NO_DOWNFORCE = "without v_y tires are not learnt of a car with downforce: log v_y, or leave it out"
 LATEST = 0.25  # s, by which a measured v_y may be late
 
 # Title, unit and meaning of what rests at `MOST`, and whether that refuses an answer.
@@ -222,8 +223,10 @@ class InertialIdentifier(Method):
         Raises
         ------
         ValueError
-            Where stored weights are those of another structure.
+            Where stored weights are those of another structure, or the car has downforce.
         """
+        if vehicle.has_downforce:
+            raise ValueError(NO_DOWNFORCE)
         n = len(self.ladder)
         W, own = self.prior.means(vehicle, self.ladder)
         P = prior_P = self._prior_covariance(vehicle)

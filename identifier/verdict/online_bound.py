@@ -25,7 +25,7 @@ from models.vehicle import GRAVITY
 
 
 class _Sample(NamedTuple):
-    """ξ (2,) [s], v_x r/g, tanh(x/α_j) (2, n), cos δ (2,), β (2,), ρ (2,) [1/s]; if it counts."""
+    """ξ (2,) [s], v_x r/g, λ tanh(x/α_j) (2, n), cos δ (2,), β (2,), ρ (2,) [1/s]; if it counts."""
 
     impulse: Array
     sideways: float
@@ -113,7 +113,7 @@ class OnlineBound:
         return _Sample(
             impulse=axle_impulse(self._car, x[0], x[1]),
             sideways=v_x * x[1] / GRAVITY,
-            units=unit_matrix(slip, model.ladder),
+            units=unit_matrix(slip, model.ladder) * model.vehicle.load_ratio(v_x)[:, None],
             cos_delta=np.cos(u),
             beyond=np.maximum(over, fading * last),
             rate=np.zeros(2),
@@ -145,7 +145,9 @@ class OnlineBound:
                 self.left[axle] = known.cut(h[axle], float(y[axle]), float(allowed[axle]))
 
     def band(self, alpha: ArrayLike) -> tuple[Array, Array] | None:
-        """Return least and largest steady force at slip angles, (k, 2) [N]; None once `violated`.
+        """Return least and largest steady force at slip angles under static loads, (k, 2) [N].
+
+        None once `violated`.
 
         Parameters
         ----------

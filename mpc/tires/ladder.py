@@ -138,7 +138,14 @@ def axle_tire(model: AxleModel) -> PredictionTire:
     Parameters
     ----------
     model : frozen force curves, their compliance, sway and offsets.
+
+    Raises
+    ------
+    ValueError
+        Where the car has downforce.
     """
+    if model.vehicle.has_downforce:
+        raise ValueError("the tracker does not predict a car with downforce: leave its areas out")
     load, ladder = np.array(model.vehicle.axle_loads), np.array(model.ladder)
     W, shortest = model.W * load[:, None], SHORTEST * model.vehicle.wheelbase
     compliance = (model.own[:, 0] + GRAVITY / model.sway.frequency**2 * model.own[:, 1]) / load

@@ -4,6 +4,7 @@ import math
 from dataclasses import FrozenInstanceError, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from identifier.frozen import vehicle_from, vehicle_numbers
@@ -223,3 +224,45 @@ def test_nothing_is_estimated_of_a_car_that_cannot_be(tmp_path, size, said):
 def test_only_what_has_a_rule_can_be_estimated():
     with pytest.raises(VehicleError, match="estimated must be of yaw_inertia"):
         replace(sedan(), estimated=("mass",))
+
+
+def test_downforce_adds_to_the_static_load_and_comes_back_from_files(tmp_path):
+    text = SIX + "downforce_area_front = 0.9\ndownforce_area_rear = -0.2\n"
+    car = Vehicle.from_toml(written(tmp_path, text))
+    loads = np.array(car.axle_loads)
+    expected = 1.0 + 0.5 * 1.2 * np.array([0.9, -0.2]) * 50.0**2 / loads
+    np.testing.assert_allclose(car.load_ratio(50.0), expected, rtol=1e-12)
+    assert car.load_ratio(np.full((3, 4), 7.0)).shape == (3, 4, 2)
+    car.to_toml(tmp_path / "again.toml")
+    assert Vehicle.from_toml(tmp_path / "again.toml") == car
+    assert vehicle_from(vehicle_numbers(car)) == replace(car, chassis=None)
+    assert car.has_downforce
+
+
+def test_a_car_without_downforce_has_the_files_that_it_had(tmp_path):
+    car = Vehicle.from_toml(written(tmp_path, SIX))
+    assert not car.has_downforce
+    np.testing.assert_array_equal(car.load_ratio(80.0), 1.0)
+    assert list(vehicle_numbers(car)) == ["name", *(line.split()[0] for line in SIX.splitlines())]
+    car.to_toml(tmp_path / "again.toml")
+    assert "downforce" not in (tmp_path / "again.toml").read_text()
+    again = Vehicle.from_toml(written(tmp_path, SIX + "downforce_area_front = 0\n"))
+    assert vehicle_numbers(again) == vehicle_numbers(car)
+
+
+@pytest.mark.parametrize("key", ["downforce_area_front", "downforce_area_rear"])
+@pytest.mark.parametrize("value", [math.nan, math.inf, 5000.0, -20.0])
+def test_a_downforce_that_no_car_has_is_refused_by_name(key, value):
+    with pytest.raises(VehicleError, match=f"{key} in m.2 must lie between"):
+        replace(sedan(), **{key: value})
+    with pytest.raises(VehicleError, match=f"{key} must be a number"):
+        replace(sedan(), **{key: "much"})
+
+
+def test_race_cars_have_a_downforce_that_is_believed():
+    for mass, area in ((798.0, 5.0), (230.0, 5.0), (180.0, 6.0), (1.5, 0.02), (1300.0, -0.4)):
+        stiffness = 12.0 * mass * GRAVITY / 2.0
+        car = Vehicle(mass=mass, yaw_inertia=mass * 0.8**2, l_f=0.8, l_r=0.8,
+                      cornering_stiffness_front=stiffness, cornering_stiffness_rear=stiffness,
+                      downforce_area_front=area / 2.0, downforce_area_rear=area / 2.0)  # fmt: skip
+        assert car.has_downforce

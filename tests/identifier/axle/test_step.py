@@ -22,6 +22,7 @@ class ByHand:
         n = self.n = self.alpha_j.size
         self.L, self.U = car.wheelbase, np.sqrt(G * car.wheelbase)
         self.load = car.weight * np.array([car.l_r, car.l_f]) / self.L
+        self.area = np.array([car.downforce_area_front, car.downforce_area_rear])
         W, own = design.prior.means(car, design.ladder)
         self.theta = np.hstack([W, own])
         self.P = design.prior.covariance(car, design.ladder)
@@ -145,7 +146,9 @@ class ByHand:
         phi, C = (w * T).sum(1), (w * S).sum(1)
         bend = -2 * (w * T * S / self.alpha_j).sum(1)
         least = 0.02 * np.maximum((w / self.alpha_j).sum(1), 0.1)
-        slope = C
+        pressed = np.maximum(1 + 0.5 * 1.2 * self.area * v_x**2 / self.load, 0.2)
+        phi, C, bend, least = (pressed * one for one in (phi, C, bend, least))
+        T, slope = pressed[:, None] * T, C
         bend, C = np.where(least > C, 0.0, bend), np.maximum(C, least)
         cos = np.cos(delta)
         offset = np.array([1.0, 1 / v_x])

@@ -1,0 +1,237 @@
+"""A car that pushes on the road with the square of its speed: it learns the static curve."""
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from identifier.axle import AxleIdentifier
+from identifier.axle.curve import doublings
+from identifier.axle.information import Evidence, merged, reference_of
+from identifier.axle.step import build_frozen, build_lesson, build_step
+from identifier.run import identify
+from identifier.stored import load_model
+from identifier.tire_model import AXLES
+from identifier.verdict import OnlineBound, calibrated, contradictions, guaranteed
+from models.recordings import Recording
+from models.vehicle import Vehicle
+from tests.identifier.axle.test_step import assert_by_hand, disturbed
+
+RACER = Vehicle(
+    mass=900.0,
+    yaw_inertia=1100.0,
+    l_f=1.5,
+    l_r=1.3,
+    cornering_stiffness_front=9e4,
+    cornering_stiffness_rear=1.1e5,
+    downforce_area_front=1.6,
+    downforce_area_rear=2.2,
+)
+LIFTING = replace(RACER, downforce_area_front=-1.6, downforce_area_rear=-0.4)
+UNTOLD = replace(RACER, downforce_area_front=0.0, downforce_area_rear=0.0)
+LOADS = 900.0 * 9.81 * np.array([1.3, 1.5]) / 2.8
+STIFF, PEAK = np.array([9e4, 1.1e5]), 1.5 * LOADS
+SLIPS = np.array([-0.06, -0.03, -0.01, 0.01, 0.03, 0.06])
+
+
+def static(alpha):
+    """The forces of both axles under their static loads (k, 2)."""
+    return PEAK * np.tanh(STIFF * np.asarray(alpha)[..., None] / PEAK)
+
+
+def pressed(v_x, car=RACER):
+    """Loads over the static ones, by the physics: ½ ρ A v²; no axle flies."""
+    areas = np.array([car.downforce_area_front, car.downforce_area_rear])
+    return np.maximum(1.0 + 0.5 * 1.2 * areas * np.asarray(v_x)[..., None] ** 2 / LOADS, 0.2)
+
+
+def race(n=3000, dt=0.01, phase=0.0, slowest=15.0, fastest=60.0, car=RACER):
+    """A slalom while the car speeds up and brakes; forces are known exactly."""
+    p, fine = RACER.bicycle, 10
+    v_y = r = 0.0
+    rows = []
+    for k in range(n * fine):
+        t = k * dt / fine
+        v = 0.5 * (fastest + slowest) - 0.5 * (fastest - slowest) * np.cos(0.45 * t + phase)
+        delta = 0.055 * (20.0 / (20.0 + v)) * np.sin(2 * np.pi * 0.5 * t + 3.0 * np.sin(0.3 * t))
+        slip = np.array([delta - np.arctan((v_y + p.l_f * r) / v),
+                         -np.arctan((v_y - p.l_r * r) / v)])  # fmt: skip
+        F = PEAK * np.tanh(STIFF * slip / PEAK) * pressed(v, car) * np.array([np.cos(delta), 1.0])
+        if k % fine == 0:
+            rows.append((t, v, v_y, r, delta, *F))
+        v_y += dt / fine * (F.sum() / p.m - v * r)
+        r += dt / fine * (p.l_f * F[0] - p.l_r * F[1]) / p.I_z
+    t, v_x, v_y, r, delta, F_f, F_r = np.array(rows).T
+    force = np.column_stack([F_f, F_r])
+    return Recording(name="race", t=t, v_x=v_x, v_y=v_y, r=r, delta_f=delta,
+                     delta_r=np.zeros(n), axle_force=force)  # fmt: skip
+
+
+def learnt(recording, car):
+    return identify(recording, car, AxleIdentifier.for_vehicle(car))
+
+
+def missed(model, recording):
+    force = recording.axle_force
+    return np.sqrt(np.mean((model.axle_force(recording) - force) ** 2, axis=0)) / np.sqrt(
+        np.mean(force**2, axis=0)
+    )
+
+
+@pytest.fixture(scope="module", name="drive")
+def a_drive():
+    return race()
+
+
+@pytest.fixture(scope="module", name="run")
+def a_run(drive):
+    return learnt(drive, RACER)
+
+
+@pytest.fixture(scope="module", name="model")
+def a_model(run):
+    return run.freeze()
+
+
+def test_the_told_area_leaves_the_static_curve_to_learn(model, drive):
+    np.testing.assert_allclose(model.force_at(SLIPS), static(SLIPS), rtol=0.04)
+    np.testing.assert_allclose(model.stiffness, STIFF, rtol=0.08)
+    assert (missed(model, drive) < 0.03).all()
+    assert (missed(model, race(phase=2.0)) < 0.03).all()
+    untold = learnt(drive, UNTOLD).freeze()
+    assert (missed(untold, drive) > 0.1).all()
+    assert (np.abs(untold.force_at(SLIPS) / static(SLIPS) - 1.0).max(axis=0) > 0.15).all()
+
+
+def test_the_step_repeats_the_equations_by_hand(drive):
+    recording = disturbed(drive.between(0.0, 12.0))
+    hand = assert_by_hand(AxleIdentifier.for_vehicle(RACER), RACER, recording)
+    assert hand.time.min() > 3.0
+
+
+def test_an_axle_that_lifts_keeps_a_fifth_of_its_load():
+    drive = race(n=1200, car=LIFTING)
+    assert_by_hand(AxleIdentifier.for_vehicle(LIFTING), LIFTING, drive)
+    assert LIFTING.load_ratio(60.0)[0] == 0.2 < LIFTING.load_ratio(20.0)[0] < 1.0
+    np.testing.assert_allclose(LIFTING.load_ratio(drive.v_x), pressed(drive.v_x, LIFTING))
+    longer = race(car=LIFTING)
+    assert (missed(learnt(longer, LIFTING).freeze(), longer) < 0.03).all()
+
+
+def test_a_car_without_has_the_functions_that_there_were():
+    steps = doublings(AxleIdentifier.for_vehicle(UNTOLD).ladder)
+    for build in (build_step, build_frozen, build_lesson):
+        plain, more = build(steps), build(steps, pressed=True)
+        assert "downforce" not in plain.name_in() and "pressed" not in plain.name()
+        assert {*more.name_in()} == {*plain.name_in(), "downforce"}
+        assert more.name() == f"{plain.name()}_pressed"
+    assert AxleIdentifier.for_vehicle(RACER).setup(UNTOLD).scan.step.name() == (
+        AxleIdentifier.for_vehicle(RACER).setup(RACER).scan.step.name().removesuffix("_pressed")
+    )
+
+
+def test_curves_with_a_speed_are_those_of_its_load(model):
+    for speed in (15.0, 40.0, 70.0):
+        curve = model.force(SLIPS, v_x=speed)
+        np.testing.assert_allclose(curve, model.force_at(SLIPS) * pressed(speed), rtol=1e-9)
+    np.testing.assert_allclose(model.force(SLIPS), model.force_at(SLIPS), rtol=1e-9)
+    assert model.force(0.03, "rear") == pytest.approx(model.force_at(np.array([0.03]))[0, 1])
+    assert "30 m/s" in model.summary()
+    assert "30 m/s" not in replace(model, vehicle=UNTOLD, guarantee=None).summary()
+
+
+def test_motion_and_lag_are_those_of_the_replay(model, drive):
+    """The replay holds slip by its closed form, the equations of motion are integrated here."""
+    soft = replace(model, own=np.array([[0.02, 0.0, 0.0], [0.03, 0.0, 0.0]]))
+    force, slip, x = soft.axle_force(drive), soft.lagged_slip(drive), np.zeros(2)
+    dynamics = ca.Function("rate", *_slip_rate(soft))
+    found = []
+    for k in range(len(drive) - 1):
+        ends = [(drive.v_y[j], drive.r[j], drive.delta_f[j], drive.v_x[j]) for j in (k, k + 1)]
+        for share in (np.arange(20) + 0.5) / 20:
+            at = (1.0 - share) * np.array(ends[0]) + share * np.array(ends[1])
+            x = x + drive.dt / 20 * np.array(dynamics(x, *at)[1]).ravel()
+        found.append(np.array(dynamics(x, *ends[1])[0]).ravel())
+    away = np.abs(np.array(found)[100:] - force[101:]).max(axis=0)
+    assert (away < 0.02 * np.abs(force).max(axis=0)).all()
+    plain = replace(soft, vehicle=UNTOLD, guarantee=None)
+    assert np.abs(plain.lagged_slip(drive) - slip).max() > 1e-3  # more slope, a longer lag
+
+
+def _slip_rate(model):
+    slip, x = ca.SX.sym("slip", 2), ca.SX.sym("x", 2)
+    delta, v_x = ca.SX.sym("delta"), ca.SX.sym("v_x")
+    ports = [slip, x[0], x[1], delta, v_x]
+    v_y, r = ca.SX.sym("v_y"), ca.SX.sym("r")
+    told = model.force_expression(slip, ca.vertcat(v_y, r), delta, v_x)
+    return [ports[0], v_y, r, delta, v_x], list(told)
+
+
+def test_bands_hold_at_every_speed(run, drive):
+    model, other = calibrated(run), race(phase=2.0)
+    half = model.half_band_over(other)
+    inside = np.abs(model.axle_force(other) - other.axle_force) <= half
+    fast = other.v_x > 45.0
+    assert (inside[fast].mean(axis=0) > 0.85).all() and (inside[~fast].mean(axis=0) > 0.85).all()
+    # The factors of a band are of ranges of speed: those of one range are compared.
+    wide = model.half_band(SLIPS, v_x=60.0) / model.half_band(SLIPS, v_x=45.0)
+    assert (wide > 1.05).all() and (wide < 1.8).all()
+    told = model.slope_over(other) / model.slope_at(model.lagged_slip(other))
+    np.testing.assert_allclose(told, pressed(other.v_x), rtol=1e-12)
+
+
+def test_a_guarantee_holds_and_a_car_that_was_told_without_contradicts_itself(run, drive):
+    model, other = guaranteed(run), race(phase=2.0)
+    low, high = model.guaranteed_force(other)
+    driven = np.isfinite(low).all(axis=1)
+    assert (low[driven] <= other.axle_force[driven]).all()
+    assert (other.axle_force[driven] <= high[driven]).all()
+    _, against = contradictions(model, other)
+    assert not against.any()
+    untold = guaranteed(learnt(drive, UNTOLD))
+    assert untold.guarantee.bound.error[0] > 2.0 * model.guarantee.bound.error[0]
+
+
+def test_while_driving_the_bound_reads_the_load_too(model, drive):
+    error = 0.12
+    for vehicle, violated in ((RACER, False), (UNTOLD, True)):
+        told = replace(model, vehicle=vehicle, guarantee=None)
+        online = OnlineBound(told, error, drive.dt)
+        for k in range(len(drive)):
+            online.update(drive.x[k], drive.u[k], float(drive.v_x[k]))
+        assert any(online.violated) == violated, vehicle.downforce
+
+
+def test_what_drives_tell_adds_up_to_the_static_curve(drive):
+    design = AxleIdentifier.for_vehicle(RACER)
+    away = {}
+    for vehicle in (RACER, UNTOLD):
+        model = reference_of(design, vehicle)
+        for _ in range(2):  # a reference close to the tires is the next one
+            told = Evidence(design=design, reference=model).of(drive)
+            model = merged(design, model, told, np.zeros((2, 9)))
+        away[vehicle] = np.abs(model.force_at(SLIPS) / static(SLIPS) - 1.0).max(axis=0)
+    assert (away[RACER] < 0.05).all() and (away[UNTOLD] > 0.15).all()
+
+
+def test_what_is_proven_along_a_drive_is_proven_of_the_car_that_drove(run):
+    found = {
+        one.name: one for one in AxleIdentifier.for_vehicle(RACER).certify_along(run).properties
+    }
+    for axle in AXLES:
+        assert found[f"along/{axle}/left"].status == "pass"
+
+
+def test_a_file_keeps_the_downforce_and_one_without_has_no_word_of_it(model, tmp_path, drive):
+    model.save(tmp_path / "racer.json")
+    again = load_model(tmp_path / "racer.json")
+    assert again.vehicle.downforce == RACER.downforce
+    np.testing.assert_array_equal(again.axle_force(drive), model.axle_force(drive))
+    assert "downforce" not in str(replace(model, vehicle=UNTOLD, guarantee=None).to_dict())
+
+
+def test_the_certificate_states_no_time_of_a_drop_that_is_not_proven():
+    design = AxleIdentifier.for_vehicle(RACER)
+    with_downforce, without = (design.certify(car).properties for car in (RACER, UNTOLD))
+    assert [one.name for one in without] == [*(one.name for one in with_downforce), "drop_time"]

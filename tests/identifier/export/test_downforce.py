@@ -1,0 +1,85 @@
+"""The step of a car with downforce in C: the bits of CasADi, and of both compilers."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.export.compiled import CompiledPackage, samples_of
+from identifier.export.onnx import onnx_bytes
+from identifier.export.package import build_package, run_in_virtual_machine
+from identifier.export.processor import replay_here
+from identifier.methods import make_method
+from identifier.run import identify
+from models.vehicle import sedan
+
+RACER = replace(sedan(), downforce_area_front=1.5, downforce_area_rear=-0.4)
+AXLE = make_method("axle", RACER)
+
+
+@pytest.fixture(scope="module")
+def package():
+    return build_package(AXLE, RACER, with_a_y=True, with_band=True)
+
+
+@pytest.fixture(scope="module")
+def rows(slalom, package):
+    """The slalom at a speed that swings, with gaps."""
+    rows = samples_of(slalom, [port.name for port in package.specialized.inputs])
+    rows[:, 0] *= 1.0 + 0.8 * np.sin(np.linspace(0.0, 20.0, len(rows))) ** 2
+    rows[:5, 0], rows[1000:1020, 4], rows[2000:2200, 2] = np.inf, np.nan, 1e308
+    return rows
+
+
+def test_c_computes_the_bits_of_casadi(package, rows):
+    told, state = run_in_virtual_machine(package.specialized, rows)
+    run = CompiledPackage.of(package, single=False)
+    shipped = run.run_samples(rows)
+    np.testing.assert_array_equal(np.column_stack(list(shipped.outputs.values())), told)
+    for name, value in run.weights.items():
+        np.testing.assert_array_equal(value, state[name].reshape(value.shape))
+
+
+def test_float_is_within_a_tenth_of_a_newton_over_45_s(slalom):
+    package = build_package(AXLE, RACER)
+    double, single = (
+        CompiledPackage.of(package, single=choice).run(slalom) for choice in (False, True)
+    )
+    assert 0.0 < np.abs(double.axle_force - single.axle_force).max() <= 0.1
+
+
+@pytest.mark.parametrize("single", [False, True])
+def test_both_compilers_make_the_same_bits(package, rows, single, run):
+    for compiler in ("gcc", "clang"):
+        run(compiler, "--version")  # skips where there is none
+    gcc, clang = (
+        replay_here(compiler, "tireid", package.files, rows, single=single)
+        for compiler in ("gcc", "clang")
+    )
+    assert gcc.hash == clang.hash
+
+
+def test_the_package_learns_what_identify_learns(package, slalom):
+    compiled = CompiledPackage.of(build_package(AXLE, RACER))
+    forces = compiled.run(slalom).axle_force
+    np.testing.assert_allclose(forces, identify(slalom, RACER, AXLE).axle_force, atol=1e-3)
+    plain = CompiledPackage.of(build_package(AXLE, sedan())).run(slalom).axle_force
+    assert np.abs(forces - plain).max() > 50.0
+    assert "downforce_area_front" in package.files["tireid.json"]
+    assert "downforce" not in "".join(build_package(AXLE, sedan()).files.values())
+
+
+def test_onnx_has_the_curves_of_the_static_loads_and_says_so(slalom):
+    pytest.importorskip("onnx", reason="needs the package onnx")
+    runtime = pytest.importorskip("onnxruntime", reason="needs the package onnxruntime")
+    model = identify(slalom.between(0.0, 20.0), RACER, AXLE).freeze()
+    content = onnx_bytes(model)
+    session = runtime.InferenceSession(content)
+    alpha = np.linspace(-0.2, 0.2, 11)
+    told = session.run(None, {"alpha_f": alpha[:, None], "alpha_r": alpha[:, None]})
+    np.testing.assert_allclose(np.hstack(told), model.force_at(alpha), rtol=1e-9, atol=1e-6)
+    assert b"static loads" in content
+    front, rear = (float(session.get_modelmeta().custom_metadata_map[f"downforce_{axle}_s2_m2"])
+                   for axle in ("front", "rear"))  # fmt: skip
+    assert (front, rear) == RACER.downforce
+    assert b"downforce" not in onnx_bytes(replace(model, vehicle=sedan()))
