@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from codegen import Scan
 from codegen.arrays import Array
-from identifier.axle.car import car_numbers
+from identifier.axle.car import car_numbers, downforce_numbers
 from identifier.axle.covariance import packed, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
 from identifier.axle.design import AxleIdentifier
@@ -35,7 +35,6 @@ from models.vehicle import GRAVITY, Vehicle
 NEAR = 0.99  # of a bound, from which on a number rests at it
 RISING_UNTIL = 0.0  # rad, the slip at which force curves shall not fall: the cornering stiffness
 MOST = {"bias": 0.1, "roll": 0.3, "gyro": 0.1, "inertia": 0.4}  # others are in `Bounds`
-NO_DOWNFORCE = "without v_y tires are not learnt of a car with downforce: log v_y, or leave it out"
 LATEST = 0.25  # s, by which a measured v_y may be late
 
 # Title, unit and meaning of what rests at `MOST`, and whether that refuses an answer.
@@ -223,10 +222,8 @@ class InertialIdentifier(Method):
         Raises
         ------
         ValueError
-            Where stored weights are those of another structure, or the car has downforce.
+            Where stored weights are those of another structure.
         """
-        if vehicle.has_downforce:
-            raise ValueError(NO_DOWNFORCE)
         n = len(self.ladder)
         W, own = self.prior.means(vehicle, self.ladder)
         P = prior_P = self._prior_covariance(vehicle)
@@ -251,7 +248,7 @@ class InertialIdentifier(Method):
         heard_v_y[2] = first.v_y_noise
         rest = len(triangle(size(n))) - len(triangle(size(n) - MOVING))
         return Setup(
-            scan=_scan(doublings(self.ladder), self._delay),
+            scan=_scan(doublings(self.ladder), self._delay, pressed=vehicle.has_downforce),
             carry={
                 "motion": np.zeros(MOVING),
                 "W": W,
@@ -280,6 +277,7 @@ class InertialIdentifier(Method):
                 "bounds": self.bounds.of_ladder(self.ladder, RISING_UNTIL),
                 "metric": np.array([one[np.triu_indices(n)] for one in prior_P[:, :n, :n]]),
                 "rising": rising_shares(self.ladder, RISING_UNTIL),
+                **downforce_numbers(vehicle),
             },
             ends_run=self.plausibility.rest(self.dt),
         )
@@ -437,5 +435,5 @@ def _learnt_of_axle(n: int) -> tuple[NDArray[np.intp], ...]:
 
 
 @cache
-def _scan(steps: tuple[int, ...], delay: int | None) -> Scan:
-    return Scan(build_step(steps, delay), carry=CARRY, over=OVER)
+def _scan(steps: tuple[int, ...], delay: int | None, *, pressed: bool) -> Scan:
+    return Scan(build_step(steps, delay, pressed=pressed), carry=CARRY, over=OVER)

@@ -7,7 +7,8 @@ of the units, n each, s compliances [m]; b bias of the accelerometer [g], ρ rol
 per g], δ₀ zero of the steering [rad], b_r bias of the gyro [rad/s], κ excess of 1/I_z [-], o bias
 of a sensor of v_y [m/s].
 
-f = φ(x) cos δ + e,   dx/dt = v_x/σ (α - x),   σ = s C(x),
+f = λ φ(x) cos δ + e,   dx/dt = v_x/σ (α - x),   σ = s λ C(x),   λ = 1 + κ v_x² where the car has
+downforce (its own κ, of `Vehicle`), else 1,
 α = δ + δ₀ - atan((v_y ± l r)/v_x) - k ä'/(ω² v_x), the last by the sway of the body, k told,
 dv_y/dt = g Σ share f - v_x r + g p,   dr/dt = (1 + κ)/I_z (l_f F_f - l_r F_r).
 Shown: r + b_r,  a_y = g Σ share f + ρ ä + g b + x_s dr/dt - y_s r²,  and  v_y + o  where that is
@@ -18,6 +19,7 @@ Everything is taken at the middle of the step: where forces and v_x r are half a
 difference is no v_y.
 """
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -110,6 +112,20 @@ def unknowns(z: Any, n: int) -> Unknowns:
         inertia=z[k + 6],
         v_y_bias=z[k + 7],
     )
+
+
+Load = Callable[[Any], Any]  # v_x [m/s] -> λ, loads of the axles over the static ones (2,) [-]
+
+
+def static_load(v_x: Any) -> Any:
+    """Return the loads of a car without downforce, 1 (2,): factors of which CasADi makes nothing.
+
+    Parameters
+    ----------
+    v_x : not looked at.
+    """
+    del v_x
+    return ca.SX.ones(2)
 
 
 class Sample(NamedTuple):
@@ -259,6 +275,7 @@ def predicted(
     now: Sample,
     scales: Any,
     steps: tuple[int, ...],
+    load: Load = static_load,
 ) -> Predicted:
     """Return the state a step later, linearly implicit in v_y and r: stable for any stiff tire.
 
@@ -276,10 +293,11 @@ def predicted(
     now : the sample to which the step leads.
     scales : 1/α_j of the units [1/rad], (1, n).
     steps : doublings between the units.
+    load : of the axles at a speed.
     """
     way = Way()
     v_x = (before.v_x + now.v_x) / 2
-    at = curve_by(way, z, scales, steps)
+    at = curve_by(way, z, scales, steps).under(load(v_x))
     wheelbase = car.arm[0] - car.arm[1]
     steep = way.held(at.carcass_slope <= at.slope)
     carcass = steep * at.slope + (1 - steep) * way.held(at.carcass_slope)
@@ -321,7 +339,7 @@ def predicted(
 
 
 def curve_by(way: Way, z: Unknowns, scales: Any, steps: tuple[int, ...]) -> Curve:
-    """Return the curves at the lagged slip, with the gradient of tanh as tanh tells it.
+    """Return the curves at the lagged slip under static loads, tanh with the gradient it tells.
 
     Parameters
     ----------

@@ -10,11 +10,12 @@ Sampled: x = [v_y, r], of which v_y is not read; u, v_x, a_y, NaN where there is
 """
 
 from dataclasses import fields
+from functools import partial
 from typing import Any, NamedTuple
 
 import casadi as ca
 
-from identifier.axle.car import Car, axle_port, larger, named_port, smaller, within
+from identifier.axle.car import Car, axle_port, larger, load_ratio, named_port, smaller, within
 from identifier.axle.covariance import Factors, entry, factors_of, row_of, triangle
 from identifier.axle.curve import EDGES, curve, excited
 from identifier.axle.gate import Gate, GateState, Plausibility, gate
@@ -26,6 +27,7 @@ from identifier.inertial.motion import (
     MOVING,
     SENSORS,
     Laws,
+    Load,
     Predicted,
     Sample,
     Way,
@@ -35,6 +37,7 @@ from identifier.inertial.motion import (
     shown,
     size,
     slip_angle,
+    static_load,
     turning,
     unknowns,
 )
@@ -191,13 +194,14 @@ class Change(NamedTuple):
     gradient: Any
 
 
-def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
+def build_step(steps: tuple[int, ...], delay: int | None, *, pressed: bool = False) -> ca.Function:
     """Return the step; every number stays an input of it.
 
     Parameters
     ----------
     steps : doublings between the units.
     delay : samples by which a measured v_y is late; None does not look at it.
+    pressed : whether the load of the axles changes with speed; adds the input `downforce` (2,).
     """
     n = len(steps) + 1
     q = size(n)
@@ -225,6 +229,10 @@ def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
     ports["bounds"], bounds = named_port(BoundNumbers, "bounds")
     ports["rising"] = ca.SX.sym("rising", n)
     ports["metric"] = ca.SX.sym("metric", 2, len(triangle(n)))
+    load: Load = static_load
+    if pressed:
+        ports["downforce"] = ca.SX.sym("downforce", 2)
+        load = partial(load_ratio, ports["downforce"])
 
     seen = ca.vertcat(0, ports["x"][1])  # a missing v_y speaks against no sample
     gated = gate(ports["plausibility"], dt, last, seen, ports["u"], ports["v_x"])
@@ -245,6 +253,7 @@ def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
         now,
         scales,
         steps,
+        load,
     )
     known = factors_of([*ca.horzsplit(ports["motion_UD"]), *ca.horzsplit(ports["UD"])], q)
     if delay is None:  # nothing depends on the bias of a sensor that is not looked at
@@ -263,7 +272,7 @@ def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
         factors = _unsure_of_v_y(factors, trust, ca.logic_and(goes_on, _is_good(gated)))
     noise = _noise(ports, trust, gated, goes_on, ca.SX(0) if lateral is None else lateral.counts)
     corrected, factors, heard = _corrected(
-        (car, laws, trust), ahead, ahead_z, factors, (noise, lateral), now, scales, steps
+        (car, laws, trust), ahead, ahead_z, factors, (noise, lateral), now, scales, steps, load
     )
     if lateral is not None:
         left = lateral.innovation - ca.dot(lateral.h.T, ca.vertcat(*corrected) - ahead_z)
@@ -276,7 +285,7 @@ def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
     corrected = _bounded(ports, corrected, bounds, limits, n)
 
     sane = ca.fabs(corrected[0]) < MOST_SLIDING * now.v_x  # else it begins anew, a sample later
-    begun, unsure = _afresh(ports, trust, car, gated, now)
+    begun, unsure = _afresh(ports, trust, car, gated, now, load)
     kept = [
         *(ca.if_else(goes_on, a, b) for a, b in zip(corrected[:MOVING], begun, strict=True)),
         *corrected[MOVING:],  # which are not moved unless the filter goes on
@@ -289,7 +298,8 @@ def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
     tilt = ca.if_else(
         goes_on, ca.vertcat(ahead.tilt, ahead.tilt_rate), ca.vertcat(gated.v_x * told.r, 0)
     )
-    force = curve(told.slip, told.W, scales, steps).force * cosine(now.delta) + told.error
+    curves = curve(told.slip, told.W, scales, steps).under(load(now.v_x))
+    force = curves.force * cosine(now.delta) + told.error
     variance = larger(entry(factors, 0, 0), 0)
     size_of_slip = larger(ca.fabs(told.slip), ca.fabs(ahead.alpha))
     next_state = {
@@ -313,7 +323,7 @@ def build_step(steps: tuple[int, ...], delay: int | None) -> ca.Function:
         ),
     }
     return ca.Function(
-        "_".join(["inertial_step", *map(str, steps)]),
+        "_".join(["inertial_step", *map(str, steps), *["pressed"] * pressed]),
         list(ports.values()),
         [
             *(ca.densify(next_state[name]) for name in CARRY),
@@ -386,6 +396,7 @@ def _corrected(
     now: Sample,
     scales: Any,
     steps: tuple[int, ...],
+    load: Load,
 ) -> tuple[list[Any], Factors, Any]:
     """Return z and its factors after v_y, r or a_y, and what is carried of the last two.
 
@@ -397,7 +408,7 @@ def _corrected(
     symbol = ca.SX.sym("z", z.numel())
     tilt = ca.SX.sym("tilt")
     named, way = unknowns(symbol, n), Way()
-    at = curve_by(way, named, scales, steps)
+    at = curve_by(way, named, scales, steps).under(load(now.v_x))
     expected = shown(car, laws, named, tilt, now, at)
     y = ca.vertcat(expected.r, expected.a_y)
     numbers = way.valued([y, ca.jacobian(y, symbol), ca.dot(turning(car), at.force)])
@@ -539,12 +550,14 @@ def _afresh(
     car: Car,
     gated: Gate,
     now: Sample,
+    load: Load,
 ) -> tuple[list[Any], list[Any]]:
     """Return what moves, and its variances, of a filter that begins: in a steady corner."""
     sensors = ports["sensors"]
     zero, bias = (sensors[SENSORS.index(name)] for name in ("steering", "gyro"))
     r = gated.r - bias
-    stiffness = larger(ca.dot(ports["W"][1, :], ports["scales"]), STIFFNESS)
+    stiffness = ca.dot(ports["W"][1, :], ports["scales"]) * load(now.v_x)[1]
+    stiffness = larger(stiffness, STIFFNESS)
     lean = smaller(ca.fabs(gated.v_x * r) / GRAVITY, 1) / stiffness * ca.sign(r)
     v_y = gated.v_x * (gated.delta[1] - lean) - car.arm[1] * r
     alpha = slip_angle(now, v_y + car.arm * r, zero)
