@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
-from models.vehicle import GRAVITY, LIGHTEST, Vehicle
+from models.vehicle import GRAVITY, Vehicle
 
 
 class Car(NamedTuple):
@@ -51,9 +51,8 @@ def axle_impulse(car: Car, v_y: Any, r: Any) -> Any:
     return v_y / GRAVITY + car.inertia * r
 
 
-# Downforce: an axle of κ pushes as one whose load is λ = 1 + κ v_x² static ones, F = F_z λ φ(α).
-#
-# A car without has no such port, and steps without it have no such product.
+# Downforce: an axle of κ pushes as one of λ = 1 + κ v_x² static loads, F = F_z λ φ(α); λ is
+# `models.downforce.load_ratio`. Steps of cars without have neither the port nor the product.
 
 
 def downforce_numbers(vehicle: Vehicle) -> dict[str, Array]:
@@ -64,17 +63,6 @@ def downforce_numbers(vehicle: Vehicle) -> dict[str, Array]:
     vehicle : the car; `downforce` holds its κ (2,) [s²/m²].
     """
     return {"downforce": np.array(vehicle.downforce)} if vehicle.has_downforce else {}
-
-
-def load_ratio(downforce: Any, v_x: Any) -> Any:
-    """Return λ (2,) [-] as a CasADi expression, as `Vehicle.load_ratio` has it.
-
-    Parameters
-    ----------
-    downforce : κ (2,) [s²/m²].
-    v_x : longitudinal speed [m/s].
-    """
-    return larger(1 + downforce * v_x**2, LIGHTEST)
 
 
 # Ports of a compiled step whose numbers have names: a NamedTuple says what is in a vector.

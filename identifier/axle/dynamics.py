@@ -12,9 +12,10 @@ import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.axle.car import Car, load_ratio
+from identifier.axle.car import Car
 from identifier.axle.curve import Curve, curve, doublings
 from identifier.axle.slip import SHORTEST
+from models.downforce import load_ratio
 from models.vehicle import GRAVITY, Vehicle
 
 

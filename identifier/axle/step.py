@@ -21,7 +21,6 @@ from identifier.axle.car import (
     axle_impulse,
     axle_port,
     larger,
-    load_ratio,
     named_port,
     reciprocal,
     smaller,
@@ -58,6 +57,7 @@ from identifier.axle.slip import (
 )
 from identifier.axle.watch import Watched, WatchNumbers, WatchState, watched
 from identifier.setup import AXLE_FORCE, FACTORS, HALF_BAND, NOT_NEGATIVE, Port
+from models.downforce import load_ratio
 from models.vehicle import GRAVITY
 
 # From a sample to the axle forces of given weights: what learning and the frozen model share.

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from identifier.axle.car import Car, axle_port, larger, load_ratio, named_port, smaller, within
+from identifier.axle.car import Car, axle_port, larger, named_port, smaller, within
 from identifier.axle.covariance import Factors, entry, factors_of, row_of, triangle
 from identifier.axle.curve import EDGES, curve, excited
 from identifier.axle.gate import Gate, GateState, Plausibility, gate
@@ -42,6 +42,7 @@ from identifier.inertial.motion import (
     unknowns,
 )
 from identifier.setup import AXLE_FORCE, FACTORS, NOT_NEGATIVE, Port
+from models.downforce import load_ratio
 from models.vehicle import GRAVITY
 
 OVER = ("x", "u", "v_x", "a_y")

@@ -5,7 +5,7 @@ X, Y [m], heading psi [rad], the lagged slip tan(α') of four wheels [-], the ac
 two axles [rad], the lagged side force of the two axles [N] and acceleration a_x [m/s^2] that the
 wheel loads follow, and the driver's integral [m].
 The wheel loads follow the forces through a lag of 10 ms, the vertical motion of wheel and tire;
-it also breaks the algebraic loop between load and force.
+it also breaks the algebraic loop between load and force. Downforce adds to them at once.
 Assumed away: pitch, steer by the suspension, aligning moments of the tires, spin of the wheels
 (longitudinal slip follows from the wanted force at once), rolling and air resistance.
 """
@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
+from models.downforce import load_ratio
 from models.friction import MAX_PLACES, place_change
 from models.rules import require_positive
 from models.tires import MagicFormula, Tire
@@ -125,8 +126,29 @@ def tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: An
 # Order of wheels everywhere: front left, front right, rear left, rear right.
 
 
-def wheel_loads(vehicle: Vehicle, roll: Any, roll_rate: Any, axle_force: Any, a_x: Any) -> Any:
-    """Return the four wheel loads [N]; none is negative and their sum is m g exactly.
+def downforce(vehicle: Vehicle, v_x: Any) -> tuple[Any, Any]:
+    """Return what the air adds to the loads of front and rear axle [N]; 0 of a car without.
+
+    Parameters
+    ----------
+    vehicle : the car.
+    v_x : longitudinal speed [m/s].
+    """
+    if not vehicle.has_downforce:
+        return 0.0, 0.0
+    more = load_ratio(ca.DM(vehicle.downforce), v_x) - 1
+    return vehicle.axle_loads[0] * more[0], vehicle.axle_loads[1] * more[1]
+
+
+def wheel_loads(
+    vehicle: Vehicle,
+    roll: Any,
+    roll_rate: Any,
+    axle_force: Any,
+    a_x: Any,
+    pressed: tuple[Any, Any] = (0.0, 0.0),
+) -> Any:
+    """Return the four wheel loads [N]; none is negative, their sum is m g and downforce exactly.
 
     An axle takes its share of the spring and damper moment and, through its roll center, the
     moment of its own side force. A wheel that would pull on the road is lifted: its load is zero
@@ -138,13 +160,14 @@ def wheel_loads(vehicle: Vehicle, roll: Any, roll_rate: Any, axle_force: Any, a_
     roll, roll_rate : angle [rad] and rate [rad/s] of the body, positive when the right side dips.
     axle_force : side force of the front and the rear axle, body frame, (2,) [N].
     a_x : longitudinal acceleration [m/s^2].
+    pressed : downforce of front and rear axle [N].
     """
     c = vehicle.require_chassis()
-    total = vehicle.weight
+    total = vehicle.weight + pressed[0] + pressed[1]
     share = c.roll_stiffness_front_share
     body_moment = c.roll_stiffness * roll + c.roll_damping * roll_rate
     to_rear = vehicle.mass * a_x * c.cg_height / vehicle.wheelbase
-    front = ca.fmin(ca.fmax(vehicle.axle_loads[0] - to_rear, 0.0), total)
+    front = ca.fmin(ca.fmax(vehicle.axle_loads[0] + pressed[0] - to_rear, 0.0), total)
     rear = total - front
     loads = []
     for axle, part, force, height, track in (
@@ -240,7 +263,8 @@ def dynamics(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver) -> ca.F
 
     demand, integral_dot = driver.demand(v_ref - v_x, integral)
     drive = [m * demand * share for share in (c.drive_front_share, 1.0 - c.drive_front_share)]
-    F_z = wheel_loads(vehicle, roll, roll_rate, F_lagged, a_x_lagged)
+    pressed = downforce(vehicle, v_x)
+    F_z = wheel_loads(vehicle, roll, roll_rate, F_lagged, a_x_lagged, pressed)
 
     F_x, F_y, alpha, slip_dot = [], [], [], []
     force, axle_force, moment = 0.0, [0.0, 0.0], 0.0

@@ -43,9 +43,14 @@ def frozen_start(package: Package) -> TireModel:
     Raises
     ------
     NoHandoverError
-        Where the method learns neither a network nor axle curves.
+        Where the method learns neither a network nor axle curves, or the car has downforce.
     """
     specialized = package.specialized
+    if specialized.vehicle.has_downforce:
+        raise NoHandoverError(
+            f"{specialized.vehicle.name} has downforce, of which the handover in C does not know: "
+            "export the identifier alone"
+        )
     try:
         model = specialized.method.frozen(specialized.vehicle, specialized.carry)
     except CannotFreezeError as error:

@@ -64,8 +64,9 @@ def tire_complaint(tire: PredictionTire, v_x: float, largest: float = LARGEST_SL
 
 
 def _forces(tire: PredictionTire, v_x: float, largest: float) -> tuple[Array, Array]:
-    """Return slips and forces (turns, axles, signs, slips) [rad, static axle loads]."""
+    """Return slips and forces (turns, axles, signs, slips) [rad, axle loads at that speed]."""
     arm, load = car_numbers(tire.vehicle)[:, [0, 3]].T
+    load = load * tire.vehicle.load_ratio(v_x)
     signs = np.array([1.0, -1.0])[:, None]
     alpha = signs * largest * np.array(SHARES)
     r = np.array([0.0, 1.0, -1.0])[:, None, None] * GRAVITY / (3.0 * v_x)

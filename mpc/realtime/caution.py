@@ -47,7 +47,17 @@ def set_caution(params: NDArray[Any], tire: PredictionTire, caution: float) -> N
     params : of `mpc.realtime.instance.params_type`, written in place.
     tire : of the prediction.
     caution : from 0 to 1.
+
+    Raises
+    ------
+    ValueError
+        For a caution of a car with downforce: what is not known is told under static loads.
     """
+    if caution > 0.0 and tire.vehicle.has_downforce:
+        raise ValueError(
+            f"caution must be 0 for a car with downforce, whose bands are of static loads, it is "
+            f"{caution:g}"
+        )
     can = offers_friction(tire)
     params["caution"] = caution
     params["grips"] = GRIPS if can else 1.0

@@ -1,6 +1,7 @@
 """Axles as ladders of tanh, lagged or not: the frozen axle model, and any curve fitted by one.
 
-F = Σ_j w_j tanh(α'/α_j) cos δ per axle; lag σ = max(s Σ_j w_j/α_j (1 - tanh²) + σ_0, σ_least).
+F = λ Σ_j w_j tanh(α'/α_j) cos δ per axle; lag σ = max(s λ Σ_j w_j/α_j (1 - tanh²) + σ_0, σ_least).
+λ = 1 + κ v_x² is the load of the axle over the static one, 1 where the car has no downforce.
 """
 
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from identifier.axle.slip import SHORTEST
 from models.plant import tire_of
 from models.plant.dynamics import wheel_loads
 from models.tires import MagicFormula, Tire
-from models.vehicle import GRAVITY, Vehicle
+from models.vehicle import GRAVITY, LIGHTEST, Vehicle
 from mpc.tires.tire import (
     DOUBT_STEP,
     N_DOUBTS,
@@ -40,7 +41,7 @@ class Axle(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LadderAxles:
-    """Weights: [δ_0, b, σ_0], 1/α_j (n,), then `Axle` in front and at the rear.
+    """Weights: [δ_0, b, σ_0], 1/α_j (n,), `Axle` in front and at the rear; where pressed, κ (2,).
 
     δ_0 [rad]: zero of the steering. b [m/s]: bias of v_y. Both were learnt as offsets of sensors,
     and the tracker reads the same sensors.
@@ -49,6 +50,7 @@ class LadderAxles:
     ----------
     units : n of an axle.
     lagged : whether the slip lags; else the lag's weights are there and do nothing.
+    pressed : whether the loads of the axles change with speed.
     """
 
     saturates = True
@@ -56,10 +58,15 @@ class LadderAxles:
 
     units: int
     lagged: bool = True
+    pressed: bool = False
 
     @property
     def n_weights(self) -> int:
-        """3 + n + 2 (2 + n)."""
+        """3 + n + 2 (2 + n), and 2 where pressed."""
+        return self._static + 2 * self.pressed
+
+    @property
+    def _static(self) -> int:
         return N_COMMON + self.units + 2 * (N_AXLE + self.units)
 
     def slip(self, at: Point) -> Pair:
@@ -71,7 +78,8 @@ class LadderAxles:
         """Return the axle forces [N], frame of the body."""
         per_scale, axles = self._weights(at.w)
         front, rear = (
-            ca.dot(axle.W, ca.tanh(per_scale * x)) for axle, x in zip(axles, slip, strict=True)
+            load * ca.dot(axle.W, ca.tanh(per_scale * x))
+            for axle, x, load in zip(axles, slip, self._loads(at), strict=True)
         )
         cos_delta = 1 - at.delta**2 / 2 + at.delta**4 / 24  # as the frozen axle model has it
         return front * cos_delta, rear
@@ -80,9 +88,9 @@ class LadderAxles:
         """Return the relaxation lengths [m], which shorten with the slope of the curve."""
         per_scale, axles = self._weights(at.w)
         lengths = []
-        for axle, x in zip(axles, slip, strict=True):
+        for axle, x, load in zip(axles, slip, self._loads(at), strict=True):
             T = ca.tanh(per_scale * x)
-            slope = ca.dot(axle.W * per_scale, 1 - T * T)
+            slope = load * ca.dot(axle.W * per_scale, 1 - T * T)
             lengths.append(ca.fmax(axle.compliance * slope + at.w[2], axle.least))
         return lengths[0], lengths[1]
 
@@ -90,9 +98,17 @@ class LadderAxles:
         """Return `weights` (n_weights,) of another friction: 1/α_j over it, W times it."""
         w, n = weights.copy(), self.units
         w[N_COMMON : N_COMMON + n] /= ratio  # 1/α_j
-        axles = w[N_COMMON + n :].reshape(2, -1)  # a view
+        axles = w[N_COMMON + n : self._static].reshape(2, -1)  # a view
         axles[:, N_AXLE:] *= ratio
         return w
+
+    def _loads(self, at: Point) -> Pair:
+        """Return λ of the axles [-]; CasADi makes nothing of a factor of 1."""
+        if not self.pressed:
+            return 1, 1
+        kappa = at.w[self._static], at.w[self._static + 1]
+        front, rear = (ca.fmax(1 + one * at.v_x**2, LIGHTEST) for one in kappa)
+        return front, rear
 
     def _weights(self, w: Any) -> tuple[Any, tuple[Axle, Axle]]:
         n, size = self.units, N_AXLE + self.units
@@ -112,6 +128,7 @@ def ladder_weights(
     least: Array,
     shortest: float = 0.0,
     offset: tuple[float, float] = (0.0, 0.0),
+    downforce: tuple[float, ...] = (),
 ) -> Array:
     """Return w of `LadderAxles`.
 
@@ -123,9 +140,11 @@ def ladder_weights(
     least : least lag [m], (2,).
     shortest : σ_0 [m].
     offset : δ_0 [rad] and b [m/s].
+    downforce : κ of front and rear [s²/m²] where pressed, else nothing.
     """
     axles = np.column_stack([compliance, least, W])
-    return np.concatenate([offset, [shortest], 1.0 / np.asarray(ladder), axles.ravel()])
+    scales = 1.0 / np.asarray(ladder)
+    return np.concatenate([offset, [shortest], scales, axles.ravel(), downforce])
 
 
 def axle_tire(model: AxleModel) -> PredictionTire:
@@ -138,14 +157,7 @@ def axle_tire(model: AxleModel) -> PredictionTire:
     Parameters
     ----------
     model : frozen force curves, their compliance, sway and offsets.
-
-    Raises
-    ------
-    ValueError
-        Where the car has downforce.
     """
-    if model.vehicle.has_downforce:
-        raise ValueError("the tracker does not predict a car with downforce: leave its areas out")
     load, ladder = np.array(model.vehicle.axle_loads), np.array(model.ladder)
     W, shortest = model.W * load[:, None], SHORTEST * model.vehicle.wheelbase
     compliance = (model.own[:, 0] + GRAVITY / model.sway.frequency**2 * model.own[:, 1]) / load
@@ -157,9 +169,15 @@ def axle_tire(model: AxleModel) -> PredictionTire:
         least=compliance * 0.02 * slope + shortest,  # the slope is held up as when it was learnt
         shortest=shortest,
         offset=(model.own[0, 2], model.own[1, 2]),
+        downforce=_downforce(model.vehicle),
     )
     doubt = model.half_band(DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)).T
-    return PredictionTire(LadderAxles(units=ladder.size), weights, model.vehicle, doubt)
+    structure = LadderAxles(units=ladder.size, pressed=model.vehicle.has_downforce)
+    return PredictionTire(structure, weights, model.vehicle, doubt)
+
+
+def _downforce(vehicle: Vehicle) -> tuple[float, ...]:
+    return vehicle.downforce if vehicle.has_downforce else ()
 
 
 # A force curve, tabulated over slip, as a ladder of tanh: a linear least-squares fit.
@@ -249,7 +267,8 @@ HALVINGS = 50
 def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> PredictionTire:
     """Return the axle curves of a car on its true tires, lagged by their relaxation lengths.
 
-    Load transfer and camber are quasi-steady; drive forces are left out. The sedan's Magic
+    Load transfer and camber are quasi-steady; drive forces are left out. With downforce curves are
+    those of the static load, and forces in proportion with load. The sedan's Magic
     Formula is fitted to 0.2 % of its peak, a tire with a kink, as Dugoff's, to 1.2 %.
 
     Parameters
@@ -338,6 +357,7 @@ def _fitted_tire(
 ) -> PredictionTire:
     ladder, W = fitted_ladder(alpha, force)
     least = np.zeros(2) if lengths is None else lengths
-    weights = ladder_weights(ladder, W, compliance=np.zeros(2), least=least)
-    structure = LadderAxles(units=ladder.size, lagged=lengths is not None)
+    told, pressed = _downforce(vehicle), vehicle.has_downforce
+    weights = ladder_weights(ladder, W, compliance=np.zeros(2), least=least, downforce=told)
+    structure = LadderAxles(units=ladder.size, lagged=lengths is not None, pressed=pressed)
     return PredictionTire(structure, weights, vehicle)

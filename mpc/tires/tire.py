@@ -203,7 +203,7 @@ def no_lag(self: TireStructure, slip: Pair, at: Point) -> Pair:
 FLAT = 0.05  # of the slope at zero: the peak is reached within a per cent or two of its force
 LEAST_RISE = 0.04  # of the slope at zero; a little less than where slip ends to be of use
 SLIPS = np.linspace(0.0, 0.5, 251)  # rad
-SPEED = 15.0  # m/s; curves of slip do not depend on it
+SPEED = 15.0  # m/s; curves of slip do not depend on it, but where the car has downforce
 
 
 class ValidSlip(NamedTuple):

@@ -197,6 +197,17 @@ def test_wheel_loads_sum_to_the_weight_and_are_never_negative(hard_run):
     assert hard_run.F_z.min() >= 0.0
 
 
+def test_downforce_adds_to_the_loads_of_its_axle_by_the_square_of_speed():
+    racer = replace(CAR, downforce_area_front=1.5, downforce_area_rear=2.5)
+    run = Plant(racer).simulate(replace(HARD, amplitude=0.05), speed=lambda t: 40.0 - t)
+    pushes = 0.5 * 1.2 * run.v_x**2
+    np.testing.assert_allclose(run.F_z.sum(axis=1), CAR.weight + 4.0 * pushes, rtol=1e-12)
+    along = CAR.mass * run.a_x * CHASSIS.cg_height / CAR.wheelbase  # a few samples behind
+    front = CAR.axle_loads[0] + 1.5 * pushes - along
+    np.testing.assert_allclose(run.F_z[:, :2].sum(axis=1), front, atol=60.0)
+    assert np.ptp(pushes) > 20.0
+
+
 def test_wheels_lift_at_extreme_steer_and_the_loads_stay_physical():
     """A high car on sticky tires: inner wheels leave the road, the sum of loads stays."""
     high = replace(

@@ -14,8 +14,10 @@ from identifier.run import identify
 from identifier.stored import load_model
 from identifier.tire_model import AXLES
 from identifier.verdict import OnlineBound, calibrated, contradictions, guaranteed
+from models.maneuvers import RandomSteer
+from models.plant import Plant, tire_of
 from models.recordings import Recording
-from models.vehicle import Vehicle
+from models.vehicle import Vehicle, sedan
 from tests.identifier.axle.test_step import assert_by_hand, disturbed
 
 RACER = Vehicle(
@@ -235,3 +237,29 @@ def test_the_certificate_states_no_time_of_a_drop_that_is_not_proven():
     design = AxleIdentifier.for_vehicle(RACER)
     with_downforce, without = (design.certify(car).properties for car in (RACER, UNTOLD))
     assert [one.name for one in without] == [*(one.name for one in with_downforce), "drop_time"]
+
+
+def grows_with_load(tire):
+    """The tire with a stiffness and a friction that hardly know of a load above the nominal one."""
+    c, far = tire.coefficients, 8.0
+    now, then = (np.sin(2.0 * np.arctan(1.0 / peak)) for peak in (c.PKY2, far))
+    racing = replace(c, PKY1=c.PKY1 * now / then, PKY2=far, PDY2=0.0)
+    return replace(tire, coefficients=racing)
+
+
+def test_on_the_plant_forces_grow_as_far_as_tires_grow_with_load():
+    """With roll and load transfer; a road tire gains less grip than load, and most at its peak."""
+    car = replace(sedan(), downforce_area_front=2.0, downforce_area_rear=2.4)
+    steer = RandomSteer(
+        amplitude=0.03, frequency=0.5, seed=1, onset=0.5, rate_limit=2.0, duration=30.0
+    )
+    tire = tire_of(car)
+    log = Plant(car, grows_with_load(tire)).simulate(steer, speed=lambda t: 15.0 + 1.5 * t)
+    told, untold = (learnt(log.recording(), one).freeze() for one in (car, sedan()))
+    assert log.v_x.max() > 55.0
+    assert (missed(told, log.recording()) < 0.03).all()
+    assert (missed(untold, log.recording()) > 2.0 * missed(told, log.recording())).all()
+    road = Plant(car, tire).simulate(steer, speed=lambda t: 15.0 + 1.5 * t).recording()
+    half = replace(car, downforce_area_front=1.0, downforce_area_rear=1.2)
+    away = [missed(learnt(road, one).freeze(), road) for one in (car, half)]
+    assert (away[1] < away[0]).all()

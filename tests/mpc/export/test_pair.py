@@ -15,7 +15,7 @@ from identifier.methods import make_method
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan
-from mpc.export.pair import DELAY, NoHandoverError, build_pair
+from mpc.export.pair import DELAY, NoHandoverError, build_pair, frozen_start
 from mpc.realtime import Tracker
 from mpc.realtime.instance import CAUTION
 from mpc.tires import prediction_tire
@@ -245,3 +245,10 @@ def test_a_pair_holds_each_package_under_its_own_name(pairs):
     for pair in pairs.values():
         assert pair.identifier.specialized.name + "_mpc" == pair.tracker.name
         assert pair.tracker.params["delay"] == DELAY
+
+
+def test_a_car_with_downforce_has_no_handover_in_c():
+    racer = replace(sedan(), downforce_area_front=1.0)
+    package = build_package(make_method("axle", racer), racer)
+    with pytest.raises(NoHandoverError, match="has downforce, of which the handover in C does not"):
+        frozen_start(package)

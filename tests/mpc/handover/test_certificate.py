@@ -166,3 +166,11 @@ def test_ladders_are_judged_far_others_as_far_as_the_car_slipped(car, tire):
         right.add(20.0, 20.0 * np.tan(0.05), 0.0, 0.0)
     for one in (excitation, right):
         assert one.trusted_slip(prediction_tire(car)) == pytest.approx(0.06, rel=1e-3)
+
+
+def test_a_tire_of_a_car_with_downforce_is_judged_by_the_load_at_the_speed(car):
+    racer = replace(car, downforce_area_front=4.0, downforce_area_rear=4.0)
+    tire = oracle_tire(racer)
+    for v_x in (10.0, 40.0, 70.0):
+        assert tire_complaint(tire, v_x) is None
+    assert "times its load" in tire_complaint(tire._replace(vehicle=car), 70.0)

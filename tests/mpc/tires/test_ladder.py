@@ -1,5 +1,7 @@
 """The frozen axle model in the prediction: its curves, its lag, its offsets."""
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ import pytest
 from identifier.axle import AxleIdentifier, AxleModel
 from models.recordings import Recording
 from mpc.prediction import N_CAR, build_dynamics
+from mpc.realtime import Tracker
 from mpc.tires import prediction_tire
 from mpc.tires.tire import ALL, Car, Point
 
@@ -157,3 +160,54 @@ def test_a_model_learnt_anew_is_other_weights_only(car):
     assert one.weights.size == one.structure.n_weights
     assert one.structure.lagged
     assert one.car.size == N_CAR
+
+
+@pytest.fixture(name="racer")
+def a_racer(car):
+    return replace(car, downforce_area_front=1.8, downforce_area_rear=-0.6)
+
+
+@pytest.mark.parametrize("speed", [12.0, 35.0, 60.0])
+def test_of_a_car_with_downforce_forces_are_those_of_the_frozen_model(racer, forces, speed):
+    model, motion = axle_model(racer, offset=(0.01, 0.15)), (0.4, 0.3, 0.05)
+    tire = prediction_tire(model)
+    predicted, _ = forces(tire, speed, *(np.array([value]) for value in motion))
+    expected = model.axle_force(standing(*motion, speed=speed))[-1]
+    np.testing.assert_allclose(predicted[0], expected, rtol=1e-9)
+    half = tire._replace(weights=tire.structure.at_friction(tire.weights, 0.5))
+    less, _ = forces(half, speed, *(np.array([value]) for value in motion))
+    slid = standing(0.4, 0.3, 0.05, speed=speed)
+    np.testing.assert_allclose(less[0], model.at_friction(0.5).axle_force(slid)[-1], rtol=1e-9)
+
+
+def test_of_a_car_with_downforce_slip_lags_as_in_the_frozen_model(racer):
+    model, drive = axle_model(racer), slalom()
+    drive = replace(drive, v_x=np.linspace(15.0, 60.0, len(drive)))
+    tire = prediction_tire(model)
+    rates = build_dynamics(tire.structure)
+    behind, fine, slips = np.zeros(2), 10, []
+    for k in range(len(drive)):
+        slips.append(behind)
+        i = min(k + 1, len(drive) - 1)
+        for j in range(fine):
+            share = j / fine
+            v_x, v_y, r, delta = (
+                (1 - share) * signal[k] + share * signal[i]
+                for signal in (drive.v_x, drive.v_y, drive.r, drive.delta_f)
+            )
+            x = np.concatenate([[0.0, 0.0, v_y, r, delta], behind])
+            x_dot = rates(x, 0.0, 0.0, v_x, 1e-9, tire.car, tire.weights, *ALL)
+            behind = behind + 0.01 / fine * np.array(x_dot).ravel()[5:]
+    expected = model.lagged_slip(drive)[100:]
+    size = np.abs(expected).max(axis=0)
+    assert (np.abs(np.array(slips)[100:] - expected).max(axis=0) < 0.03 * size).all()
+    plain = replace(model, vehicle=replace(racer, downforce_area_front=0.0, downforce_area_rear=0))
+    apart = np.abs(plain.lagged_slip(drive)[100:] - expected).max(axis=0)
+    assert (apart > 5.0 * np.abs(np.array(slips)[100:] - expected).max(axis=0)).any()
+
+
+def test_caution_is_refused_for_a_car_whose_bands_are_of_static_loads(racer):
+    tire = prediction_tire(axle_model(racer))
+    assert Tracker(tire, period=0.05).caution == 0.0
+    with pytest.raises(ValueError, match="caution must be 0 for a car with downforce"):
+        Tracker(tire, caution=0.5, period=0.05)
