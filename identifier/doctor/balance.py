@@ -4,7 +4,7 @@ Kinematics, of a log with an accelerometer:  a_y - ρ a_y(t - τ) = v̇_y + v_x 
 body rolls with the accelerometer by ρ/(1 - ρ) rad for each g, τ behind, so that it shows weight.
 Dynamics, per axle in static axle loads:  dξ_i/dt + v_x r/g - sin β = h_i(α_i) cos δ_i, of an odd
 curve h_i = Σ_j w_j tanh(α/α_j) that nobody knows: the weights that fit best are taken for every
-size of the faults (variable projection); with downforce it grows as 1 + κ_i v_x².
+size of the faults (variable projection); it grows as 1 + κ_i v_x² with downforce, told or found.
 ξ_i = v_y/g ± I_z r/(L F_z,i),
 α_i = δ_i - atan((v_y ± l_i r)/v_x).
 Both are asked in means over smooth windows ψ, ∫ψ ẋ dt = -∫ψ̇ x dt: no signal is differentiated.
@@ -29,7 +29,7 @@ from models.recordings import Recording
 from models.recordings.record import CHANNELS
 from models.sensors import noise_in_means
 from models.smoothing import low_passed, smoothed, window
-from models.vehicle import GRAVITY, Vehicle
+from models.vehicle import GRAVITY, LIGHTEST, Vehicle
 
 LADDER = (0.016, 0.032, 0.064, 0.128, 0.256)  # rad, slip scales of the curve
 RIDGE = 1e-3  # on its weights, over the mean power of its units
@@ -45,7 +45,6 @@ BANKS = 6  # cosines over the drive in which a bank may swing
 OVERLAP = 4  # windows that begin within the length of one
 WANDER = 0.03  # of a force: what no model of this size explains; of kinematics a third
 SMALL = 0.004  # static axle loads
-LIGHTEST = 0.2  # load of an axle that lifts, over the static one
 MOST_TILT = 0.15  # ρ of the softest body, 10 degrees for each g; none leans into the turn
 TYPICAL = 10.0  # slope of a curve [static axle loads per rad], for the noise that slip brings
 
@@ -54,7 +53,7 @@ Told = tuple[tuple[str, float], ...]  # the same, those of it that matter
 FRONT, REAR, KINEMATICS = range(3)
 STEERING = ("delta_f", "delta_r")
 RELAXATION = ("relaxation.front", "relaxation.rear")
-DOWNFORCE = ("downforce.front", "downforce.rear")  # κ [s²/m²]
+DOWNFORCE = ("downforce.front", "downforce.rear")  # κ beside the told one [s²/m²]
 # Sizes that change nothing of a part: it is not computed again for their sake.
 TIRES = frozenset({*RELAXATION, "sway"})
 BODY = frozenset({"tilt"})
@@ -345,7 +344,8 @@ class Balance:
         y = self.forces(told(sizes, NOT_OF_FORCES))[:, part] / allowed
         slip = self._slip(motion, part, car, sizes)
         x = motion.channels
-        pressed = np.maximum(1.0 + sizes.get(DOWNFORCE[part], 0.0) * x["v_x"] ** 2, LIGHTEST)
+        kappa = self.vehicle.downforce[part] + sizes.get(DOWNFORCE[part], 0.0)
+        pressed = np.maximum(1.0 + kappa * x["v_x"] ** 2, LIGHTEST)
         units = unit_matrix(slip, LADDER) * (pressed * np.cos(x[STEERING[part]]))[:, None]
         basis = (self.mean @ units) / allowed[:, None]
         w = rising(basis, y, self.curved.get(part))

@@ -16,8 +16,8 @@ from identifier.doctor.finding import Finding
 from identifier.doctor.fit import Fit, Fitter, Outlook
 from identifier.doctor.pieces import stretches_of
 from identifier.doctor.suspects import SUSPECTS, Suspect
-from models.recordings import Recording
-from models.vehicle import Vehicle
+from models.recordings import Recording, Repair
+from models.vehicle import AIR_DENSITY, AREAS, Vehicle, VehicleError
 
 LONGEST, PIECES = 60.0, 4  # s that are looked at, and from how many parts of a longer log
 FEWEST = 24  # windows, below which nothing is asked
@@ -279,7 +279,7 @@ class Search:
             listed.append((one.suspect, first))
             # Numbers of the car can be measured; a drive is no reason to overrule who did.
             changed = first.repair.vehicle if first.repair is not None else {}
-            measured = not {*changed} <= {*self.vehicle.estimated}
+            measured = not {*changed} <= {*self.vehicle.unmeasured}
             believed = self._believed(one.suspect, self.fit)  # together with the others too
             believed = believed and abs(self.size(one.suspect, self.fit.sizes)) > STANDS * deviation
             if believed and not alike and not measured and first.confidence > SURE:
@@ -311,6 +311,28 @@ class Search:
         }
         return {one.key for one in clear if moved[one.key] < STAYS * self.deviation(one, self.fit)}
 
+    def _repair(self, suspect: Suspect, sizes: Sizes) -> Repair | None:
+        """Return what takes a suspect out: of downforce, which has two sizes, the areas of the car.
+
+        None for what no repair does, also for areas that no car has.
+        """
+        if suspect.code != "downforce":
+            return suspect.repair(self.size(suspect, sizes), self.vehicle)
+        pairs = zip(self.vehicle.downforce, DOWNFORCE, self.vehicle.axle_loads, strict=True)
+        areas = [2.0 * (told + sizes[key]) * load / AIR_DENSITY for told, key, load in pairs]
+        repair = Repair(vehicle=dict(zip(AREAS, areas, strict=True)))
+        try:
+            repair.on(self.vehicle)
+        except VehicleError:
+            return None
+        return repair
+
+    def _areas_told(self, repair: Repair | None) -> str:
+        """Return what a vehicle file is to say of downforce, "" where it says all."""
+        told = {} if repair is None else repair.vehicle
+        lines = [f"{name} = {told[name]:.2g}" for name in AREAS if name in told]
+        return f"; in the vehicle file, m²: {', '.join(lines)}" if lines else ""
+
     def _finding(
         self,
         suspect: Suspect,
@@ -326,6 +348,7 @@ class Search:
             others = ", ".join(f"{one.code} {one.channel}".strip() for one in alike)
             text += f"; this drive cannot tell it from: {others}"
         factor = suspect.is_factor
+        repair = self._repair(suspect, sizes)
         return Finding(
             code=suspect.code,
             channel=suspect.channel,
@@ -334,8 +357,8 @@ class Search:
             unit=suspect.unit,
             confidence=told[0],
             group=told[1],
-            text=text,
-            repair=suspect.repair(size, self.vehicle),
+            text=text + self._areas_told(repair),
+            repair=repair,
         )
 
 

@@ -19,7 +19,7 @@ from models.logs.log import RecordingError
 from models.recordings.record import CHANNELS, MINIMUM_SAMPLES, Recording
 from models.schema import Table
 from models.smoothing import without_low_pass
-from models.vehicle import BICYCLE, Vehicle
+from models.vehicle import AREAS, BICYCLE, Vehicle
 
 SMOOTHED = 0.08  # half the width of the window before a low pass is inverted, over sqrt(L/g)
 
@@ -45,7 +45,7 @@ class Repair:
     ------
     RecordingError
         For an unknown channel or number of a car, for a value that is not finite, for a factor of
-        zero, a lag that is not positive, or a number of a car that is not.
+        zero, a lag that is not positive, or a number of a car that is not, its downforce aside.
     """
 
     factor: Mapping[str, float] = field(default_factory=dict)
@@ -60,7 +60,7 @@ class Repair:
 
     def __post_init__(self) -> None:
         for name in TABLES:
-            known = BICYCLE if name == "vehicle" else CHANNELS
+            known = (*BICYCLE, *AREAS) if name == "vehicle" else CHANNELS
             for key, value in getattr(self, name).items():
                 if key not in known:
                     raise RecordingError(
@@ -69,7 +69,7 @@ class Repair:
                 _require_finite(f"{name}.{key}", value)
                 if name == "factor" and value == 0.0:
                     raise RecordingError(f"repair: factor.{key} must not be 0")
-                if name in ("lag", "vehicle") and not value > 0.0:
+                if name in ("lag", "vehicle") and key not in AREAS and not value > 0.0:
                     raise RecordingError(f"repair: {name}.{key} must be positive, it is {value}")
         for name in SCALARS:
             _require_finite(name, getattr(self, name))

@@ -281,6 +281,17 @@ def test_what_repairs_nothing_is_refused(made, words):
         Repair(**made)
 
 
+def test_areas_of_downforce_come_into_the_car_and_may_be_of_lift(drive):
+    areas = {"downforce_area_front": 1.2, "downforce_area_rear": -0.3}
+    repair = Repair(vehicle=areas)
+    kept = Repair.of_table(Table(repair.tables(), "", RecordingError, "repair."))
+    _, car = kept.apply(drive, CAR)
+    assert car == replace(CAR, **areas)
+    assert set(CAR.unmeasured) == {*CAR.estimated, *areas} and not {*car.unmeasured} & {*areas}
+    with pytest.raises(VehicleError, match=r"downforce_area_rear in m.2 must lie between"):
+        Repair(vehicle={"downforce_area_rear": -50.0}).apply(drive, CAR)
+
+
 def test_what_cannot_be_applied_is_refused(drive):
     without = replace(drive, a_y=None)
     for repair in (Repair(delay={"a_y": 0.1}), Repair(acceleration_sensor_x=0.1)):

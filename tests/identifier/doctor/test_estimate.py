@@ -16,6 +16,9 @@ from identifier.doctor.estimate import Candidate, Search
 from identifier.doctor.fit import Fitter
 from identifier.doctor.pieces import stretches_of
 from identifier.doctor.suspects import SUSPECTS
+from identifier.methods import make_method
+from identifier.run import identify
+from identifier.verdict.motion import evidence
 from models.faults import Late, Misaligned, SensorFault, Together
 from models.recordings import Recording, Repair
 from models.vehicle import GRAVITY, Vehicle
@@ -128,12 +131,48 @@ def pressed(lift, rng):
     return log, car
 
 
+def areas_of(car, lift):
+    """Areas of the downforce of `pressed` [m²], by the physics: ½ ρ A v²."""
+    pushes = 0.5 * 1.2 * (100.0 / 3.6) ** 2
+    return {f"downforce_area_{axle}": lift * load / pushes
+            for axle, load in zip(("front", "rear"), car.axle_loads, strict=True)}  # fmt: skip
+
+
 @pytest.mark.parametrize("lift", [0.12, 0.3])
 def test_downforce_is_named_and_nothing_in_its_place(lift):
-    found = estimate(*pressed(lift, np.random.default_rng(3)))
+    log, car = pressed(lift, np.random.default_rng(3))
+    found = estimate(log, car)
     assert [one.code for one in found] == ["downforce"]
-    assert "downforce" in found[0].text and found[0].repair is None and not found[0].sure
     assert found[0].size * (100.0 / 3.6) ** 2 == pytest.approx(lift, rel=0.2)
+    assert found[0].sure
+    told = found[0].repair.on(car)
+    for name, area in areas_of(car, lift).items():
+        assert getattr(told, name) == pytest.approx(area, rel=0.25)
+        assert f"{name} = {getattr(told, name):.2g}" in found[0].text
+    alike = {one: missed_by(log, two) for one, two in (("told", told), ("untold", car))}
+    assert (alike["told"] < 0.6 * alike["untold"]).all()
+
+
+def missed_by(log, car):
+    """Share of the force that the tires learnt of a log miss of its motion, (2,)."""
+    tires = identify(log, car, make_method("axle", car)).freeze()
+    return evidence(tires, log).missed
+
+
+def test_downforce_that_is_told_rightly_is_none_that_is_missing():
+    log, car = pressed(0.3, np.random.default_rng(3))
+    assert estimate(log, replace(car, **areas_of(car, 0.3))) == ()
+
+
+@pytest.mark.parametrize("told", [0.12, 0.5])
+def test_downforce_that_is_told_is_judged_and_never_overruled(told):
+    log, car = pressed(0.3, np.random.default_rng(3))
+    (found,) = estimate(log, replace(car, **areas_of(car, told)))
+    assert found.code == "downforce" and not found.sure
+    assert found.size * (100.0 / 3.6) ** 2 == pytest.approx(0.3 - told, rel=0.35)
+    assert ("push less at speed" in found.text) == (told > 0.3)
+    for name, area in areas_of(car, 0.3).items():
+        assert found.repair.vehicle[name] == pytest.approx(area, rel=0.25)
 
 
 def test_where_there_is_none_no_downforce_is_named():
