@@ -179,7 +179,8 @@ def make_plan(
 
     Parameters
     ----------
-    tires : that the car may have.
+    tires : that the car may have, under static loads; the plan's are those under the loads of its
+        speed.
     space : where and how.
     time : of all passes together [s].
     rng : source of randomness of the search.
@@ -197,6 +198,7 @@ def make_plan(
         raise PlanError(
             f"nothing is learnt below {least:.3g} m/s with this car, the speed is {space.speed:g}"
         )
+    tires = tires.at_speed(space.speed)
     body = body_of(tires)
     narrowest = 2.0 * (space.margin + body.side)
     if space.width < narrowest:

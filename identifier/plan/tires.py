@@ -153,6 +153,27 @@ class PlausibleTires:
         curves: Array = np.einsum("sj,kaj->ska", units, self.W)
         return curves
 
+    def at_speed(self, v_x: float) -> Self:
+        """Return the tires under the loads of a speed, as curves of that speed.
+
+        Weights, and what is not known of them, are those of the static loads times λ; of a car
+        without downforce they stay as they are.
+
+        Parameters
+        ----------
+        v_x : speed [m/s].
+        """
+        load, n = self.vehicle.load_ratio(v_x), len(self.method.ladder)
+        unit = np.ones(self.covariance.shape[:2])
+        unit[:, :n] = load[:, None]
+        both = unit[:, :, None] * unit[:, None, :]
+        return replace(
+            self,
+            W=self.W * load[:, None],
+            covariance=self.covariance * both,
+            prior=self.prior * both,
+        )
+
     def after(self, covariance: Array) -> Self:
         """Return the same tires when more is known of them.
 

@@ -309,3 +309,23 @@ def test_the_step_scales_with_the_size_of_the_car(tires):
     ratio = time_step(PlausibleTires.told(small, 0.8)) / time_step(tires)
     assert ratio == pytest.approx(0.1)
     assert Motion._fields[-1] == "delta"
+
+
+def test_a_car_with_downforce_is_planned_under_the_loads_of_its_speed(tires, brief):
+    racer, speed = replace(CAR, downforce_area_front=1.5, downforce_area_rear=2.5), 25.0
+    static = PlausibleTires.told(racer, 0.8)
+    np.testing.assert_array_equal(static.at_speed(0.0).W, static.W)
+    known = static.at_speed(speed)
+    load = 1.0 + 0.5 * 1.2 * np.array([1.5, 2.5]) * speed**2 / CAR.axle_loads
+    np.testing.assert_allclose(known.grip, static.grip * load, rtol=1e-12)
+    before, under = (
+        deviation(asked(one, speed), one.covariance) for one in (static, known)
+    )  # of forces
+    np.testing.assert_allclose(under, before * load[:, None], rtol=1e-9)
+    wide = space(length=120.0, width=30.0, speed=speed)
+    found = make_plan(static, wide, 2.0, np.random.default_rng(0))
+    np.testing.assert_array_equal(found.tires.W, known.W)
+    assert found.error < 0.9 * found.error_before
+    assert found.clearance > 0.0
+    for name in ("W", "covariance", "prior"):
+        np.testing.assert_array_equal(getattr(tires.at_speed(40.0), name), getattr(tires, name))
