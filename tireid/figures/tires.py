@@ -165,7 +165,7 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
         model.force(slip)[:, axle] / newtons,
         color=BLUE,
         linewidth=1.2,
-        label="frozen curve, steady",
+        label=f"frozen curve, {'static load' if model.vehicle.has_downforce else 'steady'}",
     )
 
 
