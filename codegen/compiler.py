@@ -155,6 +155,7 @@ FLAGS = (
     "-fPIC",
     "-shared",
 )
+LEVELS = ("0", "1", "2", "3")
 # Before all other flags: words of $CC such as -ffast-math must not delete the guards either.
 KEEP_GUARDS = ("-fno-fast-math", "-fno-finite-math-only")
 
@@ -182,6 +183,21 @@ def find_compiler() -> tuple[str, ...] | None:
 def _version(compiler: tuple[str, ...]) -> str:
     answer = subprocess.run([*compiler, "--version"], capture_output=True, text=True, check=False)
     return answer.stdout.splitlines()[0] if answer.stdout else "unknown"
+
+
+def _at_level(flags: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the flags with the level of optimization that $TIREID_OPTIMIZE asks for, if it does.
+
+    The bits are the same at each; tests, which run little of much that is compiled, take a low one.
+    """
+    level = os.environ.get("TIREID_OPTIMIZE", "")
+    if not level:
+        return flags
+    if level not in LEVELS:
+        raise CompilationError(
+            f"TIREID_OPTIMIZE must be one of {', '.join(LEVELS)}, it is {level!r}"
+        )
+    return tuple(f"-O{level}" if flag in ("-O1", "-O2", "-O3") else flag for flag in flags)
 
 
 def load_library(
@@ -227,7 +243,7 @@ def build_library(source: str, name: str, flags: tuple[str, ...] | None = None) 
     if compiler is None:
         return None
     flags = FLAGS if flags is None else flags
-    words = [*compiler, *KEEP_GUARDS, *flags]
+    words = [*compiler, *KEEP_GUARDS, *_at_level(flags)]
     made_of = "\0".join((source, _version(compiler), *words))
     stem = f"{name}-{hashlib.sha256(made_of.encode()).hexdigest()[:20]}"
     found = kept(stem, ".so")

@@ -3,6 +3,7 @@ little; what is heavy.
 """
 
 import os
+import time
 import tomllib
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -53,6 +54,13 @@ def pytest_collection_modifyitems(config, items):
     items.sort(key=lambda item: not item.nodeid.startswith(LONGEST))
     if unmet and config.args == config.getini("testpaths") and not config.option.keyword:
         raise pytest.UsageError("tests/heavy.toml names what is not there: " + ", ".join(unmet))
+
+
+def pytest_runtest_setup(item):
+    """Leave out what is heavy and begins after a moment that was told, and say so."""
+    until = os.environ.get("TIREID_HEAVY_UNTIL")
+    if until and item.get_closest_marker("heavy") and time.time() > float(until):
+        pytest.skip("no time is left for what is heavy: `make heavy` runs it")
 
 
 @pytest.fixture(scope="session")

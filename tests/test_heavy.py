@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import HEAVY, sort_out
+from tests.conftest import HEAVY, pytest_runtest_setup, sort_out
 
 ROOT = Path(__file__).resolve().parents[1]
 ENTRIES = [{"test": "t.py::sweep", "keep": ["a", "b-*"]}, {"test": "t.py::long", "beside": "x"}]
@@ -17,6 +17,9 @@ class Item:
 
     def add_marker(self, mark):
         self.marks.append(mark.name)
+
+    def get_closest_marker(self, name):
+        return name if name in self.marks else None
 
 
 def sorted_out(*names):
@@ -34,6 +37,18 @@ def test_an_entry_that_nothing_meets_is_told():
     assert sorted_out("sweep[a]", "sweep[c]")[1] == ["t.py::long", "t.py::sweep: b-*"]
     assert sorted_out("sweep[a]", "sweep[b-1]", "long")[1] == ["t.py::sweep"]  # none is heavy
     assert sort_out([Item("u.py::long")], ENTRIES) == []  # t.py is skipped
+
+
+def test_what_is_heavy_is_left_out_when_its_time_is_over_and_nothing_else_is(monkeypatch):
+    quick, heavy = Item("t.py::other"), Item("t.py::long")
+    sort_out([quick, heavy], ENTRIES)
+    for until in ("", "1e12"):
+        monkeypatch.setenv("TIREID_HEAVY_UNTIL", until)
+        pytest_runtest_setup(heavy)
+    monkeypatch.setenv("TIREID_HEAVY_UNTIL", "1")
+    pytest_runtest_setup(quick)
+    with pytest.raises(pytest.skip.Exception, match="make heavy"):
+        pytest_runtest_setup(heavy)
 
 
 @pytest.mark.parametrize("entry", HEAVY, ids=lambda entry: entry["test"].partition("::")[2][:60])

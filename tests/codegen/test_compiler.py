@@ -91,6 +91,25 @@ def test_the_name_of_a_library_follows_flags_and_compiler(monkeypatch, fresh_cac
     assert build_library(ONE, "one") == before
 
 
+def test_the_environment_may_ask_for_another_level_of_optimization(monkeypatch, fresh_cache):
+    monkeypatch.delenv("TIREID_OPTIMIZE", raising=False)
+    usual = build_library(ONE, "one")
+    levels, run = [], subprocess.run
+
+    def listen(words, **options):
+        levels.extend(word for word in words if word.startswith("-O"))
+        return run(words, **options)
+
+    monkeypatch.setattr(subprocess, "run", listen)
+    monkeypatch.setenv("TIREID_OPTIMIZE", "0")
+    found = {build_library(ONE, "one"), build_library(ONE, "one", ("-O3", "-fPIC", "-shared"))}
+    assert levels == ["-O0", "-O0"]
+    assert len(found | {usual}) == 3
+    monkeypatch.setenv("TIREID_OPTIMIZE", "fast")
+    with pytest.raises(CompilationError, match="TIREID_OPTIMIZE must be one of 0, 1, 2, 3"):
+        build_library(ONE, "one")
+
+
 def require_no_library_before_it_is_whole(monkeypatch, folder, build):
     """Look into the cache when the compiler has just ended: its file must have another name."""
     seen = []
@@ -297,6 +316,7 @@ CPU = Path("/proc/cpuinfo")
     reason="needs an x86-64 processor that can fuse multiplication and addition",
 )
 def test_flags_give_the_same_bits_where_the_machine_could_fuse(monkeypatch, fresh_cache):
+    monkeypatch.delenv("TIREID_OPTIMIZE", raising=False)  # a lower level fuses nothing
     flags = compiler_module.FLAGS
     monkeypatch.setattr(compiler_module, "FLAGS", (*flags, "-mfma"))
     require_two_roundings()

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from codegen import arrays
+from codegen import Scan, arrays
 from identifier.axle import AxleIdentifier
 from identifier.methods import make_method
 from identifier.reproducibility import beyond_known, predict, reproduce
@@ -304,3 +304,22 @@ def test_memory_that_grows_would_be_noticed(lengths, monkeypatch):
     short = peak_of(lengths[0])
     monkeypatch.setattr(arrays, "IN_MEMORY", 1e12)
     assert peak_of(lengths[1]) - short > 8 * (len(lengths[1]) - len(lengths[0]))
+
+
+@pytest.mark.parametrize("method", ["axle", "integral"])
+def test_no_level_of_optimization_changes_a_bit(method, monkeypatch, tmp_path):
+    """What tests compile sooner is what everybody runs."""
+    monkeypatch.setenv("TIREID_CACHE", str(tmp_path))
+    recording = drive(n=800)
+    design = AxleIdentifier.for_vehicle(CAR) if method == "axle" else make_method(method, CAR)
+    setup = design.setup(CAR, None).begin(recording.x[0])
+    step, found = setup.scan, {}
+    for level in ("0", "1", "2", "3"):
+        monkeypatch.setenv("TIREID_OPTIMIZE", level)
+        anew = setup._replace(scan=Scan(step.step, carry=step.carry, over=step.over))
+        (block,) = anew.run(recording, (slice(0, len(recording)),))
+        found[level] = {**block.state, **block.outputs}
+    assert len([*tmp_path.glob("*.so")]) == 4
+    for level in ("1", "2", "3"):
+        for port, values in found[level].items():
+            np.testing.assert_array_equal(values, found["0"][port], err_msg=f"{port} at {level}")
