@@ -274,7 +274,8 @@ class Search:
             group = float(1.0 - shares[0])
             names = [other.suspect for other in alike]
             deviation = self.real_deviation(one.suspect, self.fit)
-            told = float(shares[1]), group
+            real = _beyond(self.size(one.suspect, self.fit.sizes), deviation)
+            told = real * float(shares[1]), real * group
             first = self._finding(one.suspect, self.fit.sizes, deviation, told, names)
             listed.append((one.suspect, first))
             # Numbers of the car can be measured; a drive is no reason to overrule who did.
@@ -286,7 +287,7 @@ class Search:
                 clear.append(one.suspect)
             for other, share in zip(alike, shares[2:].tolist(), strict=True):
                 off = self.real_deviation(other.suspect, other.fit)
-                told = share, group
+                told = real * share, real * group
                 second = self._finding(other.suspect, other.fit.sizes, off, told, [one.suspect])
                 listed.append((other.suspect, second))
         doubtful = self.in_doubt or len(self.found) > SEVERAL
@@ -360,6 +361,16 @@ class Search:
             text=text + self._areas_told(repair),
             repair=repair,
         )
+
+
+def _beyond(size: float, deviation: float) -> float:
+    """Return how probably a size is more than its deviation: 0 of one that is nothing beside it.
+
+    Parameters
+    ----------
+    size, deviation : of the same unit.
+    """
+    return math.erf(abs(size) / (math.sqrt(2.0) * deviation))
 
 
 class Examination(NamedTuple):

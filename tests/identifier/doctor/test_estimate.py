@@ -320,16 +320,30 @@ def test_what_is_negative_is_said_the_other_way_round(key, word):
     assert word in said and "-" not in said
 
 
-def test_what_nobody_believes_is_not_sure_nor_what_rests_on_it():
+def test_what_nobody_believes_is_not_sure_nor_what_rests_on_it(monkeypatch):
     """A lag of a small car that the drive hardly tells: several sizes drift off together."""
     log, car, _ = drawn("tenth", 600)
     fault = planted("lag v_y", car, np.random.default_rng([600, 13, 7]))
     bad = fault.case.log(log)
+    monkeypatch.setattr(sys.modules[Search.__module__], "SURE", 0.8)
+    monkeypatch.setattr(sys.modules[Search.__module__], "STANDS", 0.0)
     found = estimate(bad, car)
     scaled = next(one for one in found if (one.code, one.channel) == ("factor", "v_y"))
     assert math.log(scaled.size) > 3.5 * 0.2
-    assert scaled.confidence > 0.95
+    assert scaled.confidence > 0.8
     assert not any(one.sure for one in found)
+
+
+def test_the_confidence_counts_how_far_a_size_is_from_nothing(driven, monkeypatch):
+    car, log, _ = driven
+    bad = SensorFault(channel="r", kind="scaled", size=1.1).apply(log)
+    (found, *_) = estimate(bad, car)
+    away = math.log(found.size) / (found.deviation / found.size)
+    monkeypatch.setattr(Search, "real_deviation", lambda *_: math.log(found.size))
+    (doubted, *_) = estimate(bad, car)
+    assert found.confidence > 0.95 * math.erf(away / math.sqrt(2.0))
+    assert doubted.confidence == pytest.approx(0.683, abs=0.02)
+    assert doubted.group == pytest.approx(0.683, abs=0.02)
 
 
 def test_what_else_is_a_little_off_moves_a_size_as_far_as_is_told(driven):
