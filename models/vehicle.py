@@ -358,11 +358,6 @@ class Vehicle:
         )
 
     @property
-    def unmeasured(self) -> tuple[str, ...]:
-        """Names of the values that nobody told: estimated ones, and a downforce of zero."""
-        return self.estimated if self.has_downforce else (*self.estimated, *AREAS)
-
-    @property
     def downforce(self) -> tuple[float, float]:
         """Downforce of the front and the rear axle over static load and v_x^2, κ [s^2/m^2]."""
         front, rear = (

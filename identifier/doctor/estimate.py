@@ -280,7 +280,7 @@ class Search:
             listed.append((one.suspect, first))
             # Numbers of the car can be measured; a drive is no reason to overrule who did.
             changed = first.repair.vehicle if first.repair is not None else {}
-            measured = not {*changed} <= {*self.vehicle.unmeasured}
+            measured = not {*changed} <= {*self.vehicle.estimated}
             believed = self._believed(one.suspect, self.fit)  # together with the others too
             believed = believed and abs(self.size(one.suspect, self.fit.sizes)) > STANDS * deviation
             if believed and not alike and not measured and first.confidence > SURE:

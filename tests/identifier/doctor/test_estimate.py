@@ -144,7 +144,8 @@ def test_downforce_is_named_and_nothing_in_its_place(lift):
     found = estimate(log, car)
     assert [one.code for one in found] == ["downforce"]
     assert found[0].size * (100.0 / 3.6) ** 2 == pytest.approx(lift, rel=0.2)
-    assert found[0].sure
+    assert found[0].confidence > 0.9
+    assert not found[0].sure, "whether tires gain as the load does, who knows the car must say"
     told = found[0].repair.on(car)
     for name, area in areas_of(car, lift).items():
         assert getattr(told, name) == pytest.approx(area, rel=0.25)
