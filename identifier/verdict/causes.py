@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from models.recordings import Recording, Repair
-from models.vehicle import Vehicle
+from models.vehicle import AIR_DENSITY, AREAS, Vehicle
 
+HUNDRED_KMH = 100.0 / 3.6  # m/s
 TELLING = 0.3  # share of what is missed (squared) that a cause must explain to be named
 DOUBLINGS = 5  # sizes of one sign that are tried, each twice the last
 PATIENCE = 2  # sizes in a row that do not help, after which no larger one is tried
@@ -39,9 +40,11 @@ Mend = Callable[[Recording, Vehicle, float], Mended]
 class Cause(NamedTuple):
     """A number that may be wrong.
 
-    code : for machines.   text : with {size} in its unit.   per_unit : of `text` per SI unit.
+    code : for machines.   text : with {size} in its unit, and {told}, what the vehicle file were
+    to hold.   per_unit : of `text` per SI unit.
     step : first that is tried, and most : largest that is believed, in wheelbases or sqrt(g L)
     where `scale` says so.   signed : whether it may be negative.   mend : takes it out.
+    tells : the repair of the car that {told} is of.
     """
 
     code: str
@@ -52,6 +55,7 @@ class Cause(NamedTuple):
     signed: bool
     scale: str
     mend: Mend
+    tells: Callable[[Vehicle, float], Repair] | None = None
 
     def unit(self, vehicle: Vehicle) -> float:
         """Return what `step` and `most` are multiples of for a car, SI."""
@@ -81,6 +85,15 @@ def _inertia(vehicle: Vehicle, size: float) -> Repair:
 
 def _center(vehicle: Vehicle, size: float) -> Repair:
     return Repair(vehicle={"l_f": vehicle.l_f + size, "l_r": vehicle.l_r - size})
+
+
+def _pressed(vehicle: Vehicle, size: float) -> Repair:
+    """Return the areas of a car that presses by a share of its weight more at `HUNDRED_KMH`."""
+    unit = 0.5 * AIR_DENSITY * HUNDRED_KMH**2
+    loads = zip(AREAS, vehicle.axle_loads, strict=True)
+    return Repair(
+        vehicle={name: getattr(vehicle, name) + size * load / unit for name, load in loads}
+    )
 
 
 def _earlier(name: str) -> Mend:
@@ -127,6 +140,9 @@ CAUSES = (
           0.5, 4.0, True, "", _by(_inertia)),
     Cause("center_of_gravity", "the center of gravity is {size:+.2g} m behind the told one "
           "(l_f and l_r; +: farther back)", 1.0, 0.06, 0.3, True, "length", _by(_center)),
+    Cause("downforce", "a downforce of {size:+.0f} % of the weight at 100 km/h (-: lift) beside "
+          "what the vehicle file tells, which were to hold {told}", 100.0, 0.03, 1.0, True, "",
+          _by(_pressed), _pressed),
     Cause("bank", "the road falls by {size:+.2g} degrees (+: to the left), or wind pushes so",
           DEGREE, 0.02, 0.2, True, "", _bank),
     Cause("v_y_scale", "v_y is scaled by {size:+.0f} %", 100.0,
@@ -141,17 +157,22 @@ OF_ROAD = Cause(  # that a model of another drive may be asked about
 
 
 class Suspect(NamedTuple):
-    """A cause, its best size [SI], and the share of what is missed (squared) that it explains."""
+    """A cause, its best size [SI], and the share of what is missed (squared) that it explains.
+
+    told : what the vehicle file were to hold then, "key = value"; empty of most causes.
+    """
 
     cause: Cause
     size: float
     share: float
+    told: str = ""
 
     @property
     def text(self) -> str:
         """The cause in words, with its size."""
         size = self.size * self.cause.per_unit
-        return self.cause.text.format(size=size, factor=math.exp(min(self.size, 9.0)))
+        factor = math.exp(min(self.size, 9.0))
+        return self.cause.text.format(size=size, factor=factor, told=self.told)
 
 
 Ask = Callable[[Mended], float]
@@ -183,8 +204,14 @@ def suspects(
 
         size, left = _least(missed, here, cause)
         share = (here - left) / here if here > 0.0 else 0.0
-        listed.append(Suspect(cause, size * unit, share))
+        listed.append(Suspect(cause, size * unit, share, _told(cause, vehicle, size * unit)))
     return tuple(sorted(listed, key=lambda one: -one.share))
+
+
+def _told(cause: Cause, vehicle: Vehicle, size: float) -> str:
+    """Return what a cause tells of a car, as lines of its file are written, in one."""
+    keys = {} if cause.tells is None else cause.tells(vehicle, size).vehicle
+    return ", ".join(f"{key} = {value:.2g}" for key, value in keys.items())
 
 
 def _least(missed: Callable[[float], float], here: float, cause: Cause) -> tuple[float, float]:

@@ -26,7 +26,7 @@ from identifier.verdict.motion import (
     noise_variance,
 )
 from identifier.verdict.parts import asked_run, taught_elsewhere, without_v_y
-from identifier.verdict.rules import MOST_MISSED, PERCENT, Drive, findings
+from identifier.verdict.rules import MOST_MISSED, PERCENT, Drive, findings, is_off_center
 from identifier.verdict.verdict import WITHOUT_V_Y, Number, Objection, Verdict
 from models.recordings import Recording
 from models.recordings.portion import Portion, portion
@@ -37,8 +37,7 @@ REST_MISSED = 0.08  # of the force elsewhere, where a piece is,
 CONFINED = 0.6  # and of what is missed with the piece
 ROADS = 3  # stretches of another friction that are told one by one
 TINY = 1e-9  # of a force, squared [static axle loads²]
-GEOMETRY = "center_of_gravity"
-CENTER = tuple(one for one in CAUSES if one.code == GEOMETRY)
+GEOMETRY, PRESS = "center_of_gravity", "downforce"
 
 
 def judge(history: History, t: float | None = None) -> Verdict:
@@ -66,11 +65,15 @@ def judge(history: History, t: float | None = None) -> Verdict:
     if drive is None:
         return _too_short(model)
     drive = drive._replace(
-        center=None if drive.notes or without_v_y(asked) else _center(drive, taught, road),
+        center=(
+            None if drive.notes or without_v_y(asked) else _suspect(GEOMETRY, drive, taught, road)
+        ),
         elsewhere=_elsewhere(taught, drive, history.vehicle),
         apart=_apart(history.axle_force[asked.samples], history.vehicle, drive.found),
         learns=True,
     )
+    if is_off_center(drive):
+        drive = drive._replace(pressed=_suspect(PRESS, drive, taught, road))
     reached = [
         Objection(
             "at_bound",
@@ -102,7 +105,9 @@ def judge_prediction(
 
     asked = portion(recording)
     road = _road_driven(asked.recording, model.vehicle)
-    causes = (*CAUSES, OF_ROAD) if another_road else CAUSES
+    # Downforce changes the curve that is learnt: of one that is not learnt anew it is friction.
+    of_drive = tuple(one for one in CAUSES if one.code != PRESS)
+    causes = (*of_drive, OF_ROAD) if another_road else of_drive
     drive = _looked_at(mounted, model, asked, recording.t, road, causes)
     if drive is None:
         return _too_short(model)
@@ -179,11 +184,12 @@ def _looked_at(
     return Drive(model=model, recording=recording, found=found, suspects=listed, notes=notes)
 
 
-def _center(drive: Drive, tires: Tires, road: Array | None) -> Suspect:
-    """Return the center of gravity that would explain most."""
+def _suspect(code: str, drive: Drive, tires: Tires, road: Array | None) -> Suspect:
+    """Return a cause of that code with the size that would explain most."""
     ask = _ask(tires, drive.found.windows, road)
-    listed = drive.suspects or suspects(ask, drive.recording, drive.model.vehicle, CENTER)
-    return next(one for one in listed if one.cause.code == GEOMETRY)
+    causes = [one for one in CAUSES if one.code == code]
+    listed = drive.suspects or suspects(ask, drive.recording, drive.model.vehicle, causes)
+    return next(one for one in listed if one.cause.code == code)
 
 
 def _stretch(found: Evidence, rest: Evidence, t: Array, first: int, last: int) -> Objection:

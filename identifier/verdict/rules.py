@@ -39,7 +39,8 @@ class Drive(NamedTuple):
 
     model, recording : what was learnt, or asked, and the drive.   found : what the model explains.
     suspects : causes of what is missed, the likeliest first.   notes : what is said beside.
-    center : the center of gravity that explains most, None where it was not asked.   elsewhere :
+    center : the center of gravity that explains most, None where it was not asked.   pressed : the
+    downforce that explains most, where another center of gravity would explain much.   elsewhere :
     force missed by models taught without a part of the drive in that part, over the force (2,),
     None unknown.   apart : online from frozen (2,), None unknown.   learns : whether the model was
     learnt on this drive.
@@ -51,6 +52,7 @@ class Drive(NamedTuple):
     suspects: tuple[Suspect, ...] = ()
     notes: tuple[Objection, ...] = ()
     center: Suspect | None = None
+    pressed: Suspect | None = None
     elsewhere: Array | None = None
     apart: Array | None = None
     learns: bool = False
@@ -263,23 +265,44 @@ def _car(drive: Drive) -> Iterator[Objection]:
         yield from _a_y(drive, vehicle, found)
 
 
-def _center(drive: Drive) -> Iterator[Objection]:
-    """The split of the force between the axles follows the center of gravity, and nothing else."""
-    suspect, vehicle = drive.center, drive.model.vehicle
-    if suspect is None or any(_forceless(drive)):
-        return
-    off = suspect.size / vehicle.wheelbase
-    gained = float(np.sqrt(np.mean(drive.found.missed**2) * max(suspect.share, 0.0)))
+def is_off_center(drive: Drive) -> bool:
+    """Return whether another center of gravity explains much, and lies where that of no car does.
+
+    Parameters
+    ----------
+    drive : whose `center` was asked.
+    """
+    if drive.center is None or any(_forceless(drive)):
+        return False
+    off = drive.center.size / drive.model.vehicle.wheelbase
+    gained = float(np.sqrt(np.mean(drive.found.missed**2) * max(drive.center.share, 0.0)))
     moved = not CENTER[0] <= off <= CENTER[1]
-    if moved and suspect.share > CERTAIN and gained > NOTICED:
-        share = PERCENT * min(suspect.share, 1.0)
+    return moved and drive.center.share > CERTAIN and gained > NOTICED
+
+
+def _center(drive: Drive) -> Iterator[Objection]:
+    """The split of the force between the axles follows the center of gravity, and downforce."""
+    center, pressed = drive.center, drive.pressed
+    if center is None or not is_off_center(drive):
+        return
+    share = PERCENT * min(center.share, 1.0)
+    if pressed is not None and pressed.share > center.share:
+        more = PERCENT * min(pressed.share, 1.0)
         yield Objection(
-            "center_of_gravity",
+            "downforce",
             None,
-            f"{suspect.text}: that would explain {share:.0f} % of what is missed; are l_f and l_r "
-            "swapped? A v_y that is late or measured elsewhere looks alike",
+            f"{pressed.text}: that would explain {more:.0f} % of what is missed; or "
+            f"{center.text}: {share:.0f} %",
             True,
         )
+        return
+    yield Objection(
+        "center_of_gravity",
+        None,
+        f"{center.text}: that would explain {share:.0f} % of what is missed; are l_f and l_r "
+        "swapped? A v_y that is late or measured elsewhere looks alike",
+        True,
+    )
 
 
 def _turning(recording: Recording, found: Evidence) -> Iterator[Objection]:

@@ -95,3 +95,42 @@ def refused_in_one_line(tmp_path):
 def a_drive():
     """The function `drive(n, dt, speed, amplitude, scale)`, which makes a recording."""
     return drive
+
+
+def pressed(lift, rng):
+    """A minute of a race car whose axle loads grow by `lift` of the weight at 100 km/h, squared.
+
+    One track, tires that follow slip at once, speeds from 18 to 45 m/s, steered by two sines.
+    """
+    car = Vehicle(name="race", mass=1100.0, yaw_inertia=1600.0, l_f=1.45, l_r=1.35,
+                  cornering_stiffness_front=1e5, cornering_stiffness_rear=1e5)  # fmt: skip
+    dt, kappa = 0.01, lift / (100.0 / 3.6) ** 2
+    t = np.arange(0.0, 60.0, dt)
+    v_x = 31.5 + 13.5 * np.sin(0.35 * t)
+    a_y = 7.0 * np.sin(2.0 * t) + 4.0 * np.sin(4.3 * t)  # that steering asks for, about
+    delta = a_y * (car.wheelbase / v_x**2 + 0.002)
+    loads, moving, fine = np.array(car.axle_loads), np.zeros(2), 10
+    v_y, r, felt = np.empty((3, t.size))
+    for k in range(t.size):
+        v_y[k], r[k] = moving
+        for i in range(fine):
+            sideways = moving[0] + np.array([car.l_f, -car.l_r]) * moving[1]
+            slip = np.array([delta[k], 0.0]) - np.arctan(sideways / v_x[k])
+            force = loads * (1.0 + kappa * v_x[k] ** 2) * 1.6 * np.tanh(16.0 * slip)
+            across = force[0] * np.cos(delta[k]) + force[1]
+            felt[k] = across / car.mass if i == 0 else felt[k]
+            turn = car.l_f * force[0] * np.cos(delta[k]) - car.l_r * force[1]
+            rates = across / car.mass - v_x[k] * moving[1], turn / car.yaw_inertia
+            moving = moving + dt / fine * np.array(rates)
+    noise = rng.normal(size=(3, t.size)) * np.array([[0.02], [0.002], [0.05]])
+    signals = {"v_y": v_y + noise[0], "r": r + noise[1], "a_y": felt + noise[2]}
+    log = Recording.from_dataframe({"t": t, "vx": v_x, "vy": signals["v_y"], "r": signals["r"],
+                                    "delta_f": delta, "ay": signals["a_y"]})  # fmt: skip
+    return log, car
+
+
+def areas_of(car, lift):
+    """Areas of the downforce of `pressed` [m²], by the physics: ½ ρ A v²."""
+    pushes = 0.5 * 1.2 * (100.0 / 3.6) ** 2
+    return {f"downforce_area_{axle}": lift * load / pushes
+            for axle, load in zip(("front", "rear"), car.axle_loads, strict=True)}  # fmt: skip

@@ -28,6 +28,7 @@ from models.maneuvers import RandomSteer
 from models.plant import Plant
 from models.sensors import Sensor, Sensors, white_noise
 from models.vehicle import sedan
+from tests.identifier.conftest import areas_of, pressed
 
 SENSORS = Sensors(
     v_x=Sensor(noise=0.03), v_y=Sensor(noise=0.03), r=Sensor(noise=0.003), delta=Sensor(noise=5e-4)
@@ -237,6 +238,28 @@ def test_swapped_axles_are_noticed_by_the_center_of_gravity(drive):
     verdict = answer(drive, swapped).verdict()
     assert codes(verdict) == {"center_of_gravity"}
     assert verdict.measures["center_of_gravity_m"] == pytest.approx(car.l_f - car.l_r, rel=0.4)
+
+
+def test_a_downforce_that_is_not_told_is_the_likely_cause_and_told_the_answer_is_valid():
+    log, car = pressed(0.3, np.random.default_rng(3))
+    verdict = answer(log, car).verdict()
+    assert not verdict.valid
+    named = [one.text for one in verdict.findings if "downforce" in one.text]
+    told = dict(re.findall(r"(downforce_area_\w+) = ([\d.]+)", named[0]))
+    right = areas_of(car, 0.3)
+    assert set(told) == set(right)
+    for name, area in told.items():
+        assert float(area) == pytest.approx(right[name], rel=0.25)
+    assert "center_of_gravity" not in codes(verdict)
+    written = replace(car, **{key: float(area) for key, area in told.items()})
+    assert answer(log, written).verdict().valid
+
+
+def test_without_downforce_none_is_blamed(drive):
+    car = sedan()
+    swapped = replace(car, l_f=car.l_r, l_r=car.l_f)
+    (one,) = answer(drive, swapped).verdict().findings
+    assert "downforce" not in one.text
 
 
 def test_each_learnt_number_holds_the_truth_within_its_doubt(good):
