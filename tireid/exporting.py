@@ -17,7 +17,7 @@ from identifier.run import History
 from identifier.tire_model import TireModel
 from models.vehicle import Vehicle, sedan
 from mpc.export.package import mpc_readme
-from mpc.export.pair import build_pair
+from mpc.export.pair import build_pair, frozen_start
 from mpc.export.processor import measure_mpc, mpc_figures_text, time_here, with_mpc_figures
 from mpc.realtime import NoCompilerError
 from tireid.output import output_folder
@@ -198,6 +198,8 @@ def export_method(
         package = build_package(
             method, vehicle, start, name=name, single=single, with_a_y=with_a_y, with_band=band
         )
+        if mpc:
+            frozen_start(package)  # what cannot be handed over is refused before costs are measured
         costs = measure(package, progress.begin(COSTS))
         place = scratch / IDENTIFIER if mpc else scratch
         write_files(place, package, figures_text(costs), costs)
