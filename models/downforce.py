@@ -12,11 +12,11 @@ from models.vehicle import LIGHTEST
 
 
 def load_ratio(downforce: Any, v_x: Any) -> Any:
-    """Return λ (2,) [-] as a CasADi expression.
+    """Return λ [-] as a CasADi expression, of the shape of κ.
 
     Parameters
     ----------
-    downforce : κ (2,) [s²/m²].
+    downforce : κ of both axles (2,), or of one [s²/m²].
     v_x : longitudinal speed [m/s].
     """
     pressed = 1 + downforce * v_x**2

@@ -17,7 +17,7 @@ from identifier.doctor.fit import Fit, Fitter, Outlook
 from identifier.doctor.pieces import stretches_of
 from identifier.doctor.suspects import SUSPECTS, Suspect
 from models.recordings import Recording, Repair
-from models.vehicle import AIR_DENSITY, AREAS, Vehicle, VehicleError
+from models.vehicle import AREAS, Vehicle, VehicleError
 
 LONGEST, PIECES = 60.0, 4  # s that are looked at, and from how many parts of a longer log
 FEWEST = 24  # windows, below which nothing is asked
@@ -319,9 +319,9 @@ class Search:
         """
         if suspect.code != "downforce":
             return suspect.repair(self.size(suspect, sizes), self.vehicle)
-        pairs = zip(self.vehicle.downforce, DOWNFORCE, self.vehicle.axle_loads, strict=True)
-        areas = [2.0 * (told + sizes[key]) * load / AIR_DENSITY for told, key, load in pairs]
-        repair = Repair(vehicle=dict(zip(AREAS, areas, strict=True)))
+        pairs = zip(self.vehicle.downforce, DOWNFORCE, strict=True)
+        more = [told + sizes[key] for told, key in pairs]
+        repair = Repair(vehicle=self.vehicle.downforce_areas(more))
         try:
             repair.on(self.vehicle)
         except VehicleError:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from models.recordings import Recording, Repair
-from models.vehicle import AIR_DENSITY, AREAS, Vehicle
+from models.vehicle import Vehicle
 
 HUNDRED_KMH = 100.0 / 3.6  # m/s
 TELLING = 0.3  # share of what is missed (squared) that a cause must explain to be named
@@ -89,11 +89,8 @@ def _center(vehicle: Vehicle, size: float) -> Repair:
 
 def _pressed(vehicle: Vehicle, size: float) -> Repair:
     """Return the areas of a car that presses by a share of its weight more at `HUNDRED_KMH`."""
-    unit = 0.5 * AIR_DENSITY * HUNDRED_KMH**2
-    loads = zip(AREAS, vehicle.axle_loads, strict=True)
-    return Repair(
-        vehicle={name: getattr(vehicle, name) + size * load / unit for name, load in loads}
-    )
+    more = [told + size / HUNDRED_KMH**2 for told in vehicle.downforce]
+    return Repair(vehicle=vehicle.downforce_areas(more))
 
 
 def _earlier(name: str) -> Mend:

@@ -13,10 +13,11 @@ import numpy as np
 from codegen.arrays import Array
 from identifier.axle.model import AxleModel
 from identifier.axle.slip import SHORTEST
+from models.downforce import load_ratio
 from models.plant import tire_of
 from models.plant.dynamics import wheel_loads
 from models.tires import MagicFormula, Tire
-from models.vehicle import GRAVITY, LIGHTEST, Vehicle
+from models.vehicle import GRAVITY, Vehicle
 from mpc.tires.tire import (
     DOUBT_STEP,
     N_DOUBTS,
@@ -106,8 +107,7 @@ class LadderAxles:
         """Return λ of the axles [-]; CasADi makes nothing of a factor of 1."""
         if not self.pressed:
             return 1, 1
-        kappa = at.w[self._static], at.w[self._static + 1]
-        front, rear = (ca.fmax(1 + one * at.v_x**2, LIGHTEST) for one in kappa)
+        front, rear = (load_ratio(at.w[self._static + i], at.v_x) for i in range(2))
         return front, rear
 
     def _weights(self, w: Any) -> tuple[Any, tuple[Axle, Axle]]:

@@ -266,3 +266,11 @@ def test_race_cars_have_a_downforce_that_is_believed():
                       cornering_stiffness_front=stiffness, cornering_stiffness_rear=stiffness,
                       downforce_area_front=area / 2.0, downforce_area_rear=area / 2.0)  # fmt: skip
         assert car.has_downforce
+
+
+def test_areas_of_a_downforce_are_those_that_make_it():
+    car = replace(sedan(), downforce_area_front=1.2, downforce_area_rear=-0.3)
+    areas = car.downforce_areas(car.downforce)
+    assert areas == pytest.approx({"downforce_area_front": 1.2, "downforce_area_rear": -0.3})
+    pushed = 0.5 * 1.2 * areas["downforce_area_front"] * 20.0**2
+    assert car.load_ratio(20.0)[0] == pytest.approx(1.0 + pushed / car.axle_loads[0])
