@@ -138,7 +138,7 @@ CAUSES = (
     Cause("center_of_gravity", "the center of gravity is {size:+.2g} m behind the told one "
           "(l_f and l_r; +: farther back)", 1.0, 0.06, 0.3, True, "length", _by(_center)),
     Cause("downforce", "a downforce of {size:+.0f} % of the weight at 100 km/h (-: lift) beside "
-          "what the vehicle file tells, which were to hold {told}", 100.0, 0.03, 1.0, True, "",
+          "what the vehicle file tells (it would say {told})", 100.0, 0.03, 1.0, True, "",
           _by(_pressed), _pressed),
     Cause("bank", "the road falls by {size:+.2g} degrees (+: to the left), or wind pushes so",
           DEGREE, 0.02, 0.2, True, "", _bank),
