@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
@@ -201,6 +202,21 @@ LIGHTEST = 0.2  # load of an axle that lifts, over the static one: a car that fl
 DOWNFORCE_SPEED = 30.0  # m/s
 LEAST_PRESS, MOST_PRESS = -0.5, 5.0  # static axle loads of downforce there
 AREAS = ("downforce_area_front", "downforce_area_rear")  # of a `Vehicle`
+
+
+def load_ratio(downforce: Any, v_x: Any) -> Any:
+    """Return λ = 1 + κ v_x^2, the load over the static one [-], as a CasADi expression.
+
+    `Vehicle.load_ratio` is the same of numbers.
+
+    Parameters
+    ----------
+    downforce : κ of both axles (2,), or of one, as `Vehicle.downforce` has it [s^2/m^2].
+    v_x : longitudinal speed [m/s].
+    """
+    pressed = 1 + downforce * v_x**2
+    return ca.if_else(pressed > LIGHTEST, pressed, LIGHTEST)
+
 
 __all__ = [
     "GRAVITY",

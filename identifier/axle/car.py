@@ -52,7 +52,7 @@ def axle_impulse(car: Car, v_y: Any, r: Any) -> Any:
 
 
 # Downforce: an axle of κ pushes as one of λ = 1 + κ v_x² static loads, F = F_z λ φ(α); λ is
-# `models.downforce.load_ratio`. Steps of cars without have neither the port nor the product.
+# `models.vehicle.load_ratio`. Steps of cars without have neither the port nor the product.
 
 
 def downforce_numbers(vehicle: Vehicle) -> dict[str, Array]:

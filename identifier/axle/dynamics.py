@@ -15,8 +15,7 @@ from codegen.arrays import Array
 from identifier.axle.car import Car
 from identifier.axle.curve import Curve, curve, doublings
 from identifier.axle.slip import SHORTEST
-from models.downforce import load_ratio
-from models.vehicle import GRAVITY, Vehicle
+from models.vehicle import GRAVITY, Vehicle, load_ratio
 
 
 def static_curve(slip: Any, W: Array, ladder: tuple[float, ...]) -> Curve:

@@ -57,8 +57,7 @@ from identifier.axle.slip import (
 )
 from identifier.axle.watch import Watched, WatchNumbers, WatchState, watched
 from identifier.setup import AXLE_FORCE, FACTORS, HALF_BAND, NOT_NEGATIVE, Port
-from models.downforce import load_ratio
-from models.vehicle import GRAVITY
+from models.vehicle import GRAVITY, load_ratio
 
 # From a sample to the axle forces of given weights: what learning and the frozen model share.
 #

@@ -42,8 +42,7 @@ from identifier.inertial.motion import (
     unknowns,
 )
 from identifier.setup import AXLE_FORCE, FACTORS, NOT_NEGATIVE, Port
-from models.downforce import load_ratio
-from models.vehicle import GRAVITY
+from models.vehicle import GRAVITY, load_ratio
 
 OVER = ("x", "u", "v_x", "a_y")
 LEARNT = ("W", "own", "sensors")

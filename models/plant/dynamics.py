@@ -16,11 +16,10 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from models.downforce import load_ratio
 from models.friction import MAX_PLACES, place_change
 from models.rules import require_positive
 from models.tires import MagicFormula, Tire
-from models.vehicle import Vehicle
+from models.vehicle import Vehicle, load_ratio
 
 # Slip and force of the four wheels in the paper's sign: α = δ - atan2(v_y, v_x), F_y = +C α.
 #

@@ -13,11 +13,10 @@ import numpy as np
 from codegen.arrays import Array
 from identifier.axle.model import AxleModel
 from identifier.axle.slip import SHORTEST
-from models.downforce import load_ratio
 from models.plant import tire_of
 from models.plant.dynamics import wheel_loads
 from models.tires import MagicFormula, Tire
-from models.vehicle import GRAVITY, Vehicle
+from models.vehicle import GRAVITY, Vehicle, load_ratio
 from mpc.tires.tire import (
     DOUBT_STEP,
     N_DOUBTS,

@@ -11,8 +11,8 @@ from identifier.export.package import build_package, run_in_virtual_machine
 from identifier.inertial import InertialIdentifier
 from identifier.inertial.motion import Sample, places, predicted, static_load, unknowns
 from identifier.run import identify
-from models.downforce import load_ratio
 from models.recordings import Recording
+from models.vehicle import load_ratio
 from tests.identifier.axle.test_downforce import RACER, SLIPS, UNTOLD, missed, race, static
 from tests.identifier.inertial.test_motion import SCALES, STEPS, V_X, N, car, laws, state
 
