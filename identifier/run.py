@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,9 +40,13 @@ def state_index(recording: Recording, t: float) -> int:
 
     Raises
     ------
+    TypeError
+        Where the time is no number.
     ValueError
         Where the recording begins after that time.
     """
+    if not isinstance(t, Real):
+        raise TypeError(f"a time to freeze at is a number of seconds, not {t!r}")
     times, tolerance = recording.t, 1e-6 * recording.dt
     if not t >= times[0]:
         raise ValueError(f"cannot freeze at {t:g} s, the recording begins at {times[0]:g} s")
@@ -50,7 +55,7 @@ def state_index(recording: Recording, t: float) -> int:
     return int(np.searchsorted(times, t + tolerance, side="right")) - 1
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
+@dataclass(frozen=True, slots=True, weakref_slot=True, kw_only=True, repr=False, eq=False)
 class History:
     """An online run over n samples.
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +67,14 @@ def asked_run(history: History, t: float | None = None) -> AskedRun:
     asked = portion(whole, frozen)
     n = asked.place(frozen)
     until = None if n == len(asked.recording) else float(asked.recording.t[n])
-    return AskedRun(model, history, asked, end, until, road_felt(history, asked))
+    roads = _felt.setdefault(history, {})
+    if frozen not in roads:
+        roads[frozen] = road_felt(history, asked)
+    return AskedRun(model, history, asked, end, until, roads[frozen])
+
+
+# What is felt takes as long as learning: it is found once of each run and sample of the freeze.
+_felt: WeakKeyDictionary[History, dict[int, Array | None]] = WeakKeyDictionary()
 
 
 def road_felt(history: History, asked: Portion) -> Array | None:

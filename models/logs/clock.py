@@ -36,25 +36,41 @@ class Stretch(NamedTuple):
 
 
 class Raw(NamedTuple):
-    """A signal in SI on the clock of its channel: t (n,), values (n,), and where they stand."""
+    """A signal in SI on the clock of its channel: t (n,), values (n,), and where they stand.
+
+    holes : how many cells without a value were cut out.
+    """
 
     t: Array
     values: Array
     place: str
     rows: NDArray[np.int64]
+    holes: int = 0
 
 
-def without_empty(channel: Channel) -> Channel:
-    """Return a channel without the empty cells that a slower channel has in a table.
+def holes(channel: Channel) -> NDArray[np.intp]:
+    """Return which samples of a channel are empty cells where its sensor should have told one.
 
-    Where less than 40 % are empty they are holes in the data, which stay and are refused.
+    Where 40 % are empty, or all, there are none: it is a slower channel in a table, or nothing.
 
     Parameters
     ----------
     channel : as it was logged.
     """
+    empty = np.flatnonzero(np.isnan(channel.values))
+    return empty if empty.size < OWN_CLOCK * channel.values.size else empty[:0]
+
+
+def without_empty(channel: Channel, *, cut: bool = False) -> Channel:
+    """Return a channel without the empty cells that a slower channel has in a table.
+
+    Parameters
+    ----------
+    channel : as it was logged.
+    cut : whether `holes` are left out too; else they stay, and are refused.
+    """
     kept = ~np.isnan(channel.values)
-    if not kept.any() or kept.mean() > 1.0 - OWN_CLOCK:
+    if kept.all() or not kept.any() or (not cut and holes(channel).size):
         return channel
     return Channel(
         name=channel.name,

@@ -16,6 +16,7 @@ from models.logs.clock import (
     Stretch,
     are_one_clock,
     gaps,
+    holes,
     on_one_clock,
     require_rising,
     typical_step,
@@ -26,7 +27,7 @@ from models.logs.signals import BETA, QUANTITIES, WHEELS, Signal, quantity_of
 from models.logs.spelling import without_unit
 from models.logs.units import TIME, is_told, to_si
 from models.recordings.choice import chosen_signals, column_of, has_wheels, listing
-from models.recordings.map import AXES, LogMap
+from models.recordings.map import AXES, CUT, LogMap
 from models.recordings.record import (
     LARGEST,
     MINIMUM_SAMPLES,
@@ -100,7 +101,7 @@ def recording_of(
     if has_wheels(signals):
         kept, rolls = _on_wheels(label, stretches.kept, log_map, dt)
         stretches = stretches._replace(kept=kept)
-    notes = (*_notes(log), *reading.notes, *_gap_notes(stretches.kept))
+    notes = (*_notes(log), *reading.notes, *_hole_notes(parts), *_gap_notes(stretches.kept))
     notes += tuple(note for note in (learnt, rolls) if note)
     if stretches.short:
         several = "es" if stretches.short > 1 else ""
@@ -157,7 +158,8 @@ def _channels(
     for ours, signal in signals.items():
         found[ours] = []
         for name in signal.channel:
-            channel = without_empty(by_name[name])
+            logged, cut = by_name[name], log_map.holes == CUT
+            channel = without_empty(logged, cut=cut)
             unit = signal.unit if is_told(signal.unit) else channel.unit
             what = f"{label}: {column_of(ours)}"
             what += "" if name == column_of(ours) else f" (channel {name!r})"
@@ -167,7 +169,8 @@ def _channels(
             _require_finite(label, column_of(ours), channel)
             values = scaled(channel.values, factor)
             _require_of_a_car(label, ours, values, channel)
-            found[ours].append(Raw(channel.t, values, channel.place, channel.rows))
+            empty = holes(logged).size if cut else 0
+            found[ours].append(Raw(channel.t, values, channel.place, channel.rows, empty))
     return found
 
 
@@ -207,7 +210,7 @@ def _require_finite(label: str, name: str, channel: Channel) -> None:
         raise RecordingError(
             f"{label}: {name} must be finite, {bad.size} of {channel.values.size} values are "
             f"empty, NaN or infinite, the first in {channel.place} {channel.rows[bad[0]]}; fill "
-            "or cut them out"
+            'or cut them out (holes = "cut" in a map, as tireid channels --write makes it)'
         )
     bad = np.flatnonzero(~np.isfinite(channel.t))
     if bad.size:
@@ -307,6 +310,16 @@ def _other_unit(step: float) -> str:
 def _pieces(t: Array, longest: float) -> list[slice]:
     ends = [0, *gaps(t, longest).tolist(), t.size]
     return [slice(first, end) for first, end in pairwise(ends)]
+
+
+def _hole_notes(parts: Mapping[str, list[Raw]]) -> tuple[str, ...]:
+    """Return what is to be said of cells without a value that were cut out."""
+    counts = {column_of(name): sum(raw.holes for raw in raws) for name, raws in parts.items()}
+    empty = {name: count for name, count in counts.items() if count}
+    if not empty:
+        return ()
+    told = ", ".join(f"{count} of {name}" for name, count in empty.items())
+    return (f"cells without a value are cut out: {told}",)
 
 
 def _gap_notes(stretches: list[Stretch]) -> tuple[str, ...]:

@@ -40,6 +40,7 @@ from models.recordings.wheels import Wheels
 from models.schema import Table, read_toml
 
 AXES = {"ISO": 1.0, "SAE": -1.0}  # sign of everything but speed: y left and z up, or both turned
+REFUSE, CUT = "refuse", "cut"  # what becomes of cells without a value
 TABLES = ("file", "clock", "filters", "signals", "wheels", "repair")
 SIGNAL_KEYS = tuple(one.name for one in fields(Signal))
 
@@ -58,6 +59,8 @@ class LogMap:
     clock : channel that is the time, where it is not what the format takes for it; empty else.
     clock_unit : of that channel; empty takes that of the file, seconds where it tells none.
     longest_gap : the log is cut where a channel has no sample for longer [s].
+    holes : "refuse" a channel of which some cells have no value (NaN), or "cut" them out: then it
+        has no sample there.
     low_pass : cut-off of a low pass on all signals [Hz]; None filters nothing. All pass the same
         one, of second order, which looks at no later sample: so none is late against another.
     wheels : what they are, where v_x is made of their speeds.
@@ -76,6 +79,7 @@ class LogMap:
     clock: str = ""
     clock_unit: str = ""
     longest_gap: float = LONGEST_GAP
+    holes: str = REFUSE
     low_pass: float | None = None
     wheels: Wheels = field(default_factory=Wheels)
     repair: Repair = field(default_factory=Repair)
@@ -88,6 +92,8 @@ class LogMap:
             raise RecordingError(
                 f"longest_gap must be positive and finite, it is {self.longest_gap}"
             )
+        if self.holes not in (REFUSE, CUT):
+            raise RecordingError(f"holes must be {REFUSE} or {CUT}, not {shown(self.holes)}")
         if self.low_pass is not None and not 0.0 < self.low_pass < math.inf:
             raise RecordingError(f"low_pass must be positive and finite, it is {self.low_pass}")
         for name, signal in self.signals.items():
@@ -140,8 +146,8 @@ class LogMap:
             given |= _texts(table.table("file"), "axes", "run", "dbc")
         if "clock" in table:
             inner = table.table("clock")
-            inner.only("channel", "unit", "longest_gap")
-            names = {"channel": "clock", "unit": "clock_unit"}
+            names = {"channel": "clock", "unit": "clock_unit", "holes": "holes"}
+            inner.only(*names, "longest_gap")
             given |= {ours: inner.text(key) for key, ours in names.items() if key in inner}
             if "longest_gap" in inner:
                 given["longest_gap"] = inner.number("longest_gap")
@@ -170,9 +176,10 @@ class LogMap:
         if self.dbc and folder is not None:
             return replace(self, dbc=_named_from(Path(self.dbc), Path(folder))).toml()
         plain, blocks = LogMap(), []
+        clock = {"channel": "clock", "unit": "clock_unit"}
         for table, keys in (
             ("file", {"axes": "axes", "run": "run", "dbc": "dbc"}),
-            ("clock", {"channel": "clock", "unit": "clock_unit", "longest_gap": "longest_gap"}),
+            ("clock", {**clock, "longest_gap": "longest_gap", "holes": "holes"}),
             ("filters", {"low_pass": "low_pass"}),
         ):
             told = {key: getattr(self, ours) for key, ours in keys.items()}

@@ -240,12 +240,14 @@ def test_arguments_of_another_kind_are_refused_by_their_name(log, words, said):
 
 def test_what_a_command_takes_as_a_word_is_refused_with_the_remedy(log, tires):
     car, tire = ti.sedan(), next(iter(tires.values()))
+    run = ti.identify(log, car)
     for call, said in (
         (lambda: ti.identify("log.csv", car), "recording must be a Recording, as of read_rec"),
         (lambda: ti.identify([log, log], car), "recording must be a Recording, .* a list of 2"),
         (lambda: ti.identify(log, "car.toml"), "vehicle must be a Vehicle, as of Vehicle.from_"),
         (lambda: ti.identify(log, car, "rls"), r"method must be a Method, as of make_method\("),
         (lambda: ti.replay(log, tire), "tire must be a TireModel, as of History.freeze"),
+        (lambda: run.freeze("20"), "a time to freeze at is a number of seconds, not '20'"),
         (lambda: ti.replay(tire, "log.csv"), "recording must be a Recording"),
     ):
         with pytest.raises(TypeError, match=f"^{said}"):

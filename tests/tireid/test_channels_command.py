@@ -253,3 +253,36 @@ def test_a_unit_in_the_header_is_a_unit_and_need_not_be_told(log, tmp_path):
     assert np.allclose(in_ms.v_y, 3.6 * got.v_y)  # what is told holds
     with pytest.raises(RecordingError, match="must be in a unit of a speed"):
         read_recording(path, columns={"vy": "Yaw Rate"})
+
+
+def test_cells_without_a_value_are_told_and_cut_out_by_the_map_that_is_written(folder, log, capsys):
+    lost, single = slice(1000, 1300), 2000  # three seconds without v_y, and one sample
+    rows = (folder / "plain.csv").read_text(encoding="utf-8").splitlines()
+    at = rows[0].split(",").index("vy")
+    for k in (*range(lost.start, lost.stop), single):
+        cells = rows[k + 1].split(",")
+        cells[at] = "" if k % 2 else "nan"
+        rows[k + 1] = ",".join(cells)
+    path, by = folder / "holes.csv", folder / "holes.toml"
+    path.write_text("\n".join([*rows, ""]), encoding="utf-8")
+    with pytest.raises(RecordingError, match=r"vy must be finite, 301 of 4000 values .*holes = "):
+        read_recording(path)
+    assert main(["channels", str(path), "--write", str(by)]) == 0
+    said = capsys.readouterr().out
+    assert "vy has no value in 301 of 4000 cells of 'vy', the first in line 1002" in said
+    assert "they are refused, but by a map" in said
+    read = read_recording(path, log_map=by)
+    assert read.breaks == (1000,) and len(read) == 3700
+    assert "cells without a value are cut out: 301 of vy" in read.notes
+    assert any("gaps cut the log into 2 stretches" in note for note in read.notes)
+    kept = np.r_[0 : lost.start, lost.stop : len(log)]
+    known = kept != single
+    assert np.array_equal(read.v_y[known], log.v_y[kept][known])
+    assert abs(read.v_y[~known] - log.v_y[single]) < 0.1, "v_y goes on as before for one sample"
+    assert main(["channels", str(path), "--log", str(by)]) == 0
+    assert "they are cut out, as the map says" in capsys.readouterr().out
+
+
+def test_a_map_says_refuse_or_cut_of_holes():
+    with pytest.raises(RecordingError, match="holes must be refuse or cut, not 'fill'"):
+        ti.LogMap(holes="fill")

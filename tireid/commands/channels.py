@@ -11,6 +11,7 @@ import numpy as np
 
 from codegen.escape import visible
 from models.files import write_atomically
+from models.logs.clock import holes
 from models.logs.door import open_log
 from models.logs.log import Channel, Listed, LogFile, RecordingError, one_run, some
 from models.logs.names import Proposal, propose
@@ -29,6 +30,7 @@ from models.recordings.choice import (
     standard_signals,
     with_wheels,
 )
+from models.recordings.map import CUT
 from models.recordings.wheel_scale import scale_text, wheel_factor, with_scales
 from tireid.commands import COMMANDS, DONE, FAILS
 from tireid.commands.options import add_force, add_log_map, told_map
@@ -36,6 +38,7 @@ from tireid.output import require_free, text_table
 from tireid.progress import say, tell
 
 MOST_NUMBERS = 5e7  # that are read to tell ranges; of a larger log only those of likely channels
+CUT_BY_MAP = 'refused, but by a map with holes = "cut", as --write makes it'
 NO_RADIUS = "\n# [wheels]\n# radius =   # by which a wheel rolls [m]\n"
 LONGEST_NAME = 48  # letters of a channel in the table
 
@@ -82,6 +85,11 @@ def run(options: argparse.Namespace) -> int:
     tell("\n".join(_head(log, chosen)))
     seen = _seen(log, listed, signals, chosen)
     tell(channels_text(listed, seen, signals, proposal, frozenset(told.signals)))
+    empty = holes_text(seen, signals)
+    if empty:
+        cut = "cut out, as the map says" if told.holes == CUT else CUT_BY_MAP
+        tell(f"{empty}: they are {cut}")
+        told = replace(told, holes=CUT)
     if not has_v_y(signals) and not missing:
         tell(f"{column_of('a_y')} is there: without vy, identify estimates it")
     said, of_wheels, rolls = _wheels(log, signals, told, chosen)
@@ -171,14 +179,16 @@ def channels_text(
     for one in listed:
         channel = seen.get(one.name)
         low = high = "?"
+        samples = one.samples
         if channel is not None:
             finite = channel.values[np.isfinite(channel.values)]
+            samples = np.count_nonzero(~np.isnan(channel.values))
             low, high = (f"{end:.4g}" for end in (finite.min(), finite.max())) if finite.size else (
                 "empty", "")  # fmt: skip
         name = visible(one.name if len(one.name) <= LONGEST_NAME else f"{one.name[:44]}...")
         rate = "?" if math.isnan(one.rate) else f"{one.rate:.4g}"
         meant = _meaning(one.name, signals, proposal, told)
-        rows.append([name, visible(one.unit), rate, str(one.samples), low, high, meant])
+        rows.append([name, visible(one.unit), rate, str(samples), low, high, meant])
     return text_table(rows, "<<>>>><")
 
 
@@ -200,6 +210,27 @@ def _meaning(
                 doubt = "; another is as likely" if name in proposal.rivals else ""
                 return f"perhaps {column_of(name)} ({one.confidence:.0%}){hand}{doubt}"
     return ""
+
+
+def holes_text(seen: Mapping[str, Channel], signals: Mapping[str, Signal]) -> str:
+    """Return which signals have cells without a value; nothing where none has.
+
+    Parameters
+    ----------
+    seen : channels that were read, by name.
+    signals : how each signal would be read.
+    """
+    said = []
+    for name, signal in signals.items():
+        for channel in (seen[one] for one in signal.channel if one in seen):
+            empty = holes(channel)
+            if empty.size:
+                first = f"{channel.place} {channel.rows[empty[0]]}"
+                said.append(
+                    f"{column_of(name)} has no value in {empty.size} of {channel.values.size} "
+                    f"cells of {channel.name!r}, the first in {first}"
+                )
+    return "\n".join(said)
 
 
 def missing_text(

@@ -57,6 +57,12 @@ def add_vehicle(
 
 def read_vehicle(options: argparse.Namespace) -> Vehicle:
     """Return the car of --vehicle, the sedan without, and say what of it is estimated."""
+    path: Path | None = options.vehicle
+    if path is not None and path.suffix.lower() != ".toml":
+        raise ValueError(
+            f"--vehicle {path}: wants the .toml of a car, by its ending; tireid init writes one to "
+            "fill in"
+        )
     vehicle = sedan() if options.vehicle is None else Vehicle.from_toml(options.vehicle)
     if vehicle.estimates:
         say(f"{options.vehicle}: {vehicle.estimates}")

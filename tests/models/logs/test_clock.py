@@ -11,6 +11,7 @@ from models.logs.clock import (
     Raw,
     are_one_clock,
     gaps,
+    holes,
     on_one_clock,
     sampled,
     typical_step,
@@ -137,8 +138,13 @@ def test_empty_cells_of_a_slower_channel_are_no_holes_but_single_ones_are() -> N
 
     slower = without_empty(channel(every_tenth))
     assert slower.t.size == 10 and np.isfinite(slower.values).all()
-    holes = channel(np.where(np.arange(100) % 10 == 0, np.nan, t))
-    assert without_empty(holes) is holes
+    broken = channel(np.where(np.arange(100) % 10 == 0, np.nan, t))
+    assert without_empty(broken) is broken
+    assert (
+        holes(broken).tolist() == list(range(0, 100, 10)) and not holes(channel(every_tenth)).size
+    )
+    cut = without_empty(broken, cut=True)
+    assert cut.t.size == 90 and np.array_equal(cut.values, cut.t) and cut.rows[0] == 1
 
 
 def test_clocks_are_one_where_their_numbers_are() -> None:
