@@ -182,7 +182,7 @@ def channels_text(
         samples = one.samples
         if channel is not None:
             finite = channel.values[np.isfinite(channel.values)]
-            samples = np.count_nonzero(~np.isnan(channel.values))
+            samples = int(np.count_nonzero(~np.isnan(channel.values)))
             low, high = (f"{end:.4g}" for end in (finite.min(), finite.max())) if finite.size else (
                 "empty", "")  # fmt: skip
         name = visible(one.name if len(one.name) <= LONGEST_NAME else f"{one.name[:44]}...")
