@@ -30,10 +30,10 @@ UNCALIBRATED = (
 )
 PARTS = (  # of an export: about how long each takes, and the option that asks for it
     ("the identifier", 1.0, ""),
+    (NETWORK, 1.0, "onnx"),
     (COSTS, 17.0, ""),
     (TRACKING, 17.0, "mpc"),
     (UNITS, 8.0, "fmu"),
-    (NETWORK, 1.0, "onnx"),
 )
 
 
@@ -198,8 +198,11 @@ def export_method(
         package = build_package(
             method, vehicle, start, name=name, single=single, with_a_y=with_a_y, with_band=band
         )
+        if onnx:  # what cannot be made is refused before costs are measured
+            progress.begin(NETWORK)
+            _write_onnx(scratch, method, vehicle, package, start, band=band)
         if mpc:
-            frozen_start(package)  # what cannot be handed over is refused before costs are measured
+            frozen_start(package)  # likewise
         costs = measure(package, progress.begin(COSTS))
         place = scratch / IDENTIFIER if mpc else scratch
         write_files(place, package, figures_text(costs), costs)
@@ -218,9 +221,6 @@ def export_method(
                     version,
                 )
                 progress.step(2)
-        if onnx:
-            progress.begin(NETWORK)
-            _write_onnx(scratch, method, vehicle, package, start, band=band)
     return Exported(folder=folder, package=package, costs=tuple(costs), told=tuple(told))
 
 
