@@ -2,7 +2,9 @@
 
 import hashlib
 import json
+import math
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -33,7 +35,7 @@ from tireid.fleet.learn import (
     on_a_cluster,
     on_this_machine,
 )
-from tireid.fleet.merge import MergeError, fleet_prior, merge, usable
+from tireid.fleet.merge import MergeError, excitation_of, fleet_prior, merge, usable
 from tireid.fleet.store import LogRow, Store, StoreError, information_columns
 from tireid.fleet.watch import Watching, watch
 from tireid.learning import identify
@@ -151,6 +153,31 @@ def test_a_file_of_a_store_that_somebody_changed_is_refused_by_its_name(store, t
     os.mkfifo(path)
     with pytest.raises(StoreError, match=f"^{path}: must be a file, it is a device, pipe or soc"):
         Store(str(out)).rows()
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "said"),
+    [
+        ("matrix", lambda one: one[:-1], r"matrix must hold \d+ numbers, not"),
+        ("square", lambda one: [*one, 0.0], r"square must hold \d+ numbers, not"),
+        ("part_samples", lambda one: one[1:], r"part_samples must hold \d+ numbers, not"),
+        ("vector", lambda one: [math.nan] * len(one), "vector holds a number that is not finite"),
+        ("part_seconds", lambda one: [-1.0] * len(one), "seconds must not be negative"),
+    ],
+)
+def test_a_row_whose_numbers_do_not_fit_is_named_with_its_column(store, name, change, said):
+    row = next(row for row in Store(store).rows() if row.parts)
+    broken = replace(row, **{name: change(list(getattr(row, name)))})
+    with pytest.raises(StoreError, match=f"bucket-.*{re.escape(repr(row.log))}: .*{said}"):
+        _ = broken.parts
+
+
+def test_a_car_and_an_excitation_that_are_none_are_named(store):
+    row = next(row for row in Store(store).rows() if row.parts)
+    with pytest.raises(StoreError, match=r"bucket-.*: car is none: vehicle\.mass is missing"):
+        _ = replace(row, car="{}").told_car
+    with pytest.raises(StoreError, match="excitation must hold 18 numbers, not 17"):
+        excitation_of([row, replace(row, excitation=row.excitation[1:])])
 
 
 def test_each_run_of_a_file_is_a_row(logs, tmp_path, capsys):

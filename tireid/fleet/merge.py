@@ -167,7 +167,7 @@ def excitation_of(rows: Sequence[LogRow]) -> Array:
     ----------
     rows : of logs.
     """
-    each = np.array([np.reshape(row.excitation, (2, 1 + len(EDGES))) for row in rows])
+    each = np.array([row.numbers("excitation", 2, 1 + len(EDGES)) for row in rows])
     together: Array = each.sum(axis=0)
     together[:, 0] = each[:, :, 0].max(axis=0)
     return together

@@ -13,6 +13,7 @@ import hashlib
 import importlib
 import io
 import json
+import math
 import posixpath
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -149,7 +150,10 @@ class LogRow:
     @property
     def told_car(self) -> Vehicle:
         """The car as it was told."""
-        return vehicle_from(json.loads(self.car))
+        try:
+            return vehicle_from(json.loads(self.car))
+        except ValueError as error:
+            raise StoreError(f"{self._where}: car is none: {error}") from None
 
     @property
     def frozen(self) -> AxleModel:
@@ -158,23 +162,62 @@ class LogRow:
 
     @property
     def parts(self) -> list[Information]:
-        """What its parts tell of the tires, in the order of time."""
+        """What its parts tell of the tires, in the order of time.
+
+        Raises
+        ------
+        StoreError
+            Where its columns do not fit one another, or a number is not finite.
+        """
         k = len(self.part_begin)
-        if k == 0:
-            return []
-        vector = np.reshape(np.asarray(self.vector, dtype=np.float64), (k, 2, -1))
-        packed = np.reshape(np.asarray(self.matrix, dtype=np.float64), (k, 2, -1))
-        square = np.reshape(np.asarray(self.square, dtype=np.float64), (k, 2))
-        matrix = unpacked_triangles(packed, vector.shape[-1])
-        counts = zip(self.part_samples, self.part_seconds, strict=True)
-        return [
-            Information(matrix=M, vector=v, square=c, samples=float(n), seconds=float(s))
-            for M, v, c, (n, s) in zip(matrix, vector, square, counts, strict=True)
-        ]
+        self.numbers("part_begin", k)
+        q = len(self.vector) // max(2 * k, 1)
+        matrix = unpacked_triangles(self.numbers("matrix", k, 2, q * (q + 1) // 2), q)
+        each = zip(
+            matrix,
+            self.numbers("vector", k, 2, q),
+            self.numbers("square", k, 2),
+            self.numbers("part_samples", k).tolist(),
+            self.numbers("part_seconds", k).tolist(),
+            strict=True,
+        )
+        try:
+            return [
+                Information(matrix=M, vector=v, square=c, samples=n, seconds=s)
+                for M, v, c, n, s in each
+            ]
+        except ValueError as error:
+            raise StoreError(f"{self._where}: {error}") from None
+
+    def numbers(self, name: str, *shape: int) -> Array:
+        """Return a column that is a list, in its shape.
+
+        Parameters
+        ----------
+        name : of the column.
+        shape : that it must have.
+
+        Raises
+        ------
+        StoreError
+            Where it holds more numbers or fewer, or one that is not finite.
+        """
+        values, count = np.asarray(getattr(self, name), dtype=np.float64), math.prod(shape)
+        if values.size != count:
+            raise StoreError(f"{self._where}: {name} must hold {count} numbers, not {values.size}")
+        if not np.isfinite(values).all():
+            raise StoreError(f"{self._where}: {name} holds a number that is not finite")
+        return values.reshape(shape)
+
+    @property
+    def _where(self) -> str:
+        """Which row of a store it is, for messages."""
+        return f"logs/bucket-{bucket_of(self.log):02d}.parquet, log {self.log!r}"
 
 
 COLUMNS = tuple(field.name for field in fields(LogRow))
 LISTS = ("excitation", *COLUMNS[COLUMNS.index("part_begin") :])
+WORDS = ("log", "setting", "vehicle", "tires", "date", "tags", "error", "car", "model")
 HEAVY = ("model",)  # what a fleet's arithmetic does not want
 
 
@@ -405,9 +448,8 @@ class Store:
 
 def _plain(row: Mapping[str, Any]) -> dict[str, Any]:
     """Return a row of Arrow as the arguments of `LogRow`."""
-    return {
-        name: value if value is not None or name not in LISTS else () for name, value in row.items()
-    }
+    empty = {**dict.fromkeys(LISTS, ()), **dict.fromkeys(WORDS, "")}
+    return {name: empty.get(name) if value is None else value for name, value in row.items()}
 
 
 def schema() -> Any:
@@ -420,8 +462,7 @@ def schema() -> Any:
         "findings": pyarrow.list_(pyarrow.string()),
         **{name: pyarrow.list_(pyarrow.float64()) for name in LISTS},
     }
-    words = ("log", "setting", "vehicle", "tires", "date", "tags", "error", "car", "model")
-    kinds |= {name: pyarrow.string() for name in words}
+    kinds |= {name: pyarrow.string() for name in WORDS}
     listed = [pyarrow.field(name, kinds.get(name, pyarrow.float64())) for name in COLUMNS]
     return pyarrow.schema(listed, metadata={"format": FORMAT})
 
