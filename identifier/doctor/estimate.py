@@ -283,7 +283,9 @@ class Search:
             measured = not {*changed} <= {*self.vehicle.estimated}
             believed = self._believed(one.suspect, self.fit)  # together with the others too
             believed = believed and abs(self.size(one.suspect, self.fit.sizes)) > STANDS * deviation
-            if believed and not alike and not measured and first.confidence > SURE:
+            # Late or behind a low pass, the same channel comes back by either repair.
+            twins = all(other.is_late_as(one.suspect) for other in names)
+            if believed and twins and not measured and first.group > SURE:
                 clear.append(one.suspect)
             for other, share in zip(alike, shares[2:].tolist(), strict=True):
                 off = self.real_deviation(other.suspect, other.fit)

@@ -95,6 +95,15 @@ class Suspect(NamedTuple):
         """Whether its size in `Sizes` is the logarithm of a factor."""
         return self.code in ("factor", "yaw_inertia")
 
+    def is_late_as(self, other: "Suspect") -> bool:
+        """Return whether both say that the same channel is late, by a delay and by a low pass.
+
+        Parameters
+        ----------
+        other : another suspect.
+        """
+        return self.channel == other.channel and {self.code, other.code} == {"delay", "lag"}
+
     def repair(self, size: float, vehicle: Vehicle) -> Repair | None:
         """Return what takes it out, None for what no repair does.
 
