@@ -27,7 +27,8 @@ if TYPE_CHECKING:  # what some models answer with
 
 Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
-STIFFNESS, GRIP = "cornering stiffness", "grip"  # as summaries and verdicts name them
+# As summaries and verdicts name what is learnt of an axle.
+STIFFNESS, GRIP, RELAXATION = "cornering stiffness", "grip", "relaxation length"
 
 
 class TireFunctions(NamedTuple):

@@ -44,7 +44,7 @@ from identifier.axle.slip import SHORTEST, Sway, SwayState
 from identifier.axle.step import FROZEN_CARRY, OVER, build_frozen
 from identifier.frozen import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
 from identifier.setup import Setup
-from identifier.tire_model import AXLES, GRIP, STIFFNESS, Estimate, Fact, TireModel
+from identifier.tire_model import AXLES, GRIP, RELAXATION, STIFFNESS, Estimate, Fact, TireModel
 from models.recordings import Recording
 from models.rules import require_positive
 from models.schema import Table
@@ -565,7 +565,7 @@ class AxleModel(TireModel):
             rows = (
                 (STIFFNESS, steep, slope[i] * load, load, "N/rad", told[i], True),
                 (GRIP, level, self.W[i].sum(), 1.0, "static load", None, bends[i]),
-                ("relaxation length", lag, self.relaxation_length[i], max(slope[i], 0.0), "m",
+                (RELAXATION, lag, self.relaxation_length[i], max(slope[i], 0.0), "m",
                  None, True),
                 (name, zero, scale * self.own[i, 2], scale, unit, 0.0, True),
             )  # fmt: skip
@@ -591,7 +591,7 @@ class AxleModel(TireModel):
         known = self.known_slip
         lines = [
             Fact("cornering stiffness", self.cornering_stiffness, "N/rad"),
-            Fact("relaxation length", self.relaxation_length, "m"),
+            Fact(RELAXATION, self.relaxation_length, "m"),
             Fact("known up to a slip of", np.degrees(known), "deg"),
         ]
         if (known > 0.0).all():

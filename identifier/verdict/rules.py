@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.tire_model import AXLES, TireModel
+from identifier.tire_model import AXLES, RELAXATION, TireModel
 from identifier.verdict.causes import TELLING, Suspect
 from identifier.verdict.motion import Evidence
 from identifier.verdict.verdict import Objection
@@ -21,6 +21,7 @@ MOST_DOUBT = 0.5  # standard deviation of the curve over the prior's, where the 
 LEAST_SLIP = 1e-4  # rad: every curve is known at zero
 STIFFNESS = (2.0, 100.0)  # 1/rad, over static load: scale cars have 4, race cars 50
 REAR_OVER_FRONT = (0.4, 3.0)  # of these
+MOST_RELAXATION = 1.0  # wheelbases; right answers on random cars, late sensors included, had 0.92
 FAR_FROM_TOLD = 3.0  # ratio of learnt to told stiffness, or told to learnt
 STIFFENS = 1.6  # secant at the known slip over slope at zero: no tire stiffens with slip
 INERTIA = (0.3, 2.0)  # I_z/(m l_f l_r): two points on the axles have 1
@@ -65,7 +66,8 @@ def findings(drive: Drive) -> list[Objection]:
     ----------
     drive : what the rules look at.
     """
-    rules = (_v_y_stuck, _no_force, _missed, _elsewhere, _unknown, _stiffness, _shape, _apart, _car)
+    of_tires = (_stiffness, _relaxation, _shape)
+    rules = (_v_y_stuck, _no_force, _missed, _elsewhere, _unknown, *of_tires, _apart, _car)
     return [*(finding for rule in rules for finding in rule(drive)), *drive.notes]
 
 
@@ -194,6 +196,20 @@ def _stiffness(drive: Drive) -> Iterator[Objection]:
             "v_y measured far from the center of gravity, or steering scaled",
             True,
         )
+
+
+def _relaxation(drive: Drive) -> Iterator[Objection]:
+    wheelbase = drive.model.vehicle.wheelbase
+    for one in drive.model.estimates():
+        if one.title == RELAXATION and one.value > MOST_RELAXATION * wheelbase:
+            yield Objection(
+                "lags_too_far",
+                one.axle,
+                f"a relaxation length of {one.value:.3g} m is more than the car is long between "
+                "its axles: no tire's. v_y is measured high above the road, on a roof that rolls, "
+                "or low-passed or late; or the yaw inertia is far off",
+                True,
+            )
 
 
 def _shape(drive: Drive) -> Iterator[Objection]:

@@ -210,7 +210,7 @@ def _require_finite(label: str, name: str, channel: Channel) -> None:
         raise RecordingError(
             f"{label}: {name} must be finite, {bad.size} of {channel.values.size} values are "
             f"empty, NaN or infinite, the first in {channel.place} {channel.rows[bad[0]]}; fill "
-            'or cut them out (holes = "cut" in a map, as tireid channels --write makes it)'
+            'them, or cut them out: --cut-holes, LogMap(holes="cut")'
         )
     bad = np.flatnonzero(~np.isfinite(channel.t))
     if bad.size:

@@ -265,12 +265,12 @@ def test_cells_without_a_value_are_told_and_cut_out_by_the_map_that_is_written(f
         rows[k + 1] = ",".join(cells)
     path, by = folder / "holes.csv", folder / "holes.toml"
     path.write_text("\n".join([*rows, ""]), encoding="utf-8")
-    with pytest.raises(RecordingError, match=r"vy must be finite, 301 of 4000 values .*holes = "):
+    with pytest.raises(RecordingError, match=r"vy must be finite, 301 of 4000 .*--cut-holes"):
         read_recording(path)
     assert main(["channels", str(path), "--write", str(by)]) == 0
     said = capsys.readouterr().out
     assert "vy has no value in 301 of 4000 cells of 'vy', the first in line 1002" in said
-    assert "they are refused, but by a map" in said
+    assert "they are refused but with --cut-holes" in said
     read = read_recording(path, log_map=by)
     assert read.breaks == (1000,) and len(read) == 3700
     assert "cells without a value are cut out: 301 of vy" in read.notes
@@ -279,8 +279,8 @@ def test_cells_without_a_value_are_told_and_cut_out_by_the_map_that_is_written(f
     known = kept != single
     assert np.array_equal(read.v_y[known], log.v_y[kept][known])
     assert abs(read.v_y[~known] - log.v_y[single]) < 0.1, "v_y goes on as before for one sample"
-    assert main(["channels", str(path), "--log", str(by)]) == 0
-    assert "they are cut out, as the map says" in capsys.readouterr().out
+    assert main(["channels", str(path), "--cut-holes"]) == 0
+    assert "they are cut out, as is told" in capsys.readouterr().out
 
 
 def test_a_map_says_refuse_or_cut_of_holes():

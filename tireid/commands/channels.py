@@ -38,7 +38,7 @@ from tireid.output import require_free, text_table
 from tireid.progress import say, tell
 
 MOST_NUMBERS = 5e7  # that are read to tell ranges; of a larger log only those of likely channels
-CUT_BY_MAP = 'refused, but by a map with holes = "cut", as --write makes it'
+CUT_BY_MAP = "refused but with --cut-holes, or by a map that says so, as --write makes it"
 NO_RADIUS = "\n# [wheels]\n# radius =   # by which a wheel rolls [m]\n"
 LONGEST_NAME = 48  # letters of a channel in the table
 
@@ -87,7 +87,7 @@ def run(options: argparse.Namespace) -> int:
     tell(channels_text(listed, seen, signals, proposal, frozenset(told.signals)))
     empty = holes_text(seen, signals)
     if empty:
-        cut = "cut out, as the map says" if told.holes == CUT else CUT_BY_MAP
+        cut = "cut out, as is told" if told.holes == CUT else CUT_BY_MAP
         tell(f"{empty}: they are {cut}")
         told = replace(told, holes=CUT)
     if not has_v_y(signals) and not missing:

@@ -228,7 +228,11 @@ def run(options: argparse.Namespace) -> int:
 
 def _require_drive(options: argparse.Namespace) -> None:
     """Refuse to be told how a log is read where none is."""
-    told = {"--columns": options.columns, "--dbc": options.dbc}
+    told = {
+        "--columns": options.columns,
+        "--dbc": options.dbc,
+        "--cut-holes": options.cut_holes,
+    }
     for option, value in told.items():
         if value and options.along is None:
             raise ValueError(f"{option} says how a drive is read: give one by --along LOG")

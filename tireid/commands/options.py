@@ -26,6 +26,7 @@ from identifier.paper.design import read_design
 from identifier.paper.network import SIGNALS
 from identifier.verdict import Verdict
 from models.recordings import LogMap, Recording, read_repaired, split_log_argument
+from models.recordings.map import CUT
 from models.recordings.reader import map_of, with_columns
 from models.schema import require_few
 from models.vehicle import Vehicle, sedan
@@ -291,7 +292,7 @@ def add_log_reading(parser: argparse.ArgumentParser) -> None:
 
 
 def add_log_map(parser: argparse.ArgumentParser) -> None:
-    """Add --log, --columns and --dbc: how a log is read.
+    """Add --log, --columns, --dbc and --cut-holes: how a log is read.
 
     Parameters
     ----------
@@ -318,6 +319,11 @@ def add_log_map(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="DBC that tells the signals in the frames of a CAN log",
     )
+    parser.add_argument(
+        "--cut-holes",
+        action="store_true",
+        help="leave cells without a value (NaN) out of the logs, which are refused else",
+    )
 
 
 def _map_path(options: argparse.Namespace) -> Path | None:
@@ -332,7 +338,7 @@ def _map_path(options: argparse.Namespace) -> Path | None:
 
 
 def told_map(options: argparse.Namespace) -> LogMap:
-    """Return how logs are read by --log, and by --columns and --dbc, which come first.
+    """Return how logs are read by --log, and by the other options, which come first.
 
     Raises
     ------
@@ -340,6 +346,8 @@ def told_map(options: argparse.Namespace) -> LogMap:
         Where the file or a word is not right.
     """
     told = with_columns(map_of(_map_path(options)), column_words(options.columns))
+    if options.cut_holes:
+        told = replace(told, holes=CUT)
     return told if options.dbc is None else replace(told, dbc=options.dbc)
 
 

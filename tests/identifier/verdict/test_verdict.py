@@ -328,6 +328,25 @@ def test_a_rear_axle_of_five_times_the_front_is_noticed(clean):
     assert looked_at(clean, model=stiff) == {("front_against_rear", None)}
 
 
+@pytest.mark.parametrize("wheelbases", [0.97, 1.03])
+def test_a_force_that_lags_by_more_than_a_wheelbase_is_no_tires(clean, wheelbases):
+    model = clean.freeze()
+    wanted = wheelbases * model.vehicle.wheelbase - model.relaxation_length[1]
+    slope = model.stiffness[1] / model.vehicle.axle_loads[1]
+    own = model.own + np.array([[0.0, 0.0, 0.0], [wanted / slope, 0.0, 0.0]])
+    late = replace(model, own=own)
+    assert late.relaxation_length[1] == pytest.approx(wheelbases * model.vehicle.wheelbase)
+    assert (("lags_too_far", "rear") in looked_at(clean, model=late)) == (wheelbases > 1.0)
+
+
+def test_a_v_y_from_the_roof_of_a_car_that_rolls_is_refused(whole):
+    roll = -0.012 * whole.a_y  # 6.7 degrees at 1 g, 1.5 m below the sensor
+    shaken = replace(whole, v_y=whole.v_y + 1.5 * np.gradient(roll, whole.dt), axle_force=None)
+    car = sedan()
+    verdict = identify(shaken, car, make_method("axle", car)).verdict()
+    assert "lags_too_far" in {one.code for one in verdict.findings if one.refuses}
+
+
 def test_a_curve_that_stiffens_with_slip_is_noticed(clean):
     def s_shape(W):
         slope = W[0] / np.array(clean.design.ladder)
