@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.axle.curve import unit_matrix
+from identifier.doctor.suspects import NUISANCES, grown
 from identifier.doctor.windows import Windows, not_negative
 from identifier.verdict.motion import BRISK
 from models.recordings import Recording
@@ -261,7 +262,15 @@ class Balance:
         v_x, v_y = out["v_x"], out["v_y"]
         out["v_x"] = np.maximum(c * v_x - s * v_y, 0.3 * self.vehicle.froude_speed)
         out["v_y"] = c * v_y + s * v_x - get("velocity_sensor_x", 0.0) * out["r"]
+        if swung := get("velocity_sensor_z", 0.0):
+            usual = {"roll_delay": NUISANCES["roll_delay"][0] * grown("time", self.vehicle)}
+            out["v_y"] = out["v_y"] + swung * self._as_it_rolls(self._a_y_dot(out), usual)
         return out
+
+    def _a_y_dot(self, x: Mapping[str, Array]) -> Array:
+        """Return the change of what makes the body roll [m/s³], (n,)."""
+        changes: Array = np.convolve(x["v_y"], self.jolt, "same")
+        return changes + np.convolve(x["v_x"] * x["r"], self.jerk, "same")
 
     def _later(self, signal: Smooth, delay: float) -> tuple[Array, Array]:
         """Return value and slope of a channel at t + delay, by cubics between samples."""
@@ -321,11 +330,9 @@ class Balance:
 
     def _motion(self, of: Told) -> Motion:
         x = self.channels(dict(of))
-        v_x, v_y = x["v_x"], x["v_y"]
-        a_y_dot = np.convolve(v_y, self.jolt, "same")
-        a_y_dot = a_y_dot + np.convolve(v_x * x["r"], self.jerk, "same")
+        v_x = x["v_x"]
         rolled = np.concatenate([[0.0], np.cumsum(0.5 * (v_x[1:] + v_x[:-1]) * self.dt)])
-        return Motion(x, a_y_dot, rolled, self.mean @ v_x)
+        return Motion(x, self._a_y_dot(x), rolled, self.mean @ v_x)
 
     def _forces(self, of: Told) -> Array:
         sizes = dict(of)

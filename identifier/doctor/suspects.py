@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from models.recordings import Repair
-from models.vehicle import Vehicle
+from models.vehicle import GRAVITY, Vehicle
 
 SEDAN = 2.7  # m, wheelbase of whose size the numbers are
 DEGREES = math.degrees(1.0)  # in a rad
@@ -21,6 +21,7 @@ OPPOSITES = {  # of what a size says, where it is negative
     " late ": " early ",
     "too much": "too little",
     " ahead of ": " behind ",
+    " swings out ": " swings in ",
     "too far back": "too far forward",
     "push more at speed, as by a downforce": "push less at speed, as by a lift",
 }
@@ -114,7 +115,7 @@ class Suspect(NamedTuple):
         """
         numbers: dict[str, Any] = {self.code: size}
         match self.code:
-            case "bank" | "downforce":
+            case "bank" | "downforce" | "velocity_sensor_z":
                 return None
             case "factor":
                 numbers = {"factor": {self.channel: math.exp(-size)}}
@@ -214,6 +215,9 @@ SUSPECTS = (
             "the velocity sensor is turned by {size} (+: to the left)", "°", DEGREES),
     Suspect("velocity_sensor_x", "velocity_sensor_x", "v_y", "m", 0.8, 0.04, "length", True,
             "the velocity is measured {size} ahead of the center of gravity", " m"),
+    Suspect("velocity_sensor_z", "velocity_sensor_z", "v_y", "s^2", 0.008, 0.001, "length", True,
+            "v_y is measured where the body swings out by {size} for each g, as on a roof",
+            " cm", 100.0 * GRAVITY),
     Suspect("acceleration_sensor_x", "acceleration_sensor_x", "a_y", "m", 0.8, 0.04, "length",
             True, "the acceleration is measured {size} ahead of the center of gravity", " m"),
     Suspect("center_of_gravity", "center_of_gravity", "", "m", 0.2, 0.1, "length", True,

@@ -72,15 +72,21 @@ def test_a_planted_fault_is_named_first_or_second_with_its_size(driven, kind):
     assert (right[0].repair is None) == (kind == "bank")
 
 
-def rolling(exact, log, degrees_per_g):
-    """The log of an accelerometer that rolls with the body, a mass on spring and damper."""
+def roll_of(exact, degrees_per_g):
+    """The roll of a body, a mass on spring and damper: its angle, and how fast it turns."""
     omega, damping, gain = 2.0 * math.pi * 1.6, 0.35, math.radians(degrees_per_g) / GRAVITY
     roll = rate = 0.0
-    angle = np.empty(len(exact))
+    angle, rates = np.empty((2, len(exact)))
     for k, a_y in enumerate(exact.a_y):
-        angle[k] = roll
+        angle[k], rates[k] = roll, rate
         rate += exact.dt * (omega**2 * (gain * a_y - roll) - 2.0 * damping * omega * rate)
         roll += exact.dt * rate
+    return angle, rates
+
+
+def rolling(exact, log, degrees_per_g):
+    """The log of an accelerometer that rolls with the body."""
+    angle, _ = roll_of(exact, degrees_per_g)
     shown = exact.a_y * np.cos(angle) + GRAVITY * np.sin(angle)
     return replace(log, a_y=shown + log.a_y - exact.a_y)
 
@@ -89,6 +95,16 @@ def rolling(exact, log, degrees_per_g):
 def test_an_accelerometer_on_a_body_that_rolls_has_no_fault(driven, degrees_per_g):
     car, log, exact = driven
     assert examine(rolling(exact, log, degrees_per_g), car).findings == ()
+
+
+@pytest.mark.parametrize("height", [0.8, 1.4])
+def test_a_v_y_from_the_roof_is_named_and_nothing_in_its_place(driven, height):
+    car, log, exact = driven
+    _, rates = roll_of(exact, 4.5)
+    found = estimate(replace(log, v_y=log.v_y - height * rates), car)
+    assert [one.code for one in found] == ["velocity_sensor_z"]
+    assert found[0].size == pytest.approx(height * math.radians(4.5) / GRAVITY, rel=0.3)
+    assert found[0].repair is None, "it takes the rate at which the body rolls"
 
 
 @pytest.mark.parametrize("factor", [0.8, 1.28, 1.4])
