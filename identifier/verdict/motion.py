@@ -167,6 +167,19 @@ def noise_variance(recording: Recording, vehicle: Vehicle, windows: Windows) -> 
     return variance / windows.duration**2
 
 
+def lateral_noise(recording: Recording, windows: Windows) -> tuple[float, float]:
+    """Return the variance that white noise leaves in means of v̇_y + v_x r, and of a_y [m²/s⁴].
+
+    Parameters
+    ----------
+    recording : with v_y and a_y.
+    windows : of the recording.
+    """
+    v_y, a_y = (white_noise(recording.needed(name)) for name in ("v_y", "a_y"))
+    turning = float(np.mean(recording.v_x**2)) * white_noise(recording.r) ** 2 / windows.n
+    return 2.0 * (v_y / windows.duration) ** 2 + turning, a_y**2 / windows.n
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
     """Measured and modelled mean forces over the windows of a drive.

@@ -8,7 +8,7 @@ import numpy as np
 from codegen.arrays import Array
 from identifier.tire_model import AXLES, RELAXATION, TireModel
 from identifier.verdict.causes import TELLING, Suspect
-from identifier.verdict.motion import Evidence
+from identifier.verdict.motion import Evidence, lateral_noise
 from identifier.verdict.verdict import Objection
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
@@ -349,12 +349,14 @@ def _a_y(drive: Drive, vehicle: Vehicle, found: Evidence) -> Iterator[Objection]
     assert drive.recording.a_y is not None
     recorded = found.windows.mean(drive.recording.a_y)
     motion = found.measured @ np.array(vehicle.axle_loads) / vehicle.mass
-    size = float(np.sqrt(np.mean(motion**2)))
-    if not size > LEAST_FORCE * GRAVITY:
+    of_motion, of_a_y = lateral_noise(drive.recording, found.windows)
+    power = float(np.mean(motion**2)) - of_motion
+    if not power > (LEAST_FORCE * GRAVITY) ** 2:
         return
     offset = float(np.mean(recorded - motion))
-    slope = float(recorded @ motion) / float(motion @ motion)
-    missed = float(np.sqrt(np.mean((recorded - motion) ** 2))) / size
+    slope = float(np.mean(recorded * motion)) / power
+    apart = float(np.mean((recorded - motion) ** 2)) - of_motion - of_a_y
+    missed = float(np.sqrt(max(apart, 0.0) / power))
     if missed > MOST_A_Y or not A_Y_SLOPE[0] <= slope <= A_Y_SLOPE[1]:
         yield Objection(
             "a_y_disagrees",

@@ -462,3 +462,19 @@ def test_every_finding_is_in_the_documents():
     page = (folder.parents[1] / "docs" / "results.md").read_text(encoding="utf-8")
     assert len(written) > 10
     assert written == set(re.findall(r"^\| `(\w+)` \| (?:no|yes)", page, flags=re.MULTILINE))
+
+
+@pytest.mark.parametrize("noise", [1.0, 8.0])
+def test_noise_of_the_sensors_is_no_disagreement_with_the_accelerometer(whole, noise, rng):
+    shown = replace(
+        whole,
+        v_y=whole.v_y + noise * 0.03 * rng.standard_normal(len(whole)),
+        a_y=whole.a_y + noise * 0.1 * rng.standard_normal(len(whole)),
+        axle_force=None,
+    )
+    car = sedan()
+    model = identify(whole, car, make_method("axle", car)).freeze()
+    codes = {one.code for one in judge_prediction(model, shown).findings}
+    assert "a_y_disagrees" not in codes
+    scaled = replace(shown, a_y=1.4 * shown.a_y)
+    assert "a_y_disagrees" in {one.code for one in judge_prediction(model, scaled).findings}
