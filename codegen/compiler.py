@@ -156,6 +156,9 @@ FLAGS = (
     "-shared",
 )
 LEVELS = ("0", "1", "2", "3")
+LONG = (
+    50_000  # characters of a source, beyond which to optimize it takes longer than a test runs it
+)
 # Before all other flags: words of $CC such as -ffast-math must not delete the guards either.
 KEEP_GUARDS = ("-fno-fast-math", "-fno-finite-math-only")
 
@@ -185,18 +188,22 @@ def _version(compiler: tuple[str, ...]) -> str:
     return answer.stdout.splitlines()[0] if answer.stdout else "unknown"
 
 
-def _at_level(flags: tuple[str, ...]) -> tuple[str, ...]:
+def _at_level(flags: tuple[str, ...], source: str) -> tuple[str, ...]:
     """Return the flags with the level of optimization that $TIREID_OPTIMIZE asks for, if it does.
 
-    The bits are the same at each; tests, which run little of much that is compiled, take a low one.
+    Two levels, as in 1,0, are one for short sources and one for long ones. The bits are the same at
+    each; tests, which run little of much that is compiled, take low ones.
     """
-    level = os.environ.get("TIREID_OPTIMIZE", "")
-    if not level:
+    asked = os.environ.get("TIREID_OPTIMIZE", "")
+    if not asked:
         return flags
-    if level not in LEVELS:
+    levels = asked.split(",")
+    if len(levels) > 2 or not set(levels) <= set(LEVELS):
         raise CompilationError(
-            f"TIREID_OPTIMIZE must be one of {', '.join(LEVELS)}, it is {level!r}"
+            f"TIREID_OPTIMIZE must be one of {', '.join(LEVELS)}, or two of them, for short and "
+            f"for long sources, it is {asked!r}"
         )
+    level = levels[-1] if len(source) > LONG else levels[0]
     return tuple(f"-O{level}" if flag in ("-O1", "-O2", "-O3") else flag for flag in flags)
 
 
@@ -243,7 +250,7 @@ def build_library(source: str, name: str, flags: tuple[str, ...] | None = None) 
     if compiler is None:
         return None
     flags = FLAGS if flags is None else flags
-    words = [*compiler, *KEEP_GUARDS, *_at_level(flags)]
+    words = [*compiler, *KEEP_GUARDS, *_at_level(flags, source)]
     made_of = "\0".join((source, _version(compiler), *words))
     stem = f"{name}-{hashlib.sha256(made_of.encode()).hexdigest()[:20]}"
     found = kept(stem, ".so")

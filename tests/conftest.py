@@ -2,6 +2,7 @@
 little; what is heavy.
 """
 
+import gc
 import os
 import time
 import tomllib
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+gc.disable()  # until all is collected: what is imported until then stays
 for flag in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL"):  # packages are built as from a shell
     os.environ.pop(flag, None)
 
@@ -56,6 +58,13 @@ def pytest_collection_modifyitems(config, items):
         raise pytest.UsageError("tests/heavy.toml names what is not there: " + ", ".join(unmet))
 
 
+def pytest_collection_finish():
+    """Let garbage be looked for, but not in modules and tests again and again: they stay."""
+    gc.collect()
+    gc.freeze()
+    gc.enable()
+
+
 def pytest_runtest_setup(item):
     """Leave out what is heavy and begins after a moment that was told, and say so."""
     until = os.environ.get("TIREID_HEAVY_UNTIL")
@@ -90,10 +99,11 @@ def undrawn(monkeypatch):
 @pytest.fixture
 def laid_out(monkeypatch, undrawn):
     """As `undrawn`, but a figure for paper is laid out with all that it shows, without ink."""
-    from tireid.figures.style import styled
+    from tireid.figures import style
 
     def empty(figure, **_):
-        styled(figure.draw_without_rendering)()
+        with style.laid_out(figure):
+            figure.draw_without_rendering()
         return PNG
 
     monkeypatch.setattr("tireid.figures.style.figure_png", empty)

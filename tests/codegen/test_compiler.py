@@ -105,7 +105,16 @@ def test_the_environment_may_ask_for_another_level_of_optimization(monkeypatch, 
     found = {build_library(ONE, "one"), build_library(ONE, "one", ("-O3", "-fPIC", "-shared"))}
     assert levels == ["-O0", "-O0"]
     assert len(found | {usual}) == 3
-    monkeypatch.setenv("TIREID_OPTIMIZE", "fast")
+    monkeypatch.setenv("TIREID_OPTIMIZE", "1,0")
+    long = f"{ONE}/* {'long' * compiler_module.LONG} */\n"
+    found |= {build_library(ONE, "one"), build_library(long, "one")}
+    assert levels == ["-O0", "-O0", "-O1", "-O0"]
+    assert len(found | {usual}) == 5
+
+
+@pytest.mark.parametrize("asked", ["fast", "4", "1,", "2,1,0", "1,fast"])
+def test_a_level_that_there_is_not_is_refused(monkeypatch, fresh_cache, asked):
+    monkeypatch.setenv("TIREID_OPTIMIZE", asked)
     with pytest.raises(CompilationError, match="TIREID_OPTIMIZE must be one of 0, 1, 2, 3"):
         build_library(ONE, "one")
 

@@ -204,6 +204,20 @@ def _remembered(axis: Axis, find: Callable[..., Any]) -> Callable[..., Any]:
     return find_once
 
 
+@contextmanager
+def laid_out(figure: Figure, look: Mapping[str, Any] = LOOK) -> Iterator[None]:
+    """Lay a figure out, and let it be drawn in the look of the project meanwhile.
+
+    Parameters
+    ----------
+    figure : as a function of this package returns it.
+    look : what differs from Matplotlib's own.
+    """
+    with style.context(["default", look]), _ticks_found_once(figure):
+        _lay_out(figure)
+        yield
+
+
 def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
     """Return a figure as PNG, the same bytes for the same figure.
 
@@ -213,8 +227,7 @@ def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
     resolution : dots per inch.
     """
     buffer = BytesIO()
-    with style.context(["default", LOOK]), _ticks_found_once(figure):
-        _lay_out(figure)
+    with laid_out(figure):
         figure.savefig(buffer, format="png", dpi=resolution, metadata={"Software": None})
     return buffer.getvalue()
 
@@ -236,8 +249,7 @@ def figure_svg(figure: Figure) -> bytes:
     figure : as a function of this package returns it.
     """
     buffer = BytesIO()
-    with style.context(["default", LOOK, VECTOR]), _ticks_found_once(figure):
-        _lay_out(figure)
+    with laid_out(figure, {**LOOK, **VECTOR}):
         figure.savefig(buffer, format="svg", dpi=CLOUDS, metadata={"Date": None, "Creator": None})
     return OUTLINE.sub(lambda path: DIGITS.sub(b"", path[0]), buffer.getvalue())
 

@@ -146,16 +146,18 @@ def test_curves_with_a_speed_are_those_of_its_load(model):
 def test_motion_and_lag_are_those_of_the_replay(model, drive):
     """The replay holds slip by its closed form, the equations of motion are integrated here."""
     soft = replace(model, own=np.array([[0.02, 0.0, 0.0], [0.03, 0.0, 0.0]]))
-    force, slip, x = soft.axle_force(drive), soft.lagged_slip(drive), np.zeros(2)
+    force, slip = soft.axle_force(drive), soft.lagged_slip(drive)
     dynamics = ca.Function("rate", *_slip_rate(soft))
-    found = []
-    for k in range(len(drive) - 1):
-        ends = [(drive.v_y[j], drive.r[j], drive.delta_f[j], drive.v_x[j]) for j in (k, k + 1)]
-        for share in (np.arange(20) + 0.5) / 20:
-            at = (1.0 - share) * np.array(ends[0]) + share * np.array(ends[1])
-            x = x + drive.dt / 20 * np.array(dynamics(x, *at)[1]).ravel()
-        found.append(np.array(dynamics(x, *ends[1])[0]).ravel())
-    away = np.abs(np.array(found)[100:] - force[101:]).max(axis=0)
+    begin, before, after = ca.SX.sym("x", 2), ca.SX.sym("before", 4), ca.SX.sym("after", 4)
+    x = begin
+    for share in (np.arange(20) + 0.5) / 20:
+        at = (1.0 - share) * before + share * after
+        x = x + drive.dt / 20 * dynamics(x, *ca.vertsplit(at))[1]
+    told = dynamics(x, *ca.vertsplit(after))[0]
+    sample = ca.Function("sample", [begin, before, after], [x, told])
+    rows = np.stack([drive.v_y, drive.r, drive.delta_f, drive.v_x])
+    _, found = sample.mapaccum(len(drive) - 1)(np.zeros(2), rows[:, :-1], rows[:, 1:])
+    away = np.abs(np.array(found).T[100:] - force[101:]).max(axis=0)
     assert (away < 0.02 * np.abs(force).max(axis=0)).all()
     plain = replace(soft, vehicle=UNTOLD, guarantee=None)
     assert np.abs(plain.lagged_slip(drive) - slip).max() > 1e-3  # more slope, a longer lag

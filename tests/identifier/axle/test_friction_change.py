@@ -35,10 +35,17 @@ def means(q, *, fast=(1.0, 1.0), slow=(1.0, 1.0), learns=1, dt=DT) -> Means:
     return Means(*(np.array(value).ravel() for value in found))
 
 
+def settled(q, n, dt) -> Means:
+    """The means after n samples of one error."""
+    fast, slow = ca.SX.sym("fast", 2), ca.SX.sym("slow", 2)
+    found = error_means(numbers(dt), ErrorState(fast, slow, ca.SX.ones(2)), ca.SX(q), 1)
+    step = ca.Function("step", [ca.vertcat(fast, slow)], [ca.vertcat(*found)])
+    return Means(*np.array(step.mapaccum(n)(np.ones(4)))[:, -1].reshape(2, 2))
+
+
 def test_the_means_approach_a_constant_error_with_their_time_constants():
-    detector, state = ChangeDetector(), Means(np.ones(2), np.ones(2))
-    for _ in range(round(detector.fast / 0.001)):
-        state = means([3.0, 2.0], fast=state.fast, slow=state.slow, dt=0.001)
+    detector = ChangeDetector()
+    state = settled([3.0, 2.0], round(detector.fast / 0.001), dt=0.001)
     reached = 1.0 - np.exp(-1.0)
     np.testing.assert_allclose(state.fast, [1 + 2 * reached, 1 + reached], rtol=0.01)
     share = 1.0 - np.exp(-detector.fast / detector.slow)
@@ -65,9 +72,7 @@ def test_nothing_moves_while_learning_rests():
 
 
 def test_learning_does_not_get_used_to_errors_that_are_no_noise():
-    state = Means(np.ones(2), np.ones(2))
-    for _ in range(5000):
-        state = means([1e3, 2.0], fast=state.fast, slow=state.slow, dt=0.1)
+    state = settled([1e3, 2.0], 5000, dt=0.1)
     np.testing.assert_allclose(state.slow, [4.0, 2.0], rtol=1e-6)
 
 

@@ -154,22 +154,22 @@ def test_sway_settles_where_the_body_leans_and_a_step_swings(car):
     numbers = SwayNumbers(*system.numbers())
     force, loads = np.array([0.4, 0.3]), np.array(car.axle_loads)
     a = (force * loads).sum() / car.mass
-    state, path = SwayState(ca.SX(0), ca.SX(0), ca.SX(0)), []
-    for _ in range(3000):
-        state = sway.sway(
-            numbers,
-            the_car(car),
-            0.002,
-            state,
-            first=0,
-            v_x=20.0,
-            r=0.1,
-            force=ca.SX(force),
-            slope=ca.SX.ones(2),
-            share=ca.SX.zeros(2),
-        )
-        state = SwayState(*(ca.SX(float(value)) for value in state))
-        path.append(float(state.rho))
+    before = SwayState(*(ca.SX.sym(name) for name in SwayState._fields))
+    after = sway.sway(
+        numbers,
+        the_car(car),
+        0.002,
+        before,
+        first=0,
+        v_x=20.0,
+        r=0.1,
+        force=ca.SX(force),
+        slope=ca.SX.ones(2),
+        share=ca.SX.zeros(2),
+    )
+    step = ca.Function("step", [ca.vertcat(*before)], [ca.vertcat(*after)])
+    states = SwayState(*np.array(step.mapaccum(3000)(np.zeros(3))))
+    path = states.rho
     assert path[-1] == pytest.approx(a, rel=1e-6)
     overshoot = np.exp(-0.3 * np.pi / np.sqrt(1 - 0.09))
     assert max(path) == pytest.approx(a * (1 + overshoot), rel=0.02)

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from identifier.paper.design import with_keeping
 from identifier.run import identify
 from models.vehicle import sedan
 from tests.identifier.export.conftest import BANKED
+from tests.kept import Kept
 
 CAR = sedan()
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
@@ -162,13 +164,15 @@ def test_weights_that_do_not_fit_are_refused(packages):
 @pytest.fixture(scope="module")
 def learnt(slalom):
     """By law and precision, a package that has learnt for 45 s."""
-    found = {}
-    for law in ("axle", "rls", "kreisselmeier", "stiffness_rls"):
-        package = build_package(make_method(law, CAR), CAR)
-        for single in (False, True):
-            found[law, single] = CompiledPackage.of(package, single=single)
-            found[law, single].run(slalom)
-    return found
+
+    def make(key):
+        law, single = key
+        run = CompiledPackage.of(build_package(make_method(law, CAR), CAR), single=single)
+        run.run(slalom)
+        return run
+
+    laws = ("axle", "rls", "kreisselmeier", "stiffness_rls")
+    return Kept(product(laws, (False, True)), make)
 
 
 def with_covariance(law, weights, P):

@@ -22,13 +22,13 @@ def run_filters(xi, b, sigma, filter_rate=4.0, dt=DT):
     signals = {name: p[name] for name in ("xi", "b", "sigma")}
     lags = Lags(p["target_lag"], p["regressor_lag"])
     pair, following = filtered_pair(lags, p["fresh"], **signals, filter_rate=filter_rate, dt=dt)
-    function = ca.Function("pair", [*p.values()], [pair.s, pair.y, *following])
-    state, fresh, rows = (np.zeros(2), np.zeros(3)), 1.0, []
-    for sample in zip(xi, b, sigma, strict=True):
-        s, y, *state = (np.array(v).ravel() for v in function(*state, fresh, *sample))
-        fresh = 0.0
-        rows.append((s, y))
-    return (np.array(column) for column in zip(*rows, strict=True))
+    lags = ca.vertcat(*lags)
+    samples = [p[name] for name in ("fresh", "xi", "b", "sigma")]
+    function = ca.Function("pair", [lags, *samples], [ca.vertcat(*following), pair.s, pair.y])
+    fresh = np.arange(len(xi)) == 0
+    rows = (np.array(column, dtype=float).T for column in (fresh[:, None], xi, b, sigma))
+    _, s, y = function.mapaccum(len(xi))(np.zeros(5), *rows)
+    return np.array(s).T, np.array(y).T
 
 
 def drive_by_trapezoids(car, n=300, dt=DT, refine=1):
