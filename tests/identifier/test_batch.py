@@ -160,14 +160,15 @@ def test_models_of_every_kind_replay_as_they_do_alone(car, drive):
     assert len({round(error.front, 6) for error in found}) > 10
 
 
-def test_many_methods_are_judged_as_each_alone(car, drive):
+@pytest.mark.parametrize("names", [("linear", "integral", "rls"), QUICK], ids=["three", "all"])
+def test_many_methods_are_judged_as_each_alone(names, car, drive):
     slow, quick = felt(drive(n=400)), replace(felt(drive(n=400, amplitude=0.09)), name="quick")
     course = Course(vehicle=car, recordings=(slow, quick), min_speed=1.0)
     wild = replace(
         PaperIdentifier.for_vehicle(car),
         gains=replace(PaperIdentifier.for_vehicle(car).gains, eta_W=1e6),
     )
-    methods = [*(make_method(name, car, seed) for name in QUICK for seed in (1, 2)), wild]
+    methods = [*(make_method(name, car, seed) for name in names for seed in (1, 2)), wild]
     for method, trial in zip(methods, cross_replay_batch(methods, course), strict=True):
         alone = cross_replay(method, course)
         assert trial.diverged_at == alone.diverged_at

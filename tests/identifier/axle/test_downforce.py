@@ -1,6 +1,7 @@
 """A car that pushes on the road with the square of its speed: it learns the static curve."""
 
 from dataclasses import replace
+from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -48,6 +49,7 @@ def pressed(v_x, car=RACER):
     return np.maximum(1.0 + 0.5 * 1.2 * areas * np.asarray(v_x)[..., None] ** 2 / LOADS, 0.2)
 
 
+@cache
 def race(n=3000, dt=0.01, phase=0.0, slowest=15.0, fastest=60.0, car=RACER):
     """A slalom while the car speeds up and brakes; forces are known exactly."""
     p, fine = RACER.bicycle, 10

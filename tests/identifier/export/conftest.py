@@ -10,7 +10,7 @@ import pytest
 from identifier.axle.band import BandCalibration
 from identifier.export.compiled import samples_of
 from identifier.export.package import build_package
-from identifier.methods import make_method
+from identifier.methods import METHODS, make_method
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan
@@ -39,7 +39,7 @@ CALIBRATION = BandCalibration(
 
 @pytest.fixture(scope="session")
 def packages():
-    """By law: the paper's network; what tireid learns by, without and with a_y; without v_y."""
+    """By law, also of the default that reads a_y and tells its band."""
     car = sedan()
 
     def make(law):
@@ -47,7 +47,7 @@ def packages():
             return banded(car, with_a_y=True)
         return build_package(make_method(law, car), car)
 
-    return Kept((*TWO, "inertial", BANKED), make)
+    return Kept((*METHODS, BANKED), make)
 
 
 def banded(car, **options):

@@ -43,9 +43,9 @@ def test_sample_by_sample_is_the_whole_recording(packages, slalom):
 
 
 @pytest.mark.parametrize("law", ["integral", "axle", "rls"])
-def test_frozen_c_is_the_frozen_model(law, slalom):
+def test_frozen_c_is_the_frozen_model(law, packages, slalom):
     method = make_method(law, CAR)
-    run = CompiledPackage.of(build_package(method, CAR))
+    run = CompiledPackage.of(packages[law])
     run.run(slalom)
     learnt = run.weights
     model = identify(slalom, CAR, method).freeze(float(slalom.t[-1]))
@@ -162,12 +162,12 @@ def test_weights_that_do_not_fit_are_refused(packages):
 
 
 @pytest.fixture(scope="module")
-def learnt(slalom):
+def learnt(packages, slalom):
     """By law and precision, a package that has learnt for 45 s."""
 
     def make(key):
         law, single = key
-        run = CompiledPackage.of(build_package(make_method(law, CAR), CAR), single=single)
+        run = CompiledPackage.of(packages[law], single=single)
         run.run(slalom)
         return run
 
@@ -257,8 +257,8 @@ def test_amounts_that_are_negative_are_refused(learnt, law, name):
         assert refused(run, {**weights, name: spoilt})
 
 
-def test_a_signal_has_no_weights(slalom):
-    run = CompiledPackage.of(build_package(make_method("eso", CAR), CAR))
+def test_a_signal_has_no_weights(packages, slalom):
+    run = CompiledPackage.of(packages["eso"])
     assert run.weights == {}
     with pytest.raises(ValueError, match="nothing to freeze"):
         run.set_adaptation(False)

@@ -8,7 +8,6 @@ import pytest
 
 from codegen import find_compiler
 from identifier.export.compiled import CompiledPackage, Status, samples_of
-from identifier.export.package import build_package
 from identifier.export.specialize import SIDE_SLIP
 from identifier.methods import make_method
 from identifier.refused import STALE_TIME
@@ -27,13 +26,7 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compi
 @pytest.fixture(scope="module")
 def shipped(packages):
     """By law, what a package is computed with; each test begins anew."""
-
-    def make(law):
-        other = law in OTHERS
-        package = build_package(make_method(law, CAR), CAR) if other else packages[law]
-        return CompiledPackage.of(package)
-
-    return Kept(LAWS, make)
+    return Kept(LAWS, lambda law: CompiledPackage.of(packages[law]))
 
 
 def method_of(law):
