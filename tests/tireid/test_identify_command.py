@@ -556,7 +556,7 @@ def test_what_cannot_be_read_back_as_tires_is_refused_by_the_name_of_its_log(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_is_not_valid_exits_with_three_unless_it_is_accepted(logs, tmp_path, capsys, laid_out):
+def test_what_is_not_valid_exits_with_three_unless_it_is_accepted(logs, tmp_path, capsys, undrawn):
     def biased(row):
         row["vy"] = repr(float(row["vy"]) + 0.6)
 

@@ -95,7 +95,7 @@ def by_hand(z, tilt, t):
     return np.array(moving), np.array([tilt[1], rolling]), a, turn
 
 
-def integrated(z, tilt, duration, dt=2e-5):
+def integrated(z, tilt, duration, dt=1e-4):
     z, tilt = z.copy(), tilt.copy()
     for k in range(round(duration / dt)):
         moving, rolling, *_ = by_hand(z, tilt, k * dt)

@@ -52,7 +52,9 @@ def drive_by_trapezoids(car, n=300, dt=DT, refine=1):
         ahead = xi
         for _ in range(20):  # a contraction by about h |A_ξ| < 0.1
             b_next, sigma_next = terms(ahead, u[min(k + 1, len(u) - 1)])
-            ahead = xi + h / 2 * (b + b_next + W_TRUE @ (sigma + sigma_next))
+            last, ahead = ahead, xi + h / 2 * (b + b_next + W_TRUE @ (sigma + sigma_next))
+            if np.abs(ahead - last).max() < 1e-16:
+                break
         xi = ahead
     return [np.array(column)[::refine] for column in zip(*rows, strict=True)]
 
