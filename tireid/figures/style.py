@@ -213,7 +213,7 @@ def laid_out(figure: Figure, look: Mapping[str, Any] = LOOK) -> Iterator[None]:
     figure : as a function of this package returns it.
     look : what differs from Matplotlib's own.
     """
-    with style.context(["default", look]), _ticks_found_once(figure):
+    with style.context(["default", dict(look)]), _ticks_found_once(figure):
         _lay_out(figure)
         yield
 
