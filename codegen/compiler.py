@@ -156,9 +156,7 @@ FLAGS = (
     "-shared",
 )
 LEVELS = ("0", "1", "2", "3")
-LONG = (
-    50_000  # characters of a source, beyond which to optimize it takes longer than a test runs it
-)
+LONG = 50_000  # characters of a source, beyond which to optimize it takes longer than a test runs
 # Before all other flags: words of $CC such as -ffast-math must not delete the guards either.
 KEEP_GUARDS = ("-fno-fast-math", "-fno-finite-math-only")
 
