@@ -1,13 +1,15 @@
 """Which channel of a log is probably which signal, by its name, its unit and what is in it.
 
 A name is cut into small words ("Car.YawRate" is car, yaw, rate) and set beside how loggers call
-things: MoTeC, AiM, VBOX, OxTS, Kistler, CarMaker, veDYNA, dSPACE, ROS messages, CAN databases, in
-English and German. The unit must be one of the signal's; the numbers must be those of a car. A
-proposal says how sure it is; of two that are equal none is taken.
+things: MoTeC, AiM, VBOX, OxTS, Kistler, CarMaker, veDYNA, dSPACE, openpilot, ROS messages, CAN
+databases, in English and German, by their plain words in French, Italian and Spanish. The unit must
+be one of the signal's; the numbers must be those of a car. A proposal says how sure it is; of two
+that are equal none is taken.
 """
 
 import math
 import re
+import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -24,19 +26,31 @@ from models.logs.signals import (
     Signal,
     quantity_of,
 )
-from models.logs.spelling import without_ending
+from models.logs.spelling import unit_in_name, without_ending
 from models.logs.stamps import typical_rate
-from models.logs.units import ANGLE, FORCE, RATE, is_told, quantities, to_si
+from models.logs.units import (
+    ANGLE,
+    FORCE,
+    HAND_WHEEL,
+    RATE,
+    is_told,
+    quantities,
+    to_si,
+    unit_of_range,
+)
 from models.logs.wheel_names import wheel_words
 
 SURE = 0.8  # confidence from which a proposal is used without being told to
 STANDARD, KNOWN, WORDS, VAGUE = 1.0, 0.95, 0.9, 0.82  # our own name, a logger's, its words, one
+HINT = 0.5  # a word of the name beside a unit that fits: named, never taken
 NO_UNIT_LOSS = 0.25  # of confidence, where neither file nor name tells the unit
+FILTERED_LOSS = 0.08  # of confidence, so that the channel that was filtered stands back
 STILL = 0.25  # of confidence that is left to a channel that never changes
 APART = 0.04  # of confidence: nearer ones are equal
 HAND = "steering wheel"  # an angle that wants a ratio
 LARGEST_ROAD = 1.2  # [rad]: an angle that goes further is that of a hand wheel
 LOOKED_AT = 20_000  # samples at most, in telling contents apart
+SPIKES = 1e-3  # share of samples that say nothing of the unit
 
 
 class Rule(NamedTuple):
@@ -52,45 +66,70 @@ class Rule(NamedTuple):
     never: tuple[str, ...]
 
 
-LONGITUDINAL = "long|longitudinal|fwd|forward|x|laengs|lon|lgt"
-LATERAL = "lat|lateral|y|quer|side"
-VELOCITY = "vel|velocity|v|speed|spd|geschwindigkeit|geschw"
-ACCELERATIONS = "acc|accel|acceleration|a|beschleunigung|beschl|gforce"
-YAW = "yaw|gier|psi"
-CHANGE = "rate|vel|velocity|speed|geschwindigkeit|dot|p|d"
-WHEEL_WORDS = ("wheel", "wheels", "tire", "tyre", "rad", "reifen", "whl")
+LONGITUDINAL = "long|longitudinal|longitudinale|fwd|forward|x|laengs|lon|lgt"
+ACROSS = "transversal|transversale|trasversale|transverse|transv"
+LATERAL = f"lat|lateral|laterale|y|quer|side|{ACROSS}"
+ROMANCE_SPEED = "vitesse|velocita|velocidad"
+VELOCITY = f"vel|velocity|v|speed|spd|geschwindigkeit|geschw|{ROMANCE_SPEED}"
+ACCELERATIONS = (
+    "acc|accel|acceleration|a|beschleunigung|beschl|gforce|accelerazione|aceleracion|acel"
+)
+YAW = "yaw|gier|psi|lacet|imbardata|guinada"
+CHANGE = f"rate|vel|velocity|speed|geschwindigkeit|geschw|dot|p|d|taux|{ROMANCE_SPEED}"
+WHEEL_WORDS = ("wheel", "wheels", "tire", "tyre", "rad", "reifen", "whl", "roue", "roues", "ruota",
+               "ruote", "rueda", "ruedas")  # fmt: skip
 CORNERS = ("fl", "fr", "rl", "rr", "vl", "vr", "hl", "hr", "lf", "rf", "lr")
 REFERENCE = ("cmd", "command", "target", "desired", "des", "ref", "request", "req", "limit", "max",
              "min", "std", "stddev", "var", "cov", "covariance", "err", "error", "quality", "valid",
-             "status", "soll", "accuracy", "sigma", "bias", "offset", "dev")  # fmt: skip
+             "status", "soll", "accuracy", "sigma", "bias", "offset", "dev", "commanded", "demand",
+             "requested", "reference", "setpoint", "wanted", "planned", "goal", "limiter", "cruise",
+             "actuator", "actuators", "sollwert", "vorgabe", "anforderung", "consigne", "cible",
+             "riferimento", "richiesta", "consigna", "objetivo", "deseado", "deseada")  # fmt: skip
 NOT_BODY = (*WHEEL_WORDS, *CORNERS, *REFERENCE)
+NO_VELOCITY = ("speed", "velocity", "vel", "geschw", "geschwindigkeit", *ROMANCE_SPEED.split("|"))
+NO_SPEED = (*NO_VELOCITY, "rate", "dot")
+NO_ACCELERATION = ("accel", "acceleration", "acc", "beschl", "beschleunigung", "accelerazione",
+                   "aceleracion", "acel")  # fmt: skip
+NO_TORQUE = ("torque", "moment", "force", "power", "couple", "coppia", "par", "kraft")
+UPRIGHT = ("z", "vert", "vertical", "vertikal", "verticale", "hoch")
+BEHIND = ("rear", "hinten", "hinterachse", "hinterachs", "ha", "arriere", "posteriore", "trasera",
+          "trasero")  # fmt: skip
+TURNING = ("angular", "yaw", "gier", "lacet", "imbardata", "guinada")
+FILTERED = {"filt", "filtered", "filter", "flt", "lowpass", "lp", "smooth", "smoothed",
+            "gefiltert", "filtre", "filtree", "filtrata", "filtrado"}  # fmt: skip
 RULES: Mapping[str, Rule] = {
     "v_x": Rule(
         ("vx", "velx", "xvel", "velocityx", "vxb", "vlon", "vlong", "vellong", "vellon", "velfwd",
          "velforward", "longvel", "vlgt", "vlaengs", "vxcg", "vxcog",
-         "carvx", "vxcar", "vxref", "laengsgeschwindigkeit", "wheelbasedvehiclespeed"),
+         "carvx", "vxcar", "vxref", "laengsgeschwindigkeit", "wheelbasedvehiclespeed", "vego",
+         "egospeed"),
         (f"{LONGITUDINAL};{VELOCITY}", "linear;x"),
         ("speed|velocity|spd|geschwindigkeit|fahrgeschwindigkeit|vfzg|vehspd|vveh|v|vel|"
-         "speed2d|kmh|fahrzeuggeschwindigkeit|vehv|groundspeed|vehiclespeed",),
-        (*NOT_BODY, "y", "z", "angular", "yaw", "gier", "engine", "motor", "lateral", "lat", "wind",
-         "vert", "vertical", "accel", "acceleration", "acc", "steering", "steer", "east", "north",
-         "up", "down", "n", "e"),
+         "speed2d|kmh|fahrzeuggeschwindigkeit|vehv|groundspeed|vehiclespeed|geschw|fahrgeschw|"
+         f"fahrzeuggeschw|{ROMANCE_SPEED}|vitessevehicule|velocitaveicolo|velocidadvehiculo",),
+        (*NOT_BODY, *TURNING, *UPRIGHT, *NO_ACCELERATION, "y", "engine", "motor", "moteur",
+         "motore", "lateral", "lat", "laterale", "quer", *ACROSS.split("|"), "trans", "fan",
+         "pump", "turbo", "turbine", "wind", "vent", "vento", "viento", "steering", "steer",
+         "lenkrad", "lenk", "volant", "volante", "sterzo", "east", "north", "up", "down", "n",
+         "e"),
     ),
     "v_y": Rule(
         ("vy", "vely", "yvel", "velocityy", "vyb", "vlat", "vellat", "vellateral", "latvel",
-         "vquer", "vycg", "vycog", "carvy", "vycar"),
-        (f"{LATERAL};{VELOCITY}", "linear;y", "quergeschwindigkeit"),
+         "vquer", "vycg", "vycog", "carvy", "vycar", "vtrans", "veltrans", "vtransversal",
+         "vlateral"),
+        (f"{LATERAL};{VELOCITY}", "linear;y", "quergeschwindigkeit", "trans;vel|velocity|v"),
         (),
-        (*NOT_BODY, "x", "z", "angular", "yaw", "gier", "accel", "acceleration", "acc", "east",
-         "north", "up", "down", "vert", "vertical"),
+        (*NOT_BODY, *TURNING, *UPRIGHT, *NO_ACCELERATION, "x", "east", "north", "up", "down",
+         "wind", "vent", "vento", "viento"),
     ),
     BETA: Rule(
         ("beta", "sideslip", "sideslipangle", "bodyslip", "bodyslipangle", "schwimmwinkel",
          "carsideslipangle", "slipangle", "anglebeta", "carbeta", "betacog", "driftangle"),
         ("sideslip|schwimmwinkel|beta", "side|body|vehicle;slip;angle", "side;slip", "slip;angle",
-         "drift;angle"),
+         "drift;angle", "schwimm;winkel", "derive;caisse|vehicule", "angolo;assetto"),
         (),
-        (*NOT_BODY, "rate", "dot", "ratio", "longitudinal", "front", "rear", "brake"),
+        (*NOT_BODY, *BEHIND, "rate", "dot", "ratio", "longitudinal", "front", "brake",
+         "vorderachse", "va", "avant", "anteriore"),
     ),
     "r": Rule(
         ("r", "yawrate", "psip", "psidot", "dpsi", "gierrate", "giergeschwindigkeit", "gyroz",
@@ -99,8 +138,7 @@ RULES: Mapping[str, Rule] = {
         (f"{YAW};{CHANGE}", "angular|gyro|omega|rate|ang;z", "gierrate|giergeschwindigkeit|yawrate",
          "heading|turn;rate", "rotation;rate;z"),
         (),
-        (*NOT_BODY, "x", "y", "roll", "pitch", "linear", "acceleration", "accel", "acc", "moment",
-         "torque"),
+        (*NOT_BODY, *NO_ACCELERATION, "x", "y", "roll", "pitch", "linear", "moment", "torque"),
     ),
     "delta_f": Rule(
         ("deltaf", "deltafront", "roadwheelangle", "frontwheelangle", "frontsteer",
@@ -110,34 +148,36 @@ RULES: Mapping[str, Rule] = {
          "drive;steering;angle", "road;steer|steering", "radlenkwinkel|radeinschlag",
          "ackermann;steering;angle"),
         ("delta",),
-        (*CORNERS, *REFERENCE, "torque", "moment", "rate", "speed", "velocity", "vel", "force",
-         "rear", "power", "dot", "mode", "assist"),
+        (*CORNERS, *REFERENCE, *NO_TORQUE, *NO_SPEED, *BEHIND, "mode", "assist"),
     ),
     HAND: Rule(
         ("steeringwheelangle", "steeringwheel", "handwheel", "handwheelangle", "swa", "sasangle",
          "lenkradwinkel", "lrw", "deltasw", "steerwhlang", "steeringwheelposition", "sas",
          "steerwhlangle", "stwhlang", "deltah", "lenkradw"),
         ("steer|steering|hand|stw|driv;wheel|whl;angle|ang|position|pos", "handwheel;angle|ang",
-         "lenkradwinkel|lenkrad", "sas|lws;angle|ang|winkel", "steering;wheel"),
-        ("steer|steering|steerangle|steeringangle|lenkwinkel|steerang|lenkung|steeredangle",),
-        (*CORNERS, *REFERENCE, "torque", "moment", "rate", "speed", "velocity", "vel", "force",
-         "front", "rear", "road", "tire", "tyre", "power", "dot", "mode", "assist", "drive"),
+         "lenkradwinkel|lenkrad", "sas|lws;angle|ang|winkel", "steering;wheel",
+         "volant|volante;angle|angolo|angulo|ang"),
+        ("steer|steering|steerangle|steeringangle|lenkwinkel|steerang|lenkung|steeredangle|"
+         "braquage|anglebraquage|angledebraquage|sterzo|angolosterzo|angolodisterzo|"
+         "angulodireccion|angulodedireccion",),
+        (*CORNERS, *REFERENCE, *NO_TORQUE, *NO_SPEED, *BEHIND, "front", "road", "tire", "tyre",
+         "mode", "assist", "drive", "roue", "roues", "ruota", "ruote", "rueda", "ruedas"),
     ),
     "delta_r": Rule(
         ("deltar", "deltarear", "rearsteer", "rearsteerangle", "steerrear", "rearwheelangle",
-         "deltah", "hinterradlenkwinkel"),
-        ("rear|r;steer|steering", "rear;wheel;angle"),
+         "hinterradlenkwinkel", "hinterachslenkwinkel"),
+        ("rear|r;steer|steering", "rear;wheel;angle", "hinten|hinterachse;lenkwinkel"),
         (),
-        (*CORNERS, *REFERENCE, "torque", "moment", "rate", "speed", "velocity", "force", "front"),
+        (*CORNERS, *REFERENCE, *NO_TORQUE, *NO_SPEED, "front"),
     ),
     "a_y": Rule(
         ("ay", "accy", "accely", "yaccel", "accelerationy", "latacc", "lataccel", "acclat",
          "glat", "latg", "gforcelat", "querbeschleunigung", "aquer", "aqu", "bquer", "caray",
          "lateralacceleration", "lateralacc", "accelerometery", "aycog", "aycg", "ayb"),
-        (f"{LATERAL};{ACCELERATIONS}|g", "linear;acceleration;y", "querbeschleunigung"),
+        (f"{LATERAL};{ACCELERATIONS}|g", "linear;acceleration;y", "querbeschleunigung",
+         "trans;acc|accel|acceleration"),
         (),
-        (*NOT_BODY, "x", "z", "angular", "yaw", "gier", "vel", "velocity", "speed", "gyro",
-         "twist", "magnetic"),
+        (*NOT_BODY, *TURNING, *UPRIGHT, *NO_VELOCITY, "x", "gyro", "twist", "magnetic"),
     ),
     "Fyf": Rule(
         ("fyf", "fyfront", "fyfrontaxle", "fyfinv"),
@@ -173,8 +213,20 @@ LONG_SIDES = (  # words of a corner, in either order, and what they are cut down
     (("hinten", "links"), "rl"),
     (("hinten", "rechts"), "rr"),
 )
-UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ψ": "psi", "β": "beta",
-                         "δ": "delta", "ω": "omega"})  # fmt: skip
+# Words in a name beside a unit that fits, by what they begin with: they may mean the signal.
+HINTS: Mapping[str, tuple[str, ...]] = {
+    "v_y": ("quer", "transv", "trasv", "lateral", "side", "seit"),
+    BETA: ("slip", "schwimm", "drift", "deriv", "assetto"),
+}
+# German words are written together: "Querbeschl", "Lenkradwinkel", "Sollgierrate".
+_FIRST = "soll|ist|fahrzeug|fahr|quer|laengs|gier|vertikal|hoch|radlenk|lenkrad|lenk|schwimm|rad"
+_LAST = "beschleunigung|beschl|geschwindigkeit|geschw|rate|winkel|moment|kraft"
+_COMPOUND = re.compile(f"(?:{_FIRST})+(?:{_LAST})+")
+_PARTS = re.compile(f"{_FIRST}|{_LAST}")
+GENERIC = ("data", "value")  # a field that says nothing, as of std_msgs: its topic is its name
+UMLAUTS = str.maketrans({"Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ä": "ae", "ö": "oe", "ü": "ue",
+                         "ß": "ss", "ψ": "psi", "β": "beta", "δ": "delta",
+                         "ω": "omega"})  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -256,11 +308,27 @@ def words_of(name: str) -> tuple[str, ...]:
     ----------
     name : as in the file.
     """
-    plain = name.translate(UMLAUTS)
+    plain = unicodedata.normalize("NFC", name).translate(UMLAUTS)
+    bare = unicodedata.normalize("NFD", plain)  # accents stand behind their letters
+    plain = "".join(letter for letter in bare if not unicodedata.combining(letter))
     plain = re.sub(r"\[[^]]*\]|\([^)]*\)", " ", plain)  # a unit in brackets
     plain = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", plain)
     plain = re.sub(r"([A-Z]+)([A-Z][a-z])", r"\1 \2", plain)
     return tuple(re.findall(r"[a-z]+|\d+", plain.lower().translate(UMLAUTS)))
+
+
+def _with_parts(words: Sequence[str]) -> frozenset[str]:
+    """Return words, and what German ones are made of: "gierrate" is gier and rate too."""
+    parts = (_PARTS.findall(word) for word in words if _COMPOUND.fullmatch(word))
+    return frozenset(words).union(*parts)
+
+
+def _field(name: str) -> str:
+    """Return what a name of ROS says of itself, behind its topic; the topic of a lone number."""
+    if not name.startswith("/"):
+        return name
+    topic, _, field = name.rpartition("/")
+    return topic.rpartition("/")[2] if field.lower() in GENERIC else field
 
 
 def _matches(group: str, words: frozenset[str]) -> bool:
@@ -282,20 +350,31 @@ def name_confidence(signal: str, name: str) -> float:
     listed = words_of(name)
     if signal in WHEELS:
         return WORDS if wheel_words(signal, listed) else 0.0
-    rule, words = RULES[signal], frozenset(listed)
+    while name.startswith("/") and len(listed) > 1 and listed[-1] in GENERIC:
+        listed = listed[:-1]
+    rule, words = RULES[signal], _with_parts(listed)
     ends = ["".join(listed[k:]) for k in range(len(listed))]
     if set(rule.known) & set(ends[:1]):
         return KNOWN
-    field = name.rpartition("/")[2] if name.startswith("/") else name  # behind a topic
-    if frozenset(words_of(field)) & set(rule.never):
+    if _with_parts(words_of(_field(name))) & set(rule.never):
         return 0.0
+    loss = FILTERED_LOSS if words & FILTERED else 0.0
     if set(rule.known) & set(ends):
-        return WORDS
+        return WORDS - loss
     if any(_matches(group, words) for group in rule.words):
-        return WORDS
+        return WORDS - loss
     if set(ends) & {word for group in rule.vague for word in group.split("|")}:
         return VAGUE
     return 0.0
+
+
+def _is_hint(signal: str, one: Heading) -> bool:
+    """Return whether a word of a name and its unit let a channel be what no rule knows."""
+    words = _with_parts(words_of(_field(one.name)))
+    starts = HINTS.get(signal, ())
+    fits = is_told(one.unit) and QUANTITIES[signal] in quantities(one.unit)
+    named = any(word.startswith(starts) for word in words) if starts else False
+    return fits and named and not words & set(RULES[signal].never)
 
 
 def propose(log: LogFile, headings: Sequence[Heading], run: str | None = None) -> Proposal:
@@ -348,9 +427,10 @@ def _seen(log: LogFile, names: list[str], run: str | None) -> dict[str, Channel]
     return {key: one for name in names for key, one in _seen(log, [name], run).items()}
 
 
-def _candidates(signal: str, listed: Sequence[Heading]) -> list[Guess]:
+def _candidates(signal: str, headings: Sequence[Heading]) -> list[Guess]:
     """Return the channels whose names and units may be a signal."""
     found = []
+    listed = [_with_told_unit(one) for one in headings]
     for one in listed:
         names = {one.name, without_ending(one.name, one.unit)}
         by_name = max(name_confidence(signal, name) for name in names)
@@ -362,9 +442,17 @@ def _candidates(signal: str, listed: Sequence[Heading]) -> list[Guess]:
                     channel=(one.name,), confidence=best, hand=by_hand > by_name
                 ))
             )  # fmt: skip
+        elif _is_hint(signal, one):
+            unit, why = one.unit.strip(), "by a word of its name and its unit"
+            found.append(Guess(channel=(one.name,), confidence=HINT, unit=unit, why=why))
     if signal in PER_WHEEL and not any(one.confidence >= WORDS for one in found):
         found += _pairs(signal, listed)
     return found
+
+
+def _with_told_unit(one: Heading) -> Heading:
+    """Return a heading with the unit that its name ends in, where the file tells none."""
+    return one if is_told(one.unit) else Heading(one.name, unit_in_name(one.name))
 
 
 def _with_unit(signal: str, one: Heading, guess: Guess) -> Guess:
@@ -381,6 +469,7 @@ def _with_unit(signal: str, one: Heading, guess: Guess) -> Guess:
     near = quantity == RATE and ANGLE in told  # as some databases have it
     return replace(
         guess,
+        unit=f"{unit}/s" if near else "",
         confidence=0.5 * guess.confidence if near else 0.0,
         why=f"its unit {unit} is none of a {quantity}",
     )
@@ -423,7 +512,7 @@ def _said(guess: Guess, why: str) -> Guess:
 
 def _looked(signal: str, guess: Guess, seen: Mapping[str, Channel]) -> Guess:
     """Return a guess by what the numbers say of it."""
-    size = 0.0
+    size = usual = 0.0
     for name in guess.channel:
         if name not in seen:
             return replace(guess, confidence=0.0)
@@ -434,12 +523,34 @@ def _looked(signal: str, guess: Guess, seen: Mapping[str, Channel]) -> Guess:
             unlikely = STILL * guess.confidence if guess.confidence < STANDARD else STANDARD
             return replace(_said(guess, "it never changes"), confidence=unlikely)
         size = max(size, float(np.abs(finite).max()))
-    if QUANTITIES[signal] != ANGLE or guess.confidence == STANDARD:
+        usual = max(usual, float(np.quantile(np.abs(finite), 1.0 - SPIKES)))
+    if guess.confidence == STANDARD or signal in WHEELS:
         return guess
     if not guess.unit:
-        return _said(guess, f"goes to {size:.3g}")
+        return _by_range(signal, guess, size, usual)
+    if QUANTITIES[signal] != ANGLE:
+        return guess
     largest = size * to_si(guess.unit, ANGLE, signal)
     if signal != BETA and largest > LARGEST_ROAD and not guess.hand:
         why = f"goes to {math.degrees(largest):.0f} deg, as a hand wheel does"
         return replace(_said(guess, why), hand=True)
     return guess
+
+
+def _by_range(signal: str, guess: Guess, size: float, usual: float) -> Guess:
+    """Return a guess without a unit by how far its numbers go, and all but a few of them.
+
+    A name that may mean hand or road wheels, as "steer", means these where it stays as near.
+    """
+    quantity = QUANTITIES[signal]
+    vague = max(name_confidence(HAND, name) for name in guess.channel) <= VAGUE
+    if guess.hand and vague and not unit_of_range(quantity, usual):
+        return _said(replace(guess, hand=False), f"goes to {size:.3g}, as road wheels do in rad")
+    unit = unit_of_range(HAND_WHEEL if guess.hand else quantity, usual)
+    if unit and quantity == ANGLE and signal != BETA and not guess.hand:
+        hand = usual * to_si(unit, quantity, signal) > LARGEST_ROAD
+        guess = replace(guess, hand=hand)
+    if not unit:
+        return _said(guess, f"goes to {size:.3g}") if quantity == ANGLE else guess
+    wheel = " of a hand wheel" if guess.hand else ""
+    return _said(replace(guess, unit=unit), f"goes to {size:.3g}, as {unit}{wheel} do")

@@ -14,7 +14,8 @@ _OTHERS = (
 _EMPTY = ("1", "-", "--", "none", "")
 _BRACKETS = re.compile(r".*?[\[({]\s*([^\])}]{0,24}?)\s*[\])}]\s*")
 _NUMBER = re.compile(r"[-+]?[\d.,]+(?:[eE][-+]?\d+)?")
-# What a name may end in after "_", as "speed_kmh"; "r", "f", "t" and "x" end names of signals.
+# What a name may end in after "_", as "speed_kmh", or with a capital letter, as "speedKmh" and
+# "ACC_MPS2"; "r", "f", "t" and "x" end names of signals.
 _ENDINGS = {
     "kmh": "km/h", "km_h": "km/h", "kph": "km/h", "mph": "mph", "mps": "m/s", "m_s": "m/s",
     "mps2": "m/s^2", "ms2": "m/s^2", "m_s2": "m/s^2", "deg": "deg", "rad": "rad", "degs": "deg/s",
@@ -23,6 +24,16 @@ _ENDINGS = {
     "N": "N", "kN": "kN",
 }  # fmt: skip
 _LONGEST_FIRST = sorted(_ENDINGS.items(), key=lambda one: -len(one[0]))
+_CAPITAL = {  # in small letters
+    "radpersec": "rad/s", "radps": "rad/s", "rads": "rad/s", "rad": "rad", "degpersec": "deg/s",
+    "degps": "deg/s", "degs": "deg/s", "dps": "deg/s", "deg": "deg", "kmperh": "km/h",
+    "kmph": "km/h", "kmh": "km/h", "kph": "km/h", "mph": "mph", "mps2": "m/s^2", "mps": "m/s",
+}  # fmt: skip
+_CAPITAL_ENDING = re.compile(
+    f"(?:(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Za-z0-9])_(?=[A-Z]))(?i:(?P<unit>{'|'.join(_CAPITAL)}))$"
+)
+_OF_ANGLES = re.compile("(?i:ang|winkel|slip|steer|yaw|roll|pitch|heading|delta|beta)")
+_LENKRAD = re.compile("(?i:lenk_?rad)$")  # German for a wheel: no angle in rad
 
 
 def is_unit(word: str) -> bool:
@@ -70,10 +81,21 @@ def unit_in_name(name: str) -> str:
         _, found, unit = name.rpartition(mark)
         if found and is_unit(unit) and unit.strip() not in _EMPTY:
             return unit.strip()
+    return _ending(name)[1]
+
+
+def _ending(name: str) -> tuple[str, str]:
+    """Return what stands before the unit in which a name ends, and the unit; it and ""."""
+    if _LENKRAD.search(name):
+        return name, ""
     for ending, unit in _LONGEST_FIRST:
         if name.endswith("_" + ending):
-            return unit
-    return ""
+            return name.removesuffix("_" + ending), unit
+    found = _CAPITAL_ENDING.search(name)
+    unit = _CAPITAL[found["unit"].lower()] if found else ""
+    if found is None or (unit == "rad" and not _OF_ANGLES.search(name)):  # "vRad" is of a wheel
+        return name, ""
+    return name[: found.start()], unit
 
 
 _UNIT_BEHIND = re.compile(r"\s*[\[(][^\[\]()]*[\])]$")
@@ -97,7 +119,5 @@ def without_ending(name: str, unit: str) -> str:
     name : of a column, as in the file: "speed_kmh".
     unit : that was understood: "km/h".
     """
-    for ending, meant in _LONGEST_FIRST:
-        if meant == unit and name.endswith("_" + ending):
-            return name.removesuffix("_" + ending)
-    return name
+    bare, meant = _ending(name)
+    return bare if meant == unit else name

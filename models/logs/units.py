@@ -113,6 +113,16 @@ OTHERS = {  # what else loggers log, so that an error can say what a unit is of
     "frequency": ("khz",),
     "power": ("kw", "w", "hp"),
 }
+# Where nothing tells a unit: beyond which number it is no SI unit, and which it is then. A hand
+# wheel goes further. No car turns faster than once in a second, or drives at 430 km/h.
+HAND_WHEEL = "angle of a hand wheel"
+FARTHEST = {
+    SPEED: (120.0, "km/h"),
+    ANGLE: (0.8, "deg"),
+    HAND_WHEEL: (3.0 * math.pi, "deg"),
+    RATE: (2.0 * math.pi, "deg/s"),
+}
+SMALLEST_ACCELERATION = 2.5  # [m/s²]: a drive that does not reach it teaches no tire, so it is in g
 NO_UNIT = ("", "-", "none", "1", "unitless", "n/a", "si")
 _WORDS = (
     ("²", "2"),
@@ -205,6 +215,20 @@ def is_told(unit: str) -> bool:
     unit : as written.
     """
     return _plain(unit) not in NO_UNIT
+
+
+def unit_of_range(quantity: str, largest: float) -> str:
+    """Return the unit that numbers without one can have; "" where SI can be.
+
+    Parameters
+    ----------
+    quantity : one of `SI`, or `HAND_WHEEL`.
+    largest : how far the numbers go from zero.
+    """
+    if quantity == ACCELERATION:
+        return "g" if largest < SMALLEST_ACCELERATION else ""
+    limit, unit = FARTHEST.get(quantity, (math.inf, ""))
+    return unit if largest > limit else ""
 
 
 def to_si(unit: str, quantity: str, what: str) -> float:
