@@ -7,6 +7,7 @@ be one of the signal's; the numbers must be those of a car. A proposal says how 
 that are equal none is taken.
 """
 
+import itertools
 import math
 import re
 import unicodedata
@@ -16,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from codegen.arrays import Array
 from models.logs.log import Channel, Heading, LogFile, RecordingError
 from models.logs.signals import (
     BETA,
@@ -29,6 +31,7 @@ from models.logs.signals import (
 from models.logs.spelling import unit_in_name, without_ending
 from models.logs.stamps import typical_rate
 from models.logs.units import (
+    ACCELERATION,
     ANGLE,
     FORCE,
     HAND_WHEEL,
@@ -51,6 +54,7 @@ HAND = "steering wheel"  # an angle that wants a ratio
 LARGEST_ROAD = 1.2  # [rad]: an angle that goes further is that of a hand wheel
 LOOKED_AT = 20_000  # samples at most, in telling contents apart
 SPIKES = 1e-3  # share of samples that say nothing of the unit
+UNTOLD = {"r": ("", "deg/s"), "a_y": ("", "g")}  # units that are met where none is told, "" SI
 
 
 class Rule(NamedTuple):
@@ -224,9 +228,8 @@ _LAST = "beschleunigung|beschl|geschwindigkeit|geschw|rate|winkel|moment|kraft"
 _COMPOUND = re.compile(f"(?:{_FIRST})+(?:{_LAST})+")
 _PARTS = re.compile(f"{_FIRST}|{_LAST}")
 GENERIC = ("data", "value")  # a field that says nothing, as of std_msgs: its topic is its name
-UMLAUTS = str.maketrans({"Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ä": "ae", "ö": "oe", "ü": "ue",
-                         "ß": "ss", "ψ": "psi", "β": "beta", "δ": "delta",
-                         "ω": "omega"})  # fmt: skip
+UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ψ": "psi", "β": "beta",
+                         "δ": "delta", "ω": "omega"})  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -309,8 +312,7 @@ def words_of(name: str) -> tuple[str, ...]:
     name : as in the file.
     """
     plain = unicodedata.normalize("NFC", name).translate(UMLAUTS)
-    bare = unicodedata.normalize("NFD", plain)  # accents stand behind their letters
-    plain = "".join(letter for letter in bare if not unicodedata.combining(letter))
+    plain = "".join(one if one in "ÄÖÜ" else unicodedata.normalize("NFD", one)[0] for one in plain)
     plain = re.sub(r"\[[^]]*\]|\([^)]*\)", " ", plain)  # a unit in brackets
     plain = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", plain)
     plain = re.sub(r"([A-Z]+)([A-Z][a-z])", r"\1 \2", plain)
@@ -392,6 +394,7 @@ def propose(log: LogFile, headings: Sequence[Heading], run: str | None = None) -
     candidates = {
         name: [_looked(name, guess, seen) for guess in found] for name, found in candidates.items()
     }
+    candidates = _beside_turning(candidates, seen)
     guesses: dict[str, Guess] = {}
     rivals: dict[str, tuple[Guess, ...]] = {}
     for name, found in candidates.items():
@@ -523,7 +526,7 @@ def _looked(signal: str, guess: Guess, seen: Mapping[str, Channel]) -> Guess:
             unlikely = STILL * guess.confidence if guess.confidence < STANDARD else STANDARD
             return replace(_said(guess, "it never changes"), confidence=unlikely)
         size = max(size, float(np.abs(finite).max()))
-        usual = max(usual, float(np.quantile(np.abs(finite), 1.0 - SPIKES)))
+        usual = max(usual, _usual(finite))
     if guess.confidence == STANDARD or signal in WHEELS:
         return guess
     if not guess.unit:
@@ -546,11 +549,73 @@ def _by_range(signal: str, guess: Guess, size: float, usual: float) -> Guess:
     vague = max(name_confidence(HAND, name) for name in guess.channel) <= VAGUE
     if guess.hand and vague and not unit_of_range(quantity, usual):
         return _said(replace(guess, hand=False), f"goes to {size:.3g}, as road wheels do in rad")
+    if quantity == ACCELERATION:
+        return guess  # `_beside_turning` sets it beside v_x and r
     unit = unit_of_range(HAND_WHEEL if guess.hand else quantity, usual)
     if unit and quantity == ANGLE and signal != BETA and not guess.hand:
         hand = usual * to_si(unit, quantity, signal) > LARGEST_ROAD
         guess = replace(guess, hand=hand)
     if not unit:
         return _said(guess, f"goes to {size:.3g}") if quantity == ANGLE else guess
-    wheel = " of a hand wheel" if guess.hand else ""
-    return _said(replace(guess, unit=unit), f"goes to {size:.3g}, as {unit}{wheel} do")
+    far = f"goes to {size:.3g}, " + ("as a hand wheel does in" if guess.hand else "so in")
+    return _said(replace(guess, unit=unit), f"{far} {unit}")
+
+
+def _beside_turning(
+    candidates: Mapping[str, list[Guess]], seen: Mapping[str, Channel]
+) -> dict[str, list[Guess]]:
+    """Return the guesses; r and a_y without a unit in those with which a_y is nearest to v_x r.
+
+    Where they cannot be set beside each other, how far a_y goes tells whether it is in g.
+    """
+    best = {
+        name: max(likely, key=lambda one: one.confidence)
+        for name in ("v_x", "r", "a_y")
+        if (likely := [one for one in candidates[name] if one.confidence > STILL])
+    }
+    mended = dict(candidates)
+    for name in UNTOLD:
+        mended[name] = [
+            guess
+            if _is_told(guess) or guess.confidence == 0.0
+            else _in_turning(name, {**best, name: guess}, seen)
+            for guess in candidates[name]
+        ]
+    return mended
+
+
+def _is_told(guess: Guess) -> bool:
+    """Return whether the unit of a guess is known; names of ours are in SI."""
+    return bool(guess.unit) or guess.confidence == STANDARD
+
+
+def _in_turning(name: str, there: Mapping[str, Guess], seen: Mapping[str, Channel]) -> Guess:
+    """Return the guess of r or a_y in the unit that v_x, r and a_y together have."""
+    guess = there[name]
+    sizes = {one: _root_mean_square(seen[there[one].channel[0]].values) for one in there}
+    if len(there) < 3 or not _is_told(there["v_x"]) or not all(sizes.values()):
+        usual = _usual(seen[guess.channel[0]].values)
+        return replace(guess, unit=unit_of_range(QUANTITIES[name], usual))
+
+    def far(units: tuple[str, ...]) -> float:
+        in_si = {
+            one: sizes[one] * to_si(unit, QUANTITIES[one], one)
+            for one, unit in zip(there, units, strict=True)
+        }
+        return abs(math.log(in_si["a_y"] / (in_si["v_x"] * in_si["r"])))
+
+    choices = [(one.unit,) if _is_told(one) else UNTOLD[key] for key, one in there.items()]
+    unit = dict(zip(there, min(itertools.product(*choices), key=far), strict=True))[name]
+    return replace(_said(guess, f"so in {unit}, by vx r = ay"), unit=unit) if unit else guess
+
+
+def _usual(values: Array) -> float:
+    """Return how far the finite ones go from zero, but for spikes."""
+    finite = values[np.isfinite(values)]
+    return float(np.quantile(np.abs(finite), 1.0 - SPIKES)) if finite.size else 0.0
+
+
+def _root_mean_square(values: Array) -> float:
+    """Return it of the finite ones."""
+    finite = values[np.isfinite(values)]
+    return math.sqrt(float(np.mean(np.square(finite)))) if finite.size else 0.0

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from codegen.escape import shown
 from models.logs.log import Heading, LogFile, RecordingError, some
-from models.logs.names import Proposal, propose
+from models.logs.names import HINT, STILL, Proposal, propose
 from models.logs.signals import (
     BETA,
     COLUMNS,
@@ -80,8 +80,9 @@ def chosen_signals(
     if missing := missing_signals(found):
         raise RecordingError(missing_text(log, missing, proposal, names))
     notes = [_taken_text(name, found[name]) for name in found if name not in told]
-    without = [] if has_v_y(found) else [_without_v_y_text(proposal)]
-    return Reading(found, (*lost, *notes, *without))
+    if aside := aside_text(found, proposal):
+        notes.append(aside)
+    return Reading(found, (*lost, *notes))
 
 
 def as_listed(
@@ -265,11 +266,55 @@ def _lost_text(told: Mapping[str, Signal], listed: Mapping[str, Signal]) -> tupl
     return (f"there is no column {shown(channels)}: vx is made of the wheels",)
 
 
-def _without_v_y_text(proposal: Proposal) -> str:
-    """Return what is said of a log that has no lateral velocity."""
-    likely = likely_text("v_y", proposal)
-    may = f"; if {likely} is one, tell it by --columns {column_word('v_y', proposal)}"
-    return f"no lateral velocity is read: vy is to be estimated{may if likely else ''}"
+def aside_text(found: Mapping[str, Signal], proposal: Proposal) -> str:
+    """Return which channel was left aside that may be v_y, or beside it a_y; empty where none.
+
+    Parameters
+    ----------
+    found : signals that are read, by our name.
+    proposal : what the channels probably are.
+    """
+    if has_v_y(found):
+        a_y = proposal.guesses.get("a_y")
+        if "a_y" in found or a_y is None or a_y.confidence < HINT:
+            return ""
+        likely, word = likely_text("a_y", proposal), column_word("a_y", proposal)
+        return f"ay is left aside, as it is not sure: {likely}; tell it by --columns {word}"
+    said = "no lateral velocity is read: vy is to be estimated"
+    name = next(iter(stand_ins("v_y", proposal)), "a_y")
+    if name == "a_y":
+        return said
+    likely, word = likely_text(name, proposal), column_word(name, proposal)
+    return f"{said}; if {likely} is one, tell it by --columns {word}"
+
+
+def aside_signals(found: Mapping[str, Signal], proposal: Proposal) -> list[str]:
+    """Return the signals that a channel may be and that are left aside, as `aside_text` says.
+
+    Parameters
+    ----------
+    found : signals that are read, by our name.
+    proposal : what the channels probably are.
+    """
+    if not aside_text(found, proposal):
+        return []
+    return ["a_y"] if has_v_y(found) else [x for x in stand_ins("v_y", proposal) if x != "a_y"]
+
+
+def stand_ins(name: str, proposal: Proposal) -> list[str]:
+    """Return what a channel may tell of a signal: itself; of v_y it or beta, and a_y.
+
+    Parameters
+    ----------
+    name : of a signal that is missing.
+    proposal : what the channels probably are.
+    """
+    there = {one: guess.confidence for one, guess in proposal.guesses.items()}
+    if name != "v_y":
+        return [name] if name in there else []
+    measured = [one for one in ("v_y", BETA) if there.get(one, 0.0) > STILL]
+    best = [max(measured, key=lambda one: there[one])] if measured else []
+    return best + ["a_y"] * (there.get("a_y", 0.0) > STILL)
 
 
 def missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: list[str]) -> str:
@@ -282,11 +327,13 @@ def missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: li
     proposal : what the channels probably are.
     names : of the channels.
     """
-    parts = [said for name in missing if (said := likely_text(name, proposal))]
-    words = [word for name in missing if (word := column_word(name, proposal))]
+    likely = [one for name in missing for one in stand_ins(name, proposal)]
+    parts = [likely_text(one, proposal) for one in likely]
+    words = [column_word(one, proposal) for one in likely]
     columns = ", ".join(column_of(name) for name in missing)
-    instead = " (or ay, from which it is estimated)" if missing == ["v_y"] else ""
-    said = f"{log.path}: column {columns}{instead} is missing; "
+    if missing == ["v_y"] or (missing[0] == "v_y" and "a_y" in likely):
+        columns = columns.replace("vy", "vy (or ay, from which it is estimated)", 1)
+    said = f"{log.path}: column {columns} is missing; "
     if parts:
         said += f"did you mean {', '.join(parts)}? tell it by --columns {' '.join(words)}; "
     else:

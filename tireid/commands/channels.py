@@ -15,11 +15,14 @@ from models.logs.clock import holes
 from models.logs.door import open_log
 from models.logs.log import Channel, Listed, LogFile, RecordingError, one_run, some
 from models.logs.names import Proposal, propose
-from models.logs.signals import MEANINGS, NEEDED, Signal, told_by
+from models.logs.signals import INSTEAD, MEANINGS, NEEDED, QUANTITIES, Signal, told_by
+from models.logs.units import SI, is_told
 from models.recordings import LogMap, split_log_argument
 from models.recordings.assembly import wheel_scales, wheel_units
 from models.recordings.choice import (
     as_listed,
+    aside_signals,
+    aside_text,
     column_of,
     column_word,
     has_v_y,
@@ -27,6 +30,7 @@ from models.recordings.choice import (
     likely_signals,
     likely_text,
     missing_signals,
+    stand_ins,
     standard_signals,
     with_wheels,
 )
@@ -90,7 +94,10 @@ def run(options: argparse.Namespace) -> int:
         cut = "cut out, as is told" if told.holes == CUT else CUT_BY_MAP
         tell(f"{empty}: they are {cut}")
         told = replace(told, holes=CUT)
-    if not has_v_y(signals) and not missing:
+    aside = [] if "v_y" in missing else aside_signals(signals, proposal)
+    if aside:
+        tell(aside_text(signals, proposal))
+    elif not has_v_y(signals) and not missing:
         tell(f"{column_of('a_y')} is there: without vy, identify estimates it")
     said, of_wheels, rolls = _wheels(log, signals, told, chosen)
     if rolls or missing:
@@ -98,10 +105,11 @@ def run(options: argparse.Namespace) -> int:
     if said:
         tell(said)
     if options.write is not None:
+        behind = [*missing, *aside]
         text = of_wheels.toml(options.write.parent)
-        text += unsure_toml(missing, proposal) + ("" if rolls else NO_RADIUS)
+        text += unsure_toml(behind, proposal) + ("" if rolls else NO_RADIUS)
         write_atomically(options.write, text)
-        say(f"wrote {options.write}" + (": what is missing stands behind # in it" * bool(missing)))
+        say(f"wrote {options.write}" + (": what is missing stands behind # in it" * bool(behind)))
     return DONE if rolls and not missing else FAILS
 
 
@@ -187,15 +195,16 @@ def channels_text(
                 "empty", "")  # fmt: skip
         name = visible(one.name if len(one.name) <= LONGEST_NAME else f"{one.name[:44]}...")
         rate = "?" if math.isnan(one.rate) else f"{one.rate:.4g}"
-        meant = _meaning(one.name, signals, proposal, told)
+        meant = _meaning(one, signals, proposal, told)
         rows.append([name, visible(one.unit), rate, str(samples), low, high, meant])
     return text_table(rows, "<<>>>><")
 
 
 def _meaning(
-    channel: str, signals: Mapping[str, Signal], proposal: Proposal, known: frozenset[str]
+    listed: Listed, signals: Mapping[str, Signal], proposal: Proposal, known: frozenset[str]
 ) -> str:
-    """Return what a channel is taken for, or may be."""
+    """Return what a channel is taken for, or may be, in which unit where the file tells none."""
+    channel = listed.name
     for name, signal in signals.items():
         if channel in signal.channel:
             guess = proposal.guesses.get(name)
@@ -205,10 +214,13 @@ def _meaning(
             return f"{column_of(name)}: {MEANINGS[name]}{told}{among}"
     for name, guess in proposal.guesses.items():
         for one in (guess, *proposal.rivals.get(name, ())):
+            if channel in one.channel and INSTEAD.get(name) in signals:
+                return f"{column_of(name)}, not read beside {column_of(INSTEAD[name])}"
             if channel in one.channel and name not in signals:
+                unit = f" in {one.unit}" if one.unit and not is_told(listed.unit) else ""
                 hand = ", of the hand wheel: tell its ratio" if one.hand else ""
                 doubt = "; another is as likely" if name in proposal.rivals else ""
-                return f"perhaps {column_of(name)} ({one.confidence:.0%}){hand}{doubt}"
+                return f"perhaps {column_of(name)}{unit} ({one.confidence:.0%}){hand}{doubt}"
     return ""
 
 
@@ -252,14 +264,19 @@ def missing_text(
             needed.append("a_y")
         return f"all that is needed is there: {', '.join(map(column_of, needed))}"
     lines = []
+    words = []
     for name in missing:
-        likely = likely_text(name, proposal)
+        likely = stand_ins(name, proposal)
+        texts = " or ".join(likely_text(one, proposal) for one in likely)
+        instead = ", ay would stand in for it" if likely == ["a_y"] and name != "a_y" else ""
         lines.append(
-            f"{column_of(name)} ({MEANINGS[name]}) is not sure: {likely}"
+            f"{column_of(name)} ({MEANINGS[name]}) is {'missing' if instead else 'not sure'}"
+            f"{instead}: {texts}"
             if likely
             else f"{column_of(name)} ({MEANINGS[name]}) is missing"
         )
-    words = [column_word(name, proposal) or f'"{column_of(name)}=CHANNEL"' for name in missing]
+        told = [column_word(one, proposal) for one in likely]
+        words += told or [f'"{column_of(name)}=CHANNEL"']
     return "\n".join([*lines, f"tell it: tireid channels {log} --columns {' '.join(words)}"])
 
 
@@ -272,12 +289,13 @@ def unsure_toml(missing: Sequence[str], proposal: Proposal) -> str:
     proposal : what the channels probably are.
     """
     blocks = []
-    for name in missing:
+    for name in (one for lack in missing for one in stand_ins(lack, proposal) or [lack]):
         guess = proposal.guesses.get(name)
-        channel = "" if guess is None else " + ".join(guess.channel)
+        names = ("",) if guess is None else guess.channel
+        channel = repr(names[0] if len(names) == 1 else list(names))
         ratio = ["# ratio =   # of the steering: hand wheel over road wheels"]
         wants_ratio = guess is not None and guess.hand
-        unit = "" if guess is None else guess.unit
-        blocks += ["", f"# [signals.{name}]", f"# channel = {channel!r}   # {MEANINGS[name]}"]
+        unit = "" if guess is None else guess.unit or SI[QUANTITIES[name]]
+        blocks += ["", f"# [signals.{name}]", f"# channel = {channel}   # {MEANINGS[name]}"]
         blocks += [f"# unit = {unit!r}", *(ratio if wants_ratio else [])]
     return "".join(f"{line}\n" for line in blocks)

@@ -7,22 +7,35 @@ import pytest
 
 from models.logs.log import Channel, Listed
 from models.logs.names import HAND, RULES, SURE, Guess, name_confidence, propose, words_of
+from models.logs.spelling import unit_in_name, without_ending
 
 CALLED = {
     "v_x": ["vx", "VelForward", "Vel_Longitudinal", "Car.vx", "/odom/twist.twist.linear.x", "v_lon",
-            "Velocity_X", "WheelBasedVehicleSpeed", "Längsgeschwindigkeit", "Ground Speed",
+            "Velocity_X", "WheelBasedVehicleSpeed", "carState.vEgo", "vxCG", "VelLong", "Geschw",
+            "Längsgeschw.", "Fahrzeuggeschwindigkeit", "Vitesse", "vitesse_longitudinale",
+            "Velocità longitudinale", "Velocidad", "Längsgeschwindigkeit", "Ground Speed",
             "/vehicle/status/velocity_status/longitudinal_velocity"],
     "v_y": ["vy", "Vel Lat", "LatVel", "VelLateral", "Car.vy", "/odom/twist.twist.linear.y",
+            "Correvit.VelTrans", "VelTrans", "Quergeschw", "v_transversal", "Transverse Velocity",
+            "vyCG", "vitesse latérale", "Velocità trasversale", "velocidad_lateral",
             "v_lat", "Quergeschwindigkeit", "lateral_velocity", "Correvit_vQuer"],
-    "beta": ["beta", "Schwimmwinkel", "Slip_Angle", "SideSlipAngle", "Car.SideSlipAngle"],
+    "beta": ["beta", "Schwimmwinkel", "Slip_Angle", "SideSlipAngle", "Car.SideSlipAngle",
+             "sideSlip", "angle de dérive caisse"],
     "r": ["r", "Car.YawRate", "Yaw_Rate", "Gyro Z", "AngRateZ", "Gierrate", "Giergeschwindigkeit",
-          "/imu/angular_velocity.z", "psi_dot", "YAW_RATE", "ESP_YawRate", "Gyro Yaw Velocity"],
+          "/imu/angular_velocity.z", "psi_dot", "YAW_RATE", "ESP_YawRate", "Gyro Yaw Velocity",
+          "carState.yawRate", "livePose.angularVelocityDevice.z", "Ist-Gierrate",
+          "Vitesse de lacet", "Velocità di imbardata", "velocidad_guiñada"],
     "delta_f": ["delta_f", "RoadWheelAngle", "/ackermann_cmd/drive.steering_angle",
-                "/vehicle/status/steering_status/steering_tire_angle", "Radlenkwinkel"],
+                "/vehicle/status/steering_status/steering_tire_angle", "Radlenkwinkel",
+                "roadwheelAngle"],
     HAND: ["Steering Angle", "SteerAngle", "Steered Angle", "SWA", "Steering_Wheel_Angle",
-           "Lenkradwinkel", "SAS_Angle", "LWS_Angle", "Steer.WhlAng", "HandwheelAngle"],
+           "Lenkradwinkel", "SAS_Angle", "LWS_Angle", "Steer.WhlAng", "HandwheelAngle",
+           "handwheelAngle", "carState.steeringAngle", "/steering_angle/data", "Angle volant",
+           "Angolo volante", "ángulo_volante", "delta_h"],
     "a_y": ["ay", "G Force Lat", "LateralAcc", "GPS LatAcc", "Acc_Y", "Querbeschleunigung",
-            "Car.ay", "/imu/linear_acceleration.y", "AccelLateral", "Accel Y"],
+            "Querbeschl", "ayCG", "Accélération transversale", "Accelerazione laterale",
+            "aceleración lateral", "Car.ay", "/imu/linear_acceleration.y", "AccelLateral",
+            "Accel Y"],
     "delta_r": ["delta_r", "RearSteerAngle"],
     "Fyf": ["Fyf", "Fy_front"],
     "Fyr": ["Fyr", "Fy_rear"],
@@ -30,7 +43,14 @@ CALLED = {
 NO_SIGNAL = ["Engine RPM", "Wheel Speed FL", "Brake Pressure", "Yaw Rate Target", "Roll Rate",
              "Steering Wheel Torque", "Throttle", "/imu/orientation.z", "/odom/twist.covariance[0]",
              "Longitudinal Acceleration",
-             "Fuel Level", "Gear", "GPS Latitude", "Steering Wheel Speed", "vy_std"]  # fmt: skip
+             "Fuel Level", "Gear", "GPS Latitude", "Steering Wheel Speed", "vy_std",
+             "carState.aEgo", "Längsbeschl", "Vertikalbeschl", "Acc_Z", "axCG",
+             "accélération longitudinale", "Sollquerbeschl", "Querbeschl_Soll", "Gierrate Sollwert", "actuators.steeringAngle",
+             "carState.cruiseState.speed", "steeringRate", "/steering_cmd/data",
+             "/target_steering_angle/data", "HA_Lenkwinkel", "Lenkradmoment",
+             "Lenkradwinkelgeschw", "Gierbeschleunigung", "Raddrehzahl VL", "vitesse_roue_FL",
+             "Lateral Wind Speed", "Yaw Rate Setpoint", "couple volant",
+             "Motordrehzahl", "consigne de vitesse"]  # fmt: skip
 
 
 @pytest.mark.parametrize(("signal", "name"), [(s, n) for s, all_ in CALLED.items() for n in all_])
@@ -49,6 +69,8 @@ def test_names_are_cut_into_words() -> None:
     assert words_of("Car.YawRate") == ("car", "yaw", "rate")
     assert words_of("IMU01_gyro_z [deg/s]") == ("imu", "01", "gyro", "z")
     assert words_of("Längsgeschw.") == ("laengsgeschw",)
+    assert words_of("Accélération") == ("acceleration",)
+    assert words_of("LÄNGS") == words_of("LA\u0308NGS") == ("laengs",)
 
 
 class Log:
@@ -200,3 +222,126 @@ def test_a_guess_that_cannot_be_read_is_none() -> None:
     found = propose(log, log.listed())
     assert "r" not in found.guesses and found.is_sure("v_y")
     assert isinstance(found.guesses["v_y"], Guess)
+
+
+@pytest.mark.parametrize(
+    ("name", "bare", "unit"),
+    [
+        ("carState.steeringAngleDeg", "carState.steeringAngle", "deg"),
+        ("SpeedKph", "Speed", "km/h"),
+        ("ACC_LAT_MPS2", "ACC_LAT", "m/s^2"),
+        ("accLatMps2", "accLat", "m/s^2"),
+        ("yawRateRadPs", "yawRate", "rad/s"),
+        ("yawRateDegPerSec", "yawRate", "deg/s"),
+        ("SteerAngleRad", "SteerAngle", "rad"),
+        ("speed_kmh", "speed", "km/h"),
+        ("GeschwRad", "GeschwRad", ""),  # of a wheel
+        ("LenkRad", "LenkRad", ""),
+        ("lenk_rad", "lenk_rad", ""),
+        ("MPS", "MPS", ""),
+        ("dampsDeg2", "dampsDeg2", ""),
+    ],
+)
+def test_units_stand_at_the_end_of_names_in_any_spelling(name: str, bare: str, unit: str) -> None:
+    assert unit_in_name(name) == unit
+    assert without_ending(name, unit) == bare
+
+
+def test_a_unit_of_the_name_is_that_of_the_signal_where_the_format_tells_none() -> None:
+    found = proposed(("yawRateDegPs", "", 20 * WAVE), ("roadwheelAngleDeg", "", 4 * WAVE))
+    assert found.signals()["r"].unit == "deg/s" and found.signals()["delta_f"].unit == "deg"
+
+
+@pytest.mark.parametrize(
+    ("signal", "name", "size", "unit"),
+    [
+        ("r", "YawRate", 37.0, "deg/s"),
+        ("r", "YawRate", 2.0, ""),
+        ("v_x", "Speed", 180.0, "km/h"),
+        ("v_x", "Speed", 60.0, ""),
+        ("beta", "Slip_Angle", 9.0, "deg"),
+        ("beta", "Slip_Angle", 0.2, ""),
+        ("delta_f", "RoadWheelAngle", 12.0, "deg"),
+        ("delta_f", "RoadWheelAngle", 0.3, ""),
+        ("delta_f", "SteeringWheelAngle", 102.0, "deg"),
+        ("delta_f", "SteeringWheelAngle", 6.0, ""),
+        ("a_y", "Lat_Acc", 1.05, "g"),
+        ("a_y", "Lat_Acc", 8.0, ""),
+    ],
+)
+def test_without_a_unit_that_is_proposed_which_the_range_allows_and_none_is_sure(
+    signal: str, name: str, size: float, unit: str
+) -> None:
+    guess = proposed((name, "", size * WAVE)).guesses[signal]
+    assert guess.unit == unit and guess.confidence < SURE
+    assert "no unit in the file" in guess.why
+    if unit and signal != "a_y":
+        assert f"goes to {size:.3g}, " in guess.why
+
+
+def test_one_spike_does_not_change_a_unit() -> None:
+    wave = 2.0 * np.sin(np.arange(5000.0))
+    wave[7] = 400.0
+    assert proposed(("YawRate", "", wave)).guesses["r"].unit == ""
+
+
+@pytest.mark.parametrize("rate", ["", "deg/s"])
+@pytest.mark.parametrize("lateral", ["", "g"])
+def test_r_and_a_y_without_units_have_those_in_which_a_y_is_v_x_r(rate: str, lateral: str) -> None:
+    r = 0.06 * np.sin(0.03 * np.arange(2000.0))  # [rad/s], on a slippery road
+    a_y = 20.0 * r
+    r, a_y = (np.degrees(r) if rate else r), (a_y / 9.80665 if lateral else a_y)
+    speed = ("Speed", "km/h", 72.0 + 0.1 * np.cos(np.arange(2000.0)))
+    found = proposed(speed, ("YawRate", "", r), ("Lat_Acc", "", a_y)).guesses
+    assert (found["r"].unit, found["a_y"].unit) == (rate, lateral)
+    assert found["r"].confidence < SURE and found["a_y"].confidence < SURE
+
+
+def test_a_steering_that_stays_near_in_rad_is_that_of_road_wheels_if_its_name_allows() -> None:
+    near = proposed(("log.steer", "", 0.107 * WAVE)).guesses["delta_f"]
+    assert not near.hand and near.confidence < SURE and "as road wheels do in rad" in near.why
+    far = proposed(("log.steer", "", 80.0 * WAVE)).guesses["delta_f"]
+    assert far.hand and far.unit == "deg"
+    named = proposed(("SteeringWheelAngle", "", 0.107 * WAVE)).guesses["delta_f"]
+    assert named.hand
+    told = proposed(("Steering", "rad", 0.107 * WAVE)).guesses["delta_f"]
+    assert told.hand
+
+
+def test_a_road_wheel_without_a_unit_that_goes_too_far_is_a_hand_wheel_in_degrees() -> None:
+    far = proposed(("RoadWheelAngle", "", 400 * WAVE)).guesses["delta_f"]
+    assert far.hand and far.unit == "deg" and "as a hand wheel does in deg" in far.why
+
+
+def test_a_rate_whose_unit_is_an_angles_is_proposed_per_second() -> None:
+    guess = proposed(("Yaw Rate", "deg", 20 * WAVE)).guesses["r"]
+    assert guess.unit == "deg/s" and guess.confidence < SURE
+
+
+def test_a_filtered_duplicate_stands_back_for_what_was_filtered() -> None:
+    found = proposed(("LatAcc_filtered", "g", WAVE), ("ESP_AccLat", "g", WAVE))
+    assert found.is_sure("a_y") and found.guesses["a_y"].channel == ("ESP_AccLat",)
+    alone = proposed(("LatAcc_filtered", "g", WAVE))
+    assert alone.is_sure("a_y")
+
+
+def test_a_word_and_a_unit_of_what_no_rule_knows_are_named_and_never_taken() -> None:
+    found = proposed(("Seitwärts", "km/h", WAVE), ("Slip", "deg", WAVE))
+    assert found.guesses["v_y"].channel == ("Seitwärts",) and not found.is_sure("v_y")
+    assert found.guesses["beta"].channel == ("Slip",) and not found.is_sure("beta")
+    none = [("Lateral", "", WAVE), ("Lateral", "bar", WAVE), ("Slip FL", "deg", WAVE),
+            ("Lateral Target", "m/s", WAVE), ("Transmission", "km/h", WAVE)]  # fmt: skip
+    assert not any({"v_y", "beta"} & set(proposed(one).guesses) for one in none)
+
+
+def test_the_programs_of_stanford_are_understood_but_for_the_ratio() -> None:
+    found = proposed(
+        ("vxCG", "m/s", 20 + WAVE),
+        ("vyCG", "m/s", WAVE),
+        ("ayCG", "m/s2", WAVE),
+        ("axCG", "m/s2", WAVE),
+        ("yawRate", "deg/s", WAVE),
+        ("sideSlip", "deg", WAVE),
+        ("handwheelAngle", "deg", 90 * WAVE),
+    )
+    assert set(found.signals()) == {"v_x", "v_y", "r", "a_y"} and found.guesses["delta_f"].hand
