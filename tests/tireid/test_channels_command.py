@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import tomllib
 
 import numpy as np
@@ -286,3 +287,110 @@ def test_cells_without_a_value_are_told_and_cut_out_by_the_map_that_is_written(f
 def test_a_map_says_refuse_or_cut_of_holes():
     with pytest.raises(RecordingError, match="holes must be refuse or cut, not 'fill'"):
         ti.LogMap(holes="fill")
+
+
+def written(path, log, columns):
+    """Write a CSV file whose header has units in brackets, and return its path."""
+    table = np.column_stack([log.t, *columns.values()])
+    header = ",".join(["Time [s]", *columns])
+    np.savetxt(path, table, "%.9g", ",", header=header, comments="", encoding="utf-8")
+    return path
+
+
+def in_degrees(log):
+    columns = {"Geschw [km/h]": 3.6 * log.v_x, "Gierrate [°/s]": np.degrees(log.r)}
+    return columns | {"RoadWheelAngle [deg]": np.degrees(log.delta_f)}
+
+
+def test_a_log_in_german_is_read_by_its_names(log, tmp_path):
+    columns = in_degrees(log) | {"Quergeschw [km/h]": 3.6 * log.v_y, "Querbeschl [m/s²]": log.a_y}
+    got = read_recording(written(tmp_path / "fahrt.csv", log, columns))
+    for name in ("v_x", "v_y", "r", "delta_f", "a_y"):
+        assert np.allclose(getattr(got, name), getattr(log, name), atol=1e-6)
+
+
+def test_a_channel_that_may_be_v_y_is_named_where_the_log_is_read_without(log, tmp_path, capsys):
+    columns = in_degrees(log) | {"Querbeschl [m/s²]": log.a_y, "Seitwärts [km/h]": 3.6 * log.v_y}
+    path = written(tmp_path / "log.csv", log, columns)
+    got = read_recording(path)
+    assert got.v_y is None
+    note = next(one for one in got.notes if one.startswith("no lateral velocity is read"))
+    word = '--columns "vy=Seitwärts [km/h]"'
+    assert "if 'Seitwärts [km/h]' for vy (by a word of its name and its unit) is one" in note
+    assert note.endswith(f"tell it by {word}")
+    assert main(["channels", str(path), "--write", str(tmp_path / "log.toml")]) == 0
+    said = capsys.readouterr().out
+    assert note in said and "perhaps vy (50%)" in said
+    assert "# channel = 'Seitwärts [km/h]'" in (tmp_path / "log.toml").read_text(encoding="utf-8")
+    told = read_recording(path, columns={"vy": "Seitwärts [km/h]"})
+    assert np.allclose(told.v_y, log.v_y, atol=1e-6)
+
+
+def test_two_channels_that_may_be_a_y_are_named_beside_a_v_y_that_is_read(log, tmp_path, capsys):
+    lateral = {"INS_AccLateral [m/s^2]": log.a_y, "ESP_LatAcc [m/s^2]": log.a_y}
+    columns = in_degrees(log) | {"VelTrans [km/h]": 3.6 * log.v_y} | lateral
+    path = written(tmp_path / "log.csv", log, columns)
+    got = read_recording(path)
+    assert got.a_y is None and got.v_y is not None
+    note = (
+        "ay is left aside, as it is not sure: 'INS_AccLateral [m/s^2]' or 'ESP_LatAcc [m/s^2]' for "
+        'ay, equally; tell it by --columns "ay=INS_AccLateral [m/s^2]"'
+    )
+    assert note in got.notes
+    assert main(["channels", str(path)]) == 0
+    assert note in capsys.readouterr().out
+    told = read_recording(path, columns={"ay": "INS_AccLateral [m/s^2]"})
+    assert not any("left aside" in one for one in told.notes)
+
+
+def test_two_channels_that_may_be_a_y_are_named_where_no_v_y_is_there(log, tmp_path, capsys):
+    lateral = {"INS_AccLateral [m/s^2]": log.a_y, "ESP_LatAcc [m/s^2]": log.a_y}
+    path = written(tmp_path / "log.csv", log, in_degrees(log) | lateral)
+    with pytest.raises(RecordingError) as caught:
+        read_recording(path)
+    said = str(caught.value)
+    assert "column vy (or ay, from which it is estimated) is missing; did you mean 'INS_Acc" in said
+    assert "'ESP_LatAcc [m/s^2]' for ay, equally?" in said
+    assert 'tell it by --columns "ay=INS_AccLateral [m/s^2]"' in said
+    assert main(["channels", str(path), "--write", str(tmp_path / "log.toml")]) == 1
+    said = capsys.readouterr().out
+    assert "vy (lateral velocity) is missing, ay would stand in for it: 'INS_AccLateral" in said
+    assert '--columns "ay=INS_AccLateral [m/s^2]"\n' in said
+    assert "# [signals.a_y]" in (tmp_path / "log.toml").read_text(encoding="utf-8")
+
+
+def test_words_that_are_proposed_for_a_log_without_units_read_it(log, tmp_path, capsys):
+    columns = {"velocity [km/h]": 3.6 * log.v_x, "YawRate": np.degrees(log.r)}
+    columns |= {
+        "Slip_Angle": np.degrees(np.arctan2(log.v_y, log.v_x)),
+        "Lat_Acc": log.a_y / 9.80665,
+    }
+    columns |= {"Steering_Angle": 16.0 * np.degrees(log.delta_f)}
+    path = written(tmp_path / "vbox.csv", log, columns)
+    assert main(["channels", str(path), "--write", str(tmp_path / "log.toml")]) == 1
+    said = capsys.readouterr().out
+    assert "perhaps r in deg/s (70%)" in said
+    words = re.findall(r'"([^"]+)"', next(x for x in said.splitlines() if x.startswith("tell it")))
+    assert words == [
+        "beta=Slip_Angle [deg]",
+        "ay=Lat_Acc [g]",
+        "r=YawRate [deg/s]",
+        "delta_f=Steering_Angle [deg] /RATIO",
+    ]
+    told = dict(word.replace("RATIO", "16").split("=", 1) for word in words)
+    got = read_recording(path, columns=told)
+    for name in ("v_x", "v_y", "r", "delta_f", "a_y"):
+        assert np.allclose(getattr(got, name), getattr(log, name), atol=1e-6)
+    text = (tmp_path / "log.toml").read_text(encoding="utf-8")
+    completed = re.sub(r"^# (?=\[|channel|unit|ratio)", "", text, flags=re.M)
+    completed = completed.replace("ratio =", "ratio = 16.0")
+    (tmp_path / "log.toml").write_text(completed, encoding="utf-8")
+    by_map = read_recording(path, log_map=tmp_path / "log.toml")
+    assert np.array_equal(by_map.v_y, got.v_y) and np.array_equal(by_map.delta_f, got.delta_f)
+
+
+def test_a_sideslip_beside_a_v_y_that_is_read_is_said_to_be_none(log, tmp_path, capsys):
+    slip = {"sideSlip [deg]": np.degrees(np.arctan2(log.v_y, log.v_x)), "vyCG [m/s]": log.v_y}
+    path = written(tmp_path / "log.csv", log, in_degrees(log) | slip)
+    assert main(["channels", str(path)]) == 0
+    assert "beta, not read beside vy" in capsys.readouterr().out

@@ -9,6 +9,7 @@ from models.logs.units import (
     ANGLE,
     FACTORS,
     FORCE,
+    HAND_WHEEL,
     RATE,
     SI,
     SPEED,
@@ -16,6 +17,7 @@ from models.logs.units import (
     is_told,
     quantities,
     to_si,
+    unit_of_range,
 )
 
 
@@ -96,3 +98,12 @@ def test_spellings_that_are_written_in_the_table_are_found_as_they_stand() -> No
 def test_a_sign_of_no_unit_tells_none() -> None:
     assert not any(map(is_told, ("", " ", "-", "[]", "none", "1")))
     assert all(map(is_told, ("m/s", "%", "1/s")))
+
+
+def test_a_number_that_no_car_reaches_in_si_is_in_another_unit() -> None:
+    assert unit_of_range(RATE, 6.0) == unit_of_range(ANGLE, 0.7) == unit_of_range(SPEED, 110) == ""
+    assert unit_of_range(RATE, 7.0) == "deg/s" and unit_of_range(SPEED, 130.0) == "km/h"
+    assert unit_of_range(ANGLE, 5.0) == "deg" and unit_of_range(HAND_WHEEL, 5.0) == ""
+    assert unit_of_range(HAND_WHEEL, 20.0) == "deg"
+    assert unit_of_range(ACCELERATION, 1.1) == "g" and unit_of_range(ACCELERATION, 9.0) == ""
+    assert unit_of_range(FORCE, 1e6) == ""
