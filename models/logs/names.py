@@ -81,7 +81,7 @@ ACCELERATIONS = (
 YAW = "yaw|gier|psi|lacet|imbardata|guinada"
 CHANGE = f"rate|vel|velocity|speed|geschwindigkeit|geschw|dot|p|d|taux|{ROMANCE_SPEED}"
 WHEEL_WORDS = ("wheel", "wheels", "tire", "tyre", "rad", "reifen", "whl", "roue", "roues", "ruota",
-               "ruote", "rueda", "ruedas")  # fmt: skip
+               "ruote", "rueda", "ruedas", "pneu", "pneus", "pneumatico", "neumatico")  # fmt: skip
 CORNERS = ("fl", "fr", "rl", "rr", "vl", "vr", "hl", "hr", "lf", "rf", "lr")
 REFERENCE = ("cmd", "command", "target", "desired", "des", "ref", "request", "req", "limit", "max",
              "min", "std", "stddev", "var", "cov", "covariance", "err", "error", "quality", "valid",
@@ -90,6 +90,9 @@ REFERENCE = ("cmd", "command", "target", "desired", "des", "ref", "request", "re
              "actuator", "actuators", "sollwert", "vorgabe", "anforderung", "consigne", "cible",
              "riferimento", "richiesta", "consigna", "objetivo", "deseado", "deseada")  # fmt: skip
 NOT_BODY = (*WHEEL_WORDS, *CORNERS, *REFERENCE)
+OTHER_CARS = ("radar", "lidar", "obj", "object", "objekt", "lead", "rel", "relative", "relativ")
+SHOWN = ("ui", "display", "displayed", "indicated", "cluster", "angez", "anzeige", "angezeigt",
+         "setspeed", "setspd", "speedset")  # fmt: skip
 NO_VELOCITY = ("speed", "velocity", "vel", "geschw", "geschwindigkeit", *ROMANCE_SPEED.split("|"))
 NO_SPEED = (*NO_VELOCITY, "rate", "dot")
 NO_ACCELERATION = ("accel", "acceleration", "acc", "beschl", "beschleunigung", "accelerazione",
@@ -111,9 +114,9 @@ RULES: Mapping[str, Rule] = {
         ("speed|velocity|spd|geschwindigkeit|fahrgeschwindigkeit|vfzg|vehspd|vveh|v|vel|"
          "speed2d|kmh|fahrzeuggeschwindigkeit|vehv|groundspeed|vehiclespeed|geschw|fahrgeschw|"
          f"fahrzeuggeschw|{ROMANCE_SPEED}|vitessevehicule|velocitaveicolo|velocidadvehiculo",),
-        (*NOT_BODY, *TURNING, *UPRIGHT, *NO_ACCELERATION, "y", "engine", "motor", "moteur",
-         "motore", "lateral", "lat", "laterale", "quer", *ACROSS.split("|"), "trans", "fan",
-         "pump", "turbo", "turbine", "wind", "vent", "vento", "viento", "steering", "steer",
+        (*NOT_BODY, *OTHER_CARS, *SHOWN, *TURNING, *UPRIGHT, *NO_ACCELERATION, "y", "engine",
+         "motor", "moteur", "motore", "sas", "lws", "lateral", "lat", "laterale", "quer",
+         *ACROSS.split("|"), "trans", "fan", "pump", "turbo", "turbine", "wind", "vent", "vento", "viento", "steering", "steer",
          "lenkrad", "lenk", "volant", "volante", "sterzo", "east", "north", "up", "down", "n",
          "e"),
     ),
@@ -123,8 +126,8 @@ RULES: Mapping[str, Rule] = {
          "vlateral"),
         (f"{LATERAL};{VELOCITY}", "linear;y", "quergeschwindigkeit", "trans;vel|velocity|v"),
         (),
-        (*NOT_BODY, *TURNING, *UPRIGHT, *NO_ACCELERATION, "x", "east", "north", "up", "down",
-         "wind", "vent", "vento", "viento"),
+        (*NOT_BODY, *OTHER_CARS, *TURNING, *UPRIGHT, *NO_ACCELERATION, "x", "east", "north",
+         "up", "down", "wind", "vent", "vento", "viento"),
     ),
     BETA: Rule(
         ("beta", "sideslip", "sideslipangle", "bodyslip", "bodyslipangle", "schwimmwinkel",
@@ -181,7 +184,8 @@ RULES: Mapping[str, Rule] = {
         (f"{LATERAL};{ACCELERATIONS}|g", "linear;acceleration;y", "querbeschleunigung",
          "trans;acc|accel|acceleration"),
         (),
-        (*NOT_BODY, *TURNING, *UPRIGHT, *NO_VELOCITY, "x", "gyro", "twist", "magnetic"),
+        (*NOT_BODY, *OTHER_CARS, *TURNING, *UPRIGHT, *NO_VELOCITY, "x", "gyro", "twist",
+         "magnetic"),
     ),
     "Fyf": Rule(
         ("fyf", "fyfront", "fyfrontaxle", "fyfinv"),
@@ -358,7 +362,7 @@ def name_confidence(signal: str, name: str) -> float:
     ends = ["".join(listed[k:]) for k in range(len(listed))]
     if set(rule.known) & set(ends[:1]):
         return KNOWN
-    if _with_parts(words_of(_field(name))) & set(rule.never):
+    if _with_parts(words_of(_field(name))).union(ends) & set(rule.never):
         return 0.0
     loss = FILTERED_LOSS if words & FILTERED else 0.0
     if set(rule.known) & set(ends):
@@ -375,7 +379,7 @@ def _is_hint(signal: str, one: Heading) -> bool:
     words = _with_parts(words_of(_field(one.name)))
     starts = HINTS.get(signal, ())
     fits = is_told(one.unit) and QUANTITIES[signal] in quantities(one.unit)
-    named = any(word.startswith(starts) for word in words) if starts else False
+    named = any(word.startswith(starts) and "wind" not in word for word in words)
     return fits and named and not words & set(RULES[signal].never)
 
 

@@ -51,7 +51,9 @@ NO_SIGNAL = ["Engine RPM", "Wheel Speed FL", "Brake Pressure", "Yaw Rate Target"
              "/target_steering_angle/data", "HA_Lenkwinkel", "Lenkradmoment",
              "Lenkradwinkelgeschw", "Gierbeschleunigung", "Raddrehzahl VL", "vitesse_roue_FL",
              "Lateral Wind Speed", "Yaw Rate Setpoint", "couple volant",
-             "Motordrehzahl", "consigne de vitesse"]  # fmt: skip
+             "Motordrehzahl", "consigne de vitesse", "radar.LateralVelocity", "Obj01_vLat",
+             "lead.vRel", "DAS_setSpeed", "KBI_angez_Geschw", "SAS_Speed",
+             "Seitenwind"]  # fmt: skip
 
 
 @pytest.mark.parametrize(("signal", "name"), [(s, n) for s, all_ in CALLED.items() for n in all_])
@@ -331,7 +333,8 @@ def test_a_word_and_a_unit_of_what_no_rule_knows_are_named_and_never_taken() -> 
     assert found.guesses["v_y"].channel == ("Seitwärts",) and not found.is_sure("v_y")
     assert found.guesses["beta"].channel == ("Slip",) and not found.is_sure("beta")
     none = [("Lateral", "", WAVE), ("Lateral", "bar", WAVE), ("Slip FL", "deg", WAVE),
-            ("Lateral Target", "m/s", WAVE), ("Transmission", "km/h", WAVE)]  # fmt: skip
+            ("Lateral Target", "m/s", WAVE), ("Seitenwind", "m/s", WAVE),
+            ("dérive pneu", "deg", WAVE), ("Transmission", "km/h", WAVE)]  # fmt: skip
     assert not any({"v_y", "beta"} & set(proposed(one).guesses) for one in none)
 
 
