@@ -116,9 +116,9 @@ RULES: Mapping[str, Rule] = {
          f"fahrzeuggeschw|{ROMANCE_SPEED}|vitessevehicule|velocitaveicolo|velocidadvehiculo",),
         (*NOT_BODY, *OTHER_CARS, *SHOWN, *TURNING, *UPRIGHT, *NO_ACCELERATION, "y", "engine",
          "motor", "moteur", "motore", "sas", "lws", "lateral", "lat", "laterale", "quer",
-         *ACROSS.split("|"), "trans", "fan", "pump", "turbo", "turbine", "wind", "vent", "vento", "viento", "steering", "steer",
-         "lenkrad", "lenk", "volant", "volante", "sterzo", "east", "north", "up", "down", "n",
-         "e"),
+         *ACROSS.split("|"), "trans", "fan", "pump", "turbo", "turbine", "wind", "vent", "vento",
+         "viento", "steering", "steer", "lenkrad", "lenk", "volant", "volante", "sterzo", "east",
+         "north", "up", "down", "n", "e"),
     ),
     "v_y": Rule(
         ("vy", "vely", "yvel", "velocityy", "vyb", "vlat", "vellat", "vellateral", "latvel",
@@ -609,7 +609,8 @@ def _in_turning(name: str, there: Mapping[str, Guess], seen: Mapping[str, Channe
         return abs(math.log(in_si["a_y"] / (in_si["v_x"] * in_si["r"])))
 
     choices = [(one.unit,) if _is_told(one) else UNTOLD[key] for key, one in there.items()]
-    unit = dict(zip(there, min(itertools.product(*choices), key=far), strict=True))[name]
+    nearest = min(itertools.product(*choices), key=far)
+    unit = nearest[list(there).index(name)]
     return replace(_said(guess, f"so in {unit}, by vx r = ay"), unit=unit) if unit else guess
 
 
