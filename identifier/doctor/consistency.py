@@ -36,7 +36,7 @@ class Reading(NamedTuple):
 
     sideslip: v_y is the sideslip angle, its factor makes it rad.   size: lengths of the car over
     the told ones, and so the root of its yaw inertia over its mass.   inertia: yaw inertia over
-    what it then is.
+    what it then is.   arm: how far ahead of the center of gravity v_y is measured [m].
     """
 
     v_x: float = 1.0
@@ -47,6 +47,7 @@ class Reading(NamedTuple):
     sideslip: bool = False
     size: float = 1.0
     inertia: float = 1.0
+    arm: float = 0.0
 
 
 class Motion(NamedTuple):
@@ -198,8 +199,10 @@ def forces_and_slips(motion: Motion, vehicle: Vehicle, reading: Reading) -> Axle
         v_y_dot, sideslip = k_y * k_x * motion.v_x_v_y_dot, k_y * motion.v_y
     else:
         v_y_dot, sideslip = k_y * motion.v_y_dot, k_y / k_x * motion.sideslip
+    turn = k_r / k_x * motion.turn
+    v_y_dot, sideslip = v_y_dot - reading.arm * k_r * motion.r_dot, sideslip - reading.arm * turn
     acceleration = v_y_dot + k_x * k_r * motion.v_x_r
-    yaw, turn = inertia * k_r * motion.r_dot, k_r / k_x * motion.turn
+    yaw = inertia * k_r * motion.r_dot
     force = np.stack([acceleration + yaw / l_r, acceleration - yaw / l_f]) / GRAVITY
     front = reading.delta * motion.delta_f - sideslip - l_f * turn
     rear = motion.delta_r - sideslip + l_r * turn

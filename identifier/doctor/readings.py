@@ -25,7 +25,8 @@ from models.vehicle import GRAVITY, Vehicle
 DEGREE, KMH, MPH, MILLI = math.pi / 180.0, 1.0 / 3.6, 0.44704, 1e-3
 GAIN = 1.1  # that a change must earn: less than it is left by a third in a sum of logarithms
 FREEDOM = 0.5  # that a change must earn beside, whose factor is free
-FREE = ("steering", "other_car", "yaw_inertia")
+ARM = "velocity_sensor_x"  # a size and no gross fault, tried beside: it may explain a log as well
+FREE = ("steering", "other_car", "yaw_inertia", ARM)
 DEEPER = math.log(0.15)  # left of each equation, above which more changes are tried together
 KEPT = 8  # readings that are taken further
 JUDGED = 10  # of the best, by laws that need no vehicle
@@ -33,8 +34,11 @@ MOST = 4  # changes at once
 STEERING = np.geomspace(1.0 / 2500.0, 4.0, 48)  # factors of the steering angle that are tried
 SAME_STEERING, SAME_SIZE, SAME_INERTIA = math.log(2.5), math.log(2.2), math.log(2.0)
 # within which nothing is gross
+FINER, FINEST = 5, 12  # golden sections: of an arm, of a steering angle
 SIZES = np.geomspace(1.0 / 32.0, 32.0, 41)
 INERTIAS = np.geomspace(1.0 / 16.0, 16.0, 17)
+ARMS = np.linspace(-1.0, 1.0, 17)  # wheelbases
+ALIKE = math.log(1.15)  # factors that say the same
 STEEPNESS = 3.0  # of the confidence over what the next best reading leaves more
 
 
@@ -53,6 +57,7 @@ class Change:
     unit : in which they are logged, "" where that is right.
     factors : by field of a `Reading`, what takes it out.
     sideslip : whether v_y is the sideslip angle.
+    arm : how far ahead of the center of gravity v_y is measured [m].
     price : that it must earn beside that of every change, where it is less usual.
     """
 
@@ -61,6 +66,7 @@ class Change:
     unit: str = ""
     factors: tuple[tuple[str, float], ...] = ()
     sideslip: bool = False
+    arm: float = 0.0
     price: float = 0.0
 
     @property
@@ -89,7 +95,20 @@ class Change:
         reading : without it.
         """
         factors = {name: getattr(reading, name) * factor for name, factor in self.factors}
-        return reading._replace(**factors, sideslip=reading.sideslip or self.sideslip)
+        sideslip, arm = reading.sideslip or self.sideslip, reading.arm + self.arm
+        return reading._replace(**factors, sideslip=sideslip, arm=arm)
+
+    def is_like(self, other: "Change") -> bool:
+        """Return whether both say the same, be it by a factor that is a little another one.
+
+        Parameters
+        ----------
+        other : another change.
+        """
+        what = (self.code, self.channels, self.unit)
+        pairs = zip(self.factors, other.factors, strict=False)
+        near = all(abs(math.log(abs(a / b))) < ALIKE and a * b > 0.0 for (_, a), (_, b) in pairs)
+        return what == (other.code, other.channels, other.unit) and near
 
 
 def _changed(code: str, unit: str, factor: float, *channels: str, price: float = 0.0) -> Change:
@@ -145,6 +164,11 @@ class Explanation:
     changes: tuple[Change, ...]
     reading: Reading
     left: float
+
+    @property
+    def gross(self) -> tuple[Change, ...]:
+        """The changes that are gross faults: all but the place of a sensor."""
+        return tuple(change for change in self.changes if change.code != ARM)
 
     @property
     def cost(self) -> float:
@@ -208,8 +232,8 @@ def read(motion: Motion, vehicle: Vehicle, possible: Callable[[tuple[Change, ...
 
 
 def _means_else(one: Explanation, best: Explanation) -> bool:
-    """Whether an explanation is not the best one with something more."""
-    return not set(best.changes) < set(one.changes)
+    """Whether an explanation lacks a gross fault of the best one, or has another in its place."""
+    return not all(any(change.is_like(other) for other in one.gross) for change in best.gross)
 
 
 def _longer(
@@ -224,6 +248,8 @@ def _longer(
         free += _scaled("other_car", "size", SIZES, SAME_SIZE, motion, vehicle)
     if "inertia size" not in taken:
         free += _scaled("yaw_inertia", "inertia", INERTIAS, SAME_INERTIA, motion, vehicle, one)
+    if not any(change.code == ARM for change in one.changes):
+        free += _arms(one, motion, vehicle)
     longer = []
     for change in free:
         reading = change.on(one.reading)
@@ -272,12 +298,33 @@ def _scaled(
     return [Change(code=code, factors=((name, size),))]
 
 
+def _arms(one: Explanation, motion: Motion, vehicle: Vehicle) -> list[Change]:
+    """Return the place of the velocity sensor, within a wheelbase, that leaves least."""
+    length = one.reading.size * vehicle.wheelbase
+
+    def left(share: float) -> float:
+        return unexplained(motion, vehicle, one.reading._replace(arm=share * length))
+
+    share = min(map(float, ARMS), key=left)
+    if share == 0.0:
+        return []
+    step = float(ARMS[1] - ARMS[0])
+    share = _least(left, share - step, share + step, FINER)
+    return [Change(code=ARM, channels=("v_y",), arm=share * length)]
+
+
 def _refined(factor: float, left: Callable[[float], float]) -> float:
-    """Return a factor nearer to the least, by golden sections of its logarithm."""
-    step, golden = math.log(STEERING[1] / STEERING[0]), 0.5 * (math.sqrt(5.0) - 1.0)
-    low, high = factor * math.exp(-step), factor * math.exp(step)
-    for _ in range(12):
-        span = math.log(high / low)
-        a, b = high * math.exp(-golden * span), low * math.exp(golden * span)
+    """Return a factor nearer to the least, in its logarithm."""
+    step = math.log(STEERING[1] / STEERING[0])
+    finer = _least(lambda by: left(factor * math.exp(by)), -step, step, FINEST)
+    return factor * math.exp(finer)
+
+
+def _least(left: Callable[[float], float], low: float, high: float, sections: int) -> float:
+    """Return where between two numbers least is left, by golden sections."""
+    golden = 0.5 * (math.sqrt(5.0) - 1.0)
+    for _ in range(sections):
+        span = golden * (high - low)
+        a, b = high - span, low + span
         low, high = (low, b) if left(a) < left(b) else (a, high)
-    return math.copysign(math.sqrt(abs(low * high)), factor)
+    return 0.5 * (low + high)

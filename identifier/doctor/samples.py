@@ -24,7 +24,9 @@ SPIKE = 12.0  # times the noise beyond its neighbors
 FREEZE = 0.3  # [s] that a noisy channel repeats one number
 MOVES = 0.15  # of the range of v_x r, by which a car must move meanwhile, in any unit
 ALTERNATE = -0.35  # correlation of neighboring second differences, below which they are noise
-REPEATED = 0.01  # share of repeated samples of a noisy channel
+REPEATED, FEW = 0.01, 5  # of a noisy channel: share of repeated samples, and how often
+ON_GRID = 0.9  # of steps that are multiples of the smallest
+ESTIMATED, SWITCHED = ("v_y", "r"), 2  # channels that may be, how often they are off in a turn
 OUTLIER = 16.0  # times the variance that is expected of a difference, and not more
 ALIKE = math.log(1.6)  # of the times by which samples of two channels are late
 COARSE = 0.05  # quantum over the rms of a channel
@@ -220,14 +222,25 @@ def _channel(name: str, signal: Array, recording: Recording, jumps: bool) -> Ite
 
 def _repeats(name: str, runs: Runs, noisy: bool, recording: Recording) -> Iterator[Finding]:
     """A channel that holds one number: for long, or again and again, as noise never does."""
-    n = len(recording)
+    signal, dt = getattr(recording, name), recording.dt
+    zero = _zero(name, runs, recording) if name in ESTIMATED else None
+    if zero is not None:
+        yield zero
+        return
     longest = int(np.argmax(runs.length))
-    length = int(runs.length[longest])
-    repeats = runs.length > 1
-    share = float(np.sum(runs.length - 1)) / n
-    again = int(np.count_nonzero(repeats))
-    if noisy and share - _rounded_alike(getattr(recording, name)) > REPEATED and again >= 5:
-        typical = float(np.median(runs.length[repeats])) * recording.dt
+    length, at = int(runs.length[longest]), int(runs.first[longest])
+    grain = _grain(signal, runs)
+    lost = _lost_on_the_way(signal, runs, grain)
+    rests = not (lost[longest] or at + length == signal.size)
+    frozen = length * dt >= FREEZE and not rests
+    frozen = frozen and _runs_on(name, noisy, recording, at, length)
+    first = float(recording.t[at])
+    of_all, again = float(np.sum(runs.length[lost] - 1)), int(np.count_nonzero(lost))
+    of_others = of_all - (length - 1) * bool(frozen and lost[longest])
+    alike = _rounded_alike(signal, grain)
+    if noisy and of_others / len(recording) - alike > REPEATED and again >= FEW:
+        typical = float(np.median(runs.length[lost])) * dt
+        most = f", the longest for {length * dt:.3g} s from {first:.4g} s on" if frozen else ""
         yield Finding(
             code="held",
             channel=name,
@@ -235,24 +248,90 @@ def _repeats(name: str, runs: Runs, noisy: bool, recording: Recording) -> Iterat
             unit="s",
             confidence=0.95,
             text=f"{name} holds its last value {again} times, typically for {1e3 * typical:.3g} ms "
-            f"({100.0 * share:.2g} % of the log): samples were lost on the way and repeated",
+            f"({100.0 * of_all / len(recording):.2g} % of the log){most}: samples were lost on the "
+            "way and repeated",
         )
-    elif length * recording.dt >= FREEZE and _runs_on(
-        name, noisy, recording, int(runs.first[longest]), length
-    ):
-        first = float(recording.t[runs.first[longest]])
+    elif frozen:
         yield Finding(
             code="frozen",
             channel=name,
-            size=length * recording.dt,
+            size=length * dt,
             unit="s",
             confidence=0.95,
-            text=f"{name} does not change from {first:.4g} s on for {length * recording.dt:.3g} s: "
+            text=f"{name} does not change from {first:.4g} s on for {length * dt:.3g} s: "
             "frozen; cut the log there",
         )
 
 
-def _rounded_alike(signal: Array) -> float:
+def _zero(name: str, runs: Runs, recording: Recording) -> Finding | None:
+    """A channel that is exactly 0 for long, again and again, while the car turns.
+
+    No sensor does that: an estimate does, which is switched off there.
+    """
+    signal, dt, usual = getattr(recording, name), recording.dt, _swing(_turning(name, recording))
+    long = np.flatnonzero((runs.length * dt >= FREEZE) & (signal[runs.first] == 0.0))
+    places = [slice(int(runs.first[k]), int(runs.first[k] + runs.length[k])) for k in long]
+    turning = [
+        one for one in places if _moves(name, recording, one.start, one.stop - one.start, usual)
+    ]
+    if len(turning) < SWITCHED:
+        return None
+    off = np.zeros(len(recording), dtype=bool)
+    for one in places:
+        off[one] = True
+    size, there = dt * np.count_nonzero(off), max(turning, key=lambda one: one.stop - one.start)
+    speed = np.abs(recording.v_x)
+    slowest, fastest = float(np.percentile(speed[~off], 5)), float(np.percentile(speed[off], 95))
+    slow = f", where the car is slower than {slowest:.3g} m/s" if fastest <= slowest else ""
+    return Finding(
+        code="zero",
+        channel=name,
+        size=size,
+        unit="s",
+        confidence=0.95,
+        text=f"{name} reads exactly 0 {len(places)} times, for {size:.3g} s in all "
+        f"({100.0 * float(np.mean(off)):.2g} % of the log), as from {recording.t[there.start]:.4g} "
+        f"s on for {dt * (there.stop - there.start):.3g} s{slow}: an estimate that is switched off "
+        "there and no measurement; leave these stretches out of the log",
+    )
+
+
+def _grain(signal: Array, runs: Runs) -> float | None:
+    """Return the step of which all values are multiples that a channel keeps for a while.
+
+    None where there is none. Between them a channel that was brought to another clock has any
+    value, so that all of its values say nothing.
+    """
+    kept = np.unique(signal[runs.first[runs.length > 2]])
+    steps = np.diff(kept)
+    steps = steps[steps > 1e-9 * float(np.abs(signal).max())]
+    if steps.size < FEW:
+        return None
+    step = float(np.median(steps[steps < 1.5 * float(steps.min())]))
+    count = steps / step
+    return step if float(np.mean(np.abs(count - np.round(count)) < 0.05)) > ON_GRID else None
+
+
+def _lost_on_the_way(signal: Array, runs: Runs, grain: float | None) -> NDArray[np.bool_]:
+    """Return which runs of equal values may be lost samples: a rest of a rounded channel is none.
+
+    A rest ends by one step of the rounding, which a channel that was brought to another clock may
+    overshoot, or as the channel begins to move: by a step that is followed by another. After a loss
+    the channel catches up at once.
+    """
+    again = runs.length > 1
+    if grain is None:
+        return again
+    change = np.concatenate([np.diff(signal), [0.0, 0.0]])
+    end = runs.first + runs.length - 1
+    step, after = change[end], change[end + 1]
+    goes_on = step * after > 0.5 * step**2
+    far = np.minimum(np.abs(step), np.abs(step + after)) > 1.5 * grain
+    may: NDArray[np.bool_] = again & far & ~goes_on
+    return may
+
+
+def _rounded_alike(signal: Array, grain: float | None) -> float:
     """Return the share of neighbors that rounding alone makes equal; 0 where nothing was rounded.
 
     Differences of a rounded channel are multiples k of its last digit. Where noise makes them,
@@ -262,7 +341,7 @@ def _rounded_alike(signal: Array) -> float:
     moved = steps[steps > 1e-9 * float(np.abs(signal).max())]
     if not moved.size:
         return 0.0
-    digits = np.round(moved / float(moved.min()))
+    digits = np.round(moved / (float(moved.min()) if grain is None else grain))
     one, two = (float(np.count_nonzero(digits == k)) / (2.0 * signal.size) for k in (1, 2))
     return one * (one / two) ** (1.0 / 3.0) if two > 0.0 else 0.0
 

@@ -19,7 +19,7 @@ from identifier.doctor.pieces import (
     looked_at,
     usual_speed,
 )
-from identifier.doctor.readings import DEGREE, Change, Read, read
+from identifier.doctor.readings import ARM, DEGREE, Change, Read, read
 from identifier.doctor.samples import sample_findings
 from identifier.doctor.suspects import similar_inertia, usual_inertia
 from models.recordings import Recording, RecordingError
@@ -34,6 +34,7 @@ SEVERAL = 3  # changes at once, beyond which nothing is sure
 WHEEL = (5.0, 30.0)  # ratios of a steering wheel to the road wheels
 NEAR = math.log(1.15)  # of a factor to that of a unit
 PERFECT = 0.999
+OFTEN = 0.1  # of a drive, from which a channel that reads exactly 0 so long is no measurement
 SLOW = 1.0  # s between samples, from which a clock is in ms
 
 
@@ -72,7 +73,9 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
     missing = [
         one.channel
         for one in samples
-        if one.code == "copied" or (one.code == "frozen" and _throughout(one, recording))
+        if one.code == "copied"
+        or (one.code == "frozen" and _lasts(one, recording, PERFECT))
+        or (one.code == "zero" and _lasts(one, recording, OFTEN))
     ]
     if missing:
         return Screened(
@@ -100,7 +103,7 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
 
     found = read(motion, vehicle, possible)
     gross = [
-        one for change in found.best.changes for one in reading_findings(change, found, vehicle)
+        one for change in found.best.gross for one in reading_findings(change, found, vehicle)
     ]
     gross = one_steering(gross)
     gross = doubted(gross, gross)  # a reading is judged as a whole
@@ -125,7 +128,9 @@ def repair_of(changes: tuple[Change, ...]) -> Repair:
     """
     repair = Repair()
     for change in changes:
-        if change.channels:
+        if change.code == ARM:
+            repair = repair.merged(Repair(velocity_sensor_x=change.arm))
+        elif change.channels:
             factors = {
                 name: factor
                 for name, (_, factor) in zip(change.channels, change.factors, strict=True)
@@ -171,9 +176,9 @@ def doubted(later: Iterable[Finding], earlier: Iterable[Finding]) -> list[Findin
     return [replace(one, sure=one.sure and firm) for one in later]
 
 
-def _throughout(finding: Finding, recording: Recording) -> bool:
-    """Whether a channel stands still in all that is driven."""
-    return finding.size >= PERFECT * sum(one.duration for one in driven_pieces(recording))
+def _lasts(finding: Finding, recording: Recording, share: float) -> bool:
+    """Whether a channel stands still in a share of all that is driven."""
+    return finding.size >= share * sum(one.duration for one in driven_pieces(recording))
 
 
 def quiet_finding(recording: Recording) -> Finding | None:
@@ -287,7 +292,7 @@ def reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
     vehicle : as it was told.
     """
     confidence = found.confidence
-    if len(found.best.changes) > SEVERAL:
+    if len(found.best.gross) > SEVERAL:
         confidence = min(confidence, SURE)  # so much that is wrong may be wrong otherwise
     factors = dict(change.factors)
     names = " and ".join(change.channels)
@@ -400,6 +405,8 @@ def words(changes: tuple[Change, ...]) -> str:
         match change.code:
             case "sign":
                 said.append(f"{names} turned")
+            case "velocity_sensor_x":
+                said.append(f"a velocity sensor {change.arm:.2g} m ahead")
             case "sideslip":
                 said.append(f"the sideslip angle in {change.unit} as v_y")
             case "steering":
