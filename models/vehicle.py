@@ -465,6 +465,15 @@ class Vehicle:
             )
         return self.chassis
 
+    def origin(self, name: str) -> str:
+        """Return where a value comes from, in a word: "told", or "estimated" of what was left out.
+
+        Parameters
+        ----------
+        name : of the value.
+        """
+        return "estimated" if name in self.estimated else "told"
+
     @property
     def estimates(self) -> str:
         """What of the car is estimated, with values and rules, in one line; empty if nothing is."""

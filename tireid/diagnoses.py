@@ -48,7 +48,7 @@ NAMES = {  # of findings by their code, where the code is not the word
     "unit": "wrong unit",
     "velocity_sensor_angle": "velocity sensor turned",
     "velocity_sensor_x": "velocity sensor ahead of the c.g.",
-    "yaw_inertia": "yaw inertia told, times the right one",
+    "yaw_inertia": "yaw inertia, times the right one",
     "zero": "reads exactly 0 again and again",
 }
 

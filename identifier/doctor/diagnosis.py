@@ -110,7 +110,9 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
     if not blind:
         try:
             found, fine = _asked_finely(gross, recording, vehicle)
-            found += _contradictions(*before_sizes(found).apply(recording, vehicle))
+            sure = combined(one for one in doubted(fine.findings, found) if one.sure)
+            mended = before_sizes(found).merged(sure)
+            found += _contradictions(*mended.apply(recording, vehicle))
         except (RecordingError, VehicleError) as error:
             blind = str(error)
     sizes = doubted(fine.findings, found)
@@ -153,7 +155,10 @@ def _asked_finely(
 
 
 def _contradictions(recording: Recording, vehicle: Vehicle) -> list[Finding]:
-    """Return the law that a log still breaks as it is read best, as one finding."""
+    """Return the law that a log still breaks as it is read best, as one finding.
+
+    What is sure of its sizes is taken out before: a sensor far ahead alone may break a law.
+    """
     blind = replace(recording, axle_force=None)
     said = physics_contradiction(blind) or vehicle_contradiction(blind, vehicle)
     return [] if said is None else [Finding(code="contradiction", confidence=0.9, text=said)]

@@ -25,6 +25,8 @@ FREEZE = 0.3  # [s] that a noisy channel repeats one number
 MOVES = 0.15  # of the range of v_x r, by which a car must move meanwhile, in any unit
 ALTERNATE = -0.35  # correlation of neighboring second differences, below which they are noise
 REPEATED, FEW = 0.01, 5  # of a noisy channel: share of repeated samples, and how often
+CAUGHT_UP = 0.025  # of a rounded channel: share of samples after which it catches up
+GOES_ON = 0.6  # of a step after a rest, that the next but one has where a channel begins to move
 ON_GRID = 0.9  # of steps that are multiples of the smallest
 ESTIMATED, SWITCHED = ("v_y", "r"), 2  # channels that may be, how often they are off in a turn
 OUTLIER = 16.0  # times the variance that is expected of a difference, and not more
@@ -193,7 +195,7 @@ def _channel(name: str, signal: Array, recording: Recording, jumps: bool) -> Ite
             repair=Repair(delay={name: delay}),
             sure=True,
         )
-    elif quantum is None and (noise > 0.0 or name in ("v_y", "r", "a_y")):
+    elif quantum is None:
         yield from _repeats(name, runs, noise > 0.0, recording)
     spikes = _spikes(signal, noise) if not jumps else np.empty(0)
     if 3 <= spikes.size <= 0.1 * signal.size:
@@ -232,13 +234,14 @@ def _repeats(name: str, runs: Runs, noisy: bool, recording: Recording) -> Iterat
     grain = _grain(signal, runs)
     lost = _lost_on_the_way(signal, runs, grain)
     rests = not (lost[longest] or at + length == signal.size)
-    frozen = length * dt >= FREEZE and not rests
+    frozen = length * dt >= FREEZE and not rests and (noisy or name in ("v_y", "r", "a_y"))
     frozen = frozen and _runs_on(name, noisy, recording, at, length)
     first = float(recording.t[at])
     of_all, again = float(np.sum(runs.length[lost] - 1)), int(np.count_nonzero(lost))
     of_others = of_all - (length - 1) * bool(frozen and lost[longest])
-    alike = _rounded_alike(signal, grain)
-    if noisy and of_others / len(recording) - alike > REPEATED and again >= FEW:
+    enough = CAUGHT_UP if grain is not None else REPEATED + _rounded_alike(signal)
+    known = noisy or grain is not None
+    if known and of_others / len(recording) > enough and again >= FEW:
         typical = float(np.median(runs.length[lost])) * dt
         most = f", the longest for {length * dt:.3g} s from {first:.4g} s on" if frozen else ""
         yield Finding(
@@ -315,23 +318,23 @@ def _grain(signal: Array, runs: Runs) -> float | None:
 def _lost_on_the_way(signal: Array, runs: Runs, grain: float | None) -> NDArray[np.bool_]:
     """Return which runs of equal values may be lost samples: a rest of a rounded channel is none.
 
-    A rest ends by one step of the rounding, which a channel that was brought to another clock may
-    overshoot, or as the channel begins to move: by a step that is followed by another. After a loss
-    the channel catches up at once.
+    A rest ends by one step of the rounding, or as the channel begins to move: by a step that others
+    follow. After a loss the channel catches up at once, brought to another clock by two steps; that
+    of a rest then may overshoot.
     """
     again = runs.length > 1
     if grain is None:
         return again
-    change = np.concatenate([np.diff(signal), [0.0, 0.0]])
+    change = np.concatenate([np.diff(signal), [0.0, 0.0, 0.0]])
     end = runs.first + runs.length - 1
-    step, after = change[end], change[end + 1]
-    goes_on = step * after > 0.5 * step**2
+    step, after, later = change[end], change[end + 1], change[end + 2]
+    goes_on = step * later > GOES_ON * step**2
     far = np.minimum(np.abs(step), np.abs(step + after)) > 1.5 * grain
     may: NDArray[np.bool_] = again & far & ~goes_on
     return may
 
 
-def _rounded_alike(signal: Array, grain: float | None) -> float:
+def _rounded_alike(signal: Array) -> float:
     """Return the share of neighbors that rounding alone makes equal; 0 where nothing was rounded.
 
     Differences of a rounded channel are multiples k of its last digit. Where noise makes them,
@@ -341,7 +344,7 @@ def _rounded_alike(signal: Array, grain: float | None) -> float:
     moved = steps[steps > 1e-9 * float(np.abs(signal).max())]
     if not moved.size:
         return 0.0
-    digits = np.round(moved / (float(moved.min()) if grain is None else grain))
+    digits = np.round(moved / float(moved.min()))
     one, two = (float(np.count_nonzero(digits == k)) / (2.0 * signal.size) for k in (1, 2))
     return one * (one / two) ** (1.0 / 3.0) if two > 0.0 else 0.0
 

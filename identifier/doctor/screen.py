@@ -102,9 +102,7 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
         return physics_contradiction(read_so) is None
 
     found = read(motion, vehicle, possible)
-    gross = [
-        one for change in found.best.gross for one in reading_findings(change, found, vehicle)
-    ]
+    gross = [one for change in found.best.gross for one in reading_findings(change, found, vehicle)]
     gross = one_steering(gross)
     gross = doubted(gross, gross)  # a reading is judged as a whole
     other = any(change.code == "other_car" for change in found.best.changes)
@@ -234,7 +232,7 @@ def unlike(vehicle: Vehicle) -> list[Finding]:
     vehicle : as it was told.
     """
     similar, (least, most) = similar_inertia(vehicle), usual_inertia(vehicle)
-    ratio = vehicle.yaw_inertia / similar
+    ratio, origin = vehicle.yaw_inertia / similar, vehicle.origin("yaw_inertia")
     if least <= ratio <= most:
         return []
     return [
@@ -242,7 +240,7 @@ def unlike(vehicle: Vehicle) -> list[Finding]:
             code="yaw_inertia",
             size=ratio,
             confidence=0.8,
-            text=f"the told yaw inertia is {ratio:.2g} times m l_f l_r, of cars {least:g} to "
+            text=f"the {origin} yaw inertia is {ratio:.2g} times m l_f l_r, of cars {least:g} to "
             f"{most:g}: {similar:.4g} kg m² would be usual",
             repair=Repair(vehicle={"yaw_inertia": similar}),
         )
@@ -313,7 +311,8 @@ def reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
             code="yaw_inertia",
             size=1.0 / factor,
             confidence=confidence,
-            text=f"the told yaw inertia is about {1.0 / factor:.2g} times the right one{doubt}",
+            text=f"the {vehicle.origin(change.code)} yaw inertia is about {1.0 / factor:.2g} times "
+            f"the right one{doubt}",
             repair=Repair(vehicle={"yaw_inertia": factor * vehicle.yaw_inertia}),
         )
     if change.code == "steering":

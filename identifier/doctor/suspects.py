@@ -22,6 +22,7 @@ OPPOSITES = {  # of what a size says, where it is negative
     "too much": "too little",
     " ahead of ": " behind ",
     " swings out ": " swings in ",
+    " to the left": " to the right",
     "too far back": "too far forward",
     "push more at speed, as by a downforce": "push less at speed, as by a lift",
 }
@@ -66,7 +67,8 @@ class Suspect(NamedTuple):
     channels of one device are joined by "+".
     plausible : standard deviation of what is believed [SI], of a sedan.   least : what nobody need
     mend, and what no model of this size tells from a tire.   grows : with the size of a car.
-    signed : whether it may be negative.   text : with {size} and {deviation} in `shown`.
+    signed : whether it may be negative.   text : with {size} and {deviation} in `shown`, {origin}
+    of a number of the car.
     shown : unit of the text.   per_unit : of the text per SI unit.
     """
 
@@ -147,12 +149,13 @@ class Suspect(NamedTuple):
                 return least < right / similar_inertia(vehicle) < most
         return True
 
-    def words(self, size: float, deviation: float) -> str:
+    def words(self, size: float, deviation: float, vehicle: Vehicle) -> str:
         """Return it in words.
 
         Parameters
         ----------
         size, deviation : as in `Sizes`.
+        vehicle : as it was told.
         """
         text = self.text
         if self.is_factor:
@@ -160,7 +163,7 @@ class Suspect(NamedTuple):
         elif size < 0.0 and (said := next((one for one in OPPOSITES if one in text), None)):
             size, text = -size, text.replace(said, OPPOSITES[said])
         shown = f"{size * self.per_unit:.3g} ± {abs(deviation) * self.per_unit:.2g}{self.shown}"
-        return text.format(size=shown)
+        return text.format(size=shown, origin=vehicle.origin(self.code))
 
 
 def _channels() -> tuple[Suspect, ...]:
@@ -212,7 +215,7 @@ def _channels() -> tuple[Suspect, ...]:
 SUSPECTS = (
     *_channels(),
     Suspect("velocity_sensor_angle", "velocity_sensor_angle", "v_y", "rad", 0.02, 0.0012, "", True,
-            "the velocity sensor is turned by {size} (+: to the left)", "°", DEGREES),
+            "the velocity sensor is turned by {size} to the left", "°", DEGREES),
     Suspect("velocity_sensor_x", "velocity_sensor_x", "v_y", "m", 0.8, 0.04, "length", True,
             "the velocity is measured {size} ahead of the center of gravity", " m"),
     Suspect("velocity_sensor_z", "velocity_sensor_z", "v_y", "s^2", 0.008, 0.001, "length", True,
@@ -223,9 +226,9 @@ SUSPECTS = (
     Suspect("center_of_gravity", "center_of_gravity", "", "m", 0.2, 0.1, "length", True,
             "the center of gravity is told {size} too far back (l_f and l_r)", " m"),
     Suspect("yaw_inertia", "yaw_inertia", "", "", 0.5, 0.05, "", True,
-            "the told yaw inertia is {size} times the right one", ""),
+            "the {origin} yaw inertia is {size} times the right one", ""),
     Suspect("bank", "bank", "", "rad", 0.03, 0.003, "", True,
-            "the road falls by {size} (+: to the left), or wind pushes so", "°", DEGREES),
+            "the road falls by {size} to the left, or wind pushes so", "°", DEGREES),
     Suspect("downforce", "downforce", "", "s^2/m^2", 2e-4, 5e-5, "", True,
             "the tires push more at speed, as by a downforce of {size}",
             " % of the weight at 100 km/h", 100.0 * (100.0 / 3.6) ** 2),

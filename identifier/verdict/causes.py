@@ -40,8 +40,9 @@ Mend = Callable[[Recording, Vehicle, float], Mended]
 class Cause(NamedTuple):
     """A number that may be wrong.
 
-    code : for machines.   text : with {size} in its unit, and {told}, what the vehicle file were
-    to hold.   per_unit : of `text` per SI unit.
+    code : for machines.   text : with {size} in its unit, or {length} and {where}, it without its
+    sign; {told}, what the vehicle file were to hold, and {origin} of a number of it.
+    per_unit : of `text` per SI unit.
     step : first that is tried, and most : largest that is believed, in wheelbases or sqrt(g L)
     where `scale` says so.   signed : whether it may be negative.   mend : takes it out.
     tells : the repair of the car that {told} is of.
@@ -133,10 +134,10 @@ CAUSES = (
           0.03, 0.6, False, "", _earlier("r")),
     Cause("v_y_late", "v_y is {size:.0f} ms late (filtered?)", MILLI,
           0.03, 0.4, False, "", _earlier("v_y")),
-    Cause("yaw_inertia", "the told yaw inertia is about {factor:.2g} times the true one", 1.0,
+    Cause("yaw_inertia", "the {origin} yaw inertia is about {factor:.2g} times the true one", 1.0,
           0.5, 4.0, True, "", _by(_inertia)),
-    Cause("center_of_gravity", "the center of gravity is {size:+.2g} m behind the told one "
-          "(l_f and l_r; +: farther back)", 1.0, 0.06, 0.3, True, "length", _by(_center)),
+    Cause("center_of_gravity", "the center of gravity is {length:.2g} m {where} the told one "
+          "(l_f and l_r)", 1.0, 0.06, 0.3, True, "length", _by(_center)),
     Cause("downforce", "a downforce of {size:+.0f} % of the weight at 100 km/h (-: lift) beside "
           "what the vehicle file tells (it would say {told})", 100.0, 0.03, 1.0, True, "",
           _by(_pressed), _pressed),
@@ -157,19 +158,29 @@ class Suspect(NamedTuple):
     """A cause, its best size [SI], and the share of what is missed (squared) that it explains.
 
     told : what the vehicle file were to hold then, "key = value"; empty of most causes.
+    origin : of the number of the car that is the cause, see `Vehicle.origin`.
     """
 
     cause: Cause
     size: float
     share: float
     told: str = ""
+    origin: str = "told"
 
     @property
     def text(self) -> str:
         """The cause in words, with its size."""
         size = self.size * self.cause.per_unit
         factor = math.exp(min(self.size, 9.0))
-        return self.cause.text.format(size=size, factor=factor, told=self.told)
+        where = "ahead of" if size < 0.0 else "behind"
+        return self.cause.text.format(
+            size=size,
+            length=abs(size),
+            where=where,
+            factor=factor,
+            told=self.told,
+            origin=self.origin,
+        )
 
 
 Ask = Callable[[Mended], float]
@@ -201,7 +212,8 @@ def suspects(
 
         size, left = _least(missed, here, cause)
         share = (here - left) / here if here > 0.0 else 0.0
-        listed.append(Suspect(cause, size * unit, share, _told(cause, vehicle, size * unit)))
+        told, origin = _told(cause, vehicle, size * unit), vehicle.origin(cause.code)
+        listed.append(Suspect(cause, size * unit, share, told, origin))
     return tuple(sorted(listed, key=lambda one: -one.share))
 
 

@@ -179,11 +179,13 @@ def _stiffness(drive: Drive) -> Iterator[Objection]:
                 True,
             )
         elif not 1.0 / FAR_FROM_TOLD <= C / before <= FAR_FROM_TOLD:
+            origin = vehicle.origin(f"cornering_stiffness_{axle}")
+            swapped = "l_f and l_r swapped, or the vehicle file of another car"
             yield Objection(
                 "far_from_told",
                 axle,
-                f"a cornering stiffness of {C:.3g} N/rad against {before:.3g} told: l_f and l_r "
-                "swapped, the vehicle file of another car, or an estimate that was far off",
+                f"a cornering stiffness of {C:.3g} N/rad against {before:.3g} {origin}: "
+                + (swapped if origin == "told" else f"an estimate that was far off, {swapped}"),
                 False,
             )
     ratio = float(relative[1] / relative[0]) if relative[0] > 0.0 else np.inf
@@ -270,8 +272,8 @@ def _car(drive: Drive) -> Iterator[Objection]:
         yield Objection(
             "yaw_inertia",
             None,
-            f"the told yaw inertia is {ratio:.2g} m l_f l_r, cars have {INERTIA[0]:g} to "
-            f"{INERTIA[1]:g}: check it, transients are read with it",
+            f"the {vehicle.origin('yaw_inertia')} yaw inertia is {ratio:.2g} m l_f l_r, cars have "
+            f"{INERTIA[0]:g} to {INERTIA[1]:g}: check it, transients are read with it",
             False,
         )
     yield from _center(drive)

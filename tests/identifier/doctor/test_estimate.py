@@ -21,7 +21,7 @@ from identifier.run import identify
 from identifier.verdict.motion import evidence
 from models.faults import Late, Misaligned, SensorFault, Together
 from models.recordings import Repair
-from models.vehicle import GRAVITY
+from models.vehicle import GRAVITY, sedan
 from tests.identifier.conftest import areas_of, pressed
 
 # Kinds whose sizes this drive tells well, and how well: of the size, or where "" absolutely.
@@ -290,13 +290,20 @@ def test_nothing_is_found_in_a_right_log_that_was_drawn_from_a_slower_clock(driv
 @pytest.mark.parametrize(
     ("key", "word"),
     [("delay.r", "early"), ("offset.r", "too little"), ("velocity_sensor_x", "behind"),
-     ("center_of_gravity", "too far forward")],
+     ("center_of_gravity", "too far forward"), ("bank", "to the right")],
 )  # fmt: skip
 def test_what_is_negative_is_said_the_other_way_round(key, word):
     suspect = next(one for one in SUSPECTS if one.key == key)
-    assert word not in suspect.words(0.1, 0.01)
-    said = suspect.words(-0.1, 0.01)
+    assert word not in suspect.words(0.1, 0.01, sedan())
+    said = suspect.words(-0.1, 0.01, sedan())
     assert word in said and "-" not in said
+
+
+def test_a_yaw_inertia_that_the_file_leaves_out_was_estimated_and_not_told():
+    suspect = next(one for one in SUSPECTS if one.key == "yaw_inertia")
+    assert suspect.words(0.3, 0.1, sedan()).startswith("the told yaw inertia is 1.35")
+    left_out = replace(sedan(), estimated=("yaw_inertia",))
+    assert suspect.words(0.3, 0.1, left_out).startswith("the estimated yaw inertia is 1.35")
 
 
 def test_what_nobody_believes_is_not_sure_nor_what_rests_on_it(monkeypatch):
@@ -501,7 +508,7 @@ def test_a_suspect_repairs_what_it_says(suspect, driven):
     if repair is not None:
         assert repair
         repair.apply(log, car)
-    assert "±" in suspect.words(size, 0.1 * size)
+    assert "±" in suspect.words(size, 0.1 * size, car)
 
 
 def test_a_finding_that_is_sure_has_a_repair():

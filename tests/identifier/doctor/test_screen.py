@@ -9,12 +9,22 @@ from benchmarks.doctor_gross import drawn
 from benchmarks.fault_cases import StraightOnly
 from benchmarks.random_cars import CLASSES, good_sensors, random_car, random_drive
 from benchmarks.recorded_cars import CARMAKER, DART
+from identifier.doctor import diagnose
 from identifier.doctor.consistency import Motion, Reading, unexplained
 from identifier.doctor.pieces import PIECE, PIECES, looked_at
 from identifier.doctor.samples import sample_findings
 from identifier.doctor.screen import screen, steering_finding
-from models.faults import ClockJump, Held, Jitter, Mirrored, SensorFault, Together, WrongUnit
-from models.maneuvers import RandomSteer
+from models.faults import (
+    ClockJump,
+    Held,
+    Jitter,
+    Mirrored,
+    SensorElsewhere,
+    SensorFault,
+    Together,
+    WrongUnit,
+)
+from models.maneuvers import RandomSteer, SampledSteer
 from models.plant import Plant
 from models.recordings import joined, read_recording, runs
 from models.vehicle import sedan
@@ -139,6 +149,54 @@ def test_sideslip_in_place_of_v_y_is_read_as_such(one, per_rad):
     np.testing.assert_allclose(mended.v_y, log.v_y, atol=0.25 * np.std(log.v_y))
 
 
+def elsewhere(log, x):
+    return SensorElsewhere(sensor="velocity", x=x).apply(log)
+
+
+@pytest.mark.parametrize("kind", CLASSES)
+@pytest.mark.parametrize("seed", [1500, 1501])
+def test_a_velocity_sensor_at_an_axle_is_no_gross_fault(kind, seed):
+    """Gentle bends and one maneuver, with an accelerometer and without one."""
+    log, car = drawn(kind, seed)
+    for x in (car.l_f, -car.l_r):
+        assert screen(elsewhere(log, x), car).findings == ()
+
+
+def figure_of_eight(car, speed):
+    """Circles to the left and to the right in turn, twice, by good sensors."""
+    t = np.arange(0.0, 48.0, 1.0)
+    angles = np.where(t % 24.0 < 12.0, 0.08, -0.08) * (t > 0.0)
+    steering = SampledSteer(
+        times=tuple(t), angles=tuple(angles), rate_limit=0.2, duration=float(t[-1])
+    )
+
+    def wanted(t):
+        return speed * (1.0 + 0.2 * np.sin(0.4 * t))
+
+    log = Plant(car).simulate(steering, speed=wanted, name="eight").recording()
+    return good_sensors(car).apply(log, np.random.default_rng(3))
+
+
+@pytest.mark.parametrize("share", [0.5, -0.5])
+def test_a_figure_of_eight_tells_the_place_of_the_velocity_sensor_and_no_unit(share):
+    """In steady circles v_y is nearly a multiple of r: read in mph, an arm is nearly as good."""
+    car = sedan()
+    x = share * car.wheelbase
+    log = elsewhere(figure_of_eight(car, 10.0), x)
+    assert screen(log, car).findings == ()
+    first = diagnose(log, car).findings[0]
+    assert first.code == "velocity_sensor_x"
+    assert first.size == pytest.approx(x, abs=0.15 * car.wheelbase)
+
+
+@pytest.mark.parametrize("case", ["r flipped", "r in degrees", "v_x flipped", "a_y in g"])
+def test_gross_faults_are_named_beside_a_sensor_at_the_rear_axle(driven, case):
+    car, log = driven
+    fault, want = GROSS[case]
+    found = screen(fault.apply(elsewhere(log, -car.l_r)), car).findings
+    assert [f"{one.code} {one.channel}" for one in found] == [want]
+
+
 def test_another_car_and_its_size_are_told(driven):
     car, log = driven
     other = DART if car.mass > 100.0 else replace(sedan(), chassis=None)
@@ -242,6 +300,50 @@ def test_numbers_that_rounding_makes_alike_are_no_lost_samples(one):
     assert rounded_speed(one, lost=0.0) == []
     (held,) = rounded_speed(one, lost=0.04)
     assert held.code == "held"
+
+
+def steered_by_hand(lost, *, ratio=16.0, step=0.1):
+    """A sedan's drive, its wheel told in steps of 0.1 degrees by another clock, and held still."""
+    rng = np.random.default_rng(7)
+    t = np.arange(0.0, 60.0, 0.1)
+    swings = 0.05 * np.sin(0.9 * t) * np.maximum(np.sin(0.21 * t) - 0.1, 0.0)
+    steering = SampledSteer(times=tuple(t), angles=tuple(swings), rate_limit=1.0, duration=60.0)
+    log = Plant(sedan()).simulate(steering, speed=20.0, name="by hand").recording()
+    log = good_sensors(sedan()).apply(log, rng)
+    wheel = np.degrees(ratio * np.interp(log.t, t, swings))
+    wheel += 0.02 * rng.standard_normal(len(log))
+    wheel = np.radians(step * np.round(wheel / step)) / ratio
+    for k in np.flatnonzero(lost * rng.random(len(log)) > 0.97):
+        wheel[k + 1 : k + 5] = wheel[k]
+    return replace(log, delta_f=np.interp(log.t, log.t - 0.37 * log.dt, wheel))
+
+
+def test_a_coarse_steering_wheel_that_rests_has_lost_nothing():
+    assert sample_findings(steered_by_hand(lost=False)) == []
+    found = sample_findings(steered_by_hand(lost=True))
+    assert [(one.code, one.channel) for one in found] == [("held", "delta_f")]
+
+
+def test_of_a_frozen_channel_the_place_and_the_length_are_told(one):
+    """Five digits are written, so that a few neighbors are alike elsewhere too."""
+    _, log = one
+    r = SAMPLES["stuck"][0].apply(log).r
+    digits = np.array([float(f"{value:.5g}") for value in r])
+    (frozen,) = sample_findings(replace(log, r=digits))
+    assert (frozen.code, frozen.channel) == ("frozen", "r")
+    assert frozen.size == pytest.approx(2.0, abs=0.05)
+    assert "from 12 s on" in frozen.text or "from 11.99 s on" in frozen.text
+
+
+def test_a_v_y_that_is_switched_off_when_slow_is_no_measurement(one):
+    car, log = one
+    slow = np.sin(1.3 * log.t) < -0.3
+    log = replace(log, v_x=log.v_x * np.where(slow, 0.9, 1.1), v_y=np.where(slow, 0.0, log.v_y))
+    found = screen(log, car)
+    (off,) = (one for one in found.findings if one.channel == "v_y")
+    assert off.code == "zero" and "exactly 0" in off.text
+    assert off.size == pytest.approx(log.dt * np.count_nonzero(slow), rel=0.15)
+    assert "v_y" in found.blind
 
 
 def test_a_slow_sampling_interval_is_a_clock_in_ms_and_nothing_else_is_asked(one):
