@@ -25,6 +25,7 @@ from models.vehicle import Vehicle, VehicleError
 
 RATIOS = ("steering_ratio", "factor")  # codes of gross findings whose factor is any number
 FACTOR, ROUNDS, SETTLED = "factor.delta_f", 4, 0.1  # deviations
+ELSEWHERE = "velocity_sensor_x"  # the size that may be in place of a gross fault
 TOGETHER = 2  # times that a ratio and what is found beside it are asked
 WITHOUT_V_Y = "all but what contradicts physics or the car: the log has no lateral velocity"
 NEVER = (
@@ -110,6 +111,11 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
     if not blind:
         try:
             found, fine = _asked_finely(gross, recording, vehicle)
+            if gross.without is not None and ELSEWHERE not in fine.sizes:
+                gross, fine = gross.without, Examination((), (), {})
+                found, blind = list(gross.findings), gross.blind
+                if not blind:
+                    found, fine = _asked_finely(gross, recording, vehicle)
             sure = combined(one for one in doubted(fine.findings, found) if one.sure)
             mended = before_sizes(found).merged(sure)
             found += _contradictions(*mended.apply(recording, vehicle))

@@ -7,7 +7,7 @@ readings that leave the same cannot be told apart, and the confidence says so.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -186,10 +186,13 @@ class Read:
     ----------
     best : the reading that is taken.
     other : the next best that means something else.
+    without : the same with the velocity sensor where it should be, if elsewhere it makes a reading
+        the best that nothing gross is in; None else.
     """
 
     best: Explanation
     other: Explanation
+    without: "Read | None" = None
 
     @property
     def confidence(self) -> float:
@@ -212,20 +215,30 @@ def read(motion: Motion, vehicle: Vehicle, possible: Callable[[tuple[Change, ...
     as_told = Explanation(
         changes=(), reading=Reading(), left=unexplained(motion, vehicle, Reading())
     )
-    found, best = [as_told], as_told
+    tried, best = [as_told], as_told
     equations = 2 if motion.a_y is None else 3
     beam = [as_told]
     for _ in range(MOST):
         longer = [new for one in beam for new in _longer(one, changes, motion, vehicle)]
-        found += longer
-        before, best = best, min(found, key=lambda one: one.cost)
+        tried += longer
+        before, best = best, min(tried, key=lambda one: one.cost)
         if best is before and (len(beam) > 1 or best.left < equations * DEEPER):
             break
         good = best is not before and best.left < equations * DEEPER
         beam = [best] if good else sorted(longer, key=lambda one: one.cost)[:KEPT]
-    ranked = sorted(found, key=lambda one: (one.cost, len(one.changes)))
+    ranked = sorted(tried, key=lambda one: (one.cost, len(one.changes)))
     lawful = [one for one in ranked[:JUDGED] if possible(one.changes)]
-    best, *others = lawful + [one for one in ranked if one not in lawful] if lawful else ranked
+    ranked = lawful + [one for one in ranked if one not in lawful]
+    found = _chosen(ranked)
+    in_place = _chosen([one for one in ranked if one.gross == one.changes])
+    if found.best.gross or not (found.best.changes and in_place.best.gross):
+        return found
+    return replace(found, without=in_place)
+
+
+def _chosen(ranked: list[Explanation]) -> Read:
+    """Return the first of some explanations, and the next that means something else."""
+    best, *others = ranked
     others = [one for one in others if one.cost >= best.cost]
     other = next((one for one in others if _means_else(one, best)), ranked[-1])
     return Read(best=best, other=other)

@@ -49,12 +49,15 @@ class Screened:
         of no number of the car.
     blind : why nothing finer can be asked, "" where it can.
     unseen : what gross faults this log cannot tell, a line each.
+    without : the same if the velocity sensor is where it should be, where that alone makes gross
+        findings of it: to be asked where no size tells that it is elsewhere; None else.
     """
 
     findings: tuple[Finding, ...]
     repair: Repair
     blind: str = ""
     unseen: tuple[str, ...] = ()
+    without: "Screened | None" = None
 
 
 def screen(recording: Recording, vehicle: Vehicle) -> Screened:
@@ -101,20 +104,28 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
             return False
         return physics_contradiction(read_so) is None
 
-    found = read(motion, vehicle, possible)
+    def screened(found: Read) -> Screened:
+        gross = _gross_findings(found, vehicle)
+        other = any(change.code == "other_car" for change in found.best.changes)
+        return Screened(
+            findings=(*gross, *samples, *told),
+            repair=before_sizes((*samples, *gross)),
+            blind="the car is another one" if other else "",
+            unseen=tuple(
+                f"unit of {name}: it hardly swings more than its noise on this drive"
+                for name in sorted(motion.hidden)
+            ),
+            without=None if found.without is None else screened(found.without),
+        )
+
+    return screened(read(motion, vehicle, possible))
+
+
+def _gross_findings(found: Read, vehicle: Vehicle) -> list[Finding]:
+    """Return what the best reading says is grossly wrong."""
     gross = [one for change in found.best.gross for one in reading_findings(change, found, vehicle)]
     gross = one_steering(gross)
-    gross = doubted(gross, gross)  # a reading is judged as a whole
-    other = any(change.code == "other_car" for change in found.best.changes)
-    return Screened(
-        findings=(*gross, *samples, *told),
-        repair=before_sizes((*samples, *gross)),
-        blind="the car is another one" if other else "",
-        unseen=tuple(
-            f"unit of {name}: it hardly swings more than its noise on this drive"
-            for name in sorted(motion.hidden)
-        ),
-    )
+    return doubted(gross, gross)  # a reading is judged as a whole
 
 
 def repair_of(changes: tuple[Change, ...]) -> Repair:
