@@ -15,6 +15,7 @@ from identifier.methods import make_method
 from identifier.run import identify
 from identifier.tire_model import GRIP, STIFFNESS
 from identifier.verdict import judge_prediction
+from identifier.verdict.causes import CAUSES, Suspect
 from identifier.verdict.judging import judge
 from identifier.verdict.motion import (
     Windows,
@@ -203,6 +204,18 @@ def test_a_wrong_inertia_is_refused_and_named(drive):
     found = re.search(rf"told yaw inertia is about {NUMBER} times the true", likely(verdict))
     assert found
     assert 4.0 < float(found[1]) < 25.0
+
+
+def test_a_cause_is_said_by_its_side_and_by_where_a_number_comes_from():
+    by_code = {cause.code: cause for cause in CAUSES}
+    for size, side in ((-0.58, "ahead of"), (0.58, "behind")):
+        said = Suspect(by_code["center_of_gravity"], size, 0.5).text
+        assert f"0.58 m {side} the told one" in said and "-" not in said
+    inertia = by_code["yaw_inertia"]
+    assert Suspect(inertia, 1.0, 0.5).text.startswith("the told yaw inertia is about 2.7")
+    left_out = replace(sedan(), estimated=("yaw_inertia",))
+    said = Suspect(inertia, 1.0, 0.5, "", left_out.origin("yaw_inertia")).text
+    assert said.startswith("the estimated yaw inertia")
 
 
 def test_a_straight_drive_teaches_nothing_and_nothing_is_called_learnt(drive):
