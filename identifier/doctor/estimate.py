@@ -209,7 +209,8 @@ class Search:
     def _candidate(self, suspect: Suspect, start: Sizes) -> Candidate:
         keys = self.keys(suspect)
         fit = self.fitter.fit([*self.chosen, *keys], start)
-        return Candidate(suspect, fit, self.fit.J - fit.J - 0.5 * (len(keys) - 1))
+        price = 0.5 * (len(keys) - 1) + suspect.price
+        return Candidate(suspect, fit, self.fit.J - fit.J - price)
 
     def _believed(self, suspect: Suspect, fit: Fit, gain: float = 0.0) -> bool:
         """Return whether a size stands out, by its deviation or by what it gains of J.

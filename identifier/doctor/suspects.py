@@ -69,7 +69,8 @@ class Suspect(NamedTuple):
     mend, and what no model of this size tells from a tire.   grows : with the size of a car.
     signed : whether it may be negative.   text : with {size} and {deviation} in `shown`, {origin}
     of a number of the car.
-    shown : unit of the text.   per_unit : of the text per SI unit.
+    shown : unit of the text.   per_unit : of the text per SI unit.   price : gain of J that it must
+    bring beside that of every suspect, where it easily explains what is none.
     """
 
     key: str
@@ -83,6 +84,7 @@ class Suspect(NamedTuple):
     text: str
     shown: str
     per_unit: float = 1.0
+    price: float = 0.0
 
     def scale(self, vehicle: Vehicle) -> float:
         """Return what `plausible` and `least` are multiplied by for a car.
@@ -220,7 +222,7 @@ SUSPECTS = (
             "the velocity is measured {size} ahead of the center of gravity", " m"),
     Suspect("velocity_sensor_z", "velocity_sensor_z", "v_y", "s^2", 0.008, 0.001, "length", True,
             "v_y is measured where the body swings out by {size} for each g, as on a roof",
-            " cm", 100.0 * GRAVITY),
+            " cm", 100.0 * GRAVITY, 6.0),
     Suspect("acceleration_sensor_x", "acceleration_sensor_x", "a_y", "m", 0.8, 0.04, "length",
             True, "the acceleration is measured {size} ahead of the center of gravity", " m"),
     Suspect("center_of_gravity", "center_of_gravity", "", "m", 0.2, 0.1, "length", True,
