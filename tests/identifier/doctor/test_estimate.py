@@ -308,8 +308,8 @@ def test_a_yaw_inertia_that_the_file_leaves_out_was_estimated_and_not_told():
 
 def test_what_nobody_believes_is_not_sure_nor_what_rests_on_it(monkeypatch):
     """A lag of a small car that the drive hardly tells: several sizes drift off together."""
-    log, car, _ = drawn("tenth", 600)
-    fault = planted("lag v_y", car, np.random.default_rng([600, 13, 7]))
+    log, car, _ = drawn("tenth", 620)
+    fault = planted("lag v_y", car, np.random.default_rng([620, 13, 7]))
     bad = fault.case.log(log)
     monkeypatch.setattr(sys.modules[Search.__module__], "SURE", 0.8)
     monkeypatch.setattr(sys.modules[Search.__module__], "STANDS", 0.0)
