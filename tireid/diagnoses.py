@@ -48,6 +48,7 @@ NAMES = {  # of findings by their code, where the code is not the word
     "unit": "wrong unit",
     "velocity_sensor_angle": "velocity sensor turned",
     "velocity_sensor_x": "velocity sensor ahead of the c.g.",
+    "velocity_sensor_z": "velocity sensor swings out as the body rolls",
     "yaw_inertia": "yaw inertia, times the right one",
     "zero": "reads exactly 0 again and again",
 }

@@ -78,7 +78,6 @@ class Search:
         self.found: list[Found] = []
         self.in_doubt = False  # whether what would leave no car explained more than a found one
         self.fit = self.fitter.fit((), {})
-        self.before = self.fit.misses
 
     def keys(self, suspect: Suspect) -> list[str]:
         """Return the keys of its sizes.
@@ -252,17 +251,6 @@ class Search:
         ]
         return self._ranked(again)
 
-    def explains_all_but(self, part: int) -> bool:
-        """Return whether what was found explains each other part, one of which was beyond it all.
-
-        Parameters
-        ----------
-        part : the equation that stays unexplained.
-        """
-        others = [k for k in range(len(self.before)) if k != part]
-        beyond = max(self.before[k] for k in others) > BEYOND
-        return beyond and all(self.fit.misses[k] < AWRY for k in others)
-
     def _drop(self) -> None:
         """Drop what the later ones explain too."""
         for one in self.found[:-1]:
@@ -418,9 +406,7 @@ def examine(recording: Recording, vehicle: Vehicle) -> Examination:
     sizes = {key: search.fit.sizes[key] for key in search.chosen}
     worst = int(np.argmax(search.fit.misses))
     if search.fit.misses[worst] > BEYOND:
-        beside = search.findings() if search.explains_all_but(worst) else ()
-        unsure = tuple(replace(one, sure=False) for one in beside)
-        return Examination(unsure, (f"sizes of faults: {UNEXPLAINED[worst]}",), sizes)
+        return Examination((), (f"sizes of faults: {UNEXPLAINED[worst]}",), sizes)
     return Examination(search.findings(), search.unseen(), sizes)
 
 

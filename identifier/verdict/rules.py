@@ -201,15 +201,16 @@ def _stiffness(drive: Drive) -> Iterator[Objection]:
 
 
 def _relaxation(drive: Drive) -> Iterator[Objection]:
-    wheelbase = drive.model.vehicle.wheelbase
+    wheelbase, late = drive.model.vehicle.wheelbase, "r or a_y is late or low-passed"
+    if drive.recording.logged_v_y is not None:
+        late = "v_y is measured high above the road, on a roof that rolls, or low-passed or late"
     for one in drive.model.estimates():
         if one.title == RELAXATION and one.value > MOST_RELAXATION * wheelbase:
             yield Objection(
                 "lags_too_far",
                 one.axle,
                 f"a relaxation length of {one.value:.3g} m is more than the car is long between "
-                "its axles: no tire's. v_y is measured high above the road, on a roof that rolls, "
-                "or low-passed or late; or the yaw inertia is far off",
+                f"its axles: no tire's. {late}; or the yaw inertia is far off",
                 True,
             )
 

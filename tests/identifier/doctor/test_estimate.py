@@ -23,6 +23,7 @@ from models.faults import Late, Misaligned, SensorFault, Together
 from models.recordings import Repair
 from models.vehicle import GRAVITY, sedan
 from tests.identifier.conftest import areas_of, pressed
+from tireid.diagnoses import NAMES
 
 # Kinds whose sizes this drive tells well, and how well: of the size, or where "" absolutely.
 SIZED = {
@@ -517,3 +518,7 @@ def test_a_finding_that_is_sure_has_a_repair():
         Finding(code="delay", confidence=1.0, sure=True)
     with pytest.raises(ValueError, match="between 0 and 1"):
         Finding(code="delay", confidence=1.2)
+
+
+def test_every_suspect_has_a_name_in_words():
+    assert {one.code for one in SUSPECTS if "_" in one.code} <= set(NAMES)

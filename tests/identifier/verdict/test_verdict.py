@@ -352,6 +352,15 @@ def test_a_force_that_lags_by_more_than_a_wheelbase_is_no_tires(clean, wheelbase
     assert (("lags_too_far", "rear") in looked_at(clean, model=late)) == (wheelbases > 1.0)
 
 
+@pytest.mark.parametrize(("estimated", "blamed"), [((), "v_y is measured"), (("v_y",), "r or a_y")])
+def test_what_lags_too_far_is_blamed_on_a_sensor_that_is_there(clean, estimated, blamed):
+    model = clean.freeze()
+    late = replace(model, own=model.own + np.array([[0.0] * 3, [0.5, 0.0, 0.0]]))
+    recording = replace(clean.recording, estimated=estimated)
+    said = [one for one in judge_prediction(late, recording).findings if one.code == "lags_too_far"]
+    assert said and blamed in said[0].text
+
+
 def test_a_v_y_from_the_roof_of_a_car_that_rolls_is_refused(whole):
     roll = -0.012 * whole.a_y  # 6.7 degrees at 1 g, 1.5 m below the sensor
     shaken = replace(whole, v_y=whole.v_y + 1.5 * np.gradient(roll, whole.dt), axle_force=None)
