@@ -21,8 +21,13 @@ from models.sensors import white_noise
 from models.vehicle import GRAVITY, Vehicle
 
 FEWEST, MOST = 20, 500  # windows: fewer say nothing, of more that many are taken all over the log
-STIFFNESS = np.geomspace(1.0, 100.0, 28)  # c [1/rad]
-FRICTION = np.array([0.3, 0.5, 0.8, 1.2, 1.8, 3.0])  # μ [-]
+# Curves that are tried, on one grid of c and μ, so that many have the same c/μ: to saturate them,
+# which costs most, is done once for each of these.
+FINENESS, STIFFNESSES, FRICTIONS = 100.0 ** (1.0 / 27.0), 28, 15
+STIFFNESS = FINENESS ** np.arange(STIFFNESSES)  # c [1/rad], to 100
+FRICTION = 0.3 * FINENESS ** np.arange(FRICTIONS)[:, None]  # μ [-], to 3.3
+RATIOS = FINENESS ** np.arange(1 - FRICTIONS, STIFFNESSES)[:, None] / 0.3  # c/μ [1/rad]
+RATIO_OF = np.subtract.outer(-np.arange(FRICTIONS), -np.arange(STIFFNESSES)) + FRICTIONS - 1
 # A stiffness that is twice the told one costs as much as 14 % of what is left unexplained.
 DISBELIEF = 0.3  # per square of the logarithm of c over the told one
 FAST = 6.0  # sqrt(g L), 30 m/s for a sedan; what is faster costs as much per square of a logarithm
@@ -212,16 +217,14 @@ def forces_and_slips(motion: Motion, vehicle: Vehicle, reading: Reading) -> Axle
 def _curve_leaves(force: Array, slip: Array, told: float) -> float:
     """Return the logarithm of the share of a force that no curve of its slip explains."""
     disbelief = DISBELIEF * np.log(STIFFNESS / told) ** 2
-    linear = STIFFNESS[:, None] * slip
     force = force - force.mean()
     size = float(force @ force) + 1e-12
-    least = math.inf
-    for friction in FRICTION:
-        curve = linear / np.sqrt(1.0 + (linear / friction) ** 2)
-        curve -= curve.mean(axis=1, keepdims=True)
-        left = np.sum((force - curve) ** 2, axis=1) / size
-        least = min(least, float(np.min(np.log(np.minimum(left, 1.0) + EXACT) + disbelief)))
-    return least
+    bent = RATIOS * slip
+    bent /= np.sqrt(1.0 + bent * bent)
+    bent -= bent.mean(axis=1, keepdims=True)
+    along, power = bent @ force, np.einsum("ij,ij->i", bent, bent)
+    left = size - 2.0 * FRICTION * along[RATIO_OF] + FRICTION**2 * power[RATIO_OF]
+    return float(np.min(np.log(np.clip(left / size, 0.0, 1.0) + EXACT) + disbelief))
 
 
 def _accelerometer_leaves(a_y: Array, acceleration: Array) -> float:
