@@ -1,5 +1,6 @@
 """A function with fewer operations: decided once where it can be, constants gathered."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import casadi as ca
@@ -9,6 +10,7 @@ from codegen.graph import Graph, assumed, decision, function_of, graph_of, simpl
 from codegen.simplify import simplified
 
 WORTHWHILE = 0.5  # share of nodes that the smaller part may have, else nothing is decided
+KEPT = 16  # functions that were asked for before: C, FMU and ONNX of one method are made of one
 
 
 class Tuned(NamedTuple):
@@ -26,7 +28,6 @@ class Tuned(NamedTuple):
     where_false: ca.Function | None
 
 
-@simplifying(False)
 def tuned(function: ca.Function, *, sampled: tuple[str, ...]) -> Tuned:
     """Return a function with our own tanh, exp and atan and without needless operations.
 
@@ -35,6 +36,13 @@ def tuned(function: ca.Function, *, sampled: tuple[str, ...]) -> Tuned:
     function : SX, dense outputs.
     sampled : inputs that may decide which part of the function is computed.
     """
+    return _tuned(function.serialize(), sampled)
+
+
+@lru_cache(KEPT)
+@simplifying(False)
+def _tuned(serialized: str, sampled: tuple[str, ...]) -> Tuned:
+    function = ca.Function.deserialize(serialized)
     graph = recognized(graph_of(function))
     names = function.name_in()
     place = decision(graph, {names.index(port) for port in sampled})
