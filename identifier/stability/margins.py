@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     import control
 
 LARGEST_FACTOR = 1e6
+AT_ONCE = 150  # points of a grid whose eigenvalues are found together
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,7 +157,9 @@ def _first_crossing(
     the loop is marginal from the start (a direction that does not learn), the crossing of the
     threshold is returned instead.
     """
-    growth = growth_at(grid)
+    growth = np.empty(0)
+    while growth.size < grid.size and not np.any(growth > threshold):
+        growth = np.append(growth, growth_at(grid[growth.size : growth.size + AT_ONCE]))
     unstable = np.flatnonzero(growth > threshold)
     if unstable.size == 0:
         return None
