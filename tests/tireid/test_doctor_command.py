@@ -1,13 +1,12 @@
 """`tireid doctor` as a user meets it: a faulty log goes to a valid verdict without an editor."""
 
 import json
-import pickle
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from identifier.doctor import Diagnosis, Finding, diagnose
+from identifier.doctor import Diagnosis, Finding
 from models.recordings import LogMap, Repair, read_recording, write_recording
 from tests.pages import faults_of
 from tireid.cli import main
@@ -35,28 +34,18 @@ def clinic(tmp_path_factory):
     return folder
 
 
-@pytest.fixture(autouse=True, scope="module")
-def asked_once():
-    """The doctor answers the same to the same, and takes longest here: a log is looked at once."""
-    known = {}
-
-    def answered(recording, vehicle):
-        asked = pickle.dumps((recording, vehicle))
-        if asked not in known:
-            known[asked] = diagnose(recording, vehicle)
-        return known[asked]
-
-    with pytest.MonkeyPatch.context() as patch:
-        for command in ("commands.doctor", "commands.identify", "learning"):
-            patch.setattr(f"tireid.{command}.diagnose", answered)
-        yield
-    assert known
-
-
 def doctor(clinic, log, *words):
     return main(
         ["doctor", str(clinic / log), "--vehicle", str(clinic / "car.toml"), *map(str, words)]
     )
+
+
+def test_of_the_same_log_these_tests_ask_the_doctor_once(clinic, diagnoses):
+    assert doctor(clinic, "good.csv") == 0
+    asked = len(diagnoses)
+    assert asked > 0
+    assert doctor(clinic, "good.csv") == 0
+    assert len(diagnoses) == asked
 
 
 def test_a_good_log_ends_with_0_and_says_what_it_cannot_tell(clinic, capsys):
