@@ -89,11 +89,16 @@ def rng() -> np.random.Generator:
 PNG, SVG = b"\x89PNG\r\n\x1a\n", b"<?xml"
 
 
+def without_ink(patch) -> None:
+    """Leave out what takes longest in a figure, for what a module's tests share, too."""
+    patch.setattr("tireid.figures.style.figure_png", lambda *_, **__: PNG)
+    patch.setattr("tireid.figures.style.figure_svg", lambda _: SVG)
+
+
 @pytest.fixture
 def undrawn(monkeypatch):
     """Figures are made as ever; on paper and on the page they are empty."""
-    monkeypatch.setattr("tireid.figures.style.figure_png", lambda *_, **__: PNG)
-    monkeypatch.setattr("tireid.figures.style.figure_svg", lambda _: SVG)
+    without_ink(monkeypatch)
 
 
 @pytest.fixture

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from identifier.stored import load_model
+from tests.conftest import without_ink
 from tireid.cli import main
 
 
@@ -17,7 +18,9 @@ def words(logs):
 @pytest.fixture(scope="module")
 def result(words, tmp_path_factory):
     out = tmp_path_factory.mktemp("bound") / "out"
-    assert main([*words, "--bound", "--out", str(out)]) == 0
+    with pytest.MonkeyPatch.context() as patch:
+        without_ink(patch)
+        assert main([*words, "--bound", "--out", str(out)]) == 0
     return out
 
 
