@@ -1,4 +1,4 @@
-"""Two short drives of the sedan as log files, and its vehicle file; the doctor, asked once a log."""
+"""Two short drives of the sedan as log files, and its vehicle file; a doctor that is asked once."""
 
 import hashlib
 import pickle
