@@ -424,11 +424,12 @@ def _check_rear_rises(alpha: Array, w: Windows, l_r: float, other: str) -> str |
     if not (together < -0.3 and np.sqrt(np.mean(alpha**2)) > 0.003):
         return None
     car = f"name the right vehicle, of which l_r = {l_r:g} m is told"
-    remedy = f"change the sign of vy{other or f', or {car}'}"
+    place = "move vy to the center of gravity"
+    remedy = f"change the sign of vy{other or f', or {car}'}, or {place}"
     if w.a_y is not None:
         slope, error = _of_v_y(least_squares(_kinematics(w), w.a_y), w)
         if slope > 0.3 > error:
-            remedy = f"vy has the sign of ay: {car}, or move vy to the center of gravity"
+            remedy = f"vy has the sign of ay: {car}, or {place}"
         elif slope < -0.3 < -error:
             remedy = "change the sign of vy"
     return f"lateral acceleration {RISES}, their correlation is {together:.2f}; {remedy}"
