@@ -10,7 +10,7 @@ from codegen.graph import Graph, assumed, decision, function_of, graph_of, simpl
 from codegen.simplify import simplified
 
 WORTHWHILE = 0.5  # share of nodes that the smaller part may have, else nothing is decided
-KEPT = 16  # functions that were asked for before: C, FMU and ONNX of one method are made of one
+KEPT = 16  # functions whose forms are kept: who exports again often asks for the same ones
 
 
 class Tuned(NamedTuple):

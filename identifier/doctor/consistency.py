@@ -24,10 +24,10 @@ FEWEST, MOST = 20, 500  # windows: fewer say nothing, of more that many are take
 # Curves that are tried, on one grid of c and μ, so that many have the same c/μ: to saturate them,
 # which costs most, is done once for each of these.
 FINENESS, STIFFNESSES, FRICTIONS = 100.0 ** (1.0 / 27.0), 28, 15
-STIFFNESS = FINENESS ** np.arange(STIFFNESSES)  # c [1/rad], to 100
-FRICTION = 0.3 * FINENESS ** np.arange(FRICTIONS)[:, None]  # μ [-], to 3.3
+STIFFNESS = FINENESS ** np.arange(STIFFNESSES)  # c [1/rad], 1 to 100
+FRICTION = 0.3 * FINENESS ** np.arange(FRICTIONS)[:, None]  # μ [-], 0.3 to 3.3
 RATIOS = FINENESS ** np.arange(1 - FRICTIONS, STIFFNESSES)[:, None] / 0.3  # c/μ [1/rad]
-RATIO_OF = np.subtract.outer(-np.arange(FRICTIONS), -np.arange(STIFFNESSES)) + FRICTIONS - 1
+RATIO_OF = np.arange(STIFFNESSES) - np.arange(FRICTIONS)[:, None] + FRICTIONS - 1  # of μ and c
 # A stiffness that is twice the told one costs as much as 14 % of what is left unexplained.
 DISBELIEF = 0.3  # per square of the logarithm of c over the told one
 FAST = 6.0  # sqrt(g L), 30 m/s for a sedan; what is faster costs as much per square of a logarithm

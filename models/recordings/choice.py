@@ -249,7 +249,7 @@ def listing(names: Sequence[str]) -> str:
     ----------
     names : of the channels.
     """
-    return f"columns found: '{some(names)}'"
+    return f"columns found: '{some(names)}'" if names else "there is none but the time"
 
 
 def _taken_text(name: str, signal: Signal) -> str:

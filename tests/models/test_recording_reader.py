@@ -146,6 +146,7 @@ def test_parquet_without_pyarrow_names_the_extra(
         ("a.parquet", b"", "not a Parquet file"),
         ("a.csv", b"t;vx;vy;r;delta_f\n0;1;2;3;4\n", "there are 1 rows, at least 10 needed"),
         ("a.csv", b"hello world\nhow are you\n", "column vx, vy, r, delta_f is missing"),
+        ("a.csv", b"t\n0\n1\n2\n", "there is none but the time"),
     ],
 )
 def test_a_file_that_is_no_log_is_refused(
