@@ -52,6 +52,11 @@ class Fact(NamedTuple):
     values: Array
     unit: str
 
+    @property
+    def words(self) -> list[str]:
+        """The values in four digits, 127000 as such and not as 1.27e+05."""
+        return [f"{float(f'{value:.4g}'):.10g}" for value in self.values]
+
 
 class Estimate(NamedTuple):
     """A number of one axle that a drive may have decided.
@@ -553,8 +558,8 @@ class TireModel(ABC):
             f"{type(self).__name__} of {self.vehicle.name!r}",
             f"{'':{width}}  {'front':>10}  {'rear':>10}",
             *(
-                f"{title:{width}}  {front:>10.4g}  {rear:>10.4g}  {unit}"
-                for title, (front, rear), unit in facts
+                "  ".join([f"{fact.title:{width}}", *(f"{v:>10}" for v in fact.words), fact.unit])
+                for fact in facts
             ),
         ]
         if self.vehicle.estimates:

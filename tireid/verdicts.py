@@ -126,7 +126,7 @@ def verdict_section(verdict: Verdict) -> Section:
         ),
         *(Paragraph(text=printed(line)) for line in (verdict.headline, *verdict.unseen)),
         Table(
-            caption="What was learnt, and what is worth it.",
+            caption="What was learnt, and what it is worth.",
             header=HEADER,
             rows=number_rows(verdict),
         ),

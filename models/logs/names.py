@@ -144,8 +144,10 @@ RULES: Mapping[str, Rule] = {
          "wzb", "angularratez", "angvelz", "yawratecar", "headingrate", "turnrate"),
         (f"{YAW};{CHANGE}", "angular|gyro|omega|rate|ang;z", "gierrate|giergeschwindigkeit|yawrate",
          "heading|turn;rate", "rotation;rate;z"),
-        (),
-        (*NOT_BODY, *NO_ACCELERATION, "x", "y", "roll", "pitch", "linear", "moment", "torque"),
+        ("omega|angularvelocity|angularspeed|angularrate|angvel",),
+        (*NOT_BODY, *NO_ACCELERATION, "x", "y", "roll", "pitch", "linear", "moment", "torque",
+         "engine", "motor", "moteur", "motore", "crank", "shaft", "turbo", "turbine", "fan",
+         "pump"),
     ),
     "delta_f": Rule(
         ("deltaf", "deltafront", "roadwheelangle", "frontwheelangle", "frontsteer",

@@ -404,12 +404,11 @@ def test_a_summary_says_what_the_numbers_are(tires):
     tire = tires["axle"]
     lines = tire.summary().splitlines()
     stiffness = next(line for line in lines if line.startswith("cornering stiffness"))
-    values = [float(word) for word in re.findall(r"[\d.]+e\+05|\d{4,}", stiffness)]
+    values = [float(word) for word in re.findall(r"\b\d{6,}\b", stiffness)]
     assert np.allclose(values, tire.stiffness, rtol=1e-3)
     for word in ("relaxation length", "known up to", "standard deviation", "time of learning"):
         assert word in tire.summary()
     assert tires["linear"].known_slip is None and "known" not in tires["linear"].summary()
-    assert np.array_equal(tire.known_slip, tire.known_slip)
 
 
 def test_representations_are_short(tires, run, log, car):

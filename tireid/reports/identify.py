@@ -191,7 +191,7 @@ def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> 
     law : what learnt, as the user named it.
     figures : by the name of their files.
     """
-    facts = [[title, *(f"{v:.4g}" for v in values), unit] for title, values, unit in model.facts()]
+    facts = [[fact.title, *fact.words, fact.unit] for fact in model.facts()]
     blocks: list[Block] = [
         Paragraph(
             text="Slip has the sign of the paper, so that curves rise: positive slip pushes to the "

@@ -24,7 +24,8 @@ CALLED = {
     "r": ["r", "Car.YawRate", "Yaw_Rate", "Gyro Z", "AngRateZ", "Gierrate", "Giergeschwindigkeit",
           "/imu/angular_velocity.z", "psi_dot", "YAW_RATE", "ESP_YawRate", "Gyro Yaw Velocity",
           "carState.yawRate", "livePose.angularVelocityDevice.z", "Ist-Gierrate",
-          "Vitesse de lacet", "Velocità di imbardata", "velocidad_guiñada"],
+          "Vitesse de lacet", "Velocità di imbardata", "velocidad_guiñada", "omega",
+          "Angular Velocity"],
     "delta_f": ["delta_f", "RoadWheelAngle", "/ackermann_cmd/drive.steering_angle",
                 "/vehicle/status/steering_status/steering_tire_angle", "Radlenkwinkel",
                 "roadwheelAngle"],
@@ -51,7 +52,8 @@ NO_SIGNAL = ["Engine RPM", "Wheel Speed FL", "Brake Pressure", "Yaw Rate Target"
              "/target_steering_angle/data", "HA_Lenkwinkel", "Lenkradmoment",
              "Lenkradwinkelgeschw", "Gierbeschleunigung", "Raddrehzahl VL", "vitesse_roue_FL",
              "Lateral Wind Speed", "Yaw Rate Setpoint", "couple volant",
-             "Motordrehzahl", "consigne de vitesse", "radar.LateralVelocity", "Obj01_vLat",
+             "Motordrehzahl", "engine_omega", "omega_fl", "consigne de vitesse",
+             "radar.LateralVelocity", "Obj01_vLat",
              "lead.vRel", "DAS_setSpeed", "KBI_angez_Geschw", "SAS_Speed",
              "Seitenwind"]  # fmt: skip
 
