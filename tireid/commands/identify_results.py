@@ -42,6 +42,8 @@ from tireid.figures import (
     slip_figure,
     weights_figure,
 )
+from tireid.figures.thinned import DrawnRun
+from tireid.figures.tires import drawn_tracks
 from tireid.output import text_table, write_csv, write_json, write_table
 from tireid.progress import Progress, say
 from tireid.reports.identify import guaranteed_sentence
@@ -241,9 +243,11 @@ def write_results(
         model.save(folder / f"weights{last}.json", valid=None if judged is None else judged.valid)
         columns = curve_columns(model, [run.recording for run in (learnt, *others)])
         write_csv(folder / f"curve{last}.csv", columns)
-    _write_curves(folder, learnt, others, frozen, curves, progress or Progress("curves"))
+    tracks = drawn_tracks(learnt)
+    told = progress or Progress("curves")
+    _write_curves(folder, learnt, others, frozen, curves, told, tracks)
     say("drawing figures")
-    return _draw(folder, learnt, others, frozen, calibrated)
+    return _draw(folder, learnt, others, frozen, calibrated, tracks)
 
 
 def file_name(recording: Recording) -> str:
@@ -279,6 +283,7 @@ def _write_curves(
     frozen: Frozen,
     curves: str,
     progress: Progress,
+    tracks: DrawnRun | None,
 ) -> None:
     count = 1 + len(others)
     for k, history in enumerate((learnt, *others)):
@@ -292,8 +297,14 @@ def _write_curves(
     if OBSERVED in learnt.outputs:
         found = learnt.blocks()
         write_table(folder / f"errors.{curves}", (_error_columns(learnt, one) for one in found))
-    parts = (_weight_columns(learnt, one) for one in learnt.blocks())
-    write_table(folder / f"weights.{curves}", parts)
+
+    def weights() -> Iterator[dict[str, Array]]:
+        for block in learnt.blocks():
+            if tracks is not None:  # beside it: a long run is computed again for each look at it
+                tracks.take(block)
+            yield _weight_columns(learnt, block)
+
+    write_table(folder / f"weights.{curves}", weights())
 
 
 def _error_columns(learnt: History, block: Block) -> dict[str, Array]:
@@ -416,6 +427,7 @@ def _draw(
     others: Sequence[History],
     frozen: Frozen,
     calibrated: TireModel,
+    tracks: DrawnRun | None,
 ) -> dict[str, Figure]:
     name, last = learnt.recording.name, max(frozen)
     own = {t: replays[name] for t, replays in frozen.items()}
@@ -430,8 +442,8 @@ def _draw(
     told = side_slip(learnt, learnt.design.min_speed, learnt.recording.logged_v_y)
     if told is not None:
         figures["side_slip"] = side_slip_figure([learnt.recording], {"estimate": {name: told}})
-    if learnt.tracks_over(next(learnt.blocks())):
-        figures["learnt"] = learnt_axles_figure(learnt, list(frozen))
+    if tracks is not None:
+        figures["learnt"] = learnt_axles_figure(learnt, list(frozen), tracks)
     for other in others:
         replay = frozen[last][other.recording.name]
         figures[f"replay_{file_name(other.recording)}"] = prediction_figure(replay, other)

@@ -81,12 +81,8 @@ def farthest(signals: Iterable[Array], width: int) -> NDArray[np.intp]:
     return np.unique(np.concatenate(found))
 
 
-def shown_of_run(
-    history: History, ends: tuple[float, float], tell: Callable[[Block], Sequence[Array]]
-) -> tuple[Array, list[Array]]:
-    """Return times and values of what a run recorded, as they are drawn: (k,) and (k, ...) each.
-
-    Times are those of `drawn_times`.
+class DrawnRun:
+    """What is drawn of what a run recorded, gathered block by block.
 
     Parameters
     ----------
@@ -94,20 +90,56 @@ def shown_of_run(
     ends : first and last time [s].
     tell : returns what is drawn of a block, one value a sample.
     """
-    t = history.recording.t
-    n = int(np.searchsorted(t, ends[1], side="right") - np.searchsorted(t, ends[0], side="left"))
-    width = 1 if n <= LONG else -(-n // COLUMNS)
-    times, values = [], []
-    for block in history.blocks():
-        told, here = tell(block), t[block.part]
-        part: Samples = (here >= ends[0]) & (here <= ends[1])
-        if width > 1 and part.any():
+
+    def __init__(
+        self, history: History, ends: tuple[float, float], tell: Callable[[Block], Sequence[Array]]
+    ) -> None:
+        self._recording, self._ends, self._tell = history.recording, ends, tell
+        t = self._recording.t
+        first, last = np.searchsorted(t, ends[0], side="left"), np.searchsorted(t, ends[1], "right")
+        self._width = 1 if last - first <= LONG else -(-int(last - first) // COLUMNS)
+        self._times: list[Array] = []
+        self._values: list[list[Array]] = []
+
+    def take(self, block: Block) -> None:
+        """Gather what is drawn of a block.
+
+        Parameters
+        ----------
+        block : of the run; one after the other, all of them.
+        """
+        told, here = self._tell(block), self._recording.t[block.part]
+        part: Samples = (here >= self._ends[0]) & (here <= self._ends[1])
+        if self._width > 1 and part.any():
             part = np.flatnonzero(part)
-            part = part[farthest([one[part] for one in told], width)]
-        times.append(here[part])
-        values.append([one[part] for one in told])
-    joined = [np.concatenate(one) for one in zip(*values, strict=True)]
-    return drawn_times(history.recording, np.concatenate(times)), joined
+            part = part[farthest([one[part] for one in told], self._width)]
+        self._times.append(here[part])
+        self._values.append([one[part] for one in told])
+
+    def curves(self) -> tuple[Array, list[Array]]:
+        """Return times and values as they are drawn: (k,) and (k, ...) each.
+
+        Times are those of `drawn_times`.
+        """
+        joined = [np.concatenate(one) for one in zip(*self._values, strict=True)]
+        return drawn_times(self._recording, np.concatenate(self._times)), joined
+
+
+def shown_of_run(
+    history: History, ends: tuple[float, float], tell: Callable[[Block], Sequence[Array]]
+) -> tuple[Array, list[Array]]:
+    """Return times and values of what a run recorded, as `DrawnRun` gathers them.
+
+    Parameters
+    ----------
+    history : the run.
+    ends : first and last time [s].
+    tell : returns what is drawn of a block, one value a sample.
+    """
+    drawn = DrawnRun(history, ends, tell)
+    for block in history.blocks():
+        drawn.take(block)
+    return drawn.curves()
 
 
 def cloud(n: int, slips: Signal, heights: Sequence[Signal], counts: Signal) -> Samples:
@@ -129,10 +161,11 @@ def cloud(n: int, slips: Signal, heights: Sequence[Signal], counts: Signal) -> S
     for part in blocks(n):
         kept = counts(part)
         for k, signal in enumerate(signals):
-            values = signal(part)[kept]
-            low[k] = np.minimum(low[k], values.min(axis=0, initial=np.inf))
-            high[k] = np.maximum(high[k], values.max(axis=0, initial=-np.inf))
+            for axle, values in enumerate(signal(part)[kept].T.copy()):  # rows are looked at faster
+                low[k][axle] = min(low[k][axle], values.min(initial=np.inf))
+                high[k][axle] = max(high[k][axle], values.max(initial=-np.inf))
     seen = np.zeros((len(heights), 2, *CELLS), dtype=bool)
+    first = np.zeros(CELLS[0] * CELLS[1], dtype=np.intp)
     found = []
     for part in blocks(n):
         kept = np.flatnonzero(counts(part))
@@ -141,10 +174,10 @@ def cloud(n: int, slips: Signal, heights: Sequence[Signal], counts: Signal) -> S
             up = _cells(signal(part)[kept], low[1 + k], high[1 + k], CELLS[1])
             for axle in (0, 1):
                 place = across[:, axle] * CELLS[1] + up[:, axle]
-                places, firsts = np.unique(place, return_index=True)
+                first[place[::-1]] = kept[::-1]  # the last that is written is the first sample
                 marks = seen[k, axle].reshape(-1)
-                found.append(part.start + kept[firsts[~marks[places]]])
-                marks[places] = True
+                found.append(part.start + kept[~marks[place] & (first[place] == kept)])
+                marks[place] = True
     return np.unique(np.concatenate(found))
 
 

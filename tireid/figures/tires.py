@@ -34,7 +34,7 @@ from tireid.figures.style import (
     new_figure,
     styled,
 )
-from tireid.figures.thinned import cloud, shown_of_run
+from tireid.figures.thinned import DrawnRun, cloud
 
 if TYPE_CHECKING:
     from mpc.loop import Drive
@@ -284,8 +284,26 @@ def _missed_of_truth(
 # What the axle identifier has learnt over time, in the numbers an engineer reads.
 
 
+def drawn_tracks(history: History) -> DrawnRun | None:
+    """Return what gathers `learnt_axles_figure` block by block; None where there is nothing to.
+
+    Parameters
+    ----------
+    history : a run.
+    """
+    if not history.tracks_over(next(history.blocks())):
+        return None
+    t = history.recording.t
+    ends = (float(t[0]), float(t[-1]))
+    return DrawnRun(
+        history, ends, lambda block: [track.values for track in history.tracks_over(block)]
+    )
+
+
 @styled
-def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) -> Figure:
+def learnt_axles_figure(
+    history: History, freeze_times: Sequence[float] = (), drawn: DrawnRun | None = None
+) -> Figure:
     """Draw what was learnt of both axles over time.
 
     Of the axle identifier cornering stiffness, relaxation length and capacity, the force at which
@@ -295,21 +313,21 @@ def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) ->
     ----------
     history : a run of a method that has `tracks`.
     freeze_times : times at which weights were taken [s].
+    drawn : `drawn_tracks` that has taken all blocks; None looks at the run.
 
     Raises
     ------
     TypeError
         Where the method has none.
     """
-    tracks = history.tracks_over(next(history.blocks()))
-    if not tracks:
-        raise TypeError(f"{history.design} does not say what it learns of the axles")
-    t = history.recording.t
-    at, curves = shown_of_run(
-        history,
-        (float(t[0]), float(t[-1])),
-        lambda block: [track.values for track in history.tracks_over(block)],
-    )
+    if drawn is None:
+        drawn = drawn_tracks(history)
+        if drawn is None:
+            raise TypeError(f"{history.design} does not say what it learns of the axles")
+        for block in history.blocks():
+            drawn.take(block)
+    tracks, t = history.tracks_over(next(history.blocks())), history.recording.t
+    at, curves = drawn.curves()
     figure = new_figure(PAGE, 4.4)
     panels = figure.subplots(len(tracks), 1, sharex=True)
     for axes, (title, unit, _), values in zip(panels, tracks, curves, strict=True):
