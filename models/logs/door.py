@@ -5,8 +5,10 @@ that the libraries it needs stay optional. How its first bytes look is told in `
 """
 
 import zlib
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from models.logs.log import LogFile, RecordingError
 from models.logs.magic import GZIP, HEAD, format_of
@@ -27,13 +29,14 @@ OPENERS = {
 }
 
 
-def open_log(path: str | Path, dbc: str | Path | None = None) -> LogFile:
+def open_log(path: str | Path, dbc: str | Path | None = None, *, mend: bool = False) -> LogFile:
     """Open a log of any format; nothing but its beginning is read.
 
     Parameters
     ----------
     path : of a file; of a folder, where a format keeps a log in one.
     dbc : of the file that tells the signals in the frames of a CAN bus.
+    mend : whether stamps that do not rise are mended, and not refused.
 
     Raises
     ------
@@ -55,8 +58,9 @@ def open_log(path: str | Path, dbc: str | Path | None = None) -> LogFile:
                 f"{path}: is packed by gzip, which only tables in text may be; unpack it first"
             )
         module, _, function = OPENERS["can" if told else format].partition(":")
-        opened: LogFile = getattr(import_module(module), function)(path, *told)
-        return opened
+        opened: Any = getattr(import_module(module), function)(path, *told)
+        log: LogFile = replace(opened, mend=mend)
+        return log
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read ({error.strerror or error})") from None
 

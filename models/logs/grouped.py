@@ -57,6 +57,8 @@ class GroupedLog(Generic[P]):
     channels : as listed, each with where the format finds it.
     said : what is left out or taken for granted.
     samples : reads channels; a list, so that a file is not open any more when it is returned.
+    mend : whether stamps that do not rise are mended, and not refused; not a clock of several that
+        starts again.
     """
 
     path: Path
@@ -66,6 +68,7 @@ class GroupedLog(Generic[P]):
     channels: tuple[tuple[Listed, P], ...]
     said: tuple[str, ...]
     samples: Callable[[Sequence[tuple[Listed, P]]], list[Samples]]
+    mend: bool = False
     _mended: list[str] = field(default_factory=list, compare=False, repr=False)
 
     @classmethod
@@ -165,10 +168,10 @@ class GroupedLog(Generic[P]):
         found: dict[str, tuple[Array, Array, NDArray[np.int64]]] = {}
         with one_line(self.path, self.what):
             for clock, t, values in self.samples(asked):
-                stamps = seconds_of(self.path, clock, t, self.place)
+                stamps = seconds_of(self.path, clock, t, self.place, mend=self.mend)
                 self._mended.extend(stamps.notes)
-                rows = np.arange(1, t.size + 1)
-                found |= {name: (stamps.t, one, rows) for name, one in values.items()}
+                rows = stamps.of(np.arange(1, t.size + 1))
+                found |= {n: (stamps.t, stamps.of(one), rows) for n, one in values.items()}
         result = []
         for listed, _ in asked:
             t, values_of, rows = found[listed.name]
@@ -185,8 +188,8 @@ class GroupedLog(Generic[P]):
         return tuple(result)
 
 
-def seconds_of(path: Path, clock: str, t: Array, place: str) -> Stamps:
-    """Return times that rise, as `stamps.seconds` mends them where they were rounded.
+def seconds_of(path: Path, clock: str, t: Array, place: str, *, mend: bool = False) -> Stamps:
+    """Return times that rise, as `stamps.seconds` mends them.
 
     Parameters
     ----------
@@ -194,6 +197,7 @@ def seconds_of(path: Path, clock: str, t: Array, place: str) -> Stamps:
     clock : whose times they are.
     t : times [s], (n,).
     place : what a sample is in the file.
+    mend : whether what does not rise is mended, but for a clock that starts again.
 
     Raises
     ------
@@ -201,7 +205,8 @@ def seconds_of(path: Path, clock: str, t: Array, place: str) -> Stamps:
         One line, where they are not finite or do not rise.
     """
     told = Clock(0, f"the clock of {clock}", "s", False, "")
-    return seconds(str(path), told, t, np.arange(1, t.size + 1), place)
+    rows = np.arange(1, t.size + 1)
+    return seconds(str(path), told, t, rows, place, mend=mend, restarts=False)
 
 
 def unique(names: Iterable[tuple[str, str]]) -> list[str]:

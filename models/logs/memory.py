@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from models.logs.log import Channel, Clock, Heading, Listed, RecordingError, chosen, one_run, some
+from models.logs.stamps import Stamps, seconds
 
 TIMES = ("t", "time", "timestamp")  # what the clock is called
 RUN = "run"
@@ -24,6 +25,7 @@ class ArrayLog:
     data : a data frame or a mapping, by column: what `data[column]` is has one axis.
     clock : column that is the time: seconds, or times of the calendar or durations, which count
         from the first; empty takes the one called t or time.
+    mend : whether times that do not rise are mended, and not refused.
 
     Raises
     ------
@@ -31,7 +33,7 @@ class ArrayLog:
         Where there are no columns, their lengths differ, or none is the time.
     """
 
-    def __init__(self, name: str, data: Any, clock: str = "") -> None:
+    def __init__(self, name: str, data: Any, clock: str = "", *, mend: bool = False) -> None:
         found = getattr(data, "columns", data)  # of a data frame; a mapping yields its keys
         try:
             header = [str(column) for column in found]
@@ -41,7 +43,8 @@ class ArrayLog:
             raise RecordingError(
                 f"{name}: a data frame or a mapping of arrays is needed, not {type(data).__name__}"
             ) from None
-        self._name, self._arrays = name, arrays
+        self._name, self._arrays, self._mend = name, arrays, mend
+        self._noted: list[str] = []
         lower = {column.lower(): column for column in reversed(header)}
         named = next((lower[one] for one in TIMES if one in lower), None)
         self._clock = clock or named
@@ -64,8 +67,8 @@ class ArrayLog:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was taken for granted: nothing."""
-        return ()
+        """What was mended in what has been read so far, one sentence each."""
+        return tuple(dict.fromkeys(self._noted))
 
     @property
     def dialect(self) -> tuple[str, ...]:
@@ -126,8 +129,20 @@ class ArrayLog:
         if run is not None:
             kept = np.array([str(word) == run for word in self._arrays[RUN].tolist()])
         t, rows = columns[clock][kept], np.flatnonzero(kept)
+        stamps = Stamps(t, ())
+        if self._mend:
+            told = Clock(0, clock, "s", False, "")
+            stamps = seconds(self._name, told, t, rows, "index", mend=True)
+            self._noted.extend(stamps.notes)
         return tuple(
-            Channel(name=name, unit="", t=t, values=columns[name][kept], place="index", rows=rows)
+            Channel(
+                name=name,
+                unit="",
+                t=stamps.t,
+                values=stamps.of(columns[name][kept]),
+                place="index",
+                rows=stamps.of(rows),
+            )
             for name in names
         )
 

@@ -3,6 +3,7 @@
 Stamps that are rounded (ten samples of 0.01 s that share the stamp 0.1 s, 400 Hz in whole
 milliseconds) are put back on the even clock that they were taken from, where one explains every
 stamp; it is said. Stamps that fall are no rounding: a clock that starts again, or a mixed order.
+They are refused, or mended where that is asked for.
 """
 
 import datetime
@@ -40,6 +41,10 @@ TICKS = tuple(10.0**-k for k in range(10))  # [s]: what stamps may be rounded to
 WORTH = 0.05  # share of a step by which rounding must shift stamps to be taken out
 MOST_STEPS = 100_000  # samples that a rate is taken from
 SHARED = 1.2  # samples that share a stamp, on average: with fewer they are doubled, not rounded
+PAUSE = 10.0  # [s] before a clock that starts again: a gap, which cuts the log
+BACK, FEWEST = 1.0, 10  # [s], samples: what goes back so far and lasts so long is no sample astray
+
+MENDING = '--mend-clock (in Python LogMap(order="mend"))'
 
 _DATE = re.compile(
     r"(?:(\d{4})[-/]?(\d\d)[-/]?(\d\d)|(\d{1,2})[./](\d{1,2})[./](\d{4}))(?:[T ]+(.+))?"
@@ -51,10 +56,23 @@ _SHORT = re.compile(r"(\d\d)(\d\d)(\d\d)(?:[.,](\d+))?Z?")
 
 
 class Stamps(NamedTuple):
-    """Time of each sample [s], (n,), and what was mended, one sentence each."""
+    """Time of each sample [s], (n,), and what was mended, one sentence each.
+
+    order : which rows they are of, (n,); None are all as they stand.
+    """
 
     t: Array
     notes: tuple[str, ...]
+    order: NDArray[np.intp] | None = None
+
+    def of(self, column: NDArray[Any]) -> NDArray[Any]:
+        """Return the cells of a column that the stamps are of.
+
+        Parameters
+        ----------
+        column : a cell of each row.
+        """
+        return column if self.order is None else column[self.order]
 
 
 # Which column, in which unit.
@@ -241,9 +259,16 @@ def _of_day(text: str) -> int | None:
 
 @np.errstate(all="ignore")  # of numbers that are no times
 def seconds(
-    label: str, clock: Clock, values: NDArray[Any], rows: NDArray[np.int64], place: str
+    label: str,
+    clock: Clock,
+    values: NDArray[Any],
+    rows: NDArray[np.int64],
+    place: str,
+    *,
+    mend: bool = False,
+    restarts: bool = True,
 ) -> Stamps:
-    """Return stamps in seconds that rise, mended where they were rounded.
+    """Return stamps in seconds that rise, mended where they were rounded, and where it is asked.
 
     Dates and times of day count from the first of them; numbers stay as they stand, in seconds,
     those since 1970 too.
@@ -255,11 +280,15 @@ def seconds(
     values : (n,) as in the file.
     rows : (n,) where each is in the file.
     place : what a row is called.
+    mend : whether samples out of order are sorted, those that share a stamp with another left out,
+        and what follows where the clock goes back for long is put after the rest; refused else.
+    restarts : whether a clock that goes back for long is mended, too: not one of several.
 
     Raises
     ------
     RecordingError
-        Where a stamp is missing, or stamps fall or repeat and no even clock explains it.
+        Where a stamp is missing, or stamps fall or repeat, which no even clock explains and
+        nothing mends.
     """
     if values.size == 0:
         return Stamps(np.empty(0), ())
@@ -278,9 +307,66 @@ def seconds(
     even = None if fall is not None else even_clock(t)
     if even is not None:
         return Stamps(even.t, (f"{clock.name} {even.words}",))
-    if fall is not None or repeat is not None:
-        raise RecordingError(f"{label}: {clock.name} {not_rising(t, rows, place)}")
-    return Stamps(t, ())
+    if fall is None and repeat is None:
+        return Stamps(t, ())
+    mended = _in_order(t, restarts=restarts) if mend else None
+    if mended is None:
+        said = not_rising(t, rows, place, restarts=restarts)
+        raise RecordingError(f"{label}: {clock.name} {said}")
+    return mended._replace(notes=tuple(f"{clock.name}: {note}" for note in mended.notes))
+
+
+def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
+    """Return stamps that rise and the rows that they are of; None where that is no mending.
+
+    Parameters
+    ----------
+    t : stamps [s], some of which are not above the one before, (n,).
+    restarts : whether a clock that goes back for long is mended: samples of two runs are not mixed.
+    """
+    falls = (np.flatnonzero(np.diff(t) < 0.0) + 1).tolist()
+    begins = [0]
+    for first, end in pairwise([*falls, t.size]):
+        lasts = end - first >= FEWEST and t[end - 1] - t[first] >= BACK
+        if lasts and t[first - 1] - t[first] >= BACK:
+            begins.append(first)
+    if len(begins) > 1 and not restarts:
+        return None
+    late = 0
+    orders: list[NDArray[np.intp]] = []
+    times: list[Array] = []
+    for first, end in pairwise([*begins, t.size]):
+        piece = t[first:end]
+        late += int(np.count_nonzero(piece < np.maximum.accumulate(piece)))
+        order = np.argsort(piece, kind="stable")
+        risen = piece[order]
+        single = np.concatenate([[True], np.diff(risen) > 0.0])
+        orders.append(first + order[single])
+        times.append(risen[single] + (times[-1][-1] + PAUSE - risen[0] if times else 0.0))
+    found = np.concatenate(times)
+    twice = t.size - found.size
+    if t.size >= SHARED * found.size:
+        return None  # rounded, or written twice throughout: who leaves them out leaves out too much
+    notes = []
+    if late:
+        notes.append(f"samples out of order are sorted: {late}")
+    if twice:
+        notes.append(f"samples that share their stamp with one before are left out: {twice}")
+    if len(begins) > 1:
+        again = len(begins) - 1
+        notes.append(f"times it goes back by {BACK:g} s or more, and on {PAUSE:g} s later: {again}")
+    return Stamps(found, tuple(notes), np.concatenate(orders))
+
+
+def _starts_again(first: float, before: float, after: float) -> bool:
+    """Return whether a clock that fell starts again; else its samples are out of order.
+
+    Parameters
+    ----------
+    first : stamp since which it rose [s].
+    before, after : stamps between which it fell [s].
+    """
+    return bool(after - first <= 0.5 * (before - first) and before > first)
 
 
 def typical_rate(t: Array) -> float:
@@ -452,7 +538,7 @@ def _even_step(t: Array, tick: float) -> float | None:
 
 
 @np.errstate(all="ignore")
-def not_rising(t: Array, rows: NDArray[np.int64], place: str) -> str:
+def not_rising(t: Array, rows: NDArray[np.int64], place: str, *, restarts: bool = True) -> str:
     """Return the rule that stamps break which fall or repeat, with value and remedy.
 
     Parameters
@@ -460,14 +546,20 @@ def not_rising(t: Array, rows: NDArray[np.int64], place: str) -> str:
     t : stamps [s], one of which is not above the one before, (n,).
     rows : (n,) where each is in the file.
     place : what a row is called.
+    restarts : whether a clock that starts again can be mended.
     """
     k = _first_step(t, lambda step: ~(step > 0.0))
     assert k is not None
     said = f"must increase, {place} {rows[k + 1]} has {t[k + 1]:.9g} after {t[k]:.9g}; "
     if t[k + 1] < t[k]:
-        if t[k + 1] - t[0] <= 0.5 * (t[k] - t[0]) and t[k] > t[0]:
-            return said + "the clock starts again: several runs in one file need a column run"
-        return said + "samples are out of order: sort them by time, or cut the log there"
+        if not restarts and t[k] - t[k + 1] >= BACK:
+            return said + "the clock starts again beside others: cut the log there"
+        if _starts_again(t[0], t[k], t[k + 1]):
+            return said + (
+                "the clock starts again: several runs in one file need a column run, or "
+                f"{MENDING}, which learns on them as one drive"
+            )
+        return said + f"samples are out of order: {MENDING} sorts them by time"
     steps = np.diff(t[k : k + LONGEST_IN_MEMORY])
     moves = int(np.count_nonzero(steps > 0.0))
     if moves and steps.size / moves >= SHARED:
@@ -475,4 +567,4 @@ def not_rising(t: Array, rows: NDArray[np.int64], place: str) -> str:
             f"stamps are rounded, {steps.size / moves:.3g} samples share one, and no even clock "
             "explains them: export time with more digits"
         )
-    return said + "a sample is there twice: cut one of them out"
+    return said + f"a sample is there twice: {MENDING} leaves one of them out"

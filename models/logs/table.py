@@ -200,10 +200,12 @@ class TableLog:
     ----------
     table : of any format.
     clock_name : of the column that is the time; empty finds it.
+    mend : whether stamps that do not rise are mended, and not refused.
     """
 
     table: Table
     clock_name: str = ""
+    mend: bool = False
     _noted: list[str] = field(default_factory=list, compare=False, repr=False)
 
     @property
@@ -286,7 +288,8 @@ class TableLog:
             stamps, rows = cells.columns[clock.column], cells.rows
             for words in cells.words.values():  # each run has a clock of its own
                 stamps, rows = stamps[words.codes == 0], rows[words.codes == 0]
-            t = seconds(str(self.path), clock, stamps, rows, self.table.place).t
+            label = str(self.path)
+            t = seconds(label, clock, stamps, rows, self.table.place, mend=self.mend).t
         rate = math.nan if t is None else typical_rate(t)
         listed = []
         for k, heading in zip(self._channels, self.headings(), strict=True):
@@ -335,16 +338,19 @@ class TableLog:
         kinds |= {k: Kind.NUMBER for k in places if timed or k != clock.column}
         cells = self.table.cells(kinds, self._one_run(run))
         label = str(self.path) if run is None else f"{self.path}:{run}"
-        stamps = seconds(label, clock, cells.columns[clock.column], cells.rows, self.table.place)
+        column, place = cells.columns[clock.column], self.table.place
+        stamps = seconds(label, clock, column, cells.rows, place, mend=self.mend)
         self._noted.extend(stamps.notes)
         return tuple(
             Channel(
                 name=name,
                 unit=self.table.units[k],
                 t=stamps.t,
-                values=stamps.t if k == clock.column and not timed else cells.columns[k],
-                place=self.table.place,
-                rows=cells.rows,
+                values=(
+                    stamps.t if k == clock.column and not timed else stamps.of(cells.columns[k])
+                ),
+                place=place,
+                rows=stamps.of(cells.rows),
             )
             for name, k in zip(names, places, strict=True)
         )

@@ -22,12 +22,13 @@ from models.logs.clock import (
     typical_step,
     without_empty,
 )
-from models.logs.log import Channel, Heading, LogFile, RecordingError, one_run
+from models.logs.log import Channel, Clock, Heading, LogFile, RecordingError, one_run
 from models.logs.signals import BETA, QUANTITIES, WHEELS, Signal, quantity_of
 from models.logs.spelling import without_unit
+from models.logs.stamps import Stamps, seconds
 from models.logs.units import TIME, is_told, to_si
 from models.recordings.choice import chosen_signals, column_of, has_wheels, listing
-from models.recordings.map import AXES, CUT, LogMap
+from models.recordings.map import AXES, CUT, MEND, LogMap
 from models.recordings.record import (
     LARGEST,
     MINIMUM_SAMPLES,
@@ -101,7 +102,9 @@ def recording_of(
     if has_wheels(signals):
         kept, rolls = _on_wheels(label, stretches.kept, log_map, dt)
         stretches = stretches._replace(kept=kept)
-    notes = (*_notes(log), *reading.notes, *_hole_notes(parts), *_gap_notes(stretches.kept))
+    mended = dict.fromkeys(note for raws in parts.values() for raw in raws for note in raw.mended)
+    notes = (*_notes(log), *reading.notes, *mended, *_hole_notes(parts))
+    notes += _gap_notes(stretches.kept)
     notes += tuple(note for note in (learnt, rolls) if note)
     if stretches.short:
         several = "es" if stretches.short > 1 else ""
@@ -149,10 +152,16 @@ def _channels(
     names = list(dict.fromkeys(one for signal in signals.values() for one in signal.channel))
     asked = names if timed is None else [*names, timed.clock]
     by_name = dict(zip(asked, log.read(asked, run), strict=True))
+    mended: tuple[str, ...] = ()
     if timed is not None:
         clock = by_name[timed.clock]
         unit = timed.clock_unit or clock.unit
-        stamps = clock.values * to_si(unit, TIME, f"{label}: t (channel {clock.name!r})")
+        t = clock.values * to_si(unit, TIME, f"{label}: t (channel {clock.name!r})")
+        stamps = Stamps(t, ())
+        if log_map.order == MEND:
+            told = Clock(0, "t", "s", False, "")
+            stamps = seconds(label, told, t, clock.rows, clock.place, mend=True)
+        mended = stamps.notes
         by_name = {name: _timed(label, by_name[name], clock, stamps) for name in names}
     found: dict[str, list[Raw]] = {}
     for ours, signal in signals.items():
@@ -170,7 +179,7 @@ def _channels(
             values = scaled(channel.values, factor)
             _require_of_a_car(label, ours, values, channel)
             empty = holes(logged).size if cut else 0
-            found[ours].append(Raw(channel.t, values, channel.place, channel.rows, empty))
+            found[ours].append(Raw(channel.t, values, channel.place, channel.rows, empty, mended))
     return found
 
 
@@ -187,20 +196,20 @@ def scaled(values: Array, factor: float) -> Array:
     return filled(values.size, lambda part: values[part] * factor)
 
 
-def _timed(label: str, channel: Channel, clock: Channel, stamps: Array) -> Channel:
+def _timed(label: str, channel: Channel, clock: Channel, stamps: Stamps) -> Channel:
     """Return a channel on the time that another one tells."""
-    if channel.values.size != stamps.size:
+    if channel.values.size != clock.values.size:
         raise RecordingError(
             f"{label}: {clock.name!r} must have a sample for each of {channel.name!r} to be its "
-            f"time, it has {stamps.size} of {channel.values.size}"
+            f"time, it has {clock.values.size} of {channel.values.size}"
         )
     return Channel(
         name=channel.name,
         unit=channel.unit,
-        t=stamps,
-        values=channel.values,
+        t=stamps.t,
+        values=stamps.of(channel.values),
         place=channel.place,
-        rows=channel.rows,
+        rows=stamps.of(channel.rows),
     )
 
 

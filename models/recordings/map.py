@@ -41,6 +41,7 @@ from models.schema import Table, read_toml
 
 AXES = {"ISO": 1.0, "SAE": -1.0}  # sign of everything but speed: y left and z up, or both turned
 REFUSE, CUT = "refuse", "cut"  # what becomes of cells without a value
+MEND = "mend"  # what may become of stamps that do not rise
 TABLES = ("file", "clock", "filters", "signals", "wheels", "repair")
 SIGNAL_KEYS = tuple(one.name for one in fields(Signal))
 
@@ -61,6 +62,9 @@ class LogMap:
     longest_gap : the log is cut where a channel has no sample for longer [s].
     holes : "refuse" a channel of which some cells have no value (NaN), or "cut" them out: then it
         has no sample there.
+    order : "refuse" stamps that fall or repeat, or "mend" them: samples are sorted by time, of
+        those that share a stamp the first stays, and where the clock goes back for a second or more
+        the rest follows after a gap.
     low_pass : cut-off of a low pass on all signals [Hz]; None filters nothing. All pass the same
         one, of second order, which looks at no later sample: so none is late against another.
     wheels : what they are, where v_x is made of their speeds.
@@ -80,6 +84,7 @@ class LogMap:
     clock_unit: str = ""
     longest_gap: float = LONGEST_GAP
     holes: str = REFUSE
+    order: str = REFUSE
     low_pass: float | None = None
     wheels: Wheels = field(default_factory=Wheels)
     repair: Repair = field(default_factory=Repair)
@@ -94,6 +99,8 @@ class LogMap:
             )
         if self.holes not in (REFUSE, CUT):
             raise RecordingError(f"holes must be {REFUSE} or {CUT}, not {shown(self.holes)}")
+        if self.order not in (REFUSE, MEND):
+            raise RecordingError(f"order must be {REFUSE} or {MEND}, not {shown(self.order)}")
         if self.low_pass is not None and not 0.0 < self.low_pass < math.inf:
             raise RecordingError(f"low_pass must be positive and finite, it is {self.low_pass}")
         for name, signal in self.signals.items():
@@ -146,7 +153,7 @@ class LogMap:
             given |= _texts(table.table("file"), "axes", "run", "dbc")
         if "clock" in table:
             inner = table.table("clock")
-            names = {"channel": "clock", "unit": "clock_unit", "holes": "holes"}
+            names = {"channel": "clock", "unit": "clock_unit", "holes": "holes", "order": "order"}
             inner.only(*names, "longest_gap")
             given |= {ours: inner.text(key) for key, ours in names.items() if key in inner}
             if "longest_gap" in inner:
@@ -179,7 +186,7 @@ class LogMap:
         clock = {"channel": "clock", "unit": "clock_unit"}
         for table, keys in (
             ("file", {"axes": "axes", "run": "run", "dbc": "dbc"}),
-            ("clock", {**clock, "longest_gap": "longest_gap", "holes": "holes"}),
+            ("clock", clock | {key: key for key in ("longest_gap", "holes", "order")}),
             ("filters", {"low_pass": "low_pass"}),
         ):
             told = {key: getattr(self, ours) for key, ours in keys.items()}

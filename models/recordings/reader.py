@@ -12,7 +12,7 @@ from models.logs.log import LogFile, RecordingError
 from models.logs.memory import ArrayLog
 from models.recordings.assembly import recording_of
 from models.recordings.checks import check_against_vehicle, check_physics
-from models.recordings.map import LogMap, told_signals
+from models.recordings.map import MEND, LogMap, told_signals
 from models.recordings.record import Recording
 from models.recordings.repair import Repair
 from models.vehicle import Vehicle, sedan
@@ -66,7 +66,7 @@ def read_recording(
     """
     path = Path(path)
     told = with_columns(map_of(log_map), columns)
-    log = open_log(path, told.dbc or None)
+    log = open_log(path, told.dbc or None, mend=told.order == MEND)
     return _judged(log, _stem(path), told, run=run, dt=dt, check=check)
 
 
@@ -143,7 +143,7 @@ def recording_from_arrays(
     RecordingError
         One line: name and run, column, rule, value, remedy.
     """
-    log = ArrayLog(name, data, told.clock)
+    log = ArrayLog(name, data, told.clock, mend=told.order == MEND)
     return _judged(log, name, replace(told, clock=""), run=run, dt=dt, check=check)
 
 

@@ -72,6 +72,7 @@ def test_what_is_written_reads_back_bit_for_bit(
         clock=words[1],
         longest_gap=gap,
         holes="cut" if gap > 1.0 else "refuse",
+        order="mend" if gap < 2.0 else "refuse",
         low_pass=low_pass,
         wheels=wheels,
         repair=repair,

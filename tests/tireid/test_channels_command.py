@@ -287,6 +287,41 @@ def test_cells_without_a_value_are_told_and_cut_out_by_the_map_that_is_written(f
 def test_a_map_says_refuse_or_cut_of_holes():
     with pytest.raises(RecordingError, match="holes must be refuse or cut, not 'fill'"):
         ti.LogMap(holes="fill")
+    with pytest.raises(RecordingError, match="order must be refuse or mend, not 'sort'"):
+        ti.LogMap(order="sort")
+
+
+def test_a_clock_is_mended_where_it_is_asked_for(folder, tmp_path, capsys):
+    rows = (folder / "plain.csv").read_text(encoding="utf-8").splitlines()
+    path, by = tmp_path / "twice.csv", tmp_path / "log.toml"
+    mixed = [rows[0], *rows[1:2000], rows[1999], *rows[2001:], rows[2000]]
+    path.write_text("\n".join([*mixed, ""]), encoding="utf-8")
+    with pytest.raises(
+        RecordingError, match=r"a sample is there twice: --mend-clock .* leaves one"
+    ):
+        read_recording(path)
+    assert main(["channels", str(path), "--mend-clock", "--write", str(by)]) == 0
+    assert 'order = "mend"' in by.read_text(encoding="utf-8")
+    read, right = read_recording(path, log_map=by), read_recording(folder / "plain.csv")
+    assert np.array_equal(read.t, right.t) and np.array_equal(read.r, right.r)
+    assert "t: samples out of order are sorted: 1" in read.notes
+    capsys.readouterr()
+
+
+def test_a_clock_that_a_map_names_is_mended_too(folder, tmp_path):
+    rows = (folder / "plain.csv").read_text(encoding="utf-8").splitlines()
+    own = [row.split(",")[0] for row in rows]
+    rows, own = [*rows, rows[-1]], ["own", *own[1:], own[-1]]
+    count = ["t", *(repr(k / 100.0) for k in range(len(rows) - 1))]
+    path = tmp_path / "own.csv"
+    both = zip(count, own, (row.partition(",")[2] for row in rows), strict=True)
+    path.write_text("\n".join([*map(",".join, both), ""]), encoding="utf-8")
+    with pytest.raises(RecordingError, match="a sample is there twice"):
+        read_recording(path, log_map=ti.LogMap(clock="own"))
+    mended = read_recording(path, log_map=ti.LogMap(clock="own", order="mend"))
+    right = read_recording(folder / "plain.csv")
+    assert np.array_equal(mended.t, right.t) and np.array_equal(mended.v_y, right.v_y)
+    assert any("left out: 1" in note for note in mended.notes)
 
 
 def written(path, log, columns):

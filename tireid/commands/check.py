@@ -232,6 +232,7 @@ def _require_drive(options: argparse.Namespace) -> None:
         "--columns": options.columns,
         "--dbc": options.dbc,
         "--cut-holes": options.cut_holes,
+        "--mend-clock": options.mend_clock,
     }
     for option, value in told.items():
         if value and options.along is None:

@@ -26,7 +26,7 @@ from identifier.paper.design import read_design
 from identifier.paper.network import SIGNALS
 from identifier.verdict import Verdict
 from models.recordings import LogMap, Recording, read_repaired, split_log_argument
-from models.recordings.map import CUT
+from models.recordings.map import CUT, MEND
 from models.recordings.reader import map_of, with_columns
 from models.schema import require_few
 from models.vehicle import Vehicle, sedan
@@ -292,7 +292,7 @@ def add_log_reading(parser: argparse.ArgumentParser) -> None:
 
 
 def add_log_map(parser: argparse.ArgumentParser) -> None:
-    """Add --log, --columns, --dbc and --cut-holes: how a log is read.
+    """Add --log, --columns, --dbc, --cut-holes and --mend-clock: how a log is read.
 
     Parameters
     ----------
@@ -324,6 +324,12 @@ def add_log_map(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="leave cells without a value (NaN) out of the logs, which are refused else",
     )
+    parser.add_argument(
+        "--mend-clock",
+        action="store_true",
+        help="sort samples by time, leave out those that share a stamp, and learn on what follows "
+        "where the clock starts again as after a gap; refused else",
+    )
 
 
 def _map_path(options: argparse.Namespace) -> Path | None:
@@ -348,6 +354,8 @@ def told_map(options: argparse.Namespace) -> LogMap:
     told = with_columns(map_of(_map_path(options)), column_words(options.columns))
     if options.cut_holes:
         told = replace(told, holes=CUT)
+    if options.mend_clock:
+        told = replace(told, order=MEND)
     return told if options.dbc is None else replace(told, dbc=options.dbc)
 
 

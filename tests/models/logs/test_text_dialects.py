@@ -292,7 +292,7 @@ WRONG = {
     ),
     "a sample twice": (
         plain().replace("\n0.510,", "\n0.500,"),
-        "Time [s] must increase, line 53 has 0.5 after 0.5; a sample is there twice: cut one",
+        "Time [s] must increase, line 53 has 0.5 after 0.5; a sample is there twice: --mend",
     ),
     "samples out of order": (
         plain().replace("\n0.510,", "\n0.485,"),
