@@ -324,6 +324,15 @@ PRESSURE = ("PPX1", "PPX2", "PPX3", "PPX4", "PPY1", "PPY2", "PPY3", "PPY4")
 MARKS_OF_OTHERS = (
     "PKY4", "PKY5", "PKY6", "PKY7", "PEY5", "PPY5", "RBX3", "RBY4", "PCY2", "NOMPRES", "INFLPRES",
 )  # fmt: skip
+# Of these, what changes no equation of a tire of 5.2: the pressures by their names of 6.x, and the
+# value of PKY4 at which K_y of 6.x is that of 5.2. PHY3 is what 6.x has no more: a file that calls
+# itself 5.2 and has it was extended for a program that asks for all names.
+PRESSURES_OF_OTHERS = ("INFLPRES", "NOMPRES")
+PKY4_OF_52 = 2.0
+
+# MF-Tyre 5.0 often fits a negative mu_y. Its sign is free: B = K/(C D) takes it too, and the curve
+# is the same in (-B, -D); D_Vyk = mu_y F_z (RVY1 + ...) is the only other place of mu_y.
+SIGNED_AS_FRICTION = ("PDY1", "PDY2", "RVY1", "RVY2", "RVY3")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -392,6 +401,8 @@ def read_magic_formula(path: str | PathLike[str]) -> MagicFormulaFile:
     tir = read_tir(path)
     _require_mf52(tir)
     c = _inflated(_coefficients(tir), tir)
+    if (tir.number("USE_MODE") or 0.0) < 0.0:
+        c = c.mirrored()  # as the format has it: a negative mode mirrors the characteristics
     side = tir.text("TYRESIDE", "LEFT").upper()
     if side not in ("LEFT", "RIGHT", "SYMMETRIC", "UNKNOWN"):
         raise tir.error(f"TYRESIDE must be LEFT, RIGHT or SYMMETRIC, it is {side!r}")
@@ -417,13 +428,21 @@ def _require_mf52(tir: TirFile) -> None:
             f"PROPERTY_FILE_FORMAT = {model!r} is another tire model; only PAC2002, MF_05 and "
             "MF 5.2 (MF-TYRE or USER with FITTYP 5, 6, 21 or 52) are read"
         )
-    if marks := [f"{key} = {value:g}" for key in MARKS_OF_OTHERS if (value := tir.number(key))]:
+    found = {key: value for key in MARKS_OF_OTHERS if (value := tir.number(key))}
+    if "PHY3" in tir and (model or fittyp is not None):
+        found = {key: value for key, value in found.items() if not _changes_nothing(key, value)}
+    if marks := [f"{key} = {value:g}" for key, value in found.items()]:
         label = f"it calls itself {model}" if model else "it has no PROPERTY_FILE_FORMAT"
         label += "" if fittyp is None else f", FITTYP {fittyp:g}"
         raise tir.error(
             f"{', '.join(marks)} belong to Magic Formula 6.x or MF-MCTyre, whose equations differ, "
             f"although {label}; only MF 5.2 and PAC2002 are read"
         )
+
+
+def _changes_nothing(key: str, value: float) -> bool:
+    """Whether a coefficient of 6.x leaves the equations of 5.2 as they are."""
+    return key in PRESSURES_OF_OTHERS or (key == "PKY4" and value == PKY4_OF_52)
 
 
 def _coefficients(tir: TirFile) -> Coefficients:
@@ -434,6 +453,8 @@ def _coefficients(tir: TirFile) -> Coefficients:
             value = tir.number("LKG")
         if value is not None:
             values[name] = value
+    if values.get("PDY1", 0.0) < 0.0:
+        values |= {name: -values[name] for name in SIGNED_AS_FRICTION if name in values}
     if missing := [name for name in ESSENTIAL if name not in values]:
         raise tir.error(f"lacks {', '.join(missing)}, without which there is no Magic Formula 5.2")
     try:
@@ -444,11 +465,12 @@ def _coefficients(tir: TirFile) -> Coefficients:
 
 def _inflated(c: Coefficients, tir: TirFile) -> Coefficients:
     """PAC2002's effect of inflation pressure, a constant of the file: scales eight coefficients."""
-    p, p_0 = tir.number("IP"), tir.number("IP_NOM")
-    if p is None or p_0 is None:
+    names = ("IP", "IP_NOM") if "IP" in tir else PRESSURES_OF_OTHERS
+    p, p_0 = (tir.number(name) for name in names)
+    if p is None or p_0 is None or (names == PRESSURES_OF_OTHERS and p == p_0 == 0.0):
         return c
     if not (p > 0.0 and p_0 > 0.0):
-        raise tir.error(f"IP and IP_NOM must be positive, they are {p:g} and {p_0:g}")
+        raise tir.error(f"{' and '.join(names)} must be positive, they are {p:g} and {p_0:g}")
     scale = tir.number("LIP")
     dp = ((1.0 if scale is None else scale) * p - p_0) / p_0
     PPX1, PPX2, PPX3, PPX4, PPY1, PPY2, PPY3, PPY4 = (tir.number(name) or 0.0 for name in PRESSURE)

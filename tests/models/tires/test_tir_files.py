@@ -1,7 +1,7 @@
 """Tire property files as the world writes them, and the lines that say what is wrong with one."""
 
 import re
-from math import inf, radians
+from math import atan, cos, inf, radians, sin
 from pathlib import Path
 
 import pytest
@@ -242,6 +242,62 @@ def test_the_pressure_coefficients_of_pac2002_are_no_mark_of_another_version(
     """PPX1-4 and PPY1-4 beside IP and IP_NOM are PAC2002's own; only PPY5 is not."""
     own = edited(IP="2", IP_NOM="2", PPX1="0.5", PPY1="-0.4", PPY4="0.1")
     MagicFormula.from_tir(written(tmp_path, f"PROPERTY_FILE_FORMAT = 'PAC2002'\n{own}"))
+
+
+def test_a_file_of_the_formula_that_lists_later_names_too_is_read(tmp_path: Path) -> None:
+    """PHY3 is what later versions dropped; PKY4 = 2 and equal pressures change no equation."""
+    own = edited(PHY3="0.02", PPY1="-0.4")
+    later = "PKY4 = 2\nPKY5 = 0\nPEY5 = 0\nNOMPRES = 80000\nINFLPRES = 80000"
+    for label in (
+        "PROPERTY_FILE_FORMAT = 'MF-TYRE'\nFITTYP = 52",
+        "PROPERTY_FILE_FORMAT = 'MF_05'",
+    ):
+        plain = MagicFormula.from_tir(written(tmp_path, f"{label}\n{own}")).coefficients
+        listed = written(tmp_path, f"{label}\n{own}\n{later}")
+        assert MagicFormula.from_tir(listed).coefficients == plain
+        for mark in ("PKY4 = 1.9", "PKY6 = -0.9"):
+            assert mark in complaint(tmp_path, f"{label}\n{own}\nNOMPRES = 80000\n{mark}")
+    assert "PKY4 = 2" in complaint(tmp_path, f"{own}\n{later}")
+
+
+def test_pressures_by_their_later_names_scale_as_those_of_pac2002(tmp_path: Path) -> None:
+    label = "PROPERTY_FILE_FORMAT = 'MF_05'\n"
+    effects = {"PHY3": "0.02", "PPY1": "-0.4", "PPY3": "-1"}
+    now, nominal = "220000", "200000"
+    later = label + edited(**effects, INFLPRES=now, NOMPRES=nominal)
+    own = label + edited(**effects, IP=now, IP_NOM=nominal)
+    read = MagicFormula.from_tir(written(tmp_path, later)).coefficients
+    mu = read.PDY1
+    assert mu == pytest.approx(0.9)
+    assert read == MagicFormula.from_tir(written(tmp_path, own)).coefficients
+    says = complaint(tmp_path, label + edited(**effects, INFLPRES="0", NOMPRES=nominal))
+    assert says == "INFLPRES and NOMPRES must be positive, they are 0 and 200000"
+
+
+def test_a_negative_lateral_friction_is_the_same_tire(tmp_path: Path) -> None:
+    """B = K/(C D) takes the sign of D, and D sin(C atan(B x)) is the same in (-B, -D)."""
+    values = {"PDY1": -0.71, "PDY2": 0.14, "PDY3": -4.5, "PHY1": 0.005, "PVY1": 0.014, "RVY1": 0.2}
+    values |= {"RVY4": 12.0, "RVY5": 1.9, "RVY6": -10.0, "RBY1": 7.0, "RBY2": 2.0, "RCY1": 1.0}
+    tire = MagicFormula.from_tir(written(tmp_path, edited(**{k: str(values[k]) for k in values})))
+    F_z, alpha, kappa, gamma = 5000.0, -0.06, -0.04, 0.03  # ISO slip angle
+    df = (F_z - 4000.0) / 4000.0
+    D = F_z * (values["PDY1"] + values["PDY2"] * df) * (1.0 - values["PDY3"] * gamma**2)
+    K = -19.0 * 4000.0 * sin(2.0 * atan(F_z / (1.9 * 4000.0)))
+    F_0 = D * sin(1.3 * atan(K / (1.3 * D) * (alpha + 0.005))) + F_z * 0.014
+    G = cos(atan(7.0 * cos(atan(2.0 * alpha)) * kappa))
+    S = D * 0.2 * cos(atan(12.0 * alpha)) * sin(1.9 * atan(-10.0 * kappa))
+    assert tire.forces(-alpha, kappa, gamma, F_z).F_y == pytest.approx(G * F_0 + S, rel=1e-6)
+    assert tire.cornering_stiffness(F_z) > 0.0
+
+
+def test_a_negative_use_mode_mirrors_the_tire(tmp_path: Path) -> None:
+    lopsided = {"PHY1": "0.01", "PVY1": "0.02", "RHX1": "0.003"}
+    plain = MagicFormula.from_tir(written(tmp_path, edited(**lopsided, USE_MODE="14")))
+    tire = MagicFormula.from_tir(written(tmp_path, edited(**lopsided, USE_MODE="-14")))
+    assert tire.side == plain.side == "left"
+    there, here = (one.forces(a, 0.0, 0.0, 4000.0).F_y for one, a in ((plain, -0.03), (tire, 0.03)))
+    assert here == pytest.approx(-there)
+    assert plain.forces(0.03, 0.0, 0.0, 4000.0).F_y != pytest.approx(here, rel=1e-3)
 
 
 def test_all_missing_coefficients_are_named_at_once(tmp_path: Path) -> None:
