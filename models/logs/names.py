@@ -36,6 +36,7 @@ from models.logs.units import (
     FORCE,
     HAND_WHEEL,
     RATE,
+    SPEED,
     is_told,
     quantities,
     to_si,
@@ -54,7 +55,9 @@ HAND = "steering wheel"  # an angle that wants a ratio
 LARGEST_ROAD = 1.2  # [rad]: an angle that goes further is that of a hand wheel
 LOOKED_AT = 20_000  # samples at most, in telling contents apart
 SPIKES = 1e-3  # share of samples that say nothing of the unit
-UNTOLD = {"r": ("", "deg/s"), "a_y": ("", "g")}  # units that are met where none is told, "" SI
+# Units that are met where none is told, "" SI.
+UNTOLD = {"v_x": ("", "km/h"), "r": ("", "deg/s"), "a_y": ("", "g")}
+SAME = 2e-3  # of their size: by less two channels differ that are one, but for rounding
 
 
 class Rule(NamedTuple):
@@ -101,13 +104,13 @@ NO_TORQUE = ("torque", "moment", "force", "power", "couple", "coppia", "par", "k
 UPRIGHT = ("z", "vert", "vertical", "vertikal", "verticale", "hoch")
 BEHIND = ("rear", "hinten", "hinterachse", "hinterachs", "ha", "arriere", "posteriore", "trasera",
           "trasero")  # fmt: skip
-TURNING = ("angular", "yaw", "gier", "lacet", "imbardata", "guinada")
+TURNING = ("angular", "ang", "yaw", "gier", "lacet", "imbardata", "guinada")
 FILTERED = {"filt", "filtered", "filter", "flt", "lowpass", "lp", "smooth", "smoothed",
             "gefiltert", "filtre", "filtree", "filtrata", "filtrado"}  # fmt: skip
 RULES: Mapping[str, Rule] = {
     "v_x": Rule(
         ("vx", "velx", "xvel", "velocityx", "vxb", "vlon", "vlong", "vellong", "vellon", "velfwd",
-         "velforward", "longvel", "vlgt", "vlaengs", "vxcg", "vxcog",
+         "velforward", "longvel", "vlgt", "vlaengs", "vxcg", "vxcog", "ux",
          "carvx", "vxcar", "vxref", "laengsgeschwindigkeit", "wheelbasedvehiclespeed", "vego",
          "egospeed"),
         (f"{LONGITUDINAL};{VELOCITY}", "linear;x"),
@@ -122,7 +125,7 @@ RULES: Mapping[str, Rule] = {
     ),
     "v_y": Rule(
         ("vy", "vely", "yvel", "velocityy", "vyb", "vlat", "vellat", "vellateral", "latvel",
-         "vquer", "vycg", "vycog", "carvy", "vycar", "vtrans", "veltrans", "vtransversal",
+         "vquer", "vycg", "vycog", "carvy", "vycar", "uy", "vtrans", "veltrans", "vtransversal",
          "vlateral"),
         (f"{LATERAL};{VELOCITY}", "linear;y", "quergeschwindigkeit", "trans;vel|velocity|v"),
         (),
@@ -141,13 +144,13 @@ RULES: Mapping[str, Rule] = {
     "r": Rule(
         ("r", "yawrate", "psip", "psidot", "dpsi", "gierrate", "giergeschwindigkeit", "gyroz",
          "zgyro", "omegaz", "wz", "angratez", "ratez", "zrate", "caryawrate", "yawvel", "gz",
-         "wzb", "angularratez", "angvelz", "yawratecar", "headingrate", "turnrate"),
+         "wzb", "angularratez", "angvelz", "yawratecar", "headingrate", "turnrate", "avz"),
         (f"{YAW};{CHANGE}", "angular|gyro|omega|rate|ang;z", "gierrate|giergeschwindigkeit|yawrate",
          "heading|turn;rate", "rotation;rate;z"),
         ("omega|angularvelocity|angularspeed|angularrate|angvel",),
         (*NOT_BODY, *NO_ACCELERATION, "x", "y", "roll", "pitch", "linear", "moment", "torque",
          "engine", "motor", "moteur", "motore", "crank", "shaft", "turbo", "turbine", "fan",
-         "pump"),
+         "pump", "gear", "rotor"),
     ),
     "delta_f": Rule(
         ("deltaf", "deltafront", "roadwheelangle", "frontwheelangle", "frontsteer",
@@ -156,17 +159,18 @@ RULES: Mapping[str, Rule] = {
         ("road|front;wheel;angle", "steering|steer;tire|tyre;angle", "front|f;steer|steering",
          "drive;steering;angle", "road;steer|steering", "radlenkwinkel|radeinschlag",
          "ackermann;steering;angle"),
-        ("delta",),
+        ("delta|deltawheel",),
         (*CORNERS, *REFERENCE, *NO_TORQUE, *NO_SPEED, *BEHIND, "mode", "assist"),
     ),
     HAND: Rule(
         ("steeringwheelangle", "steeringwheel", "handwheel", "handwheelangle", "swa", "sasangle",
          "lenkradwinkel", "lrw", "deltasw", "steerwhlang", "steeringwheelposition", "sas",
-         "steerwhlangle", "stwhlang", "deltah", "lenkradw"),
+         "steerwhlangle", "stwhlang", "deltah", "lenkradw", "steersw"),
         ("steer|steering|hand|stw|driv;wheel|whl;angle|ang|position|pos", "handwheel;angle|ang",
-         "lenkradwinkel|lenkrad", "sas|lws;angle|ang|winkel", "steering;wheel",
+         "lenkradwinkel|lenkrad", "sas|lws;angle|ang|agl|winkel", "steering;wheel",
          "volant|volante;angle|angolo|angulo|ang"),
         ("steer|steering|steerangle|steeringangle|lenkwinkel|steerang|lenkung|steeredangle|"
+         "steerpos|steeringpos|steerposition|steeringposition|"
          "braquage|anglebraquage|angledebraquage|sterzo|angolosterzo|angolodisterzo|"
          "angulodireccion|angulodedireccion",),
         (*CORNERS, *REFERENCE, *NO_TORQUE, *NO_SPEED, *BEHIND, "front", "road", "tire", "tyre",
@@ -182,7 +186,8 @@ RULES: Mapping[str, Rule] = {
     "a_y": Rule(
         ("ay", "accy", "accely", "yaccel", "accelerationy", "latacc", "lataccel", "acclat",
          "glat", "latg", "gforcelat", "querbeschleunigung", "aquer", "aqu", "bquer", "caray",
-         "lateralacceleration", "lateralacc", "accelerometery", "aycog", "aycg", "ayb"),
+         "lateralacceleration", "lateralacc", "accelerometery", "aycog", "aycg", "ayb",
+         "alhori", "lateralg"),
         (f"{LATERAL};{ACCELERATIONS}|g", "linear;acceleration;y", "querbeschleunigung",
          "trans;acc|accel|acceleration"),
         (),
@@ -225,6 +230,8 @@ LONG_SIDES = (  # words of a corner, in either order, and what they are cut down
 )
 # Words in a name beside a unit that fits, by what they begin with: they may mean the signal.
 HINTS: Mapping[str, tuple[str, ...]] = {
+    "r": ("yaw", "gier", "gyro"),
+    "delta_f": ("steer", "lenk"),
     "v_y": ("quer", "transv", "trasv", "lateral", "side", "seit"),
     BETA: ("slip", "schwimm", "drift", "deriv", "assetto"),
 }
@@ -233,6 +240,9 @@ _FIRST = "soll|ist|fahrzeug|fahr|quer|laengs|gier|vertikal|hoch|radlenk|lenkrad|
 _LAST = "beschleunigung|beschl|geschwindigkeit|geschw|rate|winkel|moment|kraft"
 _COMPOUND = re.compile(f"(?:{_FIRST})+(?:{_LAST})+")
 _PARTS = re.compile(f"{_FIRST}|{_LAST}")
+# CarSim says left or right and the number of the axle: "Steer_L1", "Fy_R2".
+_SIDE_AND_AXLE = re.compile(r"(?<![A-Za-z0-9])[LR][12](?![A-Za-z0-9])")
+CORNER_OF_AXLE = {"L1": " fl ", "R1": " fr ", "L2": " rl ", "R2": " rr "}
 GENERIC = ("data", "value")  # a field that says nothing, as of std_msgs: its topic is its name
 UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ψ": "psi", "β": "beta",
                          "δ": "delta", "ω": "omega"})  # fmt: skip
@@ -320,6 +330,7 @@ def words_of(name: str) -> tuple[str, ...]:
     plain = unicodedata.normalize("NFC", name).translate(UMLAUTS)
     plain = "".join(one if one in "ÄÖÜ" else unicodedata.normalize("NFD", one)[0] for one in plain)
     plain = re.sub(r"\[[^]]*\]|\([^)]*\)", " ", plain)  # a unit in brackets
+    plain = _SIDE_AND_AXLE.sub(lambda found: CORNER_OF_AXLE[found[0]], plain)
     plain = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", plain)
     plain = re.sub(r"([A-Z]+)([A-Z][a-z])", r"\1 \2", plain)
     return tuple(re.findall(r"[a-z]+|\d+", plain.lower().translate(UMLAUTS)))
@@ -404,16 +415,47 @@ def propose(log: LogFile, headings: Sequence[Heading], run: str | None = None) -
     guesses: dict[str, Guess] = {}
     rivals: dict[str, tuple[Guess, ...]] = {}
     for name, found in candidates.items():
-        ranked = sorted((one for one in found if one.confidence > 0.0),
-                        key=lambda one: -one.confidence)  # fmt: skip
+        ranked = sorted((one for one in found if one.confidence > 0.0), key=_rank)
         if not ranked:
             continue
         guesses[name] = ranked[0]
-        equal = [one for one in ranked if one.confidence > ranked[0].confidence - APART]
+        equal = [
+            one
+            for one in ranked
+            if one.confidence > ranked[0].confidence - APART
+            and _rank(one)[0] == _rank(ranked[0])[0]
+        ]
         if len(equal) > 1:
             equal.sort(key=lambda one: -_rate(seen[one.channel[0]]))
-            guesses[name], rivals[name] = equal[0], tuple(equal)
+            guesses[name] = equal[0]
+            others = [one for one in equal[1:] if not _are_one(name, equal[0], one, seen)]
+            if others:
+                rivals[name] = (equal[0], *others)
     return Proposal(guesses=guesses, rivals=rivals)
+
+
+def _rank(guess: Guess) -> tuple[bool, float]:
+    """Return what guesses are sorted by: a clear one that needs no ratio first, then the surest."""
+    return guess.hand or guess.confidence < WORDS, -guess.confidence
+
+
+def _are_one(name: str, one: Guess, other: Guess, seen: Mapping[str, Channel]) -> bool:
+    """Return whether two guesses are one channel, as SPEED_KPH and SPEED_MPH: name and numbers."""
+    if len(one.channel) + len(other.channel) > 2 or _is_told(one) != _is_told(other):
+        return False
+    names = (words_of(without_ending(guess.channel[0], guess.unit)) for guess in (one, other))
+    if len(set(names)) > 1:
+        return False
+    first, second = (seen[guess.channel[0]] for guess in (one, other))
+    good, there = np.isfinite(first.values), np.isfinite(second.values)
+    if not good.any() or not there.any():
+        return False
+    scales = (to_si(guess.unit, quantity_of(name, guess.unit), name) for guess in (one, other))
+    beside = np.interp(first.t[good], second.t[there], second.values[there])
+    here, beside = (
+        x * scale for x, scale in zip((first.values[good], beside), scales, strict=True)
+    )
+    return _root_mean_square(here - beside) <= SAME * _root_mean_square(here)
 
 
 def _rate(channel: Channel) -> float:
@@ -454,7 +496,7 @@ def _candidates(signal: str, headings: Sequence[Heading]) -> list[Guess]:
         elif _is_hint(signal, one):
             unit, why = one.unit.strip(), "by a word of its name and its unit"
             found.append(Guess(channel=(one.name,), confidence=HINT, unit=unit, why=why))
-    if signal in PER_WHEEL and not any(one.confidence >= WORDS for one in found):
+    if signal in PER_WHEEL and all(one.hand or one.confidence < WORDS for one in found):
         found += _pairs(signal, listed)
     return found
 
@@ -537,6 +579,8 @@ def _looked(signal: str, guess: Guess, seen: Mapping[str, Channel]) -> Guess:
         return guess
     if not guess.unit:
         return _by_range(signal, guess, size, usual)
+    if QUANTITIES[signal] == RATE and guess.confidence <= VAGUE:
+        return _slow_enough(guess, usual * to_si(guess.unit, RATE, signal))
     if QUANTITIES[signal] != ANGLE:
         return guess
     largest = size * to_si(guess.unit, ANGLE, signal)
@@ -544,6 +588,13 @@ def _looked(signal: str, guess: Guess, seen: Mapping[str, Channel]) -> Guess:
         why = f"goes to {math.degrees(largest):.0f} deg, as a hand wheel does"
         return replace(_said(guess, why), hand=True)
     return guess
+
+
+def _slow_enough(guess: Guess, usual: float) -> Guess:
+    """Return a guess of r by a name that wheels and shafts have too; no car turns as fast."""
+    if not unit_of_range(RATE, usual):
+        return guess
+    return replace(_said(guess, f"goes to {usual:.3g} rad/s"), confidence=0.0)
 
 
 def _by_range(signal: str, guess: Guess, size: float, usual: float) -> Guess:
@@ -562,7 +613,7 @@ def _by_range(signal: str, guess: Guess, size: float, usual: float) -> Guess:
         hand = usual * to_si(unit, quantity, signal) > LARGEST_ROAD
         guess = replace(guess, hand=hand)
     if not unit:
-        return _said(guess, f"goes to {size:.3g}") if quantity == ANGLE else guess
+        return _said(guess, f"goes to {size:.3g}") if quantity in (ANGLE, SPEED) else guess
     far = f"goes to {size:.3g}, " + ("as a hand wheel does in" if guess.hand else "so in")
     return _said(replace(guess, unit=unit), f"{far} {unit}")
 
@@ -570,7 +621,7 @@ def _by_range(signal: str, guess: Guess, size: float, usual: float) -> Guess:
 def _beside_turning(
     candidates: Mapping[str, list[Guess]], seen: Mapping[str, Channel]
 ) -> dict[str, list[Guess]]:
-    """Return the guesses; r and a_y without a unit in those with which a_y is nearest to v_x r.
+    """Return the guesses; those without a unit in the one with which a_y is nearest to v_x r.
 
     Where they cannot be set beside each other, how far a_y goes tells whether it is in g.
     """
@@ -587,7 +638,17 @@ def _beside_turning(
             else _in_turning(name, {**best, name: guess}, seen)
             for guess in candidates[name]
         ]
+    forward = next((one for one in mended["v_x"] if one.channel == _channel_of(best, "v_x")), None)
+    if forward is not None and forward.unit and not _is_told(best["v_x"]):
+        mended["v_y"] = [
+            guess if _is_told(guess) else replace(_said(guess, "as v_x"), unit=forward.unit)
+            for guess in candidates["v_y"]
+        ]
     return mended
+
+
+def _channel_of(there: Mapping[str, Guess], name: str) -> tuple[str, ...]:
+    return there[name].channel if name in there else ()
 
 
 def _is_told(guess: Guess) -> bool:
@@ -596,10 +657,10 @@ def _is_told(guess: Guess) -> bool:
 
 
 def _in_turning(name: str, there: Mapping[str, Guess], seen: Mapping[str, Channel]) -> Guess:
-    """Return the guess of r or a_y in the unit that v_x, r and a_y together have."""
+    """Return the guess of one of them in the unit that v_x, r and a_y together have."""
     guess = there[name]
     sizes = {one: _root_mean_square(seen[there[one].channel[0]].values) for one in there}
-    if len(there) < 3 or not _is_told(there["v_x"]) or not all(sizes.values()):
+    if len(there) < 3 or not all(sizes.values()):
         usual = _usual(seen[guess.channel[0]].values)
         return replace(guess, unit=unit_of_range(QUANTITIES[name], usual))
 

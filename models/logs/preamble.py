@@ -21,6 +21,7 @@ from typing import NamedTuple
 from codegen.escape import shown
 from models.logs.log import RecordingError
 from models.logs.spelling import is_unit, is_units_row, unit_in_name
+from models.logs.units import quantities
 from models.schema import require_few
 
 HEAD, LINES = 1 << 18, 1500  # bytes and lines that are looked at
@@ -43,6 +44,8 @@ _INSTANT = re.compile(
     r"(?:[T ]\d\d:?\d\d(?::?\d\d(?:[.,]\d+)?)?(?: ?(?:Z|UTC|[-+]\d\d:?\d\d))?)?"
     r"|(?:\d+:)?\d{1,2}:\d\d(?:[.,]\d+)?"
 )
+# RaceCapture describes a channel in one cell: "Speed"|"mph"|0.0|150.0|10, its range and rate.
+_DESCRIBED = re.compile(r'"?(?P<name>[^"|]+)"?\|"?(?P<unit>[^"|]*)"?(?:\|[-+.\deE]*){1,3}')
 _CONTROLS = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 _QUOTED = re.compile(r'["\r\n\x00]')  # what a reader of CSV does more with than to split
 LONGEST_CELL = csv.field_size_limit()  # characters
@@ -273,6 +276,10 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
         )
     while len(names) > width and not names[-1] and len(names) > 1:
         names.pop()  # the header alone ends in a delimiter
+    if not units and (described := [_DESCRIBED.fullmatch(name) for name in names]):
+        fitting = [one for one in described if one]
+        if len(fitting) == len(names):
+            names, units = [one["name"] for one in fitting], [one["unit"] for one in fitting]
     units = (units + [""] * len(names))[: len(names)]
     units = [
         unit.strip("[](){} ") or unit_in_name(name) for name, unit in zip(names, units, strict=True)
@@ -424,7 +431,9 @@ def _no_data(path: Path, lines: list[str], encoding: str) -> Layout:
     )
 
 
-# Racelogic VBOX: [header], [column names], [data], each a section.
+# Racelogic VBOX: [header], [channel units], [column names], [data], each a section.
+
+_OF_THE_BOX = ("sats", "time", "lat", "long", "velocity", "heading", "height")
 
 
 def _sections(lines: list[str]) -> dict[str, int] | None:
@@ -449,7 +458,10 @@ def _racelogic(path: Path, lines: list[str], encoding: str, at: dict[str, int]) 
         after = [k for k in at.values() if k > at["header"]]
         titles = [one.strip() for one in lines[at["header"] + 1 : min(after)] if one.strip()]
         if len(titles) == len(names):
-            units = [one.split()[-1] if is_unit(one.split()[-1]) else "" for one in titles]
+            last = [one.rpartition(" ")[2] if " " in one else "" for one in titles]
+            units = [word if is_unit(word) else "" for word in last]
+    if "channel units" in at:
+        units = _with_channel_units(lines, at, names, units)
     known = {"time": "hhmmss", "velocity": "km/h", "lat": "min", "long": "min", "heading": "deg"}
     units = [unit or known.get(name.lower(), "") for name, unit in zip(names, units, strict=True)]
     units = [
@@ -477,3 +489,23 @@ def _racelogic(path: Path, lines: list[str], encoding: str, at: dict[str, int]) 
         ),
         made_by="Racelogic VBOX",
     )
+
+
+def _with_channel_units(
+    lines: list[str], at: dict[str, int], names: Sequence[str], units: Sequence[str]
+) -> list[str]:
+    """Return units with those of [channel units], a line for each of the last columns.
+
+    None of them where one is not what the name or title of its column says.
+    """
+    end = min((k for k in at.values() if k > at["channel units"]), default=len(lines))
+    listed = [one.strip() for one in lines[at["channel units"] + 1 : end] if one.strip()]
+    own = len(names) - len(listed)
+    if own < 0 or any(name.lower() in _OF_THE_BOX for name in names[own:]):
+        return list(units)
+    told = [unit if is_unit(unit) else "" for unit in listed]
+    for name, title, unit in zip(names[own:], units[own:], told, strict=True):
+        said = title or unit_in_name(name)
+        if said and unit and quantities(said) != quantities(unit):
+            return list(units)
+    return [*units[:own], *(a or b for a, b in zip(units[own:], told, strict=True))]

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 
-from models.logs.units import is_known
+from models.logs.units import are_same, is_known
 from models.schema import LONGEST_NAME
 
 _OTHERS = (
@@ -120,4 +120,4 @@ def without_ending(name: str, unit: str) -> str:
     unit : that was understood: "km/h".
     """
     bare, meant = _ending(name)
-    return bare if meant == unit else name
+    return bare if are_same(meant, unit) else name

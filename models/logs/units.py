@@ -138,6 +138,7 @@ _WORDS = (
     ("kilometres", "km"),
     ("meters", "m"),
     ("metres", "m"),
+    ("|", "/"),  # as dSPACE writes it: km|h, where a name may have no slash
     ("**", "^"),
     ("·", "*"),
     ("⋅", "*"),
@@ -205,6 +206,20 @@ def time_unit(unit: str) -> str:
     unit : as written.
     """
     return _TIMES.get(_plain(unit), "")
+
+
+def are_same(one: str, other: str) -> bool:
+    """Return whether two spellings are one unit, as "deg" and "°".
+
+    Parameters
+    ----------
+    one, other : as written.
+    """
+    first, second = _plain(one), _plain(other)
+    return first == second or any(
+        first in known and second in known and known[first] == known[second]
+        for known in FACTORS.values()
+    )
 
 
 def is_told(unit: str) -> bool:

@@ -14,29 +14,30 @@ CALLED = {
             "Velocity_X", "WheelBasedVehicleSpeed", "carState.vEgo", "vxCG", "VelLong", "Geschw",
             "Längsgeschw.", "Fahrzeuggeschwindigkeit", "Vitesse", "vitesse_longitudinale",
             "Velocità longitudinale", "Velocidad", "Längsgeschwindigkeit", "Ground Speed",
-            "/vehicle/status/velocity_status/longitudinal_velocity"],
+            "/vehicle/status/velocity_status/longitudinal_velocity", "Ux"],
     "v_y": ["vy", "Vel Lat", "LatVel", "VelLateral", "Car.vy", "/odom/twist.twist.linear.y",
             "Correvit.VelTrans", "VelTrans", "Quergeschw", "v_transversal", "Transverse Velocity",
             "vyCG", "vitesse latérale", "Velocità trasversale", "velocidad_lateral",
-            "v_lat", "Quergeschwindigkeit", "lateral_velocity", "Correvit_vQuer"],
+            "v_lat", "Quergeschwindigkeit", "Uy", "lateral_velocity", "Correvit_vQuer"],
     "beta": ["beta", "Schwimmwinkel", "Slip_Angle", "SideSlipAngle", "Car.SideSlipAngle",
              "sideSlip", "angle de dérive caisse"],
     "r": ["r", "Car.YawRate", "Yaw_Rate", "Gyro Z", "AngRateZ", "Gierrate", "Giergeschwindigkeit",
           "/imu/angular_velocity.z", "psi_dot", "YAW_RATE", "ESP_YawRate", "Gyro Yaw Velocity",
-          "carState.yawRate", "livePose.angularVelocityDevice.z", "Ist-Gierrate",
+          "AVz", "carState.yawRate", "livePose.angularVelocityDevice.z", "Ist-Gierrate",
           "Vitesse de lacet", "Velocità di imbardata", "velocidad_guiñada", "omega",
           "Angular Velocity"],
     "delta_f": ["delta_f", "RoadWheelAngle", "/ackermann_cmd/drive.steering_angle",
                 "/vehicle/status/steering_status/steering_tire_angle", "Radlenkwinkel",
-                "roadwheelAngle"],
+                "roadwheelAngle", "Delta_Wheel"],
     HAND: ["Steering Angle", "SteerAngle", "Steered Angle", "SWA", "Steering_Wheel_Angle",
            "Lenkradwinkel", "SAS_Angle", "LWS_Angle", "Steer.WhlAng", "HandwheelAngle",
            "handwheelAngle", "carState.steeringAngle", "/steering_angle/data", "Angle volant",
-           "Angolo volante", "ángulo_volante", "delta_h"],
+           "Angolo volante", "ángulo_volante", "delta_h", "Steering Pos", "Steer_SW",
+           "SAS_SteerAgl"],
     "a_y": ["ay", "G Force Lat", "LateralAcc", "GPS LatAcc", "Acc_Y", "Querbeschleunigung",
             "Querbeschl", "ayCG", "Accélération transversale", "Accelerazione laterale",
             "aceleración lateral", "Car.ay", "/imu/linear_acceleration.y", "AccelLateral",
-            "Accel Y"],
+            "Accel Y", "alHori", "LATERALG"],
     "delta_r": ["delta_r", "RearSteerAngle"],
     "Fyf": ["Fyf", "Fy_front"],
     "Fyr": ["Fyr", "Fy_rear"],
@@ -55,7 +56,7 @@ NO_SIGNAL = ["Engine RPM", "Wheel Speed FL", "Brake Pressure", "Yaw Rate Target"
              "Motordrehzahl", "engine_omega", "omega_fl", "consigne de vitesse",
              "radar.LateralVelocity", "Obj01_vLat",
              "lead.vRel", "DAS_setSpeed", "KBI_angez_Geschw", "SAS_Speed",
-             "Seitenwind"]  # fmt: skip
+             "Seitenwind", "local_ang_vel_y", "motor_omega", "Steer_L1", "Steer_R1"]  # fmt: skip
 
 
 @pytest.mark.parametrize(("signal", "name"), [(s, n) for s, all_ in CALLED.items() for n in all_])
@@ -351,3 +352,57 @@ def test_the_programs_of_stanford_are_understood_but_for_the_ratio() -> None:
         ("handwheelAngle", "deg", 90 * WAVE),
     )
     assert set(found.signals()) == {"v_x", "v_y", "r", "a_y"} and found.guesses["delta_f"].hand
+
+
+def test_a_side_and_the_number_of_an_axle_are_a_corner() -> None:
+    """CarSim's R1 is the right wheel of the front axle, and none of the rear."""
+    assert words_of("Steer_R1") == ("steer", "fr") and words_of("Fy_L2") == ("fy", "rl")
+    assert words_of("IMU_L12") == words_of("IMU_l12") == ("imu", "l", "12")
+    found = proposed(
+        *((f"Steer_{place}", "deg", 5 * WAVE) for place in ("L1", "R1")),
+        *((f"Fy_{place}", "N", 2e3 * WAVE) for place in ("L1", "R1", "L2", "R2")),
+        ("Steer_SW", "deg", 80 * WAVE),
+    )
+    assert found.guesses["delta_f"].channel == ("Steer_L1", "Steer_R1")
+    assert found.is_sure("delta_f") and "delta_r" not in found.guesses
+    assert found.guesses["Fyf"].channel == ("Fy_L1", "Fy_R1")
+    assert found.guesses["Fyr"].channel == ("Fy_L2", "Fy_R2")
+
+
+def test_a_channel_that_is_there_in_two_units_is_one() -> None:
+    speed = 70 + WAVE
+    found = proposed(("SPEED_KPH", "", speed), ("SPEED_MPH", "", np.round(speed / 1.609344, 2)))
+    assert found.is_sure("v_x") and "v_x" not in found.rivals
+    again = proposed(("speed", "m/s", speed), ("speed (2)", "m/s", speed))
+    assert again.is_sure("v_x")
+    others = proposed(("SPEED_KPH", "", speed), ("SPEED_MPH", "", speed / 1.5))
+    assert not others.is_sure("v_x") and len(others.rivals["v_x"]) == 2
+
+
+def test_omega_is_a_yaw_rate_where_it_is_no_faster_than_a_car_turns() -> None:
+    assert proposed(("omega", "rad/s", 0.5 * WAVE)).is_sure("r")
+    assert "r" not in proposed(("omega", "rad/s", 60 + WAVE)).guesses
+
+
+def test_a_speed_without_a_unit_is_told_by_how_the_car_turns() -> None:
+    """v_x r = a_y: at 20 m/s and 0.4 rad/s 0.82 g."""
+    turn = (("Gyro Z", "", 0.4 * 57.3 * WAVE), ("GForceY", "", 0.82 * WAVE))
+    found = proposed(("Speed", "", 72.0 + WAVE), ("Vy", "", 3.6 * WAVE), *turn)
+    told = {name: found.guesses[name].unit for name in ("v_x", "v_y", "r", "a_y")}
+    assert told == {"v_x": "km/h", "v_y": "km/h", "r": "deg/s", "a_y": "g"}
+    assert not any(found.is_sure(name) for name in told)
+    slow = proposed(("Speed", "", 20.0 + WAVE), ("Vy", "", WAVE), *turn)
+    assert slow.guesses["v_x"].unit == slow.guesses["v_y"].unit == ""
+
+
+def test_a_word_of_a_name_and_its_unit_are_named_and_not_taken() -> None:
+    found = proposed(("Yaw", "deg/s", 20 * WAVE), ("SteerXyz", "deg", 90 * WAVE))
+    assert found.guesses["r"].channel == ("Yaw",) and not found.is_sure("r")
+    assert found.guesses["delta_f"].hand and found.guesses["delta_f"].confidence < SURE
+    assert "r" not in proposed(("Yaw", "deg", 20 * WAVE)).guesses
+
+
+def test_a_unit_in_a_name_may_be_spelled_in_another_way_beside_it() -> None:
+    assert without_ending("steering_deg", "°") == "steering"
+    assert without_ending("speed_kmh", "kph") == "speed"
+    assert without_ending("speed_kmh", "mph") == "speed_kmh"

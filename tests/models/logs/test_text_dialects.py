@@ -391,3 +391,50 @@ def test_a_line_is_data_or_not_whether_seen_at_once_or_cell_by_cell(monkeypatch)
     monkeypatch.setattr(preamble, "_numbers", lambda *_: re.compile("(?!)"))
     assert at_once == [preamble._is_data(*case) for case in cases]
     assert 0.01 < np.mean(at_once) < 0.99
+
+
+VBO = """[header]
+satellites
+time
+velocity kmh
+{titles}
+
+[channel units]
+{units}
+
+[column names]
+sats time velocity {names}
+
+[data]
+012 103000.00 071.2 +1.0E+00 +2.0E+00
+012 103000.01 071.3 +1.1E+00 +2.1E+00
+"""
+
+
+@pytest.mark.parametrize(
+    ("names", "units", "told"),
+    [
+        ("slip yaw", "Degrees\n°/s", ("Degrees", "°/s")),
+        ("gear yaw_rate", "(null)\n°/s", ("", "°/s")),
+        ("brake yaw_rate", "°/s", ("", "°/s")),
+        ("accel_g slip", "°\nG", ("", "")),
+        ("slip yaw", "%\n°\n°\n°/s\nG\nbar", ("", "")),
+    ],
+    ids=["each", "none told", "of the last", "against a name", "more than columns"],
+)
+def test_units_of_a_vbo_belong_to_its_last_columns(tmp_path, names, units, told):
+    titles = names.replace(" ", "\n")
+    text = VBO.format(names=names, units=units, titles=titles)
+    listed = {one.name: one.unit for one in open_log(written(tmp_path, text, "log.vbo")).listed()}
+    assert tuple(listed[name] for name in names.split()) == told
+    assert listed["velocity"] == "kmh"
+
+
+def test_a_cell_that_describes_a_channel_is_its_name_and_unit(tmp_path):
+    head = '"Interval"|"ms"|0|0|1,"Speed"|"mph"|0.0|150.0|10,"Yaw"|"Deg/Sec"|-120|120|25'
+    rows = "".join(f"{40 * k},{40.0 + k if k % 2 else ''},{0.5 * k}\n" for k in range(20))
+    log = open_log(written(tmp_path, f"{head}\n{rows}", "run.log"))
+    assert [(one.name, one.unit) for one in log.listed()] == [("Speed", "mph"), ("Yaw", "Deg/Sec")]
+    speed, yaw = log.read(["Speed", "Yaw"])
+    assert np.isfinite(speed.values).sum() == 10
+    assert np.diff(yaw.t) == pytest.approx(0.04)
