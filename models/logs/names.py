@@ -77,12 +77,13 @@ LONGITUDINAL = "long|longitudinal|longitudinale|fwd|forward|x|laengs|lon|lgt"
 ACROSS = "transversal|transversale|trasversale|transverse|transv"
 LATERAL = f"lat|lateral|laterale|y|quer|side|{ACROSS}"
 ROMANCE_SPEED = "vitesse|velocita|velocidad"
-VELOCITY = f"vel|velocity|v|speed|spd|geschwindigkeit|geschw|{ROMANCE_SPEED}"
+VELOCITY = f"vel|velocity|velocities|v|speed|spd|geschwindigkeit|geschw|{ROMANCE_SPEED}"
 ACCELERATIONS = (
-    "acc|accel|acceleration|a|beschleunigung|beschl|gforce|accelerazione|aceleracion|acel"
+    "acc|accel|acceleration|accelerations|a|beschleunigung|beschl|gforce|accelerazione|"
+    "aceleracion|acel"
 )
 YAW = "yaw|gier|psi|lacet|imbardata|guinada"
-CHANGE = f"rate|vel|velocity|speed|geschwindigkeit|geschw|dot|p|d|taux|{ROMANCE_SPEED}"
+CHANGE = f"rate|vel|velocity|velocities|speed|geschwindigkeit|geschw|dot|p|d|w|taux|{ROMANCE_SPEED}"
 WHEEL_WORDS = ("wheel", "wheels", "tire", "tyre", "rad", "reifen", "whl", "roue", "roues", "ruota",
                "ruote", "rueda", "ruedas", "pneu", "pneus", "pneumatico", "neumatico")  # fmt: skip
 CORNERS = ("fl", "fr", "rl", "rr", "vl", "vr", "hl", "hr", "lf", "rf", "lr")
@@ -91,15 +92,24 @@ REFERENCE = ("cmd", "command", "target", "desired", "des", "ref", "request", "re
              "status", "soll", "accuracy", "sigma", "bias", "offset", "dev", "commanded", "demand",
              "requested", "reference", "setpoint", "wanted", "planned", "goal", "limiter", "cruise",
              "actuator", "actuators", "sollwert", "vorgabe", "anforderung", "consigne", "cible",
-             "riferimento", "richiesta", "consigna", "objetivo", "deseado", "deseada")  # fmt: skip
+             "riferimento", "richiesta", "consigna", "objetivo", "deseado", "deseada", "sign",
+             "sgn", "vz", "vorzeichen")  # fmt: skip
 NOT_BODY = (*WHEEL_WORDS, *CORNERS, *REFERENCE)
 OTHER_CARS = ("radar", "lidar", "obj", "object", "objekt", "lead", "rel", "relative", "relativ")
 SHOWN = ("ui", "display", "displayed", "indicated", "cluster", "angez", "anzeige", "angezeigt",
          "setspeed", "setspd", "speedset")  # fmt: skip
-NO_VELOCITY = ("speed", "velocity", "vel", "geschw", "geschwindigkeit", *ROMANCE_SPEED.split("|"))
+NO_VELOCITY = (
+    "speed",
+    "velocity",
+    "velocities",
+    "vel",
+    "geschw",
+    "geschwindigkeit",
+    *ROMANCE_SPEED.split("|"),
+)
 NO_SPEED = (*NO_VELOCITY, "rate", "dot")
-NO_ACCELERATION = ("accel", "acceleration", "acc", "beschl", "beschleunigung", "accelerazione",
-                   "aceleracion", "acel")  # fmt: skip
+NO_ACCELERATION = ("accel", "acceleration", "accelerations", "acc", "beschl", "beschleunigung",
+                   "accelerazione", "aceleracion", "acel")  # fmt: skip
 NO_TORQUE = ("torque", "moment", "force", "power", "couple", "coppia", "par", "kraft")
 UPRIGHT = ("z", "vert", "vertical", "vertikal", "verticale", "hoch")
 BEHIND = ("rear", "hinten", "hinterachse", "hinterachs", "ha", "arriere", "posteriore", "trasera",
@@ -110,12 +120,12 @@ FILTERED = {"filt", "filtered", "filter", "flt", "lowpass", "lp", "smooth", "smo
 RULES: Mapping[str, Rule] = {
     "v_x": Rule(
         ("vx", "velx", "xvel", "velocityx", "vxb", "vlon", "vlong", "vellong", "vellon", "velfwd",
-         "velforward", "longvel", "vlgt", "vlaengs", "vxcg", "vxcog", "ux",
+         "velforward", "longvel", "vlgt", "vlaengs", "vxcg", "vxcog", "ux", "vxbody", "vxsm",
          "carvx", "vxcar", "vxref", "laengsgeschwindigkeit", "wheelbasedvehiclespeed", "vego",
          "egospeed"),
         (f"{LONGITUDINAL};{VELOCITY}", "linear;x"),
         ("speed|velocity|spd|geschwindigkeit|fahrgeschwindigkeit|vfzg|vehspd|vveh|v|vel|"
-         "speed2d|kmh|fahrzeuggeschwindigkeit|vehv|groundspeed|vehiclespeed|geschw|fahrgeschw|"
+         "speedveh|vsignal|vist|speed2d|kmh|fahrzeuggeschwindigkeit|vehv|groundspeed|vehiclespeed|geschw|fahrgeschw|"
          f"fahrzeuggeschw|{ROMANCE_SPEED}|vitessevehicule|velocitaveicolo|velocidadvehiculo",),
         (*NOT_BODY, *OTHER_CARS, *SHOWN, *TURNING, *UPRIGHT, *NO_ACCELERATION, "y", "engine",
          "motor", "moteur", "motore", "sas", "lws", "lateral", "lat", "laterale", "quer",
@@ -125,8 +135,8 @@ RULES: Mapping[str, Rule] = {
     ),
     "v_y": Rule(
         ("vy", "vely", "yvel", "velocityy", "vyb", "vlat", "vellat", "vellateral", "latvel",
-         "vquer", "vycg", "vycog", "carvy", "vycar", "uy", "vtrans", "veltrans", "vtransversal",
-         "vlateral"),
+         "vquer", "vycg", "vycog", "carvy", "vycar", "uy", "vybody", "vysm", "vtrans", "veltrans",
+         "vtransversal", "vlateral"),
         (f"{LATERAL};{VELOCITY}", "linear;y", "quergeschwindigkeit", "trans;vel|velocity|v"),
         (),
         (*NOT_BODY, *OTHER_CARS, *TURNING, *UPRIGHT, *NO_ACCELERATION, "x", "east", "north",
@@ -136,7 +146,8 @@ RULES: Mapping[str, Rule] = {
         ("beta", "sideslip", "sideslipangle", "bodyslip", "bodyslipangle", "schwimmwinkel",
          "carsideslipangle", "slipangle", "anglebeta", "carbeta", "betacog", "driftangle"),
         ("sideslip|schwimmwinkel|beta", "side|body|vehicle;slip;angle", "side;slip", "slip;angle",
-         "drift;angle", "schwimm;winkel", "derive;caisse|vehicule", "angolo;assetto"),
+         "drift;angle", "slip;cog|cg", "schwimm;winkel", "derive;caisse|vehicule",
+         "angolo;assetto"),
         (),
         (*NOT_BODY, *BEHIND, "rate", "dot", "ratio", "longitudinal", "front", "brake",
          "vorderachse", "va", "avant", "anteriore"),
@@ -144,9 +155,10 @@ RULES: Mapping[str, Rule] = {
     "r": Rule(
         ("r", "yawrate", "psip", "psidot", "dpsi", "gierrate", "giergeschwindigkeit", "gyroz",
          "zgyro", "omegaz", "wz", "angratez", "ratez", "zrate", "caryawrate", "yawvel", "gz",
-         "wzb", "angularratez", "angvelz", "yawratecar", "headingrate", "turnrate", "avz"),
-        (f"{YAW};{CHANGE}", "angular|gyro|omega|rate|ang;z", "gierrate|giergeschwindigkeit|yawrate",
-         "heading|turn;rate", "rotation;rate;z"),
+         "wzb", "angularratez", "angvelz", "yawratecar", "headingrate", "turnrate", "avz", "avzs",
+         "avzsm", "yawdot", "dyaw", "dpsidt"),
+        (f"{YAW};{CHANGE}", "angular|gyro|gyr|gyroscope|omega|rate|ang;z",
+         "gierrate|giergeschwindigkeit|yawrate", "heading|turn;rate", "rotation;rate;z"),
         ("omega|angularvelocity|angularspeed|angularrate|angvel",),
         (*NOT_BODY, *NO_ACCELERATION, "x", "y", "roll", "pitch", "linear", "moment", "torque",
          "engine", "motor", "moteur", "motore", "crank", "shaft", "turbo", "turbine", "fan",
@@ -165,9 +177,11 @@ RULES: Mapping[str, Rule] = {
     HAND: Rule(
         ("steeringwheelangle", "steeringwheel", "handwheel", "handwheelangle", "swa", "sasangle",
          "lenkradwinkel", "lrw", "deltasw", "steerwhlang", "steeringwheelposition", "sas",
-         "steerwhlangle", "stwhlang", "deltah", "lenkradw", "steersw"),
-        ("steer|steering|hand|stw|driv;wheel|whl;angle|ang|position|pos", "handwheel;angle|ang",
-         "lenkradwinkel|lenkrad", "sas|lws;angle|ang|agl|winkel", "steering;wheel",
+         "steerwhlangle", "stwhlang", "deltah", "lenkradw", "steersw",
+         "swangle", "swang", "lwwinkel"),
+        ("steer|steering|hand|stw|st|driv;wheel|whl;angle|ang|angl|position|pos",
+         "handwheel;angle|ang",
+         "lenkradwinkel|lenkrad", "sas|lws;angle|ang|agl|winkel", "steer|steering;wheel",
          "volant|volante;angle|angolo|angulo|ang"),
         ("steer|steering|steerangle|steeringangle|lenkwinkel|steerang|lenkung|steeredangle|"
          "steerpos|steeringpos|steerposition|steeringposition|"
@@ -187,7 +201,7 @@ RULES: Mapping[str, Rule] = {
         ("ay", "accy", "accely", "yaccel", "accelerationy", "latacc", "lataccel", "acclat",
          "glat", "latg", "gforcelat", "querbeschleunigung", "aquer", "aqu", "bquer", "caray",
          "lateralacceleration", "lateralacc", "accelerometery", "aycog", "aycg", "ayb",
-         "alhori", "lateralg"),
+         "alhori", "lateralg", "alat", "aysm", "ayveh"),
         (f"{LATERAL};{ACCELERATIONS}|g", "linear;acceleration;y", "querbeschleunigung",
          "trans;acc|accel|acceleration"),
         (),
