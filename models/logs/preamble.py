@@ -132,6 +132,8 @@ def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
         raise RecordingError(f"{path}: is empty")
     begun = next(k for k, line in enumerate(lines) if line.strip())
     lines = lines[: begun + LINES]
+    if lines[begun].startswith(_PI_TOOLBOX):
+        _require_one_block(path, lines)
     section = _sections(lines)
     if section is not None:
         return _racelogic(path, lines, encoding, section)
@@ -142,6 +144,20 @@ def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
     require_few(RecordingError, str(path), way.width, "columns", "columns")
     table = [_Line(k, line, way.delimiter) for k, line in enumerate(lines, start=1)]
     return _table(path, table, way, encoding)
+
+
+_PI_TOOLBOX, _BLOCK = "PiToolboxVersionedASCIIDataSet", "{ChannelBlock}"
+
+
+def _require_one_block(path: Path, lines: list[str]) -> None:
+    """Refuse channels at rates of their own, one below the other, as Pi Toolbox can write them."""
+    begun = [k for k, line in enumerate(lines) if line.strip() == _BLOCK]
+    names = [lines[k + 1].split("\t") for k in begun if k + 1 < len(lines)]
+    if len(begun) > 1 or any(len(one) == 2 for one in names):
+        raise RecordingError(
+            f"{path}: line {begun[-1] + 1} begins a {_BLOCK} of one channel: each has its own; "
+            "export all channels in one block, at one rate"
+        )
 
 
 def _encoding(path: Path, head: bytes) -> str:
@@ -274,9 +290,12 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
             f"{path}: line {lines[first].number} has {width} cells, the header has {len(names)}: "
             "decimal commas cannot be told from commas between cells; export with semicolons"
         )
-    while len(names) > width and not names[-1] and len(names) > 1:
-        names.pop()  # the header alone ends in a delimiter
-    if not units and (described := [_DESCRIBED.fullmatch(name) for name in names]):
+    while len(names) > width and (not names[-1] or names[-1] == "Comment") and len(names) > 1:
+        names.pop()  # the header alone ends in a delimiter, or in LabVIEW's Comment
+    if not units:
+        labels = (line.cells for line in zone if line.text.startswith("Y_Unit_Label"))
+        units = ["", *next(labels, ("",))[1:]]
+    if not any(units) and (described := [_DESCRIBED.fullmatch(name) for name in names]):
         fitting = [one for one in described if one]
         if len(fitting) == len(names):
             names, units = [one["name"] for one in fitting], [one["unit"] for one in fitting]

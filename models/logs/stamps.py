@@ -208,14 +208,16 @@ def nanoseconds(cell: str) -> int | None:
 
     Parameters
     ----------
-    cell : ISO 8601, or with the day first, or hh:mm:ss, mm:ss; "" gives `MISSING`.
+    cell : ISO 8601, or with the day first, or hh:mm:ss, mm:ss, or "0.01 sec" as MATLAB writes a
+        duration; "" gives `MISSING`.
     """
     text = cell.strip()
     if not text:
         return MISSING
     found = _DATE.fullmatch(text)
     if found is None:
-        return _of_day(text)
+        lasting = _DURATION.fullmatch(text)
+        return _of_day(text) if lasting is None else _of_duration(lasting)
     if found[1]:
         year, month, day = int(found[1]), int(found[2]), int(found[3])
     else:
@@ -232,6 +234,13 @@ def nanoseconds(cell: str) -> int | None:
 
 
 _FIRST = datetime.date(1970, 1, 1).toordinal()
+_DURATION = re.compile(r"(\d{1,15}(?:\.\d{0,15})?(?:e-?\d{1,2})?) (sec|min|hr)")
+
+
+def _of_duration(found: re.Match[str]) -> int | None:
+    """Return a number and its unit of time [ns]."""
+    total = float(found[1]) / PER_SECOND[time_unit(found[2])] * 1e9
+    return round(total) if total < 2**62 else None
 
 
 def _of_day(text: str) -> int | None:

@@ -74,6 +74,9 @@ def physics_contradiction(recording: Recording) -> str | None:
     found = _check_peaks(recording)
     if found is not None or w.r.size * STRIDE < 2.0:
         return found
+    found = _check_signs_are_there(recording)
+    if found is not None:
+        return found
     turn = steering(w)
     found = _check_lateral_acceleration(w, turn) or _check_v_x_r(w)
     if turn is not None:
@@ -105,6 +108,31 @@ def _check_peaks(recording: Recording) -> str | None:
             f"vx must point forward (ISO axes), 95 % of it lies below "
             f"{forward:.4g} m/s; change the sign of vx (and of vy, if the axes are turned about z)"
         )
+    return None
+
+
+def _check_signs_are_there(recording: Recording) -> str | None:
+    """Answer with an r or a delta_f that is an amount: never negative, and large on both sides.
+
+    Some cars send amounts, and whether they are negative in a channel of its own. Judged where a_y,
+    or else r, goes to both sides beyond a third of its peak for a twentieth of the time.
+    """
+    some = slice(None, None, thinning(len(recording)))
+    for name, other in (("r", "a_y"), ("delta_f", "a_y"), ("delta_f", "r")):
+        if getattr(recording, other) is None:
+            continue
+        x, y = getattr(recording, name)[some], getattr(recording, other)[some]
+        third = float(np.percentile(np.abs(y), 99.0)) / 3.0
+        left, right = y > third, y < -third
+        if min(np.mean(left), np.mean(right)) < 0.05 or np.min(x) < -0.02 * np.max(np.abs(x)):
+            continue
+        on_left, on_right = float(np.median(x[left])), float(np.median(x[right]))
+        between = float(np.median(x[~left & ~right])) if np.any(~left & ~right) else 0.0
+        if min(on_left, on_right) > 1.5 * max(between, 0.0) and min(on_left, on_right) > 0.0:
+            return (
+                f"{name} must be negative to the right, it never is, and as large there as to the "
+                f"left: an amount whose sign stands in a channel of its own? multiply by that"
+            )
     return None
 
 

@@ -353,3 +353,22 @@ def test_of_the_wrong_car_it_is_not_the_sign_of_v_y_that_is_to_blame() -> None:
     with pytest.raises(RecordingError, match=r"change the sign of vy; tireid doctor"):
         fast = replace(drive(speed=20.0), axle_force=None)
         check_against_vehicle(replace(fast, v_y=-fast.v_y), short)
+
+
+@pytest.mark.parametrize("column", ["r", "delta_f"])
+def test_an_amount_whose_sign_is_elsewhere_is_refused(column: str) -> None:
+    made = drive()
+    amount = replace(made, **{column: np.abs(getattr(made, column))})
+    with pytest.raises(RecordingError, match=f"{column} must be negative to the right, it never"):
+        check_physics(amount)
+    if column == "delta_f":
+        with pytest.raises(RecordingError, match="an amount whose sign"):
+            check_physics(replace(amount, a_y=None))
+
+
+def test_a_car_that_turns_to_one_side_alone_has_no_amounts() -> None:
+    left = drive(steering=lambda t: 0.02 + 0.01 * np.sin(2.0 * t))
+    check_physics(left)
+    noise = 4.0 * np.random.default_rng(3).standard_normal(left.t.size)
+    assert left.a_y is not None
+    check_physics(replace(left, a_y=left.a_y + noise))

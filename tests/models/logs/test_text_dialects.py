@@ -310,6 +310,14 @@ WRONG = {
         plain() + '"' + table(zip(*drive(), strict=True)) * 3,
         "has 1 cells, the header has 5",
     ),
+    "channels in blocks of their own": (
+        "PiToolboxVersionedASCIIDataSet\nVersion\t2\n"
+        + "".join(
+            f"\n{{ChannelBlock}}\nTime\t{name}\n" + "".join(f"{0.1 * k}\t{k}\n" for k in range(9))
+            for name in ("vCar[km/h]", "gLat[g]")
+        ),
+        "line 16 begins a {ChannelBlock} of one channel: each has its own; export all",
+    ),
     "VBOX without names": ("[column names]\n\n[data]\n1 2\n", "[column names], line 1, must be"),
 }  # fmt: skip
 
@@ -438,3 +446,25 @@ def test_a_cell_that_describes_a_channel_is_its_name_and_unit(tmp_path):
     speed, yaw = log.read(["Speed", "Yaw"])
     assert np.isfinite(speed.values).sum() == 10
     assert np.diff(yaw.t) == pytest.approx(0.04)
+
+
+def test_a_duration_with_its_unit_is_a_time(tmp_path):
+    """As MATLAB writes a timetable."""
+    rows = "".join(f"{0.01 * k:g} sec,{20 + k % 3}\n" for k in range(200))
+    log = open_log(written(tmp_path, f"Time,vx\n{rows}"))
+    (vx,) = log.read(["vx"])
+    np.testing.assert_allclose(vx.t - vx.t[0], 0.01 * np.arange(200), atol=1e-9)
+
+
+def test_a_table_of_labview_has_units_in_a_label_and_a_comment_that_no_row_has(tmp_path):
+    head = (
+        "LabVIEW Measurement\t\nSeparator\tTab\n***End_of_Header***\t\n\t\nChannels\t2\t\t\n"
+        "Samples\t99\t99\t\nY_Unit_Label\tkm/h\tdeg/s\t\nX0\t0.0\t0.0\t\nDelta_X\t0.01\t0.01\t\n"
+        "***End_of_Header***\t\t\t\nX_Value\tSpeed\tYaw Rate\tComment\n"
+    )
+    rows = "".join(f"{0.01 * k:.2f}\t{70 + k % 5}.5\t{k % 7}.25\n" for k in range(99))
+    log = open_log(written(tmp_path, head + rows, "run.lvm.txt"))
+    assert [(one.name, one.unit, one.samples) for one in log.listed()] == [
+        ("Speed", "km/h", 99),
+        ("Yaw Rate", "deg/s", 99),
+    ]
