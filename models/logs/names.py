@@ -87,6 +87,7 @@ CHANGE = f"rate|vel|velocity|velocities|speed|geschwindigkeit|geschw|dot|p|d|w|t
 WHEEL_WORDS = ("wheel", "wheels", "tire", "tyre", "rad", "reifen", "whl", "roue", "roues", "ruota",
                "ruote", "rueda", "ruedas", "pneu", "pneus", "pneumatico", "neumatico")  # fmt: skip
 CORNERS = ("fl", "fr", "rl", "rr", "vl", "vr", "hl", "hr", "lf", "rf", "lr")
+CARRIERS = {"cfl": "fl", "cfr": "fr", "crl": "rl", "crr": "rr"}  # of CarMaker: Car.CFL.rz
 REFERENCE = ("cmd", "command", "target", "desired", "des", "ref", "request", "req", "limit", "max",
              "min", "std", "stddev", "var", "cov", "covariance", "err", "error", "quality", "valid",
              "status", "soll", "accuracy", "sigma", "bias", "offset", "dev", "commanded", "demand",
@@ -223,7 +224,7 @@ RULES: Mapping[str, Rule] = {
 }  # fmt: skip
 # A signal of several wheels: words of the name beside those of the corners.
 PER_WHEEL: Mapping[str, tuple[str, ...]] = {
-    "delta_f": ("steer|steering|delta|radlenkwinkel|rwa|toe", "steer|wheel;angle|ang"),
+    "delta_f": ("steer|steering|delta|radlenkwinkel|rwa|toe", "steer|wheel;angle|ang", "car;rz"),
     "Fyf": ("fy|flat", "lateral|side;force"),
     "Fyr": ("fy|flat", "lateral|side;force"),
 }
@@ -546,8 +547,8 @@ def _corner(words: tuple[str, ...]) -> tuple[str, frozenset[str]] | None:
     for pair, short in LONG_SIDES:
         if rest >= set(pair):
             return short, rest - set(pair)
-    corners = [word for word in words if word in CORNERS]
-    return (corners[-1], rest - {corners[-1]}) if corners else None
+    corners = [word for word in words if word in CORNERS or word in CARRIERS]
+    return (CARRIERS.get(corners[-1], corners[-1]), rest - {corners[-1]}) if corners else None
 
 
 def _pairs(signal: str, listed: Sequence[Heading]) -> list[Guess]:

@@ -410,3 +410,13 @@ def test_a_unit_in_a_name_may_be_spelled_in_another_way_beside_it() -> None:
     assert without_ending("steering_deg", "°") == "steering"
     assert without_ending("speed_kmh", "kph") == "speed"
     assert without_ending("speed_kmh", "mph") == "speed_kmh"
+
+
+def test_the_carriers_of_carmaker_are_road_wheels() -> None:
+    places = ("CFL", "CFR", "CRL", "CRR")
+    found = proposed(
+        *((f"Car.{place}.rz", "rad", 0.1 * WAVE) for place in places),
+        ("DM.Steer.Ang", "rad", 2.0 * WAVE),
+    )
+    assert found.guesses["delta_f"].channel == ("Car.CFL.rz", "Car.CFR.rz")
+    assert found.is_sure("delta_f") and "delta_r" not in found.guesses
