@@ -102,6 +102,18 @@ def undrawn(monkeypatch):
 
 
 @pytest.fixture
+def unmade(monkeypatch, undrawn):
+    """As `undrawn`, and `tireid identify` makes no axes either, which take as long as learning."""
+    from matplotlib.figure import Figure
+
+    from tireid.commands import identify_results
+
+    for name in dir(identify_results):
+        if name.endswith("_figure") and name != "save_figure":
+            monkeypatch.setattr(identify_results, name, lambda *_, **__: Figure())
+
+
+@pytest.fixture
 def laid_out(monkeypatch, undrawn):
     """As `undrawn`, but a figure for paper is laid out with all that it shows, without ink."""
     from tireid.figures import style

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import tireid as ti
+from tests.sources import tree_of
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("codegen", "models", "identifier", "mpc", "tireid")
@@ -75,7 +76,7 @@ def is_overload(node: Documented) -> bool:
 def public_definitions(source: str) -> list[Documented]:
     """Public functions, classes and methods."""
     found: list[Documented] = []
-    for node in ast.parse(source).body:
+    for node in tree_of(source).body:
         if isinstance(node, Documented) and not node.name.startswith("_"):
             found.append(node)
             if isinstance(node, ast.ClassDef):
@@ -118,7 +119,7 @@ def test_documented_parameters_are_those_of_the_signature():
         f"{path.relative_to(ROOT)}: {line}"
         for package in PACKAGES
         for path in sorted((ROOT / package).rglob("*.py"))
-        for line in complaints(path.read_text())
+        for line in complaints(path.read_text(encoding="utf-8"))
     ]
     assert not wrong, "\n".join(wrong)
 

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.sources import nodes_of
+
 ROOT = Path(__file__).resolve().parents[1]
 PLACES = ("codegen", "models", "identifier", "mpc", "tireid", "examples", "benchmarks")
 
@@ -12,7 +14,7 @@ PLACES = ("codegen", "models", "identifier", "mpc", "tireid", "examples", "bench
 def without_encoding(source: str) -> list[int]:
     """Lines that open, read or write text and leave the encoding to the machine."""
     lines = []
-    for node in ast.walk(ast.parse(source)):
+    for node in nodes_of(source):
         if not isinstance(node, ast.Call):
             continue
         method = node.func.attr if isinstance(node.func, ast.Attribute) else ""

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.sources import nodes_of
+
 ROOT = Path(__file__).resolve().parents[1]
 ORDER = ("codegen", "models", "identifier", "mpc", "tireid")
 PLOTTING_ALLOWED = ("tireid", "examples", "benchmarks")
@@ -12,7 +14,7 @@ PLOTTING_ALLOWED = ("tireid", "examples", "benchmarks")
 
 def imported_packages(source: str) -> set[str]:
     packages = set()
-    for node in ast.walk(ast.parse(source)):
+    for node in nodes_of(source):
         if isinstance(node, ast.Import):
             packages |= {alias.name.split(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
@@ -30,7 +32,7 @@ def wrong_imports(package: str, source: str) -> set[str]:
 @pytest.mark.parametrize("package", ORDER)
 def test_imports_run_one_way(package):
     for path in (ROOT / package).rglob("*.py"):
-        assert not wrong_imports(package, path.read_text()), path
+        assert not wrong_imports(package, path.read_text(encoding="utf-8")), path
 
 
 def test_the_rule_catches_a_planted_import():
@@ -43,7 +45,7 @@ def test_the_rule_catches_a_planted_import():
 def commands_imported(source: str) -> set[str]:
     """The modules of commands that a file imports."""
     modules = set()
-    for node in ast.walk(ast.parse(source)):
+    for node in nodes_of(source):
         if isinstance(node, ast.Import):
             modules |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:

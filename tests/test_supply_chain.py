@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.sources import nodes_of
+
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 LOWEST = runpy.run_path(str(ROOT / ".ci" / "lowest.py"))
@@ -44,7 +46,7 @@ def test_every_package_that_is_imported_is_declared():
     imported = set()
     for package in ("codegen", "models", "identifier", "mpc", "tireid"):
         for path in (ROOT / package).rglob("*.py"):
-            for node in ast.walk(ast.parse(path.read_text())):
+            for node in nodes_of(path.read_text(encoding="utf-8")):
                 if isinstance(node, ast.Import):
                     imported |= {name.name.split(".")[0] for name in node.names}
                 elif isinstance(node, ast.ImportFrom) and node.module:

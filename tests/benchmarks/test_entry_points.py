@@ -5,6 +5,8 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+from tests.sources import nodes_of, tree_of
+
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("codegen", "models", "identifier", "mpc", "tireid")
 Name = tuple[str, str]  # module, name in it
@@ -21,18 +23,13 @@ CHECKED = {
 
 
 @cache
-def parsed(source: str) -> ast.Module:
-    return ast.parse(source)
-
-
-@cache
 def imported(source: str) -> tuple[Name, ...]:
     """Names of the product that a file imports."""
     return tuple(_imported(source))
 
 
 def _imported(source: str) -> Iterator[Name]:
-    for node in ast.walk(parsed(source)):
+    for node in nodes_of(source):
         if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in PACKAGES:
             for alias in node.names:
                 yield str(node.module), alias.name
@@ -69,11 +66,11 @@ def reads(node: ast.AST, name: str) -> bool:
 
 def used_at_home(name: Name, root: Path) -> bool:
     """Whether the module that defines a name uses it as well."""
-    return reads(parsed(source_of(name[0], root)), name[1])
+    return reads(tree_of(source_of(name[0], root)), name[1])
 
 
 def is_function(name: Name, root: Path) -> bool:
-    tree = parsed(source_of(name[0], root))
+    tree = tree_of(source_of(name[0], root))
     return any(isinstance(n, ast.FunctionDef) and n.name == name[1] for n in tree.body)
 
 

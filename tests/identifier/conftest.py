@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -27,6 +28,22 @@ def saturating(alpha, stiffness, peak):
 
 def drive(n=1500, dt=0.01, speed=20.0, amplitude=0.06, scale=1.0):
     """A slalom of a bicycle on saturating tires, integrated finely; forces are known exactly."""
+    t, v_y, r, delta, F_f, F_r = driven(n, dt, speed, amplitude).copy()
+    return Recording(
+        name="drive",
+        t=t,
+        v_x=np.full(n, speed),
+        v_y=v_y,
+        r=r,
+        delta_f=delta,
+        delta_r=np.zeros(n),
+        axle_force=np.column_stack([F_f, F_r]) * scale,
+    )
+
+
+@cache
+def driven(n, dt, speed, amplitude):
+    """Time, lateral velocity, yaw rate, steering and forces of `drive`, (6, n); many ask for it."""
     p, fine = CAR.bicycle, 10
     v_y = r = 0.0
     rows = []
@@ -39,17 +56,7 @@ def drive(n=1500, dt=0.01, speed=20.0, amplitude=0.06, scale=1.0):
             rows.append((t, v_y, r, delta, *F))
         v_y += dt / fine * ((F[0] + F[1]) / p.m - speed * r)
         r += dt / fine * (p.l_f * F[0] - p.l_r * F[1]) / p.I_z
-    t, v_y, r, delta, F_f, F_r = np.array(rows).T
-    return Recording(
-        name="drive",
-        t=t,
-        v_x=np.full(n, speed),
-        v_y=v_y,
-        r=r,
-        delta_f=delta,
-        delta_r=np.zeros(n),
-        axle_force=np.column_stack([F_f, F_r]) * scale,
-    )
+    return np.array(rows).T.copy()
 
 
 def felt(recording):
@@ -102,8 +109,22 @@ def pressed(lift, rng):
 
     One track, tires that follow slip at once, speeds from 18 to 45 m/s, steered by two sines.
     """
-    car = Vehicle(name="race", mass=1100.0, yaw_inertia=1600.0, l_f=1.45, l_r=1.35,
-                  cornering_stiffness_front=1e5, cornering_stiffness_rear=1e5)  # fmt: skip
+    t, v_x, delta, v_y, r, felt = pressed_down(lift)
+    noise = rng.normal(size=(3, t.size)) * np.array([[0.02], [0.002], [0.05]])
+    signals = {"v_y": v_y + noise[0], "r": r + noise[1], "a_y": felt + noise[2]}
+    log = Recording.from_dataframe({"t": t, "vx": v_x, "vy": signals["v_y"], "r": signals["r"],
+                                    "delta_f": delta, "ay": signals["a_y"]})  # fmt: skip
+    return log, RACE
+
+
+RACE = Vehicle(name="race", mass=1100.0, yaw_inertia=1600.0, l_f=1.45, l_r=1.35,
+               cornering_stiffness_front=1e5, cornering_stiffness_rear=1e5)  # fmt: skip
+
+
+@cache
+def pressed_down(lift):
+    """Time, speed, steering, lateral velocity, yaw rate, acceleration of `pressed`, (n,) each."""
+    car = RACE
     dt, kappa = 0.01, lift / (100.0 / 3.6) ** 2
     t = np.arange(0.0, 60.0, dt)
     v_x = 31.5 + 13.5 * np.sin(0.35 * t)
@@ -122,11 +143,7 @@ def pressed(lift, rng):
             turn = car.l_f * force[0] * np.cos(delta[k]) - car.l_r * force[1]
             rates = across / car.mass - v_x[k] * moving[1], turn / car.yaw_inertia
             moving = moving + dt / fine * np.array(rates)
-    noise = rng.normal(size=(3, t.size)) * np.array([[0.02], [0.002], [0.05]])
-    signals = {"v_y": v_y + noise[0], "r": r + noise[1], "a_y": felt + noise[2]}
-    log = Recording.from_dataframe({"t": t, "vx": v_x, "vy": signals["v_y"], "r": signals["r"],
-                                    "delta_f": delta, "ay": signals["a_y"]})  # fmt: skip
-    return log, car
+    return t, v_x, delta, v_y, r, felt
 
 
 def areas_of(car, lift):

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -46,6 +47,20 @@ def drive(
 
     Sampled `every` so many milliseconds.
     """
+    made = finely(car, peak, speed, grip, steering, duration)
+    return Recording(name="made", **{one: values[::every].copy() for one, values in made.items()})
+
+
+@cache
+def finely(
+    car: str,
+    peak: float,
+    speed: float | None,
+    grip: float,
+    steering: Callable[[Array], Array] | None,
+    duration: float,
+) -> dict[str, Array]:
+    """`drive` every millisecond; many tests ask for the same."""
     m, I_z, l_f, l_r, C_f, C_r = CARS[car]
     L, v = l_f + l_r, SPEEDS[car] if speed is None else speed
     dt, t = 1e-3, np.arange(0.0, duration, 1e-3)
@@ -67,18 +82,16 @@ def drive(
         v_y_dot[k] = F[k].sum() / m - v * r[k]
         v_y[k + 1] = v_y[k] + dt * v_y_dot[k]
         r[k + 1] = r[k] + dt * (l_f * F[k, 0] - l_r * F[k, 1]) / I_z
-    keep = slice(None, None, every)
-    return Recording(
-        name="made",
-        t=t[keep],
-        v_x=np.full(t.size, v)[keep],
-        v_y=v_y[:-1][keep],
-        r=r[:-1][keep],
-        delta_f=delta[keep],
-        delta_r=0.0 * t[keep],
-        a_y=(v_y_dot + v * r[:-1])[keep],
-        axle_force=F[keep],
-    )
+    return {
+        "t": t,
+        "v_x": np.full(t.size, v),
+        "v_y": v_y[:-1],
+        "r": r[:-1],
+        "delta_f": delta,
+        "delta_r": 0.0 * t,
+        "a_y": v_y_dot + v * r[:-1],
+        "axle_force": F,
+    }
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from tireid.cli import main
 
 CAR = ti.sedan()
 
-pytestmark = pytest.mark.usefixtures("undrawn")  # words and numbers are asked, not pictures
+pytestmark = pytest.mark.usefixtures("unmade")  # words and numbers are asked, not pictures
 
 
 @pytest.fixture(scope="module")

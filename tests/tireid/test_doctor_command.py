@@ -63,7 +63,7 @@ def test_a_faulty_log_ends_with_3_and_each_fault_has_a_line(clinic, capsys):
     assert doctor(clinic, "bad.csv", "--accept") == 0
 
 
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("unmade")
 def test_repaired_by_the_doctor_the_log_is_learnt_and_valid(clinic, tmp_path, capsys):
     log_map, out = tmp_path / "log.toml", tmp_path / "out"
     assert doctor(clinic, "bad.csv", "--repair", log_map, "--out", out) == 0
@@ -88,7 +88,7 @@ def test_identify_refuses_a_faulty_log_and_names_the_doctor(clinic, tmp_path, ca
     assert "tireid doctor LOG" in capsys.readouterr().err
 
 
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("unmade")
 def test_identify_repairs_what_is_sure_and_says_so(clinic, tmp_path, capsys):
     out, log_map = tmp_path / "out", tmp_path / "log.toml"
     words = ["identify", str(clinic / "bad.csv"), "--vehicle", str(clinic / "car.toml")]

@@ -38,7 +38,7 @@ def summary(driven, logs, tmp_path_factory):
     return summary_of("CSV", tmp_path_factory.mktemp("csv"), driven, logs)
 
 
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("unmade")
 @pytest.mark.parametrize("format", OTHERS)
 def test_a_drive_gives_the_same_bytes_of_a_summary_from_every_format(
     format, driven, summary, logs, tmp_path
@@ -61,7 +61,7 @@ def test_channels_writes_a_map_that_reads_the_same_recording_from_every_format(
         assert np.array_equal(getattr(recording, name), values), name
 
 
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("unmade")
 def test_another_drive_gives_another_summary(driven, summary, logs, tmp_path):
     t, columns = driven
     other = {**columns, "r": columns["r"] * 1.0000001}

@@ -125,7 +125,7 @@ def test_every_curve_is_also_data(result, law):
         assert (result / name).is_file()
 
 
-def test_curves_as_parquet_stand_in_place_of_those_as_csv(logs, tmp_path, undrawn):
+def test_curves_as_parquet_stand_in_place_of_those_as_csv(logs, tmp_path, unmade):
     parquet = pytest.importorskip("pyarrow.parquet")
     words = ["identify", str(logs / "quick.csv"), "--vehicle", str(logs / "car.toml")]
     for curves in ("csv", "parquet"):
@@ -325,7 +325,7 @@ def written_design(path, **changes):
     return path
 
 
-def test_a_design_from_a_file_is_the_one_that_runs(logs, tmp_path, capsys, undrawn):
+def test_a_design_from_a_file_is_the_one_that_runs(logs, tmp_path, capsys, unmade):
     design = written_design(tmp_path / "design.toml", law="instantaneous", seed=3, eta_W=12.5)
     words = ["identify", str(logs / "slalom.csv"), "--vehicle", str(logs / "car.toml")]
     words += ["--accept", "--design", str(design), "--out", str(tmp_path / "out")]
@@ -414,7 +414,7 @@ def test_a_log_in_degrees_is_refused_by_its_column(logs, tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
-def test_learning_goes_on_from_stored_weights(result, law, logs, tmp_path, undrawn):
+def test_learning_goes_on_from_stored_weights(result, law, logs, tmp_path, unmade):
     """What was learnt on the slalom serves from the first sample of the next drive."""
     words = ["identify", str(logs / "quick.csv"), "--vehicle", str(logs / "car.toml")]
     words += ["--method", law, "--accept"]  # the paper's network needs a longer drive
@@ -427,7 +427,7 @@ def test_learning_goes_on_from_stored_weights(result, law, logs, tmp_path, undra
 
 
 @pytest.mark.parametrize("layer", ["W", "V"])
-def test_resumed_weights_beyond_what_is_proven_are_told(logs, tmp_path, capsys, layer, undrawn):
+def test_resumed_weights_beyond_what_is_proven_are_told(logs, tmp_path, capsys, layer, unmade):
     """On either side of the bound that `tireid check` states of the same gains."""
     check = ["check", "--paper", "--vehicle", str(logs / "car.toml"), "--json"]
     assert main(check) == 0
@@ -565,7 +565,7 @@ def test_what_cannot_be_read_back_as_tires_is_refused_by_the_name_of_its_log(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_is_not_valid_exits_with_three_unless_it_is_accepted(logs, tmp_path, capsys, undrawn):
+def test_what_is_not_valid_exits_with_three_unless_it_is_accepted(logs, tmp_path, capsys, unmade):
     def biased(row):
         row["vy"] = repr(float(row["vy"]) + 0.6)
 

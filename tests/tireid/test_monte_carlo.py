@@ -23,9 +23,9 @@ def observed(xi_tilde):
 
 
 def test_no_drive_passes_a_proven_bound(capsys):
-    assert main(["check", "--paper", "--monte-carlo", "200", "--seed", "5"]) == 0
+    assert main(["check", "--paper", "--monte-carlo", "100", "--seed", "5"]) == 0
     told = capsys.readouterr()
-    assert "200 random drives within what is judged, seed 5" in told.out
+    assert "100 random drives within what is judged, seed 5" in told.out
     assert "|xi - xi_hat|, by the leakage [kN s]" in told.out
 
 

@@ -112,7 +112,7 @@ def logger(run, wheels, **more):
     }
 
 
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("unmade")
 def test_a_log_with_a_second_speed_teaches_the_radius_for_one_without(
     run, wheels, tmp_path, capsys
 ):

@@ -179,7 +179,7 @@ def test_a_written_recording_leaves_out_what_was_estimated(history, tmp_path):
     assert read_recording(tmp_path / "log.csv").v_y is None
 
 
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("unmade")
 def test_the_command_learns_and_tells_side_slip_with_its_deviation(log, exact, tmp_path, capsys):
     words = ["identify", str(log), "--vehicle", str(tmp_path / "car.toml")]
     assert main([*words, "--out", str(tmp_path / "out")]) == 0

@@ -76,7 +76,7 @@ def test_fmpy_finds_nothing_to_complain_about_and_all_has_units(paths, version):
 @pytest.mark.parametrize("version", [2, 3])
 def test_side_slip_is_told_without_a_lateral_velocity(paths, version, slalom):
     """An input that is not connected is no number, so that nothing is measured by it."""
-    drive = replace(slalom.taken(np.arange(1500)), v_y=None)
+    drive = replace(slalom.taken(np.arange(900)), v_y=None)
     told = simulated(paths[version], drive, ("v_x", "r", "delta_f", "delta_r", "a_y"))
     assert (told["status"] == 0).all()
     history = identify(drive, CAR, make_method("inertial", CAR))

@@ -1,6 +1,7 @@
 """y = W s: to round-off where the trapezoidal rule holds, to second order where it does not."""
 
 from dataclasses import replace
+from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -31,6 +32,7 @@ def run_filters(xi, b, sigma, filter_rate=4.0, dt=DT):
     return np.array(s).T, np.array(y).T
 
 
+@cache
 def drive_by_trapezoids(car, n=300, dt=DT, refine=1):
     """ξ, b, σ (n, .) of dξ/dt = b + W σ by the implicit trapezoidal rule, solved to round-off.
 
