@@ -99,15 +99,8 @@ NOT_BODY = (*WHEEL_WORDS, *CORNERS, *REFERENCE)
 OTHER_CARS = ("radar", "lidar", "obj", "object", "objekt", "lead", "rel", "relative", "relativ")
 SHOWN = ("ui", "display", "displayed", "indicated", "cluster", "angez", "anzeige", "angezeigt",
          "setspeed", "setspd", "speedset")  # fmt: skip
-NO_VELOCITY = (
-    "speed",
-    "velocity",
-    "velocities",
-    "vel",
-    "geschw",
-    "geschwindigkeit",
-    *ROMANCE_SPEED.split("|"),
-)
+NO_VELOCITY = ("speed", "velocity", "velocities", "vel", "geschw", "geschwindigkeit",
+               *ROMANCE_SPEED.split("|"))  # fmt: skip
 NO_SPEED = (*NO_VELOCITY, "rate", "dot")
 NO_ACCELERATION = ("accel", "acceleration", "accelerations", "acc", "beschl", "beschleunigung",
                    "accelerazione", "aceleracion", "acel")  # fmt: skip
@@ -125,9 +118,9 @@ RULES: Mapping[str, Rule] = {
          "carvx", "vxcar", "vxref", "laengsgeschwindigkeit", "wheelbasedvehiclespeed", "vego",
          "egospeed"),
         (f"{LONGITUDINAL};{VELOCITY}", "linear;x"),
-        ("speed|velocity|spd|geschwindigkeit|fahrgeschwindigkeit|vfzg|vehspd|vveh|v|vel|"
-         "speedveh|vsignal|vist|speed2d|kmh|fahrzeuggeschwindigkeit|vehv|groundspeed|vehiclespeed|geschw|fahrgeschw|"
-         f"fahrzeuggeschw|{ROMANCE_SPEED}|vitessevehicule|velocitaveicolo|velocidadvehiculo",),
+        ("speed|velocity|spd|geschwindigkeit|fahrgeschwindigkeit|vfzg|vehspd|vveh|v|vel|speedveh|"
+         "vsignal|vist|speed2d|kmh|fahrzeuggeschwindigkeit|vehv|groundspeed|vehiclespeed|geschw|"
+         f"fahrgeschw|fahrzeuggeschw|{ROMANCE_SPEED}|vitessevehicule|velocitaveicolo|velocidadvehiculo",),
         (*NOT_BODY, *OTHER_CARS, *SHOWN, *TURNING, *UPRIGHT, *NO_ACCELERATION, "y", "engine",
          "motor", "moteur", "motore", "sas", "lws", "lateral", "lat", "laterale", "quer",
          *ACROSS.split("|"), "trans", "fan", "pump", "turbo", "turbine", "wind", "vent", "vento",

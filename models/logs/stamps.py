@@ -46,6 +46,8 @@ BACK, FEWEST = 1.0, 10  # [s], samples: what goes back so far and lasts so long 
 
 MENDING = '--mend-clock (in Python LogMap(order="mend"))'
 
+OTHER_RATE, NEAR = 0.2, 60.0  # share of a step, [s]: of a clock that another column has for itself
+
 _DATE = re.compile(
     r"(?:(\d{4})[-/]?(\d\d)[-/]?(\d\d)|(\d{1,2})[./](\d{1,2})[./](\d{4}))(?:[T ]+(.+))?"
 )
@@ -102,6 +104,57 @@ def find_clock(
         if (clock := _clock(k, names[k], units[k], head(k), _is_any)) is not None:
             return clock
     return None
+
+
+def own_clocks(
+    names: Sequence[str], units: Sequence[str], head: Callable[[int], Sequence[str]], first: Clock
+) -> dict[int, Clock]:
+    """Return by column the clock of those that stand behind a time of their own; else nothing.
+
+    So tables are written whose channels were sampled at rates of their own: "time_1, v_x, time_2,
+    v_y". It is such a table where it begins with a time, a channel stands between any two, and one
+    of the others, called alike or of another rate, rises without a rest from about the same instant
+    on: what a receiver tells of the same rows has another name and the same steps.
+
+    Parameters
+    ----------
+    names, units : of the columns.
+    head : gives the first cells of a column, with decimal points.
+    first : the clock of the others.
+    """
+    found = {}
+    for k, name in enumerate(names):
+        if _plain(name) in NAMES and (clock := _clock(k, name, units[k], head(k), _rises)):
+            found[k] = clock
+    if first.column != 0 or len(found) < 2 or any(k - 1 in found for k in found):
+        return {}
+    others = (clock for k, clock in found.items() if k > 0)
+    if not any(_is_beside(one, head(one.column), first, head(0)) for one in others):
+        return {}
+    own, current = {}, first
+    for k in range(len(names)):
+        current = found.get(k, current)
+        if current.column > 0:
+            own[k] = current
+    return own
+
+
+def _is_beside(
+    clock: Clock, cells: Sequence[str], first: Clock, first_cells: Sequence[str]
+) -> bool:
+    """Return whether a time is that of other samples than the first one's, of the same drive."""
+    times = []
+    for told, column in ((clock, cells), (first, first_cells)):
+        numbers = [value for cell in column if (value := _number(cell)) is not None]
+        if told.unit not in PER_SECOND or len(numbers) < FEWEST:
+            return False
+        times.append(np.array(numbers) / PER_SECOND[told.unit])
+    if any((np.diff(t) <= 0.0).any() for t in times) or abs(times[0][0] - times[1][0]) > NEAR:
+        return False
+    if _plain(clock.name) == _plain(first.name):
+        return not np.array_equal(times[0], times[1])
+    steps = [float(np.median(np.diff(t))) for t in times]
+    return abs(steps[0] / steps[1] - 1.0) > OTHER_RATE
 
 
 def told_clock(column: int, name: str, unit: str, head: Sequence[str]) -> Clock | None:

@@ -23,7 +23,15 @@ from models.logs.log import (
     one_run,
     some,
 )
-from models.logs.stamps import find_clock, seconds, told_clock, typical_rate
+from models.logs.stamps import (
+    MISSING,
+    Stamps,
+    find_clock,
+    own_clocks,
+    seconds,
+    told_clock,
+    typical_rate,
+)
 from models.schema import LONGEST_NAME, limits, require_few
 
 RUN = "run"
@@ -256,13 +264,21 @@ class TableLog:
         return told
 
     @cached_property
+    def _own_clocks(self) -> dict[int, Clock]:
+        """By column the clock of those that have one of their own."""
+        if self.clock_name or self.clock is None or self._run_column is not None:
+            return {}
+        return own_clocks(self.names, self.table.units, self.table.first_rows, self.clock)
+
+    @cached_property
     def _run_column(self) -> int | None:
         return self.names.index(RUN) if RUN in self.names else None
 
     @cached_property
     def _channels(self) -> tuple[int, ...]:
         """Which columns are channels: the numeric ones, but for the clock and the runs."""
-        other = (None if self.clock is None else self.clock.column, self._run_column)
+        other = {None if self.clock is None else self.clock.column, self._run_column}
+        other |= {clock.column for clock in self._own_clocks.values()}
         return tuple(k for k, is_one in enumerate(self.table.numeric) if is_one and k not in other)
 
     @property
@@ -281,29 +297,42 @@ class TableLog:
 
     @cached_property
     def _listed(self) -> tuple[Listed, ...]:
-        clock, t = self.clock, None
         kinds = {} if self._run_column is None else {self._run_column: Kind.WORD}
-        cells = self.table.cells(kinds | ({} if clock is None else {clock.column: _kind(clock)}))
-        if clock is not None:
-            stamps, rows = cells.columns[clock.column], cells.rows
-            for words in cells.words.values():  # each run has a clock of its own
-                stamps, rows = stamps[words.codes == 0], rows[words.codes == 0]
-            label = str(self.path)
-            t = seconds(label, clock, stamps, rows, self.table.place, mend=self.mend).t
-        rate = math.nan if t is None else typical_rate(t)
+        clocks = {one.column: one for one in (self.clock, *self._own_clocks.values()) if one}
+        cells = self.table.cells(kinds | {k: _kind(one) for k, one in clocks.items()})
+        size = cells.rows.size
+        for words in cells.words.values():  # each run has a clock of its own
+            first = words.codes == 0
+            columns = {k: cells.columns[k][first] for k in clocks}
+            cells = cells._replace(columns=columns, rows=cells.rows[first])
+        stamps = {k: self._stamps(str(self.path), one, cells).t for k, one in clocks.items()}
+        rates = {k: typical_rate(t) for k, t in stamps.items()}
         listed = []
         for k, heading in zip(self._channels, self.headings(), strict=True):
             head = self.table.first_rows(k)
             filled = sum(cell != "" for cell in head) / max(len(head), 1)
+            filled = 1.0 if self._own_clocks else filled  # of its own times, which end sooner
+            own = self._own_clocks.get(k, self.clock)
             listed.append(
                 Listed(
                     name=heading.name,
                     unit=heading.unit,
-                    samples=cells.rows.size,
-                    rate=rate * filled,
+                    samples=stamps[own.column].size if own and self._own_clocks else size,
+                    rate=rates[own.column] * filled if own else math.nan,
                 )
             )
         return tuple(listed)
+
+    def _stamps(self, label: str, clock: Clock, cells: Cells) -> Stamps:
+        """Return the stamps of a clock; of several each ends where it ends."""
+        column, rows, place = cells.columns[clock.column], cells.rows, self.table.place
+        if not self._own_clocks:
+            return seconds(label, clock, column, rows, place, mend=self.mend)
+        there = np.flatnonzero(column != MISSING if column.dtype.kind == "i" else ~np.isnan(column))
+        own = seconds(
+            label, clock, column[there], rows[there], place, mend=self.mend, restarts=False
+        )
+        return own._replace(order=own.of(there))
 
     def runs(self) -> tuple[str, ...]:
         """Return the words of the column "run" in their order; empty where there is none."""
@@ -333,27 +362,33 @@ class TableLog:
             raise RecordingError(
                 f"{self.path}: no column is a time that rises; columns found: '{some(self.names)}'"
             )
-        kinds = {clock.column: _kind(clock)}
+        clocks = {k: self._own_clocks.get(k, clock) for k in places}
+        kinds = {one.column: _kind(one) for one in clocks.values()}
         timed = clock.column in places and _kind(clock) is Kind.NUMBER  # asked for as it stands
         kinds |= {k: Kind.NUMBER for k in places if timed or k != clock.column}
         cells = self.table.cells(kinds, self._one_run(run))
         label = str(self.path) if run is None else f"{self.path}:{run}"
-        column, place = cells.columns[clock.column], self.table.place
-        stamps = seconds(label, clock, column, cells.rows, place, mend=self.mend)
-        self._noted.extend(stamps.notes)
-        return tuple(
-            Channel(
-                name=name,
-                unit=self.table.units[k],
-                t=stamps.t,
-                values=(
-                    stamps.t if k == clock.column and not timed else stamps.of(cells.columns[k])
-                ),
-                place=place,
-                rows=stamps.of(cells.rows),
+        found = {one.column: self._stamps(label, one, cells) for one in clocks.values()}
+        self._noted.extend(note for stamps in found.values() for note in stamps.notes)
+        if self._own_clocks:
+            own = dict.fromkeys(shown(one.name) for one in (clock, *self._own_clocks.values()))
+            said = "channels have times of their own, each the one before it: "
+            self._noted.append(said + ", ".join(own))
+        channels = []
+        for name, k in zip(names, places, strict=True):
+            stamps = found[clocks[k].column]
+            asked = k == clock.column and not timed
+            channels.append(
+                Channel(
+                    name=name,
+                    unit=self.table.units[k],
+                    t=stamps.t,
+                    values=stamps.t if asked else stamps.of(cells.columns[k]),
+                    place=self.table.place,
+                    rows=stamps.of(cells.rows),
+                )
             )
-            for name, k in zip(names, places, strict=True)
-        )
+        return tuple(channels)
 
     @cached_property
     def _places(self) -> dict[str, int]:
