@@ -624,6 +624,8 @@ def not_rising(t: Array, rows: NDArray[np.int64], place: str, *, restarts: bool 
         return said + f"samples are out of order: {MENDING} sorts them by time"
     steps = np.diff(t[k : k + LONGEST_IN_MEMORY])
     moves = int(np.count_nonzero(steps > 0.0))
+    if k == 0 and not moves:
+        return said + "it never moves: tell the column that is the time"
     if moves and steps.size / moves >= SHARED:
         return said + (
             f"stamps are rounded, {steps.size / moves:.3g} samples share one, and no even clock "

@@ -96,6 +96,13 @@ def test_stamps_that_are_shared_throughout_are_refused_all_the_same(drive):
         log.read(["r"])
 
 
+def test_a_time_that_never_moves_is_refused_all_the_same(drive):
+    t, columns = drive
+    log = as_arrays(0.0 * t, columns, EVERY, mend=True)
+    with pytest.raises(RecordingError, match="it never moves: tell the column"):
+        log.read(["r"])
+
+
 def test_a_log_that_is_right_is_left_alone(drive):
     t, columns = drive
     log = as_arrays(t, columns, EVERY, mend=True)
