@@ -24,7 +24,7 @@ from models.logs.log import (
     one_run,
     some,
 )
-from models.logs.stamps import Stamps, seconds
+from models.logs.stamps import risen
 from models.schema import require_few
 
 MOST_NOTED = 5  # names that a note lists
@@ -168,9 +168,12 @@ class GroupedLog(Generic[P]):
         found: dict[str, tuple[Array, Array, NDArray[np.int64]]] = {}
         with one_line(self.path, self.what):
             for clock, t, values in self.samples(asked):
-                stamps = seconds_of(self.path, clock, t, self.place, mend=self.mend)
+                rows, what = np.arange(1, t.size + 1), f"the clock of {clock}"
+                stamps = risen(
+                    str(self.path), what, t, rows, self.place, mend=self.mend, restarts=False
+                )
                 self._mended.extend(stamps.notes)
-                rows = stamps.of(np.arange(1, t.size + 1))
+                rows = stamps.of(rows)
                 found |= {n: (stamps.t, stamps.of(one), rows) for n, one in values.items()}
         result = []
         for listed, _ in asked:
@@ -186,27 +189,6 @@ class GroupedLog(Generic[P]):
                 )
             )
         return tuple(result)
-
-
-def seconds_of(path: Path, clock: str, t: Array, place: str, *, mend: bool = False) -> Stamps:
-    """Return times that rise, as `stamps.seconds` mends them.
-
-    Parameters
-    ----------
-    path : of the file.
-    clock : whose times they are.
-    t : times [s], (n,).
-    place : what a sample is in the file.
-    mend : whether what does not rise is mended, but for a clock that starts again.
-
-    Raises
-    ------
-    RecordingError
-        One line, where they are not finite or do not rise.
-    """
-    told = Clock(0, f"the clock of {clock}", "s", False, "")
-    rows = np.arange(1, t.size + 1)
-    return seconds(str(path), told, t, rows, place, mend=mend, restarts=False)
 
 
 def unique(names: Iterable[tuple[str, str]]) -> list[str]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from models.logs.log import Channel, Clock, Heading, Listed, RecordingError, chosen, one_run, some
-from models.logs.stamps import Stamps, seconds
+from models.logs.stamps import Stamps, risen
 
 TIMES = ("t", "time", "timestamp")  # what the clock is called
 RUN = "run"
@@ -131,8 +131,7 @@ class ArrayLog:
         t, rows = columns[clock][kept], np.flatnonzero(kept)
         stamps = Stamps(t, ())
         if self._mend:
-            told = Clock(0, clock, "s", False, "")
-            stamps = seconds(self._name, told, t, rows, "index", mend=True)
+            stamps = risen(self._name, clock, t, rows, "index", mend=True)
             self._noted.extend(stamps.notes)
         return tuple(
             Channel(

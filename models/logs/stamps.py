@@ -114,7 +114,8 @@ def own_clocks(
     So tables are written whose channels were sampled at rates of their own: "time_1, v_x, time_2,
     v_y". It is such a table where it begins with a time, a channel stands between any two, and one
     of the others, called alike or of another rate, rises without a rest from about the same instant
-    on: what a receiver tells of the same rows has another name and the same steps.
+    on: what a receiver tells of the same rows has another name and the same steps. What stands
+    behind a time that is none of its own has the first.
 
     Parameters
     ----------
@@ -128,13 +129,14 @@ def own_clocks(
             found[k] = clock
     if first.column != 0 or len(found) < 2 or any(k - 1 in found for k in found):
         return {}
-    others = (clock for k, clock in found.items() if k > 0)
-    if not any(_is_beside(one, head(one.column), first, head(0)) for one in others):
-        return {}
+    times = {
+        k: clock if _is_beside(clock, head(k), first, head(0)) else first
+        for k, clock in found.items()
+    }
     own, current = {}, first
     for k in range(len(names)):
-        current = found.get(k, current)
-        if current.column > 0:
+        current = times.get(k, current)
+        if current is not first:
             own[k] = current
     return own
 
@@ -376,6 +378,36 @@ def seconds(
         said = not_rising(t, rows, place, restarts=restarts)
         raise RecordingError(f"{label}: {clock.name} {said}")
     return mended._replace(notes=tuple(f"{clock.name}: {note}" for note in mended.notes))
+
+
+def risen(
+    label: str,
+    name: str,
+    t: Array,
+    rows: NDArray[np.int64],
+    place: str,
+    *,
+    mend: bool = False,
+    restarts: bool = True,
+) -> Stamps:
+    """Return times in seconds as `seconds` does.
+
+    Parameters
+    ----------
+    label : file and run, for messages.
+    name : whose times they are, for messages.
+    t : times [s], (n,).
+    rows : (n,) where each is in the file.
+    place : what a row is called.
+    mend, restarts : as of `seconds`.
+
+    Raises
+    ------
+    RecordingError
+        As `seconds`.
+    """
+    clock = Clock(0, name, "s", False, "")
+    return seconds(label, clock, t, rows, place, mend=mend, restarts=restarts)
 
 
 def _in_order(t: Array, *, restarts: bool) -> Stamps | None:

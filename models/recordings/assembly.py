@@ -22,10 +22,10 @@ from models.logs.clock import (
     typical_step,
     without_empty,
 )
-from models.logs.log import Channel, Clock, Heading, LogFile, RecordingError, one_run
+from models.logs.log import Channel, Heading, LogFile, RecordingError, one_run
 from models.logs.signals import BETA, QUANTITIES, WHEELS, Signal, quantity_of
 from models.logs.spelling import without_unit
-from models.logs.stamps import Stamps, seconds
+from models.logs.stamps import Stamps, risen
 from models.logs.units import TIME, is_told, to_si
 from models.recordings.choice import chosen_signals, column_of, has_wheels, listing
 from models.recordings.map import AXES, CUT, MEND, LogMap
@@ -159,8 +159,7 @@ def _channels(
         t = clock.values * to_si(unit, TIME, f"{label}: t (channel {clock.name!r})")
         stamps = Stamps(t, ())
         if log_map.order == MEND:
-            told = Clock(0, "t", "s", False, "")
-            stamps = seconds(label, told, t, clock.rows, clock.place, mend=True)
+            stamps = risen(label, "t", t, clock.rows, clock.place, mend=True)
         mended = stamps.notes
         by_name = {name: _timed(label, by_name[name], clock, stamps) for name in names}
     found: dict[str, list[Raw]] = {}

@@ -29,15 +29,20 @@ def saturating(alpha, stiffness, peak):
 def drive(n=1500, dt=0.01, speed=20.0, amplitude=0.06, scale=1.0):
     """A slalom of a bicycle on saturating tires, integrated finely; forces are known exactly."""
     t, v_y, r, delta, F_f, F_r = driven(n, dt, speed, amplitude).copy()
+    return at_one_speed("drive", speed, t, v_y, r, delta, scale * np.column_stack([F_f, F_r]))
+
+
+def at_one_speed(name, speed, t, v_y, r, delta_f, axle_force):
+    """A recording of a car that steers its front wheels alone and keeps its speed."""
     return Recording(
-        name="drive",
+        name=name,
         t=t,
-        v_x=np.full(n, speed),
+        v_x=np.full(t.size, speed),
         v_y=v_y,
         r=r,
-        delta_f=delta,
-        delta_r=np.zeros(n),
-        axle_force=np.column_stack([F_f, F_r]) * scale,
+        delta_f=delta_f,
+        delta_r=np.zeros(t.size),
+        axle_force=axle_force,
     )
 
 

@@ -6,7 +6,7 @@ from math import atan2, cos, sin
 import numpy as np
 import pytest
 
-from models.recordings import Recording
+from tests.identifier.conftest import at_one_speed
 
 
 def steering(t, amplitude):
@@ -46,16 +46,7 @@ def simulate(car, curve, n=2000, dt=0.01, speed=20.0, amplitude=0.1, rng=None, l
     if rng is not None:
         v_y = v_y + 0.02 * rng.standard_normal(n)
         r = r + 0.002 * rng.standard_normal(n)
-    return Recording(
-        name="curve",
-        t=t,
-        v_x=np.full(n, speed),
-        v_y=v_y,
-        r=r,
-        delta_f=delta,
-        delta_r=np.zeros(n),
-        axle_force=np.column_stack([F_f, F_r]),
-    )
+    return at_one_speed("curve", speed, t, v_y, r, delta, np.column_stack([F_f, F_r]))
 
 
 @pytest.fixture(name="curve_drive")

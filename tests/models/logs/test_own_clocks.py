@@ -40,6 +40,15 @@ def test_each_channel_has_the_time_that_stands_before_it(tmp_path, names, order)
     assert note.startswith("channels have times of their own, each the one before it: ")
 
 
+def test_behind_a_time_that_repeats_the_first_stands_what_has_the_first(tmp_path):
+    (t, v), (t_2, v_2) = at(100), at(50)
+    columns = {"time_1": t, "v": v, "time_2": t_2, "w": v_2, "time_3": t, "u": v}
+    log = open_log(written(tmp_path / "log.csv", **columns))
+    v, w, u = log.read(["v", "w", "u"])
+    np.testing.assert_array_equal(u.t, v.t)
+    np.testing.assert_array_equal(w.t, t_2)
+
+
 def test_channels_that_began_apart_stay_apart(tmp_path):
     (t_1, v_1), (t_2, v_2) = at(100), at(100, begin=2.0)
     log = open_log(written(tmp_path / "log.csv", time_1=t_1, v=v_1, time_2=t_2, w=v_2))
