@@ -1,0 +1,135 @@
+"""A drive as the estimate reads it: signals of at most 100 Hz, smoothed alike, and where they count.
+
+The balance is linear in its signals but for slip: the same zero-phase mean over all of them costs
+nothing and takes noise away.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import Array
+from identifier.estimate.priors import SEDAN
+from models.recordings import Recording
+from models.vehicle import GRAVITY, Vehicle
+
+FASTEST = 0.01  # [s]: sampled faster, samples are averaged
+SMOOTHED = 0.07  # [s] of a mean, of a sedan
+SLOW = 0.45  # sqrt(g L): below, no tire curve is learnt
+LONGITUDINAL = 0.3  # [s] over which v_x is differentiated
+MOST_A_X = 18.0  # m/s²
+BANK_MEAN = 1.0  # [s]: roads bank slowly
+LEVEL = 0.01  # sine, by which an accelerometer may be off level; twice that is a bank in full
+MOST_ROLL = 0.08  # per g, by which a body rolls outwards
+EXPLAINED = 0.15  # of the fast motion that an accelerometer may miss, else it is none of this car
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Drive:
+    """Signals of n samples, for the forward model.
+
+    Parameters
+    ----------
+    dt : sampling interval [s].
+    signals : columns as `motion.model.SIGNALS`, (n, 9).
+    rates : d/dt of v_y, r and δ_f, (n, 3).
+    counts : samples that count, (n,).
+    every : samples of the recording that make one of these.
+    """
+
+    dt: float
+    signals: Array
+    rates: Array
+    counts: NDArray[np.bool_]
+    every: int
+
+    @classmethod
+    def of(cls, recording: Recording, vehicle: Vehicle) -> "Drive":
+        """Return a recording with a v_y as the estimate reads it."""
+        every = max(1, round(FASTEST / recording.dt))
+        dt = recording.dt * every
+        pieces = [
+            _piece(recording, piece, vehicle, every, dt) for piece in recording.stretches
+        ]
+        signals, rates = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+        return cls(dt=dt, signals=signals, rates=rates, counts=signals[:, -1] > 0.0, every=every)
+
+
+def _piece(
+    recording: Recording, piece: slice, vehicle: Vehicle, every: int, dt: float
+) -> tuple[Array, Array]:
+    """Return signals and rates of a stretch; its first sample does not count."""
+    v_y = recording.needed("v_y")
+
+    def thinned(signal: Array) -> Array:
+        part = signal[piece]
+        if every == 1:
+            return np.asarray(part)
+        m = len(part) // every * every
+        mean: Array = part[:m].reshape(-1, every).mean(axis=1)
+        return mean
+
+    scale = float(np.sqrt(vehicle.wheelbase / SEDAN))
+    count = round(SMOOTHED * scale / dt) | 1
+    raw = (recording.v_x, v_y, recording.r, recording.delta_f, recording.delta_r)
+    v_x, v_y, r, delta_f, delta_r = (box(thinned(signal), count) for signal in raw)
+    slowest = SLOW * vehicle.froude_speed
+    on = v_x > slowest
+    v_x = np.where(on, v_x, slowest)
+    n3 = LONGITUDINAL / dt
+    a_x = box(gradient(box(v_x, n3 / 2), dt), n3) - box(v_y * r, n3)
+    a_x = np.where(on, np.clip(a_x, -MOST_A_X, MOST_A_X), 0.0)
+    bank = np.zeros_like(v_x)
+    if recording.a_y is not None:
+        bank = _bank(thinned(recording.a_y), v_x, v_y, r, on, dt)
+    on[0] = False  # nothing is carried into a stretch
+    signals = np.column_stack(
+        [v_x, v_y, r, delta_f, delta_r, a_x, bank, np.zeros_like(v_x), on.astype(float)]
+    )
+    rates = np.column_stack([gradient(signal, dt) for signal in (v_y, r, delta_f)])
+    return np.ascontiguousarray(signals), np.ascontiguousarray(rates)
+
+
+def gradient(signal: Array, dt: float) -> Array:
+    """Return d/dt by central differences, (n,)."""
+    slope: Array = np.gradient(signal, dt) if signal.size > 1 else np.zeros_like(signal)
+    return slope
+
+
+def box(signal: Array, count: float) -> Array:
+    """Return the centered mean over an odd count of samples, edges held, (n,)."""
+    width = max(1, int(count) | 1)
+    if width == 1:
+        return np.array(signal, dtype=np.float64)
+    half = width // 2
+    padded = np.concatenate([np.full(half + 1, signal[0]), signal, np.full(half, signal[-1])])
+    total = np.cumsum(padded - signal[0])
+    mean: Array = (total[width:] - total[:-width]) / width + signal[0]
+    return mean
+
+
+def _bank(a_y: Array, v_x: Array, v_y: Array, r: Array, on: NDArray[np.bool_], dt: float) -> Array:
+    """Return the side force of a banked road [m/s²], what motion shows and no accelerometer, (n,).
+
+    What roll and a sensor off level show instead is taken off; a channel that does not show the
+    fast motion is left out.
+    """
+    nothing = np.zeros_like(v_x)
+    n1, n3 = BANK_MEAN / dt, LONGITUDINAL / dt
+    motion = gradient(box(v_y, n3 / 3), dt) + v_x * r
+    slow, felt = box(motion, n1), box(a_y, n1)
+    fast, fast_felt = (box(motion, n3) - slow)[on], (box(a_y, n3) - felt)[on]
+    power = float(fast @ fast)
+    if fast.size < 2.0 / dt or power <= 0.0 or not np.any(fast_felt):
+        return nothing
+    gain = float(fast @ fast_felt) / power
+    missed = 1.0 - float(np.corrcoef(fast, fast_felt)[0, 1]) ** 2
+    if not (0.8 < gain < 1.2 and missed < EXPLAINED):
+        return nothing
+    gap = slow - felt / (1.0 + min(max(gain - 1.0, 0.0), MOST_ROLL))
+    off = 10.0 * LEVEL
+    gap = gap - min(max(float(np.median(gap[on])), -off), off)
+    share = np.clip((np.abs(gap) / GRAVITY - LEVEL) / LEVEL, 0.0, 1.0)
+    bank: Array = np.where(on, gap * share, 0.0)
+    return bank

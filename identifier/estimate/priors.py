@@ -1,0 +1,148 @@
+"""What is believed of a car before a log is read: one table, each number with its reason.
+
+Beliefs are Gaussian and in static axle loads and wheelbases L, so that they serve a sedan and a
+car of 1:10; a stiffness that a vehicle file gives does not enter. Chosen on random cars of the
+plant and confirmed once on recordings.
+"""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.arrays import Array
+from identifier.motion.parameters import INDEX, NAMES
+from models.vehicle import Vehicle
+
+SEDAN = 2.7  # m, the wheelbase for which times and speeds are given; they go with its root
+
+
+class Belief(NamedTuple):
+    """A prior: mean, standard deviation, bounds, and why.
+
+    per : what mean, sd and bounds are multiples of: "" for SI, "L" for the wheelbase, "v" for the
+    speed sqrt(L/2.7 m).
+    """
+
+    mean: float
+    sd: float
+    low: float
+    high: float
+    per: str
+    reason: str
+
+
+INF = float("inf")
+OF_AXLES: dict[str, Belief] = {
+    "ln_stiffness": Belief(
+        np.log(14.0), 0.5, np.log(2.0), np.log(60.0), "", "road tires 8-25 loads/rad, 1:10 4-20"
+    ),
+    "ln_grip": Belief(np.log(0.85), 0.25, np.log(0.1), np.log(3.0), "", "wet asphalt to slicks"),
+    "shape": Belief(1.35, 0.15, 1.0, 1.9, "", "Magic Formula fits of lateral forces"),
+    "curvature": Belief(0.0, 0.6, -4.0, 0.95, "", "beyond 0.95 the curve has no peak"),
+    **{
+        f"residual{j}": Belief(0.0, 0.08, -INF, INF, "", "what tires of one formula differ by")
+        for j in range(4)
+    },
+    "compliance": Belief(0.008, 0.008, 0.0, 0.1, "L", "relaxation of about a tenth wheelbase"),
+    "sway_share": Belief(0.2, 0.3, 0.0, 1.0, "", "roll center low to high"),
+    "braking": Belief(0.65, 0.3, 0.0, 2.0, "", "all four wheels brake"),
+    "driving": Belief(0.35, 0.4, 0.0, 3.0, "", "which axle drives is not known"),
+}
+OF_CAR: dict[str, Belief] = {
+    "load_transfer": Belief(0.18, 0.08, 0.0, 0.5, "", "height 0.5 m, less what tires lose"),
+    "ln_sway": Belief(0.0, 0.25, -INF, INF, "", "1.5 Hz for a sedan, 5 sqrt(g/L)"),
+    "steering_zero": Belief(0.0, 0.007, -0.2, 0.2, "", "a toe or a zero of 0.4 degrees"),
+    "steering_gain": Belief(0.0, 0.04, -0.6, 1.5, "", "a steering ratio that somebody typed"),
+    "v_y_bias": Belief(0.0, 0.07, -INF, INF, "v", "of optical and satellite sensors"),
+    "v_y_angle": Belief(0.0, 0.007, -INF, INF, "", "mounted to 0.4 degrees"),
+    "v_y_lever": Belief(0.0, 0.015, -INF, INF, "L", "place measured to 4 cm"),
+}
+ALIKE = {  # standard deviation of front less rear
+    "ln_stiffness": (0.35, ""),
+    "ln_grip": (0.15, ""),
+    "shape": (0.1, ""),
+    "curvature": (0.5, ""),
+    "compliance": (0.003, "L"),
+    "sway_share": (0.1, ""),
+}
+# At one speed a bias of v_y and a mounting angle are one: each takes its half, unless speeds differ.
+SHARED_ERROR = 0.5
+FAULTS = (  # what no log leaves open but one that shows it
+    "v_y_delay", "steering_delay", "r_bias", "r_delay", "v_x_factor", "cg_shift", "ln_inertia",
+    "bank",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Priors:
+    """The beliefs for a car, as numbers.
+
+    Parameters
+    ----------
+    mean, low, high : of all parameters, (p,).
+    information : inverse covariance, (p, p); zero where a parameter does not move.
+    moves : which are estimated, (p,).
+    """
+
+    mean: Array
+    low: Array
+    high: Array
+    information: Array
+    moves: NDArray[np.bool_]
+
+    @classmethod
+    def of(
+        cls,
+        vehicle: Vehicle,
+        *,
+        wide: Mapping[str, float] = {},
+        apart: bool = False,
+        fixed: Collection[str] = (),
+    ) -> "Priors":
+        """Return the beliefs for a car.
+
+        Parameters
+        ----------
+        wide : standard deviations in SI in place of those of the table, by parameter.
+        apart : whether bias and angle of v_y are believed apart, without `SHARED_ERROR`.
+        fixed : parameters that do not move.
+        """
+        L = vehicle.wheelbase
+        unit = {"": 1.0, "L": L, "v": float(np.sqrt(L / SEDAN))}
+        p = len(NAMES)
+        mean, sd, low, high = np.zeros(p), np.zeros(p), np.full(p, -INF), np.full(p, INF)
+        table = {f"{name}_{axle}": one for name, one in OF_AXLES.items() for axle in "fr"} | OF_CAR
+        for name, belief in table.items():
+            k, size = INDEX[name], unit[belief.per]
+            mean[k], sd[k] = size * belief.mean, size * belief.sd
+            low[k], high[k] = size * belief.low, size * belief.high
+        for name, value in wide.items():
+            sd[INDEX[name]] = value
+        for name in fixed:
+            sd[INDEX[name]] = 0.0
+        information = np.zeros((p, p))
+        moves = sd > 0.0
+        information[moves, moves] = 1.0 / sd[moves] ** 2
+        for name, (spread, per) in ALIKE.items():
+            _couple(information, {f"{name}_f": 1.0, f"{name}_r": -1.0}, spread * unit[per])
+        if not apart and moves[INDEX["v_y_bias"]] and moves[INDEX["v_y_angle"]]:
+            b, beta = OF_CAR["v_y_bias"], OF_CAR["v_y_angle"]
+            each = {"v_y_bias": 1.0 / (b.sd * unit[b.per]), "v_y_angle": -1.0 / beta.sd}
+            _couple(information, each, SHARED_ERROR)
+        return cls(mean=mean, low=low, high=high, information=information, moves=moves)
+
+    def cost(self, p: Array) -> float:
+        """Return -ln of the prior's density over that at its mean [nats]."""
+        away = p - self.mean
+        return float(0.5 * away @ self.information @ away)
+
+
+def _couple(information: Array, of: Mapping[str, float], sd: float) -> None:
+    """Add that a sum of parameters is zero within a standard deviation."""
+    v = np.zeros(len(information))
+    for name, factor in of.items():
+        v[INDEX[name]] = factor
+    information += np.outer(v, v) / sd**2

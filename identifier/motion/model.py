@@ -1,0 +1,400 @@
+"""Lateral motion of a car from its signals, one sample a step, with slopes over the parameters.
+
+Signals, after the sensors' errors are taken out:
+v_y = v_y,m(t + τ) - b - β v_x - x_s r,   δ = (1 + g) δ_m + δ0.
+Slip, i = f, r:   α_i = δ_i - atan((v_y ± l_i r)/v_x) + k_i (-ρ'/(ω² v_x)),
+sway:   ρ'' = ω² (a - ρ) - 2 ζ ω ρ',   a = g Σ share_i φ_i.
+Relaxation:   x_i' = (v_x/σ_i)(α_i - x_i),   σ_i = s_i max(φ_i'(x_i), 0.02 C_i) + 0.001 L, solved
+exactly for α linear over a step.
+Curve on a road of m times the friction:   φ(x) = m φ_0(x/m),
+φ_0 = μ sin(c atan u) + Σ q_j tanh(x/a_j),   u = B x - E (B x - atan B x),   B = C/(c μ)
+(Pacejka, Tyre and Vehicle Dynamics, 4.3, and what it misses).
+Load and ellipse, f = a_x/g:   λ_i = max(1 ∓ (h L/l_o) f + κ_i v_x², 0.2),
+G_i = sqrt(max(1 - (c_i f)², 0.05)).
+Force over the static load:   F_i = λ_i G_i φ_i(x_i) cos δ_i.
+Balance of an axle (`axle.car`):   ξ_i' + v_x r/g - F_i - bank = 0. Missed, through a filter of
+time 1/κ and without a derivative:   z' = (what is missed) - κ z,   e = κ z.
+
+Slopes run along by the chain rule from stage to stage (forward differentiation): each stage has
+few inputs, so that no stage but the last knows all parameters.
+"""
+
+from functools import cache
+from typing import Any, NamedTuple
+
+import casadi as ca
+
+from codegen import Scan
+from codegen.compiler import FLAGS
+from identifier.axle.slip import SHORTEST
+from identifier.motion.parameters import INDEX, NAMES, SLIPS
+from models.vehicle import GRAVITY, LIGHTEST
+
+LEAST_GRIP = 0.05  # of G²: what an axle that uses all of its grip lengthwise keeps sideways
+LEAST_SLOPE = 0.02  # of C: the carcass does not stretch further
+DAMPING = 0.3  # ζ of the sway
+# Slopes over all parameters are thousands of lines: to optimize them further takes the compiler
+# longer than they run.
+QUICK = tuple("-O1" if flag == "-O2" else flag for flag in FLAGS)
+RATE = 4.0  # κ [1/s]: what is missed is a mean over a quarter of a second
+
+Columns = tuple[str, ...]
+SIGNALS = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_x", "bank", "road", "on")
+RATES = ("v_y_rate", "r_rate", "delta_rate")  # of late signals, by which a delay is told
+CARRIED = (
+    "x_f", "x_r", "alpha_f", "alpha_r", "slope_f", "slope_r", "force_f", "force_r",
+    "rho", "rate", "z_f", "z_r", "xi_f", "xi_r", "u_f", "u_r",
+)  # fmt: skip
+
+
+class CarNumbers(NamedTuple):
+    """l_f, l_r [m], I_z/(m g) [s²], ω of the sway [rad/s], κ of the downforce (2) [s²/m²]."""
+
+    l_f: Any
+    l_r: Any
+    inertia: Any
+    omega: Any
+    press_f: Any
+    press_r: Any
+
+
+class Dual(NamedTuple):
+    """A value and its slopes over the parameters, (1, n)."""
+
+    value: Any
+    slopes: Any
+
+
+class Stage:
+    """Equations from a few inputs to a few outputs, differentiated once.
+
+    Parameters
+    ----------
+    inputs : symbols, of names that no other symbol of the outputs has.
+    outputs : expressions of them, and of symbols without slopes.
+    """
+
+    def __init__(self, inputs: list[Any], outputs: list[Any]) -> None:
+        x, y = ca.vertcat(*inputs), ca.vertcat(*outputs)
+        names = {one.name() for one in inputs}
+        self._free = ca.vertcat(*(one for one in ca.symvar(y) if one.name() not in names))
+        self._function = ca.Function("stage", [x, self._free], [y, ca.jacobian(y, x)])
+
+    def __call__(self, inputs: list[Dual]) -> list[Dual]:
+        """Return the outputs and their slopes."""
+        value, J = self._function(ca.vertcat(*(one.value for one in inputs)), self._free)
+        slopes = ca.mtimes(J, ca.vertcat(*(one.slopes for one in inputs)))
+        return [Dual(value[i], slopes[i, :]) for i in range(value.shape[0])]
+
+
+@cache
+def motion_scan(columns: Columns = ()) -> Scan:
+    """Return the model as a compiled loop.
+
+    Its ports: `state` (16,) and `tangent` are carried, `signals` (9,) and `rates` (3,) have a row
+    a sample, `parameters` (p,), `car` (6,) and `dt` are constant; `force` (2,) [static loads],
+    `missed` e (2,) [static loads], `slip` (2,) [rad] and, where slopes are asked for,
+    `missed_slopes` (2, n) come out.
+
+    Parameters
+    ----------
+    columns : names of the parameters over which slopes are asked for, (n,).
+    """
+    n = len(columns)
+    state, old = _symbols(CARRIED)
+    signal_port, signals = _symbols(SIGNALS)
+    rate_port, rates = _symbols(RATES)
+    parameter_port, parameters = _symbols(NAMES)
+    car_port = ca.SX.sym("car", len(CarNumbers._fields))
+    dt = ca.SX.sym("dt")
+    was_on = ca.SX.sym("was_on")
+    duals = {name: Dual(parameters[name], _unit(name, columns)) for name in NAMES}
+    nothing = ca.SX(1, n)
+    fixed = {name: Dual(value, nothing) for name, value in (signals | rates).items()}
+    first = 1 - was_on * signals["on"]
+    pattern = {name: ca.Sparsity(1, n) for name in CARRIED}
+    while True:  # which parameters each state can depend on
+        tangents = {name: ca.SX.sym(f"t_{name}", pattern[name]) for name in CARRIED}
+        before = {name: Dual(old[name], tangents[name]) for name in CARRIED}
+        car = CarNumbers(*ca.vertsplit(car_port))
+        after, out = _step(before, fixed, duals, car, dt, first)
+        grown = {
+            name: pattern[name] + ca.sparsify(after[name].slopes).sparsity() for name in CARRIED
+        }
+        if all(grown[name].nnz() == pattern[name].nnz() for name in CARRIED):
+            break
+        pattern = grown
+    on = signals["on"]
+    following = ca.vertcat(*(ca.if_else(on > 0, after[name].value, 0) for name in CARRIED))
+    ports_in = [state, was_on, signal_port, rate_port, parameter_port, car_port, dt]
+    names_in = ["state", "was_on", "signals", "rates", "parameters", "car", "dt"]
+    names_out = ["state_next", "was_on_next", "force", "missed", "slip"]
+    ports_out = [
+        following,
+        on,
+        *(on * ca.vertcat(*(axis.value for axis in out[name])) for name in ("F", "e", "x")),
+    ]
+    carry: tuple[str, ...] = ("state", "was_on")
+    if n:
+        kept = [ca.vec(tangents[name].nz[:]) for name in CARRIED]
+        flat = ca.SX.sym("tangent", sum(one.numel() for one in kept))
+        moved = [
+            on * ca.vec(ca.project(after[name].slopes, pattern[name]).nz[:]) for name in CARRIED
+        ]
+        slopes = on * ca.vertcat(*(ca.densify(axis.slopes) for axis in out["e"]))
+        exchanged = ca.substitute(
+            [*ports_out, ca.vertcat(*moved), ca.densify(slopes)], [ca.vertcat(*kept)], [flat]
+        )
+        ports_in.append(flat)
+        names_in.append("tangent")
+        ports_out = exchanged
+        names_out += ["tangent_next", "missed_slopes"]
+        carry = ("state", "was_on", "tangent")
+    step = ca.Function(
+        f"motion_{n}", ports_in, [ca.densify(one) for one in ports_out], names_in, names_out
+    )
+    return Scan(step, carry=carry, over=("signals", "rates"), flags=QUICK)
+
+
+def _symbols(names: tuple[str, ...]) -> tuple[Any, dict[str, Any]]:
+    port = ca.SX.sym(names[0], len(names))
+    return port, dict(zip(names, ca.vertsplit(port), strict=True))
+
+
+def _unit(name: str, columns: Columns) -> Any:
+    """Return the slopes of a parameter over the columns: one at its own, (1, n)."""
+    slopes = ca.SX(1, len(columns))
+    if name in columns:
+        slopes[0, columns.index(name)] = 1
+    return slopes
+
+
+def _step(
+    before: dict[str, Dual],
+    signals: dict[str, Dual],
+    p: dict[str, Dual],
+    car: CarNumbers,
+    dt: Any,
+    first: Any,
+) -> tuple[dict[str, Dual], dict[str, tuple[Dual, Dual]]]:
+    """Return the state after a sample, and F, e, x of both axles."""
+    after: dict[str, Dual] = {}
+    L = car.l_f + car.l_r
+    v_x, v_y, r, delta = _sensors(signals, p)
+    after["rate"], after["rho"], sway = _sway(before, p, car, dt, first, v_x, r)
+    out: dict[str, tuple[Dual, Dual]] = {}
+    found = [
+        _axle(
+            axle,
+            before,
+            signals,
+            p,
+            car,
+            dt,
+            first,
+            v_x=v_x,
+            v_y=v_y,
+            r=r,
+            delta=delta if axle == "f" else signals["delta_r"],
+            sway=sway,
+            after=after,
+            L=L,
+        )
+        for axle in "fr"
+    ]
+    for k, name in enumerate(("F", "e", "x")):
+        out[name] = (found[0][k], found[1][k])
+    return after, out
+
+
+def _sensors(signals: dict[str, Dual], p: dict[str, Dual]) -> tuple[Dual, Dual, Dual, Dual]:
+    """Return v_x, v_y, r and δ_f without the sensors' errors."""
+    names = ("v_x", "v_y", "r", "delta_f", "v_y_rate", "r_rate", "delta_rate")
+    v_x, v_y, r, delta, v_y_rate, r_rate, delta_rate = (ca.SX.sym(name) for name in names)
+    of = (
+        "v_x_factor", "v_y_bias", "v_y_angle", "v_y_lever", "v_y_delay", "r_bias", "r_delay",
+        "steering_zero", "steering_gain", "steering_delay",
+    )  # fmt: skip
+    factor, b, beta, x_s, late, r_b, r_late, zero, gain, delta_late = (ca.SX.sym(n) for n in of)
+    true_v_x = v_x * (1 + factor)
+    true_r = r + r_late * r_rate - r_b
+    true_v_y = v_y + late * v_y_rate - b - beta * true_v_x - x_s * true_r
+    true_delta = (1 + gain) * (delta + delta_late * delta_rate) + zero
+    stage = Stage(
+        [v_x, v_y, r, delta, v_y_rate, r_rate, delta_rate,
+         factor, b, beta, x_s, late, r_b, r_late, zero, gain, delta_late],
+        [true_v_x, true_v_y, true_r, true_delta],
+    )  # fmt: skip
+    found = stage([signals[name] for name in names] + [p[name] for name in of])
+    return found[0], found[1], found[2], found[3]
+
+
+def _sway(
+    before: dict[str, Dual],
+    p: dict[str, Dual],
+    car: CarNumbers,
+    dt: Any,
+    first: Any,
+    v_x: Dual,
+    r: Dual,
+) -> tuple[Dual, Dual, Dual]:
+    """Return ρ', ρ and -ρ'/(ω² v_x), semi-implicit in ρ' (as `axle.slip.sway`)."""
+    names = ("rho", "rate", "force_f", "force_r", "slope_f", "slope_r")
+    rho, rate, f_f, f_r, C_f, C_r = (ca.SX.sym(name) for name in names)
+    k_f, k_r, ln_sway, shift, speed, yaw = (ca.SX.sym(n) for n in ("k_f", "k_r", "w", "shift", "speed", "yaw"))
+    L = car.l_f + car.l_r
+    front, rear = (car.l_r + shift) / L, (car.l_f - shift) / L
+    omega = car.omega * ca.exp(ln_sway)
+    a = GRAVITY * (front * f_f + rear * f_r)
+    eased = 1 + dt * GRAVITY * (front * C_f * k_f + rear * C_r * k_r) / speed
+    moved = (rate * eased + dt * omega**2 * (a - rho)) / (eased + dt * 2 * DAMPING * omega)
+    moved = ca.if_else(first > 0, 0, moved)
+    place = ca.if_else(first > 0, speed * yaw, rho + dt * moved)
+    inputs = [rho, rate, f_f, f_r, C_f, C_r, k_f, k_r, ln_sway, shift, speed, yaw]
+    outputs = [moved, place, -moved / (omega**2 * speed)]
+    of = ("sway_share_f", "sway_share_r", "ln_sway", "cg_shift")
+    found = Stage(inputs, outputs)(
+        [before[name] for name in names] + [p[name] for name in of] + [v_x, r]
+    )
+    return found[0], found[1], found[2]
+
+
+def curve_symbols() -> tuple[list[Any], Any, Any, Any]:
+    """Return the numbers of a curve, a slip, and there φ and dφ/dx, as CasADi symbols.
+
+    The numbers are ln C, ln μ, c, E, q (4) and ln m, (9,); forces in static axle loads.
+    """
+    numbers = [ca.SX.sym(n) for n in ("lnC", "lnmu", "c", "E", "q0", "q1", "q2", "q3", "lnm")]
+    ln_C, ln_mu, c, E, *q, ln_m = numbers
+    x = ca.SX.sym("x")
+    m = ca.exp(ln_m)
+    y = x / m
+    mu = ca.exp(ln_mu)
+    B = ca.exp(ln_C) / (c * mu)
+    u = B * y - E * (B * y - ca.atan(B * y))
+    at = c * ca.atan(u)
+    du = B * (1 - E * (B * y) ** 2 / (1 + (B * y) ** 2))
+    T = [ca.tanh(y / slip) for slip in SLIPS]
+    phi = mu * ca.sin(at) + sum(weight * t for weight, t in zip(q, T, strict=True))
+    slope = mu * c * ca.cos(at) / (1 + u * u) * du + sum(
+        weight * (1 - t * t) / slip for weight, t, slip in zip(q, T, SLIPS, strict=True)
+    )
+    return numbers, x, m * phi, slope
+
+
+def _axle(
+    axle: str,
+    before: dict[str, Dual],
+    signals: dict[str, Dual],
+    p: dict[str, Dual],
+    car: CarNumbers,
+    dt: Any,
+    first: Any,
+    *,
+    v_x: Dual,
+    v_y: Dual,
+    r: Dual,
+    delta: Dual,
+    sway: Dual,
+    after: dict[str, Dual],
+    L: Any,
+) -> tuple[Dual, Dual, Dual]:
+    """Return F, e and x of an axle; its states after the sample go into `after`."""
+    front = axle == "f"
+    # Slip.
+    d, vy, vx, yaw, k, s, shift = (ca.SX.sym(n) for n in ("d", "vy", "vx", "r", "k", "s", "cg"))
+    arm = (car.l_f - shift) if front else -(car.l_r + shift)
+    (alpha,) = Stage([d, vy, vx, yaw, k, s, shift], [d - ca.atan((vy + arm * yaw) / vx) + k * s])(
+        [delta, v_y, v_x, r, p[f"sway_share_{axle}"], sway, p["cg_shift"]]
+    )
+    # Relaxation: the exact step of a first-order lag for α linear over it.
+    x0, a0, a1, C, give = (ca.SX.sym(n) for n in ("x", "a0", "a1", "C", "s"))
+    sigma = give * C + SHORTEST * L
+    h = vx * dt / sigma
+    e = ca.exp(-h)
+    x1 = e * x0 + (1 - e) * a0 + (1 - (1 - e) / h) * (a1 - a0)
+    (x,) = Stage([x0, a0, a1, C, give, vx], [ca.if_else(first > 0, a1, x1)])(
+        [
+            before[f"x_{axle}"],
+            before[f"alpha_{axle}"],
+            alpha,
+            before[f"slope_{axle}"],
+            p[f"compliance_{axle}"],
+            v_x,
+        ]
+    )
+    after[f"x_{axle}"], after[f"alpha_{axle}"] = x, alpha
+    # Curve.
+    numbers, at, phi, slope = curve_symbols()
+    road = p["ln_road"]
+    ln_m = Dual(road.value + signals["road"].value, road.slopes)
+    floor = LEAST_SLOPE * ca.exp(numbers[0])
+    names = ("ln_stiffness", "ln_grip", "shape", "curvature")
+    given = [p[f"{name}_{axle}"] for name in names]
+    given += [p[f"residual{j}_{axle}"] for j in range(len(SLIPS))]
+    curve = Stage([*numbers, at], [phi, ca.fmax(slope, floor)])
+    value, after[f"slope_{axle}"] = curve([*given, ln_m, x])
+    # Load and ellipse.
+    phi0, height, brake, drive, cg, f, speed = (
+        ca.SX.sym(n) for n in ("phi", "h", "b", "d", "cg", "f", "v")
+    )
+    other = (car.l_r + cg) if front else (car.l_f - cg)
+    shifted = (-height if front else height) * L / other * f
+    press = car.press_f if front else car.press_r
+    load = 1 + shifted + press * speed**2
+    load = ca.if_else(load > LIGHTEST, load, LIGHTEST)
+    use = ca.if_else(f > 0, drive, brake) * f
+    left = ca.sqrt(ca.fmax(1 - use**2, LEAST_GRIP))
+    a_x = Dual(signals["a_x"].value / GRAVITY, signals["a_x"].slopes)
+    (force,) = Stage([phi0, height, brake, drive, cg, f, speed], [phi0 * load * left])(
+        [
+            value,
+            p["load_transfer"],
+            p[f"braking_{axle}"],
+            p[f"driving_{axle}"],
+            p["cg_shift"],
+            a_x,
+            v_x,
+        ]
+    )
+    after[f"force_{axle}"] = force
+    # What the balance misses.
+    z0, xi0, u0, F0, angle, ln_I, push = (
+        ca.SX.sym(n) for n in ("z", "xi", "u", "F", "d", "I", "bank")
+    )
+    J = car.inertia * ca.exp(ln_I) / (other if front else -other)
+    across = F0 * ca.cos(angle)
+    xi = vy / GRAVITY + J * yaw
+    u = across - vx * yaw / GRAVITY + push
+    fall = ca.exp(-RATE * dt)
+    mean = (1 - fall) / (RATE * dt)
+    z = fall * z0 + mean * (xi - xi0) - (u + u0) / 2 * dt * mean
+    z = ca.if_else(first > 0, 0, z)
+    bank = Dual(
+        signals["bank"].value / GRAVITY + p["bank"].value, p["bank"].slopes
+    )
+    balance = Stage(
+        [z0, xi0, u0, F0, angle, ln_I, push, vx, vy, yaw, cg], [z, xi, u, across, RATE * z]
+    )
+    found = balance(
+        [
+            before[f"z_{axle}"],
+            before[f"xi_{axle}"],
+            before[f"u_{axle}"],
+            force,
+            delta,
+            p["ln_inertia"],
+            bank,
+            v_x,
+            v_y,
+            r,
+            p["cg_shift"],
+        ]
+    )
+    after[f"z_{axle}"], after[f"xi_{axle}"], after[f"u_{axle}"] = found[0], found[1], found[2]
+    return found[3], found[4], x
+
+
+def parameter_index(columns: Columns) -> list[int]:
+    """Return where columns stand among all parameters."""
+    return [INDEX[name] for name in columns]
