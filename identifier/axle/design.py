@@ -124,17 +124,7 @@ class AxleIdentifier(Method):
             prior=Prior(compliance=0.01 * L, sd_compliance=0.01 * L, sd_v_y=0.01 * U),
             sway=Sway.for_vehicle(vehicle),
             bounds=Bounds(compliance=0.12 * L, v_y=0.15 * U),
-            plausibility=Plausibility(
-                min_speed=vehicle.lowest_speed,
-                learning_speed=0.6 * U,
-                max_speed=60.0 * U,
-                slow=U,
-                max_yaw_rate=4.0 * U / L,
-                max_rate=3.0 * GRAVITY,
-                jump=0.1 * U,
-                max_yaw_acceleration=6.0 * GRAVITY / L,
-                yaw_jump=0.2 * U / L,
-            ),
+            plausibility=Plausibility.for_vehicle(vehicle),
             regression=Regression(noise=0.001 * U),
             dt=dt,
         )

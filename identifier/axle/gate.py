@@ -15,6 +15,7 @@ import numpy as np
 from codegen.arrays import Array
 from identifier.axle.car import larger
 from models.rules import require_positive_fields
+from models.vehicle import GRAVITY, Vehicle
 
 BAD_IN_A_ROW = 3
 
@@ -65,6 +66,22 @@ class Plausibility:
 
     def __post_init__(self) -> None:
         require_positive_fields(self)
+
+    @classmethod
+    def for_vehicle(cls, vehicle: Vehicle) -> "Plausibility":
+        """Return the bounds for a car: speeds scale with U = sqrt(g L), lengths with L (Froude)."""
+        U, L = vehicle.froude_speed, vehicle.wheelbase
+        return cls(
+            min_speed=vehicle.lowest_speed,
+            learning_speed=0.6 * U,
+            max_speed=60.0 * U,
+            slow=U,
+            max_yaw_rate=4.0 * U / L,
+            max_rate=3.0 * GRAVITY,
+            jump=0.1 * U,
+            max_yaw_acceleration=6.0 * GRAVITY / L,
+            yaw_jump=0.2 * U / L,
+        )
 
     def rest(self, dt: float) -> int:
         """Return how many bad samples in a row end a run, so that the next good one begins anew.

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from codegen.arrays import Array
 from identifier.estimate.priors import SEDAN
 from models.recordings import Recording
+from models.recordings.record import ALL
 from models.vehicle import GRAVITY, Vehicle
 
 FASTEST = 0.01  # [s]: sampled faster, samples are averaged
@@ -44,13 +45,34 @@ class Drive:
     counts: NDArray[np.bool_]
     every: int
 
+    @staticmethod
+    def slowest(vehicle: Vehicle) -> float:
+        """Return the speed [m/s] below which samples do not count."""
+        return SLOW * vehicle.froude_speed
+
     @classmethod
-    def of(cls, recording: Recording, vehicle: Vehicle) -> "Drive":
-        """Return a recording with a v_y as the estimate reads it."""
-        every = max(1, round(FASTEST / recording.dt))
+    def of(
+        cls, recording: Recording, vehicle: Vehicle, part: slice = ALL, *, thin: bool = True
+    ) -> "Drive":
+        """Return a recording with a v_y as the estimate reads it.
+
+        Parameters
+        ----------
+        part : samples that are read.
+        thin : whether samples that come faster than 100 Hz are averaged.
+        """
+        every = max(1, round(FASTEST / recording.dt)) if thin else 1
         dt = recording.dt * every
+        begin, end, _ = part.indices(len(recording))
+        within = [
+            slice(max(one.start, begin), min(one.stop, end))
+            for one in recording.stretches
+            if one.start < end and one.stop > begin
+        ]
         pieces = [
-            _piece(recording, piece, vehicle, every, dt) for piece in recording.stretches
+            _piece(recording, one, vehicle, every, dt)
+            for one in within
+            if one.stop - one.start >= every
         ]
         signals, rates = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
         return cls(dt=dt, signals=signals, rates=rates, counts=signals[:, -1] > 0.0, every=every)
@@ -74,7 +96,7 @@ def _piece(
     count = round(SMOOTHED * scale / dt) | 1
     raw = (recording.v_x, v_y, recording.r, recording.delta_f, recording.delta_r)
     v_x, v_y, r, delta_f, delta_r = (box(thinned(signal), count) for signal in raw)
-    slowest = SLOW * vehicle.froude_speed
+    slowest = Drive.slowest(vehicle)
     on = v_x > slowest
     v_x = np.where(on, v_x, slowest)
     n3 = LONGITUDINAL / dt

@@ -26,8 +26,9 @@ import casadi as ca
 
 from codegen import Scan
 from codegen.compiler import FLAGS
+from identifier.axle.gate import GateState, gate
 from identifier.axle.slip import SHORTEST
-from identifier.motion.parameters import INDEX, NAMES, SLIPS
+from identifier.motion.parameters import NAMES, SLIPS
 from models.vehicle import GRAVITY, LIGHTEST
 
 LEAST_GRIP = 0.05  # of G²: what an axle that uses all of its grip lengthwise keeps sideways
@@ -395,6 +396,57 @@ def _axle(
     return found[3], found[4], x
 
 
-def parameter_index(columns: Columns) -> list[int]:
-    """Return where columns stand among all parameters."""
-    return [INDEX[name] for name in columns]
+# The same, sample by sample in a car: no smoothing, a gate before it, a_x from v_x alone.
+
+LAG_OF_A_X = 0.2  # [s] of the washout that tells a_x
+REPLAYED = (*CARRIED[:10], "v_x_slow")
+REPLAY_CARRY, REPLAY_OVER = ("gate", "motion"), ("x", "u", "v_x")
+
+
+@cache
+def replay_step() -> ca.Function:
+    """Return the model as a step: axle_force [N], lagged slip and the larger slip [rad], (2,)."""
+    state_port, old = _symbols(REPLAYED)
+    gate_port = ca.SX.sym("gate", len(GateState._fields))
+    x, u, v_x, dt = ca.SX.sym("x", 2), ca.SX.sym("u", 2), ca.SX.sym("v_x"), ca.SX.sym("dt")
+    parameter_port, parameters = _symbols(NAMES)
+    car_port, limits = ca.SX.sym("car", len(CarNumbers._fields)), ca.SX.sym("plausibility", 15)
+    loads = ca.SX.sym("loads", 2)
+    g = gate(limits, dt, GateState(*ca.vertsplit(gate_port)), x, u, v_x)
+    slow = ca.if_else(g.first > 0, g.v_x, old["v_x_slow"])
+    a_x = (g.v_x - slow) / LAG_OF_A_X - g.v_y * g.r
+    following = g.v_x + (slow - g.v_x) * ca.exp(-dt / LAG_OF_A_X)
+    values = [g.v_x, g.v_y, g.r, g.delta[0], g.delta[1], a_x, 0, 0, g.on]
+    nothing = ca.SX(1, 0)
+    fixed = {
+        name: Dual(value, nothing)
+        for name, value in zip((*SIGNALS, *RATES), (*values, 0, 0, 0), strict=True)
+    }
+    duals = {name: Dual(parameters[name], nothing) for name in NAMES}
+    before = {name: Dual(old.get(name, 0), nothing) for name in CARRIED}
+    car = CarNumbers(*ca.vertsplit(car_port))
+    after, out = _step(before, fixed, duals, car, dt, g.first)
+    slip = ca.vertcat(*(axis.value for axis in out["x"]))
+    alpha = ca.vertcat(after["alpha_f"].value, after["alpha_r"].value)
+    motion = [ca.if_else(g.on, after[name].value, 0) for name in CARRIED[:10]]
+    force = ca.if_else(g.on, loads * ca.vertcat(*(axis.value for axis in out["F"])), 0)
+    return ca.Function(
+        "motion_replay",
+        [gate_port, state_port, x, u, v_x, parameter_port, dt, car_port, limits, loads],
+        [
+            g.state,
+            ca.vertcat(*motion, following),
+            force,
+            ca.if_else(g.on, slip, 0),
+            ca.if_else(g.on, ca.fmax(ca.fabs(slip), ca.fabs(alpha)), 0),
+        ],
+        ["gate", "motion", "x", "u", "v_x", "parameters", "dt", "car", "plausibility", "loads"],
+        ["gate_next", "motion_next", "axle_force", "lagged_slip", "slip_size"],
+        {"cse": True},
+    )
+
+
+@cache
+def replay_scan() -> Scan:
+    """Return `replay_step` as a compiled loop."""
+    return Scan(replay_step(), carry=REPLAY_CARRY, over=REPLAY_OVER)

@@ -1,0 +1,675 @@
+"""The tires that an estimate found, frozen: curve, lag, sway, load transfer, ellipse and sensors."""
+
+import math
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from codegen.arrays import Array, blocks, large
+from identifier.axle.band import LEVEL, normal_quantile
+from identifier.axle.curve import EDGES
+from identifier.axle.gate import GateState, Plausibility
+from identifier.axle.model import AxleModel
+from identifier.axle.slip import SHORTEST, Sway
+from identifier.estimate.drive import Drive
+from identifier.estimate.priors import Priors
+from identifier.estimate.solve import car_numbers, simulate
+from identifier.frozen import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
+from identifier.motion.model import LEAST_GRIP, REPLAYED, curve_symbols, replay_scan
+from identifier.motion.parameters import INDEX, NAMES, PARAMETERS, SLIPS
+from identifier.setup import Setup
+from identifier.tire_model import (
+    AXLES,
+    GRIP,
+    RELAXATION,
+    STIFFNESS,
+    Axle,
+    Estimate,
+    Fact,
+    TireModel,
+)
+from models.recordings import Recording
+from models.rules import require_positive
+from models.schema import Table
+from models.vehicle import DOWNFORCE_SPEED, GRAVITY, LIGHTEST, Vehicle
+
+UNITS = (0.008, 0.016, 0.032, 0.064, 0.128, 0.256, 0.512)  # rad, of the projection
+WIDEST = 0.6  # rad, as far as it is fitted
+BEYOND = 0.02  # weight of a slip that no drive reached, in that fit
+DECIDED = 0.5  # standard deviation over the prior's, up to which drives decided a number
+LARGEST_SD = 0.25  # of the force over the prior's, above which a slip is not known
+WARM = 300  # samples before a part of a long drive, over which lag and sway settle
+LARGEST = 1e6  # of the numbers in a file
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
+class FittedModel(TireModel):
+    """Axle forces of the forward model (`motion.model`) at estimated parameters.
+
+    Parameters
+    ----------
+    vehicle : the car.
+    p : parameters, as `motion.parameters` lists them (p,).
+    covariance : of them (p, p); zero of what was not estimated.
+    driven : largest slip of each axle that the drives reached [rad], (2,).
+    speeds : least and largest speed of them [m/s], (2,).
+    a_x : least and largest longitudinal acceleration of them [m/s²], (2,).
+    missed : share of the force by which drives of a car differ from one model, (2,).
+    """
+
+    kind = "fit"
+
+    vehicle: Vehicle
+    p: Array
+    covariance: Array
+    driven: Array
+    speeds: Array
+    a_x: Array
+    missed: Array
+
+    def __post_init__(self) -> None:
+        n = len(NAMES)
+        shapes = {
+            "p": (n,),
+            "covariance": (n, n),
+            "driven": (2,),
+            "speeds": (2,),
+            "a_x": (2,),
+            "missed": (2,),
+        }
+        for name, shape in shapes.items():
+            value = getattr(self, name)
+            if value.shape != shape or not np.isfinite(value).all():
+                raise ValueError(f"{name} must hold {shape} finite numbers, it has {value.shape}")
+        priors = Priors.of(self.vehicle)
+        for name, value, low, high in zip(NAMES, self.p, priors.low, priors.high, strict=True):
+            if not low - 1e-9 <= value <= high + 1e-9:
+                raise ValueError(f"{name} must be within {low:g} and {high:g}, it is {value:g}")
+        if not np.allclose(self.covariance, self.covariance.T, atol=1e-9):
+            raise ValueError("covariance must be symmetric")
+        if (np.diag(self.covariance) < 0.0).any():
+            raise ValueError("covariance must have no negative variance")
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.p[INDEX[name]])
+
+    @property
+    def min_speed(self) -> float:
+        """Below this speed [m/s] the forces read zero."""
+        return Drive.slowest(self.vehicle)
+
+    @property
+    def _loads(self) -> Array:
+        return np.array(self.vehicle.axle_loads)
+
+    # The curve.
+
+    def _curve_numbers(self, axle: str) -> Array:
+        """Return the numbers of `curve_symbols` of an axle, (9,)."""
+        return self.p[_curve_index(axle)]
+
+    def curve_at(self, alpha: Array) -> tuple[Array, Array, Array]:
+        """Return φ and dφ/dα (k, 2) [static loads], and slopes of φ over curve numbers (2, k, 9).
+
+        Parameters
+        ----------
+        alpha : slip angles of each axle [rad], (k, 2).
+        """
+        phi, slope, J = [], [], []
+        for i, axle in enumerate("fr"):
+            found = _curve_function()(self._curve_numbers(axle), alpha[:, i][None])
+            values = [np.array(one) for one in found]
+            phi.append(values[0].ravel())
+            slope.append(values[1].ravel())
+            J.append(values[2].T)
+        return np.column_stack(phi), np.column_stack(slope), np.array(J)
+
+    def force_at(self, alpha: Array) -> Array:
+        """Return the steady axle forces at slip angles under static loads, (k, 2) [N]."""
+        phi, _, _ = self.curve_at(np.column_stack([alpha, alpha]))
+        return phi * self._loads
+
+    def force(  # type: ignore[override]
+        self,
+        alpha: ArrayLike,
+        axle: Axle | None = None,
+        *,
+        v_x: float | None = None,
+        a_x: float = 0.0,
+    ) -> float | Array:
+        """Return the steady lateral force at slip angles, the wheels straight ahead [N].
+
+        Parameters
+        ----------
+        alpha, axle, v_x : as of `TireModel.force`.
+        a_x : longitudinal acceleration [m/s²]: braking and power take of the lateral force, and
+            shift load between the axles.
+        """
+        found = np.asarray(TireModel.force(self, alpha, axle, v_x=v_x))
+        speed = self.curve_speed if v_x is None else v_x
+        ratio = self.ratio(np.array([speed]), np.array([a_x]))[0]
+        ratio = ratio / self.ratio(np.array([speed]), np.zeros(1))[0]
+        scaled: Array = found * (ratio if axle is None else ratio[AXLES.index(axle)])
+        return float(scaled) if scaled.ndim == 0 else scaled
+
+    def ratio(self, v_x: Array, a_x: Array) -> Array:
+        """Return λ G, load and ellipse: force over that at static load and a_x = 0, (k, 2).
+
+        Parameters
+        ----------
+        v_x : speeds [m/s], (k,).
+        a_x : longitudinal accelerations [m/s²], (k,).
+        """
+        car, f = self.vehicle, np.asarray(a_x) / GRAVITY
+        moved = self["load_transfer"] * car.wheelbase * np.array([-1.0 / car.l_r, 1.0 / car.l_f])
+        load = 1.0 + np.outer(f, moved) + np.outer(np.square(v_x), car.downforce)
+        drive = np.array([self["driving_f"], self["driving_r"]])
+        brake = np.array([self["braking_f"], self["braking_r"]])
+        use = np.where(f[:, None] > 0.0, drive, brake) * f[:, None]
+        left = np.sqrt(np.maximum(1.0 - use**2, LEAST_GRIP))
+        product: Array = np.maximum(load, LIGHTEST) * left
+        return product
+
+    @property
+    def curve_speed(self) -> float:
+        """Speed [m/s] of curves that are asked for without one: with downforce 0, static loads."""
+        return 0.0 if self.vehicle.has_downforce else self.reference_speed
+
+    def curve_expression(self, alpha: Any, v_x: Any) -> Any:
+        """Return the steady axle forces (2,) [N] as a CasADi expression."""
+        forces = []
+        for i, axle in enumerate("fr"):
+            phi, _ = _curve_expression(alpha[i], self._curve_numbers(axle))
+            forces.append(phi * self._loads[i] * self._load_at(i, v_x))
+        return ca.vertcat(*forces)
+
+    def _load_at(self, i: int, v_x: Any) -> Any:
+        if not self.vehicle.has_downforce:
+            return 1.0
+        load = 1 + self.vehicle.downforce[i] * v_x**2
+        return ca.fmax(load, LIGHTEST)
+
+    def force_expression(
+        self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
+    ) -> tuple[Any, Any]:
+        """Return the axle forces (2,) [N] and the rate of lagged slip (2,) [rad/s].
+
+        The sway gives way in series with the carcass, without its inertia (`axle.dynamics`); the
+        speed is held. x is read by the sensors of the drives.
+        """
+        car = self.vehicle
+        yaw = x[1]
+        v_y = x[0] - self["v_y_bias"] - self["v_y_angle"] * v_x - self["v_y_lever"] * yaw
+        wheel = (1.0 + self["steering_gain"]) * delta + self["steering_zero"]
+        omega = self._sway.frequency
+        forces, rates = [], []
+        for i, (axle, arm) in enumerate((("f", car.l_f), ("r", -car.l_r))):
+            angle = wheel if i == 0 else 0.0
+            alpha = angle - ca.atan((v_y + arm * yaw) / v_x)
+            numbers = self._curve_numbers(axle)
+            phi, slope = _curve_expression(slip[i], numbers)
+            load = self._load_at(i, v_x)
+            gives = self[f"compliance_{axle}"] + GRAVITY / omega**2 * self[f"sway_share_{axle}"]
+            sigma = gives * load * ca.fmax(slope, 0.02 * math.exp(numbers[0]))
+            sigma += SHORTEST * car.wheelbase
+            across = 1 - angle**2 / 2 + angle**4 / 24 if i == 0 else 1.0
+            forces.append(phi * load * self._loads[i] * across)
+            rates.append((alpha - slip[i]) / ca.fmax(sigma / v_x, least_lag))
+        return ca.vertcat(*forces), ca.vertcat(*rates)
+
+    @property
+    def lagged(self) -> bool:
+        """Whether the force follows a lagged slip, two more states."""
+        return True
+
+    @property
+    def _sway(self) -> Sway:
+        usual = Sway.for_vehicle(self.vehicle)
+        return replace(usual, frequency=usual.frequency * math.exp(self["ln_sway"]))
+
+    # Over a drive.
+
+    def axle_force(self, recording: Recording) -> Array:
+        """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
+
+        Signals go through a zero-phase mean of 0.07 s (`estimate.drive`); where the car is slower
+        than `min_speed` forces are zero.
+        """
+        return self._over(recording)[0] * self._loads
+
+    def lagged_slip(self, recording: Recording) -> Array:
+        """Return the slip that makes the force, in the paper's sign, (n, 2) [rad]."""
+        return self._over(recording)[1]
+
+    def _over(self, recording: Recording) -> tuple[Array, Array]:
+        force, slip = large((len(recording), 2)), large((len(recording), 2))
+        for stretch in recording.stretches:
+            begin, end = stretch.start, min(stretch.stop, len(recording))
+            for part in blocks(end - begin):
+                first = max(part.start - WARM, 0)
+                some = slice(begin + first, begin + part.stop)
+                drive = Drive.of(recording, self.vehicle, some, thin=False)
+                out = simulate(drive, self.p, self.vehicle)
+                kept = slice(begin + part.start, begin + part.stop)
+                force[kept] = out["force"][part.start - first :]
+                slip[kept] = out["slip"][part.start - first :]
+        return force, slip
+
+    def slope_over(self, recording: Recording) -> Array:
+        """Return the slope of the force curves over the slip of a drive [static loads/rad]."""
+        _, slope, _ = self.curve_at(self.lagged_slip(recording))
+        return slope * self.vehicle.load_ratio(recording.v_x)
+
+    def outside(self, recording: Recording) -> NDArray[np.bool_]:
+        """Return where the slip leaves the known range, (n, 2)."""
+        beyond: NDArray[np.bool_] = np.abs(self.lagged_slip(recording)) > self.known_slip
+        return beyond
+
+    # How sure.
+
+    def _curve_sd(self, alpha: Array, covariance: Array) -> Array:
+        """Return the standard deviation of φ at slips (k, 2), of the curves' numbers alone."""
+        _, _, J = self.curve_at(alpha)
+        found = [
+            np.einsum("ki,ij,kj->k", J[i], covariance[np.ix_(index, index)], J[i])
+            for i, index in enumerate(map(_curve_index, "fr"))
+        ]
+        sd: Array = np.sqrt(np.maximum(np.column_stack(found), 0.0))
+        return sd
+
+    def relative_sd(self, alpha: Array) -> Array:
+        """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning."""
+        both = np.column_stack([alpha, alpha])
+        prior = self._curve_sd(both, _prior_covariance(self.vehicle))
+        ratio: Array = self._curve_sd(both, self.covariance) / np.maximum(prior, 1e-12)
+        return ratio
+
+    @property
+    def known_slip(self) -> Array:
+        """Largest slip [rad] that the drives reached and where the doubt is small, (2,)."""
+        known, grid = np.zeros(2), np.linspace(0.0, 1.0, 101)[1:]
+        for i, largest in enumerate(self.driven):
+            if largest > 0.0:
+                sure = self.relative_sd(largest * grid)[:, i] <= LARGEST_SD
+                count = sure.size if sure.all() else int(np.argmin(sure))
+                known[i] = largest * count / grid.size
+        return known
+
+    @property
+    def has_band(self) -> bool:
+        """Whether the model can tell how sure it is: by its covariance."""
+        return True
+
+    def half_band(
+        self, alpha: Array, level: float = LEVEL, *, v_x: float | Array | None = None
+    ) -> Array:
+        """Return half the width of the band around the steady forces, (k, 2) [N].
+
+        It has the doubt of the curve and of the sensors' zeros, and the share `missed` of the force
+        by which drives of a car differ.
+
+        Raises
+        ------
+        ValueError
+            Where the level is impossible, or a speed is not positive.
+        """
+        speed = np.broadcast_to(self.reference_speed if v_x is None else v_x, np.shape(alpha))
+        if not (speed > 0.0).all():
+            raise ValueError(f"v_x of a band must be positive, it is {speed.min()}")
+        both = np.column_stack([alpha, alpha])
+        wide = self._sd_along(both, speed)
+        return normal_quantile(level) * wide * self._loads * self._pressed(v_x, speed)
+
+    def _pressed(self, v_x: float | Array | None, speed: Array) -> Array:
+        return self.vehicle.load_ratio(np.zeros_like(speed) if v_x is None else speed)
+
+    def half_band_along(self, slip: Array, v_x: Array, level: float = LEVEL) -> Array:
+        """Return half the width of the band where each axle has its own slip, (n, 2) [N]."""
+        pressed = self.vehicle.load_ratio(v_x)
+        return normal_quantile(level) * self._sd_along(slip, v_x) * self._loads * pressed
+
+    def _sd_along(self, slip: Array, v_x: Array) -> Array:
+        """Return the standard deviation of the forces over static loads, (k, 2)."""
+        phi, slope, J = self.curve_at(slip)
+        variance = np.empty_like(phi)
+        for i, axle in enumerate("fr"):
+            index = [*_curve_index(axle), *_OFFSETS]
+            zero = slope[:, i, None] * np.column_stack(
+                [
+                    np.full(len(phi), 1.0 if i == 0 else 0.0),
+                    1.0 / v_x,
+                    np.ones(len(phi)),
+                ]
+            )
+            h = np.hstack([J[i], zero])
+            variance[:, i] = np.einsum("ki,ij,kj->k", h, self.covariance[np.ix_(index, index)], h)
+        return np.sqrt(np.maximum(variance, 0.0) + (self.missed * phi) ** 2)
+
+    def half_band_of_curves(self, recording: Recording, level: float = LEVEL) -> Array:
+        """Return half the width of `band` at the slip and speed of a drive, (n, 2) [N]."""
+        speed = np.maximum(recording.v_x, self.min_speed)
+        return self.half_band_along(self.lagged_slip(recording), speed, level)
+
+    def half_band_over(self, recording: Recording, level: float = LEVEL) -> Array:
+        """Return half the width of the band around `axle_force` of a drive, (n, 2) [N]."""
+        half = self.half_band_of_curves(recording, level)
+        return np.where(recording.v_x[:, None] >= self.min_speed, half, 0.0)
+
+    def samples(self, n: int, rng: np.random.Generator) -> "tuple[FittedModel, ...]":
+        """Return models drawn from what the drives left open.
+
+        Raises
+        ------
+        ValueError
+            Where n is negative.
+        """
+        if n < 0:
+            raise ValueError(f"n must not be negative, it is {n}")
+        priors = Priors.of(self.vehicle)
+        values, vectors = np.linalg.eigh(self.covariance)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        drawn = []
+        for _ in range(n):
+            p = self.p + root @ rng.standard_normal(len(self.p))
+            for i, axle in enumerate("fr"):
+                p[INDEX[f"ln_stiffness_{axle}"]] += 0.5 * self.missed[i] * rng.standard_normal()
+                p[INDEX[f"ln_grip_{axle}"]] += self.missed[i] * rng.standard_normal()
+            drawn.append(replace(self, p=np.clip(p, priors.low, priors.high)))
+        return tuple(drawn)
+
+    # What is told of it.
+
+    @property
+    def cornering_stiffness(self) -> Array:
+        """Slope of the force curves at zero, under static loads [N/rad], (2,)."""
+        _, slope, _ = self.curve_at(np.zeros((1, 2)))
+        return slope[0] * self._loads
+
+    @property
+    def relaxation_length(self) -> Array:
+        """Lag of slip at small slip, under static loads [m], (2,); it goes with the slope."""
+        give = np.array([self["compliance_f"], self["compliance_r"]])
+        stiff = np.maximum(self.cornering_stiffness / self._loads, 0.0)
+        length: Array = give * stiff + SHORTEST * self.vehicle.wheelbase
+        return length
+
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Return stiffness, grip, relaxation length and zeros of sensors, with their doubt."""
+        before = _prior_covariance(self.vehicle)
+        given = self.vehicle.bicycle[4:]
+        zero = np.zeros((1, 2))
+        stiff = self._curve_slope_sd(self.covariance), self._curve_slope_sd(before)
+        peak = np.tile(np.maximum(self.known_slip, 1e-3), (1, 1))
+        top, _, _ = self.curve_at(peak)
+        _, at_zero, _ = self.curve_at(zero)
+        _, at_known, _ = self.curve_at(peak)
+        wide = self._curve_sd(peak, self.covariance), self._curve_sd(peak, before)
+        listed = []
+        for i, (axle, short) in enumerate(zip(AXLES, "fr", strict=True)):
+            load, s = float(self._loads[i]), INDEX[f"compliance_{short}"]
+            lag = float(self.relaxation_length[i])
+            C = float(at_zero[0, i])
+            sd = stiff[0][i]
+            listed.append(
+                Estimate(
+                    STIFFNESS, axle, C * load, sd * load, "N/rad", given[i],
+                    bool(sd <= DECIDED * stiff[1][i]),
+                )
+            )  # fmt: skip
+            bent = bool(at_known[0, i] < 0.4 * C and wide[0][0, i] <= DECIDED * wide[1][0, i])
+            listed.append(
+                Estimate(
+                    GRIP, axle, float(top[0, i]), float(wide[0][0, i]), "static load", None, bent
+                )
+            )
+            now, prior = (float(np.sqrt(P[s, s])) for P in (self.covariance, before))
+            listed.append(
+                Estimate(RELAXATION, axle, lag, C * now, "m", None, now <= DECIDED * prior)
+            )
+        zeros = (
+            ("zero of the steering", "front", "steering_zero", "deg", math.degrees(1.0)),
+            ("bias of v_y", "rear", "v_y_bias", "m/s", 1.0),
+        )
+        for title, of, name, unit, scale in zeros:
+            k = INDEX[name]
+            now, prior = (scale * float(np.sqrt(P[k, k])) for P in (self.covariance, before))
+            listed.append(
+                Estimate(
+                    title, of, scale * self[name], now, unit, 0.0, now <= DECIDED * prior  # type: ignore[arg-type]
+                )
+            )
+        return tuple(listed)
+
+    def _curve_slope_sd(self, covariance: Array) -> Array:
+        """Return the standard deviation of the slope at zero [static loads/rad], (2,)."""
+        small = np.full((1, 2), 1e-4)
+        return self._curve_sd(small, covariance)[0] / 1e-4
+
+    def facts(self) -> tuple[Fact, ...]:
+        """Return the lines of `summary`."""
+        known = self.known_slip
+        lines = [
+            Fact("cornering stiffness", self.cornering_stiffness, "N/rad"),
+            Fact(RELAXATION, self.relaxation_length, "m"),
+            Fact("known up to a slip of", np.degrees(known), "deg"),
+        ]
+        if self.vehicle.has_downforce:
+            more = 100.0 * (self.vehicle.load_ratio(DOWNFORCE_SPEED) - 1.0)
+            lines.append(Fact(f"more of all forces at {DOWNFORCE_SPEED:g} m/s", more, "%"))
+        return tuple(lines)
+
+    # Another car, another road, another form.
+
+    @property
+    def scales_with_load(self) -> bool:
+        """Whether forces are in static axle loads, so that another car's model scales to a car."""
+        return True
+
+    def mounted_on(self, vehicle: Vehicle) -> "FittedModel":
+        """Return the tires on another car, their forces scaled by its static axle loads."""
+        return replace(self, vehicle=vehicle)
+
+    def at_friction(self, ratio: float) -> "FittedModel":
+        """Return the tires on a road of another friction, φ(α) → μ φ(α/μ); the stiffness stays.
+
+        Raises
+        ------
+        ValueError
+            Where the ratio is not positive.
+        """
+        require_positive(ValueError, ratio=ratio)
+        p = self.p.copy()
+        p[INDEX["ln_road"]] += math.log(ratio)
+        return replace(self, p=p, driven=ratio * self.driven)
+
+    def in_units(self) -> AxleModel:
+        """Return the tires in the hidden units of the axle identifier, for C, FMU and tracker.
+
+        Curve, lag, sway and zeros of the sensors; without load transfer, ellipse, lever and gain.
+        """
+        reach = np.maximum(self.known_slip, UNITS[2])
+        W = np.stack([self._units_of(axle, reach[i]) for i, axle in enumerate("fr")])
+        bias = self["v_y_bias"] + self["v_y_angle"] * self.reference_speed
+        limits = Plausibility.for_vehicle(self.vehicle)
+        own = np.array(
+            [
+                [self["compliance_f"], self["sway_share_f"], self["steering_zero"]],
+                [self["compliance_r"], self["sway_share_r"], bias],
+            ]
+        )
+        own[0, 2] = np.clip(own[0, 2], -limits.max_steering, limits.max_steering)
+        own[1, 2] = np.clip(own[1, 2], -limits.slow, limits.slow)
+        excitation = np.zeros((2, 1 + len(EDGES)))
+        excitation[:, 0] = self.driven
+        return AxleModel(
+            vehicle=self.vehicle,
+            ladder=UNITS,
+            sway=self._sway,
+            plausibility=limits,
+            W=W,
+            own=own,
+            covariance=self._units_covariance(self.covariance),
+            prior_covariance=self._units_covariance(_prior_covariance(self.vehicle)),
+            excitation=excitation,
+        )
+
+    def _units_fit(self, reach: float) -> tuple[Array, Array]:
+        """Return slips (k,) and what makes unit weights of forces there, (n, k)."""
+        m = math.exp(self["ln_road"])
+        slip = np.concatenate([np.linspace(0.0, reach, 120)[1:], np.linspace(reach, WIDEST, 60)])
+        weight = np.where(slip <= reach, 1.0, BEYOND)
+        T = np.tanh(slip[:, None] / (m * np.array(UNITS)))
+        damped = np.vstack([T * weight[:, None], 1e-4 * np.eye(len(UNITS))])
+        pseudo: Array = np.linalg.pinv(damped)[:, : slip.size] * weight
+        return slip, pseudo
+
+    def _units_of(self, axle: str, reach: float) -> Array:
+        slip, pseudo = self._units_fit(reach)
+        phi, _, _ = self.curve_at(np.column_stack([slip, slip]))
+        W: Array = pseudo @ phi[:, "fr".index(axle)]
+        return W
+
+    def _units_covariance(self, covariance: Array) -> Array:
+        """Return the covariance of [W, own] (2, n + 3, n + 3), never singular."""
+        n = len(UNITS)
+        found = np.empty((2, n + 3, n + 3))
+        for i, axle in enumerate("fr"):
+            slip, pseudo = self._units_fit(max(float(self.known_slip[i]), UNITS[2]))
+            _, _, J = self.curve_at(np.column_stack([slip, slip]))
+            offset = "steering_zero" if i == 0 else "v_y_bias"
+            own = [INDEX[f"compliance_{axle}"], INDEX[f"sway_share_{axle}"], INDEX[offset]]
+            index = [*_curve_index(axle), *own]
+            to = np.zeros((n + 3, len(index)))
+            to[:n, :9] = pseudo @ J[i]
+            to[n:, 9:] = np.eye(3)
+            P = to @ covariance[np.ix_(index, index)] @ to.T
+            found[i] = P + np.diag(np.full(n + 3, 1e-8))
+        return found
+
+    def setup(self, dt: float) -> Setup:
+        """Return what a replay sample by sample needs."""
+        limits = Plausibility.for_vehicle(self.vehicle)
+        return Setup(
+            scan=replay_scan(),
+            carry={
+                "gate": np.zeros(len(GateState._fields)),
+                "motion": np.zeros(len(REPLAYED)),
+            },
+            constants={
+                "parameters": self.p,
+                "dt": np.array(dt),
+                "car": car_numbers(self.vehicle),
+                "plausibility": limits.numbers(),
+                "loads": self._loads,
+            },
+            ends_run=limits.rest(dt),
+        )
+
+    # As a file.
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the model as plain numbers and words, ready for JSON."""
+        return {
+            "format": FORMAT,
+            "kind": self.kind,
+            "vehicle": vehicle_numbers(self.vehicle),
+            "parameters": {
+                one.name: {"value": float(value), "unit": one.unit, "sd": float(math.sqrt(var))}
+                for one, value, var in zip(
+                    PARAMETERS, self.p, np.maximum(np.diag(self.covariance), 0.0), strict=True
+                )
+            },
+            "covariance": self.covariance.tolist(),
+            "driven_slip_rad": self.driven.tolist(),
+            "speeds_m_s": self.speeds.tolist(),
+            "a_x_m_s2": self.a_x.tolist(),
+            "missed": self.missed.tolist(),
+            "cornering_stiffness_N_rad": self.cornering_stiffness.tolist(),
+            "relaxation_length_m": self.relaxation_length.tolist(),
+            "known_slip_rad": self.known_slip.tolist(),
+        }
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any], source: str) -> "FittedModel":
+        """Return the model that `to_dict` describes.
+
+        Raises
+        ------
+        FrozenModelError
+            Where a key is missing or a value impossible.
+        """
+        table = Table(data, f"{source}: ", FrozenModelError)
+        parameters = table.table("parameters")
+        p = np.array([parameters.table(name).number("value") for name in NAMES])
+        arrays = {
+            "covariance": "covariance",
+            "driven": "driven_slip_rad",
+            "speeds": "speeds_m_s",
+            "a_x": "a_x_m_s2",
+            "missed": "missed",
+        }
+        found = {name: table.array(key) for name, key in arrays.items()}
+        for name, value in (("parameters", p), *found.items()):
+            if np.abs(value).max(initial=0.0) > LARGEST:
+                table.refuse(name, f"must hold numbers below {LARGEST:g}")
+        try:
+            return cls(vehicle=vehicle_from(data["vehicle"]), p=p, **found)
+        except KeyError as error:
+            raise FrozenModelError(f"{source}: key {error} is missing") from error
+        except (TypeError, ValueError) as error:
+            raise FrozenModelError(f"{source}: {error}") from error
+
+
+_CURVE = ("ln_stiffness", "ln_grip", "shape", "curvature")
+_OFFSETS = [INDEX["steering_zero"], INDEX["v_y_bias"], INDEX["v_y_angle"]]
+
+
+@cache
+def _curve_index(axle: str) -> list[int]:
+    """Return where the numbers of `curve_symbols` stand among the parameters."""
+    names = [f"{name}_{axle}" for name in _CURVE]
+    names += [f"residual{j}_{axle}" for j in range(len(SLIPS))]
+    return [INDEX[name] for name in (*names, "ln_road")]
+
+
+@cache
+def _curve_function() -> ca.Function:
+    """Return (numbers (9,), slips (1, k)) -> φ (1, k), dφ/dx (1, k), ∂φ/∂numbers (9, k)."""
+    numbers, x, phi, slope = curve_symbols()
+    vector = ca.vertcat(*numbers)
+    gradient = ca.densify(ca.jacobian(phi, vector)).T
+    one = ca.Function("curve", [vector, x], [phi, slope, gradient])
+    return _Mapped(one)  # type: ignore[return-value]
+
+
+class _Mapped:
+    """A function over columns of its second argument."""
+
+    def __init__(self, one: ca.Function) -> None:
+        self._one = one
+
+    def __call__(self, numbers: Array, slips: Array) -> tuple[Any, ...]:
+        k = slips.shape[1]
+        found: tuple[Any, ...] = self._one(np.tile(numbers[:, None], (1, k)), slips)
+        return found
+
+
+def _curve_expression(slip: Any, numbers: Array) -> tuple[Any, Any]:
+    """Return φ and dφ/dx at a slip, as expressions."""
+    symbols, x, phi, slope = curve_symbols()
+    one = ca.Function("curve", [ca.vertcat(*symbols), x], [phi, slope])
+    found: tuple[Any, Any] = one(ca.DM(numbers), slip)
+    return found
+
+
+def _prior_covariance(vehicle: Vehicle) -> Array:
+    """Return the covariance of the beliefs about a car, (p, p)."""
+    priors = Priors.of(vehicle)
+    found = np.zeros_like(priors.information)
+    where = np.ix_(priors.moves, priors.moves)
+    found[where] = np.linalg.inv(priors.information[where])
+    return found
